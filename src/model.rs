@@ -1,0 +1,73 @@
+//! [`Model`]: the equations, written once.
+
+use crate::scalar::Scalar;
+use crate::signals::{Of, Signals};
+
+/// Whether time is continuous, discrete, or plays no part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub enum Kind {
+    /// `dx/dt = f(t, x, u; p)`, written as [`Model::derivative`].
+    Continuous,
+    /// `x[k+1] = f(t, x[k], u[k]; p)`, written as [`Model::next`].
+    Discrete,
+    /// `y = g(t, u; p)`: no state; only [`Model::output`] is written.
+    Static,
+}
+
+/// A physical system, as arithmetic on named quantities.
+///
+/// The functions are generic over [`Scalar`], so that one text serves simulation, exact slopes and observers. Put
+/// `#[inline]` on them: a fit runs them inside a loop compiled for the vector unit of the machine at hand, and can only
+/// do so with what is inlined there. Constants multiply from the right (`x * 2.0`).
+///
+/// The names and units of all quantities come from the four signal types.
+pub trait Model: Sync {
+    /// The states `x`; [`Nothing`](crate::Nothing) for a static model.
+    type State: Signals;
+    /// The inputs `u`; [`Nothing`](crate::Nothing) if there are none.
+    type Input: Signals;
+    /// The outputs `y`, in the units they are measured in.
+    type Output: Signals;
+    /// The parameters `p`.
+    type Parameters: Signals;
+
+    /// The kind of the equations; continuous unless said otherwise.
+    const KIND: Kind = Kind::Continuous;
+
+    /// `dx/dt` of a continuous model, per second, at time `t` (s).
+    ///
+    /// Not called for other kinds. Left unwritten, it is not a number, which the first simulated step reports.
+    #[inline]
+    fn derivative<S: Scalar>(
+        &self,
+        _t: f64,
+        _x: &Of<Self::State, S>,
+        _u: &Of<Self::Input, S>,
+        _p: &Of<Self::Parameters, S>,
+    ) -> Of<Self::State, S> {
+        Self::State::splat(S::from(f64::NAN))
+    }
+
+    /// The state at the next sample of a discrete model, from the state and the input at time `t` (s).
+    ///
+    /// Not called for other kinds. Left unwritten, it is not a number, which the first simulated step reports.
+    #[inline]
+    fn next<S: Scalar>(
+        &self,
+        _t: f64,
+        _x: &Of<Self::State, S>,
+        _u: &Of<Self::Input, S>,
+        _p: &Of<Self::Parameters, S>,
+    ) -> Of<Self::State, S> {
+        Self::State::splat(S::from(f64::NAN))
+    }
+
+    /// The outputs at time `t` (s).
+    fn output<S: Scalar>(
+        &self,
+        t: f64,
+        x: &Of<Self::State, S>,
+        u: &Of<Self::Input, S>,
+        p: &Of<Self::Parameters, S>,
+    ) -> Of<Self::Output, S>;
+}

@@ -1,0 +1,134 @@
+//! [`Parameter`]: what is known of a quantity before the data speak.
+
+use serde::{Deserialize, Serialize};
+
+/// A free parameter that starts at `start`.
+pub fn free(start: f64) -> Parameter {
+    Parameter { start, free: true, ..fixed(start) }
+}
+
+/// A parameter that keeps `value`.
+pub fn fixed(value: f64) -> Parameter {
+    Parameter {
+        start: value,
+        free: false,
+        lower: f64::NEG_INFINITY,
+        upper: f64::INFINITY,
+        prior: None,
+        transform: Transform::Identity,
+        per_experiment: false,
+    }
+}
+
+/// Guess, bounds, prior and transform of one parameter or initial state, in its own unit.
+///
+/// ```
+/// use greybox::{fixed, free};
+/// let rs = free(1.0).within(0.01, 10.0); // estimated, in bounds
+/// let ls = free(2e-3).log(); // positive: estimated as ln(ls)
+/// let ke = free(0.7).prior(0.72, 0.05); // known beforehand to 0.72 +- 0.05
+/// let np = fixed(4.0);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parameter {
+    /// Where the search starts; the value itself, if fixed.
+    pub start: f64,
+    /// Whether the fit may move it.
+    pub free: bool,
+    /// Lower bound; `null` in JSON stands for none.
+    #[serde(with = "unbounded_below")]
+    pub lower: f64,
+    /// Upper bound; `null` in JSON stands for none.
+    #[serde(with = "unbounded_above")]
+    pub upper: f64,
+    /// What is known beforehand, as one more measurement.
+    pub prior: Option<Prior>,
+    /// The coordinate that the optimizer works in.
+    pub transform: Transform,
+    /// Whether each experiment has a value of its own (a winding cold and warm).
+    pub per_experiment: bool,
+}
+
+/// Knowledge from elsewhere: a Gaussian measurement of the parameter in its own unit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Prior {
+    /// Expected value.
+    pub mean: f64,
+    /// Standard deviation.
+    pub std: f64,
+}
+
+/// The coordinate that the optimizer works in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Transform {
+    /// The value itself.
+    Identity,
+    /// Its natural logarithm: the value stays positive, and a factor is a step.
+    Log,
+}
+
+impl Parameter {
+    /// Keeps the value within `lower..=upper`.
+    pub fn within(self, lower: f64, upper: f64) -> Self {
+        Parameter { lower, upper, ..self }
+    }
+
+    /// Adds the knowledge `mean +- std` from elsewhere.
+    pub fn prior(self, mean: f64, std: f64) -> Self {
+        Parameter { prior: Some(Prior { mean, std }), ..self }
+    }
+
+    /// Estimates the logarithm: for positive quantities known to a factor rather than to a difference.
+    pub fn log(self) -> Self {
+        Parameter { transform: Transform::Log, ..self }
+    }
+
+    /// Gives each experiment a value of its own.
+    pub fn per_experiment(self) -> Self {
+        Parameter { per_experiment: true, ..self }
+    }
+}
+
+impl Transform {
+    /// The optimizer's coordinate of a value.
+    pub fn to_coordinate(self, value: f64) -> f64 {
+        match self {
+            Transform::Identity => value,
+            Transform::Log => value.ln(),
+        }
+    }
+
+    /// The value at a coordinate.
+    pub fn to_value(self, coordinate: f64) -> f64 {
+        match self {
+            Transform::Identity => coordinate,
+            Transform::Log => coordinate.exp(),
+        }
+    }
+
+    /// d value / d coordinate where the value is `value`.
+    pub fn slope(self, value: f64) -> f64 {
+        match self {
+            Transform::Identity => 1.0,
+            Transform::Log => value,
+        }
+    }
+}
+
+// JSON has no infinity: an absent bound is a null.
+macro_rules! nullable {
+    ($module:ident, $absent:expr) => {
+        mod $module {
+            use serde::{Deserialize, Deserializer, Serialize, Serializer};
+            pub fn serialize<S: Serializer>(bound: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+                (*bound != $absent).then_some(*bound).serialize(serializer)
+            }
+            pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+                Ok(Option::deserialize(deserializer)?.unwrap_or($absent))
+            }
+        }
+    };
+}
+nullable!(unbounded_below, f64::NEG_INFINITY);
+nullable!(unbounded_above, f64::INFINITY);
