@@ -7,6 +7,13 @@ mod parameter;
 mod scalar;
 mod signals;
 
+#[cfg(feature = "std")]
+mod error;
+#[cfg(feature = "std")]
+mod experiment;
+#[cfg(feature = "std")]
+mod integrate;
+
 #[doc(hidden)]
 pub use {approx, nalgebra, serde};
 
@@ -15,3 +22,10 @@ pub use model::{Kind, Model};
 pub use parameter::{Parameter, Prior, Transform, fixed, free};
 pub use scalar::Scalar;
 pub use signals::{Entry, Nothing, Of, Signals};
+
+#[cfg(feature = "std")]
+pub use {
+    error::{Error, Failure},
+    experiment::{Experiment, ExperimentOf, Hold, Initial, Interval, Sample, Time},
+    integrate::{Automatic, Discrete, Integrator, Rk4, Stuck},
+};

@@ -6,8 +6,8 @@
 use core::fmt::Debug;
 
 /// What a signal vector may hold: numbers, guesses, intervals, names.
-pub trait Entry: Copy + Send + Sync + 'static {}
-impl<T: Copy + Send + Sync + 'static> Entry for T {}
+pub trait Entry: Copy + Debug + Send + Sync + 'static {}
+impl<T: Copy + Debug + Send + Sync + 'static> Entry for T {}
 
 /// The vector of signals `S` with entries of type `T`: `Of<Currents, Dual<8>>` is `Currents<Dual<8>>`.
 pub type Of<S, T> = <S as Signals>::Of<T>;

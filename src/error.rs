@@ -1,0 +1,206 @@
+//! [`Error`]: why there is nothing to hand back. What a fit found but did not like is an outcome, not an error.
+
+use std::path::PathBuf;
+
+/// A call that could not be served, with the thing, the number and the remedy.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A record without a sample, or with too few for what was asked.
+    #[error("experiment `{experiment}` has {samples} sample(s); {needed} or more are needed {purpose}")]
+    TooFewSamples {
+        /// Name of the experiment.
+        experiment: String,
+        /// How many there are.
+        samples: usize,
+        /// How many there must be.
+        needed: usize,
+        /// What for.
+        purpose: &'static str,
+    },
+    /// Two columns of one record differ in length.
+    #[error(
+        "experiment `{experiment}`: {what} has {found} rows, but {reference} has {expected}; every sample needs both"
+    )]
+    Lengths {
+        /// Name of the experiment.
+        experiment: String,
+        /// The column.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// The column it was compared with.
+        reference: &'static str,
+        /// That one's length.
+        expected: usize,
+    },
+    /// A time or input that is not a finite number.
+    #[error(
+        "experiment `{experiment}`: `{signal}` is {value} at sample {sample} (t = {time} s); only outputs may be missing (NaN)"
+    )]
+    NotFinite {
+        /// Name of the experiment.
+        experiment: String,
+        /// Name of the signal; `t` for time.
+        signal: String,
+        /// The offending value.
+        value: f64,
+        /// Index of the sample, from zero.
+        sample: usize,
+        /// Its time (s).
+        time: f64,
+    },
+    /// Time that stands still or runs backwards.
+    #[error(
+        "experiment `{experiment}`: time does not increase at sample {sample}: {before} s is followed by {time} s; sort the record or drop repeated stamps"
+    )]
+    TimeOrder {
+        /// Name of the experiment.
+        experiment: String,
+        /// Index of the second of the two samples.
+        sample: usize,
+        /// Time of the first (s).
+        before: f64,
+        /// Time of the second (s).
+        time: f64,
+    },
+    /// A sample time, factor or scale that must be a positive finite number.
+    #[error("{what} is {value}; it must be positive and finite")]
+    NotPositive {
+        /// What it is.
+        what: String,
+        /// The offending value.
+        value: f64,
+    },
+    /// No output of a fit was measured at all.
+    #[error(
+        "experiment `{experiment}`: output `{output}` is missing in every sample; drop it from the model's output or record it"
+    )]
+    OutputMissing {
+        /// Name of the experiment.
+        experiment: String,
+        /// Name of the output.
+        output: String,
+    },
+    /// A column that the file does not have.
+    #[error("{}: no column `{column}`{}; the file has: {}", path.display(), wanted_by(signal, column), available.join(", "))]
+    MissingColumn {
+        /// The file.
+        path: PathBuf,
+        /// Name of the column looked for.
+        column: String,
+        /// The signal it was to fill.
+        signal: String,
+        /// The columns there are.
+        available: Vec<String>,
+    },
+    /// A renaming or factor for a signal that the model does not have.
+    #[error("the model has no signal `{signal}`; it has: {}", available.join(", "))]
+    UnknownSignal {
+        /// The name given.
+        signal: String,
+        /// The names there are.
+        available: Vec<String>,
+    },
+    /// A cell that is not a number.
+    #[error("{}, line {line}, column `{column}`: `{text}` is not a number", path.display())]
+    NotANumber {
+        /// The file.
+        path: PathBuf,
+        /// Line, from one.
+        line: u64,
+        /// Name of the column.
+        column: String,
+        /// What stands there.
+        text: String,
+    },
+    /// A file that could not be read or written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// The system's or the parser's word.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// A guess, bound or prior that makes no sense.
+    #[error("parameter `{parameter}`: {problem}")]
+    Parameter {
+        /// Name of the parameter or initial state.
+        parameter: String,
+        /// What is wrong, with the numbers and the remedy.
+        problem: String,
+    },
+    /// A fit in which nothing may move.
+    #[error("nothing is free: every parameter and initial state is fixed; declare at least one with free(start)")]
+    NothingFree,
+    /// A fit without a record.
+    #[error("there is no experiment to fit; pass at least one")]
+    NoExperiment,
+    /// An integrator that does not serve the model's kind.
+    #[error(
+        "a {model} model cannot be stepped by {integrator}, which serves {serves} models; leave the integrator out or choose one that fits"
+    )]
+    WrongIntegrator {
+        /// The model's kind.
+        model: &'static str,
+        /// The integrator.
+        integrator: String,
+        /// The kind that it serves.
+        serves: &'static str,
+    },
+    /// An initial state, or a restart, that the outputs do not give.
+    #[error(
+        "experiment `{experiment}`: the state cannot be read from the outputs ({reason}); give it with Experiment::initial"
+    )]
+    StateNotMeasured {
+        /// Name of the experiment.
+        experiment: String,
+        /// Why not.
+        reason: String,
+    },
+    /// A simulation that fails where the search was to start.
+    #[error("the start cannot be evaluated: {0}")]
+    Start(Failure),
+    /// A simulation, asked for by itself, that fails.
+    #[error("the simulation fails: {0}")]
+    Simulation(Failure),
+    /// A filter that cannot be made.
+    #[error("filter: {0}")]
+    Filter(String),
+    /// An option that makes no sense.
+    #[error("{0}")]
+    Option(String),
+    /// A checkpoint that belongs to another problem or cannot be understood.
+    #[error("checkpoint {}: {problem}", path.display())]
+    Checkpoint {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong and what to do.
+        problem: String,
+    },
+    /// An optimizer that gave up with an error of its own.
+    #[error("optimizer: {0}")]
+    Optimizer(String),
+}
+
+/// Where and how a simulation failed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("experiment `{experiment}`, sample {sample} (t = {time} s): {signal} is {value}{hint}")]
+pub struct Failure {
+    /// Name of the experiment.
+    pub experiment: String,
+    /// Index of the sample, from zero.
+    pub sample: usize,
+    /// Its time (s).
+    pub time: f64,
+    /// What failed: `state id`, `output iq`, `slope of output iq with respect to rs`, ...
+    pub signal: String,
+    /// Its value there.
+    pub value: f64,
+    /// What it usually means.
+    pub hint: &'static str,
+}
+
+fn wanted_by(signal: &str, column: &str) -> String {
+    if signal == column { String::new() } else { format!(" for `{signal}`") }
+}
