@@ -1,10 +1,10 @@
 //! [`Dual`]: a value and its slopes, propagated exactly through arithmetic (forward-mode differentiation; Griewank and
 //! Walther, *Evaluating Derivatives*, 2008, ch. 3).
 //!
-//! Speed rests on two things. The slopes are a fixed array walked by plain loops, which the compiler turns into vector
-//! lanes. And a quotient multiplies by the reciprocal of its divisor, which is computed once where the divisor does not
+//! Speed rests on two things. The slopes are a fixed array walked two at a time in vector registers. And a quotient multiplies by the reciprocal of its divisor, which is computed once where the divisor does not
 //! change (a parameter inside a time loop); its value may therefore differ from `a / b` in the last bit.
 
+use crate::lanes::lanes;
 use crate::scalar::Scalar;
 use core::cmp::Ordering;
 use core::iter::Sum;
@@ -109,7 +109,8 @@ impl<const N: usize> Neg for Dual<N> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self::with(-self.value, |i| -self.slopes[i])
+        let slopes = lanes!(N; x in self.slopes; sign = -1.0; x * sign);
+        Dual { value: -self.value, slopes }
     }
 }
 
@@ -117,7 +118,8 @@ impl<const N: usize> Add for Dual<N> {
     type Output = Self;
     #[inline(always)]
     fn add(self, b: Self) -> Self {
-        Self::with(self.value + b.value, |i| self.slopes[i] + b.slopes[i])
+        let slopes = lanes!(N; x in self.slopes, y in b.slopes;; x + y);
+        Dual { value: self.value + b.value, slopes }
     }
 }
 
@@ -125,7 +127,8 @@ impl<const N: usize> Sub for Dual<N> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, b: Self) -> Self {
-        Self::with(self.value - b.value, |i| self.slopes[i] - b.slopes[i])
+        let slopes = lanes!(N; x in self.slopes, y in b.slopes;; x - y);
+        Dual { value: self.value - b.value, slopes }
     }
 }
 
@@ -133,7 +136,8 @@ impl<const N: usize> Mul for Dual<N> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, b: Self) -> Self {
-        Self::with(self.value * b.value, |i| self.slopes[i] * b.value + b.slopes[i] * self.value)
+        let slopes = lanes!(N; x in self.slopes, y in b.slopes; u = self.value, v = b.value; x * v + y * u);
+        Dual { value: self.value * b.value, slopes }
     }
 }
 
@@ -143,7 +147,8 @@ impl<const N: usize> Div for Dual<N> {
     fn div(self, b: Self) -> Self {
         let reciprocal = 1.0 / b.value;
         let value = self.value * reciprocal;
-        Self::with(value, |i| (self.slopes[i] - b.slopes[i] * value) * reciprocal)
+        let slopes = lanes!(N; x in self.slopes, y in b.slopes; q = value, r = reciprocal; (x - y * q) * r);
+        Dual { value, slopes }
     }
 }
 
@@ -167,7 +172,8 @@ impl<const N: usize> Mul<f64> for Dual<N> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, b: f64) -> Self {
-        Self::with(self.value * b, |i| self.slopes[i] * b)
+        let slopes = lanes!(N; x in self.slopes; v = b; x * v);
+        Dual { value: self.value * b, slopes }
     }
 }
 
@@ -176,7 +182,8 @@ impl<const N: usize> Div<f64> for Dual<N> {
     #[inline(always)]
     fn div(self, b: f64) -> Self {
         let reciprocal = 1.0 / b;
-        Self::with(self.value * reciprocal, |i| self.slopes[i] * reciprocal)
+        let slopes = lanes!(N; x in self.slopes; r = reciprocal; x * r);
+        Dual { value: self.value * reciprocal, slopes }
     }
 }
 
@@ -211,7 +218,8 @@ impl<const N: usize> Scalar for Dual<N> {
     }
     #[inline(always)]
     fn chain(self, f: f64, df: f64) -> Self {
-        Self::with(f, |i| self.slopes[i] * df)
+        let slopes = lanes!(N; x in self.slopes; d = df; x * d);
+        Dual { value: f, slopes }
     }
     #[inline(always)]
     fn sqrt(self) -> Self {

@@ -2,6 +2,7 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 
 mod dual;
+mod lanes;
 mod model;
 mod parameter;
 mod scalar;
@@ -29,3 +30,5 @@ pub use {
     experiment::{Experiment, ExperimentOf, Hold, Initial, Interval, Sample, Time},
     integrate::{Automatic, Discrete, Integrator, Rk4, Stuck},
 };
+#[cfg(feature = "std")]
+mod predict;

@@ -23,6 +23,9 @@ impl Default for Rk4 {
     }
 }
 
+/// Node and weight of each stage.
+const STAGES: [(f64, f64); 4] = [(0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0)];
+
 impl<M: Model> Integrator<M> for Rk4 {
     type Memory = ();
 
@@ -39,17 +42,17 @@ impl<M: Model> Integrator<M> for Rk4 {
         let steps = self.substeps.max(1);
         let h = (interval.t1 - interval.t0) / steps as f64;
         let fraction = 1.0 / steps as f64;
-        for step in 0..steps {
-            let mut sum = x;
-            let mut k = M::State::splat(S::from(0.0));
-            for (node, weight) in [(0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0)] {
-                let position = step as f64 + node;
-                let u = interval.input::<S>(position * fraction);
-                let stage = axpy::<M::State, S>(x, h * node, k);
-                k = model.derivative(interval.t0 + position * h, &stage, &u, p);
-                sum = axpy::<M::State, S>(sum, h * weight, k);
+        let mut sum = x;
+        let mut k = M::State::splat(S::from(0.0));
+        for stage in 0..4 * steps {
+            let (node, weight) = STAGES[stage as usize & 3];
+            let position = (stage >> 2) as f64 + node;
+            let u = interval.input::<S>(position * fraction);
+            k = model.derivative(interval.t0 + position * h, &axpy::<M::State, S>(x, h * node, k), &u, p);
+            sum = axpy::<M::State, S>(sum, h * weight, k);
+            if stage & 3 == 3 {
+                x = sum;
             }
-            x = sum;
         }
         Ok(x)
     }

@@ -1,0 +1,95 @@
+//! [`Predictor`]: what the model expects of each output, and the slopes of that.
+//!
+//! A record is walked in windows of [`WINDOW`] samples. In each window the states are carried forward as [`Dual`]s, eight
+//! slopes at a time, and the prediction errors and slopes are laid down in columns, ready for filters, weights and the
+//! triangle. Memory is one window, whatever the record's length.
+//!
+//! Slopes with respect to the initial state die away like `exp(-t / T)`. After some ten thousand samples they are
+//! denormal numbers, on which processors are up to 60 times slower; so slopes below 1e-150 are set to zero between windows.
+
+mod free_run;
+
+mod window;
+
+pub use free_run::FreeRun;
+
+pub(crate) use window::{Seed, Target, Trajectory, WINDOW, Window};
+
+use crate::error::Error;
+use crate::experiment::ExperimentOf;
+use crate::integrate::{Integrator, Stuck};
+use crate::model::Model;
+use crate::scalar::Scalar;
+use crate::signals::Of;
+use core::fmt::Debug;
+
+/// Where the state behind each predicted output comes from.
+pub trait Predictor<M: Model>: Clone + Debug + Send + Sync {
+    /// What is made of a record once, before the search (restart states).
+    type Prepared: Send + Sync;
+
+    /// Looks at a record once, with the parameters at their start.
+    ///
+    /// # Errors
+    /// A record that the method cannot serve.
+    fn prepare(
+        &self,
+        model: &M,
+        experiment: &ExperimentOf<M>,
+        p: &Of<M::Parameters, f64>,
+    ) -> Result<Self::Prepared, Error>;
+
+    /// The state that the output of sample `k` is predicted from; `x` is the one before (the initial one, for `k = 0`).
+    /// `None` where there is no prediction for lack of a measurement to start from.
+    ///
+    /// # Errors
+    /// Where the integrator is [`Stuck`].
+    fn state<S: Scalar, I: Integrator<M>>(
+        &self,
+        walk: &Walk<'_, M, I>,
+        prepared: &Self::Prepared,
+        k: usize,
+        x: Of<M::State, S>,
+        p: &Of<M::Parameters, S>,
+        memory: &mut I::Memory,
+    ) -> Result<Option<Of<M::State, S>>, Stuck>;
+
+    /// Name and settings in a few words, for reports.
+    fn describe(&self) -> String;
+}
+
+/// A model on its way through a record.
+#[derive(Debug)]
+pub struct Walk<'a, M: Model, I> {
+    /// The equations.
+    pub model: &'a M,
+    /// The method that steps them.
+    pub integrator: &'a I,
+    /// The record.
+    pub experiment: &'a ExperimentOf<M>,
+}
+
+impl<M: Model, I> Clone for Walk<'_, M, I> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M: Model, I> Copy for Walk<'_, M, I> {}
+
+impl<M: Model, I: Integrator<M>> Walk<'_, M, I> {
+    /// From sample `k` to sample `k + 1`.
+    ///
+    /// # Errors
+    /// Where the integrator is [`Stuck`].
+    #[inline(always)]
+    pub fn advance<S: Scalar>(
+        &self,
+        k: usize,
+        x: Of<M::State, S>,
+        p: &Of<M::Parameters, S>,
+        memory: &mut I::Memory,
+    ) -> Result<Of<M::State, S>, Stuck> {
+        self.integrator.advance(self.model, &self.experiment.interval(k), x, p, memory)
+    }
+}

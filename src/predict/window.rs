@@ -1,0 +1,196 @@
+//! [`Trajectory`]: fills windows with prediction errors and slopes; the hot loop of every fit.
+
+use super::{Predictor, Walk};
+
+use crate::dual::Dual;
+use crate::integrate::{Integrator, Stuck};
+use crate::model::Model;
+use crate::scalar::Scalar;
+use crate::signals::{Of, Signals};
+
+/// Samples per window: short enough for two outputs and eight slopes to stay in the nearest cache.
+pub(crate) const WINDOW: usize = 128;
+
+/// Slopes below this are gone for good; squared they are denormal.
+const NEGLIGIBLE: f64 = 1e-150;
+
+/// Which quantity a column of slopes belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Target {
+    /// Parameter number.
+    Parameter(usize),
+    /// Initial state number.
+    State(usize),
+}
+
+/// One column of slopes: the quantity, and how fast it moves with the optimizer's coordinate.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Seed {
+    pub target: Target,
+    pub slope: f64,
+}
+
+/// Prediction errors and slopes of a run of samples, column by column: the slopes with respect to each seed, then the
+/// error. Row `j * WINDOW + k` is output `j` at the window's sample `k`; rows without measurement or beyond the end are zero.
+pub(crate) struct Window {
+    /// First sample.
+    pub begin: usize,
+    /// Number of samples.
+    pub samples: usize,
+    columns: usize,
+    rows: usize,
+    data: Vec<f64>,
+    /// Which rows hold a measurement.
+    pub measured: Vec<bool>,
+}
+
+impl Window {
+    pub fn new(seeds: usize, outputs: usize) -> Self {
+        let (columns, rows) = (seeds + 1, outputs * WINDOW);
+        let (data, measured) = (vec![0.0; columns * rows], vec![false; rows]);
+        Window { begin: 0, samples: 0, columns, rows, data, measured }
+    }
+
+    /// The columns of slopes, then the errors, each of one row per output and sample.
+    pub fn columns_mut(&mut self) -> impl Iterator<Item = &mut [f64]> {
+        self.data.chunks_exact_mut(self.rows)
+    }
+
+    pub fn data_mut(&mut self) -> &mut [f64] {
+        &mut self.data
+    }
+
+    pub fn errors(&self) -> &[f64] {
+        &self.data[(self.columns - 1) * self.rows..]
+    }
+}
+
+/// The states of one experiment with up to `N` slopes, on their way through the record.
+struct Lanes<M: Model, I: Integrator<M>, const N: usize> {
+    x: Of<M::State, Dual<N>>,
+    p: Of<M::Parameters, Dual<N>>,
+    memory: I::Memory,
+    first: usize,
+    used: usize,
+}
+
+/// A model on its way through a record, with all the slopes asked for: in as many passes of `N` as it takes.
+pub(crate) struct Trajectory<'a, M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize> {
+    walk: Walk<'a, M, I>,
+    predictor: &'a P,
+    prepared: &'a P::Prepared,
+    passes: Vec<Lanes<M, I, N>>,
+    next: usize,
+}
+
+impl<'a, M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize> Trajectory<'a, M, I, P, N> {
+    pub fn new(
+        walk: Walk<'a, M, I>,
+        predictor: &'a P,
+        prepared: &'a P::Prepared,
+        x: Of<M::State, f64>,
+        p: Of<M::Parameters, f64>,
+        seeds: &[Seed],
+    ) -> Self {
+        let passes = (0..seeds.len().div_ceil(N.max(1)).max(1))
+            .map(|pass| {
+                let first = pass * N;
+                let mine = &seeds[first..seeds.len().min(first + N)];
+                let seeded = |target: Target, value: f64| {
+                    let mut dual = Dual::constant(value);
+                    for (slope, seed) in dual.slopes.iter_mut().zip(mine) {
+                        if seed.target == target {
+                            *slope = seed.slope;
+                        }
+                    }
+                    dual
+                };
+                let (x, p) = (M::State::into_array(x), M::Parameters::into_array(p));
+                Lanes {
+                    x: M::State::from_fn(|i| seeded(Target::State(i), x.as_ref()[i])),
+                    p: M::Parameters::from_fn(|i| seeded(Target::Parameter(i), p.as_ref()[i])),
+                    memory: I::Memory::default(),
+                    first,
+                    used: mine.len(),
+                }
+            })
+            .collect();
+        Trajectory { walk, predictor, prepared, passes, next: 0 }
+    }
+
+    /// The next window of the record; `false` at its end.
+    ///
+    /// # Errors
+    /// The sample that the integrator could not reach.
+    pub fn fill(&mut self, window: &mut Window) -> Result<bool, usize> {
+        let begin = self.next;
+        let samples = WINDOW.min(self.walk.experiment.len() - begin);
+        (window.begin, window.samples) = (begin, samples);
+        if samples == 0 {
+            return Ok(false);
+        }
+        if samples < WINDOW {
+            window.data.fill(0.0);
+            window.measured.fill(false);
+        }
+        for lanes in &mut self.passes {
+            lanes.fill(self.walk, self.predictor, self.prepared, window)?;
+        }
+        self.next += samples;
+        Ok(true)
+    }
+}
+
+impl<M: Model, I: Integrator<M>, const N: usize> Lanes<M, I, N> {
+    /// The one place that calls the model in a fit: what has one caller is inlined.
+    #[inline(never)]
+    fn fill<P: Predictor<M>>(
+        &mut self,
+        walk: Walk<'_, M, I>,
+        predictor: &P,
+        prepared: &P::Prepared,
+        window: &mut Window,
+    ) -> Result<(), usize> {
+        let Window { begin, samples, columns, rows, ref mut data, ref mut measured } = *window;
+        let (first, used, p, mut x) = (self.first, self.used.min(N), self.p, self.x);
+        let errors = (columns - 1) * rows;
+        for k in 0..samples {
+            let sample = begin + k;
+            let state = predictor.state(&walk, prepared, sample, x, &p, &mut self.memory).map_err(|Stuck| sample)?;
+            let Some(state) = state else {
+                for j in 0..M::Output::LEN {
+                    let row = j * WINDOW + k;
+                    measured[row] = false;
+                    data[errors + row] = 0.0;
+                    for c in 0..used {
+                        data[(first + c) * rows + row] = 0.0;
+                    }
+                }
+                continue;
+            };
+            x = state;
+            let u = M::Input::map(walk.experiment.inputs()[sample], Dual::from);
+            let expected = M::Output::into_array(walk.model.output(walk.experiment.time(sample), &x, &u, &p));
+            let found = M::Output::into_array(walk.experiment.outputs()[sample]);
+            for j in 0..M::Output::LEN {
+                let (expected, found) = (expected.as_ref()[j], found.as_ref()[j]);
+                let row = j * WINDOW + k;
+                let here = !found.is_nan();
+                measured[row] = here;
+                data[errors + row] = if here { found - expected.value } else { 0.0 };
+                for c in 0..used {
+                    data[(first + c) * rows + row] = if here { expected.slopes[c] } else { 0.0 };
+                }
+            }
+        }
+        self.x = M::State::map(x, |mut dual| {
+            for slope in &mut dual.slopes {
+                if slope.abs() < NEGLIGIBLE {
+                    *slope = 0.0;
+                }
+            }
+            dual
+        });
+        Ok(())
+    }
+}
