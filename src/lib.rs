@@ -3,6 +3,8 @@
 
 mod dual;
 mod lanes;
+#[cfg(feature = "std")]
+mod information;
 mod model;
 mod parameter;
 mod scalar;
@@ -19,6 +21,8 @@ mod integrate;
 pub use {approx, nalgebra, serde};
 
 pub use dual::Dual;
+#[cfg(feature = "std")]
+pub use information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix};
 pub use model::{Kind, Model};
 pub use parameter::{Parameter, Prior, Transform, fixed, free};
 pub use scalar::Scalar;

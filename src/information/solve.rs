@@ -1,0 +1,56 @@
+//! The minimizing step, and what there is to say when there is none.
+
+use super::Information;
+
+/// A pivot below this part of its column's norm is no more than rounding, per column of the triangle.
+const NEGLIGIBLE: f64 = 1e-14;
+
+/// The data do not determine the unknowns: one column is zero or a combination of those before it.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "column {column} {}: fix or remove that unknown, give it a prior, or take data that excite it",
+    if *norm == 0.0 { "is zero (its unknown has no influence)".to_string() }
+    else if norm.is_finite() { format!("depends on those before it (only {independence:.1e} of it is independent)") }
+    else { "is not finite".to_string() }
+)]
+pub struct RankDeficient {
+    /// The first column without a usable pivot.
+    pub column: usize,
+    /// Its Euclidean norm.
+    pub norm: f64,
+    /// Norm of its part that is independent of the columns before, relative to `norm`.
+    pub independence: f64,
+}
+
+impl Information {
+    /// The minimizer `d` of `|y - Phi d|^2`.
+    ///
+    /// # Errors
+    /// Names the first column whose pivot is zero, or no more than rounding of the column.
+    pub fn solve(&self) -> Result<Vec<f64>, RankDeficient> {
+        self.full_rank()?;
+        let n = self.columns();
+        let mut d: Vec<f64> = (0..n).map(|i| self.at(i, n)).collect();
+        for i in (0..n).rev() {
+            let known: f64 = (i + 1..n).map(|j| self.at(i, j) * d[j]).sum();
+            d[i] = (d[i] - known) / self.at(i, i);
+        }
+        Ok(d)
+    }
+
+    /// Checks every pivot against its column; the column norms if all are usable.
+    pub(super) fn full_rank(&self) -> Result<Vec<f64>, RankDeficient> {
+        let norms = self.column_norms();
+        let negligible = NEGLIGIBLE * norms.len() as f64;
+        for (column, &norm) in norms.iter().enumerate() {
+            let independence = self.at(column, column) / norm;
+            // Also false for NaN.
+            let usable = independence > negligible && norm.is_finite();
+            if !usable {
+                let independence = if norm == 0.0 { 0.0 } else { independence };
+                return Err(RankDeficient { column, norm, independence });
+            }
+        }
+        Ok(norms)
+    }
+}
