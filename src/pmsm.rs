@@ -11,13 +11,38 @@
 //! | `ke` | line-to-line *rms* back-EMF per mechanical speed (V s/rad): the phase-peak EMF is `sqrt(2/3) ke w` |
 //! | `kt` | torque per ampere of peak `iq`: `sqrt(3/2) ke` (N m/A) |
 //!
+//! Where data come in another convention, [`units`] and [`frames`] hold a named conversion for each; a bare factor in
+//! user code is the most common bug in this field.
+//!
+//! | file | holds | builds on |
+//! |---|---|---|
+//! | [`frames`] | Park and Clarke transforms | |
+//! | [`units`] | line-line and phase, rms and peak, terminals, Ke, Kt, flux, rpm, cable | |
+//! | [`motor`] | constants from geometry | units |
+//! | [`temperature`] | winding and magnet laws, temperatures read back from estimates | |
+//! | [`Surface`], [`Salient`], [`Saturated`], [`Fed`], [`Shaft`] | the equations, each a [`Model`](crate::Model) | frames |
+//! | [`Machine`] | currents, speed and angle together | `Salient`, `Shaft` |
+//!
 //! Source of the formulas: M. Tenerz, *Parameter Estimation in a Permanent Magnet Synchronous Motor*,
 //! LiTH-ISY-EX--11/4495--SE, Linkoping 2011, called "the thesis"; corrected where it errs, which is said in place.
 
+pub mod frames;
+pub mod motor;
+pub mod temperature;
+pub mod units;
+
+mod fed;
+mod machine;
 mod salient;
+mod saturated;
+mod shaft;
 mod surface;
 
+pub use fed::{AngledDrive, Fed, Line, dead_time};
+pub use machine::{Acting, Machine, Motion, Rotor};
 pub use salient::{Salient, SalientWinding};
+pub use saturated::{Saturated, SaturatedWinding};
+pub use shaft::{COULOMB_WIDTH, Mechanics, Shaft, Torque, Turning};
 pub use surface::Surface;
 
 use crate::scalar::Scalar;
@@ -117,6 +142,22 @@ pub enum Error {
         /// What it must be, in words.
         must: &'static str,
     },
+}
+
+impl Error {
+    /// `value` if it is positive and finite.
+    pub(crate) fn positive(quantity: &'static str, value: f64, unit: &'static str) -> Result<f64, Error> {
+        if value > 0.0 && value.is_finite() {
+            Ok(value)
+        } else {
+            Err(Error::OutOfRange { quantity, value, unit, must: "be positive and finite" })
+        }
+    }
+
+    /// `value` if it is finite.
+    pub(crate) fn finite(quantity: &'static str, value: f64, unit: &'static str) -> Result<f64, Error> {
+        if value.is_finite() { Ok(value) } else { Err(Error::OutOfRange { quantity, value, unit, must: "be finite" }) }
+    }
 }
 
 impl fmt::Display for Error {
