@@ -7,6 +7,7 @@ mod lanes;
 mod information;
 mod model;
 mod parameter;
+pub mod pmsm;
 mod scalar;
 mod signals;
 

@@ -1,0 +1,77 @@
+use super::{Error, SQRT_3_2};
+use crate::{Model, Scalar};
+use serde::{Deserialize, Serialize};
+
+crate::signals! {
+    /// Motion of the rotor.
+    pub struct Turning {
+        /// Mechanical speed.
+        w: "rad/s",
+        /// Mechanical angle, not wrapped.
+        theta: "rad",
+    }
+    /// What drives the rotor.
+    pub struct Torque {
+        /// Current that makes torque, phase peak.
+        iq: "A",
+    }
+    /// Parameters of the mechanics, seen from the motor's side of the gear.
+    pub struct Mechanics {
+        /// Inertia.
+        j: "kg m^2",
+        /// Viscous friction.
+        bv: "N m s",
+        /// Coulomb friction.
+        tc: "N m",
+        /// Gravity's torque where the arm is level.
+        tg: "N m",
+        /// Line-to-line rms back-EMF per mechanical speed: the scale of the torque.
+        ke: "V s/rad",
+    }
+}
+
+/// Speed within which Coulomb friction turns over (rad/s): `tc tanh(w / 0.5)`.
+pub const COULOMB_WIDTH: f64 = 0.5;
+
+/// The rotor and its load (thesis (3.17), (3.18)):
+///
+/// ```text
+/// j dw/dt = sqrt(3/2) ke iq - tc tanh(w/0.5) - bv w - tg cos(theta/gear)      dtheta/dt = w
+/// ```
+///
+/// With measured current as input it identifies inertia, friction and gravity; all torques scale with `ke`, which is
+/// therefore to be fixed (or known from the electrical fit).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Shaft {
+    gear: f64,
+}
+
+impl Shaft {
+    /// A rotor behind a gear that turns the arm once in `gear` turns of the motor; not positive is an error.
+    pub fn new(gear: f64) -> Result<Self, Error> {
+        Ok(Shaft { gear: Error::positive("gear ratio", gear, "turns")? })
+    }
+
+    /// Torque (N m) that the load takes at this motion.
+    #[inline]
+    pub fn load<S: Scalar>(&self, x: &Turning<S>, p: &Mechanics<S>) -> S {
+        p.tc * (x.w / COULOMB_WIDTH).tanh() + p.bv * x.w + p.tg * (x.theta / self.gear).cos()
+    }
+}
+
+impl Model for Shaft {
+    type State = Turning;
+    type Input = Torque;
+    type Output = Turning;
+    type Parameters = Mechanics;
+
+    #[inline]
+    fn derivative<S: Scalar>(&self, _t: f64, x: &Turning<S>, u: &Torque<S>, p: &Mechanics<S>) -> Turning<S> {
+        Turning { w: (p.ke * u.iq * SQRT_3_2 - self.load(x, p)) / p.j, theta: x.w }
+    }
+
+    #[inline]
+    fn output<S: Scalar>(&self, _t: f64, x: &Turning<S>, _u: &Torque<S>, _p: &Mechanics<S>) -> Turning<S> {
+        *x
+    }
+}

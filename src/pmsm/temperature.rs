@@ -1,0 +1,272 @@
+//! What heat does to a winding and to a magnet, and reading temperatures back from estimates.
+//!
+//! One kelvin is 0.393 % of the winding's resistance and 0.11 % of Ke, both relative to 20 C. The thesis' (3.19) has the
+//! magnet's sign wrong and mixes absolute and relative slopes; the laws here are the corrected ones.
+
+use super::Error;
+use crate::dual::Dual;
+use crate::scalar::Scalar;
+use serde::{Deserialize, Serialize};
+
+/// Temperature coefficient of copper's resistance (1/K), relative to 20 C.
+pub const COPPER: f64 = 0.003_93;
+/// Reversible loss of magnet flux (1/K), relative to 20 C, up to [`KNEE`].
+pub const MAGNET: f64 = 0.001_1;
+/// By how much that loss grows with each kelvin above [`KNEE`] (1/K^2).
+pub const MAGNET_GROWTH: f64 = 1.6e-5;
+/// Above this temperature (C) what a magnet loses does not come back.
+pub const KNEE: f64 = 150.0;
+/// Reference temperature of the laws (C).
+pub const REFERENCE: f64 = 20.0;
+
+/// A temperature (C) not below absolute zero.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Serialize, Deserialize)]
+#[serde(try_from = "f64", into = "f64")]
+pub struct Celsius(f64);
+
+impl Celsius {
+    /// `degrees` Celsius; below -273.15, infinite or not a number is an error.
+    pub fn new(degrees: f64) -> Result<Self, Error> {
+        if (-273.15..f64::INFINITY).contains(&degrees) {
+            Ok(Celsius(degrees))
+        } else {
+            let must = "be finite and not below absolute zero (-273.15 C)";
+            Err(Error::OutOfRange { quantity: "temperature", value: degrees, unit: "C", must })
+        }
+    }
+
+    /// The number (C).
+    pub const fn get(self) -> f64 {
+        self.0
+    }
+
+    /// How far above [`KNEE`] (K); zero below it.
+    fn above_knee(self) -> f64 {
+        Scalar::max(self.0 - KNEE, 0.0)
+    }
+}
+
+impl TryFrom<f64> for Celsius {
+    type Error = Error;
+    fn try_from(degrees: f64) -> Result<Self, Error> {
+        Celsius::new(degrees)
+    }
+}
+
+impl From<Celsius> for f64 {
+    fn from(t: Celsius) -> f64 {
+        t.0
+    }
+}
+
+/// `R(t) / R(20 C) = 1 + 0.00393 (t - 20)` of a copper winding.
+pub fn winding(t: Celsius) -> f64 {
+    1.0 + COPPER * (t.0 - REFERENCE)
+}
+
+/// How the growth of the magnet's coefficient above [`KNEE`] is read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Reading {
+    /// As a local slope: flux is its integral, `1 - 0.0011 (t - 20) - 0.8e-5 (t - 150)^2` (175 C: 0.8245).
+    #[default]
+    Local,
+    /// As a secant coefficient `s(t)`, flux is `1 - s(t) (t - 20)` (175 C: 0.7675).
+    Secant,
+}
+
+/// `Ke(t) / Ke(20 C)` of a magnet that is at its hottest so far; for one that has been hotter, see [`Magnet`].
+pub fn magnet(t: Celsius, reading: Reading) -> f64 {
+    let (rise, above) = (t.0 - REFERENCE, t.above_knee());
+    match reading {
+        Reading::Local => 1.0 - MAGNET * rise - 0.5 * MAGNET_GROWTH * above * above,
+        Reading::Secant => 1.0 - (MAGNET + MAGNET_GROWTH * above) * rise,
+    }
+}
+
+/// A magnet that remembers: what it lost above [`KNEE`] stays lost.
+///
+/// `Ke/Ke0 = (1 - ageing) [1 - 0.0011 (t - 20) - 0.8e-5 max(peak - 150, 0)^2]`
+///
+/// ```
+/// use greybox::pmsm::temperature::{Celsius, Magnet};
+/// let mut magnet = Magnet::default();
+/// magnet.reach(Celsius::new(175.0)?);
+/// assert!((magnet.factor(Celsius::new(20.0)?) - 0.995).abs() < 1e-12); // half a per cent is gone for good
+/// # Ok::<(), greybox::pmsm::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Magnet {
+    peak: Celsius,
+    ageing: f64,
+}
+
+impl Default for Magnet {
+    /// A new magnet that was never above 20 C.
+    fn default() -> Self {
+        Magnet { peak: Celsius(REFERENCE), ageing: 0.0 }
+    }
+}
+
+impl Magnet {
+    /// The magnet with a share `loss` of its flux lost to age (0.01 to 0.02 over a life), within `0..1`.
+    pub fn aged(self, loss: f64) -> Result<Self, Error> {
+        if (0.0..1.0).contains(&loss) {
+            Ok(Magnet { ageing: loss, ..self })
+        } else {
+            Err(Error::OutOfRange { quantity: "ageing", value: loss, unit: "of 1", must: "lie in 0..1" })
+        }
+    }
+
+    /// Takes the magnet to temperature `t`; says what happened to it.
+    pub fn reach(&mut self, t: Celsius) -> Heating {
+        let before = self.lost();
+        if t > self.peak {
+            self.peak = t;
+        }
+        if self.factor(t) <= 0.0 {
+            Heating::Demagnetized
+        } else if self.lost() > before {
+            Heating::Irreversible { lost: self.lost() - before }
+        } else {
+            Heating::Reversible
+        }
+    }
+
+    /// Share of the flux that heat has taken for good: `0.8e-5 max(peak - 150, 0)^2`.
+    pub fn lost(&self) -> f64 {
+        0.5 * MAGNET_GROWTH * self.peak.above_knee() * self.peak.above_knee()
+    }
+
+    /// `Ke / Ke0` at temperature `t`; not below zero. The past counts, `t` itself only if [`Magnet::reach`]ed.
+    pub fn factor(&self, t: Celsius) -> f64 {
+        Scalar::max((1.0 - self.ageing) * (1.0 - MAGNET * (t.0 - REFERENCE) - self.lost()), 0.0)
+    }
+}
+
+/// What a temperature did to a [`Magnet`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Heating {
+    /// The flux comes back on cooling.
+    Reversible,
+    /// A share `lost` of the flux is gone: the magnet was above its range.
+    Irreversible {
+        /// Of the flux at 20 C when new.
+        lost: f64,
+    },
+    /// The law leaves no flux: far outside the range in which it was measured.
+    Demagnetized,
+}
+
+/// A number and how well it is known.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Estimated {
+    /// The estimate.
+    pub value: f64,
+    /// Its standard error, same unit.
+    pub std: f64,
+}
+
+/// Rise (K) of the winding between a cold and a warm estimate of the resistance, `dT = (R_warm - R_cold) / (0.00393
+/// R20)`.
+///
+/// `cold` and `warm` may contain the cable (it cancels); `r20` is the *motor's* phase resistance at 20 C alone: with the
+/// cable in it, 35 K read 22 K on the reference robot. The three errors are taken as independent.
+pub fn winding_rise(cold: Estimated, warm: Estimated, r20: Estimated) -> Result<Estimated, Error> {
+    Error::positive("resistance of the motor at 20 C", r20.value, "ohm")?;
+    propagate([cold, warm, r20], |[cold, warm, r20]| (warm - cold) / (r20 * COPPER))
+}
+
+/// Rise (K) of the magnet between a cold and a warm estimate of Ke, below [`KNEE`]; `cold_at` is the temperature of the
+/// cold one. The two errors are taken as independent.
+pub fn magnet_rise(cold: Estimated, warm: Estimated, cold_at: Celsius) -> Result<Estimated, Error> {
+    Error::positive("Ke of the cold motor", cold.value, "V s/rad")?;
+    let cold_factor =
+        Error::positive("magnet factor at the cold temperature", magnet(cold_at, Reading::Local), "of 1")?;
+    propagate([cold, warm], |[cold, warm]| (cold - warm) / (cold * (MAGNET / cold_factor)))
+}
+
+/// First-order propagation of independent errors.
+fn propagate<const N: usize>(of: [Estimated; N], f: impl Fn([Dual<N>; N]) -> Dual<N>) -> Result<Estimated, Error> {
+    let result = f(core::array::from_fn(|i| Dual::variable(of[i].value, i)));
+    let variance: f64 = result.slopes.iter().zip(of).map(|(slope, e)| (slope * e.std) * (slope * e.std)).sum();
+    Ok(Estimated {
+        value: Error::finite("temperature rise", result.value, "K")?,
+        std: Error::finite("standard error of the temperature rise", Scalar::sqrt(variance), "K")?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use proptest::prelude::*;
+
+    fn at(degrees: f64) -> Celsius {
+        Celsius::new(degrees).unwrap()
+    }
+
+    #[test]
+    fn published_values() {
+        assert_relative_eq!(winding(at(55.0)), 1.137_55, max_relative = 1e-15);
+        assert_relative_eq!(magnet(at(175.0), Reading::Local), 0.8245, max_relative = 1e-14);
+        assert_relative_eq!(magnet(at(175.0), Reading::Secant), 0.7675, max_relative = 1e-14);
+        assert_relative_eq!(magnet(at(55.0), Reading::Local), 0.9615, max_relative = 1e-14);
+    }
+
+    proptest! {
+        #[test]
+        fn both_readings_agree_up_to_the_knee(t in -40.0..=150.0) {
+            prop_assert_eq!(magnet(at(t), Reading::Local), magnet(at(t), Reading::Secant));
+        }
+
+        // Local: the slope is 0.0011 + 1.6e-5 (t - 150), by a central difference of a parabola (exact but for rounding).
+        #[test]
+        fn local_slope_grows_by_the_rate(t in 152.0..250.0f64) {
+            let slope = (magnet(at(t + 1.0), Reading::Local) - magnet(at(t - 1.0), Reading::Local)) / 2.0;
+            prop_assert!((slope + MAGNET + MAGNET_GROWTH * (t - KNEE)).abs() < 1e-14);
+        }
+
+        #[test]
+        fn a_magnet_on_its_way_up_follows_the_law_and_on_its_way_down_does_not_return(t in 20.0..250.0f64) {
+            let mut magnet_ = Magnet::default();
+            magnet_.reach(at(t));
+            prop_assert!((magnet_.factor(at(t)) - magnet(at(t), Reading::Local)).abs() < 1e-14);
+            let cooled = magnet_.factor(at(REFERENCE));
+            prop_assert!((1.0 - cooled - magnet_.lost()).abs() < 1e-14);
+            prop_assert_eq!(magnet_.reach(at(100.0)), Heating::Reversible);
+        }
+
+        #[test]
+        fn rises_are_read_back(rise in 1.0..100.0f64, r20 in 0.1..2.0, cable in 0.0..2.0, ke in 0.1..2.0) {
+            let known = |value| Estimated { value, std: 0.0 };
+            let (cold, warm) = (at(25.0), at(25.0 + rise));
+            let winding_read = winding_rise(
+                known(r20 * winding(cold) + cable), known(r20 * winding(warm) + cable), known(r20)).unwrap();
+            prop_assert!((winding_read.value - rise).abs() < 1e-9);
+            let factor = |t| magnet(t, Reading::Local);
+            let magnet_read = magnet_rise(known(ke * factor(cold)), known(ke * factor(warm)), cold).unwrap();
+            prop_assert!((magnet_read.value - rise).abs() < 1e-9);
+        }
+    }
+
+    // 0.001 ohm of a 0.4 ohm motor is 0.636 K; twice, in quadrature.
+    #[test]
+    fn uncertainty_is_propagated() {
+        let e = |value, std| Estimated { value, std };
+        let read = winding_rise(e(0.63, 1e-3), e(0.685, 1e-3), e(0.4, 0.0)).unwrap();
+        assert_relative_eq!(read.std, 2f64.sqrt() * 1e-3 / (COPPER * 0.4), max_relative = 1e-12);
+        // SPEC: with the cable in the denominator, 35 K read 22 K.
+        let with_cable = winding_rise(e(0.63, 0.0), e(0.63 + 35.0 * COPPER * 0.4, 0.0), e(0.63, 0.0)).unwrap();
+        assert_relative_eq!(with_cable.value, 22.2, epsilon = 0.1);
+    }
+
+    #[test]
+    fn impossible_temperatures_are_refused() {
+        assert!(Celsius::new(-300.0).unwrap_err().to_string().contains("absolute zero"));
+        assert!(Celsius::new(f64::NAN).is_err());
+        let mut magnet = Magnet::default();
+        assert!(matches!(magnet.reach(at(180.0)), Heating::Irreversible { .. }));
+        assert_eq!(magnet.reach(at(900.0)), Heating::Demagnetized);
+        assert!(magnet.aged(1.5).is_err());
+    }
+}
