@@ -4,6 +4,7 @@
 mod dual;
 mod model;
 mod parameter;
+pub mod pmsm;
 mod scalar;
 mod signals;
 

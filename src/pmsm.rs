@@ -1,0 +1,135 @@
+//! The permanent magnet synchronous motor (PMSM) and its drive.
+//!
+//! Conventions, the same everywhere in this wing:
+//!
+//! | quantity | convention |
+//! |---|---|
+//! | speed `w`, angle `theta` | mechanical, rad/s and rad; electrical ones are `np` times as large and called `we`, `theta_e` |
+//! | dq frame | d axis on the magnet flux, q 90 electrical degrees ahead |
+//! | dq amplitude | currents and voltages are phase *peak* values |
+//! | `rs`, `ls`, `ld`, `lq` | phase resistance (ohm), dq inductances (H) |
+//! | `ke` | line-to-line *rms* back-EMF per mechanical speed (V s/rad): the phase-peak EMF is `sqrt(2/3) ke w` |
+//! | `kt` | torque per ampere of peak `iq`: `sqrt(3/2) ke` (N m/A) |
+//!
+//! Source of the formulas: M. Tenerz, *Parameter Estimation in a Permanent Magnet Synchronous Motor*,
+//! LiTH-ISY-EX--11/4495--SE, Linkoping 2011, called "the thesis"; corrected where it errs, which is said in place.
+
+mod salient;
+mod surface;
+
+pub use salient::{Salient, SalientWinding};
+pub use surface::Surface;
+
+use crate::scalar::Scalar;
+use core::fmt;
+use serde::{Deserialize, Serialize};
+
+/// `sqrt(2/3)`: phase peak from line-to-line rms.
+pub const SQRT_2_3: f64 = 0.816_496_580_927_726;
+
+/// `sqrt(3/2)`: line-to-line rms from phase peak, and `kt / ke`.
+pub const SQRT_3_2: f64 = 1.224_744_871_391_589;
+
+crate::signals! {
+    /// Stator currents in the rotor frame, phase peak.
+    pub struct Currents {
+        /// Current along the magnet flux.
+        id: "A",
+        /// Current that makes torque.
+        iq: "A",
+    }
+    /// Stator voltages in the rotor frame, phase peak, and the speed of the rotor.
+    pub struct Drive {
+        /// Voltage along the magnet flux.
+        ud: "V",
+        /// Voltage 90 electrical degrees ahead of it.
+        uq: "V",
+        /// Mechanical speed.
+        w: "rad/s",
+    }
+    /// Parameters of a motor with surface magnets.
+    pub struct Winding {
+        /// Phase resistance.
+        rs: "ohm",
+        /// Synchronous inductance.
+        ls: "H",
+        /// Line-to-line rms back-EMF per mechanical speed.
+        ke: "V s/rad",
+    }
+}
+
+/// Number of pole pairs `np`, at least one: what turns mechanical into electrical.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "u32", into = "u32")]
+pub struct PolePairs(u32);
+
+impl PolePairs {
+    /// `count` pole pairs; zero is an error.
+    pub const fn new(count: u32) -> Result<Self, Error> {
+        if count == 0 { Err(Error::NoPolePairs) } else { Ok(PolePairs(count)) }
+    }
+
+    /// The number.
+    #[inline(always)]
+    pub const fn get(self) -> f64 {
+        self.0 as f64
+    }
+
+    /// Electrical angle (rad) or speed (rad/s) from the mechanical one.
+    #[inline(always)]
+    pub fn electrical<S: Scalar>(self, mechanical: S) -> S {
+        mechanical * self.get()
+    }
+
+    /// Mechanical angle (rad) or speed (rad/s) from the electrical one.
+    #[inline(always)]
+    pub fn mechanical<S: Scalar>(self, electrical: S) -> S {
+        electrical / self.get()
+    }
+}
+
+impl TryFrom<u32> for PolePairs {
+    type Error = Error;
+    fn try_from(count: u32) -> Result<Self, Error> {
+        PolePairs::new(count)
+    }
+}
+
+impl From<PolePairs> for u32 {
+    fn from(pole_pairs: PolePairs) -> u32 {
+        pole_pairs.0
+    }
+}
+
+/// Why a motor, a drive or a temperature was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub enum Error {
+    /// A motor needs at least one pole pair.
+    NoPolePairs,
+    /// A quantity lies outside the range in which it means something.
+    OutOfRange {
+        /// What it is, in words.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+        /// Its unit.
+        unit: &'static str,
+        /// What it must be, in words.
+        must: &'static str,
+    },
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Error::NoPolePairs => {
+                write!(f, "a motor has at least one pole pair; got 0 (count magnet poles, divide by 2)")
+            }
+            Error::OutOfRange { quantity, value, unit, must } => {
+                write!(f, "{quantity} is {value} {unit}; it must {must}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for Error {}
