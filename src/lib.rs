@@ -1,11 +1,15 @@
 //! Nonlinear grey-box parameter estimation.
 #![cfg_attr(not(feature = "std"), no_std)]
 
+mod covariance;
 mod dual;
 mod lanes;
 #[cfg(feature = "std")]
 mod information;
+mod integrate;
+mod interval;
 mod model;
+pub mod online;
 mod parameter;
 pub mod pmsm;
 mod scalar;
@@ -15,15 +19,16 @@ mod signals;
 mod error;
 #[cfg(feature = "std")]
 mod experiment;
-#[cfg(feature = "std")]
-mod integrate;
 
 #[doc(hidden)]
 pub use {approx, nalgebra, serde};
 
+pub use covariance::{Covariance, Gain};
 pub use dual::Dual;
 #[cfg(feature = "std")]
 pub use information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix};
+pub use integrate::{Automatic, Discrete, Integrator, Rk4, Stuck};
+pub use interval::{Hold, Interval};
 pub use model::{Kind, Model};
 pub use parameter::{Parameter, Prior, Transform, fixed, free};
 pub use scalar::Scalar;
@@ -32,8 +37,7 @@ pub use signals::{Entry, Nothing, Of, Signals};
 #[cfg(feature = "std")]
 pub use {
     error::{Error, Failure},
-    experiment::{Experiment, ExperimentOf, Hold, Initial, Interval, Sample, Time},
-    integrate::{Automatic, Discrete, Integrator, Rk4, Stuck},
+    experiment::{Experiment, ExperimentOf, Initial, Sample, Time},
 };
 #[cfg(feature = "std")]
 mod predict;
