@@ -13,6 +13,13 @@ mod error;
 mod experiment;
 #[cfg(feature = "std")]
 mod integrate;
+#[cfg(feature = "std")]
+mod loss;
+#[cfg(feature = "std")]
+mod weighting;
+
+#[cfg(feature = "std")]
+pub mod check;
 
 #[doc(hidden)]
 pub use {approx, nalgebra, serde};
@@ -28,4 +35,6 @@ pub use {
     error::{Error, Failure},
     experiment::{Experiment, ExperimentOf, Hold, Initial, Interval, Sample, Time},
     integrate::{Automatic, Discrete, Integrator, Rk4, Stuck},
+    loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
+    weighting::{BySignal, Law, Weighting},
 };
