@@ -16,6 +16,8 @@ mod integrate;
 #[cfg(feature = "std")]
 mod loss;
 #[cfg(feature = "std")]
+mod prefilter;
+#[cfg(feature = "std")]
 mod weighting;
 
 #[cfg(feature = "std")]
@@ -36,5 +38,6 @@ pub use {
     experiment::{Experiment, ExperimentOf, Hold, Initial, Interval, Sample, Time},
     integrate::{Automatic, Discrete, Integrator, Rk4, Stuck},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
+    prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
     weighting::{BySignal, Law, Weighting},
 };
