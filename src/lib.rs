@@ -19,6 +19,17 @@ mod signals;
 mod error;
 #[cfg(feature = "std")]
 mod experiment;
+#[cfg(feature = "std")]
+mod integrate;
+#[cfg(feature = "std")]
+mod loss;
+#[cfg(feature = "std")]
+mod prefilter;
+#[cfg(feature = "std")]
+mod weighting;
+
+#[cfg(feature = "std")]
+pub mod check;
 
 #[doc(hidden)]
 pub use {approx, nalgebra, serde};
@@ -38,6 +49,11 @@ pub use signals::{Entry, Nothing, Of, Signals};
 pub use {
     error::{Error, Failure},
     experiment::{Experiment, ExperimentOf, Initial, Sample, Time},
+    experiment::{Experiment, ExperimentOf, Hold, Initial, Interval, Sample, Time},
+    integrate::{Automatic, Discrete, Integrator, Rk4, Stuck},
+    loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
+    prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
+    weighting::{BySignal, Law, Weighting},
 };
 #[cfg(feature = "std")]
 mod predict;
