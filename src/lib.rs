@@ -3,11 +3,9 @@
 
 mod covariance;
 mod dual;
-mod lanes;
-#[cfg(feature = "std")]
-mod information;
 mod integrate;
 mod interval;
+mod lanes;
 mod model;
 pub mod online;
 mod parameter;
@@ -16,28 +14,27 @@ mod scalar;
 mod signals;
 
 #[cfg(feature = "std")]
+pub mod check;
+#[cfg(feature = "std")]
 mod error;
 #[cfg(feature = "std")]
 mod experiment;
 #[cfg(feature = "std")]
-mod integrate;
+mod information;
 #[cfg(feature = "std")]
 mod loss;
+#[cfg(feature = "std")]
+mod predict;
 #[cfg(feature = "std")]
 mod prefilter;
 #[cfg(feature = "std")]
 mod weighting;
-
-#[cfg(feature = "std")]
-pub mod check;
 
 #[doc(hidden)]
 pub use {approx, nalgebra, serde};
 
 pub use covariance::{Covariance, Gain};
 pub use dual::Dual;
-#[cfg(feature = "std")]
-pub use information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix};
 pub use integrate::{Automatic, Discrete, Integrator, Rk4, Stuck};
 pub use interval::{Hold, Interval};
 pub use model::{Kind, Model};
@@ -49,11 +46,9 @@ pub use signals::{Entry, Nothing, Of, Signals};
 pub use {
     error::{Error, Failure},
     experiment::{Experiment, ExperimentOf, Initial, Sample, Time},
-    experiment::{Experiment, ExperimentOf, Hold, Initial, Interval, Sample, Time},
-    integrate::{Automatic, Discrete, Integrator, Rk4, Stuck},
+    information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
+    predict::{FreeRun, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
     weighting::{BySignal, Law, Weighting},
 };
-#[cfg(feature = "std")]
-mod predict;

@@ -11,7 +11,6 @@
 //! | `ke` | line-to-line *rms* back-EMF per mechanical speed (V s/rad): the phase-peak EMF is `sqrt(2/3) ke w` |
 //! | `kt` | torque per ampere of peak `iq`: `sqrt(3/2) ke` (N m/A) |
 //!
-<<<<<<< HEAD
 //! Where data come in another convention, [`units`] and [`frames`] hold a named conversion for each; a bare factor in
 //! user code is the most common bug in this field.
 //!
@@ -44,15 +43,6 @@ pub use machine::{Acting, Machine, Motion, Rotor};
 pub use salient::{Salient, SalientWinding};
 pub use saturated::{Saturated, SaturatedWinding};
 pub use shaft::{COULOMB_WIDTH, Mechanics, Shaft, Torque, Turning};
-=======
-//! Source of the formulas: M. Tenerz, *Parameter Estimation in a Permanent Magnet Synchronous Motor*,
-//! LiTH-ISY-EX--11/4495--SE, Linkoping 2011, called "the thesis"; corrected where it errs, which is said in place.
-
-mod salient;
-mod surface;
-
-pub use salient::{Salient, SalientWinding};
->>>>>>> online
 pub use surface::Surface;
 
 use crate::scalar::Scalar;
@@ -154,7 +144,6 @@ pub enum Error {
     },
 }
 
-<<<<<<< HEAD
 impl Error {
     /// `value` if it is positive and finite.
     pub(crate) fn positive(quantity: &'static str, value: f64, unit: &'static str) -> Result<f64, Error> {
@@ -171,8 +160,6 @@ impl Error {
     }
 }
 
-=======
->>>>>>> online
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
