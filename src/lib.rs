@@ -24,9 +24,13 @@ mod information;
 #[cfg(feature = "std")]
 mod loss;
 #[cfg(feature = "std")]
+pub mod optimize;
+#[cfg(feature = "std")]
 mod predict;
 #[cfg(feature = "std")]
 mod prefilter;
+#[cfg(feature = "std")]
+mod scaling;
 #[cfg(feature = "std")]
 mod weighting;
 
@@ -50,5 +54,6 @@ pub use {
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
     predict::{FreeRun, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
+    scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
     weighting::{BySignal, Law, Weighting},
 };
