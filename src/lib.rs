@@ -18,7 +18,11 @@ pub mod check;
 #[cfg(feature = "std")]
 mod error;
 #[cfg(feature = "std")]
+mod estimate;
+#[cfg(feature = "std")]
 mod experiment;
+#[cfg(feature = "std")]
+mod fit;
 #[cfg(feature = "std")]
 mod information;
 #[cfg(feature = "std")]
@@ -49,10 +53,12 @@ pub use signals::{Entry, Nothing, Of, Signals};
 #[cfg(feature = "std")]
 pub use {
     error::{Error, Failure},
+    estimate::{Direction, Estimate, Knowledge, Method, Prediction, Quality, Share, Unknown, Warning},
     experiment::{Experiment, ExperimentOf, Initial, Sample, Time},
+    fit::{Fit, FitProblem, Objective, Records, Search},
     information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
-    predict::{FreeRun, Predictor, Walk},
+    predict::{FreeRun, Horizon, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
     scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
     weighting::{BySignal, Law, Weighting},

@@ -40,7 +40,9 @@ impl<M: Model> Predictor<M> for Horizon {
             states.push(match measured::state(model, t, u, y, p) {
                 Ok(x) => {
                     known += 1;
-                    if known == 1 && let Some(name) = measured::depends_on_parameter(model, t, &x, u, p) {
+                    if known == 1
+                        && let Some(name) = measured::depends_on_parameter(model, t, &x, u, p)
+                    {
                         let reason = format!("the outputs depend on the parameter `{name}`, too");
                         return Err(Error::StateNotMeasured { experiment: experiment.name().to_owned(), reason });
                     }

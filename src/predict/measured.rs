@@ -32,7 +32,8 @@ pub(crate) fn state<M: Model>(
         let mut errors = vec![0.0; M::Output::LEN];
         for first in (0..n).step_by(LANES) {
             let seeded = M::State::from_fn(|i| Dual::<LANES>::variable(entries(x).as_ref()[i], i.wrapping_sub(first)));
-            let expected = model.output(t, &seeded, &M::Input::map(*u, Dual::from), &M::Parameters::map(*p, Dual::from));
+            let expected =
+                model.output(t, &seeded, &M::Input::map(*u, Dual::from), &M::Parameters::map(*p, Dual::from));
             for (j, output) in M::Output::into_array(expected).into_iter().enumerate() {
                 errors[j] = y.as_ref()[j] - output.value;
                 for lane in 0..LANES.min(n - first) {
