@@ -28,6 +28,8 @@ mod predict;
 #[cfg(feature = "std")]
 mod prefilter;
 #[cfg(feature = "std")]
+mod regress;
+#[cfg(feature = "std")]
 mod weighting;
 
 #[doc(hidden)]
@@ -50,5 +52,6 @@ pub use {
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
     predict::{FreeRun, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
+    regress::{Assumption, Direction, LinearEstimate, Regression, RegressionError},
     weighting::{BySignal, Law, Weighting},
 };

@@ -244,6 +244,23 @@ fn sandwich_is_the_product_of_its_layers() {
 }
 
 #[test]
+fn leverage_is_the_diagonal_of_the_projection() {
+    let rows = random_rows(4, 60, 12);
+    let information = absorbed(4, &rows, 16);
+    let covariance = information.covariance().unwrap();
+    let mut total = 0.0;
+    for (phi, _) in &rows {
+        let product: f64 = (0..16).map(|k| phi[k / 4] * covariance[(k / 4, k % 4)] * phi[k % 4]).sum();
+        let leverage = information.leverage(phi).unwrap();
+        assert_all(&[leverage], &[product], 1e-12);
+        total += leverage;
+    }
+    // The trace of a projection is its rank.
+    assert_all(&[total], &[4.0], 1e-13);
+    assert!(Information::new(1).leverage(&[1.0]).is_err());
+}
+
+#[test]
 fn dependent_columns_are_found_at_any_scale() {
     // Third column: twice the first less the second; the fourth does nothing. Their scales differ by 1e24.
     let scales = [1e-12, 1.0, 1e12, 1.0, 1e6];
