@@ -3,6 +3,29 @@
 use faer::{Mat, linalg::solvers::SolveLstsq};
 use greybox::{Block, Information, RankDeficient, SquareMatrix};
 use proptest::{prelude::*, test_runner::RngSeed};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+struct Counting;
+
+thread_local! {
+    // Of this thread alone: the test harness has threads of its own.
+    static COUNT: Cell<usize> = const { Cell::new(0) };
+}
+
+// SAFETY: hands every call on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.with(|count| count.set(count.get() + 1));
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
 
 /// Numbers in -1..1, the same on every run.
 struct Noise(u64);
@@ -326,6 +349,24 @@ fn a_polynomial_as_bad_as_filip_is_fitted_to_rounding() {
     }
     let relative = residual_sum(&rows, &d) / information.residual_at_zero();
     assert!(relative.sqrt() < 1e-13, "{relative:e}");
+}
+
+#[test]
+fn absorption_needs_no_memory() {
+    let (mut information, mut block, mut noise) = (Information::new(6), Block::new(6, 256), Noise(11));
+    let before = COUNT.with(Cell::get);
+    for _ in 0..100_000 {
+        if block.is_full() {
+            information.absorb(&mut block);
+        }
+        assert!(block.push(&[(); 6].map(|()| noise.next()), noise.next()));
+    }
+    // And where columns have to be scaled.
+    block.column_mut(3).fill(1e-170);
+    information.absorb(&mut block);
+    assert_eq!(COUNT.with(Cell::get), before);
+    let _ = std::hint::black_box(Box::new(1));
+    assert_eq!(COUNT.with(Cell::get), before + 1, "the counter counts");
 }
 
 #[test]

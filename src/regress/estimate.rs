@@ -83,13 +83,13 @@ impl<P: Signals> fmt::Display for LinearEstimate<P> {
         let width = P::NAMES.iter().map(|name| name.chars().count()).max().unwrap_or(0).max(9);
         writeln!(
             f,
-            "{:width$}  {:>13} {:>12} {:>10} {:>10}  unit",
+            "{:width$}  {:>15} {:>12} {:>10} {:>10}  unit",
             "parameter", "value", "std. error", "index %", "held %"
         )?;
         let columns = [self.parameters, self.standard_errors, self.index, self.index_others_held].map(P::into_array);
         for (i, (name, unit)) in P::NAMES.iter().zip(P::UNITS).enumerate() {
             let [value, error, index, held] = columns.each_ref().map(|column| column.as_ref()[i]);
-            writeln!(f, "{name:width$}  {value:>13.6e} {error:>12.2e} {index:>10.3} {held:>10.3}  {unit}")?;
+            writeln!(f, "{name:width$}  {value:>15.8e} {error:>12.2e} {index:>10.3} {held:>10.3}  {unit}")?;
         }
         let assumption = match self.assumption {
             Assumption::EqualVariance => "independent, of equal variance".to_owned(),
