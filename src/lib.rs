@@ -34,6 +34,8 @@ mod predict;
 #[cfg(feature = "std")]
 mod prefilter;
 #[cfg(feature = "std")]
+pub mod regress;
+#[cfg(feature = "std")]
 mod scaling;
 #[cfg(feature = "std")]
 mod weighting;
@@ -60,6 +62,7 @@ pub use {
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
     predict::{FreeRun, Horizon, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
+    regress::{LinearEstimate, Regression},
     scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
     weighting::{BySignal, Law, Weighting},
 };
