@@ -4,7 +4,6 @@ use crate::error::Error;
 use crate::interval::{Hold, Interval};
 use crate::model::Model;
 use crate::parameter::Parameter;
-use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
 use serde::{Deserialize, Serialize};
 
