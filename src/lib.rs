@@ -15,6 +15,8 @@ mod signals;
 pub mod units;
 
 #[cfg(feature = "std")]
+mod by_name;
+#[cfg(feature = "std")]
 pub mod check;
 #[cfg(feature = "std")]
 mod error;
@@ -48,7 +50,7 @@ pub use experiment::CsvFile;
 #[cfg(feature = "std")]
 pub use {
     error::{Error, Failure},
-    experiment::{Experiment, ExperimentOf, Initial, Sample, Time},
+    experiment::{Experiment, ExperimentOf, Gap, Initial, Sample, Time},
     information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
     predict::{FreeRun, Predictor, Walk},
