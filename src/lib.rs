@@ -12,7 +12,10 @@ mod parameter;
 pub mod pmsm;
 mod scalar;
 mod signals;
+pub mod units;
 
+#[cfg(feature = "std")]
+mod by_name;
 #[cfg(feature = "std")]
 pub mod check;
 #[cfg(feature = "std")]
@@ -52,12 +55,14 @@ pub use parameter::{Parameter, Prior, Transform, fixed, free};
 pub use scalar::Scalar;
 pub use signals::{Entry, Nothing, Of, Signals};
 
+#[cfg(feature = "csv")]
+pub use experiment::CsvFile;
 #[cfg(feature = "std")]
 pub use {
     error::{Error, Failure},
     estimate::{Direction, Estimate, Knowledge, Method, Prediction, Quality, Share, Unknown, Warning},
-    experiment::{Experiment, ExperimentOf, Initial, Sample, Time},
     fit::{Fit, FitProblem, Objective, Records, Search},
+    experiment::{Experiment, ExperimentOf, Gap, Initial, Sample, Time},
     information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
     predict::{FreeRun, Horizon, Predictor, Walk},
