@@ -45,7 +45,7 @@ pub use {approx, nalgebra, serde};
 
 pub use covariance::{Covariance, Gain};
 pub use dual::Dual;
-pub use integrate::{Automatic, Discrete, Integrator, Rk4, Stuck};
+pub use integrate::{Automatic, Discrete, Esdirk, Integrator, Rk4, Rk45, Stuck};
 pub use interval::{Hold, Interval};
 pub use model::{Kind, Model};
 pub use parameter::{Parameter, Prior, Transform, fixed, free};
