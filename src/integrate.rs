@@ -136,7 +136,8 @@ impl Adaptive {
                 }
                 None => f64::NAN,
             };
-            let factor = if ratio.is_nan() { 0.1 } else { (0.9 * ratio.powf(-1.0 / self.power)).clamp(0.2, growth) };
+            let factor =
+                if ratio.is_nan() { 0.1 } else { (0.9 * Scalar::powf(ratio, -1.0 / self.power)).clamp(0.2, growth) };
             if ratio <= 1.0 {
                 growth = 5.0;
                 tau += h;

@@ -29,6 +29,7 @@ mod information;
 mod loss;
 #[cfg(feature = "std")]
 pub mod optimize;
+mod numeric;
 #[cfg(feature = "std")]
 mod predict;
 #[cfg(feature = "std")]
@@ -61,6 +62,8 @@ pub use {
     information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
     predict::{FreeRun, Horizon, Predictor, Walk},
+    numeric::{Derivative, Next, Numeric, StateEquation},
+    predict::{FreeRun, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
     regress::{LinearEstimate, Regression},
     scaling::{JacobianColumns, Nominal, Scaling, Unscaled},

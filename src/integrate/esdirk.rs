@@ -10,7 +10,7 @@
 
 use super::{Adaptive, Integrator, Stuck, axpy, combined};
 use crate::dual::Dual;
-use crate::experiment::Interval;
+use crate::interval::Interval;
 use crate::model::{Kind, Model};
 use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
@@ -136,6 +136,7 @@ impl<M: Model> Integrator<M> for Esdirk {
         Some(Esdirk { relative: self.relative * 1e-2, absolute: self.absolute * 1e-2 })
     }
 
+    #[cfg(feature = "std")]
     fn describe(&self) -> String {
         format!("implicit Runge-Kutta 4(3), adaptive, relative {:e}, absolute {:e}", self.relative, self.absolute)
     }

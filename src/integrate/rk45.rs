@@ -2,7 +2,7 @@
 //! of embedded Runge-Kutta formulae", Journal of Computational and Applied Mathematics 6, 1980, 19-26, table 2).
 
 use super::{Adaptive, Integrator, Stuck, combined};
-use crate::experiment::Interval;
+use crate::interval::Interval;
 use crate::model::{Kind, Model};
 use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
@@ -87,6 +87,7 @@ impl<M: Model> Integrator<M> for Rk45 {
         Some(Rk45 { relative: self.relative * 1e-2, absolute: self.absolute * 1e-2 })
     }
 
+    #[cfg(feature = "std")]
     fn describe(&self) -> String {
         format!("Runge-Kutta 5(4), adaptive, relative {:e}, absolute {:e}", self.relative, self.absolute)
     }
