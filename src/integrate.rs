@@ -49,7 +49,7 @@ pub trait Integrator<M: Model>: Clone + Debug + Send + Sync {
     fn describe(&self) -> String;
 }
 
-/// The method cannot cross an interval: its step went below what time can resolve.
+/// The method cannot cross an interval: its step went below what time can resolve, or 100,000 steps were not enough.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stuck;
 
@@ -70,21 +70,19 @@ pub(crate) fn combined<X: Signals, S: Scalar>(x: &Of<X, S>, h: f64, a: &[f64], k
     axpy::<X, S>(*x, h, sum)
 }
 
-/// The steps of an adaptive method.
+/// The error that an adaptive method allows itself per step.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Adaptive {
-    /// Error allowed per step, relative to the value of each state.
+pub(crate) struct Tolerance {
+    /// Relative to the value of each state.
     pub relative: f64,
-    /// Error allowed per step on top, in the unit of each state.
+    /// On top of that, in the unit of each state.
     pub absolute: f64,
-    /// The power of the step that the error estimate goes with.
-    pub power: f64,
 }
 
 /// Steps per interval, tried or taken, after which a method is stuck.
 const MAX_STEPS: u32 = 100_000;
 
-impl Adaptive {
+impl Tolerance {
     /// Largest ratio of an error to what is allowed; not a number if one of the values is not finite.
     #[inline(always)]
     pub fn ratio<X: Signals, S: Scalar>(&self, error: &Of<X, f64>, from: &Of<X, S>, to: &Of<X, S>) -> f64 {
@@ -104,22 +102,24 @@ impl Adaptive {
     }
 
     /// Crosses `interval` from `x` with the step kept in `memory` (s; zero: none yet). `step(x, tau, h)` goes from the time
-    /// `t0 + tau` to `t0 + tau + h` and tells the state there and its error; `None`, where it cannot.
+    /// `t0 + tau` to `t0 + tau + h` and tells the state there and its error, which goes with this `power` of the step;
+    /// `None`, where it cannot.
     #[inline(always)]
     pub fn cross<X: Signals, U: Signals, S: Scalar>(
         &self,
+        power: f64,
         interval: &Interval<U>,
         mut x: Of<X, S>,
         memory: &mut f64,
         mut step: impl FnMut(&Of<X, S>, f64, f64) -> Option<(Of<X, S>, Of<X, f64>)>,
     ) -> Result<Of<X, S>, Stuck> {
         let length = interval.t1 - interval.t0;
-        let resolution = 4.0 * f64::EPSILON * interval.t0.abs().max(interval.t1.abs());
         let (mut tau, mut growth) = (0.0, 5.0);
         // The first step is a cautious guess; a few steps later it is forgotten.
         let mut proposed = if *memory > 0.0 { *memory } else { 1e-3 * length };
         for _ in 0..MAX_STEPS {
             let left = length - tau;
+            let resolution = 4.0 * f64::EPSILON * tau.max((interval.t0 + tau).abs());
             // The last two steps share what is left, so that none is tiny.
             let last = proposed >= left;
             let h = if last { left } else { proposed.min(0.5 * left) };
@@ -137,7 +137,7 @@ impl Adaptive {
                 None => f64::NAN,
             };
             let factor =
-                if ratio.is_nan() { 0.1 } else { (0.9 * Scalar::powf(ratio, -1.0 / self.power)).clamp(0.2, growth) };
+                if ratio.is_nan() { 0.1 } else { (0.9 * Scalar::powf(ratio, -1.0 / power)).clamp(0.2, growth) };
             if ratio <= 1.0 {
                 growth = 5.0;
                 tau += h;

@@ -30,6 +30,7 @@ mod loss;
 #[cfg(feature = "std")]
 pub mod optimize;
 mod numeric;
+pub mod numeric;
 #[cfg(feature = "std")]
 mod predict;
 #[cfg(feature = "std")]
@@ -63,6 +64,7 @@ pub use {
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
     predict::{FreeRun, Horizon, Predictor, Walk},
     numeric::{Derivative, Next, Numeric, StateEquation},
+    numeric::Numeric,
     predict::{FreeRun, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
     regress::{LinearEstimate, Regression},

@@ -1,7 +1,7 @@
 //! [`Rk45`]: the explicit Runge-Kutta pair of orders 5 and 4 of Dormand and Prince (J. R. Dormand, P. J. Prince, "A family
 //! of embedded Runge-Kutta formulae", Journal of Computational and Applied Mathematics 6, 1980, 19-26, table 2).
 
-use super::{Adaptive, Integrator, Stuck, combined};
+use super::{Integrator, Stuck, Tolerance, combined};
 use crate::interval::Interval;
 use crate::model::{Kind, Model};
 use crate::scalar::Scalar;
@@ -62,8 +62,8 @@ impl<M: Model> Integrator<M> for Rk45 {
         let mut k = [zero; STAGES];
         // The times whose derivatives stand in the first and in the last stage.
         let (mut start, mut end) = (f64::NAN, f64::NAN);
-        let steps = Adaptive { relative: self.relative, absolute: self.absolute, power: 5.0 };
-        steps.cross::<M::State, M::Input, S>(interval, x, memory, |x, tau, h| {
+        let tolerance = Tolerance { relative: self.relative, absolute: self.absolute };
+        tolerance.cross::<M::State, M::Input, S>(5.0, interval, x, memory, |x, tau, h| {
             if tau == end {
                 (k[0], start) = (k[STAGES - 1], tau);
             }
