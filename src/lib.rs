@@ -32,6 +32,8 @@ mod information;
 mod loss;
 #[cfg(feature = "std")]
 pub mod optimize;
+mod numeric;
+pub mod numeric;
 #[cfg(feature = "std")]
 mod predict;
 #[cfg(feature = "std")]
@@ -48,7 +50,7 @@ pub use {approx, nalgebra, serde};
 
 pub use covariance::{Covariance, Gain};
 pub use dual::Dual;
-pub use integrate::{Automatic, Discrete, Integrator, Rk4, Stuck};
+pub use integrate::{Automatic, Discrete, Esdirk, Integrator, Rk4, Rk45, Stuck};
 pub use interval::{Hold, Interval};
 pub use model::{Kind, Model};
 pub use parameter::{Parameter, Prior, Transform, fixed, free};
@@ -66,6 +68,9 @@ pub use {
     information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
     predict::{FreeRun, Horizon, Predictor, Walk},
+    numeric::{Derivative, Next, Numeric, StateEquation},
+    numeric::Numeric,
+    predict::{FreeRun, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
     regress::{LinearEstimate, Regression},
     scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
