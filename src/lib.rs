@@ -31,9 +31,9 @@ mod information;
 #[cfg(feature = "std")]
 mod loss;
 #[cfg(feature = "std")]
-pub mod optimize;
-mod numeric;
 pub mod numeric;
+#[cfg(feature = "std")]
+pub mod optimize;
 #[cfg(feature = "std")]
 mod predict;
 #[cfg(feature = "std")]
@@ -63,14 +63,12 @@ pub use experiment::CsvFile;
 pub use {
     error::{Error, Failure},
     estimate::{Direction, Estimate, Knowledge, Method, Prediction, Quality, Share, Unknown, Warning},
-    fit::{Fit, FitProblem, Objective, Records, Search},
     experiment::{Experiment, ExperimentOf, Gap, Initial, Sample, Time},
+    fit::{Fit, FitProblem, Objective, Records, Search},
     information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
-    predict::{FreeRun, Horizon, Predictor, Walk},
     numeric::{Derivative, Next, Numeric, StateEquation},
-    numeric::Numeric,
-    predict::{FreeRun, Predictor, Walk},
+    predict::{FreeRun, Horizon, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
     regress::{LinearEstimate, Regression},
     scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
