@@ -67,7 +67,7 @@ pub use {
     fit::{Fit, FitProblem, Objective, Records, Search},
     information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
-    numeric::{Derivative, Next, Numeric, StateEquation},
+    numeric::Numeric,
     predict::{FreeRun, Horizon, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
     regress::{LinearEstimate, Regression},
