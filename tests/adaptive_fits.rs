@@ -33,7 +33,7 @@ impl Model for Stiff {
 /// The stray current follows at once: `i' = (u - r (i + u / 100)) / l`, exactly from sample to sample.
 fn record<M: Model<State = Circuit, Input = Source, Output = Measured>>(model: &M, r: f64, l: f64) -> ExperimentOf<M> {
     let (h, samples) = (1e-3, 300);
-    let u = |k: usize| if k / 9 % 2 == 0 { 1.0 } else { -0.4 };
+    let u = |k: usize| if k % 18 < 9 { 1.0 } else { -0.4 };
     let mut i = 0.0;
     let mut outputs = Vec::new();
     for k in 0..samples {
