@@ -2,6 +2,8 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 
 mod covariance;
+#[cfg(feature = "std")]
+mod dispatch;
 mod dual;
 mod integrate;
 mod interval;
