@@ -72,7 +72,7 @@ pub use {
     numeric::Numeric,
     predict::{FreeRun, Horizon, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
-    regress::{LinearEstimate, Regression},
+    regress::{Assumption, LinearEstimate, Regression, RegressionError},
     scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
     weighting::{BySignal, Law, Weighting},
 };
