@@ -1,36 +1,20 @@
 //! [`Experiment`]: a measured record, valid by construction.
 
+#[cfg(feature = "csv")]
+mod csv;
+mod time;
+
+#[cfg(feature = "csv")]
+pub use csv::CsvFile;
+#[cfg(feature = "csv")]
+pub(crate) use time::Clock;
+pub use time::Time;
+
 use crate::error::Error;
 use crate::interval::{Hold, Interval};
 use crate::model::Model;
 use crate::parameter::Parameter;
 use crate::signals::{Of, Signals};
-use serde::{Deserialize, Serialize};
-
-/// When the samples were taken (s).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Time {
-    /// `start + k * step`.
-    Uniform {
-        /// Time of the first sample (s).
-        start: f64,
-        /// From sample to sample (s).
-        step: f64,
-    },
-    /// One stamp per sample, increasing.
-    Stamps(Vec<f64>),
-}
-
-impl Time {
-    /// Time of sample `k` (s); not a number beyond the last stamp.
-    #[inline(always)]
-    pub fn at(&self, k: usize) -> f64 {
-        match self {
-            Time::Uniform { start, step } => start + k as f64 * step,
-            Time::Stamps(stamps) => stamps.get(k).copied().unwrap_or(f64::NAN),
-        }
-    }
-}
 
 /// What is known of the state at the first sample.
 #[derive(Clone, Copy, Debug)]
@@ -135,6 +119,11 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     #[inline(always)]
     pub fn time(&self, k: usize) -> f64 {
         self.time.at(k)
+    }
+
+    /// When the samples were taken.
+    pub fn times(&self) -> &Time {
+        &self.time
     }
 
     /// Inputs, one row per sample.

@@ -12,6 +12,7 @@ mod parameter;
 pub mod pmsm;
 mod scalar;
 mod signals;
+pub mod units;
 
 #[cfg(feature = "std")]
 pub mod check;
@@ -50,6 +51,8 @@ pub use parameter::{Parameter, Prior, Transform, fixed, free};
 pub use scalar::Scalar;
 pub use signals::{Entry, Nothing, Of, Signals};
 
+#[cfg(feature = "csv")]
+pub use experiment::CsvFile;
 #[cfg(feature = "std")]
 pub use {
     error::{Error, Failure},
