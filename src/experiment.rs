@@ -44,6 +44,11 @@ pub struct Experiment<X: Signals, U: Signals, Y: Signals> {
 /// The experiment that fits a model.
 pub type ExperimentOf<M> = Experiment<<M as Model>::State, <M as Model>::Input, <M as Model>::Output>;
 
+/// The fewest samples of a record: a state needs an interval to move in.
+pub(crate) fn least<X: Signals>() -> usize {
+    if X::LEN == 0 { 1 } else { 2 }
+}
+
 /// One row of a record.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample<M: Model> {
@@ -164,71 +169,23 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     /// The record, if it keeps its promises.
     pub(crate) fn checked(self) -> Result<Self, Error> {
         let samples = self.inputs.len();
-        let experiment = || self.name.clone();
         if self.outputs.len() != samples {
             let (what, found, reference) = ("the output", self.outputs.len(), "the input");
-            return Err(Error::Lengths { experiment: experiment(), what, found, reference, expected: samples });
+            let experiment = self.name;
+            return Err(Error::Lengths { experiment, what, found, reference, expected: samples });
         }
-        match &self.time {
-            Time::Uniform { start, step } => {
-                if !start.is_finite() {
-                    let signal = "t".to_owned();
-                    return Err(Error::NotFinite {
-                        experiment: experiment(),
-                        signal,
-                        value: *start,
-                        sample: 0,
-                        time: *start,
-                    });
-                }
-                if !(*step > 0.0 && step.is_finite()) {
-                    return Err(Error::NotPositive {
-                        what: format!("experiment `{}`: the sample time", self.name),
-                        value: *step,
-                    });
-                }
-            }
-            Time::Stamps(stamps) => {
-                if stamps.len() != samples {
-                    let (what, found, reference) = ("time", stamps.len(), "the input");
-                    return Err(Error::Lengths { experiment: experiment(), what, found, reference, expected: samples });
-                }
-                if let Some((sample, &value)) = stamps.iter().enumerate().find(|(_, t)| !t.is_finite()) {
-                    let signal = "t".to_owned();
-                    return Err(Error::NotFinite { experiment: experiment(), signal, value, sample, time: value });
-                }
-                if let Some(k) = stamps.windows(2).position(|w| w[1] <= w[0]) {
-                    let (before, time) = (stamps[k], stamps[k + 1]);
-                    return Err(Error::TimeOrder { experiment: experiment(), sample: k + 1, before, time });
-                }
-            }
-        }
-        let needed = if X::LEN == 0 { 1 } else { 2 };
+        self.time.check(&self.name, samples)?;
+        let needed = least::<X>();
         if samples < needed {
-            return Err(Error::TooFewSamples { experiment: experiment(), samples, needed, purpose: "for a fit" });
+            return Err(Error::TooFewSamples { experiment: self.name, samples, needed, purpose: "for a fit" });
         }
-        for k in 0..samples {
-            let inputs = U::into_array(self.inputs[k]);
-            if let Some(i) = inputs.as_ref().iter().position(|v| !v.is_finite()) {
-                let (signal, value) = (U::NAMES[i].to_owned(), inputs.as_ref()[i]);
-                return Err(Error::NotFinite {
-                    experiment: experiment(),
-                    signal,
-                    value,
-                    sample: k,
-                    time: self.time(k),
-                });
-            }
-            let outputs = Y::into_array(self.outputs[k]);
-            if let Some(j) = outputs.as_ref().iter().position(|v| v.is_infinite()) {
-                let (signal, value) = (Y::NAMES[j].to_owned(), outputs.as_ref()[j]);
-                return Err(Error::NotFinite {
-                    experiment: experiment(),
-                    signal,
-                    value,
-                    sample: k,
-                    time: self.time(k),
-                });
+        for sample in 0..samples {
+            let (u, y) = (U::into_array(self.inputs[sample]), Y::into_array(self.outputs[sample]));
+            let inputs = U::NAMES.iter().zip(u.as_ref()).find(|(_, value)| !value.is_finite());
+            let outputs = || Y::NAMES.iter().zip(y.as_ref()).find(|(_, value)| value.is_infinite());
+            if let Some((signal, &value)) = inputs.or_else(outputs) {
+                let (experiment, signal, time) = (self.name.clone(), (*signal).to_owned(), self.time(sample));
+                return Err(Error::NotFinite { experiment, signal, value, sample, time });
             }
         }
         Ok(self)

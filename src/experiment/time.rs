@@ -1,5 +1,6 @@
 //! [`Time`]: when the samples were taken, and whether that was evenly.
 
+use crate::error::Error;
 use serde::{Deserialize, Serialize};
 
 /// When the samples were taken (s).
@@ -37,6 +38,41 @@ impl Time {
             Time::Uniform { start, step } => start + k as f64 * step,
             Time::Stamps(stamps) => stamps.get(k).copied().unwrap_or(f64::NAN),
         }
+    }
+
+    /// Refuses time that is not finite, does not increase, or does not go with so many samples.
+    pub(crate) fn check(&self, experiment: &str, samples: usize) -> Result<(), Error> {
+        if let Time::Stamps(stamps) = self
+            && stamps.len() != samples
+        {
+            let (experiment, what, found, reference) = (experiment.to_owned(), "time", stamps.len(), "the input");
+            return Err(Error::Lengths { experiment, what, found, reference, expected: samples });
+        }
+        if let Time::Uniform { step: value, .. } = *self
+            && !(value > 0.0 && value.is_finite())
+        {
+            return Err(Error::NotPositive { what: format!("experiment `{experiment}`: the sample time"), value });
+        }
+        // A uniform time fails, if at all, where its numbers are largest: a step below their resolution, or an overflow.
+        let places = match self {
+            Time::Uniform { .. } => [0..samples.min(2), samples.saturating_sub(2)..samples],
+            Time::Stamps(_) => [0..samples, 0..0],
+        };
+        for place in places {
+            let mut before = f64::NEG_INFINITY;
+            for sample in place {
+                let time = self.at(sample);
+                if !time.is_finite() {
+                    let (experiment, signal) = (experiment.to_owned(), "t".to_owned());
+                    return Err(Error::NotFinite { experiment, signal, value: time, sample, time });
+                }
+                if time <= before {
+                    return Err(Error::TimeOrder { experiment: experiment.to_owned(), sample, before, time });
+                }
+                before = time;
+            }
+        }
+        Ok(())
     }
 }
 
