@@ -195,3 +195,37 @@ fn vectors_that_make_no_record() {
     }
     says(new(EVEN, &[U; 3], &[Y, Currents { iq: f64::INFINITY, ..Y }, Y]), &["`iq` is inf", "sample 1", "0.1 s"]);
 }
+
+#[test]
+fn unwritable() {
+    let record = Experiment::new(&Pmsm, EVEN, vec![U; 3], vec![Y; 3]).unwrap();
+    says(record.to_csv(path("no_such_folder/record.csv")), &["no_such_folder", "record.csv"]);
+    says(record.to_csv(env!("CARGO_TARGET_TMPDIR")), &[env!("CARGO_TARGET_TMPDIR")]);
+    if std::path::Path::new("/dev/full").exists() {
+        let long = Experiment::new(&Pmsm, EVEN, vec![U; 100_000], vec![Y; 100_000]).unwrap();
+        says(long.to_csv("/dev/full"), &["/dev/full", "space"]);
+        says(record.to_csv("/dev/full"), &["/dev/full", "space"]);
+    }
+    // A folder stands where the file would be written first: the old file stays as it was.
+    let old = file("kept.csv", "old");
+    std::fs::create_dir_all(path("kept.csv.part")).unwrap();
+    says(record.to_csv(&old), &["kept.csv"]);
+    assert_eq!(std::fs::read_to_string(old).unwrap(), "old");
+}
+
+#[test]
+fn writing_two_columns_of_one_name() {
+    struct Twice;
+    impl Model for Twice {
+        type State = Currents;
+        type Input = Drive;
+        type Output = Drive;
+        type Parameters = Winding;
+
+        fn output<S: Scalar>(&self, _t: f64, _x: &Currents<S>, u: &Drive<S>, _p: &Winding<S>) -> Drive<S> {
+            *u
+        }
+    }
+    let record = Experiment::new(&Twice, EVEN, vec![U; 3], vec![U; 3]).unwrap();
+    says(record.to_csv(path("twice_written.csv")), &["twice_written.csv", "`ud`", "2 and 4"]);
+}

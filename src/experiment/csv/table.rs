@@ -128,6 +128,6 @@ fn cells(file: &CsvFile, line: &[u8]) -> Result<Vec<String>, Error> {
 }
 
 /// The error of a file that cannot be read or written.
-fn cannot(path: &Path, source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Error {
+pub(super) fn cannot(path: &Path, source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Error {
     Error::File { path: path.to_owned(), source: source.into() }
 }
