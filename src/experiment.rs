@@ -2,35 +2,53 @@
 
 #[cfg(feature = "csv")]
 mod csv;
+mod cycles;
+mod edit;
+mod meta;
 mod time;
 
 #[cfg(feature = "csv")]
 pub use csv::CsvFile;
+pub use cycles::Gap;
 #[cfg(feature = "csv")]
 pub(crate) use time::Clock;
 pub use time::Time;
 
+use crate::by_name;
 use crate::error::Error;
 use crate::interval::{Hold, Interval};
 use crate::model::Model;
 use crate::parameter::Parameter;
 use crate::signals::{Of, Signals};
+use serde::{Deserialize, Serialize};
 
 /// What is known of the state at the first sample.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(bound = "")]
 pub enum Initial<X: Signals> {
     /// It is estimated, starting from what the first sample says.
     Estimated,
     /// It is what the first sample says, taken as exact.
     FirstSample,
     /// Guess, bounds and prior of each state.
-    Given(Of<X, Parameter>),
+    Given(
+        #[serde(
+            serialize_with = "by_name::serialize::<X, _, _>",
+            deserialize_with = "by_name::deserialize::<X, _, _>"
+        )]
+        Of<X, Parameter>,
+    ),
 }
 
 /// One measured record of inputs `U` and outputs `Y`, and what is known of the state `X` at its first sample.
 ///
 /// Time increases, inputs are finite, lengths agree; an output that was not measured is `NaN`. Without a further word the
 /// input is held from sample to sample, and the initial state is estimated from a start that the first sample gives.
+///
+/// It is made of vectors ([`new`](Experiment::new)) or of a CSV file (`from_csv`, `CsvFile`), and
+/// cut ([`slice`](Experiment::slice), [`between`](Experiment::between), [`split`](Experiment::split),
+/// [`cycles`](Experiment::cycles), [`without_gaps`](Experiment::without_gaps)), [joined](Experiment::join) and
+/// [thinned](Experiment::decimate) into others. As JSON it keeps everything; what is read back is checked again.
 #[derive(Clone, Debug)]
 pub struct Experiment<X: Signals, U: Signals, Y: Signals> {
     pub(crate) name: String,
@@ -189,6 +207,20 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
             }
         }
         Ok(self)
+    }
+
+    /// The samples of a range that the record has, and that is long enough, under a name of their own.
+    pub(crate) fn piece(&self, samples: std::ops::Range<usize>, name: String) -> Self {
+        let time = match &self.time {
+            Time::Uniform { step, .. } => Time::Uniform { start: self.time(samples.start), step: *step },
+            Time::Stamps(stamps) => Time::Stamps(stamps[samples.clone()].to_vec()),
+        };
+        let initial = match self.initial {
+            Initial::Given(_) if samples.start > 0 => Initial::Estimated,
+            initial => initial,
+        };
+        let (inputs, outputs) = (self.inputs[samples.clone()].to_vec(), self.outputs[samples].to_vec());
+        Experiment { name, time, inputs, outputs, hold: self.hold, initial }
     }
 
     /// What happens from sample `k` to the next.

@@ -15,6 +15,8 @@ mod signals;
 pub mod units;
 
 #[cfg(feature = "std")]
+mod by_name;
+#[cfg(feature = "std")]
 pub mod check;
 #[cfg(feature = "std")]
 mod error;
@@ -57,7 +59,7 @@ pub use experiment::CsvFile;
 pub use {
     error::{Error, Failure},
     estimate::{Direction, Estimate, Knowledge, Method, Prediction, Quality, Share, Unknown, Warning},
-    experiment::{Experiment, ExperimentOf, Initial, Sample, Time},
+    experiment::{Experiment, ExperimentOf, Gap, Initial, Sample, Time},
     fit::{Fit, FitProblem, Objective, Records, Search},
     information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},

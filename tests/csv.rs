@@ -127,6 +127,23 @@ fn time_is_uniform_only_where_it_is() {
     assert!(matches!(Time::from_stamps(epoch), Time::Uniform { .. }));
 }
 
+/// A pipe is read once; an uneven clock keeps its stamps there too.
+#[cfg(unix)]
+#[test]
+fn reads_from_a_pipe() {
+    let pipe = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("pipe_{}", std::process::id()));
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for (last, even) in [(4, true), (5, false)] {
+        let (to, text) = (pipe.clone(), format!("t,ud,w,id,iq\n0,1,2,3,4\n2,1,2,3,4\n{last},1,2,3,4\n"));
+        let writer = std::thread::spawn(move || std::fs::write(to, text).unwrap());
+        let record = Experiment::from_csv(&Pmsm, &pipe).unwrap();
+        writer.join().unwrap();
+        assert_eq!([record.time(0), record.time(1), record.time(2)], [0.0, 2.0, last as f64]);
+        assert_eq!(matches!(record.times(), Time::Uniform { .. }), even);
+    }
+    std::fs::remove_file(pipe).unwrap();
+}
+
 struct Line;
 
 signals! {

@@ -118,6 +118,7 @@ impl Clock {
     }
 
     /// The last stamp; `None` before the first.
+    #[cfg(feature = "csv")]
     pub(crate) fn last(&self) -> Option<f64> {
         (self.ticks > 0).then_some(self.last)
     }
