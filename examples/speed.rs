@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::var("PEERDATA").unwrap_or_else(|_| "data".to_owned());
     let fleet = size == "fleet";
     let path = if fleet { format!("{folder}/fleet.bin") } else { format!("{folder}/data_{size}.bin") };
-    let model = Surface { np: 4.0 };
+    let model = Surface::new(4)?;
     let records = read(&model, &path, if fleet { 2000 } else { usize::MAX })?;
     let mut times = vec![];
     let (mut cost, mut passes) = (0.0, 0);

@@ -31,11 +31,15 @@ mod information;
 #[cfg(feature = "std")]
 mod loss;
 #[cfg(feature = "std")]
+pub mod numeric;
+#[cfg(feature = "std")]
 pub mod optimize;
 #[cfg(feature = "std")]
 mod predict;
 #[cfg(feature = "std")]
 mod prefilter;
+#[cfg(feature = "std")]
+pub mod regress;
 #[cfg(feature = "std")]
 mod scaling;
 #[cfg(feature = "std")]
@@ -46,7 +50,7 @@ pub use {approx, nalgebra, serde};
 
 pub use covariance::{Covariance, Gain};
 pub use dual::Dual;
-pub use integrate::{Automatic, Discrete, Integrator, Rk4, Stuck};
+pub use integrate::{Automatic, Discrete, Esdirk, Integrator, Rk4, Rk45, Stuck};
 pub use interval::{Hold, Interval};
 pub use model::{Kind, Model};
 pub use parameter::{Parameter, Prior, Transform, fixed, free};
@@ -63,8 +67,10 @@ pub use {
     fit::{Fit, FitProblem, Objective, Records, Search},
     information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
+    numeric::{Derivative, Next, Numeric, StateEquation},
     predict::{FreeRun, Horizon, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
+    regress::{LinearEstimate, Regression},
     scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
     weighting::{BySignal, Law, Weighting},
 };

@@ -107,7 +107,7 @@ impl Clock {
         }
         if self.ticks > 0 {
             // Rounding: half a unit in the last place each for this stamp, the first, the product and the sum.
-            let rounding = 2.0 * f64::EPSILON * stamp.abs().max(self.start.abs());
+            let rounding = 2.0 * f64::EPSILON * (stamp.abs() + self.start.abs());
             let (steps, tolerance) = (self.ticks as f64, self.tolerance + rounding);
             self.shortest = self.shortest.max((stamp - self.start - tolerance) / steps);
             self.longest = self.longest.min((stamp - self.start + tolerance) / steps);
