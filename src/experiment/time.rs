@@ -77,7 +77,7 @@ impl Time {
 }
 
 /// How far a stamp may be off an even grid, as a fraction of the step.
-pub(crate) const EVEN: f64 = 1e-6;
+const EVEN: f64 = 1e-6;
 
 /// Tells, stamp by stamp and without keeping them, whether one even grid from the first stamp on serves them all: each
 /// stamp narrows the range that the step can be in.
