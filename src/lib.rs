@@ -2,6 +2,8 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 
 mod covariance;
+#[cfg(feature = "std")]
+mod dispatch;
 mod dual;
 mod integrate;
 mod interval;
@@ -67,7 +69,7 @@ pub use {
     fit::{Fit, FitProblem, Objective, Records, Search},
     information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
-    numeric::{Derivative, Next, Numeric, StateEquation},
+    numeric::Numeric,
     predict::{FreeRun, Horizon, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
     regress::{LinearEstimate, Regression},
