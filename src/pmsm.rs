@@ -26,8 +26,12 @@
 //! Source of the formulas: M. Tenerz, *Parameter Estimation in a Permanent Magnet Synchronous Motor*,
 //! LiTH-ISY-EX--11/4495--SE, Linkoping 2011, called "the thesis"; corrected where it errs, which is said in place.
 
+pub mod control;
 pub mod frames;
+pub mod inverter;
 pub mod motor;
+pub mod robot;
+pub mod sensors;
 pub mod temperature;
 pub mod units;
 
