@@ -21,15 +21,23 @@
 //! | [`motor`] | constants from geometry | units |
 //! | [`temperature`] | winding and magnet laws, temperatures read back from estimates | |
 //! | [`Surface`], [`Salient`], [`Saturated`], [`Fed`], [`Shaft`] | the equations, each a [`Model`](crate::Model) | frames |
+//! | [`control`], [`inverter`], [`sensors`] | the parts of a drive | frames |
+//! | [`robot`] | the axes of the reference robot | temperature |
+//! | [`Plant`] | a motor and its load as they really are | inverter, robot |
+//! | `program`, `drive` | motion programs; the whole drive in simulation (with `std`) | all of these |
 //! | [`Machine`] | currents, speed and angle together | `Salient`, `Shaft` |
 //!
 //! Source of the formulas: M. Tenerz, *Parameter Estimation in a Permanent Magnet Synchronous Motor*,
 //! LiTH-ISY-EX--11/4495--SE, Linkoping 2011, called "the thesis"; corrected where it errs, which is said in place.
 
 pub mod control;
+#[cfg(feature = "std")]
+pub mod drive;
 pub mod frames;
 pub mod inverter;
 pub mod motor;
+#[cfg(feature = "std")]
+pub mod program;
 pub mod robot;
 pub mod sensors;
 pub mod temperature;
@@ -37,6 +45,7 @@ pub mod units;
 
 mod fed;
 mod machine;
+mod plant;
 mod salient;
 mod saturated;
 mod shaft;
@@ -44,13 +53,13 @@ mod surface;
 
 pub use fed::{AngledDrive, Fed, Line, dead_time};
 pub use machine::{Acting, Machine, Motion, Rotor};
+pub use plant::Plant;
 pub use salient::{Salient, SalientWinding};
 pub use saturated::{Saturated, SaturatedWinding};
 pub use shaft::{COULOMB_WIDTH, Mechanics, Shaft, Torque, Turning};
 pub use surface::Surface;
 
 use crate::scalar::Scalar;
-use core::fmt;
 use serde::{Deserialize, Serialize};
 
 /// `sqrt(2/3)`: phase peak from line-to-line rms.
@@ -131,11 +140,13 @@ impl From<PolePairs> for u32 {
 }
 
 /// Why a motor, a drive or a temperature was refused.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, thiserror::Error)]
 pub enum Error {
     /// A motor needs at least one pole pair.
+    #[error("a motor has at least one pole pair; got 0 (count magnet poles, divide by 2)")]
     NoPolePairs,
     /// A quantity lies outside the range in which it means something.
+    #[error("{quantity} is {value} {unit}; it must {must}")]
     OutOfRange {
         /// What it is, in words.
         quantity: &'static str,
@@ -163,18 +174,3 @@ impl Error {
         if value.is_finite() { Ok(value) } else { Err(Error::OutOfRange { quantity, value, unit, must: "be finite" }) }
     }
 }
-
-impl fmt::Display for Error {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Error::NoPolePairs => {
-                write!(f, "a motor has at least one pole pair; got 0 (count magnet poles, divide by 2)")
-            }
-            Error::OutOfRange { quantity, value, unit, must } => {
-                write!(f, "{quantity} is {value} {unit}; it must {must}")
-            }
-        }
-    }
-}
-
-impl core::error::Error for Error {}
