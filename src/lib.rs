@@ -24,9 +24,13 @@ mod information;
 #[cfg(feature = "std")]
 mod loss;
 #[cfg(feature = "std")]
+mod outliers;
+#[cfg(feature = "std")]
 mod predict;
 #[cfg(feature = "std")]
 mod prefilter;
+#[cfg(feature = "std")]
+mod regress;
 #[cfg(feature = "std")]
 mod weighting;
 
@@ -48,7 +52,9 @@ pub use {
     experiment::{Experiment, ExperimentOf, Initial, Sample, Time},
     information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
+    outliers::hampel,
     predict::{FreeRun, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
+    regress::{Equations, Regression, all_free},
     weighting::{BySignal, Law, Weighting},
 };

@@ -25,6 +25,7 @@
 //! | [`robot`] | the axes of the reference robot | temperature |
 //! | [`Plant`] | a motor and its load as they really are | inverter, robot |
 //! | `program`, `drive` | motion programs; the whole drive in simulation (with `std`) | all of these |
+//! | `offline` | least squares on a record (with `std`) | drive |
 //! | [`Machine`] | currents, speed and angle together | `Salient`, `Shaft` |
 //!
 //! Source of the formulas: M. Tenerz, *Parameter Estimation in a Permanent Magnet Synchronous Motor*,
@@ -36,6 +37,8 @@ pub mod drive;
 pub mod frames;
 pub mod inverter;
 pub mod motor;
+#[cfg(feature = "std")]
+pub mod offline;
 #[cfg(feature = "std")]
 pub mod program;
 pub mod robot;
