@@ -1,5 +1,6 @@
 //! [`Parameter`]: what is known of a quantity before the data speak.
 
+use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
 /// A free parameter that starts at `start`.
@@ -95,7 +96,7 @@ impl Transform {
     pub fn to_coordinate(self, value: f64) -> f64 {
         match self {
             Transform::Identity => value,
-            Transform::Log => value.ln(),
+            Transform::Log => Scalar::ln(value),
         }
     }
 
@@ -103,7 +104,7 @@ impl Transform {
     pub fn to_value(self, coordinate: f64) -> f64 {
         match self {
             Transform::Identity => coordinate,
-            Transform::Log => coordinate.exp(),
+            Transform::Log => Scalar::exp(coordinate),
         }
     }
 
