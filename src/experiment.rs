@@ -1,21 +1,12 @@
 //! [`Experiment`]: a measured record, valid by construction.
 
 use crate::error::Error;
+use crate::interval::{Hold, Interval};
 use crate::model::Model;
 use crate::parameter::Parameter;
 use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
 use serde::{Deserialize, Serialize};
-
-/// How the input behaves between two samples.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Hold {
-    /// Constant from each sample to the next (what a digital controller commands).
-    #[default]
-    Zero,
-    /// A straight line from each sample to the next (a sampled physical quantity).
-    First,
-}
 
 /// When the samples were taken (s).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -266,34 +257,5 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
 impl<X: Signals, U: Signals, Y: Signals> AsRef<[Experiment<X, U, Y>]> for Experiment<X, U, Y> {
     fn as_ref(&self) -> &[Experiment<X, U, Y>] {
         std::slice::from_ref(self)
-    }
-}
-
-/// The time between two samples and the input in it.
-#[derive(Clone, Copy, Debug)]
-pub struct Interval<U: Signals> {
-    /// Its begin (s).
-    pub t0: f64,
-    /// Its end (s).
-    pub t1: f64,
-    /// The input at its begin.
-    pub u0: Of<U, f64>,
-    /// The input at its end; the same under a zero-order hold.
-    pub u1: Of<U, f64>,
-    /// How the input gets from one to the other.
-    pub hold: Hold,
-}
-
-impl<U: Signals> Interval<U> {
-    /// The input at the fraction `s` (0 to 1) of the interval.
-    #[inline(always)]
-    pub fn input<S: Scalar>(&self, s: f64) -> Of<U, S> {
-        match self.hold {
-            Hold::Zero => U::map(self.u0, S::from),
-            Hold::First => {
-                let (u0, u1) = (U::into_array(self.u0), U::into_array(self.u1));
-                U::from_fn(|i| S::from(u0.as_ref()[i] + (u1.as_ref()[i] - u0.as_ref()[i]) * s))
-            }
-        }
     }
 }

@@ -8,7 +8,7 @@ pub use automatic::Automatic;
 pub use discrete::Discrete;
 pub use rk4::Rk4;
 
-use crate::experiment::Interval;
+use crate::interval::Interval;
 use crate::model::{Kind, Model};
 use crate::scalar::Scalar;
 use crate::signals::Of;
@@ -41,6 +41,7 @@ pub trait Integrator<M: Model>: Clone + Debug + Send + Sync {
     fn refined(&self) -> Option<Self>;
 
     /// Name and settings in a few words, for reports.
+    #[cfg(feature = "std")]
     fn describe(&self) -> String;
 }
 

@@ -1,7 +1,7 @@
 //! [`Automatic`]: the step that the model's kind asks for.
 
 use super::{Discrete, Integrator, Rk4, Stuck};
-use crate::experiment::Interval;
+use crate::interval::Interval;
 use crate::model::{Kind, Model};
 use crate::scalar::Scalar;
 use crate::signals::Of;
@@ -45,6 +45,7 @@ impl<M: Model> Integrator<M> for Automatic {
         }
     }
 
+    #[cfg(feature = "std")]
     fn describe(&self) -> String {
         match M::KIND {
             Kind::Continuous => Integrator::<M>::describe(&self.continuous),

@@ -1,7 +1,7 @@
 //! [`Discrete`]: the step of a discrete-time model.
 
 use super::{Integrator, Stuck};
-use crate::experiment::Interval;
+use crate::interval::Interval;
 use crate::model::{Kind, Model};
 use crate::scalar::Scalar;
 use crate::signals::Of;
@@ -34,6 +34,7 @@ impl<M: Model> Integrator<M> for Discrete {
         None
     }
 
+    #[cfg(feature = "std")]
     fn describe(&self) -> String {
         "discrete steps".to_owned()
     }

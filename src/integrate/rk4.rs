@@ -1,7 +1,7 @@
 //! [`Rk4`]: the classical Runge-Kutta method of order 4 (Kutta 1901).
 
 use super::{Integrator, Stuck, axpy};
-use crate::experiment::Interval;
+use crate::interval::Interval;
 use crate::model::{Kind, Model};
 use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
@@ -62,6 +62,7 @@ impl<M: Model> Integrator<M> for Rk4 {
         Some(Rk4 { substeps: self.substeps.max(1).saturating_mul(2) })
     }
 
+    #[cfg(feature = "std")]
     fn describe(&self) -> String {
         format!("Runge-Kutta 4, {} step(s) per sample", self.substeps.max(1))
     }

@@ -1,0 +1,85 @@
+use crate::dual::Dual;
+use crate::model::{Kind, Model};
+use crate::signals::{Of, Signals};
+
+/// What an adaptation law sees of one sample.
+pub struct Moment<'a, M: Model> {
+    /// The observer's model.
+    pub model: &'a M,
+    /// Sample time (s).
+    pub ts: f64,
+    /// Time (s).
+    pub t: f64,
+    /// Predicted states, before the correction.
+    pub x: &'a Of<M::State, f64>,
+    /// Measured less predicted states.
+    pub e: &'a Of<M::State, f64>,
+    /// Inputs.
+    pub u: &'a Of<M::Input, f64>,
+    /// Parameters, before the correction.
+    pub p: &'a Of<M::Parameters, f64>,
+}
+
+/// How a parameter moves in one sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Rate {
+    /// By so much per second, in its unit.
+    Adapt(f64),
+    /// Not at all: this sample tells nothing reliable of it.
+    Hold {
+        /// What is too small, in words and with its unit.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+        /// The limit it stays under.
+        limit: f64,
+    },
+}
+
+/// An adaptation law: how the error between measured and predicted states moves the parameters. Closures are laws.
+pub trait Law<M: Model> {
+    /// The rate of each parameter.
+    fn rates(&self, now: &Moment<M>) -> Of<M::Parameters, Rate>;
+}
+
+impl<M: Model, F: Fn(&Moment<M>) -> Of<M::Parameters, Rate>> Law<M> for F {
+    #[inline(always)]
+    fn rates(&self, now: &Moment<M>) -> Of<M::Parameters, Rate> {
+        self(now)
+    }
+}
+
+/// The gradient law `dp/dt = gain (df/dp)^T e`, for any model by exact slopes; of a discrete model, `df` is what one
+/// sample adds, per second.
+///
+/// Where `f` is linear in the parameters, this is the law of Lyapunov's `V = e^T e + sum of (error of p)^2 / gain`. `N`
+/// is the number of parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gradient<P, const N: usize> {
+    /// Gain of each parameter, zero or more: (unit of p)^2 / (s (unit of x)^2).
+    pub gain: P,
+}
+
+impl<M: Model, const N: usize> Law<M> for Gradient<Of<M::Parameters, f64>, N> {
+    #[inline]
+    fn rates(&self, now: &Moment<M>) -> Of<M::Parameters, Rate> {
+        const { assert!(N == M::Parameters::LEN, "the second parameter of Gradient is the number of parameters") };
+        let p = M::Parameters::into_array(*now.p);
+        let p = M::Parameters::from_fn(|i| Dual::<N>::variable(p.as_ref()[i], i));
+        let (x, u) = (M::State::map(*now.x, Dual::from), M::Input::map(*now.u, Dual::from));
+        let (f, scale) = match M::KIND {
+            Kind::Continuous => (now.model.derivative(now.t, &x, &u, &p), 1.0),
+            Kind::Discrete => (now.model.next(now.t, &x, &u, &p), 1.0 / now.ts),
+            Kind::Static => (x, 0.0),
+        };
+        let (f, e, gain) =
+            (M::State::into_array(f), M::State::into_array(*now.e), M::Parameters::into_array(self.gain));
+        M::Parameters::from_fn(|j| {
+            let mut sum = 0.0;
+            for i in 0..M::State::LEN {
+                sum += f.as_ref()[i].slopes[j] * e.as_ref()[i];
+            }
+            Rate::Adapt(sum * gain.as_ref()[j] * scale)
+        })
+    }
+}
