@@ -21,6 +21,9 @@
 //! | [`motor`] | constants from geometry | units |
 //! | [`temperature`] | winding and magnet laws, temperatures read back from estimates | |
 //! | [`Surface`], [`Salient`], [`Saturated`], [`Fed`], [`Shaft`] | the equations, each a [`Model`](crate::Model) | frames |
+//! | [`ExactSurface`], [`ExactFed`] | the currents' equation in exact steps, for observers | `Fed` |
+//! | [`MotorLaw`] and its parts | adaptation laws for the motor's [`Mras`](crate::online::Mras) | |
+//! | [`Injection`] | d current that makes the resistance visible | |
 //! | [`Machine`] | currents, speed and angle together | `Salient`, `Shaft` |
 //!
 //! Source of the formulas: M. Tenerz, *Parameter Estimation in a Permanent Magnet Synchronous Motor*,
@@ -31,14 +34,23 @@ pub mod motor;
 pub mod temperature;
 pub mod units;
 
+mod adaptation;
+mod exact;
 mod fed;
+mod injection;
 mod machine;
 mod salient;
 mod saturated;
 mod shaft;
 mod surface;
 
+pub use adaptation::{
+    Adaptation, DeadZone, DirectCurrent, KeConstantGain, KeLyapunov, MotorLaw, Normalized, Resting, RsDirect,
+    RsLyapunov, Seen, lyapunov_margin, lyapunov_rate,
+};
+pub use exact::{ExactFed, ExactStep, ExactSurface, FedWinding, HeldIn};
 pub use fed::{AngledDrive, Fed, Line, dead_time};
+pub use injection::{Injection, Stair};
 pub use machine::{Acting, Machine, Motion, Rotor};
 pub use salient::{Salient, SalientWinding};
 pub use saturated::{Saturated, SaturatedWinding};
