@@ -21,6 +21,9 @@
 //! | [`motor`] | constants from geometry | units |
 //! | [`temperature`] | winding and magnet laws, temperatures read back from estimates | |
 //! | [`Surface`], [`Salient`], [`Saturated`], [`Fed`], [`Shaft`] | the equations, each a [`Model`](crate::Model) | frames |
+//! | [`ExactSurface`], [`ExactFed`] | the currents' equation in exact steps, for observers | `Fed` |
+//! | [`MotorLaw`] and its parts | adaptation laws for the motor's [`Mras`](crate::online::Mras) | |
+//! | [`Injection`] | d current that makes the resistance visible | |
 //! | [`control`], [`inverter`], [`sensors`] | the parts of a drive | frames |
 //! | [`robot`] | the axes of the reference robot | temperature |
 //! | [`Plant`] | a motor and its load as they really are | inverter, robot |
@@ -46,7 +49,10 @@ pub mod sensors;
 pub mod temperature;
 pub mod units;
 
+mod adaptation;
+mod exact;
 mod fed;
+mod injection;
 mod machine;
 mod plant;
 mod salient;
@@ -54,7 +60,13 @@ mod saturated;
 mod shaft;
 mod surface;
 
+pub use adaptation::{
+    Adaptation, DeadZone, DirectCurrent, KeConstantGain, KeLyapunov, MotorLaw, Normalized, Resting, RsDirect,
+    RsLyapunov, Seen, lyapunov_margin, lyapunov_rate,
+};
+pub use exact::{ExactFed, ExactStep, ExactSurface, FedWinding, HeldIn};
 pub use fed::{AngledDrive, Fed, Line, dead_time};
+pub use injection::{Injection, Stair};
 pub use machine::{Acting, Machine, Motion, Rotor};
 pub use plant::Plant;
 pub use salient::{Salient, SalientWinding};
