@@ -28,12 +28,15 @@
 //! | [`robot`] | the axes of the reference robot | temperature |
 //! | [`Plant`] | a motor and its load as they really are | inverter, robot |
 //! | `program`, `drive` | motion programs; the whole drive in simulation (with `std`) | all of these |
+//! | `adaptive` | a drive that uses its observer (with `std`) | control, `Machine` |
 //! | `offline` | least squares on a record (with `std`) | drive |
 //! | [`Machine`] | currents, speed and angle together | `Salient`, `Shaft` |
 //!
 //! Source of the formulas: M. Tenerz, *Parameter Estimation in a Permanent Magnet Synchronous Motor*,
 //! LiTH-ISY-EX--11/4495--SE, Linkoping 2011, called "the thesis"; corrected where it errs, which is said in place.
 
+#[cfg(feature = "std")]
+pub mod adaptive;
 pub mod control;
 #[cfg(feature = "std")]
 pub mod drive;
