@@ -219,26 +219,154 @@ pub struct Regression<P: Signals> {
     pub rows: usize,
 }
 
+impl<P: Signals> Regression<P> {
+    /// Index (%) above which a parameter counts as hardly seen: a change by two fifths of its value does no more than
+    /// double the squared residual.
+    pub const WEAK: f64 = 40.0;
+
+    /// Names of the parameters that these equations hardly see, by [`WEAK`](Self::WEAK): their values are not to be relied
+    /// on, whatever their standard errors.
+    pub fn weak(&self) -> Vec<&'static str> {
+        let index = P::into_array(self.index);
+        P::NAMES
+            .iter()
+            .zip(index.as_ref())
+            .filter(|(_, index)| !(**index <= Self::WEAK))
+            .map(|(name, _)| *name)
+            .collect()
+    }
+}
+
 impl<P: Signals> fmt::Display for Regression<P> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (value, std, index) = (P::into_array(self.parameters), P::into_array(self.std), P::into_array(self.index));
-        writeln!(f, "{:<10} {:>14} {:>14} {:>10}", "parameter", "value", "std. error", "index %")?;
+        writeln!(f, "{:<10} {:>14} {:>10} {:<8} {:>10}", "parameter", "value", "std. error", "unit", "index %")?;
         for i in 0..P::LEN {
             writeln!(
                 f,
-                "{:<10} {:>14.6e} {:>14.2e} {:>10.3} {}",
+                "{:<10} {:>14.6e} {:>10.2e} {:<8} {:>10.3}",
                 P::NAMES[i],
                 value.as_ref()[i],
                 std.as_ref()[i],
-                index.as_ref()[i],
-                P::UNITS[i]
+                P::UNITS[i],
+                index.as_ref()[i]
             )?;
         }
-        Ok(())
+        match self.weak().as_slice() {
+            [] => Ok(()),
+            weak => writeln!(f, "hardly seen in these data: {}", weak.join(", ")),
+        }
     }
 }
 
 /// What a regression may be told to hold, by signals: nothing.
 pub fn all_free<P: Signals>() -> Of<P, Option<f64>> {
     P::splat(None)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+    use rand_xoshiro::rand_core::SeedableRng;
+
+    crate::signals! {
+        struct Pair { a: "V/A", b: "V" }
+    }
+
+    fn rows(n: usize, noise: f64, seed: u64) -> Vec<(Pair, f64)> {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        (0..n)
+            .map(|k| {
+                let x = (0.01 * k as f64).sin();
+                let e: f64 = StandardNormal.sample(&mut rng);
+                (Pair { a: x, b: 1.0 }, 3.0 * x - 0.5 + noise * e)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn exact_rows_give_exact_parameters() {
+        let filter = Butterworth::low_pass(4, 10.0, 1e-3).unwrap();
+        for equations in [
+            Equations::new().stream(rows(500, 0.0, 1)),
+            Equations::new().stream(rows(500, 0.0, 1)).prefiltered(&filter),
+            Equations::new().stream(rows(500, 0.0, 1)).weighted(|k| k as f64).unwrap(),
+        ] {
+            let found = equations.solve(all_free::<Pair>()).unwrap();
+            assert_relative_eq!(found.parameters, Pair { a: 3.0, b: -0.5 }, max_relative = 1e-12);
+        }
+        let held = Equations::new().stream(rows(500, 0.0, 1)).solve(Pair { a: Some(3.0), b: None }).unwrap();
+        assert_relative_eq!(held.parameters, Pair { a: 3.0, b: -0.5 }, max_relative = 1e-12);
+        assert_eq!(held.std.a, 0.0);
+    }
+
+    // The index is the change that doubles the squared residual when the others are refitted: the profile itself.
+    #[test]
+    fn index_doubles_the_profiled_residual() {
+        let equations = Equations::new().stream(rows(500, 0.1, 1));
+        let found = equations.solve(all_free::<Pair>()).unwrap();
+        let a = found.parameters.a * (1.0 + found.index.a / 100.0);
+        let profiled = equations.solve(Pair { a: Some(a), b: None }).unwrap();
+        assert!((profiled.residual / found.residual - 2.0).abs() < 1e-6);
+        // Held: all others stay where they are.
+        let b = found.parameters.b * (1.0 + found.index_others_held.b / 100.0);
+        let moved = equations.predictions(&Pair { a: found.parameters.a, b });
+        let residual: f64 = moved.iter().flatten().map(|(y, y_hat)| (y - y_hat).powi(2)).sum();
+        assert!((residual / found.residual - 2.0).abs() < 1e-6);
+        // It is sqrt(rows - p) standard errors.
+        let n = (500.0f64 - 2.0).sqrt();
+        assert_relative_eq!(found.index.a / 100.0 * found.parameters.a, n * found.std.a, max_relative = 1e-9);
+    }
+
+    /// Spread of the estimates over what the standard errors say, in variance, over 1000 seeds.
+    fn calibration(make: impl Fn(u64) -> Regression<Pair>) -> f64 {
+        let ratios = (0..1000).map(|seed| {
+            let found = make(seed);
+            ((found.parameters.a - 3.0) / found.std.a).powi(2)
+        });
+        ratios.sum::<f64>() / 1000.0
+    }
+
+    // Chi-square of 1000: standard deviation 0.045; three of them.
+    #[test]
+    fn standard_errors_hold_plain_weighted_and_filtered() {
+        let plain =
+            calibration(|seed| Equations::new().stream(rows(200, 0.1, seed)).solve(all_free::<Pair>()).unwrap());
+        assert!((plain - 1.0).abs() < 0.135, "{plain}");
+        // The sandwich is a little small on 200 rows of unequal weight: of order (mean leverage) more.
+        let weighted = calibration(|seed| {
+            let equations = Equations::new().stream(rows(200, 0.1, seed)).weighted(|k| (k % 5) as f64).unwrap();
+            equations.solve(all_free::<Pair>()).unwrap()
+        });
+        assert!((weighted - 1.0).abs() < 0.16, "{weighted}");
+        // The regressor (1.6 Hz) is slow against the filter (25 Hz); without the colour the ratio would be near 20.
+        let filter = Butterworth::low_pass(4, 25.0, 1e-3).unwrap();
+        let filtered = calibration(|seed| {
+            Equations::new().stream(rows(4000, 0.1, seed)).prefiltered(&filter).solve(all_free::<Pair>()).unwrap()
+        });
+        assert!((filtered - 1.0).abs() < 0.135, "{filtered}");
+    }
+
+    // SPEC 5: 100 Hz at 0.126 ms makes the variance 39 times as large.
+    #[test]
+    fn colour_of_the_motors_filter() {
+        let filter = Butterworth::low_pass(4, 100.0, 0.126e-3).unwrap();
+        assert!((1.0 / energy(&filter) - 39.0).abs() < 0.5, "{}", 1.0 / energy(&filter));
+    }
+
+    #[test]
+    fn what_cannot_be_told_is_named() {
+        let twins = (0..50).map(|k| (Pair { a: k as f64, b: 2.0 * k as f64 }, k as f64));
+        let error = Equations::new().stream(twins).solve(all_free::<Pair>()).unwrap_err().to_string();
+        assert!(error.contains("`b`") && error.contains("not identifiable"), "{error}");
+        let absent = (0..50).map(|k| (Pair { a: k as f64, b: 0.0 }, k as f64));
+        let error = Equations::new().stream(absent).solve(all_free::<Pair>()).unwrap_err().to_string();
+        assert!(error.contains("`b`") && error.contains("no influence"), "{error}");
+        assert!(Equations::<Pair>::new().solve(all_free::<Pair>()).is_err());
+        assert!(Equations::new().stream(rows(9, 0.0, 1)).solve(Pair { a: Some(1.0), b: Some(1.0) }).is_err());
+        assert!(Equations::new().stream(rows(9, 0.0, 1)).weighted(|_| f64::NAN).is_err());
+    }
 }

@@ -72,7 +72,7 @@ pub fn search_i0<P: crate::Signals>(
     if !(low > 0.0 && high > low && high.is_finite()) {
         return Err(Error::Option(format!("the search of i0 needs 0 < low < high; got {low} A and {high} A")));
     }
-    let solver = BrentOpt::new(low.ln(), high.ln()).set_tolerance(1e-3, 1e-3);
+    let solver = BrentOpt::new(low.ln(), high.ln()).set_tolerance(1e-2, 1e-2);
     let found = Executor::new(OverI0(|i0| Ok(regression(i0)?.residual)), solver)
         .configure(|state| state.max_iters(60))
         .run()
