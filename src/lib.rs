@@ -24,6 +24,8 @@ mod information;
 #[cfg(feature = "std")]
 mod loss;
 #[cfg(feature = "std")]
+pub mod optimize;
+#[cfg(feature = "std")]
 mod outliers;
 #[cfg(feature = "std")]
 mod predict;
@@ -31,6 +33,8 @@ mod predict;
 mod prefilter;
 #[cfg(feature = "std")]
 mod regress;
+#[cfg(feature = "std")]
+mod scaling;
 #[cfg(feature = "std")]
 mod weighting;
 
@@ -56,5 +60,6 @@ pub use {
     predict::{FreeRun, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
     regress::{Equations, Regression, all_free},
+    scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
     weighting::{BySignal, Law, Weighting},
 };

@@ -8,10 +8,13 @@
 //! denormal numbers, on which processors are up to 60 times slower; so slopes below 1e-150 are set to zero between windows.
 
 mod free_run;
+mod horizon;
+pub(crate) mod measured;
 
 mod window;
 
 pub use free_run::FreeRun;
+pub use horizon::Horizon;
 
 pub(crate) use window::{Seed, Target, Trajectory, WINDOW, Window};
 
@@ -39,7 +42,8 @@ pub trait Predictor<M: Model>: Clone + Debug + Send + Sync {
         p: &Of<M::Parameters, f64>,
     ) -> Result<Self::Prepared, Error>;
 
-    /// The state that the output of sample `k` is predicted from; `x` is the one before (the initial one, for `k = 0`).
+    /// The state that the output of sample `k` is predicted from. `x` is the one before (the initial one, for
+    /// `k = 0`) if the method carries it on, else always the initial one.
     /// `None` where there is no prediction for lack of a measurement to start from.
     ///
     /// # Errors
@@ -53,6 +57,9 @@ pub trait Predictor<M: Model>: Clone + Debug + Send + Sync {
         p: &Of<M::Parameters, S>,
         memory: &mut I::Memory,
     ) -> Result<Option<Of<M::State, S>>, Stuck>;
+
+    /// Which state to hand to the next sample: the one just reached (a simulation), or the initial one.
+    const CARRIES: bool;
 
     /// Name and settings in a few words, for reports.
     fn describe(&self) -> String;

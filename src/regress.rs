@@ -291,14 +291,14 @@ mod tests {
     fn exact_rows_give_exact_parameters() {
         let filter = Butterworth::low_pass(4, 10.0, 1e-3).unwrap();
         for equations in [
-            Equations::new().stream(rows(500, 0.0, 1)),
-            Equations::new().stream(rows(500, 0.0, 1)).prefiltered(&filter),
-            Equations::new().stream(rows(500, 0.0, 1)).weighted(|k| k as f64).unwrap(),
+            Equations::<Pair>::new().stream(rows(500, 0.0, 1)),
+            Equations::<Pair>::new().stream(rows(500, 0.0, 1)).prefiltered(&filter),
+            Equations::<Pair>::new().stream(rows(500, 0.0, 1)).weighted(|k| k as f64).unwrap(),
         ] {
             let found = equations.solve(all_free::<Pair>()).unwrap();
             assert_relative_eq!(found.parameters, Pair { a: 3.0, b: -0.5 }, max_relative = 1e-12);
         }
-        let held = Equations::new().stream(rows(500, 0.0, 1)).solve(Pair { a: Some(3.0), b: None }).unwrap();
+        let held = Equations::<Pair>::new().stream(rows(500, 0.0, 1)).solve(Pair { a: Some(3.0), b: None }).unwrap();
         assert_relative_eq!(held.parameters, Pair { a: 3.0, b: -0.5 }, max_relative = 1e-12);
         assert_eq!(held.std.a, 0.0);
     }
@@ -306,7 +306,7 @@ mod tests {
     // The index is the change that doubles the squared residual when the others are refitted: the profile itself.
     #[test]
     fn index_doubles_the_profiled_residual() {
-        let equations = Equations::new().stream(rows(500, 0.1, 1));
+        let equations = Equations::<Pair>::new().stream(rows(500, 0.1, 1));
         let found = equations.solve(all_free::<Pair>()).unwrap();
         let a = found.parameters.a * (1.0 + found.index.a / 100.0);
         let profiled = equations.solve(Pair { a: Some(a), b: None }).unwrap();
@@ -333,19 +333,24 @@ mod tests {
     // Chi-square of 1000: standard deviation 0.045; three of them.
     #[test]
     fn standard_errors_hold_plain_weighted_and_filtered() {
-        let plain =
-            calibration(|seed| Equations::new().stream(rows(200, 0.1, seed)).solve(all_free::<Pair>()).unwrap());
+        let plain = calibration(|seed| {
+            Equations::<Pair>::new().stream(rows(200, 0.1, seed)).solve(all_free::<Pair>()).unwrap()
+        });
         assert!((plain - 1.0).abs() < 0.135, "{plain}");
         // The sandwich is a little small on 200 rows of unequal weight: of order (mean leverage) more.
         let weighted = calibration(|seed| {
-            let equations = Equations::new().stream(rows(200, 0.1, seed)).weighted(|k| (k % 5) as f64).unwrap();
+            let equations = Equations::<Pair>::new().stream(rows(200, 0.1, seed)).weighted(|k| (k % 5) as f64).unwrap();
             equations.solve(all_free::<Pair>()).unwrap()
         });
         assert!((weighted - 1.0).abs() < 0.16, "{weighted}");
         // The regressor (1.6 Hz) is slow against the filter (25 Hz); without the colour the ratio would be near 20.
         let filter = Butterworth::low_pass(4, 25.0, 1e-3).unwrap();
         let filtered = calibration(|seed| {
-            Equations::new().stream(rows(4000, 0.1, seed)).prefiltered(&filter).solve(all_free::<Pair>()).unwrap()
+            Equations::<Pair>::new()
+                .stream(rows(4000, 0.1, seed))
+                .prefiltered(&filter)
+                .solve(all_free::<Pair>())
+                .unwrap()
         });
         assert!((filtered - 1.0).abs() < 0.135, "{filtered}");
     }
@@ -360,13 +365,13 @@ mod tests {
     #[test]
     fn what_cannot_be_told_is_named() {
         let twins = (0..50).map(|k| (Pair { a: k as f64, b: 2.0 * k as f64 }, k as f64));
-        let error = Equations::new().stream(twins).solve(all_free::<Pair>()).unwrap_err().to_string();
+        let error = Equations::<Pair>::new().stream(twins).solve(all_free::<Pair>()).unwrap_err().to_string();
         assert!(error.contains("`b`") && error.contains("not identifiable"), "{error}");
         let absent = (0..50).map(|k| (Pair { a: k as f64, b: 0.0 }, k as f64));
-        let error = Equations::new().stream(absent).solve(all_free::<Pair>()).unwrap_err().to_string();
+        let error = Equations::<Pair>::new().stream(absent).solve(all_free::<Pair>()).unwrap_err().to_string();
         assert!(error.contains("`b`") && error.contains("no influence"), "{error}");
         assert!(Equations::<Pair>::new().solve(all_free::<Pair>()).is_err());
-        assert!(Equations::new().stream(rows(9, 0.0, 1)).solve(Pair { a: Some(1.0), b: Some(1.0) }).is_err());
-        assert!(Equations::new().stream(rows(9, 0.0, 1)).weighted(|_| f64::NAN).is_err());
+        assert!(Equations::<Pair>::new().stream(rows(9, 0.0, 1)).solve(Pair { a: Some(1.0), b: Some(1.0) }).is_err());
+        assert!(Equations::<Pair>::new().stream(rows(9, 0.0, 1)).weighted(|_| f64::NAN).is_err());
     }
 }

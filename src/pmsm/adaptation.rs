@@ -231,13 +231,14 @@ mod tests {
             let observer = Winding { rs: plant.rs - dr, ke: plant.ke - dk, ..plant };
             let (motor, u) = (Surface::new(4).unwrap(), Drive { ud: 30.0, uq: 90.0, w });
             let (e, i) = (Currents { id: ed, iq: eq }, Currents { id: id - ed, iq: iq - eq });
-            let v = |i: &Currents, p: &Winding| Vector2::from(motor.derivative(0.0, i, &u, p));
-            let de = v(&Currents { id, iq }, &plant) - v(&i, &observer) - f * Vector2::from(e);
+            let v = |i: &Currents, p: &Winding| Vector2::<f64>::from(motor.derivative(0.0, i, &u, p));
+            let de = v(&Currents { id, iq }, &plant) - v(&i, &observer) - f * Vector2::<f64>::from(e);
             let now = Seen { e, i, w, ls: plant.ls };
             let (rs, ke) = (number(RsLyapunov { gain: gr }.rate(&now)), number(KeLyapunov { gain: g }.rate(&now)));
-            let (term1, term2, term3) = (2.0 * Vector2::from(e).dot(&de), -2.0 * dk * ke / g, -2.0 * dr * rs / gr);
+            let e2 = Vector2::<f64>::from(e);
+            let (term1, term2, term3): (f64, f64, f64) = (2.0 * e2.dot(&de), -2.0 * dk * ke / g, -2.0 * dr * rs / gr);
             // Relative to the terms that cancel.
-            let size = 1.0 + 2.0 * Vector2::from(e).norm() * de.norm() + term2.abs() + term3.abs();
+            let size = 1.0 + 2.0 * e2.norm() * de.norm() + term2.abs() + term3.abs();
             let expected = lyapunov_rate(plant.rs, plant.ls, &f, &e);
             prop_assert!((term1 + term2 + term3 - expected).abs() <= 1e-10 * size);
             // The condition is sharp: V' is at most -margin e^T e.

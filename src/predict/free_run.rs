@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 pub struct FreeRun;
 
 impl<M: Model> Predictor<M> for FreeRun {
+    const CARRIES: bool = true;
     type Prepared = ();
 
     fn prepare(&self, _: &M, _: &ExperimentOf<M>, _: &Of<M::Parameters, f64>) -> Result<(), Error> {

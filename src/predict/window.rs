@@ -60,6 +60,15 @@ impl Window {
         &mut self.data
     }
 
+    /// Sets the rows without a measurement to zero, after a filter has run over them.
+    pub fn clear_unmeasured(&mut self) {
+        for column in self.data.chunks_exact_mut(self.rows) {
+            for (value, _) in column.iter_mut().zip(&self.measured).filter(|(_, here)| !**here) {
+                *value = 0.0;
+            }
+        }
+    }
+
     pub fn errors(&self) -> &[f64] {
         &self.data[(self.columns - 1) * self.rows..]
     }
@@ -168,9 +177,11 @@ impl<M: Model, I: Integrator<M>, const N: usize> Lanes<M, I, N> {
                 }
                 continue;
             };
-            x = state;
+            if P::CARRIES {
+                x = state;
+            }
             let u = M::Input::map(walk.experiment.inputs()[sample], Dual::from);
-            let expected = M::Output::into_array(walk.model.output(walk.experiment.time(sample), &x, &u, &p));
+            let expected = M::Output::into_array(walk.model.output(walk.experiment.time(sample), &state, &u, &p));
             let found = M::Output::into_array(walk.experiment.outputs()[sample]);
             for j in 0..M::Output::LEN {
                 let (expected, found) = (expected.as_ref()[j], found.as_ref()[j]);

@@ -1,0 +1,276 @@
+//! [`Fit`]: from a model and its records to an estimate.
+
+mod as_argmin;
+mod checkpoint;
+mod conclude;
+mod covariance;
+mod noise;
+mod objective;
+mod run;
+mod unknowns;
+
+pub use objective::Objective;
+pub use run::FitProblem;
+
+use crate::error::Error;
+use crate::experiment::ExperimentOf;
+use crate::integrate::{Automatic, Integrator};
+use crate::loss::Loss;
+use crate::model::{Kind, Model};
+use crate::optimize::{GaussNewton, LeastSquaresState, LevenbergMarquardt, Linearization, Outcome};
+use crate::parameter::Parameter;
+use crate::predict::{FreeRun, Predictor};
+use crate::prefilter::Butterworth;
+use crate::signals::{Of, Signals};
+use crate::weighting::Weighting;
+use argmin::core::observers::{Observe, ObserverMode};
+use noise::{Noise, Whitening};
+use objective::Control;
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+use unknowns::Unknowns;
+
+/// A search that a fit can run: one of argmin's solvers that says how it ended.
+pub trait Search {
+    /// How the search ended, if it was its own decision.
+    fn outcome(&self) -> Option<Outcome>;
+
+    /// Cost and slopes where the search stands.
+    fn linearization(&self) -> Option<&Linearization>;
+}
+
+impl<S: crate::scaling::Scaling> Search for LevenbergMarquardt<S> {
+    fn outcome(&self) -> Option<Outcome> {
+        LevenbergMarquardt::outcome(self)
+    }
+
+    fn linearization(&self) -> Option<&Linearization> {
+        LevenbergMarquardt::linearization(self)
+    }
+}
+
+impl Search for GaussNewton {
+    fn outcome(&self) -> Option<Outcome> {
+        GaussNewton::outcome(self)
+    }
+
+    fn linearization(&self) -> Option<&Linearization> {
+        GaussNewton::linearization(self)
+    }
+}
+
+type Observer = Arc<Mutex<Box<dyn Observe<LeastSquaresState> + Send>>>;
+
+/// A model and its records, still without a word on the parameters.
+#[derive(Debug)]
+pub struct Records<'a, M: Model> {
+    model: &'a M,
+    experiments: &'a [ExperimentOf<M>],
+}
+
+impl<'a, M: Model> Records<'a, M> {
+    /// Says of each parameter whether it is `free` (from where, within which bounds, with what prior) or `fixed`.
+    pub fn parameters(self, parameters: Of<M::Parameters, Parameter>) -> Fit<'a, M> {
+        Fit {
+            model: self.model,
+            experiments: self.experiments,
+            parameters,
+            integrator: Automatic::default(),
+            predictor: FreeRun,
+            optimizer: LevenbergMarquardt::default(),
+            noise: Noise::PerOutput,
+            weighting: None,
+            loss: None,
+            prefilter: None,
+            control: Control::default(),
+            time_limit: None,
+            observers: vec![],
+            checkpoint: None,
+        }
+    }
+}
+
+/// A fit about to be run.
+///
+/// Left unsaid: simulation error, squared loss, no weighting, noise estimated per output, [`LevenbergMarquardt`], and the
+/// step that the model's kind asks for.
+pub struct Fit<'a, M: Model, I = Automatic, P = FreeRun, O = LevenbergMarquardt> {
+    model: &'a M,
+    experiments: &'a [ExperimentOf<M>],
+    parameters: Of<M::Parameters, Parameter>,
+    integrator: I,
+    predictor: P,
+    optimizer: O,
+    noise: Noise<M::Output>,
+    weighting: Option<Box<dyn Weighting<M> + 'a>>,
+    loss: Option<Box<dyn Loss + 'a>>,
+    prefilter: Option<Butterworth>,
+    control: Control,
+    time_limit: Option<Duration>,
+    observers: Vec<(Observer, ObserverMode)>,
+    checkpoint: Option<(PathBuf, u64)>,
+}
+
+impl<'a, M: Model> Fit<'a, M> {
+    /// A fit of one record, or of several (`&[a, b]`, `&vec`) at once.
+    #[expect(clippy::new_ret_no_self, reason = "a fit without parameters is not a fit yet")]
+    pub fn new<R: AsRef<[ExperimentOf<M>]> + ?Sized>(model: &'a M, records: &'a R) -> Records<'a, M> {
+        Records { model, experiments: records.as_ref() }
+    }
+}
+
+impl<'a, M: Model, I, P, O> Fit<'a, M, I, P, O> {
+    /// Steps the model by another method.
+    pub fn integrator<J: Integrator<M>>(self, integrator: J) -> Fit<'a, M, J, P, O> {
+        let Fit { model, experiments, parameters, predictor, optimizer, noise, .. } = self;
+        let Fit { weighting, loss, prefilter, control, time_limit, observers, checkpoint, .. } = self;
+        #[rustfmt::skip]
+        return Fit { model, experiments, parameters, integrator, predictor, optimizer, noise, weighting, loss, prefilter,
+                     control, time_limit, observers, checkpoint };
+    }
+
+    /// Minimizes another prediction error.
+    pub fn predictor<Q: Predictor<M>>(self, predictor: Q) -> Fit<'a, M, I, Q, O> {
+        let Fit { model, experiments, parameters, integrator, optimizer, noise, .. } = self;
+        let Fit { weighting, loss, prefilter, control, time_limit, observers, checkpoint, .. } = self;
+        #[rustfmt::skip]
+        return Fit { model, experiments, parameters, integrator, predictor, optimizer, noise, weighting, loss, prefilter,
+                     control, time_limit, observers, checkpoint };
+    }
+
+    /// Searches by another method, or by the same with other settings.
+    pub fn optimizer<S: Search>(self, optimizer: S) -> Fit<'a, M, I, P, S> {
+        let Fit { model, experiments, parameters, integrator, predictor, noise, .. } = self;
+        let Fit { weighting, loss, prefilter, control, time_limit, observers, checkpoint, .. } = self;
+        #[rustfmt::skip]
+        return Fit { model, experiments, parameters, integrator, predictor, optimizer, noise, weighting, loss, prefilter,
+                     control, time_limit, observers, checkpoint };
+    }
+
+    /// The standard deviation of the noise of each output, in its unit (after the pre-filter, if there is one). Left out,
+    /// it is estimated from the errors.
+    pub fn noise(self, sigma: Of<M::Output, f64>) -> Self {
+        Fit { noise: Noise::Given(sigma), ..self }
+    }
+
+    /// Estimates the noise with its correlations between outputs.
+    pub fn noise_covariance(self) -> Self {
+        Fit { noise: Noise::Covariance, ..self }
+    }
+
+    /// Multiplies the cost of each sample by a weight (at least zero), any function of the sample. It is not an inverse
+    /// variance: the covariance is that of the weighted estimate, whatever the noise (a sandwich).
+    pub fn weighting(self, weighting: impl Weighting<M> + 'a) -> Self {
+        Fit { weighting: Some(Box::new(weighting)), ..self }
+    }
+
+    /// Bends the cost of large standardized errors.
+    pub fn loss(self, loss: impl Loss + 'a) -> Self {
+        Fit { loss: Some(Box::new(loss)), ..self }
+    }
+
+    /// Filters the prediction errors (and their slopes) before they count. A missing sample enters the filter as a zero.
+    pub fn prefilter(self, filter: Butterworth) -> Self {
+        Fit { prefilter: Some(filter), ..self }
+    }
+
+    /// Stops the search, with what it has found by then, when the flag is raised (from another thread, a signal handler).
+    pub fn cancel(mut self, flag: Arc<AtomicBool>) -> Self {
+        self.control.cancel = Some(flag);
+        self
+    }
+
+    /// Stops the search after this time, with what it has found by then.
+    pub fn time_limit(self, limit: Duration) -> Self {
+        Fit { time_limit: Some(limit), ..self }
+    }
+
+    /// Shows the progress to an observer of argmin.
+    pub fn observe(mut self, observer: impl Observe<LeastSquaresState> + Send + 'static, mode: ObserverMode) -> Self {
+        self.observers.push((Arc::new(Mutex::new(Box::new(observer))), mode));
+        self
+    }
+
+    /// Saves the place of the search into a file, every so many iterations, and goes on from there if the file exists. A
+    /// file of another problem is refused.
+    pub fn checkpoint(self, path: impl Into<PathBuf>, every: u64) -> Self {
+        Fit { checkpoint: Some((path.into(), every)), ..self }
+    }
+}
+
+/// What a fit needs to be evaluated, prepared once.
+struct Setting<M: Model, P: Predictor<M>> {
+    unknowns: Unknowns<M>,
+    prepared: Vec<P::Prepared>,
+}
+
+impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
+    /// Checks all that was said, and looks at every record once.
+    fn prepare(&self) -> Result<Setting<M, P>, Error> {
+        self.check()?;
+        let unknowns = Unknowns::new(self.model, self.experiments, self.parameters)?;
+        if unknowns.row.is_empty() {
+            return Err(Error::NothingFree);
+        }
+        self.prepared(unknowns)
+    }
+
+    fn prepared(&self, unknowns: Unknowns<M>) -> Result<Setting<M, P>, Error> {
+        let start = M::Parameters::map(self.parameters, |p| p.start);
+        let prepare = |experiment| self.predictor.prepare(self.model, experiment, &start);
+        let prepared = self.experiments.iter().map(prepare).collect::<Result<_, _>>()?;
+        Ok(Setting { unknowns, prepared })
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        if self.experiments.is_empty() {
+            return Err(Error::NoExperiment);
+        }
+        if !self.integrator.serves(M::KIND) {
+            let word = |kind| match kind {
+                Kind::Continuous => "continuous",
+                Kind::Discrete => "discrete",
+                Kind::Static => "static",
+            };
+            let kinds = [Kind::Continuous, Kind::Discrete, Kind::Static];
+            let serves = kinds.into_iter().find(|&kind| self.integrator.serves(kind)).map_or("no", word);
+            return Err(Error::WrongIntegrator { model: word(M::KIND), integrator: self.integrator.describe(), serves });
+        }
+        if let Noise::Given(sigma) = self.noise {
+            let sigma = M::Output::into_array(sigma);
+            if let Some(j) = sigma.as_ref().iter().position(|s| !(*s > 0.0 && s.is_finite())) {
+                let what = format!("the noise of output `{}`", M::Output::NAMES[j]);
+                return Err(Error::NotPositive { what, value: sigma.as_ref()[j] });
+            }
+        }
+        if let Some(loss) = &self.loss {
+            loss.check()?;
+        }
+        for j in 0..M::Output::LEN {
+            let measured = |e: &ExperimentOf<M>| e.outputs().iter().any(|y| !M::Output::into_array(*y).as_ref()[j].is_nan());
+            if !self.experiments.iter().any(measured) {
+                let experiment = self.experiments[0].name().to_owned();
+                return Err(Error::OutputMissing { experiment, output: M::Output::NAMES[j].to_owned() });
+            }
+        }
+        Ok(())
+    }
+
+    fn objective<'s>(&'s self, setting: &'s Setting<M, P>, whitening: Whitening) -> Objective<'s, M, I, P> {
+        Objective {
+            model: self.model,
+            experiments: self.experiments,
+            unknowns: &setting.unknowns,
+            integrator: &self.integrator,
+            predictor: &self.predictor,
+            prepared: &setting.prepared,
+            weighting: self.weighting.as_deref(),
+            loss: self.loss.as_deref().map(|loss| loss as &dyn Loss),
+            prefilter: self.prefilter.as_ref(),
+            whitening,
+            control: &self.control,
+        }
+    }
+}

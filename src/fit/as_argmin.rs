@@ -1,0 +1,112 @@
+//! The fit as a problem of argmin's own solvers.
+//!
+//! Cost and gradient serve the line-search and population methods; the dense residual, Jacobian and Gauss-Newton Hessian
+//! are made on request only. Where the model cannot be evaluated, or a bound is crossed, the cost is infinite.
+
+use super::objective::{Halt, Objective, Rows};
+use crate::integrate::Integrator;
+use crate::model::Model;
+use crate::optimize::{Infeasible, LeastSquares};
+use crate::predict::{Predictor, WINDOW};
+use argmin::core::{CostFunction, Error, Gradient, Hessian, Jacobian, Operator};
+
+impl<M: Model, I: Integrator<M>, P: Predictor<M>> CostFunction for Objective<'_, M, I, P> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, x: &Vec<f64>) -> Result<f64, Error> {
+        let inside = self.bounds().iter().zip(x).all(|((lower, upper), x)| lower <= x && x <= upper);
+        match self.cost_at(x) {
+            _ if !inside => Ok(f64::INFINITY),
+            Ok(cost) if cost.is_finite() => Ok(cost),
+            Ok(_) | Err(Infeasible::Failed(_)) => Ok(f64::INFINITY),
+            Err(cancelled) => Err(cancelled.into()),
+        }
+    }
+}
+
+impl<M: Model, I: Integrator<M>, P: Predictor<M>> Gradient for Objective<'_, M, I, P> {
+    type Param = Vec<f64>;
+    type Gradient = Vec<f64>;
+
+    fn gradient(&self, x: &Vec<f64>) -> Result<Vec<f64>, Error> {
+        Ok(self.evaluate(x)?.gradient())
+    }
+}
+
+impl<M: Model, I: Integrator<M>, P: Predictor<M>> Operator for Objective<'_, M, I, P> {
+    type Param = Vec<f64>;
+    type Output = Vec<f64>;
+
+    /// The residuals: prediction minus measurement, standardized, times the square root of their weight.
+    fn apply(&self, x: &Vec<f64>) -> Result<Vec<f64>, Error> {
+        Ok(self.dense(x, false)?.into_iter().map(|(residual, _)| residual).collect())
+    }
+}
+
+impl<M: Model, I: Integrator<M>, P: Predictor<M>> Jacobian for Objective<'_, M, I, P> {
+    type Param = Vec<f64>;
+    type Jacobian = Vec<Vec<f64>>;
+
+    /// The slopes of the residuals, row by row.
+    fn jacobian(&self, x: &Vec<f64>) -> Result<Vec<Vec<f64>>, Error> {
+        Ok(self.dense(x, true)?.into_iter().map(|(_, slopes)| slopes).collect())
+    }
+}
+
+impl<M: Model, I: Integrator<M>, P: Predictor<M>> Hessian for Objective<'_, M, I, P> {
+    type Param = Vec<f64>;
+    type Hessian = Vec<Vec<f64>>;
+
+    /// The Gauss-Newton Hessian `J'J`.
+    fn hessian(&self, x: &Vec<f64>) -> Result<Vec<Vec<f64>>, Error> {
+        let linear = self.evaluate(x)?;
+        let mut hessian = vec![vec![0.0; x.len()]; x.len()];
+        for (block, columns) in linear.columns() {
+            for (a, &i) in columns.iter().enumerate() {
+                for (b, &j) in columns.iter().enumerate() {
+                    hessian[i][j] += (0..=a.min(b)).map(|row| block.at(row, a) * block.at(row, b)).sum::<f64>();
+                }
+            }
+        }
+        Ok(hessian)
+    }
+}
+
+impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
+    /// Every weighted residual with its slopes: sample by sample, output by output, the priors last.
+    fn dense(&self, x: &[f64], slopes: bool) -> Result<Vec<(f64, Vec<f64>)>, Infeasible> {
+        let width = if slopes { x.len() } else { 0 };
+        let mut rows = vec![];
+        for e in 0..self.experiments.len() {
+            let columns: Vec<usize> = if slopes { self.unknowns.columns(e).collect() } else { vec![] };
+            let visit = &mut |Rows { begin, samples, window }: Rows<'_>| {
+                let measured = window.measured.clone();
+                let columns_of: Vec<&mut [f64]> = window.columns_mut().collect();
+                for k in 0..samples {
+                    for row in (k..measured.len()).step_by(WINDOW).filter(|&row| measured[row]) {
+                        let z = columns_of[columns_of.len() - 1][row];
+                        let root = (self.sample_weight(e, begin + k) * self.loss.map_or(1.0, |l| l.weight(z))).sqrt();
+                        let mut dense = vec![0.0; width];
+                        for (column, &i) in columns_of.iter().zip(&columns) {
+                            dense[i] = root * column[row];
+                        }
+                        rows.push((-root * z, dense));
+                    }
+                }
+            };
+            self.walk(e, x, slopes, visit).map_err(|halt| match halt {
+                Halt::Cancelled => Infeasible::Cancelled,
+                Halt::Failed { sample } => Infeasible::Failed(self.locate(e, x, sample).to_string()),
+            })?;
+        }
+        for (i, slope, error) in self.unknowns.priors(x) {
+            let mut dense = vec![0.0; width];
+            if slopes {
+                dense[i] = slope;
+            }
+            rows.push((-error, dense));
+        }
+        Ok(rows)
+    }
+}

@@ -1,0 +1,208 @@
+//! [`Whitening`]: from prediction errors to standardized ones, and how large the noise is.
+
+use crate::information::SquareMatrix;
+use crate::loss::{Huber, Loss, expectations};
+use crate::model::Model;
+use crate::predict::{Predictor, WINDOW, Window};
+use crate::signals::{Of, Signals};
+use super::objective::{Objective, Rows};
+use super::unknowns::Unknowns;
+use crate::integrate::Integrator;
+use crate::optimize::Infeasible;
+
+/// What is said of the measurement noise.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Noise<Y: Signals> {
+    /// Its standard deviation per output.
+    Given(Of<Y, f64>),
+    /// Estimated per output.
+    PerOutput,
+    /// Estimated as a full covariance.
+    Covariance,
+}
+
+/// How errors are standardized: divided by their standard deviations, or multiplied by the inverse Cholesky factor of
+/// their covariance.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Whitening {
+    Diagonal(Vec<f64>),
+    Full { covariance: SquareMatrix, inverse: SquareMatrix },
+}
+
+impl Whitening {
+    pub fn full(covariance: SquareMatrix) -> Option<Self> {
+        let inverse = inverse_factor(&covariance)?;
+        Some(Whitening::Full { covariance, inverse })
+    }
+
+    /// Standard deviation of each output.
+    pub fn sigma(&self) -> Vec<f64> {
+        match self {
+            Whitening::Diagonal(sigma) => sigma.clone(),
+            Whitening::Full { covariance, .. } => covariance.diagonal().iter().map(|v| v.sqrt()).collect(),
+        }
+    }
+
+    /// Twice the sum over a sample's outputs of the logarithms of the standard deviations.
+    pub fn log_determinant(&self) -> f64 {
+        match self {
+            Whitening::Diagonal(sigma) => 2.0 * sigma.iter().map(|s| s.ln()).sum::<f64>(),
+            Whitening::Full { inverse, .. } => -2.0 * inverse.diagonal().iter().map(|l| l.ln()).sum::<f64>(),
+        }
+    }
+
+    /// The same with all standard deviations longer by a factor.
+    pub fn widened(&self, factor: f64) -> Self {
+        match self {
+            Whitening::Diagonal(sigma) => Whitening::Diagonal(sigma.iter().map(|s| s * factor).collect()),
+            Whitening::Full { covariance, inverse } => {
+                let n = covariance.size();
+                Whitening::Full {
+                    covariance: SquareMatrix::from_fn(n, |i, j| covariance[(i, j)] * factor * factor),
+                    inverse: SquareMatrix::from_fn(n, |i, j| inverse[(i, j)] / factor),
+                }
+            }
+        }
+    }
+
+    /// Standardizes a window in place.
+    pub fn apply(&self, window: &mut Window) {
+        match self {
+            Whitening::Diagonal(sigma) => {
+                for column in window.columns_mut() {
+                    for (values, sigma) in column.chunks_exact_mut(WINDOW).zip(sigma) {
+                        if *sigma != 1.0 {
+                            let scale = 1.0 / sigma;
+                            values.iter_mut().for_each(|value| *value *= scale);
+                        }
+                    }
+                }
+            }
+            Whitening::Full { covariance, inverse } => {
+                let outputs = covariance.size();
+                for k in 0..window.samples {
+                    let here: Vec<usize> = (0..outputs).filter(|j| window.measured[j * WINDOW + k]).collect();
+                    // Where outputs are missing, those left have a covariance of their own.
+                    let part = (here.len() < outputs).then(|| {
+                        let part = SquareMatrix::from_fn(here.len(), |a, b| covariance[(here[a], here[b])]);
+                        inverse_factor(&part).unwrap_or_else(|| SquareMatrix::zeros(here.len()))
+                    });
+                    let factor = part.as_ref().unwrap_or(inverse);
+                    for column in window.columns_mut() {
+                        for a in (0..here.len()).rev() {
+                            let value = (0..=a).map(|b| factor[(a, b)] * column[here[b] * WINDOW + k]).sum();
+                            column[here[a] * WINDOW + k] = value;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Inverse of the lower Cholesky factor; `None` if the matrix is not positive definite.
+fn inverse_factor(covariance: &SquareMatrix) -> Option<SquareMatrix> {
+    let n = covariance.size();
+    let matrix = nalgebra::DMatrix::from_fn(n, n, |i, j| covariance[(i, j)]);
+    let inverse = matrix.cholesky()?.l().try_inverse()?;
+    Some(SquareMatrix::from_fn(n, |i, j| inverse[(i, j)]))
+}
+
+/// Sums over the errors of a fit: what estimates of noise are made of.
+#[derive(Clone, Debug)]
+pub(crate) struct Moments {
+    /// Measured samples of each output (with positive weight).
+    pub counts: Vec<f64>,
+    /// Mean over the measured samples of the products of the errors of two outputs.
+    pub covariance: SquareMatrix,
+}
+
+/// Noise below this part of the output's own size is rounding of the simulation.
+const ROUNDING: f64 = 1e-15;
+
+impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
+    /// Second moments of the (filtered) errors in the units of the outputs; each error through `bend` in units of
+    /// `sigma`, for robust estimates.
+    fn moments(
+        &self,
+        coordinates: &[f64],
+        sigma: &[f64],
+        bend: Option<&dyn Fn(f64) -> f64>,
+    ) -> Result<Moments, Infeasible> {
+        let outputs = M::Output::LEN;
+        let mut sums = SquareMatrix::zeros(outputs);
+        let mut pairs = SquareMatrix::zeros(outputs);
+        let plain = Objective { whitening: Whitening::Diagonal(vec![1.0; outputs]), ..*self };
+        for e in 0..self.experiments.len() {
+            let mut errors = vec![0.0; outputs];
+            let visit = &mut |Rows { begin, samples, window }: Rows<'_>| {
+                for k in 0..samples {
+                    if self.sample_weight(e, begin + k) <= 0.0 {
+                        continue;
+                    }
+                    for (j, error) in errors.iter_mut().enumerate() {
+                        let value = window.errors()[j * WINDOW + k];
+                        *error = bend.map_or(value, |bend| bend(value / sigma[j]) * sigma[j]);
+                    }
+                    for i in 0..outputs {
+                        for j in 0..outputs {
+                            if window.measured[i * WINDOW + k] && window.measured[j * WINDOW + k] {
+                                sums[(i, j)] += errors[i] * errors[j];
+                                pairs[(i, j)] += 1.0;
+                            }
+                        }
+                    }
+                }
+            };
+            plain.walk(e, coordinates, false, visit).map_err(|halt| match halt {
+                super::objective::Halt::Cancelled => Infeasible::Cancelled,
+                super::objective::Halt::Failed { sample } => {
+                    Infeasible::Failed(self.locate(e, coordinates, sample).to_string())
+                }
+            })?;
+        }
+        let covariance = SquareMatrix::from_fn(outputs, |i, j| sums[(i, j)] / pairs[(i, j)].max(1.0));
+        Ok(Moments { counts: pairs.diagonal(), covariance })
+    }
+
+    /// The noise that the errors at a point show: plainly, or robustly by Huber's proposal 2 (Huber, *Robust Statistics*,
+    /// 1981, section 6.4) where a robust loss bends the large ones.
+    pub(crate) fn estimate_noise(&self, coordinates: &[f64], noise: Noise<M::Output>) -> Result<Whitening, Infeasible> {
+        let outputs = M::Output::LEN;
+        let mut moments = self.moments(coordinates, &vec![1.0; outputs], None)?;
+        let floor: Vec<f64> = self.magnitudes().iter().map(|size| (ROUNDING * size).max(f64::MIN_POSITIVE)).collect();
+        let sigma = |m: &Moments| -> Vec<f64> {
+            m.covariance.diagonal().iter().zip(&floor).map(|(v, floor)| v.sqrt().max(*floor)).collect()
+        };
+        if self.loss.is_some_and(|loss| expectations(loss).efficiency() < 1.0 - 1e-9) {
+            let huber = Huber::default();
+            let kappa = expectations(&huber).psi_squared;
+            for _ in 0..50 {
+                let before = sigma(&moments);
+                moments = self.moments(coordinates, &before, Some(&|z| huber.psi(z)))?;
+                let n = moments.covariance.size();
+                moments.covariance = SquareMatrix::from_fn(n, |i, j| moments.covariance[(i, j)] / kappa);
+                let change = |(a, b): (f64, &f64)| (a / b).ln().abs();
+                if sigma(&moments).into_iter().zip(&before).map(change).fold(0.0, f64::max) < 1e-9 {
+                    break;
+                }
+            }
+        }
+        let diagonal = Whitening::Diagonal(sigma(&moments));
+        Ok(match noise {
+            Noise::Covariance => Whitening::full(moments.covariance).unwrap_or(diagonal),
+            Noise::Given(_) | Noise::PerOutput => diagonal,
+        })
+    }
+
+    /// Largest measured magnitude of each output.
+    fn magnitudes(&self) -> Vec<f64> {
+        let mut magnitudes = vec![0.0f64; M::Output::LEN];
+        for y in self.experiments.iter().flat_map(|e| e.outputs()) {
+            for (size, y) in magnitudes.iter_mut().zip(M::Output::into_array(*y)) {
+                *size = size.max(y.abs());
+            }
+        }
+        magnitudes
+    }
+}

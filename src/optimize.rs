@@ -1,0 +1,77 @@
+//! Nonlinear least squares: [`LevenbergMarquardt`] and [`GaussNewton`], as solvers of argmin on the information triangle.
+//!
+//! A problem hands over one [`Linearization`] per point: cost and triangle from a single pass over the data. The solvers
+//! never see a residual vector and never form normal equations.
+
+mod gauss_newton;
+mod levenberg_marquardt;
+mod linearization;
+mod outcome;
+mod search;
+
+pub use gauss_newton::GaussNewton;
+pub use levenberg_marquardt::LevenbergMarquardt;
+pub use linearization::Linearization;
+pub use outcome::{Outcome, Severity};
+
+use serde::{Deserialize, Serialize};
+
+/// What both solvers keep in argmin's state: the point, the gradient there, the cost.
+pub type LeastSquaresState = argmin::core::IterState<Vec<f64>, Vec<f64>, (), (), (), f64>;
+
+/// A sum of squares to be minimized.
+pub trait LeastSquares {
+    /// Cost, slopes and residuals at `x`, in one pass.
+    ///
+    /// # Errors
+    /// [`Infeasible`], where there is no cost at `x`: the solver then tries a shorter step.
+    fn linearize(&self, x: &[f64]) -> Result<Linearization, Infeasible>;
+
+    /// Lower and upper bound of each unknown; infinite where there is none. None at all unless said otherwise.
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        Vec::new()
+    }
+}
+
+impl<T: LeastSquares + ?Sized> LeastSquares for &T {
+    fn linearize(&self, x: &[f64]) -> Result<Linearization, Infeasible> {
+        (**self).linearize(x)
+    }
+
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        (**self).bounds()
+    }
+}
+
+/// Why there is no cost at a point.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Infeasible {
+    /// The model cannot be evaluated there.
+    #[error("{0}")]
+    Failed(String),
+    /// The user or the clock stopped the evaluation.
+    #[error("the evaluation was cancelled")]
+    Cancelled,
+}
+
+/// When to stop.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stop {
+    /// Converged, if no unknown would move by more than this part of itself (or, near zero, of its standard error).
+    pub step: f64,
+    /// Converged, if the residual is orthogonal to every column of the Jacobian to this cosine.
+    pub gradient: f64,
+    /// Converged, if a step lowered the cost by less than this part; zero switches the test off. A convenience of other
+    /// tools: on hard problems it stops with few right digits.
+    pub cost: f64,
+    /// Most trial steps.
+    pub iterations: u64,
+}
+
+impl Default for Stop {
+    /// Step 1e-10 and gradient 1e-8, both; at most 5,000 trial steps.
+    fn default() -> Self {
+        Stop { step: 1e-10, gradient: 1e-8, cost: 0.0, iterations: 5000 }
+    }
+}

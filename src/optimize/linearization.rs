@@ -1,0 +1,141 @@
+//! [`Linearization`]: cost and slopes at a point, as triangles.
+
+use crate::information::Information;
+
+/// Cost and slopes at a point.
+///
+/// The unknowns stand in the order: those shared by all blocks, then those of the first block alone, of the second, ...
+/// Each block's triangle has the columns: its own unknowns, then the shared ones. Own unknowns (initial states, parameters
+/// that each experiment has for itself) are minimized out inside their block before the blocks are merged, so that many
+/// blocks cost no more than one.
+#[derive(Clone, Debug)]
+pub struct Linearization {
+    /// The cost; half the sum of squares unless a robust loss bends it.
+    pub cost: f64,
+    shared: usize,
+    blocks: Vec<Information>,
+}
+
+impl Linearization {
+    /// From the cost, the number of shared unknowns, and one triangle per block.
+    pub fn new(cost: f64, shared: usize, blocks: Vec<Information>) -> Self {
+        Linearization { cost, shared, blocks }
+    }
+
+    /// Number of unknowns.
+    pub fn unknowns(&self) -> usize {
+        self.shared + self.blocks.iter().map(|block| block.columns().saturating_sub(self.shared)).sum::<usize>()
+    }
+
+    /// Number of unknowns that all blocks share.
+    pub fn shared(&self) -> usize {
+        self.shared
+    }
+
+    /// The triangle of each block: its own columns, then the shared ones.
+    pub fn blocks(&self) -> &[Information] {
+        &self.blocks
+    }
+
+    /// The unknown behind each column of each block.
+    pub fn columns(&self) -> impl Iterator<Item = (&Information, Vec<usize>)> {
+        let mut next = self.shared;
+        self.blocks.iter().map(move |block| {
+            let own = block.columns().saturating_sub(self.shared);
+            let columns = (next..next + own).chain(0..self.shared).collect();
+            next += own;
+            (block, columns)
+        })
+    }
+
+    /// Gradient of half the sum of squares.
+    pub fn gradient(&self) -> Vec<f64> {
+        let mut gradient = vec![0.0; self.unknowns()];
+        for (block, columns) in self.columns() {
+            for (&unknown, slope) in columns.iter().zip(block.gradient()) {
+                gradient[unknown] += slope;
+            }
+        }
+        gradient
+    }
+
+    /// Norm of each unknown's column of the Jacobian.
+    pub fn column_norms(&self) -> Vec<f64> {
+        let mut norms = vec![0.0f64; self.unknowns()];
+        for (block, columns) in self.columns() {
+            for (&unknown, norm) in columns.iter().zip(block.column_norms()) {
+                norms[unknown] = norms[unknown].hypot(norm);
+            }
+        }
+        norms
+    }
+
+    /// Sum of squares at the point itself.
+    pub fn sum_of_squares(&self) -> f64 {
+        self.blocks.iter().map(Information::residual_at_zero).sum()
+    }
+
+    /// By how much half the sum of squares falls along a step, if the slopes held.
+    pub fn predicted_reduction(&self, step: &[f64]) -> f64 {
+        let mut reduction = 0.0;
+        for (block, columns) in self.columns() {
+            let n = block.columns();
+            // Row by row, |z|^2 - |z - R d|^2 = (2 z - R d) R d, which does not cancel.
+            for i in 0..n {
+                let change: f64 = (i..n).map(|j| block.at(i, j) * step[columns[j]]).sum();
+                reduction += change * (block.at(i, n) - 0.5 * change);
+            }
+        }
+        reduction
+    }
+
+    /// What is left for the shared unknowns when each block's own are minimized out, with these unknowns held and this
+    /// damping; and each block's damped triangle of its free columns with the unknowns behind them.
+    fn reduce(&self, damping: &[f64], held: &[bool]) -> (Information, Vec<usize>, Vec<(Information, Vec<usize>)>) {
+        let shared: Vec<usize> = (0..self.shared).filter(|&i| !held[i]).collect();
+        let mut total = Information::new(shared.len());
+        let mut blocks = Vec::with_capacity(self.blocks.len());
+        for (block, columns) in self.columns() {
+            let kept: Vec<usize> = (0..columns.len()).filter(|&c| !held[columns[c]]).collect();
+            let unknowns: Vec<usize> = kept.iter().map(|&c| columns[c]).collect();
+            let own = unknowns.len() - shared.len();
+            let diagonal: Vec<f64> =
+                unknowns.iter().enumerate().map(|(c, &i)| if c < own { damping[i] } else { 0.0 }).collect();
+            let mut block = if kept.len() == columns.len() { block.clone() } else { block.select(&kept) };
+            if diagonal.iter().any(|&d| d != 0.0) {
+                block = block.damped(&diagonal);
+            }
+            total.merge(&block.eliminate(own));
+            blocks.push((block, unknowns));
+        }
+        let diagonal: Vec<f64> = shared.iter().map(|&i| damping[i]).collect();
+        if diagonal.iter().any(|&d| d != 0.0) {
+            total = total.damped(&diagonal);
+        }
+        (total, shared, blocks)
+    }
+
+    /// The step that minimizes the linearized sum of squares plus `|diag(damping) step|^2`, with the unknowns in `held`
+    /// kept; `None` where the free unknowns are not determined.
+    pub fn step(&self, damping: &[f64], held: &[bool]) -> Option<Vec<f64>> {
+        let (total, shared, blocks) = self.reduce(damping, held);
+        let mut step = vec![0.0; self.unknowns()];
+        for (&unknown, d) in shared.iter().zip(total.solve().ok()?) {
+            step[unknown] = d;
+        }
+        for (block, unknowns) in &blocks {
+            let n = block.columns();
+            for i in (0..n - shared.len()).rev() {
+                let known: f64 = (i + 1..n).map(|j| block.at(i, j) * step[unknowns[j]]).sum();
+                step[unknowns[i]] = (block.at(i, n) - known) / block.at(i, i);
+            }
+        }
+        step.iter().all(|d| d.is_finite()).then_some(step)
+    }
+
+    /// What the data say of the shared unknowns alone, each block's own minimized out.
+    pub fn shared_information(&self) -> Information {
+        let free = vec![false; self.unknowns()];
+        self.reduce(&vec![0.0; self.unknowns()], &free).0
+    }
+}

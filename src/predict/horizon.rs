@@ -1,0 +1,94 @@
+//! [`Horizon`]: prediction a fixed number of samples ahead.
+
+use super::{Predictor, Walk, measured};
+use crate::error::Error;
+use crate::experiment::ExperimentOf;
+use crate::integrate::{Integrator, Stuck};
+use crate::model::Model;
+use crate::scalar::Scalar;
+use crate::signals::{Of, Signals};
+use serde::{Deserialize, Serialize};
+
+/// Prediction `steps` samples ahead: each output is simulated from the state measured that many samples earlier, so that
+/// model error and disturbances are forgotten after the horizon (Ljung, *System Identification*, 1999, section 3.2, for a
+/// measured state). Needs outputs that give the state, and takes them as exact: noise biases short horizons.
+///
+/// The first samples are predicted from the initial state. Where the state was not measured, the output `steps` samples
+/// later is not predicted. For filtered states, filter the record first ([`zero_phase`](crate::zero_phase)).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Horizon {
+    /// Samples from the measured state to the predicted output; zero counts as one.
+    pub steps: usize,
+}
+
+impl<M: Model> Predictor<M> for Horizon {
+    const CARRIES: bool = false;
+    /// The measured state at each sample; NaN where there is none.
+    type Prepared = Vec<Of<M::State, f64>>;
+
+    fn prepare(
+        &self,
+        model: &M,
+        experiment: &ExperimentOf<M>,
+        p: &Of<M::Parameters, f64>,
+    ) -> Result<Self::Prepared, Error> {
+        let mut why = None;
+        let mut states = Vec::with_capacity(experiment.len());
+        let mut known = 0;
+        for k in 0..experiment.len() {
+            let (t, u, y) = (experiment.time(k), &experiment.inputs()[k], &experiment.outputs()[k]);
+            states.push(match measured::state(model, t, u, y, p) {
+                Ok(x) => {
+                    known += 1;
+                    if known == 1
+                        && let Some(name) = measured::depends_on_parameter(model, t, &x, u, p)
+                    {
+                        let reason = format!("the outputs depend on the parameter `{name}`, too");
+                        return Err(Error::StateNotMeasured { experiment: experiment.name().to_owned(), reason });
+                    }
+                    x
+                }
+                Err(reason) => {
+                    why = why.or(Some(reason));
+                    M::State::splat(f64::NAN)
+                }
+            });
+        }
+        match why {
+            Some(reason) if known == 0 => {
+                Err(Error::StateNotMeasured { experiment: experiment.name().to_owned(), reason })
+            }
+            _ => Ok(states),
+        }
+    }
+
+    #[inline(always)]
+    fn state<S: Scalar, I: Integrator<M>>(
+        &self,
+        walk: &Walk<'_, M, I>,
+        prepared: &Self::Prepared,
+        k: usize,
+        start: Of<M::State, S>,
+        p: &Of<M::Parameters, S>,
+        memory: &mut I::Memory,
+    ) -> Result<Option<Of<M::State, S>>, Stuck> {
+        let steps = self.steps.max(1);
+        let (mut x, first) = if k < steps {
+            (start, 0)
+        } else {
+            let x = prepared[k - steps];
+            if M::State::into_array(x).as_ref().iter().any(|x| x.is_nan()) {
+                return Ok(None);
+            }
+            (M::State::map(x, S::from), k - steps)
+        };
+        for j in first..k {
+            x = walk.advance(j, x, p, memory)?;
+        }
+        Ok(Some(x))
+    }
+
+    fn describe(&self) -> String {
+        format!("prediction {} sample(s) ahead", self.steps.max(1))
+    }
+}
