@@ -83,7 +83,7 @@ pub enum Error {
         output: String,
     },
     /// A column that the file does not have.
-    #[error("{}: no column `{column}`{}; the file has: {}", path.display(), wanted_by(signal, column), available.join(", "))]
+    #[error("{}: no column `{column}`{}; the file has: {}", path.display(), wanted_by(signal, column), listed(available))]
     MissingColumn {
         /// The file.
         path: PathBuf,
@@ -94,6 +94,40 @@ pub enum Error {
         /// The columns there are.
         available: Vec<String>,
     },
+    /// A column that the file has twice.
+    #[error("{}: column `{column}` stands twice, in place {first} and {second}; rename one", path.display())]
+    AmbiguousColumn {
+        /// The file.
+        path: PathBuf,
+        /// Name of the column.
+        column: String,
+        /// Its first place, from one.
+        first: usize,
+        /// Its second place, from one.
+        second: usize,
+    },
+    /// A row with more or fewer cells than there are columns.
+    #[error("{}, line {line}: {found} cell(s), but {expected} column(s) have a name", path.display())]
+    RowLength {
+        /// The file.
+        path: PathBuf,
+        /// Line, from one.
+        line: u64,
+        /// Cells in this row.
+        found: usize,
+        /// Names in the header.
+        expected: usize,
+    },
+    /// What is wrong with a record, and on which line of its file.
+    #[error("{}, line {line}: {problem}", path.display())]
+    AtLine {
+        /// The file.
+        path: PathBuf,
+        /// Line, from one.
+        line: u64,
+        /// What is wrong.
+        problem: Box<Error>,
+    },
     /// A renaming or factor for a signal that the model does not have.
     #[error("the model has no signal `{signal}`; it has: {}", available.join(", "))]
     UnknownSignal {
@@ -103,7 +137,7 @@ pub enum Error {
         available: Vec<String>,
     },
     /// A cell that is not a number.
-    #[error("{}, line {line}, column `{column}`: `{text}` is not a number", path.display())]
+    #[error("{}, line {line}, column `{column}`: `{text}` is not a number{}", path.display(), number_hint(text))]
     NotANumber {
         /// The file.
         path: PathBuf,
@@ -199,6 +233,25 @@ pub struct Failure {
     pub value: f64,
     /// What it usually means.
     pub hint: &'static str,
+}
+
+/// The columns that a file has, and what the list gives away.
+fn listed(columns: &[String]) -> String {
+    let hint = match columns {
+        [single] if single.contains([';', '\t', '|']) => "; set what stands between cells with CsvFile::delimiter",
+        _ if columns.iter().all(|name| name.parse::<f64>().is_ok()) => "; its first line must hold the names",
+        _ if columns.iter().any(|name| name.eq_ignore_ascii_case("time")) => "; rename with CsvFile::column",
+        _ => "",
+    };
+    columns.join(", ") + hint
+}
+
+/// What a text that is not a number gives away.
+fn number_hint(text: &str) -> &'static str {
+    match text.replacen(',', ".", 1).parse::<f64>() {
+        Ok(_) => "; for decimal commas there is CsvFile::decimal_comma",
+        Err(_) => "",
+    }
 }
 
 fn wanted_by(signal: &str, column: &str) -> String {

@@ -3,7 +3,7 @@
 mod display;
 mod predict;
 mod stored;
-mod student;
+pub(crate) mod student;
 
 pub use predict::Prediction;
 

@@ -1,53 +1,54 @@
 //! [`Experiment`]: a measured record, valid by construction.
 
+#[cfg(feature = "csv")]
+mod csv;
+mod cycles;
+mod edit;
+mod meta;
+mod time;
+
+#[cfg(feature = "csv")]
+pub use csv::CsvFile;
+pub use cycles::Gap;
+#[cfg(feature = "csv")]
+pub(crate) use time::Clock;
+pub use time::Time;
+
+use crate::by_name;
 use crate::error::Error;
 use crate::interval::{Hold, Interval};
 use crate::model::Model;
 use crate::parameter::Parameter;
-use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
 use serde::{Deserialize, Serialize};
 
-/// When the samples were taken (s).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Time {
-    /// `start + k * step`.
-    Uniform {
-        /// Time of the first sample (s).
-        start: f64,
-        /// From sample to sample (s).
-        step: f64,
-    },
-    /// One stamp per sample, increasing.
-    Stamps(Vec<f64>),
-}
-
-impl Time {
-    /// Time of sample `k` (s); not a number beyond the last stamp.
-    #[inline(always)]
-    pub fn at(&self, k: usize) -> f64 {
-        match self {
-            Time::Uniform { start, step } => start + k as f64 * step,
-            Time::Stamps(stamps) => stamps.get(k).copied().unwrap_or(f64::NAN),
-        }
-    }
-}
-
 /// What is known of the state at the first sample.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(bound = "")]
 pub enum Initial<X: Signals> {
     /// It is estimated, starting from what the first sample says.
     Estimated,
     /// It is what the first sample says, taken as exact.
     FirstSample,
     /// Guess, bounds and prior of each state.
-    Given(Of<X, Parameter>),
+    Given(
+        #[serde(
+            serialize_with = "by_name::serialize::<X, _, _>",
+            deserialize_with = "by_name::deserialize::<X, _, _>"
+        )]
+        Of<X, Parameter>,
+    ),
 }
 
 /// One measured record of inputs `U` and outputs `Y`, and what is known of the state `X` at its first sample.
 ///
 /// Time increases, inputs are finite, lengths agree; an output that was not measured is `NaN`. Without a further word the
 /// input is held from sample to sample, and the initial state is estimated from a start that the first sample gives.
+///
+/// It is made of vectors ([`new`](Experiment::new)) or of a CSV file (`from_csv`, `CsvFile`), and
+/// cut ([`slice`](Experiment::slice), [`between`](Experiment::between), [`split`](Experiment::split),
+/// [`cycles`](Experiment::cycles), [`without_gaps`](Experiment::without_gaps)), [joined](Experiment::join) and
+/// [thinned](Experiment::decimate) into others. As JSON it keeps everything; what is read back is checked again.
 #[derive(Clone, Debug)]
 pub struct Experiment<X: Signals, U: Signals, Y: Signals> {
     pub(crate) name: String,
@@ -60,6 +61,11 @@ pub struct Experiment<X: Signals, U: Signals, Y: Signals> {
 
 /// The experiment that fits a model.
 pub type ExperimentOf<M> = Experiment<<M as Model>::State, <M as Model>::Input, <M as Model>::Output>;
+
+/// The fewest samples of a record: a state needs an interval to move in.
+pub(crate) fn least<X: Signals>() -> usize {
+    if X::LEN == 0 { 1 } else { 2 }
+}
 
 /// One row of a record.
 #[derive(Clone, Copy, Debug)]
@@ -138,6 +144,11 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
         self.time.at(k)
     }
 
+    /// When the samples were taken.
+    pub fn times(&self) -> &Time {
+        &self.time
+    }
+
     /// Inputs, one row per sample.
     pub fn inputs(&self) -> &[Of<U, f64>] {
         &self.inputs
@@ -176,74 +187,40 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     /// The record, if it keeps its promises.
     pub(crate) fn checked(self) -> Result<Self, Error> {
         let samples = self.inputs.len();
-        let experiment = || self.name.clone();
         if self.outputs.len() != samples {
             let (what, found, reference) = ("the output", self.outputs.len(), "the input");
-            return Err(Error::Lengths { experiment: experiment(), what, found, reference, expected: samples });
+            let experiment = self.name;
+            return Err(Error::Lengths { experiment, what, found, reference, expected: samples });
         }
-        match &self.time {
-            Time::Uniform { start, step } => {
-                if !start.is_finite() {
-                    let signal = "t".to_owned();
-                    return Err(Error::NotFinite {
-                        experiment: experiment(),
-                        signal,
-                        value: *start,
-                        sample: 0,
-                        time: *start,
-                    });
-                }
-                if !(*step > 0.0 && step.is_finite()) {
-                    return Err(Error::NotPositive {
-                        what: format!("experiment `{}`: the sample time", self.name),
-                        value: *step,
-                    });
-                }
-            }
-            Time::Stamps(stamps) => {
-                if stamps.len() != samples {
-                    let (what, found, reference) = ("time", stamps.len(), "the input");
-                    return Err(Error::Lengths { experiment: experiment(), what, found, reference, expected: samples });
-                }
-                if let Some((sample, &value)) = stamps.iter().enumerate().find(|(_, t)| !t.is_finite()) {
-                    let signal = "t".to_owned();
-                    return Err(Error::NotFinite { experiment: experiment(), signal, value, sample, time: value });
-                }
-                if let Some(k) = stamps.windows(2).position(|w| w[1] <= w[0]) {
-                    let (before, time) = (stamps[k], stamps[k + 1]);
-                    return Err(Error::TimeOrder { experiment: experiment(), sample: k + 1, before, time });
-                }
-            }
-        }
-        let needed = if X::LEN == 0 { 1 } else { 2 };
+        self.time.check(&self.name, samples)?;
+        let needed = least::<X>();
         if samples < needed {
-            return Err(Error::TooFewSamples { experiment: experiment(), samples, needed, purpose: "for a fit" });
+            return Err(Error::TooFewSamples { experiment: self.name, samples, needed, purpose: "for a fit" });
         }
-        for k in 0..samples {
-            let inputs = U::into_array(self.inputs[k]);
-            if let Some(i) = inputs.as_ref().iter().position(|v| !v.is_finite()) {
-                let (signal, value) = (U::NAMES[i].to_owned(), inputs.as_ref()[i]);
-                return Err(Error::NotFinite {
-                    experiment: experiment(),
-                    signal,
-                    value,
-                    sample: k,
-                    time: self.time(k),
-                });
-            }
-            let outputs = Y::into_array(self.outputs[k]);
-            if let Some(j) = outputs.as_ref().iter().position(|v| v.is_infinite()) {
-                let (signal, value) = (Y::NAMES[j].to_owned(), outputs.as_ref()[j]);
-                return Err(Error::NotFinite {
-                    experiment: experiment(),
-                    signal,
-                    value,
-                    sample: k,
-                    time: self.time(k),
-                });
+        for sample in 0..samples {
+            let (u, y) = (U::into_array(self.inputs[sample]), Y::into_array(self.outputs[sample]));
+            let inputs = U::NAMES.iter().zip(u.as_ref()).find(|(_, value)| !value.is_finite());
+            let outputs = || Y::NAMES.iter().zip(y.as_ref()).find(|(_, value)| value.is_infinite());
+            if let Some((signal, &value)) = inputs.or_else(outputs) {
+                let (experiment, signal, time) = (self.name.clone(), (*signal).to_owned(), self.time(sample));
+                return Err(Error::NotFinite { experiment, signal, value, sample, time });
             }
         }
         Ok(self)
+    }
+
+    /// The samples of a range that the record has, and that is long enough, under a name of their own.
+    pub(crate) fn piece(&self, samples: std::ops::Range<usize>, name: String) -> Self {
+        let time = match &self.time {
+            Time::Uniform { step, .. } => Time::Uniform { start: self.time(samples.start), step: *step },
+            Time::Stamps(stamps) => Time::Stamps(stamps[samples.clone()].to_vec()),
+        };
+        let initial = match self.initial {
+            Initial::Given(_) if samples.start > 0 => Initial::Estimated,
+            initial => initial,
+        };
+        let (inputs, outputs) = (self.inputs[samples.clone()].to_vec(), self.outputs[samples].to_vec());
+        Experiment { name, time, inputs, outputs, hold: self.hold, initial }
     }
 
     /// What happens from sample `k` to the next.

@@ -236,7 +236,11 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             };
             let kinds = [Kind::Continuous, Kind::Discrete, Kind::Static];
             let serves = kinds.into_iter().find(|&kind| self.integrator.serves(kind)).map_or("no", word);
-            return Err(Error::WrongIntegrator { model: word(M::KIND), integrator: self.integrator.describe(), serves });
+            return Err(Error::WrongIntegrator {
+                model: word(M::KIND),
+                integrator: self.integrator.describe(),
+                serves,
+            });
         }
         if let Noise::Given(sigma) = self.noise {
             let sigma = M::Output::into_array(sigma);
@@ -249,7 +253,8 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             loss.check()?;
         }
         for j in 0..M::Output::LEN {
-            let measured = |e: &ExperimentOf<M>| e.outputs().iter().any(|y| !M::Output::into_array(*y).as_ref()[j].is_nan());
+            let measured =
+                |e: &ExperimentOf<M>| e.outputs().iter().any(|y| !M::Output::into_array(*y).as_ref()[j].is_nan());
             if !self.experiments.iter().any(measured) {
                 let experiment = self.experiments[0].name().to_owned();
                 return Err(Error::OutputMissing { experiment, output: M::Output::NAMES[j].to_owned() });

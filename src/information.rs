@@ -52,11 +52,7 @@ impl Information {
         self.rows
     }
 
-    /// Absorbs the rows of a block and empties it, without allocation.
-    ///
-    /// It inlines into its caller, down to the loops: called from a function with `#[target_feature]`, it uses these
-    /// features.
-    #[inline(always)]
+    /// Absorbs the rows of a block and empties it, without allocation, by the widest vector unit of the processor.
     pub fn absorb(&mut self, block: &mut Block) {
         if block.columns() != self.columns {
             return self.absorb_other_width(block);

@@ -127,12 +127,13 @@ struct Design {
     sample_time: f64,
 }
 
-/// Two poles, or (with `a1 = a2 = 0`) one.
+/// Two poles, or (with `c1 = c2 = 0`) one. In Simper's letters `c1 = 2 a1 - 1`, `c2 = 2 a2`, `c3 = 2 a3`: the shortest
+/// chain of operations from one sample to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Section {
-    a1: f64,
-    a2: f64,
-    a3: f64,
+    c1: f64,
+    c2: f64,
+    c3: f64,
     k: f64,
 }
 
@@ -143,12 +144,11 @@ pub struct FilterState<V = f64>([[V; 2]; SECTIONS]);
 impl Section {
     #[inline(always)]
     fn step<V: Linear>(&self, high: bool, [s1, s2]: &mut [V; 2], x: V) -> V {
-        let v3 = x - *s2;
-        let v1 = *s1 * self.a1 + v3 * self.a2;
-        let v2 = *s2 + (*s1 * self.a2 + v3 * self.a3);
-        *s1 = v1 + (v1 - *s1);
-        *s2 = v2 + (v2 - *s2);
-        if high { x - v1 * self.k - v2 } else { v2 }
+        let v = x - *s2;
+        let next = [*s1 * self.c1 + v * self.c2, *s2 + (*s1 * self.c2 + v * self.c3)];
+        let (band, low) = ((*s1 + next[0]) * 0.5, (*s2 + next[1]) * 0.5);
+        [*s1, *s2] = next;
+        if high { x - band * self.k - low } else { low }
     }
 }
 
@@ -255,8 +255,10 @@ impl Butterworth {
         for from in (0..rows).step_by(TILE) {
             let height = TILE.min(rows - from);
             let tile = &mut tile[..height];
-            for (row, lanes) in tile.iter_mut().enumerate() {
-                *lanes = Lanes(core::array::from_fn(|l| block[l * stride + from + row]));
+            for (l, column) in block.chunks(stride).take(L).enumerate() {
+                for (lanes, x) in tile.iter_mut().zip(&column[from..]) {
+                    lanes.0[l] = *x;
+                }
             }
             for (section, state) in self.sections().iter().zip(&mut memory.0) {
                 let mut local = *state;
@@ -265,9 +267,9 @@ impl Butterworth {
                 }
                 *state = local.map(Lanes::flushed);
             }
-            for (row, lanes) in tile.iter().enumerate() {
-                for (l, x) in lanes.0.iter().enumerate() {
-                    block[l * stride + from + row] = *x;
+            for (l, column) in block.chunks_mut(stride).take(L).enumerate() {
+                for (lanes, x) in tile.iter().zip(&mut column[from..]) {
+                    *x = lanes.0[l];
                 }
             }
         }
@@ -304,12 +306,12 @@ impl TryFrom<Design> for Butterworth {
         for (i, section) in sections.iter_mut().take(order.div_ceil(2) as usize).enumerate() {
             let pair = 2 * i as u32 + 1;
             *section = if pair == order {
-                Section { a3: g / (1.0 + g), ..Section::default() }
+                Section { c3: 2.0 * g / (1.0 + g), ..Section::default() }
             } else {
                 // Pole pairs at the angles (2 i + 1) pi / (2 n) from the imaginary axis: 2 zeta = 2 sin.
                 let k = 2.0 * (core::f64::consts::FRAC_PI_2 * f64::from(pair) / f64::from(order)).sin();
-                let a1 = 1.0 / (1.0 + g * (g + k));
-                Section { a1, a2: g * a1, a3: g * g * a1, k }
+                let d = 1.0 + g * (g + k);
+                Section { c1: (1.0 - g * (g + k)) / d, c2: 2.0 * g / d, c3: 2.0 * g * g / d, k }
             };
         }
         Ok(Butterworth { design, sections })

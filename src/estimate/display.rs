@@ -23,13 +23,22 @@ impl<M: Model, I, P> fmt::Display for Estimate<M, I, P> {
             writeln!(f, "  {}", self.outcome.advice())?;
         }
         for warning in &self.warnings {
-            writeln!(f, "  {}: {}", if warning.severity == Severity::Usable { "note" } else { "warning" }, warning.text)?;
+            writeln!(
+                f,
+                "  {}: {}",
+                if warning.severity == Severity::Usable { "note" } else { "warning" },
+                warning.text
+            )?;
         }
         writeln!(f)?;
         let width = self.unknowns.iter().map(|u| u.name.len()).max().unwrap_or(0);
         let width = M::Parameters::NAMES.iter().map(|name| name.len()).max().unwrap_or(0).max(width).max(9);
         let title = ["value", "unit", "std. error", "95 % interval", "index"];
-        writeln!(f, "{:<width$} {:>14} {:<9} {:>11} {:^29} {:>8}", "parameter", title[0], title[1], title[2], title[3], title[4])?;
+        writeln!(
+            f,
+            "{:<width$} {:>14} {:<9} {:>11} {:^29} {:>8}",
+            "parameter", title[0], title[1], title[2], title[3], title[4]
+        )?;
         for unknown in &self.unknowns {
             write!(f, "{:<width$} {:>14} {:<9} ", unknown.name, number(unknown.value, 7), unknown.unit)?;
             match unknown.knowledge {
@@ -46,7 +55,8 @@ impl<M: Model, I, P> fmt::Display for Estimate<M, I, P> {
                 Knowledge::Fixed => writeln!(f, "fixed")?,
             }
         }
-        let (values, knowledge) = (M::Parameters::into_array(self.parameters), M::Parameters::into_array(self.knowledge));
+        let (values, knowledge) =
+            (M::Parameters::into_array(self.parameters), M::Parameters::into_array(self.knowledge));
         for (i, value) in values.as_ref().iter().enumerate() {
             if knowledge.as_ref()[i] == Knowledge::Fixed {
                 let (name, unit) = (M::Parameters::NAMES[i], M::Parameters::UNITS[i]);
@@ -70,8 +80,16 @@ impl<M: Model, I, P> fmt::Display for Estimate<M, I, P> {
         }
         writeln!(f)?;
         let m = &self.method;
-        writeln!(f, "{}: {} iterations, {} evaluations, {:.3} s", m.optimizer, self.iterations, self.evaluations, self.seconds)?;
-        writeln!(f, "{}; {}; loss {}; weighting {}; pre-filter {}", m.predictor, m.integrator, m.loss, m.weighting, m.prefilter)?;
+        writeln!(
+            f,
+            "{}: {} iterations, {} evaluations, {:.3} s",
+            m.optimizer, self.iterations, self.evaluations, self.seconds
+        )?;
+        writeln!(
+            f,
+            "{}; {}; loss {}; weighting {}; pre-filter {}",
+            m.predictor, m.integrator, m.loss, m.weighting, m.prefilter
+        )?;
         write!(f, "noise {}; covariance {}", m.noise, m.covariance)
     }
 }

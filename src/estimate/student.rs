@@ -47,9 +47,11 @@ mod tests {
     /// Quantiles to 12 digits from tables and multiple-precision inversion; both branches and where they meet.
     #[test]
     fn quantiles_match_reference() {
-        for (probability, degrees, expected) in
-            [(0.975, 1.0, 12.706_204_736_174_7), (0.975, 10.0, 2.228_138_851_986_27), (0.975, 1e12, 1.959_963_984_540_05)]
-        {
+        for (probability, degrees, expected) in [
+            (0.975, 1.0, 12.706_204_736_174_7),
+            (0.975, 10.0, 2.228_138_851_986_27),
+            (0.975, 1e12, 1.959_963_984_540_05),
+        ] {
             let found = quantile(probability, degrees);
             // Nine digits: what the library's inversion promises at few degrees.
             assert!((found / expected - 1.0).abs() < 1e-9, "{probability} {degrees}: {found} {expected}");

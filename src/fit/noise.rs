@@ -1,14 +1,13 @@
 //! [`Whitening`]: from prediction errors to standardized ones, and how large the noise is.
 
+use super::objective::{Objective, Rows};
 use crate::information::SquareMatrix;
+use crate::integrate::Integrator;
 use crate::loss::{Huber, Loss, expectations};
 use crate::model::Model;
+use crate::optimize::Infeasible;
 use crate::predict::{Predictor, WINDOW, Window};
 use crate::signals::{Of, Signals};
-use super::objective::{Objective, Rows};
-use super::unknowns::Unknowns;
-use crate::integrate::Integrator;
-use crate::optimize::Infeasible;
 
 /// What is said of the measurement noise.
 #[derive(Clone, Copy, Debug)]
@@ -111,8 +110,6 @@ fn inverse_factor(covariance: &SquareMatrix) -> Option<SquareMatrix> {
 /// Sums over the errors of a fit: what estimates of noise are made of.
 #[derive(Clone, Debug)]
 pub(crate) struct Moments {
-    /// Measured samples of each output (with positive weight).
-    pub counts: Vec<f64>,
     /// Mean over the measured samples of the products of the errors of two outputs.
     pub covariance: SquareMatrix,
 }
@@ -162,7 +159,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
             })?;
         }
         let covariance = SquareMatrix::from_fn(outputs, |i, j| sums[(i, j)] / pairs[(i, j)].max(1.0));
-        Ok(Moments { counts: pairs.diagonal(), covariance })
+        Ok(Moments { covariance })
     }
 
     /// The noise that the errors at a point show: plainly, or robustly by Huber's proposal 2 (Huber, *Robust Statistics*,

@@ -239,8 +239,13 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
         let walk = self.step(experiment);
         let record = walk.experiment;
         let (start, p) = self.unknowns.place(experiment, coordinates);
-        let failure = |k: usize, signal: String, value: f64, hint: &'static str| {
-            Failure { experiment: record.name().to_owned(), sample: k, time: record.time(k), signal, value, hint }
+        let failure = |k: usize, signal: String, value: f64, hint: &'static str| Failure {
+            experiment: record.name().to_owned(),
+            sample: k,
+            time: record.time(k),
+            signal,
+            value,
+            hint,
         };
         let (mut x, mut memory) = (start, I::Memory::default());
         for k in 0..record.len() {

@@ -2,22 +2,24 @@
 
 use super::checkpoint::CheckpointFile;
 use super::noise::{Noise, Whitening};
-use super::objective::{Halt, Objective, Rows};
+use super::objective::{Halt, Objective};
+use super::unknowns::Unknowns;
 use super::{Fit, Observer, Search, Setting};
 use crate::error::Error;
 use crate::estimate::{Estimate, Prediction};
+use crate::experiment::{Initial, Sample};
 use crate::integrate::Integrator;
 use crate::model::Model;
-use crate::optimize::{Infeasible, LeastSquaresState, Linearization, Outcome};
-use crate::predict::{Predictor, WINDOW};
+use crate::optimize::{Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization, Outcome};
+use crate::parameter::Parameter;
+use crate::predict::Predictor;
 use crate::signals::Signals;
-use crate::experiment::Sample;
 use argmin::core::observers::Observe;
-use argmin::core::{Executor, KV, Problem, Solver, State, TerminationReason, TerminationStatus};
+use argmin::core::{Executor, KV, Solver, State, TerminationReason, TerminationStatus};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Where a search ended.
@@ -178,7 +180,7 @@ struct Round {
     name: String,
 }
 
-impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
+impl<'a, M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'a, M, I, P, O> {
     /// Simulates (or predicts) the first record with the parameters at their start; only what is free of its initial
     /// state is estimated from it.
     ///
@@ -186,7 +188,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
     /// As [`run`](Fit::run), and a simulation that fails.
     pub fn simulate(self) -> Result<Prediction<M>, Error> {
         let parameters = M::Parameters::map(self.parameters, |p| crate::parameter::fixed(p.start));
-        let fit = Fit { parameters, optimizer: LevenbergMarquardt::default(), ..self.plain() };
+        let fit = Fit { parameters, ..self.optimizer(LevenbergMarquardt::default()) };
         fit.check()?;
         let unknowns = Unknowns::new(fit.model, fit.experiments, fit.parameters)?;
         let setting = fit.prepared(unknowns)?;
@@ -202,7 +204,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
     ///
     /// # Errors
     /// As [`run`](Fit::run).
-    pub fn problem(self) -> Result<FitProblem<'_, M, I, P, O>, Error> {
+    pub fn problem(self) -> Result<FitProblem<'a, M, I, P, O>, Error> {
         self.check_weights()?;
         let setting = self.prepare()?;
         let whitening = self.first_whitening(&setting, &setting.unknowns.start())?;
@@ -282,7 +284,8 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             format!("{parameter:?}").hash(&mut hash);
         }
         for record in self.experiments {
-            (record.name(), record.len(), format!("{:?}{:?}", record.input_hold(), record.initial_state())).hash(&mut hash);
+            (record.name(), record.len(), format!("{:?}{:?}", record.input_hold(), record.initial_state()))
+                .hash(&mut hash);
             for k in 0..record.len() {
                 bits(record.time(k), &mut hash);
                 M::Input::into_array(record.inputs()[k]).into_iter().for_each(|v| bits(v, &mut hash));
@@ -319,7 +322,9 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> FitProblem<'_, M, I, P, O> 
         let expected = self.setting.unknowns.row.len();
         if coordinates.len() != expected {
             let found = coordinates.len();
-            return Err(Error::Option(format!("the point has {found} coordinates, but the fit has {expected} unknowns")));
+            return Err(Error::Option(format!(
+                "the point has {found} coordinates, but the fit has {expected} unknowns"
+            )));
         }
         let objective = self.objective();
         let linear = objective.evaluate(coordinates).map_err(|_| self.fit.start_failure(&objective, coordinates))?;

@@ -52,7 +52,8 @@ impl<M: Model> Unknowns<M> {
             experiment,
             parameter: declared[i],
         };
-        let chosen = |own: bool| (0..declared.len()).filter(move |&i| declared[i].free && declared[i].per_experiment == own);
+        let chosen =
+            |own: bool| (0..declared.len()).filter(move |&i| declared[i].free && declared[i].per_experiment == own);
         let mut row: Vec<Unknown> = chosen(false).map(|i| parameter(i, None)).collect();
         let (mut begins, mut initial) = (vec![], vec![]);
         for (e, experiment) in experiments.iter().enumerate() {
@@ -180,9 +181,10 @@ fn check(name: &str, parameter: &Parameter) -> Result<(), Error> {
         return wrong(format!("its start {start} has no logarithm; start above zero or leave .log() out"));
     }
     match prior {
-        Some(p) if !(p.mean.is_finite() && p.std > 0.0 && p.std.is_finite()) => {
-            wrong(format!("its prior is {} +- {}; mean and standard deviation must be finite, the latter positive", p.mean, p.std))
-        }
+        Some(p) if !(p.mean.is_finite() && p.std > 0.0 && p.std.is_finite()) => wrong(format!(
+            "its prior is {} +- {}; mean and standard deviation must be finite, the latter positive",
+            p.mean, p.std
+        )),
         _ => Ok(()),
     }
 }

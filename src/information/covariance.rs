@@ -14,8 +14,7 @@ impl Information {
         let inverse = self.scaled_inverse(&norms);
         let n = norms.len();
         Ok(SquareMatrix::from_fn(n, |i, j| {
-            let product: f64 = (i.max(j)..n).map(|k| inverse[(i, k)] * inverse[(j, k)]).sum();
-            product / norms[i] / norms[j]
+            (i.max(j)..n).map(|k| (inverse[(i, k)] / norms[i]) * (inverse[(j, k)] / norms[j])).sum()
         }))
     }
 
@@ -34,9 +33,24 @@ impl Information {
             SquareMatrix::from_fn(n, |i, j| (i..=j).map(|k| meat.slope(i, k) / norms[k] * inverse[(k, j)]).sum());
         let whole = SquareMatrix::from_fn(n, |i, j| (i.max(j)..n).map(|k| half[(i, k)] * inverse[(j, k)]).sum());
         Ok(SquareMatrix::from_fn(n, |i, j| {
-            let product: f64 = (0..n).map(|k| whole[(k, i)] * whole[(k, j)]).sum();
-            product / norms[i] / norms[j]
+            (0..n).map(|k| (whole[(k, i)] / norms[i]) * (whole[(k, j)] / norms[j])).sum()
         }))
+    }
+
+    /// `phi (Phi^T Phi)^-1 phi`: the variance of the prediction `phi . d` per unit variance of `y`. For a row that was
+    /// absorbed it is its leverage, between 0 and 1: how much of its own value its prediction takes over (Belsley, Kuh
+    /// and Welsch, Regression Diagnostics, 1980, section 2.1). Missing entries of `phi` are zero.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn leverage(&self, phi: &[f64]) -> Result<f64, RankDeficient> {
+        self.full_rank()?;
+        let mut v: Vec<f64> = (0..self.columns()).map(|j| phi.get(j).copied().unwrap_or(0.0)).collect();
+        for j in 0..v.len() {
+            let known: f64 = (0..j).map(|i| self.at(i, j) * v[i]).sum();
+            v[j] = (v[j] - known) / self.at(j, j);
+        }
+        Ok(v.iter().map(|v| v * v).sum())
     }
 
     // Entry of the triangle among the slopes; zero where there is no such column.

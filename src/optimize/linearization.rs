@@ -16,6 +16,9 @@ pub struct Linearization {
     blocks: Vec<Information>,
 }
 
+/// See [`Linearization::reduce`].
+pub(crate) type Reduced = (Information, Vec<usize>, Vec<(Information, Vec<usize>)>);
+
 impl Linearization {
     /// From the cost, the number of shared unknowns, and one triangle per block.
     pub fn new(cost: f64, shared: usize, blocks: Vec<Information>) -> Self {
@@ -91,7 +94,7 @@ impl Linearization {
 
     /// What is left for the shared unknowns when each block's own are minimized out, with these unknowns held and this
     /// damping; and each block's damped triangle of its free columns with the unknowns behind them.
-    fn reduce(&self, damping: &[f64], held: &[bool]) -> (Information, Vec<usize>, Vec<(Information, Vec<usize>)>) {
+    pub(crate) fn reduce(&self, damping: &[f64], held: &[bool]) -> Reduced {
         let shared: Vec<usize> = (0..self.shared).filter(|&i| !held[i]).collect();
         let mut total = Information::new(shared.len());
         let mut blocks = Vec::with_capacity(self.blocks.len());

@@ -225,20 +225,20 @@ mod tests {
         #[test]
         fn v_falls_as_appendix_a_says(id in -60.0..60.0, iq in -60.0..60.0, ed in -5.0..5.0, eq in -5.0..5.0, w in -700.0..700.0,
                                       dr in -0.3..0.3, dk in -0.3..0.3, f in prop::array::uniform4(-200.0..200.0)) {
-            let (g, gr) = (1e-3, 5e-3);
+            let (g, gr) = (1e-3f64, 5e-3f64);
             let f = Matrix2::new(f[0], f[1], f[2], f[3]);
             let plant = Winding { rs: 0.4, ls: 4e-3, ke: 0.95 };
             let observer = Winding { rs: plant.rs - dr, ke: plant.ke - dk, ..plant };
             let (motor, u) = (Surface::new(4).unwrap(), Drive { ud: 30.0, uq: 90.0, w });
             let (e, i) = (Currents { id: ed, iq: eq }, Currents { id: id - ed, iq: iq - eq });
-            let v = |i: &Currents, p: &Winding| Vector2::<f64>::from(motor.derivative(0.0, i, &u, p));
-            let de = v(&Currents { id, iq }, &plant) - v(&i, &observer) - f * Vector2::<f64>::from(e);
+            let vector = |i: Currents| Vector2::new(i.id, i.iq);
+            let v = |i: &Currents, p: &Winding| vector(motor.derivative(0.0, i, &u, p));
+            let de = v(&Currents { id, iq }, &plant) - v(&i, &observer) - f * vector(e);
             let now = Seen { e, i, w, ls: plant.ls };
             let (rs, ke) = (number(RsLyapunov { gain: gr }.rate(&now)), number(KeLyapunov { gain: g }.rate(&now)));
-            let e2 = Vector2::<f64>::from(e);
-            let (term1, term2, term3): (f64, f64, f64) = (2.0 * e2.dot(&de), -2.0 * dk * ke / g, -2.0 * dr * rs / gr);
+            let (term1, term2, term3): (f64, f64, f64) = (2.0 * vector(e).dot(&de), -2.0 * dk * ke / g, -2.0 * dr * rs / gr);
             // Relative to the terms that cancel.
-            let size = 1.0 + 2.0 * e2.norm() * de.norm() + term2.abs() + term3.abs();
+            let size = 1.0 + 2.0 * vector(e).norm() * de.norm() + term2.abs() + term3.abs();
             let expected = lyapunov_rate(plant.rs, plant.ls, &f, &e);
             prop_assert!((term1 + term2 + term3 - expected).abs() <= 1e-10 * size);
             // The condition is sharp: V' is at most -margin e^T e.

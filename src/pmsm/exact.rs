@@ -6,7 +6,8 @@
 //! biases the resistance.
 
 use super::{AngledDrive, Currents, Drive, Error, PolePairs, SQRT_2_3, Winding, dead_time};
-use crate::{Kind, Model, Scalar};
+use crate::online::{Ekf, EkfStart, Law, Mras, MrasStart, ObserverError};
+use crate::{Kind, Model, Parameter, Scalar};
 use serde::{Deserialize, Serialize};
 
 /// In which frame the voltage stands still between two samples.
@@ -85,6 +86,18 @@ pub struct ExactSurface(
     pub ExactStep,
 );
 
+impl ExactSurface {
+    /// The motor's [`Mras`], with this step's sample time.
+    ///
+    /// # Errors
+    /// A resistance, inductance or back-EMF that does not start above zero; else as [`Mras::new`].
+    pub fn mras<L: Law<Self>>(self, law: L, start: MrasStart<Self>) -> Result<Mras<Self, L>, ObserverError> {
+        let Winding { rs, ls, ke } = start.parameters;
+        all_positive([("rs", rs), ("ls", ls), ("ke", ke)])?;
+        Mras::new(self, law, self.0.ts, start)
+    }
+}
+
 impl Model for ExactSurface {
     type State = Currents;
     type Input = Drive;
@@ -136,6 +149,16 @@ impl ExactFed {
     pub fn new(step: ExactStep, i0: f64) -> Result<Self, Error> {
         Ok(ExactFed { step, i0: Error::positive("turnover current i0", i0, "A")? })
     }
+
+    /// The motor's joint [`Ekf`], with this step's sample time; five states where rs, ke and vdt are free.
+    ///
+    /// # Errors
+    /// A resistance, inductance or back-EMF that does not start above zero; else as [`Ekf::new`].
+    pub fn ekf<const N: usize>(self, start: EkfStart<Self>) -> Result<Ekf<Self, N>, ObserverError> {
+        let FedWinding { rs, ls, ke, .. } = start.parameters;
+        all_positive([("rs", rs), ("ls", ls), ("ke", ke)])?;
+        Ekf::new(self, self.step.ts, start)
+    }
 }
 
 impl Model for ExactFed {
@@ -156,6 +179,13 @@ impl Model for ExactFed {
     fn output<S: Scalar>(&self, _t: f64, x: &Currents<S>, _u: &AngledDrive<S>, _p: &FedWinding<S>) -> Currents<S> {
         *x
     }
+}
+
+fn all_positive(starts: [(&'static str, Parameter); 3]) -> Result<(), ObserverError> {
+    starts.iter().try_for_each(|&(signal, Parameter { start: value, .. })| {
+        let positive = value > 0.0 && value.is_finite();
+        if positive { Ok(()) } else { Err(ObserverError::NotPositive { what: "the start", signal, value }) }
+    })
 }
 
 #[cfg(test)]

@@ -5,7 +5,6 @@ use super::{Predictor, Walk};
 use crate::dual::Dual;
 use crate::integrate::{Integrator, Stuck};
 use crate::model::Model;
-use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
 
 /// Samples per window: short enough for two outputs and eight slopes to stay in the nearest cache.
@@ -125,6 +124,14 @@ impl<'a, M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize> Trajectory
             })
             .collect();
         Trajectory { walk, predictor, prepared, passes, next: 0 }
+    }
+
+    /// Goes on from where another trajectory stands.
+    pub fn restart_at(&mut self, other: &Self) {
+        self.next = other.next;
+        for (mine, theirs) in self.passes.iter_mut().zip(&other.passes) {
+            (mine.x, mine.memory) = (theirs.x, theirs.memory);
+        }
     }
 
     /// The next window of the record; `false` at its end.

@@ -1,0 +1,75 @@
+//! Times the fit of a motor record: `speed N REPS` reads `data_N.bin` (or `fleet.bin`) from the folder `$PEERDATA`, fits it
+//! REPS times and prints the median process CPU time of one fit as a line of JSON.
+//!
+//! The files hold little-endian `f64` rows `[ud, uq, w, id, iq]`; row k was measured at `k * 0.126 ms`.
+
+use greybox::optimize::{LevenbergMarquardt, Stop};
+use greybox::pmsm::{Currents, Drive, Surface, Winding};
+use greybox::{Estimate, Experiment, ExperimentOf, Fit, JacobianColumns, Time, free};
+use std::error::Error;
+
+const SAMPLE_TIME: f64 = 0.126e-3;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().collect();
+    let [_, size, repetitions] = arguments.as_slice() else { return Err("usage: speed N|fleet REPS".into()) };
+    let folder = std::env::var("PEERDATA").unwrap_or_else(|_| "data".to_owned());
+    let fleet = size == "fleet";
+    let path = if fleet { format!("{folder}/fleet.bin") } else { format!("{folder}/data_{size}.bin") };
+    let model = Surface::new(4)?;
+    let records = read(&model, &path, if fleet { 2000 } else { usize::MAX })?;
+    let mut times = vec![];
+    let (mut cost, mut passes) = (0.0, 0);
+    for _ in 0..repetitions.parse()? {
+        let begin = cpu_time();
+        let fits: Vec<Estimate<Surface>> =
+            records.iter().map(|record| fit(&model, record)).collect::<Result<_, _>>()?;
+        times.push(cpu_time() - begin);
+        cost = fits.iter().map(|fit| fit.cost).sum();
+        passes = fits.iter().map(|fit| fit.evaluations).sum::<u64>() / fits.len() as u64;
+    }
+    times.sort_by(f64::total_cmp);
+    let median = times.get(times.len() / 2).ok_or("REPS must be at least 1")?;
+    let size = if fleet { "\"fleet\"".to_owned() } else { size.clone() };
+    println!(
+        "{{\"peer\": \"greybox\", \"N\": {size}, \"cpu_med\": {median:e}, \"iters\": {passes}, \"jevals\": {passes}, \
+         \"cost\": {cost:.12e}, \"rss_mb\": {:.1}}}",
+        peak_memory()
+    );
+    Ok(())
+}
+
+fn fit(model: &Surface, record: &ExperimentOf<Surface>) -> Result<Estimate<Surface>, greybox::Error> {
+    let stop = Stop { cost: 1e-10, ..Stop::default() };
+    Fit::new(model, record)
+        .parameters(Winding { rs: free(1.2), ls: free(1.75e-3), ke: free(0.63) })
+        .noise(Currents { id: 1.0, iq: 1.0 })
+        .optimizer(LevenbergMarquardt::new(stop, JacobianColumns))
+        .run()
+}
+
+fn read(model: &Surface, path: &str, samples: usize) -> Result<Vec<ExperimentOf<Surface>>, Box<dyn Error>> {
+    let bytes = std::fs::read(path).map_err(|error| format!("{path}: {error}"))?;
+    let numbers: Vec<f64> =
+        bytes.chunks_exact(8).map(|b| f64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]])).collect();
+    drop(bytes);
+    let record = |rows: &[f64]| {
+        let inputs = rows.chunks_exact(5).map(|r| Drive { ud: r[0], uq: r[1], w: r[2] }).collect();
+        let outputs = rows.chunks_exact(5).map(|r| Currents { id: r[3], iq: r[4] }).collect();
+        Experiment::new(model, Time::Uniform { start: 0.0, step: SAMPLE_TIME }, inputs, outputs)
+    };
+    Ok(numbers.chunks(samples.saturating_mul(5)).map(record).collect::<Result<_, _>>()?)
+}
+
+/// CPU time of all threads of this process (s), from the system's own account.
+fn cpu_time() -> f64 {
+    let time = cpu_time::ProcessTime::now().as_duration();
+    time.as_secs_f64()
+}
+
+/// Largest memory of this process so far (MB); zero where the system does not tell.
+fn peak_memory() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find(|line| line.starts_with("VmHWM"));
+    line.and_then(|line| line.split_whitespace().nth(1)?.parse::<f64>().ok()).unwrap_or(0.0) / 1024.0
+}

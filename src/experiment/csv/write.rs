@@ -1,0 +1,51 @@
+//! Writing: a record becomes rows of numbers that read back to the last bit.
+
+use super::table::cannot;
+use crate::error::Error;
+use crate::experiment::Experiment;
+use crate::signals::Signals;
+use std::fs::{self, File};
+use std::path::Path;
+
+/// Writes the record to `path`: beside it first, so that there is never half a file.
+pub(super) fn write<X: Signals, U: Signals, Y: Signals>(
+    record: &Experiment<X, U, Y>,
+    path: &Path,
+) -> Result<(), Error> {
+    let names: Vec<&str> = ["t"].iter().chain(U::NAMES).chain(Y::NAMES).copied().collect();
+    for (second, name) in names.iter().enumerate() {
+        if let Some(first) = names[..second].iter().position(|earlier| earlier == name) {
+            let (path, column) = (path.to_owned(), (*name).to_owned());
+            return Err(Error::AmbiguousColumn { path, column, first: first + 1, second: second + 1 });
+        }
+    }
+    // A pipe or a device is written to as it stands.
+    if path.exists() && !path.is_file() {
+        return rows(record, &names, path).map_err(|source| cannot(path, source));
+    }
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".part");
+    let beside = Path::new(&beside);
+    let written = rows(record, &names, beside).and_then(|()| Ok(fs::rename(beside, path)?));
+    written.map_err(|source| {
+        // What matters is why the record was not written, not whether its remains could be removed.
+        let _ = fs::remove_file(beside);
+        cannot(path, source)
+    })
+}
+
+fn rows<X: Signals, U: Signals, Y: Signals>(
+    record: &Experiment<X, U, Y>,
+    names: &[&str],
+    path: &Path,
+) -> Result<(), csv::Error> {
+    let mut file =
+        csv::WriterBuilder::new().has_headers(false).buffer_capacity(1 << 16).from_writer(File::create(path)?);
+    file.write_record(names)?;
+    for (k, (u, y)) in record.inputs().iter().zip(record.outputs()).enumerate() {
+        let (u, y) = (U::into_array(*u), Y::into_array(*y));
+        let measured = Y::array_from_fn(|j| Some(y.as_ref()[j]).filter(|value| !value.is_nan()));
+        file.serialize((record.time(k), u.as_ref(), measured.as_ref()))?;
+    }
+    Ok(file.flush()?)
+}

@@ -1,0 +1,484 @@
+//! From where a search ended to an [`Estimate`].
+
+use super::covariance::classical;
+use super::noise::{Noise, Whitening};
+use super::objective::{Halt, Objective, Rows};
+use super::run::Found;
+use super::{Fit, Setting};
+use crate::error::Error;
+use crate::estimate::{Direction, Estimate, Knowledge, Method, Prediction, Quality, Share, Unknown, Warning, student};
+use crate::information::{Information, SquareMatrix};
+use crate::integrate::Integrator;
+use crate::model::Model;
+use crate::optimize::{Infeasible, Linearization, Severity};
+use crate::predict::{Predictor, Target, Trajectory, WINDOW, Walk, Window};
+use crate::signals::Signals;
+use std::time::Instant;
+
+/// Singular values below this part of the largest are rounding of a simulation: nothing is known along their directions.
+const RANK: f64 = 1e-11;
+/// What has less than this share in a direction that is not known is itself known.
+const SHARE: f64 = 1e-3;
+/// A finer step may move a parameter by this part of its standard error without a word.
+const STEP_SHIFT: f64 = 0.5;
+
+impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
+    pub(super) fn conclude(
+        &self,
+        setting: &Setting<M, P>,
+        found: Found,
+        begin: Instant,
+    ) -> Result<Estimate<M, I, P>, Error> {
+        let Found { coordinates, whitening, linear, outcome, iterations, evaluations, name, trouble } = found;
+        let coordinates = coordinates.as_slice();
+        let unknowns = &setting.unknowns;
+        let objective = self.objective(setting, whitening.clone());
+        let fresh = if linear.is_none() { 1 } else { 0 };
+        let linear = match linear {
+            Some(linear) => linear,
+            None => objective.evaluate(coordinates).map_err(|error| Error::Optimizer(error.to_string()))?,
+        };
+        let n = unknowns.row.len();
+        let (quality, measured, step_error) = self.reproduce(&objective, coordinates)?;
+        let degrees = (measured as f64 - n as f64).max(0.0);
+
+        // What is held or not determined has no interval.
+        let (gradient, norms) = (linear.gradient(), linear.column_norms());
+        let bounds = unknowns.bounds();
+        let at_bound = |i: usize| {
+            let ((lower, upper), x) = (bounds[i], coordinates[i]);
+            if x <= lower && gradient[i] >= 0.0 {
+                Some(unknowns.row[i].parameter.lower)
+            } else if x >= upper && gradient[i] <= 0.0 {
+                Some(unknowns.row[i].parameter.upper)
+            } else {
+                None
+            }
+        };
+        let values = unknowns.values(coordinates);
+        let slopes: Vec<f64> = (0..n).map(|i| unknowns.row[i].parameter.transform.slope(values[i])).collect();
+        let held_at: Vec<Option<f64>> = (0..n).map(at_bound).collect();
+        let mut free: Vec<bool> = held_at.iter().map(Option::is_none).collect();
+        let unseen = unseen_directions(&linear, &free, &norms);
+        let mut unidentified = vec![false; n];
+        for direction in &unseen {
+            let largest = direction.iter().fold(0.0f64, |m, d| m.max(d.abs()));
+            for i in 0..n {
+                unidentified[i] |= direction[i].abs() > SHARE * largest;
+            }
+        }
+        (0..n).for_each(|i| free[i] &= !unidentified[i]);
+        let directions: Vec<Direction> =
+            unseen.iter().map(|d| self.direction(setting, d, &norms, &values, &slopes)).collect();
+
+        // The covariance in the optimizer's coordinates, then in the unknowns' own units.
+        let held: Vec<bool> = free.iter().map(|free| !free).collect();
+        let sum_of_squares = linear.sum_of_squares();
+        let widening = match self.noise {
+            Noise::Given(_) => 1.0,
+            _ if self.noise_is_no_matter() => (sum_of_squares / degrees.max(1.0)).sqrt(),
+            _ => (measured as f64 / degrees.max(1.0)).sqrt(),
+        };
+        let unit = classical(&linear, &held);
+        let sandwich = objective.needs_sandwich();
+        let small_sample = measured as f64 / degrees.max(1.0);
+        let (covariance, factor) = match sandwich {
+            true => (objective.sandwich(coordinates).ok().and_then(|s| s.covariance(&held)), small_sample),
+            false => (unit.clone(), widening * widening),
+        };
+        let singular = covariance.is_none();
+        let covariance = covariance.unwrap_or_else(|| SquareMatrix::zeros(n));
+        let covariance = SquareMatrix::from_fn(n, |i, j| covariance[(i, j)] * factor * slopes[i] * slopes[j]);
+        let known = |i: usize| free[i] && !singular && degrees > 0.0;
+
+        let rows: Vec<Unknown> = (0..n)
+            .map(|i| {
+                let (unknown, value) = (&unknowns.row[i], values[i]);
+                let transform = unknown.parameter.transform;
+                let knowledge = match held_at[i] {
+                    Some(bound) => Knowledge::Held { bound },
+                    None if !known(i) => Knowledge::Unidentified,
+                    None => {
+                        let standard_error = covariance[(i, i)].sqrt();
+                        let (lower, upper) = student::interval(value, standard_error, transform, 0.95, degrees);
+                        Knowledge::Known { standard_error, lower, upper }
+                    }
+                };
+                let index = |change: f64| {
+                    let percent = 100.0 * (sum_of_squares.sqrt() * change * slopes[i] / value).abs();
+                    (known(i) && percent.is_finite()).then_some(percent)
+                };
+                Unknown {
+                    name: unknown.name.clone(),
+                    unit: unknown.unit.to_owned(),
+                    value,
+                    start: unknown.parameter.start,
+                    knowledge,
+                    error_index: unit.as_ref().and_then(|unit| index(unit[(i, i)].sqrt())),
+                    error_index_held: index(1.0 / norms[i]),
+                    transform,
+                }
+            })
+            .collect();
+        let knowledge = M::Parameters::from_fn(|j| {
+            let mine = |i: &usize| unknowns.row[*i].target == Target::Parameter(j);
+            (0..n).find(mine).map_or(Knowledge::Fixed, |i| rows[i].knowledge)
+        });
+
+        let mut warnings = self.warnings(&rows, &directions, degrees, step_error, setting, &whitening, coordinates);
+        if let Some(trouble) = trouble {
+            let text = format!("the checkpoint could not be written ({trouble}); the search went on without it");
+            warnings.push(Warning { severity: Severity::Usable, text });
+        }
+        let widened = whitening.widened(if matches!(self.noise, Noise::Given(_)) { 1.0 } else { widening });
+        let ml = match self.noise {
+            Noise::Given(_) => whitening.clone(),
+            _ if self.noise_is_no_matter() => whitening.widened((sum_of_squares / measured as f64).sqrt()),
+            _ => whitening.clone(),
+        };
+        let plain = self.loss.is_none() && self.weighting.is_none();
+        let deviance = plain.then(|| {
+            let scale = ml.sigma()[0] / whitening.sigma()[0];
+            let outputs = M::Output::LEN as f64;
+            measured as f64 * ((2.0 * std::f64::consts::PI).ln() + ml.log_determinant() / outputs)
+                + sum_of_squares / (scale * scale)
+        });
+        let sigma = widened.sigma();
+        let quality = M::Output::from_fn(|j| Quality { sigma: sigma[j], ..quality[j] });
+        Ok(Estimate {
+            parameters: unknowns.place(0, coordinates).1,
+            knowledge,
+            declared: self.parameters,
+            experiments: self
+                .experiments
+                .iter()
+                .enumerate()
+                .map(|(e, record)| {
+                    let (initial_state, parameters) = unknowns.place(e, coordinates);
+                    Share { name: record.name().to_owned(), samples: record.len(), parameters, initial_state }
+                })
+                .collect(),
+            quality,
+            unknowns: rows,
+            covariance,
+            noise_covariance: match &widened {
+                Whitening::Full { covariance, .. } => Some(covariance.clone()),
+                Whitening::Diagonal(_) => None,
+            },
+            directions,
+            outcome,
+            warnings,
+            cost: linear.cost,
+            measurements: measured,
+            deviance,
+            iterations,
+            evaluations: evaluations + fresh,
+            seconds: begin.elapsed().as_secs_f64(),
+            method: self.method(name, sandwich),
+            integrator: self.integrator.clone(),
+            predictor: self.predictor.clone(),
+        })
+    }
+
+    fn method(&self, optimizer: String, sandwich: bool) -> Method {
+        let noise = match self.noise {
+            Noise::Given(_) => "given",
+            Noise::PerOutput => "estimated per output",
+            Noise::Covariance => "estimated as a full covariance",
+        };
+        let covariance = match (sandwich, &self.prefilter) {
+            (false, _) => "classical (white errors)",
+            (true, None) => "sandwich (errors independent from sample to sample)",
+            (true, Some(_)) => "sandwich (white errors before the pre-filter)",
+        };
+        Method {
+            optimizer,
+            integrator: self.integrator.describe(),
+            predictor: self.predictor.describe(),
+            loss: self.loss.as_ref().map_or("squared".to_owned(), |loss| loss.describe()),
+            weighting: self.weighting.as_ref().map_or("none".to_owned(), |weighting| weighting.describe()),
+            prefilter: self.prefilter.as_ref().map_or("none".to_owned(), |filter| filter.describe()),
+            noise: noise.to_owned(),
+            covariance: covariance.to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+        }
+    }
+
+    /// A direction of the scaled unknowns as relative changes by name.
+    fn direction(
+        &self,
+        setting: &Setting<M, P>,
+        direction: &[f64],
+        norms: &[f64],
+        values: &[f64],
+        slopes: &[f64],
+    ) -> Direction {
+        let change = |i: usize| {
+            let step = direction[i] / if norms[i] > 0.0 { norms[i] } else { 1.0 } * slopes[i];
+            if values[i] == 0.0 { step } else { step / values[i].abs() }
+        };
+        let largest = direction.iter().fold(0.0f64, |m, d| m.max(d.abs()));
+        let mut moves: Vec<(String, f64)> = (0..direction.len())
+            .filter(|&i| direction[i].abs() > SHARE * largest)
+            .map(|i| (setting.unknowns.row[i].name.clone(), change(i)))
+            .collect();
+        let unit = moves.iter().map(|(_, by)| *by).fold(0.0, |m: f64, by| if by.abs() > m.abs() { by } else { m });
+        moves.iter_mut().for_each(|(_, by)| *by /= unit);
+        Direction { moves }
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "each is one thing that a warning may be about")]
+    fn warnings(
+        &self,
+        rows: &[Unknown],
+        directions: &[Direction],
+        degrees: f64,
+        step_error: f64,
+        setting: &Setting<M, P>,
+        whitening: &Whitening,
+        coordinates: &[f64],
+    ) -> Vec<Warning> {
+        let care = |text: String| Warning { severity: Severity::UsableWithCare, text };
+        let mut warnings = vec![];
+        if degrees == 0.0 {
+            let text = format!(
+                "{} unknowns are too many for the measurements: nothing can be said of their accuracy",
+                rows.len()
+            );
+            warnings.push(Warning { severity: Severity::NotUsable, text });
+        }
+        for row in rows {
+            if let Knowledge::Held { bound } = row.knowledge {
+                let text = format!("`{}` is held at its bound {bound} {}: the data want it beyond", row.name, row.unit);
+                warnings.push(care(text));
+            }
+        }
+        warnings.extend(
+            directions.iter().map(|d| care(format!("{d}; fix one, add a prior, or excite the system differently"))),
+        );
+        // The bound first, which costs little; the shift itself only where the bound is not enough.
+        if step_error > STEP_SHIFT
+            && let Some(refined) = self.integrator.refined()
+            && let Some((name, shift, part)) = self.shift(setting, whitening, coordinates, rows, &refined)
+            && shift > STEP_SHIFT
+        {
+            warnings.push(care(format!(
+                "the step is too coarse: with {} `{name}` would move by {:.1e} of itself ({shift:.1} standard errors); use a \
+                 finer step",
+                refined.describe(),
+                part
+            )));
+        }
+        warnings
+    }
+
+    /// By how many standard errors, and by which part of itself, a parameter would move at most with a refined integrator.
+    fn shift(
+        &self,
+        setting: &Setting<M, P>,
+        whitening: &Whitening,
+        coordinates: &[f64],
+        rows: &[Unknown],
+        refined: &I,
+    ) -> Option<(String, f64, f64)> {
+        let objective = Objective { integrator: refined, ..self.objective(setting, whitening.clone()) };
+        let linear = objective.evaluate(coordinates).ok()?;
+        let held: Vec<bool> = rows.iter().map(|row| row.knowledge.standard_error().is_none()).collect();
+        let step = linear.step(&vec![0.0; rows.len()], &held)?;
+        let shift = |i: usize| {
+            let change = (step[i] * rows[i].transform.slope(rows[i].value)).abs();
+            let error = rows[i].knowledge.standard_error()?;
+            Some((rows[i].name.clone(), change / error, change / rows[i].value.abs()))
+        };
+        (0..rows.len()).filter_map(shift).max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// One pass without slopes: how well the outputs are reproduced, how many measurements count, and a bound on how far (in
+    /// standard errors) a finer step could move the unknowns.
+    ///
+    /// The bound is the norm of the change of all standardized predictions. It is taken on every eighth window, simulated
+    /// once more with a finer step from the state at its begin, and extrapolated.
+    #[expect(clippy::type_complexity, reason = "three answers of one pass")]
+    fn reproduce(
+        &self,
+        objective: &Objective<'_, M, I, P>,
+        coordinates: &[f64],
+    ) -> Result<(Vec<Quality>, u64, f64), Error> {
+        let outputs = M::Output::LEN;
+        let mut sums = vec![Sums::default(); outputs];
+        let (mut counted, mut bound) = (0u64, 0.0);
+        let raw = Whitening::Diagonal(vec![1.0; outputs]);
+        let plain = Objective { whitening: raw, prefilter: None, ..*objective };
+        for (e, record) in self.experiments.iter().enumerate() {
+            let visit = &mut |Rows { begin, samples, window }: Rows<'_>| {
+                for k in 0..samples {
+                    let y = M::Output::into_array(record.outputs()[begin + k]);
+                    let counts = self.weighting.is_none() || plain.sample_weight(e, begin + k) > 0.0;
+                    for j in 0..outputs {
+                        if window.measured[j * WINDOW + k] {
+                            sums[j].add(y.as_ref()[j], window.errors()[j * WINDOW + k]);
+                            counted += u64::from(counts);
+                        }
+                    }
+                }
+            };
+            plain.walk(e, coordinates, false, visit).map_err(|halt| match halt {
+                Halt::Failed { sample } => Error::Simulation(plain.locate(e, coordinates, sample)),
+                Halt::Cancelled => Error::Optimizer(Infeasible::Cancelled.to_string()),
+            })?;
+            bound += self.step_error(objective, e, coordinates);
+        }
+        let quality = sums.iter().map(Sums::quality).collect();
+        Ok((quality, counted, bound.sqrt()))
+    }
+
+    /// Square of the norm of the change of one experiment's standardized predictions under a finer step, extrapolated.
+    fn step_error(&self, objective: &Objective<'_, M, I, P>, e: usize, coordinates: &[f64]) -> f64 {
+        const EVERY: usize = 8;
+        let Some(refined) = self.integrator.refined() else { return 0.0 };
+        let record = &self.experiments[e];
+        let (x, p) = objective.unknowns.place(e, coordinates);
+        let prepared = &objective.prepared[e];
+        let trajectory = |integrator| {
+            let walk = Walk { model: self.model, integrator, experiment: record };
+            Trajectory::<M, I, P, 0>::new(walk, &self.predictor, prepared, x, p, &[])
+        };
+        let (mut coarse, mut fine) = (trajectory(&self.integrator), trajectory(&refined));
+        let (mut a, mut b) = (Window::new(0, M::Output::LEN), Window::new(0, M::Output::LEN));
+        let (mut sum, mut seen) = (0.0, 0usize);
+        for window in 0.. {
+            let checks = window % EVERY == 0;
+            if checks {
+                fine.restart_at(&coarse);
+                if !matches!(fine.fill(&mut b), Ok(true)) {
+                    break;
+                }
+            }
+            if !matches!(coarse.fill(&mut a), Ok(true)) {
+                break;
+            }
+            if checks {
+                objective.whitening.apply(&mut a);
+                objective.whitening.apply(&mut b);
+                sum += a.errors().iter().zip(b.errors()).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+                seen += a.samples;
+            }
+        }
+        if seen == 0 { 0.0 } else { sum * record.len() as f64 / seen as f64 }
+    }
+}
+
+impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
+    /// What the model says of one record.
+    pub(super) fn prediction(&self, e: usize, coordinates: &[f64]) -> Result<Prediction<M>, Error> {
+        let record = &self.experiments[e];
+        let (initial_state, p) = self.unknowns.place(e, coordinates);
+        let walk = self.step(e);
+        let (mut x, mut memory) = (initial_state, I::Memory::default());
+        let mut sums = vec![Sums::default(); M::Output::LEN];
+        let mut outputs = Vec::with_capacity(record.len());
+        let mut residuals = Vec::with_capacity(record.len());
+        for k in 0..record.len() {
+            let failed = || Error::Simulation(self.locate(e, coordinates, k));
+            let state = self.predictor.state(&walk, &self.prepared[e], k, x, &p, &mut memory).map_err(|_| failed())?;
+            let Some(state) = state else {
+                outputs.push(M::Output::splat(f64::NAN));
+                residuals.push(M::Output::splat(f64::NAN));
+                continue;
+            };
+            if P::CARRIES {
+                x = state;
+            }
+            let y = self.model.output(record.time(k), &state, &record.inputs()[k], &p);
+            let (predicted, found) = (M::Output::into_array(y), M::Output::into_array(record.outputs()[k]));
+            if predicted.as_ref().iter().any(|y| !y.is_finite()) {
+                return Err(failed());
+            }
+            for (j, sums) in sums.iter_mut().enumerate() {
+                if !found.as_ref()[j].is_nan() {
+                    sums.add(found.as_ref()[j], found.as_ref()[j] - predicted.as_ref()[j]);
+                }
+            }
+            outputs.push(y);
+            residuals.push(M::Output::from_fn(|j| found.as_ref()[j] - predicted.as_ref()[j]));
+        }
+        let quality: Vec<Quality> = sums.iter().map(Sums::quality).collect();
+        Ok(Prediction {
+            t: (0..record.len()).map(|k| record.time(k)).collect(),
+            outputs,
+            residuals,
+            initial_state,
+            quality: M::Output::from_fn(|j| quality[j]),
+        })
+    }
+}
+
+/// Directions in the space of the scaled unknowns along which nothing is known.
+fn unseen_directions(linear: &Linearization, free: &[bool], norms: &[f64]) -> Vec<Vec<f64>> {
+    let n = free.len();
+    let unit = |i: usize| (0..n).map(|j| if i == j { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
+    let mut unseen: Vec<Vec<f64>> = (0..n).filter(|&i| free[i] && norms[i] == 0.0).map(unit).collect();
+    let seen: Vec<bool> = (0..n).map(|i| free[i] && norms[i] > 0.0).collect();
+    let mut look = |information: &Information, unknowns: &[usize]| {
+        let kept: Vec<usize> = (0..unknowns.len()).filter(|&c| seen[unknowns[c]]).collect();
+        let scales: Vec<f64> = kept.iter().map(|&c| 1.0 / norms[unknowns[c]]).collect();
+        if let Ok(spectrum) = information.select(&kept).decomposition(&scales) {
+            for null in spectrum.null_directions(RANK) {
+                let mut direction = vec![0.0; n];
+                kept.iter().zip(null).for_each(|(&c, d)| direction[unknowns[c]] = *d);
+                unseen.push(direction);
+            }
+        }
+    };
+    match linear.blocks() {
+        // One block holds everything.
+        [block] => {
+            let columns: Vec<usize> = linear.columns().flat_map(|(_, columns)| columns).collect();
+            look(block, &columns);
+        }
+        blocks => {
+            for (block, columns) in blocks.iter().zip(linear.columns().map(|(_, columns)| columns)) {
+                let own = columns.len() - linear.shared();
+                look(&block.select(&(0..own).collect::<Vec<_>>()), &columns[..own]);
+            }
+            look(&linear.shared_information(), &(0..linear.shared()).collect::<Vec<_>>());
+        }
+    }
+    unseen
+}
+
+/// Running sums of an output and its error.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    count: u64,
+    first: f64,
+    sum: f64,
+    squares: f64,
+    errors: f64,
+}
+
+impl Sums {
+    fn add(&mut self, y: f64, error: f64) {
+        if self.count == 0 {
+            self.first = y;
+        }
+        // From the first value, so that a large mean costs no digits.
+        let y = y - self.first;
+        self.count += 1;
+        self.sum += y;
+        self.squares += y * y;
+        self.errors += error * error;
+    }
+
+    fn quality(&self) -> Quality {
+        let n = self.count as f64;
+        let spread = self.squares - self.sum * self.sum / n;
+        let fit_percent = (spread > 0.0).then(|| 100.0 * (1.0 - (self.errors / spread).sqrt()));
+        Quality {
+            samples: self.count,
+            rmse: if self.count > 0 { (self.errors / n).sqrt() } else { 0.0 },
+            fit_percent,
+            sigma: 0.0,
+        }
+    }
+}

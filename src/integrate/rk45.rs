@@ -1,0 +1,94 @@
+//! [`Rk45`]: the explicit Runge-Kutta pair of orders 5 and 4 of Dormand and Prince (J. R. Dormand, P. J. Prince, "A family
+//! of embedded Runge-Kutta formulae", Journal of Computational and Applied Mathematics 6, 1980, 19-26, table 2).
+
+use super::{Integrator, Stuck, Tolerance, combined};
+use crate::interval::Interval;
+use crate::model::{Kind, Model};
+use crate::scalar::Scalar;
+use crate::signals::{Of, Signals};
+use serde::{Deserialize, Serialize};
+
+/// Explicit Runge-Kutta 5(4) whose steps follow the error of the values; they stop at every sample, where the input
+/// jumps or bends, and carry on with the same step.
+///
+/// For models that are fast at times and slow at others. A stiff one needs [`Esdirk`](super::Esdirk).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rk45 {
+    /// Error allowed per step, relative to the value of each state; 1e-14 at least.
+    pub relative: f64,
+    /// Error allowed per step on top, in the unit of each state: what counts as nothing where a state passes zero.
+    pub absolute: f64,
+}
+
+impl Default for Rk45 {
+    /// 1e-8 and 1e-12.
+    fn default() -> Self {
+        Rk45 { relative: 1e-8, absolute: 1e-12 }
+    }
+}
+
+const STAGES: usize = 7;
+const C: [f64; STAGES] = [0.0, 1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0, 1.0];
+/// The last row is the result of order 5, so that its stage is the first of the next step.
+const A: [[f64; STAGES]; STAGES] = [
+    [0.0; 7],
+    [1.0 / 5.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [3.0 / 40.0, 9.0 / 40.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0, 0.0, 0.0, 0.0, 0.0],
+    [19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0, 0.0, 0.0, 0.0],
+    [9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0, 0.0, 0.0],
+    [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0, 0.0],
+];
+/// Order 5 less order 4.
+const ERROR: [f64; STAGES] =
+    [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
+
+impl<M: Model> Integrator<M> for Rk45 {
+    type Memory = f64;
+
+    // One call site of the derivative, as in Rk4.
+    #[inline(always)]
+    fn advance<S: Scalar>(
+        &self,
+        model: &M,
+        interval: &Interval<M::Input>,
+        x: Of<M::State, S>,
+        p: &Of<M::Parameters, S>,
+        memory: &mut f64,
+    ) -> Result<Of<M::State, S>, Stuck> {
+        let length = interval.t1 - interval.t0;
+        let zero = M::State::splat(S::from(0.0));
+        let mut k = [zero; STAGES];
+        // The times whose derivatives stand in the first and in the last stage.
+        let (mut start, mut end) = (f64::NAN, f64::NAN);
+        let tolerance = Tolerance { relative: self.relative, absolute: self.absolute };
+        tolerance.cross::<M::State, M::Input, S>(5.0, interval, x, memory, |x, tau, h| {
+            if tau == end {
+                (k[0], start) = (k[STAGES - 1], tau);
+            }
+            let mut stage = *x;
+            for i in usize::from(tau == start)..STAGES {
+                stage = combined::<M::State, S>(x, h, &A[i][..i], &k);
+                let at = tau + C[i] * h;
+                k[i] = model.derivative(interval.t0 + at, &stage, &interval.input::<S>(at / length), p);
+            }
+            (start, end) = (tau, tau + h);
+            let values = k.map(|k| M::State::map(k, |v: S| v.value()));
+            Some((stage, combined::<M::State, f64>(&M::State::splat(0.0), h, &ERROR, &values)))
+        })
+    }
+
+    fn serves(&self, kind: Kind) -> bool {
+        kind == Kind::Continuous
+    }
+
+    fn refined(&self) -> Option<Self> {
+        Some(Rk45 { relative: self.relative * 1e-2, absolute: self.absolute * 1e-2 })
+    }
+
+    #[cfg(feature = "std")]
+    fn describe(&self) -> String {
+        format!("Runge-Kutta 5(4), adaptive, relative {:e}, absolute {:e}", self.relative, self.absolute)
+    }
+}

@@ -1,0 +1,192 @@
+//! Records from CSV files as laboratories write them.
+#![cfg(feature = "csv")]
+
+use greybox::{CsvFile, Experiment, Kind, Model, Nothing, Scalar, Time, signals, units};
+use std::path::PathBuf;
+
+signals! {
+    pub struct Currents { id: "A", iq: "A" }
+    pub struct Drive { ud: "V", w: "rad/s" }
+    pub struct Winding { rs: "ohm" }
+}
+
+struct Pmsm;
+
+impl Model for Pmsm {
+    type State = Currents;
+    type Input = Drive;
+    type Output = Currents;
+    type Parameters = Winding;
+
+    fn output<S: Scalar>(&self, _t: f64, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
+        *x
+    }
+}
+
+fn file(name: &str, text: impl AsRef<[u8]>) -> PathBuf {
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+#[test]
+fn columns_go_by_name() {
+    let path = file("by_name.csv", "iq,extra,t,ud,id,w\n4,x,0,1,3,2\n40,,0.5,10,30,20\n");
+    let record = Experiment::from_csv(&Pmsm, path).unwrap();
+    assert_eq!(record.name(), "by_name");
+    assert_eq!(record.len(), 2);
+    assert_eq!([record.time(0), record.time(1)], [0.0, 0.5]);
+    assert_eq!(record.inputs(), [Drive { ud: 1.0, w: 2.0 }, Drive { ud: 10.0, w: 20.0 }]);
+    assert_eq!(record.outputs(), [Currents { id: 3.0, iq: 4.0 }, Currents { id: 30.0, iq: 40.0 }]);
+}
+
+#[test]
+fn renames_scales_shifts_and_reverses() {
+    let path = file("bench.csv", "time (ms),speed,ud,id,iq\n0,60,1,3,4\n2,-30,1,3,4\n");
+    let record = CsvFile::new(path)
+        .column("t", "time (ms)")
+        .factor("t", 1e-3)
+        .column("w", "speed")
+        .factor("w", units::RPM)
+        .offset("id", -0.5)
+        .reversed("iq")
+        .factor("iq", 2.0)
+        .read(&Pmsm)
+        .unwrap();
+    assert_eq!(record.time(1), 0.002);
+    approx::assert_relative_eq!(record.inputs()[0].w, 2.0 * std::f64::consts::PI, max_relative = 1e-15);
+    approx::assert_relative_eq!(record.inputs()[1].w, -std::f64::consts::PI, max_relative = 1e-15);
+    assert_eq!(record.outputs()[0], Currents { id: 2.5, iq: -8.0 });
+}
+
+#[test]
+fn reads_what_instruments_write() {
+    let plain = "t,ud,w,id,iq\n0,1.5,2,3,4\n1,1.5,2,,4\n";
+    let cases = [
+        ("plain", plain.to_owned(), CsvFile::new as fn(PathBuf) -> CsvFile),
+        ("crlf", plain.replace('\n', "\r\n"), CsvFile::new),
+        ("no_last_newline", plain.trim_end().to_owned(), CsvFile::new),
+        ("byte_order_mark", format!("\u{feff}{plain}"), CsvFile::new),
+        ("spaces", plain.replace(',', " ,  "), CsvFile::new),
+        ("quotes", plain.replace("1.5", "\" 1.5 \"").replace("ud", "\"ud\""), CsvFile::new),
+        ("missing_nan", plain.replace(",,", ",NaN,"), CsvFile::new),
+        ("missing_na", plain.replace(",,", ", NA ,"), CsvFile::new),
+        ("missing_null", plain.replace(",,", ",null,"), CsvFile::new),
+        (
+            "comments",
+            format!("# bench 3\n\n{}\n# end\n", plain.replace("\n1,", "\n# pause, a \" quote\n\n1,")),
+            CsvFile::new,
+        ),
+        ("numpy", format!("# bench 3\n# {plain}"), CsvFile::new),
+        ("trailing_delimiter", plain.replace('\n', ",\n"), CsvFile::new),
+        ("signs", plain.replace("1.5", "+15e-1"), CsvFile::new),
+        ("tabs", plain.replace(',', "\t"), |p| CsvFile::new(p).delimiter(b'\t')),
+        ("semicolons", plain.replace(',', ";"), |p| CsvFile::new(p).delimiter(b';')),
+        ("decimal_comma", plain.replace(',', ";").replace('.', ","), |p| CsvFile::new(p).decimal_comma()),
+        ("percent", format!("% a\n{plain}"), |p| CsvFile::new(p).comment(b'%')),
+        ("preamble", format!("Scope\nt,ud,5\n{plain}"), |p| CsvFile::new(p).preamble(2)),
+        ("units_row", plain.replace("iq\n", "iq\ns,V,rad/s,A,A\n"), |p| CsvFile::new(p).units_row()),
+        ("sample_time", plain.replace("t,", "clock,"), |p| CsvFile::new(p).sample_time(1.0)),
+    ];
+    for (name, text, read) in cases {
+        let record = read(file(&format!("{name}.csv"), text)).read(&Pmsm).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!(record.inputs(), [Drive { ud: 1.5, w: 2.0 }; 2], "{name}");
+        assert_eq!(record.outputs()[0], Currents { id: 3.0, iq: 4.0 }, "{name}");
+        assert!(record.outputs()[1].id.is_nan(), "{name}");
+        assert_eq!(record.outputs()[1].iq, 4.0, "{name}");
+        assert_eq!([record.time(0), record.time(1)], [0.0, 1.0], "{name}");
+    }
+}
+
+/// Even stamps become a start and a step; a gap, a jitter or an uneven end keeps every stamp as written.
+#[test]
+fn time_is_uniform_only_where_it_is() {
+    let record = |name: &str, stamps: &[f64]| {
+        let rows: String = stamps.iter().map(|t| format!("{t},1,2,3,4\n")).collect();
+        Experiment::from_csv(&Pmsm, file(name, format!("t,ud,w,id,iq\n{rows}"))).unwrap()
+    };
+    let even: Vec<f64> = (0..2000).map(|k| 5.0 + (k * 126) as f64 / 1e6).collect();
+    let uniform = record("even.csv", &even);
+    let Time::Uniform { start, step } = uniform.times() else { panic!("stamps {:?}", uniform.times()) };
+    assert_eq!(*start, 5.0);
+    approx::assert_relative_eq!(*step, 126e-6, max_relative = 1e-12);
+
+    let mut jitter = even.clone();
+    jitter[1500] += 126e-6 * 3e-6;
+    let mut gap = even.clone();
+    gap.drain(1998..1999);
+    let mut within = even.clone();
+    within[1500] += 126e-6 * 0.5e-6;
+    for (name, stamps) in [("jitter.csv", &jitter), ("gap.csv", &gap)] {
+        assert_eq!(record(name, stamps).times(), &Time::Stamps(stamps.clone()), "{name}");
+        assert_eq!(Time::from_stamps(stamps.clone()), Time::Stamps(stamps.clone()), "{name}");
+    }
+    assert!(matches!(record("within.csv", &within).times(), Time::Uniform { .. }));
+    // Seconds since 1970 resolve 2.4e-7 s: rounded, but even.
+    let epoch: Vec<f64> = even.iter().map(|t| 1.7e9 + t).collect();
+    assert!(matches!(Time::from_stamps(epoch), Time::Uniform { .. }));
+}
+
+/// A pipe is read once; an uneven clock keeps its stamps there too.
+#[cfg(unix)]
+#[test]
+fn reads_from_a_pipe() {
+    let pipe = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("pipe_{}", std::process::id()));
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for (last, even) in [(4, true), (5, false)] {
+        let (to, text) = (pipe.clone(), format!("t,ud,w,id,iq\n0,1,2,3,4\n2,1,2,3,4\n{last},1,2,3,4\n"));
+        let writer = std::thread::spawn(move || std::fs::write(to, text).unwrap());
+        let record = Experiment::from_csv(&Pmsm, &pipe).unwrap();
+        writer.join().unwrap();
+        assert_eq!([record.time(0), record.time(1), record.time(2)], [0.0, 2.0, last as f64]);
+        assert_eq!(matches!(record.times(), Time::Uniform { .. }), even);
+    }
+    std::fs::remove_file(pipe).unwrap();
+}
+
+struct Line;
+
+signals! {
+    pub struct X { x: "1" }
+    pub struct Y { y: "1" }
+}
+
+impl Model for Line {
+    type State = Nothing;
+    type Input = X;
+    type Output = Y;
+    type Parameters = Winding;
+    const KIND: Kind = Kind::Static;
+
+    fn output<S: Scalar>(&self, _t: f64, _x: &Nothing, u: &X<S>, p: &Winding<S>) -> Y<S> {
+        Y { y: u.x * p.rs }
+    }
+}
+
+#[test]
+fn a_static_model_needs_no_time() {
+    let record = Experiment::from_csv(&Line, file("static.csv", "x,y\n7,8\n9,10\n")).unwrap();
+    assert_eq!(record.inputs(), [X { x: 7.0 }, X { x: 9.0 }]);
+    assert_eq!([record.time(0), record.time(1)], [0.0, 1.0]);
+    let timed = Experiment::from_csv(&Line, file("static_t.csv", "x,t,y\n7,3,8\n")).unwrap();
+    assert_eq!(timed.time(0), 3.0);
+}
+
+/// Measured records that nobody here made.
+#[test]
+fn shared_records() {
+    let shared = std::env::var("GREYBOX_SHARED").map(PathBuf::from);
+    let data = shared.unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../shared").into()).join("data");
+    let path = data.join("motulator/spm_avg.csv");
+    if !path.exists() {
+        println!("no shared data at {}: nothing was tested", data.display());
+        return;
+    }
+    let record = CsvFile::new(path).column("w", "omega_m").read(&Pmsm).unwrap();
+    assert_eq!(record.len(), 8000);
+    assert_eq!(record.times(), &Time::Uniform { start: 0.0, step: 125e-6 });
+    let emps = CsvFile::new(data.join("emps/emps.csv")).column("x", "vir").column("y", "qm").read(&Line).unwrap();
+    assert_eq!(emps.len(), 24_841);
+    // The clock of this instrument jitters by 2.4e-5 of a step.
+    assert!(matches!(emps.times(), Time::Stamps(_)));
+}

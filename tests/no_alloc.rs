@@ -1,0 +1,106 @@
+//! The observers allocate nothing, from their making on: counted.
+
+use greybox::online::{Ekf, EkfStart, Forgetting, Mras, MrasStart, Order, Rls, Stepping, Watch};
+use greybox::pmsm::{
+    AngledDrive, Currents, Drive, ExactFed, ExactStep, ExactSurface, FedWinding, HeldIn, KeLyapunov, MotorLaw,
+    RsLyapunov, Winding,
+};
+use greybox::{Hold, fixed, free};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+struct Counting;
+
+thread_local! {
+    // Of this thread alone: the test harness has threads of its own.
+    static COUNT: Cell<usize> = const { Cell::new(0) };
+}
+
+// SAFETY: hands every call on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.with(|count| count.set(count.get() + 1));
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations(work: impl FnOnce()) -> usize {
+    let before = COUNT.with(Cell::get);
+    work();
+    COUNT.with(Cell::get) - before
+}
+
+const TS: f64 = 0.126e-3;
+
+#[test]
+fn the_counter_counts() {
+    assert_eq!(allocations(|| drop(std::hint::black_box(Box::new(1)))), 1);
+}
+
+#[test]
+fn mras_allocates_nothing() {
+    let count = allocations(|| {
+        let model = ExactSurface(ExactStep::new(4, TS, HeldIn::Stationary).unwrap());
+        let start = MrasStart {
+            parameters: Winding { rs: free(0.4), ls: fixed(4e-3), ke: free(0.9) },
+            pull: Currents { id: 100.0, iq: 100.0 },
+            order: Order::UpdateThenPredict,
+            stepping: Stepping::Split,
+            watch: Watch { limit: Currents { id: 1e3, iq: 1e3 }, patience: 1 },
+        };
+        let law = MotorLaw { rs: RsLyapunov { gain: 5e-3 }, ke: KeLyapunov { gain: 1e-3 } };
+        let mut mras: Mras<_, _> = model.mras(law, start).unwrap();
+        for k in 0..100 {
+            mras.update(k as f64 * TS, &Drive { ud: 0.0, uq: 70.0, w: 90.0 }, &Currents { id: 0.0, iq: 5.0 });
+        }
+        assert!(mras.radius::<5>(&mras.state(), &Drive { ud: 0.0, uq: 70.0, w: 90.0 }) > 0.0);
+    });
+    assert_eq!(count, 0);
+}
+
+#[test]
+fn ekf_allocates_nothing() {
+    let count = allocations(|| {
+        let model = ExactFed::new(ExactStep::new(4, TS, HeldIn::Stationary).unwrap(), 0.15).unwrap();
+        let start = EkfStart {
+            state: Currents { id: free(0.0).prior(0.0, 1.0), iq: free(0.0).prior(0.0, 1.0) },
+            parameters: FedWinding {
+                rs: free(0.4).prior(0.4, 0.3).log(),
+                ls: fixed(4e-3),
+                ke: free(0.9).prior(0.9, 0.1),
+                vdt: free(0.0).prior(0.0, 2.0),
+            },
+            state_drift: Currents { id: 0.1, iq: 0.1 },
+            parameter_drift: FedWinding { rs: 1e-5, ls: 0.0, ke: 3e-6, vdt: 3e-5 },
+            noise: Currents { id: 0.06, iq: 0.06 },
+            hold: Hold::Zero,
+            watch: Watch { limit: Currents { id: 8.0, iq: 8.0 }, patience: 100 },
+        };
+        let mut ekf: Ekf<_, 5> = model.ekf(start).unwrap();
+        for k in 0..100 {
+            let u = AngledDrive { ud: 0.0, uq: 70.0, w: 90.0, theta: 90.0 * TS * k as f64 };
+            ekf.update(k as f64 * TS, &u, &Currents { id: 0.0, iq: f64::NAN });
+        }
+    });
+    assert_eq!(count, 0);
+}
+
+#[test]
+fn rls_allocates_nothing() {
+    let count = allocations(|| {
+        let start =
+            Winding { rs: free(0.4).prior(0.4, 1.0), ls: free(4e-3).prior(4e-3, 1e-2), ke: free(0.9).prior(0.9, 1.0) };
+        let limits = Forgetting { factor: 0.999, floor: [1e-6; 3], ceiling: [1.0; 3] };
+        let mut rls = Rls::<Winding, 3>::new(start, 1.0, limits).unwrap();
+        for k in 0..100 {
+            rls.update(&[(Winding { rs: 1.0, ls: k as f64, ke: 3.0 }, 5.0)]);
+        }
+    });
+    assert_eq!(count, 0);
+}

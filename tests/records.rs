@@ -1,0 +1,127 @@
+//! Records survive files, cuts and joints.
+#![cfg(feature = "csv")]
+
+use greybox::{Experiment, ExperimentOf, Hold, Model, Sample, Scalar, Time, signals};
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+use std::path::PathBuf;
+
+signals! {
+    pub struct Currents { id: "A", iq: "A" }
+    pub struct Drive { ud: "V", w: "rad/s" }
+    pub struct Winding { rs: "ohm" }
+}
+
+struct Pmsm;
+
+impl Model for Pmsm {
+    type State = Currents;
+    type Input = Drive;
+    type Output = Currents;
+    type Parameters = Winding;
+
+    fn output<S: Scalar>(&self, _t: f64, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
+        *x
+    }
+}
+
+type Record = ExperimentOf<Pmsm>;
+
+fn finite() -> impl Strategy<Value = f64> {
+    prop_oneof![-1e3..1e3, proptest::num::f64::NORMAL | proptest::num::f64::SUBNORMAL | proptest::num::f64::ZERO]
+}
+
+fn time(samples: usize) -> impl Strategy<Value = Time> {
+    let uniform = (-1e3..1e3, 1e-6..1e3).prop_map(|(start, step)| Time::Uniform { start, step });
+    let stamps = (-1e3..1e3, prop::collection::vec(1e-6..1e3, samples)).prop_map(|(start, steps)| {
+        let stamps = steps.iter().scan(start, |t: &mut f64, step| {
+            *t += step;
+            Some(*t)
+        });
+        Time::Stamps(stamps.collect())
+    });
+    prop_oneof![uniform, stamps]
+}
+
+fn record() -> impl Strategy<Value = Record> {
+    let row = (finite(), finite(), prop::option::of(finite()), prop::option::of(finite()));
+    prop::collection::vec(row, 2..40).prop_flat_map(|rows| {
+        time(rows.len()).prop_map(move |time| {
+            let u = rows.iter().map(|row| Drive { ud: row.0, w: row.1 }).collect();
+            let or_nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
+            let y = rows.iter().map(|row| Currents { id: or_nan(row.2), iq: or_nan(row.3) }).collect();
+            Experiment::new(&Pmsm, time, u, y).unwrap()
+        })
+    })
+}
+
+/// Equal to the last bit, missing outputs included.
+fn same_signals(a: &Record, b: &Record) -> bool {
+    let bits = |r: &Record| r.outputs().iter().map(|y| [y.id.to_bits(), y.iq.to_bits()]).collect::<Vec<_>>();
+    a.inputs() == b.inputs() && bits(a) == bits(b)
+}
+
+/// Equal up to what rounding an even grid costs: as far as a [`Time::Uniform`] may be from the stamps that it replaces.
+fn same_time(a: &Record, b: &Record) -> bool {
+    let span = a.time(a.len() - 1).abs().max(a.time(0).abs());
+    (0..a.len()).all(|k| (a.time(k) - b.time(k)).abs() <= 2.0 * f64::EPSILON * span)
+}
+
+/// The same cases in every run.
+fn seeded() -> ProptestConfig {
+    ProptestConfig { rng_seed: RngSeed::Fixed(7), failure_persistence: None, ..ProptestConfig::default() }
+}
+
+proptest! {
+    #![proptest_config(seeded())]
+
+    #[test]
+    fn csv_gives_a_record_back(record in record(), id in any::<u32>()) {
+        let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("round_trip_{id}.csv"));
+        record.to_csv(&path).unwrap();
+        let read = Experiment::from_csv(&Pmsm, &path);
+        std::fs::remove_file(&path).unwrap();
+        let read = read.unwrap();
+        prop_assert!(same_signals(&record, &read));
+        prop_assert!(same_time(&record, &read), "{:?} {:?}", record.times(), read.times());
+    }
+}
+
+proptest! {
+    #![proptest_config(seeded())]
+
+    #[test]
+    fn json_gives_a_record_back(record in record(), first in any::<bool>()) {
+        let hold = if first { Hold::First } else { Hold::Zero };
+        let record = record.hold(hold).named("a \"b\" ü");
+        let text = serde_json::to_string(&record).unwrap();
+        let read: Record = serde_json::from_str(&text).unwrap();
+        prop_assert!(same_signals(&record, &read));
+        prop_assert_eq!(record.times(), read.times());
+        prop_assert_eq!((record.name(), record.input_hold()), (read.name(), read.input_hold()));
+        prop_assert_eq!(serde_json::to_string(&read).unwrap(), text);
+    }
+
+    #[test]
+    fn a_split_record_joins_again(record in record(), at in 0.0..1.0_f64) {
+        let cut = 2 + (at * (record.len() as f64 - 4.0)).max(0.0) as usize;
+        prop_assume!(record.len() >= cut + 2);
+        let (first, second) = record.split_at(record.time(cut)).unwrap();
+        prop_assert_eq!((first.len(), second.len()), (cut, record.len() - cut));
+        let joined = first.join(&second).unwrap();
+        prop_assert!(same_signals(&record, &joined));
+        prop_assert!(same_time(&record, &joined), "{:?} {:?}", record.times(), joined.times());
+    }
+
+    #[test]
+    fn cycles_are_the_runs(record in record(), level in -1e3..1e3_f64) {
+        let running = |s: &Sample<Pmsm>| s.u.w > level;
+        let cycles = record.cycles(2, running);
+        for cycle in &cycles {
+            prop_assert!(cycle.len() >= 2 && cycle.samples().all(|s| running(&s)));
+        }
+        // No pair of running neighbors is lost, and none is counted twice.
+        let pairs = |r: &Record| r.inputs().windows(2).filter(|u| u[0].w > level && u[1].w > level).count();
+        prop_assert_eq!(pairs(&record), cycles.iter().map(|cycle| cycle.len() - 1).sum::<usize>());
+    }
+}
