@@ -64,13 +64,13 @@ mod tests {
     fn a_resting_quantized_signal_is_left_alone() {
         let mut values = vec![0.0; 30];
         values[10] = 0.03;
-        assert_eq!(hampel(&mut values, 3, 6.0, 0.03), []);
+        assert!(hampel(&mut values, 3, 6.0, 0.03).is_empty());
         assert_eq!(hampel(&mut values, 3, 6.0, 0.01), [10]);
     }
 
     #[test]
     fn nothing_is_fine() {
-        assert_eq!(hampel(&mut [], 3, 6.0, 0.0), []);
-        assert_eq!(hampel(&mut [f64::NAN], 3, 6.0, 0.0), []);
+        assert!(hampel(&mut [], 3, 6.0, 0.0).is_empty());
+        assert!(hampel(&mut [f64::NAN], 3, 6.0, 0.0).is_empty());
     }
 }

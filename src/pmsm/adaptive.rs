@@ -81,7 +81,7 @@ fn runge_kutta(machine: &Machine, t: f64, x: Motion, u: &Acting, p: &Rotor, h: f
     let k2 = f(axpy::<Motion, f64>(x, 0.5 * h, k1));
     let k3 = f(axpy::<Motion, f64>(x, 0.5 * h, k2));
     let k4 = f(axpy::<Motion, f64>(x, h, k3));
-    let [k1, k2, k3, k4] = [k1, k2, k3, k4].map(|k| <[f64; 4]>::from(k));
+    let [k1, k2, k3, k4] = [k1, k2, k3, k4].map(<[f64; 4]>::from);
     let mean = core::array::from_fn(|i| (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]) / 6.0);
     axpy::<Motion, f64>(x, h, Motion::from(mean))
 }

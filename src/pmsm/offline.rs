@@ -2,12 +2,14 @@
 //!
 //! A record becomes [`Spans`]: per sample interval the currents at both ends, the voltage commanded in between, and the
 //! *mean* speed. Misaligned by half a sample, a record at 350 rad/s is wrong by degrees of electrical angle. From spans,
-//! [`plain`] and [`extended`] make equations; these are filtered, weighted and solved by [`Equations`](crate::Equations).
+//! [`plain`] and [`extended`] make [`Equations`]; these are filtered, weighted and solved.
 
+mod equations;
 mod extended;
 mod plain;
 mod validate;
 
+pub use equations::{Equations, WEAK, hardly_seen};
 pub use extended::{Extended, extended, search_i0};
 pub use plain::{Axes, Form, plain};
 pub use validate::{Validation, voltages};

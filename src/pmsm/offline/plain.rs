@@ -1,7 +1,6 @@
-use super::{Span, Spans};
+use super::{Equations, Span, Spans};
 use crate::pmsm::frames::{rotate_into, rotate_out_of};
 use crate::pmsm::{SQRT_2_3, Winding};
-use crate::regress::Equations;
 use serde::{Deserialize, Serialize};
 
 /// Which voltage equations are used.
