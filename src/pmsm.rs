@@ -21,7 +21,7 @@
 //! | [`motor`] | constants from geometry | units |
 //! | [`temperature`] | winding and magnet laws, temperatures read back from estimates | |
 //! | [`Surface`], [`Salient`], [`Saturated`], [`Fed`], [`Shaft`] | the equations, each a [`Model`](crate::Model) | frames |
-//! | [`ExactSurface`], [`ExactFed`] | the currents' equation in exact steps, for observers | `Fed` |
+//! | [`ExactSurface`], [`ExactFed`], [`ExactCompensated`] | the currents' equation in exact steps | `Fed` |
 //! | [`MotorLaw`] and its parts | adaptation laws for the motor's [`Mras`](crate::online::Mras) | |
 //! | [`Injection`] | d current that makes the resistance visible | |
 //! | [`control`], [`inverter`], [`sensors`] | the parts of a drive | frames |
@@ -53,6 +53,7 @@ pub mod temperature;
 pub mod units;
 
 mod adaptation;
+mod compensated;
 mod exact;
 mod fed;
 mod injection;
@@ -67,6 +68,7 @@ pub use adaptation::{
     Adaptation, DeadZone, DirectCurrent, KeConstantGain, KeLyapunov, MotorLaw, Normalized, Resting, RsDirect,
     RsLyapunov, Seen, lyapunov_margin, lyapunov_rate,
 };
+pub use compensated::{CompensatedDrive, CompensatedWinding, ExactCompensated};
 pub use exact::{ExactFed, ExactStep, ExactSurface, FedWinding, HeldIn};
 pub use fed::{AngledDrive, Fed, Line, dead_time};
 pub use injection::{Injection, Stair};

@@ -6,8 +6,10 @@ use greybox::pmsm::drive::{Log, Simulation};
 use greybox::pmsm::offline::{Axes, Form, Spans, extended, hardly_seen, plain, search_i0};
 use greybox::pmsm::program::{Cycle, Program};
 use greybox::pmsm::robot::{Axis, TS};
-use greybox::pmsm::{AngledDrive, Currents, ExactFed, ExactStep, FedWinding, HeldIn, Winding};
-use greybox::{Butterworth, Hold, LinearEstimate, fixed, free};
+use greybox::pmsm::{
+    AngledDrive, CompensatedWinding, Currents, ExactCompensated, ExactFed, ExactStep, FedWinding, HeldIn, Winding,
+};
+use greybox::{Butterworth, Fit, Hold, LinearEstimate, fixed, free};
 use std::sync::OnceLock;
 
 struct Record {
@@ -134,6 +136,35 @@ fn without_d_current_ld_is_not_identifiable() {
     }
     let error = extended(&spans, 0.15).prefiltered(&filter()).solve().unwrap_err().to_string();
     assert!(error.contains("`ld`") && error.contains("not identifiable"), "{error}");
+}
+
+fn grey_box(number: u8, every: usize) {
+    let Record { axis, spans, cycles, .. } = cycles(number);
+    let model = ExactCompensated(ExactStep::new(4, TS, HeldIn::Stationary).unwrap());
+    for cycle in cycles.iter().step_by(every) {
+        let experiment = spans.cut(cycle.samples.clone()).grey_box(&model, 0.15).unwrap();
+        let start = CompensatedWinding {
+            rs: free(1.5 * axis.rs),
+            ls: free(1.2 * axis.ls),
+            ke: free(0.9 * axis.ke),
+            vdt: free(0.0),
+        };
+        let p = Fit::new(&model, &experiment).parameters(start).run().unwrap().parameters;
+        let (ke, r) = (percent(p.ke, axis.ke), percent(p.rs, axis.rs + axis.r_cable));
+        assert!(ke.abs() < 0.3 && r.abs() < 2.0, "axis {number}, {}: Ke {ke} %, R {r} %", cycle.speed);
+    }
+}
+
+#[test]
+fn grey_box_with_dead_time_at_every_speed() {
+    grey_box(1, 1);
+}
+
+#[test]
+fn grey_box_with_dead_time_on_the_other_axes() {
+    for number in 2..=6 {
+        grey_box(number, 6);
+    }
 }
 
 /// Relative rms error of Ke (%) over the second half of a run of the joint filter on (id, iq, R, Ke, Vdt).

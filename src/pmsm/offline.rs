@@ -6,6 +6,7 @@
 
 mod equations;
 mod extended;
+mod grey_box;
 mod plain;
 mod validate;
 
