@@ -4,9 +4,34 @@
 //! The files hold little-endian `f64` rows `[ud, uq, w, id, iq]`; row k was measured at `k * 0.126 ms`.
 
 use greybox::optimize::{LevenbergMarquardt, Stop};
-use greybox::pmsm::{Currents, Drive, Surface, Winding};
-use greybox::{Estimate, Experiment, ExperimentOf, Fit, JacobianColumns, Time, free};
+use greybox::pmsm::{Currents, Drive, SQRT_2_3, Winding};
+use greybox::{Estimate, Experiment, ExperimentOf, Fit, JacobianColumns, Model, Scalar, Time, free};
 use std::error::Error;
+
+struct Pmsm {
+    pole_pairs: f64,
+}
+
+impl Model for Pmsm {
+    type State = Currents;
+    type Input = Drive;
+    type Output = Currents;
+    type Parameters = Winding;
+
+    #[inline]
+    fn derivative<S: Scalar>(&self, _t: f64, x: &Currents<S>, u: &Drive<S>, p: &Winding<S>) -> Currents<S> {
+        let we = u.w * self.pole_pairs;
+        Currents {
+            id: (u.ud - p.rs * x.id) / p.ls + we * x.iq,
+            iq: (u.uq - p.rs * x.iq - p.ke * u.w * SQRT_2_3) / p.ls - we * x.id,
+        }
+    }
+
+    #[inline]
+    fn output<S: Scalar>(&self, _t: f64, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
+        *x
+    }
+}
 
 const SAMPLE_TIME: f64 = 0.126e-3;
 
@@ -16,14 +41,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::var("PEERDATA").unwrap_or_else(|_| "data".to_owned());
     let fleet = size == "fleet";
     let path = if fleet { format!("{folder}/fleet.bin") } else { format!("{folder}/data_{size}.bin") };
-    let model = Surface::new(4)?;
+    let model = Pmsm { pole_pairs: 4.0 };
     let records = read(&model, &path, if fleet { 2000 } else { usize::MAX })?;
     let mut times = vec![];
     let (mut cost, mut passes) = (0.0, 0);
     for _ in 0..repetitions.parse()? {
         let begin = cpu_time();
-        let fits: Vec<Estimate<Surface>> =
-            records.iter().map(|record| fit(&model, record)).collect::<Result<_, _>>()?;
+        let fits: Vec<Estimate<Pmsm>> = records.iter().map(|record| fit(&model, record)).collect::<Result<_, _>>()?;
         times.push(cpu_time() - begin);
         cost = fits.iter().map(|fit| fit.cost).sum();
         passes = fits.iter().map(|fit| fit.evaluations).sum::<u64>() / fits.len() as u64;
@@ -39,7 +63,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn fit(model: &Surface, record: &ExperimentOf<Surface>) -> Result<Estimate<Surface>, greybox::Error> {
+fn fit(model: &Pmsm, record: &ExperimentOf<Pmsm>) -> Result<Estimate<Pmsm>, greybox::Error> {
     let stop = Stop { cost: 1e-10, ..Stop::default() };
     Fit::new(model, record)
         .parameters(Winding { rs: free(1.2), ls: free(1.75e-3), ke: free(0.63) })
@@ -48,7 +72,7 @@ fn fit(model: &Surface, record: &ExperimentOf<Surface>) -> Result<Estimate<Surfa
         .run()
 }
 
-fn read(model: &Surface, path: &str, samples: usize) -> Result<Vec<ExperimentOf<Surface>>, Box<dyn Error>> {
+fn read(model: &Pmsm, path: &str, samples: usize) -> Result<Vec<ExperimentOf<Pmsm>>, Box<dyn Error>> {
     let bytes = std::fs::read(path).map_err(|error| format!("{path}: {error}"))?;
     let numbers: Vec<f64> =
         bytes.chunks_exact(8).map(|b| f64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]])).collect();

@@ -22,6 +22,7 @@ pub struct Gain<const N: usize> {
     pub variance: f64,
 }
 
+#[expect(clippy::needless_range_loop, reason = "matrix algebra is written in indices")]
 impl<const N: usize> Covariance<N> {
     /// Independent quantities with these variances (negative ones count as zero).
     pub fn diagonal(variances: [f64; N]) -> Self {

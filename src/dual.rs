@@ -10,7 +10,7 @@ use core::cmp::Ordering;
 use core::iter::Sum;
 use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
-/// A value and its slopes with respect to `N` quantities.
+/// A value and its slopes with respect to `N` quantities. `UNIT` is for the library's own loops: leave it out.
 ///
 /// ```
 /// use greybox::{Dual, Scalar};
@@ -21,7 +21,7 @@ use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAss
 /// assert_eq!(f.slopes[1], 9.0 + 2f64.cos()); // x^2 + cos y
 /// ```
 #[derive(Clone, Copy, Debug)]
-pub struct Dual<const N: usize> {
+pub struct Dual<const N: usize, const UNIT: u8 = 0> {
     /// The value.
     pub value: f64,
     /// d value / d quantity, one entry per quantity.
@@ -44,7 +44,9 @@ impl<const N: usize> Dual<N> {
         }
         Dual { value, slopes }
     }
+}
 
+impl<const N: usize, const UNIT: u8> Dual<N, UNIT> {
     #[inline(always)]
     fn with(value: f64, slope: impl Fn(usize) -> f64) -> Self {
         let mut slopes = [0.0; N];
@@ -63,49 +65,49 @@ impl<const N: usize> Dual<N> {
     }
 }
 
-impl<const N: usize> Default for Dual<N> {
+impl<const N: usize, const UNIT: u8> Default for Dual<N, UNIT> {
     #[inline(always)]
     fn default() -> Self {
-        Self::constant(0.0)
+        Self::from(0.0)
     }
 }
 
-impl<const N: usize> From<f64> for Dual<N> {
+impl<const N: usize, const UNIT: u8> From<f64> for Dual<N, UNIT> {
     #[inline(always)]
     fn from(value: f64) -> Self {
-        Self::constant(value)
+        Dual { value, slopes: [0.0; N] }
     }
 }
 
-impl<const N: usize> PartialEq for Dual<N> {
+impl<const N: usize, const UNIT: u8> PartialEq for Dual<N, UNIT> {
     #[inline(always)]
     fn eq(&self, other: &Self) -> bool {
         self.value == other.value
     }
 }
 
-impl<const N: usize> PartialOrd for Dual<N> {
+impl<const N: usize, const UNIT: u8> PartialOrd for Dual<N, UNIT> {
     #[inline(always)]
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         self.value.partial_cmp(&other.value)
     }
 }
 
-impl<const N: usize> PartialEq<f64> for Dual<N> {
+impl<const N: usize, const UNIT: u8> PartialEq<f64> for Dual<N, UNIT> {
     #[inline(always)]
     fn eq(&self, other: &f64) -> bool {
         self.value == *other
     }
 }
 
-impl<const N: usize> PartialOrd<f64> for Dual<N> {
+impl<const N: usize, const UNIT: u8> PartialOrd<f64> for Dual<N, UNIT> {
     #[inline(always)]
     fn partial_cmp(&self, other: &f64) -> Option<Ordering> {
         self.value.partial_cmp(other)
     }
 }
 
-impl<const N: usize> Neg for Dual<N> {
+impl<const N: usize, const UNIT: u8> Neg for Dual<N, UNIT> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -114,7 +116,7 @@ impl<const N: usize> Neg for Dual<N> {
     }
 }
 
-impl<const N: usize> Add for Dual<N> {
+impl<const N: usize, const UNIT: u8> Add for Dual<N, UNIT> {
     type Output = Self;
     #[inline(always)]
     fn add(self, b: Self) -> Self {
@@ -123,7 +125,7 @@ impl<const N: usize> Add for Dual<N> {
     }
 }
 
-impl<const N: usize> Sub for Dual<N> {
+impl<const N: usize, const UNIT: u8> Sub for Dual<N, UNIT> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, b: Self) -> Self {
@@ -132,7 +134,7 @@ impl<const N: usize> Sub for Dual<N> {
     }
 }
 
-impl<const N: usize> Mul for Dual<N> {
+impl<const N: usize, const UNIT: u8> Mul for Dual<N, UNIT> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, b: Self) -> Self {
@@ -141,7 +143,7 @@ impl<const N: usize> Mul for Dual<N> {
     }
 }
 
-impl<const N: usize> Div for Dual<N> {
+impl<const N: usize, const UNIT: u8> Div for Dual<N, UNIT> {
     type Output = Self;
     #[inline(always)]
     fn div(self, b: Self) -> Self {
@@ -152,7 +154,7 @@ impl<const N: usize> Div for Dual<N> {
     }
 }
 
-impl<const N: usize> Add<f64> for Dual<N> {
+impl<const N: usize, const UNIT: u8> Add<f64> for Dual<N, UNIT> {
     type Output = Self;
     #[inline(always)]
     fn add(self, b: f64) -> Self {
@@ -160,7 +162,7 @@ impl<const N: usize> Add<f64> for Dual<N> {
     }
 }
 
-impl<const N: usize> Sub<f64> for Dual<N> {
+impl<const N: usize, const UNIT: u8> Sub<f64> for Dual<N, UNIT> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, b: f64) -> Self {
@@ -168,7 +170,7 @@ impl<const N: usize> Sub<f64> for Dual<N> {
     }
 }
 
-impl<const N: usize> Mul<f64> for Dual<N> {
+impl<const N: usize, const UNIT: u8> Mul<f64> for Dual<N, UNIT> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, b: f64) -> Self {
@@ -177,7 +179,7 @@ impl<const N: usize> Mul<f64> for Dual<N> {
     }
 }
 
-impl<const N: usize> Div<f64> for Dual<N> {
+impl<const N: usize, const UNIT: u8> Div<f64> for Dual<N, UNIT> {
     type Output = Self;
     #[inline(always)]
     fn div(self, b: f64) -> Self {
@@ -189,13 +191,13 @@ impl<const N: usize> Div<f64> for Dual<N> {
 
 macro_rules! assign {
     ($($trait:ident $method:ident $op:tt;)*) => {$(
-        impl<const N: usize> $trait for Dual<N> {
+        impl<const N: usize, const UNIT: u8> $trait for Dual<N, UNIT> {
             #[inline(always)]
             fn $method(&mut self, b: Self) {
                 *self = *self $op b;
             }
         }
-        impl<const N: usize> $trait<f64> for Dual<N> {
+        impl<const N: usize, const UNIT: u8> $trait<f64> for Dual<N, UNIT> {
             #[inline(always)]
             fn $method(&mut self, b: f64) {
                 *self = *self $op b;
@@ -205,13 +207,13 @@ macro_rules! assign {
 }
 assign! { AddAssign add_assign +; SubAssign sub_assign -; MulAssign mul_assign *; DivAssign div_assign /; }
 
-impl<const N: usize> Sum for Dual<N> {
+impl<const N: usize, const UNIT: u8> Sum for Dual<N, UNIT> {
     fn sum<I: Iterator<Item = Self>>(terms: I) -> Self {
         terms.fold(Self::default(), |a, b| a + b)
     }
 }
 
-impl<const N: usize> Scalar for Dual<N> {
+impl<const N: usize, const UNIT: u8> Scalar for Dual<N, UNIT> {
     #[inline(always)]
     fn value(&self) -> f64 {
         self.value
@@ -370,7 +372,7 @@ impl<const N: usize> Scalar for Dual<N> {
     }
     #[inline(always)]
     fn signum(self) -> Self {
-        Self::constant(f64::signum(self.value))
+        Self::from(f64::signum(self.value))
     }
     #[inline(always)]
     fn max(self, other: Self) -> Self {
@@ -383,28 +385,28 @@ impl<const N: usize> Scalar for Dual<N> {
     #[inline(always)]
     fn clamp(self, low: f64, high: f64) -> Self {
         if self.value > high {
-            Self::constant(high)
+            Self::from(high)
         } else if self.value < low {
-            Self::constant(low)
+            Self::from(low)
         } else {
             self
         }
     }
     #[inline(always)]
     fn floor(self) -> Self {
-        Self::constant(Scalar::floor(self.value))
+        Self::from(Scalar::floor(self.value))
     }
     #[inline(always)]
     fn ceil(self) -> Self {
-        Self::constant(Scalar::ceil(self.value))
+        Self::from(Scalar::ceil(self.value))
     }
     #[inline(always)]
     fn round(self) -> Self {
-        Self::constant(Scalar::round(self.value))
+        Self::from(Scalar::round(self.value))
     }
     #[inline(always)]
     fn trunc(self) -> Self {
-        Self::constant(Scalar::trunc(self.value))
+        Self::from(Scalar::trunc(self.value))
     }
     #[inline(always)]
     fn fract(self) -> Self {

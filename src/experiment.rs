@@ -225,9 +225,9 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
 
     /// What happens from sample `k` to the next.
     #[inline(always)]
-    pub(crate) fn interval(&self, k: usize) -> Interval<U> {
-        let u1 = if self.hold == Hold::First { self.inputs[k + 1] } else { self.inputs[k] };
-        Interval { t0: self.time(k), t1: self.time(k + 1), u0: self.inputs[k], u1, hold: self.hold }
+    pub(crate) fn interval(&self, k: usize, hold: Hold) -> Interval<U> {
+        let u1 = if hold == Hold::First { self.inputs[k + 1] } else { self.inputs[k] };
+        Interval { t0: self.time(k), t1: self.time(k + 1), u0: self.inputs[k], u1, hold }
     }
 }
 

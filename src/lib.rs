@@ -2,6 +2,8 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 
 mod covariance;
+#[cfg(feature = "std")]
+mod dispatch;
 mod dual;
 mod integrate;
 mod interval;
@@ -71,6 +73,7 @@ pub use {
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
     numeric::{Derivative, Next, Numeric, StateEquation},
     outliers::hampel,
+    numeric::Numeric,
     predict::{FreeRun, Horizon, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
     regress::{LinearEstimate, Regression},

@@ -21,6 +21,7 @@ pub(crate) use window::{Seed, Target, Trajectory, WINDOW, Window};
 use crate::error::Error;
 use crate::experiment::ExperimentOf;
 use crate::integrate::{Integrator, Stuck};
+use crate::interval::Hold;
 use crate::model::Model;
 use crate::scalar::Scalar;
 use crate::signals::Of;
@@ -74,6 +75,8 @@ pub struct Walk<'a, M: Model, I> {
     pub integrator: &'a I,
     /// The record.
     pub experiment: &'a ExperimentOf<M>,
+    /// How its input behaves between samples; apart, so that a loop may be compiled for one hold.
+    pub(crate) hold: Hold,
 }
 
 impl<M: Model, I> Clone for Walk<'_, M, I> {
@@ -84,7 +87,12 @@ impl<M: Model, I> Clone for Walk<'_, M, I> {
 
 impl<M: Model, I> Copy for Walk<'_, M, I> {}
 
-impl<M: Model, I: Integrator<M>> Walk<'_, M, I> {
+impl<'a, M: Model, I: Integrator<M>> Walk<'a, M, I> {
+    /// A model before its first step.
+    pub fn new(model: &'a M, integrator: &'a I, experiment: &'a ExperimentOf<M>) -> Self {
+        Walk { model, integrator, experiment, hold: experiment.input_hold() }
+    }
+
     /// From sample `k` to sample `k + 1`.
     ///
     /// # Errors
@@ -97,6 +105,6 @@ impl<M: Model, I: Integrator<M>> Walk<'_, M, I> {
         p: &Of<M::Parameters, S>,
         memory: &mut I::Memory,
     ) -> Result<Of<M::State, S>, Stuck> {
-        self.integrator.advance(self.model, &self.experiment.interval(k), x, p, memory)
+        self.integrator.advance(self.model, &self.experiment.interval(k, self.hold), x, p, memory)
     }
 }

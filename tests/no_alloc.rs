@@ -1,11 +1,12 @@
-//! The observers allocate nothing, from their making on: counted.
+//! Observers, integrators and filters allocate nothing, from their making on: counted.
 
+use greybox::check::{Plane, Rates, Spiral};
 use greybox::online::{Ekf, EkfStart, Forgetting, Mras, MrasStart, Order, Rls, Stepping, Watch};
 use greybox::pmsm::{
     AngledDrive, Currents, Drive, ExactFed, ExactStep, ExactSurface, FedWinding, HeldIn, KeLyapunov, MotorLaw,
     RsLyapunov, Winding,
 };
-use greybox::{Hold, fixed, free};
+use greybox::{Butterworth, Dual, Esdirk, FilterState, Hold, Integrator, Interval, Nothing, Rk4, Rk45, fixed, free};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
@@ -101,6 +102,31 @@ fn rls_allocates_nothing() {
         for k in 0..100 {
             rls.update(&[(Winding { rs: 1.0, ls: k as f64, ke: 3.0 }, 5.0)]);
         }
+    });
+    assert_eq!(count, 0);
+}
+
+#[test]
+fn integrators_allocate_nothing() {
+    fn run<I: Integrator<Spiral>>(integrator: &I) -> usize {
+        let p = Rates { growth: Dual::<2>::variable(1.0, 0), turn: Dual::variable(2.0, 1) };
+        let interval = Interval { t0: 0.0, t1: 0.5, u0: Nothing, u1: Nothing, hold: Hold::Zero };
+        allocations(|| {
+            let start = Plane { x: Dual::constant(0.5), y: Dual::constant(0.0) };
+            integrator.advance(&Spiral, &interval, start, &p, &mut I::Memory::default()).unwrap();
+        })
+    }
+    assert_eq!((run(&Rk4::default()), run(&Rk45::default()), run(&Esdirk::default())), (0, 0, 0));
+}
+
+#[test]
+fn filters_allocate_nothing() {
+    let mut block = vec![1.0; 7 * 100];
+    let mut states = [FilterState::default(); 7];
+    let count = allocations(|| {
+        let filter = Butterworth::low_pass(5, 100.0, TS).unwrap();
+        filter.filter(&mut block, 100, 90, &mut states);
+        filter.step(&mut states[0], 1.0);
     });
     assert_eq!(count, 0);
 }

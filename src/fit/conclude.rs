@@ -5,6 +5,7 @@ use super::noise::{Noise, Whitening};
 use super::objective::{Halt, Objective, Rows};
 use super::run::Found;
 use super::{Fit, Setting};
+use crate::dispatch::PORTABLE;
 use crate::error::Error;
 use crate::estimate::{Direction, Estimate, Knowledge, Method, Prediction, Quality, Share, Unknown, Warning, student};
 use crate::information::{Information, SquareMatrix};
@@ -340,8 +341,8 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
         let (x, p) = objective.unknowns.place(e, coordinates);
         let prepared = &objective.prepared[e];
         let trajectory = |integrator| {
-            let walk = Walk { model: self.model, integrator, experiment: record };
-            Trajectory::<M, I, P, 0>::new(walk, &self.predictor, prepared, x, p, &[])
+            let walk = Walk::new(self.model, integrator, record);
+            Trajectory::<M, I, P, 0, PORTABLE>::new(walk, &self.predictor, prepared, x, p, &[])
         };
         let (mut coarse, mut fine) = (trajectory(&self.integrator), trajectory(&refined));
         let (mut a, mut b) = (Window::new(0, M::Output::LEN), Window::new(0, M::Output::LEN));

@@ -5,10 +5,12 @@
 
 use super::noise::Whitening;
 use super::unknowns::Unknowns;
+use crate::dispatch::{PORTABLE, Unit, WIDE, has_wide};
 use crate::error::Failure;
 use crate::experiment::{ExperimentOf, Sample};
 use crate::information::{Block, Information};
 use crate::integrate::Integrator;
+use crate::interval::Hold;
 use crate::loss::Loss;
 use crate::model::Model;
 use crate::optimize::{Infeasible, LeastSquares, Linearization};
@@ -82,7 +84,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
     }
 
     pub(crate) fn step<'s>(&'s self, experiment: usize) -> Walk<'s, M, I> {
-        Walk { model: self.model, integrator: self.integrator, experiment: &self.experiments[experiment] }
+        Walk::new(self.model, self.integrator, &self.experiments[experiment])
     }
 
     /// Walks one experiment, with slopes or without, and shows each window of standardized errors.
@@ -94,15 +96,20 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
         visit: &mut dyn FnMut(Rows<'_>),
     ) -> Result<(), Halt> {
         let seeds = if slopes { self.unknowns.seeds(experiment, coordinates) } else { vec![] };
-        match seeds.len() {
-            0 => self.walk_in::<0>(experiment, coordinates, &seeds, visit),
-            1..=4 => self.walk_in::<4>(experiment, coordinates, &seeds, visit),
-            5 | 6 => self.walk_in::<6>(experiment, coordinates, &seeds, visit),
-            _ => self.walk_in::<8>(experiment, coordinates, &seeds, visit),
+        // The wide loop is made for the hold that nearly all records have.
+        let wide = has_wide() && self.experiments[experiment].input_hold() == Hold::Zero;
+        match (seeds.len(), wide) {
+            (0, _) => self.walk_in::<0, PORTABLE>(experiment, coordinates, &seeds, visit),
+            (1..=4, false) => self.walk_in::<4, PORTABLE>(experiment, coordinates, &seeds, visit),
+            (5 | 6, false) => self.walk_in::<6, PORTABLE>(experiment, coordinates, &seeds, visit),
+            (_, false) => self.walk_in::<8, PORTABLE>(experiment, coordinates, &seeds, visit),
+            (1..=4, true) => self.walk_in::<4, WIDE>(experiment, coordinates, &seeds, visit),
+            (5 | 6, true) => self.walk_in::<6, WIDE>(experiment, coordinates, &seeds, visit),
+            (_, true) => self.walk_in::<8, WIDE>(experiment, coordinates, &seeds, visit),
         }
     }
 
-    fn walk_in<const N: usize>(
+    fn walk_in<const N: usize, const UNIT: Unit>(
         &self,
         experiment: usize,
         coordinates: &[f64],
@@ -112,7 +119,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
         let (x, p) = self.unknowns.place(experiment, coordinates);
         let prepared = &self.prepared[experiment];
         let mut trajectory =
-            Trajectory::<M, I, P, N>::new(self.step(experiment), self.predictor, prepared, x, p, seeds);
+            Trajectory::<M, I, P, N, UNIT>::new(self.step(experiment), self.predictor, prepared, x, p, seeds);
         let mut window = Window::new(seeds.len(), M::Output::LEN);
         let filtered = if self.prefilter.is_some() { (seeds.len() + 1) * M::Output::LEN } else { 0 };
         let mut states = vec![FilterState::default(); filtered];

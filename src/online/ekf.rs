@@ -54,6 +54,8 @@ pub struct Ekf<M: Model, const N: usize, I: Integrator<M> = Automatic> {
     stopped: Option<Divergence>,
 }
 
+type Step<Y> = Result<Update<Y>, (Y, Divergence)>;
+
 impl<M: Model, const N: usize> Ekf<M, N> {
     /// A filter for samples `ts` seconds apart, with the integrator that the model's kind asks for.
     ///
@@ -139,13 +141,9 @@ impl<M: Model, const N: usize, I: Integrator<M>> Ekf<M, N, I> {
         }
     }
 
+    /// The update, or why it cannot stand, with the innovation that told.
     #[inline(always)]
-    fn step(
-        &mut self,
-        t: f64,
-        u: &Of<M::Input, f64>,
-        y: &Of<M::Output, f64>,
-    ) -> Result<Update<Of<M::Output, f64>>, (Of<M::Output, f64>, Divergence)> {
+    fn step(&mut self, t: f64, u: &Of<M::Input, f64>, y: &Of<M::Output, f64>) -> Step<Of<M::Output, f64>> {
         let none = M::Output::splat(0.0);
         let since = self.clock.last.unwrap_or(t);
         let mut outcome = match (self.clock.beat(t), self.input.replace(*u)) {
@@ -181,12 +179,12 @@ impl<M: Model, const N: usize, I: Integrator<M>> Ekf<M, N, I> {
             }
             let mut e = y - value;
             prior.as_mut()[i] = e;
-            for k in 0..N {
-                e -= slopes[k] * dz[k];
+            for (slope, dz) in slopes.iter().zip(&dz) {
+                e -= slope * dz;
             }
             let gain = self.covariance.absorb(&slopes, noise.as_ref()[i] * noise.as_ref()[i]);
-            for k in 0..N {
-                dz[k] += gain.gain[k] * e;
+            for (dz, gain) in dz.iter_mut().zip(&gain.gain) {
+                *dz += gain * e;
             }
             self.nis += e * e / gain.variance;
             whitened.as_mut()[i] = e;

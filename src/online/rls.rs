@@ -1,3 +1,5 @@
+//! Recursive least squares in factored form (Bierman 1977), with forgetting that cannot wind up.
+
 use super::{Divergence, ObserverError, Outcome, Update, check_identity, check_positive, check_starts, in_bounds};
 use crate::covariance::Covariance;
 use crate::parameter::Parameter;

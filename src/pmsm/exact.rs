@@ -37,6 +37,14 @@ impl ExactStep {
         Ok(ExactStep { pole_pairs: PolePairs::new(pole_pairs)?, ts, held_in })
     }
 
+    /// The input that reaches the motor: the command less `vdt tanh(i/i0)` (V, A) per phase, at the interval's middle angle.
+    /// An observer of the motor alone is fed with this, and with measured currents for `i`.
+    #[inline(always)]
+    pub fn less_dead_time<S: Scalar>(&self, i: &Currents<S>, u: &AngledDrive<S>, vdt: S, i0: f64) -> Drive<S> {
+        let lost = dead_time(i, S::from(i0), self.pole_pairs.electrical(u.theta));
+        Drive { ud: u.ud - vdt * lost.0, uq: u.uq - vdt * lost.1, w: u.w }
+    }
+
     /// The currents one sample after `i`, under the input `u`.
     #[inline(always)]
     pub fn advance<S: Scalar>(&self, i: &Currents<S>, u: &Drive<S>, p: &Winding<S>) -> Currents<S> {
@@ -170,8 +178,7 @@ impl Model for ExactFed {
 
     #[inline]
     fn next<S: Scalar>(&self, _t: f64, x: &Currents<S>, u: &AngledDrive<S>, p: &FedWinding<S>) -> Currents<S> {
-        let lost = dead_time(x, S::from(self.i0), self.step.pole_pairs.electrical(u.theta));
-        let u = Drive { ud: u.ud - p.vdt * lost.0, uq: u.uq - p.vdt * lost.1, w: u.w };
+        let u = self.step.less_dead_time(x, u, p.vdt, self.i0);
         self.step.advance(x, &u, &Winding { rs: p.rs, ls: p.ls, ke: p.ke })
     }
 

@@ -1,4 +1,9 @@
 //! Injection of d current, which makes the resistance visible: torque hardly moves, the d axis does.
+//!
+//! Resistance and back-EMF are found in turns, and the error of one is in the other. With the law of the d axis
+//! ([`RsDirect`](super::RsDirect)) at rest on a stair, and the back-EMF at rest before, one period leaves
+//! `iq/(iq + (rs/ls + F) id/we)` of the resistance's error. So the pull `F` must be strong, or `id` of the sign that makes
+//! the denominator grow; else the turns drive the two apart.
 
 use super::Error;
 use serde::{Deserialize, Serialize};

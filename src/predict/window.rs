@@ -2,8 +2,10 @@
 
 use super::{Predictor, Walk};
 
+use crate::dispatch::{Kernel, Unit, WIDE, run};
 use crate::dual::Dual;
 use crate::integrate::{Integrator, Stuck};
+use crate::interval::Hold;
 use crate::model::Model;
 use crate::signals::{Of, Signals};
 
@@ -74,24 +76,26 @@ impl Window {
 }
 
 /// The states of one experiment with up to `N` slopes, on their way through the record.
-struct Lanes<M: Model, I: Integrator<M>, const N: usize> {
-    x: Of<M::State, Dual<N>>,
-    p: Of<M::Parameters, Dual<N>>,
+struct Lanes<M: Model, I: Integrator<M>, const N: usize, const UNIT: Unit> {
+    x: Of<M::State, Dual<N, UNIT>>,
+    p: Of<M::Parameters, Dual<N, UNIT>>,
     memory: I::Memory,
     first: usize,
     used: usize,
 }
 
 /// A model on its way through a record, with all the slopes asked for: in as many passes of `N` as it takes.
-pub(crate) struct Trajectory<'a, M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize> {
+pub(crate) struct Trajectory<'a, M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize, const UNIT: Unit> {
     walk: Walk<'a, M, I>,
     predictor: &'a P,
     prepared: &'a P::Prepared,
-    passes: Vec<Lanes<M, I, N>>,
+    passes: Vec<Lanes<M, I, N, UNIT>>,
     next: usize,
 }
 
-impl<'a, M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize> Trajectory<'a, M, I, P, N> {
+impl<'a, M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize, const UNIT: Unit>
+    Trajectory<'a, M, I, P, N, UNIT>
+{
     pub fn new(
         walk: Walk<'a, M, I>,
         predictor: &'a P,
@@ -105,7 +109,7 @@ impl<'a, M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize> Trajectory
                 let first = pass * N;
                 let mine = &seeds[first..seeds.len().min(first + N)];
                 let seeded = |target: Target, value: f64| {
-                    let mut dual = Dual::constant(value);
+                    let mut dual = Dual::from(value);
                     for (slope, seed) in dual.slopes.iter_mut().zip(mine) {
                         if seed.target == target {
                             *slope = seed.slope;
@@ -150,29 +154,46 @@ impl<'a, M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize> Trajectory
             window.measured.fill(false);
         }
         for lanes in &mut self.passes {
-            lanes.fill(self.walk, self.predictor, self.prepared, window)?;
+            run::<UNIT, _>(Fill {
+                lanes,
+                walk: self.walk,
+                predictor: self.predictor,
+                prepared: self.prepared,
+                window,
+            })?;
         }
         self.next += samples;
         Ok(true)
     }
 }
 
-impl<M: Model, I: Integrator<M>, const N: usize> Lanes<M, I, N> {
-    /// The one place that calls the model in a fit: what has one caller is inlined.
-    #[inline(never)]
-    fn fill<P: Predictor<M>>(
-        &mut self,
-        walk: Walk<'_, M, I>,
-        predictor: &P,
-        prepared: &P::Prepared,
-        window: &mut Window,
-    ) -> Result<(), usize> {
+/// One window of one pass. The only caller of the model in a fit.
+struct Fill<'f, 'a, M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize, const UNIT: Unit> {
+    lanes: &'f mut Lanes<M, I, N, UNIT>,
+    walk: Walk<'a, M, I>,
+    predictor: &'a P,
+    prepared: &'a P::Prepared,
+    window: &'f mut Window,
+}
+
+impl<M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize, const UNIT: Unit> Kernel
+    for Fill<'_, '_, M, I, P, N, UNIT>
+{
+    type Output = Result<(), usize>;
+
+    #[inline(always)]
+    fn run(self) -> Result<(), usize> {
+        let Fill { lanes, mut walk, predictor, prepared, window } = self;
+        if UNIT == WIDE {
+            // Known to the compiler, which then computes once per interval what depends on the input alone.
+            walk.hold = Hold::Zero;
+        }
         let Window { begin, samples, columns, rows, ref mut data, ref mut measured } = *window;
-        let (first, used, p, mut x) = (self.first, self.used.min(N), self.p, self.x);
+        let (first, used, p, mut x) = (lanes.first, lanes.used.min(N), lanes.p, lanes.x);
         let errors = (columns - 1) * rows;
         for k in 0..samples {
             let sample = begin + k;
-            let state = predictor.state(&walk, prepared, sample, x, &p, &mut self.memory).map_err(|Stuck| sample)?;
+            let state = predictor.state(&walk, prepared, sample, x, &p, &mut lanes.memory).map_err(|Stuck| sample)?;
             let Some(state) = state else {
                 for j in 0..M::Output::LEN {
                     let row = j * WINDOW + k;
@@ -201,7 +222,7 @@ impl<M: Model, I: Integrator<M>, const N: usize> Lanes<M, I, N> {
                 }
             }
         }
-        self.x = M::State::map(x, |mut dual| {
+        lanes.x = M::State::map(x, |mut dual| {
             for slope in &mut dual.slopes {
                 if slope.abs() < NEGLIGIBLE {
                     *slope = 0.0;

@@ -1,3 +1,5 @@
+//! Adaptation laws: what the error between measured and predicted states says of the parameters.
+
 use crate::dual::Dual;
 use crate::model::{Kind, Model};
 use crate::signals::{Of, Signals};

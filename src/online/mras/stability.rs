@@ -80,7 +80,7 @@ impl<M: Model, L: Law<M>> Mras<M, L> {
         for (point, (x, u)) in points.into_iter().enumerate() {
             let radius = self.radius::<N>(&x, &u);
             // An estimate that nothing moves has the radius 1, give or take the rounding.
-            if !(radius <= 1.0 + 1e-9) {
+            if radius > 1.0 + 1e-9 || radius.is_nan() {
                 return Err(ObserverError::Unstable { point, radius });
             }
         }

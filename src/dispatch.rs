@@ -1,0 +1,49 @@
+//! Runs a loop with the widest vector registers of the machine at hand.
+//!
+//! The default target of `x86_64` has 16 registers of two lanes; with AVX-512 there are 32, and no copies between them. A
+//! [`Kernel`] is compiled once portably and once for that, and everything that is inlined into it (models too: hence
+//! `#[inline]` on them) profits. Two lessons:
+//! - The compiler surely inlines a large function only where it has one caller. So the numbers of each unit are types of
+//!   their own ([`Dual`](crate::Dual) carries the unit), and each has its own copy of the model, with one caller.
+//! - Neither fused multiply-add nor wider lanes by explicit instructions: where inlining fails they become calls, twenty
+//!   times slower, while this is never slower than the portable loop, and gives the same bits.
+
+/// Which registers, as a const parameter.
+pub(crate) type Unit = u8;
+/// What every machine of the target has.
+pub(crate) const PORTABLE: Unit = 0;
+/// AVX-512.
+pub(crate) const WIDE: Unit = 1;
+
+/// A loop to be compiled for several units. `run` and all it calls in its loop must be inlined.
+pub(crate) trait Kernel {
+    type Output;
+    fn run(self) -> Self::Output;
+}
+
+/// Whether this machine has the wide unit.
+pub(crate) fn has_wide() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    return std::arch::is_x86_feature_detected!("avx512f")
+        && std::arch::is_x86_feature_detected!("avx512vl")
+        && std::arch::is_x86_feature_detected!("avx512dq");
+    #[cfg(not(target_arch = "x86_64"))]
+    return false;
+}
+
+/// Runs the kernel in the given unit, or portably where the machine lacks it.
+#[inline]
+pub(crate) fn run<const UNIT: Unit, K: Kernel>(kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    if UNIT == WIDE && has_wide() {
+        // SAFETY: the features were just found on this machine.
+        return unsafe { wide(kernel) };
+    }
+    kernel.run()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512vl,avx512dq")]
+unsafe fn wide<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run()
+}
