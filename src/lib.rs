@@ -135,6 +135,8 @@ pub mod numeric;
 #[cfg(feature = "std")]
 pub mod optimize;
 #[cfg(feature = "std")]
+mod outliers;
+#[cfg(feature = "std")]
 mod predict;
 #[cfg(feature = "std")]
 mod prefilter;
@@ -167,7 +169,8 @@ pub use {
     fit::{Fit, FitProblem, Objective, Records, Search},
     information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
-    numeric::Numeric,
+    numeric::{Derivative, Next, Numeric, StateEquation},
+    outliers::hampel,
     predict::{FreeRun, Horizon, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
     regress::{Assumption, LinearEstimate, Regression, RegressionError},
