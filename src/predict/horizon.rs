@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 /// later is not predicted. For filtered states, filter the record first ([`zero_phase`](crate::zero_phase)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Horizon {
-    /// Samples from the measured state to the predicted output; zero counts as one.
+    /// Samples from the measured state to the predicted output: one or more, and fewer than the record has.
     pub steps: usize,
 }
 
@@ -32,6 +32,14 @@ impl<M: Model> Predictor<M> for Horizon {
         experiment: &ExperimentOf<M>,
         p: &Of<M::Parameters, f64>,
     ) -> Result<Self::Prepared, Error> {
+        let (steps, samples) = (self.steps, experiment.len());
+        if steps == 0 || steps >= samples {
+            return Err(Error::Option(format!(
+                "a prediction {steps} sample(s) ahead makes no sense for experiment `{}` of {samples} samples; take at least \
+                 1 and fewer than {samples}, or FreeRun to simulate it whole",
+                experiment.name()
+            )));
+        }
         let mut why = None;
         let mut states = Vec::with_capacity(experiment.len());
         let mut known = 0;
@@ -72,7 +80,7 @@ impl<M: Model> Predictor<M> for Horizon {
         p: &Of<M::Parameters, S>,
         memory: &mut I::Memory,
     ) -> Result<Option<Of<M::State, S>>, Stuck> {
-        let steps = self.steps.max(1);
+        let steps = self.steps;
         let (mut x, first) = if k < steps {
             (start, 0)
         } else {
@@ -89,6 +97,6 @@ impl<M: Model> Predictor<M> for Horizon {
     }
 
     fn describe(&self) -> String {
-        format!("prediction {} sample(s) ahead", self.steps.max(1))
+        format!("prediction {} sample(s) ahead", self.steps)
     }
 }
