@@ -132,11 +132,7 @@ pub fn speeds() -> Result<Report> {
         low > 1.5 && high < 3.5,
     );
     let (low, high) = range(&l_top);
-    report.claim(
-        "At the highest speed L is 2 to 25 % off",
-        format!("{low:.1} to {high:.1} %"),
-        high < 25.0,
-    );
+    report.claim("At the highest speed L is 2 to 25 % off", format!("{low:.1} to {high:.1} %"), high < 25.0);
     let (low, high) = range(&at_top);
     let found = format!("{low:.2} to {high:.2} %");
     report.claim("At the highest speed Ke is 0.25 to 2.1 % off: much the best", found, high < 2.1);
