@@ -83,7 +83,7 @@ pub enum Error {
         output: String,
     },
     /// A column that the file does not have.
-    #[error("{}: no column `{column}`{}; the file has: {}", path.display(), wanted_by(signal, column), listed(available))]
+    #[error("{}: no column `{column}`{}; the file has: {}", path.display(), wanted_by(signal, column), listed(available, signal))]
     MissingColumn {
         /// The file.
         path: PathBuf,
@@ -236,14 +236,14 @@ pub struct Failure {
 }
 
 /// The columns that a file has, and what the list gives away.
-fn listed(columns: &[String]) -> String {
-    let hint = match columns {
-        [single] if single.contains([';', '\t', '|']) => "; set what stands between cells with CsvFile::delimiter",
-        _ if columns.iter().all(|name| name.parse::<f64>().is_ok()) => "; its first line must hold the names",
-        _ if columns.iter().any(|name| name.eq_ignore_ascii_case("time")) => "; rename with CsvFile::column",
-        _ => "",
+fn listed(columns: &[String], wanted: &str) -> String {
+    let remedy = match columns {
+        [single] if single.contains([';', '\t', '|']) => "set what stands between cells with CsvFile::delimiter",
+        _ if columns.iter().all(|name| name.parse::<f64>().is_ok()) => "its first line must hold the names",
+        _ if wanted == "t" => "name another with CsvFile::column, or give CsvFile::sample_time",
+        _ => "name another with CsvFile::column",
     };
-    columns.join(", ") + hint
+    format!("{}; {remedy}", columns.join(", "))
 }
 
 /// What a text that is not a number gives away.

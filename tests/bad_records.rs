@@ -63,7 +63,7 @@ fn missing_column() {
     says(renamed, &["no column `rpm` for `w`", "t, ud, speed, id, iq"]);
     refused("semicolon.csv", "t;ud;w;id;iq\n0;1;2;3;4\n", &["t;ud;w;id;iq", "CsvFile::delimiter"]);
     refused("nameless.csv", "0,1,2,3,4\n1,1,2,3,4\n", &["no column `t`", "0, 1, 2, 3, 4", "must hold the names"]);
-    refused("capitals.csv", "Time,ud,w,id,iq\n", &["no column `t`", "CsvFile::column"]);
+    refused("capitals.csv", "Time,ud,w,id,iq\n", &["no column `t`", "CsvFile::column", "CsvFile::sample_time"]);
 }
 
 #[test]

@@ -78,6 +78,7 @@ fn reads_what_instruments_write() {
             CsvFile::new,
         ),
         ("numpy", format!("# bench 3\n# {plain}"), CsvFile::new),
+        ("numpy_gaps", format!("# note, {plain}").replace("\n0,", "\n,0,").replace("\n1,", "\nnan,1,"), CsvFile::new),
         ("trailing_delimiter", plain.replace('\n', ",\n"), CsvFile::new),
         ("signs", plain.replace("1.5", "+15e-1"), CsvFile::new),
         ("tabs", plain.replace(',', "\t"), |p| CsvFile::new(p).delimiter(b'\t')),
@@ -170,6 +171,9 @@ fn a_static_model_needs_no_time() {
     assert_eq!([record.time(0), record.time(1)], [0.0, 1.0]);
     let timed = Experiment::from_csv(&Line, file("static_t.csv", "x,t,y\n7,3,8\n")).unwrap();
     assert_eq!(timed.time(0), 3.0);
+    // A time that was asked for must be there.
+    let absent = CsvFile::new(file("static_absent.csv", "x,y\n7,8\n")).column("t", "clock").read(&Line);
+    assert!(absent.unwrap_err().to_string().contains("no column `clock` for `t`"));
 }
 
 /// Measured records that nobody here made.

@@ -74,8 +74,8 @@ use std::path::{Path, PathBuf};
 /// **The record** is named after the file, its input is held from sample to sample, and its initial state is estimated,
 /// unless the [`Experiment`] is told otherwise.
 ///
-/// The file is read row by row and kept only as the record: ten million rows of five signals in 400 MB, at about 200 MB of
-/// text per second. Only where time turns out uneven, a regular file is read again up to there for its stamps.
+/// The file is read row by row and kept only as the record: ten million rows of five signals take 400 MB. Only where time
+/// turns out uneven, a regular file is read again up to there for its stamps.
 #[derive(Clone, Debug)]
 pub struct CsvFile {
     path: PathBuf,
@@ -100,7 +100,8 @@ struct Column {
 
 impl Column {
     fn new(signal: &str) -> Column {
-        Column { signal: signal.to_owned(), name: signal.to_owned(), factor: 1.0, offset: 0.0, reversed: false }
+        // Adding minus zero changes no number, not even minus zero.
+        Column { signal: signal.to_owned(), name: signal.to_owned(), factor: 1.0, offset: -0.0, reversed: false }
     }
 }
 

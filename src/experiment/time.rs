@@ -77,7 +77,7 @@ impl Time {
 }
 
 /// How far a stamp may be off an even grid, as a fraction of the step.
-pub(crate) const EVEN: f64 = 1e-6;
+const EVEN: f64 = 1e-6;
 
 /// Tells, stamp by stamp and without keeping them, whether one even grid from the first stamp on serves them all: each
 /// stamp narrows the range that the step can be in.
@@ -107,7 +107,7 @@ impl Clock {
         }
         if self.ticks > 0 {
             // Rounding: half a unit in the last place each for this stamp, the first, the product and the sum.
-            let rounding = 2.0 * f64::EPSILON * stamp.abs().max(self.start.abs());
+            let rounding = 2.0 * f64::EPSILON * (stamp.abs() + self.start.abs());
             let (steps, tolerance) = (self.ticks as f64, self.tolerance + rounding);
             self.shortest = self.shortest.max((stamp - self.start - tolerance) / steps);
             self.longest = self.longest.min((stamp - self.start + tolerance) / steps);

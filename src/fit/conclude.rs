@@ -2,7 +2,7 @@
 
 use super::covariance::classical;
 use super::noise::{Noise, Whitening};
-use super::objective::{Halt, Objective, Rows};
+use super::objective::Objective;
 use super::run::Found;
 use super::{Fit, Setting};
 use crate::dispatch::PORTABLE;
@@ -11,7 +11,7 @@ use crate::estimate::{Direction, Estimate, Knowledge, Method, Prediction, Qualit
 use crate::information::{Information, SquareMatrix};
 use crate::integrate::Integrator;
 use crate::model::Model;
-use crate::optimize::{Infeasible, Linearization, Severity};
+use crate::optimize::{Linearization, Severity};
 use crate::predict::{Predictor, Target, Trajectory, WINDOW, Walk, Window};
 use crate::signals::Signals;
 use std::time::Instant;
@@ -40,7 +40,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             None => objective.evaluate(coordinates).map_err(|error| Error::Optimizer(error.to_string()))?,
         };
         let n = unknowns.row.len();
-        let (quality, measured, step_error) = self.reproduce(&objective, coordinates)?;
+        let Reproduced { quality, measured, step_error } = self.reproduce(&objective, coordinates)?;
         let degrees = (measured as f64 - n as f64).max(0.0);
 
         // What is held or not determined has no interval.
@@ -299,74 +299,58 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
     ///
     /// The bound is the norm of the change of all standardized predictions. It is taken on every eighth window, simulated
     /// once more with a finer step from the state at its begin, and extrapolated.
-    #[expect(clippy::type_complexity, reason = "three answers of one pass")]
-    fn reproduce(
-        &self,
-        objective: &Objective<'_, M, I, P>,
-        coordinates: &[f64],
-    ) -> Result<(Vec<Quality>, u64, f64), Error> {
+    fn reproduce(&self, objective: &Objective<'_, M, I, P>, coordinates: &[f64]) -> Result<Reproduced, Error> {
+        const EVERY: usize = 8;
         let outputs = M::Output::LEN;
+        let sigma = objective.whitening.sigma();
+        let refined = self.integrator.refined();
         let mut sums = vec![Sums::default(); outputs];
-        let (mut counted, mut bound) = (0u64, 0.0);
-        let raw = Whitening::Diagonal(vec![1.0; outputs]);
-        let plain = Objective { whitening: raw, prefilter: None, ..*objective };
+        let (mut measured, mut bound) = (0u64, 0.0);
         for (e, record) in self.experiments.iter().enumerate() {
-            let visit = &mut |Rows { begin, samples, window }: Rows<'_>| {
-                for k in 0..samples {
-                    let y = M::Output::into_array(record.outputs()[begin + k]);
-                    let counts = self.weighting.is_none() || plain.sample_weight(e, begin + k) > 0.0;
-                    for j in 0..outputs {
-                        if window.measured[j * WINDOW + k] {
-                            sums[j].add(y.as_ref()[j], window.errors()[j * WINDOW + k]);
-                            counted += u64::from(counts);
-                        }
+            let (x, p) = objective.unknowns.place(e, coordinates);
+            let trajectory = |integrator| {
+                let (walk, prepared) = (Walk::new(self.model, integrator, record), &objective.prepared[e]);
+                Trajectory::<M, I, P, 0, PORTABLE>::new(walk, &self.predictor, prepared, x, p, &[])
+            };
+            let (mut coarse, mut fine) = (trajectory(&self.integrator), refined.as_ref().map(trajectory));
+            let (mut window, mut finer) = (Window::new(0, outputs), Window::new(0, outputs));
+            let (mut change, mut seen) = (0.0, 0usize);
+            for number in 0.. {
+                let fine = fine.as_mut().filter(|_| number % EVERY == 0);
+                let refilled = fine.is_some_and(|fine| {
+                    fine.restart_at(&coarse);
+                    matches!(fine.fill(&mut finer), Ok(true))
+                });
+                match coarse.fill(&mut window) {
+                    Ok(true) => {}
+                    Ok(false) => break,
+                    Err(sample) => return Err(Error::Simulation(objective.locate(e, coordinates, sample))),
+                }
+                for k in 0..window.samples {
+                    let y = M::Output::into_array(record.outputs()[window.begin + k]);
+                    let counts = self.weighting.is_none() || objective.sample_weight(e, window.begin + k) > 0.0;
+                    for j in (0..outputs).filter(|j| window.measured[j * WINDOW + k]) {
+                        sums[j].add(y.as_ref()[j], window.errors()[j * WINDOW + k]);
+                        measured += u64::from(counts);
                     }
                 }
-            };
-            plain.walk(e, coordinates, false, visit).map_err(|halt| match halt {
-                Halt::Failed { sample } => Error::Simulation(plain.locate(e, coordinates, sample)),
-                Halt::Cancelled => Error::Optimizer(Infeasible::Cancelled.to_string()),
-            })?;
-            bound += self.step_error(objective, e, coordinates);
-        }
-        let quality = sums.iter().map(Sums::quality).collect();
-        Ok((quality, counted, bound.sqrt()))
-    }
-
-    /// Square of the norm of the change of one experiment's standardized predictions under a finer step, extrapolated.
-    fn step_error(&self, objective: &Objective<'_, M, I, P>, e: usize, coordinates: &[f64]) -> f64 {
-        const EVERY: usize = 8;
-        let Some(refined) = self.integrator.refined() else { return 0.0 };
-        let record = &self.experiments[e];
-        let (x, p) = objective.unknowns.place(e, coordinates);
-        let prepared = &objective.prepared[e];
-        let trajectory = |integrator| {
-            let walk = Walk::new(self.model, integrator, record);
-            Trajectory::<M, I, P, 0, PORTABLE>::new(walk, &self.predictor, prepared, x, p, &[])
-        };
-        let (mut coarse, mut fine) = (trajectory(&self.integrator), trajectory(&refined));
-        let (mut a, mut b) = (Window::new(0, M::Output::LEN), Window::new(0, M::Output::LEN));
-        let (mut sum, mut seen) = (0.0, 0usize);
-        for window in 0.. {
-            let checks = window % EVERY == 0;
-            if checks {
-                fine.restart_at(&coarse);
-                if !matches!(fine.fill(&mut b), Ok(true)) {
-                    break;
+                if refilled {
+                    let errors = window.errors().iter().zip(finer.errors()).enumerate();
+                    change += errors.map(|(row, (a, b))| ((a - b) / sigma[row / WINDOW]).powi(2)).sum::<f64>();
+                    seen += window.samples;
                 }
             }
-            if !matches!(coarse.fill(&mut a), Ok(true)) {
-                break;
-            }
-            if checks {
-                objective.whitening.apply(&mut a);
-                objective.whitening.apply(&mut b);
-                sum += a.errors().iter().zip(b.errors()).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
-                seen += a.samples;
-            }
+            bound += if seen > 0 { change * record.len() as f64 / seen as f64 } else { 0.0 };
         }
-        if seen == 0 { 0.0 } else { sum * record.len() as f64 / seen as f64 }
+        Ok(Reproduced { quality: sums.iter().map(Sums::quality).collect(), measured, step_error: bound.sqrt() })
     }
+}
+
+/// See [`Fit::reproduce`].
+struct Reproduced {
+    quality: Vec<Quality>,
+    measured: u64,
+    step_error: f64,
 }
 
 impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {

@@ -44,15 +44,14 @@ impl<M: Model> Integrator<M> for Rk4 {
         let fraction = 1.0 / steps as f64;
         let mut sum = x;
         let mut k = M::State::splat(S::from(0.0));
-        for stage in 0..4 * steps {
-            let (node, weight) = STAGES[stage as usize & 3];
-            let position = (stage >> 2) as f64 + node;
-            let u = interval.input::<S>(position * fraction);
-            k = model.derivative(interval.t0 + position * h, &axpy::<M::State, S>(x, h * node, k), &u, p);
-            sum = axpy::<M::State, S>(sum, h * weight, k);
-            if stage & 3 == 3 {
-                x = sum;
+        for step in 0..steps {
+            for (node, weight) in STAGES {
+                let position = step as f64 + node;
+                let u = interval.input::<S>(position * fraction);
+                k = model.derivative(interval.t0 + position * h, &axpy::<M::State, S>(x, h * node, k), &u, p);
+                sum = axpy::<M::State, S>(sum, h * weight, k);
             }
+            x = sum;
         }
         Ok(x)
     }

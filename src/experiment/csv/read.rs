@@ -29,8 +29,9 @@ impl CsvFile {
         let name = self.path.file_stem().map_or("record".into(), |stem| stem.to_string_lossy().into_owned());
 
         // A static model needs no time: without one its rows are numbered.
-        let timeless = M::KIND == Kind::Static && !table.names().iter().any(|name| *name == self.said("t").name);
-        let sample_time = self.sample_time.or(timeless.then_some(1.0));
+        let timed =
+            self.columns.iter().any(|column| column.signal == "t") || table.names().iter().any(|name| name == "t");
+        let sample_time = self.sample_time.or((M::KIND == Kind::Static && !timed).then_some(1.0));
         let t = if sample_time.is_none() { Some(self.source(&table, "t")?) } else { None };
         let inputs = self.sources::<M::Input>(&table)?;
         let outputs = self.sources::<M::Output>(&table)?;
@@ -44,10 +45,10 @@ impl CsvFile {
             let sample = us.len();
             let mut time = sample as f64 * sample_time.unwrap_or_default();
             if let Some(t) = t {
-                time = self.value(&table, t);
-                if !time.is_finite() {
+                let Some(stamp) = self.value(&table, t).filter(|stamp| stamp.is_finite()) else {
                     return Err(self.bad_cell(&table, t, &name, "t", sample, f64::NAN));
-                }
+                };
+                time = stamp;
                 if let Some(before) = clock.last().filter(|before| time <= *before) {
                     let problem = Error::TimeOrder { experiment: name, sample, before, time };
                     return Err(self.at_line(&table, problem));
@@ -63,19 +64,18 @@ impl CsvFile {
             }
             let mut bad = None;
             us.push(M::Input::from_fn(|i| {
-                let value = self.value(&table, inputs.as_ref()[i]);
-                if !value.is_finite() {
+                let value = self.value(&table, inputs.as_ref()[i]).filter(|value| value.is_finite());
+                value.unwrap_or_else(|| {
                     bad.get_or_insert((M::Input::NAMES[i], inputs.as_ref()[i]));
-                }
-                value
+                    f64::NAN
+                })
             }));
             ys.push(M::Output::from_fn(|i| {
-                let source = outputs.as_ref()[i];
-                let value = self.value(&table, source);
-                if !value.is_finite() && (value.is_infinite() || !missing(table.cell(source.column))) {
-                    bad.get_or_insert((M::Output::NAMES[i], source));
-                }
-                value
+                let value = self.value(&table, outputs.as_ref()[i]).filter(|value| !value.is_infinite());
+                value.unwrap_or_else(|| {
+                    bad.get_or_insert((M::Output::NAMES[i], outputs.as_ref()[i]));
+                    f64::NAN
+                })
             }));
             if let Some((signal, source)) = bad {
                 return Err(self.bad_cell(&table, source, &name, signal, sample, time));
@@ -99,7 +99,7 @@ impl CsvFile {
         let mut table = Table::open(self)?;
         let mut stamps = Vec::with_capacity(rows + 1);
         while stamps.len() < rows && table.next()? {
-            stamps.push(self.value(&table, t));
+            stamps.extend(self.value(&table, t));
         }
         Ok(stamps)
     }
@@ -155,43 +155,42 @@ impl CsvFile {
         Ok(Source { column: at, factor, offset: said.offset })
     }
 
+    /// The value of a signal in the current row; NaN where missing, none where its cell is no number.
     #[inline]
-    fn value(&self, table: &Table, source: Source) -> f64 {
-        self.number(table.cell(source.column)).unwrap_or(f64::NAN) * source.factor + source.offset
+    fn value(&self, table: &Table, source: Source) -> Option<f64> {
+        Some(self.number(table.cell(source.column))? * source.factor + source.offset)
     }
 
-    /// The number in a cell.
+    /// The number in a cell: NaN where it says that nothing was measured.
     #[inline]
     pub(super) fn number(&self, cell: &[u8]) -> Option<f64> {
-        if !self.decimal_comma {
-            return std::str::from_utf8(cell).ok()?.parse().ok();
-        }
         let mut text = [0; 64];
-        let text = text.get_mut(..cell.len())?;
-        for (to, &from) in text.iter_mut().zip(cell) {
-            *to = if from == b',' { b'.' } else { from };
+        let mut plain = cell;
+        if self.decimal_comma {
+            let text = text.get_mut(..cell.len())?;
+            for (to, &from) in text.iter_mut().zip(cell) {
+                *to = if from == b',' { b'.' } else { from };
+            }
+            plain = text;
         }
-        std::str::from_utf8(text).ok()?.parse().ok()
+        let number = std::str::from_utf8(plain).ok()?.parse().ok();
+        let missing = || [&b""[..], b"na", b"null"].iter().any(|word| cell.eq_ignore_ascii_case(word));
+        number.or_else(|| missing().then_some(f64::NAN))
     }
 
-    /// The error of a cell whose value is not finite.
+    /// The error of a cell that is no number, or not a finite one.
     #[cold]
     fn bad_cell(&self, table: &Table, source: Source, name: &str, signal: &str, sample: usize, time: f64) -> Error {
-        let cell = table.cell(source.column);
-        if self.number(cell).is_none() && !missing(cell) {
+        let Some(value) = self.value(table, source) else {
             let (path, line, column) = (self.path.clone(), table.line(), table.names()[source.column].clone());
-            return Error::NotANumber { path, line, column, text: String::from_utf8_lossy(cell).into_owned() };
-        }
-        let (experiment, signal, value) = (name.to_owned(), signal.to_owned(), self.value(table, source));
+            let text = String::from_utf8_lossy(table.cell(source.column)).into_owned();
+            return Error::NotANumber { path, line, column, text };
+        };
+        let (experiment, signal) = (name.to_owned(), signal.to_owned());
         self.at_line(table, Error::NotFinite { experiment, signal, value, sample, time })
     }
 
     fn at_line(&self, table: &Table, problem: Error) -> Error {
         Error::AtLine { path: self.path.clone(), line: table.line(), problem: Box::new(problem) }
     }
-}
-
-/// Whether a cell says that nothing was measured.
-fn missing(cell: &[u8]) -> bool {
-    [&b""[..], b"nan", b"na", b"null"].iter().any(|word| cell.eq_ignore_ascii_case(word))
 }
