@@ -9,6 +9,15 @@ crate::signals! {
         /// Speed.
         v: "m/s",
     }
+    /// Motion of a linear axis, and the speed as its controller sees it.
+    pub struct GuidedMotion {
+        /// Position.
+        q: "m",
+        /// Speed.
+        v: "m/s",
+        /// Speed, differenced and filtered.
+        vm: "m/s",
+    }
     /// Input of the axis.
     pub struct Command {
         /// Command to the drive.
@@ -95,7 +104,8 @@ impl Model for Positioning {
 /// A [`Positioning`] axis under a position controller around a speed controller:
 ///
 /// ```text
-/// vir = kp kv (qg - q) - kv v,    |vir| <= limit
+/// vir = kp kv (qg - q) - kv vm,    |vir| <= limit
+/// lag dvm/dt = v - vm
 /// ```
 ///
 /// The controller keeps the simulated axis near the reference whatever the parameters, so that a fit finds its way from
@@ -110,31 +120,34 @@ pub struct PositioningLoop {
     pub kv: f64,
     /// Largest command (V).
     pub limit: f64,
+    /// Lag of the speed that the controller sees (s), by difference, filter and hold; positive.
+    pub lag: f64,
 }
 
 impl PositioningLoop {
     /// The axis of the benchmark under its recorded controller.
-    pub const EMPS: PositioningLoop = PositioningLoop { axis: Positioning::EMPS, kp: 160.18, kv: 243.45, limit: 10.0 };
+    pub const EMPS: PositioningLoop = PositioningLoop { axis: Positioning::EMPS, kp: 160.18, kv: 243.45, limit: 10.0, lag: 1.1e-3 };
 
     #[inline]
-    fn command<S: Scalar>(&self, x: &Motion<S>, u: &Reference<S>) -> S {
-        (((u.qg - x.q) * self.kp - x.v) * self.kv).clamp(-self.limit, self.limit)
+    fn command<S: Scalar>(&self, x: &GuidedMotion<S>, u: &Reference<S>) -> S {
+        (((u.qg - x.q) * self.kp - x.vm) * self.kv).clamp(-self.limit, self.limit)
     }
 }
 
 impl Model for PositioningLoop {
-    type State = Motion;
+    type State = GuidedMotion;
     type Input = Reference;
     type Output = Guided;
     type Parameters = Axis;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Motion<S>, u: &Reference<S>, p: &Axis<S>) -> Motion<S> {
-        Motion { q: x.v, v: self.axis.acceleration(x.v, self.command(x, u), p) }
+    fn derivative<S: Scalar>(&self, _t: f64, x: &GuidedMotion<S>, u: &Reference<S>, p: &Axis<S>) -> GuidedMotion<S> {
+        let v = self.axis.acceleration(x.v, self.command(x, u), p);
+        GuidedMotion { q: x.v, v, vm: (x.v - x.vm) / self.lag }
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Motion<S>, u: &Reference<S>, _p: &Axis<S>) -> Guided<S> {
+    fn output<S: Scalar>(&self, _t: f64, x: &GuidedMotion<S>, u: &Reference<S>, _p: &Axis<S>) -> Guided<S> {
         Guided { qm: x.q, vir: self.command(x, u) }
     }
 }
