@@ -210,6 +210,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
     /// Checks all that was said, and looks at every record once.
     fn prepare(&self) -> Result<Setting<M, P>, Error> {
         self.check()?;
+        self.check_outputs()?;
         let unknowns = Unknowns::new(self.model, self.experiments, self.parameters)?;
         if unknowns.row.is_empty() {
             return Err(Error::NothingFree);
@@ -252,6 +253,11 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
         if let Some(loss) = &self.loss {
             loss.check()?;
         }
+        Ok(())
+    }
+
+    /// Each output must have been measured somewhere.
+    fn check_outputs(&self) -> Result<(), Error> {
         for j in 0..M::Output::LEN {
             let measured =
                 |e: &ExperimentOf<M>| e.outputs().iter().any(|y| !M::Output::into_array(*y).as_ref()[j].is_nan());

@@ -59,7 +59,8 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Estimate<M, I, P> {
     ) -> Result<Prediction<M>, Error> {
         Fit::new(model, record)
             .parameters(M::Parameters::map(parameters, fixed))
-            .noise(M::Output::map(self.quality, |quality| quality.sigma))
+            // Noise weighs the outputs against each other where an initial state is to be estimated.
+            .noise(M::Output::map(self.quality, |quality| if quality.sigma > 0.0 { quality.sigma } else { 1.0 }))
             .integrator(self.integrator.clone())
             .predictor(self.predictor.clone())
             .simulate()

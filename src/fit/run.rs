@@ -194,7 +194,10 @@ impl<'a, M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'a, M, I, P, O> {
         let setting = fit.prepared(unknowns)?;
         let coordinates = match setting.unknowns.row.is_empty() {
             true => vec![],
-            false => fit.search(&setting)?.coordinates,
+            false => {
+                fit.check_outputs()?;
+                fit.search(&setting)?.coordinates
+            }
         };
         let objective = fit.objective(&setting, Whitening::Diagonal(vec![1.0; M::Output::LEN]));
         objective.prediction(0, &coordinates)
