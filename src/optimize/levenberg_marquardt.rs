@@ -157,9 +157,8 @@ impl<S: Scaling> LevenbergMarquardt<S> {
         };
         let x = point.towards(&step);
         let promised = point.linear.predicted_reduction(&step);
-        let unresolved = point.cannot_resolve(point.potential);
-        // No shorter step is left to try.
-        if x == point.x || point.cannot_resolve(promised) && !unresolved || unresolved && self.growth > LAST_GROWTH {
+        let unresolved = point.cannot_resolve(promised);
+        if x == point.x || unresolved && self.growth > LAST_GROWTH {
             self.outcome = Some(point.stuck(&self.stop, self.failed));
             return Ok(None);
         }
@@ -180,12 +179,12 @@ impl<S: Scaling> LevenbergMarquardt<S> {
         // Where the cost decides nothing, what the full step would still gain does.
         let (accept, gain) = if unresolved {
             let part = next.potential / point.potential;
-            (part < 1.0 && new_cost <= cost * (1.0 + COST_ROUNDING), if part < 0.25 { 1.0 } else { 0.5 })
+            (part < 1.0 && new_cost <= cost * (1.0 + COST_ROUNDING), if part < 0.25 { 1.0 } else { 0.9 })
         } else {
             let gain = (cost - new_cost) / promised;
             (gain > ACCEPT, gain)
         };
-        if !accept {
+        if !accept || point.loses_influence(&next) {
             self.shorter();
             return Ok(None);
         }

@@ -29,6 +29,8 @@ pub(super) struct Point {
 const RESOLUTION: f64 = 1e-13;
 /// Where no step lowers the cost, a cosine up to this is rounding too.
 pub(super) const PRECISION_GRADIENT: f64 = 1e-6;
+/// A step that shrinks a column of the Jacobian to less than this part went too far.
+const LOST: f64 = 1e-10;
 /// Damping of undetermined directions, relative to the column norms.
 const RANK_DAMPING: f64 = 1e-8;
 
@@ -99,6 +101,11 @@ impl Point {
     /// Whether a decrease of this size drowns in the rounding of the cost.
     pub fn cannot_resolve(&self, decrease: f64) -> bool {
         decrease <= RESOLUTION * self.linear.cost
+    }
+
+    /// Whether an unknown that had influence here has none there: a plateau that no slope leads back from.
+    pub fn loses_influence(&self, next: &Point) -> bool {
+        self.norms.iter().zip(&next.norms).any(|(before, after)| *after < LOST * before)
     }
 
     /// Whether there is anything left to do.
