@@ -116,7 +116,7 @@ impl GaussNewton {
         let mut blind = 0;
         for _ in 0..HALVINGS {
             let x = point.towards(&step);
-            let slope: f64 = point.gradient.iter().zip(&step).map(|(g, d)| g * d).sum();
+            let slope = point.slope(&step);
             let unresolved = point.cannot_resolve(-slope);
             blind += u32::from(unresolved);
             if x == point.x || blind > LAST_HALVINGS {

@@ -88,6 +88,11 @@ impl Point {
         self.full.as_ref().map_or(f64::INFINITY, size)
     }
 
+    /// Slope of the cost along a step; negative downhill.
+    pub fn slope(&self, step: &[f64]) -> f64 {
+        self.gradient.iter().zip(step).map(|(g, d)| g * d).sum()
+    }
+
     /// `x + step`, exactly on the bound where the step uses up the room.
     pub fn towards(&self, step: &[f64]) -> Vec<f64> {
         let along = |i: usize| match self.room[i] {
