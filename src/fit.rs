@@ -258,11 +258,6 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
 
     /// Each output must have been measured somewhere.
     fn check_outputs(&self) -> Result<(), Error> {
-        Ok(())
-    }
-
-    /// Each output must be measured somewhere; a simulation needs none.
-    fn check_measured(&self) -> Result<(), Error> {
         for j in 0..M::Output::LEN {
             let measured =
                 |e: &ExperimentOf<M>| e.outputs().iter().any(|y| !M::Output::into_array(*y).as_ref()[j].is_nan());
