@@ -18,7 +18,7 @@ impl fmt::Display for Severity {
 
 impl<M: Model, I, P> fmt::Display for Estimate<M, I, P> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "Verdict: {}. The search {}.", self.severity(), self.outcome)?;
+        writeln!(f, "Verdict: {}. Search: {}.", self.severity(), self.outcome)?;
         if !self.outcome.converged() {
             writeln!(f, "  {}", self.outcome.advice())?;
         }

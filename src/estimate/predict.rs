@@ -57,10 +57,12 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Estimate<M, I, P> {
         record: &ExperimentOf<M>,
         parameters: Of<M::Parameters, f64>,
     ) -> Result<Prediction<M>, Error> {
-        Fit::new(model, record)
-            .parameters(M::Parameters::map(parameters, fixed))
-            // Noise weighs the outputs against each other where an initial state is to be estimated.
-            .noise(M::Output::map(self.quality, |quality| if quality.sigma > 0.0 { quality.sigma } else { 1.0 }))
+        let fit = Fit::new(model, record).parameters(M::Parameters::map(parameters, fixed));
+        // An output without any error tells no noise; that of this record does then.
+        let sigma = M::Output::map(self.quality, |quality| quality.sigma);
+        let noisy = M::Output::into_array(sigma).as_ref().iter().all(|sigma| *sigma > 0.0);
+        let fit = if noisy { fit.noise(sigma) } else { fit };
+        fit
             .integrator(self.integrator.clone())
             .predictor(self.predictor.clone())
             .simulate()

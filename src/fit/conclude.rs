@@ -126,7 +126,11 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             (0..n).find(mine).map_or(Knowledge::Fixed, |i| rows[i].knowledge)
         });
 
-        let mut warnings = self.warnings(&rows, &directions, degrees, step_error, setting, &whitening, coordinates);
+        let mut warnings = self.warnings(&rows, &directions, measured, step_error, setting, &whitening, coordinates);
+        if !outcome.converged() && rows.iter().any(|row| row.knowledge.standard_error().is_some()) {
+            let text = "standard errors and intervals are those of a minimum, where the search did not arrive".to_owned();
+            warnings.push(Warning { severity: Severity::NotUsable, text });
+        }
         if let Some(trouble) = trouble {
             let text = format!("the checkpoint could not be written ({trouble}); the search went on without it");
             warnings.push(Warning { severity: Severity::Usable, text });
@@ -144,6 +148,8 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             measured as f64 * ((2.0 * std::f64::consts::PI).ln() + ml.log_determinant() / outputs)
                 + sum_of_squares / (scale * scale)
         });
+        // Without any error the likelihood has no bound.
+        let deviance = deviance.filter(|deviance| deviance.is_finite());
         let sigma = widened.sigma();
         let quality = M::Output::from_fn(|j| Quality { sigma: sigma[j], ..quality[j] });
         Ok(Estimate {
@@ -156,7 +162,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
                 .enumerate()
                 .map(|(e, record)| {
                     let (initial_state, parameters) = unknowns.place(e, coordinates);
-                    Share { name: record.name().to_owned(), samples: record.len(), parameters, initial_state }
+                    Share { name: unknowns.labels[e].clone(), samples: record.len(), parameters, initial_state }
                 })
                 .collect(),
             quality,
@@ -233,7 +239,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
         &self,
         rows: &[Unknown],
         directions: &[Direction],
-        degrees: f64,
+        measured: u64,
         step_error: f64,
         setting: &Setting<M, P>,
         whitening: &Whitening,
@@ -241,11 +247,15 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
     ) -> Vec<Warning> {
         let care = |text: String| Warning { severity: Severity::UsableWithCare, text };
         let mut warnings = vec![];
-        if degrees == 0.0 {
+        let degrees = measured.saturating_sub(rows.len() as u64);
+        if degrees == 0 {
             let text = format!(
-                "{} unknowns are too many for the measurements: nothing can be said of their accuracy",
+                "{measured} measurement(s) for {} unknown(s) leave nothing to tell the accuracy by; fix some, or record more",
                 rows.len()
             );
+            warnings.push(Warning { severity: Severity::NotUsable, text });
+        } else if rows.iter().all(|row| row.knowledge == Knowledge::Unidentified) {
+            let text = "the data determine none of the unknowns".to_owned();
             warnings.push(Warning { severity: Severity::NotUsable, text });
         }
         for row in rows {

@@ -159,6 +159,9 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
             })?;
         }
         let covariance = SquareMatrix::from_fn(outputs, |i, j| sums[(i, j)] / pairs[(i, j)].max(1.0));
+        if let Some(variance) = covariance.diagonal().iter().find(|variance| !variance.is_finite()) {
+            return Err(Infeasible::Failed(format!("the variance of an output's errors is {variance}")));
+        }
         Ok(Moments { covariance })
     }
 
