@@ -56,7 +56,10 @@ fn a_dc_motor_is_recovered() {
     let truth = Armature { r: 1.1, l: 1.2e-3, k: 0.05, j: 1e-4, b: 2e-5 };
     let time = Time::Uniform { start: 0.0, step: 2e-4 };
     let inputs: Vec<_> = (0..2000)
-        .map(|k| Feed { u: if k / 250 % 2 == 0 { 12.0 } else { -6.0 }, tau_l: if k / 400 % 2 == 0 { 0.0 } else { 0.05 } })
+        .map(|k| Feed {
+            u: if k / 250 % 2 == 0 { 12.0 } else { -6.0 },
+            tau_l: if k / 400 % 2 == 0 { 0.0 } else { 0.05 },
+        })
         .collect();
     let unknown = vec![Rotation { i: f64::NAN, w: f64::NAN }; inputs.len()];
     let at_rest = Rotation::splat(fixed(0.0));
