@@ -1,10 +1,10 @@
 //! [`Estimate`]: what a fit found, and how well it is known.
 
 mod display;
-mod predict;
+mod prediction;
 pub(crate) mod student;
 
-pub use predict::Prediction;
+pub use prediction::Prediction;
 
 use crate::by_name;
 use crate::information::SquareMatrix;

@@ -126,6 +126,8 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             (0..n).find(mine).map_or(Knowledge::Fixed, |i| rows[i].knowledge)
         });
 
+        // The noise, where the errors were not divided by it.
+        let step_error = step_error / widening;
         let mut warnings = self.warnings(&rows, &directions, measured, step_error, setting, &whitening, coordinates);
         if !outcome.converged() && rows.iter().any(|row| row.knowledge.standard_error().is_some()) {
             let text =
@@ -299,7 +301,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
         let step = linear.step(&vec![0.0; rows.len()], &held)?;
         let shift = |i: usize| {
             let change = (step[i] * rows[i].transform.slope(rows[i].value)).abs();
-            let error = rows[i].knowledge.standard_error()?;
+            let error = rows[i].knowledge.standard_error().filter(|error| *error > 0.0)?;
             Some((rows[i].name.clone(), change / error, change / rows[i].value.abs()))
         };
         (0..rows.len()).filter_map(shift).max_by(|a, b| a.1.total_cmp(&b.1))

@@ -170,7 +170,8 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
     pub(crate) fn estimate_noise(&self, coordinates: &[f64], noise: Noise<M::Output>) -> Result<Whitening, Infeasible> {
         let outputs = M::Output::LEN;
         let mut moments = self.moments(coordinates, &vec![1.0; outputs], None)?;
-        let floor: Vec<f64> = self.magnitudes().iter().map(|size| (ROUNDING * size).max(f64::MIN_POSITIVE)).collect();
+        let size = |size: f64| if size > 0.0 { size } else { 1.0 };
+        let floor: Vec<f64> = self.magnitudes().into_iter().map(|magnitude| ROUNDING * size(magnitude)).collect();
         let sigma = |m: &Moments| -> Vec<f64> {
             m.covariance.diagonal().iter().zip(&floor).map(|(v, floor)| v.sqrt().max(*floor)).collect()
         };

@@ -22,7 +22,8 @@ where
     O: for<'p> Solver<&'p Problem, LeastSquaresState>,
 {
     let configure = |state: LeastSquaresState| state.param(start.to_vec()).counting(true);
-    let result = Executor::new(problem, solver).configure(configure).ctrlc(false).run().expect("a start that evaluates");
+    let result =
+        Executor::new(problem, solver).configure(configure).ctrlc(false).run().expect("a start that evaluates");
     let state = result.state();
     Ended {
         x: state.get_param().expect("a point").clone(),
@@ -69,7 +70,8 @@ fn check(optimizer: &str, problem: &Problem, ended: &Ended) -> bool {
 #[test]
 fn the_default_solves_every_problem() {
     for problem in PROBLEMS {
-        let solved = check("LM, Jacobian columns", problem, &levenberg_marquardt(problem, problem.start, JacobianColumns));
+        let solved =
+            check("LM, Jacobian columns", problem, &levenberg_marquardt(problem, problem.start, JacobianColumns));
         println!("   {solved}");
     }
 }
