@@ -2,6 +2,7 @@
 
 mod as_argmin;
 mod checkpoint;
+mod colored;
 mod conclude;
 mod covariance;
 mod noise;

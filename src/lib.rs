@@ -46,6 +46,8 @@ pub mod regress;
 mod scaling;
 #[cfg(feature = "std")]
 mod weighting;
+#[cfg(feature = "std")]
+mod whiteness;
 
 #[doc(hidden)]
 pub use {approx, nalgebra, serde};

@@ -189,6 +189,16 @@ pub(super) fn classical(linear: &Linearization, held: &[bool]) -> Option<SquareM
 }
 
 impl Sandwich {
+    /// The bread of plain least squares, still without meat.
+    pub fn plain(linear: &Linearization) -> Self {
+        Sandwich { bread: linear.clone(), meat: vec![], curvature: 1.0, meat_scale: 1.0 }
+    }
+
+    /// Takes another covariance of the scores, one triangle per experiment.
+    pub fn replace_meat(&mut self, meat: Vec<Information>) {
+        (self.meat, self.meat_scale) = (meat, 1.0);
+    }
+
     /// `A^-1 B A^-1` over all unknowns that are not held.
     pub fn covariance(&self, held: &[bool]) -> Option<SquareMatrix> {
         let Inverse { own, shared, total } = invert(&self.bread, held)?;
