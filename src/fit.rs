@@ -10,7 +10,9 @@ mod objective;
 mod run;
 mod unknowns;
 
+pub(crate) use covariance::classical;
 pub use objective::Objective;
+pub(crate) use objective::{Rows, each};
 pub use run::FitProblem;
 
 use crate::error::Error;

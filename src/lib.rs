@@ -21,6 +21,8 @@ mod by_name;
 #[cfg(feature = "std")]
 pub mod check;
 #[cfg(feature = "std")]
+pub mod diagnose;
+#[cfg(feature = "std")]
 mod error;
 #[cfg(feature = "std")]
 mod estimate;
@@ -40,6 +42,8 @@ pub mod optimize;
 mod predict;
 #[cfg(feature = "std")]
 mod prefilter;
+#[cfg(feature = "std")]
+mod random;
 #[cfg(feature = "std")]
 pub mod regress;
 #[cfg(feature = "std")]

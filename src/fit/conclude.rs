@@ -425,7 +425,7 @@ impl Color {
 
 impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
     /// What the model says of one record.
-    pub(super) fn prediction(&self, e: usize, coordinates: &[f64]) -> Result<Prediction<M>, Error> {
+    pub(crate) fn prediction(&self, e: usize, coordinates: &[f64]) -> Result<Prediction<M>, Error> {
         let record = &self.experiments[e];
         let (initial_state, p) = self.unknowns.place(e, coordinates);
         let walk = self.step(e);

@@ -168,7 +168,7 @@ fn invert(linear: &Linearization, held: &[bool]) -> Option<Inverse> {
 }
 
 /// `(sum of squares)^-1` over all unknowns that are not held; zero in the rows and columns of those.
-pub(super) fn classical(linear: &Linearization, held: &[bool]) -> Option<SquareMatrix> {
+pub(crate) fn classical(linear: &Linearization, held: &[bool]) -> Option<SquareMatrix> {
     let Inverse { own, shared, total } = invert(linear, held)?;
     let mut covariance = SquareMatrix::zeros(held.len());
     let cgg = &total * total.transpose();
