@@ -10,7 +10,8 @@ use std::path::PathBuf;
 
 /// The files, if they are there.
 fn files() -> Vec<PathBuf> {
-    let shared = std::env::var("GREYBOX_SHARED").unwrap_or(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared").to_owned());
+    let shared =
+        std::env::var("GREYBOX_SHARED").unwrap_or(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared").to_owned());
     let folder = PathBuf::from(shared).join("data/nist");
     let Ok(entries) = std::fs::read_dir(&folder) else {
         println!("no files in {}: nothing tested", folder.display());

@@ -79,7 +79,8 @@ fn problems_of_the_list_stay_in_their_bounds_all_the_way() {
         for _ in 0..300 {
             solver.stop.iterations = 1;
             let configure = |state: greybox::optimize::LeastSquaresState| state.param(x.clone());
-            let result = Executor::new(&boxed, solver.clone()).configure(configure).ctrlc(false).run().expect("a start");
+            let result =
+                Executor::new(&boxed, solver.clone()).configure(configure).ctrlc(false).run().expect("a start");
             x = result.state().get_param().expect("a point").clone();
             solver = result.solver().clone();
             for (x, (lower, upper)) in x.iter().zip(boxed.bounds) {

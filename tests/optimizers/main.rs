@@ -5,9 +5,9 @@ mod others;
 mod problems;
 
 use argmin::core::{Executor, Solver, State};
-use greybox::optimize::{GaussNewton, LeastSquaresState, LevenbergMarquardt, Outcome, Stop};
-use greybox::{JacobianColumns, Nominal, Scaling, Unscaled};
-use problems::{PROBLEMS, Problem};
+use greybox::optimize::{GaussNewton, LeastSquares, LeastSquaresState, LevenbergMarquardt, Outcome, Stop};
+use greybox::{JacobianColumns, Nominal, Scalar, Scaling, Unscaled};
+use problems::{D, PROBLEMS, Problem};
 
 /// Where a search ended: point, sum of squares, outcome, evaluations.
 struct Ended {
@@ -22,7 +22,8 @@ where
     O: for<'p> Solver<&'p Problem, LeastSquaresState>,
 {
     let configure = |state: LeastSquaresState| state.param(start.to_vec()).counting(true);
-    let result = Executor::new(problem, solver).configure(configure).ctrlc(false).run().expect("a start that evaluates");
+    let result =
+        Executor::new(problem, solver).configure(configure).ctrlc(false).run().expect("a start that evaluates");
     let state = result.state();
     Ended {
         x: state.get_param().expect("a point").clone(),
@@ -40,37 +41,44 @@ fn gauss_newton(problem: &Problem, start: &[f64]) -> Ended {
     run(problem, start, GaussNewton::default(), GaussNewton::outcome)
 }
 
-/// That a search that says it converged is at one of the minima; whether it is at the global one.
-fn check(optimizer: &str, problem: &Problem, ended: &Ended) -> bool {
+/// That a search that says it converged is at one of the minima, and which of them; `None` if it did not converge.
+fn check(optimizer: &str, problem: &Problem, ended: &Ended) -> Option<usize> {
     let Ended { x, sum_of_squares, outcome, evaluations } = ended;
     let name = problem.name;
     // The minima are printed with six digits or more; those at zero are reached to rounding.
     let at = |minimum: f64| (sum_of_squares - minimum).abs() <= 1e-5 * minimum + 1e-18;
     let minimum = problem.minima.iter().position(|&minimum| at(minimum));
-    let said = outcome.map_or("no outcome".to_owned(), |outcome| outcome.to_string());
-    println!("{optimizer:<22} {name:<24} {sum_of_squares:<12.6e} {evaluations:>5} {minimum:?} {said}");
-    let converged = outcome.is_some_and(|outcome| outcome.converged());
-    if !converged {
-        return false;
+    let said = outcome.map_or("the limit of iterations".to_owned(), |outcome| outcome.to_string());
+    println!("{optimizer:<20} {name:<24} {sum_of_squares:<12.6e} {evaluations:>5}  {said}");
+    // What has lost its influence is named by the report of a fit, whatever the outcome.
+    let lost = problem.linearize(x).is_ok_and(|linear| linear.column_norms().contains(&0.0));
+    if !outcome.is_some_and(|outcome| outcome.converged()) || lost && minimum.is_none() {
+        return None;
     }
     assert!(minimum.is_some(), "{optimizer} on {name}: {sum_of_squares:e} at {x:?} is called {said}");
     if let (Some(minimizer), Some(0)) = (problem.minimizer, minimum) {
         for (i, (found, known)) in x.iter().zip(minimizer).enumerate() {
-            let swapped = name.contains("Osborne 1") || name.contains("Jennrich");
-            assert!(
-                (found - known).abs() <= 2e-5 * known.abs() + 1e-6 || swapped && sum_of_squares.is_finite(),
-                "{optimizer} on {name}: x[{i}] = {found}, known is {known}"
-            );
+            // The minimizers are printed with five digits or more.
+            let error = (found - known).abs();
+            assert!(error <= 1e-5 * known.abs() + 1e-6, "{optimizer} on {name}: x[{i}] = {found}, not {known}");
         }
     }
-    minimum == Some(0)
+    minimum
 }
 
 #[test]
 fn the_default_solves_every_problem() {
     for problem in PROBLEMS {
-        let solved = check("LM, Jacobian columns", problem, &levenberg_marquardt(problem, problem.start, JacobianColumns));
-        println!("   {solved}");
+        let found =
+            check("LM, Jacobian columns", problem, &levenberg_marquardt(problem, problem.start, JacobianColumns));
+        let expected = match problem.name {
+            // The usual start leads every method with slopes into the other minimum.
+            "2 Freudenstein and Roth" => Some(1),
+            // Its Jacobian is singular at the minimum: halving the distance at each step has no end.
+            "13 Powell singular" => None,
+            _ => Some(0),
+        };
+        assert_eq!(found, expected, "{}", problem.name);
     }
 }
 
@@ -87,4 +95,50 @@ fn gauss_newton_is_honest() {
     for problem in PROBLEMS {
         check("Gauss-Newton", problem, &gauss_newton(problem, problem.start));
     }
+}
+
+#[test]
+fn far_starts_are_honest() {
+    let stop = Stop { iterations: 500, ..Stop::default() };
+    for problem in PROBLEMS {
+        let start: Vec<f64> = problem.start.iter().map(|x| 10.0 * x).collect();
+        if problem.linearize(&start).is_err() {
+            continue;
+        }
+        // From far, the two exponentials of Osborne 1 may come out exchanged.
+        let problem = &Problem { minimizer: None, ..*problem };
+        let solver = LevenbergMarquardt::new(stop, JacobianColumns);
+        check("LM, far", problem, &run(problem, &start, solver, LevenbergMarquardt::outcome));
+        check("Gauss-Newton, far", problem, &run(problem, &start, GaussNewton::new(stop), GaussNewton::outcome));
+    }
+}
+
+/// With a large residual the methods converge linearly, and the cost has no digits left long before the unknowns have.
+#[test]
+fn large_residuals_cost_no_digits() {
+    for number in ["2", "6", "16"] {
+        let problem = PROBLEMS.iter().find(|problem| problem.name.starts_with(number)).expect("a problem of the list");
+        let first = levenberg_marquardt(problem, problem.start, JacobianColumns);
+        let other = levenberg_marquardt(problem, problem.start, Unscaled);
+        for (a, b) in first.x.iter().zip(&other.x) {
+            // Eight digits are asked for.
+            assert!((a - b).abs() <= 1e-8 * a.abs(), "{}: {:?} and {:?}", problem.name, first.x, other.x);
+        }
+    }
+}
+
+/// `exp(-b t)` with `b` far too large has no slope left.
+#[test]
+fn a_parameter_that_cannot_move_is_not_called_found() {
+    let residuals: fn(&[D]) -> Vec<D> =
+        |x| (1..=10).map(|t| (-x[0] * f64::from(t)).exp() - (-f64::from(t)).exp()).collect();
+    let problem =
+        |start| Problem { name: "decay", start, residuals, minima: &[0.0], minimizer: Some(&[1.0]), bounds: &[] };
+    for start in [&[1000.0], &[100.0], &[40.0]] {
+        let problem = problem(start);
+        check("LM", &problem, &levenberg_marquardt(&problem, start, JacobianColumns));
+        check("Gauss-Newton", &problem, &gauss_newton(&problem, start));
+    }
+    let stuck = levenberg_marquardt(&problem(&[1000.0]), &[1000.0], JacobianColumns);
+    assert_eq!(stuck.outcome, Some(Outcome::Stalled { gradient: 0.0, failed: 0 }));
 }

@@ -61,7 +61,8 @@ fn l_bfgs() {
     for number in ["1", "5", "7", "8", "9", "13", "14", "16"] {
         let problem = of(number);
         let solver = LBFGS::new(MoreThuenteLineSearch::new(), 7);
-        let configure = |state: argmin::core::IterState<_, _, _, _, _, _>| state.param(problem.start.to_vec()).max_iters(2000);
+        let configure =
+            |state: argmin::core::IterState<_, _, _, _, _, _>| state.param(problem.start.to_vec()).max_iters(2000);
         let result = Executor::new(Other(problem), solver).configure(configure).ctrlc(false).run().expect("a search");
         reached(problem, result.state().get_best_cost(), 1e-8);
     }
