@@ -214,15 +214,23 @@ fn settings_without_sense() {
     }
     for bad in [-1e-9, f64::NAN, f64::INFINITY] {
         let stop = Stop::default();
-        for (what, stop) in
-            [("step", Stop { step: bad, ..stop }), ("gradient", Stop { gradient: bad, ..stop }), ("cost", Stop { cost: bad, ..stop })]
-        {
+        for (what, stop) in [
+            ("step", Stop { step: bad, ..stop }),
+            ("gradient", Stop { gradient: bad, ..stop }),
+            ("cost", Stop { cost: bad, ..stop }),
+        ] {
             let parts = [&format!("Stop::{what}"), &bad.to_string() as &str, "not negative"];
             says(fit(&record).optimizer(LevenbergMarquardt::new(stop, JacobianColumns)).run(), &parts);
             says(fit(&record).optimizer(GaussNewton::new(stop)).run(), &parts);
         }
-        says(fit(&record).integrator(Rk45 { relative: bad, absolute: 1e-9 }).run(), &["relative", "Rk45", &bad.to_string()]);
-        says(fit(&record).integrator(Esdirk { relative: 1e-9, absolute: bad }).run(), &["absolute", "Esdirk", &bad.to_string()]);
+        says(
+            fit(&record).integrator(Rk45 { relative: bad, absolute: 1e-9 }).run(),
+            &["relative", "Rk45", &bad.to_string()],
+        );
+        says(
+            fit(&record).integrator(Esdirk { relative: 1e-9, absolute: bad }).run(),
+            &["absolute", "Esdirk", &bad.to_string()],
+        );
     }
     says(fit(&record).integrator(Rk45 { relative: 0.0, absolute: 0.0 }).run(), &["relative", "Rk45", "0"]);
     // Weightings.
@@ -240,7 +248,10 @@ fn settings_without_sense() {
     says(fit(&record).prefilter(other).run(), &["every 0.0001 s", "`bench`", "0.001 s apart", "resample"]);
     // Horizons.
     for steps in [0, 200, usize::MAX] {
-        says(fit(&record).predictor(Horizon { steps }).run(), &[&format!("{steps} sample(s)"), "`bench`", "200", "FreeRun"]);
+        says(
+            fit(&record).predictor(Horizon { steps }).run(),
+            &[&format!("{steps} sample(s)"), "`bench`", "200", "FreeRun"],
+        );
     }
 }
 
@@ -272,7 +283,10 @@ fn stopped_before_or_soon_after_the_start() {
 #[test]
 fn missing_and_constant_outputs() {
     let parts = ["`record`", "output `i`", "missing in every sample"];
-    says(fit(&record_of(&Rl, &[f64::NAN; 50])).run(), &["1 state(s), i", "0 measured", "t = 0 s", "Experiment::initial"]);
+    says(
+        fit(&record_of(&Rl, &[f64::NAN; 50])).run(),
+        &["1 state(s), i", "0 measured", "t = 0 s", "Experiment::initial"],
+    );
     let unmeasured = record_of(&Rl, &[f64::NAN; 50]).initial(Current { i: fixed(0.0) });
     assert!(matches!(says(fit(&unmeasured).run(), &parts), Error::OutputMissing { .. }));
     // A prediction needs no measurement if the initial state is known.
@@ -386,7 +400,8 @@ fn scalings_that_return_rubbish() {
     for scale in [f64::NAN, f64::INFINITY, 0.0, -1.0, 1e-300, 1e300, 1e-8, 1e8] {
         for count in [0, 1, 3, 9] {
             let search = LevenbergMarquardt::new(Stop::default(), Rubbish(scale, count));
-            let estimate = fit(&record).optimizer(search).run().unwrap_or_else(|error| panic!("{scale} {count}: {error}"));
+            let estimate =
+                fit(&record).optimizer(search).run().unwrap_or_else(|error| panic!("{scale} {count}: {error}"));
             println!("{scale} {count}: {}", estimate.outcome);
             if estimate.outcome.converged() {
                 assert_relative_eq!(estimate.parameters.r, right.r, max_relative = 1e-7);

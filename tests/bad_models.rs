@@ -68,7 +68,11 @@ fn lag(a: f64, b: f64, h: f64, samples: usize, amplitude: f64) -> Vec<f64> {
         .collect()
 }
 
-fn record<M: Model<State = Position, Input = Force, Output = Position>>(model: &M, h: f64, y: &[f64]) -> ExperimentOf<M> {
+fn record<M: Model<State = Position, Input = Force, Output = Position>>(
+    model: &M,
+    h: f64,
+    y: &[f64],
+) -> ExperimentOf<M> {
     let inputs = (0..y.len()).map(|k| Force { u: force(k) }).collect();
     let outputs = y.iter().map(|&x| Position { x }).collect();
     let record = Experiment::new(model, Time::Uniform { start: 0.0, step: h }, inputs, outputs).unwrap();
@@ -185,7 +189,8 @@ fn a_start_where_the_model_is_undefined() {
     // An output that is undefined at some samples only.
     let y: Vec<f64> = lag(3.0, 1.0, H, 300, 0.0).iter().map(|x| (x + 0.1).ln()).collect();
     let logged = record(&Logged, H, &y);
-    let error = says(Fit::new(&Logged, &logged).parameters(free_pair(0.5, 1.0)).run(), &["output `x` is NaN", "logarithm"]);
+    let error =
+        says(Fit::new(&Logged, &logged).parameters(free_pair(0.5, 1.0)).run(), &["output `x` is NaN", "logarithm"]);
     let Error::Start(failure) = error else { panic!("{error}") };
     assert!(failure.sample > 25, "{failure}");
     // There, and only there, no measurement: nothing is asked of it.
@@ -197,9 +202,17 @@ fn a_start_where_the_model_is_undefined() {
     // 25 samples without noise: Runge-Kutta's error, (3 H)^5 / 120 a step.
     assert_relative_eq!(fit.parameters.a, 3.0, max_relative = 1e-5);
     // Its state cannot be read from an output that is undefined on the way.
-    let open = Experiment::new(&Rootless, Time::Uniform { start: 0.0, step: H }, vec![Force { u: 1.0 }; 9], vec![Position { x: 1.0 }; 9]);
+    let open = Experiment::new(
+        &Rootless,
+        Time::Uniform { start: 0.0, step: H },
+        vec![Force { u: 1.0 }; 9],
+        vec![Position { x: 1.0 }; 9],
+    );
     let open = open.unwrap();
-    says(Fit::new(&Rootless, &open).parameters(free_pair(1.0, 1.0)).run(), &["output `x` is not a number", "Experiment::initial"]);
+    says(
+        Fit::new(&Rootless, &open).parameters(free_pair(1.0, 1.0)).run(),
+        &["output `x` is not a number", "Experiment::initial"],
+    );
 }
 
 model!(Rootless, Kind::Continuous, derivative, |x, u, p| p.b * u.u - p.a * x.x, (x.x - 1.0).sqrt());
@@ -239,7 +252,11 @@ fn a_step_too_coarse_for_the_dynamics_is_warned_of() {
     warns(&estimate, &["step is too coarse", "Runge-Kutta 4, 2 step(s)", "standard errors", "finer step"]);
     assert_eq!(estimate.severity(), Severity::UsableWithCare);
     let error = estimate.knowledge.a.standard_error().unwrap();
-    assert!((estimate.parameters.a - 3.0).abs() > 2.0 * error, "it is in fact wrong: {} {error}", estimate.parameters.a);
+    assert!(
+        (estimate.parameters.a - 3.0).abs() > 2.0 * error,
+        "it is in fact wrong: {} {error}",
+        estimate.parameters.a
+    );
     // With steps to match, and with an adaptive method, there is nothing to warn of, and the answer is right.
     let fine = [
         fit().integrator(Rk4 { substeps: 40 }).run().map(|e| (e.parameters.a, e.knowledge.a, e.warnings)),
@@ -281,7 +298,8 @@ fn one_of_two_outputs() {
         record.named("bench").initial(Position { x: fixed(0.0) })
     };
     let missing = record(f64::NAN, 1.0);
-    let error = says(Fit::new(&Twins, &missing).parameters(free_pair(2.0, 2.0)).run(), &["`bench`", "output `z`", "drop it"]);
+    let error =
+        says(Fit::new(&Twins, &missing).parameters(free_pair(2.0, 2.0)).run(), &["`bench`", "output `z`", "drop it"]);
     assert!(matches!(error, Error::OutputMissing { .. }));
     // Always zero, as the model says: it tells nothing, and spoils nothing.
     for noise in [1.0, 0.0] {
@@ -345,7 +363,8 @@ fn a_fit_without_any_error() {
     let estimate = Fit::new(&Line, &line).parameters(free_pair(-7.0, 30.0)).run().unwrap();
     assert_relative_eq!(estimate.parameters.a, 2.0, max_relative = 1e-12);
     // One sample of a static model, one unknown.
-    let one = Experiment::new(&Line, Time::Stamps(vec![0.0]), vec![Force { u: 2.0 }], vec![Position { x: 6.0 }]).unwrap();
+    let one =
+        Experiment::new(&Line, Time::Stamps(vec![0.0]), vec![Force { u: 2.0 }], vec![Position { x: 6.0 }]).unwrap();
     let estimate = Fit::new(&Line, &one).parameters(Pair { a: free(1.0), b: fixed(0.0) }).run().unwrap();
     warns(&estimate, &["1 measurement(s) for 1 unknown(s)"]);
     assert_relative_eq!(estimate.parameters.a, 3.0, max_relative = 1e-9);

@@ -50,7 +50,8 @@ impl File {
 
     /// Fits it from both starts.
     pub fn fit(&self) -> Result<Vec<Found>, String> {
-        let results = problems::by_name(&self.name, self).ok_or_else(|| format!("{}: not a known problem", self.name))?;
+        let results =
+            problems::by_name(&self.name, self).ok_or_else(|| format!("{}: not a known problem", self.name))?;
         results.map_err(|error| format!("{}: {error}", self.name))
     }
 

@@ -62,9 +62,6 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Estimate<M, I, P> {
         let sigma = M::Output::map(self.quality, |quality| quality.sigma);
         let noisy = M::Output::into_array(sigma).as_ref().iter().all(|sigma| *sigma > 0.0);
         let fit = if noisy { fit.noise(sigma) } else { fit };
-        fit
-            .integrator(self.integrator.clone())
-            .predictor(self.predictor.clone())
-            .simulate()
+        fit.integrator(self.integrator.clone()).predictor(self.predictor.clone()).simulate()
     }
 }

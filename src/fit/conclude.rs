@@ -128,7 +128,8 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
 
         let mut warnings = self.warnings(&rows, &directions, measured, step_error, setting, &whitening, coordinates);
         if !outcome.converged() && rows.iter().any(|row| row.knowledge.standard_error().is_some()) {
-            let text = "standard errors and intervals are those of a minimum, where the search did not arrive".to_owned();
+            let text =
+                "standard errors and intervals are those of a minimum, where the search did not arrive".to_owned();
             warnings.push(Warning { severity: Severity::NotUsable, text });
         }
         if let Some(trouble) = trouble {

@@ -186,7 +186,9 @@ fn check(name: &str, parameter: &Parameter) -> Result<(), Error> {
         return wrong(format!("its bounds are {lower} and {upper}; the lower must be below the upper (or use fixed)"));
     }
     if start < lower || start > upper {
-        return wrong(format!("its start {start} lies outside its bounds {lower} to {upper}; move the start, or the bounds"));
+        return wrong(format!(
+            "its start {start} lies outside its bounds {lower} to {upper}; move the start, or the bounds"
+        ));
     }
     if !free {
         return Ok(());
