@@ -6,6 +6,7 @@ mod conclude;
 mod covariance;
 mod noise;
 mod objective;
+mod predict;
 mod run;
 mod unknowns;
 

@@ -249,7 +249,7 @@ fn settings_without_sense() {
     // Horizons.
     for steps in [0, 200, usize::MAX] {
         says(
-            fit(&record).predictor(Horizon { steps }).run(),
+            fit(&record).predictor(Horizon::new(steps)).run(),
             &[&format!("{steps} sample(s)"), "`bench`", "200", "FreeRun"],
         );
     }

@@ -185,7 +185,7 @@ fn a_start_where_the_model_is_undefined() {
     // Where the value is finite and its slope is not.
     let steep = record(&Steep, H, &lag(1.2, 1.0, H, 300, 1e-3));
     let error = Fit::new(&Steep, &steep).parameters(free_pair(0.0, 1.0)).run();
-    says(error, &["slope of output `x` with respect to `a`", "sample 2", "start elsewhere"]);
+    says(error, &["slope of output `x` with respect to `a`", "sample 1", "start elsewhere"]);
     // An output that is undefined at some samples only.
     let y: Vec<f64> = lag(3.0, 1.0, H, 300, 0.0).iter().map(|x| (x + 0.1).ln()).collect();
     let logged = record(&Logged, H, &y);

@@ -267,6 +267,12 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
                 Ok(None) => continue,
                 Err(_) => {
                     let before = k.saturating_sub(1);
+                    let values = M::State::into_array(x);
+                    if let Some((i, value)) =
+                        values.as_ref().iter().enumerate().find(|(_, x)| x.is_nan() || x.abs() >= RUNAWAY)
+                    {
+                        return failure(before, format!("state `{}`", M::State::NAMES[i]), *value, OVERFLOW);
+                    }
                     let slope = self.model.derivative(record.time(before), &x, &record.inputs()[before], &p);
                     return match unsound(M::State::into_array(slope).as_ref()) {
                         Some((i, value, hint)) => {
@@ -321,6 +327,9 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
         first.map(|(k, output, unknown, value)| (k, output, self.unknowns.row[unknown].name.as_str(), value))
     }
 }
+
+/// An adaptive method is stuck with states as large as this before they overflow.
+const RUNAWAY: f64 = 1e100;
 
 const STUCK: &str = "; no step is short enough, or 100,000 of them do not reach the next sample: the model is too stiff for \
                      the method, jumps, or leaves its domain (take Esdirk, or smooth the model)";

@@ -25,7 +25,7 @@ pub struct GaussNewton {
 const SUFFICIENT: f64 = 1e-4;
 const HALVINGS: u32 = 60;
 /// Fewer are enough where the cost has no digits left.
-const LAST_HALVINGS: u32 = 5;
+const LAST_HALVINGS: u32 = 10;
 
 impl GaussNewton {
     /// A search with this rule to stop.
@@ -110,15 +110,18 @@ impl GaussNewton {
         point: &Point,
         bounds: &[(f64, f64)],
     ) -> Result<Option<Point>, Error> {
-        let (cost, unresolved) = (point.linear.cost, point.cannot_resolve(point.potential));
+        let cost = point.linear.cost;
         let mut step = point.full.clone().unwrap_or_default();
         let mut failed = 0;
-        for _ in 0..if unresolved { LAST_HALVINGS } else { HALVINGS } {
+        let mut blind = 0;
+        for _ in 0..HALVINGS {
             let x = point.towards(&step);
-            if x == point.x {
+            let slope = point.slope(&step);
+            let unresolved = point.cannot_resolve(-slope);
+            blind += u32::from(unresolved);
+            if x == point.x || blind > LAST_HALVINGS {
                 break;
             }
-            let slope: f64 = point.gradient.iter().zip(&step).map(|(g, d)| g * d).sum();
             match linearize(problem, &x)? {
                 Err(Infeasible::Cancelled) => {
                     self.outcome = Some(Outcome::Cancelled);
@@ -133,7 +136,7 @@ impl GaussNewton {
                         true => next.potential < point.potential,
                         false => decrease > 0.0 && decrease >= -SUFFICIENT * slope,
                     };
-                    if enough {
+                    if enough && !point.loses_influence(&next) {
                         if decrease <= self.stop.cost * cost && next.potential <= self.stop.cost * cost {
                             self.outcome = Some(Outcome::CostUnchanged { decrease: decrease / cost });
                         }

@@ -11,9 +11,8 @@ use serde::{Deserialize, Serialize};
 /// Each iteration tries one step, the minimizer of the linearized sum of squares plus `lambda |D step|^2`, computed from
 /// the triangle; the trial brings its slopes along. Bounds are part of that minimization: an unknown that would cross one
 /// is put on it, and the others are minimized again. `lambda` falls by up to 10 after a step that kept its promise and
-/// grows, ever faster, after one that did not. Where the cost can no longer resolve a step, what the undamped step would
-/// still gain decides instead. The undamped step also decides when to stop, so that heavy damping never looks like a
-/// minimum.
+/// grows, ever faster, after one that did not. Where the cost can no longer resolve a step, the slope along the step
+/// decides instead. The undamped step decides when to stop, so that heavy damping never looks like a minimum.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LevenbergMarquardt<S = JacobianColumns> {
     /// When to stop.
@@ -157,9 +156,8 @@ impl<S: Scaling> LevenbergMarquardt<S> {
         };
         let x = point.towards(&step);
         let promised = point.linear.predicted_reduction(&step);
-        let unresolved = point.cannot_resolve(point.potential);
-        // No shorter step is left to try.
-        if x == point.x || point.cannot_resolve(promised) && !unresolved || unresolved && self.growth > LAST_GROWTH {
+        let unresolved = point.cannot_resolve(promised);
+        if x == point.x || unresolved && self.growth > LAST_GROWTH {
             self.outcome = Some(point.stuck(&self.stop, self.failed));
             return Ok(None);
         }
@@ -177,15 +175,17 @@ impl<S: Scaling> LevenbergMarquardt<S> {
         };
         let (cost, new_cost) = (point.linear.cost, linear.cost);
         let next = Point::new(x, linear, &self.scaling, &point.scales, bounds);
-        // Where the cost decides nothing, what the full step would still gain does.
+        // Where the cost decides nothing, the slope along the step does: in the metric of the damped step the gradient of
+        // a convergent iteration shrinks steadily.
         let (accept, gain) = if unresolved {
-            let part = next.potential / point.potential;
-            (part < 1.0 && new_cost <= cost * (1.0 + COST_ROUNDING), if part < 0.25 { 1.0 } else { 0.5 })
+            let again = next.linear.step_within(&damping, &next.held, &next.room);
+            let part = again.map_or(f64::INFINITY, |again| next.slope(&again) / point.slope(&step));
+            (part < 1.0 && new_cost <= cost * (1.0 + COST_ROUNDING), if part < 0.25 { 1.0 } else { 0.9 })
         } else {
             let gain = (cost - new_cost) / promised;
             (gain > ACCEPT, gain)
         };
-        if !accept {
+        if !accept || point.loses_influence(&next) {
             self.shorter();
             return Ok(None);
         }

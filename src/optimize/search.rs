@@ -19,6 +19,7 @@ pub(super) struct Point {
     pub held: Vec<bool>,
     /// How far each unknown may move, down and up.
     pub room: Vec<(f64, f64)>,
+    bounds: Vec<(f64, f64)>,
     /// The undamped step; damped by 1e-8 where the data do not determine it.
     pub full: Option<Vec<f64>>,
     /// By how much the full step would lower the cost, if the slopes held.
@@ -29,6 +30,8 @@ pub(super) struct Point {
 const RESOLUTION: f64 = 1e-13;
 /// Where no step lowers the cost, a cosine up to this is rounding too.
 pub(super) const PRECISION_GRADIENT: f64 = 1e-6;
+/// A step that shrinks a column of the Jacobian to less than this part went too far.
+const LOST: f64 = 1e-10;
 /// Damping of undetermined directions, relative to the column norms.
 const RANK_DAMPING: f64 = 1e-8;
 
@@ -56,8 +59,9 @@ impl Point {
                 *scale = 1.0;
             }
         }
-        let bound = |i: usize| bounds.get(i).copied().unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
-        let room: Vec<(f64, f64)> = (0..x.len()).map(|i| (bound(i).0 - x[i], bound(i).1 - x[i])).collect();
+        let mut bounds = bounds.to_vec();
+        bounds.resize(x.len(), (f64::NEG_INFINITY, f64::INFINITY));
+        let room: Vec<(f64, f64)> = bounds.iter().zip(&x).map(|(bound, x)| (bound.0 - x, bound.1 - x)).collect();
         // Held: what has no influence, and what sits on a bound that it would cross.
         let on_bound = |i: usize| room[i].0 >= 0.0 && gradient[i] >= 0.0 || room[i].1 <= 0.0 && gradient[i] <= 0.0;
         let held: Vec<bool> = (0..x.len()).map(|i| norms[i] == 0.0 || on_bound(i)).collect();
@@ -65,7 +69,7 @@ impl Point {
         let undamped = linear.step_within(&vec![0.0; x.len()], &held, &room);
         let full = undamped.or_else(|| linear.step_within(&damping, &held, &room));
         let potential = full.as_ref().map_or(f64::INFINITY, |step| linear.predicted_reduction(step));
-        Point { x, linear, gradient, norms, scales, held, room, full, potential }
+        Point { x, linear, gradient, norms, scales, held, room, bounds, full, potential }
     }
 
     /// Largest cosine between the residual and a free column of the Jacobian.
@@ -86,12 +90,21 @@ impl Point {
         self.full.as_ref().map_or(f64::INFINITY, size)
     }
 
+    /// Slope of the cost along a step; negative downhill.
+    pub fn slope(&self, step: &[f64]) -> f64 {
+        self.gradient.iter().zip(step).map(|(g, d)| g * d).sum()
+    }
+
     /// `x + step`, exactly on the bound where the step uses up the room.
     pub fn towards(&self, step: &[f64]) -> Vec<f64> {
-        let along = |i: usize| match self.room[i] {
-            (lower, _) if step[i] <= lower => self.x[i] + lower,
-            (_, upper) if step[i] >= upper => self.x[i] + upper,
-            _ => self.x[i] + step[i],
+        let along = |i: usize| {
+            let ((down, up), (lower, upper)) = (self.room[i], self.bounds[i]);
+            match step[i] {
+                step if step <= down => lower,
+                step if step >= up => upper,
+                // Not `clamp`, which panics where the bounds are out of order.
+                step => (self.x[i] + step).max(lower).min(upper),
+            }
         };
         (0..self.x.len()).map(along).collect()
     }
@@ -99,6 +112,11 @@ impl Point {
     /// Whether a decrease of this size drowns in the rounding of the cost.
     pub fn cannot_resolve(&self, decrease: f64) -> bool {
         decrease <= RESOLUTION * self.linear.cost
+    }
+
+    /// Whether an unknown that had influence here has none there: a plateau that no slope leads back from.
+    pub fn loses_influence(&self, next: &Point) -> bool {
+        self.norms.iter().zip(&next.norms).any(|(before, after)| *after < LOST * before)
     }
 
     /// Whether there is anything left to do.
