@@ -143,6 +143,8 @@ mod prefilter;
 #[cfg(feature = "std")]
 pub mod regress;
 #[cfg(feature = "std")]
+pub mod report;
+#[cfg(feature = "std")]
 mod scaling;
 #[cfg(feature = "std")]
 mod weighting;
@@ -174,6 +176,7 @@ pub use {
     predict::{FreeRun, Horizon, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
     regress::{Assumption, LinearEstimate, Regression, RegressionError},
+    report::Report,
     scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
     weighting::{BySignal, Law, Weighting},
 };
