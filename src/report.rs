@@ -12,12 +12,14 @@ mod markdown;
 mod markup;
 mod plots;
 mod residuals;
+mod sections;
 mod text;
 mod trace;
 mod words;
 
 pub use plots::Plot;
 pub use residuals::{Histogram, Residuals};
+pub use sections::{Finding, ProfileCurve};
 pub use trace::{Band, Trace};
 
 use crate::error::Error;
@@ -59,6 +61,10 @@ pub struct Report {
     pub outputs: Vec<Output>,
     /// The records of the fit.
     pub records: Vec<Record>,
+    /// What tests found, if any were made.
+    pub findings: Vec<Finding>,
+    /// Profile curves, if any were made.
+    pub profiles: Vec<ProfileCurve>,
     /// Sums and criteria of the fit.
     pub figures: Figures,
     /// How it was made.

@@ -55,6 +55,8 @@ impl Report {
                 .map(|((name, unit), quality)| Output { name, unit, quality })
                 .collect(),
             records: summaries,
+            findings: vec![],
+            profiles: vec![],
             figures: Figures {
                 cost: estimate.cost,
                 measurements: estimate.measurements,

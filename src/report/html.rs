@@ -34,6 +34,8 @@ pub(super) fn page(report: &Report) -> String {
                 parameters(main, report);
                 fits(main, report);
                 identifiability(main, report);
+                profiles(main, report);
+                findings(main, report);
                 data(main, report);
                 reproduce(main, report);
             });
@@ -181,6 +183,26 @@ fn identifiability(main: &mut Markup, report: &Report) {
             plots::correlation(report).iter().for_each(|plot| figure(pair, plot, "Correlation of the estimates"));
         });
     });
+}
+
+fn profiles(main: &mut Markup, report: &Report) {
+    if report.profiles.is_empty() {
+        return;
+    }
+    section(main, "Profiles", |section| {
+        let text = "Each curve tells how much worse the fit gets as one parameter is moved and the others are estimated \
+                    anew. Where it crosses the dashed line the interval ends; where it never does, the data set no end.";
+        section.words("p", &[], text);
+        section.node("div", &[("class", &"panels")], |panels| {
+            report.profiles.iter().for_each(|profile| figure(panels, &plots::profile(profile), &profile.name));
+        });
+    });
+}
+
+fn findings(main: &mut Markup, report: &Report) {
+    if !report.findings.is_empty() {
+        section(main, "Tests", |section| table(section, "What tests found", "cards", &words::findings(report)));
+    }
 }
 
 fn data(main: &mut Markup, report: &Report) {

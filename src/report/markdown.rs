@@ -18,6 +18,10 @@ pub(super) fn page(report: &Report) -> String {
         heading(&mut lines, "Strongly correlated estimates");
         lines.extend(strong.iter().map(|pair| format!("- {}", sentence(pair))));
     }
+    if !report.findings.is_empty() {
+        heading(&mut lines, "Tests");
+        table(&mut lines, &words::findings(report));
+    }
     heading(&mut lines, "Data");
     for record in &report.records {
         lines.push(format!("**{}**: {}", escaped(&record.name), escaped(&words::extent(record))));

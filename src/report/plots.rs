@@ -3,7 +3,7 @@
 use super::chart::{Axis, Curves, Forest, ForestRow, Heat, Layer, Size};
 use super::markup::Markup;
 use super::trace::Trace;
-use super::{OutputFit, Record, Report, file};
+use super::{OutputFit, ProfileCurve, Record, Report, file};
 use crate::error::Error;
 use crate::estimate::{Knowledge, Unknown};
 use std::path::Path;
@@ -71,7 +71,8 @@ pub(super) fn all(report: &Report) -> Vec<Plot<'_>> {
             [response(record, fit), residuals(record, fit), histogram(record, fit), autocorrelation(record, fit)];
         drawn.into_iter().chain(closeup(record, fit)).flatten()
     };
-    [parameters(report), correlation(report)].into_iter().flatten().chain(fits.flat_map(of_fit)).collect()
+    let of_report = [parameters(report), correlation(report)].into_iter().flatten();
+    of_report.chain(report.profiles.iter().map(profile)).chain(fits.flat_map(of_fit)).collect()
 }
 
 /// Estimates with their intervals.
@@ -148,6 +149,21 @@ fn joined(a: Option<(f64, f64)>, b: Option<(f64, f64)>) -> Option<(f64, f64)> {
     }
 }
 
+/// How the fit worsens away from an estimate, the others refitted.
+pub(super) fn profile(profile: &ProfileCurve) -> Plot<'_> {
+    let range = profile.values.first().copied().zip(profile.values.last().copied());
+    let title = format!("Profile of {}: rise of the deviance as it is moved, the others refitted", profile.name);
+    // Far above the level a curve says nothing more.
+    let highest = profile.rise.iter().flatten().copied().fold(profile.level, f64::max).min(4.0 * profile.level);
+    let drawing = Drawing::Curves(Curves {
+        x: Axis::new(&profile.name, &profile.unit, range),
+        y: Axis::new("rise of -2 ln L", "", Some((0.0, 1.05 * highest))),
+        layers: vec![Layer::Curve { x: &profile.values, y: &profile.rise }, Layer::Level(profile.level)],
+        height: 160.0,
+    });
+    plot(&file_name(&format!("profile-{}", profile.name)), title, drawing)
+}
+
 /// How often which residual occurs.
 pub(super) fn histogram<'a>(record: &Record, fit: &OutputFit) -> Option<Plot<'a>> {
     let histogram = &fit.residuals.histogram;
@@ -190,6 +206,9 @@ fn plot<'a>(name: &str, title: String, drawing: Drawing<'a>) -> Plot<'a> {
 
 /// A name for a file, whatever the record is called.
 fn stem(what: &str, record: &Record, fit: &OutputFit) -> String {
-    let joined = format!("{what}-{}-{}", record.name, fit.name);
-    joined.chars().map(|letter| if letter.is_alphanumeric() { letter } else { '-' }).collect()
+    file_name(&format!("{what}-{}-{}", record.name, fit.name))
+}
+
+fn file_name(text: &str) -> String {
+    text.chars().map(|letter| if letter.is_alphanumeric() { letter } else { '-' }).collect()
 }

@@ -40,6 +40,10 @@ pub(super) fn page(report: &Report, color: bool) -> String {
         page.line(&format!("\nstrongly correlated: {}", strong.join("; ")));
     }
     page.line("");
+    for finding in report.findings.iter().filter(|finding| finding.severity > Severity::Usable) {
+        page.painted(finding.severity, words::sign(finding.severity));
+        page.line(&format!(" {}, {}: {}. {}", finding.about, finding.test, finding.result, finding.meaning));
+    }
     page.table(&words::figures(report));
     page.table(&words::settings(report));
     page.text.truncate(page.text.trim_end().len());

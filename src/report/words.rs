@@ -80,6 +80,15 @@ pub(super) fn outputs(report: &Report) -> Table {
     Table { columns: &["output", "fit", "rms error", "noise", "unit", "samples"], rows: rows.collect() }
 }
 
+/// What tests found.
+pub(super) fn findings(report: &Report) -> Table {
+    let rows = report.findings.iter().map(|finding| {
+        let verdict = format!("{} {}", sign(finding.severity), verdict(finding.severity).to_lowercase());
+        row([&finding.about, &finding.test, &finding.result, &verdict, &finding.meaning.replace('`', "")])
+    });
+    Table { columns: &["about", "test", "result", "verdict", "meaning"], rows: rows.collect() }
+}
+
 /// The columns of a record.
 pub(super) fn signals(record: &Record) -> Table {
     let rows = record.signals.iter().map(|signal| {

@@ -22,6 +22,8 @@ pub(in crate::report) struct Curves<'a> {
 pub(in crate::report) enum Layer<'a> {
     /// A curve that spans a range in each column.
     Band { class: &'static str, x: &'a [f64], y: &'a Band },
+    /// A curve.
+    Curve { x: &'a [f64], y: &'a [Option<f64>] },
     /// Bars of equal width, standing on zero.
     Bars { first: f64, width: f64, heights: Vec<f64> },
     /// A value of `y` to compare with.
@@ -77,7 +79,10 @@ impl Curves<'_> {
             for layer in &self.layers {
                 match layer {
                     Layer::Band { class, x: places, y: band } => {
-                        svg.leaf("path", &[("class", class), ("d", &path(places, band, x, y))]);
+                        svg.leaf("path", &[("class", class), ("d", &path(places, &band.low, &band.high, x, y))]);
+                    }
+                    Layer::Curve { x: places, y: values } => {
+                        svg.leaf("path", &[("class", &"curve"), ("d", &path(places, values, values, x, y))]);
                     }
                     Layer::Bars { first, width, heights } => {
                         let mut d = String::new();
@@ -99,10 +104,16 @@ impl Curves<'_> {
 }
 
 /// A line through all columns, up and down each, broken where there is nothing.
-fn path(places: &[f64], band: &Band, x: impl Fn(f64) -> Short, y: impl Fn(f64) -> Short) -> String {
+fn path(
+    places: &[f64],
+    low: &[Option<f64>],
+    high: &[Option<f64>],
+    x: impl Fn(f64) -> Short,
+    y: impl Fn(f64) -> Short,
+) -> String {
     let mut d = String::new();
     let mut before = None;
-    for ((place, low), high) in places.iter().zip(&band.low).zip(&band.high) {
+    for ((place, low), high) in places.iter().zip(low).zip(high) {
         let (Some(low), Some(high)) = (*low, *high) else {
             before = None;
             continue;
