@@ -5,7 +5,7 @@
 
 use clap::Parser;
 use greybox::pmsm::{Surface, Winding};
-use greybox::{CsvFile, ExperimentOf, Fit, Model, Of, Parameter, Report, Scalar, free, signals};
+use greybox::{CsvFile, ExperimentOf, Fit, Hold, Model, Of, Parameter, Report, Scalar, fixed, free, signals};
 use std::{error::Error, fs::File, io::BufRead, io::BufReader, io::IsTerminal, path::PathBuf};
 
 #[derive(Parser)]
@@ -74,7 +74,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         let record = file.column("w", "omega_m").read(&motor)?;
         report(&motor, record, Winding { rs: free(1.0), ls: free(0.01), ke: free(1.0) })?
     } else if has("qg") {
-        let record = file.read(&Axis)?;
+        // It starts at rest.
+        let record =
+            file.read(&Axis)?.hold(Hold::First).initial(Motion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) });
         let friction = Friction { m: free(50.0), fv: free(100.0), fcp: free(10.0), fcn: free(10.0), offset: free(0.0) };
         report(&Axis, record, friction)?
     } else {

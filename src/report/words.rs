@@ -136,7 +136,7 @@ pub(super) fn declared(report: &Report) -> Table {
         if p.per_experiment {
             kind += ", one per experiment";
         }
-        row([name, &kind, &number(p.start, 17), unit, &bounds, &prior])
+        row([name, &kind, &format!("{:?}", p.start), unit, &bounds, &prior])
     });
     Table { columns: &["parameter", "declared", "start", "unit", "bounds", "prior"], rows: rows.collect() }
 }

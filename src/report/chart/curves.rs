@@ -6,6 +6,9 @@ use crate::report::markup::Markup;
 use crate::report::trace::Band;
 use core::fmt::{Display, Write};
 
+/// Room for so many letters is left beside every drawing, so that those below each other are in line.
+const LETTERS: usize = 6;
+
 /// A drawing over axes.
 #[derive(Clone, Debug)]
 pub(in crate::report) struct Curves<'a> {
@@ -34,7 +37,7 @@ impl Curves<'_> {
     /// Draws it under a name for those who cannot see it.
     pub(in crate::report) fn draw(&self, to: &mut Markup, size: Size, name: &str) {
         let ticks = self.y.ticks();
-        let letters = ticks.iter().map(|tick| tick.label.chars().count()).max().unwrap_or(0);
+        let letters = ticks.iter().map(|tick| tick.label.chars().count()).fold(LETTERS, usize::max);
         let margins = Margins { left: letters as f64 * LETTER + 12.0, right: 14.0, top: 24.0, bottom: 40.0 };
         Frame { size, margins, height: self.height }.draw(to, name, |frame, svg| {
             let (h, left) = (frame.height, -frame.margins.left);

@@ -20,16 +20,14 @@ pub(in crate::report) struct Row {
 }
 
 const ROW: f64 = 28.0;
-/// An interval wider than the value itself is cut there (%).
-const WIDEST: f64 = 100.0;
+/// An interval so many times as wide as the middle one is cut, lest it leave nothing to see of the others.
+const WIDEST: f64 = 4.0;
 const LETTERS: usize = 14;
 
 impl Forest {
     /// Draws it under a name for those who cannot see it.
     pub(in crate::report) fn draw(&self, to: &mut Markup, size: Size, name: &str) {
-        let known = || self.rows.iter().filter_map(|row| row.interval.as_ref().ok());
-        let widest = known().fold(0.0f64, |widest, (lower, upper)| widest.max(-lower).max(*upper)).min(WIDEST);
-        let reach = if widest > 0.0 { round_step(1.1 * widest) } else { 1.0 };
+        let reach = self.reach();
         let axis = Axis::new("95 % interval about the estimate", "%", Some((-reach, reach)));
         let letters = self.rows.iter().map(|row| row.name.chars().count()).max().unwrap_or(0).min(LETTERS);
         let margins = Margins { left: letters as f64 * LETTER + 14.0, right: 18.0, top: 6.0, bottom: 40.0 };
@@ -49,6 +47,19 @@ impl Forest {
                 row.draw(frame, svg, &axis, ROW * (i as f64 + 0.5));
             }
         });
+    }
+}
+
+impl Forest {
+    /// The end of the axis (%): the widest interval fits, or four of the middle one do.
+    fn reach(&self) -> f64 {
+        let known = self.rows.iter().filter_map(|row| row.interval.as_ref().ok());
+        let mut widths: Vec<f64> = known.map(|(lower, upper)| upper.max(-lower)).filter(|w| w.is_finite()).collect();
+        widths.sort_by(f64::total_cmp);
+        match (widths.get(widths.len() / 2), widths.last()) {
+            (Some(middle), Some(widest)) if *middle > 0.0 => round_step(1.1 * widest.min(WIDEST * middle)),
+            _ => 1.0,
+        }
     }
 }
 
