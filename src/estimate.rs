@@ -4,6 +4,7 @@ mod display;
 mod prediction;
 pub(crate) mod student;
 
+pub(crate) use display::number;
 pub use prediction::Prediction;
 
 use crate::by_name;
@@ -11,7 +12,7 @@ use crate::information::SquareMatrix;
 use crate::integrate::Automatic;
 use crate::model::Model;
 use crate::optimize::{Outcome, Severity};
-use crate::parameter::{Parameter, Transform};
+use crate::parameter::{Parameter, Transform, unbounded_above, unbounded_below};
 use crate::predict::FreeRun;
 use crate::signals::{Of, Signals};
 use core::fmt;
@@ -24,9 +25,11 @@ pub enum Knowledge {
     Known {
         /// Standard error, in its own unit.
         standard_error: f64,
-        /// Lower end of the 95 % interval.
+        /// Lower end of the 95 % interval; `null` in JSON stands for none.
+        #[serde(with = "unbounded_below")]
         lower: f64,
-        /// Upper end of the 95 % interval.
+        /// Upper end of the 95 % interval; `null` in JSON stands for none.
+        #[serde(with = "unbounded_above")]
         upper: f64,
     },
     /// It was given.

@@ -148,6 +148,8 @@ mod random;
 #[cfg(feature = "std")]
 pub mod regress;
 #[cfg(feature = "std")]
+pub mod report;
+#[cfg(feature = "std")]
 mod scaling;
 #[cfg(feature = "std")]
 mod weighting;
@@ -181,6 +183,7 @@ pub use {
     predict::{FreeRun, Horizon, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
     regress::{Assumption, LinearEstimate, Regression, RegressionError},
+    report::Report,
     scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
     weighting::{BySignal, Law, Weighting},
 };
