@@ -48,6 +48,7 @@ fn run<M: Model>(bencher: Bencher, model: &M, amplitude: Of<M::Input, f64>, p: O
     let inputs = (0..SAMPLES).map(|k| M::Input::map(amplitude, |a| a * swing(k))).collect();
     let outputs = (0..SAMPLES).map(|k| M::Output::splat(swing(7 * k))).collect();
     let record = Experiment::new(model, Time::Uniform { start: 0.0, step: STEP }, inputs, outputs).unwrap();
+    let record = record.initial(M::State::splat(free(0.0)));
     let fit = Fit::new(model, &record).parameters(M::Parameters::map(p, free)).noise(M::Output::splat(1.0));
     let problem = fit.problem().unwrap();
     let objective = problem.objective();

@@ -80,7 +80,7 @@ fn measured(
     seed: u64,
 ) -> Result<ExperimentOf<Cooling>, Box<dyn Error>> {
     let time = Time::Uniform { start: 0.0, step: model.step };
-    let power = |k: usize| if k / 60 % 2 == 0 { 0.0 } else { 90.0 };
+    let power = |k: usize| if (k / 60).is_multiple_of(2) { 0.0 } else { 90.0 };
     let inputs: Vec<_> = (0..180).map(|k| Surroundings { power: power(k), ambient: 293.0 }).collect();
     let unknown = vec![Thermistor { resistance: f64::NAN }; inputs.len()];
     let record = Experiment::new(model, time.clone(), inputs.clone(), unknown)?
