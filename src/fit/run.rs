@@ -99,11 +99,16 @@ where
             evaluations += result.evaluations;
             coordinates = result.coordinates;
             let (mut outcome, mut linear) = (result.outcome, result.linear);
+            let lost = matches!(outcome, Outcome::Stalled { .. } | Outcome::LimitOfPrecision { .. });
+            if lost && objective.reproduces(&coordinates) {
+                outcome = Outcome::Exact;
+            }
             let mut settled = known || !outcome.converged();
             if !settled {
                 let next = objective.estimate_noise(&coordinates, self.noise).unwrap_or_else(|_| whitening.clone());
                 let changes = next.sigma().into_iter().zip(whitening.sigma()).map(|(a, b)| (a / b).ln().abs());
-                settled = changes.fold(0.0, f64::max) < NOISE_TOLERANCE;
+                // Rounding is another at every point.
+                settled = outcome == Outcome::Exact || changes.fold(0.0, f64::max) < NOISE_TOLERANCE;
                 (whitening, linear) = (next, None);
                 if !settled && round == NOISE_ROUNDS {
                     outcome = Outcome::IterationLimit { iterations };
