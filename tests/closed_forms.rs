@@ -289,3 +289,20 @@ fn an_estimate_comes_back_from_json() {
     assert_eq!(serde_json::to_string(&back).unwrap(), text);
     assert_eq!(back.covariance, estimate.covariance);
 }
+
+/// Only the course of a weight matters: its scale changes neither the noise nor the covariance.
+#[test]
+fn the_scale_of_a_weighting_does_not_matter() {
+    let records = lags();
+    let fit = |scale: f64| {
+        let weight = move |s: &Sample<Lag>| scale * (0.1 + s.u.u.abs());
+        Fit::new(&Lag, &records).parameters(lags_free()).weighting(weight).run().unwrap()
+    };
+    let (one, hundred) = (fit(1.0), fit(100.0));
+    assert_close(hundred.quality.i.sigma, one.quality.i.sigma, 1e-9);
+    for (a, b) in hundred.covariance.diagonal().into_iter().zip(one.covariance.diagonal()) {
+        assert_close(a, b, 1e-8);
+    }
+    // The errors are those of the noise, 0.1 A, known to one part in sqrt(2 * 450): 3.3 %.
+    assert!((one.quality.i.sigma / 0.1 - 1.0).abs() < 0.1, "{one}");
+}

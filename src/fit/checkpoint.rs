@@ -19,6 +19,8 @@ pub(crate) struct CheckpointFile {
     pub path: PathBuf,
     pub every: u64,
     pub fingerprint: String,
+    /// The solver as it is set in this run, as text.
+    pub settings: String,
     pub before: u64,
     /// What went wrong while saving; the search goes on all the same.
     pub trouble: Arc<Mutex<Option<String>>>,
@@ -31,14 +33,17 @@ struct Saved<S> {
     problem: String,
     iterations: u64,
     coordinates: Vec<f64>,
+    /// The solver as it was set, as text.
+    settings: String,
     solver: S,
 }
 
 const FORMAT: &str = "greybox checkpoint 1";
 
 impl CheckpointFile {
-    /// The place, the iterations so far and the solver of an earlier run; `None` if there is no file yet.
-    pub fn load<S: DeserializeOwned>(&self) -> Result<Option<(Vec<f64>, u64, S)>, Error> {
+    /// The place, the iterations so far and, if it was set as it is now, the solver of an earlier run; `None` if there is
+    /// no file yet.
+    pub fn load<S: DeserializeOwned>(&self) -> Result<Option<(Vec<f64>, u64, Option<S>)>, Error> {
         // A device may have no end, and must not be replaced by a file.
         if std::fs::metadata(&self.path).is_ok_and(|meta| !meta.is_file()) {
             let problem = "it is no regular file; name one that can be written".to_owned();
@@ -61,7 +66,8 @@ impl CheckpointFile {
                     .to_owned(),
             ));
         }
-        Ok(Some((saved.coordinates, saved.iterations, saved.solver)))
+        let solver = (saved.settings == self.settings).then_some(saved.solver);
+        Ok(Some((saved.coordinates, saved.iterations, solver)))
     }
 
     /// Writes the file beside its place, then moves it there.
@@ -71,6 +77,7 @@ impl CheckpointFile {
             problem: self.fingerprint.clone(),
             iterations: self.before + iterations,
             coordinates: coordinates.to_vec(),
+            settings: self.settings.clone(),
             solver,
         };
         let file = |source: Box<dyn std::error::Error + Send + Sync>| Error::File { path: self.path.clone(), source };

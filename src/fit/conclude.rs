@@ -163,7 +163,14 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             let widest = (0..n).filter_map(widened).fold(0.0, f64::max);
             warnings.push(color.warning(colored.as_ref().map(|(_, lags)| (*lags, widest))));
         }
-        let widened = whitening.widened(if matches!(self.noise, Noise::Given(_)) { 1.0 } else { widening });
+        let widened = match self.noise {
+            // Weights are in the sum of squares, but no part of the noise.
+            Noise::PerOutput | Noise::Covariance if self.weighting.is_some() && self.noise_is_no_matter() => objective
+                .estimate_noise(coordinates, self.noise)
+                .map_err(|error| Error::Optimizer(error.to_string()))?
+                .widened((measured as f64 / degrees.max(1.0)).sqrt()),
+            _ => whitening.widened(widening),
+        };
         let ml = match self.noise {
             Noise::Given(_) => whitening.clone(),
             _ if self.noise_is_no_matter() => whitening.widened((sum_of_squares / measured as f64).sqrt()),

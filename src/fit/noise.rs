@@ -129,6 +129,8 @@ fn bent_variance(&Huber(c): &Huber) -> f64 {
 
 /// Noise below this part of the output's own size is rounding of the simulation.
 const ROUNDING: f64 = 1e-15;
+/// Errors below this part of the output's own size, in the mean, are all rounding: it adds up along a record.
+const REPRODUCED: f64 = 1e-12;
 
 impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
     /// Second moments of the (filtered) errors in the units of the outputs; each error through `bend` in units of
@@ -207,6 +209,15 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
             Noise::Covariance => Whitening::full(moments.covariance).unwrap_or(diagonal),
             Noise::Given(_) | Noise::PerOutput => diagonal,
         })
+    }
+
+    /// Whether the model reproduces the data but for rounding, whose errors lead no search anywhere.
+    pub(crate) fn reproduces(&self, coordinates: &[f64]) -> bool {
+        let reproduced = |moments: Moments| {
+            let mut variances = moments.covariance.diagonal().into_iter().zip(self.magnitudes());
+            variances.all(|(variance, size)| variance.sqrt() <= REPRODUCED * size)
+        };
+        self.moments(coordinates, &vec![1.0; M::Output::LEN], None).is_ok_and(reproduced)
     }
 
     /// Largest measured magnitude of each output.

@@ -73,14 +73,13 @@ where
         let mut before = 0;
         if let Some((path, every)) = &self.checkpoint {
             let (path, every, fingerprint) = (path.clone(), *every, self.fingerprint(&coordinates));
-            let mut checkpoint = CheckpointFile { path, every, fingerprint, before, trouble: Arc::default() };
+            let settings = serde_json::to_string(&solver).map_err(|error| Error::Optimizer(error.to_string()))?;
+            let mut checkpoint = CheckpointFile { path, every, fingerprint, settings, before, trouble: Arc::default() };
             match checkpoint.load::<O>()? {
                 Some((place, iterations, saved)) if place.len() == coordinates.len() => {
                     (coordinates, before) = (place, iterations);
-                    // The tolerances are those of this run; only a search that has not ended goes on as it was.
-                    if saved.outcome().is_none() {
-                        solver = saved;
-                    }
+                    // The settings are those of this run; only a search with the same that has not ended goes on as it was.
+                    solver = saved.filter(|saved| saved.outcome().is_none()).unwrap_or(solver);
                 }
                 // Written at once: a place that cannot be written to is better known now.
                 _ => checkpoint.write(&coordinates, 0, &solver)?,
@@ -100,11 +99,16 @@ where
             evaluations += result.evaluations;
             coordinates = result.coordinates;
             let (mut outcome, mut linear) = (result.outcome, result.linear);
+            let lost = matches!(outcome, Outcome::Stalled { .. } | Outcome::LimitOfPrecision { .. });
+            if lost && objective.reproduces(&coordinates) {
+                outcome = Outcome::Exact;
+            }
             let mut settled = known || !outcome.converged();
             if !settled {
                 let next = objective.estimate_noise(&coordinates, self.noise).unwrap_or_else(|_| whitening.clone());
                 let changes = next.sigma().into_iter().zip(whitening.sigma()).map(|(a, b)| (a / b).ln().abs());
-                settled = changes.fold(0.0, f64::max) < NOISE_TOLERANCE;
+                // Rounding is another at every point.
+                settled = outcome == Outcome::Exact || changes.fold(0.0, f64::max) < NOISE_TOLERANCE;
                 (whitening, linear) = (next, None);
                 if !settled && round == NOISE_ROUNDS {
                     outcome = Outcome::IterationLimit { iterations };
