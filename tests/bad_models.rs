@@ -40,7 +40,7 @@ model!(Deaf, Kind::Continuous, derivative, |x, u, p| u.u - p.a * x.x + p.b * 0.0
 model!(Ratio, Kind::Continuous, derivative, |x, u, p| u.u - p.a / p.b * x.x, x.x);
 model!(Rooted, Kind::Continuous, derivative, |x, u, p| p.b * u.u - (p.a - 1.5).sqrt() * x.x, x.x);
 model!(Steep, Kind::Continuous, derivative, |x, u, p| p.b * u.u - p.a.sqrt() * x.x, x.x);
-model!(Logged, Kind::Continuous, derivative, |x, u, p| p.b * u.u - p.a * x.x, (x.x + 0.1).ln());
+model!(Logged, Kind::Continuous, derivative, |x, u, p| p.b * u.u - p.a * x.x, (S::from(0.12) - x.x).ln());
 model!(Mixed, Kind::Continuous, next, |x, u, p| p.a * x.x + p.b * u.u, x.x);
 model!(Turned, Kind::Discrete, derivative, |x, u, p| p.b * u.u - p.a * x.x, x.x);
 // Slopes that differ by 1e-7 of themselves.
@@ -186,20 +186,18 @@ fn a_start_where_the_model_is_undefined() {
     let steep = record(&Steep, H, &lag(1.2, 1.0, H, 300, 1e-3));
     let error = Fit::new(&Steep, &steep).parameters(free_pair(0.0, 1.0)).run();
     says(error, &["slope of output `x` with respect to `a`", "sample 1", "start elsewhere"]);
-    // An output that is undefined at some samples only.
-    let y: Vec<f64> = lag(3.0, 1.0, H, 300, 0.0).iter().map(|x| (x + 0.1).ln()).collect();
-    let logged = record(&Logged, H, &y);
-    let error =
-        says(Fit::new(&Logged, &logged).parameters(free_pair(0.5, 1.0)).run(), &["output `x` is NaN", "logarithm"]);
+    // An output that is undefined from some sample on: x reaches 0.12 after 0.124 s.
+    let exact = lag(3.0, 1.0, H, 300, 0.0);
+    let logged = record(&Logged, H, &[0.0; 300]);
+    let run = |record: &ExperimentOf<Logged>| Fit::new(&Logged, record).parameters(free_pair(0.5, 1.0)).run();
+    let error = says(run(&logged), &["output `x` is NaN", "logarithm"]);
     let Error::Start(failure) = error else { panic!("{error}") };
-    assert!(failure.sample > 25, "{failure}");
+    assert_eq!(failure.sample, 13, "{failure}");
     // There, and only there, no measurement: nothing is asked of it.
-    let outputs = y.iter().enumerate().map(|(k, &x)| Position { x: if k < 25 { x } else { f64::NAN } }).collect();
-    let inputs = logged.inputs().to_vec();
-    let missing = Experiment::new(&Logged, Time::Uniform { start: 0.0, step: H }, inputs, outputs).unwrap();
-    let missing = missing.initial(Position { x: fixed(0.0) });
-    let fit = Fit::new(&Logged, &missing).parameters(free_pair(0.5, 1.0)).run().unwrap();
-    // 25 samples without noise: Runge-Kutta's error, (3 H)^5 / 120 a step.
+    let measured: Vec<f64> =
+        exact.iter().enumerate().map(|(k, x)| if k < 10 { (0.12 - x).ln() } else { f64::NAN }).collect();
+    let fit = run(&record(&Logged, H, &measured)).unwrap();
+    // Ten samples without noise: Runge-Kutta's error, (3 H)^5 / 120 a step.
     assert_relative_eq!(fit.parameters.a, 3.0, max_relative = 1e-5);
     // Its state cannot be read from an output that is undefined on the way.
     let open = Experiment::new(

@@ -16,7 +16,7 @@ use crate::model::Model;
 use crate::optimize::{Infeasible, LeastSquares, Linearization};
 use crate::predict::{Predictor, Seed, Trajectory, WINDOW, Walk, Window};
 use crate::prefilter::{Butterworth, FilterState};
-use crate::signals::Signals;
+use crate::signals::{Of, Signals};
 use crate::weighting::Weighting;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -263,6 +263,10 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
             let i = values.iter().position(|v| !v.is_finite())?;
             Some((i, values[i], if values[i].is_nan() { UNDEFINED } else { OVERFLOW }))
         };
+        let runaway = |x: Of<M::State, f64>| {
+            let x = M::State::into_array(x);
+            x.as_ref().iter().copied().enumerate().find(|(_, x)| x.abs() >= RUNAWAY)
+        };
         let (mut x, mut memory) = (start, I::Memory::default());
         // The error that costs most, in standard deviations.
         let (sigma, mut largest) = (self.whitening.sigma(), (sample, 0, 0.0f64));
@@ -272,11 +276,8 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
                 Ok(None) => continue,
                 Err(_) => {
                     let before = k.saturating_sub(1);
-                    let values = M::State::into_array(x);
-                    if let Some((i, value)) =
-                        values.as_ref().iter().enumerate().find(|(_, x)| x.is_nan() || x.abs() >= RUNAWAY)
-                    {
-                        return failure(before, format!("state `{}`", M::State::NAMES[i]), *value, OVERFLOW);
+                    if let Some((i, value)) = runaway(x) {
+                        return failure(before, format!("state `{}`", M::State::NAMES[i]), value, OVERFLOW);
                     }
                     let slope = self.model.derivative(record.time(before), &x, &record.inputs()[before], &p);
                     return match unsound(M::State::into_array(slope).as_ref()) {
@@ -287,11 +288,12 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
                     };
                 }
             };
+            if let Some((i, value, hint)) = unsound(M::State::into_array(state).as_ref()) {
+                let hint = if runaway(x).is_some() { OVERFLOW } else { hint };
+                return failure(k, format!("state `{}`", M::State::NAMES[i]), value, hint);
+            }
             if P::CARRIES {
                 x = state;
-            }
-            if let Some((i, value, hint)) = unsound(M::State::into_array(state).as_ref()) {
-                return failure(k, format!("state `{}`", M::State::NAMES[i]), value, hint);
             }
             let y = M::Output::into_array(self.model.output(record.time(k), &state, &record.inputs()[k], &p));
             let found = M::Output::into_array(record.outputs()[k]);
@@ -333,7 +335,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
     }
 }
 
-/// An adaptive method is stuck with states as large as this before they overflow.
+/// A state as large as this is about to overflow; a method then gets stuck, or computes infinity less infinity.
 const RUNAWAY: f64 = 1e100;
 
 const STUCK: &str = "; no step is short enough, or 100,000 of them do not reach the next sample: the model is too stiff for \
