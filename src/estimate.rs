@@ -1,11 +1,11 @@
 //! [`Estimate`]: what a fit found, and how well it is known.
 
 mod display;
-mod predict;
+mod prediction;
 pub(crate) mod student;
 
 pub(crate) use display::number;
-pub use predict::Prediction;
+pub use prediction::Prediction;
 
 use crate::by_name;
 use crate::information::SquareMatrix;
@@ -230,9 +230,10 @@ pub struct Estimate<M: Model, I = Automatic, P = FreeRun> {
 }
 
 impl<M: Model, I, P> Estimate<M, I, P> {
-    /// Degrees of freedom: measurements less unknowns.
+    /// Degrees of freedom: measurements less unknowns that were determined.
     pub fn degrees_of_freedom(&self) -> f64 {
-        (self.measurements as f64 - self.unknowns.len() as f64).max(0.0)
+        let known = self.unknowns.iter().filter(|unknown| unknown.knowledge.standard_error().is_some()).count();
+        (self.measurements as f64 - known as f64).max(0.0)
     }
 
     /// The worst that is said of this estimate.

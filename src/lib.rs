@@ -107,6 +107,7 @@ mod integrate;
 mod interval;
 mod lanes;
 mod model;
+pub mod models;
 pub mod online;
 mod parameter;
 pub mod pmsm;

@@ -14,6 +14,7 @@ pub use levenberg_marquardt::LevenbergMarquardt;
 pub use linearization::Linearization;
 pub use outcome::{Outcome, Severity};
 
+use crate::error::Error;
 use serde::{Deserialize, Serialize};
 
 /// What both solvers keep in argmin's state: the point, the gradient there, the cost.
@@ -67,6 +68,19 @@ pub struct Stop {
     pub cost: f64,
     /// Most trial steps.
     pub iterations: u64,
+}
+
+impl Stop {
+    /// Refuses tolerances that are no numbers or negative.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let tolerances = [("step", self.step), ("gradient", self.gradient), ("cost", self.cost)];
+        match tolerances.into_iter().find(|(_, value)| !(*value >= 0.0 && value.is_finite())) {
+            None => Ok(()),
+            Some((what, value)) => Err(Error::Option(format!(
+                "the tolerance Stop::{what} is {value}; it must be finite and not negative (zero: as far as rounding allows)"
+            ))),
+        }
+    }
 }
 
 impl Default for Stop {

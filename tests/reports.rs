@@ -221,7 +221,8 @@ fn what_cannot_be_written_leaves_nothing_behind() {
     let taken = folder.join("taken.html");
     fs::create_dir(&taken).unwrap();
     assert!(matches!(report.save(&taken), Err(Error::File { .. })));
-    assert!(matches!(report.plots()[0].save(&taken), Err(Error::File { .. })));
+    assert!(matches!(report.plots()[0].save(nowhere.with_extension("svg")), Err(Error::File { .. })));
+    assert!(report.plots()[0].save(&taken).unwrap_err().to_string().contains("a picture is written as .svg"));
     let unknown = report.save(folder.join("report.pdf")).unwrap_err().to_string();
     assert!(unknown.contains("report.pdf") && unknown.contains(".html, .md, .json or .txt"), "{unknown}");
     let left: Vec<_> = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name()).collect();

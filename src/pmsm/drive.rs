@@ -12,7 +12,7 @@ use super::program::Program;
 use super::robot::{Axis, TS, V_MAX};
 use super::sensors::{CurrentSensors, Resolver};
 use super::temperature::Celsius;
-use super::{Currents, Drive, Error, Motion, SQRT_3_2, Surface};
+use super::{Currents, Drive, Error, Injection, Motion, SQRT_3_2, Surface};
 use crate::experiment::{Experiment, Time};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -93,6 +93,8 @@ pub struct Simulation {
     pub current_control: CurrentControl,
     /// Speed control.
     pub speed_control: SpeedControl,
+    /// d current that is injected to see the resistance; `None` for id = 0.
+    pub injection: Option<Injection>,
     /// Seed of the sensors' noise.
     pub seed: u64,
     /// Midpoint steps of the plant in one sample.
@@ -155,6 +157,7 @@ impl Simulation {
             resolver: Resolver::SIXTEEN_BIT,
             current_control: control.limited(V_MAX),
             speed_control: SpeedControl { kv: 20.0, torque_max: axis.kt() * axis.i_max, ..speed },
+            injection: None,
             seed: axis.number as u64,
             substeps: 6,
         })
@@ -192,6 +195,11 @@ impl Simulation {
         self
     }
 
+    /// With d current injected.
+    pub fn injecting(self, injection: Injection) -> Self {
+        Simulation { injection: Some(injection), ..self }
+    }
+
     /// With another seed for the sensors' noise.
     pub fn seeded(self, seed: u64) -> Self {
         Simulation { seed, ..self }
@@ -211,7 +219,7 @@ impl Simulation {
         let mut last_theta = None;
         let mut wf = 0.0;
         let (mut acting, mut held) = (Command::default(), Stator::default());
-        for target in &program.targets {
+        for (k, target) in program.targets.iter().enumerate() {
             let theta = self.resolver.read(x.theta, draw());
             let (alpha, beta) = rotate_out_of((x.id, x.iq), self.plant.axis.pole_pairs.electrical(x.theta));
             let read = self.currents.read(Stator { alpha, beta }, [draw(), draw()]);
@@ -222,7 +230,8 @@ impl Simulation {
 
             let (torque, current_limited) = speed_control.step(*target, theta, wf, TS);
             let iq_ref = (torque / kt).clamp(-i_max, i_max);
-            let reference = Currents { id: 0.0, iq: iq_ref };
+            let id_ref = self.injection.map_or(0.0, |injection| injection.at(k as f64 * TS).id);
+            let reference = Currents { id: id_ref, iq: iq_ref };
             let command = current_control.step(reference, Currents { id, iq }, wf, TS);
             log.voltage_limited += usize::from(command.limited);
             log.current_limited += usize::from(current_limited);
@@ -249,5 +258,71 @@ impl Log {
             })
             .unzip();
         Experiment::new(model, Time::Uniform { start: 0.0, step: TS }, inputs, outputs)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pmsm::program::Program;
+
+    fn short(simulation: Simulation) -> Log {
+        simulation.run(&Program::speed_cycles(&simulation.nominal, 2, 1.0).unwrap())
+    }
+
+    fn reference() -> Simulation {
+        Simulation::new(Axis::reference(2).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_bits_and_another_does_not() {
+        assert_eq!(short(reference()), short(reference()));
+        assert_ne!(short(reference()), short(reference().seeded(99)));
+    }
+
+    // Each disturbance shows in the record by itself, and with all of them off the measurement is the truth.
+    #[test]
+    fn every_disturbance_is_there_and_can_be_switched_off() {
+        let all = short(reference());
+        for disturbance in Disturbance::ALL {
+            assert_ne!(short(reference().without(disturbance)), all, "{disturbance:?}");
+        }
+        let ideal = short(reference().undisturbed());
+        for row in &ideal.rows {
+            assert!((row.id - row.truth.id).abs() < 1e-12 && (row.iq - row.truth.iq).abs() < 1e-12);
+            assert_eq!(row.theta, row.truth.theta);
+        }
+    }
+
+    #[test]
+    fn the_drive_follows_its_program_within_its_limits() {
+        let log = short(reference());
+        assert_eq!((log.voltage_limited, log.current_limited), (0, 0));
+        for row in &log.rows {
+            assert!((row.truth.w - row.w_ref).abs() < 5.0, "{} for {}", row.truth.w, row.w_ref);
+            assert!(row.ud.hypot(row.uq) <= V_MAX * (1.0 + 1e-12));
+        }
+        let end = log.rows.last().unwrap();
+        assert!(end.truth.theta.abs() < 0.05, "forth and back: {}", end.truth.theta);
+    }
+
+    #[test]
+    fn limits_are_counted() {
+        let axis = Axis::reference(1).unwrap();
+        // Beyond the speed at which the EMF uses up the voltage.
+        let fast = Program::speed_cycles(&Axis { w_max: 600.0, ..axis }, 2, 1.0).unwrap();
+        assert!(Simulation::new(axis).unwrap().run(&fast).voltage_limited > 0);
+        // More acceleration than the current can make.
+        let hard = Program::speed_cycles(&axis, 2, 12.0).unwrap();
+        assert!(Simulation::new(axis).unwrap().run(&hard).current_limited > 0);
+    }
+
+    #[test]
+    fn impossible_axes_are_refused() {
+        assert!(Axis::reference(7).unwrap_err().to_string().contains("number of the robot's axis is 7"));
+        let axis = Axis::reference(1).unwrap();
+        let error = Simulation::new(Axis { ls: -4e-3, ..axis }).unwrap_err();
+        assert_eq!(error.to_string(), "inductance is -0.004 H; it must be positive and finite");
+        assert!(Simulation::new(Axis { r_cable: f64::NAN, ..axis }).is_err());
     }
 }

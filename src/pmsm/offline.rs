@@ -7,11 +7,13 @@
 mod equations;
 mod extended;
 mod grey_box;
+mod mechanics;
 mod plain;
 mod validate;
 
 pub use equations::{Equations, WEAK, hardly_seen};
 pub use extended::{Extended, extended, search_i0};
+pub use mechanics::{Inertia, mechanics};
 pub use plain::{Axes, Form, plain};
 pub use validate::{Validation, voltages};
 

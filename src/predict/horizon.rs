@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Horizon {
-    /// Samples from the measured state to the predicted output; zero counts as one.
+    /// Samples from the measured state to the predicted output: one or more, and fewer than the record has.
     pub steps: usize,
     /// What the states are restarted from: the outputs as measured, or filtered forward and backward.
     pub filter: Option<Butterworth>,
@@ -51,6 +51,14 @@ impl<M: Model> Predictor<M> for Horizon {
     ) -> Result<Self::Prepared, Error> {
         let filtered = self.filter.as_ref().map(|filter| zero_phase(experiment, filter)).transpose()?;
         let outputs = filtered.as_ref().map_or(experiment.outputs(), |filtered| filtered.outputs());
+        let (steps, samples) = (self.steps, experiment.len());
+        if steps == 0 || steps >= samples {
+            return Err(Error::Option(format!(
+                "a prediction {steps} sample(s) ahead makes no sense for experiment `{}` of {samples} samples; take at least \
+                 1 and fewer than {samples}, or FreeRun to simulate it whole",
+                experiment.name()
+            )));
+        }
         let mut why = None;
         let mut states = Vec::with_capacity(experiment.len());
         let mut known = 0;
@@ -91,7 +99,7 @@ impl<M: Model> Predictor<M> for Horizon {
         p: &Of<M::Parameters, S>,
         memory: &mut I::Memory,
     ) -> Result<Option<Of<M::State, S>>, Stuck> {
-        let steps = self.steps.max(1);
+        let steps = self.steps;
         let (mut x, first) = if k < steps {
             (start, 0)
         } else {
@@ -109,6 +117,6 @@ impl<M: Model> Predictor<M> for Horizon {
 
     fn describe(&self) -> String {
         let from = self.filter.as_ref().map(|filter| format!(" of states filtered by {}", filter.describe()));
-        format!("prediction {} sample(s) ahead{}", self.steps.max(1), from.unwrap_or_default())
+        format!("prediction {} sample(s) ahead{}", self.steps, from.unwrap_or_default())
     }
 }
