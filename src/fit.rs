@@ -2,6 +2,7 @@
 
 mod as_argmin;
 mod checkpoint;
+mod colored;
 mod conclude;
 mod covariance;
 mod noise;
@@ -10,7 +11,9 @@ mod predict;
 mod run;
 mod unknowns;
 
+pub(crate) use covariance::classical;
 pub use objective::Objective;
+pub(crate) use objective::{Rows, each};
 pub use run::FitProblem;
 
 use crate::error::Error;

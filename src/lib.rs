@@ -120,6 +120,8 @@ mod by_name;
 #[cfg(feature = "std")]
 pub mod check;
 #[cfg(feature = "std")]
+pub mod diagnose;
+#[cfg(feature = "std")]
 mod error;
 #[cfg(feature = "std")]
 mod estimate;
@@ -142,6 +144,8 @@ mod predict;
 #[cfg(feature = "std")]
 mod prefilter;
 #[cfg(feature = "std")]
+mod random;
+#[cfg(feature = "std")]
 pub mod regress;
 #[cfg(feature = "std")]
 pub mod report;
@@ -149,6 +153,8 @@ pub mod report;
 mod scaling;
 #[cfg(feature = "std")]
 mod weighting;
+#[cfg(feature = "std")]
+mod whiteness;
 
 #[doc(hidden)]
 pub use {approx, nalgebra, serde};

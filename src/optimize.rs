@@ -20,6 +20,9 @@ use serde::{Deserialize, Serialize};
 /// What both solvers keep in argmin's state: the point, the gradient there, the cost.
 pub type LeastSquaresState = argmin::core::IterState<Vec<f64>, Vec<f64>, (), (), (), f64>;
 
+/// Where no step lowers the cost, a cosine up to this is rounding too.
+const PRECISION_GRADIENT: f64 = 1e-6;
+
 /// A sum of squares to be minimized.
 pub trait LeastSquares {
     /// Cost, slopes and residuals at `x`, in one pass.

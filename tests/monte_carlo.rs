@@ -1,3 +1,4 @@
+#![cfg(feature = "std")]
 //! Intervals cover what they promise, and estimates scatter no more than the Cramer-Rao bound: by thousands of fits.
 //!
 //! Fast enough with optimization only; the debug run says so and passes.

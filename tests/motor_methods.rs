@@ -96,7 +96,7 @@ fn inertia_friction_and_gravity_by_regression_and_by_fit() {
         ke: fixed(axis.ke),
     };
     // A tenth of a second ahead at a time: a free run adds up every small torque over seconds.
-    let fit = Fit::new(&shaft, &record).parameters(start).predictor(Horizon { steps: 100 });
+    let fit = Fit::new(&shaft, &record).parameters(start).predictor(Horizon::new(100));
     let p = fit.run().unwrap().parameters;
     check(p.j, p.bv, p.tc, p.tg, "fit");
 }

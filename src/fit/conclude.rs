@@ -10,16 +10,24 @@ use crate::error::Error;
 use crate::estimate::{Direction, Estimate, Knowledge, Method, Prediction, Quality, Share, Unknown, Warning, student};
 use crate::information::{Information, SquareMatrix};
 use crate::integrate::Integrator;
-use crate::model::Model;
+use crate::model::{Kind, Model};
 use crate::optimize::{Linearization, Severity};
 use crate::predict::{Predictor, Target, Trajectory, WINDOW, Walk, Window};
 use crate::signals::Signals;
+use crate::whiteness::{Autocorrelation, ljung_box};
 use std::time::Instant;
 
 /// Singular values below this part of the largest are rounding of a simulation: nothing is known along their directions.
 const RANK: f64 = 1e-11;
 /// What has less than this share in a direction that is not known is itself known.
 const SHARE: f64 = 1e-3;
+/// Lags, and the probability below which errors count as colored.
+const COLOR_LAGS: usize = 20;
+const COLOR_LEVEL: f64 = 0.01;
+/// Below so many measurements a covariance that allows for colored errors is less sure than the classical one.
+const COLOR_SAMPLES: u64 = 100;
+/// Colored errors that widen an interval by more than this factor call for care.
+const COLOR_MATTERS: f64 = 2.0;
 /// A finer step may move a parameter by this part of its standard error without a word.
 const STEP_SHIFT: f64 = 0.5;
 
@@ -40,7 +48,8 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             None => objective.evaluate(coordinates).map_err(|error| Error::Optimizer(error.to_string()))?,
         };
         let n = unknowns.row.len();
-        let Reproduced { quality, measured, log_determinant, step_error } = self.reproduce(&objective, coordinates)?;
+        let Reproduced { quality, measured, log_determinant, step_error, color } =
+            self.reproduce(&objective, coordinates)?;
 
         // What is held or not determined has no interval.
         let (gradient, norms) = (linear.gradient(), linear.column_norms());
@@ -83,14 +92,19 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
         let unit = classical(&linear, &held);
         let sandwich = objective.needs_sandwich();
         let priors: f64 = unknowns.priors(coordinates).map(|(_, _, error)| error * error).sum();
-        let (covariance, factor) = match sandwich {
-            true => (objective.sandwich(coordinates, &held).ok().flatten(), 1.0),
+        let small_sample = measured as f64 / degrees.max(1.0);
+        let colored = color.as_ref().filter(|_| M::KIND != Kind::Static && measured >= COLOR_SAMPLES);
+        let colored = colored.and_then(|_| objective.colored(coordinates, &linear, &held));
+        let colored = colored.and_then(|found| Some((found.sandwich.covariance(&held)?, found.lags)));
+        let (covariance, factor) = match (&colored, sandwich) {
+            (Some((covariance, _)), _) => (Some(covariance.clone()), small_sample),
+            (None, true) => (objective.sandwich(coordinates, &held).ok().flatten(), 1.0),
             // The noise is wider than the errors, the priors are not.
-            false if widening != 1.0 && unknowns.priors(coordinates).next().is_some() => {
+            (None, false) if widening != 1.0 && unknowns.priors(coordinates).next().is_some() => {
                 let widened = self.objective(setting, whitening.widened(widening));
                 (widened.evaluate(coordinates).ok().and_then(|linear| classical(&linear, &held)), 1.0)
             }
-            false => (unit.clone(), widening * widening),
+            (None, false) => (unit.clone(), widening * widening),
         };
         let singular = covariance.is_none();
         let covariance = covariance.unwrap_or_else(|| SquareMatrix::zeros(n));
@@ -143,6 +157,12 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             let text = format!("the checkpoint could not be written ({trouble}); the search went on without it");
             warnings.push(Warning { severity: Severity::Usable, text });
         }
+        if let Some(color) = color {
+            let white = |i: usize| unit.as_ref().map(|unit| unit[(i, i)].sqrt() * widening * slopes[i].abs());
+            let widened = |i: usize| Some(covariance[(i, i)].sqrt() / white(i).filter(|error| *error > 0.0)?);
+            let widest = (0..n).filter_map(widened).fold(0.0, f64::max);
+            warnings.push(color.warning(colored.as_ref().map(|(_, lags)| (*lags, widest))));
+        }
         let widened = whitening.widened(if matches!(self.noise, Noise::Given(_)) { 1.0 } else { widening });
         let ml = match self.noise {
             Noise::Given(_) => whitening.clone(),
@@ -190,22 +210,23 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             iterations,
             evaluations: evaluations + fresh,
             seconds: begin.elapsed().as_secs_f64(),
-            method: self.method(name, sandwich),
+            method: self.method(name, sandwich, colored.map(|(_, lags)| lags)),
             integrator: self.integrator.clone(),
             predictor: self.predictor.clone(),
         })
     }
 
-    fn method(&self, optimizer: String, sandwich: bool) -> Method {
+    fn method(&self, optimizer: String, sandwich: bool, colored: Option<usize>) -> Method {
         let noise = match self.noise {
             Noise::Given(_) => "given",
             Noise::PerOutput => "estimated per output",
             Noise::Covariance => "estimated as a full covariance",
         };
-        let covariance = match (sandwich, &self.prefilter) {
-            (false, _) => "classical (white errors)",
-            (true, None) => "sandwich (errors independent from sample to sample)",
-            (true, Some(_)) => "sandwich (white errors before the pre-filter)",
+        let covariance = match (colored, sandwich, &self.prefilter) {
+            (Some(lags), _, _) => format!("HAC (Newey-West over {lags} lag(s), prewhitened, for colored errors)"),
+            (None, false, _) => "classical (white errors)".to_owned(),
+            (None, true, None) => "sandwich (errors independent from sample to sample)".to_owned(),
+            (None, true, Some(_)) => "sandwich (white errors before the pre-filter)".to_owned(),
         };
         Method {
             optimizer,
@@ -215,7 +236,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             weighting: self.weighting.as_ref().map_or("none".to_owned(), |weighting| weighting.describe()),
             prefilter: self.prefilter.as_ref().map_or("none".to_owned(), |filter| filter.describe()),
             noise: noise.to_owned(),
-            covariance: covariance.to_owned(),
+            covariance,
             version: env!("CARGO_PKG_VERSION").to_owned(),
         }
     }
@@ -326,6 +347,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
         let mut sums = vec![Sums::default(); outputs];
         let (mut measured, mut log_determinant, mut bound) = (0u64, 0.0, 0.0);
         let mut here = Vec::with_capacity(outputs);
+        let mut autocorrelations = vec![Autocorrelation::new(COLOR_LAGS); outputs];
         for (e, record) in self.experiments.iter().enumerate() {
             let (x, p) = objective.unknowns.place(e, coordinates);
             let trajectory = |integrator| {
@@ -335,6 +357,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             let (mut coarse, mut fine) = (trajectory(&self.integrator), refined.as_ref().map(trajectory));
             let (mut window, mut finer) = (Window::new(0, outputs), Window::new(0, outputs));
             let (mut change, mut seen) = (0.0, 0usize);
+            autocorrelations.iter_mut().for_each(Autocorrelation::restart);
             for number in 0.. {
                 let fine = fine.as_mut().filter(|_| number % EVERY == 0);
                 let refilled = fine.is_some_and(|fine| {
@@ -357,6 +380,11 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
                         measured += u64::from(counts);
                     }
                 }
+                for (j, autocorrelation) in autocorrelations.iter_mut().enumerate() {
+                    let rows = j * WINDOW..j * WINDOW + window.samples;
+                    let here = window.measured[rows.clone()].iter().filter(|here| **here).count();
+                    autocorrelation.add(&window.errors()[rows], here as u64);
+                }
                 if refilled {
                     let errors = window.errors().iter().zip(finer.errors()).enumerate();
                     change += errors.map(|(row, (a, b))| ((a - b) / sigma[row / WINDOW]).powi(2)).sum::<f64>();
@@ -365,8 +393,8 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             }
             bound += if seen > 0 { change * record.len() as f64 / seen as f64 } else { 0.0 };
         }
-        let quality = sums.iter().map(Sums::quality).collect();
-        Ok(Reproduced { quality, measured, log_determinant, step_error: bound.sqrt() })
+        let (quality, color) = (sums.iter().map(Sums::quality).collect(), Color::of::<M>(&autocorrelations));
+        Ok(Reproduced { quality, measured, log_determinant, step_error: bound.sqrt(), color })
     }
 }
 
@@ -377,11 +405,54 @@ struct Reproduced {
     /// Logarithm of the determinant of the covariance of all measurements.
     log_determinant: f64,
     step_error: f64,
+    color: Option<Color>,
+}
+
+/// Errors that are not white.
+struct Color {
+    output: &'static str,
+    /// Probability that white errors look like this.
+    p_value: f64,
+    /// Correlation of an error with the one before.
+    first: f64,
+}
+
+impl Color {
+    /// The output whose errors are least white, if the test of Ljung and Box refuses any.
+    fn of<M: Model>(autocorrelations: &[Autocorrelation]) -> Option<Self> {
+        let tested = autocorrelations.iter().enumerate().map(|(j, autocorrelation)| {
+            let coefficients = autocorrelation.coefficients();
+            let (_, p_value) = ljung_box(&coefficients, autocorrelation.count());
+            let first = coefficients.first().copied().unwrap_or(0.0);
+            Color { output: M::Output::NAMES[j], p_value: p_value * autocorrelations.len() as f64, first }
+        });
+        let strongest = |a: &Color, b: &Color| a.p_value.total_cmp(&b.p_value).then(b.first.total_cmp(&a.first));
+        tested.min_by(strongest).filter(|color| color.p_value < COLOR_LEVEL)
+    }
+
+    /// What it means; `allowed` holds the lags that the covariance allows for, and by which factor that widens intervals.
+    fn warning(&self, allowed: Option<(usize, f64)>) -> Warning {
+        let Color { output, p_value, first } = self;
+        let mut text = format!(
+            "the errors of `{output}` are not white (Ljung-Box p = {:.1e}, correlation with the error before {first:.3}): the \
+             model misses a part, or the noise is colored",
+            p_value.min(1.0)
+        );
+        let Some((lags, widest)) = allowed else {
+            text += "; the intervals take them as white and are too narrow if the order of the samples matters";
+            return Warning { severity: Severity::UsableWithCare, text };
+        };
+        text += &format!(
+            "; the intervals allow for it (HAC over {lags} lag(s), prewhitened), up to {widest:.2} times those for white errors"
+        );
+        let severity = if widest > COLOR_MATTERS { Severity::UsableWithCare } else { Severity::Usable };
+        Warning { severity, text }
+    }
 }
 
 impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
     /// What the model says of one record.
-    pub(super) fn prediction(&self, e: usize, coordinates: &[f64]) -> Result<Prediction<M>, Error> {
+    pub(crate) fn prediction(&self, e: usize, coordinates: &[f64]) -> Result<Prediction<M>, Error> {
         let record = &self.experiments[e];
         let (initial_state, p) = self.unknowns.place(e, coordinates);
         let walk = self.step(e);

@@ -24,7 +24,7 @@ use nalgebra::DMatrix;
 const ALONE: f64 = 1e-6;
 
 /// Bread and meat of the sandwich, one pair of triangles per experiment.
-struct Sandwich {
+pub(super) struct Sandwich {
     bread: Linearization,
     meat: Vec<Information>,
     /// Mean of `psi'`, by which the bread is to be multiplied.
@@ -34,7 +34,7 @@ struct Sandwich {
 }
 
 /// What the first pass sums up over all measurements.
-struct Tally {
+pub(super) struct Tally {
     weights: f64,
     curvature: f64,
     /// Sums of the products of two outputs' influences.
@@ -56,27 +56,35 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
 
     /// The sandwich over all unknowns that are not held, in two more passes with slopes; `None` if it has no number.
     pub(super) fn sandwich(&self, coordinates: &[f64], held: &[bool]) -> Result<Option<SquareMatrix>, Infeasible> {
-        let (mut blocks, tally) = self.bread(coordinates)?;
-        let curvature = tally.curvature / tally.weights;
-        let row = |e: usize, i: usize, value: f64| -> Vec<f64> {
-            self.unknowns.columns(e).map(|c| if c == i { value } else { 0.0 }).collect()
-        };
-        for (i, slope, _) in self.unknowns.priors(coordinates) {
-            let e = self.unknowns.row[i].experiment.unwrap_or(0);
-            // A prior is a measurement of unit variance; the bread is multiplied by the mean curvature later.
-            blocks[e].absorb_row(&row(e, i, slope / curvature.max(f64::MIN_POSITIVE).sqrt()), 0.0);
-        }
-        let bread = Linearization::new(0.0, self.unknowns.shared(), blocks);
-        let Some(inverse) = classical(&bread, held) else { return Ok(None) };
+        let (sandwich, tally) = self.without_meat(coordinates)?;
+        let Some(inverse) = classical(&sandwich.bread, held) else { return Ok(None) };
         let (mut meat, meat_scale) = match self.prefilter {
             Some(filter) => self.filtered_scores(coordinates, &inverse, filter, &tally)?,
             None => (self.scores(coordinates, &inverse)?, 1.0),
         };
         for (i, slope, _) in self.unknowns.priors(coordinates) {
             let e = self.unknowns.row[i].experiment.unwrap_or(0);
-            meat[e].absorb_row(&row(e, i, slope / meat_scale.sqrt()), 0.0);
+            meat[e].absorb_row(&self.prior_row(e, i, slope / meat_scale.sqrt()), 0.0);
         }
-        Ok(Sandwich { bread, meat, curvature, meat_scale }.covariance(held))
+        Ok(Sandwich { meat, meat_scale, ..sandwich }.covariance(held))
+    }
+
+    /// The bread for the weights and the loss of this fit, in one pass with slopes.
+    pub(super) fn without_meat(&self, coordinates: &[f64]) -> Result<(Sandwich, Tally), Infeasible> {
+        let (mut blocks, tally) = self.bread(coordinates)?;
+        let curvature = tally.curvature / tally.weights;
+        for (i, slope, _) in self.unknowns.priors(coordinates) {
+            let e = self.unknowns.row[i].experiment.unwrap_or(0);
+            // A prior is a measurement of unit variance; the bread is multiplied by the mean curvature later.
+            blocks[e].absorb_row(&self.prior_row(e, i, slope / curvature.max(f64::MIN_POSITIVE).sqrt()), 0.0);
+        }
+        let bread = Linearization::new(0.0, self.unknowns.shared(), blocks);
+        Ok((Sandwich { bread, meat: vec![], curvature, meat_scale: 1.0 }, tally))
+    }
+
+    /// The row of a prior on unknown `i` among the columns of experiment `e`.
+    pub(super) fn prior_row(&self, e: usize, i: usize, slope: f64) -> Vec<f64> {
+        self.unknowns.columns(e).map(|c| if c == i { slope } else { 0.0 }).collect()
     }
 
     /// The triangles of `sqrt(w) g`, and what there is to know of the errors.
@@ -291,7 +299,7 @@ fn invert(linear: &Linearization, held: &[bool]) -> Option<Inverse> {
 }
 
 /// `(sum of squares)^-1` over all unknowns that are not held; zero in the rows and columns of those.
-pub(super) fn classical(linear: &Linearization, held: &[bool]) -> Option<SquareMatrix> {
+pub(crate) fn classical(linear: &Linearization, held: &[bool]) -> Option<SquareMatrix> {
     let Inverse { own, shared, total } = invert(linear, held)?;
     let mut covariance = SquareMatrix::zeros(held.len());
     let cgg = &total * total.transpose();
@@ -312,8 +320,18 @@ pub(super) fn classical(linear: &Linearization, held: &[bool]) -> Option<SquareM
 }
 
 impl Sandwich {
+    /// The bread of plain least squares, still without meat.
+    pub fn plain(linear: &Linearization) -> Self {
+        Sandwich { bread: linear.clone(), meat: vec![], curvature: 1.0, meat_scale: 1.0 }
+    }
+
+    /// Takes another covariance of the scores, one triangle per experiment.
+    pub fn replace_meat(&mut self, meat: Vec<Information>) {
+        (self.meat, self.meat_scale) = (meat, 1.0);
+    }
+
     /// `A^-1 B A^-1` over all unknowns that are not held.
-    fn covariance(&self, held: &[bool]) -> Option<SquareMatrix> {
+    pub fn covariance(&self, held: &[bool]) -> Option<SquareMatrix> {
         let Inverse { own, shared, total } = invert(&self.bread, held)?;
         let (g, mut covariance) = (shared.len(), SquareMatrix::zeros(held.len()));
         let hessian = &total * total.transpose();

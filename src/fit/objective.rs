@@ -83,6 +83,11 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
         self.unknowns.start()
     }
 
+    /// Leaves errors and slopes in the units of the outputs from here on.
+    pub(crate) fn leave_units(&mut self) {
+        self.whitening = Whitening::Diagonal(vec![1.0; M::Output::LEN]);
+    }
+
     pub(crate) fn step<'s>(&'s self, experiment: usize) -> Walk<'s, M, I> {
         Walk::new(self.model, self.integrator, &self.experiments[experiment])
     }

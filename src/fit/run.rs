@@ -292,7 +292,53 @@ pub struct FitProblem<'a, M: Model, I: Integrator<M>, P: Predictor<M>, O> {
     whitening: Whitening,
 }
 
+impl<M, I, P, O> FitProblem<'_, M, I, P, O>
+where
+    M: Model,
+    I: Integrator<M>,
+    P: Predictor<M>,
+    O: Search + Clone + Serialize + DeserializeOwned,
+    O: for<'p> Solver<&'p Objective<'p, M, I, P>, LeastSquaresState>,
+{
+    /// As [`Fit::run`], keeping the problem for what is to be asked of the estimate ([`diagnose`](crate::diagnose)).
+    ///
+    /// # Errors
+    /// As [`Fit::run`].
+    pub fn run(&mut self) -> Result<Estimate<M, I, P>, Error> {
+        let begin = Instant::now();
+        self.fit.control.deadline = self.fit.time_limit.map(|limit| begin + limit);
+        let found = self.fit.search(&self.setting);
+        // What was found is concluded even if the time is over.
+        self.fit.control.deadline = None;
+        self.fit.conclude(&self.setting, found?, begin)
+    }
+}
+
 impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> FitProblem<'_, M, I, P, O> {
+    /// The cost with the noise that an estimate of this problem has found, and the coordinates of that estimate.
+    ///
+    /// # Errors
+    /// An estimate of another problem.
+    pub(crate) fn at<'s>(&'s self, estimate: &Estimate<M, I, P>) -> Result<(Objective<'s, M, I, P>, Vec<f64>), Error> {
+        let row = &self.setting.unknowns.row;
+        let same = row.len() == estimate.unknowns.len()
+            && row.iter().zip(&estimate.unknowns).all(|(mine, its)| mine.name == its.name);
+        if !same {
+            let names: Vec<&str> = estimate.unknowns.iter().map(|unknown| unknown.name.as_str()).collect();
+            let mine: Vec<&str> = row.iter().map(|unknown| unknown.name.as_str()).collect();
+            return Err(Error::Option(format!(
+                "the estimate is of another problem: it has the unknowns {}, the problem has {}",
+                names.join(", "),
+                mine.join(", ")
+            )));
+        }
+        let sigma = M::Output::map(estimate.quality, |quality| quality.sigma);
+        let diagonal = Whitening::Diagonal(M::Output::into_array(sigma).as_ref().to_vec());
+        let full = estimate.noise_covariance.clone().and_then(Whitening::full);
+        let objective = self.fit.objective(&self.setting, full.unwrap_or(diagonal));
+        let coordinates = estimate.unknowns.iter().map(|u| u.transform.to_coordinate(u.value)).collect();
+        Ok((objective, coordinates))
+    }
     /// The cost to minimize. Noise that was not given is what the errors at the start show.
     pub fn objective(&self) -> Objective<'_, M, I, P> {
         self.fit.objective(&self.setting, self.whitening.clone())

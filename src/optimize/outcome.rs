@@ -1,6 +1,6 @@
 //! [`Outcome`]: how a search ended.
 
-use super::search::PRECISION_GRADIENT;
+use super::PRECISION_GRADIENT;
 use core::fmt;
 use serde::{Deserialize, Serialize};
 

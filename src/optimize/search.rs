@@ -4,7 +4,7 @@
 //! the data resolve. There the length of the residual's projection on the Jacobian's columns decides, which is what Bates
 //! and Watts (Technometrics 23 (1981) 179) call the relative offset; unlike the gradient it weighs all directions alike.
 
-use super::{Infeasible, LeastSquares, Linearization, Outcome, Stop};
+use super::{Infeasible, LeastSquares, Linearization, Outcome, PRECISION_GRADIENT, Stop};
 use crate::scaling::Scaling;
 use argmin::core::{Error, Problem};
 
@@ -28,8 +28,6 @@ pub(super) struct Point {
 
 /// A cost cannot tell apart points that differ by less than this part of it.
 const RESOLUTION: f64 = 1e-13;
-/// Where no step lowers the cost, a cosine up to this is rounding too.
-pub(super) const PRECISION_GRADIENT: f64 = 1e-6;
 /// A step that shrinks a column of the Jacobian to less than this part went too far.
 const LOST: f64 = 1e-10;
 /// Damping of undetermined directions, relative to the column norms.

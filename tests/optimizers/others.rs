@@ -1,7 +1,7 @@
 //! Argmin's own solvers on the same problems: simplex, quasi-Newton, particle swarm.
 
 use crate::problems::{PROBLEMS, Problem};
-use argmin::core::{CostFunction, Error, Executor, Gradient, State};
+use argmin::core::{CostFunction, Error, Executor, Gradient};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::neldermead::NelderMead;
 use argmin::solver::particleswarm::ParticleSwarm;

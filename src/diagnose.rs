@@ -1,0 +1,78 @@
+//! What can be said of an estimate beyond its numbers: residuals, identifiability, intervals, other models, other data.
+//!
+//! Everything here is handed back as plain data that serializes, for reports and for programs.
+
+mod bands;
+mod bootstrap;
+mod compare;
+mod derived;
+mod identifiability;
+mod profile;
+pub mod residuals;
+mod restarts;
+
+pub use bands::{Bands, bands};
+pub use bootstrap::{Bootstrap, Resampling, bootstrap};
+pub use compare::{Comparison, Drift, Summary, Validation, cross_validate, drift, f_test, likelihood_ratio, validate};
+pub use derived::{Derived, derived};
+pub use identifiability::{COLLINEAR, Collinear, Excitation, Identifiability, Segment, identifiability};
+pub use profile::{End, Profile, ProfilePoint, profile};
+pub use restarts::{Better, Restarts, restarts};
+
+use crate::optimize::{Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization};
+use argmin::core::{Executor, State};
+use serde::{Deserialize, Serialize};
+
+/// The probability of error below which a hypothesis is given up.
+pub const LEVEL: f64 = 0.01;
+
+/// A hypothesis and whether the data are against it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Test {
+    /// Name of the test.
+    pub name: String,
+    /// Its statistic.
+    pub statistic: f64,
+    /// Probability of such a statistic, or one further out, if the hypothesis is true.
+    pub p_value: f64,
+    /// Whether the hypothesis may stand: `p_value` is at least [`LEVEL`].
+    pub passed: bool,
+    /// What the result means; where it failed, what that usually comes from.
+    pub meaning: String,
+}
+
+impl Test {
+    /// Passed if `p_value` is at least [`LEVEL`]; the meaning is the first if passed, else the second.
+    pub(crate) fn new(name: impl Into<String>, statistic: f64, p_value: f64, passed: &str, failed: &str) -> Self {
+        let holds = p_value >= LEVEL;
+        let meaning = if holds { passed } else { failed }.to_owned();
+        Test { name: name.into(), statistic, p_value, passed: holds, meaning }
+    }
+}
+
+/// A problem with other bounds; equal bounds pin an unknown.
+struct Pinned<'a, L> {
+    problem: &'a L,
+    bounds: Vec<(f64, f64)>,
+}
+
+impl<L: LeastSquares> LeastSquares for Pinned<'_, L> {
+    fn linearize(&self, x: &[f64]) -> Result<Linearization, Infeasible> {
+        self.problem.linearize(x)
+    }
+
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        self.bounds.clone()
+    }
+}
+
+/// Place and cost of the minimum that a search from `start` ends in; `None` where it cannot begin or does not end.
+fn minimize(problem: impl LeastSquares, start: Vec<f64>) -> Option<(Vec<f64>, f64)> {
+    let solver: LevenbergMarquardt = LevenbergMarquardt::default();
+    let configure = |state: LeastSquaresState| state.param(start);
+    let result = Executor::new(problem, solver).configure(configure).ctrlc(false).run().ok()?;
+    let ended = result.solver().outcome().is_some_and(|outcome| outcome.converged());
+    let place = result.state().get_param()?.clone();
+    ended.then(|| (place, result.state().get_cost()))
+}

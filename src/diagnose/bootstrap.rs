@@ -1,0 +1,174 @@
+//! Bootstrap: refits of what the model could as well have measured. It asks for no normal distribution, and in blocks for
+//! no white residuals.
+
+use super::{Pinned, minimize};
+use crate::error::Error;
+use crate::estimate::Estimate;
+use crate::experiment::ExperimentOf;
+use crate::fit::{FitProblem, Objective, each};
+use crate::integrate::Integrator;
+use crate::model::Model;
+use crate::optimize::LeastSquares;
+use crate::predict::Predictor;
+use crate::random::Random;
+use crate::signals::{Of, Signals};
+use serde::{Deserialize, Serialize};
+
+/// What is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Resampling {
+    /// Single residuals (Efron, Annals of Statistics 7 (1979) 1): for white ones.
+    Residuals,
+    /// Blocks of this many residuals in a row, from anywhere (Kuensch, Annals of Statistics 17 (1989) 1217): for colored
+    /// ones. Several times as long as they are correlated; zero takes the cube root of the samples.
+    Blocks(usize),
+}
+
+/// What the refits found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bootstrap {
+    /// Names of the unknowns.
+    pub unknowns: Vec<String>,
+    /// Refits that ended; the others are left out.
+    pub converged: u64,
+    /// Refits begun.
+    pub tried: u64,
+    /// Standard deviation of each unknown over the refits.
+    pub standard_errors: Vec<f64>,
+    /// Mean over the refits less the estimate.
+    pub bias: Vec<f64>,
+    /// The 95 % interval of each: the percentiles of the refits, their deviations from the estimate stretched by
+    /// `sqrt(n / (n - p))` for the degrees of freedom that residuals have lost (Davison and Hinkley, *Bootstrap Methods*,
+    /// 1997, section 6.2.3).
+    pub intervals: Vec<(f64, f64)>,
+    /// The seed that makes the same again.
+    pub seed: u64,
+}
+
+/// Refits `count` records made of the prediction and resampled residuals, from the estimate on.
+///
+/// # Errors
+/// An estimate of another problem or one that cannot be simulated, and fewer than twenty refits that end.
+pub fn bootstrap<M: Model, I: Integrator<M>, P: Predictor<M>, O: Sync>(
+    problem: &FitProblem<'_, M, I, P, O>,
+    estimate: &Estimate<M, I, P>,
+    resampling: Resampling,
+    count: usize,
+    seed: u64,
+) -> Result<Bootstrap, Error> {
+    let (objective, best) = problem.at(estimate)?;
+    let predictions = (0..objective.experiments.len()).map(|e| objective.prediction(e, &best));
+    let predictions = predictions.collect::<Result<Vec<_>, _>>()?;
+    // Centered: a mean that the model left would be counted as noise.
+    let residuals: Vec<Vec<Of<M::Output, f64>>> = predictions
+        .iter()
+        .map(|prediction| {
+            let columns: Vec<f64> = (0..M::Output::LEN).map(|j| mean::<M::Output>(&prediction.residuals, j)).collect();
+            let centered = |row: &Of<M::Output, f64>| {
+                let row = M::Output::into_array(*row);
+                M::Output::from_fn(|j| row.as_ref()[j] - columns[j])
+            };
+            let here = |row: &&Of<M::Output, f64>| M::Output::into_array(**row).as_ref().iter().all(|e| e.is_finite());
+            prediction.residuals.iter().filter(here).map(centered).collect()
+        })
+        .collect();
+    if let Some(e) = residuals.iter().position(Vec::is_empty) {
+        let experiment = objective.experiments[e].name().to_owned();
+        return Err(Error::TooFewSamples {
+            experiment,
+            samples: 0,
+            needed: 1,
+            purpose: "with all outputs, to resample",
+        });
+    }
+    let refit = |number: usize| -> Option<Vec<f64>> {
+        let mut random = Random::stream(seed, number as u64);
+        let records: Vec<ExperimentOf<M>> = objective
+            .experiments
+            .iter()
+            .zip(&predictions)
+            .zip(&residuals)
+            .map(|((record, prediction), residuals)| {
+                let drawn = draw(residuals, record.len(), resampling, &mut random);
+                let mut record = record.clone();
+                for ((y, predicted), e) in record.outputs.iter_mut().zip(&prediction.outputs).zip(drawn) {
+                    let (old, new, e) =
+                        (M::Output::into_array(*y), M::Output::into_array(*predicted), M::Output::into_array(e));
+                    *y = M::Output::from_fn(|j| match old.as_ref()[j].is_nan() {
+                        true => f64::NAN,
+                        false => new.as_ref()[j] + e.as_ref()[j],
+                    });
+                }
+                record
+            })
+            .collect();
+        let prepare = |record| objective.predictor.prepare(objective.model, record, &estimate.parameters);
+        let prepared = records.iter().map(prepare).collect::<Result<Vec<_>, _>>().ok()?;
+        let whitening = objective.whitening.clone();
+        let again = Objective { experiments: &records, prepared: &prepared, whitening, ..objective };
+        let (place, _) = minimize(Pinned { problem: &again, bounds: again.bounds() }, best.clone())?;
+        Some(estimate.unknowns.iter().zip(&place).map(|(u, &c)| u.transform.to_value(c)).collect())
+    };
+    let found: Vec<Vec<f64>> = each(count, refit).into_iter().flatten().collect();
+    if found.len() < 20 {
+        return Err(Error::Option(format!(
+            "only {} of {count} refits ended; twenty are the least, some thousand are wanted for percentiles",
+            found.len()
+        )));
+    }
+    let stretch = (estimate.measurements as f64 / estimate.degrees_of_freedom().max(1.0)).sqrt();
+    let mut result = Bootstrap {
+        unknowns: estimate.unknowns.iter().map(|unknown| unknown.name.clone()).collect(),
+        converged: found.len() as u64,
+        tried: count as u64,
+        standard_errors: vec![],
+        bias: vec![],
+        intervals: vec![],
+        seed,
+    };
+    let n = found.len() as f64;
+    for (i, unknown) in estimate.unknowns.iter().enumerate() {
+        let transform = unknown.transform;
+        let center = transform.to_coordinate(unknown.value);
+        let mut column: Vec<f64> = found.iter().map(|values| values[i]).collect();
+        column.sort_unstable_by(f64::total_cmp);
+        let mean = column.iter().sum::<f64>() / n;
+        let variance = column.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        let at = |part: f64| {
+            let place = part * (n + 1.0) - 1.0;
+            let below = place.floor().clamp(0.0, n - 1.0);
+            let above = (below + 1.0).min(n - 1.0);
+            let (low, high) = (column[below as usize], column[above as usize]);
+            let value = low + (high - low) * (place - below).clamp(0.0, 1.0);
+            transform.to_value(center + stretch * (transform.to_coordinate(value) - center))
+        };
+        result.standard_errors.push(stretch * variance.sqrt());
+        result.bias.push(mean - unknown.value);
+        result.intervals.push((at(0.025), at(0.975)));
+    }
+    Ok(result)
+}
+
+fn mean<Y: Signals>(rows: &[Of<Y, f64>], j: usize) -> f64 {
+    let values = rows.iter().map(|row| Y::into_array(*row).as_ref()[j]).filter(|value| value.is_finite());
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+    if count > 0.0 { sum / count } else { 0.0 }
+}
+
+/// As many rows as asked for, all outputs of a sample together.
+fn draw<Y: Copy>(residuals: &[Y], count: usize, resampling: Resampling, random: &mut Random) -> Vec<Y> {
+    let length = match resampling {
+        Resampling::Residuals => 1,
+        Resampling::Blocks(0) => (residuals.len() as f64).cbrt().round() as usize,
+        Resampling::Blocks(length) => length,
+    }
+    .clamp(1, residuals.len().max(1));
+    let mut drawn = Vec::with_capacity(count + length);
+    while drawn.len() < count {
+        let begin = random.below(residuals.len() - length + 1);
+        drawn.extend_from_slice(&residuals[begin..begin + length]);
+    }
+    drawn.truncate(count);
+    drawn
+}

@@ -1,0 +1,64 @@
+//! Delta method: how well a function of the parameters is known, by its exact slopes.
+
+use crate::dual::Dual;
+use crate::estimate::{Estimate, student};
+use crate::model::Model;
+use crate::parameter::Transform;
+use crate::signals::{Of, Signals};
+use serde::{Deserialize, Serialize};
+
+/// Slopes taken at once.
+const LANES: usize = 8;
+
+/// A quantity computed from the parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Derived {
+    /// Its name.
+    pub name: String,
+    /// Its value.
+    pub value: f64,
+    /// Its standard error, to first order (Rao, *Linear Statistical Inference and Its Applications*, 1973, section 6a.2);
+    /// `None` if it depends on a parameter that has none because it is held or not determined, or is not a number.
+    pub standard_error: Option<f64>,
+    /// The 95 % interval by Student's t.
+    pub interval: Option<(f64, f64)>,
+}
+
+/// A function of the parameters with its interval: `derived(&estimate, "kt", |p| p.ke * 1.5)`. Parameters that each
+/// experiment has for itself are those of the first; fixed ones count as exact.
+pub fn derived<M: Model, I, P>(
+    estimate: &Estimate<M, I, P>,
+    name: &str,
+    f: impl Fn(&Of<M::Parameters, Dual<LANES>>) -> Dual<LANES>,
+) -> Derived {
+    let values = M::Parameters::into_array(estimate.parameters);
+    let own = estimate.experiments.first().map(|share| share.name.as_str()).unwrap_or_default();
+    let unknown = |j: usize| {
+        let name = M::Parameters::NAMES[j];
+        let local = format!("{name} [{own}]");
+        estimate.unknowns.iter().position(|u| u.name == name || u.name == local)
+    };
+    let mut gradient = vec![0.0; estimate.unknowns.len()];
+    let (mut value, mut known) = (f64::NAN, true);
+    for first in (0..M::Parameters::LEN.max(1)).step_by(LANES) {
+        let seeded = M::Parameters::from_fn(|j| Dual::variable(values.as_ref()[j], j.wrapping_sub(first)));
+        let result = f(&seeded);
+        value = result.value;
+        for lane in 0..LANES.min(M::Parameters::LEN - first.min(M::Parameters::LEN)) {
+            let slope = result.slopes[lane];
+            if let Some(i) = unknown(first + lane).filter(|_| slope != 0.0) {
+                gradient[i] = slope;
+                known &= estimate.unknowns[i].knowledge.standard_error().is_some();
+            }
+        }
+    }
+    let c = &estimate.covariance;
+    let n = gradient.len();
+    let variance: f64 =
+        (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).map(|(i, j)| gradient[i] * c[(i, j)] * gradient[j]).sum();
+    let standard_error = Some(variance.max(0.0).sqrt()).filter(|error| known && error.is_finite() && value.is_finite());
+    let degrees = estimate.degrees_of_freedom();
+    let interval = standard_error.map(|error| student::interval(value, error, Transform::Identity, 0.95, degrees));
+    Derived { name: name.to_owned(), value, standard_error, interval }
+}

@@ -1,0 +1,244 @@
+//! Residuals: what is left of the measurement when the model has said its part. If the model is complete, it is noise.
+//!
+//! Tests take correlated residuals into account by their effective number: `n / (1 + 2 sum rho(k))`, the sum over the lags
+//! up to the first that is not positive (Bayley and Hammersley, J. Royal Statistical Society suppl. 8 (1946) 184).
+
+mod correlation;
+mod normality;
+mod outliers;
+mod period;
+mod spread;
+
+pub use correlation::Correlation;
+pub use outliers::Outlier;
+pub use period::Period;
+pub use spread::Spread;
+
+use super::Test;
+use crate::error::Error;
+use crate::estimate::Prediction;
+use crate::experiment::ExperimentOf;
+use crate::model::Model;
+use crate::signals::{Of, Signals};
+use crate::whiteness::{Autocorrelation, ljung_box};
+use serde::{Deserialize, Serialize};
+
+/// Lags of correlations: up to 25, and never more than a quarter of the samples.
+const LAGS: usize = 25;
+/// The fewest residuals that tests say anything of.
+pub const FEWEST: u64 = 20;
+
+/// What the residuals of one output show.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Residuals {
+    /// Name of the experiment.
+    pub experiment: String,
+    /// Name of the output.
+    pub output: String,
+    /// Unit of the residuals.
+    pub unit: String,
+    /// Residuals there are.
+    pub samples: u64,
+    /// How many independent ones they are worth.
+    pub effective_samples: f64,
+    /// Mean, in the unit.
+    pub mean: f64,
+    /// Standard deviation, in the unit.
+    pub standard_deviation: f64,
+    /// Third standardized moment; zero for a symmetric distribution.
+    pub skewness: f64,
+    /// Fourth standardized moment less three; zero for a normal distribution.
+    pub excess_kurtosis: f64,
+    /// Correlation with the residuals 1, 2, ... samples before.
+    pub autocorrelation: Vec<f64>,
+    /// White residuals stay within plus and minus this at 99 of 100 lags.
+    pub autocorrelation_band: f64,
+    /// Correlation with each input and measured output that is not constant.
+    pub correlations: Vec<Correlation>,
+    /// Inputs that do not change in this record: what they drive cannot be told.
+    pub constant_inputs: Vec<String>,
+    /// How the spread goes with each input, predicted output and time.
+    pub spreads: Vec<Spread>,
+    /// The residuals furthest out, beyond what a normal distribution allows; furthest first, twenty at most.
+    pub outliers: Vec<Outlier>,
+    /// How many outliers there are.
+    pub outlier_count: u64,
+    /// The strongest line of the spectrum, if it stands out.
+    pub period: Option<Period>,
+    /// What the residuals were tested for.
+    pub tests: Vec<Test>,
+}
+
+/// Examines the residuals of a prediction of a record, output by output.
+///
+/// # Errors
+/// A prediction that is not of this record, or a prediction that is infinite. Too few residuals for a test (fewer than
+/// [`FEWEST`]), and residuals that do not vary, are not errors: the tests are left out.
+pub fn examine<M: Model>(prediction: &Prediction<M>, record: &ExperimentOf<M>) -> Result<Vec<Residuals>, Error> {
+    if prediction.residuals.len() != record.len() {
+        return Err(Error::Lengths {
+            experiment: record.name().to_owned(),
+            what: "the prediction",
+            found: prediction.residuals.len(),
+            reference: "the record",
+            expected: record.len(),
+        });
+    }
+    let inputs: Vec<Series> = (0..M::Input::LEN)
+        .map(|i| Series::new("input", M::Input::NAMES[i], M::Input::UNITS[i], &column::<M::Input>(record.inputs(), i)))
+        .collect();
+    let outputs: Vec<Series> = (0..M::Output::LEN)
+        .map(|j| {
+            let values = column::<M::Output>(record.outputs(), j);
+            Series::new("measured output", M::Output::NAMES[j], M::Output::UNITS[j], &values)
+        })
+        .collect();
+    let predicted: Vec<Series> = (0..M::Output::LEN)
+        .map(|j| {
+            let values = column::<M::Output>(&prediction.outputs, j);
+            Series::new("predicted output", M::Output::NAMES[j], M::Output::UNITS[j], &values)
+        })
+        .collect();
+    let times: Vec<f64> = (0..record.len()).map(|k| record.time(k)).collect();
+    let time = Series::new("time", "t", "s", &times);
+    let even = record.gaps().is_empty();
+    (0..M::Output::LEN)
+        .map(|j| {
+            let residuals = column::<M::Output>(&prediction.residuals, j);
+            if let Some(k) = residuals.iter().position(|e| e.is_infinite()) {
+                return Err(Error::NotFinite {
+                    experiment: record.name().to_owned(),
+                    signal: format!("residual of {}", M::Output::NAMES[j]),
+                    value: residuals[k],
+                    sample: k,
+                    time: record.time(k),
+                });
+            }
+            let output = Series::new("residual", M::Output::NAMES[j], M::Output::UNITS[j], &residuals);
+            let mut result = output.examine(record.name(), &inputs, &outputs, &predicted, &time);
+            if result.samples >= FEWEST && output.deviation > 0.0 {
+                if even {
+                    let (period, test) = period::find(&output, record.sample_time());
+                    result.period = period;
+                    result.tests.push(test);
+                }
+                (result.outliers, result.outlier_count) = outliers::find(&residuals, &times);
+            }
+            Ok(result)
+        })
+        .collect()
+}
+
+fn column<S: Signals>(rows: &[Of<S, f64>], i: usize) -> Vec<f64> {
+    rows.iter().map(|row| S::into_array(*row).as_ref()[i]).collect()
+}
+
+/// A signal less its mean, zero where missing.
+struct Series {
+    role: &'static str,
+    name: &'static str,
+    unit: &'static str,
+    values: Vec<f64>,
+    /// Whether each value was there; empty if all were.
+    missing: Vec<bool>,
+    count: u64,
+    mean: f64,
+    /// Standard deviation (`n` in the denominator); zero for a constant.
+    deviation: f64,
+}
+
+impl Series {
+    fn new(role: &'static str, name: &'static str, unit: &'static str, raw: &[f64]) -> Self {
+        let count = raw.iter().filter(|v| v.is_finite()).count();
+        let missing = if count < raw.len() { raw.iter().map(|v| !v.is_finite()).collect() } else { vec![] };
+        let n = count.max(1) as f64;
+        let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
+        for v in raw.iter().filter(|v| v.is_finite()) {
+            (lowest, highest) = (lowest.min(*v), highest.max(*v));
+        }
+        // From the first value, so that a large mean costs no digits.
+        let first = raw.iter().copied().find(|v| v.is_finite()).unwrap_or(0.0);
+        let mean = first + raw.iter().filter(|v| v.is_finite()).map(|v| v - first).sum::<f64>() / n;
+        let values: Vec<f64> = raw.iter().map(|v| if v.is_finite() { v - mean } else { 0.0 }).collect();
+        let deviation = if highest > lowest { (values.iter().map(|v| v * v).sum::<f64>() / n).sqrt() } else { 0.0 };
+        Series { role, name, unit, values, missing, count: count as u64, mean, deviation }
+    }
+
+    fn is_missing(&self, k: usize) -> bool {
+        self.missing.get(k).copied().unwrap_or(false)
+    }
+
+    fn lags(&self) -> usize {
+        LAGS.min(self.count as usize / 4)
+    }
+
+    fn autocorrelation(&self) -> Vec<f64> {
+        let mut sums = Autocorrelation::new(self.lags());
+        sums.add(&self.values, self.count);
+        sums.coefficients()
+    }
+
+    /// The residuals' own story.
+    fn examine(
+        &self,
+        experiment: &str,
+        inputs: &[Series],
+        outputs: &[Series],
+        predicted: &[Series],
+        time: &Series,
+    ) -> Residuals {
+        let autocorrelation = self.autocorrelation();
+        let correlated: f64 = autocorrelation.iter().take_while(|rho| **rho > 0.0).sum();
+        let effective = self.count as f64 / (1.0 + 2.0 * correlated);
+        let constant = inputs.iter().filter(|u| u.deviation == 0.0).map(|u| u.name.to_owned()).collect();
+        let mut result = Residuals {
+            experiment: experiment.to_owned(),
+            output: self.name.to_owned(),
+            unit: self.unit.to_owned(),
+            samples: self.count,
+            effective_samples: effective,
+            mean: if self.count > 0 { self.mean } else { 0.0 },
+            standard_deviation: self.deviation,
+            skewness: 0.0,
+            excess_kurtosis: 0.0,
+            autocorrelation,
+            autocorrelation_band: 2.576 / (self.count.max(1) as f64).sqrt(),
+            correlations: vec![],
+            constant_inputs: constant,
+            spreads: vec![],
+            outliers: vec![],
+            outlier_count: 0,
+            period: None,
+            tests: vec![],
+        };
+        if self.count < FEWEST || self.deviation == 0.0 {
+            return result;
+        }
+        let (q, p) = ljung_box(&result.autocorrelation, self.count);
+        let lags = result.autocorrelation.len();
+        result.tests.push(Test::new(
+            format!("Ljung-Box, {lags} lags"),
+            q,
+            p,
+            "the residuals are white: each is news",
+            "the residuals follow from those before: the model misses dynamics, or the noise enters before the states \
+             (predict over a shorter horizon); classical intervals are too narrow",
+        ));
+        result.tests.push(normality::mean(self, effective));
+        normality::shape(self, effective, &mut result);
+        for signal in inputs.iter().chain(outputs).filter(|signal| signal.deviation > 0.0) {
+            let (correlation, test) = correlation::between(self, &result.autocorrelation, signal);
+            result.correlations.push(correlation);
+            result.tests.push(test);
+        }
+        let own = [time];
+        for signal in inputs.iter().chain(predicted).chain(own).filter(|signal| signal.deviation > 0.0) {
+            if let Some((spread, test)) = spread::over(self, effective, signal) {
+                result.spreads.push(spread);
+                result.tests.push(test);
+            }
+        }
+        result
+    }
+}

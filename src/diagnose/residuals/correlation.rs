@@ -1,0 +1,74 @@
+//! Correlation of residuals with what went in and what was measured before.
+
+use super::Series;
+use crate::diagnose::Test;
+use crate::whiteness::dot;
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, Normal};
+
+/// Correlation of residuals with another signal over lags.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Correlation {
+    /// Name of the signal.
+    pub signal: String,
+    /// What it is: `input` or `measured output`.
+    pub role: String,
+    /// The first lag (samples): the signal this much before the residual; negative where it comes after.
+    pub first_lag: i64,
+    /// Correlation at that lag and the following ones.
+    pub values: Vec<f64>,
+    /// Without correlation they stay within plus and minus this at 99 of 100 lags; it allows for the two signals' own
+    /// autocorrelations (Bartlett; Ljung, *System Identification*, 1999, eq. 16.65).
+    pub band: f64,
+}
+
+pub(super) fn between(residuals: &Series, own: &[f64], signal: &Series) -> (Correlation, Test) {
+    let lags = residuals.lags();
+    let (e, s) = (&residuals.values, &signal.values);
+    let common = match residuals.missing.is_empty() && signal.missing.is_empty() {
+        true => e.len() as f64,
+        false => (0..e.len()).filter(|&k| !residuals.is_missing(k) && !signal.is_missing(k)).count() as f64,
+    }
+    .max(1.0);
+    let scale = (common * residuals.deviation * signal.deviation).recip();
+    let before = (1..=lags).rev().map(|k| dot(&e[..e.len() - k], &s[k..]) * scale);
+    let after = (0..=lags).map(|k| dot(&e[k..], &s[..s.len() - k]) * scale);
+    let values: Vec<f64> = before.chain(after).collect();
+    let both: f64 = own.iter().zip(signal.autocorrelation()).map(|(a, b)| a * b).sum();
+    let deviation = ((1.0 + 2.0 * both).max(0.1) / common).sqrt();
+
+    // Residuals go with their own output of the same sample by construction: only its past is tested.
+    let is_output = signal.role == "measured output";
+    let tested = &values[lags + usize::from(is_output)..];
+    let largest = tested.iter().fold(0.0f64, |m, r| m.max(r.abs())) / deviation;
+    // The largest of many, as if they were independent: on the safe side where they are not.
+    let single = 2.0 * Normal::standard().sf(largest);
+    let p_value = -(tested.len() as f64 * (-single).ln_1p()).exp_m1();
+    let failed = match is_output {
+        false => format!(
+            "the residuals follow from the input `{0}`: the way from `{0}` to `{1}` is missing or wrong in the model (a \
+             term, a delay, a nonlinearity)",
+            signal.name, residuals.name
+        ),
+        true => format!(
+            "the residuals follow from `{}` measured before: the model misses dynamics of `{}`, or its noise is colored",
+            signal.name, residuals.name
+        ),
+    };
+    let test = Test::new(
+        format!("cross-correlation with {} `{}`", signal.role, signal.name),
+        largest,
+        p_value,
+        "nothing of it is left in the residuals",
+        &failed,
+    );
+    let correlation = Correlation {
+        signal: signal.name.to_owned(),
+        role: signal.role.to_owned(),
+        first_lag: -(lags as i64),
+        values,
+        band: 2.576 * deviation,
+    };
+    (correlation, test)
+}

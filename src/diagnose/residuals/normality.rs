@@ -1,0 +1,76 @@
+//! Mean and shape of the residuals' distribution.
+
+use super::{Residuals, Series};
+use crate::diagnose::Test;
+use crate::whiteness::chi_squared_tail;
+use statrs::distribution::{ContinuousCDF, Normal};
+
+/// Whether the mean is zero, by its standard error from the effective number of residuals.
+pub(super) fn mean(residuals: &Series, effective: f64) -> Test {
+    let z = residuals.mean / (residuals.deviation / effective.sqrt());
+    Test::new(
+        "zero mean",
+        z,
+        2.0 * Normal::standard().sf(z.abs()),
+        "the model is right on average",
+        "the model is off on average: an offset of a sensor, or a constant load, is missing as a parameter",
+    )
+}
+
+const NORMAL: &str = "the residuals may be normal, as least squares wants them for its best";
+const NOT_NORMAL: &str = "the residuals are not normal: outliers (use a robust loss), switching between regimes, or steps \
+                          of a converter; estimates stand, but are not the most precise there are";
+
+/// Jarque and Bera's test (International Statistical Review 55 (1987) 163) and Anderson and Darling's with Stephens'
+/// p-values (D'Agostino and Stephens, *Goodness-of-Fit Techniques*, 1986, table 4.9). Both take the residuals to be
+/// independent; the former counts the effective number, the latter takes so many of them, evenly.
+pub(super) fn shape(residuals: &Series, effective: f64, result: &mut Residuals) {
+    let n = residuals.count as f64;
+    let (mut third, mut fourth) = (0.0, 0.0);
+    for e in &residuals.values {
+        let square = e * e;
+        third += square * e;
+        fourth += square * square;
+    }
+    let sigma = residuals.deviation;
+    result.skewness = third / n / sigma.powi(3);
+    result.excess_kurtosis = fourth / n / sigma.powi(4) - 3.0;
+    let statistic = effective / 6.0 * (result.skewness.powi(2) + result.excess_kurtosis.powi(2) / 4.0);
+    let p_value = chi_squared_tail(statistic, 2.0);
+    result.tests.push(Test::new("Jarque-Bera", statistic, p_value, NORMAL, NOT_NORMAL));
+
+    // More than a few thousand tell nothing new, and every distribution is not normal in the tenth digit.
+    let wanted = effective.clamp(8.0, 5000.0);
+    let every = (n / wanted).ceil().max(1.0) as usize;
+    let present = (0..residuals.values.len()).filter(|&k| !residuals.is_missing(k));
+    let mut sample: Vec<f64> = present.step_by(every).map(|k| residuals.values[k]).collect();
+    if sample.len() >= 8 {
+        let (statistic, p_value) = anderson_darling(&mut sample);
+        result.tests.push(Test::new("Anderson-Darling", statistic, p_value, NORMAL, NOT_NORMAL));
+    }
+}
+
+/// Statistic (corrected for the estimated mean and deviation) and p-value.
+fn anderson_darling(sample: &mut [f64]) -> (f64, f64) {
+    sample.sort_unstable_by(f64::total_cmp);
+    let n = sample.len() as f64;
+    let mean = sample.iter().sum::<f64>() / n;
+    let sigma = (sample.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+    if sigma == 0.0 {
+        return (f64::MAX, 0.0);
+    }
+    let normal = Normal::standard();
+    let log = |p: f64| p.max(f64::MIN_POSITIVE).ln();
+    let below: Vec<f64> = sample.iter().map(|v| log(normal.cdf((v - mean) / sigma))).collect();
+    let above: Vec<f64> = sample.iter().map(|v| log(normal.sf((v - mean) / sigma))).collect();
+    let sum: f64 = (0..sample.len()).map(|i| (2.0 * i as f64 + 1.0) * (below[i] + above[sample.len() - 1 - i])).sum();
+    let a = (-n - sum / n) * (1.0 + 0.75 / n + 2.25 / (n * n));
+    let p = match a {
+        a if a < 0.2 => 1.0 - (-13.436 + 101.14 * a - 223.73 * a * a).exp(),
+        a if a < 0.34 => 1.0 - (-8.318 + 42.796 * a - 59.938 * a * a).exp(),
+        a if a < 0.6 => (0.9177 - 4.279 * a - 1.38 * a * a).exp(),
+        a if a < 153.0 => (1.2937 - 5.709 * a + 0.0186 * a * a).exp(),
+        _ => 0.0,
+    };
+    (a, p.clamp(0.0, 1.0))
+}

@@ -1,0 +1,136 @@
+//! A period in the residuals: the line of the periodogram that stands out most from its neighborhood.
+//!
+//! Ordinates of a periodogram are exponentially distributed about a smooth spectrum (Brockwell and Davis, *Time Series:
+//! Theory and Methods*, 1991, section 10.3). The spectrum is the local median, so that colored residuals do not count as
+//! periodic; what does not complete four periods within the record is a trend, not a period.
+
+use super::Series;
+use crate::diagnose::Test;
+use nalgebra::Complex;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// A periodic part of the residuals.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Period {
+    /// Its length (s).
+    pub seconds: f64,
+    /// Its length in samples.
+    pub samples: f64,
+    /// Its frequency (Hz).
+    pub frequency: f64,
+    /// Amplitude of the line, in the output's unit.
+    pub amplitude: f64,
+    /// Part of the residuals' variance.
+    pub share: f64,
+}
+
+/// Periods within the record that make a line.
+const FEWEST: usize = 4;
+/// Half of the neighborhood: at most, at least.
+const REACH: (usize, usize) = (60, 6);
+
+pub(super) fn find(residuals: &Series, step: f64) -> (Option<Period>, Test) {
+    let n = residuals.values.len();
+    let mut spectrum: Vec<Complex<f64>> = residuals.values.iter().map(|&e| Complex::new(e, 0.0)).collect();
+    let grid = n.next_power_of_two();
+    spectrum.resize(grid, Complex::default());
+    transform(&mut spectrum);
+    // Less the line at half the sampling frequency, which is distributed otherwise.
+    let power: Vec<f64> = spectrum[..grid / 2].iter().map(|z| z.norm_sqr()).collect();
+    let fewest = (FEWEST * grid).div_ceil(n);
+    let mut best = (0.0, 0);
+    let mut neighbors = Vec::with_capacity(2 * REACH.0);
+    let mut median = f64::INFINITY;
+    for k in fewest..power.len() {
+        let reach = (k / 2).clamp(REACH.1, REACH.0);
+        // Far from zero frequency the neighborhood moves slowly: one median serves a few lines.
+        if reach < REACH.0 || k % 8 == 0 || median.is_infinite() {
+            neighbors.clear();
+            let (from, to) = (k.saturating_sub(reach).max(1), (k + reach + 1).min(power.len()));
+            neighbors.extend_from_slice(&power[from..to]);
+            let half = neighbors.len() / 2;
+            median = *neighbors.select_nth_unstable_by(half, f64::total_cmp).1;
+        }
+        let excess = power[k] / (median / std::f64::consts::LN_2).max(f64::MIN_POSITIVE);
+        if excess > best.0 {
+            best = (excess, k);
+        }
+    }
+    let (excess, k) = best;
+    let tried = power.len().saturating_sub(fewest).max(1) as f64;
+    // The median of some twenty neighbors is itself uncertain: as F with 2 and 2 * 20 degrees of freedom.
+    let neighbors = (2 * (k / 2).clamp(REACH.1, REACH.0)) as f64;
+    let single = (1.0 + excess / neighbors).powf(-neighbors);
+    let p_value = -(tried * (-single.min(1.0 - 1e-16)).ln_1p()).exp_m1();
+    let energy: f64 = residuals.values.iter().map(|e| e * e).sum();
+    let frequency = center(&power, k) / (grid as f64 * step);
+    let period = Period {
+        seconds: frequency.recip(),
+        samples: (frequency * step).recip(),
+        frequency,
+        amplitude: 2.0 * power[k].sqrt() / residuals.count as f64,
+        share: (2.0 * power[k] / (energy * residuals.count as f64)).min(1.0),
+    };
+    let failed = format!(
+        "the residuals repeat every {:.4} s ({:.4} Hz): look for what turns or switches at that rate (cogging, \
+         eccentricity, sampling, mains) and model it or filter it out",
+        period.seconds, period.frequency
+    );
+    let test = Test::new("periodogram", excess, p_value, "no period stands out", &failed);
+    ((!test.passed && k > 0).then_some(period), test)
+}
+
+/// Where between the lines of the grid the strongest is: the top of the parabola through the logarithms.
+fn center(power: &[f64], k: usize) -> f64 {
+    let at = |k: usize| power.get(k).copied().unwrap_or(0.0).max(f64::MIN_POSITIVE).ln();
+    let (left, middle, right) = (at(k.saturating_sub(1)), at(k), at(k + 1));
+    let bend = left - 2.0 * middle + right;
+    k as f64 + if bend < 0.0 { (0.5 * (left - right) / bend).clamp(-0.5, 0.5) } else { 0.0 }
+}
+
+/// Discrete Fourier transform in place, of a length that is a power of two (Cooley and Tukey, Mathematics of Computation
+/// 19 (1965) 297).
+fn transform(values: &mut [Complex<f64>]) {
+    let n = values.len();
+    if n < 2 {
+        return;
+    }
+    for k in 0..n {
+        let reversed = k.reverse_bits() >> (usize::BITS - n.trailing_zeros());
+        if k < reversed {
+            values.swap(k, reversed);
+        }
+    }
+    let roots: Vec<Complex<f64>> = (0..n / 2).map(|k| Complex::from_polar(1.0, -TAU * k as f64 / n as f64)).collect();
+    let mut half = 1;
+    while half < n {
+        for part in values.chunks_exact_mut(2 * half) {
+            let (even, odd) = part.split_at_mut(half);
+            for (k, (a, b)) in even.iter_mut().zip(odd).enumerate() {
+                let turned = *b * roots[k * (n / 2 / half)];
+                (*a, *b) = (*a + turned, *a - turned);
+            }
+        }
+        half *= 2;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The definition, sum by sum.
+    #[test]
+    fn transform_is_fourier() {
+        let signal = |k: usize| Complex::new((k as f64 * 1.7).sin(), (k * k) as f64 * 0.01);
+        let mut fast: Vec<Complex<f64>> = (0..32).map(signal).collect();
+        transform(&mut fast);
+        for (f, found) in fast.iter().enumerate() {
+            let term = |k: usize| signal(k) * Complex::from_polar(1.0, -TAU * (f * k) as f64 / 32.0);
+            let expected: Complex<f64> = (0..32).map(term).sum();
+            assert!((found - expected).norm() < 1e-12, "{f}: {found} {expected}");
+        }
+    }
+}

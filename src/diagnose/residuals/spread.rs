@@ -1,0 +1,99 @@
+//! Whether the residuals' spread goes with a signal (heteroscedasticity).
+
+use super::Series;
+use crate::diagnose::Test;
+use crate::whiteness::chi_squared_tail;
+use serde::{Deserialize, Serialize};
+
+/// Standard deviation of the residuals over the range of a signal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spread {
+    /// Name of the signal.
+    pub signal: String,
+    /// What it is: `input`, `predicted output` or `time`.
+    pub role: String,
+    /// Unit of the signal.
+    pub unit: String,
+    /// Middle of each part of the signal's range in which it was met.
+    pub at: Vec<f64>,
+    /// Standard deviation of the residuals there, in the output's unit.
+    pub deviation: Vec<f64>,
+    /// How many residuals there are.
+    pub count: Vec<u64>,
+    /// Part of the variance of the squared residuals that goes with the signal.
+    pub share: f64,
+}
+
+const PARTS: usize = 12;
+
+/// Koenker's form (J. Econometrics 17 (1981) 107) of Breusch and Pagan's test with the signal and its square, which does
+/// not ask for normal residuals.
+pub(super) fn over(residuals: &Series, effective: f64, signal: &Series) -> Option<(Spread, Test)> {
+    let scale = signal.deviation.recip();
+    let variance = residuals.deviation.powi(2);
+    // Sums of products of (1, x, x^2) and the squared residuals.
+    let mut moments = [0.0; 5];
+    let mut products = [0.0; 3];
+    let mut squares = 0.0;
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    let here = |k: usize| !residuals.is_missing(k) && !signal.is_missing(k);
+    for (k, (e, s)) in residuals.values.iter().zip(&signal.values).enumerate() {
+        if here(k) {
+            let (x, q) = (s * scale, e * e / variance);
+            let x2 = x * x;
+            for (sum, value) in moments.iter_mut().zip([1.0, x, x2, x2 * x, x2 * x2]) {
+                *sum += value;
+            }
+            for (sum, value) in products.iter_mut().zip([q, q * x, q * x2]) {
+                *sum += value;
+            }
+            squares += q * q;
+            (low, high) = (low.min(*s), high.max(*s));
+        }
+    }
+    let n = moments[0];
+    let total = squares - products[0] * products[0] / n;
+    if total.is_nan() || total <= 0.0 || high <= low {
+        return None;
+    }
+    // About the means: x and what of x^2 is not x.
+    let mean = |i: usize| moments[i] / n;
+    let (sxx, sxz) = (moments[2] - n * mean(1) * mean(1), moments[3] - n * mean(1) * mean(2));
+    let szz = moments[4] - n * mean(2) * mean(2);
+    let (sxq, szq) = (products[1] - mean(1) * products[0], products[2] - mean(2) * products[0]);
+    let (slope, rest) = (sxz / sxx, szz - sxz * sxz / sxx);
+    // A signal of two levels has no square of its own.
+    let curved = rest > 1e-9 * szz.max(1.0);
+    let own = if curved { (szq - slope * sxq).powi(2) / rest } else { 0.0 };
+    let share = ((sxq * sxq / sxx + own) / total).clamp(0.0, 1.0);
+    let statistic = effective * share;
+    let p_value = chi_squared_tail(statistic, if curved { 2.0 } else { 1.0 });
+
+    let width = (high - low) / PARTS as f64;
+    let (mut sums, mut counts) = ([0.0; PARTS], [0u64; PARTS]);
+    for (k, (e, s)) in residuals.values.iter().zip(&signal.values).enumerate() {
+        if here(k) {
+            let part = (((s - low) / width) as usize).min(PARTS - 1);
+            sums[part] += e * e;
+            counts[part] += 1;
+        }
+    }
+    let met = || (0..PARTS).filter(|&part| counts[part] > 0);
+    let spread = Spread {
+        signal: signal.name.to_owned(),
+        role: signal.role.to_owned(),
+        unit: signal.unit.to_owned(),
+        at: met().map(|part| signal.mean + low + width * (part as f64 + 0.5)).collect(),
+        deviation: met().map(|part| (sums[part] / counts[part] as f64).sqrt()).collect(),
+        count: met().map(|part| counts[part]).collect(),
+        share,
+    };
+    let failed = format!(
+        "the size of the residuals goes with {} `{}`: the noise grows with it, or the model is wrong in part of its range; a \
+         weighting by `{}` gives the quiet part its due",
+        signal.role, signal.name, signal.name
+    );
+    let name = format!("Breusch-Pagan-Koenker, {} `{}`", signal.role, signal.name);
+    Some((spread, Test::new(name, statistic, p_value, "the residuals are of one size over its range", &failed)))
+}

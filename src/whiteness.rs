@@ -1,0 +1,107 @@
+//! Whether errors are white: autocorrelations gathered run by run, and the portmanteau test of Ljung and Box.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+/// Running sums of products of a sequence with its own past, which need no memory but that of the longest lag.
+#[derive(Clone, Debug)]
+pub(crate) struct Autocorrelation {
+    /// Sum of `e[t] e[t - k]` for `k = 0..=lags`.
+    sums: Vec<f64>,
+    /// The last values, then those of the run at hand.
+    values: Vec<f64>,
+    /// How many values were measured.
+    count: u64,
+}
+
+impl Autocorrelation {
+    pub fn new(lags: usize) -> Self {
+        Autocorrelation { sums: vec![0.0; lags + 1], values: vec![0.0; lags], count: 0 }
+    }
+
+    /// The next values in order of time, zero where missing; `count` of them were measured.
+    pub fn add(&mut self, run: &[f64], count: u64) {
+        let lags = self.sums.len() - 1;
+        self.values.extend_from_slice(run);
+        for (k, sum) in self.sums.iter_mut().enumerate() {
+            *sum += dot(run, &self.values[lags - k..]);
+        }
+        self.values.drain(..run.len());
+        self.count += count;
+    }
+
+    /// Forgets the past: what comes next belongs to another record.
+    pub fn restart(&mut self) {
+        self.values.fill(0.0);
+    }
+
+    /// How many values were measured.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// Correlation with the value `1, 2, ...` samples before; zeros if there is no value but zero.
+    pub fn coefficients(&self) -> Vec<f64> {
+        let whole = if self.sums[0] > 0.0 { self.sums[0] } else { f64::INFINITY };
+        self.sums[1..].iter().map(|sum| sum / whole).collect()
+    }
+}
+
+/// Statistic and p-value of Ljung and Box (Biometrika 65 (1978) 297) for the autocorrelations at lags `1, 2, ...` of
+/// `count` values: the probability that white noise shows as much.
+pub(crate) fn ljung_box(coefficients: &[f64], count: u64) -> (f64, f64) {
+    let n = count as f64;
+    let lags = coefficients.len().min(count.saturating_sub(1) as usize);
+    let term = |(k, rho): (usize, &f64)| rho * rho / (n - (k + 1) as f64);
+    let statistic = n * (n + 2.0) * coefficients[..lags].iter().enumerate().map(term).sum::<f64>();
+    (statistic, chi_squared_tail(statistic, lags as f64))
+}
+
+/// Probability that chi squared with so many degrees of freedom is larger.
+pub(crate) fn chi_squared_tail(statistic: f64, degrees: f64) -> f64 {
+    ChiSquared::new(degrees).map_or(1.0, |distribution| distribution.sf(statistic.max(0.0)))
+}
+
+/// Sum of products over the shorter, in accumulators that the compiler may keep in vector lanes.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let n = a.len().min(b.len());
+    let (a, b) = (&a[..n], &b[..n]);
+    let mut sums = [0.0; 8];
+    for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
+        }
+    }
+    let rest = a.chunks_exact(8).remainder().iter().zip(b.chunks_exact(8).remainder());
+    sums.iter().sum::<f64>() + rest.map(|(a, b)| a * b).sum::<f64>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// In one run or in many, the sums are those of the definition.
+    #[test]
+    fn runs_make_the_whole() {
+        let e: Vec<f64> = (0..300).map(|k| ((k * k) as f64 * 0.37).sin()).collect();
+        let mut runs = Autocorrelation::new(12);
+        for run in [&e[..5], &e[5..133], &e[133..134], &e[134..]] {
+            runs.add(run, run.len() as u64);
+        }
+        let whole: f64 = e.iter().map(|e| e * e).sum();
+        for (k, found) in runs.coefficients().into_iter().enumerate() {
+            let expected = (k + 1..300).map(|t| e[t] * e[t - k - 1]).sum::<f64>() / whole;
+            assert!((found - expected).abs() < 1e-14, "lag {}: {found} {expected}", k + 1);
+        }
+        assert_eq!(runs.count(), 300);
+    }
+
+    /// By hand: n = 10, rho = (0.5, -0.2) gives 10 * 12 * (0.25 / 9 + 0.04 / 8); two degrees of freedom have the tail
+    /// `exp(-q / 2)`.
+    #[test]
+    fn ljung_box_by_hand() {
+        let (q, p) = ljung_box(&[0.5, -0.2], 10);
+        let expected = 120.0 * (0.25 / 9.0 + 0.005);
+        assert!((q - expected).abs() < 1e-12, "{q}");
+        assert!((p - (-expected / 2.0).exp()).abs() < 1e-10, "{p}");
+    }
+}

@@ -1,0 +1,124 @@
+//! Comparison, validation, drift and derived quantities against values known beforehand.
+
+use greybox::diagnose::{Comparison, Summary, cross_validate, derived, drift, f_test, likelihood_ratio, validate};
+use greybox::{Error, Estimate, Experiment, Fit, Kind, Model, Nothing, Parameter, Scalar, Time, fixed, free, signals};
+
+signals! { struct Input { u: "V" } }
+signals! { struct Output { y: "A" } }
+signals! { struct Cubic { a: "A", b: "A/V", c: "A/V^2" } }
+
+/// `y = a + b u + c u^2`.
+struct Polynomial;
+
+impl Model for Polynomial {
+    type State = Nothing;
+    type Input = Input;
+    type Output = Output;
+    type Parameters = Cubic;
+    const KIND: Kind = Kind::Static;
+
+    #[inline]
+    fn output<S: Scalar>(&self, _t: f64, _x: &Nothing, u: &Input<S>, p: &Cubic<S>) -> Output<S> {
+        Output { y: p.a + p.b * u.u + p.c * u.u * u.u }
+    }
+}
+
+type Record = Experiment<Nothing, Input, Output>;
+
+struct Random(u64);
+
+impl Random {
+    fn normal(&mut self) -> f64 {
+        let mut uniform = || {
+            self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let mut z = self.0;
+            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        };
+        (-2.0 * (1.0 - uniform()).ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()
+    }
+}
+
+fn record(seed: u64, b: f64, c: f64) -> Record {
+    let mut random = Random(seed.wrapping_mul(0x2545_f491_4f6c_dd1d));
+    let inputs: Vec<Input> = (0..40).map(|k| Input { u: k as f64 * 0.05 - 1.0 }).collect();
+    let outputs = inputs.iter().map(|u| Output { y: 1.0 + b * u.u + c * u.u * u.u + 0.1 * random.normal() }).collect();
+    let time = Time::Uniform { start: 0.0, step: 1.0 };
+    Experiment::new(&Polynomial, time, inputs, outputs).unwrap().named(format!("record {seed}"))
+}
+
+fn fit(records: &[Record], c: Parameter) -> Result<Estimate<Polynomial>, Error> {
+    Fit::new(&Polynomial, records).parameters(Cubic { a: free(0.0), b: free(0.0), c }).run()
+}
+
+/// Both tests refuse a true restriction once in a hundred times (0.2 to 2.2 % over 1,000 records: four deviations; the
+/// likelihood ratio, which is for long records, up to 2.6 %), and see a false one.
+#[test]
+fn nested_models_are_told_apart() {
+    let (mut by_ratio, mut by_f) = (0, 0);
+    for seed in 0..1000 {
+        let record = [record(seed, 2.0, 0.0)];
+        let line = Summary::of("line", &fit(&record, fixed(0.0)).unwrap());
+        let parabola = Summary::of("parabola", &fit(&record, free(0.1)).unwrap());
+        by_ratio += u32::from(!likelihood_ratio(&line, &parabola).unwrap().passed);
+        by_f += u32::from(!f_test(&line, &parabola).unwrap().passed);
+        assert!(likelihood_ratio(&parabola, &line).is_err());
+    }
+    println!("refused {by_ratio} by likelihood ratio, {by_f} by F");
+    assert!((2..=22).contains(&by_f) && (2..=26).contains(&by_ratio), "{by_f} {by_ratio}");
+
+    let record = [record(1, 2.0, 0.3)];
+    let line = Summary::of("line", &fit(&record, fixed(0.0)).unwrap());
+    let parabola = Summary::of("parabola", &fit(&record, free(0.1)).unwrap());
+    let test = f_test(&line, &parabola).unwrap();
+    assert!(!test.passed && test.meaning.contains("`line` misses something"), "{test:?}");
+    assert!(parabola.aicc < line.aicc && parabola.bic < line.bic);
+    let table = Comparison(vec![line, parabola]).to_string();
+    println!("{table}");
+    assert!(table.lines().any(|line| line.starts_with("c ") && line.contains(" - ")), "{table}");
+}
+
+/// The variance of a product by hand: `(b sa)^2 + (a sb)^2 + 2 a b cov`.
+#[test]
+fn delta_method_by_hand() {
+    let estimate = fit(&[record(3, 2.0, 0.4)], free(0.1)).unwrap();
+    let (p, c) = (estimate.parameters, &estimate.covariance);
+    let product = derived(&estimate, "a b", |p| p.a * p.b);
+    let expected = (p.b * p.b * c[(0, 0)] + p.a * p.a * c[(1, 1)] + 2.0 * p.a * p.b * c[(0, 1)]).sqrt();
+    assert!((product.value - p.a * p.b).abs() < 1e-15);
+    assert!((product.standard_error.unwrap() / expected - 1.0).abs() < 1e-12);
+    let (lower, upper) = product.interval.unwrap();
+    assert!(lower < product.value && product.value < upper);
+    // A root of a negative number has no error, and is not taken for one.
+    assert_eq!(derived(&estimate, "root", |p| (-p.a).sqrt()).standard_error, None);
+}
+
+/// On data not used the error is the noise, a little more by the parameters' own.
+#[test]
+fn unseen_data_and_drift() {
+    let records: Vec<Record> = (0..6).map(|seed| record(seed, 2.0, 0.3)).collect();
+    for validation in cross_validate(&Polynomial, &records, |records| fit(records, free(0.0))).unwrap() {
+        let (_, outputs) = &validation.qualities[0];
+        // 40 samples: the deviation of a standard deviation is 11 %.
+        assert!((outputs[0].1.rmse / 0.1 - 1.0).abs() < 0.4, "{validation:?}");
+    }
+    assert!(cross_validate(&Polynomial, &records[..1], |records| fit(records, free(0.0))).is_err());
+    let estimate = fit(&records[..1], free(0.0)).unwrap();
+    assert_eq!(validate(&estimate, &Polynomial, &records[1], &[]).unwrap().experiment, "record 1");
+
+    let each = |first: u64, b: &dyn Fn(u64) -> f64| -> Vec<Summary> {
+        let estimates = (0..8).map(|day| fit(&[record(first + day, b(day), 0.3)], free(0.0)).unwrap());
+        estimates.map(|estimate| Summary::of("day", &estimate)).collect()
+    };
+    // Nothing drifts: each test refuses about once in a hundred times; 300 of each, three deviations above 1.4 % (the tail of
+    // Student's t with 37 degrees of freedom where a normal one has 1 %).
+    let steady: Vec<_> = (0..100).flat_map(|batch| drift(&each(100 + 8 * batch, &|_| 2.0))).collect();
+    let (changed, trended) =
+        (steady.iter().filter(|d| !d.change.passed).count(), steady.iter().filter(|d| !d.trend.passed).count());
+    println!("of {}: {changed} changes, {trended} trends", steady.len());
+    assert!(steady.len() == 300 && changed <= 10 && trended <= 10, "{changed} {trended}");
+    let warming = drift(&each(20, &|day| 2.0 + 0.05 * day as f64));
+    let b = warming.iter().find(|drift| drift.name == "b").unwrap();
+    assert!(!b.trend.passed && !b.change.passed && (b.slope - 0.05).abs() < 0.02, "{b:?}");
+}

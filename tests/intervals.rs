@@ -1,0 +1,189 @@
+//! Whether intervals cover the truth as often as they say, by simulation. Seeds are fixed.
+#![cfg(not(debug_assertions))]
+
+use greybox::diagnose::{Resampling, bands, bootstrap};
+use greybox::{Estimate, Experiment, Fit, Knowledge, Model, Scalar, Signals, Time, free, signals};
+use std::f64::consts::TAU;
+
+signals! { struct Level { x: "V" } }
+signals! { struct Drive { u: "V" } }
+signals! { struct Lag { k: "1", tau: "s" } }
+
+/// `tau dx/dt = k u - x`.
+struct FirstOrder;
+
+impl Model for FirstOrder {
+    type State = Level;
+    type Input = Drive;
+    type Output = Level;
+    type Parameters = Lag;
+
+    #[inline]
+    fn derivative<S: Scalar>(&self, _t: f64, x: &Level<S>, u: &Drive<S>, p: &Lag<S>) -> Level<S> {
+        Level { x: (p.k * u.u - x.x) / p.tau }
+    }
+
+    #[inline]
+    fn output<S: Scalar>(&self, _t: f64, x: &Level<S>, _u: &Drive<S>, _p: &Lag<S>) -> Level<S> {
+        *x
+    }
+}
+
+const TRUTH: Lag = Lag { k: 2.0, tau: 0.05 };
+const STEP: f64 = 0.01;
+
+/// Normal numbers by Box and Muller from SplitMix64.
+struct Random(u64);
+
+impl Random {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        (-2.0 * (1.0 - self.uniform()).ln()).sqrt() * (TAU * self.uniform()).cos()
+    }
+}
+
+/// A record of slow random steps with noise of unit innovations and this autoregression.
+fn record(samples: usize, rho: f64, seed: u64) -> Experiment<Level, Drive, Level> {
+    let mut random = Random(seed.wrapping_mul(0x2545_f491_4f6c_dd1d));
+    let (mut inputs, mut outputs) = (vec![], vec![]);
+    let (mut x, mut noise, mut u) = (0.0, random.normal() / (1.0 - rho * rho).sqrt(), 1.0);
+    let decay = (-STEP / TRUTH.tau).exp();
+    for k in 0..samples {
+        if k % 40 == 0 {
+            u = 1.0 + random.uniform();
+        }
+        inputs.push(Drive { u });
+        outputs.push(Level { x: x + 0.05 * noise });
+        x = TRUTH.k * u + (x - TRUTH.k * u) * decay;
+        noise = rho * noise + random.normal();
+    }
+    Experiment::new(&FirstOrder, Time::Uniform { start: 0.0, step: STEP }, inputs, outputs).unwrap()
+}
+
+fn fit(samples: usize, rho: f64, seed: u64) -> Estimate<FirstOrder> {
+    let record = record(samples, rho, seed);
+    Fit::new(&FirstOrder, &record).parameters(Lag { k: free(1.5), tau: free(0.1).log() }).run().unwrap()
+}
+
+/// Part of the repetitions whose intervals cover the truth, for each parameter: as said, and classical ones (which the
+/// parametric error index holds).
+fn coverage(samples: usize, rho: f64, repetitions: u64) -> [(f64, f64); 2] {
+    let truth = Lag::<f64>::into_array(TRUTH);
+    let mut covered = [(0.0, 0.0); 2];
+    for seed in 0..repetitions {
+        let estimate = fit(samples, rho, seed);
+        assert!(estimate.outcome.converged(), "{}", estimate.outcome);
+        let part = |covers: bool| f64::from(u8::from(covers)) / repetitions as f64;
+        for (j, (said, classical)) in covered.iter_mut().enumerate() {
+            let unknown = &estimate.unknowns[j];
+            let Knowledge::Known { lower, upper, .. } = unknown.knowledge else { panic!("{:?}", unknown.knowledge) };
+            *said += part(lower <= truth[j] && truth[j] <= upper);
+            let error = unknown.error_index.unwrap() / 100.0 * unknown.value / estimate.degrees_of_freedom().sqrt();
+            *classical += part((unknown.value - truth[j]).abs() <= 1.96 * error);
+        }
+    }
+    covered
+}
+
+/// With white noise the intervals are classical (but for the one in a hundred that the test refuses by chance) and cover
+/// 95 %; over 1,000 repetitions the binomial spread is 0.7 %.
+#[test]
+fn classical_intervals_cover_white_noise() {
+    for (covered, classical) in coverage(500, 0.0, 1000) {
+        println!("white noise, 500 samples: {covered}, classical {classical}");
+        assert!((0.93..=0.97).contains(&covered), "{covered}");
+    }
+}
+
+/// With colored noise the fit says so, and its intervals cover 93 to 97 % of the time at 5,000 samples.
+#[test]
+fn colored_noise_is_seen_and_allowed_for() {
+    let estimate = fit(5000, 0.9, 7);
+    assert!(estimate.method.covariance.starts_with("HAC"), "{}", estimate.method.covariance);
+    println!("{estimate}");
+    for samples in [500, 5000] {
+        for (covered, classical) in coverage(samples, 0.9, 1000) {
+            println!("AR(1) 0.9, {samples} samples: {covered}, classical {classical}");
+            assert!(classical < 0.7, "{samples}: {classical}");
+            assert!(samples < 5000 || (0.93..=0.97).contains(&covered), "{samples}: {covered}");
+        }
+    }
+}
+
+/// Refits of resampled records, single residuals for white noise and blocks for colored, say the same as the intervals; and
+/// the same again from the same seed.
+#[test]
+fn bootstraps_agree() {
+    for (rho, resampling, tolerance) in [(0.0, Resampling::Residuals, 0.1), (0.9, Resampling::Blocks(100), 0.25)] {
+        let record = record(5000, rho, 3);
+        let fit = Fit::new(&FirstOrder, &record).parameters(Lag { k: free(1.5), tau: free(0.1).log() });
+        let mut problem = fit.problem().unwrap();
+        let estimate = problem.run().unwrap();
+        let found = bootstrap(&problem, &estimate, resampling, 400, 1).unwrap();
+        assert_eq!(found.converged, 400);
+        for i in 0..2 {
+            let ratio = found.standard_errors[i] / estimate.unknowns[i].knowledge.standard_error().unwrap();
+            println!("{rho} {}: {ratio} {:?}", found.unknowns[i], found.intervals[i]);
+            // 400 refits know a standard deviation to 3.5 %; a block covariance from 50 blocks to some 10 %.
+            assert!((ratio - 1.0).abs() < tolerance, "{rho} {}: {ratio}", found.unknowns[i]);
+        }
+        let again = bootstrap(&problem, &estimate, resampling, 20, 1).unwrap();
+        assert_eq!(again, bootstrap(&problem, &estimate, resampling, 20, 1).unwrap());
+    }
+}
+
+/// Percentiles of refits cover 93 to 97 % of the time: 400 records of 300 samples, 300 refits each; binomial spread 1.1 %.
+#[test]
+fn bootstrap_covers() {
+    let truth = [TRUTH.k, TRUTH.tau];
+    let mut covered = [0.0; 2];
+    for seed in 0..400 {
+        let record = record(300, 0.0, seed);
+        let fit = Fit::new(&FirstOrder, &record).parameters(Lag { k: free(1.5), tau: free(0.1).log() });
+        let mut problem = fit.problem().unwrap();
+        let estimate = problem.run().unwrap();
+        let found = bootstrap(&problem, &estimate, Resampling::Residuals, 300, seed).unwrap();
+        for (j, covered) in covered.iter_mut().enumerate() {
+            let (lower, upper) = found.intervals[j];
+            *covered += f64::from(u8::from(lower <= truth[j] && truth[j] <= upper)) / 400.0;
+        }
+    }
+    println!("bootstrap: {covered:?}");
+    assert!(covered.iter().all(|covered| (0.93..=0.97).contains(covered)), "{covered:?}");
+}
+
+/// Bands hold the noise-free output, and new measurements, as often as they say; 400 records, at one sample each.
+#[test]
+fn bands_cover() {
+    let (mut confident, mut predicted) = (0.0, 0.0);
+    for seed in 0..400 {
+        let record = record(300, 0.0, seed);
+        let fit = Fit::new(&FirstOrder, &record).parameters(Lag { k: free(1.5), tau: free(0.1).log() });
+        let mut problem = fit.problem().unwrap();
+        let estimate = problem.run().unwrap();
+        let bands = bands(&problem, &estimate, 0, 0.95).unwrap();
+        // The truth: simulated without noise, which does not depend on the seed of the noise but on the inputs.
+        let (mut x, decay) = (0.0, (-STEP / TRUTH.tau).exp());
+        let at = 200 + seed as usize % 90;
+        for k in 0..at {
+            let steady = TRUTH.k * record.inputs()[k].u;
+            x = steady + (x - steady) * decay;
+        }
+        let error = (bands.outputs[at].x - x).abs();
+        confident += f64::from(u8::from(error <= bands.confidence[at].x)) / 400.0;
+        let measured = x + 0.05 * Random(seed.wrapping_mul(77) + 5).normal();
+        let error = (bands.outputs[at].x - measured).abs();
+        predicted += f64::from(u8::from(error <= bands.prediction[at].x)) / 400.0;
+    }
+    println!("bands: {confident}, {predicted}");
+    for covered in [confident, predicted] {
+        assert!((0.92..=0.98).contains(&covered), "{covered}");
+    }
+}

@@ -1,0 +1,159 @@
+//! What the examination of residuals says, on records whose trouble is known.
+
+use greybox::diagnose::residuals::{Residuals, examine};
+use greybox::{Experiment, Fit, Hold, Model, Nothing, Scalar, Time, fixed, signals};
+use std::f64::consts::TAU;
+
+signals! { struct Drive { u: "V", w: "rad/s" } }
+signals! { struct Reading { y: "V" } }
+signals! { struct Gain { k: "1" } }
+
+/// `y = k u`, whatever `w`.
+struct Amplifier;
+
+impl Model for Amplifier {
+    type State = Nothing;
+    type Input = Drive;
+    type Output = Reading;
+    type Parameters = Gain;
+    const KIND: greybox::Kind = greybox::Kind::Static;
+
+    #[inline]
+    fn output<S: Scalar>(&self, _t: f64, _x: &Nothing, u: &Drive<S>, p: &Gain<S>) -> Reading<S> {
+        Reading { y: p.k * u.u }
+    }
+}
+
+struct Random(u64);
+
+impl Random {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        (-2.0 * (1.0 - self.uniform()).ln()).sqrt() * (TAU * self.uniform()).cos()
+    }
+}
+
+const STEP: f64 = 0.01;
+
+/// The examination of `y = 2 u + disturbance(k, u, w, e)`, `e` a normal number.
+fn examined(samples: usize, seed: u64, mut disturbance: impl FnMut(usize, Drive, f64) -> f64) -> Residuals {
+    let mut random = Random(seed.wrapping_mul(0x2545_f491_4f6c_dd1d));
+    let (mut inputs, mut outputs) = (vec![], vec![]);
+    for k in 0..samples {
+        let u = Drive { u: 2.0 * random.uniform() - 1.0, w: 100.0 * random.uniform() };
+        inputs.push(u);
+        outputs.push(Reading { y: 2.0 * u.u + disturbance(k, u, random.normal()) });
+    }
+    let record = Experiment::new(&Amplifier, Time::Uniform { start: 0.0, step: STEP }, inputs, outputs).unwrap();
+    let record = record.hold(Hold::Zero);
+    let prediction = Fit::new(&Amplifier, &record).parameters(Gain { k: fixed(2.0) }).simulate().unwrap();
+    examine(&prediction, &record).unwrap().remove(0)
+}
+
+fn failed(residuals: &Residuals) -> Vec<&str> {
+    residuals.tests.iter().filter(|test| !test.passed).map(|test| test.name.as_str()).collect()
+}
+
+/// Each test refuses white normal noise once in a hundred times: over 400 records at most 2.5 % of the tests of a kind
+/// (1 % and three binomial deviations).
+#[test]
+fn noise_passes() {
+    let mut refused = std::collections::BTreeMap::<String, u32>::new();
+    for seed in 0..400 {
+        for name in failed(&examined(1000, seed, |_, _, e| 0.1 * e)) {
+            *refused.entry(name.to_owned()).or_default() += 1;
+        }
+    }
+    println!("{refused:?}");
+    assert!(refused.values().all(|count| *count <= 10), "{refused:?}");
+}
+
+/// A coloring is no period, however strong.
+#[test]
+fn colored_noise_has_no_period() {
+    for rho in [0.5, 0.9, 0.99, 1.0] {
+        let found = (0..200).filter(|&seed| {
+            let mut noise = 0.0;
+            let residuals = examined(2000, seed, |_, _, e| {
+                noise = rho * noise + e;
+                noise
+            });
+            residuals.period.is_some()
+        });
+        let found = found.count();
+        println!("{rho}: {found}");
+        assert!(found <= 8, "{rho}: {found} of 200");
+    }
+}
+
+/// A ripple of a tenth of the noise is found in 20,000 samples, with its period and amplitude.
+#[test]
+fn ripple_is_found() {
+    let residuals = examined(20_000, 3, |k, _, e| e + 0.1 * (TAU * k as f64 * STEP / 0.137).sin());
+    let period = residuals.period.unwrap();
+    // A hundredth of a period over the record; the amplitude by its standard error sqrt(2 / n) of the noise.
+    assert!((period.seconds / 0.137 - 1.0).abs() < 1e-4, "{period:?}");
+    assert!((period.amplitude - 0.1).abs() < 0.03, "{period:?}");
+    assert!(residuals.tests.iter().any(|t| t.name == "periodogram" && t.meaning.contains("0.1370 s")), "{residuals:?}");
+}
+
+/// What each trouble fails.
+#[test]
+fn each_trouble_has_its_test() {
+    let growing = examined(2000, 1, |_, u, e| 0.1 * e * (0.5 + u.w / 50.0));
+    assert!(failed(&growing).iter().any(|name| name.contains("Koenker, input `w`")), "{:?}", failed(&growing));
+    let spread = growing.spreads.iter().find(|spread| spread.signal == "w").unwrap();
+    assert!(spread.deviation.last().unwrap() > &(3.0 * spread.deviation[0]), "{spread:?}");
+
+    let mut before = 0.0;
+    let late = examined(2000, 2, |_, u, e| 0.1 * e + 0.1 * std::mem::replace(&mut before, u.u));
+    assert!(failed(&late).contains(&"cross-correlation with input `u`"), "{:?}", failed(&late));
+    let correlation = late.correlations.iter().find(|c| c.signal == "u").unwrap();
+    let largest = (0..correlation.values.len())
+        .max_by(|&a, &b| correlation.values[a].abs().total_cmp(&correlation.values[b].abs()));
+    assert_eq!(largest.unwrap() as i64 + correlation.first_lag, 1);
+
+    assert_eq!(failed(&examined(2000, 3, |_, _, e| 0.1 * e + 0.02)), ["zero mean"]);
+
+    let spiked = examined(2000, 4, |k, _, e| if k % 500 == 99 { 3.0 } else { 0.1 * e });
+    assert_eq!(spiked.outlier_count, 4);
+    let mut samples: Vec<u64> = spiked.outliers.iter().map(|outlier| outlier.sample).collect();
+    samples.sort_unstable();
+    assert_eq!(samples, [99, 599, 1099, 1599]);
+    assert!(failed(&spiked).contains(&"Jarque-Bera"));
+
+    let mut noise = 0.0;
+    let colored = examined(2000, 5, |_, _, e| {
+        noise = 0.8 * noise + 0.1 * e;
+        noise
+    });
+    assert!(failed(&colored).contains(&"Ljung-Box, 25 lags"));
+    assert!((colored.autocorrelation[0] - 0.8).abs() < 0.05, "{}", colored.autocorrelation[0]);
+    // (1 - rho) / (1 + rho) of the samples are worth as much as independent ones.
+    assert!((colored.effective_samples / 2000.0 * 9.0 - 1.0).abs() < 0.25, "{}", colored.effective_samples);
+}
+
+/// Too few residuals, none that vary, and inputs that are constant: no test, no number that is not one.
+#[test]
+fn little_is_said_of_little() {
+    assert!(examined(10, 1, |_, _, e| e).tests.is_empty());
+    let exact = examined(100, 1, |_, _, _| 0.0);
+    assert!(exact.tests.is_empty() && exact.standard_deviation == 0.0);
+    let json = format!("{exact:?}");
+    assert!(!json.contains("NaN") && !json.contains("inf"), "{json}");
+
+    let inputs = vec![Drive { u: 1.0, w: 5.0 }; 50];
+    let outputs = (0..50).map(|k| Reading { y: 2.0 + ((k * k) as f64).sin() }).collect();
+    let record = Experiment::new(&Amplifier, Time::Uniform { start: 0.0, step: STEP }, inputs, outputs).unwrap();
+    let prediction = Fit::new(&Amplifier, &record).parameters(Gain { k: fixed(2.0) }).simulate().unwrap();
+    let residuals = examine(&prediction, &record).unwrap().remove(0);
+    assert_eq!(residuals.constant_inputs, ["u", "w"]);
+    assert!(residuals.correlations.iter().all(|c| c.signal == "y"));
+}
