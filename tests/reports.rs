@@ -274,3 +274,19 @@ fn scratch(name: &str) -> PathBuf {
     fs::create_dir_all(&folder).unwrap();
     folder
 }
+
+/// Two pixels to each of the drawing's; the header of the file says so (PNG specification, 11.2.2).
+#[cfg(feature = "png")]
+#[test]
+fn pictures_become_pixels() {
+    let report = with_everything();
+    for plot in report.plots() {
+        match plot.to_png() {
+            Ok(png) => {
+                assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n");
+                assert_eq!(u32::from_be_bytes(png[16..20].try_into().unwrap()), 2 * 960, "{}", plot.title());
+            }
+            Err(error) => assert!(error.to_string().contains("the system has no font"), "{error}"),
+        }
+    }
+}
