@@ -4,7 +4,10 @@
 //! pairs, `t vir qm qg` a linear axis under its position controller, with friction that may differ between the directions.
 
 use clap::Parser;
+use greybox::diagnose::residuals::examine;
+use greybox::optimize::Severity;
 use greybox::pmsm::{Surface, Winding};
+use greybox::report::Finding;
 use greybox::{CsvFile, ExperimentOf, Fit, Hold, Model, Of, Parameter, Report, Scalar, fixed, free, signals};
 use std::{error::Error, fs::File, io::BufRead, io::BufReader, io::IsTerminal, path::PathBuf};
 
@@ -98,5 +101,16 @@ fn report<M: Model>(
     parameters: Of<M::Parameters, Parameter>,
 ) -> Result<Report, greybox::Error> {
     let estimate = Fit::new(model, &record).parameters(parameters).run()?;
-    Ok(Report::new(model, &estimate, &record)?.titled(format!("Estimate from {}", record.name())))
+    let findings = examine(&estimate.predict(model, &record)?, &record)?.into_iter().flat_map(|residuals| {
+        let about = format!("residual of {}", residuals.output);
+        residuals.tests.into_iter().map(move |test| Finding {
+            about: about.clone(),
+            test: test.name,
+            result: format!("p = {:.1e}", test.p_value),
+            meaning: test.meaning,
+            severity: if test.passed { Severity::Usable } else { Severity::UsableWithCare },
+        })
+    });
+    let title = format!("Estimate from {}", record.name());
+    Ok(Report::new(model, &estimate, &record)?.titled(title).with_findings(findings))
 }

@@ -221,7 +221,8 @@ fn what_cannot_be_written_leaves_nothing_behind() {
     let taken = folder.join("taken.html");
     fs::create_dir(&taken).unwrap();
     assert!(matches!(report.save(&taken), Err(Error::File { .. })));
-    assert!(matches!(report.plots()[0].save(&taken), Err(Error::File { .. })));
+    assert!(matches!(report.plots()[0].save(nowhere.with_extension("svg")), Err(Error::File { .. })));
+    assert!(report.plots()[0].save(&taken).unwrap_err().to_string().contains("a picture is written as .svg"));
     let unknown = report.save(folder.join("report.pdf")).unwrap_err().to_string();
     assert!(unknown.contains("report.pdf") && unknown.contains(".html, .md, .json or .txt"), "{unknown}");
     let left: Vec<_> = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name()).collect();
@@ -272,4 +273,20 @@ fn scratch(name: &str) -> PathBuf {
     let _ = fs::remove_dir_all(&folder);
     fs::create_dir_all(&folder).unwrap();
     folder
+}
+
+/// Two pixels to each of the drawing's; the header of the file says so (PNG specification, 11.2.2).
+#[cfg(feature = "png")]
+#[test]
+fn pictures_become_pixels() {
+    let report = with_everything();
+    for plot in report.plots() {
+        match plot.to_png() {
+            Ok(png) => {
+                assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n");
+                assert_eq!(u32::from_be_bytes(png[16..20].try_into().unwrap()), 2 * 960, "{}", plot.title());
+            }
+            Err(error) => assert!(error.to_string().contains("the system has no font"), "{error}"),
+        }
+    }
 }

@@ -85,8 +85,8 @@ fn class(severity: Severity) -> &'static str {
 
 fn parameters(main: &mut Markup, report: &Report) {
     section(main, "Parameters", |section| {
-        section.node("div", &[("class", &"pair")], |pair| {
-            table(pair, "Parameters", "cards", &words::parameters(report));
+        section.node("div", &[("class", &"pair table-first")], |pair| {
+            table(pair, "Estimates", "cards", &words::parameters(report));
             plots::parameters(report).iter().for_each(|plot| figure(pair, plot, "Intervals beside each other"));
         });
         table(section, "Outputs", "cards", &words::outputs(report));
@@ -234,7 +234,7 @@ fn section(main: &mut Markup, title: &str, content: impl FnOnce(&mut Markup)) {
 
 fn figure(to: &mut Markup, plot: &Plot<'_>, caption: &str) {
     to.node("figure", &[], |figure| {
-        figure.words("figcaption", &[], caption);
+        figure.words("figcaption", &[], typeset(caption));
         plot.draw(figure, Size::Fluid);
     });
 }
@@ -288,6 +288,17 @@ fn list(to: &mut Markup, items: &[String]) {
 /// A sentence with names as code.
 fn sentence(to: &mut Markup, text: &str) {
     for (name, piece) in words::pieces(text) {
-        if name { to.words("code", &[], piece) } else { to.text(piece) }
+        if name { to.words("code", &[], piece) } else { to.text(typeset(piece)) }
     }
+}
+
+/// A minus that does not part from its number at the end of a line. Tables keep the plain one, for those who copy numbers.
+fn typeset(text: &str) -> String {
+    let mut typeset = String::with_capacity(text.len());
+    let mut letters = text.chars().peekable();
+    while let Some(letter) = letters.next() {
+        let before_digit = letters.peek().is_some_and(char::is_ascii_digit);
+        typeset.push(if letter == '-' && before_digit { '−' } else { letter });
+    }
+    typeset
 }

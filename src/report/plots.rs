@@ -1,5 +1,8 @@
 //! [`Plot`]: the pictures of a report, for its page and as files.
 
+#[cfg(feature = "png")]
+mod png;
+
 use super::chart::{Axis, Curves, Forest, ForestRow, Heat, Layer, Size};
 use super::markup::Markup;
 use super::trace::Trace;
@@ -10,7 +13,7 @@ use std::path::Path;
 
 /// A picture of a report.
 ///
-/// [`save`](Plot::save) writes it as an SVG file of its own, on white; the page draws it by the same code.
+/// [`save`](Plot::save) writes it as a file of its own, on white; the page draws it by the same code.
 #[derive(Clone, Debug)]
 pub struct Plot<'a> {
     name: String,
@@ -27,6 +30,8 @@ enum Drawing<'a> {
 
 /// Width of a picture in a file of its own (px).
 const WIDTH: f64 = 960.0;
+/// Height of the small pictures beside each other (px).
+const PANEL: f64 = 160.0;
 
 impl Plot<'_> {
     /// A name made of letters, digits and `-`, fit for a file.
@@ -46,12 +51,31 @@ impl Plot<'_> {
         svg.finish()
     }
 
-    /// Writes the picture as an SVG file; beside first and then renamed, so that there is never half a file.
+    /// The picture as pixels, in a PNG file's bytes: two to each of the SVG's, and its letters in a font of the system.
     ///
     /// # Errors
-    /// A path that cannot be written to; nothing is left behind.
+    /// A system without fonts.
+    #[cfg(feature = "png")]
+    pub fn to_png(&self) -> Result<Vec<u8>, Error> {
+        png::rendered(&self.to_svg())
+    }
+
+    /// Writes the picture to a file that ends in `.svg` (or `.png`, with the feature of that name); beside first and then
+    /// renamed, so that there is never half a file.
+    ///
+    /// # Errors
+    /// Another ending, or a path that cannot be written to; nothing is left behind.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
-        file::write(path.as_ref(), self.to_svg().as_bytes())
+        let path = path.as_ref();
+        match path.extension().and_then(|ending| ending.to_str()) {
+            Some("svg") => file::write(path, self.to_svg().as_bytes()),
+            #[cfg(feature = "png")]
+            Some("png") => file::write(path, &self.to_png()?),
+            _ => {
+                let (path, endings) = (path.display(), if cfg!(feature = "png") { ".svg or .png" } else { ".svg" });
+                Err(Error::Option(format!("{path}: a picture is written as {endings}; give the path that ending")))
+            }
+        }
     }
 
     pub(super) fn draw(&self, to: &mut Markup, size: Size) {
@@ -98,14 +122,15 @@ fn forest_row(unknown: &Unknown) -> ForestRow {
 pub(super) fn correlation(report: &Report) -> Option<Plot<'_>> {
     let names: Vec<&str> = report.unknowns.iter().map(|unknown| unknown.name.as_str()).collect();
     let title = "Correlation of the estimates".to_owned();
+    let known = report.unknowns.iter().map(|unknown| unknown.knowledge.standard_error().is_some()).collect();
     (names.len() > 1 && names.len() == report.correlation.size())
-        .then(|| plot("correlation", title, Drawing::Heat(Heat { names, matrix: &report.correlation })))
+        .then(|| plot("correlation", title, Drawing::Heat(Heat { names, known, matrix: &report.correlation })))
 }
 
 /// Measured and predicted over time.
 pub(super) fn response<'a>(record: &Record, fit: &'a OutputFit) -> Option<Plot<'a>> {
     let title = format!("Output {} of {}: measured and predicted over time", fit.name, record.name);
-    Some(plot(&stem("response", record, fit), title, over_time(fit, fit.overview.as_ref()?, &fit.name)))
+    Some(plot(&stem("response", record, fit), title, over_time(fit, fit.overview.as_ref()?, 240.0)))
 }
 
 /// The same about the largest residual.
@@ -114,28 +139,28 @@ pub(super) fn closeup<'a>(record: &Record, fit: &'a OutputFit) -> [Option<Plot<'
     let title = format!("Output {} of {} about its largest residual: measured and predicted", fit.name, record.name);
     let of_residuals = format!("Residual of {} of {} about the largest one", fit.name, record.name);
     [
-        Some(plot(&stem("closeup", record, fit), title, over_time(fit, trace, &fit.name))),
-        Some(plot(&stem("closeup-residual", record, fit), of_residuals, residual_over_time(fit, trace))),
+        Some(plot(&stem("closeup", record, fit), title, over_time(fit, trace, PANEL))),
+        Some(plot(&stem("closeup-residual", record, fit), of_residuals, residual_over_time(fit, trace, PANEL))),
     ]
 }
 
 /// What is left over time.
 pub(super) fn residuals<'a>(record: &Record, fit: &'a OutputFit) -> Option<Plot<'a>> {
     let title = format!("Residual of {} of {} over time: measured less predicted", fit.name, record.name);
-    Some(plot(&stem("residual", record, fit), title, residual_over_time(fit, fit.overview.as_ref()?)))
+    Some(plot(&stem("residual", record, fit), title, residual_over_time(fit, fit.overview.as_ref()?, 130.0)))
 }
 
-fn over_time<'a>(fit: &OutputFit, trace: &'a Trace, name: &str) -> Drawing<'a> {
+fn over_time<'a>(fit: &OutputFit, trace: &'a Trace, height: f64) -> Drawing<'a> {
     let range = joined(trace.measured.range(), trace.predicted.range());
     let layer = |class, band| Layer::Band { class, x: &trace.t, y: band };
     let layers = vec![layer("measured", &trace.measured), layer("predicted", &trace.predicted)];
-    Drawing::Curves(Curves { x: time(trace), y: Axis::new(name, &fit.unit, range).with_room(), layers, height: 240.0 })
+    Drawing::Curves(Curves { x: time(trace), y: Axis::new(&fit.name, &fit.unit, range).with_room(), layers, height })
 }
 
-fn residual_over_time<'a>(fit: &OutputFit, trace: &'a Trace) -> Drawing<'a> {
+fn residual_over_time<'a>(fit: &OutputFit, trace: &'a Trace, height: f64) -> Drawing<'a> {
     let y = Axis::new("residual", &fit.unit, trace.residual.range()).with_room();
     let layers = vec![Layer::Band { class: "residual", x: &trace.t, y: &trace.residual }];
-    Drawing::Curves(Curves { x: time(trace), y, layers, height: 130.0 })
+    Drawing::Curves(Curves { x: time(trace), y, layers, height })
 }
 
 fn time(trace: &Trace) -> Axis {
@@ -159,7 +184,7 @@ pub(super) fn profile(profile: &ProfileCurve) -> Plot<'_> {
         x: Axis::new(&profile.name, &profile.unit, range),
         y: Axis::new("rise of -2 ln L", "", Some((0.0, 1.05 * highest))),
         layers: vec![Layer::Curve { x: &profile.values, y: &profile.rise }, Layer::Level(profile.level)],
-        height: 160.0,
+        height: PANEL,
     });
     plot(&file_name(&format!("profile-{}", profile.name)), title, drawing)
 }
@@ -176,7 +201,7 @@ pub(super) fn histogram<'a>(record: &Record, fit: &OutputFit) -> Option<Plot<'a>
         x: Axis::new("residual", &fit.unit, Some((histogram.from, to))),
         y: Axis::new("share", "%", Some((0.0, 1.05 * highest))),
         layers: vec![Layer::Bars { first: histogram.from, width: histogram.width, heights }],
-        height: 160.0,
+        height: PANEL,
     });
     Some(plot(&stem("histogram", record, fit), title, drawing))
 }
@@ -195,7 +220,7 @@ pub(super) fn autocorrelation<'a>(record: &Record, fit: &OutputFit) -> Option<Pl
             Layer::Level(bound),
             Layer::Level(-bound),
         ],
-        height: 160.0,
+        height: PANEL,
     });
     Some(plot(&stem("autocorrelation", record, fit), title, drawing))
 }

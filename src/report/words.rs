@@ -84,7 +84,8 @@ pub(super) fn outputs(report: &Report) -> Table {
 pub(super) fn findings(report: &Report) -> Table {
     let rows = report.findings.iter().map(|finding| {
         let verdict = format!("{} {}", sign(finding.severity), verdict(finding.severity).to_lowercase());
-        row([&finding.about, &finding.test, &finding.result, &verdict, &finding.meaning.replace('`', "")])
+        let plain = |text: &str| text.replace('`', "");
+        row([&finding.about, &plain(&finding.test), &finding.result, &verdict, &plain(&finding.meaning)])
     });
     Table { columns: &["about", "test", "result", "verdict", "meaning"], rows: rows.collect() }
 }

@@ -30,7 +30,7 @@ impl Forest {
         let reach = self.reach();
         let axis = Axis::new("95 % interval about the estimate", "%", Some((-reach, reach)));
         let letters = self.rows.iter().map(|row| row.name.chars().count()).max().unwrap_or(0).min(LETTERS);
-        let margins = Margins { left: letters as f64 * LETTER + 14.0, right: 18.0, top: 6.0, bottom: 40.0 };
+        let margins = Margins { left: letters as f64 * LETTER + 20.0, right: 18.0, top: 6.0, bottom: 40.0 };
         let height = ROW * self.rows.len() as f64;
         Frame { size, margins, height }.draw(to, name, |frame, svg| {
             for tick in axis.ticks() {
@@ -65,7 +65,7 @@ impl Forest {
 
 impl Row {
     fn draw(&self, frame: &Frame, svg: &mut Markup, axis: &Axis, y: f64) {
-        let place: [(&str, &dyn Display); 4] = [("class", &"end"), ("x", &-8), ("y", &y), ("dy", &4)];
+        let place: [(&str, &dyn Display); 4] = [("class", &"end"), ("x", &-14), ("y", &y), ("dy", &4)];
         svg.words("text", &place, cut(&self.name, LETTERS));
         let (lower, upper) = match &self.interval {
             Ok(interval) => *interval,
@@ -79,10 +79,12 @@ impl Row {
         let bar: [(&str, &dyn Display); 5] =
             [("class", &"interval"), ("x1", &frame.x(begin)), ("x2", &frame.x(end)), ("y1", &y), ("y2", &y)];
         svg.leaf("line", &bar);
-        for (beyond, at, arrow) in [(lower < axis.from, 0.0, "◂"), (upper > axis.to, 1.0, "▸")] {
+        for (beyond, at, shift, class, arrow) in
+            [(lower < axis.from, 0.0, 1, "beyond end", "◀"), (upper > axis.to, 1.0, -1, "beyond", "▶")]
+        {
             if beyond {
-                let place: [(&str, &dyn Display); 4] =
-                    [("class", &"beyond middle"), ("x", &frame.x(at)), ("y", &y), ("dy", &4)];
+                let place: [(&str, &dyn Display); 5] =
+                    [("class", &class), ("x", &frame.x(at)), ("y", &y), ("dx", &shift), ("dy", &4)];
                 svg.words("text", &place, arrow);
             }
         }

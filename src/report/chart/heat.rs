@@ -9,6 +9,8 @@ use core::fmt::Display;
 #[derive(Clone, Debug)]
 pub(in crate::report) struct Heat<'a> {
     pub names: Vec<&'a str>,
+    /// Which of them have an interval, and so a correlation.
+    pub known: Vec<bool>,
     pub matrix: &'a SquareMatrix,
 }
 
@@ -34,8 +36,13 @@ impl Heat<'_> {
                 svg.words("text", &[("class", &"middle"), ("x", &frame.x(middle(i))), ("y", &-8)], i + 1);
                 for j in 0..n {
                     let r = self.matrix[(i, j)];
-                    let class = if r < 0.0 { "cell negative" } else { "cell positive" };
-                    let strength = format!("{:.2}", STRENGTH * r.abs().min(1.0));
+                    let known = self.known[i] && self.known[j];
+                    let class = match (known, r < 0.0) {
+                        (false, _) => "cell none",
+                        (true, true) => "cell negative",
+                        (true, false) => "cell positive",
+                    };
+                    let strength = format!("{:.2}", if known { STRENGTH * r.abs().min(1.0) } else { STRENGTH });
                     let cell: [(&str, &dyn Display); 6] = [
                         ("class", &class),
                         ("x", &frame.x(j as f64 / n as f64)),
@@ -48,7 +55,9 @@ impl Heat<'_> {
                     if n <= WRITTEN {
                         let place: [(&str, &dyn Display); 4] =
                             [("class", &"middle"), ("x", &frame.x(middle(j))), ("y", &y), ("dy", &4)];
-                        svg.words("text", &place, format!("{r:.2}").replace('-', "−"));
+                        // Adding a zero takes the sign from one.
+                        let r = format!("{:.2}", (r * 100.0).round() / 100.0 + 0.0).replace('-', "−");
+                        svg.words("text", &place, if known { &r } else { "–" });
                     }
                 }
             }

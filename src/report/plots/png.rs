@@ -13,7 +13,9 @@ pub(super) fn rendered(svg: &str) -> Result<Vec<u8>, Error> {
     let mut options = Options::default();
     options.fontdb_mut().load_system_fonts();
     if options.fontdb.is_empty() {
-        return Err(failed("the system has no font for its letters; install one, or keep the picture as SVG".to_owned()));
+        return Err(failed(
+            "the system has no font for its letters; install one, or keep the picture as SVG".to_owned(),
+        ));
     }
     let tree = Tree::from_str(svg, &options).map_err(|error| failed(error.to_string()))?;
     let (width, height) = (tree.size().width() * SCALE, tree.size().height() * SCALE);
