@@ -180,6 +180,7 @@ impl Model for Emps {
     }
 }
 
+#[cfg(not(debug_assertions))]
 fn emps() -> Option<Experiment<Motion, Command, Motion>> {
     let shared = std::env::var("GREYBOX_SHARED")
         .map_or_else(|_| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared")), PathBuf::from);
@@ -202,6 +203,7 @@ fn emps() -> Option<Experiment<Motion, Command, Motion>> {
 }
 
 /// Friction forward, friction backward and the offset are known only up to a common shift.
+#[cfg(not(debug_assertions))]
 #[test]
 fn a_common_shift_of_frictions_and_offset_is_named() {
     let Some(record) = emps() else { return };
