@@ -219,7 +219,7 @@ pub enum Error {
 
 /// Where and how a simulation failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("experiment `{experiment}`, sample {sample} (t = {time} s): {signal} is {value}{hint}")]
+#[error("experiment `{experiment}`, sample {sample} (t = {time} s): {signal} is {}{hint}", short(*value))]
 pub struct Failure {
     /// Name of the experiment.
     pub experiment: String,
@@ -244,6 +244,12 @@ fn listed(columns: &[String], wanted: &str) -> String {
         _ => "name another with CsvFile::column",
     };
     format!("{}; {remedy}", columns.join(", "))
+}
+
+/// A number without the hundreds of zeros that a large or small one would be printed with.
+fn short(value: f64) -> String {
+    let plain = value == 0.0 || !value.is_finite() || (1e-4..1e7).contains(&value.abs());
+    if plain { value.to_string() } else { format!("{value:e}") }
 }
 
 /// What a text that is not a number gives away.

@@ -1,17 +1,18 @@
 //! [`Estimate`]: what a fit found, and how well it is known.
 
 mod display;
-mod predict;
-mod stored;
+mod prediction;
 pub(crate) mod student;
 
-pub use predict::Prediction;
+pub(crate) use display::number;
+pub use prediction::Prediction;
 
+use crate::by_name;
 use crate::information::SquareMatrix;
 use crate::integrate::Automatic;
 use crate::model::Model;
 use crate::optimize::{Outcome, Severity};
-use crate::parameter::{Parameter, Transform};
+use crate::parameter::{Parameter, Transform, unbounded_above, unbounded_below};
 use crate::predict::FreeRun;
 use crate::signals::{Of, Signals};
 use core::fmt;
@@ -24,9 +25,11 @@ pub enum Knowledge {
     Known {
         /// Standard error, in its own unit.
         standard_error: f64,
-        /// Lower end of the 95 % interval.
+        /// Lower end of the 95 % interval; `null` in JSON stands for none.
+        #[serde(with = "unbounded_below")]
         lower: f64,
-        /// Upper end of the 95 % interval.
+        /// Upper end of the 95 % interval; `null` in JSON stands for none.
+        #[serde(with = "unbounded_above")]
         upper: f64,
     },
     /// It was given.
@@ -116,15 +119,24 @@ pub struct Warning {
 }
 
 /// What one experiment has for itself.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(bound = "", deny_unknown_fields)]
 pub struct Share<M: Model> {
     /// Name of the experiment.
     pub name: String,
     /// Number of samples.
     pub samples: usize,
     /// Parameters of this experiment: the common ones and its own.
+    #[serde(
+        serialize_with = "by_name::serialize::<M::Parameters, _, _>",
+        deserialize_with = "by_name::deserialize::<M::Parameters, _, _>"
+    )]
     pub parameters: Of<M::Parameters, f64>,
     /// State at the first sample.
+    #[serde(
+        serialize_with = "by_name::serialize::<M::State, _, _>",
+        deserialize_with = "by_name::deserialize::<M::State, _, _>"
+    )]
     pub initial_state: Of<M::State, f64>,
 }
 
@@ -153,16 +165,37 @@ pub struct Method {
 }
 
 /// What a fit found, and how well it is known. It borrows nothing.
+#[derive(Serialize, Deserialize)]
+#[serde(
+    bound(serialize = "I: Serialize, P: Serialize", deserialize = "I: Deserialize<'de>, P: Deserialize<'de>"),
+    deny_unknown_fields
+)]
 pub struct Estimate<M: Model, I = Automatic, P = FreeRun> {
     /// The parameters; of those that each experiment has for itself, the first experiment's.
+    #[serde(
+        serialize_with = "by_name::serialize::<M::Parameters, _, _>",
+        deserialize_with = "by_name::deserialize::<M::Parameters, _, _>"
+    )]
     pub parameters: Of<M::Parameters, f64>,
     /// What is known of each parameter.
+    #[serde(
+        serialize_with = "by_name::serialize::<M::Parameters, _, _>",
+        deserialize_with = "by_name::deserialize::<M::Parameters, _, _>"
+    )]
     pub knowledge: Of<M::Parameters, Knowledge>,
     /// What was declared of each parameter.
+    #[serde(
+        serialize_with = "by_name::serialize::<M::Parameters, _, _>",
+        deserialize_with = "by_name::deserialize::<M::Parameters, _, _>"
+    )]
     pub declared: Of<M::Parameters, Parameter>,
     /// What each experiment has for itself.
     pub experiments: Vec<Share<M>>,
     /// How well each output is reproduced, over all experiments.
+    #[serde(
+        serialize_with = "by_name::serialize::<M::Output, _, _>",
+        deserialize_with = "by_name::deserialize::<M::Output, _, _>"
+    )]
     pub quality: Of<M::Output, Quality>,
     /// All free quantities in the order of the covariance: common parameters, then experiment by experiment.
     pub unknowns: Vec<Unknown>,
@@ -197,9 +230,10 @@ pub struct Estimate<M: Model, I = Automatic, P = FreeRun> {
 }
 
 impl<M: Model, I, P> Estimate<M, I, P> {
-    /// Degrees of freedom: measurements less unknowns.
+    /// Degrees of freedom: measurements less unknowns that were determined.
     pub fn degrees_of_freedom(&self) -> f64 {
-        (self.measurements as f64 - self.unknowns.len() as f64).max(0.0)
+        let known = self.unknowns.iter().filter(|unknown| unknown.knowledge.standard_error().is_some()).count();
+        (self.measurements as f64 - known as f64).max(0.0)
     }
 
     /// The worst that is said of this estimate.

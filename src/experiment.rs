@@ -101,6 +101,19 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
         experiment.checked()
     }
 
+    /// A record of inputs alone, to be simulated: every output is missing.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn of_inputs<M: Model<State = X, Input = U, Output = Y>>(
+        model: &M,
+        time: Time,
+        inputs: Vec<Of<U, f64>>,
+    ) -> Result<Self, Error> {
+        let outputs = vec![Y::splat(f64::NAN); inputs.len()];
+        Experiment::new(model, time, inputs, outputs)
+    }
+
     /// Names the record in reports and errors.
     pub fn named(self, name: impl Into<String>) -> Self {
         Experiment { name: name.into(), ..self }

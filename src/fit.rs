@@ -7,6 +7,7 @@ mod conclude;
 mod covariance;
 mod noise;
 mod objective;
+mod predict;
 mod run;
 mod unknowns;
 
@@ -16,7 +17,7 @@ pub(crate) use objective::{Rows, each};
 pub use run::FitProblem;
 
 use crate::error::Error;
-use crate::experiment::ExperimentOf;
+use crate::experiment::{ExperimentOf, Sample};
 use crate::integrate::{Automatic, Integrator};
 use crate::loss::Loss;
 use crate::model::{Kind, Model};
@@ -42,6 +43,14 @@ pub trait Search {
 
     /// Cost and slopes where the search stands.
     fn linearization(&self) -> Option<&Linearization>;
+
+    /// Whether its settings make sense.
+    ///
+    /// # Errors
+    /// The setting and its value.
+    fn check(&self) -> Result<(), Error> {
+        Ok(())
+    }
 }
 
 impl<S: crate::scaling::Scaling> Search for LevenbergMarquardt<S> {
@@ -52,6 +61,10 @@ impl<S: crate::scaling::Scaling> Search for LevenbergMarquardt<S> {
     fn linearization(&self) -> Option<&Linearization> {
         LevenbergMarquardt::linearization(self)
     }
+
+    fn check(&self) -> Result<(), Error> {
+        self.stop.check()
+    }
 }
 
 impl Search for GaussNewton {
@@ -61,6 +74,10 @@ impl Search for GaussNewton {
 
     fn linearization(&self) -> Option<&Linearization> {
         GaussNewton::linearization(self)
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        self.stop.check()
     }
 }
 
@@ -217,6 +234,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
         if unknowns.row.is_empty() {
             return Err(Error::NothingFree);
         }
+        self.check_measured()?;
         self.prepared(unknowns)
     }
 
@@ -252,18 +270,54 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
                 return Err(Error::NotPositive { what, value: sigma.as_ref()[j] });
             }
         }
-        if let Some(loss) = &self.loss {
-            loss.check()?;
+        self.integrator.check()?;
+        self.loss.as_ref().map_or(Ok(()), |loss| loss.check())?;
+        if let Some(filter) = &self.prefilter {
+            self.experiments.iter().try_for_each(|record| filter.check(record))?;
         }
+        self.check_weights()
+    }
+
+    /// Every output must have been measured somewhere.
+    fn check_measured(&self) -> Result<(), Error> {
         for j in 0..M::Output::LEN {
             let measured =
                 |e: &ExperimentOf<M>| e.outputs().iter().any(|y| !M::Output::into_array(*y).as_ref()[j].is_nan());
             if !self.experiments.iter().any(measured) {
-                let experiment = self.experiments[0].name().to_owned();
-                return Err(Error::OutputMissing { experiment, output: M::Output::NAMES[j].to_owned() });
+                let names: Vec<&str> = self.experiments.iter().map(|e| e.name()).collect();
+                let output = M::Output::NAMES[j].to_owned();
+                return Err(Error::OutputMissing { experiment: names.join("`, `"), output });
             }
         }
         Ok(())
+    }
+
+    /// Weights must be finite, not negative, and not zero wherever something was measured.
+    fn check_weights(&self) -> Result<(), Error> {
+        let Some(weighting) = &self.weighting else { return Ok(()) };
+        weighting.check()?;
+        let mut counts = false;
+        for record in self.experiments {
+            for k in 0..record.len() {
+                let (t, u, y) = (record.time(k), record.inputs()[k], record.outputs()[k]);
+                let weight = weighting.weight(&Sample { t, u, y });
+                if !(weight >= 0.0 && weight.is_finite()) {
+                    let name = record.name();
+                    return Err(Error::Option(format!(
+                        "weighting: the weight of sample {k} (t = {t} s) of experiment `{name}` is {weight}; weights must \
+                         be finite and not negative"
+                    )));
+                }
+                counts |= weight > 0.0 && M::Output::into_array(y).as_ref().iter().any(|y| !y.is_nan());
+            }
+        }
+        if counts {
+            return Ok(());
+        }
+        Err(Error::Option(format!(
+            "weighting: `{}` is zero at every sample with a measured output; nothing is left to fit",
+            weighting.describe()
+        )))
     }
 
     fn objective<'s>(&'s self, setting: &'s Setting<M, P>, whitening: Whitening) -> Objective<'s, M, I, P> {

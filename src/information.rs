@@ -120,6 +120,17 @@ impl Information {
         selected
     }
 
+    /// What is known of the unknowns counted from `d`: `y - Phi d` in the place of `y`. Missing entries of `d` are zero.
+    pub fn about(&self, d: &[f64]) -> Information {
+        let (mut moved, mut start, width) = (self.clone(), 0, self.columns + 1);
+        for i in 0..self.columns {
+            let known: f64 = (i..self.columns).zip(d.iter().skip(i)).map(|(j, d)| self.at(i, j) * d).sum();
+            start += width - i;
+            moved.triangle[start - 1] -= known;
+        }
+        moved
+    }
+
     /// With the rows `diag(diagonal) d = 0` added: Levenberg-Marquardt damping, or a prior with zero mean.
     pub fn damped(&self, diagonal: &[f64]) -> Information {
         let mut damped = self.clone();

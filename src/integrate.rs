@@ -44,6 +44,15 @@ pub trait Integrator<M: Model>: Clone + Debug + Send + Sync {
     /// The same method with half the step or a far smaller tolerance, to see whether the answer moves; `None` if exact.
     fn refined(&self) -> Option<Self>;
 
+    /// Whether its settings make sense.
+    ///
+    /// # Errors
+    /// The setting and its value.
+    #[cfg(feature = "std")]
+    fn check(&self) -> Result<(), crate::error::Error> {
+        Ok(())
+    }
+
     /// Name and settings in a few words, for reports.
     #[cfg(feature = "std")]
     fn describe(&self) -> String;
@@ -83,6 +92,22 @@ pub(crate) struct Tolerance {
 const MAX_STEPS: u32 = 100_000;
 
 impl Tolerance {
+    /// Refuses what is no tolerance: a relative one that is not positive, an absolute one that is negative.
+    #[cfg(feature = "std")]
+    pub fn check(&self, method: &str) -> Result<(), crate::error::Error> {
+        let Tolerance { relative, absolute } = *self;
+        if !(relative > 0.0 && relative.is_finite()) {
+            let what = format!("the relative tolerance of {method}");
+            return Err(crate::error::Error::NotPositive { what, value: relative });
+        }
+        if absolute >= 0.0 && absolute.is_finite() {
+            return Ok(());
+        }
+        Err(crate::error::Error::Option(format!(
+            "the absolute tolerance of {method} is {absolute}; it must be finite and not negative"
+        )))
+    }
+
     /// Largest ratio of an error to what is allowed; not a number if one of the values is not finite.
     #[inline(always)]
     pub fn ratio<X: Signals, S: Scalar>(&self, error: &Of<X, f64>, from: &Of<X, S>, to: &Of<X, S>) -> f64 {

@@ -1,4 +1,102 @@
-//! Nonlinear grey-box parameter estimation.
+//! Nonlinear grey-box parameter estimation: from the equations of a physical system and a record of it to its parameters,
+//! and to what is known of them.
+//!
+//! # The problem
+//!
+//! ```text
+//! dx/dt = f(t, x, u; p)      y = g(t, x, u; p) + noise      find p, and say how well it is known
+//! ```
+//!
+//! The states `x` are not all measured, the inputs `u` are, the outputs `y` with noise; `f` and `g` are known from physics,
+//! their parameters `p` are not. The estimate is the `p` whose predictions miss the record by least:
+//!
+//! ```text
+//! V(p) = sum over samples and outputs of  weight * rho((y - y_hat(p)) / sigma)
+//! ```
+//!
+//! with `rho(z) = z^2 / 2`, or a loss that forgives outliers. `y_hat` is what the model says: simulated from the initial
+//! state ([`FreeRun`]), or predicted a few samples ahead of a measured state ([`Horizon`]). See L. Ljung, *System
+//! Identification: Theory for the User*, 2nd ed., 1999, chapters 7, 9 and 10.
+//!
+//! # The result
+//!
+//! ```
+//! use greybox::{Experiment, Fit, Model, Scalar, Time, fixed, free, signals};
+//!
+//! signals! {
+//!     pub struct Level { h: "m" }
+//!     pub struct Inflow { q: "m^3/s" }
+//!     pub struct Tank { area: "m^2", outlet: "m^2" }
+//! }
+//!
+//! struct Draining;
+//!
+//! impl Model for Draining {
+//!     type State = Level;
+//!     type Input = Inflow;
+//!     type Output = Level;
+//!     type Parameters = Tank;
+//!
+//!     #[inline]
+//!     fn derivative<S: Scalar>(&self, _t: f64, x: &Level<S>, u: &Inflow<S>, p: &Tank<S>) -> Level<S> {
+//!         Level { h: (u.q - p.outlet * (x.h * 19.62).sqrt()) / p.area }
+//!     }
+//!     #[inline]
+//!     fn output<S: Scalar>(&self, _t: f64, x: &Level<S>, _u: &Inflow<S>, _p: &Tank<S>) -> Level<S> {
+//!         *x
+//!     }
+//! }
+//!
+//! # fn main() -> Result<(), greybox::Error> {
+//! // A record: here simulated, from a known tank.
+//! let time = Time::Uniform { start: 0.0, step: 1.0 };
+//! let inflow = (0..300).map(|k| Inflow { q: if k < 150 { 1e-3 } else { 3e-3 } }).collect();
+//! let tank = Experiment::of_inputs(&Draining, time.clone(), inflow)?.initial(Level { h: fixed(1.0) });
+//! let truth = Fit::new(&Draining, &tank).parameters(Tank { area: fixed(0.5), outlet: fixed(4e-4) }).simulate()?;
+//! let ripple = |k: usize| 1e-3 * (k as f64 * 2.4).sin(); // stands for noise
+//! let measured = truth.outputs.iter().enumerate().map(|(k, y)| Level { h: y.h + ripple(k) }).collect();
+//! let record = Experiment::new(&Draining, time, tank.inputs().to_vec(), measured)?;
+//!
+//! // The fit, from a start that is far off.
+//! let estimate =
+//!     Fit::new(&Draining, &record).parameters(Tank { area: free(1.0), outlet: free(1e-4).within(0.0, 1.0) }).run()?;
+//! println!("{estimate}");
+//! assert!(estimate.outcome.converged());
+//! assert!((estimate.parameters.area / 0.5 - 1.0).abs() < 0.01);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! The report leads with a verdict. Each quantity is *known* (with an interval), *fixed*, *held* at a bound, or
+//! *unidentified* ([`Knowledge`]): nothing is reported as known that the data do not say, and parameters that the record
+//! cannot tell apart are named with the direction in which they may move together. A search that did not converge is an
+//! [`Outcome`](optimize::Outcome) with advice, not an error; an [`Error`] names the thing, the number and the remedy.
+//!
+//! # The house
+//!
+//! A file imports only from floors below its own; a test enforces it.
+//!
+//! | floor | what | files |
+//! |---|---|---|
+//! | roof | read | `diagnose`, `report`, [`check`] |
+//! | 3 | learn | `loss`, `weighting`, `prefilter`, [`optimize`], [`regress`], [`numeric`], `fit`, `estimate`, [`online`] |
+//! | 2 | expect | `integrate`, `predict` |
+//! | 1 | say | `model`, `parameter`, `scaling`, `interval`, `experiment`, [`units`] |
+//! | ground | numbers | `scalar`, `lanes`, `dual`, `signals`, `information`, `covariance` |
+//! | wing | the motor | [`pmsm`] |
+//!
+//! **The way of a sample through a fit.** [`Experiment`] holds it. The integrator carries the state to it in
+//! [`Dual`] numbers, a value with up to eight slopes, and the predictor turns that into a prediction error and its slopes,
+//! column by column in a window of 128 samples. The fit filters the window, divides it by the noise, weights it. The
+//! [`Information`] triangle absorbs its rows by orthogonal reflections and forgets them. After the last window the optimizer
+//! reads its step off the triangle; initial states, and parameters that each experiment has for itself, are minimized out
+//! of their experiment's triangle before the triangles are merged. When the search has ended, covariance, rank and
+//! directions come from the same triangle. Nothing is kept of the samples, and nothing is allocated for them.
+//!
+//! # Features
+//!
+//! `std`, `csv` and `parallel` are on by default; without `std` the ground floor (but for the triangle), models,
+//! integrators and [`online`] observers build without `alloc` too.
 #![cfg_attr(not(feature = "std"), no_std)]
 
 mod covariance;
@@ -9,6 +107,7 @@ mod integrate;
 mod interval;
 mod lanes;
 mod model;
+pub mod models;
 pub mod online;
 mod parameter;
 pub mod pmsm;
@@ -39,6 +138,8 @@ pub mod numeric;
 #[cfg(feature = "std")]
 pub mod optimize;
 #[cfg(feature = "std")]
+mod outliers;
+#[cfg(feature = "std")]
 mod predict;
 #[cfg(feature = "std")]
 mod prefilter;
@@ -46,6 +147,8 @@ mod prefilter;
 mod random;
 #[cfg(feature = "std")]
 pub mod regress;
+#[cfg(feature = "std")]
+pub mod report;
 #[cfg(feature = "std")]
 mod scaling;
 #[cfg(feature = "std")]
@@ -75,10 +178,17 @@ pub use {
     fit::{Fit, FitProblem, Objective, Records, Search},
     information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
-    numeric::Numeric,
+    numeric::{Derivative, Next, Numeric, StateEquation},
+    outliers::hampel,
     predict::{FreeRun, Horizon, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
     regress::{Assumption, LinearEstimate, Regression, RegressionError},
+    report::Report,
     scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
     weighting::{BySignal, Law, Weighting},
 };
+
+/// The README's code, compiled and run.
+#[cfg(all(doctest, feature = "csv"))]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

@@ -14,10 +14,14 @@ pub use levenberg_marquardt::LevenbergMarquardt;
 pub use linearization::Linearization;
 pub use outcome::{Outcome, Severity};
 
+use crate::error::Error;
 use serde::{Deserialize, Serialize};
 
 /// What both solvers keep in argmin's state: the point, the gradient there, the cost.
 pub type LeastSquaresState = argmin::core::IterState<Vec<f64>, Vec<f64>, (), (), (), f64>;
+
+/// Where no step lowers the cost, a cosine up to this is rounding too.
+const PRECISION_GRADIENT: f64 = 1e-6;
 
 /// A sum of squares to be minimized.
 pub trait LeastSquares {
@@ -67,6 +71,19 @@ pub struct Stop {
     pub cost: f64,
     /// Most trial steps.
     pub iterations: u64,
+}
+
+impl Stop {
+    /// Refuses tolerances that are no numbers or negative.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let tolerances = [("step", self.step), ("gradient", self.gradient), ("cost", self.cost)];
+        match tolerances.into_iter().find(|(_, value)| !(*value >= 0.0 && value.is_finite())) {
+            None => Ok(()),
+            Some((what, value)) => Err(Error::Option(format!(
+                "the tolerance Stop::{what} is {value}; it must be finite and not negative (zero: as far as rounding allows)"
+            ))),
+        }
+    }
 }
 
 impl Default for Stop {

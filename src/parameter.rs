@@ -120,7 +120,7 @@ impl Transform {
 // JSON has no infinity: an absent bound is a null.
 macro_rules! nullable {
     ($module:ident, $absent:expr) => {
-        mod $module {
+        pub(crate) mod $module {
             use serde::{Deserialize, Deserializer, Serialize, Serializer};
             pub fn serialize<S: Serializer>(bound: &f64, serializer: S) -> Result<S::Ok, S::Error> {
                 (*bound != $absent).then_some(*bound).serialize(serializer)

@@ -21,24 +21,44 @@
 //! | [`motor`] | constants from geometry | units |
 //! | [`temperature`] | winding and magnet laws, temperatures read back from estimates | |
 //! | [`Surface`], [`Salient`], [`Saturated`], [`Fed`], [`Shaft`] | the equations, each a [`Model`](crate::Model) | frames |
-//! | [`ExactSurface`], [`ExactFed`] | the currents' equation in exact steps, for observers | `Fed` |
+//! | [`ExactSurface`], [`ExactFed`], [`ExactCompensated`] | the currents' equation in exact steps | `Fed` |
 //! | [`MotorLaw`] and its parts | adaptation laws for the motor's [`Mras`](crate::online::Mras) | |
 //! | [`Injection`] | d current that makes the resistance visible | |
+//! | [`control`], [`inverter`], [`sensors`] | the parts of a drive | frames |
+//! | [`robot`] | the axes of the reference robot | temperature |
+//! | [`Plant`] | a motor and its load as they really are | inverter, robot |
+//! | `program`, `drive` | motion programs; the whole drive in simulation (with `std`) | all of these |
+//! | `adaptive` | a drive that uses its observer (with `std`) | control, `Machine` |
+//! | `offline` | least squares on a record (with `std`) | drive |
 //! | [`Machine`] | currents, speed and angle together | `Salient`, `Shaft` |
 //!
 //! Source of the formulas: M. Tenerz, *Parameter Estimation in a Permanent Magnet Synchronous Motor*,
 //! LiTH-ISY-EX--11/4495--SE, Linkoping 2011, called "the thesis"; corrected where it errs, which is said in place.
 
+#[cfg(feature = "std")]
+pub mod adaptive;
+pub mod control;
+#[cfg(feature = "std")]
+pub mod drive;
 pub mod frames;
+pub mod inverter;
 pub mod motor;
+#[cfg(feature = "std")]
+pub mod offline;
+#[cfg(feature = "std")]
+pub mod program;
+pub mod robot;
+pub mod sensors;
 pub mod temperature;
 pub mod units;
 
 mod adaptation;
+mod compensated;
 mod exact;
 mod fed;
 mod injection;
 mod machine;
+mod plant;
 mod salient;
 mod saturated;
 mod shaft;
@@ -48,17 +68,18 @@ pub use adaptation::{
     Adaptation, DeadZone, DirectCurrent, KeConstantGain, KeLyapunov, MotorLaw, Normalized, Resting, RsDirect,
     RsLyapunov, Seen, lyapunov_margin, lyapunov_rate,
 };
+pub use compensated::{CompensatedDrive, CompensatedWinding, ExactCompensated};
 pub use exact::{ExactFed, ExactStep, ExactSurface, FedWinding, HeldIn};
 pub use fed::{AngledDrive, Fed, Line, dead_time};
 pub use injection::{Injection, Stair};
 pub use machine::{Acting, Machine, Motion, Rotor};
+pub use plant::Plant;
 pub use salient::{Salient, SalientWinding};
 pub use saturated::{Saturated, SaturatedWinding};
 pub use shaft::{COULOMB_WIDTH, Mechanics, Shaft, Torque, Turning};
 pub use surface::Surface;
 
 use crate::scalar::Scalar;
-use core::fmt;
 use serde::{Deserialize, Serialize};
 
 /// `sqrt(2/3)`: phase peak from line-to-line rms.
@@ -139,11 +160,13 @@ impl From<PolePairs> for u32 {
 }
 
 /// Why a motor, a drive or a temperature was refused.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, thiserror::Error)]
 pub enum Error {
     /// A motor needs at least one pole pair.
+    #[error("a motor has at least one pole pair; got 0 (count magnet poles, divide by 2)")]
     NoPolePairs,
     /// A quantity lies outside the range in which it means something.
+    #[error("{quantity} is {value} {unit}; it must {must}")]
     OutOfRange {
         /// What it is, in words.
         quantity: &'static str,
@@ -171,18 +194,3 @@ impl Error {
         if value.is_finite() { Ok(value) } else { Err(Error::OutOfRange { quantity, value, unit, must: "be finite" }) }
     }
 }
-
-impl fmt::Display for Error {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Error::NoPolePairs => {
-                write!(f, "a motor has at least one pole pair; got 0 (count magnet poles, divide by 2)")
-            }
-            Error::OutOfRange { quantity, value, unit, must } => {
-                write!(f, "{quantity} is {value} {unit}; it must {must}")
-            }
-        }
-    }
-}
-
-impl core::error::Error for Error {}

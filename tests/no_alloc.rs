@@ -6,7 +6,10 @@ use greybox::pmsm::{
     AngledDrive, Currents, Drive, ExactFed, ExactStep, ExactSurface, FedWinding, HeldIn, KeLyapunov, MotorLaw,
     RsLyapunov, Winding,
 };
-use greybox::{Butterworth, Dual, Esdirk, FilterState, Hold, Integrator, Interval, Nothing, Rk4, Rk45, fixed, free};
+use greybox::{
+    Butterworth, Dual, Esdirk, Experiment, FilterState, Fit, Hold, Huber, Integrator, Interval, Nothing, Rk4, Rk45,
+    Sample, Time, fixed, free,
+};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
@@ -129,4 +132,38 @@ fn filters_allocate_nothing() {
         filter.step(&mut states[0], 1.0);
     });
     assert_eq!(count, 0);
+}
+
+/// One evaluation of a fit with slopes, of so many samples, on this thread.
+fn evaluation(samples: usize) -> usize {
+    use greybox::optimize::LeastSquares;
+    let model = greybox::pmsm::Surface::new(4).unwrap();
+    let drive = |k: usize| Drive { ud: (k % 7) as f64, uq: 20.0, w: 30.0 };
+    let record = Experiment::new(
+        &model,
+        Time::Uniform { start: 0.0, step: TS },
+        (0..samples).map(drive).collect(),
+        vec![Currents { id: 0.0, iq: 1.0 }; samples],
+    )
+    .unwrap();
+    let problem = Fit::new(&model, &record)
+        .parameters(Winding { rs: free(0.4), ls: free(4e-3), ke: free(0.9) })
+        .noise(Currents { id: 0.1, iq: 0.1 })
+        .loss(Huber(1.345))
+        .weighting(|s: &Sample<greybox::pmsm::Surface>| s.u.w)
+        .prefilter(Butterworth::low_pass(4, 100.0, TS).unwrap())
+        .problem()
+        .unwrap();
+    let objective = problem.objective();
+    let start = objective.start();
+    let count = allocations(|| {
+        objective.linearize(&start).unwrap();
+    });
+    println!("{count} allocations for {samples} samples");
+    count
+}
+
+#[test]
+fn allocations_of_a_fit_do_not_grow_with_the_record() {
+    assert_eq!(evaluation(1000), evaluation(10_000));
 }

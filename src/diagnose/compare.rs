@@ -239,7 +239,7 @@ pub fn validate<M: Model, I: Integrator<M>, P>(
     }
     let mut qualities = vec![(None, quality(estimate, model, record, FreeRun)?)];
     for &steps in steps {
-        qualities.push((Some(steps as u64), quality(estimate, model, record, Horizon { steps })?));
+        qualities.push((Some(steps as u64), quality(estimate, model, record, Horizon::new(steps))?));
     }
     Ok(Validation { experiment: record.name().to_owned(), qualities })
 }

@@ -18,7 +18,7 @@ impl fmt::Display for Severity {
 
 impl<M: Model, I, P> fmt::Display for Estimate<M, I, P> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "Verdict: {}. The search {}.", self.severity(), self.outcome)?;
+        writeln!(f, "Verdict: {}. Search: {}.", self.severity(), self.outcome)?;
         if !self.outcome.converged() {
             writeln!(f, "  {}", self.outcome.advice())?;
         }
@@ -33,22 +33,28 @@ impl<M: Model, I, P> fmt::Display for Estimate<M, I, P> {
         writeln!(f)?;
         let width = self.unknowns.iter().map(|u| u.name.len()).max().unwrap_or(0);
         let width = M::Parameters::NAMES.iter().map(|name| name.len()).max().unwrap_or(0).max(width).max(9);
+        let declared = M::Parameters::UNITS.iter().chain(M::Output::UNITS).copied();
+        let units = self.unknowns.iter().map(|u| u.unit.as_str()).chain(declared).map(|unit| unit.chars().count());
+        let units = units.max().unwrap_or(0).max(4);
         let title = ["value", "unit", "std. error", "95 % interval", "index"];
         writeln!(
             f,
-            "{:<width$} {:>14} {:<9} {:>11} {:^29} {:>8}",
+            "{:<width$} {:>14} {:<units$} {:>11} {:^29} {:>8}",
             "parameter", title[0], title[1], title[2], title[3], title[4]
         )?;
         for unknown in &self.unknowns {
-            write!(f, "{:<width$} {:>14} {:<9} ", unknown.name, number(unknown.value, 7), unknown.unit)?;
+            let known = unknown.knowledge.standard_error();
+            let value = known.map_or_else(|| number(unknown.value, 7), |error| resolved(unknown.value, error));
+            write!(f, "{:<width$} {value:>14} {:<units$} ", unknown.name, unknown.unit)?;
             match unknown.knowledge {
                 Knowledge::Known { standard_error, lower, upper } => {
-                    let interval = format!("[{:>13}, {:>13}]", number(lower, 6), number(upper, 6));
-                    write!(f, "{:>11} {interval} ", number(standard_error, 3))?;
-                    match unknown.error_index {
-                        Some(index) => writeln!(f, "{:>6} %", number(index, 3))?,
-                        None => writeln!(f, "{:>8}", "-")?,
-                    }
+                    let (lower, upper) = (resolved(lower, standard_error), resolved(upper, standard_error));
+                    let index = match unknown.error_index {
+                        Some(index) if index >= 1e4 => "> 9999 %".to_owned(),
+                        Some(index) => format!("{} %", number(index, 3)),
+                        None => "-".to_owned(),
+                    };
+                    writeln!(f, "{:>11} [{lower:>13}, {upper:>13}] {index:>8}", number(standard_error, 3))?;
                 }
                 Knowledge::Held { bound } => writeln!(f, "held at its bound {}", number(bound, 6))?,
                 Knowledge::Unidentified => writeln!(f, "not determined by the data")?,
@@ -60,16 +66,16 @@ impl<M: Model, I, P> fmt::Display for Estimate<M, I, P> {
         for (i, value) in values.as_ref().iter().enumerate() {
             if knowledge.as_ref()[i] == Knowledge::Fixed {
                 let (name, unit) = (M::Parameters::NAMES[i], M::Parameters::UNITS[i]);
-                writeln!(f, "{name:<width$} {:>14} {unit:<9} fixed", number(*value, 7))?;
+                writeln!(f, "{name:<width$} {:>14} {unit:<units$} fixed", number(*value, 7))?;
             }
         }
         writeln!(f)?;
-        writeln!(f, "{:<width$} {:>14} {:<9} {:>11} {:>9}", "output", "rmse", "unit", "noise", "fit")?;
+        writeln!(f, "{:<width$} {:>14} {:<units$} {:>11} {:>9}", "output", "rmse", "unit", "noise", "fit")?;
         for (j, quality) in M::Output::into_array(self.quality).into_iter().enumerate() {
             let (name, unit) = (M::Output::NAMES[j], M::Output::UNITS[j]);
             let fit = quality.fit_percent.map_or("-".to_owned(), |fit| format!("{fit:.3} %"));
             let (rmse, sigma) = (number(quality.rmse, 4), number(quality.sigma, 4));
-            writeln!(f, "{name:<width$} {rmse:>14} {unit:<9} {sigma:>11} {fit:>9}")?;
+            writeln!(f, "{name:<width$} {rmse:>14} {unit:<units$} {sigma:>11} {fit:>9}")?;
         }
         writeln!(f)?;
         write!(f, "{} measurements, {} unknowns", self.measurements, self.unknowns.len())?;
@@ -92,6 +98,12 @@ impl<M: Model, I, P> fmt::Display for Estimate<M, I, P> {
         )?;
         write!(f, "noise {}; covariance {}", m.noise, m.covariance)
     }
+}
+
+/// A number with the digits that its standard error leaves: to a thousandth of it, nine at most.
+fn resolved(value: f64, error: f64) -> String {
+    let digits = (value.abs() / error).log10().floor() + 4.0;
+    number(value, if digits.is_nan() { 6 } else { digits.clamp(3.0, 9.0) as usize })
 }
 
 /// A number with so many significant digits, in the form that is read more easily.

@@ -39,6 +39,11 @@ const FORMAT: &str = "greybox checkpoint 1";
 impl CheckpointFile {
     /// The place, the iterations so far and the solver of an earlier run; `None` if there is no file yet.
     pub fn load<S: DeserializeOwned>(&self) -> Result<Option<(Vec<f64>, u64, S)>, Error> {
+        // A device may have no end, and must not be replaced by a file.
+        if std::fs::metadata(&self.path).is_ok_and(|meta| !meta.is_file()) {
+            let problem = "it is no regular file; name one that can be written".to_owned();
+            return Err(Error::Checkpoint { path: self.path.clone(), problem });
+        }
         let text = match std::fs::read_to_string(&self.path) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),

@@ -43,7 +43,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
     /// Two passes with slopes. `None` where the scores of the unknowns that are not held are linearly dependent.
     pub(super) fn colored(&self, coordinates: &[f64], linear: &Linearization, held: &[bool]) -> Option<Colored> {
         let mut sandwich = match self.needs_sandwich() {
-            true => self.sandwich(coordinates).ok()?,
+            true => self.without_meat(coordinates).ok()?.0,
             false => Sandwich::plain(linear),
         };
         let mut longest = 0;
@@ -63,8 +63,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
         }
         for (i, slope, _) in self.unknowns.priors(coordinates) {
             let e = self.unknowns.row[i].experiment.unwrap_or(0);
-            let row: Vec<f64> = self.unknowns.columns(e).map(|c| if c == i { slope } else { 0.0 }).collect();
-            meat[e].absorb_row(&row, 0.0);
+            meat[e].absorb_row(&self.prior_row(e, i, slope), 0.0);
         }
         sandwich.replace_meat(meat);
         Some(Colored { sandwich, lags: longest })
@@ -115,7 +114,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
         let mut products = [DMatrix::zeros(n, n), DMatrix::zeros(n, n)];
         let (mut triangle, mut block) = (Information::new(n), Block::new(n, BLOCK));
         let (mut before, mut count) = ([vec![0.0; n], vec![0.0; n]], 0);
-        self.scores(e, coordinates, kept, &mut |score| {
+        self.each_score(e, coordinates, kept, &mut |score| {
             for (product, before) in products.iter_mut().zip(&before) {
                 for j in 0..n {
                     for i in 0..n {
@@ -159,7 +158,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
             absorb(&mut triangle, &mut block, &row);
         };
         let mut fresh = vec![0.0; n];
-        self.scores(e, coordinates, kept, &mut |score| {
+        self.each_score(e, coordinates, kept, &mut |score| {
             for j in 0..n {
                 z[j] = (0..=j).map(|i| score[i] * w[(i, j)]).sum();
             }
@@ -176,7 +175,13 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
     }
 
     /// Shows the score of each sample, `sum over the outputs of w psi(z) g`, in the columns kept.
-    fn scores(&self, e: usize, coordinates: &[f64], kept: &[usize], visit: &mut dyn FnMut(&[f64])) -> Result<(), Halt> {
+    fn each_score(
+        &self,
+        e: usize,
+        coordinates: &[f64],
+        kept: &[usize],
+        visit: &mut dyn FnMut(&[f64]),
+    ) -> Result<(), Halt> {
         let (columns, rows) = (self.unknowns.columns(e).count(), M::Output::LEN * WINDOW);
         let mut score = vec![0.0; kept.len()];
         self.walk(e, coordinates, true, &mut |Rows { begin, samples, window }| {

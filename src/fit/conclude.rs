@@ -48,8 +48,8 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             None => objective.evaluate(coordinates).map_err(|error| Error::Optimizer(error.to_string()))?,
         };
         let n = unknowns.row.len();
-        let Reproduced { quality, measured, step_error, color } = self.reproduce(&objective, coordinates)?;
-        let degrees = (measured as f64 - n as f64).max(0.0);
+        let Reproduced { quality, measured, log_determinant, step_error, color } =
+            self.reproduce(&objective, coordinates)?;
 
         // What is held or not determined has no interval.
         let (gradient, norms) = (linear.gradient(), linear.column_norms());
@@ -82,6 +82,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
 
         // The covariance in the optimizer's coordinates, then in the unknowns' own units.
         let held: Vec<bool> = free.iter().map(|free| !free).collect();
+        let degrees = (measured as f64 - free.iter().filter(|free| **free).count() as f64).max(0.0);
         let sum_of_squares = linear.sum_of_squares();
         let widening = match self.noise {
             Noise::Given(_) => 1.0,
@@ -90,13 +91,19 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
         };
         let unit = classical(&linear, &held);
         let sandwich = objective.needs_sandwich();
+        let priors: f64 = unknowns.priors(coordinates).map(|(_, _, error)| error * error).sum();
         let small_sample = measured as f64 / degrees.max(1.0);
         let colored = color.as_ref().filter(|_| M::KIND != Kind::Static && measured >= COLOR_SAMPLES);
         let colored = colored.and_then(|_| objective.colored(coordinates, &linear, &held));
         let colored = colored.and_then(|found| Some((found.sandwich.covariance(&held)?, found.lags)));
         let (covariance, factor) = match (&colored, sandwich) {
             (Some((covariance, _)), _) => (Some(covariance.clone()), small_sample),
-            (None, true) => (objective.sandwich(coordinates).ok().and_then(|s| s.covariance(&held)), small_sample),
+            (None, true) => (objective.sandwich(coordinates, &held).ok().flatten(), 1.0),
+            // The noise is wider than the errors, the priors are not.
+            (None, false) if widening != 1.0 && unknowns.priors(coordinates).next().is_some() => {
+                let widened = self.objective(setting, whitening.widened(widening));
+                (widened.evaluate(coordinates).ok().and_then(|linear| classical(&linear, &held)), 1.0)
+            }
             (None, false) => (unit.clone(), widening * widening),
         };
         let singular = covariance.is_none();
@@ -138,7 +145,14 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             (0..n).find(mine).map_or(Knowledge::Fixed, |i| rows[i].knowledge)
         });
 
-        let mut warnings = self.warnings(&rows, &directions, degrees, step_error, setting, &whitening, coordinates);
+        // The noise, where the errors were not divided by it.
+        let step_error = step_error / widening;
+        let mut warnings = self.warnings(&rows, &directions, measured, step_error, setting, &whitening, coordinates);
+        if !outcome.converged() && rows.iter().any(|row| row.knowledge.standard_error().is_some()) {
+            let text =
+                "standard errors and intervals are those of a minimum, where the search did not arrive".to_owned();
+            warnings.push(Warning { severity: Severity::NotUsable, text });
+        }
         if let Some(trouble) = trouble {
             let text = format!("the checkpoint could not be written ({trouble}); the search went on without it");
             warnings.push(Warning { severity: Severity::Usable, text });
@@ -157,11 +171,14 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
         };
         let plain = self.loss.is_none() && self.weighting.is_none();
         let deviance = plain.then(|| {
+            // Both differ by a factor at most.
             let scale = ml.sigma()[0] / whitening.sigma()[0];
-            let outputs = M::Output::LEN as f64;
-            measured as f64 * ((2.0 * std::f64::consts::PI).ln() + ml.log_determinant() / outputs)
-                + sum_of_squares / (scale * scale)
+            measured as f64 * ((2.0 * std::f64::consts::PI).ln() + 2.0 * scale.ln())
+                + log_determinant
+                + (sum_of_squares - priors) / (scale * scale)
         });
+        // Without any error the likelihood has no bound.
+        let deviance = deviance.filter(|deviance| deviance.is_finite());
         let sigma = widened.sigma();
         let quality = M::Output::from_fn(|j| Quality { sigma: sigma[j], ..quality[j] });
         Ok(Estimate {
@@ -174,7 +191,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
                 .enumerate()
                 .map(|(e, record)| {
                     let (initial_state, parameters) = unknowns.place(e, coordinates);
-                    Share { name: record.name().to_owned(), samples: record.len(), parameters, initial_state }
+                    Share { name: unknowns.labels[e].clone(), samples: record.len(), parameters, initial_state }
                 })
                 .collect(),
             quality,
@@ -252,7 +269,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
         &self,
         rows: &[Unknown],
         directions: &[Direction],
-        degrees: f64,
+        measured: u64,
         step_error: f64,
         setting: &Setting<M, P>,
         whitening: &Whitening,
@@ -260,11 +277,15 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
     ) -> Vec<Warning> {
         let care = |text: String| Warning { severity: Severity::UsableWithCare, text };
         let mut warnings = vec![];
-        if degrees == 0.0 {
+        let degrees = measured.saturating_sub(rows.len() as u64);
+        if degrees == 0 {
             let text = format!(
-                "{} unknowns are too many for the measurements: nothing can be said of their accuracy",
+                "{measured} measurement(s) for {} unknown(s) leave nothing to tell the accuracy by; fix some, or record more",
                 rows.len()
             );
+            warnings.push(Warning { severity: Severity::NotUsable, text });
+        } else if rows.iter().all(|row| row.knowledge == Knowledge::Unidentified) {
+            let text = "the data determine none of the unknowns".to_owned();
             warnings.push(Warning { severity: Severity::NotUsable, text });
         }
         for record in self.experiments.iter().filter(|_| M::KIND != Kind::Static) {
@@ -318,7 +339,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
         let step = linear.step(&vec![0.0; rows.len()], &held)?;
         let shift = |i: usize| {
             let change = (step[i] * rows[i].transform.slope(rows[i].value)).abs();
-            let error = rows[i].knowledge.standard_error()?;
+            let error = rows[i].knowledge.standard_error().filter(|error| *error > 0.0)?;
             Some((rows[i].name.clone(), change / error, change / rows[i].value.abs()))
         };
         (0..rows.len()).filter_map(shift).max_by(|a, b| a.1.total_cmp(&b.1))
@@ -335,7 +356,8 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
         let sigma = objective.whitening.sigma();
         let refined = self.integrator.refined();
         let mut sums = vec![Sums::default(); outputs];
-        let (mut measured, mut bound) = (0u64, 0.0);
+        let (mut measured, mut log_determinant, mut bound) = (0u64, 0.0, 0.0);
+        let mut here = Vec::with_capacity(outputs);
         let mut autocorrelations = vec![Autocorrelation::new(COLOR_LAGS); outputs];
         for (e, record) in self.experiments.iter().enumerate() {
             let (x, p) = objective.unknowns.place(e, coordinates);
@@ -361,7 +383,10 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
                 for k in 0..window.samples {
                     let y = M::Output::into_array(record.outputs()[window.begin + k]);
                     let counts = self.weighting.is_none() || objective.sample_weight(e, window.begin + k) > 0.0;
-                    for j in (0..outputs).filter(|j| window.measured[j * WINDOW + k]) {
+                    here.clear();
+                    here.extend((0..outputs).filter(|j| window.measured[j * WINDOW + k]));
+                    log_determinant += objective.whitening.log_determinant(&here);
+                    for &j in &here {
                         sums[j].add(y.as_ref()[j], window.errors()[j * WINDOW + k]);
                         measured += u64::from(counts);
                     }
@@ -379,8 +404,8 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             }
             bound += if seen > 0 { change * record.len() as f64 / seen as f64 } else { 0.0 };
         }
-        let color = Color::of::<M>(&autocorrelations);
-        Ok(Reproduced { quality: sums.iter().map(Sums::quality).collect(), measured, step_error: bound.sqrt(), color })
+        let (quality, color) = (sums.iter().map(Sums::quality).collect(), Color::of::<M>(&autocorrelations));
+        Ok(Reproduced { quality, measured, log_determinant, step_error: bound.sqrt(), color })
     }
 }
 
@@ -388,6 +413,8 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
 struct Reproduced {
     quality: Vec<Quality>,
     measured: u64,
+    /// Logarithm of the determinant of the covariance of all measurements.
+    log_determinant: f64,
     step_error: f64,
     color: Option<Color>,
 }

@@ -2,8 +2,13 @@
 //!
 //! The sandwich is `A^-1 B A^-1` (Huber 1967; White 1980). `A` is the curvature of the cost, `E[psi'] sum w g g'`. `B` is
 //! the covariance of the score: the sum of squares of the samples' own scores, `w psi(z) g` added up over the outputs.
-//! A pre-filter colors the errors; where those before it are white, their scores are the slopes filtered once more (the
-//! filter's adjoint, which a causal pass equals but for the ends of the record).
+//! Errors of a fit are smaller than the noise by the part of it that the fit took over, so each is divided by one less its
+//! leverage (HC3: MacKinnon and White, J. Econometrics 29 (1985) 305).
+//!
+//! A pre-filter colors the errors. Where those before it are white, with covariance `S` between the outputs, the score is
+//! theirs times the weighted slopes passed through the filter backward in time (its adjoint), from rest at the end of the
+//! record to its first sample. A forward pass instead counts what happens at the begin of a record wrongly: errors of
+//! initial states came out several times too large.
 
 use super::objective::{Objective, Rows};
 use crate::information::{Block, Information, SquareMatrix};
@@ -11,9 +16,12 @@ use crate::integrate::Integrator;
 use crate::model::Model;
 use crate::optimize::{Infeasible, Linearization};
 use crate::predict::{Predictor, WINDOW};
-use crate::prefilter::FilterState;
+use crate::prefilter::{Butterworth, FilterState};
 use crate::signals::Signals;
 use nalgebra::DMatrix;
+
+/// One less the leverage of a measurement that alone determines an unknown: its error is rounding.
+const ALONE: f64 = 1e-6;
 
 /// Bread and meat of the sandwich, one pair of triangles per experiment.
 pub(super) struct Sandwich {
@@ -25,115 +33,238 @@ pub(super) struct Sandwich {
     meat_scale: f64,
 }
 
+/// What the first pass sums up over all measurements.
+pub(super) struct Tally {
+    weights: f64,
+    curvature: f64,
+    /// Sums of the products of two outputs' influences.
+    influence: DMatrix<f64>,
+    /// Sums of the variance that white noise of variance one would have.
+    expected: Vec<f64>,
+}
+
 impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
     /// Whether the classical covariance would be wrong whatever the data say.
     pub(super) fn needs_sandwich(&self) -> bool {
-        self.weighting.is_some() || self.prefilter.is_some() || self.loss.is_some_and(|loss| loss.weight(1e3) < 1.0)
+        self.weighting.is_some() || self.prefilter.is_some() || self.is_robust()
     }
 
-    /// One more pass with slopes.
-    pub(super) fn sandwich(&self, coordinates: &[f64]) -> Result<Sandwich, Infeasible> {
-        let (mut blocks, mut meat) = (vec![], vec![]);
-        let (mut weights, mut curvature) = (0.0, 0.0);
-        let (mut influence, mut count) = (0.0, 0.0);
+    /// Whether the loss bends the cost of large errors.
+    pub(super) fn is_robust(&self) -> bool {
+        self.loss.is_some_and(|loss| loss.weight(1e3) < 1.0)
+    }
+
+    /// The sandwich over all unknowns that are not held, in two more passes with slopes; `None` if it has no number.
+    pub(super) fn sandwich(&self, coordinates: &[f64], held: &[bool]) -> Result<Option<SquareMatrix>, Infeasible> {
+        let (sandwich, tally) = self.without_meat(coordinates)?;
+        let Some(inverse) = classical(&sandwich.bread, held) else { return Ok(None) };
+        let (mut meat, meat_scale) = match self.prefilter {
+            Some(filter) => self.filtered_scores(coordinates, &inverse, filter, &tally)?,
+            None => (self.scores(coordinates, &inverse)?, 1.0),
+        };
+        for (i, slope, _) in self.unknowns.priors(coordinates) {
+            let e = self.unknowns.row[i].experiment.unwrap_or(0);
+            meat[e].absorb_row(&self.prior_row(e, i, slope / meat_scale.sqrt()), 0.0);
+        }
+        Ok(Sandwich { meat, meat_scale, ..sandwich }.covariance(held))
+    }
+
+    /// The bread for the weights and the loss of this fit, in one pass with slopes.
+    pub(super) fn without_meat(&self, coordinates: &[f64]) -> Result<(Sandwich, Tally), Infeasible> {
+        let (mut blocks, tally) = self.bread(coordinates)?;
+        let curvature = tally.curvature / tally.weights;
+        for (i, slope, _) in self.unknowns.priors(coordinates) {
+            let e = self.unknowns.row[i].experiment.unwrap_or(0);
+            // A prior is a measurement of unit variance; the bread is multiplied by the mean curvature later.
+            blocks[e].absorb_row(&self.prior_row(e, i, slope / curvature.max(f64::MIN_POSITIVE).sqrt()), 0.0);
+        }
+        let bread = Linearization::new(0.0, self.unknowns.shared(), blocks);
+        Ok((Sandwich { bread, meat: vec![], curvature, meat_scale: 1.0 }, tally))
+    }
+
+    /// The row of a prior on unknown `i` among the columns of experiment `e`.
+    pub(super) fn prior_row(&self, e: usize, i: usize, slope: f64) -> Vec<f64> {
+        self.unknowns.columns(e).map(|c| if c == i { slope } else { 0.0 }).collect()
+    }
+
+    /// The triangles of `sqrt(w) g`, and what there is to know of the errors.
+    fn bread(&self, coordinates: &[f64]) -> Result<(Vec<Information>, Tally), Infeasible> {
+        let outputs = M::Output::LEN;
+        let rows = outputs * WINDOW;
+        let mut tally = Tally {
+            weights: 0.0,
+            curvature: 0.0,
+            influence: DMatrix::zeros(outputs, outputs),
+            expected: vec![0.0; outputs],
+        };
+        let mut blocks = vec![];
         for e in 0..self.experiments.len() {
             let columns = self.unknowns.columns(e).count();
-            let rows = M::Output::LEN * WINDOW;
-            let (mut bread, mut scores) = (Information::new(columns), Information::new(columns));
-            let mut block = Block::new(columns, rows);
-            let mut again = vec![FilterState::default(); columns * M::Output::LEN];
-            let mut scratch = vec![0.0; columns * rows];
+            let (mut bread, mut block) = (Information::new(columns), Block::new(columns, rows));
+            let (mut weight, mut psi) = (vec![0.0; rows], vec![0.0; rows]);
+            let mut gain = self.prefilter.map(Gain::new);
             let visit = &mut |Rows { begin, samples, window }: Rows<'_>| {
-                let errors = window.errors().to_vec();
-                let mut weight = vec![0.0; rows];
-                for (row, &z) in errors.iter().enumerate() {
-                    if window.measured[row] && row % WINDOW < samples {
-                        weight[row] = self.sample_weight(e, begin + row % WINDOW);
-                        let psi = self.loss.map_or(z, |loss| loss.psi(z));
-                        weights += weight[row];
-                        curvature += weight[row] * self.loss.map_or(1.0, |loss| loss.slope(z));
-                        if weight[row] > 0.0 {
-                            influence += psi * psi;
-                            count += 1.0;
-                        }
+                weight.fill(0.0);
+                psi.fill(0.0);
+                for k in 0..samples {
+                    let (w, gain) = (self.sample_weight(e, begin + k), gain.as_mut().map_or(1.0, Gain::next));
+                    for j in (0..outputs).filter(|j| w > 0.0 && window.measured[j * WINDOW + k]) {
+                        let (row, z) = (j * WINDOW + k, window.errors()[j * WINDOW + k]);
+                        (weight[row], psi[row]) = (w, self.loss.map_or(z, |loss| loss.psi(z)));
+                        tally.weights += w;
+                        tally.curvature += w * self.loss.map_or(1.0, |loss| loss.slope(z));
+                        tally.expected[j] += gain;
                     }
                 }
+                for (i, j) in (0..outputs).flat_map(|i| (0..outputs).map(move |j| (i, j))) {
+                    let products = (0..samples).map(|k| psi[i * WINDOW + k] * psi[j * WINDOW + k]);
+                    tally.influence[(i, j)] += products.sum::<f64>();
+                }
                 for (c, column) in window.columns_mut().take(columns).enumerate() {
-                    for ((to, from), weight) in block.column_mut(c).iter_mut().zip(&*column).zip(&weight) {
+                    for ((to, from), weight) in block.column_mut(c).iter_mut().zip(column).zip(&weight) {
                         *to = *from * weight.sqrt();
-                    }
-                    for ((to, from), weight) in scratch[c * rows..].iter_mut().zip(column).zip(&weight) {
-                        *to = *from * weight;
                     }
                 }
                 block.column_mut(columns).fill(0.0);
                 block.set_len(rows);
                 bread.absorb(&mut block);
-                match self.prefilter {
-                    Some(filter) => {
-                        filter.filter(&mut scratch, WINDOW, samples, &mut again);
-                        for c in 0..columns {
-                            block.column_mut(c).copy_from_slice(&scratch[c * rows..(c + 1) * rows]);
-                        }
-                        block.set_len(rows);
-                    }
-                    None => {
-                        for c in 0..columns {
-                            let column = block.column_mut(c);
-                            for k in 0..WINDOW {
-                                column[k] = (k..rows)
-                                    .step_by(WINDOW)
-                                    .map(|row| {
-                                        let z = errors[row];
-                                        scratch[c * rows + row] * self.loss.map_or(z, |loss| loss.psi(z))
-                                    })
-                                    .sum();
-                            }
-                        }
-                        block.set_len(WINDOW);
-                    }
-                }
-                scores.absorb(&mut block);
             };
             self.walk(e, coordinates, true, visit).map_err(|_| Infeasible::Cancelled)?;
             blocks.push(bread);
+        }
+        Ok((blocks, tally))
+    }
+
+    /// The triangle of each experiment's scores, sample by sample.
+    fn scores(&self, coordinates: &[f64], inverse: &SquareMatrix) -> Result<Vec<Information>, Infeasible> {
+        let rows = M::Output::LEN * WINDOW;
+        let mut meat = vec![];
+        for e in 0..self.experiments.len() {
+            let inverse = self.of_experiment(inverse, e);
+            let columns = inverse.nrows();
+            let (mut scores, mut block) = (Information::new(columns), Block::new(columns, WINDOW));
+            let mut slopes = vec![0.0; columns];
+            let visit = &mut |Rows { begin, samples, window }: Rows<'_>| {
+                for c in 0..=columns {
+                    block.column_mut(c).fill(0.0);
+                }
+                let errors = window.errors().to_vec();
+                let measured = window.measured.clone();
+                let data = window.data_mut();
+                for k in 0..samples {
+                    let weight = self.sample_weight(e, begin + k);
+                    for row in (k..rows).step_by(WINDOW).filter(|&row| measured[row] && weight > 0.0) {
+                        slopes.iter_mut().enumerate().for_each(|(c, slope)| *slope = data[c * rows + row]);
+                        let z = errors[row];
+                        let less = (1.0 - weight * form(&inverse, &slopes)).max(ALONE);
+                        let influence = weight * self.loss.map_or(z, |loss| loss.psi(z)) / less;
+                        for (c, slope) in slopes.iter().enumerate() {
+                            block.column_mut(c)[k] += slope * influence;
+                        }
+                    }
+                }
+                block.set_len(samples);
+                scores.absorb(&mut block);
+            };
+            self.walk(e, coordinates, true, visit).map_err(|_| Infeasible::Cancelled)?;
             meat.push(scores);
         }
-        for (i, slope, _) in self.unknowns.priors(coordinates) {
-            let e = self.unknowns.row[i].experiment.unwrap_or(0);
-            let unit = |value: f64| -> Vec<f64> {
-                self.unknowns.columns(e).map(|c| if c == i { value } else { 0.0 }).collect()
+        Ok(meat)
+    }
+
+    /// The triangle of each experiment's scores where a filter colored white errors, and the factor for all of them by
+    /// which the noise is larger than the errors. Holds the slopes of one experiment at a time.
+    fn filtered_scores(
+        &self,
+        coordinates: &[f64],
+        inverse: &SquareMatrix,
+        filter: &Butterworth,
+        tally: &Tally,
+    ) -> Result<(Vec<Information>, f64), Infeasible> {
+        let outputs = M::Output::LEN;
+        let expected = |i: usize| tally.expected[i].max(f64::MIN_POSITIVE);
+        let noise =
+            DMatrix::from_fn(outputs, outputs, |i, j| tally.influence[(i, j)] / (expected(i) * expected(j)).sqrt());
+        let deviations = DMatrix::from_diagonal(&noise.diagonal().map(f64::sqrt));
+        let factor = noise.cholesky().map_or(deviations, |cholesky| cholesky.l());
+        let (mut meat, mut taken) = (vec![], 0.0);
+        for e in 0..self.experiments.len() {
+            let inverse = self.of_experiment(inverse, e);
+            let (columns, samples) = (inverse.nrows(), self.experiments[e].len());
+            // Column by column of slopes, output by output, backward in time.
+            let mut slopes = vec![0.0; columns * outputs * samples];
+            let mut measured = vec![false; outputs * samples];
+            let visit = &mut |Rows { begin, samples: here, window }: Rows<'_>| {
+                for k in 0..here {
+                    let (weight, back) = (self.sample_weight(e, begin + k), samples - 1 - begin - k);
+                    for j in 0..outputs {
+                        measured[j * samples + back] = window.measured[j * WINDOW + k];
+                        for (c, column) in window.columns_mut().take(columns).enumerate() {
+                            slopes[(c * outputs + j) * samples + back] = weight * column[j * WINDOW + k];
+                        }
+                    }
+                }
             };
-            // A prior is a measurement of unit variance; the bread is multiplied by the mean curvature later.
-            blocks[e].absorb_row(&unit(slope / (curvature / weights).max(f64::MIN_POSITIVE).sqrt()), 0.0);
-            meat[e].absorb_row(&unit(slope), 0.0);
+            self.walk(e, coordinates, true, visit).map_err(|_| Infeasible::Cancelled)?;
+            filter.filter(&mut slopes, samples, samples, &mut vec![FilterState::default(); columns * outputs]);
+            let (mut scores, mut block) = (Information::new(columns), Block::new(columns, WINDOW));
+            let mut score = vec![0.0; columns];
+            for k in 0..samples {
+                let at = |c: usize, j: usize| {
+                    if measured[j * samples + k] { slopes[(c * outputs + j) * samples + k] } else { 0.0 }
+                };
+                for j in 0..outputs {
+                    score.iter_mut().enumerate().for_each(|(c, score)| *score = at(c, j));
+                    taken += form(&inverse, &score);
+                    score.iter_mut().enumerate().for_each(|(c, score)| {
+                        *score = (j..outputs).map(|i| factor[(i, j)] * at(c, i)).sum();
+                    });
+                    if !block.push(&score, 0.0) {
+                        scores.absorb(&mut block);
+                        let _ = block.push(&score, 0.0);
+                    }
+                }
+            }
+            scores.absorb(&mut block);
+            meat.push(scores);
         }
-        let meat_scale = match self.prefilter {
-            // Variance of the white errors behind the filtered ones.
-            Some(filter) => influence / f64::max(count, 1.0) / power_gain(filter),
-            None => 1.0,
-        };
-        let bread = Linearization::new(0.0, self.unknowns.shared(), blocks);
-        Ok(Sandwich { bread, meat, curvature: curvature / weights, meat_scale })
+        let expected: f64 = tally.expected.iter().sum();
+        Ok((meat, expected / (expected - taken).max(f64::MIN_POSITIVE)))
+    }
+
+    /// The rows and columns of one experiment.
+    fn of_experiment(&self, matrix: &SquareMatrix, e: usize) -> DMatrix<f64> {
+        let columns: Vec<usize> = self.unknowns.columns(e).collect();
+        DMatrix::from_fn(columns.len(), columns.len(), |a, b| matrix[(columns[a], columns[b])])
     }
 }
 
-/// Sum of the squared impulse response: by how much a filter changes the variance of white noise.
-fn power_gain(filter: &crate::prefilter::Butterworth) -> f64 {
-    let mut state = FilterState::<f64>::default();
-    let (mut total, mut recent) = (0.0, 0.0f64);
-    for k in 0..10_000_000u32 {
-        let y = filter.step(&mut state, if k == 0 { 1.0 } else { 0.0 });
-        total += y * y;
-        recent = recent.max(y.abs());
-        if k % 4096 == 4095 {
-            if recent * recent <= 1e-16 * total {
-                break;
-            }
-            recent = 0.0;
-        }
+/// `v' m v`.
+fn form(m: &DMatrix<f64>, v: &[f64]) -> f64 {
+    let product =
+        |(column, b): (nalgebra::DVectorView<'_, f64>, &f64)| column.iter().zip(v).map(|(m, a)| m * a).sum::<f64>() * b;
+    m.column_iter().zip(v).map(product).sum()
+}
+
+/// Variance that white noise of variance one has after a filter that was at rest: the sum of the squared impulse response
+/// so far.
+struct Gain<'f> {
+    filter: &'f Butterworth,
+    state: FilterState,
+    impulse: f64,
+    total: f64,
+}
+
+impl<'f> Gain<'f> {
+    fn new(filter: &'f Butterworth) -> Self {
+        Gain { filter, state: FilterState::default(), impulse: 1.0, total: 0.0 }
     }
-    total
+
+    fn next(&mut self) -> f64 {
+        let response = self.filter.step(&mut self.state, std::mem::take(&mut self.impulse));
+        self.total += response * response;
+        self.total
+    }
 }
 
 /// The inverse of an arrow-shaped triangle, applied column by column: for each block the map from its score to its own

@@ -3,11 +3,12 @@
 use super::objective::{Objective, Rows};
 use crate::information::SquareMatrix;
 use crate::integrate::Integrator;
-use crate::loss::{Huber, Loss, expectations};
+use crate::loss::{Huber, Loss};
 use crate::model::Model;
 use crate::optimize::Infeasible;
 use crate::predict::{Predictor, WINDOW, Window};
 use crate::signals::{Of, Signals};
+use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 /// What is said of the measurement noise.
 #[derive(Clone, Copy, Debug)]
@@ -42,11 +43,13 @@ impl Whitening {
         }
     }
 
-    /// Twice the sum over a sample's outputs of the logarithms of the standard deviations.
-    pub fn log_determinant(&self) -> f64 {
+    /// Logarithm of the determinant of the covariance of a sample of which these outputs were measured.
+    pub fn log_determinant(&self, here: &[usize]) -> f64 {
+        let of = |inverse: &SquareMatrix| -2.0 * inverse.diagonal().iter().map(|l| l.ln()).sum::<f64>();
         match self {
-            Whitening::Diagonal(sigma) => 2.0 * sigma.iter().map(|s| s.ln()).sum::<f64>(),
-            Whitening::Full { inverse, .. } => -2.0 * inverse.diagonal().iter().map(|l| l.ln()).sum::<f64>(),
+            Whitening::Diagonal(sigma) => 2.0 * here.iter().map(|&j| sigma[j].ln()).sum::<f64>(),
+            Whitening::Full { covariance, inverse } if here.len() == covariance.size() => of(inverse),
+            Whitening::Full { covariance, .. } => of(&factor_of_part(covariance, here)),
         }
     }
 
@@ -82,10 +85,7 @@ impl Whitening {
                 for k in 0..window.samples {
                     let here: Vec<usize> = (0..outputs).filter(|j| window.measured[j * WINDOW + k]).collect();
                     // Where outputs are missing, those left have a covariance of their own.
-                    let part = (here.len() < outputs).then(|| {
-                        let part = SquareMatrix::from_fn(here.len(), |a, b| covariance[(here[a], here[b])]);
-                        inverse_factor(&part).unwrap_or_else(|| SquareMatrix::zeros(here.len()))
-                    });
+                    let part = (here.len() < outputs).then(|| factor_of_part(covariance, &here));
                     let factor = part.as_ref().unwrap_or(inverse);
                     for column in window.columns_mut() {
                         for a in (0..here.len()).rev() {
@@ -107,11 +107,24 @@ fn inverse_factor(covariance: &SquareMatrix) -> Option<SquareMatrix> {
     Some(SquareMatrix::from_fn(n, |i, j| inverse[(i, j)]))
 }
 
+/// The same of the rows and columns of some outputs.
+fn factor_of_part(covariance: &SquareMatrix, here: &[usize]) -> SquareMatrix {
+    let part = SquareMatrix::from_fn(here.len(), |a, b| covariance[(here[a], here[b])]);
+    // A part of a positive definite matrix is one.
+    inverse_factor(&part).unwrap_or_else(|| SquareMatrix::zeros(here.len()))
+}
+
 /// Sums over the errors of a fit: what estimates of noise are made of.
 #[derive(Clone, Debug)]
 pub(crate) struct Moments {
     /// Mean over the measured samples of the products of the errors of two outputs.
     pub covariance: SquareMatrix,
+}
+
+/// `E[psi^2]` of Huber's loss under the standard normal.
+fn bent_variance(&Huber(c): &Huber) -> f64 {
+    let normal = Normal::standard();
+    2.0 * (normal.cdf(c) - 0.5 - c * normal.pdf(c) + c * c * normal.sf(c))
 }
 
 /// Noise below this part of the output's own size is rounding of the simulation.
@@ -159,6 +172,9 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
             })?;
         }
         let covariance = SquareMatrix::from_fn(outputs, |i, j| sums[(i, j)] / pairs[(i, j)].max(1.0));
+        if let Some(variance) = covariance.diagonal().iter().find(|variance| !variance.is_finite()) {
+            return Err(Infeasible::Failed(format!("the variance of an output's errors is {variance}")));
+        }
         Ok(Moments { covariance })
     }
 
@@ -167,13 +183,14 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
     pub(crate) fn estimate_noise(&self, coordinates: &[f64], noise: Noise<M::Output>) -> Result<Whitening, Infeasible> {
         let outputs = M::Output::LEN;
         let mut moments = self.moments(coordinates, &vec![1.0; outputs], None)?;
-        let floor: Vec<f64> = self.magnitudes().iter().map(|size| (ROUNDING * size).max(f64::MIN_POSITIVE)).collect();
+        let size = |size: f64| if size > 0.0 { size } else { 1.0 };
+        let floor: Vec<f64> = self.magnitudes().into_iter().map(|magnitude| ROUNDING * size(magnitude)).collect();
         let sigma = |m: &Moments| -> Vec<f64> {
             m.covariance.diagonal().iter().zip(&floor).map(|(v, floor)| v.sqrt().max(*floor)).collect()
         };
-        if self.loss.is_some_and(|loss| expectations(loss).efficiency() < 1.0 - 1e-9) {
+        if self.is_robust() {
             let huber = Huber::default();
-            let kappa = expectations(&huber).psi_squared;
+            let kappa = bent_variance(&huber);
             for _ in 0..50 {
                 let before = sigma(&moments);
                 moments = self.moments(coordinates, &before, Some(&|z| huber.psi(z)))?;

@@ -160,7 +160,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
     }
 
     /// Cost and triangle of one experiment, priors left out.
-    fn experiment(&self, experiment: usize, coordinates: &[f64]) -> Result<(f64, Information), Halt> {
+    pub(crate) fn experiment(&self, experiment: usize, coordinates: &[f64]) -> Result<(f64, Information), Halt> {
         let columns = self.unknowns.columns(experiment).count();
         let rows = M::Output::LEN * WINDOW;
         let mut information = Information::new(columns);
@@ -252,43 +252,100 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
         let record = walk.experiment;
         let (start, p) = self.unknowns.place(experiment, coordinates);
         let failure = |k: usize, signal: String, value: f64, hint: &'static str| Failure {
-            experiment: record.name().to_owned(),
+            experiment: self.unknowns.labels[experiment].clone(),
             sample: k,
             time: record.time(k),
             signal,
             value,
             hint,
         };
+        let unsound = |values: &[f64]| {
+            let i = values.iter().position(|v| !v.is_finite())?;
+            Some((i, values[i], if values[i].is_nan() { UNDEFINED } else { OVERFLOW }))
+        };
         let (mut x, mut memory) = (start, I::Memory::default());
+        // The error that costs most, in standard deviations.
+        let (sigma, mut largest) = (self.whitening.sigma(), (sample, 0, 0.0f64));
         for k in 0..record.len() {
             let state = match self.predictor.state(&walk, &self.prepared[experiment], k, x, &p, &mut memory) {
                 Ok(Some(state)) => state,
                 Ok(None) => continue,
-                Err(_) => return failure(k, "the integrator's step".to_owned(), 0.0, STUCK),
+                Err(_) => {
+                    let before = k.saturating_sub(1);
+                    let values = M::State::into_array(x);
+                    if let Some((i, value)) =
+                        values.as_ref().iter().enumerate().find(|(_, x)| x.is_nan() || x.abs() >= RUNAWAY)
+                    {
+                        return failure(before, format!("state `{}`", M::State::NAMES[i]), *value, OVERFLOW);
+                    }
+                    let slope = self.model.derivative(record.time(before), &x, &record.inputs()[before], &p);
+                    return match unsound(M::State::into_array(slope).as_ref()) {
+                        Some((i, value, hint)) => {
+                            failure(before, format!("the derivative of state `{}`", M::State::NAMES[i]), value, hint)
+                        }
+                        None => failure(before, "the progress of the integrator".to_owned(), 0.0, STUCK),
+                    };
+                }
             };
             if P::CARRIES {
                 x = state;
             }
-            let unsound = |values: &[f64]| values.iter().position(|v| !v.is_finite()).map(|i| (i, values[i]));
-            if let Some((i, value)) = unsound(M::State::into_array(state).as_ref()) {
-                let hint = if value.is_nan() { UNDEFINED } else { OVERFLOW };
+            if let Some((i, value, hint)) = unsound(M::State::into_array(state).as_ref()) {
                 return failure(k, format!("state `{}`", M::State::NAMES[i]), value, hint);
             }
-            let y = self.model.output(record.time(k), &state, &record.inputs()[k], &p);
-            if let Some((j, value)) = unsound(M::Output::into_array(y).as_ref()) {
-                let hint = if value.is_nan() { UNDEFINED } else { OVERFLOW };
-                return failure(k, format!("output `{}`", M::Output::NAMES[j]), value, hint);
+            let y = M::Output::into_array(self.model.output(record.time(k), &state, &record.inputs()[k], &p));
+            let found = M::Output::into_array(record.outputs()[k]);
+            for (j, (&y, &found)) in y.as_ref().iter().zip(found.as_ref()).enumerate() {
+                // What was not measured need not be predicted in a fit; where a prediction was asked for, it stopped here.
+                if !y.is_finite() && (!found.is_nan() || k == sample) {
+                    let hint = if y.is_nan() { UNDEFINED } else { OVERFLOW };
+                    return failure(k, format!("output `{}`", M::Output::NAMES[j]), y, hint);
+                }
+                if ((found - y) / sigma[j]).abs() > (largest.2 / sigma[largest.1]).abs() {
+                    largest = (k, j, found - y);
+                }
             }
         }
-        failure(sample, "the cost or a slope".to_owned(), f64::INFINITY, OVERFLOW)
+        if let Some((k, output, unknown, value)) = self.unsound_slope(experiment, coordinates) {
+            let signal = format!("the slope of output `{}` with respect to `{unknown}`", M::Output::NAMES[output]);
+            return failure(k, signal, value, if value.is_nan() { STEEP } else { OVERFLOW });
+        }
+        let (k, j, error) = largest;
+        failure(k, format!("the error of output `{}`", M::Output::NAMES[j]), error, HUGE)
+    }
+
+    /// The first slope that is not finite: sample, output, name of the unknown, value.
+    fn unsound_slope(&self, e: usize, coordinates: &[f64]) -> Option<(usize, usize, &str, f64)> {
+        let mut first: Option<(usize, usize, usize, f64)> = None;
+        let unknowns: Vec<usize> = self.unknowns.columns(e).collect();
+        let plain = Objective { whitening: Whitening::Diagonal(vec![1.0; M::Output::LEN]), prefilter: None, ..*self };
+        let visit = &mut |Rows { begin, window, .. }: Rows<'_>| {
+            for (column, &unknown) in window.columns_mut().zip(&unknowns) {
+                if let Some(row) = column.iter().position(|slope| !slope.is_finite()) {
+                    let found = (begin + row % WINDOW, row / WINDOW, unknown, column[row]);
+                    first = first.filter(|&(k, ..)| k <= found.0).or(Some(found));
+                }
+            }
+        };
+        // It fails, where it fails, after what is looked for.
+        let _ = plain.walk(e, coordinates, true, visit);
+        first.map(|(k, output, unknown, value)| (k, output, self.unknowns.row[unknown].name.as_str(), value))
     }
 }
 
-const STUCK: &str = "; it cannot get any smaller: the model is too stiff for the method, jumps, or leaves its domain";
+/// An adaptive method is stuck with states as large as this before they overflow.
+const RUNAWAY: f64 = 1e100;
+
+const STUCK: &str = "; no step is short enough, or 100,000 of them do not reach the next sample: the model is too stiff for \
+                     the method, jumps, or leaves its domain (take Esdirk, or smooth the model)";
 const UNDEFINED: &str = "; the equations are undefined there (a division by zero, a root or logarithm out of its domain, \
-                         or `derivative`/`next` was not written): bound the parameters or start elsewhere";
+                         or the `derivative` or `next` that Model::KIND asks for was not written): bound the parameters \
+                         or start elsewhere";
+const STEEP: &str = "; the value is finite but has no slope there (a root or a power at zero): start elsewhere, or write \
+                     the model so that it is smooth there";
 const OVERFLOW: &str = "; the simulation overflows (an unstable model, or a step too long for its dynamics): bound the \
                         parameters, take a shorter step or a stiff method, or predict over a shorter horizon";
+const HUGE: &str = ", whose square overflows: check the units of the record, the noise levels and the start";
 
 impl<M: Model, I: Integrator<M>, P: Predictor<M>> LeastSquares for Objective<'_, M, I, P> {
     fn linearize(&self, x: &[f64]) -> Result<Linearization, Infeasible> {

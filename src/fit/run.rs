@@ -7,7 +7,7 @@ use super::unknowns::Unknowns;
 use super::{Fit, Observer, Search, Setting};
 use crate::error::Error;
 use crate::estimate::{Estimate, Prediction};
-use crate::experiment::{Initial, Sample};
+use crate::experiment::Initial;
 use crate::integrate::Integrator;
 use crate::model::Model;
 use crate::optimize::{Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization, Outcome};
@@ -56,7 +56,7 @@ where
     pub fn run(mut self) -> Result<Estimate<M, I, P>, Error> {
         let begin = Instant::now();
         self.control.deadline = self.time_limit.map(|limit| begin + limit);
-        self.check_weights()?;
+        self.optimizer.check()?;
         let setting = self.prepare()?;
         let found = self.search(&setting)?;
         // What was found is concluded even if the time is over.
@@ -138,7 +138,7 @@ where
         }
         let result = executor.run().map_err(|error| match error.downcast::<Infeasible>() {
             Ok(Infeasible::Failed(_)) => self.start_failure(objective, &start),
-            Ok(Infeasible::Cancelled) => Error::Option("the fit was stopped before its first evaluation".to_owned()),
+            Ok(Infeasible::Cancelled) => self.stopped(),
             Err(other) => Error::Optimizer(other.to_string()),
         })?;
         let state = result.state();
@@ -191,6 +191,9 @@ impl<'a, M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'a, M, I, P, O> {
         let fit = Fit { parameters, ..self.optimizer(LevenbergMarquardt::default()) };
         fit.check()?;
         let unknowns = Unknowns::new(fit.model, fit.experiments, fit.parameters)?;
+        if !unknowns.row.is_empty() {
+            fit.check_measured()?;
+        }
         let setting = fit.prepared(unknowns)?;
         let coordinates = match setting.unknowns.row.is_empty() {
             true => vec![],
@@ -205,7 +208,6 @@ impl<'a, M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'a, M, I, P, O> {
     /// # Errors
     /// As [`run`](Fit::run).
     pub fn problem(self) -> Result<FitProblem<'a, M, I, P, O>, Error> {
-        self.check_weights()?;
         let setting = self.prepare()?;
         let whitening = self.first_whitening(&setting, &setting.unknowns.start())?;
         Ok(FitProblem { fit: self, setting, whitening })
@@ -238,40 +240,23 @@ impl<'a, M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'a, M, I, P, O> {
 
     fn start_failure(&self, objective: &Objective<'_, M, I, P>, coordinates: &[f64]) -> Error {
         for e in 0..self.experiments.len() {
-            match objective.walk(e, coordinates, true, &mut |_| {}) {
+            match objective.experiment(e, coordinates) {
                 Err(Halt::Failed { sample }) => return Error::Start(objective.locate(e, coordinates, sample)),
-                Err(Halt::Cancelled) => break,
-                Ok(()) => {}
+                Err(Halt::Cancelled) => return self.stopped(),
+                Ok(_) => {}
             }
         }
-        match objective.evaluate(coordinates) {
-            Err(Infeasible::Cancelled) => Error::Option("the fit was stopped before its first evaluation".to_owned()),
-            _ => Error::Start(objective.locate(0, coordinates, 0)),
-        }
+        Error::Start(objective.locate(0, coordinates, 0))
     }
 
-    /// Weights must be finite, not negative, and not all zero.
-    fn check_weights(&self) -> Result<(), Error> {
-        let Some(weighting) = &self.weighting else { return Ok(()) };
-        let mut total = 0.0;
-        for record in self.experiments {
-            for k in 0..record.len() {
-                let (t, u, y) = (record.time(k), record.inputs()[k], record.outputs()[k]);
-                let weight = weighting.weight(&Sample { t, u, y });
-                if !(weight >= 0.0 && weight.is_finite()) {
-                    let name = record.name();
-                    return Err(Error::Option(format!(
-                        "weighting: the weight of sample {k} (t = {t} s) of experiment `{name}` is {weight}; weights must \
-                         be finite and not negative"
-                    )));
-                }
-                total += weight;
-            }
-        }
-        if total == 0.0 {
-            return Err(Error::Option("weighting: all weights are zero; nothing is left to fit".to_owned()));
-        }
-        Ok(())
+    fn stopped(&self) -> Error {
+        Error::Option(match self.time_limit {
+            Some(limit) if self.control.expired() => format!(
+                "the time limit of {} s was over before the start had been evaluated; allow more time",
+                limit.as_secs_f64()
+            ),
+            _ => "the fit was cancelled before its start had been evaluated; lower the flag to run it".to_owned(),
+        })
     }
 
     /// What a checkpoint belongs to: the data, and everything that shapes the cost.

@@ -4,7 +4,7 @@
 //! parameters. The optimizer sees coordinates: values, or their logarithms.
 
 use crate::error::Error;
-use crate::experiment::{ExperimentOf, Initial};
+use crate::experiment::{Experiment, ExperimentOf, Initial};
 use crate::model::Model;
 use crate::parameter::{Parameter, Transform, fixed, free};
 use crate::predict::{Seed, Target, measured};
@@ -23,6 +23,8 @@ pub(crate) struct Unknown {
 }
 
 pub(crate) struct Unknowns<M: Model> {
+    /// What each experiment is called in reports and errors.
+    pub labels: Vec<String>,
     pub parameters: Of<M::Parameters, Parameter>,
     /// What is known of each experiment's initial state.
     pub initial: Vec<Of<M::State, Parameter>>,
@@ -42,9 +44,10 @@ impl<M: Model> Unknowns<M> {
         for (i, parameter) in declared.iter().enumerate() {
             check(M::Parameters::NAMES[i], parameter)?;
         }
+        let labels = labels(experiments);
         let parameter = |i: usize, experiment: Option<usize>| Unknown {
             name: match experiment {
-                Some(e) => format!("{} [{}]", M::Parameters::NAMES[i], experiments[e].name()),
+                Some(e) => format!("{} [{}]", M::Parameters::NAMES[i], labels[e]),
                 None => M::Parameters::NAMES[i].to_owned(),
             },
             unit: M::Parameters::UNITS[i],
@@ -62,7 +65,7 @@ impl<M: Model> Unknowns<M> {
             for (i, &known) in M::State::into_array(state).as_ref().iter().enumerate() {
                 let name = match experiments.len() {
                     1 => format!("{}(0)", M::State::NAMES[i]),
-                    _ => format!("{}(0) [{}]", M::State::NAMES[i], experiment.name()),
+                    _ => format!("{}(0) [{}]", M::State::NAMES[i], labels[e]),
                 };
                 check(&name, &known)?;
                 if known.free {
@@ -74,7 +77,7 @@ impl<M: Model> Unknowns<M> {
             initial.push(state);
         }
         begins.push(row.len());
-        Ok(Unknowns { parameters, initial, row, begins })
+        Ok(Unknowns { labels, parameters, initial, row, begins })
     }
 
     /// How many unknowns all experiments share; they come first.
@@ -139,6 +142,17 @@ impl<M: Model> Unknowns<M> {
     }
 }
 
+/// The names of the experiments; those that share one are numbered from 1 in their order.
+fn labels<X: Signals, U: Signals, Y: Signals>(experiments: &[Experiment<X, U, Y>]) -> Vec<String> {
+    let name = |e: usize| experiments[e].name();
+    let twins = |range: std::ops::Range<usize>, e: usize| range.filter(|&other| name(other) == name(e)).count();
+    let label = |e: usize| match twins(0..experiments.len(), e) {
+        1 => name(e).to_owned(),
+        _ => format!("{} #{}", name(e), twins(0..e, e) + 1),
+    };
+    (0..experiments.len()).map(label).collect()
+}
+
 /// What is known of the state at an experiment's first sample.
 fn initial_state<M: Model>(
     model: &M,
@@ -168,14 +182,16 @@ fn check(name: &str, parameter: &Parameter) -> Result<(), Error> {
     if !start.is_finite() {
         return wrong(format!("its value is {start}; give a finite start"));
     }
-    if !free {
-        return Ok(());
-    }
-    if lower.is_nan() || upper.is_nan() || lower >= upper {
+    if lower.is_nan() || upper.is_nan() || lower > upper || free && lower == upper {
         return wrong(format!("its bounds are {lower} and {upper}; the lower must be below the upper (or use fixed)"));
     }
     if start < lower || start > upper {
-        return wrong(format!("its start {start} lies outside its bounds {lower} to {upper}"));
+        return wrong(format!(
+            "its start {start} lies outside its bounds {lower} to {upper}; move the start, or the bounds"
+        ));
+    }
+    if !free {
+        return Ok(());
     }
     if transform == Transform::Log && start <= 0.0 {
         return wrong(format!("its start {start} has no logarithm; start above zero or leave .log() out"));

@@ -143,6 +143,11 @@ impl<M: Model> Integrator<M> for Esdirk {
     }
 
     #[cfg(feature = "std")]
+    fn check(&self) -> Result<(), crate::error::Error> {
+        Tolerance { relative: self.relative, absolute: self.absolute }.check("Esdirk")
+    }
+
+    #[cfg(feature = "std")]
     fn describe(&self) -> String {
         format!("implicit Runge-Kutta 4(3), adaptive, relative {:e}, absolute {:e}", self.relative, self.absolute)
     }

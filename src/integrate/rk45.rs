@@ -88,6 +88,11 @@ impl<M: Model> Integrator<M> for Rk45 {
     }
 
     #[cfg(feature = "std")]
+    fn check(&self) -> Result<(), crate::error::Error> {
+        Tolerance { relative: self.relative, absolute: self.absolute }.check("Rk45")
+    }
+
+    #[cfg(feature = "std")]
     fn describe(&self) -> String {
         format!("Runge-Kutta 5(4), adaptive, relative {:e}, absolute {:e}", self.relative, self.absolute)
     }

@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 ///
 /// Each iteration takes the minimizer of the linearized sum of squares and halves it until the cost falls by a part of
 /// what was promised (Armijo). Fast near a well-determined minimum; [`LevenbergMarquardt`](super::LevenbergMarquardt) is
-/// the safer choice elsewhere. Directions that the data do not determine are left alone by a damping of 1e-8.
+/// the safer choice elsewhere. Directions that the data do not determine are damped by 1e-8. Bounds are part of the
+/// linearized minimization.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct GaussNewton {
     /// When to stop.
@@ -21,10 +22,10 @@ pub struct GaussNewton {
     point: Option<Point>,
 }
 
-/// Damping where the triangle has no inverse, relative to the column norms.
-const RANK_DAMPING: f64 = 1e-8;
 const SUFFICIENT: f64 = 1e-4;
 const HALVINGS: u32 = 60;
+/// Fewer are enough where the cost has no digits left.
+const LAST_HALVINGS: u32 = 10;
 
 impl GaussNewton {
     /// A search with this rule to stop.
@@ -82,13 +83,8 @@ impl<O: LeastSquares> Solver<O, LeastSquaresState> for GaussNewton {
                 Point::new(x, linear, &JacobianColumns, &[], &bounds)
             }
         };
-        let next = match point.exact() {
-            Some(outcome) => {
-                self.outcome = Some(outcome);
-                None
-            }
-            None => self.search(problem, &point, &bounds)?,
-        };
+        self.outcome = point.exact().or_else(|| point.converged(&self.stop));
+        let next = if self.outcome.is_none() { self.search(problem, &point, &bounds)? } else { None };
         let point = next.unwrap_or(point);
         let log = argmin::kv!("gradient" => point.cosine(););
         let state = state.param(point.x.clone()).cost(point.linear.cost).gradient(point.gradient.clone());
@@ -114,25 +110,18 @@ impl GaussNewton {
         point: &Point,
         bounds: &[(f64, f64)],
     ) -> Result<Option<Point>, Error> {
-        let undamped = vec![0.0; point.x.len()];
-        let damped: Vec<f64> = point.norms.iter().map(|norm| RANK_DAMPING * norm).collect();
-        let step = point.linear.step(&undamped, &point.held).or_else(|| point.linear.step(&damped, &point.held));
-        let Some(mut step) = step else {
-            self.outcome = Some(Outcome::Stalled { gradient: point.cosine(), failed: 0 });
-            return Ok(None);
-        };
         let cost = point.linear.cost;
+        let mut step = point.full.clone().unwrap_or_default();
         let mut failed = 0;
+        let mut blind = 0;
         for _ in 0..HALVINGS {
-            let (x, cut) = point.towards(&step, bounds);
-            if let Some(outcome) = point.converged(&cut, &self.stop) {
-                self.outcome = Some(outcome);
-                return Ok(None);
-            }
-            if x == point.x {
+            let x = point.towards(&step);
+            let slope = point.slope(&step);
+            let unresolved = point.cannot_resolve(-slope);
+            blind += u32::from(unresolved);
+            if x == point.x || blind > LAST_HALVINGS {
                 break;
             }
-            let slope: f64 = point.gradient.iter().zip(&cut).map(|(g, d)| g * d).sum();
             match linearize(problem, &x)? {
                 Err(Infeasible::Cancelled) => {
                     self.outcome = Some(Outcome::Cancelled);
@@ -142,15 +131,13 @@ impl GaussNewton {
                 Ok(linear) => {
                     let decrease = cost - linear.cost;
                     let next = Point::new(x, linear, &JacobianColumns, &[], bounds);
-                    if point.cannot_resolve(-slope) {
-                        let better = next.scaled_gradient() < 0.5 * point.scaled_gradient();
-                        if !better {
-                            self.outcome = Some(Outcome::LimitOfPrecision { gradient: point.cosine() });
-                        }
-                        return Ok(better.then_some(next));
-                    }
-                    if decrease >= -SUFFICIENT * slope && decrease > 0.0 {
-                        if decrease <= self.stop.cost * cost {
+                    // Where the cost decides nothing, what the full step would still gain does.
+                    let enough = match unresolved {
+                        true => next.potential < point.potential,
+                        false => decrease > 0.0 && decrease >= -SUFFICIENT * slope,
+                    };
+                    if enough && !point.loses_influence(&next) {
+                        if decrease <= self.stop.cost * cost && next.potential <= self.stop.cost * cost {
                             self.outcome = Some(Outcome::CostUnchanged { decrease: decrease / cost });
                         }
                         return Ok(Some(next));
@@ -159,7 +146,7 @@ impl GaussNewton {
             }
             step.iter_mut().for_each(|d| *d *= 0.5);
         }
-        self.outcome = Some(Outcome::Stalled { gradient: point.cosine(), failed });
+        self.outcome = Some(point.stuck(&self.stop, failed));
         Ok(None)
     }
 }

@@ -9,9 +9,10 @@ use serde::{Deserialize, Serialize};
 /// The method of Levenberg (1944) and Marquardt (1963) with the column scaling of More (1978), in bounds.
 ///
 /// Each iteration tries one step, the minimizer of the linearized sum of squares plus `lambda |D step|^2`, computed from
-/// the triangle; the trial brings its slopes along. The step is cut at the bounds; an unknown on a bound that it
-/// would cross is held there. `lambda` falls by up to 10 after a step that kept its promise and grows, ever faster, after
-/// one that did not. Where the cost can no longer resolve a step, a smaller gradient decides instead.
+/// the triangle; the trial brings its slopes along. Bounds are part of that minimization: an unknown that would cross one
+/// is put on it, and the others are minimized again. `lambda` falls by up to 10 after a step that kept its promise and
+/// grows, ever faster, after one that did not. Where the cost can no longer resolve a step, the slope along the step
+/// decides instead. The undamped step decides when to stop, so that heavy damping never looks like a minimum.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LevenbergMarquardt<S = JacobianColumns> {
     /// When to stop.
@@ -31,6 +32,9 @@ const LEAST_LAMBDA: f64 = 1e-20;
 const LARGEST_LAMBDA: f64 = 1e20;
 const FIRST_GROWTH: f64 = 4.0;
 const ACCEPT: f64 = 1e-4;
+/// Five trials in a row are enough where the cost has no digits left.
+const LAST_GROWTH: f64 = 16.0 * FIRST_GROWTH;
+const COST_ROUNDING: f64 = 1e-10;
 
 impl<S: Scaling> LevenbergMarquardt<S> {
     /// A search with this rule to stop and this scaling.
@@ -55,14 +59,8 @@ impl<S: Scaling> LevenbergMarquardt<S> {
         const TOLERANCE: f64 = 1e-4;
         let point = Point::new(x.to_vec(), linear.clone(), &self.scaling, &[], bounds);
         let stop = Stop { step: TOLERANCE, gradient: TOLERANCE, ..self.stop };
-        let damping: Vec<f64> = point.norms.iter().map(|norm| 1e-8 * norm).collect();
-        let step = linear.step(&damping, &point.held);
-        let ended = point.exact().or_else(|| step.and_then(|step| point.converged(&step, &stop)));
+        let ended = point.exact().or_else(|| point.converged(&stop));
         ended.unwrap_or(Outcome::Stalled { gradient: point.cosine(), failed: 0 })
-    }
-
-    fn ended(&mut self, outcome: Outcome) {
-        self.outcome = Some(outcome);
     }
 
     fn longer(&mut self, gain: f64) {
@@ -120,19 +118,10 @@ impl<O: LeastSquares, S: Scaling> Solver<O, LeastSquaresState> for LevenbergMarq
             }
         };
         let cost = point.linear.cost;
-        let mut next = None;
-        if let Some(outcome) = point.exact() {
-            self.ended(outcome);
-        } else {
-            let damping: Vec<f64> = point.scales.iter().map(|scale| self.lambda.sqrt() * scale).collect();
-            match point.linear.step(&damping, &point.held) {
-                None => self.shorter(),
-                Some(step) => next = self.attempt(problem, &point, &step, &bounds)?,
-            }
-            if self.outcome.is_none() && self.lambda > LARGEST_LAMBDA {
-                let (gradient, failed) = (point.cosine(), self.failed);
-                self.ended(Outcome::Stalled { gradient, failed });
-            }
+        self.outcome = point.exact().or_else(|| point.converged(&self.stop));
+        let next = if self.outcome.is_none() { self.attempt(problem, &point, &bounds)? } else { None };
+        if self.outcome.is_none() && self.lambda > LARGEST_LAMBDA {
+            self.outcome = Some(point.stuck(&self.stop, self.failed));
         }
         let point = next.unwrap_or(point);
         let log =
@@ -158,31 +147,24 @@ impl<S: Scaling> LevenbergMarquardt<S> {
         &mut self,
         problem: &mut Problem<O>,
         point: &Point,
-        step: &[f64],
         bounds: &[(f64, f64)],
     ) -> Result<Option<Point>, Error> {
-        let (x, cut) = point.towards(step, bounds);
-        // Damping shortens steps as well: only a step that it hardly shortened tells how near the minimum is.
-        if self.lambda <= 1e-3
-            && let Some(outcome) = point.converged(&cut, &self.stop)
-        {
-            self.ended(outcome);
+        let damping: Vec<f64> = point.scales.iter().map(|scale| self.lambda.sqrt() * scale).collect();
+        let Some(step) = point.linear.step_within(&damping, &point.held, &point.room) else {
+            self.shorter();
             return Ok(None);
-        }
-        let promised = point.linear.predicted_reduction(&cut);
-        if promised <= 0.0 || x == point.x {
-            if x == point.x && self.lambda <= 1.0 {
-                let gradient = point.cosine();
-                self.ended(Outcome::LimitOfPrecision { gradient });
-            } else {
-                self.shorter();
-            }
+        };
+        let x = point.towards(&step);
+        let promised = point.linear.predicted_reduction(&step);
+        let unresolved = point.cannot_resolve(promised);
+        if x == point.x || unresolved && self.growth > LAST_GROWTH {
+            self.outcome = Some(point.stuck(&self.stop, self.failed));
             return Ok(None);
         }
         let linear = match linearize(problem, &x)? {
             Ok(linear) => linear,
             Err(Infeasible::Cancelled) => {
-                self.ended(Outcome::Cancelled);
+                self.outcome = Some(Outcome::Cancelled);
                 return Ok(None);
             }
             Err(Infeasible::Failed(_)) => {
@@ -192,28 +174,26 @@ impl<S: Scaling> LevenbergMarquardt<S> {
             }
         };
         let (cost, new_cost) = (point.linear.cost, linear.cost);
-        let gain = (cost - new_cost) / promised;
         let next = Point::new(x, linear, &self.scaling, &point.scales, bounds);
-        if point.cannot_resolve(promised) {
-            // The larger of the two sets of scales makes the gradients comparable.
-            let before = Point { scales: next.scales.clone(), ..point.clone() }.scaled_gradient();
-            if next.scaled_gradient() < 0.5 * before && new_cost <= cost * (1.0 + 1e-10) {
-                self.longer(1.0);
-                return Ok(Some(next));
-            }
-            let better = if next.scaled_gradient() < before { Some(next) } else { None };
-            let gradient = better.as_ref().unwrap_or(point).cosine();
-            self.ended(Outcome::LimitOfPrecision { gradient });
-            return Ok(better);
-        }
-        if gain <= ACCEPT {
+        // Where the cost decides nothing, the slope along the step does: in the metric of the damped step the gradient of
+        // a convergent iteration shrinks steadily.
+        let (accept, gain) = if unresolved {
+            let again = next.linear.step_within(&damping, &next.held, &next.room);
+            let part = again.map_or(f64::INFINITY, |again| next.slope(&again) / point.slope(&step));
+            (part < 1.0 && new_cost <= cost * (1.0 + COST_ROUNDING), if part < 0.25 { 1.0 } else { 0.9 })
+        } else {
+            let gain = (cost - new_cost) / promised;
+            (gain > ACCEPT, gain)
+        };
+        if !accept || point.loses_influence(&next) {
             self.shorter();
             return Ok(None);
         }
         self.longer(gain);
         let decrease = (cost - new_cost) / cost;
-        if decrease <= self.stop.cost {
-            self.ended(Outcome::CostUnchanged { decrease });
+        // A step that was short for its damping says nothing of the cost to come.
+        if decrease <= self.stop.cost && next.potential <= self.stop.cost * cost {
+            self.outcome = Some(Outcome::CostUnchanged { decrease });
         }
         Ok(Some(next))
     }

@@ -136,6 +136,30 @@ impl Linearization {
         step.iter().all(|d| d.is_finite()).then_some(step)
     }
 
+    /// As [`step`](Self::step), within this room (at most zero, at least zero) for each unknown. An unknown that would leave
+    /// it is put on its end, first come, first put, and the others are minimized again: every stage lowers the damped sum
+    /// of squares further.
+    pub(crate) fn step_within(&self, damping: &[f64], held: &[bool], room: &[(f64, f64)]) -> Option<Vec<f64>> {
+        let mut step = self.step(damping, held)?;
+        let (mut held, mut at, mut put) = (held.to_vec(), vec![0.0; step.len()], vec![0.0; step.len()]);
+        loop {
+            let end = |i: usize| if step[i] < room[i].0 { room[i].0 } else { room[i].1 };
+            let beyond = (0..step.len()).filter(|&i| !held[i] && (step[i] < room[i].0 || step[i] > room[i].1));
+            let part = |i: usize| ((end(i) - at[i]) / (step[i] - at[i])).clamp(0.0, 1.0);
+            let Some(first) = beyond.min_by(|&i, &j| part(i).total_cmp(&part(j))) else { return Some(step) };
+            let (part, end) = (part(first), end(first));
+            at.iter_mut().zip(&step).for_each(|(at, step)| *at += part * (step - *at));
+            (at[first], put[first], held[first]) = (end, end, true);
+            let columns = self.columns().map(|(_, columns)| columns);
+            let moved = |(block, columns): (&Information, Vec<usize>)| {
+                block.about(&columns.iter().map(|&unknown| put[unknown]).collect::<Vec<f64>>())
+            };
+            let blocks = self.blocks.iter().zip(columns).map(moved).collect();
+            step = Linearization::new(self.cost, self.shared, blocks).step(damping, &held)?;
+            step.iter_mut().zip(&put).for_each(|(step, put)| *step += put);
+        }
+    }
+
     /// What the data say of the shared unknowns alone, each block's own minimized out.
     pub fn shared_information(&self) -> Information {
         let free = vec![false; self.unknowns()];

@@ -1,12 +1,13 @@
 //! [`Outcome`]: how a search ended.
 
+use super::PRECISION_GRADIENT;
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
 /// How a search ended, with the numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Outcome {
-    /// The next step is negligible and the residual orthogonal to the Jacobian.
+    /// The next step is negligible and the residual orthogonal to the Jacobian (or next to rounding).
     Converged {
         /// Largest relative size of the next step.
         step: f64,
@@ -18,12 +19,12 @@ pub enum Outcome {
         /// The relative decrease.
         decrease: f64,
     },
-    /// The cost cannot resolve a further step, and the gradient no longer shrinks.
+    /// The cost cannot resolve a further step, and what the step would gain no longer shrinks.
     LimitOfPrecision {
         /// Largest cosine between the residual and a column of the Jacobian.
         gradient: f64,
     },
-    /// Nothing was left to explain: the model reproduces the data.
+    /// Nothing was left to explain: the model reproduces the data to the rounding of the unknowns.
     Exact,
     /// However short, no step lowers the cost, and yet the gradient is not zero.
     Stalled {
@@ -92,9 +93,6 @@ impl Outcome {
         }
     }
 }
-
-/// Where the cost has no digits left, a gradient up to this cosine is rounding too.
-const PRECISION_GRADIENT: f64 = 1e-6;
 
 impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -52,6 +52,11 @@ impl Shaft {
         Ok(Shaft { gear: Error::positive("gear ratio", gear, "turns")? })
     }
 
+    /// Turns of the motor per turn of the arm.
+    pub const fn gear(&self) -> f64 {
+        self.gear
+    }
+
     /// Torque (N m) that the load takes at this motion.
     #[inline]
     pub fn load<S: Scalar>(&self, x: &Turning<S>, p: &Mechanics<S>) -> S {

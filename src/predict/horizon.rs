@@ -5,6 +5,7 @@ use crate::error::Error;
 use crate::experiment::ExperimentOf;
 use crate::integrate::{Integrator, Stuck};
 use crate::model::Model;
+use crate::prefilter::{Butterworth, zero_phase};
 use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
 use serde::{Deserialize, Serialize};
@@ -14,11 +15,27 @@ use serde::{Deserialize, Serialize};
 /// measured state). Needs outputs that give the state, and takes them as exact: noise biases short horizons.
 ///
 /// The first samples are predicted from the initial state. Where the state was not measured, the output `steps` samples
-/// later is not predicted. For filtered states, filter the record first ([`zero_phase`](crate::zero_phase)).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// later is not predicted.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Horizon {
-    /// Samples from the measured state to the predicted output; zero counts as one.
+    /// Samples from the measured state to the predicted output: one or more, and fewer than the record has.
     pub steps: usize,
+    /// What the states are restarted from: the outputs as measured, or filtered forward and backward.
+    pub filter: Option<Butterworth>,
+}
+
+impl Horizon {
+    /// Restarts from the measured states.
+    pub fn new(steps: usize) -> Self {
+        Horizon { steps, filter: None }
+    }
+
+    /// Restarts from the states that the outputs give after zero-phase filtering, so that less of their noise enters; the
+    /// predictions are compared with the outputs as measured.
+    pub fn filtered(self, filter: Butterworth) -> Self {
+        Horizon { filter: Some(filter), ..self }
+    }
 }
 
 impl<M: Model> Predictor<M> for Horizon {
@@ -32,11 +49,21 @@ impl<M: Model> Predictor<M> for Horizon {
         experiment: &ExperimentOf<M>,
         p: &Of<M::Parameters, f64>,
     ) -> Result<Self::Prepared, Error> {
+        let filtered = self.filter.as_ref().map(|filter| zero_phase(experiment, filter)).transpose()?;
+        let outputs = filtered.as_ref().map_or(experiment.outputs(), |filtered| filtered.outputs());
+        let (steps, samples) = (self.steps, experiment.len());
+        if steps == 0 || steps >= samples {
+            return Err(Error::Option(format!(
+                "a prediction {steps} sample(s) ahead makes no sense for experiment `{}` of {samples} samples; take at least \
+                 1 and fewer than {samples}, or FreeRun to simulate it whole",
+                experiment.name()
+            )));
+        }
         let mut why = None;
         let mut states = Vec::with_capacity(experiment.len());
         let mut known = 0;
         for k in 0..experiment.len() {
-            let (t, u, y) = (experiment.time(k), &experiment.inputs()[k], &experiment.outputs()[k]);
+            let (t, u, y) = (experiment.time(k), &experiment.inputs()[k], &outputs[k]);
             states.push(match measured::state(model, t, u, y, p) {
                 Ok(x) => {
                     known += 1;
@@ -72,7 +99,7 @@ impl<M: Model> Predictor<M> for Horizon {
         p: &Of<M::Parameters, S>,
         memory: &mut I::Memory,
     ) -> Result<Option<Of<M::State, S>>, Stuck> {
-        let steps = self.steps.max(1);
+        let steps = self.steps;
         let (mut x, first) = if k < steps {
             (start, 0)
         } else {
@@ -89,6 +116,7 @@ impl<M: Model> Predictor<M> for Horizon {
     }
 
     fn describe(&self) -> String {
-        format!("prediction {} sample(s) ahead", self.steps.max(1))
+        let from = self.filter.as_ref().map(|filter| format!(" of states filtered by {}", filter.describe()));
+        format!("prediction {} sample(s) ahead{}", self.steps, from.unwrap_or_default())
     }
 }

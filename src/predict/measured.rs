@@ -24,7 +24,8 @@ pub(crate) fn state<M: Model>(
     let y = M::Output::into_array(*y);
     let found = y.as_ref().iter().filter(|y| y.is_finite()).count();
     if found < n {
-        return Err(format!("{n} states, but {found} measured output(s) at t = {t} s"));
+        let (states, outputs) = (M::State::NAMES.join(", "), M::Output::NAMES.join(", "));
+        return Err(format!("{n} state(s), {states}, but {found} measured of the output(s) {outputs} at t = {t} s"));
     }
     let entries = |x: Of<M::State, f64>| M::State::into_array(x);
     for iteration in 0..ITERATIONS {
@@ -40,6 +41,13 @@ pub(crate) fn state<M: Model>(
                     rows[j][first + lane] = output.slopes[lane];
                 }
             }
+        }
+        let undefined = (0..M::Output::LEN).find(|&j| y.as_ref()[j].is_finite() && errors[j].is_nan());
+        if let Some(j) = undefined {
+            return Err(format!(
+                "the model's output `{}` is not a number on the way to it, at t = {t} s",
+                M::Output::NAMES[j]
+            ));
         }
         let mut information = Information::new(n);
         for (row, &error) in rows.iter().zip(&errors).filter(|(_, error)| error.is_finite()) {

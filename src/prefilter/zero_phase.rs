@@ -31,6 +31,20 @@ impl Butterworth {
         }
     }
 
+    /// Refuses a record whose samples are, in the median, not the filter's sample time apart (to 1 %): its cut-off would be
+    /// another.
+    pub(crate) fn check<X: Signals, U: Signals, Y: Signals>(&self, record: &Experiment<X, U, Y>) -> Result<(), Error> {
+        let (step, found) = (self.design.sample_time, record.sample_time());
+        if close(found, step) {
+            return Ok(());
+        }
+        Err(Error::Filter(format!(
+            "it is made for samples every {step} s, but those of experiment `{}` are {found} s apart; make it for that \
+             sample time, or resample the record",
+            record.name()
+        )))
+    }
+
     /// Samples until the slowest pole has decayed to 1e-9.
     fn settling(&self) -> usize {
         let Design { order, cutoff, sample_time, .. } = self.design;

@@ -1,0 +1,20 @@
+//! [`Prediction`]: what an estimate says of a record.
+
+use super::Quality;
+use crate::model::Model;
+use crate::signals::Of;
+
+/// What an estimate says of a record: the outputs it predicts, beside those measured.
+#[derive(Debug)]
+pub struct Prediction<M: Model> {
+    /// Time of each sample (s).
+    pub t: Vec<f64>,
+    /// Predicted outputs, one row per sample; NaN where the method has no prediction.
+    pub outputs: Vec<Of<M::Output, f64>>,
+    /// Measured minus predicted, one row per sample; NaN where either is missing.
+    pub residuals: Vec<Of<M::Output, f64>>,
+    /// State at the first sample: given, measured, or estimated with the parameters kept.
+    pub initial_state: Of<M::State, f64>,
+    /// How well each output is reproduced.
+    pub quality: Of<M::Output, Quality>,
+}

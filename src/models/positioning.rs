@@ -1,0 +1,158 @@
+use crate::{Model, Scalar};
+use serde::{Deserialize, Serialize};
+
+crate::signals! {
+    /// Motion of a linear axis.
+    pub struct Motion {
+        /// Position.
+        q: "m",
+        /// Speed.
+        v: "m/s",
+    }
+    /// Motion of a linear axis, and the speed as its controller sees it.
+    pub struct GuidedMotion {
+        /// Position.
+        q: "m",
+        /// Speed.
+        v: "m/s",
+        /// Speed, differenced and filtered.
+        vm: "m/s",
+    }
+    /// Input of the axis.
+    pub struct Command {
+        /// Command to the drive.
+        vir: "V",
+    }
+    /// Input of the axis under its controller.
+    pub struct Reference {
+        /// Position that it is to have.
+        qg: "m",
+    }
+    /// What is measured of the axis.
+    pub struct Position {
+        /// Position.
+        qm: "m",
+    }
+    /// What is measured of the axis under its controller.
+    pub struct Guided {
+        /// Position.
+        qm: "m",
+        /// Command to the drive, as the controller gives it.
+        vir: "V",
+    }
+    /// Parameters of a linear axis, as the load feels them.
+    pub struct Axis {
+        /// Mass, with the inertia of all that turns.
+        m: "kg",
+        /// Viscous friction.
+        fv: "N s/m",
+        /// Dry friction.
+        fc: "N",
+        /// Constant force: the drive's offset, and what friction differs between the directions.
+        offset: "N",
+    }
+}
+
+/// A linear axis with a drive whose force follows its command (an electro-mechanical positioning system):
+///
+/// ```text
+/// m dv/dt = gtau vir - fv v - fc tanh(v / width) - offset      dq/dt = v
+/// ```
+///
+/// After A. Janot, M. Gautier, M. Brunot, *Data set and reference models of EMPS*, Workshop on Nonlinear System
+/// Identification Benchmarks, Eindhoven 2019, whose dry friction is `fc sign(v)`. That has no slope and no answer at rest;
+/// the smooth one approaches it where `|v|` is a few times `width`.
+///
+/// Position is the second integral of the command: in an open loop, small errors of the force grow without bound, and a
+/// long simulation from poor parameters ends in wrong minima. Where the controller is known, [`PositioningLoop`] is the
+/// better model.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Positioning {
+    /// Force per command (N/V), known beforehand: all parameters scale with it.
+    pub gtau: f64,
+    /// Speed (m/s) within which dry friction turns over; positive.
+    pub width: f64,
+}
+
+impl Positioning {
+    /// The axis of the benchmark.
+    pub const EMPS: Positioning = Positioning { gtau: 35.150_651_88, width: 5e-4 };
+
+    #[inline]
+    fn acceleration<S: Scalar>(&self, v: S, vir: S, p: &Axis<S>) -> S {
+        (vir * self.gtau - p.fv * v - p.fc * (v / self.width).tanh() - p.offset) / p.m
+    }
+}
+
+impl Model for Positioning {
+    type State = Motion;
+    type Input = Command;
+    type Output = Position;
+    type Parameters = Axis;
+
+    #[inline]
+    fn derivative<S: Scalar>(&self, _t: f64, x: &Motion<S>, u: &Command<S>, p: &Axis<S>) -> Motion<S> {
+        Motion { q: x.v, v: self.acceleration(x.v, u.vir, p) }
+    }
+
+    #[inline]
+    fn output<S: Scalar>(&self, _t: f64, x: &Motion<S>, _u: &Command<S>, _p: &Axis<S>) -> Position<S> {
+        Position { qm: x.q }
+    }
+}
+
+/// A [`Positioning`] axis under a position controller around a speed controller:
+///
+/// ```text
+/// vir = kp kv (qg - q) - kv vm,    |vir| <= limit
+/// lag dvm/dt = v - vm
+/// ```
+///
+/// The lag stands for how a digital controller comes by a speed. In the record of the benchmark it can be read off: the
+/// speed that `kp kv (qg - q) - vir` stands for is, to 0.2 %, the mean of the last two differences of the position, which
+/// is one sample old (1 ms).
+///
+/// The controller keeps the simulated axis near the reference whatever the parameters, so that a fit finds its way from
+/// far off; and the command that the model needs to do so, compared with the recorded one, tells the parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PositioningLoop {
+    /// The axis.
+    pub axis: Positioning,
+    /// Gain of the position controller (1/s).
+    pub kp: f64,
+    /// Gain of the speed controller (V s/m).
+    pub kv: f64,
+    /// Largest command (V).
+    pub limit: f64,
+    /// Lag of the speed that the controller sees (s), by difference, filter and hold; positive.
+    pub lag: f64,
+}
+
+impl PositioningLoop {
+    /// The axis of the benchmark under its recorded controller.
+    pub const EMPS: PositioningLoop =
+        PositioningLoop { axis: Positioning::EMPS, kp: 160.18, kv: 243.45, limit: 10.0, lag: 1e-3 };
+
+    #[inline]
+    fn command<S: Scalar>(&self, x: &GuidedMotion<S>, u: &Reference<S>) -> S {
+        (((u.qg - x.q) * self.kp - x.vm) * self.kv).clamp(-self.limit, self.limit)
+    }
+}
+
+impl Model for PositioningLoop {
+    type State = GuidedMotion;
+    type Input = Reference;
+    type Output = Guided;
+    type Parameters = Axis;
+
+    #[inline]
+    fn derivative<S: Scalar>(&self, _t: f64, x: &GuidedMotion<S>, u: &Reference<S>, p: &Axis<S>) -> GuidedMotion<S> {
+        let v = self.axis.acceleration(x.v, self.command(x, u), p);
+        GuidedMotion { q: x.v, v, vm: (x.v - x.vm) / self.lag }
+    }
+
+    #[inline]
+    fn output<S: Scalar>(&self, _t: f64, x: &GuidedMotion<S>, u: &Reference<S>, _p: &Axis<S>) -> Guided<S> {
+        Guided { qm: x.q, vir: self.command(x, u) }
+    }
+}

@@ -1,0 +1,87 @@
+//! A drive that controls its torque with what an observer says of the motor, in an otherwise ideal world: no noise, no
+//! delay, no dead time, and the voltage held in the rotor's frame (thesis, simulations of chapter 6).
+
+use super::control::{Command, CurrentControl};
+use super::{Acting, Currents, Drive, Machine, Motion, Rotor, SQRT_3_2, Winding};
+use crate::integrate::axpy;
+use crate::model::Model;
+use crate::online::{Law, Mras, Outcome};
+
+/// Motor, current control and observer, sampled together.
+#[derive(Clone, Copy)]
+pub struct Adaptive<M: Model, L> {
+    /// The plant's equations.
+    pub machine: Machine,
+    /// The current control; its Ke is replaced by the observer's in every sample.
+    pub control: CurrentControl,
+    /// The observer, which starts from zero current as the plant does.
+    pub observer: Mras<M, L>,
+    /// Sample time (s).
+    pub ts: f64,
+}
+
+/// One sample of an [`Adaptive`] drive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instant {
+    /// Time (s).
+    pub t: f64,
+    /// The plant's motion.
+    pub x: Motion,
+    /// Electromagnetic torque (N m).
+    pub torque: f64,
+    /// What the observer believes before this sample corrects it.
+    pub estimate: Winding,
+    /// The voltage from this sample to the next.
+    pub command: Command,
+    /// What the observer said of this sample.
+    pub outcome: Outcome,
+}
+
+impl<M, L> Adaptive<M, L>
+where
+    M: Model<State = Currents, Input = Drive, Output = Currents, Parameters = Winding>,
+    L: Law<M>,
+{
+    /// Runs for `duration` (s) from rest and shows each sample to `see`.
+    ///
+    /// `rotor` gives the plant's parameters at a time, `load` the torque (N m) besides viscous friction at a speed, and
+    /// `reference` the current references at a time and motion, for the torque constant (N m/A) that is believed.
+    pub fn run(
+        mut self,
+        duration: f64,
+        rotor: impl Fn(f64) -> Rotor,
+        load: impl Fn(f64) -> f64,
+        mut reference: impl FnMut(f64, &Motion, f64) -> Currents,
+        mut see: impl FnMut(&Instant),
+    ) {
+        let mut x = Motion::default();
+        let samples = (duration / self.ts).round() as usize;
+        for k in 0..=samples {
+            let t = k as f64 * self.ts;
+            let estimate = self.observer.parameters();
+            self.control.ke = estimate.ke;
+            let measured = Currents { id: x.id, iq: x.iq };
+            let wanted = reference(t, &x, SQRT_3_2 * estimate.ke);
+            let command = self.control.step(wanted, measured, x.w, self.ts);
+            let u = Drive { ud: command.ud, uq: command.uq, w: x.w };
+            let outcome = self.observer.update(t, &u, &measured).outcome;
+            let p = rotor(t);
+            let torque = SQRT_3_2 * p.ke * x.iq;
+            see(&Instant { t, x, torque, estimate, command, outcome });
+            let acting = Acting { ud: command.ud, uq: command.uq, tau_l: load(x.w) };
+            x = runge_kutta(&self.machine, t, x, &acting, &p, self.ts);
+        }
+    }
+}
+
+/// One classical Runge-Kutta step; the load torque is held over it.
+fn runge_kutta(machine: &Machine, t: f64, x: Motion, u: &Acting, p: &Rotor, h: f64) -> Motion {
+    let f = |x: Motion| machine.derivative(t, &x, u, p);
+    let k1 = f(x);
+    let k2 = f(axpy::<Motion, f64>(x, 0.5 * h, k1));
+    let k3 = f(axpy::<Motion, f64>(x, 0.5 * h, k2));
+    let k4 = f(axpy::<Motion, f64>(x, h, k3));
+    let [k1, k2, k3, k4] = [k1, k2, k3, k4].map(<[f64; 4]>::from);
+    let mean = core::array::from_fn(|i| (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]) / 6.0);
+    axpy::<Motion, f64>(x, h, Motion::from(mean))
+}

@@ -1,0 +1,328 @@
+//! A servo drive in simulation: controllers, inverter, cable, motor, load and sensors of one robot axis.
+//!
+//! Each sample: measure; log the measurements with the command that acts *from now on*; compute the next command, which
+//! acts one sample later, turned to where the rotor will then be; let the plant run. The same seed gives the same record,
+//! bit for bit.
+
+use super::control::{Command, CurrentControl, SpeedControl};
+use super::frames::{Stator, rotate_into, rotate_out_of};
+use super::inverter::{DeadTime, aim};
+use super::plant::Plant;
+use super::program::Program;
+use super::robot::{Axis, TS, V_MAX};
+use super::sensors::{CurrentSensors, Resolver};
+use super::temperature::Celsius;
+use super::{Currents, Drive, Error, Injection, Motion, SQRT_3_2, Surface};
+use crate::experiment::{Experiment, Time};
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::SeedableRng;
+use serde::{Deserialize, Serialize};
+
+/// What keeps a real drive from being an ideal one; each may be switched off alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Disturbance {
+    /// Voltage lost in the inverter.
+    DeadTime,
+    /// Resistance of the cable.
+    Cable,
+    /// Noise of the current sensors.
+    CurrentNoise,
+    /// Steps of the current converters.
+    CurrentSteps,
+    /// Noise of the resolver.
+    AngleNoise,
+    /// Steps of the resolver's converter.
+    AngleSteps,
+    /// Unevenness of the resolver.
+    AngleUnevenness,
+    /// Cogging torque.
+    Cogging,
+    /// Sixth harmonic in EMF and torque.
+    EmfHarmonic,
+    /// Coulomb and viscous friction.
+    Friction,
+    /// Gravity.
+    Gravity,
+    /// `Ld` below, `Lq` above the nominal inductance.
+    Saliency,
+    /// Fall of `Lq` with the current.
+    Saturation,
+}
+
+impl Disturbance {
+    /// All of them.
+    pub const ALL: [Disturbance; 13] = [
+        Disturbance::DeadTime,
+        Disturbance::Cable,
+        Disturbance::CurrentNoise,
+        Disturbance::CurrentSteps,
+        Disturbance::AngleNoise,
+        Disturbance::AngleSteps,
+        Disturbance::AngleUnevenness,
+        Disturbance::Cogging,
+        Disturbance::EmfHarmonic,
+        Disturbance::Friction,
+        Disturbance::Gravity,
+        Disturbance::Saliency,
+        Disturbance::Saturation,
+    ];
+}
+
+/// The drive of one axis, ready to run a [`Program`].
+///
+/// ```
+/// use greybox::pmsm::{drive::{Disturbance, Simulation}, program::Program, robot::Axis};
+/// let axis = Axis::reference(1)?;
+/// let program = Program::speed_cycles(&axis, 2, 1.0)?;
+/// let log = Simulation::new(axis)?.without(Disturbance::DeadTime).run(&program);
+/// assert_eq!(log.rows.len(), program.targets.len());
+/// # Ok::<(), greybox::pmsm::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Simulation {
+    /// What the controllers believe of the axis: data sheet, 20 C.
+    pub nominal: Axis,
+    /// What the axis is.
+    pub plant: Plant,
+    /// Current sensors.
+    pub currents: CurrentSensors,
+    /// Angle sensor.
+    pub resolver: Resolver,
+    /// Current control.
+    pub current_control: CurrentControl,
+    /// Speed control.
+    pub speed_control: SpeedControl,
+    /// d current that is injected to see the resistance; `None` for id = 0.
+    pub injection: Option<Injection>,
+    /// Seed of the sensors' noise.
+    pub seed: u64,
+    /// Midpoint steps of the plant in one sample.
+    pub substeps: u32,
+}
+
+/// Corner of the controllers' one-pole speed filter (Hz).
+const SPEED_FILTER: f64 = 300.0;
+
+/// What one sample of a drive's log holds, and the truth behind it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Commanded voltage along the flux that acts from this sample to the next (V).
+    pub ud: f64,
+    /// Commanded voltage 90 electrical degrees ahead, likewise (V).
+    pub uq: f64,
+    /// Speed: the angle's difference from the sample before, over the sample time (rad/s, mechanical).
+    pub w: f64,
+    /// Measured current along the flux (A).
+    pub id: f64,
+    /// Measured current 90 electrical degrees ahead (A).
+    pub iq: f64,
+    /// Measured angle (rad, mechanical, not wrapped).
+    pub theta: f64,
+    /// Reference of iq (A).
+    pub iq_ref: f64,
+    /// Reference of the speed (rad/s).
+    pub w_ref: f64,
+    /// The plant's true motion.
+    pub truth: Motion,
+}
+
+/// What a run of a drive left behind.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Log {
+    /// One row per sample of [`TS`].
+    pub rows: Vec<Row>,
+    /// Samples in which the voltage was at its limit.
+    pub voltage_limited: usize,
+    /// Samples in which the current reference was at its limit.
+    pub current_limited: usize,
+}
+
+impl Simulation {
+    /// The reference drive of an axis with all disturbances, winding and magnet at 20 C.
+    pub fn new(axis: Axis) -> Result<Self, Error> {
+        axis.check()?;
+        let control = CurrentControl::lambda_tuned(axis.rs, axis.ls, axis.ke, axis.pole_pairs, 1e-3)?;
+        let speed = SpeedControl::tuned(axis.j, 60.0, 0.9)?;
+        Ok(Simulation {
+            nominal: axis,
+            plant: Plant {
+                axis,
+                dead_time: DeadTime { vdt: 2.0, i0: 0.15 },
+                emf_harmonic: 0.01,
+                saliency: 0.04,
+                saturation: 0.1,
+            },
+            currents: CurrentSensors::twelve_bit(axis.i_max),
+            resolver: Resolver::SIXTEEN_BIT,
+            current_control: control.limited(V_MAX),
+            speed_control: SpeedControl { kv: 20.0, torque_max: axis.kt() * axis.i_max, ..speed },
+            injection: None,
+            seed: axis.number as u64,
+            substeps: 6,
+        })
+    }
+
+    /// With one disturbance switched off.
+    pub fn without(mut self, disturbance: Disturbance) -> Self {
+        let plant = &mut self.plant;
+        match disturbance {
+            Disturbance::DeadTime => plant.dead_time.vdt = 0.0,
+            Disturbance::Cable => plant.axis.r_cable = 0.0,
+            Disturbance::CurrentNoise => self.currents.noise = 0.0,
+            Disturbance::CurrentSteps => self.currents.step = 0.0,
+            Disturbance::AngleNoise => self.resolver.noise = 0.0,
+            Disturbance::AngleSteps => self.resolver.step = 0.0,
+            Disturbance::AngleUnevenness => self.resolver.unevenness = 0.0,
+            Disturbance::Cogging => plant.axis.cogging = 0.0,
+            Disturbance::EmfHarmonic => plant.emf_harmonic = 0.0,
+            Disturbance::Friction => (plant.axis.tc, plant.axis.bv) = (0.0, 0.0),
+            Disturbance::Gravity => plant.axis.tg = 0.0,
+            Disturbance::Saliency => plant.saliency = 0.0,
+            Disturbance::Saturation => plant.saturation = 0.0,
+        }
+        self
+    }
+
+    /// With every disturbance switched off.
+    pub fn undisturbed(self) -> Self {
+        Disturbance::ALL.into_iter().fold(self, Simulation::without)
+    }
+
+    /// With winding and magnet at other temperatures; the controllers keep the values at 20 C.
+    pub fn heated(mut self, winding_at: Celsius, magnet_at: Celsius) -> Self {
+        self.plant.axis = self.plant.axis.heated(winding_at, magnet_at);
+        self
+    }
+
+    /// With d current injected.
+    pub fn injecting(self, injection: Injection) -> Self {
+        Simulation { injection: Some(injection), ..self }
+    }
+
+    /// With another seed for the sensors' noise.
+    pub fn seeded(self, seed: u64) -> Self {
+        Simulation { seed, ..self }
+    }
+
+    /// Runs a program from rest.
+    pub fn run(&self, program: &Program) -> Log {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(self.seed);
+        let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
+        let (mut current_control, mut speed_control) = (self.current_control, self.speed_control);
+        let np = self.nominal.pole_pairs;
+        let (kt, i_max) = (SQRT_3_2 * self.nominal.ke, self.nominal.i_max);
+        let blend = 1.0 - (-2.0 * core::f64::consts::PI * SPEED_FILTER * TS).exp();
+
+        let mut log = Log { rows: Vec::with_capacity(program.targets.len()), voltage_limited: 0, current_limited: 0 };
+        let mut x = Motion::default();
+        let mut last_theta = None;
+        let mut wf = 0.0;
+        let (mut acting, mut held) = (Command::default(), Stator::default());
+        for (k, target) in program.targets.iter().enumerate() {
+            let theta = self.resolver.read(x.theta, draw());
+            let (alpha, beta) = rotate_out_of((x.id, x.iq), self.plant.axis.pole_pairs.electrical(x.theta));
+            let read = self.currents.read(Stator { alpha, beta }, [draw(), draw()]);
+            let (id, iq) = rotate_into((read.alpha, read.beta), np.electrical(theta));
+            let w = (theta - last_theta.unwrap_or(theta)) / TS;
+            last_theta = Some(theta);
+            wf += blend * (w - wf);
+
+            let (torque, current_limited) = speed_control.step(*target, theta, wf, TS);
+            let iq_ref = (torque / kt).clamp(-i_max, i_max);
+            let id_ref = self.injection.map_or(0.0, |injection| injection.at(k as f64 * TS).id);
+            let reference = Currents { id: id_ref, iq: iq_ref };
+            let command = current_control.step(reference, Currents { id, iq }, wf, TS);
+            log.voltage_limited += usize::from(command.limited);
+            log.current_limited += usize::from(current_limited);
+            log.rows.push(Row { ud: acting.ud, uq: acting.uq, w, id, iq, theta, iq_ref, w_ref: target.w, truth: x });
+
+            x = self.plant.advance(x, held, TS, self.substeps);
+            held = aim((command.ud, command.uq), np.electrical(theta), wf, np, TS);
+            acting = command;
+        }
+        log
+    }
+}
+
+impl Log {
+    /// The record that an identification sees: voltages held from sample to sample, the *mean* speed of the same interval
+    /// (the difference of the angles at its two ends), currents at its begin. The last row, which has no interval, is left
+    /// out.
+    pub fn experiment(&self, model: &Surface) -> Result<Experiment<Currents, Drive, Currents>, crate::Error> {
+        let (inputs, outputs) = self
+            .rows
+            .windows(2)
+            .map(|pair| {
+                (Drive { ud: pair[0].ud, uq: pair[0].uq, w: pair[1].w }, Currents { id: pair[0].id, iq: pair[0].iq })
+            })
+            .unzip();
+        Experiment::new(model, Time::Uniform { start: 0.0, step: TS }, inputs, outputs)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pmsm::program::Program;
+
+    fn short(simulation: Simulation) -> Log {
+        simulation.run(&Program::speed_cycles(&simulation.nominal, 2, 1.0).unwrap())
+    }
+
+    fn reference() -> Simulation {
+        Simulation::new(Axis::reference(2).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_bits_and_another_does_not() {
+        assert_eq!(short(reference()), short(reference()));
+        assert_ne!(short(reference()), short(reference().seeded(99)));
+    }
+
+    // Each disturbance shows in the record by itself, and with all of them off the measurement is the truth.
+    #[test]
+    fn every_disturbance_is_there_and_can_be_switched_off() {
+        let all = short(reference());
+        for disturbance in Disturbance::ALL {
+            assert_ne!(short(reference().without(disturbance)), all, "{disturbance:?}");
+        }
+        let ideal = short(reference().undisturbed());
+        for row in &ideal.rows {
+            assert!((row.id - row.truth.id).abs() < 1e-12 && (row.iq - row.truth.iq).abs() < 1e-12);
+            assert_eq!(row.theta, row.truth.theta);
+        }
+    }
+
+    #[test]
+    fn the_drive_follows_its_program_within_its_limits() {
+        let log = short(reference());
+        assert_eq!((log.voltage_limited, log.current_limited), (0, 0));
+        for row in &log.rows {
+            assert!((row.truth.w - row.w_ref).abs() < 5.0, "{} for {}", row.truth.w, row.w_ref);
+            assert!(row.ud.hypot(row.uq) <= V_MAX * (1.0 + 1e-12));
+        }
+        let end = log.rows.last().unwrap();
+        assert!(end.truth.theta.abs() < 0.05, "forth and back: {}", end.truth.theta);
+    }
+
+    #[test]
+    fn limits_are_counted() {
+        let axis = Axis::reference(1).unwrap();
+        // Beyond the speed at which the EMF uses up the voltage.
+        let fast = Program::speed_cycles(&Axis { w_max: 600.0, ..axis }, 2, 1.0).unwrap();
+        assert!(Simulation::new(axis).unwrap().run(&fast).voltage_limited > 0);
+        // More acceleration than the current can make.
+        let hard = Program::speed_cycles(&axis, 2, 12.0).unwrap();
+        assert!(Simulation::new(axis).unwrap().run(&hard).current_limited > 0);
+    }
+
+    #[test]
+    fn impossible_axes_are_refused() {
+        assert!(Axis::reference(7).unwrap_err().to_string().contains("number of the robot's axis is 7"));
+        let axis = Axis::reference(1).unwrap();
+        let error = Simulation::new(Axis { ls: -4e-3, ..axis }).unwrap_err();
+        assert_eq!(error.to_string(), "inductance is -0.004 H; it must be positive and finite");
+        assert!(Simulation::new(Axis { r_cable: f64::NAN, ..axis }).is_err());
+    }
+}

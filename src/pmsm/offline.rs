@@ -1,0 +1,140 @@
+//! Motor parameters from a record, after the fact, by linear least squares (thesis 5.2).
+//!
+//! A record becomes [`Spans`]: per sample interval the currents at both ends, the voltage commanded in between, and the
+//! *mean* speed. Misaligned by half a sample, a record at 350 rad/s is wrong by degrees of electrical angle. From spans,
+//! [`plain`] and [`extended`] make [`Equations`]; these are filtered, weighted and solved.
+
+mod equations;
+mod extended;
+mod grey_box;
+mod mechanics;
+mod plain;
+mod validate;
+
+pub use equations::{Equations, WEAK, hardly_seen};
+pub use extended::{Extended, extended, search_i0};
+pub use mechanics::{Inertia, mechanics};
+pub use plain::{Axes, Form, plain};
+pub use validate::{Validation, voltages};
+
+use super::drive::Log;
+use super::robot::TS;
+use super::{Currents, Drive, PolePairs};
+use crate::error::Error;
+use crate::experiment::Experiment;
+use crate::signals::Signals;
+use core::ops::Range;
+
+/// One sample interval of a record.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Span {
+    /// Currents at its begin.
+    pub i0: Currents,
+    /// Currents at its end.
+    pub i1: Currents,
+    /// Commanded voltage along the flux, in the rotor's frame at mid-interval (V).
+    pub ud: f64,
+    /// Commanded voltage 90 electrical degrees ahead, likewise (V).
+    pub uq: f64,
+    /// Mean speed (rad/s, mechanical).
+    pub w: f64,
+    /// Angle at mid-interval (rad, mechanical).
+    pub theta: f64,
+}
+
+impl Span {
+    /// Mean of the currents at both ends.
+    pub fn mean(&self) -> Currents {
+        Currents { id: 0.5 * (self.i0.id + self.i1.id), iq: 0.5 * (self.i0.iq + self.i1.iq) }
+    }
+}
+
+/// What the speed of a record is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Speed {
+    /// The value at the sample; the mean of an interval is that of its ends.
+    AtSample,
+    /// The mean over the interval that begins at the sample.
+    OverInterval,
+}
+
+/// A record, interval by interval.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spans {
+    /// Sample time (s).
+    pub ts: f64,
+    /// Pole pairs of the motor.
+    pub pole_pairs: PolePairs,
+    /// The intervals in order.
+    pub spans: Vec<Span>,
+}
+
+impl Spans {
+    /// The intervals of a drive's log: the speed of an interval is the difference of the angles at its ends.
+    pub fn from_log(log: &Log, pole_pairs: PolePairs) -> Spans {
+        let spans = log.rows.windows(2).map(|pair| {
+            let [a, b] = [pair[0], pair[1]];
+            Span {
+                i0: Currents { id: a.id, iq: a.iq },
+                i1: Currents { id: b.id, iq: b.iq },
+                ud: a.ud,
+                uq: a.uq,
+                w: b.w,
+                theta: 0.5 * (a.theta + b.theta),
+            }
+        });
+        Spans { ts: TS, pole_pairs, spans: spans.collect() }
+    }
+
+    /// The intervals of a record without angle, which is added up from the speed and starts at `theta` (rad, mechanical;
+    /// it matters to the dead time only). The outputs must be there in every sample and the samples evenly spaced.
+    pub fn from_experiment<X: Signals>(
+        experiment: &Experiment<X, Drive, Currents>,
+        pole_pairs: PolePairs,
+        speed: Speed,
+        mut theta: f64,
+    ) -> Result<Spans, Error> {
+        let ts = experiment.sample_time();
+        let (inputs, outputs) = (experiment.inputs(), experiment.outputs());
+        if let Some(sample) = outputs.iter().position(|y| !(y.id.is_finite() && y.iq.is_finite())) {
+            return Err(Error::NotFinite {
+                experiment: experiment.name().to_owned(),
+                signal: if outputs[sample].id.is_finite() { "iq" } else { "id" }.to_owned(),
+                value: f64::NAN,
+                sample,
+                time: experiment.time(sample),
+            });
+        }
+        let jump = (1..experiment.len()).find(|&k| {
+            let step = experiment.time(k) - experiment.time(k - 1);
+            (step - ts).abs() > 0.01 * ts
+        });
+        if let Some(k) = jump {
+            return Err(Error::Option(format!(
+                "experiment `{}`: the sample time jumps from {ts} s to {} s at sample {k}; cut the record there",
+                experiment.name(),
+                experiment.time(k) - experiment.time(k - 1)
+            )));
+        }
+        let spans = (1..experiment.len()).map(|k| {
+            let (u, next) = (inputs[k - 1], inputs[k]);
+            let w = if speed == Speed::AtSample { 0.5 * (u.w + next.w) } else { u.w };
+            let middle = theta + 0.5 * w * ts;
+            theta += w * ts;
+            Span { i0: outputs[k - 1], i1: outputs[k], ud: u.ud, uq: u.uq, w, theta: middle }
+        });
+        Ok(Spans { ts, pole_pairs, spans: spans.collect() })
+    }
+
+    /// The intervals whose both ends lie within these samples.
+    pub fn cut(&self, samples: Range<usize>) -> Spans {
+        let end = samples.end.saturating_sub(1).min(self.spans.len());
+        let spans = self.spans.get(samples.start.min(end)..end).unwrap_or_default().to_vec();
+        Spans { spans, ..*self }
+    }
+
+    /// Whether the motor moves at all: a cycle without motion says nothing of Ke.
+    pub fn moves(&self) -> bool {
+        self.spans.iter().any(|span| span.w != 0.0)
+    }
+}

@@ -1,0 +1,117 @@
+use crate::prefilter::{Butterworth, FilterState};
+use crate::regress::{LinearEstimate, Regression, RegressionError};
+use crate::signals::{Of, Signals};
+
+/// Voltage equations `y = phi . p` of a record: one stream per axis, one row per sample, to be filtered and weighted
+/// before they are solved.
+#[derive(Clone, Debug)]
+pub struct Equations<P: Signals> {
+    streams: Vec<Stream<P>>,
+    lags: Option<usize>,
+}
+
+#[derive(Clone, Debug)]
+struct Stream<P: Signals> {
+    rows: Vec<(Of<P, f64>, f64)>,
+    weights: Vec<f64>,
+}
+
+impl<P: Signals> Default for Equations<P> {
+    fn default() -> Self {
+        Equations { streams: Vec::new(), lags: None }
+    }
+}
+
+impl<P: Signals> Equations<P> {
+    /// No equation.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a stream of rows `(phi, y)`, sample by sample.
+    pub fn stream(mut self, rows: impl IntoIterator<Item = (Of<P, f64>, f64)>) -> Self {
+        self.streams.push(Stream { rows: rows.into_iter().collect(), weights: Vec::new() });
+        self
+    }
+
+    /// Adds the streams of another record.
+    pub fn and(mut self, other: Self) -> Self {
+        self.lags = self.lags.max(other.lags);
+        self.streams.extend(other.streams);
+        self
+    }
+
+    /// Filters every stream, causally and from rest: each entry of `phi`, and `y`, by the same filter, which leaves the
+    /// equations true.
+    ///
+    /// What noise is left is correlated over the filter's memory; the standard errors count this.
+    pub fn prefiltered(mut self, filter: &Butterworth) -> Self {
+        for stream in &mut self.streams {
+            let mut states = vec![FilterState::default(); P::LEN + 1];
+            for (phi, y) in &mut stream.rows {
+                let entries = P::into_array(*phi);
+                let mut states = states.iter_mut();
+                let mut pass = |x: f64| states.next().map_or(x, |state| filter.step(state, x));
+                *phi = P::from_fn(|i| pass(entries.as_ref()[i]));
+                *y = pass(*y);
+            }
+        }
+        // The response is over after some two periods of the cut-off.
+        self.lags = self.lags.max(Some((2.0 / filter.cutoff() / filter.sample_time()).ceil() as usize));
+        self
+    }
+
+    /// Multiplies the cost of row `k` of every stream by `weight(k)` (thesis (5.9)).
+    pub fn weighted(mut self, weight: impl Fn(usize) -> f64) -> Self {
+        for stream in &mut self.streams {
+            stream.weights = (0..stream.rows.len()).map(&weight).collect();
+        }
+        self
+    }
+
+    /// The rows as a regression, stream after stream.
+    pub fn regression(&self) -> Regression<P> {
+        let mut regression = Regression::new();
+        for stream in &self.streams {
+            for (k, (phi, y)) in stream.rows.iter().enumerate() {
+                regression.weighted_row(*phi, *y, stream.weights.get(k).copied().unwrap_or(1.0));
+            }
+        }
+        match self.lags {
+            Some(lags) => regression.correlated(lags),
+            None => regression,
+        }
+    }
+
+    /// The parameters that leave the least sum of squares.
+    ///
+    /// # Errors
+    /// As [`Regression::solve`].
+    pub fn solve(&self) -> Result<LinearEstimate<P>, RegressionError> {
+        self.regression().solve()
+    }
+
+    /// The least weighted sum of squared residuals.
+    pub fn least_squares(&self) -> f64 {
+        self.regression().information().residual()
+    }
+
+    /// `(y, phi . p)` of each row, stream by stream.
+    pub fn predictions(&self, parameters: &Of<P, f64>) -> Vec<Vec<(f64, f64)>> {
+        let p = P::into_array(*parameters);
+        let dot = |phi: &Of<P, f64>| P::into_array(*phi).as_ref().iter().zip(p.as_ref()).map(|(a, b)| a * b).sum();
+        self.streams.iter().map(|stream| stream.rows.iter().map(|(phi, y)| (*y, dot(phi))).collect()).collect()
+    }
+}
+
+/// Index (%) above which a parameter counts as hardly seen: a change by two fifths of its value does no more than double
+/// the squared residual.
+pub const WEAK: f64 = 40.0;
+
+/// Names of the parameters that the equations hardly see, by [`WEAK`]: what is left out of the equations may move them far
+/// more than their standard errors say.
+pub fn hardly_seen<P: Signals>(estimate: &LinearEstimate<P>) -> Vec<&'static str> {
+    let index = P::into_array(estimate.index);
+    let seen = |index: f64| index <= WEAK;
+    P::NAMES.iter().zip(index.as_ref()).filter(|(_, index)| !seen(**index)).map(|(name, _)| *name).collect()
+}

@@ -1,0 +1,78 @@
+use super::plain::sinc;
+use super::{Equations, Spans};
+use crate::error::Error;
+use crate::pmsm::{SQRT_2_3, dead_time};
+use crate::signals::Signals;
+use argmin::core::{CostFunction, Executor};
+use argmin::solver::brent::BrentOpt;
+
+crate::signals! {
+    /// What the extended least squares tells apart.
+    pub struct Extended {
+        /// Phase resistance, motor and cable.
+        r: "ohm",
+        /// Inductance along the magnet flux.
+        ld: "H",
+        /// Inductance 90 electrical degrees ahead of it, at small currents.
+        lq: "H",
+        /// By how much that changes with the square of iq.
+        lq2: "H/A^2",
+        /// Line-to-line rms back-EMF per mechanical speed.
+        ke: "V s/rad",
+        /// Voltage that dead time takes from each phase.
+        vdt: "V",
+    }
+}
+
+/// The voltage equations with unequal inductances, saturation and dead time, of the voltage over `sinc(we Ts/2)`.
+///
+/// The dead time's voltage, the Park transform of `tanh(i_abc/i0)`, is taken at the angle of mid-interval and the mean
+/// current; `i0` (A) enters it nonlinearly, see [`search_i0`].
+pub fn extended(spans: &Spans, i0: f64) -> Equations<Extended> {
+    let (q, d): (Vec<_>, Vec<_>) = spans
+        .spans
+        .iter()
+        .map(|span| {
+            let we = spans.pole_pairs.electrical(span.w);
+            let i = span.mean();
+            let (did, diq) = ((span.i1.id - span.i0.id) / spans.ts, (span.i1.iq - span.i0.iq) / spans.ts);
+            let lost = dead_time(&i, i0, spans.pole_pairs.electrical(span.theta));
+            let whole = sinc(0.5 * we * spans.ts);
+            let (lq, square) = (-we * i.iq, i.iq * i.iq);
+            let emf = SQRT_2_3 * span.w;
+            let q = Extended { r: i.iq, ld: we * i.id, lq: diq, lq2: square * diq, ke: emf, vdt: lost.1 };
+            let d = Extended { r: i.id, ld: did, lq, lq2: square * lq, ke: 0.0, vdt: lost.0 };
+            ((q, span.uq / whole), (d, span.ud / whole))
+        })
+        .unzip();
+    Equations::new().stream(q).stream(d)
+}
+
+struct OverI0<F>(F);
+
+impl<F: Fn(f64) -> f64> CostFunction for OverI0<F> {
+    type Param = f64;
+    type Output = f64;
+    fn cost(&self, ln_i0: &f64) -> Result<f64, argmin::core::Error> {
+        Ok((self.0)(ln_i0.exp()))
+    }
+}
+
+/// The current `i0` (A) within `low..high` whose equations leave the least residual: a continuous one-dimensional search
+/// (R. P. Brent, *Algorithms for Minimization without Derivatives*, 1973, ch. 5) over its logarithm, to 1 %.
+///
+/// `equations` makes them for a given `i0`, such as `|i0| extended(&spans, i0).prefiltered(&filter)`.
+///
+/// # Errors
+/// Limits that are not positive or not in order.
+pub fn search_i0<P: Signals>(low: f64, high: f64, equations: impl Fn(f64) -> Equations<P>) -> Result<f64, Error> {
+    if !(low > 0.0 && high > low && high.is_finite()) {
+        return Err(Error::Option(format!("the search of i0 needs 0 < low < high; got {low} A and {high} A")));
+    }
+    let solver = BrentOpt::new(low.ln(), high.ln()).set_tolerance(1e-2, 1e-2);
+    let found = Executor::new(OverI0(|i0| equations(i0).least_squares()), solver)
+        .configure(|state| state.max_iters(60))
+        .run()
+        .map_err(|e| Error::Optimizer(e.to_string()))?;
+    found.state.best_param.map(f64::exp).ok_or_else(|| Error::Optimizer("the search of i0 found nothing".to_owned()))
+}

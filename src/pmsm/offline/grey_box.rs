@@ -1,0 +1,27 @@
+use super::Spans;
+use crate::error::Error;
+use crate::experiment::{Experiment, Time};
+use crate::pmsm::{CompensatedDrive, Currents, ExactCompensated, dead_time};
+
+impl Spans {
+    /// The record as [`ExactCompensated`] needs it, for a fit of simulated to measured currents (thesis 5.2.3): `i0` (A) is
+    /// the current at which the dead time turns over.
+    ///
+    /// # Errors
+    /// As [`Experiment::new`].
+    pub fn grey_box(
+        &self,
+        model: &ExactCompensated,
+        i0: f64,
+    ) -> Result<Experiment<Currents, CompensatedDrive, Currents>, Error> {
+        let (inputs, outputs) = self
+            .spans
+            .iter()
+            .map(|span| {
+                let (lost_d, lost_q) = dead_time(&span.mean(), i0, self.pole_pairs.electrical(span.theta));
+                (CompensatedDrive { ud: span.ud, uq: span.uq, w: span.w, lost_d, lost_q }, span.i0)
+            })
+            .unzip();
+        Experiment::new(model, Time::Uniform { start: 0.0, step: self.ts }, inputs, outputs)
+    }
+}

@@ -1,0 +1,77 @@
+use super::frames::{Stator, rotate_into, rotate_out_of};
+use super::inverter::DeadTime;
+use super::robot::Axis;
+use super::{COULOMB_WIDTH, Motion, SQRT_2_3, SQRT_3_2};
+use crate::scalar::Scalar;
+use serde::{Deserialize, Serialize};
+
+/// The motor and its load as they really are: what no estimator is told.
+///
+/// Winding and magnet at their temperatures, cable, unequal inductances of which the q axis's falls with the current, a
+/// sixth harmonic in EMF and torque, cogging, friction and gravity. It is driven by a voltage that stands still in the
+/// *stationary* frame, as an inverter's does.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Plant {
+    /// Values at the temperatures of the run.
+    pub axis: Axis,
+    /// What the inverter loses.
+    pub dead_time: DeadTime,
+    /// Sixth harmonic of EMF and torque constant, as a share of Ke.
+    pub emf_harmonic: f64,
+    /// By which share `Ld` is below and `Lq` above the axis's inductance.
+    pub saliency: f64,
+    /// By which share `Lq` falls at half the largest current, as `1 - saturation min((iq / (Imax/2))^2, 2)`.
+    pub saturation: f64,
+}
+
+impl Plant {
+    /// Slope of the motion under a stationary voltage (V).
+    #[inline]
+    pub fn derivative(&self, x: &Motion, u: Stator) -> Motion {
+        let a = &self.axis;
+        let theta_e = a.pole_pairs.electrical(x.theta);
+        let we = a.pole_pairs.electrical(x.w);
+        let (alpha, beta) = rotate_out_of((x.id, x.iq), theta_e);
+        let lost = self.dead_time.lost(Stator { alpha, beta });
+        let (ud, uq) = rotate_into((u.alpha - lost.alpha, u.beta - lost.beta), theta_e);
+        let ke = a.ke * (1.0 + self.emf_harmonic * Scalar::cos(6.0 * theta_e));
+        let half = x.iq / (0.5 * a.i_max);
+        let ld = a.ls * (1.0 - self.saliency);
+        let lq = a.ls * (1.0 + self.saliency) * (1.0 - self.saturation * Scalar::min(half * half, 2.0));
+        let r = a.rs + a.r_cable;
+        let torque = SQRT_3_2 * ke * x.iq + 1.5 * a.pole_pairs.get() * (ld - lq) * x.id * x.iq;
+        let load = a.tc * Scalar::tanh(x.w / COULOMB_WIDTH)
+            + a.bv * x.w
+            + a.tg * Scalar::cos(x.theta / a.gear)
+            + a.cogging * Scalar::sin(24.0 * x.theta);
+        Motion {
+            id: (ud - r * x.id + we * lq * x.iq) / ld,
+            iq: (uq - r * x.iq - we * ld * x.id - SQRT_2_3 * ke * x.w) / lq,
+            w: (torque - load) / a.j,
+            theta: x.w,
+        }
+    }
+
+    /// Electromagnetic torque (N m).
+    pub fn torque(&self, x: &Motion) -> f64 {
+        let free = Plant { axis: Axis { tc: 0.0, bv: 0.0, tg: 0.0, cogging: 0.0, ..self.axis }, ..*self };
+        self.axis.j * free.derivative(x, Stator::default()).w
+    }
+
+    /// The motion after `ts` (s) under a stationary voltage, by midpoint steps (second-order Runge-Kutta).
+    #[inline]
+    pub fn advance(&self, mut x: Motion, u: Stator, ts: f64, substeps: u32) -> Motion {
+        let h = ts / substeps as f64;
+        let moved = |x: &Motion, k: &Motion, h: f64| Motion {
+            id: x.id + h * k.id,
+            iq: x.iq + h * k.iq,
+            w: x.w + h * k.w,
+            theta: x.theta + h * k.theta,
+        };
+        for _ in 0..substeps {
+            let middle = moved(&x, &self.derivative(&x, u), 0.5 * h);
+            x = moved(&x, &self.derivative(&middle, u), h);
+        }
+        x
+    }
+}

@@ -1,0 +1,161 @@
+#![cfg(feature = "std")]
+//! The fit as a problem of argmin's own solvers, and what its executor brings: observers, checkpoints, limits.
+
+mod common;
+
+use argmin::core::observers::{Observe, ObserverMode};
+use argmin::core::{Executor, KV, State};
+use argmin::solver::linesearch::MoreThuenteLineSearch;
+use argmin::solver::neldermead::NelderMead;
+use argmin::solver::quasinewton::LBFGS;
+use common::*;
+use greybox::optimize::{GaussNewton, LeastSquaresState, LevenbergMarquardt, Outcome, Stop};
+use greybox::*;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
+
+const SIGMA: Current = Current { i: 0.1 };
+
+fn record(seed: u64) -> ExperimentOf<Lag> {
+    let inputs = levels(200, 12, 7).into_iter().map(|u| Voltage { u }).collect();
+    let record = simulated(&Lag, 5e-3, inputs, Current { i: 0.5 }, Branch { gain: 2.0, tau: 0.05 });
+    noisy(&Lag, &record, SIGMA, &mut Noise(seed))
+}
+
+fn fit(record: &ExperimentOf<Lag>) -> Fit<'_, Lag> {
+    Fit::new(&Lag, record).parameters(Branch { gain: free(1.0), tau: free(0.1).log() }).noise(SIGMA)
+}
+
+#[test]
+fn nelder_mead_and_lbfgs_find_the_minimum() {
+    let record = record(1);
+    let best = fit(&record).run().unwrap();
+    let problem = fit(&record).problem().unwrap();
+    let start = problem.objective().start();
+    let moved = |i: usize| {
+        let mut corner = start.clone();
+        corner[i] += 0.2;
+        corner
+    };
+    let simplex = NelderMead::new(vec![start.clone(), moved(0), moved(1)]).with_sd_tolerance(1e-14).unwrap();
+    let found = Executor::new(problem.objective(), simplex).configure(|state| state.max_iters(500)).run().unwrap();
+    let nelder_mead = found.state().get_best_param().unwrap().clone();
+    let search = LBFGS::new(MoreThuenteLineSearch::new(), 7);
+    let configure = |state: argmin::core::IterState<_, _, _, _, _, _>| state.param(start.clone()).max_iters(100);
+    let found = Executor::new(problem.objective(), search).configure(configure).run().unwrap();
+    let lbfgs = found.state().get_best_param().unwrap().clone();
+    for place in [nelder_mead, lbfgs] {
+        let estimate = problem.estimate(&place).unwrap();
+        assert!(estimate.outcome.converged(), "{estimate}");
+        for (found, best) in estimate.unknowns.iter().zip(&best.unknowns) {
+            // A cost that is flat to 1e-14 tells the place to 1e-7 of the problem's own length, the standard error.
+            let error = best.knowledge.standard_error().unwrap();
+            assert!((found.value - best.value).abs() < 1e-5 * error, "{estimate}");
+            assert!((found.knowledge.standard_error().unwrap() / error - 1.0).abs() < 1e-5);
+        }
+    }
+    let far = problem.estimate(&start).unwrap();
+    assert!(!far.outcome.converged(), "a start is no minimum: {far}");
+    assert!(problem.estimate(&start[..1]).is_err());
+}
+
+struct Count(Arc<AtomicU64>);
+
+impl Observe<LeastSquaresState> for Count {
+    fn observe_iter(&mut self, state: &LeastSquaresState, _kv: &KV) -> Result<(), argmin::core::Error> {
+        assert!(state.get_cost().is_finite());
+        self.0.fetch_add(1, Ordering::Relaxed);
+        Ok(())
+    }
+}
+
+#[test]
+fn observers_see_every_iteration() {
+    let (record, count) = (record(1), Arc::new(AtomicU64::new(0)));
+    let estimate = fit(&record).observe(Count(count.clone()), ObserverMode::Always).run().unwrap();
+    assert!(estimate.iterations > 2);
+    assert_eq!(count.load(Ordering::Relaxed), estimate.iterations);
+}
+
+fn place(name: &str) -> PathBuf {
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = std::fs::remove_file(&path);
+    path
+}
+
+#[test]
+fn a_checkpoint_goes_on() {
+    let (record, other, path) = (record(1), record(2), place("goes_on.json"));
+    let whole = fit(&record).run().unwrap();
+    let short = Stop { iterations: 3, ..Stop::default() };
+    let cut = fit(&record).optimizer(LevenbergMarquardt::new(short, JacobianColumns)).checkpoint(&path, 1);
+    let cut = cut.run().unwrap();
+    assert_eq!(cut.outcome, Outcome::IterationLimit { iterations: 3 });
+    assert!(!cut.outcome.converged());
+    let resumed = fit(&record).checkpoint(&path, 1).run().unwrap();
+    assert!(resumed.outcome.converged(), "{resumed}");
+    assert!(resumed.iterations > 3, "those before count: {}", resumed.iterations);
+    let error = whole.unknowns[0].knowledge.standard_error().unwrap();
+    assert!((resumed.parameters.gain - whole.parameters.gain).abs() < 1e-6 * error);
+    // A finished search looks again before it says so.
+    let again = fit(&record).checkpoint(&path, 1).run().unwrap();
+    assert!(again.outcome.converged() && again.evaluations > 0 && again.iterations > resumed.iterations, "{again}");
+    assert!((again.parameters.gain - whole.parameters.gain).abs() < 1e-6 * error);
+    let refused = fit(&other).checkpoint(&path, 1).run().unwrap_err().to_string();
+    assert!(refused.contains("another problem"), "{refused}");
+    std::fs::write(&path, "{}").unwrap();
+    let refused = fit(&record).checkpoint(&path, 1).run().unwrap_err().to_string();
+    assert!(refused.contains("delete it"), "{refused}");
+}
+
+#[test]
+fn a_place_that_cannot_be_written_is_an_error_at_once() {
+    let path = place("absent_folder").join("checkpoint.json");
+    assert!(matches!(fit(&record(1)).checkpoint(path, 1).run(), Err(Error::File { .. })));
+}
+
+/// Raises the flag after the second iteration.
+struct Raise(Arc<AtomicBool>);
+
+impl Observe<LeastSquaresState> for Raise {
+    fn observe_iter(&mut self, state: &LeastSquaresState, _kv: &KV) -> Result<(), argmin::core::Error> {
+        self.0.store(state.get_iter() >= 1, Ordering::Relaxed);
+        Ok(())
+    }
+}
+
+#[test]
+fn a_flag_stops_the_search() {
+    let (record, flag) = (record(1), Arc::new(AtomicBool::new(false)));
+    let observer = Raise(flag.clone());
+    let estimate = fit(&record).cancel(flag).observe(observer, ObserverMode::Always).run().unwrap();
+    assert_eq!(estimate.outcome, Outcome::Cancelled);
+    assert_eq!(estimate.severity(), optimize::Severity::NotUsable);
+    let raised = Arc::new(AtomicBool::new(true));
+    assert!(fit(&record).cancel(raised).run().is_err());
+}
+
+#[test]
+fn a_time_limit_stops_the_search() {
+    // Over before the first evaluation: nothing to hand back.
+    assert!(fit(&record(1)).time_limit(Duration::ZERO).run().is_err());
+    assert!(fit(&record(1)).time_limit(Duration::from_secs(3600)).run().unwrap().outcome.converged());
+}
+
+#[test]
+fn settings_of_optimizers_come_back_from_json() {
+    fn same<T: serde::Serialize + serde::de::DeserializeOwned>(value: T) {
+        let text = serde_json::to_string(&value).unwrap();
+        let back: T = serde_json::from_str(&text).unwrap();
+        assert_eq!(serde_json::to_string(&back).unwrap(), text);
+    }
+    let stop = Stop { step: 1e-7, gradient: 1e-5, cost: 1e-9, iterations: 7 };
+    same(stop);
+    same(LevenbergMarquardt::new(stop, JacobianColumns));
+    same(LevenbergMarquardt::new(stop, Unscaled));
+    same(LevenbergMarquardt::new(stop, Nominal(vec![1.0, 0.1])));
+    same(GaussNewton::default());
+    same(Outcome::Stalled { gradient: 0.1, failed: 3 });
+}

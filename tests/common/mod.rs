@@ -1,0 +1,123 @@
+//! Small models and reproducible noise for the trials of the fit.
+#![allow(dead_code, reason = "each test uses some of it")]
+
+use greybox::*;
+
+signals! { pub struct Voltage { u: "V" } }
+signals! { pub struct Current { i: "A" } }
+signals! { pub struct Pair { y: "V", z: "V" } }
+signals! { pub struct Affine { slope: "1", offset: "V" } }
+signals! { pub struct Branch { gain: "A/V", tau: "s" } }
+
+/// `y = slope u + offset`, `z = offset u - slope`: linear in its parameters, without state.
+pub struct Line;
+
+impl Model for Line {
+    type State = Nothing;
+    type Input = Voltage;
+    type Output = Pair;
+    type Parameters = Affine;
+    const KIND: Kind = Kind::Static;
+    #[inline]
+    fn output<S: Scalar>(&self, _t: f64, _x: &Nothing, u: &Voltage<S>, p: &Affine<S>) -> Pair<S> {
+        Pair { y: p.slope * u.u + p.offset, z: p.offset * u.u - p.slope }
+    }
+}
+
+/// `tau di/dt = gain u - i`, the current measured.
+pub struct Lag;
+
+impl Model for Lag {
+    type State = Current;
+    type Input = Voltage;
+    type Output = Current;
+    type Parameters = Branch;
+    #[inline]
+    fn derivative<S: Scalar>(&self, _t: f64, x: &Current<S>, u: &Voltage<S>, p: &Branch<S>) -> Current<S> {
+        Current { i: (p.gain * u.u - x.i) / p.tau }
+    }
+    #[inline]
+    fn output<S: Scalar>(&self, _t: f64, x: &Current<S>, _u: &Voltage<S>, _p: &Branch<S>) -> Current<S> {
+        *x
+    }
+}
+
+/// Uniform numbers in 0..1 and Gaussian ones, the same on every run.
+pub struct Noise(pub u64);
+
+impl Noise {
+    pub fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        let mixed = (self.0 ^ (self.0 >> 29)).wrapping_mul(0xbf58476d1ce4e5b9);
+        ((mixed >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+    }
+    pub fn gauss(&mut self) -> f64 {
+        (-2.0 * self.uniform().ln()).sqrt() * (core::f64::consts::TAU * self.uniform()).cos()
+    }
+}
+
+/// A square wave, so many samples per level, with a level of its own each time.
+pub fn levels(samples: usize, hold: usize, seed: u64) -> Vec<f64> {
+    let mut noise = Noise(seed);
+    let mut level = 0.0;
+    (0..samples)
+        .map(|k| {
+            if k % hold == 0 {
+                level = 2.0 * noise.uniform() - 1.0;
+            }
+            level
+        })
+        .collect()
+}
+
+/// What a model says of these inputs with these parameters, from this state: outputs without noise.
+pub fn simulated<M: Model>(
+    model: &M,
+    step: f64,
+    inputs: Vec<Of<M::Input, f64>>,
+    start: Of<M::State, f64>,
+    truth: Of<M::Parameters, f64>,
+) -> ExperimentOf<M> {
+    let outputs = vec![M::Output::splat(0.0); inputs.len()];
+    let record = Experiment::new(model, Time::Uniform { start: 0.0, step }, inputs.clone(), outputs)
+        .unwrap()
+        .initial(M::State::map(start, fixed));
+    with_truth(model, &record, truth)
+}
+
+/// The record with the model's own outputs in place of the measured ones.
+pub fn with_truth<M: Model>(model: &M, record: &ExperimentOf<M>, truth: Of<M::Parameters, f64>) -> ExperimentOf<M> {
+    let said = Fit::new(model, record).parameters(M::Parameters::map(truth, fixed)).simulate().unwrap();
+    with_outputs(model, record, said.outputs)
+}
+
+/// The record with other outputs.
+pub fn with_outputs<M: Model>(
+    model: &M,
+    record: &ExperimentOf<M>,
+    outputs: Vec<Of<M::Output, f64>>,
+) -> ExperimentOf<M> {
+    let made = Experiment::new(model, record.times().clone(), record.inputs().to_vec(), outputs).unwrap();
+    let made = made.named(record.name()).hold(record.input_hold());
+    match *record.initial_state() {
+        Initial::Given(state) => made.initial(state),
+        Initial::FirstSample => made.initial_from_first_sample(),
+        Initial::Estimated => made,
+    }
+}
+
+/// The record with Gaussian noise of these standard deviations on its outputs.
+pub fn noisy<M: Model>(
+    model: &M,
+    record: &ExperimentOf<M>,
+    sigma: Of<M::Output, f64>,
+    noise: &mut Noise,
+) -> ExperimentOf<M> {
+    let sigma = M::Output::into_array(sigma);
+    let disturbed = |y: &Of<M::Output, f64>| {
+        let y = M::Output::into_array(*y);
+        M::Output::from_fn(|j| y.as_ref()[j] + sigma.as_ref()[j] * noise.gauss())
+    };
+    let outputs = record.outputs().iter().map(disturbed).collect();
+    with_outputs(model, record, outputs)
+}

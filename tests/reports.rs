@@ -1,0 +1,275 @@
+//! Reports: that every form of one is whole, safe against what stands in names, and honest about what is missing.
+
+use greybox::optimize::Severity;
+use greybox::report::{Finding, ProfileCurve};
+use greybox::{
+    Error, Estimate, Experiment, ExperimentOf, Fit, Kind, Model, Nothing, Report, Scalar, Signals, Time, fixed, free,
+    signals,
+};
+use std::fs;
+use std::path::PathBuf;
+
+signals! {
+    pub struct Drive { u: "V" }
+    pub struct Response { y: "<script>alert(1)</script>" }
+    pub struct Line { slope: "\"Ω\" & '1'", forwards: "N", backwards: "N", offset: "N", gain: "1", scale: "1" }
+}
+
+/// `y = gain scale (slope u + forwards [u > 0] - backwards [u <= 0] + offset)`
+struct Friction;
+
+impl Model for Friction {
+    type State = Nothing;
+    type Input = Drive;
+    type Output = Response;
+    type Parameters = Line;
+    const KIND: Kind = Kind::Static;
+
+    #[inline]
+    fn output<S: Scalar>(&self, _t: f64, _x: &Nothing, u: &Drive<S>, p: &Line<S>) -> Response<S> {
+        let dry = if u.u.value() > 0.0 { p.forwards } else { -p.backwards };
+        Response { y: p.gain * p.scale * (p.slope * u.u + dry + p.offset) }
+    }
+}
+
+const HOSTILE: &str = "<img src=x onerror=\"alert('1')\"> | `a` & ψ\u{0}\n# b";
+
+fn record(samples: usize) -> ExperimentOf<Friction> {
+    let inputs: Vec<_> = (0..samples).map(|k| Drive { u: (0.7 * k as f64).sin() }).collect();
+    // The second sine stands for noise.
+    let output = |k: usize, u: &Drive| Response { y: 2.0 * u.u + u.u.signum() + 0.3 + 0.01 * (1.9 * k as f64).sin() };
+    let outputs = inputs.iter().enumerate().map(|(k, u)| output(k, u)).collect();
+    Experiment::new(&Friction, Time::Uniform { start: 0.0, step: 1e-3 }, inputs, outputs).unwrap()
+}
+
+fn line() -> Line<greybox::Parameter> {
+    Line {
+        slope: free(1.0).within(0.0, 10.0),
+        forwards: free(2.0),
+        backwards: free(2.0),
+        offset: fixed(0.3),
+        gain: fixed(1.0),
+        scale: fixed(1.0),
+    }
+}
+
+fn estimate(record: &ExperimentOf<Friction>, line: Line<greybox::Parameter>) -> Estimate<Friction> {
+    Fit::new(&Friction, record).parameters(line).run().unwrap()
+}
+
+fn report(record: &ExperimentOf<Friction>, line: Line<greybox::Parameter>) -> Report {
+    Report::new(&Friction, &estimate(record, line), record).unwrap()
+}
+
+fn with_everything() -> Report {
+    let profile = ProfileCurve {
+        name: "slope".to_owned(),
+        unit: "1".to_owned(),
+        values: vec![1.9, 2.0, 2.1],
+        rise: vec![Some(5.0), Some(0.0), None],
+        level: 3.84,
+    };
+    let finding = Finding {
+        about: format!("residual of {HOSTILE}"),
+        test: "Ljung-Box".to_owned(),
+        result: "p = 0.2".to_owned(),
+        meaning: "they are white".to_owned(),
+        severity: Severity::Usable,
+    };
+    report(&record(500).named(HOSTILE), line()).titled(HOSTILE).with_findings([finding]).with_profile(profile)
+}
+
+/// Tags and attributes of a page that open and close as they must: a browser would mend what a reader then sees wrongly.
+fn assert_well_formed(markup: &str) {
+    let mut open: Vec<&str> = vec![];
+    let mut rest = markup.trim_start_matches("<!DOCTYPE html>\n");
+    while let Some(begin) = rest.find('<') {
+        let end = begin + rest[begin..].find('>').expect("a tag that ends");
+        let tag = &rest[begin + 1..end];
+        rest = &rest[end + 1..];
+        assert_eq!(tag.matches('"').count() % 2, 0, "<{tag}>");
+        let name = tag.split(' ').next().unwrap();
+        if let Some(closed) = name.strip_prefix('/') {
+            assert_eq!(open.pop(), Some(closed));
+        } else if !tag.ends_with('/') {
+            open.push(name);
+            // Style and script are text until they end.
+            if ["style", "script"].contains(&name) {
+                rest = &rest[rest.find("</").unwrap()..];
+            }
+        }
+    }
+    assert!(open.is_empty(), "left open: {open:?}");
+}
+
+#[test]
+fn hostile_names_stay_names() {
+    let report = with_everything();
+    let page = report.to_html();
+    assert_well_formed(&page);
+    assert_eq!(page.matches("<script").count(), 1, "the page's own");
+    assert!(!page.contains("<img") && !page.contains('\0'));
+    assert!(page.contains("&lt;img src=x onerror=&quot;alert(&#39;1&#39;)&quot;&gt; | `a` &amp; ψ\u{FFFD}\n# b"));
+    for plot in report.plots() {
+        assert_well_formed(&plot.to_svg());
+        assert!(!plot.to_svg().contains("<img") && !plot.to_svg().contains("var(--"), "{}", plot.title());
+        assert!(plot.name().chars().all(|letter| letter.is_alphanumeric() || letter == '-'), "{}", plot.name());
+    }
+    let markdown = report.to_markdown();
+    assert!(!markdown.contains("<img") && !markdown.contains("<script") && !markdown.contains("\n# b"));
+    assert!(!report.to_string().contains(['\0', '\x1b']));
+}
+
+/// Nothing is fetched: no address, no import, no resource.
+#[test]
+fn the_page_stands_alone() {
+    let page = with_everything().to_html();
+    for outside in ["://", "@import", "url(", " src=\"", " href=", "<link", "<iframe"] {
+        assert!(!page.contains(outside), "{outside}");
+    }
+}
+
+#[test]
+fn markdown_tables_have_as_many_cells_as_columns() {
+    let markdown = with_everything().to_markdown();
+    let cells = |line: &str| line.replace("\\|", "").matches('|').count();
+    let lines: Vec<&str> = markdown.lines().collect();
+    let mut tables = 0;
+    for pair in lines.windows(2).filter(|pair| pair[0].starts_with('|') && pair[1].starts_with('|')) {
+        assert_eq!(cells(pair[0]), cells(pair[1]), "{pair:?}");
+        tables += usize::from(pair[1].starts_with("| :--"));
+    }
+    assert_eq!(tables, 7, "parameters, outputs, tests, signals, declarations, settings, figures");
+    assert!(markdown.contains("| offset | 0.3000000 | N |  | fixed |  |"), "{markdown}");
+}
+
+/// A report kept in the schema of version 1 is read by every later version, and written as it was.
+#[test]
+fn the_committed_example_still_reads() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/report.json");
+    if std::env::var_os("GREYBOX_WRITE_EXAMPLE").is_some() {
+        with_everything().titled("An example of the schema").save(path).unwrap();
+    }
+    let text = fs::read_to_string(path).unwrap();
+    let report = Report::from_json(&text).unwrap();
+    assert_eq!(report.to_json().unwrap(), text);
+    assert_eq!(report.title, "An example of the schema");
+    assert_well_formed(&report.to_html());
+    let newer = text.replace("greybox report 1", "greybox report 2");
+    let refused = Report::from_json(&newer).unwrap_err().to_string();
+    assert!(refused.contains("greybox report 2") && refused.contains("reads \"greybox report 1\""), "{refused}");
+}
+
+/// A shift of both frictions against the offset changes nothing; the report says so in these words, in every form.
+#[test]
+fn a_common_shift_is_named() {
+    let report = report(&record(400), Line { offset: free(0.0), ..line() });
+    assert_eq!(report.severity, Severity::UsableWithCare);
+    let text = report.to_string();
+    let said = "`forwards`, `backwards` and `offset` are known only up to a common shift: `forwards` ";
+    assert!(text.contains(said), "{text}");
+    assert!(text.contains("not determined by the data"));
+    for form in [report.to_markdown(), report.to_html().replace("<code>", "`").replace("</code>", "`")] {
+        assert!(form.contains("known only up to a common shift"), "{form}");
+    }
+}
+
+#[test]
+fn a_product_and_a_factor_are_named() {
+    let product = report(&record(400), Line { gain: free(1.1), scale: free(0.9), slope: fixed(2.0), ..line() });
+    assert!(product.to_string().contains("known only"), "{product}");
+    let frictions = Line { forwards: fixed(1.0), backwards: fixed(1.0), slope: fixed(2.0), ..line() };
+    let product = report(&record(400), Line { gain: free(1.1), scale: free(0.9), ..frictions });
+    assert!(product.to_string().contains("`gain` and `scale` are known only as their product"), "{product}");
+}
+
+/// What cannot be predicted is a gap in the drawing, is counted and said, and no number in the report is made of it.
+#[test]
+fn missing_outputs_are_gaps() {
+    let whole = record(300);
+    let mut outputs = whole.outputs().to_vec();
+    outputs[100..200].fill(Response::splat(f64::NAN));
+    let record = Experiment::new(&Friction, whole.times().clone(), whole.inputs().to_vec(), outputs).unwrap();
+    let report = report(&record, line());
+    let fit = &report.records[0].fits[0];
+    assert_eq!((report.records[0].signals[1].missing, fit.unpredicted, fit.residuals.count), (100, 0, 200));
+    let trace = fit.overview.as_ref().unwrap();
+    assert!(trace.measured.low[100..200].iter().all(Option::is_none) && trace.residual.low[150].is_none());
+    assert!(trace.predicted.low.iter().all(Option::is_some));
+    for form in [report.to_html(), report.to_json().unwrap(), report.to_markdown(), report.to_string()] {
+        assert!(!form.contains("NaN"));
+    }
+}
+
+#[test]
+fn only_the_records_of_the_fit_are_reported_on() {
+    let estimate = estimate(&record(100), line());
+    let refused =
+        |records: &[ExperimentOf<Friction>]| Report::new(&Friction, &estimate, records).unwrap_err().to_string();
+    assert!(refused(&[]).contains("is of 1 experiment(s), but 0 record(s) were given"));
+    assert!(refused(&[record(99)]).contains("with 100 samples where record `record` with 99 was given"));
+}
+
+#[test]
+fn what_cannot_be_written_leaves_nothing_behind() {
+    let folder = scratch("unwritable");
+    let report = with_everything();
+    let nowhere = folder.join("missing").join("report.html");
+    let error = report.save(&nowhere).unwrap_err();
+    assert!(matches!(&error, Error::File { path, .. } if *path == nowhere), "{error}");
+    // A folder stands where the file should.
+    let taken = folder.join("taken.html");
+    fs::create_dir(&taken).unwrap();
+    assert!(matches!(report.save(&taken), Err(Error::File { .. })));
+    assert!(matches!(report.plots()[0].save(&taken), Err(Error::File { .. })));
+    let unknown = report.save(folder.join("report.pdf")).unwrap_err().to_string();
+    assert!(unknown.contains("report.pdf") && unknown.contains(".html, .md, .json or .txt"), "{unknown}");
+    let left: Vec<_> = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(left, ["taken.html"]);
+    fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn every_form_is_saved_by_its_ending() {
+    let folder = scratch("forms");
+    let report = with_everything();
+    let forms = [
+        ("a.html", report.to_html()),
+        ("a.md", report.to_markdown()),
+        ("a.json", report.to_json().unwrap()),
+        ("a.txt", report.to_string()),
+    ];
+    for (name, form) in forms {
+        // What stood there before is replaced.
+        fs::write(folder.join(name), "before").unwrap();
+        report.save(folder.join(name)).unwrap();
+        assert_eq!(fs::read_to_string(folder.join(name)).unwrap(), form);
+    }
+    assert_eq!(fs::read_dir(&folder).unwrap().count(), 4);
+    fs::remove_dir_all(folder).unwrap();
+}
+
+/// Ten million samples with one spike: the page is small, and the spike is on it.
+#[test]
+#[cfg_attr(debug_assertions, ignore = "ten million samples take an optimized build")]
+fn a_long_record_makes_a_small_page() {
+    let long = record(10_000_000);
+    let mut outputs = long.outputs().to_vec();
+    outputs[7_654_321].y += 100.0;
+    let record = Experiment::new(&Friction, long.times().clone(), long.inputs().to_vec(), outputs).unwrap();
+    let report = report(&record, line());
+    let fit = &report.records[0].fits[0];
+    assert!((fit.residuals.largest - 100.0).abs() < 0.1 && fit.residuals.largest_at == record.time(7_654_321));
+    let highest = fit.overview.as_ref().unwrap().residual.high.iter().flatten().copied().fold(0.0, f64::max);
+    assert_eq!(highest, fit.residuals.largest);
+    let page = report.to_html();
+    println!("{} bytes", page.len());
+    assert!(page.len() < 3_000_000, "{} bytes", page.len());
+}
+
+fn scratch(name: &str) -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("greybox_report_{name}_{}", std::process::id()));
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
