@@ -2,10 +2,9 @@
 
 use greybox::diagnose::{End, identifiability, profile, restarts};
 use greybox::optimize::Severity;
-use greybox::{
-    Butterworth, Experiment, Fit, Horizon, Kind, Knowledge, Model, Nothing, Scalar, Time, free, signals, zero_phase,
-};
-use std::path::PathBuf;
+#[cfg(not(debug_assertions))]
+use greybox::{Butterworth, Horizon, zero_phase};
+use greybox::{Experiment, Fit, Kind, Knowledge, Model, Nothing, Scalar, Time, free, signals};
 
 signals! { struct Drive { u: "V", w: "V" } }
 signals! { struct Reading { y: "V", z: "V" } }
@@ -183,8 +182,8 @@ impl Model for Emps {
 #[cfg(not(debug_assertions))]
 fn emps() -> Option<Experiment<Motion, Command, Motion>> {
     let shared = std::env::var("GREYBOX_SHARED")
-        .map_or_else(|_| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared")), PathBuf::from);
-    let path = shared.join("data/emps/emps.csv");
+        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../shared").to_owned());
+    let path = std::path::PathBuf::from(shared).join("data/emps/emps.csv");
     let Ok(text) = std::fs::read_to_string(&path) else {
         println!("{} is not there: nothing is tested", path.display());
         return None;
