@@ -48,10 +48,12 @@ fn record() -> Experiment<Currents, Drive, Currents> {
     let time = Time::Uniform { start: 0.0, step: 125e-6 };
     let blank = Experiment::new(&Pmsm, time.clone(), inputs.collect(), vec![zero; SAMPLES]).unwrap();
     let truth = Winding { rs: 0.5, ls: 2e-3, ke: 0.7 };
-    let parameters = Winding { rs: greybox::fixed(truth.rs), ls: greybox::fixed(truth.ls), ke: greybox::fixed(truth.ke) };
+    let parameters =
+        Winding { rs: greybox::fixed(truth.rs), ls: greybox::fixed(truth.ls), ke: greybox::fixed(truth.ke) };
     let blank = blank.initial(Currents { id: greybox::fixed(0.0), iq: greybox::fixed(0.0) });
     let outputs = Fit::new(&Pmsm, &blank).parameters(parameters).simulate().unwrap().outputs;
-    let noisy = outputs.iter().enumerate().map(|(k, y)| Currents { id: y.id + noise(3 * k), iq: y.iq + noise(5 * k + 1) });
+    let noisy =
+        outputs.iter().enumerate().map(|(k, y)| Currents { id: y.id + noise(3 * k), iq: y.iq + noise(5 * k + 1) });
     Experiment::new(&Pmsm, time, blank.inputs().to_vec(), noisy.collect()).unwrap()
 }
 

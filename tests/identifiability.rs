@@ -207,7 +207,7 @@ fn emps() -> Option<Experiment<Motion, Command, Motion>> {
 fn a_common_shift_of_frictions_and_offset_is_named() {
     let Some(record) = emps() else { return };
     let parameters = Slide { m: free(90.0), fv: free(200.0), fcp: free(20.0), fcm: free(20.0), offset: free(-3.0) };
-    let fit = Fit::new(&Emps, &record).parameters(parameters).predictor(Horizon { steps: 50 });
+    let fit = Fit::new(&Emps, &record).parameters(parameters).predictor(Horizon { steps: 50, filter: None });
     let mut problem = fit.problem().unwrap();
     let estimate = problem.run().unwrap();
     println!("{estimate}");
