@@ -2,7 +2,6 @@
 
 use greybox::diagnose::{End, identifiability, profile, restarts};
 use greybox::optimize::Severity;
-#[cfg(not(debug_assertions))]
 use greybox::{Butterworth, Horizon, zero_phase};
 use greybox::{Experiment, Fit, Kind, Knowledge, Model, Nothing, Scalar, Time, free, signals};
 
@@ -179,7 +178,6 @@ impl Model for Emps {
     }
 }
 
-#[cfg(not(debug_assertions))]
 fn emps() -> Option<Experiment<Motion, Command, Motion>> {
     let shared = std::env::var("GREYBOX_SHARED")
         .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../shared").to_owned());
@@ -202,7 +200,7 @@ fn emps() -> Option<Experiment<Motion, Command, Motion>> {
 }
 
 /// Friction forward, friction backward and the offset are known only up to a common shift.
-#[cfg(not(debug_assertions))]
+#[cfg_attr(debug_assertions, ignore = "takes a minute without optimization")]
 #[test]
 fn a_common_shift_of_frictions_and_offset_is_named() {
     let Some(record) = emps() else { return };
