@@ -139,7 +139,7 @@ fn bootstraps_agree() {
     }
 }
 
-/// Percentiles of refits cover 93 to 97 % of the time: 400 records of 300 samples, 300 refits each; binomial spread 1.1 %.
+/// Percentiles of refits cover 93 to 97 % of the time: 400 records of 300 samples, 200 refits each; binomial spread 1.1 %.
 #[test]
 fn bootstrap_covers() {
     let truth = [TRUTH.k, TRUTH.tau];
@@ -149,7 +149,7 @@ fn bootstrap_covers() {
         let fit = Fit::new(&FirstOrder, &record).parameters(Lag { k: free(1.5), tau: free(0.1).log() });
         let mut problem = fit.problem().unwrap();
         let estimate = problem.run().unwrap();
-        let found = bootstrap(&problem, &estimate, Resampling::Residuals, 300, seed).unwrap();
+        let found = bootstrap(&problem, &estimate, Resampling::Residuals, 200, seed).unwrap();
         for (j, covered) in covered.iter_mut().enumerate() {
             let (lower, upper) = found.intervals[j];
             *covered += f64::from(u8::from(lower <= truth[j] && truth[j] <= upper)) / 400.0;

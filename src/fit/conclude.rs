@@ -295,6 +295,17 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             let text = "the data determine none of the unknowns".to_owned();
             warnings.push(Warning { severity: Severity::NotUsable, text });
         }
+        for record in self.experiments.iter().filter(|_| M::KIND != Kind::Static) {
+            let gaps = record.gaps();
+            if let Some(first) = gaps.first() {
+                warnings.push(care(format!(
+                    "time jumps in experiment `{}` ({} gap(s), the first: {first}): the input is taken as held meanwhile, which is \
+                     seldom what happened; fit the pieces between (Experiment::without_gaps)",
+                    record.name(),
+                    gaps.len()
+                )));
+            }
+        }
         for row in rows {
             if let Knowledge::Held { bound } = row.knowledge {
                 let text = format!("`{}` is held at its bound {bound} {}: the data want it beyond", row.name, row.unit);

@@ -1,0 +1,163 @@
+//! Ways in which fits fail without a word elsewhere: here each is named.
+
+use greybox::diagnose::restarts;
+use greybox::optimize::Severity;
+use greybox::{Error, Experiment, Fit, Knowledge, Model, Scalar, Time, fixed, free, signals};
+
+signals! { struct Level { x: "V" } }
+signals! { struct Drive { u: "V" } }
+signals! { struct Lag { k: "1", tau: "s" } }
+
+/// `tau dx/dt = k u - x`.
+struct FirstOrder;
+
+impl Model for FirstOrder {
+    type State = Level;
+    type Input = Drive;
+    type Output = Level;
+    type Parameters = Lag;
+
+    #[inline]
+    fn derivative<S: Scalar>(&self, _t: f64, x: &Level<S>, u: &Drive<S>, p: &Lag<S>) -> Level<S> {
+        Level { x: (p.k * u.u - x.x) / p.tau }
+    }
+
+    #[inline]
+    fn output<S: Scalar>(&self, _t: f64, x: &Level<S>, _u: &Drive<S>, _p: &Lag<S>) -> Level<S> {
+        *x
+    }
+}
+
+/// Steps of 0.01 s with `k = 2`, `tau = 0.05 s` and a little noise; the samples in `lost` are cut out.
+fn record(lost: std::ops::Range<usize>) -> Experiment<Level, Drive, Level> {
+    let (mut x, decay) = (0.0, (-0.2f64).exp());
+    let (mut times, mut inputs, mut outputs) = (vec![], vec![], vec![]);
+    for k in 0..2000usize {
+        let u = if (k / 37) % 2 == 0 { 1.0 } else { -0.5 };
+        if !lost.contains(&k) {
+            times.push(k as f64 * 0.01);
+            inputs.push(Drive { u });
+            outputs.push(Level { x: x + 0.02 * ((k as f64 * 0.754_877_666_246_693).fract() - 0.5) });
+        }
+        x = 2.0 * u + (x - 2.0 * u) * decay;
+    }
+    Experiment::new(&FirstOrder, Time::from_stamps(times), inputs, outputs).unwrap()
+}
+
+#[test]
+fn a_gap_in_time_is_named() {
+    let parameters = Lag { k: free(1.0), tau: free(0.1).log() };
+    let whole = Fit::new(&FirstOrder, &record(0..0)).parameters(parameters).run().unwrap();
+    assert!(whole.warnings.iter().all(|w| !w.text.contains("time jumps")), "{whole}");
+    let torn = Fit::new(&FirstOrder, &record(700..760)).parameters(parameters).run().unwrap();
+    let warning = torn.warnings.iter().find(|w| w.text.contains("time jumps")).unwrap();
+    assert!(warning.text.contains("no sample from 6.99 s to 7.6"), "{}", warning.text);
+    assert!(torn.severity() >= Severity::UsableWithCare);
+}
+
+#[test]
+fn a_parameter_on_its_bound_has_no_interval() {
+    let parameters = Lag { k: free(1.0).within(0.0, 1.8), tau: free(0.1).log() };
+    let estimate = Fit::new(&FirstOrder, &record(0..0)).parameters(parameters).run().unwrap();
+    assert_eq!(estimate.knowledge.k, Knowledge::Held { bound: 1.8 });
+    assert_eq!(estimate.covariance[(0, 0)], 0.0);
+    assert!(estimate.warnings.iter().any(|w| w.text.contains("`k` is held at its bound 1.8")), "{estimate}");
+}
+
+/// From a thousand times too much or too little the search arrives, or the estimate is not called usable.
+#[test]
+fn a_guess_far_off_arrives_or_is_named() {
+    for guess in [50.0, 5e-5] {
+        for transformed in [false, true] {
+            let tau = if transformed { free(guess).log() } else { free(guess) };
+            let record = record(0..0);
+            let fit = Fit::new(&FirstOrder, &record).parameters(Lag { k: free(1.0), tau });
+            let mut problem = match fit.problem() {
+                Ok(problem) => problem,
+                Err(error) => panic!("{error}"),
+            };
+            match problem.run() {
+                Ok(estimate) => {
+                    let arrived = (estimate.parameters.tau / 0.05 - 1.0).abs() < 0.01;
+                    let again = restarts(&problem, &estimate, 16, 1000.0, 1).unwrap();
+                    let said = estimate.severity().max(again.severity);
+                    println!("{guess} {transformed}: tau = {} {said:?} {}", estimate.parameters.tau, again.meaning);
+                    assert!(arrived || said == Severity::NotUsable, "{estimate}\n{again:?}");
+                }
+                Err(error) => {
+                    println!("{guess} {transformed}: {error}");
+                    assert!(matches!(error, Error::Start(_)), "{error}");
+                }
+            }
+        }
+    }
+}
+
+/// An unstable simulation is an error with its place, not a fit of nothing.
+#[test]
+fn no_success_on_what_is_not_a_number() {
+    let parameters = Lag { k: free(1.0), tau: fixed(-1e-3) };
+    let error = Fit::new(&FirstOrder, &record(0..0)).parameters(parameters).run().unwrap_err();
+    assert!(matches!(&error, Error::Start(failure) if failure.signal.contains('x') && failure.time > 0.0), "{error}");
+}
+
+#[cfg(not(debug_assertions))]
+mod emps {
+    use super::*;
+    use greybox::diagnose::Restarts;
+    use std::path::PathBuf;
+
+    signals! { struct Motion { q: "m", v: "m/s" } }
+    signals! { struct Position { q: "m" } }
+    signals! { struct Command { vir: "V" } }
+    signals! { struct Slide { m: "kg", fv: "N s/m", fc: "N", offset: "N" } }
+
+    struct Emps;
+
+    impl Model for Emps {
+        type State = Motion;
+        type Input = Command;
+        type Output = Position;
+        type Parameters = Slide;
+
+        #[inline]
+        fn derivative<S: Scalar>(&self, _t: f64, x: &Motion<S>, u: &Command<S>, p: &Slide<S>) -> Motion<S> {
+            let friction = p.fv * x.v + p.fc * (x.v * 500.0).tanh();
+            Motion { q: x.v, v: (u.vir * 35.150_651_88 - friction - p.offset) / p.m }
+        }
+
+        #[inline]
+        fn output<S: Scalar>(&self, _t: f64, x: &Motion<S>, _u: &Command<S>, _p: &Slide<S>) -> Position<S> {
+            Position { q: x.q }
+        }
+    }
+
+    /// Simulated from a bad start, the search may end at some mass that is wrong; then the estimate or its restarts say so.
+    #[test]
+    fn a_wrong_mass_is_named() {
+        let shared = std::env::var("GREYBOX_SHARED")
+            .map_or_else(|_| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared")), PathBuf::from);
+        let path = shared.join("data/emps/emps.csv");
+        let Ok(text) = std::fs::read_to_string(&path) else {
+            println!("{} is not there: nothing is tested", path.display());
+            return;
+        };
+        let rows: Vec<Vec<f64>> =
+            text.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect();
+        let inputs = rows.iter().map(|row| Command { vir: row[1] }).collect();
+        let outputs = rows.iter().map(|row| Position { q: row[2] }).collect();
+        let record = Experiment::new(&Emps, Time::Uniform { start: 0.0, step: 1e-3 }, inputs, outputs).unwrap();
+        let record = record.initial(Motion { q: fixed(rows[0][2]), v: fixed(0.0) });
+        for m in [13.0, 500.0] {
+            let parameters = Slide { m: free(m), fv: free(100.0), fc: free(10.0), offset: free(0.0) };
+            let mut problem = Fit::new(&Emps, &record).parameters(parameters).problem().unwrap();
+            let estimate = problem.run().unwrap();
+            println!("{estimate}");
+            let found = (estimate.parameters.m / 95.1 - 1.0).abs() < 0.05;
+            let again: Restarts = restarts(&problem, &estimate, 6, 3.0, 1).unwrap();
+            let said = estimate.severity().max(again.severity);
+            println!("from {m}: m = {} {said:?} {again:?}", estimate.parameters.m);
+            assert!(found || said == Severity::NotUsable, "{estimate}\n{again:?}");
+        }
+    }
+}
