@@ -22,15 +22,14 @@ impl Pair {
     /// Entries `at` and `at + 1`; nothing is read, and zeros come back, beyond the end.
     #[inline(always)]
     pub fn load<const N: usize>(from: &[f64; N], at: usize) -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if at + 2 <= N {
-            // SAFETY: both entries lie within the array; SSE2 is part of x86_64.
-            return Pair(unsafe { _mm_loadu_pd(from.as_ptr().add(at)) });
-        } else {
+        if at + 2 > N {
             return Pair::splat(0.0);
         }
+        // SAFETY: both entries lie within the array; SSE2 is part of x86_64.
+        #[cfg(target_arch = "x86_64")]
+        return Pair(unsafe { _mm_loadu_pd(from.as_ptr().add(at)) });
         #[cfg(not(target_arch = "x86_64"))]
-        return Pair(if at + 2 <= N { [from[at], from[at + 1]] } else { [0.0; 2] });
+        return Pair([from[at], from[at + 1]]);
     }
 
     /// Writes entries `at` and `at + 1`; nothing beyond the end.

@@ -135,7 +135,7 @@ where
         let counting = |state: LeastSquaresState| state.param(start.clone()).counting(true);
         let mut executor = Executor::new(objective, solver).configure(counting).ctrlc(false);
         for (observer, mode) in &self.observers {
-            executor = executor.add_observer(Shared(observer.clone()), mode.clone());
+            executor = executor.add_observer(Shared(observer.clone()), *mode);
         }
         if let Some(file) = file {
             executor = executor.checkpointing(file.clone());
