@@ -13,7 +13,9 @@ mod restarts;
 
 pub use bands::{Bands, bands};
 pub use bootstrap::{Bootstrap, Resampling, bootstrap};
-pub use compare::{Comparison, Drift, Summary, Validation, cross_validate, drift, f_test, likelihood_ratio, validate};
+pub use compare::{
+    Comparison, Drift, NamedQualities, Summary, Validation, cross_validate, drift, f_test, likelihood_ratio, validate,
+};
 pub use derived::{Derived, derived};
 pub use identifiability::{COLLINEAR, Collinear, Excitation, Identifiability, Segment, identifiability};
 pub use profile::{End, Profile, ProfilePoint, profile};

@@ -40,10 +40,13 @@ struct Saved<S> {
 
 const FORMAT: &str = "greybox checkpoint 1";
 
+/// Place, iterations so far, and the solver if it may go on.
+type Resumed<S> = (Vec<f64>, u64, Option<S>);
+
 impl CheckpointFile {
     /// The place, the iterations so far and, if it was set as it is now, the solver of an earlier run; `None` if there is
     /// no file yet.
-    pub fn load<S: DeserializeOwned>(&self) -> Result<Option<(Vec<f64>, u64, Option<S>)>, Error> {
+    pub fn load<S: DeserializeOwned>(&self) -> Result<Option<Resumed<S>>, Error> {
         // A device may have no end, and must not be replaced by a file.
         if std::fs::metadata(&self.path).is_ok_and(|meta| !meta.is_file()) {
             let problem = "it is no regular file; name one that can be written".to_owned();

@@ -318,12 +318,15 @@ where
     }
 }
 
+/// A cost and a place in its coordinates.
+type Placed<'s, M, I, P> = (Objective<'s, M, I, P>, Vec<f64>);
+
 impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> FitProblem<'_, M, I, P, O> {
     /// The cost with the noise that an estimate of this problem has found, and the coordinates of that estimate.
     ///
     /// # Errors
     /// An estimate of another problem.
-    pub(crate) fn at<'s>(&'s self, estimate: &Estimate<M, I, P>) -> Result<(Objective<'s, M, I, P>, Vec<f64>), Error> {
+    pub(crate) fn at<'s>(&'s self, estimate: &Estimate<M, I, P>) -> Result<Placed<'s, M, I, P>, Error> {
         let row = &self.setting.unknowns.row;
         let same = row.len() == estimate.unknowns.len()
             && row.iter().zip(&estimate.unknowns).all(|(mine, its)| mine.name == its.name);

@@ -62,8 +62,8 @@ impl<M: Model> Predictor<M> for Horizon {
         let mut why = None;
         let mut states = Vec::with_capacity(experiment.len());
         let mut known = 0;
-        for k in 0..experiment.len() {
-            let (t, u, y) = (experiment.time(k), &experiment.inputs()[k], &outputs[k]);
+        for (k, (u, y)) in experiment.inputs().iter().zip(outputs).enumerate() {
+            let t = experiment.time(k);
             states.push(match measured::state(model, t, u, y, p) {
                 Ok(x) => {
                     known += 1;
