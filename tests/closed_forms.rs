@@ -162,8 +162,8 @@ fn covariances_of_several_experiments_are_the_dense_ones() {
     let bread = (rows.transpose() * &rows).try_inverse().unwrap();
     let mut meat = DMatrix::zeros(rows.ncols(), rows.ncols());
     for (g, r) in rows.row_iter().zip(residuals.iter()) {
-        let leverage = (&g * &bread * g.transpose())[(0, 0)];
-        meat += g.transpose() * &g * (r / (1.0 - leverage)).powi(2);
+        let leverage = (g * &bread * g.transpose())[(0, 0)];
+        meat += g.transpose() * g * (r / (1.0 - leverage)).powi(2);
     }
     let slopes = chain(&weighted.unknowns);
     check(&weighted.covariance, &slopes * &bread * meat * &bread * &slopes);
