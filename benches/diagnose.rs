@@ -37,7 +37,7 @@ impl Model for Pmsm {
 }
 
 fn record() -> Experiment<Currents, Drive, Currents> {
-    let wave = |k: usize, period: usize| if (k / period) % 2 == 0 { 1.0 } else { -1.0 };
+    let wave = |k: usize, period: usize| if (k / period).is_multiple_of(2) { 1.0 } else { -1.0 };
     let noise = |k: usize| (k as f64 * 0.754_877_666_246_693).fract() - 0.5;
     let inputs = (0..SAMPLES).map(|k| Drive {
         ud: wave(k, 400),
