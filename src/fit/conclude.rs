@@ -30,6 +30,8 @@ const COLOR_SAMPLES: u64 = 100;
 const COLOR_MATTERS: f64 = 2.0;
 /// A finer step may move a parameter by this part of its standard error without a word.
 const STEP_SHIFT: f64 = 0.5;
+/// Errors below this part of a given noise are no sample of it.
+const ROUNDING: f64 = 0.1;
 
 impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
     pub(super) fn conclude(
@@ -82,7 +84,9 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
 
         // The covariance in the optimizer's coordinates, then in the unknowns' own units.
         let held: Vec<bool> = free.iter().map(|free| !free).collect();
-        let degrees = (measured as f64 - free.iter().filter(|free| **free).count() as f64).max(0.0);
+        let estimated = free.iter().filter(|free| **free).count() as f64;
+        // With no more measurements than unknowns nothing is left to tell the noise from.
+        let degrees = if measured <= n as u64 { 0.0 } else { measured as f64 - estimated };
         let sum_of_squares = linear.sum_of_squares();
         let widening = match self.noise {
             Noise::Given(_) => 1.0,
@@ -93,6 +97,11 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
         let sandwich = objective.needs_sandwich();
         let priors: f64 = unknowns.priors(coordinates).map(|(_, _, error)| error * error).sum();
         let small_sample = measured as f64 / degrees.max(1.0);
+        // Errors far below a given noise are rounding: their color says nothing, and their size would promise too much.
+        let sigma = whitening.sigma();
+        let given = matches!(self.noise, Noise::Given(_));
+        let rounding = given && quality.iter().zip(&sigma).all(|(quality, sigma)| quality.rmse < ROUNDING * sigma);
+        let color = color.filter(|_| !rounding);
         let colored = color.as_ref().filter(|_| M::KIND != Kind::Static && measured >= COLOR_SAMPLES);
         let colored = colored.and_then(|_| objective.colored(coordinates, &linear, &held));
         let colored = colored.and_then(|found| Some((found.sandwich.covariance(&held)?, found.lags)));
