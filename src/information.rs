@@ -216,10 +216,10 @@ impl TryFrom<Stored> for Information {
         let Stored { columns, rows, triangle } = stored;
         // In wide integers: a width made to overflow must not pass for a small one.
         let width = columns as u128 + 1;
-        if triangle.len() as u128 == width * (width + 1) / 2 {
+        let size = width.div_ceil(2) * (width + (width + 1) % 2);
+        if triangle.len() as u128 == size {
             Ok(Information { columns, rows, triangle })
         } else {
-            let size = width * (width + 1) / 2;
             Err(format!("the triangle of {columns} columns has {size} entries, not {}", triangle.len()))
         }
     }

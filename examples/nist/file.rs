@@ -1,6 +1,6 @@
 //! A file of NIST's Statistical Reference Datasets: two starts, certified values, data.
 
-use crate::problems::{self, Predictors, Response, Task};
+use super::problems::{self, Predictors, Response, Task};
 use greybox::{Error, Estimate, Experiment, ExperimentOf, Fit, Model, Nothing, Signals, Time, free};
 use std::path::Path;
 

@@ -101,6 +101,14 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
         visit: &mut dyn FnMut(Rows<'_>),
     ) -> Result<(), Halt> {
         let seeds = if slopes { self.unknowns.seeds(experiment, coordinates) } else { vec![] };
+        if cfg!(debug_assertions) {
+            // A build that is not made for speed is soon compiled: same numbers, more passes.
+            return if slopes {
+                self.walk_in::<4, PORTABLE>(experiment, coordinates, &seeds, visit)
+            } else {
+                self.walk_in::<0, PORTABLE>(experiment, coordinates, &seeds, visit)
+            };
+        }
         // The wide loop is made for the hold that nearly all records have.
         let wide = has_wide() && self.experiments[experiment].input_hold() == Hold::Zero;
         match (seeds.len(), wide) {

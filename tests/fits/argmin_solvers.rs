@@ -1,14 +1,12 @@
 #![cfg(feature = "std")]
 //! The fit as a problem of argmin's own solvers, and what its executor brings: observers, checkpoints, limits.
 
-mod common;
-
+use crate::common::*;
 use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::{Executor, KV, State};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::neldermead::NelderMead;
 use argmin::solver::quasinewton::LBFGS;
-use common::*;
 use greybox::optimize::{GaussNewton, LeastSquaresState, LevenbergMarquardt, Outcome, Stop};
 use greybox::*;
 use std::path::PathBuf;

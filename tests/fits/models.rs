@@ -1,11 +1,11 @@
 //! The models that ship: their slopes, what physics says of them, and the records that they were made for.
 
+use crate::shared::shared;
 use approx::assert_relative_eq;
 use greybox::models::*;
 use greybox::pmsm::{Drive, ExactStep, ExactSurface, HeldIn, Surface, Winding};
 use greybox::*;
 use proptest::prelude::*;
-use std::path::PathBuf;
 
 const AXIS: Axis = Axis { m: 95.0, fv: 203.0, fc: 20.0, offset: -3.2 };
 
@@ -69,17 +69,6 @@ fn a_dc_motor_is_recovered() {
     let far = Armature { r: free(2.0), l: free(3e-3), k: free(0.1), j: free(3e-4), b: free(1e-5) };
     let estimate = Fit::new(&DcMotor, &record).parameters(far).noise(Rotation { i: 0.01, w: 1.0 }).run().unwrap();
     assert_relative_eq!(estimate.parameters, truth, max_relative = 1e-6);
-}
-
-fn shared(file: &str) -> Option<PathBuf> {
-    let beside = || concat!(env!("CARGO_MANIFEST_DIR"), "/../shared").into();
-    let folder = std::env::var_os("GREYBOX_SHARED").map_or_else(beside, PathBuf::from);
-    let path = folder.join("data").join(file);
-    if path.exists() {
-        return Some(path);
-    }
-    println!("{} is absent: nothing tested", path.display());
-    None
 }
 
 /// The published estimates (Janot, Gautier, Brunot 2019) were made from accelerations; M is to agree to 1 %, friction to

@@ -1,7 +1,7 @@
 //! Bounds: active at the solution, at the start, in a corner, and hit on the way.
 
-use crate::problems::{D, PROBLEMS, Problem};
-use crate::{gauss_newton, levenberg_marquardt};
+use super::problems::{D, PROBLEMS, Problem};
+use super::{gauss_newton, levenberg_marquardt};
 use argmin::core::{Executor, State};
 use greybox::JacobianColumns;
 use greybox::optimize::LevenbergMarquardt;

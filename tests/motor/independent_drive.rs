@@ -1,30 +1,19 @@
 //! Records of an independent drive simulator (motulator 0.5.0), averaged and switching, through the offline methods.
 #![cfg(feature = "csv")]
 
+use crate::shared::shared;
 use greybox::pmsm::offline::{Axes, Form, Spans, Speed, extended, plain, search_i0};
 use greybox::pmsm::{CompensatedWinding, ExactCompensated, ExactStep, HeldIn, PolePairs, Surface, Winding};
 use greybox::{CsvFile, Fit, fixed, free};
-use std::path::PathBuf;
 
 const TRUTH: Winding = Winding { rs: 3.6, ls: 42e-3, ke: 2.002_46 };
-
-fn folder() -> PathBuf {
-    match std::env::var_os("GREYBOX_SHARED") {
-        Some(folder) => PathBuf::from(folder).join("data/motulator"),
-        None => PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/motulator")),
-    }
-}
 
 /// The records that are there, by intervals.
 fn records() -> Vec<(&'static str, Spans)> {
     ["spm_avg.csv", "spm_pwm.csv"]
         .into_iter()
         .filter_map(|name| {
-            let path = folder().join(name);
-            if !path.exists() {
-                println!("{} is absent: not tested", path.display());
-                return None;
-            }
+            let path = shared(&format!("motulator/{name}"))?;
             let model = Surface::new(3).unwrap();
             let record = CsvFile::new(path).column("w", "omega_m").read(&model).unwrap();
             // The speed is that at the sample.

@@ -1,23 +1,23 @@
 //! NIST's Statistical Reference Datasets, nonlinear regression: certified parameters and standard errors, from both starts.
 
-#[path = "../examples/nist/file.rs"]
+#[path = "../../examples/nist/file.rs"]
 mod file;
-#[path = "../examples/nist/problems.rs"]
+#[path = "../../examples/nist/problems.rs"]
 mod problems;
 
+use crate::shared::shared;
 use file::{File, Found};
 use std::path::PathBuf;
 
 /// The files, if they are there.
 fn files() -> Vec<PathBuf> {
-    let shared =
-        std::env::var("GREYBOX_SHARED").unwrap_or(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared").to_owned());
-    let folder = PathBuf::from(shared).join("data/nist");
-    let Ok(entries) = std::fs::read_dir(&folder) else {
-        println!("no files in {}: nothing tested", folder.display());
-        return vec![];
-    };
-    entries.flatten().map(|entry| entry.path()).filter(|path| path.extension().is_some_and(|e| e == "dat")).collect()
+    let Some(folder) = shared("nist") else { return vec![] };
+    std::fs::read_dir(folder)
+        .unwrap()
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| path.extension().is_some_and(|e| e == "dat"))
+        .collect()
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Records from CSV files as laboratories write them.
 #![cfg(feature = "csv")]
 
+use crate::shared::shared;
 use greybox::{CsvFile, Experiment, Kind, Model, Nothing, Scalar, Time, signals, units};
 use std::path::PathBuf;
 
@@ -179,17 +180,11 @@ fn a_static_model_needs_no_time() {
 /// Measured records that nobody here made.
 #[test]
 fn shared_records() {
-    let shared = std::env::var("GREYBOX_SHARED").map(PathBuf::from);
-    let data = shared.unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../shared").into()).join("data");
-    let path = data.join("motulator/spm_avg.csv");
-    if !path.exists() {
-        println!("no shared data at {}: nothing was tested", data.display());
-        return;
-    }
+    let (Some(path), Some(emps)) = (shared("motulator/spm_avg.csv"), shared("emps/emps.csv")) else { return };
     let record = CsvFile::new(path).column("w", "omega_m").read(&Pmsm).unwrap();
     assert_eq!(record.len(), 8000);
     assert_eq!(record.times(), &Time::Uniform { start: 0.0, step: 125e-6 });
-    let emps = CsvFile::new(data.join("emps/emps.csv")).column("x", "vir").column("y", "qm").read(&Line).unwrap();
+    let emps = CsvFile::new(emps).column("x", "vir").column("y", "qm").read(&Line).unwrap();
     assert_eq!(emps.len(), 24_841);
     // The clock of this instrument jitters by 2.4e-5 of a step.
     assert!(matches!(emps.times(), Time::Stamps(_)));

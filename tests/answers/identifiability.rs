@@ -1,5 +1,6 @@
 //! What cannot be told is said: products, shifts, unseen parameters, constant inputs.
 
+use crate::shared::shared;
 use greybox::diagnose::{End, identifiability, profile, restarts};
 use greybox::optimize::Severity;
 use greybox::{Butterworth, Horizon, zero_phase};
@@ -179,13 +180,7 @@ impl Model for Emps {
 }
 
 fn emps() -> Option<Experiment<Motion, Command, Motion>> {
-    let shared = std::env::var("GREYBOX_SHARED")
-        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../shared").to_owned());
-    let path = std::path::PathBuf::from(shared).join("data/emps/emps.csv");
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        println!("{} is not there: nothing is tested", path.display());
-        return None;
-    };
+    let text = std::fs::read_to_string(shared("emps/emps.csv")?).unwrap();
     let rows: Vec<Vec<f64>> =
         text.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect();
     let step = 1e-3;

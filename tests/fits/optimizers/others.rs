@@ -1,6 +1,6 @@
 //! Argmin's own solvers on the same problems: simplex, quasi-Newton, particle swarm.
 
-use crate::problems::{PROBLEMS, Problem};
+use super::problems::{PROBLEMS, Problem};
 use argmin::core::{CostFunction, Error, Executor, Gradient};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::neldermead::NelderMead;

@@ -1,10 +1,8 @@
 #![cfg(feature = "std")]
 //! Fits against textbook formulas: regression, information criteria, error index, covariances of dense problems, slopes.
 
-mod common;
-
+use crate::common::*;
 use argmin::core::{CostFunction, Gradient, Hessian, Jacobian, Operator};
-use common::*;
 use greybox::*;
 use nalgebra::{DMatrix, DVector};
 

@@ -104,8 +104,8 @@ fn no_success_on_what_is_not_a_number() {
 #[cfg(not(debug_assertions))]
 mod emps {
     use super::*;
+    use crate::shared::shared;
     use greybox::diagnose::Restarts;
-    use std::path::PathBuf;
 
     signals! { struct Motion { q: "m", v: "m/s" } }
     signals! { struct Position { q: "m" } }
@@ -135,13 +135,8 @@ mod emps {
     /// Simulated from a bad start, the search may end at some mass that is wrong; then the estimate or its restarts say so.
     #[test]
     fn a_wrong_mass_is_named() {
-        let shared = std::env::var("GREYBOX_SHARED")
-            .map_or_else(|_| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared")), PathBuf::from);
-        let path = shared.join("data/emps/emps.csv");
-        let Ok(text) = std::fs::read_to_string(&path) else {
-            println!("{} is not there: nothing is tested", path.display());
-            return;
-        };
+        let Some(path) = shared("emps/emps.csv") else { return };
+        let text = std::fs::read_to_string(path).unwrap();
         let rows: Vec<Vec<f64>> =
             text.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect();
         let inputs = rows.iter().map(|row| Command { vir: row[1] }).collect();

@@ -1,9 +1,7 @@
 #![cfg(feature = "std")]
 //! Known parameters are found again, on random models, with and without noise.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use greybox::pmsm::{Currents, Drive, Surface, Winding};
 use greybox::*;
 use proptest::prelude::*;

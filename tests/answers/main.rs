@@ -1,0 +1,10 @@
+//! What is said of an estimate: intervals, diagnostics, comparison, reports.
+
+mod compare;
+mod identifiability;
+mod intervals;
+mod reports;
+mod residuals;
+#[path = "../common/shared.rs"]
+mod shared;
+mod silent_failures;

@@ -1,0 +1,17 @@
+//! Fits: parameters that are known come back, bad input is named.
+
+mod adaptive_fits;
+mod argmin_solvers;
+mod bad_input;
+mod bad_models;
+mod checks;
+mod closed_forms;
+#[path = "../common/mod.rs"]
+mod common;
+mod models;
+mod nist;
+mod optimizers;
+mod recovery;
+#[path = "../common/shared.rs"]
+mod shared;
+mod user_code;

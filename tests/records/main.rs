@@ -1,0 +1,9 @@
+//! Records: valid by construction, from files, cut and filtered.
+
+mod bad_records;
+mod csv;
+mod edits;
+mod long_record;
+#[path = "../common/shared.rs"]
+mod shared;
+mod valid;
