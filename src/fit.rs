@@ -8,8 +8,12 @@ mod covariance;
 mod noise;
 mod objective;
 mod predict;
+mod reproduce;
 mod run;
+mod search;
+mod source;
 mod unknowns;
+mod warnings;
 
 pub(crate) use covariance::classical;
 pub use objective::Objective;
@@ -25,11 +29,16 @@ use crate::optimize::{GaussNewton, LeastSquaresState, LevenbergMarquardt, Linear
 use crate::parameter::Parameter;
 use crate::predict::{FreeRun, Predictor};
 use crate::prefilter::Butterworth;
+use crate::scaling::Scaling;
 use crate::signals::{Of, Signals};
 use crate::weighting::Weighting;
+use argmin::core::Solver;
 use argmin::core::observers::{Observe, ObserverMode};
 use noise::{Noise, Whitening};
 use objective::Control;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use source::{Simulated, Source};
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
@@ -37,7 +46,7 @@ use std::time::Duration;
 use unknowns::Unknowns;
 
 /// A search that a fit can run: one of argmin's solvers that says how it ended.
-pub trait Search {
+pub trait Search: Clone + Serialize + DeserializeOwned + for<'p> Solver<&'p Objective<'p>, LeastSquaresState> {
     /// How the search ended, if it was its own decision.
     fn outcome(&self) -> Option<Outcome>;
 
@@ -53,7 +62,7 @@ pub trait Search {
     }
 }
 
-impl<S: crate::scaling::Scaling> Search for LevenbergMarquardt<S> {
+impl<S: Scaling + Serialize + DeserializeOwned> Search for LevenbergMarquardt<S> {
     fn outcome(&self) -> Option<Outcome> {
         LevenbergMarquardt::outcome(self)
     }
@@ -100,14 +109,16 @@ impl<'a, M: Model> Records<'a, M> {
             integrator: Automatic::default(),
             predictor: FreeRun,
             optimizer: LevenbergMarquardt::default(),
-            noise: Noise::PerOutput,
             weighting: None,
-            loss: None,
-            prefilter: None,
-            control: Control::default(),
-            time_limit: None,
-            observers: vec![],
-            checkpoint: None,
+            terms: Terms {
+                noise: Noise::PerOutput,
+                loss: None,
+                prefilter: None,
+                control: Control::default(),
+                time_limit: None,
+                observers: vec![],
+                checkpoint: None,
+            },
         }
     }
 }
@@ -123,8 +134,13 @@ pub struct Fit<'a, M: Model, I = Automatic, P = FreeRun, O = LevenbergMarquardt>
     integrator: I,
     predictor: P,
     optimizer: O,
-    noise: Noise<M::Output>,
     weighting: Option<Box<dyn Weighting<M> + 'a>>,
+    terms: Terms<'a>,
+}
+
+/// What is said of a fit whatever its model.
+struct Terms<'a> {
+    noise: Noise,
     loss: Option<Box<dyn Loss + 'a>>,
     prefilter: Option<Butterworth>,
     control: Control,
@@ -144,40 +160,33 @@ impl<'a, M: Model> Fit<'a, M> {
 impl<'a, M: Model, I, P, O> Fit<'a, M, I, P, O> {
     /// Steps the model by another method.
     pub fn integrator<J: Integrator<M>>(self, integrator: J) -> Fit<'a, M, J, P, O> {
-        let Fit { model, experiments, parameters, predictor, optimizer, noise, .. } = self;
-        let Fit { weighting, loss, prefilter, control, time_limit, observers, checkpoint, .. } = self;
-        #[rustfmt::skip]
-        return Fit { model, experiments, parameters, integrator, predictor, optimizer, noise, weighting, loss, prefilter,
-                     control, time_limit, observers, checkpoint };
+        let Fit { model, experiments, parameters, predictor, optimizer, weighting, terms, .. } = self;
+        Fit { model, experiments, parameters, integrator, predictor, optimizer, weighting, terms }
     }
 
     /// Minimizes another prediction error.
     pub fn predictor<Q: Predictor<M>>(self, predictor: Q) -> Fit<'a, M, I, Q, O> {
-        let Fit { model, experiments, parameters, integrator, optimizer, noise, .. } = self;
-        let Fit { weighting, loss, prefilter, control, time_limit, observers, checkpoint, .. } = self;
-        #[rustfmt::skip]
-        return Fit { model, experiments, parameters, integrator, predictor, optimizer, noise, weighting, loss, prefilter,
-                     control, time_limit, observers, checkpoint };
+        let Fit { model, experiments, parameters, integrator, optimizer, weighting, terms, .. } = self;
+        Fit { model, experiments, parameters, integrator, predictor, optimizer, weighting, terms }
     }
 
     /// Searches by another method, or by the same with other settings.
     pub fn optimizer<S: Search>(self, optimizer: S) -> Fit<'a, M, I, P, S> {
-        let Fit { model, experiments, parameters, integrator, predictor, noise, .. } = self;
-        let Fit { weighting, loss, prefilter, control, time_limit, observers, checkpoint, .. } = self;
-        #[rustfmt::skip]
-        return Fit { model, experiments, parameters, integrator, predictor, optimizer, noise, weighting, loss, prefilter,
-                     control, time_limit, observers, checkpoint };
+        let Fit { model, experiments, parameters, integrator, predictor, weighting, terms, .. } = self;
+        Fit { model, experiments, parameters, integrator, predictor, optimizer, weighting, terms }
     }
 
     /// The standard deviation of the noise of each output, in its unit (after the pre-filter, if there is one). Left out,
     /// it is estimated from the errors.
-    pub fn noise(self, sigma: Of<M::Output, f64>) -> Self {
-        Fit { noise: Noise::Given(sigma), ..self }
+    pub fn noise(mut self, sigma: Of<M::Output, f64>) -> Self {
+        self.terms.noise = Noise::Given(M::Output::into_array(sigma).as_ref().to_vec());
+        self
     }
 
     /// Estimates the noise with its correlations between outputs.
-    pub fn noise_covariance(self) -> Self {
-        Fit { noise: Noise::Covariance, ..self }
+    pub fn noise_covariance(mut self) -> Self {
+        self.terms.noise = Noise::Covariance;
+        self
     }
 
     /// Multiplies the cost of each sample by a weight (at least zero), any function of the sample. It is not an inverse
@@ -187,48 +196,53 @@ impl<'a, M: Model, I, P, O> Fit<'a, M, I, P, O> {
     }
 
     /// Bends the cost of large standardized errors.
-    pub fn loss(self, loss: impl Loss + 'a) -> Self {
-        Fit { loss: Some(Box::new(loss)), ..self }
+    pub fn loss(mut self, loss: impl Loss + 'a) -> Self {
+        self.terms.loss = Some(Box::new(loss));
+        self
     }
 
     /// Filters the prediction errors (and their slopes) before they count. A missing sample enters the filter as a zero.
-    pub fn prefilter(self, filter: Butterworth) -> Self {
-        Fit { prefilter: Some(filter), ..self }
+    pub fn prefilter(mut self, filter: Butterworth) -> Self {
+        self.terms.prefilter = Some(filter);
+        self
     }
 
     /// Stops the search, with what it has found by then, when the flag is raised (from another thread, a signal handler).
     pub fn cancel(mut self, flag: Arc<AtomicBool>) -> Self {
-        self.control.cancel = Some(flag);
+        self.terms.control.cancel = Some(flag);
         self
     }
 
     /// Stops the search after this time, with what it has found by then.
-    pub fn time_limit(self, limit: Duration) -> Self {
-        Fit { time_limit: Some(limit), ..self }
+    pub fn time_limit(mut self, limit: Duration) -> Self {
+        self.terms.time_limit = Some(limit);
+        self
     }
 
     /// Shows the progress to an observer of argmin.
     pub fn observe(mut self, observer: impl Observe<LeastSquaresState> + Send + 'static, mode: ObserverMode) -> Self {
-        self.observers.push((Arc::new(Mutex::new(Box::new(observer))), mode));
+        self.terms.observers.push((Arc::new(Mutex::new(Box::new(observer))), mode));
         self
     }
 
     /// Saves the place of the search into a file, every so many iterations, and goes on from there if the file exists. A
     /// file of another problem is refused.
-    pub fn checkpoint(self, path: impl Into<PathBuf>, every: u64) -> Self {
-        Fit { checkpoint: Some((path.into(), every)), ..self }
+    pub fn checkpoint(mut self, path: impl Into<PathBuf>, every: u64) -> Self {
+        self.terms.checkpoint = Some((path.into(), every));
+        self
     }
 }
 
 /// What a fit needs to be evaluated, prepared once.
-struct Setting<M: Model, P: Predictor<M>> {
-    unknowns: Unknowns<M>,
-    prepared: Vec<P::Prepared>,
+struct Setting<R> {
+    unknowns: Unknowns,
+    /// What the predictor made of each record.
+    prepared: Vec<R>,
 }
 
 impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
     /// Checks all that was said, and looks at every record once.
-    fn prepare(&self) -> Result<Setting<M, P>, Error> {
+    fn prepare(&self) -> Result<Setting<P::Prepared>, Error> {
         self.check()?;
         let unknowns = Unknowns::new(self.model, self.experiments, self.parameters)?;
         if unknowns.row.is_empty() {
@@ -238,7 +252,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
         self.prepared(unknowns)
     }
 
-    fn prepared(&self, unknowns: Unknowns<M>) -> Result<Setting<M, P>, Error> {
+    fn prepared(&self, unknowns: Unknowns) -> Result<Setting<P::Prepared>, Error> {
         let start = M::Parameters::map(self.parameters, |p| p.start);
         let prepare = |experiment| self.predictor.prepare(self.model, experiment, &start);
         let prepared = self.experiments.iter().map(prepare).collect::<Result<_, _>>()?;
@@ -263,16 +277,15 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
                 serves,
             });
         }
-        if let Noise::Given(sigma) = self.noise {
-            let sigma = M::Output::into_array(sigma);
-            if let Some(j) = sigma.as_ref().iter().position(|s| !(*s > 0.0 && s.is_finite())) {
-                let what = format!("the noise of output `{}`", M::Output::NAMES[j]);
-                return Err(Error::NotPositive { what, value: sigma.as_ref()[j] });
-            }
+        if let Noise::Given(sigma) = &self.terms.noise
+            && let Some(j) = sigma.iter().position(|s| !(*s > 0.0 && s.is_finite()))
+        {
+            let what = format!("the noise of output `{}`", M::Output::NAMES[j]);
+            return Err(Error::NotPositive { what, value: sigma[j] });
         }
         self.integrator.check()?;
-        self.loss.as_ref().map_or(Ok(()), |loss| loss.check())?;
-        if let Some(filter) = &self.prefilter {
+        self.terms.loss.as_ref().map_or(Ok(()), |loss| loss.check())?;
+        if let Some(filter) = &self.terms.prefilter {
             self.experiments.iter().try_for_each(|record| filter.check(record))?;
         }
         self.check_weights()
@@ -320,19 +333,26 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
         )))
     }
 
-    fn objective<'s>(&'s self, setting: &'s Setting<M, P>, whitening: Whitening) -> Objective<'s, M, I, P> {
-        Objective {
+    fn source<'s>(&'s self, experiments: &'s [ExperimentOf<M>], prepared: &'s [P::Prepared]) -> Arc<dyn Source + 's> {
+        Arc::new(Simulated {
             model: self.model,
-            experiments: self.experiments,
-            unknowns: &setting.unknowns,
-            integrator: &self.integrator,
+            experiments,
+            integrator: self.integrator.clone(),
             predictor: &self.predictor,
-            prepared: &setting.prepared,
-            weighting: self.weighting.as_deref(),
-            loss: self.loss.as_deref().map(|loss| loss as &dyn Loss),
-            prefilter: self.prefilter.as_ref(),
-            whitening,
-            control: &self.control,
+            prepared,
+            weighting: self.weighting.as_deref().map(|weighting| weighting as &dyn Weighting<M>),
+        })
+    }
+
+    /// The cost, with errors in the units of the outputs.
+    fn objective<'s>(&'s self, setting: &'s Setting<P::Prepared>) -> Objective<'s> {
+        Objective {
+            source: self.source(self.experiments, &setting.prepared),
+            unknowns: &setting.unknowns,
+            loss: self.terms.loss.as_deref().map(|loss| loss as &dyn Loss),
+            prefilter: self.terms.prefilter.as_ref(),
+            whitening: Whitening::Diagonal(vec![1.0; M::Output::LEN]),
+            control: &self.terms.control,
         }
     }
 }

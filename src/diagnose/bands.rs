@@ -33,19 +33,19 @@ pub fn bands<M: Model, I: Integrator<M>, P: Predictor<M>, O>(
     experiment: usize,
     probability: f64,
 ) -> Result<Bands<M>, Error> {
-    let (mut objective, best) = problem.at(estimate)?;
-    let Some(record) = objective.experiments.get(experiment) else {
-        let count = objective.experiments.len();
+    let (objective, best) = problem.at(estimate)?;
+    let Some(record) = problem.experiments().get(experiment) else {
+        let count = objective.experiments();
         return Err(Error::Option(format!("there is no record number {experiment}; the fit has {count}, from zero")));
     };
     if !(probability > 0.0 && probability < 1.0) {
         return Err(Error::Option(format!("the probability of a band is {probability}; it must be between 0 and 1")));
     }
-    let prediction = objective.prediction(experiment, &best)?;
+    let prediction = problem.prediction(&objective, experiment, &best)?;
     let sigma = M::Output::into_array(M::Output::map(estimate.quality, |quality| quality.sigma));
     let quantile = student::quantile(0.5 + probability / 2.0, estimate.degrees_of_freedom());
     // Slopes in the outputs' own units, and the covariance in the optimizer's coordinates.
-    objective.leave_units();
+    let objective = objective.in_units();
     let columns: Vec<usize> = objective.unknowns.columns(experiment).collect();
     let slope = |i: usize| estimate.unknowns[i].transform.slope(estimate.unknowns[i].value);
     let n = columns.len();

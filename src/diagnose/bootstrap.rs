@@ -5,7 +5,7 @@ use super::{Pinned, minimize};
 use crate::error::Error;
 use crate::estimate::Estimate;
 use crate::experiment::ExperimentOf;
-use crate::fit::{FitProblem, Objective, each};
+use crate::fit::{FitProblem, each};
 use crate::integrate::Integrator;
 use crate::model::Model;
 use crate::optimize::LeastSquares;
@@ -58,7 +58,7 @@ pub fn bootstrap<M: Model, I: Integrator<M>, P: Predictor<M>, O: Sync>(
     seed: u64,
 ) -> Result<Bootstrap, Error> {
     let (objective, best) = problem.at(estimate)?;
-    let predictions = (0..objective.experiments.len()).map(|e| objective.prediction(e, &best));
+    let predictions = (0..objective.experiments()).map(|e| problem.prediction(&objective, e, &best));
     let predictions = predictions.collect::<Result<Vec<_>, _>>()?;
     // Centered: a mean that the model left would be counted as noise.
     let residuals: Vec<Vec<Of<M::Output, f64>>> = predictions
@@ -74,7 +74,7 @@ pub fn bootstrap<M: Model, I: Integrator<M>, P: Predictor<M>, O: Sync>(
         })
         .collect();
     if let Some(e) = residuals.iter().position(Vec::is_empty) {
-        let experiment = objective.experiments[e].name().to_owned();
+        let experiment = problem.experiments()[e].name().to_owned();
         return Err(Error::TooFewSamples {
             experiment,
             samples: 0,
@@ -84,8 +84,8 @@ pub fn bootstrap<M: Model, I: Integrator<M>, P: Predictor<M>, O: Sync>(
     }
     let refit = |number: usize| -> Option<Vec<f64>> {
         let mut random = Random::stream(seed, number as u64);
-        let records: Vec<ExperimentOf<M>> = objective
-            .experiments
+        let records: Vec<ExperimentOf<M>> = problem
+            .experiments()
             .iter()
             .zip(&predictions)
             .zip(&residuals)
@@ -103,10 +103,9 @@ pub fn bootstrap<M: Model, I: Integrator<M>, P: Predictor<M>, O: Sync>(
                 record
             })
             .collect();
-        let prepare = |record| objective.predictor.prepare(objective.model, record, &estimate.parameters);
+        let prepare = |record| problem.prepared(record, &estimate.parameters);
         let prepared = records.iter().map(prepare).collect::<Result<Vec<_>, _>>().ok()?;
-        let whitening = objective.whitening.clone();
-        let again = Objective { experiments: &records, prepared: &prepared, whitening, ..objective };
+        let again = problem.of_records(&objective, &records, &prepared);
         let (place, _) = minimize(Pinned { problem: &again, bounds: again.bounds() }, best.clone())?;
         Some(estimate.unknowns.iter().zip(&place).map(|(u, &c)| u.transform.to_value(c)).collect())
     };

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::estimate::Estimate;
+use crate::experiment::ExperimentOf;
 use crate::fit::{FitProblem, Objective, Rows};
 use crate::information::Information;
 use crate::integrate::Integrator;
@@ -114,7 +115,7 @@ pub fn identifiability<M: Model, I: Integrator<M>, P: Predictor<M>, O>(
         excitation,
         advice: vec![],
     };
-    result.advice = advice(&result, &objective);
+    result.advice = advice::<M>(&result, problem.experiments());
     Ok(result)
 }
 
@@ -144,11 +145,7 @@ fn spectrum(whole: &Information) -> (usize, Option<f64>) {
 }
 
 /// The largest rank at a few random points within a factor of 1.5 of the estimate.
-fn generic<M: Model, I: Integrator<M>, P: Predictor<M>>(
-    objective: &Objective<'_, M, I, P>,
-    best: &[f64],
-    transforms: impl Iterator<Item = Transform> + Clone,
-) -> usize {
+fn generic(objective: &Objective<'_>, best: &[f64], transforms: impl Iterator<Item = Transform> + Clone) -> usize {
     let bounds = objective.bounds();
     let rank = |point: u64| {
         let mut random = Random::stream(SEED, point);
@@ -214,18 +211,16 @@ fn subsets(of: &[usize], size: usize) -> Vec<Vec<usize>> {
     }
 }
 
-fn excitation<M: Model, I: Integrator<M>, P: Predictor<M>>(
-    objective: &Objective<'_, M, I, P>,
-    best: &[f64],
-) -> Result<Vec<Excitation>, Error> {
-    let (n, outputs) = (best.len(), M::Output::LEN);
+fn excitation(objective: &Objective<'_>, best: &[f64]) -> Result<Vec<Excitation>, Error> {
+    let (n, outputs) = (best.len(), objective.outputs());
     let mut by_output = vec![vec![0.0; outputs]; n];
     let mut by_segment = vec![vec![]; n];
     let mut begins = vec![];
-    for (e, record) in objective.experiments.iter().enumerate() {
+    for e in 0..objective.experiments() {
+        let samples = objective.source.samples(e);
         let columns: Vec<usize> = objective.unknowns.columns(e).collect();
-        let (rows, length) = (outputs * WINDOW, record.len().div_ceil(SEGMENTS).max(1));
-        let mut sums = vec![vec![0.0; record.len().div_ceil(length)]; n];
+        let (rows, length) = (outputs * WINDOW, samples.div_ceil(SEGMENTS).max(1));
+        let mut sums = vec![vec![0.0; samples.div_ceil(length)]; n];
         let visit = &mut |Rows { begin, samples, window }: Rows<'_>| {
             let slopes = window.data_mut();
             for (c, &unknown) in columns.iter().enumerate() {
@@ -242,13 +237,14 @@ fn excitation<M: Model, I: Integrator<M>, P: Predictor<M>>(
             return Err(Error::Simulation(objective.locate(e, best, 0)));
         }
         let segments = sums.first().map_or(0, Vec::len);
-        begins.extend((0..segments).map(|s| (record.name().to_owned(), record.time(s * length))));
+        let label = &objective.unknowns.labels[e];
+        begins.extend((0..segments).map(|s| (label.clone(), objective.source.time(e, s * length))));
         by_segment.iter_mut().zip(sums).for_each(|(all, sums): (&mut Vec<f64>, _)| all.extend(sums));
     }
     let names = objective.names();
     let excited = |i: usize| {
         let total = by_output[i].iter().sum::<f64>().max(f64::MIN_POSITIVE);
-        let output = |j: usize| (M::Output::NAMES[j].to_owned(), by_output[i][j] / total);
+        let output = |j: usize| (objective.source.outputs()[j].to_owned(), by_output[i][j] / total);
         let segment = |(sum, (experiment, from)): (&f64, &(String, f64))| Segment {
             experiment: experiment.clone(),
             from: *from,
@@ -264,10 +260,7 @@ fn excitation<M: Model, I: Integrator<M>, P: Predictor<M>>(
     Ok((0..n).map(excited).collect())
 }
 
-fn advice<M: Model, I: Integrator<M>, P: Predictor<M>>(
-    found: &Identifiability,
-    objective: &Objective<'_, M, I, P>,
-) -> Vec<String> {
+fn advice<M: Model>(found: &Identifiability, records: &[ExperimentOf<M>]) -> Vec<String> {
     let mut advice = vec![];
     let n = found.unknowns.len() as u64;
     if found.generic_rank < n {
@@ -324,10 +317,10 @@ fn advice<M: Model, I: Integrator<M>, P: Predictor<M>>(
         }
     }
     for i in 0..M::Input::LEN {
-        let value = |k: usize, e: usize| M::Input::into_array(objective.experiments[e].inputs()[k]).as_ref()[i];
+        let value = |k: usize, e: usize| M::Input::into_array(records[e].inputs()[k]).as_ref()[i];
         let first = value(0, 0);
-        let records = objective.experiments.iter().enumerate();
-        if records.flat_map(|(e, r)| (0..r.len()).map(move |k| (k, e))).all(|(k, e)| value(k, e) == first) {
+        let all = records.iter().enumerate();
+        if all.flat_map(|(e, r)| (0..r.len()).map(move |k| (k, e))).all(|(k, e)| value(k, e) == first) {
             advice.push(format!(
                 "the input `{}` is {first} throughout: what it drives cannot be told from an offset; vary it",
                 M::Input::NAMES[i]

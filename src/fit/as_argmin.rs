@@ -3,14 +3,12 @@
 //! Cost and gradient serve the line-search and population methods; the dense residual, Jacobian and Gauss-Newton Hessian
 //! are made on request only. Where the model cannot be evaluated, or a bound is crossed, the cost is infinite.
 
-use super::objective::{Halt, Objective, Rows};
-use crate::integrate::Integrator;
-use crate::model::Model;
+use super::objective::{Objective, Rows};
 use crate::optimize::{Infeasible, LeastSquares};
-use crate::predict::{Predictor, WINDOW};
+use crate::predict::WINDOW;
 use argmin::core::{CostFunction, Error, Gradient, Hessian, Jacobian, Operator};
 
-impl<M: Model, I: Integrator<M>, P: Predictor<M>> CostFunction for Objective<'_, M, I, P> {
+impl CostFunction for Objective<'_> {
     type Param = Vec<f64>;
     type Output = f64;
 
@@ -25,7 +23,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> CostFunction for Objective<'_,
     }
 }
 
-impl<M: Model, I: Integrator<M>, P: Predictor<M>> Gradient for Objective<'_, M, I, P> {
+impl Gradient for Objective<'_> {
     type Param = Vec<f64>;
     type Gradient = Vec<f64>;
 
@@ -34,7 +32,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Gradient for Objective<'_, M, 
     }
 }
 
-impl<M: Model, I: Integrator<M>, P: Predictor<M>> Operator for Objective<'_, M, I, P> {
+impl Operator for Objective<'_> {
     type Param = Vec<f64>;
     type Output = Vec<f64>;
 
@@ -44,7 +42,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Operator for Objective<'_, M, 
     }
 }
 
-impl<M: Model, I: Integrator<M>, P: Predictor<M>> Jacobian for Objective<'_, M, I, P> {
+impl Jacobian for Objective<'_> {
     type Param = Vec<f64>;
     type Jacobian = Vec<Vec<f64>>;
 
@@ -54,7 +52,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Jacobian for Objective<'_, M, 
     }
 }
 
-impl<M: Model, I: Integrator<M>, P: Predictor<M>> Hessian for Objective<'_, M, I, P> {
+impl Hessian for Objective<'_> {
     type Param = Vec<f64>;
     type Hessian = Vec<Vec<f64>>;
 
@@ -73,12 +71,12 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Hessian for Objective<'_, M, I
     }
 }
 
-impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
+impl Objective<'_> {
     /// Every weighted residual with its slopes: sample by sample, output by output, the priors last.
     fn dense(&self, x: &[f64], slopes: bool) -> Result<Vec<(f64, Vec<f64>)>, Infeasible> {
         let width = if slopes { x.len() } else { 0 };
         let mut rows = vec![];
-        for e in 0..self.experiments.len() {
+        for e in 0..self.experiments() {
             let columns: Vec<usize> = if slopes { self.unknowns.columns(e).collect() } else { vec![] };
             let visit = &mut |Rows { begin, samples, window }: Rows<'_>| {
                 let measured = window.measured.clone();
@@ -86,7 +84,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
                 for k in 0..samples {
                     for row in (k..measured.len()).step_by(WINDOW).filter(|&row| measured[row]) {
                         let z = columns_of[columns_of.len() - 1][row];
-                        let root = (self.sample_weight(e, begin + k) * self.loss.map_or(1.0, |l| l.weight(z))).sqrt();
+                        let root = (self.source.weight(e, begin + k) * self.loss.map_or(1.0, |l| l.weight(z))).sqrt();
                         let mut dense = vec![0.0; width];
                         for (column, &i) in columns_of.iter().zip(&columns) {
                             dense[i] = root * column[row];
@@ -95,10 +93,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
                     }
                 }
             };
-            self.walk(e, x, slopes, visit).map_err(|halt| match halt {
-                Halt::Cancelled => Infeasible::Cancelled,
-                Halt::Failed { sample } => Infeasible::Failed(self.locate(e, x, sample).to_string()),
-            })?;
+            self.walk(e, x, slopes, visit).map_err(|halt| self.infeasible(e, x, halt))?;
         }
         for (i, slope, error) in self.unknowns.priors(x) {
             let mut dense = vec![0.0; width];

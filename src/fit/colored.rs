@@ -11,13 +11,11 @@
 //! depend on the choice of units or parameters.
 
 use super::covariance::Sandwich;
-use super::objective::{Halt, Objective, Rows};
+use super::objective::{Objective, Rows};
+use super::source::Halt;
 use crate::information::{Block, Information};
-use crate::integrate::Integrator;
-use crate::model::Model;
 use crate::optimize::Linearization;
-use crate::predict::{Predictor, WINDOW};
-use crate::signals::Signals;
+use crate::predict::WINDOW;
 use nalgebra::DMatrix;
 use std::collections::VecDeque;
 
@@ -39,7 +37,7 @@ struct Lagged {
     products: [DMatrix<f64>; 2],
 }
 
-impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
+impl Objective<'_> {
     /// Two passes with slopes. `None` where the scores of the unknowns that are not held are linearly dependent.
     pub(super) fn colored(&self, coordinates: &[f64], linear: &Linearization, held: &[bool]) -> Option<Colored> {
         let mut sandwich = match self.needs_sandwich() {
@@ -47,8 +45,8 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
             false => Sandwich::plain(linear),
         };
         let mut longest = 0;
-        let mut meat = Vec::with_capacity(self.experiments.len());
-        for e in 0..self.experiments.len() {
+        let mut meat = Vec::with_capacity(self.experiments());
+        for e in 0..self.experiments() {
             let columns: Vec<usize> = self.unknowns.columns(e).collect();
             let kept: Vec<usize> = (0..columns.len()).filter(|&c| !held[columns[c]]).collect();
             let (triangle, lags) = self.long_run(e, coordinates, &kept)?;
@@ -182,12 +180,12 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
         kept: &[usize],
         visit: &mut dyn FnMut(&[f64]),
     ) -> Result<(), Halt> {
-        let (columns, rows) = (self.unknowns.columns(e).count(), M::Output::LEN * WINDOW);
+        let (columns, rows) = (self.unknowns.columns(e).count(), self.outputs() * WINDOW);
         let mut score = vec![0.0; kept.len()];
         self.walk(e, coordinates, true, &mut |Rows { begin, samples, window }| {
             let (slopes, errors) = window.data_mut().split_at(columns * rows);
             for k in 0..samples {
-                let weight = self.sample_weight(e, begin + k);
+                let weight = self.source.weight(e, begin + k);
                 score.fill(0.0);
                 for row in (k..rows).step_by(WINDOW) {
                     let z = errors[row];

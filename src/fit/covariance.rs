@@ -12,12 +12,9 @@
 
 use super::objective::{Objective, Rows};
 use crate::information::{Block, Information, SquareMatrix};
-use crate::integrate::Integrator;
-use crate::model::Model;
 use crate::optimize::{Infeasible, Linearization};
-use crate::predict::{Predictor, WINDOW};
+use crate::predict::WINDOW;
 use crate::prefilter::{Butterworth, FilterState};
-use crate::signals::Signals;
 use nalgebra::DMatrix;
 
 /// One less the leverage of a measurement that alone determines an unknown: its error is rounding.
@@ -43,10 +40,10 @@ pub(super) struct Tally {
     expected: Vec<f64>,
 }
 
-impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
+impl Objective<'_> {
     /// Whether the classical covariance would be wrong whatever the data say.
     pub(super) fn needs_sandwich(&self) -> bool {
-        self.weighting.is_some() || self.prefilter.is_some() || self.is_robust()
+        self.source.is_weighted() || self.prefilter.is_some() || self.is_robust()
     }
 
     /// Whether the loss bends the cost of large errors.
@@ -89,7 +86,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
 
     /// The triangles of `sqrt(w) g`, and what there is to know of the errors.
     fn bread(&self, coordinates: &[f64]) -> Result<(Vec<Information>, Tally), Infeasible> {
-        let outputs = M::Output::LEN;
+        let outputs = self.outputs();
         let rows = outputs * WINDOW;
         let mut tally = Tally {
             weights: 0.0,
@@ -98,7 +95,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
             expected: vec![0.0; outputs],
         };
         let mut blocks = vec![];
-        for e in 0..self.experiments.len() {
+        for e in 0..self.experiments() {
             let columns = self.unknowns.columns(e).count();
             let (mut bread, mut block) = (Information::new(columns), Block::new(columns, rows));
             let (mut weight, mut psi) = (vec![0.0; rows], vec![0.0; rows]);
@@ -107,7 +104,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
                 weight.fill(0.0);
                 psi.fill(0.0);
                 for k in 0..samples {
-                    let (w, gain) = (self.sample_weight(e, begin + k), gain.as_mut().map_or(1.0, Gain::next));
+                    let (w, gain) = (self.source.weight(e, begin + k), gain.as_mut().map_or(1.0, Gain::next));
                     for j in (0..outputs).filter(|j| w > 0.0 && window.measured[j * WINDOW + k]) {
                         let (row, z) = (j * WINDOW + k, window.errors()[j * WINDOW + k]);
                         (weight[row], psi[row]) = (w, self.loss.map_or(z, |loss| loss.psi(z)));
@@ -137,9 +134,9 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
 
     /// The triangle of each experiment's scores, sample by sample.
     fn scores(&self, coordinates: &[f64], inverse: &SquareMatrix) -> Result<Vec<Information>, Infeasible> {
-        let rows = M::Output::LEN * WINDOW;
+        let rows = self.outputs() * WINDOW;
         let mut meat = vec![];
-        for e in 0..self.experiments.len() {
+        for e in 0..self.experiments() {
             let inverse = self.of_experiment(inverse, e);
             let columns = inverse.nrows();
             let (mut scores, mut block) = (Information::new(columns), Block::new(columns, WINDOW));
@@ -152,7 +149,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
                 let measured = window.measured.clone();
                 let data = window.data_mut();
                 for k in 0..samples {
-                    let weight = self.sample_weight(e, begin + k);
+                    let weight = self.source.weight(e, begin + k);
                     for row in (k..rows).step_by(WINDOW).filter(|&row| measured[row] && weight > 0.0) {
                         slopes.iter_mut().enumerate().for_each(|(c, slope)| *slope = data[c * rows + row]);
                         let z = errors[row];
@@ -181,22 +178,22 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
         filter: &Butterworth,
         tally: &Tally,
     ) -> Result<(Vec<Information>, f64), Infeasible> {
-        let outputs = M::Output::LEN;
+        let outputs = self.outputs();
         let expected = |i: usize| tally.expected[i].max(f64::MIN_POSITIVE);
         let noise =
             DMatrix::from_fn(outputs, outputs, |i, j| tally.influence[(i, j)] / (expected(i) * expected(j)).sqrt());
         let deviations = DMatrix::from_diagonal(&noise.diagonal().map(f64::sqrt));
         let factor = noise.cholesky().map_or(deviations, |cholesky| cholesky.l());
         let (mut meat, mut taken) = (vec![], 0.0);
-        for e in 0..self.experiments.len() {
+        for e in 0..self.experiments() {
             let inverse = self.of_experiment(inverse, e);
-            let (columns, samples) = (inverse.nrows(), self.experiments[e].len());
+            let (columns, samples) = (inverse.nrows(), self.source.samples(e));
             // Column by column of slopes, output by output, backward in time.
             let mut slopes = vec![0.0; columns * outputs * samples];
             let mut measured = vec![false; outputs * samples];
             let visit = &mut |Rows { begin, samples: here, window }: Rows<'_>| {
                 for k in 0..here {
-                    let (weight, back) = (self.sample_weight(e, begin + k), samples - 1 - begin - k);
+                    let (weight, back) = (self.source.weight(e, begin + k), samples - 1 - begin - k);
                     for j in 0..outputs {
                         measured[j * samples + back] = window.measured[j * WINDOW + k];
                         for (c, column) in window.columns_mut().take(columns).enumerate() {

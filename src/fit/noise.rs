@@ -2,19 +2,16 @@
 
 use super::objective::{Objective, Rows};
 use crate::information::SquareMatrix;
-use crate::integrate::Integrator;
 use crate::loss::{Huber, Loss};
-use crate::model::Model;
 use crate::optimize::Infeasible;
-use crate::predict::{Predictor, WINDOW, Window};
-use crate::signals::{Of, Signals};
+use crate::predict::{WINDOW, Window};
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 /// What is said of the measurement noise.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Noise<Y: Signals> {
+#[derive(Clone, Debug)]
+pub(crate) enum Noise {
     /// Its standard deviation per output.
-    Given(Of<Y, f64>),
+    Given(Vec<f64>),
     /// Estimated per output.
     PerOutput,
     /// Estimated as a full covariance.
@@ -132,7 +129,7 @@ const ROUNDING: f64 = 1e-15;
 /// Errors below this part of the output's own size, in the mean, are all rounding: it adds up along a record.
 const REPRODUCED: f64 = 1e-12;
 
-impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
+impl Objective<'_> {
     /// Second moments of the (filtered) errors in the units of the outputs; each error through `bend` in units of
     /// `sigma`, for robust estimates.
     fn moments(
@@ -141,15 +138,15 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
         sigma: &[f64],
         bend: Option<&dyn Fn(f64) -> f64>,
     ) -> Result<Moments, Infeasible> {
-        let outputs = M::Output::LEN;
+        let outputs = self.outputs();
         let mut sums = SquareMatrix::zeros(outputs);
         let mut pairs = SquareMatrix::zeros(outputs);
-        let plain = Objective { whitening: Whitening::Diagonal(vec![1.0; outputs]), ..*self };
-        for e in 0..self.experiments.len() {
+        let plain = self.in_units();
+        for e in 0..self.experiments() {
             let mut errors = vec![0.0; outputs];
             let visit = &mut |Rows { begin, samples, window }: Rows<'_>| {
                 for k in 0..samples {
-                    if self.sample_weight(e, begin + k) <= 0.0 {
+                    if self.source.weight(e, begin + k) <= 0.0 {
                         continue;
                     }
                     for (j, error) in errors.iter_mut().enumerate() {
@@ -166,12 +163,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
                     }
                 }
             };
-            plain.walk(e, coordinates, false, visit).map_err(|halt| match halt {
-                super::objective::Halt::Cancelled => Infeasible::Cancelled,
-                super::objective::Halt::Failed { sample } => {
-                    Infeasible::Failed(self.locate(e, coordinates, sample).to_string())
-                }
-            })?;
+            plain.walk(e, coordinates, false, visit).map_err(|halt| self.infeasible(e, coordinates, halt))?;
         }
         let covariance = SquareMatrix::from_fn(outputs, |i, j| sums[(i, j)] / pairs[(i, j)].max(1.0));
         if let Some(variance) = covariance.diagonal().iter().find(|variance| !variance.is_finite()) {
@@ -182,8 +174,8 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
 
     /// The noise that the errors at a point show: plainly, or robustly by Huber's proposal 2 (Huber, *Robust Statistics*,
     /// 1981, section 6.4) where a robust loss bends the large ones.
-    pub(crate) fn estimate_noise(&self, coordinates: &[f64], noise: Noise<M::Output>) -> Result<Whitening, Infeasible> {
-        let outputs = M::Output::LEN;
+    pub(crate) fn estimate_noise(&self, coordinates: &[f64], noise: &Noise) -> Result<Whitening, Infeasible> {
+        let outputs = self.outputs();
         let mut moments = self.moments(coordinates, &vec![1.0; outputs], None)?;
         let size = |size: f64| if size > 0.0 { size } else { 1.0 };
         let floor: Vec<f64> = self.magnitudes().into_iter().map(|magnitude| ROUNDING * size(magnitude)).collect();
@@ -217,17 +209,25 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Objective<'_, M, I, P> {
             let mut variances = moments.covariance.diagonal().into_iter().zip(self.magnitudes());
             variances.all(|(variance, size)| variance.sqrt() <= REPRODUCED * size)
         };
-        self.moments(coordinates, &vec![1.0; M::Output::LEN], None).is_ok_and(reproduced)
+        self.moments(coordinates, &vec![1.0; self.outputs()], None).is_ok_and(reproduced)
     }
 
     /// Largest measured magnitude of each output.
     fn magnitudes(&self) -> Vec<f64> {
-        let mut magnitudes = vec![0.0f64; M::Output::LEN];
-        for y in self.experiments.iter().flat_map(|e| e.outputs()) {
-            for (size, y) in magnitudes.iter_mut().zip(M::Output::into_array(*y)) {
-                *size = size.max(y.abs());
+        let magnitude = |j: usize| {
+            let mut values = vec![0.0; WINDOW];
+            let mut largest = 0.0f64;
+            for e in 0..self.experiments() {
+                let samples = self.source.samples(e);
+                for begin in (0..samples).step_by(WINDOW) {
+                    let range = begin..samples.min(begin + WINDOW);
+                    let values = &mut values[..range.len()];
+                    self.source.measured(e, j, range, values);
+                    largest = values.iter().fold(largest, |largest, y| largest.max(y.abs()));
+                }
             }
-        }
-        magnitudes
+            largest
+        };
+        (0..self.outputs()).map(magnitude).collect()
     }
 }

@@ -22,19 +22,26 @@ pub(crate) struct Unknown {
     pub parameter: Parameter,
 }
 
-pub(crate) struct Unknowns<M: Model> {
+/// Initial state and parameters of one experiment.
+#[derive(Clone, Debug)]
+pub(crate) struct Place {
+    pub x: Vec<f64>,
+    pub p: Vec<f64>,
+}
+
+pub(crate) struct Unknowns {
     /// What each experiment is called in reports and errors.
     pub labels: Vec<String>,
-    pub parameters: Of<M::Parameters, Parameter>,
+    pub parameters: Vec<Parameter>,
     /// What is known of each experiment's initial state.
-    pub initial: Vec<Of<M::State, Parameter>>,
+    initial: Vec<Vec<Parameter>>,
     pub row: Vec<Unknown>,
     /// Where in the row each experiment's own unknowns begin, and the end of the row.
     begins: Vec<usize>,
 }
 
-impl<M: Model> Unknowns<M> {
-    pub fn new(
+impl Unknowns {
+    pub fn new<M: Model>(
         model: &M,
         experiments: &[ExperimentOf<M>],
         parameters: Of<M::Parameters, Parameter>,
@@ -74,10 +81,10 @@ impl<M: Model> Unknowns<M> {
                 }
             }
             row.extend(chosen(true).map(|i| parameter(i, Some(e))));
-            initial.push(state);
+            initial.push(M::State::into_array(state).as_ref().to_vec());
         }
         begins.push(row.len());
-        Ok(Unknowns { labels, parameters, initial, row, begins })
+        Ok(Unknowns { labels, parameters: declared.to_vec(), initial, row, begins })
     }
 
     /// How many unknowns all experiments share; they come first.
@@ -110,17 +117,17 @@ impl<M: Model> Unknowns<M> {
     }
 
     /// Initial state and parameters of one experiment.
-    pub fn place(&self, experiment: usize, coordinates: &[f64]) -> (Of<M::State, f64>, Of<M::Parameters, f64>) {
-        let mut x = M::State::into_array(M::State::map(self.initial[experiment], |p| p.start));
-        let mut p = M::Parameters::into_array(M::Parameters::map(self.parameters, |p| p.start));
+    pub fn place(&self, experiment: usize, coordinates: &[f64]) -> Place {
+        let start = |known: &[Parameter]| known.iter().map(|p| p.start).collect::<Vec<f64>>();
+        let mut place = Place { x: start(&self.initial[experiment]), p: start(&self.parameters) };
         for i in self.columns(experiment) {
             let value = self.row[i].parameter.transform.to_value(coordinates[i]);
             match self.row[i].target {
-                Target::State(s) => x.as_mut()[s] = value,
-                Target::Parameter(j) => p.as_mut()[j] = value,
+                Target::State(s) => place.x[s] = value,
+                Target::Parameter(j) => place.p[j] = value,
             }
         }
-        (M::State::from_array(x), M::Parameters::from_array(p))
+        place
     }
 
     /// What each column of one experiment's slopes belongs to.
