@@ -53,6 +53,9 @@ pub trait Search: Clone + Serialize + DeserializeOwned + for<'p> Solver<&'p Obje
     /// Cost and slopes where the search stands.
     fn linearization(&self) -> Option<&Linearization>;
 
+    /// The same search for a cost that is soon to change: it may stop three digits into the minimum.
+    fn rough(&self) -> Self;
+
     /// Whether its settings make sense.
     ///
     /// # Errors
@@ -71,6 +74,10 @@ impl<S: Scaling + Serialize + DeserializeOwned> Search for LevenbergMarquardt<S>
         LevenbergMarquardt::linearization(self)
     }
 
+    fn rough(&self) -> Self {
+        LevenbergMarquardt::new(self.stop.rough(), self.scaling.clone())
+    }
+
     fn check(&self) -> Result<(), Error> {
         self.stop.check()
     }
@@ -83,6 +90,10 @@ impl Search for GaussNewton {
 
     fn linearization(&self) -> Option<&Linearization> {
         GaussNewton::linearization(self)
+    }
+
+    fn rough(&self) -> Self {
+        GaussNewton::new(self.stop.rough())
     }
 
     fn check(&self) -> Result<(), Error> {

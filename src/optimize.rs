@@ -74,6 +74,11 @@ pub struct Stop {
 }
 
 impl Stop {
+    /// Three digits of each unknown.
+    pub(crate) fn rough(self) -> Self {
+        Stop { step: self.step.max(1e-3), gradient: self.gradient.max(1e-3), ..self }
+    }
+
     /// Refuses tolerances that are no numbers or negative.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let tolerances = [("step", self.step), ("gradient", self.gradient), ("cost", self.cost)];

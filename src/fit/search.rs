@@ -25,8 +25,9 @@ pub(super) struct Found {
     pub trouble: Option<String>,
 }
 
-/// The noise is known well enough when a round changes it by less than this part.
-const NOISE_TOLERANCE: f64 = 1e-8;
+/// The noise is known well enough when a round changes it by less than this part: no unknown then moves by more than that
+/// part of its standard error.
+const NOISE_TOLERANCE: f64 = 1e-6;
 const NOISE_ROUNDS: u32 = 100;
 
 impl Objective<'_> {
@@ -56,7 +57,13 @@ impl Objective<'_> {
         let known = matches!(terms.noise, Noise::Given(_)) || self.noise_is_no_matter(&terms.noise);
         let (mut iterations, mut evaluations) = (before, 0);
         let mut name = String::new();
-        for round in 1.. {
+        // Noise as the errors at the start show it is not worth an exact minimum.
+        if !known && file.is_none() {
+            solver = optimizer.rough();
+        }
+        let mut round = 0;
+        loop {
+            round += 1;
             let objective = self.with(whitening.clone());
             let result = objective.round(terms, coordinates, solver, &file)?;
             name.clone_from(&result.name);
@@ -72,9 +79,12 @@ impl Objective<'_> {
             if !settled {
                 let next = objective.estimate_noise(&coordinates, &terms.noise).unwrap_or_else(|_| whitening.clone());
                 let changes = next.sigma().into_iter().zip(whitening.sigma()).map(|(a, b)| (a / b).ln().abs());
+                settled = round > 1 && changes.fold(0.0, f64::max) < NOISE_TOLERANCE;
+                if !settled {
+                    (whitening, linear) = (next, None);
+                }
                 // Rounding is another at every point.
-                settled = outcome == Outcome::Exact || changes.fold(0.0, f64::max) < NOISE_TOLERANCE;
-                (whitening, linear) = (next, None);
+                settled |= outcome == Outcome::Exact;
                 if !settled && round == NOISE_ROUNDS {
                     outcome = Outcome::IterationLimit { iterations };
                     settled = true;
@@ -86,7 +96,6 @@ impl Objective<'_> {
             }
             solver = optimizer.clone();
         }
-        Err(Error::Option("the noise cannot be estimated; give it with Fit::noise".to_owned()))
     }
 
     /// One search with the noise as it stands.
