@@ -5,15 +5,10 @@
 //! `#[inline]` on them) profits. Two lessons:
 //! - The compiler surely inlines a large function only where it has one caller. So the numbers of each unit are types of
 //!   their own ([`Dual`](crate::Dual) carries the unit), and each has its own copy of the model, with one caller.
-//! - Neither fused multiply-add nor wider lanes by explicit instructions: where inlining fails they become calls, twenty
-//!   times slower, while this is never slower than the portable loop, and gives the same bits.
+//! - No wider lanes by explicit instructions: where inlining fails they become calls, twenty times slower, while this is
+//!   never slower than the portable loop.
 
-/// Which registers, as a const parameter.
-pub(crate) type Unit = u8;
-/// What every machine of the target has.
-pub(crate) const PORTABLE: Unit = 0;
-/// AVX-512.
-pub(crate) const WIDE: Unit = 1;
+pub(crate) use crate::lanes::{PORTABLE, Unit, WIDE};
 
 /// A loop to be compiled for several units. `run` and all it calls in its loop must be inlined.
 pub(crate) trait Kernel {
@@ -26,7 +21,8 @@ pub(crate) fn has_wide() -> bool {
     #[cfg(target_arch = "x86_64")]
     return std::arch::is_x86_feature_detected!("avx512f")
         && std::arch::is_x86_feature_detected!("avx512vl")
-        && std::arch::is_x86_feature_detected!("avx512dq");
+        && std::arch::is_x86_feature_detected!("avx512dq")
+        && std::arch::is_x86_feature_detected!("fma");
     #[cfg(not(target_arch = "x86_64"))]
     return false;
 }

@@ -4,7 +4,7 @@
 //! Speed rests on two things. The slopes are a fixed array walked two at a time in vector registers. And a quotient multiplies by the reciprocal of its divisor, which is computed once where the divisor does not
 //! change (a parameter inside a time loop); its value may therefore differ from `a / b` in the last bit.
 
-use crate::lanes::lanes;
+use crate::lanes::{Fused, lanes};
 use crate::scalar::Scalar;
 use core::cmp::Ordering;
 use core::iter::Sum;
@@ -138,7 +138,8 @@ impl<const N: usize, const UNIT: u8> Mul for Dual<N, UNIT> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, b: Self) -> Self {
-        let slopes = lanes!(N; x in self.slopes, y in b.slopes; u = self.value, v = b.value; x * v + y * u);
+        let slopes =
+            lanes!(N; x in self.slopes, y in b.slopes; u = self.value, v = b.value; y.times_plus::<UNIT>(u, x * v));
         Dual { value: self.value * b.value, slopes }
     }
 }
@@ -149,7 +150,8 @@ impl<const N: usize, const UNIT: u8> Div for Dual<N, UNIT> {
     fn div(self, b: Self) -> Self {
         let reciprocal = 1.0 / b.value;
         let value = self.value * reciprocal;
-        let slopes = lanes!(N; x in self.slopes, y in b.slopes; q = value, r = reciprocal; (x - y * q) * r);
+        let slopes =
+            lanes!(N; x in self.slopes, y in b.slopes; q = value, r = reciprocal; y.times_from::<UNIT>(q, x) * r);
         Dual { value, slopes }
     }
 }
@@ -217,6 +219,11 @@ impl<const N: usize, const UNIT: u8> Scalar for Dual<N, UNIT> {
     #[inline(always)]
     fn value(&self) -> f64 {
         self.value
+    }
+    #[inline(always)]
+    fn plus_times(self, k: Self, a: f64) -> Self {
+        let slopes = lanes!(N; x in self.slopes, y in k.slopes; v = a; y.times_plus::<UNIT>(v, x));
+        Dual { value: self.value + k.value * a, slopes }
     }
     #[inline(always)]
     fn chain(self, f: f64, df: f64) -> Self {

@@ -66,7 +66,7 @@ pub struct Stuck;
 #[inline(always)]
 pub(crate) fn axpy<X: Signals, S: Scalar>(x: Of<X, S>, a: f64, k: Of<X, S>) -> Of<X, S> {
     let (x, k) = (X::into_array(x), X::into_array(k));
-    X::from_fn(|i| x.as_ref()[i] + k.as_ref()[i] * a)
+    X::from_fn(|i| x.as_ref()[i].plus_times(k.as_ref()[i], a))
 }
 
 /// `x + h (a[0] k[0] + a[1] k[1] + ...)`, signal by signal.

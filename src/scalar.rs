@@ -46,6 +46,11 @@ pub trait Scalar:
     /// The value without its slopes.
     fn value(&self) -> f64;
 
+    /// `self + k * a`; slopes may be rounded once instead of twice.
+    #[inline(always)]
+    fn plus_times(self, k: Self, a: f64) -> Self {
+        self + k * a
+    }
     /// `f(self)`, given the value `f` and the slope `df` of a scalar function at `self`: the chain rule, for functions
     /// that are not listed here.
     fn chain(self, f: f64, df: f64) -> Self;

@@ -188,20 +188,20 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize, const UNIT: Un
             // Known to the compiler, which then computes once per interval what depends on the input alone.
             walk.hold = Hold::Zero;
         }
-        let Window { begin, samples, columns, rows, ref mut data, ref mut measured } = *window;
-        let (first, used, p, mut x) = (lanes.first, lanes.used.min(N), lanes.p, lanes.x);
-        let errors = (columns - 1) * rows;
+        let Window { begin, samples, columns, ref mut data, ref mut measured, .. } = *window;
+        let (p, mut x) = (lanes.p, lanes.x);
+        let rows = M::Output::LEN * WINDOW;
+        let (slopes, errors) = data.split_at_mut((columns - 1) * rows);
+        let slopes = &mut slopes[lanes.first * rows..][..lanes.used.min(N) * rows];
+        let (errors, measured) = (&mut errors[..rows], &mut measured[..rows]);
         for k in 0..samples {
             let sample = begin + k;
             let state = predictor.state(&walk, prepared, sample, x, &p, &mut lanes.memory).map_err(|Stuck| sample)?;
             let Some(state) = state else {
-                for j in 0..M::Output::LEN {
-                    let row = j * WINDOW + k;
+                for row in (0..M::Output::LEN).map(|j| j * WINDOW + k) {
                     measured[row] = false;
-                    data[errors + row] = 0.0;
-                    for c in 0..used {
-                        data[(first + c) * rows + row] = 0.0;
-                    }
+                    errors[row] = 0.0;
+                    slopes.chunks_exact_mut(rows).for_each(|column| column[row] = 0.0);
                 }
                 continue;
             };
@@ -216,9 +216,9 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize, const UNIT: Un
                 let row = j * WINDOW + k;
                 let here = !found.is_nan();
                 measured[row] = here;
-                data[errors + row] = if here { found - expected.value } else { 0.0 };
-                for c in 0..used {
-                    data[(first + c) * rows + row] = if here { expected.slopes[c] } else { 0.0 };
+                errors[row] = if here { found - expected.value } else { 0.0 };
+                for (column, slope) in slopes.chunks_exact_mut(rows).zip(expected.slopes) {
+                    column[row] = if here { slope } else { 0.0 };
                 }
             }
         }
