@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 
 /// The rooms, floor by floor. Each may import from all the rows above its own, and from nothing else.
 const FLOORS: &[(&str, &[&str])] = &[
-    ("ground: hardware and units", &["lanes", "scalar", "units", "dispatch", "random", "whiteness"]),
+    ("ground: hardware", &["lanes"]),
+    ("ground: beside numbers", &["scalar", "units", "dispatch", "random", "whiteness"]),
     ("ground: numbers", &["dual", "signals"]),
     ("ground: vectors of numbers", &["information", "covariance", "error", "by_name"]),
     ("say: words", &["model", "parameter", "scaling", "interval"]),
