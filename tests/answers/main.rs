@@ -2,7 +2,6 @@
 
 mod compare;
 mod identifiability;
-mod intervals;
 mod reports;
 mod residuals;
 #[path = "../common/shared.rs"]

@@ -3,7 +3,6 @@
 mod bad_records;
 mod csv;
 mod edits;
-mod long_record;
 #[path = "../common/shared.rs"]
 mod shared;
 mod valid;

@@ -1,5 +1,4 @@
 //! Whether intervals cover the truth as often as they say, by simulation. Seeds are fixed.
-#![cfg(not(debug_assertions))]
 
 use greybox::diagnose::{Resampling, bands, bootstrap};
 use greybox::{Estimate, Experiment, Fit, Knowledge, Model, Scalar, Signals, Time, free, signals};

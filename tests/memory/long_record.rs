@@ -1,8 +1,7 @@
 //! Ten million samples in one fit: memory is the record and less than 10 MB. In release only (`cargo test --release`).
 
+use crate::allocator::most_bytes;
 use greybox::*;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::Instant;
 
 signals! { pub struct Current { i: "A" } }
@@ -26,27 +25,6 @@ impl Model for Rl {
     }
 }
 
-/// Counts what is allocated, and the most that ever was.
-struct Counting;
-
-static NOW: AtomicUsize = AtomicUsize::new(0);
-static PEAK: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: every call is handed on to the system's allocator as it came.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        PEAK.fetch_max(NOW.fetch_add(layout.size(), Relaxed) + layout.size(), Relaxed);
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        NOW.fetch_sub(layout.size(), Relaxed);
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
 #[test]
 #[cfg_attr(debug_assertions, ignore = "slow without optimization")]
 fn ten_million_samples() {
@@ -66,12 +44,10 @@ fn ten_million_samples() {
         i = u / r + (i - u / r) * decay;
     }
     let record = Experiment::new(&Rl, Time::Uniform { start: 0.0, step: H }, inputs, outputs).unwrap();
-    let before = NOW.load(Relaxed);
-    PEAK.store(before, Relaxed);
     let begin = Instant::now();
-    let estimate = Fit::new(&Rl, &record).parameters(Coil { r: free(1.0), l: free(0.03) }).run().unwrap();
-    let (seconds, more) = (begin.elapsed().as_secs_f64(), PEAK.load(Relaxed) - before);
-    println!("{estimate}\n{seconds:.1} s, record {before} bytes, beyond it {more} bytes");
+    let fit = || Fit::new(&Rl, &record).parameters(Coil { r: free(1.0), l: free(0.03) }).run().unwrap();
+    let (estimate, more) = most_bytes(fit);
+    println!("{estimate}\n{:.1} s, {more} bytes beyond the record", begin.elapsed().as_secs_f64());
     assert!(estimate.outcome.converged());
     assert!(more < 10_000_000, "{more} bytes beyond the record");
     for (name, value, truth) in [("r", estimate.parameters.r, r), ("l", estimate.parameters.l, l)] {

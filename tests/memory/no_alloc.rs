@@ -1,5 +1,6 @@
 //! Observers, integrators and filters allocate nothing, from their making on: counted.
 
+use crate::allocator::allocations;
 use greybox::check::{Plane, Rates, Spiral};
 use greybox::online::{Ekf, EkfStart, Forgetting, Mras, MrasStart, Order, Rls, Stepping, Watch};
 use greybox::pmsm::{
@@ -10,35 +11,6 @@ use greybox::{
     Butterworth, Dual, Esdirk, Experiment, FilterState, Fit, Hold, Huber, Integrator, Interval, Nothing, Rk4, Rk45,
     Sample, Time, fixed, free,
 };
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
-struct Counting;
-
-thread_local! {
-    // Of this thread alone: the test harness has threads of its own.
-    static COUNT: Cell<usize> = const { Cell::new(0) };
-}
-
-// SAFETY: hands every call on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        COUNT.with(|count| count.set(count.get() + 1));
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-fn allocations(work: impl FnOnce()) -> usize {
-    let before = COUNT.with(Cell::get);
-    work();
-    COUNT.with(Cell::get) - before
-}
 
 const TS: f64 = 0.126e-3;
 

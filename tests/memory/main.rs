@@ -1,0 +1,5 @@
+//! What is allocated: nothing inside loops over samples, and no memory that grows with them.
+
+mod allocator;
+mod long_record;
+mod no_alloc;

@@ -1,0 +1,16 @@
+//! Thousands of fits: coverage of intervals, scatter of estimates. In optimized builds only
+//! (`cargo test --release --test thorough`); others say so and pass.
+
+#[cfg(not(debug_assertions))]
+#[path = "../common/mod.rs"]
+mod common;
+#[cfg(not(debug_assertions))]
+mod intervals;
+#[cfg(not(debug_assertions))]
+mod monte_carlo;
+
+#[cfg(debug_assertions)]
+#[test]
+fn in_optimized_builds_only() {
+    println!("nothing tested: run `cargo test --release --test thorough`");
+}
