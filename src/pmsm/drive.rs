@@ -6,13 +6,13 @@
 
 use super::control::{Command, CurrentControl, SpeedControl};
 use super::frames::{Stator, rotate_into, rotate_out_of};
-use super::inverter::{DeadTime, aim};
+use super::inverter::{Carrier, DeadTime, Inverter, aim};
 use super::plant::Plant;
 use super::program::Program;
 use super::robot::{Axis, TS, V_MAX};
 use super::sensors::{CurrentSensors, Resolver};
 use super::temperature::Celsius;
-use super::{Currents, Drive, Error, Injection, Motion, SQRT_3_2, Surface};
+use super::{Bridge, Currents, Drive, Error, Injection, Motion, SQRT_3_2, Surface};
 use crate::experiment::{Experiment, Time};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -85,6 +85,8 @@ pub struct Simulation {
     pub nominal: Axis,
     /// What the axis is.
     pub plant: Plant,
+    /// What makes the voltage.
+    pub inverter: Inverter,
     /// Current sensors.
     pub currents: CurrentSensors,
     /// Angle sensor.
@@ -97,7 +99,7 @@ pub struct Simulation {
     pub injection: Option<Injection>,
     /// Seed of the sensors' noise.
     pub seed: u64,
-    /// Midpoint steps of the plant in one sample.
+    /// Midpoint steps of the plant in one sample; where the inverter switches, no step is longer than that.
     pub substeps: u32,
 }
 
@@ -153,6 +155,7 @@ impl Simulation {
                 saliency: 0.04,
                 saturation: 0.1,
             },
+            inverter: Inverter::Averaged,
             currents: CurrentSensors::twelve_bit(axis.i_max),
             resolver: Resolver::SIXTEEN_BIT,
             current_control: control.limited(V_MAX),
@@ -200,6 +203,19 @@ impl Simulation {
         Simulation { injection: Some(injection), ..self }
     }
 
+    /// With an inverter that switches a direct voltage `vdc` (V).
+    ///
+    /// # Errors
+    /// A direct voltage that cannot make the longest vector of the current control: `sqrt(3)` times its limit is needed.
+    pub fn switching(self, vdc: f64, carrier: Carrier) -> Result<Self, Error> {
+        // Ten roundings: 600 V make exactly the 346.41 V that they allow.
+        if vdc.is_finite() && vdc >= 3f64.sqrt() * self.current_control.v_max * (1.0 - 1e-15) {
+            return Ok(Simulation { inverter: Inverter::Switching { vdc, carrier }, ..self });
+        }
+        let must = "be finite and at least sqrt(3) times the voltage limit of the current control";
+        Err(Error::OutOfRange { quantity: "direct voltage", value: vdc, unit: "V", must })
+    }
+
     /// With another seed for the sensors' noise.
     pub fn seeded(self, seed: u64) -> Self {
         Simulation { seed, ..self }
@@ -218,6 +234,10 @@ impl Simulation {
         let mut x = Motion::default();
         let mut last_theta = None;
         let mut wf = 0.0;
+        let mut bridge = match self.inverter {
+            Inverter::Averaged => None,
+            Inverter::Switching { vdc, carrier } => Some(Bridge::new(&self.plant, vdc, carrier)),
+        };
         let (mut acting, mut held) = (Command::default(), Stator::default());
         for (k, target) in program.targets.iter().enumerate() {
             let theta = self.resolver.read(x.theta, draw());
@@ -237,7 +257,10 @@ impl Simulation {
             log.current_limited += usize::from(current_limited);
             log.rows.push(Row { ud: acting.ud, uq: acting.uq, w, id, iq, theta, iq_ref, w_ref: target.w, truth: x });
 
-            x = self.plant.advance(x, held, TS, self.substeps);
+            x = match &mut bridge {
+                None => self.plant.advance(x, held, TS, self.substeps),
+                Some(bridge) => bridge.advance(x, held, TS, self.substeps, |_, _| {}),
+            };
             held = aim((command.ud, command.uq), np.electrical(theta), wf, np, TS);
             acting = command;
         }

@@ -54,7 +54,7 @@ fn every(n: usize) -> usize {
     }
 }
 
-fn percent(found: f64, truth: f64) -> f64 {
+pub fn percent(found: f64, truth: f64) -> f64 {
     100.0 * (found / truth - 1.0)
 }
 

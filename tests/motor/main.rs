@@ -9,3 +9,4 @@ mod online;
 mod online_experiments;
 #[path = "../common/shared.rs"]
 mod shared;
+mod switching;
