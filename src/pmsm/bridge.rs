@@ -212,7 +212,8 @@ mod tests {
         }
     }
 
-    // The currents follow those of the mean voltage and meet them at the samples; in between they swing.
+    // The currents follow those of the mean voltage and meet them at the samples, but for what the rotor turns in a sample
+    // (0.08 rad, squared); in between they swing.
     #[test]
     fn the_ripple_vanishes_at_the_samples() {
         let (plant, w) = (round(), 150.0);
@@ -235,14 +236,14 @@ mod tests {
                     swing = swing.max((x.id - mean.id).hypot(x.iq - mean.iq));
                 });
                 mean = fine(TS);
-                // The first samples know what the carrier's first half was not preceded by.
+                // Once the start has died away.
                 if k > 1000 {
                     at_samples = at_samples.max((x.id - mean.id).hypot(x.iq - mean.iq));
                     between = between.max(swing);
                 }
             }
             println!("{carrier:?}: {at_samples:.4} A at the samples, {between:.3} A between");
-            assert!(between > 0.5 && at_samples < 0.03 * between, "{carrier:?}: {at_samples} A, {between} A");
+            assert!(between > 0.5 && at_samples < 0.005 * between, "{carrier:?}: {at_samples} A, {between} A");
         }
     }
 

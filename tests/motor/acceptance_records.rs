@@ -13,14 +13,14 @@ use greybox::pmsm::{
 use greybox::{Butterworth, Fit, Hold, LinearEstimate, fixed, free};
 use std::sync::OnceLock;
 
-struct Record {
-    axis: Axis,
+pub struct Record {
+    pub axis: Axis,
     log: Log,
-    spans: Spans,
+    pub spans: Spans,
     cycles: Vec<Cycle>,
 }
 
-fn record(simulation: Simulation, program: Program) -> Record {
+pub fn record(simulation: Simulation, program: Program) -> Record {
     let axis = simulation.nominal;
     let log = simulation.run(&program);
     let spans = Spans::from_log(&log, axis.pole_pairs);
@@ -28,7 +28,7 @@ fn record(simulation: Simulation, program: Program) -> Record {
 }
 
 /// Experiment 3 of an axis: 20 cycles of rising speed, all disturbances.
-fn cycles(number: u8) -> &'static Record {
+pub fn cycles(number: u8) -> &'static Record {
     static RECORDS: [OnceLock<Record>; 6] = [const { OnceLock::new() }; 6];
     RECORDS[number as usize - 1].get_or_init(|| {
         let axis = Axis::reference(number).unwrap();
