@@ -59,6 +59,8 @@ mod compensated;
 mod exact;
 mod fed;
 mod injection;
+#[cfg(feature = "std")]
+mod log;
 mod machine;
 mod plant;
 mod salient;

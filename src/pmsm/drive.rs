@@ -7,13 +7,13 @@
 use super::control::{Command, CurrentControl, SpeedControl};
 use super::frames::{Stator, rotate_into, rotate_out_of};
 use super::inverter::{Carrier, DeadTime, Inverter, aim};
+pub use super::log::{Log, Row, Warning};
 use super::plant::Plant;
 use super::program::Program;
 use super::robot::{Axis, TS, V_MAX};
 use super::sensors::{CurrentSensors, Resolver};
 use super::temperature::Celsius;
-use super::{Bridge, Currents, Drive, Error, Injection, Motion, SQRT_3_2, Surface};
-use crate::experiment::{Experiment, Time};
+use super::{Bridge, Currents, Error, Injection, Motion, SQRT_3_2};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
@@ -105,40 +105,6 @@ pub struct Simulation {
 
 /// Corner of the controllers' one-pole speed filter (Hz).
 const SPEED_FILTER: f64 = 300.0;
-
-/// What one sample of a drive's log holds, and the truth behind it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Row {
-    /// Commanded voltage along the flux that acts from this sample to the next (V).
-    pub ud: f64,
-    /// Commanded voltage 90 electrical degrees ahead, likewise (V).
-    pub uq: f64,
-    /// Speed: the angle's difference from the sample before, over the sample time (rad/s, mechanical).
-    pub w: f64,
-    /// Measured current along the flux (A).
-    pub id: f64,
-    /// Measured current 90 electrical degrees ahead (A).
-    pub iq: f64,
-    /// Measured angle (rad, mechanical, not wrapped).
-    pub theta: f64,
-    /// Reference of iq (A).
-    pub iq_ref: f64,
-    /// Reference of the speed (rad/s).
-    pub w_ref: f64,
-    /// The plant's true motion.
-    pub truth: Motion,
-}
-
-/// What a run of a drive left behind.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Log {
-    /// One row per sample of [`TS`].
-    pub rows: Vec<Row>,
-    /// Samples in which the voltage was at its limit.
-    pub voltage_limited: usize,
-    /// Samples in which the current reference was at its limit.
-    pub current_limited: usize,
-}
 
 impl Simulation {
     /// The reference drive of an axis with all disturbances, winding and magnet at 20 C.
@@ -268,22 +234,6 @@ impl Simulation {
     }
 }
 
-impl Log {
-    /// The record that an identification sees: voltages held from sample to sample, the *mean* speed of the same interval
-    /// (the difference of the angles at its two ends), currents at its begin. The last row, which has no interval, is left
-    /// out.
-    pub fn experiment(&self, model: &Surface) -> Result<Experiment<Currents, Drive, Currents>, crate::Error> {
-        let (inputs, outputs) = self
-            .rows
-            .windows(2)
-            .map(|pair| {
-                (Drive { ud: pair[0].ud, uq: pair[0].uq, w: pair[1].w }, Currents { id: pair[0].id, iq: pair[0].iq })
-            })
-            .unzip();
-        Experiment::new(model, Time::Uniform { start: 0.0, step: TS }, inputs, outputs)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -334,10 +284,19 @@ mod tests {
         let axis = Axis::reference(1).unwrap();
         // Beyond the speed at which the EMF uses up the voltage.
         let fast = Program::speed_cycles(&Axis { w_max: 600.0, ..axis }, 2, 1.0).unwrap();
-        assert!(Simulation::new(axis).unwrap().run(&fast).voltage_limited > 0);
+        let log = Simulation::new(axis).unwrap().run(&fast);
+        assert!(log.voltage_limited > 0);
+        let warning = log.warnings().next().unwrap();
+        assert!(matches!(warning, Warning::Voltage { .. }), "{warning}");
+        assert!(
+            warning.to_string().starts_with(&format!("the voltage was at its limit in {} of", log.voltage_limited))
+        );
         // More acceleration than the current can make.
         let hard = Program::speed_cycles(&axis, 2, 12.0).unwrap();
-        assert!(Simulation::new(axis).unwrap().run(&hard).current_limited > 0);
+        let log = Simulation::new(axis).unwrap().run(&hard);
+        assert!(log.warnings().any(|warning| matches!(warning, Warning::Current { samples, .. } if samples > 0)));
+        // Within its limits it has nothing to say.
+        assert_eq!(short(reference()).warnings().count(), 0);
     }
 
     #[test]
