@@ -1,7 +1,11 @@
-//! Time of one update of each online observer, over a record of a swinging drive: `cargo bench --bench online`.
+//! Time of one update of each online observer, over a record of a swinging drive, and of the drive's own simulation: `cargo bench --bench online`.
 
 use divan::{Bencher, counter::ItemsCount};
 use greybox::online::{EkfStart, Forgetting, MrasStart, Order, Rls, Stepping, Watch};
+use greybox::pmsm::drive::Simulation;
+use greybox::pmsm::inverter::Carrier;
+use greybox::pmsm::program::Program;
+use greybox::pmsm::robot::{Axis, V_DC};
 use greybox::pmsm::{
     AngledDrive, Currents, Drive, ExactFed, ExactStep, ExactSurface, FedWinding, HeldIn, KeLyapunov, MotorLaw,
     RsLyapunov, SQRT_2_3, Winding,
@@ -40,6 +44,26 @@ fn record() -> Vec<(f64, AngledDrive, Currents)> {
             row
         })
         .collect()
+}
+
+/// The drive's simulation; 14 s are 111,111 samples.
+fn drive(bencher: Bencher, simulation: Simulation) {
+    let program = Program::speed_cycles(&simulation.nominal, 2, 1.0).unwrap();
+    bencher.counter(ItemsCount::new(program.targets.len())).bench_local(|| simulation.run(divan::black_box(&program)));
+}
+
+fn axis_1() -> Simulation {
+    Simulation::new(Axis::reference(1).unwrap()).unwrap()
+}
+
+#[divan::bench(sample_count = 20)]
+fn drive_averaged(bencher: Bencher) {
+    drive(bencher, axis_1());
+}
+
+#[divan::bench(sample_count = 20)]
+fn drive_switching(bencher: Bencher) {
+    drive(bencher, axis_1().switching(V_DC, Carrier::PerSample).unwrap());
 }
 
 #[divan::bench]

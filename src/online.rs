@@ -19,6 +19,7 @@ pub use mras::{Gradient, Law, Moment, Mras, MrasStart, Order, Rate, Stepping};
 pub use rls::{Forgetting, Rls};
 
 use crate::parameter::{Parameter, Transform};
+use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
 
 /// What one update found.
@@ -41,7 +42,7 @@ pub enum Outcome {
     #[error("corrected")]
     Corrected,
     /// Corrected, but for a parameter that this sample tells nothing reliable of.
-    #[error("`{parameter}` held: {quantity} is {value}, and tells nothing below {limit}")]
+    #[error("`{parameter}` held: {quantity} is {}, and tells nothing below {limit}", Short(*value))]
     Held {
         /// The parameter; the first, where there are several.
         parameter: &'static str,
@@ -59,7 +60,7 @@ pub enum Outcome {
         signal: &'static str,
     },
     /// Time did not advance by one sample: what was known of the state is void, the parameters stay.
-    #[error("time went on by {found} s where {expected} s were expected: the state starts anew")]
+    #[error("time went on by {} s where {expected} s were expected: the state starts anew", Short(*found))]
     Restarted {
         /// Sample time (s).
         expected: f64,
@@ -77,7 +78,8 @@ pub enum Outcome {
 pub enum Divergence {
     /// An estimate left the bounds of its [`Parameter`].
     #[error(
-        "`{parameter}` went to {value}, outside {lower} to {upper}; check the sign and size of its gain, and that it is excited"
+        "`{parameter}` went to {}, outside {lower} to {upper}; check the sign and size of its gain, and that it is excited",
+        Short(*value)
     )]
     Bounds {
         /// The parameter.
@@ -91,7 +93,9 @@ pub enum Divergence {
     },
     /// An innovation stayed beyond its limit.
     #[error(
-        "the innovation of `{signal}` is {value}, beyond {limit} for {samples} samples; the model does not follow the plant"
+        "the innovation of `{signal}` is {}, beyond {} for {samples} samples; the model does not follow the plant",
+        Short(*value),
+        Short(*limit)
     )]
     Innovation {
         /// The output.
@@ -191,6 +195,25 @@ pub enum ObserverError {
         /// Spectral radius of the linearized error system.
         radius: f64,
     },
+}
+
+/// A number by four significant digits.
+struct Short(f64);
+
+impl core::fmt::Display for Short {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let digits = 3.0 - Scalar::floor(Scalar::log10(Scalar::abs(self.0)));
+        let power = |n: f64| Scalar::powf(10.0, n);
+        // Powers of ten are whole on one side of the point only.
+        let short = if !digits.is_finite() || digits > 22.0 {
+            self.0
+        } else if digits >= 0.0 {
+            Scalar::round(self.0 * power(digits)) / power(digits)
+        } else {
+            Scalar::round(self.0 / power(-digits)) * power(-digits)
+        };
+        write!(f, "{short}")
+    }
 }
 
 /// When innovations mean divergence: some output beyond its limit for `patience` samples in a row.
@@ -325,5 +348,24 @@ impl Clock {
         let Some(last) = self.last.replace(t) else { return Beat::First };
         let found = t - last;
         if (found - self.ts).abs() <= 0.1 * self.ts { Beat::Regular } else { Beat::Jump { found } }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_said_shortly() {
+        for (value, said) in [
+            (-0.000_993_374_516_914, "-0.0009934"),
+            (123_456.789, "123500"),
+            (0.0, "0"),
+            (20.0, "20"),
+            (1e-300, &format!("{}", 1e-300)),
+            (f64::INFINITY, "inf"),
+        ] {
+            assert_eq!(Short(value).to_string(), said);
+        }
     }
 }

@@ -27,6 +27,7 @@
 //! | [`control`], [`inverter`], [`sensors`] | the parts of a drive | frames |
 //! | [`robot`] | the axes of the reference robot | temperature |
 //! | [`Plant`] | a motor and its load as they really are | inverter, robot |
+//! | [`Bridge`] | an inverter that switches, with the plant behind it | plant |
 //! | `program`, `drive` | motion programs; the whole drive in simulation (with `std`) | all of these |
 //! | `adaptive` | a drive that uses its observer (with `std`) | control, `Machine` |
 //! | `offline` | least squares on a record (with `std`) | drive |
@@ -53,10 +54,13 @@ pub mod temperature;
 pub mod units;
 
 mod adaptation;
+mod bridge;
 mod compensated;
 mod exact;
 mod fed;
 mod injection;
+#[cfg(feature = "std")]
+mod log;
 mod machine;
 mod plant;
 mod salient;
@@ -68,6 +72,7 @@ pub use adaptation::{
     Adaptation, DeadZone, DirectCurrent, KeConstantGain, KeLyapunov, MotorLaw, Normalized, Resting, RsDirect,
     RsLyapunov, Seen, lyapunov_margin, lyapunov_rate,
 };
+pub use bridge::Bridge;
 pub use compensated::{CompensatedDrive, CompensatedWinding, ExactCompensated};
 pub use exact::{ExactFed, ExactStep, ExactSurface, FedWinding, HeldIn};
 pub use fed::{AngledDrive, Fed, Line, dead_time};

@@ -104,13 +104,23 @@ pub fn torque_step() -> Result<Report> {
             ("id = 0".to_owned(), trace(of, &without)),
         ]
     };
-    report.figure("exp1-ke", "time (s)", "Ke (V s/rad)", series(|now| now.estimate.ke, |p| p.ke));
-    report.figure("exp1-rs", "time (s)", "R (ohm)", series(|now| now.estimate.rs, |p| p.rs));
+    report.figure(
+        "exp1-ke",
+        "Back-EMF of a drifting motor",
+        ["time (s)", "Ke (V s/rad)"],
+        series(|now| now.estimate.ke, |p| p.ke),
+    );
+    report.figure(
+        "exp1-rs",
+        "Resistance of a drifting motor",
+        ["time (s)", "R (ohm)"],
+        series(|now| now.estimate.rs, |p| p.rs),
+    );
     let torque = vec![
         ("adapted".to_owned(), trace(|now| now.torque, &direct)),
         ("id = 0, R held".to_owned(), trace(|now| now.torque, &without)),
     ];
-    report.figure("exp1-torque", "time (s)", "torque (N m)", torque);
+    report.figure("exp1-torque", "Torque, 100 N m asked for from 1 s on", ["time (s)", "torque (N m)"], torque);
     Ok(report)
 }
 
@@ -180,7 +190,17 @@ pub fn position_step() -> Result<Report> {
     let series = |of: fn(&Followed) -> &Vec<(f64, f64)>| {
         runs.iter().map(|(name, run)| (name.to_string(), of(run).clone())).collect::<Vec<_>>()
     };
-    report.figure("exp2-speed-error", "time (s)", "speed error (rad/s)", series(|run| &run.speed_error));
-    report.figure("exp2-kt", "time (s)", "error of Kt (%)", series(|run| &run.kt));
+    report.figure(
+        "exp2-speed-error",
+        "Speed error in a position step",
+        ["time (s)", "speed error (rad/s)"],
+        series(|run| &run.speed_error),
+    );
+    report.figure(
+        "exp2-kt",
+        "Torque constant, believed 20 % high at first",
+        ["time (s)", "error of Kt (%)"],
+        series(|run| &run.kt),
+    );
     Ok(report)
 }

@@ -30,7 +30,9 @@ pub struct Claim {
 }
 
 pub struct Figure {
+    /// Of the file.
     pub name: String,
+    pub title: String,
     pub x: &'static str,
     pub y: &'static str,
     pub series: Vec<(String, Vec<(f64, f64)>)>,
@@ -52,11 +54,11 @@ impl Report {
     pub fn figure(
         &mut self,
         name: impl Into<String>,
-        x: &'static str,
-        y: &'static str,
+        title: impl Into<String>,
+        [x, y]: [&'static str; 2],
         series: Vec<(String, Vec<(f64, f64)>)>,
     ) {
-        self.figures.push(Figure { name: name.into(), x, y, series });
+        self.figures.push(Figure { name: name.into(), title: title.into(), x, y, series });
     }
 }
 
@@ -73,6 +75,8 @@ impl fmt::Display for Report {
             for (label, cells) in &table.rows {
                 write!(f, "{label:first$}")?;
                 for cell in cells {
+                    // No minus before a zero.
+                    let cell = if cell.abs() < 5e-4 { 0.0 } else { *cell };
                     write!(f, " {cell:>11.3}")?;
                 }
                 writeln!(f)?;
@@ -80,15 +84,43 @@ impl fmt::Display for Report {
         }
         writeln!(f)?;
         for claim in &self.claims {
-            let verdict = if claim.holds { "holds" } else { "FAILS" };
+            let verdict = if claim.holds { "holds" } else { "does not hold" };
             writeln!(f, "[{verdict}] {}\n        here: {}", claim.statement, claim.found)?;
         }
         Ok(())
     }
 }
 
+/// Told apart by color-blind eyes (Okabe and Ito), and dark enough on white.
+const COLORS: [RGBColor; 6] = [
+    RGBColor(0, 0, 0),
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+];
+
+/// Large enough to be read on a telephone, where the figure is half as wide.
+const LETTERS: u32 = 21;
+
+/// Lines that lie on one another are told apart by their widths: those below are wider.
+fn stroke(i: usize, count: usize) -> ShapeStyle {
+    let width = match count {
+        1 | 2 => 2,
+        3 | 4 => 2 + 2 * (count - 1 - i),
+        _ => 3,
+    };
+    COLORS[i % COLORS.len()].stroke_width(width as u32)
+}
+
+/// A number without zeros behind the point.
+fn plainly(value: &f64) -> String {
+    format!("{}", (value * 1e6).round() / 1e6)
+}
+
 impl Figure {
-    /// Draws the figure as `name.svg` into a folder.
+    /// Draws the figure as `name.svg` into a folder: title, legend, then the data with nothing before them.
     pub fn draw(&self, folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
         let points =
             || self.series.iter().flat_map(|(_, points)| points).filter(|p| p.0.is_finite() && p.1.is_finite());
@@ -98,23 +130,42 @@ impl Figure {
             low - pad..high + pad
         };
         let path = folder.join(format!("{}.svg", self.name));
-        let root = SVGBackend::new(&path, (800, 480)).into_drawing_area();
+        let root = SVGBackend::new(&path, (800, 520)).into_drawing_area();
         root.fill(&WHITE)?;
-        let mut chart = ChartBuilder::on(&root)
-            .caption(&self.name, ("sans-serif", 18))
-            .margin(12)
-            .x_label_area_size(40)
-            .y_label_area_size(64)
-            .build_cartesian_2d(span(|p| p.0), span(|p| p.1))?;
-        chart.configure_mesh().x_desc(self.x).y_desc(self.y).light_line_style(WHITE).draw()?;
-        for (i, (label, points)) in self.series.iter().enumerate() {
-            let color = Palette99::pick(i).to_rgba();
-            chart
-                .draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(2)))?
-                .label(label)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(2)));
+        let letters = ("sans-serif", LETTERS).into_font();
+        root.draw(&Text::new(self.title.as_str(), (16, 12), ("sans-serif", 24)))?;
+        let (count, mut x, mut y) = (self.series.len(), 16, 50);
+        for (i, (label, _)) in self.series.iter().enumerate() {
+            let width = 36 + label.chars().count() as i32 * 11 + 20;
+            if x + width > 800 && x > 16 {
+                (x, y) = (16, y + 26);
+            }
+            root.draw(&PathElement::new([(x, y + 10), (x + 28, y + 10)], stroke(i, count)))?;
+            root.draw(&Text::new(label.as_str(), (x + 36, y), letters.clone()))?;
+            x += width;
         }
-        chart.configure_series_labels().background_style(WHITE.mix(0.8)).border_style(BLACK.mix(0.3)).draw()?;
+        let (_, below) = root.split_vertically(y + 30);
+        let mut chart = ChartBuilder::on(&below)
+            .margin(12)
+            .margin_right(24)
+            .x_label_area_size(60)
+            .y_label_area_size(90)
+            .build_cartesian_2d(span(|p| p.0), span(|p| p.1))?;
+        chart
+            .configure_mesh()
+            .x_desc(self.x)
+            .y_desc(self.y)
+            .x_labels(8)
+            .y_labels(7)
+            .x_label_formatter(&plainly)
+            .y_label_formatter(&plainly)
+            .label_style(letters.clone())
+            .axis_desc_style(letters)
+            .light_line_style(WHITE)
+            .draw()?;
+        for (i, (_, points)) in self.series.iter().enumerate() {
+            chart.draw_series(LineSeries::new(points.iter().copied(), stroke(i, count)))?;
+        }
         root.present()?;
         Ok(())
     }

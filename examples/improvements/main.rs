@@ -6,9 +6,10 @@ mod report;
 
 use greybox::online::{Ekf, EkfStart, Law, Mras, MrasStart, Order, Stepping, Watch};
 use greybox::pmsm::drive::Simulation;
+use greybox::pmsm::inverter::Carrier;
 use greybox::pmsm::offline::{Axes, Extended, Form, Spans, extended, plain, search_i0};
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::{Axis, TS};
+use greybox::pmsm::robot::{Axis, TS, V_DC};
 use greybox::pmsm::{
     AngledDrive, Currents, DeadZone, Drive, ExactFed, ExactStep, ExactSurface, FedWinding, HeldIn, Injection,
     KeLyapunov, MotorLaw, Normalized, Resting, Winding, dead_time,
@@ -40,11 +41,11 @@ fn rms(axis: &Axis, ke: impl ExactSizeIterator<Item = f64>) -> f64 {
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
-/// The observer with resistance `rs` (ohm), fed with the voltage less the dead time of `vdt` (V).
-fn mras<L: Law<ExactSurface>>(axis: &Axis, spans: &Spans, rs: f64, vdt: f64, law: L) -> Result<f64> {
+/// The observer with this resistance and inductance, fed with the voltage less the dead time of `vdt` (V).
+fn mras<L: Law<ExactSurface>>(axis: &Axis, spans: &Spans, (rs, ls): (f64, f64), vdt: f64, law: L) -> Result<f64> {
     let ke = free(0.9 * axis.ke).within(0.0, 10.0 * axis.ke);
     let start = MrasStart {
-        parameters: Winding { rs: fixed(rs), ls: fixed(axis.ls), ke },
+        parameters: Winding { rs: fixed(rs), ls: fixed(ls), ke },
         pull: Currents { id: 1000.0, iq: 1000.0 },
         order: Order::UpdateThenPredict,
         stepping: Stepping::Split,
@@ -112,11 +113,13 @@ fn main() -> Result<()> {
         let law = |gain| MotorLaw { rs: Resting, ke: KeLyapunov { gain } };
         let normalized = |gain| MotorLaw { rs: Resting, ke: Normalized { law: KeLyapunov { gain }, speed: 100.0 } };
         let zone = MotorLaw { rs: Resting, ke: DeadZone { law: normalized(1e-5).ke, speed: 20.0 } };
+        let (nominal, whole) = ((total, axis.ls), solve_extended(&spans)?.parameters);
         let row = vec![
-            mras(&axis, &spans, axis.rs, 0.0, law(1e-5))?,
-            mras(&axis, &spans, total, 2.0, law(1e-5))?,
-            mras(&axis, &spans, total, 2.0, normalized(2e-5))?,
-            mras(&axis, &spans, total, 2.0, zone)?,
+            mras(&axis, &spans, (axis.rs, axis.ls), 0.0, law(1e-5))?,
+            mras(&axis, &spans, nominal, 2.0, law(1e-5))?,
+            mras(&axis, &spans, nominal, 2.0, normalized(2e-5))?,
+            mras(&axis, &spans, nominal, 2.0, zone)?,
+            mras(&axis, &spans, (total, whole.lq), 2.0, zone)?,
             joint_filter(&axis, &spans)?,
         ];
         online.push((name.clone(), row));
@@ -128,7 +131,7 @@ fn main() -> Result<()> {
     }
     let columns = ["Ke LS", "Ke extended", "R LS", "R extended"];
     report.table("Speed cycles, offline: largest error over the speeds (%; R with cable)", &columns, offline);
-    let columns = ["MRAS", "+R +Vdt", "normalized", "dead zone", "joint EKF"];
+    let columns = ["MRAS", "+R +Vdt", "normalized", "dead zone", "found Lq", "joint EKF"];
     report.table("Speed cycles, online: rms error of Ke (%)", &columns, online);
     let columns = ["Ke LS", "Ke extended", "EKF rms"];
     report.table("Water cutting: error of Ke (%)", &columns, water_rows);
@@ -143,6 +146,20 @@ fn main() -> Result<()> {
     let injected = simulation.injecting(Injection::new(-12.0, 0.1, 0.01, 0.5)?);
     let rows = vec![("id = 0".to_owned(), row(simulation)?), ("stairs of -12 A".to_owned(), row(injected)?)];
     report.table("Axis 1, d current injected", &["Ld err %", "index Ld %", "index R %"], rows);
+
+    let row = |(name, simulation): (&str, Simulation)| -> Result<(String, Vec<f64>)> {
+        let spans = Spans::from_log(&simulation.run(&program), axis.pole_pairs);
+        let (before, after) = (solve_plain(&spans)?, solve_extended(&spans)?.parameters);
+        let r = percent(after.r, axis.rs + axis.r_cable);
+        Ok((name.to_owned(), vec![percent(before.ke, axis.ke), percent(after.ke, axis.ke), r, after.vdt]))
+    };
+    let rows = [
+        ("mean voltage", simulation),
+        ("switching at 7.9 kHz", simulation.switching(V_DC, Carrier::PerSample)?),
+        ("switching at 4.0 kHz", simulation.switching(V_DC, Carrier::HalfPerSample)?),
+    ];
+    let rows = rows.into_iter().map(row).collect::<Result<_>>()?;
+    report.table("Axis 1, inverter that switches", &["Ke LS %", "Ke ext. %", "R ext. %", "Vdt V"], rows);
 
     let mut log = simulation.run(&program);
     let ls = |log: &_| -> Result<Vec<f64>> {

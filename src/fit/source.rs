@@ -187,10 +187,10 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Source for Simulated<'_, M, I,
         match (seeds.len(), wide) {
             (0, _) => self.walk_in::<0, PORTABLE>(e, place, seeds, visit),
             (1..=4, false) => self.walk_in::<4, PORTABLE>(e, place, seeds, visit),
-            (5 | 6, false) => self.walk_in::<6, PORTABLE>(e, place, seeds, visit),
+            (5 | 6 | 9..=12, false) => self.walk_in::<6, PORTABLE>(e, place, seeds, visit),
             (_, false) => self.walk_in::<8, PORTABLE>(e, place, seeds, visit),
             (1..=4, true) => self.walk_in::<4, WIDE>(e, place, seeds, visit),
-            (5 | 6, true) => self.walk_in::<6, WIDE>(e, place, seeds, visit),
+            (5 | 6 | 9..=12, true) => self.walk_in::<6, WIDE>(e, place, seeds, visit),
             (_, true) => self.walk_in::<8, WIDE>(e, place, seeds, visit),
         }
     }

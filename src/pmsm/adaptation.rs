@@ -5,6 +5,9 @@
 //! speed does no work ([`lyapunov_rate`]). The currents' error goes to zero; the parameters' only where they are
 //! excited: `ke` by speed, `rs` by current. The proof is of continuous time, and covers neither [`KeConstantGain`] nor
 //! gains that vary; [`Mras::check`](crate::online::Mras::check) looks at the sampled loop.
+//!
+//! What the observer is not told goes into `ke`: of the reference robot's 2.4 % (rms) dead time and cable are 2.1 %; 4 % of
+//! the inductance are most of the 0.15 % that the best gains leave.
 
 use super::{Currents, Drive, SQRT_2_3, Winding};
 use crate::model::Model;

@@ -2,8 +2,8 @@
 //! delay, no dead time, and the voltage held in the rotor's frame (thesis, simulations of chapter 6).
 
 use super::control::{Command, CurrentControl};
+use super::machine::runge_kutta;
 use super::{Acting, Currents, Drive, Machine, Motion, Rotor, SQRT_3_2, Winding};
-use crate::integrate::axpy;
 use crate::model::Model;
 use crate::online::{Law, Mras, Outcome};
 
@@ -69,19 +69,7 @@ where
             let torque = SQRT_3_2 * p.ke * x.iq;
             see(&Instant { t, x, torque, estimate, command, outcome });
             let acting = Acting { ud: command.ud, uq: command.uq, tau_l: load(x.w) };
-            x = runge_kutta(&self.machine, t, x, &acting, &p, self.ts);
+            x = runge_kutta(x, self.ts, |x| self.machine.derivative(t, x, &acting, &p));
         }
     }
-}
-
-/// One classical Runge-Kutta step; the load torque is held over it.
-fn runge_kutta(machine: &Machine, t: f64, x: Motion, u: &Acting, p: &Rotor, h: f64) -> Motion {
-    let f = |x: Motion| machine.derivative(t, &x, u, p);
-    let k1 = f(x);
-    let k2 = f(axpy::<Motion, f64>(x, 0.5 * h, k1));
-    let k3 = f(axpy::<Motion, f64>(x, 0.5 * h, k2));
-    let k4 = f(axpy::<Motion, f64>(x, h, k3));
-    let [k1, k2, k3, k4] = [k1, k2, k3, k4].map(<[f64; 4]>::from);
-    let mean = core::array::from_fn(|i| (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]) / 6.0);
-    axpy::<Motion, f64>(x, h, Motion::from(mean))
 }

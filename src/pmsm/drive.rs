@@ -6,14 +6,14 @@
 
 use super::control::{Command, CurrentControl, SpeedControl};
 use super::frames::{Stator, rotate_into, rotate_out_of};
-use super::inverter::{DeadTime, aim};
+use super::inverter::{Carrier, DeadTime, Inverter, aim};
+pub use super::log::{Log, Row, Warning};
 use super::plant::Plant;
 use super::program::Program;
 use super::robot::{Axis, TS, V_MAX};
 use super::sensors::{CurrentSensors, Resolver};
 use super::temperature::Celsius;
-use super::{Currents, Drive, Error, Injection, Motion, SQRT_3_2, Surface};
-use crate::experiment::{Experiment, Time};
+use super::{Bridge, Currents, Error, Injection, Motion, SQRT_3_2};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
@@ -85,6 +85,8 @@ pub struct Simulation {
     pub nominal: Axis,
     /// What the axis is.
     pub plant: Plant,
+    /// What makes the voltage.
+    pub inverter: Inverter,
     /// Current sensors.
     pub currents: CurrentSensors,
     /// Angle sensor.
@@ -97,46 +99,12 @@ pub struct Simulation {
     pub injection: Option<Injection>,
     /// Seed of the sensors' noise.
     pub seed: u64,
-    /// Midpoint steps of the plant in one sample.
+    /// Midpoint steps of the plant in one sample; where the inverter switches, no step is longer than that.
     pub substeps: u32,
 }
 
 /// Corner of the controllers' one-pole speed filter (Hz).
 const SPEED_FILTER: f64 = 300.0;
-
-/// What one sample of a drive's log holds, and the truth behind it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Row {
-    /// Commanded voltage along the flux that acts from this sample to the next (V).
-    pub ud: f64,
-    /// Commanded voltage 90 electrical degrees ahead, likewise (V).
-    pub uq: f64,
-    /// Speed: the angle's difference from the sample before, over the sample time (rad/s, mechanical).
-    pub w: f64,
-    /// Measured current along the flux (A).
-    pub id: f64,
-    /// Measured current 90 electrical degrees ahead (A).
-    pub iq: f64,
-    /// Measured angle (rad, mechanical, not wrapped).
-    pub theta: f64,
-    /// Reference of iq (A).
-    pub iq_ref: f64,
-    /// Reference of the speed (rad/s).
-    pub w_ref: f64,
-    /// The plant's true motion.
-    pub truth: Motion,
-}
-
-/// What a run of a drive left behind.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Log {
-    /// One row per sample of [`TS`].
-    pub rows: Vec<Row>,
-    /// Samples in which the voltage was at its limit.
-    pub voltage_limited: usize,
-    /// Samples in which the current reference was at its limit.
-    pub current_limited: usize,
-}
 
 impl Simulation {
     /// The reference drive of an axis with all disturbances, winding and magnet at 20 C.
@@ -153,6 +121,7 @@ impl Simulation {
                 saliency: 0.04,
                 saturation: 0.1,
             },
+            inverter: Inverter::Averaged,
             currents: CurrentSensors::twelve_bit(axis.i_max),
             resolver: Resolver::SIXTEEN_BIT,
             current_control: control.limited(V_MAX),
@@ -200,6 +169,19 @@ impl Simulation {
         Simulation { injection: Some(injection), ..self }
     }
 
+    /// With an inverter that switches a direct voltage `vdc` (V).
+    ///
+    /// # Errors
+    /// A direct voltage that cannot make the longest vector of the current control: `sqrt(3)` times its limit is needed.
+    pub fn switching(self, vdc: f64, carrier: Carrier) -> Result<Self, Error> {
+        // Ten roundings: 600 V make exactly the 346.41 V that they allow.
+        if vdc.is_finite() && vdc >= 3f64.sqrt() * self.current_control.v_max * (1.0 - 1e-15) {
+            return Ok(Simulation { inverter: Inverter::Switching { vdc, carrier }, ..self });
+        }
+        let must = "be finite and at least sqrt(3) times the voltage limit of the current control";
+        Err(Error::OutOfRange { quantity: "direct voltage", value: vdc, unit: "V", must })
+    }
+
     /// With another seed for the sensors' noise.
     pub fn seeded(self, seed: u64) -> Self {
         Simulation { seed, ..self }
@@ -218,6 +200,10 @@ impl Simulation {
         let mut x = Motion::default();
         let mut last_theta = None;
         let mut wf = 0.0;
+        let mut bridge = match self.inverter {
+            Inverter::Averaged => None,
+            Inverter::Switching { vdc, carrier } => Some(Bridge::new(&self.plant, vdc, carrier)),
+        };
         let (mut acting, mut held) = (Command::default(), Stator::default());
         for (k, target) in program.targets.iter().enumerate() {
             let theta = self.resolver.read(x.theta, draw());
@@ -237,27 +223,14 @@ impl Simulation {
             log.current_limited += usize::from(current_limited);
             log.rows.push(Row { ud: acting.ud, uq: acting.uq, w, id, iq, theta, iq_ref, w_ref: target.w, truth: x });
 
-            x = self.plant.advance(x, held, TS, self.substeps);
+            x = match &mut bridge {
+                None => self.plant.advance(x, held, TS, self.substeps),
+                Some(bridge) => bridge.advance(x, held, TS, self.substeps, |_, _| {}),
+            };
             held = aim((command.ud, command.uq), np.electrical(theta), wf, np, TS);
             acting = command;
         }
         log
-    }
-}
-
-impl Log {
-    /// The record that an identification sees: voltages held from sample to sample, the *mean* speed of the same interval
-    /// (the difference of the angles at its two ends), currents at its begin. The last row, which has no interval, is left
-    /// out.
-    pub fn experiment(&self, model: &Surface) -> Result<Experiment<Currents, Drive, Currents>, crate::Error> {
-        let (inputs, outputs) = self
-            .rows
-            .windows(2)
-            .map(|pair| {
-                (Drive { ud: pair[0].ud, uq: pair[0].uq, w: pair[1].w }, Currents { id: pair[0].id, iq: pair[0].iq })
-            })
-            .unzip();
-        Experiment::new(model, Time::Uniform { start: 0.0, step: TS }, inputs, outputs)
     }
 }
 
@@ -311,10 +284,19 @@ mod tests {
         let axis = Axis::reference(1).unwrap();
         // Beyond the speed at which the EMF uses up the voltage.
         let fast = Program::speed_cycles(&Axis { w_max: 600.0, ..axis }, 2, 1.0).unwrap();
-        assert!(Simulation::new(axis).unwrap().run(&fast).voltage_limited > 0);
+        let log = Simulation::new(axis).unwrap().run(&fast);
+        assert!(log.voltage_limited > 0);
+        let warning = log.warnings().next().unwrap();
+        assert!(matches!(warning, Warning::Voltage { .. }), "{warning}");
+        assert!(
+            warning.to_string().starts_with(&format!("the voltage was at its limit in {} of", log.voltage_limited))
+        );
         // More acceleration than the current can make.
         let hard = Program::speed_cycles(&axis, 2, 12.0).unwrap();
-        assert!(Simulation::new(axis).unwrap().run(&hard).current_limited > 0);
+        let log = Simulation::new(axis).unwrap().run(&hard);
+        assert!(log.warnings().any(|warning| matches!(warning, Warning::Current { samples, .. } if samples > 0)));
+        // Within its limits it has nothing to say.
+        assert_eq!(short(reference()).warnings().count(), 0);
     }
 
     #[test]

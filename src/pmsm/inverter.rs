@@ -26,6 +26,40 @@ impl Modulation {
     }
 }
 
+/// How the voltage that a drive asks for comes about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub enum Inverter {
+    /// As its mean over the sample: no ripple, and dead time as a voltage.
+    #[default]
+    Averaged,
+    /// By pulses of the direct voltage `vdc` (V, positive); see [`Bridge`](super::Bridge).
+    Switching {
+        /// Direct voltage (V).
+        vdc: f64,
+        /// What the duties are compared with.
+        carrier: Carrier,
+    },
+}
+
+/// How much of a triangular carrier fits into one sample; the samples are at its extrema.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Carrier {
+    /// A whole period: each leg goes up and down in every sample (7.94 kHz on the reference drive).
+    PerSample,
+    /// Half a period: each leg goes up in one sample and down in the next (3.97 kHz on the reference drive).
+    HalfPerSample,
+}
+
+impl Carrier {
+    /// Its period (s) for a sample time `ts` (s).
+    pub fn period(self, ts: f64) -> f64 {
+        match self {
+            Carrier::PerSample => ts,
+            Carrier::HalfPerSample => 2.0 * ts,
+        }
+    }
+}
+
 /// Speed (rad/s, mechanical) at which the EMF alone uses up `v_max` (V, phase peak): no current can be driven beyond it.
 pub fn top_speed(ke: f64, v_max: f64) -> Result<f64, Error> {
     Ok(Error::positive("voltage limit", v_max, "V")? / (super::SQRT_2_3 * Error::positive("Ke", ke, "V s/rad")?))

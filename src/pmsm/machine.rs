@@ -1,4 +1,5 @@
 use super::{Currents, Drive, Error, Mechanics, PolePairs, Salient, SalientWinding, Shaft, Turning};
+use crate::integrate::{axpy, combined};
 use crate::{Model, Scalar};
 use serde::{Deserialize, Serialize};
 
@@ -86,6 +87,17 @@ impl Model for Machine {
     fn output<S: Scalar>(&self, _t: f64, x: &Motion<S>, _u: &Acting<S>, _p: &Rotor<S>) -> Motion<S> {
         *x
     }
+}
+
+/// One step of the classical Runge-Kutta method (Kutta 1901) over `h` (s), for a slope that does not depend on time.
+#[inline]
+pub(super) fn runge_kutta(x: Motion, h: f64, f: impl Fn(&Motion) -> Motion) -> Motion {
+    let ahead = |h: f64, k: Motion| axpy::<Motion, f64>(x, h, k);
+    let k1 = f(&x);
+    let k2 = f(&ahead(0.5 * h, k1));
+    let k3 = f(&ahead(0.5 * h, k2));
+    let k4 = f(&ahead(h, k3));
+    combined::<Motion, f64>(&x, h / 6.0, &[1.0, 2.0, 2.0, 1.0], &[k1, k2, k3, k4])
 }
 
 #[cfg(test)]

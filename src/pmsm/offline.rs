@@ -132,9 +132,4 @@ impl Spans {
         let spans = self.spans.get(samples.start.min(end)..end).unwrap_or_default().to_vec();
         Spans { spans, ..*self }
     }
-
-    /// Whether the motor moves at all: a cycle without motion says nothing of Ke.
-    pub fn moves(&self) -> bool {
-        self.spans.iter().any(|span| span.w != 0.0)
-    }
 }

@@ -42,7 +42,10 @@ pub struct Axis {
 /// Sample time of the reference drive (s).
 pub const TS: f64 = 0.126e-3;
 
-/// Phase peak voltage limit of the reference drive: 600 V through space-vector modulation (V).
+/// Direct voltage of the reference drive (V).
+pub const V_DC: f64 = 600.0;
+
+/// Phase peak voltage limit of the reference drive: [`V_DC`] through space-vector modulation (V).
 pub const V_MAX: f64 = 346.410_161_513_775_44;
 
 impl Axis {

@@ -1,5 +1,6 @@
 //! Experiments 3 and 6 on the simulated reference robot: offline least squares and the joint filter, against the numbers
-//! they must reach. Records are simulated once and shared.
+//! they must reach. Records are simulated once and shared. A debug build looks at some of the cycles and axes only, and
+//! says so: all of them take it minutes.
 
 use greybox::online::{Ekf, EkfStart, Outcome, Watch};
 use greybox::pmsm::drive::{Log, Simulation};
@@ -12,14 +13,14 @@ use greybox::pmsm::{
 use greybox::{Butterworth, Fit, Hold, LinearEstimate, fixed, free};
 use std::sync::OnceLock;
 
-struct Record {
-    axis: Axis,
+pub struct Record {
+    pub axis: Axis,
     log: Log,
-    spans: Spans,
+    pub spans: Spans,
     cycles: Vec<Cycle>,
 }
 
-fn record(simulation: Simulation, program: Program) -> Record {
+pub fn record(simulation: Simulation, program: Program) -> Record {
     let axis = simulation.nominal;
     let log = simulation.run(&program);
     let spans = Spans::from_log(&log, axis.pole_pairs);
@@ -27,7 +28,7 @@ fn record(simulation: Simulation, program: Program) -> Record {
 }
 
 /// Experiment 3 of an axis: 20 cycles of rising speed, all disturbances.
-fn cycles(number: u8) -> &'static Record {
+pub fn cycles(number: u8) -> &'static Record {
     static RECORDS: [OnceLock<Record>; 6] = [const { OnceLock::new() }; 6];
     RECORDS[number as usize - 1].get_or_init(|| {
         let axis = Axis::reference(number).unwrap();
@@ -43,7 +44,17 @@ fn ls(spans: &Spans, form: Form) -> LinearEstimate<Winding> {
     plain(spans, Axes::Both, form).prefiltered(&filter()).solve().unwrap()
 }
 
-fn percent(found: f64, truth: f64) -> f64 {
+/// Step through what a test is to look at: one in release, `n` in a debug build.
+fn every(n: usize) -> usize {
+    if cfg!(debug_assertions) {
+        println!("one in {n}, this being a debug build; `cargo test --release --test motor` looks at all");
+        n
+    } else {
+        1
+    }
+}
+
+pub fn percent(found: f64, truth: f64) -> f64 {
     100.0 * (found / truth - 1.0)
 }
 
@@ -111,7 +122,7 @@ fn water_cutting_least_squares_and_weighted() {
 fn extended_least_squares_at_every_speed() {
     for number in 1..=6 {
         let Record { axis, spans, cycles, .. } = cycles(number);
-        for cycle in cycles {
+        for cycle in cycles.iter().step_by(every(6)) {
             let spans = spans.cut(cycle.samples.clone());
             let equations = |i0| extended(&spans, i0).prefiltered(&filter());
             let i0 = search_i0(0.03, 1.0, equations).unwrap();
@@ -157,12 +168,12 @@ fn grey_box(number: u8, every: usize) {
 
 #[test]
 fn grey_box_with_dead_time_at_every_speed() {
-    grey_box(1, 1);
+    grey_box(1, every(6));
 }
 
 #[test]
 fn grey_box_with_dead_time_on_the_other_axes() {
-    for number in 2..=6 {
+    for number in (2..=6).step_by(every(4)) {
         grey_box(number, 6);
     }
 }
@@ -204,7 +215,7 @@ fn joint_filter(record: &Record) -> f64 {
 
 #[test]
 fn the_joint_filter_on_speed_cycles_and_water_cutting() {
-    for number in 1..=6 {
+    for number in (1..=6).step_by(every(5)) {
         let rms = joint_filter(cycles(number));
         assert!(rms < 0.1, "axis {number}, speed cycles: Ke rms {rms} %");
         let axis = Axis::reference(number).unwrap();

@@ -1,6 +1,7 @@
 //! The motor wing: frames, drives, observers, and the acceptance numbers of the reference study.
 
 mod acceptance_adaptive;
+mod acceptance_mras;
 mod acceptance_records;
 mod independent_drive;
 mod motor_methods;
@@ -9,3 +10,4 @@ mod online;
 mod online_experiments;
 #[path = "../common/shared.rs"]
 mod shared;
+mod switching;

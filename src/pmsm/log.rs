@@ -1,0 +1,91 @@
+//! What a run of a drive leaves behind.
+
+use super::robot::TS;
+use super::{Currents, Drive, Motion, Surface};
+use crate::experiment::{Experiment, Time};
+use serde::{Deserialize, Serialize};
+
+/// What one sample of a drive's log holds, and the truth behind it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Commanded voltage along the flux that acts from this sample to the next (V).
+    pub ud: f64,
+    /// Commanded voltage 90 electrical degrees ahead, likewise (V).
+    pub uq: f64,
+    /// Speed: the angle's difference from the sample before, over the sample time (rad/s, mechanical).
+    pub w: f64,
+    /// Measured current along the flux (A).
+    pub id: f64,
+    /// Measured current 90 electrical degrees ahead (A).
+    pub iq: f64,
+    /// Measured angle (rad, mechanical, not wrapped).
+    pub theta: f64,
+    /// Reference of iq (A).
+    pub iq_ref: f64,
+    /// Reference of the speed (rad/s).
+    pub w_ref: f64,
+    /// The plant's true motion.
+    pub truth: Motion,
+}
+
+/// What a run of a drive left behind.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Log {
+    /// One row per sample of [`TS`].
+    pub rows: Vec<Row>,
+    /// Samples in which the voltage was at its limit.
+    pub voltage_limited: usize,
+    /// Samples in which the current reference was at its limit.
+    pub current_limited: usize,
+}
+
+impl Log {
+    /// The record that an identification sees: voltages held from sample to sample, the *mean* speed of the same interval
+    /// (the difference of the angles at its two ends), currents at its begin. The last row, which has no interval, is left
+    /// out.
+    pub fn experiment(&self, model: &Surface) -> Result<Experiment<Currents, Drive, Currents>, crate::Error> {
+        let (inputs, outputs) = self
+            .rows
+            .windows(2)
+            .map(|pair| {
+                (Drive { ud: pair[0].ud, uq: pair[0].uq, w: pair[1].w }, Currents { id: pair[0].id, iq: pair[0].iq })
+            })
+            .unzip();
+        Experiment::new(model, Time::Uniform { start: 0.0, step: TS }, inputs, outputs)
+    }
+
+    /// What kept the drive from doing as it was asked.
+    pub fn warnings(&self) -> impl Iterator<Item = Warning> {
+        let of = self.rows.len();
+        let voltage = Warning::Voltage { samples: self.voltage_limited, of };
+        let current = Warning::Current { samples: self.current_limited, of };
+        [(self.voltage_limited, voltage), (self.current_limited, current)]
+            .into_iter()
+            .filter_map(|(samples, warning)| (samples > 0).then_some(warning))
+    }
+}
+
+/// What kept a drive from doing as it was asked. Its record stays good for identification: it holds what acted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+pub enum Warning {
+    /// The voltage.
+    #[error(
+        "the voltage was at its limit in {samples} of {of} samples: the EMF leaves too little for the current asked for; go slower (see inverter::top_speed), weaken the field or raise the direct voltage"
+    )]
+    Voltage {
+        /// Samples at the limit.
+        samples: usize,
+        /// Of so many.
+        of: usize,
+    },
+    /// The current.
+    #[error(
+        "the current reference was at its limit in {samples} of {of} samples: the torque asked for cannot be made; accelerate less"
+    )]
+    Current {
+        /// Samples at the limit.
+        samples: usize,
+        /// Of so many.
+        of: usize,
+    },
+}
