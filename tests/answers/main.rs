@@ -1,7 +1,9 @@
-//! What is said of an estimate: intervals, diagnostics, comparison, reports.
+//! What is said of an estimate: identifiability, diagnostics, comparison, reports.
 
 mod compare;
 mod identifiability;
+#[path = "../common/random.rs"]
+mod random;
 mod reports;
 mod residuals;
 #[path = "../common/shared.rs"]
