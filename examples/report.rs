@@ -4,10 +4,8 @@
 //! pairs, `t vir qm qg` a linear axis under its position controller, with friction that may differ between the directions.
 
 use clap::Parser;
-use greybox::diagnose::residuals::examine;
-use greybox::optimize::Severity;
+use greybox::diagnose::profile;
 use greybox::pmsm::{Surface, Winding};
-use greybox::report::Finding;
 use greybox::{CsvFile, ExperimentOf, Fit, Hold, Model, Of, Parameter, Report, Scalar, fixed, free, signals};
 use std::{error::Error, fs::File, io::BufRead, io::BufReader, io::IsTerminal, path::PathBuf};
 
@@ -18,9 +16,9 @@ struct Arguments {
     /// Where the report goes.
     #[arg(long)]
     out: PathBuf,
-    /// A folder for the pictures of the report, as SVG files.
+    /// Whether to make likelihood profiles, which take many fits.
     #[arg(long)]
-    plots: Option<PathBuf>,
+    profiles: bool,
 }
 
 signals! {
@@ -75,42 +73,32 @@ fn main() -> Result<(), Box<dyn Error>> {
     let report = if has("omega_m") {
         let motor = Surface::new(3)?;
         let record = file.column("w", "omega_m").read(&motor)?;
-        report(&motor, record, Winding { rs: free(1.0), ls: free(0.01), ke: free(1.0) })?
+        report(&motor, &record, Winding { rs: free(1.0), ls: free(0.01), ke: free(1.0) }, arguments.profiles)?
     } else if has("qg") {
         // It starts at rest.
-        let record =
-            file.read(&Axis)?.hold(Hold::First).initial(Motion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) });
+        let rest = Motion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) };
+        let record = file.read(&Axis)?.hold(Hold::First).initial(rest);
         let friction = Friction { m: free(50.0), fv: free(100.0), fcp: free(10.0), fcn: free(10.0), offset: free(0.0) };
-        report(&Axis, record, friction)?
+        report(&Axis, &record, friction, arguments.profiles)?
     } else {
         return Err(format!("no model for the columns {}", header.trim()).into());
     };
     report.save(&arguments.out)?;
-    for plot in report.plots() {
-        if let Some(folder) = &arguments.plots {
-            plot.save(folder.join(plot.name()).with_extension("svg"))?;
-        }
-    }
     println!("{}", if std::io::stdout().is_terminal() { report.to_colored_text() } else { report.to_string() });
     Ok(())
 }
 
 fn report<M: Model>(
     model: &M,
-    record: ExperimentOf<M>,
+    record: &ExperimentOf<M>,
     parameters: Of<M::Parameters, Parameter>,
+    profiles: bool,
 ) -> Result<Report, greybox::Error> {
-    let estimate = Fit::new(model, &record).parameters(parameters).run()?;
-    let findings = examine(&estimate.predict(model, &record)?, &record)?.into_iter().flat_map(|residuals| {
-        let about = format!("residual of {}", residuals.output);
-        residuals.tests.into_iter().map(move |test| Finding {
-            about: about.clone(),
-            test: test.name,
-            result: format!("p = {:.1e}", test.p_value),
-            meaning: test.meaning,
-            severity: if test.passed { Severity::Usable } else { Severity::UsableWithCare },
-        })
-    });
-    let title = format!("Estimate from {}", record.name());
-    Ok(Report::new(model, &estimate, &record)?.titled(title).with_findings(findings))
+    let mut problem = Fit::new(model, record).parameters(parameters).problem()?;
+    let estimate = problem.run()?;
+    let mut report = Report::new(&problem, &estimate)?.titled(format!("Estimate from {}", record.name()));
+    for unknown in estimate.unknowns.iter().filter(|_| profiles) {
+        report = report.with_profile(profile(&problem, &estimate, &unknown.name, 0.95)?);
+    }
+    Ok(report)
 }

@@ -12,15 +12,18 @@ pub mod residuals;
 mod restarts;
 
 pub use bands::{Bands, bands};
+pub(crate) use bands::{Widths, widths};
 pub use bootstrap::{Bootstrap, Resampling, bootstrap};
 pub use compare::{
     Comparison, Drift, NamedQualities, Summary, Validation, cross_validate, drift, f_test, likelihood_ratio, validate,
 };
 pub use derived::{Derived, derived};
+pub(crate) use identifiability::reworded;
 pub use identifiability::{COLLINEAR, Collinear, Excitation, Identifiability, Segment, identifiability};
 pub use profile::{End, Profile, ProfilePoint, profile};
 pub use restarts::{Better, Restarts, restarts};
 
+use crate::estimate::p_value;
 use crate::optimize::{Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization};
 use argmin::core::{Executor, State};
 use serde::{Deserialize, Serialize};
@@ -45,6 +48,11 @@ pub struct Test {
 }
 
 impl Test {
+    /// The p-value in words: `p = 0.032`, or that it is below what can be computed.
+    pub fn probability(&self) -> String {
+        p_value(self.p_value)
+    }
+
     /// Passed if `p_value` is at least [`LEVEL`]; the meaning is the first if passed, else the second.
     pub(crate) fn new(name: impl Into<String>, statistic: f64, p_value: f64, passed: &str, failed: &str) -> Self {
         let holds = p_value >= LEVEL;

@@ -4,7 +4,7 @@ mod display;
 mod prediction;
 pub(crate) mod student;
 
-pub(crate) use display::number;
+pub(crate) use display::{number, p_value};
 pub use prediction::Prediction;
 
 use crate::by_name;

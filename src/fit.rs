@@ -15,6 +15,7 @@ mod source;
 mod unknowns;
 mod warnings;
 
+pub(crate) use conclude::held_or_unseen;
 pub(crate) use covariance::classical;
 pub use objective::Objective;
 pub(crate) use objective::{Rows, each};

@@ -78,7 +78,7 @@
 //!
 //! | floor | what | files |
 //! |---|---|---|
-//! | roof | read | `diagnose`, `report`, [`check`] |
+//! | roof | read | [`report`], which reads [`diagnose`]; [`check`] |
 //! | 3 | learn | `loss`, `weighting`, `prefilter`, [`optimize`], [`regress`], [`numeric`], `fit`, `estimate`, [`online`] |
 //! | 2 | expect | `integrate`, `predict` |
 //! | 1 | say | `model`, `parameter`, `scaling`, `interval`, `experiment`, [`units`] |

@@ -1,5 +1,33 @@
 //! [`Report`]: an estimate as something to read, to send and to keep.
 //!
+//! ```
+//! # use greybox::{Experiment, Fit, Kind, Model, Nothing, Report, Scalar, Time, diagnose, free, signals};
+//! # signals! { pub struct Load { f: "N" } pub struct Length { y: "m" } pub struct Spring { k: "N/m", rest: "m" } }
+//! # struct Hooke;
+//! # impl Model for Hooke {
+//! #     type State = Nothing; type Input = Load; type Output = Length; type Parameters = Spring;
+//! #     const KIND: Kind = Kind::Static;
+//! #     fn output<S: Scalar>(&self, _: f64, _: &Nothing, u: &Load<S>, p: &Spring<S>) -> Length<S> {
+//! #         Length { y: u.f / p.k + p.rest }
+//! #     }
+//! # }
+//! # let loads: Vec<Load> = (0..60).map(|k| Load { f: f64::from(k % 7) }).collect();
+//! # let length = |(k, u): (usize, &Load)| Length { y: u.f / 20.0 + 0.1 + 1e-3 * (k as f64 * 2.4).sin() };
+//! # let lengths = loads.iter().enumerate().map(length).collect();
+//! # let record = Experiment::new(&Hooke, Time::Uniform { start: 0.0, step: 1.0 }, loads, lengths)?;
+//! # let path = std::env::temp_dir().join(format!("greybox_spring_{}.html", std::process::id()));
+//! # let (model, parameters) = (Hooke, Spring { k: free(10.0), rest: free(0.0) });
+//! let mut problem = Fit::new(&model, &record).parameters(parameters).problem()?;
+//! let estimate = problem.run()?;
+//! let report = Report::new(&problem, &estimate)? // with tests of the residuals, identifiability and bands
+//!     .titled("Spring of bench 3")
+//!     .with_profile(diagnose::profile(&problem, &estimate, "k", 0.95)?); // what costs many fits is asked for
+//! report.save(&path)?; // .html, .md, .json or .txt
+//! println!("{report}");
+//! # std::fs::remove_file(path).unwrap();
+//! # Ok::<(), greybox::Error>(())
+//! ```
+//!
 //! A report knows nothing of the model's types any more: it is a value that can be stored, compared and drawn long after the
 //! program that fitted is gone. Records enter it as drawings of a few thousand columns and a few numbers each, so its size
 //! does not grow with theirs.
@@ -7,21 +35,23 @@
 mod chart;
 mod file;
 mod gather;
+mod histogram;
 mod html;
 mod markdown;
 mod markup;
 mod plots;
-mod residuals;
 mod sections;
+mod tables;
 mod text;
 mod trace;
 mod words;
 
+pub use histogram::Histogram;
 pub use plots::Plot;
-pub use residuals::{Histogram, Residuals};
-pub use sections::{Finding, ProfileCurve};
+pub use sections::Finding;
 pub use trace::{Band, Trace};
 
+use crate::diagnose::{Bootstrap, Identifiability, Profile, Restarts, residuals::Residuals};
 use crate::error::Error;
 use crate::estimate::{Direction, Method, Quality, Unknown, Warning};
 use crate::information::SquareMatrix;
@@ -34,7 +64,7 @@ use std::path::Path;
 /// What an estimate is worth, for a reader.
 ///
 /// It leads with the [`severity`](Report::severity), and holds all that is needed to judge the fit and to repeat it. It is
-/// made by [`Report::new`], kept as JSON ([`to_json`](Report::to_json), [`from_json`](Report::from_json)) and shown as text,
+/// made by [`Report::new`], which makes the diagnoses that cost little; others are added. It is kept as JSON ([`to_json`](Report::to_json), [`from_json`](Report::from_json)) and shown as text,
 /// Markdown or one self-contained HTML page; [`save`](Report::save) writes any of them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -61,10 +91,16 @@ pub struct Report {
     pub outputs: Vec<Output>,
     /// The records of the fit.
     pub records: Vec<Record>,
-    /// What tests found, if any were made.
+    /// What the records can tell of the unknowns.
+    pub identifiability: Identifiability,
+    /// Likelihood profiles, if any were made.
+    pub profiles: Vec<Profile>,
+    /// Refits of resampled records, if any were made.
+    pub bootstrap: Option<Bootstrap>,
+    /// Searches from elsewhere, if any were made.
+    pub restarts: Option<Restarts>,
+    /// Further tests that someone made; those of the residuals stand with their output.
     pub findings: Vec<Finding>,
-    /// Profile curves, if any were made.
-    pub profiles: Vec<ProfileCurve>,
     /// Sums and criteria of the fit.
     pub figures: Figures,
     /// How it was made.
@@ -158,8 +194,14 @@ pub struct OutputFit {
     pub fit_percent: Option<f64>,
     /// Samples for which the method has no prediction; they are drawn as gaps.
     pub unpredicted: u64,
-    /// What is left unexplained.
+    /// What is left unexplained, and what it was tested for.
     pub residuals: Residuals,
+    /// The largest residual in size, with its sign.
+    pub largest: f64,
+    /// Its time (s).
+    pub largest_at: f64,
+    /// How often which residual occurs.
+    pub histogram: Histogram,
     /// Measured, predicted and residual, as a drawing of the whole record; `None` where too many records are to be drawn.
     pub overview: Option<Trace>,
     /// The samples about the largest residual, one by one, where the overview cannot show them.
@@ -199,7 +241,7 @@ pub struct Figures {
 #[serde(try_from = "String", into = "&'static str")]
 pub struct Format;
 
-const FORMAT: &str = "greybox report 1";
+const FORMAT: &str = "greybox report 2";
 
 impl From<Format> for &'static str {
     fn from(_: Format) -> Self {

@@ -21,7 +21,9 @@ const FLOORS: &[(&str, &[&str])] = &[
     ("learn: parts", &["loss", "weighting", "outliers", "optimize", "regress", "numeric", "online"]),
     ("learn: the answer", &["estimate"]),
     ("learn: the fit", &["fit"]),
-    ("roof", &["diagnose", "report", "check"]),
+    ("roof: answers", &["diagnose", "check"]),
+    // A report reads diagnoses.
+    ("roof: a reader", &["report"]),
     ("wing", &["models", "pmsm"]),
 ];
 

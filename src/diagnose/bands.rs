@@ -1,8 +1,8 @@
 //! Predictions with bands: how far the truth, and how far a measurement, may be from what the model says.
 
 use crate::error::Error;
-use crate::estimate::{Estimate, student};
-use crate::fit::{FitProblem, Rows};
+use crate::estimate::{Estimate, Prediction, student};
+use crate::fit::{FitProblem, Objective, Rows};
 use crate::integrate::Integrator;
 use crate::model::Model;
 use crate::predict::{Predictor, WINDOW};
@@ -23,7 +23,7 @@ pub struct Bands<M: Model> {
 
 /// The bands, each point for itself, that hold with the given probability, to first order in the unknowns (Seber and Wild,
 /// *Nonlinear Regression*, 1989, section 5.1), for record number `experiment` of the fit. With a pre-filter they are
-/// those of the filtered outputs.
+/// those of the filtered outputs. Unknowns that are held or not determined count as exact.
 ///
 /// # Errors
 /// No such record, a probability not between 0 and 1, an estimate of another problem, a simulation that fails.
@@ -34,14 +34,32 @@ pub fn bands<M: Model, I: Integrator<M>, P: Predictor<M>, O>(
     probability: f64,
 ) -> Result<Bands<M>, Error> {
     let (objective, best) = problem.at(estimate)?;
-    let Some(record) = problem.experiments().get(experiment) else {
-        let count = objective.experiments();
+    if experiment >= problem.experiments().len() {
+        let count = problem.experiments().len();
         return Err(Error::Option(format!("there is no record number {experiment}; the fit has {count}, from zero")));
-    };
+    }
     if !(probability > 0.0 && probability < 1.0) {
         return Err(Error::Option(format!("the probability of a band is {probability}; it must be between 0 and 1")));
     }
-    let prediction = problem.prediction(&objective, experiment, &best)?;
+    let Prediction { t, outputs, .. } = problem.prediction(&objective, experiment, &best)?;
+    let Widths { confidence, prediction } = widths(&objective, &best, estimate, experiment, probability)?;
+    Ok(Bands { t, outputs, confidence, prediction })
+}
+
+/// Half widths of the bands about a prediction.
+pub(crate) struct Widths<M: Model> {
+    pub confidence: Vec<Of<M::Output, f64>>,
+    pub prediction: Vec<Of<M::Output, f64>>,
+}
+
+/// The half widths at a place, of record number `experiment`, which must be there.
+pub(crate) fn widths<M: Model, I, P>(
+    objective: &Objective<'_>,
+    best: &[f64],
+    estimate: &Estimate<M, I, P>,
+    experiment: usize,
+    probability: f64,
+) -> Result<Widths<M>, Error> {
     let sigma = M::Output::into_array(M::Output::map(estimate.quality, |quality| quality.sigma));
     let quantile = student::quantile(0.5 + probability / 2.0, estimate.degrees_of_freedom());
     // Slopes in the outputs' own units, and the covariance in the optimizer's coordinates.
@@ -55,8 +73,8 @@ pub fn bands<M: Model, I: Integrator<M>, P: Predictor<M>, O>(
             estimate.covariance[(i, j)] / (slope(i) * slope(j))
         })
         .collect();
-    let zero = M::Output::splat(0.0);
-    let (mut confidence, mut measurement) = (vec![zero; record.len()], vec![zero; record.len()]);
+    let zero = vec![M::Output::splat(0.0); objective.source.samples(experiment)];
+    let mut found = Widths { confidence: zero.clone(), prediction: zero };
     let rows = M::Output::LEN * WINDOW;
     let mut g = vec![0.0; n];
     let visit = &mut |Rows { begin, samples, window }: Rows<'_>| {
@@ -68,12 +86,13 @@ pub fn bands<M: Model, I: Integrator<M>, P: Predictor<M>, O>(
                 (0..n).map(row).sum::<f64>().max(0.0)
             });
             let variance = variance.as_ref();
-            confidence[begin + k] = M::Output::from_fn(|j| quantile * variance[j].sqrt());
-            measurement[begin + k] = M::Output::from_fn(|j| quantile * variance[j].sqrt().hypot(sigma.as_ref()[j]));
+            found.confidence[begin + k] = M::Output::from_fn(|j| quantile * variance[j].sqrt());
+            found.prediction[begin + k] =
+                M::Output::from_fn(|j| quantile * variance[j].sqrt().hypot(sigma.as_ref()[j]));
         }
     };
-    if objective.walk(experiment, &best, true, visit).is_err() {
-        return Err(Error::Simulation(objective.locate(experiment, &best, 0)));
+    if objective.walk(experiment, best, true, visit).is_err() {
+        return Err(Error::Simulation(objective.locate(experiment, best, 0)));
     }
-    Ok(Bands { t: prediction.t, outputs: prediction.outputs, confidence, prediction: measurement })
+    Ok(found)
 }

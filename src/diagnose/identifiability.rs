@@ -1,17 +1,22 @@
 //! Identifiability: which unknowns the records can tell apart, where they are excited, and what would help.
 
+mod advice;
+mod collinear;
+mod excitation;
+mod together;
+
+pub(crate) use together::reworded;
+
 use crate::error::Error;
 use crate::estimate::Estimate;
-use crate::experiment::ExperimentOf;
-use crate::fit::{FitProblem, Objective, Rows};
+use crate::fit::{FitProblem, Objective};
 use crate::information::Information;
 use crate::integrate::Integrator;
 use crate::model::Model;
 use crate::optimize::{LeastSquares, Linearization};
 use crate::parameter::Transform;
-use crate::predict::{Predictor, WINDOW};
+use crate::predict::Predictor;
 use crate::random::Random;
-use crate::signals::Signals;
 use serde::{Deserialize, Serialize};
 
 /// What the records can tell of the unknowns.
@@ -78,9 +83,6 @@ pub struct Segment {
 pub const COLLINEAR: f64 = 10.0;
 /// Singular values below this part of the largest are rounding.
 const RANK: f64 = 1e-11;
-/// Sets of up to four are looked through for at most so many unknowns; the strongest ones beyond.
-const MOST: usize = 24;
-const SEGMENTS: usize = 10;
 const POINTS: u64 = 3;
 const SEED: u64 = 1;
 
@@ -100,8 +102,8 @@ pub fn identifiability<M: Model, I: Integrator<M>, P: Predictor<M>, O>(
     let slopes: Vec<f64> = estimate.unknowns.iter().map(|u| u.transform.slope(u.value)).collect();
     let (rank, condition) = spectrum(&whole);
     let generic_rank = generic(&objective, &best, estimate.unknowns.iter().map(|u| u.transform)).max(rank);
-    let collinear = collinear(&whole, &norms, &names, &slopes);
-    let mut excitation = excitation(&objective, &best)?;
+    let collinear = collinear::collinear(&whole, &norms, &names, &slopes);
+    let mut excitation = excitation::excitation(&objective, &best)?;
     for ((excited, norm), unknown) in excitation.iter_mut().zip(&norms).zip(&estimate.unknowns) {
         let size = if unknown.value == 0.0 { 1.0 } else { unknown.value.abs() };
         excited.strength = norm * size / unknown.transform.slope(unknown.value).abs();
@@ -115,7 +117,7 @@ pub fn identifiability<M: Model, I: Integrator<M>, P: Predictor<M>, O>(
         excitation,
         advice: vec![],
     };
-    result.advice = advice::<M>(&result, problem.experiments());
+    result.advice = advice::advice::<M>(&result, &estimate.unknowns, problem.experiments());
     Ok(result)
 }
 
@@ -166,166 +168,4 @@ fn generic(objective: &Objective<'_>, best: &[f64], transforms: impl Iterator<It
         objective.linearize(&place).map_or(0, |linear| spectrum(&assembled(&linear)).0)
     };
     (0..POINTS).map(rank).max().unwrap_or(0)
-}
-
-/// All sets of two to four unknowns above the limit, without those that hold a smaller such set.
-fn collinear(whole: &Information, norms: &[f64], names: &[String], slopes: &[f64]) -> Vec<Collinear> {
-    let mut seen: Vec<usize> = (0..norms.len()).filter(|&i| norms[i] > 0.0).collect();
-    seen.truncate(MOST);
-    let mut found: Vec<(f64, Vec<usize>, Vec<f64>)> = vec![];
-    for size in 2..=seen.len().min(4) {
-        for set in subsets(&seen, size) {
-            if found.iter().any(|(_, smaller, _)| smaller.iter().all(|i| set.contains(i))) {
-                continue;
-            }
-            let scales: Vec<f64> = set.iter().map(|&i| norms[i].recip()).collect();
-            let Ok(spectrum) = whole.select(&set).decomposition(&scales) else { continue };
-            let (Some(smallest), Some(direction)) = (spectrum.values.last(), spectrum.directions.last()) else {
-                continue;
-            };
-            if smallest * COLLINEAR <= 1.0 {
-                found.push((*smallest, set, direction.clone()));
-            }
-        }
-    }
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let listed = |(smallest, set, direction): (f64, Vec<usize>, Vec<f64>)| {
-        let mut moves: Vec<(f64, String, f64)> =
-            set.iter().zip(&direction).map(|(&i, d)| (d.abs(), names[i].clone(), d / norms[i] * slopes[i])).collect();
-        moves.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let unit = moves.first().map_or(1.0, |(_, _, by)| *by);
-        let moves = moves.into_iter().map(|(_, name, by)| (name, by / unit)).collect();
-        Collinear { index: (smallest > RANK).then(|| smallest.recip()), moves }
-    };
-    found.into_iter().map(listed).collect()
-}
-
-fn subsets(of: &[usize], size: usize) -> Vec<Vec<usize>> {
-    match (size, of) {
-        (0, _) => vec![vec![]],
-        (_, []) => vec![],
-        (_, [first, rest @ ..]) => {
-            let with = subsets(rest, size - 1).into_iter().map(|set| [&[*first], set.as_slice()].concat());
-            with.chain(subsets(rest, size)).collect()
-        }
-    }
-}
-
-fn excitation(objective: &Objective<'_>, best: &[f64]) -> Result<Vec<Excitation>, Error> {
-    let (n, outputs) = (best.len(), objective.outputs());
-    let mut by_output = vec![vec![0.0; outputs]; n];
-    let mut by_segment = vec![vec![]; n];
-    let mut begins = vec![];
-    for e in 0..objective.experiments() {
-        let samples = objective.source.samples(e);
-        let columns: Vec<usize> = objective.unknowns.columns(e).collect();
-        let (rows, length) = (outputs * WINDOW, samples.div_ceil(SEGMENTS).max(1));
-        let mut sums = vec![vec![0.0; samples.div_ceil(length)]; n];
-        let visit = &mut |Rows { begin, samples, window }: Rows<'_>| {
-            let slopes = window.data_mut();
-            for (c, &unknown) in columns.iter().enumerate() {
-                for j in 0..outputs {
-                    let column = &slopes[c * rows + j * WINDOW..][..samples];
-                    for (k, slope) in column.iter().enumerate() {
-                        by_output[unknown][j] += slope * slope;
-                        sums[unknown][(begin + k) / length] += slope * slope;
-                    }
-                }
-            }
-        };
-        if objective.walk(e, best, true, visit).is_err() {
-            return Err(Error::Simulation(objective.locate(e, best, 0)));
-        }
-        let segments = sums.first().map_or(0, Vec::len);
-        let label = &objective.unknowns.labels[e];
-        begins.extend((0..segments).map(|s| (label.clone(), objective.source.time(e, s * length))));
-        by_segment.iter_mut().zip(sums).for_each(|(all, sums): (&mut Vec<f64>, _)| all.extend(sums));
-    }
-    let names = objective.names();
-    let excited = |i: usize| {
-        let total = by_output[i].iter().sum::<f64>().max(f64::MIN_POSITIVE);
-        let output = |j: usize| (objective.source.outputs()[j].to_owned(), by_output[i][j] / total);
-        let segment = |(sum, (experiment, from)): (&f64, &(String, f64))| Segment {
-            experiment: experiment.clone(),
-            from: *from,
-            share: sum / total,
-        };
-        Excitation {
-            name: names[i].clone(),
-            strength: 0.0,
-            outputs: (0..outputs).map(output).collect(),
-            segments: by_segment[i].iter().zip(&begins).map(segment).collect(),
-        }
-    };
-    Ok((0..n).map(excited).collect())
-}
-
-fn advice<M: Model>(found: &Identifiability, records: &[ExperimentOf<M>]) -> Vec<String> {
-    let mut advice = vec![];
-    let n = found.unknowns.len() as u64;
-    if found.generic_rank < n {
-        advice.push(format!(
-            "the records determine {} combinations of the {n} unknowns wherever the parameters lie: with these inputs and \
-             outputs the model cannot be told apart; fix {} of them, or measure or excite something else",
-            found.generic_rank,
-            n - found.generic_rank
-        ));
-    }
-    for Collinear { index, moves } in &found.collinear {
-        let names: Vec<String> = moves.iter().map(|(name, _)| format!("`{name}`")).collect();
-        let together: Vec<String> = moves.iter().map(|(name, by)| format!("{name} by {by:+.4}")).collect();
-        let left = index.map_or("nothing".to_owned(), |index| format!("{:.2} % of the effect", 100.0 / index));
-        advice.push(format!(
-            "{} stand in for each other: moving {} leaves {left}; fix one, or excite them apart",
-            names.join(", "),
-            together.join(", ")
-        ));
-    }
-    for excited in &found.excitation {
-        if excited.outputs.iter().all(|(_, share)| *share == 0.0) {
-            advice.push(format!("`{}` moves no output at all: fix it", excited.name));
-            continue;
-        }
-        if excited.outputs.len() > 1
-            && let Some((output, share)) = excited.outputs.iter().find(|(_, share)| *share > 0.99)
-            && !excited.name.contains("(0)")
-        {
-            let others: Vec<String> = excited
-                .outputs
-                .iter()
-                .filter(|(name, _)| name != output)
-                .map(|(name, _)| format!("`{name}`"))
-                .collect();
-            advice.push(format!(
-                "`{}` is seen only through `{output}` ({:.2} %): {} hardly answers to it; excite it there for a second witness",
-                excited.name,
-                100.0 * share,
-                others.join(", ")
-            ));
-        }
-        if let Some(segment) = excited.segments.iter().find(|segment| segment.share > 0.9)
-            && excited.segments.len() > 1
-            && !excited.name.contains("(0)")
-        {
-            advice.push(format!(
-                "`{}` is known from one tenth of `{}` alone, from t = {} s on ({:.1} %)",
-                excited.name,
-                segment.experiment,
-                segment.from,
-                100.0 * segment.share
-            ));
-        }
-    }
-    for i in 0..M::Input::LEN {
-        let value = |k: usize, e: usize| M::Input::into_array(records[e].inputs()[k]).as_ref()[i];
-        let first = value(0, 0);
-        let all = records.iter().enumerate();
-        if all.flat_map(|(e, r)| (0..r.len()).map(move |k| (k, e))).all(|(k, e)| value(k, e) == first) {
-            advice.push(format!(
-                "the input `{}` is {first} throughout: what it drives cannot be told from an offset; vary it",
-                M::Input::NAMES[i]
-            ));
-        }
-    }
-    advice
 }

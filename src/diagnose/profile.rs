@@ -5,8 +5,8 @@
 
 use super::{Pinned, minimize};
 use crate::error::Error;
-use crate::estimate::{Estimate, student};
-use crate::fit::{FitProblem, classical};
+use crate::estimate::{Estimate, Knowledge, student};
+use crate::fit::{FitProblem, classical, held_or_unseen};
 use crate::integrate::Integrator;
 use crate::model::Model;
 use crate::optimize::{LeastSquares, Severity};
@@ -91,6 +91,8 @@ impl Profile {
 
 /// Most points on each side.
 const POINTS: usize = 40;
+/// After so many points that a root of the rise below this part of the threshold's shows no end.
+const FLAT: (usize, f64) = (8, 1e-3);
 /// The ends are found to this part of the root of the threshold.
 const CLOSE: f64 = 1e-3;
 
@@ -116,8 +118,8 @@ pub fn profile<M: Model, I: Integrator<M>, P: Predictor<M>, O>(
     }
     let unknown = &estimate.unknowns[index];
     let linear = objective.linearize(&best).map_err(|error| Error::Optimizer(error.to_string()))?;
-    let held: Vec<bool> =
-        (0..best.len()).map(|i| i != index && estimate.unknowns[i].knowledge.standard_error().is_none()).collect();
+    let at_bound = |i: usize| i != index && matches!(estimate.unknowns[i].knowledge, Knowledge::Held { .. });
+    let held = held_or_unseen(&linear, (0..best.len()).map(at_bound).collect());
     let covariance = classical(&linear, &held);
     // How far one standard error is, and how the others go along.
     let error = covariance.as_ref().map(|c| c[(index, index)].sqrt()).filter(|e| e.is_finite() && *e > 0.0);
@@ -161,7 +163,11 @@ pub fn profile<M: Model, I: Integrator<M>, P: Predictor<M>, O>(
         };
         let (mut inside, mut place) = ((best[index], 0.0), best.clone());
         let mut step = sign * scale * quantile / 2.0;
-        for _ in 0..POINTS {
+        for number in 0..POINTS {
+            // A profile that has not left the ground by now will not.
+            if number >= FLAT.0 && bound.is_infinite() && inside.1 < FLAT.1 * quantile {
+                break;
+            }
             let mut next = inside.0 + step;
             let at_bound = sign * (next - bound) >= 0.0;
             if at_bound {

@@ -118,3 +118,8 @@ pub(crate) fn number(value: f64, digits: usize) -> String {
     let before = size.log10().floor() as i32;
     format!("{value:.*}", (digits as i32 - 1 - before).max(0) as usize)
 }
+
+/// A probability in words; below what the tails of distributions are computed to, only that it is.
+pub(crate) fn p_value(p: f64) -> String {
+    if p < 1e-15 { "p < 1e-15".to_owned() } else { format!("p = {}", number(p, 2)) }
+}

@@ -77,8 +77,9 @@ impl Objective<'_> {
         let directions: Vec<Direction> = unseen.iter().map(|d| self.direction(d, &norms, &values, &slopes)).collect();
 
         // The covariance in the optimizer's coordinates, then in the unknowns' own units.
-        let held: Vec<bool> = free.iter().map(|free| !free).collect();
-        let estimated = free.iter().filter(|free| **free).count() as f64;
+        let mut held: Vec<bool> = held_at.iter().map(Option::is_some).collect();
+        fix_directions(&unseen, &mut held);
+        let estimated = held.iter().filter(|held| !**held).count() as f64;
         // With no more measurements than unknowns nothing is left to tell the noise from.
         let degrees = if measured <= n as u64 { 0.0 } else { measured as f64 - estimated };
         let sum_of_squares = linear.sum_of_squares();
@@ -111,8 +112,11 @@ impl Objective<'_> {
         };
         let singular = covariance.is_none();
         let covariance = covariance.unwrap_or_else(|| SquareMatrix::zeros(n));
-        let covariance = SquareMatrix::from_fn(n, |i, j| covariance[(i, j)] * factor * slopes[i] * slopes[j]);
         let known = |i: usize| free[i] && !singular && degrees > 0.0;
+        let covariance = SquareMatrix::from_fn(n, |i, j| match free[i] && free[j] {
+            true => covariance[(i, j)] * factor * slopes[i] * slopes[j],
+            false => 0.0,
+        });
 
         let rows: Vec<Unknown> = (0..n)
             .map(|i| {
@@ -223,6 +227,29 @@ impl Objective<'_> {
         let unit = moves.iter().map(|(_, by)| *by).fold(0.0, |m: f64, by| if by.abs() > m.abs() { by } else { m });
         moves.iter_mut().for_each(|(_, by)| *by /= unit);
         Direction { moves }
+    }
+}
+
+/// The unknowns to hold so that the others have a covariance: those in `held`, and one for each direction along which
+/// nothing is known.
+pub(crate) fn held_or_unseen(linear: &Linearization, mut held: Vec<bool>) -> Vec<bool> {
+    let free: Vec<bool> = held.iter().map(|held| !held).collect();
+    fix_directions(&unseen_directions(linear, &free, &linear.column_norms()), &mut held);
+    held
+}
+
+/// Holds one unknown for each direction. To hold all that take part would count what is known of them together as known
+/// of each, and intervals of the others, which depend on that, would be too narrow. Which one does not matter to what is
+/// known; the largest is the surest to take.
+fn fix_directions(unseen: &[Vec<f64>], held: &mut [bool]) {
+    let mut rows = unseen.to_vec();
+    while let Some(row) = rows.pop() {
+        let Some(pivot) = (0..row.len()).max_by(|&i, &j| row[i].abs().total_cmp(&row[j].abs())) else { continue };
+        held[pivot] = true;
+        for other in &mut rows {
+            let factor = other[pivot] / row[pivot];
+            other.iter_mut().zip(&row).for_each(|(other, row)| *other -= factor * row);
+        }
     }
 }
 

@@ -108,9 +108,9 @@ impl Color {
     pub fn warning(&self, allowed: Option<(usize, f64)>) -> Warning {
         let Color { output, p_value, first } = self;
         let mut text = format!(
-            "the errors of `{output}` are not white (Ljung-Box p = {:.1e}, correlation with the error before {first:.3}): the \
+            "the errors of `{output}` are not white (Ljung-Box {}, correlation with the error before {first:.3}): the \
              model misses a part, or the noise is colored",
-            p_value.min(1.0)
+            crate::estimate::p_value(p_value.min(1.0))
         );
         let Some((lags, widest)) = allowed else {
             text += "; the intervals take them as white and are too narrow if the order of the samples matters";

@@ -229,10 +229,25 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> FitProblem<'_, M, I, P, O> 
                 mine.join(", ")
             )));
         }
+        let records = self.fit.experiments;
+        let shares = &estimate.experiments;
+        if records.len() != shares.len() || records.iter().zip(shares).any(|(r, share)| r.len() != share.samples) {
+            let samples = |lengths: Vec<usize>| format!("{lengths:?} samples");
+            return Err(Error::Option(format!(
+                "the estimate is of other records: it has {}, the problem has {}",
+                samples(shares.iter().map(|share| share.samples).collect()),
+                samples(records.iter().map(|record| record.len()).collect())
+            )));
+        }
         let sigma = M::Output::map(estimate.quality, |quality| quality.sigma);
         let diagonal = Whitening::Diagonal(M::Output::into_array(sigma).as_ref().to_vec());
         let full = estimate.noise_covariance.clone().and_then(Whitening::full);
-        let objective = self.fit.objective(&self.setting).with(full.unwrap_or(diagonal));
+        // An output without any error tells no noise.
+        let noisy = M::Output::into_array(sigma).as_ref().iter().all(|sigma| *sigma > 0.0);
+        let whitening = if noisy { full.unwrap_or(diagonal) } else { self.whitening.clone() };
+        // What stopped the search does not stop what is asked of its result.
+        static NEVER: Control = Control { cancel: None, deadline: None };
+        let objective = Objective { control: &NEVER, ..self.fit.objective(&self.setting).with(whitening) };
         let coordinates = estimate.unknowns.iter().map(|u| u.transform.to_coordinate(u.value)).collect();
         Ok((objective, coordinates))
     }

@@ -12,7 +12,7 @@ mod heat;
 pub(super) use axes::Axis;
 pub(super) use curves::{Curves, Layer};
 pub(super) use forest::{Forest, Row as ForestRow};
-pub(super) use heat::Heat;
+pub(super) use heat::{Cell, Heat};
 
 use super::markup::Markup;
 

@@ -1,11 +1,13 @@
-//! From an estimate and its records to a [`Report`].
+//! From an estimate and its problem to a [`Report`].
 
-use super::residuals::largest;
 use super::trace::{COLUMNS, Rows};
-use super::{Declared, Figures, Format, Output, OutputFit, Record, Report, Residuals, Role, Signal, Trace, words};
+use super::{Declared, Figures, Format, Histogram, Output, OutputFit, Record, Report, Role, Signal, Trace, words};
+use crate::diagnose::residuals::{self, Residuals};
+use crate::diagnose::{self, Widths};
 use crate::error::Error;
-use crate::estimate::{Estimate, Prediction, Warning};
+use crate::estimate::{Estimate, Prediction};
 use crate::experiment::ExperimentOf;
+use crate::fit::FitProblem;
 use crate::integrate::Integrator;
 use crate::model::Model;
 use crate::predict::Predictor;
@@ -15,34 +17,42 @@ use crate::signals::{Of, Signals};
 const DRAWN: usize = 12;
 /// Samples of a closeup.
 const CLOSE: usize = 400;
+/// The probability with which bands hold a measurement.
+const BAND: f64 = 0.95;
 
 impl Report {
-    /// The report of an estimate on the records it was fitted to, in their order.
+    /// The report of an estimate and of its problem, with the diagnoses that cost little: tests of the residuals,
+    /// identifiability, and predictions with 95 % bands (none with a pre-filter, whose noise is not that of the
+    /// measurement). They take some six passes over the data.
     ///
     /// # Errors
-    /// Records that are not those of the fit; a prediction that fails.
-    pub fn new<M: Model, I: Integrator<M>, P: Predictor<M>, R: AsRef<[ExperimentOf<M>]> + ?Sized>(
-        model: &M,
+    /// An estimate of another problem; a prediction that fails or is not finite.
+    pub fn new<M: Model, I: Integrator<M>, P: Predictor<M>, O>(
+        problem: &FitProblem<'_, M, I, P, O>,
         estimate: &Estimate<M, I, P>,
-        records: &R,
     ) -> Result<Report, Error> {
-        let records = records.as_ref();
-        check(estimate, records)?;
-        let mut summaries = vec![];
-        for (e, record) in records.iter().enumerate() {
-            if let Some(prediction) = estimate.predict_own(model, record, e) {
-                summaries.push(summary::<M>(record, &prediction?));
-            }
+        let identifiability = diagnose::identifiability(problem, estimate)?;
+        let (objective, best) = problem.at(estimate)?;
+        let mut records = vec![];
+        for (e, record) in problem.experiments().iter().enumerate() {
+            let prediction = problem.prediction(&objective, e, &best)?;
+            let widths = match objective.prefilter {
+                Some(_) => None,
+                None => Some(diagnose::widths(&objective, &best, estimate, e, BAND)?),
+            };
+            let name = &estimate.experiments[e].name;
+            records.push(summary::<M>(name, record, &prediction, widths.as_ref())?);
         }
-        thin(&mut summaries, M::Output::LEN);
+        thin(&mut records, M::Output::LEN);
         let quality = M::Output::into_array(estimate.quality);
         let declared = M::Parameters::into_array(estimate.declared);
-        Ok(Report {
+        let reworded = |warning| diagnose::reworded(warning, &estimate.directions, &estimate.unknowns);
+        let report = Report {
             format: Format,
             title: "Parameter estimation".to_owned(),
             severity: estimate.severity(),
             outcome: estimate.outcome,
-            warnings: estimate.warnings.iter().map(|warning| reworded(warning, estimate)).collect(),
+            warnings: estimate.warnings.iter().map(reworded).collect(),
             unknowns: estimate.unknowns.clone(),
             declared: named::<M::Parameters>()
                 .zip(declared)
@@ -54,9 +64,12 @@ impl Report {
                 .zip(quality)
                 .map(|((name, unit), quality)| Output { name, unit, quality })
                 .collect(),
-            records: summaries,
-            findings: vec![],
+            records,
+            identifiability,
             profiles: vec![],
+            bootstrap: None,
+            restarts: None,
+            findings: vec![],
             figures: Figures {
                 cost: estimate.cost,
                 measurements: estimate.measurements,
@@ -71,39 +84,10 @@ impl Report {
                 seconds: estimate.seconds,
             },
             method: estimate.method.clone(),
-        })
+        };
+        let tested = words::failed(&report).map_or(report.severity, |(severity, _)| severity);
+        Ok(Report { severity: report.severity.max(tested), ..report })
     }
-}
-
-/// A warning about a direction says in a report what kind of direction it is.
-fn reworded<M: Model, I, P>(warning: &Warning, estimate: &Estimate<M, I, P>) -> Warning {
-    let reworded = estimate.directions.iter().find_map(|direction| {
-        let advice = warning.text.strip_prefix(&direction.to_string())?;
-        Some(words::together(direction, &estimate.unknowns) + advice)
-    });
-    Warning { severity: warning.severity, text: reworded.unwrap_or_else(|| warning.text.clone()) }
-}
-
-fn check<M: Model, I, P>(estimate: &Estimate<M, I, P>, records: &[ExperimentOf<M>]) -> Result<(), Error> {
-    let (found, expected) = (records.len(), estimate.experiments.len());
-    if found != expected {
-        return Err(Error::Option(format!(
-            "report: the estimate is of {expected} experiment(s), but {found} record(s) were given; give those of the fit"
-        )));
-    }
-    for (record, share) in records.iter().zip(&estimate.experiments) {
-        if (record.name(), record.len()) != (share.name.as_str(), share.samples) {
-            return Err(Error::Option(format!(
-                "report: the estimate has experiment `{}` with {} samples where record `{}` with {} was given; give the \
-                 records of the fit in its order",
-                share.name,
-                share.samples,
-                record.name(),
-                record.len()
-            )));
-        }
-    }
-    Ok(())
 }
 
 fn named<S: Signals>() -> impl Iterator<Item = (String, String)> {
@@ -115,21 +99,27 @@ fn column<S: Signals>(rows: &[Of<S, f64>], signal: usize) -> Vec<f64> {
     rows.iter().map(|row| S::into_array(*row).as_ref()[signal]).collect()
 }
 
-fn summary<M: Model>(record: &ExperimentOf<M>, prediction: &Prediction<M>) -> Record {
+fn summary<M: Model>(
+    name: &str,
+    record: &ExperimentOf<M>,
+    prediction: &Prediction<M>,
+    widths: Option<&Widths<M>>,
+) -> Result<Record, Error> {
     let inputs = named::<M::Input>().enumerate();
     let inputs = inputs.map(|(i, name)| signal(name, Role::Input, &column::<M::Input>(record.inputs(), i)));
     let outputs = named::<M::Output>().enumerate();
     let outputs = outputs.map(|(j, name)| signal(name, Role::Output, &column::<M::Output>(record.outputs(), j)));
-    Record {
-        name: record.name().to_owned(),
+    let examined = residuals::examine(prediction, record)?.into_iter().enumerate();
+    Ok(Record {
+        name: name.to_owned(),
         samples: record.len() as u64,
         begin: record.time(0),
         end: record.time(record.len().saturating_sub(1)),
         sample_time: record.sample_time(),
         gaps: record.gaps().len() as u64,
         signals: inputs.chain(outputs).collect(),
-        fits: (0..M::Output::LEN).map(|j| output_fit::<M>(record, prediction, j)).collect(),
-    }
+        fits: examined.map(|(j, residuals)| output_fit::<M>(record, prediction, widths, residuals, j)).collect(),
+    })
 }
 
 fn signal((name, unit): (String, String), role: Role, values: &[f64]) -> Signal {
@@ -146,13 +136,30 @@ fn signal((name, unit): (String, String), role: Role, values: &[f64]) -> Signal 
     }
 }
 
-fn output_fit<M: Model>(record: &ExperimentOf<M>, prediction: &Prediction<M>, j: usize) -> OutputFit {
+fn output_fit<M: Model>(
+    record: &ExperimentOf<M>,
+    prediction: &Prediction<M>,
+    widths: Option<&Widths<M>>,
+    examined: Residuals,
+    j: usize,
+) -> OutputFit {
     let measured = column::<M::Output>(record.outputs(), j);
     let predicted = column::<M::Output>(&prediction.outputs, j);
     let residuals = column::<M::Output>(&prediction.residuals, j);
-    let rows = Rows { t: &prediction.t, measured: &measured, predicted: &predicted };
+    let width = |of: fn(&Widths<M>) -> &[Of<M::Output, f64>]| {
+        widths.map_or(vec![], |widths| column::<M::Output>(of(widths), j))
+    };
+    let (confidence, prediction_width) = (width(|widths| &widths.confidence), width(|widths| &widths.prediction));
+    let rows = Rows {
+        t: &prediction.t,
+        measured: &measured,
+        predicted: &predicted,
+        confidence: &confidence,
+        prediction: &prediction_width,
+    };
     let overview = Trace::new(&rows, 0..measured.len(), COLUMNS);
-    let closeup = largest(&residuals).filter(|_| overview.samples_per_column > 1).map(|worst| {
+    let largest = largest(&residuals);
+    let closeup = largest.filter(|_| overview.samples_per_column > 1).map(|worst| {
         let begin = worst.saturating_sub(CLOSE / 2).min(measured.len().saturating_sub(CLOSE));
         Trace::new(&rows, begin..(begin + CLOSE).min(measured.len()), CLOSE)
     });
@@ -161,10 +168,19 @@ fn output_fit<M: Model>(record: &ExperimentOf<M>, prediction: &Prediction<M>, j:
         unit: M::Output::UNITS[j].to_owned(),
         fit_percent: M::Output::into_array(prediction.quality).as_ref()[j].fit_percent,
         unpredicted: predicted.iter().filter(|value| !value.is_finite()).count() as u64,
-        residuals: Residuals::new(&prediction.t, &residuals),
+        residuals: examined,
+        largest: largest.map_or(0.0, |k| residuals[k]),
+        largest_at: record.time(largest.unwrap_or(0)),
+        histogram: Histogram::new(&residuals),
         overview: Some(overview),
         closeup,
     }
+}
+
+/// Index of the largest residual in size.
+fn largest(residuals: &[f64]) -> Option<usize> {
+    let finite = residuals.iter().enumerate().filter(|(_, e)| e.is_finite());
+    finite.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).map(|(k, _)| k)
 }
 
 /// Keeps the drawings of the records that are reproduced worst.

@@ -1,11 +1,14 @@
 //! A report as one HTML page: verdict first, then what it rests on.
 
+mod records;
+mod unknowns;
+
+use super::Report;
 use super::chart::{PALETTE, STYLE, Size};
 use super::markup::{Attributes, Markup};
-use super::plots::{self, Plot};
-use super::words::{self, Table};
-use super::{OutputFit, Record, Report};
-use crate::estimate::number;
+use super::plots::Plot;
+use super::tables::{self, Table};
+use super::words;
 use crate::optimize::Severity;
 use core::fmt::Display;
 
@@ -31,12 +34,13 @@ pub(super) fn page(report: &Report) -> String {
         html.node("body", &[], |body| {
             verdict(body, report);
             body.node("main", &[], |main| {
-                parameters(main, report);
-                fits(main, report);
-                identifiability(main, report);
-                profiles(main, report);
+                unknowns::parameters(main, report);
+                records::fits(main, report);
+                unknowns::identifiability(main, report);
+                unknowns::profiles(main, report);
+                unknowns::refits(main, report);
                 findings(main, report);
-                data(main, report);
+                records::data(main, report);
                 reproduce(main, report);
             });
             body.words("footer", &[], format_args!("Made by greybox {}", report.method.version));
@@ -65,10 +69,11 @@ fn verdict(body: &mut Markup, report: &Report) {
             p.text(words::verdict(report.severity));
         });
         header.node("p", &[], |p| sentence(p, &words::search(report)));
-        if !report.warnings.is_empty() {
+        let reasons = words::reasons(report);
+        if !reasons.is_empty() {
             header.node("ul", &[], |list| {
-                for warning in &report.warnings {
-                    list.node("li", &[("class", &class(warning.severity))], |item| sentence(item, &warning.text));
+                for (severity, text) in &reasons {
+                    list.node("li", &[("class", &class(*severity))], |item| sentence(item, text));
                 }
             });
         }
@@ -83,144 +88,22 @@ fn class(severity: Severity) -> &'static str {
     }
 }
 
-fn parameters(main: &mut Markup, report: &Report) {
-    section(main, "Parameters", |section| {
-        section.node("div", &[("class", &"pair table-first")], |pair| {
-            table(pair, "Estimates", "cards", &words::parameters(report));
-            plots::parameters(report).iter().for_each(|plot| figure(pair, plot, "Intervals beside each other"));
-        });
-        table(section, "Outputs", "cards", &words::outputs(report));
-    });
-}
-
-fn fits(main: &mut Markup, report: &Report) {
-    let drawn = |fit: &&OutputFit| fit.overview.is_some();
-    for record in report.records.iter().filter(|record| record.fits.iter().any(|fit| drawn(&fit))) {
-        section(main, &format!("Measured and predicted: {}", record.name), |section| {
-            for text in words::unpredicted(record) {
-                section.node("p", &[], |p| sentence(p, &text));
-            }
-            record.fits.iter().filter(drawn).for_each(|fit| output(section, record, fit));
-        });
-    }
-    let left = report.records.iter().filter(|record| record.fits.iter().all(|fit| !drawn(&fit))).count();
-    if left > 0 {
-        let text = format!("The {left} records that are reproduced better than these are not drawn.");
-        main.words("p", &[("class", &"note")], text);
-    }
-}
-
-fn output(section: &mut Markup, record: &Record, fit: &OutputFit) {
-    section.node("article", &[], |article| {
-        article.node("h3", &[], |h3| {
-            h3.text(&fit.name);
-            if let Some(percent) = fit.fit_percent {
-                h3.words("small", &[], format_args!(" reproduced to {percent:.2} %"));
-            }
-        });
-        article.node("div", &[("class", &"zoom")], |zoom| {
-            zoom.node("p", &[("class", &"legend")], |legend| {
-                for name in ["measured", "predicted", "residual"] {
-                    legend.node("span", &[("class", &format_args!("key {name}"))], |key| key.text(name));
-                }
-            });
-            plots::response(record, fit).iter().for_each(|plot| plot.draw(zoom, Size::Fluid));
-            plots::residuals(record, fit).iter().for_each(|plot| plot.draw(zoom, Size::Fluid));
-        });
-        if let Some(trace) = &fit.overview
-            && trace.samples_per_column > 1
-        {
-            let text = format!(
-                "Each column of the drawing spans the least to the greatest of {} samples.",
-                trace.samples_per_column
-            );
-            article.words("p", &[("class", &"note")], text);
-        }
-        article.node("div", &[("class", &"panels")], |panels| {
-            let worst = format!(
-                "About the largest residual, {} {} at {} s",
-                number(fit.residuals.largest, 3),
-                fit.unit,
-                number(fit.residuals.largest_at, 6)
-            );
-            if let [Some(response), Some(residual)] = &plots::closeup(record, fit) {
-                figure(panels, response, &worst);
-                figure(panels, residual, "Residual there");
-            }
-            let spread = format!(
-                "Residuals: mean {}, rms {} {}",
-                number(fit.residuals.mean, 2),
-                number(fit.residuals.rms, 3),
-                fit.unit
-            );
-            plots::histogram(record, fit).iter().for_each(|plot| figure(panels, plot, &spread));
-            let white =
-                "Autocorrelation of the residuals; white ones stay between the dashed lines at 95 % of the lags";
-            plots::autocorrelation(record, fit).iter().for_each(|plot| figure(panels, plot, white));
-        });
-    });
-}
-
-fn identifiability(main: &mut Markup, report: &Report) {
-    section(main, "What the data tell apart", |section| {
-        section.node("div", &[("class", &"pair")], |pair| {
-            pair.node("div", &[], |column| {
-                let together: Vec<String> =
-                    report.directions.iter().map(|d| words::together(d, &report.unknowns) + ".").collect();
-                match together.is_empty() {
-                    true => column.words("p", &[], "Every estimated quantity has an influence of its own."),
-                    false => list(column, &together),
-                }
-                let strong = words::correlated(report);
-                match strong.is_empty() {
-                    true => column.words("p", &[], "No two estimates are correlated by more than 0.95."),
-                    false => {
-                        column.words("p", &[], "Strongly correlated estimates, known better together than alone:");
-                        list(column, &strong);
-                    }
-                }
-            });
-            plots::correlation(report).iter().for_each(|plot| figure(pair, plot, "Correlation of the estimates"));
-        });
-    });
-}
-
-fn profiles(main: &mut Markup, report: &Report) {
-    if report.profiles.is_empty() {
-        return;
-    }
-    section(main, "Profiles", |section| {
-        let text = "Each curve tells how much worse the fit gets as one parameter is moved and the others are estimated \
-                    anew. Where it crosses the dashed line the interval ends; where it never does, the data set no end.";
-        section.words("p", &[], text);
-        section.node("div", &[("class", &"panels")], |panels| {
-            report.profiles.iter().for_each(|profile| figure(panels, &plots::profile(profile), &profile.name));
-        });
-    });
-}
-
 fn findings(main: &mut Markup, report: &Report) {
     if !report.findings.is_empty() {
-        section(main, "Tests", |section| table(section, "What tests found", "cards", &words::findings(report)));
+        section(main, "Further tests", |section| {
+            for (about, of_it) in words::by_subject(report) {
+                table(section, about, "cards", &tables::tests(of_it));
+            }
+        });
     }
-}
-
-fn data(main: &mut Markup, report: &Report) {
-    section(main, "Data", |section| {
-        for record in &report.records {
-            section.words("h3", &[], &record.name);
-            section.words("p", &[], words::extent(record));
-            table(section, &format!("Signals of {}", record.name), "", &words::signals(record));
-        }
-    });
 }
 
 fn reproduce(main: &mut Markup, report: &Report) {
     section(main, "To reproduce", |section| {
-        table(section, "What was declared of the parameters", "", &words::declared(report));
+        table(section, "What was declared of the parameters", "", &tables::declared(report));
         section.node("div", &[("class", &"pair")], |pair| {
-            table(pair, "Settings", "", &words::settings(report));
-            table(pair, "Figures", "", &words::figures(report));
+            table(pair, "Settings", "", &tables::settings(report));
+            table(pair, "Figures", "", &tables::figures(report));
         });
     });
 }

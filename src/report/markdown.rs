@@ -1,43 +1,69 @@
 //! A report as Markdown (GitHub's flavor, for its tables).
 
 use super::Report;
-use super::words::{self, Table};
+use super::tables::{self, Table};
+use super::words;
 
 pub(super) fn page(report: &Report) -> String {
     let mut lines = vec![format!("# {}", escaped(&report.title)), String::new()];
     let verdict = words::verdict(report.severity);
     lines.push(format!("**{} {verdict}.** {}", words::sign(report.severity), sentence(&words::search(report))));
     lines.push(String::new());
-    lines.extend(report.warnings.iter().map(|warning| format!("- {}", sentence(&warning.text))));
+    items(&mut lines, words::reasons(report).iter().map(|(_, text)| text));
     heading(&mut lines, "Parameters");
-    table(&mut lines, &words::parameters(report));
+    table(&mut lines, &tables::parameters(report));
     heading(&mut lines, "Outputs");
-    table(&mut lines, &words::outputs(report));
-    let strong = words::correlated(report);
-    if !strong.is_empty() {
-        heading(&mut lines, "Strongly correlated estimates");
-        lines.extend(strong.iter().map(|pair| format!("- {}", sentence(pair))));
+    table(&mut lines, &tables::outputs(report));
+    heading(&mut lines, "What the data tell apart");
+    items(&mut lines, [&words::rank(report)].into_iter().chain(&report.identifiability.advice));
+    items(&mut lines, words::correlated(report).iter().map(|pair| format!("strongly correlated: {pair}")));
+    lines.push(String::new());
+    table(&mut lines, &tables::excitation(report));
+    let failures = words::failures(report);
+    if !failures.is_empty() {
+        heading(&mut lines, "Tests of the residuals that failed");
+        items(&mut lines, failures.iter());
+    }
+    if !report.profiles.is_empty() {
+        heading(&mut lines, "Profiles");
+        table(&mut lines, &tables::profiles(report));
+    }
+    if let Some(found) = &report.bootstrap {
+        heading(&mut lines, &words::refits(found));
+        table(&mut lines, &tables::bootstrap(found));
+    }
+    if let Some(found) = &report.restarts {
+        heading(&mut lines, "Restarts");
+        lines.push(sentence(&found.meaning));
     }
     if !report.findings.is_empty() {
-        heading(&mut lines, "Tests");
-        table(&mut lines, &words::findings(report));
+        heading(&mut lines, "Further tests");
+        for (about, of_it) in words::by_subject(report) {
+            lines.push(format!("**{}**\n", escaped(about)));
+            table(&mut lines, &tables::tests(of_it));
+            lines.push(String::new());
+        }
     }
     heading(&mut lines, "Data");
     for record in &report.records {
         lines.push(format!("**{}**: {}", escaped(&record.name), escaped(&words::extent(record))));
-        lines.extend(words::unpredicted(record).iter().map(|text| format!("- {}", sentence(text))));
+        items(&mut lines, words::unpredicted(record).iter());
         lines.push(String::new());
-        table(&mut lines, &words::signals(record));
+        table(&mut lines, &tables::signals(record));
         lines.push(String::new());
     }
     heading(&mut lines, "To reproduce");
-    table(&mut lines, &words::declared(report));
+    table(&mut lines, &tables::declared(report));
     lines.push(String::new());
-    table(&mut lines, &words::settings(report));
+    table(&mut lines, &tables::settings(report));
     lines.push(String::new());
-    table(&mut lines, &words::figures(report));
+    table(&mut lines, &tables::figures(report));
     lines.push(String::new());
     lines.join("\n")
+}
+
+fn items(lines: &mut Vec<String>, texts: impl Iterator<Item = impl AsRef<str>>) {
+    lines.extend(texts.map(|text| format!("- {}", sentence(text.as_ref()))));
 }
 
 fn heading(lines: &mut Vec<String>, text: &str) {

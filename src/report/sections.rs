@@ -1,52 +1,46 @@
-//! Sections that a report has if someone made what they show: findings of tests, and profile curves.
+//! Sections that a report has if someone made what they show: tests, profiles, refits and restarts.
 
 use super::Report;
+use crate::diagnose::{Bootstrap, Profile, Restarts, Test};
 use crate::optimize::Severity;
 use serde::{Deserialize, Serialize};
 
-/// What a test found.
+/// A test, and what was put to it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Finding {
     /// What was tested.
     pub about: String,
-    /// Name of the test.
-    pub test: String,
-    /// What it found, in numbers.
-    pub result: String,
-    /// What that means; names stand between backticks.
-    pub meaning: String,
-    /// What it makes of the estimate.
-    pub severity: Severity,
-}
-
-/// How the fit worsens as one parameter is moved and the others are estimated anew.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ProfileCurve {
-    /// Name of the parameter.
-    pub name: String,
-    /// Its unit.
-    pub unit: String,
-    /// Its values, increasing.
-    pub values: Vec<f64>,
-    /// By how much `-2 ln` of the likelihood rises at each value; `None` where the fit failed.
-    pub rise: Vec<Option<f64>>,
-    /// The rise at the ends of the interval.
-    pub level: f64,
+    /// The test and its result.
+    pub test: Test,
 }
 
 impl Report {
-    /// Adds what tests found; the report is as severe as the worst of it.
-    pub fn with_findings(mut self, findings: impl IntoIterator<Item = Finding>) -> Self {
-        self.findings.extend(findings);
-        self.severity = self.findings.iter().map(|finding| finding.severity).fold(self.severity, Severity::max);
+    /// Adds tests of something (nested models, drift); where one fails, the estimate is to be used with care.
+    pub fn with_tests(mut self, about: impl Into<String>, tests: impl IntoIterator<Item = Test>) -> Self {
+        let about = about.into();
+        for test in tests {
+            let severity = if test.passed { Severity::Usable } else { Severity::UsableWithCare };
+            self.severity = self.severity.max(severity);
+            self.findings.push(Finding { about: about.clone(), test });
+        }
         self
     }
 
-    /// Adds a profile curve.
-    pub fn with_profile(mut self, profile: ProfileCurve) -> Self {
+    /// Adds the profile of an unknown; where it met a better minimum, the estimate is not usable.
+    pub fn with_profile(mut self, profile: Profile) -> Self {
+        self.severity = self.severity.max(profile.severity);
         self.profiles.push(profile);
         self
+    }
+
+    /// Adds refits of resampled records.
+    pub fn with_bootstrap(self, bootstrap: Bootstrap) -> Self {
+        Report { bootstrap: Some(bootstrap), ..self }
+    }
+
+    /// Adds searches from elsewhere; where one met a better minimum, the estimate is not usable.
+    pub fn with_restarts(self, restarts: Restarts) -> Self {
+        Report { severity: self.severity.max(restarts.severity), restarts: Some(restarts), ..self }
     }
 }

@@ -1,8 +1,9 @@
 //! A report for a terminal.
 
 use super::Report;
+use super::tables::{self, Table};
 use super::trace::Trace;
-use super::words::{self, Table};
+use super::words;
 use crate::estimate::number;
 use crate::optimize::Severity;
 use core::fmt::Write;
@@ -16,36 +17,53 @@ pub(super) fn page(report: &Report, color: bool) -> String {
     page.line(&format!("{}\n", report.title));
     page.painted(report.severity, &format!("{} {}", words::sign(report.severity), words::verdict(report.severity)));
     page.line(&format!(". {}", words::search(report)));
-    for warning in &report.warnings {
-        page.painted(warning.severity, &format!("  {} ", words::sign(warning.severity)));
-        page.line(&warning.text);
+    for (severity, text) in words::reasons(report) {
+        page.painted(severity, &format!("  {} ", words::sign(severity)));
+        page.line(&text);
     }
     page.line("");
-    page.table(&words::parameters(report));
-    page.table(&words::outputs(report));
+    page.table(&tables::parameters(report));
+    page.table(&tables::outputs(report));
     for record in &report.records {
         page.line(&format!("{}: {}", record.name, words::extent(record)));
         words::unpredicted(record).iter().for_each(|text| page.line(&format!("  {text}")));
         for fit in &record.fits {
             if let Some(trace) = &fit.overview {
-                let largest = format!("{} {}", number(fit.residuals.largest, 3), fit.unit);
-                let at = number(fit.residuals.largest_at, 6);
+                let largest = format!("{} {}", number(fit.largest, 3), fit.unit);
+                let at = number(fit.largest_at, 6);
                 page.line(&format!("  |residual of {}|, largest {largest} at {at} s", fit.name));
                 page.line(&format!("  {}", sparkline(trace)));
             }
         }
     }
-    let strong = words::correlated(report);
-    if !strong.is_empty() {
-        page.line(&format!("\nstrongly correlated: {}", strong.join("; ")));
-    }
+    page.section("what the data tell apart", [words::rank(report)]);
+    page.items(report.identifiability.advice.iter());
+    page.items(words::correlated(report).iter().map(|pair| format!("strongly correlated: {pair}")));
     page.line("");
-    for finding in report.findings.iter().filter(|finding| finding.severity > Severity::Usable) {
-        page.painted(finding.severity, words::sign(finding.severity));
-        page.line(&format!(" {}, {}: {}. {}", finding.about, finding.test, finding.result, finding.meaning));
+    page.table(&tables::excitation(report));
+    let failures = words::failures(report);
+    if !failures.is_empty() {
+        page.section("tests of the residuals that failed", []);
+        page.items(failures.iter());
+        page.line("");
     }
-    page.table(&words::figures(report));
-    page.table(&words::settings(report));
+    if !report.profiles.is_empty() {
+        page.table(&tables::profiles(report));
+    }
+    if let Some(found) = &report.bootstrap {
+        page.section(&words::refits(found), []);
+        page.table(&tables::bootstrap(found));
+    }
+    if let Some(found) = &report.restarts {
+        page.section("restarts", [found.meaning.clone()]);
+        page.line("");
+    }
+    for (about, of_it) in words::by_subject(report) {
+        page.section(about, []);
+        page.table(&tables::tests(of_it));
+    }
+    page.table(&tables::figures(report));
+    page.table(&tables::settings(report));
     page.text.truncate(page.text.trim_end().len());
     page.text
 }
@@ -60,6 +78,15 @@ impl Page {
         // A name must not move the cursor.
         let visible = |letter: char| if letter.is_control() && letter != '\n' { '\u{FFFD}' } else { letter };
         self.text.extend(text.trim_end_matches(' ').chars().map(visible).chain(['\n']));
+    }
+
+    fn section<const N: usize>(&mut self, title: &str, lines: [String; N]) {
+        self.line(title);
+        self.items(lines.iter());
+    }
+
+    fn items(&mut self, items: impl Iterator<Item = impl AsRef<str>>) {
+        items.for_each(|item| self.line(&format!("  {}", item.as_ref())));
     }
 
     fn painted(&mut self, severity: Severity, text: &str) {

@@ -33,13 +33,21 @@ pub struct Trace {
     pub predicted: Band,
     /// Measured less predicted.
     pub residual: Band,
+    /// Where the noise-free output is with 95 % probability, as the unknowns are uncertain; no columns if not made.
+    pub confidence: Band,
+    /// Where a new measurement is with 95 % probability; no columns if not made.
+    pub prediction: Band,
 }
 
 /// A record as [`Trace`] reads it: time, measured, predicted; not a number where missing.
+#[derive(Default)]
 pub(super) struct Rows<'a> {
     pub t: &'a [f64],
     pub measured: &'a [f64],
     pub predicted: &'a [f64],
+    /// Half widths of the bands about the prediction; empty if there are none.
+    pub confidence: &'a [f64],
+    pub prediction: &'a [f64],
 }
 
 impl Trace {
@@ -54,6 +62,12 @@ impl Trace {
             trace.measured.push(y.iter().copied());
             trace.predicted.push(predicted.iter().copied());
             trace.residual.push(y.iter().zip(predicted).map(|(y, predicted)| y - predicted));
+            for (band, widths) in [(&mut trace.confidence, rows.confidence), (&mut trace.prediction, rows.prediction)] {
+                if let Some(widths) = widths.get(column.clone()) {
+                    let ends = predicted.iter().zip(widths);
+                    band.push(ends.flat_map(|(predicted, width)| [predicted - width, predicted + width]));
+                }
+            }
         }
         trace
     }
@@ -90,7 +104,7 @@ mod tests {
             let mut measured = vec![0.0; n];
             measured[spike] = 1.0;
             measured[n / 2 + 1] = -2.0;
-            let rows = Rows { t: &t, measured: &measured, predicted: &predicted };
+            let rows = Rows { t: &t, measured: &measured, predicted: &predicted, ..Rows::default() };
             let trace = Trace::new(&rows, 0..n, COLUMNS);
             assert!(trace.t.len() <= COLUMNS);
             assert_eq!(trace.measured.range(), Some((-2.0, if spike == n / 2 + 1 { 0.0 } else { 1.0 })));
@@ -106,9 +120,22 @@ mod tests {
         let t: Vec<f64> = (0..6).map(f64::from).collect();
         let measured = [1.0, f64::NAN, f64::NAN, f64::NAN, 5.0, 6.0];
         let predicted = [0.0; 6];
-        let trace = Trace::new(&Rows { t: &t, measured: &measured, predicted: &predicted }, 0..6, 3);
+        let trace = Trace::new(&Rows { t: &t, measured: &measured, predicted: &predicted, ..Rows::default() }, 0..6, 3);
         assert_eq!(trace.measured.low, [Some(1.0), None, Some(5.0)]);
         assert_eq!(trace.residual.high, [Some(1.0), None, Some(6.0)]);
         assert_eq!(trace.predicted.high, [Some(0.0); 3]);
+    }
+
+    /// A band spans all of a column: from the least lower end to the greatest upper one.
+    #[test]
+    fn bands_are_about_the_prediction() {
+        let (t, predicted, widths) = ([0.0, 1.0, 2.0, 3.0], [1.0, 2.0, f64::NAN, 3.0], [0.5, 0.1, 9.0, 1.0]);
+        let rows = Rows { t: &t, measured: &t, predicted: &predicted, prediction: &widths, ..Rows::default() };
+        let trace = Trace::new(&rows, 0..4, 2);
+        assert_eq!(
+            (trace.prediction.low, trace.prediction.high),
+            (vec![Some(0.5), Some(2.0)], vec![Some(2.1), Some(4.0)])
+        );
+        assert_eq!(trace.confidence, Band::default());
     }
 }

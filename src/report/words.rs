@@ -1,15 +1,9 @@
-//! What a report says, in sentences and tables that every form of it shares.
+//! What a report says, in sentences that every form of it shares. Names stand between backticks.
 
-use super::{Declared, Record, Report, Role};
-use crate::estimate::{Direction, Knowledge, Unknown, number};
+use super::{Record, Report};
+use crate::diagnose::{Bootstrap, LEVEL, Test};
+use crate::estimate::{Knowledge, number};
 use crate::optimize::Severity;
-use crate::parameter::Transform;
-
-/// A table: names of the columns, and rows of as many cells; the first cell of a row names it.
-pub(super) struct Table {
-    pub(super) columns: &'static [&'static str],
-    pub(super) rows: Vec<Vec<String>>,
-}
 
 /// The verdict in a word or three.
 pub(super) fn verdict(severity: Severity) -> &'static str {
@@ -31,77 +25,15 @@ pub(super) fn sign(severity: Severity) -> &'static str {
 
 /// How the search ended, and what to do about it if it ended badly.
 pub(super) fn search(report: &Report) -> String {
-    match report.outcome.converged() {
-        true => format!("The search {}.", report.outcome),
-        false => format!("The search {}. {}", report.outcome, report.outcome.advice()),
+    let mut text = format!("The search {}.", report.outcome);
+    if !report.outcome.converged() {
+        text = format!("{text} {}", report.outcome.advice());
     }
-}
-
-/// Everything estimated, then everything fixed.
-pub(super) fn parameters(report: &Report) -> Table {
-    let estimated = report.unknowns.iter().map(estimated);
-    let fixed = report.declared.iter().filter(|declared| !declared.parameter.free);
-    let fixed =
-        fixed.map(|Declared { name, unit, parameter }| row([name, &number(parameter.start, 7), unit, "", "fixed", ""]));
-    let columns = &["parameter", "value", "unit", "std. error", "95 % interval", "error index"];
-    Table { columns, rows: estimated.chain(fixed).collect() }
-}
-
-fn estimated(unknown: &Unknown) -> Vec<String> {
-    let Unknown { name, value, unit, .. } = unknown;
-    let said = |text: &str| row([name, &number(*value, 6), unit, "", text, ""]);
-    match unknown.knowledge {
-        Knowledge::Known { standard_error, lower, upper } => {
-            let digits = digits(*value, standard_error);
-            let interval = format!("{} … {}", number(lower, digits), number(upper, digits));
-            let index = unknown.error_index.map_or(String::new(), |index| format!("{} %", number(index, 3)));
-            row([name, &number(*value, digits), unit, &number(standard_error, 2), &interval, &index])
-        }
-        Knowledge::Held { bound } => said(&format!("held at its bound {}", number(bound, 6))),
-        Knowledge::Unidentified => said("not determined by the data"),
-        Knowledge::Fixed => said("fixed"),
+    let unknown = report.unknowns.iter().filter(|unknown| unknown.knowledge == Knowledge::Unidentified).count();
+    match unknown {
+        0 => text,
+        _ => format!("The data do not determine {unknown} of the {} unknowns. {text}", report.unknowns.len()),
     }
-}
-
-/// The digits of a value that its standard error leaves, and one more.
-fn digits(value: f64, standard_error: f64) -> usize {
-    let digits = (value / standard_error).abs().log10().ceil() + 2.0;
-    if digits.is_finite() { digits.clamp(3.0, 10.0) as usize } else { 6 }
-}
-
-/// How well the outputs are reproduced.
-pub(super) fn outputs(report: &Report) -> Table {
-    let rows = report.outputs.iter().map(|output| {
-        let q = &output.quality;
-        let fit = q.fit_percent.map_or("constant".to_owned(), |fit| format!("{fit:.2} %"));
-        let (rmse, sigma) = (number(q.rmse, 4), number(q.sigma, 4));
-        row([&output.name, &fit, &rmse, &sigma, &output.unit, &q.samples.to_string()])
-    });
-    Table { columns: &["output", "fit", "rms error", "noise", "unit", "samples"], rows: rows.collect() }
-}
-
-/// What tests found.
-pub(super) fn findings(report: &Report) -> Table {
-    let rows = report.findings.iter().map(|finding| {
-        let verdict = format!("{} {}", sign(finding.severity), verdict(finding.severity).to_lowercase());
-        let plain = |text: &str| text.replace('`', "");
-        row([&finding.about, &plain(&finding.test), &finding.result, &verdict, &plain(&finding.meaning)])
-    });
-    Table { columns: &["about", "test", "result", "verdict", "meaning"], rows: rows.collect() }
-}
-
-/// The columns of a record.
-pub(super) fn signals(record: &Record) -> Table {
-    let rows = record.signals.iter().map(|signal| {
-        let value = |value: Option<f64>| value.map_or("-".to_owned(), |value| number(value, 4));
-        let role = match signal.role {
-            Role::Input => "input",
-            Role::Output => "output",
-        };
-        let values = [value(signal.min), value(signal.mean), value(signal.max)];
-        row([&signal.name, role, &signal.unit, &values[0], &values[1], &values[2], &signal.missing.to_string()])
-    });
-    Table { columns: &["signal", "role", "unit", "least", "mean", "greatest", "missing"], rows: rows.collect() }
 }
 
 /// A record in one line.
@@ -122,66 +54,6 @@ pub(super) fn unpredicted(record: &Record) -> Vec<String> {
     fits.map(|fit| format!("`{}` has no prediction in {} samples; they are gaps", fit.name, fit.unpredicted)).collect()
 }
 
-/// What was declared of the parameters.
-pub(super) fn declared(report: &Report) -> Table {
-    let rows = report.declared.iter().map(|Declared { name, unit, parameter: p }| {
-        let bounds = match (p.lower.is_finite(), p.upper.is_finite()) {
-            (false, false) => "none".to_owned(),
-            _ => format!("{} … {}", number(p.lower, 6), number(p.upper, 6)),
-        };
-        let prior = p.prior.map_or("none".to_owned(), |prior| format!("{} ± {}", prior.mean, prior.std));
-        let mut kind = if p.free { "free".to_owned() } else { "fixed".to_owned() };
-        if p.transform == Transform::Log {
-            kind += ", as its logarithm";
-        }
-        if p.per_experiment {
-            kind += ", one per experiment";
-        }
-        row([name, &kind, &format!("{:?}", p.start), unit, &bounds, &prior])
-    });
-    Table { columns: &["parameter", "declared", "start", "unit", "bounds", "prior"], rows: rows.collect() }
-}
-
-/// How the estimate was made.
-pub(super) fn settings(report: &Report) -> Table {
-    let m = &report.method;
-    let rows = [
-        ("optimizer", &m.optimizer),
-        ("prediction", &m.predictor),
-        ("integrator", &m.integrator),
-        ("loss", &m.loss),
-        ("weighting", &m.weighting),
-        ("pre-filter", &m.prefilter),
-        ("noise", &m.noise),
-        ("covariance", &m.covariance),
-        ("greybox version", &m.version),
-    ];
-    Table { columns: &["setting", "value"], rows: rows.map(|(name, value)| row([name, value])).to_vec() }
-}
-
-/// Sums and criteria.
-pub(super) fn figures(report: &Report) -> Table {
-    let f = &report.figures;
-    let mut rows = vec![
-        row(["cost", &number(f.cost, 8)]),
-        row(["measurements", &f.measurements.to_string()]),
-        row(["unknowns", &report.unknowns.len().to_string()]),
-    ];
-    for (name, value) in
-        [("deviance", f.deviance), ("AIC", f.aic), ("AICc", f.aicc), ("BIC", f.bic), ("final prediction error", f.fpe)]
-    {
-        rows.extend(value.map(|value| row([name, &number(value, 8)])));
-    }
-    rows.push(row(["iterations", &f.iterations.to_string()]));
-    rows.push(row(["passes with slopes", &f.evaluations.to_string()]));
-    rows.push(row(["time", &format!("{} s", number(f.seconds, 3))]));
-    Table { columns: &["figure", "value"], rows }
-}
-
-fn row<const N: usize>(cells: [&str; N]) -> Vec<String> {
-    cells.map(str::to_owned).to_vec()
-}
-
 /// Pairs of estimates that are hard to tell apart, most so first.
 pub(super) fn correlated(report: &Report) -> Vec<String> {
     const STRONG: f64 = 0.95;
@@ -194,58 +66,95 @@ pub(super) fn correlated(report: &Report) -> Vec<String> {
     strong.into_iter().take(MENTIONED).map(|(i, j, r)| format!("`{}` and `{}`: {:+.4}", name(i), name(j), r)).collect()
 }
 
-/// Moves are the same if they differ by less than this part.
-const SAME: f64 = 0.02;
+/// Rank and condition in a sentence.
+pub(super) fn rank(report: &Report) -> String {
+    let found = &report.identifiability;
+    let n = found.unknowns.len();
+    let condition = found.condition.map_or("beyond rounding".to_owned(), |condition| number(condition, 3));
+    match found.rank as usize == n {
+        true => format!("The records tell all {n} unknowns apart; condition number of the scaled problem {condition}."),
+        false => format!("The records determine {} combinations of the {n} unknowns.", found.rank),
+    }
+}
 
-/// What cannot be told apart, in the words that fit the case: a common shift, a common factor, a product.
-pub(super) fn together(direction: &Direction, unknowns: &[Unknown]) -> String {
-    let of = |name: &str| unknowns.iter().find(|unknown| unknown.name == name);
-    let absolute: Option<Vec<(f64, &Unknown)>> = direction
-        .moves
-        .iter()
-        .map(|(name, by)| {
-            of(name).map(|unknown| (if unknown.value == 0.0 { *by } else { by * unknown.value.abs() }, unknown))
-        })
-        .collect();
-    let Some(absolute) = absolute.filter(|moves| moves.len() > 1) else { return direction.to_string() };
-    let names: Vec<String> = direction.moves.iter().map(|(name, _)| format!("`{name}`")).collect();
-    let names = listed(&names);
-    let same = |sizes: &mut dyn Iterator<Item = f64>| {
-        let (low, high) = sizes.fold((f64::INFINITY, 0.0f64), |(low, high), size| (low.min(size), high.max(size)));
-        low > (1.0 - SAME) * high
+/// Why the estimate is not simply usable, the worst first: warnings, failed tests, better minima.
+pub(super) fn reasons(report: &Report) -> Vec<(Severity, String)> {
+    let mut reasons: Vec<_> = report.warnings.iter().map(|warning| (warning.severity, warning.text.clone())).collect();
+    reasons.extend(failed(report));
+    for finding in report.findings.iter().filter(|finding| !finding.test.passed) {
+        let text = format!("{}, {}: {}", finding.about, finding.test.name, finding.test.meaning);
+        reasons.push((Severity::UsableWithCare, text));
+    }
+    let remarks = report.profiles.iter().map(|profile| (profile.severity, profile.remark.clone()));
+    let restarts = report.restarts.iter().map(|restarts| (restarts.severity, restarts.meaning.clone()));
+    reasons.extend(remarks.chain(restarts).filter(|(_, text)| !text.is_empty()));
+    reasons.sort_by_key(|(severity, _)| core::cmp::Reverse(*severity));
+    reasons
+}
+
+/// The tests of the residuals, each with whose they are.
+fn tests(report: &Report) -> impl Iterator<Item = (String, &Test)> {
+    let one = report.records.len() == 1;
+    let fits = report.records.iter().flat_map(|record| record.fits.iter().map(move |fit| (record, fit)));
+    fits.flat_map(move |(record, fit)| {
+        let of = if one { format!("`{}`", fit.name) } else { format!("`{}` of `{}`", fit.name, record.name) };
+        fit.residuals.tests.iter().map(move |test| (of.clone(), test))
+    })
+}
+
+/// How many tests of the residuals fail, what the clearest of them means, and what that makes of the estimate: of many
+/// tests some fail by chance, so each must fail at its part of the [`LEVEL`] (Bonferroni) to count.
+pub(super) fn failed(report: &Report) -> Option<(Severity, String)> {
+    let failed: Vec<_> = tests(report).filter(|(_, test)| !test.passed).collect();
+    let (of, clearest) = failed.iter().min_by(|a, b| a.1.p_value.total_cmp(&b.1.p_value))?;
+    let (count, all) = (failed.len(), tests(report).count());
+    if clearest.p_value * all as f64 >= LEVEL {
+        let text =
+            format!("{count} of {all} tests of the residuals failed, none clearly: among so many that may be chance");
+        return Some((Severity::Usable, text));
+    }
+    let Test { name, meaning, .. } = clearest;
+    let text = format!("{count} of {all} tests of the residuals failed, clearest {name} on {of}: {meaning}");
+    Some((Severity::UsableWithCare, text))
+}
+
+/// What the failed tests of the residuals mean, each meaning once, with what failed it.
+pub(super) fn failures(report: &Report) -> Vec<String> {
+    const NAMED: usize = 4;
+    let mut groups: Vec<(&str, Vec<String>)> = vec![];
+    for (of, test) in tests(report).filter(|(_, test)| !test.passed) {
+        let what = format!("{of} {} ({})", test.name, test.probability());
+        match groups.iter_mut().find(|(meaning, _)| *meaning == test.meaning) {
+            Some((_, whats)) => whats.push(what),
+            None => groups.push((&test.meaning, vec![what])),
+        }
+    }
+    let said = |(meaning, whats): (&str, Vec<String>)| {
+        let more = match whats.len().saturating_sub(NAMED) {
+            0 => String::new(),
+            more => format!("; {more} more"),
+        };
+        format!("{}{more}: {meaning}", whats[..whats.len().min(NAMED)].join("; "))
     };
-    let unit = &absolute[0].1.unit;
-    if same(&mut absolute.iter().map(|(by, _)| by.abs())) && absolute.iter().all(|(_, unknown)| unknown.unit == *unit) {
-        let moves = absolute.iter().map(|(by, unknown)| format!("`{}` {}1 {unit}", unknown.name, plus(*by)));
-        let moves: Vec<String> = moves.map(|text| text.trim_end().to_owned()).collect();
-        return format!(
-            "{names} are known only up to a common shift: {} together change no prediction",
-            listed(&moves)
-        );
-    }
-    if same(&mut direction.moves.iter().map(|(_, by)| by.abs())) && absolute.iter().all(|(_, u)| u.value != 0.0) {
-        let up = direction.moves.iter().filter(|(_, by)| *by > 0.0).count();
-        if up == 0 || up == direction.moves.len() {
-            return format!("{names} are known only up to a common factor");
-        }
-        if direction.moves.len() == 2 {
-            return format!("{names} are known only as their product");
-        }
-    }
-    direction.to_string()
+    groups.into_iter().map(said).collect()
 }
 
-fn plus(by: f64) -> &'static str {
-    if by < 0.0 { "−" } else { "+" }
+/// How many refits a bootstrap rests on.
+pub(super) fn refits(found: &Bootstrap) -> String {
+    let Bootstrap { converged, tried, seed, .. } = found;
+    format!("Bootstrap: {converged} of {tried} refits ended, seed {seed}")
 }
 
-/// `a, b and c`.
-fn listed(names: &[String]) -> String {
-    match names {
-        [] => String::new(),
-        [one] => one.clone(),
-        [most @ .., last] => format!("{} and {last}", most.join(", ")),
+/// The further tests, by what they are about.
+pub(super) fn by_subject(report: &Report) -> Vec<(&str, Vec<&Test>)> {
+    let mut subjects: Vec<(&str, Vec<&Test>)> = vec![];
+    for finding in &report.findings {
+        match subjects.iter_mut().find(|(about, _)| *about == finding.about) {
+            Some((_, of_it)) => of_it.push(&finding.test),
+            None => subjects.push((&finding.about, vec![&finding.test])),
+        }
     }
+    subjects
 }
 
 /// Pieces of a sentence: plain text and, between backticks, names.

@@ -1,10 +1,9 @@
 //! Reports: that every form of one is whole, safe against what stands in names, and honest about what is missing.
 
+use greybox::diagnose::{Resampling, Test, bootstrap, profile, restarts};
 use greybox::optimize::Severity;
-use greybox::report::{Finding, ProfileCurve};
 use greybox::{
-    Error, Estimate, Experiment, ExperimentOf, Fit, Kind, Model, Nothing, Report, Scalar, Signals, Time, fixed, free,
-    signals,
+    Error, Experiment, ExperimentOf, Fit, Kind, Model, Nothing, Report, Scalar, Signals, Time, fixed, free, signals,
 };
 use std::fs;
 use std::path::PathBuf;
@@ -53,30 +52,32 @@ fn line() -> Line<greybox::Parameter> {
     }
 }
 
-fn estimate(record: &ExperimentOf<Friction>, line: Line<greybox::Parameter>) -> Estimate<Friction> {
-    Fit::new(&Friction, record).parameters(line).run().unwrap()
-}
-
 fn report(record: &ExperimentOf<Friction>, line: Line<greybox::Parameter>) -> Report {
-    Report::new(&Friction, &estimate(record, line), record).unwrap()
+    let mut problem = Fit::new(&Friction, record).parameters(line).problem().unwrap();
+    let estimate = problem.run().unwrap();
+    Report::new(&problem, &estimate).unwrap()
 }
 
 fn with_everything() -> Report {
-    let profile = ProfileCurve {
-        name: "slope".to_owned(),
-        unit: "1".to_owned(),
-        values: vec![1.9, 2.0, 2.1],
-        rise: vec![Some(5.0), Some(0.0), None],
-        level: 3.84,
+    let record = record(500).named(HOSTILE);
+    let mut problem = Fit::new(&Friction, &record).parameters(line()).problem().unwrap();
+    let mut estimate = problem.run().unwrap();
+    // What differs from run to run is no part of an example.
+    estimate.seconds = 0.25;
+    let test = Test {
+        name: "F test".to_owned(),
+        statistic: 12.0,
+        p_value: 1e-20,
+        passed: false,
+        meaning: format!("`{HOSTILE}` says more than chance would let it"),
     };
-    let finding = Finding {
-        about: format!("residual of {HOSTILE}"),
-        test: "Ljung-Box".to_owned(),
-        result: "p = 0.2".to_owned(),
-        meaning: "they are white".to_owned(),
-        severity: Severity::Usable,
-    };
-    report(&record(500).named(HOSTILE), line()).titled(HOSTILE).with_findings([finding]).with_profile(profile)
+    Report::new(&problem, &estimate)
+        .unwrap()
+        .titled(HOSTILE)
+        .with_profile(profile(&problem, &estimate, "slope", 0.95).unwrap())
+        .with_bootstrap(bootstrap(&problem, &estimate, Resampling::Blocks(0), 40, 1).unwrap())
+        .with_restarts(restarts(&problem, &estimate, 4, 2.0, 1).unwrap())
+        .with_tests(HOSTILE, [test])
 }
 
 /// Tags and attributes of a page that open and close as they must: a browser would mend what a reader then sees wrongly.
@@ -139,11 +140,12 @@ fn markdown_tables_have_as_many_cells_as_columns() {
         assert_eq!(cells(pair[0]), cells(pair[1]), "{pair:?}");
         tables += usize::from(pair[1].starts_with("| :--"));
     }
-    assert_eq!(tables, 7, "parameters, outputs, tests, signals, declarations, settings, figures");
+    let named = "parameters, outputs, excitation, profiles, bootstrap, tests, signals, declarations, settings, figures";
+    assert_eq!(tables, 10, "{named}");
     assert!(markdown.contains("| offset | 0.3000000 | N |  | fixed |  |"), "{markdown}");
 }
 
-/// A report kept in the schema of version 1 is read by every later version, and written as it was.
+/// A report kept in this schema is read by every later version that has it, and written as it was.
 #[test]
 fn the_committed_example_still_reads() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/report.json");
@@ -155,9 +157,9 @@ fn the_committed_example_still_reads() {
     assert_eq!(report.to_json().unwrap(), text);
     assert_eq!(report.title, "An example of the schema");
     assert_well_formed(&report.to_html());
-    let newer = text.replace("greybox report 1", "greybox report 2");
+    let newer = text.replace("greybox report 2", "greybox report 3");
     let refused = Report::from_json(&newer).unwrap_err().to_string();
-    assert!(refused.contains("greybox report 2") && refused.contains("reads \"greybox report 1\""), "{refused}");
+    assert!(refused.contains("greybox report 3") && refused.contains("reads \"greybox report 2\""), "{refused}");
 }
 
 /// A shift of both frictions against the offset changes nothing; the report says so in these words, in every form.
@@ -192,7 +194,7 @@ fn missing_outputs_are_gaps() {
     let record = Experiment::new(&Friction, whole.times().clone(), whole.inputs().to_vec(), outputs).unwrap();
     let report = report(&record, line());
     let fit = &report.records[0].fits[0];
-    assert_eq!((report.records[0].signals[1].missing, fit.unpredicted, fit.residuals.count), (100, 0, 200));
+    assert_eq!((report.records[0].signals[1].missing, fit.unpredicted, fit.residuals.samples), (100, 0, 200));
     let trace = fit.overview.as_ref().unwrap();
     assert!(trace.measured.low[100..200].iter().all(Option::is_none) && trace.residual.low[150].is_none());
     assert!(trace.predicted.low.iter().all(Option::is_some));
@@ -202,12 +204,16 @@ fn missing_outputs_are_gaps() {
 }
 
 #[test]
-fn only_the_records_of_the_fit_are_reported_on() {
-    let estimate = estimate(&record(100), line());
-    let refused =
-        |records: &[ExperimentOf<Friction>]| Report::new(&Friction, &estimate, records).unwrap_err().to_string();
-    assert!(refused(&[]).contains("is of 1 experiment(s), but 0 record(s) were given"));
-    assert!(refused(&[record(99)]).contains("with 100 samples where record `record` with 99 was given"));
+fn only_the_problem_of_the_fit_is_reported_on() {
+    let (long, short) = (record(100), record(99));
+    let problem = |record| Fit::new(&Friction, record).parameters(line()).problem().unwrap();
+    let estimate = problem(&long).run().unwrap();
+    let refused = |error: Result<Report, Error>| error.unwrap_err().to_string();
+    let other = refused(Report::new(&problem(&short), &estimate));
+    assert!(other.contains("it has [100] samples, the problem has [99] samples"), "{other}");
+    let shifted = Line { offset: free(0.3), ..line() };
+    let other = refused(Report::new(&Fit::new(&Friction, &long).parameters(shifted).problem().unwrap(), &estimate));
+    assert!(other.contains("the estimate is of another problem"), "{other}");
 }
 
 #[test]
@@ -260,9 +266,9 @@ fn a_long_record_makes_a_small_page() {
     let record = Experiment::new(&Friction, long.times().clone(), long.inputs().to_vec(), outputs).unwrap();
     let report = report(&record, line());
     let fit = &report.records[0].fits[0];
-    assert!((fit.residuals.largest - 100.0).abs() < 0.1 && fit.residuals.largest_at == record.time(7_654_321));
+    assert!((fit.largest - 100.0).abs() < 0.1 && fit.largest_at == record.time(7_654_321));
     let highest = fit.overview.as_ref().unwrap().residual.high.iter().flatten().copied().fold(0.0, f64::max);
-    assert_eq!(highest, fit.residuals.largest);
+    assert_eq!(highest, fit.largest);
     let page = report.to_html();
     println!("{} bytes", page.len());
     assert!(page.len() < 3_000_000, "{} bytes", page.len());

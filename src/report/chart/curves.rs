@@ -25,8 +25,10 @@ pub(in crate::report) struct Curves<'a> {
 pub(in crate::report) enum Layer<'a> {
     /// A curve that spans a range in each column.
     Band { class: &'static str, x: &'a [f64], y: &'a Band },
-    /// A curve.
-    Curve { x: &'a [f64], y: &'a [Option<f64>] },
+    /// The surface between the least and the greatest of each column.
+    Area { class: &'static str, x: &'a [f64], y: &'a Band },
+    /// A curve through points.
+    Curve { class: &'static str, points: Vec<(f64, f64)> },
     /// Bars of equal width, standing on zero.
     Bars { first: f64, width: f64, heights: Vec<f64> },
     /// A value of `y` to compare with.
@@ -84,8 +86,16 @@ impl Curves<'_> {
                     Layer::Band { class, x: places, y: band } => {
                         svg.leaf("path", &[("class", class), ("d", &path(places, &band.low, &band.high, x, y))]);
                     }
-                    Layer::Curve { x: places, y: values } => {
-                        svg.leaf("path", &[("class", &"curve"), ("d", &path(places, values, values, x, y))]);
+                    Layer::Area { class, x: places, y: band } => {
+                        svg.leaf("path", &[("class", class), ("d", &area(places, band, x, y))]);
+                    }
+                    Layer::Curve { class, points } => {
+                        let mut d = String::new();
+                        for (i, (place, value)) in points.iter().enumerate() {
+                            // Writing to a string does not fail.
+                            let _ = write!(d, "{}{} {}", if i == 0 { 'M' } else { 'L' }, x(*place), y(*value));
+                        }
+                        svg.leaf("path", &[("class", class), ("d", &d)]);
                     }
                     Layer::Bars { first, width, heights } => {
                         let mut d = String::new();
@@ -131,6 +141,26 @@ fn path(
             let _ = write!(d, "V{}", y(last));
         }
         before = Some(last);
+    }
+    d
+}
+
+/// There along the greatest and back along the least, in pieces where there is nothing between.
+fn area(places: &[f64], band: &Band, x: impl Fn(f64) -> Short, y: impl Fn(f64) -> Short) -> String {
+    let columns: Vec<Option<(f64, f64, f64)>> = places
+        .iter()
+        .zip(band.low.iter().zip(&band.high))
+        .map(|(place, (low, high))| Some((*place, (*low)?, (*high)?)))
+        .collect();
+    let mut d = String::new();
+    for piece in columns.split(Option::is_none) {
+        let there = piece.iter().flatten().map(|(place, _, high)| (place, high));
+        let back = piece.iter().rev().flatten().map(|(place, low, _)| (place, low));
+        for (i, (place, value)) in there.chain(back).enumerate() {
+            // Writing to a string does not fail.
+            let _ = write!(d, "{}{} {}", if i == 0 { 'M' } else { 'L' }, x(*place), y(*value));
+        }
+        d.push_str(if piece.is_empty() { "" } else { "Z" });
     }
     d
 }

@@ -1,0 +1,90 @@
+//! What the findings mean and what would help, a sentence each.
+
+use super::together::together;
+use super::{Excitation, Identifiability};
+use crate::estimate::{Unknown, number};
+use crate::experiment::ExperimentOf;
+use crate::model::Model;
+use crate::signals::Signals;
+
+/// An output that holds so much of an unknown's information is its only witness.
+const ONLY: f64 = 0.99;
+/// So much of an unknown's information from one tenth of a record leaves little to the others.
+const ONCE: f64 = 0.9;
+
+pub(super) fn advice<M: Model>(
+    found: &Identifiability,
+    unknowns: &[Unknown],
+    records: &[ExperimentOf<M>],
+) -> Vec<String> {
+    let mut advice = vec![];
+    let n = unknowns.len() as u64;
+    if found.generic_rank < n {
+        advice.push(format!(
+            "the records determine {} combinations of the {n} unknowns wherever the parameters lie: with these inputs and \
+             outputs the model cannot be told apart; fix {}, or measure or excite something else",
+            found.generic_rank,
+            n - found.generic_rank
+        ));
+    } else if found.rank < n {
+        advice.push(format!(
+            "at the estimate the records determine {} combinations of the {n} unknowns, elsewhere all: the estimate lies \
+             where some of them lose their influence; start elsewhere",
+            found.rank
+        ));
+    }
+    for set in &found.collinear {
+        let left = set.index.map_or(0.0, f64::recip);
+        advice.extend(together(&set.moves, left, unknowns).map(|text| text + "; fix one, or excite them apart"));
+    }
+    let initial = |excited: &&Excitation| excited.name.contains("(0)");
+    for excited in &found.excitation {
+        if excited.outputs.iter().all(|(_, share)| *share == 0.0) {
+            advice.push(format!("`{}` moves no output at all: fix it", excited.name));
+        }
+    }
+    // The beginning of a record is where initial states are seen, and nothing helps that.
+    for excited in found.excitation.iter().filter(|excited| !initial(excited)) {
+        advice.extend(one_witness(excited));
+        advice.extend(one_moment(excited));
+    }
+    for i in 0..M::Input::LEN {
+        let value = |k: usize, e: usize| M::Input::into_array(records[e].inputs()[k]).as_ref()[i];
+        let first = value(0, 0);
+        let all = records.iter().enumerate();
+        if all.flat_map(|(e, r)| (0..r.len()).map(move |k| (k, e))).all(|(k, e)| value(k, e) == first) {
+            advice.push(format!(
+                "the input `{}` is {first} throughout: what it drives cannot be told from an offset; vary it",
+                M::Input::NAMES[i]
+            ));
+        }
+    }
+    advice
+}
+
+fn one_witness(excited: &Excitation) -> Option<String> {
+    let (output, share) = excited.outputs.iter().find(|(_, share)| *share > ONLY)?;
+    let others = excited.outputs.iter().filter(|(name, _)| name != output);
+    let others: Vec<String> = others.map(|(name, _)| format!("`{name}`")).collect();
+    (!others.is_empty()).then(|| {
+        format!(
+            "`{}` is seen only through `{output}` ({:.2} %): {} hardly answers to it; excite it there for a second witness",
+            excited.name,
+            100.0 * share,
+            others.join(", ")
+        )
+    })
+}
+
+fn one_moment(excited: &Excitation) -> Option<String> {
+    let segment = excited.segments.iter().find(|segment| segment.share > ONCE)?;
+    (excited.segments.len() > 1).then(|| {
+        format!(
+            "`{}` is known from one tenth of `{}` alone, from t = {} s on ({:.1} %)",
+            excited.name,
+            segment.experiment,
+            number(segment.from, 5),
+            100.0 * segment.share
+        )
+    })
+}

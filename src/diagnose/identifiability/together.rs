@@ -1,0 +1,78 @@
+//! Words for unknowns that are known only together: a common shift, a common factor, a ratio, a product.
+
+use crate::estimate::{Direction, Unknown, Warning, number};
+
+/// Moves are the same if they differ by less than this part.
+const SAME: f64 = 0.02;
+
+/// What cannot be told apart, in the words that fit the case; `None` of a single unknown, or of one that is not listed.
+///
+/// `moves` holds names and changes in the unknowns' own units; `left` is what remains of the effect when they move
+/// together, as a part of what one alone would change, zero for nothing at all.
+pub(super) fn together(moves: &[(String, f64)], left: f64, unknowns: &[Unknown]) -> Option<String> {
+    let of = |(name, by): &(String, f64)| Some((unknowns.iter().find(|u| u.name == *name)?, *by));
+    let moves: Vec<(&Unknown, f64)> = moves.iter().map(of).collect::<Option<_>>()?;
+    let (first, _) = moves.first().filter(|_| moves.len() > 1)?;
+    let names = listed(moves.iter().map(|(unknown, _)| format!("`{}`", unknown.name)).collect());
+    let relative = |(unknown, by): &(&Unknown, f64)| by / unknown.value.abs();
+    let one_unit = moves.iter().all(|(unknown, _)| unknown.unit == first.unit);
+    let not_zero = moves.iter().all(|(unknown, _)| unknown.value != 0.0);
+    let up = moves.iter().filter(|(_, by)| *by > 0.0).count();
+    let one_way = up == 0 || up == moves.len();
+    let (how, in_units) = if one_unit && same(moves.iter().map(|(_, by)| *by)) {
+        ("up to a common shift", true)
+    } else if not_zero && same(moves.iter().map(relative)) && one_way {
+        (if moves.len() == 2 { "as their ratio" } else { "up to a common factor" }, false)
+    } else if not_zero && same(moves.iter().map(relative)) && moves.len() == 2 {
+        ("as their product", false)
+    } else {
+        ("together", !not_zero)
+    };
+    let sizes: Vec<f64> = moves.iter().map(|step| if in_units { step.1 } else { relative(step) }).collect();
+    let largest = sizes.iter().fold(0.0f64, |m, by| m.max(by.abs()));
+    let part = |((unknown, _), by): (&(&Unknown, f64), &f64)| {
+        let sign = if *by < 0.0 { '−' } else { '+' };
+        let size = number(by.abs() / largest, 3);
+        let size = size.trim_end_matches('0').trim_end_matches('.');
+        let unit = if in_units { unknown.unit.as_str() } else { "%" };
+        format!("`{}` {sign}{size} {unit}", unknown.name).trim_end().to_owned()
+    };
+    let steps = listed(moves.iter().zip(&sizes).map(part).collect());
+    Some(match left > 0.0 {
+        false => format!("{names} are known only {how}: {steps} together change no prediction"),
+        true => format!(
+            "{names} are hardly known but {how}: {steps} together change the predictions by {:.2} % of what one of them alone \
+             would",
+            100.0 * left
+        ),
+    })
+}
+
+fn same(sizes: impl Iterator<Item = f64>) -> bool {
+    let (low, high) = sizes.fold((f64::INFINITY, 0.0f64), |(low, high), by| (low.min(by.abs()), high.max(by.abs())));
+    low > (1.0 - SAME) * high
+}
+
+/// `a, b and c`.
+fn listed(mut names: Vec<String>) -> String {
+    match names.pop() {
+        Some(last) if !names.is_empty() => format!("{} and {last}", names.join(", ")),
+        last => last.unwrap_or_default(),
+    }
+}
+
+/// A warning about a direction, saying what kind of direction it is; any other stays as it is.
+pub(crate) fn reworded(warning: &Warning, directions: &[Direction], unknowns: &[Unknown]) -> Warning {
+    let found = directions.iter().find_map(|direction| {
+        let advice = warning.text.strip_prefix(&direction.to_string())?;
+        Some(together(&absolute(direction, unknowns), 0.0, unknowns)? + advice)
+    });
+    Warning { severity: warning.severity, text: found.unwrap_or_else(|| warning.text.clone()) }
+}
+
+/// The changes of a direction in the unknowns' own units.
+fn absolute(direction: &Direction, unknowns: &[Unknown]) -> Vec<(String, f64)> {
+    let size = |name: &str| unknowns.iter().find(|u| u.name == name).map_or(0.0, |unknown| unknown.value.abs());
+    let scaled = |(name, by): &(String, f64)| (name.clone(), if size(name) > 0.0 { by * size(name) } else { *by });
+    direction.moves.iter().map(scaled).collect()
+}
