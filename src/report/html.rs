@@ -133,7 +133,9 @@ fn table(to: &mut Markup, caption: &str, kind: &str, table: &Table) {
             node.node("thead", &[("role", &"rowgroup")], |head| {
                 head.node("tr", &[("role", &"row")], |row| {
                     for name in table.columns {
-                        row.words("th", &[("scope", &"col"), ("role", &"columnheader")], name);
+                        let attributes: Attributes<'_> =
+                            &[("scope", &"col"), ("role", &"columnheader"), ("data-name", name)];
+                        row.words("th", attributes, name);
                     }
                 });
             });

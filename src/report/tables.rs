@@ -88,7 +88,7 @@ pub(super) fn excitation(report: &Report) -> Table {
 pub(super) fn profiles(report: &Report) -> Table {
     let rows = report.profiles.iter().map(|profile| {
         let Profile { name, unit, value, probability, .. } = profile;
-        let probability = format!("{} %", number(100.0 * probability, 3));
+        let probability = format!("{} %", (1e4 * probability).round() / 100.0);
         row([name, &number(*value, 6), unit, &probability, &ends(profile)])
     });
     Table { columns: &["profile of", "estimate", "unit", "probability", "interval"], rows: rows.collect() }

@@ -36,7 +36,7 @@ pub(super) fn page(report: &Report, color: bool) -> String {
             }
         }
     }
-    page.section("what the data tell apart", [words::rank(report)]);
+    page.section("\nwhat the data tell apart", [words::rank(report)]);
     page.items(report.identifiability.advice.iter());
     page.items(words::correlated(report).iter().map(|pair| format!("strongly correlated: {pair}")));
     page.line("");

@@ -39,7 +39,7 @@ pub(super) fn search(report: &Report) -> String {
 /// A record in one line.
 pub(super) fn extent(record: &Record) -> String {
     let Record { samples, begin, end, sample_time, gaps, .. } = record;
-    let (begin, end, step) = (number(*begin, 7), number(*end, 7), number(*sample_time, 5));
+    let (begin, end, step) = (number(*begin, 7), number(*end, 7), number(*sample_time, 4));
     let gaps = match gaps {
         0 => "no gap".to_owned(),
         1 => "1 gap in time".to_owned(),
@@ -72,8 +72,12 @@ pub(super) fn rank(report: &Report) -> String {
     let n = found.unknowns.len();
     let condition = found.condition.map_or("beyond rounding".to_owned(), |condition| number(condition, 3));
     match found.rank as usize == n {
-        true => format!("The records tell all {n} unknowns apart; condition number of the scaled problem {condition}."),
-        false => format!("The records determine {} combinations of the {n} unknowns.", found.rank),
+        true => format!(
+            "The records tell all {n} unknowns apart (condition number of the scaled sensitivities {condition})."
+        ),
+        false => {
+            format!("The records do not tell all unknowns apart: the sensitivities have rank {} of {n}.", found.rank)
+        }
     }
 }
 

@@ -21,15 +21,15 @@ pub(super) fn advice<M: Model>(
     let n = unknowns.len() as u64;
     if found.generic_rank < n {
         advice.push(format!(
-            "the records determine {} combinations of the {n} unknowns wherever the parameters lie: with these inputs and \
-             outputs the model cannot be told apart; fix {}, or measure or excite something else",
+            "wherever the parameters lie, the sensitivities to the {n} unknowns have rank {}: with these inputs and outputs no \
+             record tells all of them apart; fix {}, or measure or excite something else",
             found.generic_rank,
             n - found.generic_rank
         ));
     } else if found.rank < n {
         advice.push(format!(
-            "at the estimate the records determine {} combinations of the {n} unknowns, elsewhere all: the estimate lies \
-             where some of them lose their influence; start elsewhere",
+            "at the estimate the sensitivities to the {n} unknowns have rank {}, elsewhere full rank: the estimate lies where \
+             some of them lose their influence; start elsewhere",
             found.rank
         ));
     }

@@ -3,7 +3,7 @@
 use super::super::Report;
 use super::super::chart::{Axis, Cell, Curves, Forest, ForestRow, Heat, Layer};
 use super::{Drawing, PANEL, Plot, file_name, plot};
-use crate::diagnose::Profile;
+use crate::diagnose::{Profile, ProfilePoint};
 use crate::estimate::{Knowledge, Unknown};
 
 /// Estimates with their intervals.
@@ -78,15 +78,27 @@ pub(in crate::report) fn excitation(report: &Report) -> Option<Plot<'_>> {
     Some(plot("excitation", title, Drawing::Heat(heat)))
 }
 
+/// A profile is drawn in so many parts between two points.
+const PARTS: u32 = 8;
+
 /// How the fit worsens away from an estimate, the others refitted.
 pub(in crate::report) fn profile(profile: &Profile) -> Plot<'_> {
     // Far above the threshold a curve says nothing more.
-    let highest = 3.0 * profile.threshold;
-    let shown = || profile.points.iter().filter(|point| point.rise <= highest).map(|point| point.value);
-    let range = shown().reduce(f64::min).zip(shown().reduce(f64::max));
+    let shown = profile.points.iter().filter(|point| point.rise <= 3.0 * profile.threshold);
+    // Between points the signed root of the rise is next to straight.
+    let root = |point: &ProfilePoint| (point.value, point.rise.sqrt().copysign(point.value - profile.value));
+    let roots: Vec<(f64, f64)> = shown.map(root).collect();
+    let between = |pair: &[(f64, f64)]| {
+        let ((a, low), (b, high)) = (pair[0], pair[1]);
+        (0..=PARTS).map(f64::from).map(move |i| i / f64::from(PARTS)).map(move |part| {
+            let root = low + part * (high - low);
+            (a + part * (b - a), root * root)
+        })
+    };
+    let points: Vec<(f64, f64)> = roots.windows(2).flat_map(between).collect();
+    let range = points.first().zip(points.last()).map(|(first, last)| (first.0, last.0));
+    let tallest = points.iter().map(|(_, rise)| *rise).fold(profile.threshold, f64::max);
     let title = format!("Profile of {}: rise of the deviance as it is moved, the others refitted", profile.name);
-    let points = profile.points.iter().map(|point| (point.value, point.rise)).collect();
-    let tallest = profile.points.iter().map(|point| point.rise).fold(profile.threshold, f64::max).min(highest);
     let drawing = Drawing::Curves(Curves {
         x: Axis::new(&profile.name, &profile.unit, range).with_room(),
         y: Axis::new("rise of -2 ln L", "", Some((0.0, 1.05 * tallest))),
