@@ -2,7 +2,7 @@
 // dark, it must pass axe without a violation, fit the width, log no error and ask for nothing from elsewhere; the zoom must
 // move the drawings. With a folder, a picture of each is kept there to be looked at.
 //
-// Needs Debian's `chromium` and, beside this file, `npm install playwright-core axe-core`.
+// `run.sh` calls it where a browser and node are there, and fetches the packages of package.json beside this file.
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { resolve } from "node:path";
@@ -28,6 +28,8 @@ for (const width of [375, 1440]) {
     const scrolled = await page.evaluate(() => document.documentElement.scrollWidth);
     if (scrolled > width) trouble(`is ${scrolled} px wide`);
     if (folder) await page.screenshot({ path: `${folder}/${width}-${colorScheme}.png`, fullPage: true });
+    // What can be opened is checked open.
+    await page.evaluate(() => document.querySelectorAll("details").forEach((details) => (details.open = true)));
     await page.evaluate(axe);
     const { violations } = await page.evaluate(() => window.axe.run());
     for (const { id, nodes } of violations) trouble(`${id}: ${nodes.map((node) => node.target).join(", ")}`);

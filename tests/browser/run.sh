@@ -1,0 +1,16 @@
+#!/usr/bin/env bash
+# Checks reports in a headless browser, light and dark, at 375 and 1440 pixels: run.sh REPORT.html...
+# Where there is no browser, no node, or no way to their packages, it says that nothing was checked, and passes.
+set -euo pipefail
+here=$(cd "$(dirname "$0")" && pwd)
+skip() { echo "the browser check was not run: $1"; exit 0; }
+export CHROMIUM=${CHROMIUM:-$(command -v chromium || true)}
+[ -n "$CHROMIUM" ] || skip 'there is no chromium (Debian: apt-get install chromium)'
+command -v node > /dev/null || skip 'there is no node'
+if [ ! -d "$here/node_modules/axe-core" ] || [ ! -d "$here/node_modules/playwright-core" ]; then
+  command -v npm > /dev/null || skip 'there is no npm to fetch axe-core and playwright-core with'
+  npm ci --silent --no-audit --no-fund --prefix "$here" || skip 'npm could not fetch axe-core and playwright-core'
+fi
+for report in "$@"; do
+  timeout 300 node "$here/check.mjs" "$report"
+done
