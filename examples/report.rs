@@ -5,6 +5,7 @@
 
 use clap::Parser;
 use greybox::diagnose::profile;
+use greybox::models::{Guided, GuidedMotion as Motion, Reference};
 use greybox::pmsm::{Surface, Winding};
 use greybox::{CsvFile, ExperimentOf, Fit, Hold, Model, Of, Parameter, Report, Scalar, fixed, free, signals};
 use std::{error::Error, fs::File, io::BufRead, io::BufReader, io::IsTerminal, path::PathBuf};
@@ -16,17 +17,12 @@ struct Arguments {
     /// Where the report goes.
     #[arg(long)]
     out: PathBuf,
-    /// Whether to make likelihood profiles, which take many fits.
+    /// Adds likelihood profiles, which take many fits.
     #[arg(long)]
     profiles: bool,
 }
 
-signals! {
-    pub struct Motion { q: "m", v: "m/s", vm: "m/s" }
-    pub struct Reference { qg: "m" }
-    pub struct Guided { qm: "m", vir: "V" }
-    pub struct Friction { m: "kg", fv: "N s/m", fcp: "N", fcn: "N", offset: "N" }
-}
+signals! { pub struct Friction { m: "kg", fv: "N s/m", fcp: "N", fcn: "N", offset: "N" } }
 
 /// The electro-mechanical positioning system of A. Janot, M. Gautier, M. Brunot, *Data set and reference models of EMPS*,
 /// 2019, in closed loop; dry friction is `fcp` forwards and `fcn` backwards.
@@ -75,7 +71,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         let record = file.column("w", "omega_m").read(&motor)?;
         report(&motor, &record, Winding { rs: free(1.0), ls: free(0.01), ke: free(1.0) }, arguments.profiles)?
     } else if has("qg") {
-        // It starts at rest.
         let rest = Motion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) };
         let record = file.read(&Axis)?.hold(Hold::First).initial(rest);
         let friction = Friction { m: free(50.0), fv: free(100.0), fcp: free(10.0), fcn: free(10.0), offset: free(0.0) };

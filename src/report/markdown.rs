@@ -84,6 +84,10 @@ fn sentence(text: &str) -> String {
 }
 
 fn code(text: &str) -> String {
+    // Not every reader of Markdown keeps markup out of code.
+    if text.contains('<') {
+        return escaped(text);
+    }
     let text: String = text.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect();
     format!("`{text}`")
 }

@@ -86,7 +86,7 @@ pub(super) fn reasons(report: &Report) -> Vec<(Severity, String)> {
     let mut reasons: Vec<_> = report.warnings.iter().map(|warning| (warning.severity, warning.text.clone())).collect();
     reasons.extend(failed(report));
     for finding in report.findings.iter().filter(|finding| !finding.test.passed) {
-        let text = format!("{}, {}: {}", finding.about, finding.test.name, finding.test.meaning);
+        let text = format!("{}, {}: {}", quoted(&finding.about), finding.test.name, finding.test.meaning);
         reasons.push((Severity::UsableWithCare, text));
     }
     let remarks = report.profiles.iter().map(|profile| (profile.severity, profile.remark.clone()));
@@ -101,9 +101,14 @@ fn tests(report: &Report) -> impl Iterator<Item = (String, &Test)> {
     let one = report.records.len() == 1;
     let fits = report.records.iter().flat_map(|record| record.fits.iter().map(move |fit| (record, fit)));
     fits.flat_map(move |(record, fit)| {
-        let of = if one { format!("`{}`", fit.name) } else { format!("`{}` of `{}`", fit.name, record.name) };
+        let of = if one { format!("`{}`", fit.name) } else { format!("`{}` of {}", fit.name, quoted(&record.name)) };
         fit.residuals.tests.iter().map(move |test| (of.clone(), test))
     })
+}
+
+/// What someone called something, as a name.
+fn quoted(name: &str) -> String {
+    format!("`{}`", name.replace('`', "'"))
 }
 
 /// How many tests of the residuals fail, what the clearest of them means, and what that makes of the estimate: of many

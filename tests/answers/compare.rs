@@ -1,5 +1,6 @@
 //! Comparison, validation, drift and derived quantities against values known beforehand.
 
+use crate::random::Random;
 use greybox::diagnose::{Comparison, Summary, cross_validate, derived, drift, f_test, likelihood_ratio, validate};
 use greybox::{Error, Estimate, Experiment, Fit, Kind, Model, Nothing, Parameter, Scalar, Time, fixed, free, signals};
 
@@ -24,21 +25,6 @@ impl Model for Polynomial {
 }
 
 type Record = Experiment<Nothing, Input, Output>;
-
-struct Random(u64);
-
-impl Random {
-    fn normal(&mut self) -> f64 {
-        let mut uniform = || {
-            self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut z = self.0;
-            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-        };
-        (-2.0 * (1.0 - uniform()).ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()
-    }
-}
 
 fn record(seed: u64, b: f64, c: f64) -> Record {
     let mut random = Random(seed.wrapping_mul(0x2545_f491_4f6c_dd1d));
@@ -121,4 +107,61 @@ fn unseen_data_and_drift() {
     let warming = drift(&each(20, &|day| 2.0 + 0.05 * day as f64));
     let b = warming.iter().find(|drift| drift.name == "b").unwrap();
     assert!(!b.trend.passed && !b.change.passed && (b.slope - 0.05).abs() < 0.02, "{b:?}");
+}
+
+signals! { struct Level { x: "V" } }
+signals! { struct Lag { k: "1", tau: "s" } }
+
+/// `tau dx/dt = k u - x`.
+struct FirstOrder;
+
+impl Model for FirstOrder {
+    type State = Level;
+    type Input = Input;
+    type Output = Level;
+    type Parameters = Lag;
+
+    #[inline]
+    fn derivative<S: Scalar>(&self, _t: f64, x: &Level<S>, u: &Input<S>, p: &Lag<S>) -> Level<S> {
+        Level { x: (p.k * u.u - x.x) / p.tau }
+    }
+
+    #[inline]
+    fn output<S: Scalar>(&self, _t: f64, x: &Level<S>, _u: &Input<S>, _p: &Lag<S>) -> Level<S> {
+        *x
+    }
+}
+
+/// Predicted n samples ahead of a state measured with noise of deviation s, the error has the variance
+/// `s^2 (1 + a^(2n))`, `a = exp(-step / tau)`: the new noise, and what is left of the old. Simulated, it has `s^2`.
+#[test]
+fn prediction_ahead_by_hand() {
+    let (step, tau, samples, sigma) = (0.01, 0.05, 20_000, 0.1);
+    let a = f64::exp(-step / tau);
+    let record = |seed: u64| {
+        let mut random = Random(seed);
+        let inputs: Vec<Input> = (0..samples).map(|k| Input { u: if k / 90 % 2 == 0 { 1.0 } else { -1.0 } }).collect();
+        let mut x = 0.0;
+        let outputs = inputs.iter().map(|u| {
+            let y = Level { x: x + sigma * random.normal() };
+            x = 2.0 * u.u + (x - 2.0 * u.u) * a;
+            y
+        });
+        let outputs = outputs.collect();
+        Experiment::new(&FirstOrder, Time::Uniform { start: 0.0, step }, inputs, outputs).unwrap()
+    };
+    let parameters = Lag { k: free(1.0), tau: free(0.1).log() };
+    let estimate = Fit::new(&FirstOrder, &record(1)).parameters(parameters).run().unwrap();
+    let found = validate(&estimate, &FirstOrder, &record(2), &[1, 5, 50]).unwrap();
+    let steps: Vec<Option<u64>> = found.qualities.iter().map(|(steps, _)| *steps).collect();
+    assert_eq!(steps, [None, Some(1), Some(5), Some(50)]);
+    for (steps, outputs) in &found.qualities {
+        let left = steps.map_or(0.0, |n| a.powi(2 * n as i32));
+        let expected = sigma * f64::sqrt(1.0 + left);
+        let (_, quality) = &outputs[0];
+        // Four deviations of a standard deviation from 20,000 samples (neighbors correlated by a^n), and the parameters' own.
+        assert!((quality.rmse / expected - 1.0).abs() < 0.025, "{steps:?}: {} {expected}", quality.rmse);
+    }
+    let refused = validate(&estimate, &FirstOrder, &record(2), &[samples]).unwrap_err().to_string();
+    assert!(refused.contains("20000 sample(s) ahead makes no sense"), "{refused}");
 }

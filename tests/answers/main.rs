@@ -2,6 +2,8 @@
 
 mod compare;
 mod identifiability;
+#[path = "../common/random.rs"]
+mod random;
 mod reports;
 mod residuals;
 #[path = "../common/shared.rs"]

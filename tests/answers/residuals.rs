@@ -1,7 +1,8 @@
 //! What the examination of residuals says, on records whose trouble is known.
 
+use crate::random::Random;
 use greybox::diagnose::residuals::{Residuals, examine};
-use greybox::{Experiment, Fit, Hold, Model, Nothing, Scalar, Time, fixed, signals};
+use greybox::{Error, Experiment, Fit, Hold, Model, Nothing, Scalar, Time, fixed, signals};
 use std::f64::consts::TAU;
 
 signals! { struct Drive { u: "V", w: "rad/s" } }
@@ -21,22 +22,6 @@ impl Model for Amplifier {
     #[inline]
     fn output<S: Scalar>(&self, _t: f64, _x: &Nothing, u: &Drive<S>, p: &Gain<S>) -> Reading<S> {
         Reading { y: p.k * u.u }
-    }
-}
-
-struct Random(u64);
-
-impl Random {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        (-2.0 * (1.0 - self.uniform()).ln()).sqrt() * (TAU * self.uniform()).cos()
     }
 }
 
@@ -156,4 +141,21 @@ fn little_is_said_of_little() {
     let residuals = examine(&prediction, &record).unwrap().remove(0);
     assert_eq!(residuals.constant_inputs, ["u", "w"]);
     assert!(residuals.correlations.iter().all(|c| c.signal == "y"));
+}
+
+/// A prediction that is infinite is refused with its place; one that is missing is left out.
+#[test]
+fn an_infinite_prediction_is_refused() {
+    let inputs: Vec<Drive> = (0..60).map(|k| Drive { u: (0.3 * k as f64).sin(), w: 0.1 * k as f64 }).collect();
+    let outputs = inputs.iter().enumerate().map(|(k, u)| Reading { y: 2.0 * u.u + ((k * k) as f64).sin() }).collect();
+    let record = Experiment::new(&Amplifier, Time::Uniform { start: 0.0, step: STEP }, inputs, outputs).unwrap();
+    let mut prediction = Fit::new(&Amplifier, &record).parameters(Gain { k: fixed(2.0) }).simulate().unwrap();
+    prediction.residuals[7].y = f64::NAN;
+    assert_eq!(examine(&prediction, &record).unwrap()[0].samples, 59);
+    prediction.residuals[8].y = f64::NEG_INFINITY;
+    let error = examine(&prediction, &record).unwrap_err();
+    let named = matches!(&error, Error::NotFinite { sample: 8, signal, .. } if signal == "residual of y");
+    assert!(named && error.to_string().contains("0.08"), "{error}");
+    prediction.residuals.pop();
+    assert!(matches!(examine(&prediction, &record), Err(Error::Lengths { found: 59, expected: 60, .. })));
 }

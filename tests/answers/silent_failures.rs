@@ -2,7 +2,7 @@
 
 use greybox::diagnose::restarts;
 use greybox::optimize::Severity;
-use greybox::{Error, Experiment, Fit, Knowledge, Model, Scalar, Time, fixed, free, signals};
+use greybox::{Error, Experiment, Fit, Kind, Knowledge, Model, Nothing, Report, Scalar, Time, fixed, free, signals};
 
 signals! { struct Level { x: "V" } }
 signals! { struct Drive { u: "V" } }
@@ -99,6 +99,66 @@ fn no_success_on_what_is_not_a_number() {
     let parameters = Lag { k: free(1.0), tau: fixed(-1e-3) };
     let error = Fit::new(&FirstOrder, &record(0..0)).parameters(parameters).run().unwrap_err();
     assert!(matches!(&error, Error::Start(failure) if failure.signal.contains('x') && failure.time > 0.0), "{error}");
+}
+
+signals! { struct Amplified { g: "1", b: "V", c: "V", idle: "1" } }
+
+/// `y = g u + b + c + 0 idle`.
+struct Offsets;
+
+impl Model for Offsets {
+    type State = Nothing;
+    type Input = Drive;
+    type Output = Level;
+    type Parameters = Amplified;
+    const KIND: Kind = Kind::Static;
+
+    #[inline]
+    fn output<S: Scalar>(&self, _t: f64, _x: &Nothing, u: &Drive<S>, p: &Amplified<S>) -> Level<S> {
+        Level { x: p.g * u.u + p.b + p.c + p.idle * 0.0 }
+    }
+}
+
+fn amplified() -> Experiment<Nothing, Drive, Level> {
+    let inputs: Vec<Drive> = (0..400).map(|k| Drive { u: 1.0 + (k as f64 * 0.37).sin() }).collect();
+    let noise = |k: usize| 0.1 * ((k as f64 * 0.754_877_666_246_693).fract() - 0.5);
+    let outputs = inputs.iter().enumerate().map(|(k, u)| Level { x: 3.0 * u.u + 1.0 + noise(k) }).collect();
+    Experiment::new(&Offsets, Time::Uniform { start: 0.0, step: 0.1 }, inputs, outputs).unwrap()
+}
+
+/// A search may converge although an unknown moves nothing; the report does not lead with a mere "usable".
+#[test]
+fn an_unknown_without_influence_is_named() {
+    let record = amplified();
+    let parameters = Amplified { g: free(1.0), b: free(0.0), c: fixed(0.0), idle: free(2.0) };
+    let mut problem = Fit::new(&Offsets, &record).parameters(parameters).problem().unwrap();
+    let estimate = problem.run().unwrap();
+    assert!(estimate.outcome.converged());
+    assert_eq!(estimate.knowledge.idle, Knowledge::Unidentified);
+    let report = Report::new(&problem, &estimate).unwrap();
+    assert!(report.severity >= Severity::UsableWithCare);
+    let text = report.to_string();
+    assert!(text.contains("The data do not determine 1 of the 3 unknowns."), "{text}");
+    assert!(text.contains("`idle` has no influence") && text.contains("`idle` moves no output at all"), "{text}");
+}
+
+/// What only a sum is known of does not make the rest look better known than it is: the gain has the standard error that it
+/// has with one of the two offsets fixed, and not the smaller one of both fixed.
+#[test]
+fn what_is_known_together_still_counts() {
+    let record = amplified();
+    let error = |b, c| {
+        let parameters = Amplified { g: free(1.0), b, c, idle: fixed(0.0) };
+        let estimate = Fit::new(&Offsets, &record).parameters(parameters).run().unwrap();
+        (estimate.knowledge.g.standard_error().unwrap(), estimate.knowledge.b)
+    };
+    let (both, b) = error(free(0.4), free(0.3));
+    assert_eq!(b, Knowledge::Unidentified);
+    let (one, _) = error(free(0.4), fixed(0.3));
+    let (neither, _) = error(fixed(0.5), fixed(0.5));
+    // The same degrees of freedom and the same minimum: equal to rounding.
+    assert!((both / one - 1.0).abs() < 1e-6, "{both} {one}");
+    assert!(neither < 0.7 * one, "{neither} {one}");
 }
 
 #[cfg(not(debug_assertions))]

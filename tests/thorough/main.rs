@@ -2,12 +2,17 @@
 //! (`cargo test --release --test thorough`); others say so and pass.
 
 #[cfg(not(debug_assertions))]
+mod colored;
+#[cfg(not(debug_assertions))]
 #[path = "../common/mod.rs"]
 mod common;
 #[cfg(not(debug_assertions))]
 mod intervals;
 #[cfg(not(debug_assertions))]
 mod monte_carlo;
+#[cfg(not(debug_assertions))]
+#[path = "../common/random.rs"]
+mod random;
 
 #[cfg(debug_assertions)]
 #[test]
