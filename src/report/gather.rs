@@ -146,10 +146,8 @@ fn output_fit<M: Model>(
     let measured = column::<M::Output>(record.outputs(), j);
     let predicted = column::<M::Output>(&prediction.outputs, j);
     let residuals = column::<M::Output>(&prediction.residuals, j);
-    let width = |of: fn(&Widths<M>) -> &[Of<M::Output, f64>]| {
-        widths.map_or(vec![], |widths| column::<M::Output>(of(widths), j))
-    };
-    let (confidence, prediction_width) = (width(|widths| &widths.confidence), width(|widths| &widths.prediction));
+    let confidence = widths.map_or(vec![], |widths| column::<M::Output>(&widths.confidence, j));
+    let prediction_width = widths.map_or(vec![], |widths| column::<M::Output>(&widths.prediction, j));
     let rows = Rows {
         t: &prediction.t,
         measured: &measured,
