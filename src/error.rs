@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 /// A call that could not be served, with the thing, the number and the remedy.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A record without a sample, or with too few for what was asked.
@@ -215,6 +215,13 @@ pub enum Error {
     /// An optimizer that gave up with an error of its own.
     #[error("optimizer: {0}")]
     Optimizer(String),
+}
+
+/// The same sentence: it is what a `main` that returns the error shows.
+impl core::fmt::Debug for Error {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        core::fmt::Display::fmt(self, f)
+    }
 }
 
 /// Where and how a simulation failed.

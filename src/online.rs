@@ -119,7 +119,7 @@ pub enum Divergence {
 }
 
 /// An observer that cannot be made as asked.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ObserverError {
     /// A quantity that must be positive and finite.
@@ -195,6 +195,13 @@ pub enum ObserverError {
         /// Spectral radius of the linearized error system.
         radius: f64,
     },
+}
+
+/// The same sentence: it is what a `main` that returns the error shows.
+impl core::fmt::Debug for ObserverError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        core::fmt::Display::fmt(self, f)
+    }
 }
 
 /// A number by four significant digits.

@@ -165,7 +165,7 @@ impl From<PolePairs> for u32 {
 }
 
 /// Why a motor, a drive or a temperature was refused.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Serialize, thiserror::Error)]
 pub enum Error {
     /// A motor needs at least one pole pair.
     #[error("a motor has at least one pole pair; got 0 (count magnet poles, divide by 2)")]
@@ -182,6 +182,13 @@ pub enum Error {
         /// What it must be, in words.
         must: &'static str,
     },
+}
+
+/// The same sentence: it is what a `main` that returns the error shows.
+impl core::fmt::Debug for Error {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        core::fmt::Display::fmt(self, f)
+    }
 }
 
 impl Error {

@@ -5,7 +5,7 @@ use crate::signals::Signals;
 use core::fmt;
 
 /// Why there is no solution.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RegressionError {
     /// A row with an entry that is not a finite number.
@@ -49,6 +49,13 @@ pub enum RegressionError {
     /// Numbers beyond the range of floating point.
     #[error("a parameter or its variance is beyond the range of floating point; scale its regressor, nearer to y")]
     OutOfRange,
+}
+
+/// The same sentence: it is what a `main` that returns the error shows.
+impl core::fmt::Debug for RegressionError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        core::fmt::Display::fmt(self, f)
+    }
 }
 
 /// A change of parameters that no row notices.
