@@ -28,7 +28,7 @@
 //! | [`robot`] | the axes of the reference robot | temperature |
 //! | [`Plant`] | a motor and its load as they really are | inverter, robot |
 //! | [`Bridge`] | an inverter that switches, with the plant behind it | plant |
-//! | `program`, `drive` | motion programs; the whole drive in simulation (with `std`) | all of these |
+//! | `program`, `drive` | motion programs; the whole drive in simulation, and its log (with `std`) | all of these |
 //! | `adaptive` | a drive that uses its observer (with `std`) | control, `Machine` |
 //! | `offline` | least squares on a record (with `std`) | drive |
 //! | [`Machine`] | currents, speed and angle together | `Salient`, `Shaft` |

@@ -4,15 +4,15 @@
 #[allow(dead_code, reason = "shared with the experiments, which also draw")]
 mod report;
 
-use greybox::online::{Ekf, EkfStart, Law, Mras, MrasStart, Order, Stepping, Watch};
+use greybox::online::{Ekf, EkfStart, Law, MrasStart, Order, Stepping, Watch};
 use greybox::pmsm::drive::Simulation;
 use greybox::pmsm::inverter::Carrier;
 use greybox::pmsm::offline::{Axes, Extended, Form, Spans, extended, plain, search_i0};
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::{Axis, TS, V_DC};
 use greybox::pmsm::{
-    AngledDrive, Currents, DeadZone, Drive, ExactFed, ExactStep, ExactSurface, FedWinding, HeldIn, Injection,
-    KeLyapunov, MotorLaw, Normalized, Resting, Winding, dead_time,
+    AngledDrive, Currents, DeadZone, ExactFed, ExactStep, ExactSurface, FedWinding, HeldIn, Injection, KeLyapunov,
+    MotorLaw, Normalized, Resting, Winding,
 };
 use greybox::{Butterworth, Hold, LinearEstimate, fixed, free, hampel};
 use report::Report;
@@ -51,13 +51,13 @@ fn mras<L: Law<ExactSurface>>(axis: &Axis, spans: &Spans, (rs, ls): (f64, f64), 
         stepping: Stepping::Split,
         watch: Watch { limit: Currents { id: 1e3, iq: 1e3 }, patience: 1000 },
     };
-    let mut observer = Mras::new(ExactSurface(ExactStep::new(4, TS, HeldIn::Stationary)?), law, TS, start)?;
+    let step = ExactStep::new(4, TS, HeldIn::Stationary)?;
+    let mut observer = ExactSurface(step).mras(law, start)?;
     Ok(rms(
         axis,
         spans.spans.iter().enumerate().map(|(k, span)| {
-            let lost = dead_time(&span.i0, 0.15, axis.pole_pairs.electrical(span.theta));
-            let u = Drive { ud: span.ud - vdt * lost.0, uq: span.uq - vdt * lost.1, w: span.w };
-            observer.update(k as f64 * TS, &u, &span.i0);
+            let u = AngledDrive { ud: span.ud, uq: span.uq, w: span.w, theta: span.theta };
+            observer.update(k as f64 * TS, &step.less_dead_time(&span.i0, &u, vdt, 0.15), &span.i0);
             observer.parameters().ke
         }),
     ))

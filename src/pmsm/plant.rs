@@ -2,6 +2,7 @@ use super::frames::{Stator, rotate_into, rotate_out_of};
 use super::inverter::DeadTime;
 use super::robot::Axis;
 use super::{COULOMB_WIDTH, Motion, SQRT_2_3, SQRT_3_2};
+use crate::integrate::axpy;
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
@@ -62,15 +63,9 @@ impl Plant {
     #[inline]
     pub fn advance(&self, mut x: Motion, u: Stator, ts: f64, substeps: u32) -> Motion {
         let h = ts / substeps as f64;
-        let moved = |x: &Motion, k: &Motion, h: f64| Motion {
-            id: x.id + h * k.id,
-            iq: x.iq + h * k.iq,
-            w: x.w + h * k.w,
-            theta: x.theta + h * k.theta,
-        };
         for _ in 0..substeps {
-            let middle = moved(&x, &self.derivative(&x, u), 0.5 * h);
-            x = moved(&x, &self.derivative(&middle, u), h);
+            let middle = axpy::<Motion, f64>(x, 0.5 * h, self.derivative(&x, u));
+            x = axpy::<Motion, f64>(x, h, self.derivative(&middle, u));
         }
         x
     }

@@ -24,6 +24,7 @@ fn records() -> Vec<(&'static str, Spans)> {
 
 fn assert_within(name: &str, found: Winding, most: f64) {
     let errors = [found.rs / TRUTH.rs, found.ls / TRUTH.ls, found.ke / TRUTH.ke].map(|ratio| 100.0 * (ratio - 1.0));
+    println!("{name}: R, L, Ke off by {errors:.4?} %, limit {most} %");
     assert!(errors.iter().all(|e| e.abs() < most), "{name}: R, L, Ke are off by {errors:?} %");
 }
 
