@@ -6,6 +6,7 @@ mod bands;
 mod bootstrap;
 mod compare;
 mod derived;
+mod drift;
 mod identifiability;
 mod profile;
 pub mod residuals;
@@ -15,9 +16,10 @@ pub use bands::{Bands, bands};
 pub(crate) use bands::{Widths, widths};
 pub use bootstrap::{Bootstrap, Resampling, bootstrap};
 pub use compare::{
-    Comparison, Drift, NamedQualities, Summary, Validation, cross_validate, drift, f_test, likelihood_ratio, validate,
+    Comparison, NamedQualities, Summary, Validation, cross_validate, f_test, likelihood_ratio, validate,
 };
 pub use derived::{Derived, derived};
+pub use drift::{Drift, drift};
 pub(crate) use identifiability::reworded;
 pub use identifiability::{COLLINEAR, Collinear, Excitation, Identifiability, Segment, identifiability};
 pub use profile::{End, Profile, ProfilePoint, profile};

@@ -34,6 +34,7 @@
 
 mod chart;
 mod file;
+mod format;
 mod gather;
 mod histogram;
 mod html;
@@ -46,6 +47,7 @@ mod text;
 mod trace;
 mod words;
 
+pub use format::Format;
 pub use histogram::Histogram;
 pub use plots::Plot;
 pub use sections::Finding;
@@ -234,29 +236,6 @@ pub struct Figures {
     pub evaluations: u64,
     /// Time taken (s).
     pub seconds: f64,
-}
-
-/// The name of the schema; a file of another one is refused by name.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "String", into = "&'static str")]
-pub struct Format;
-
-const FORMAT: &str = "greybox report 2";
-
-impl From<Format> for &'static str {
-    fn from(_: Format) -> Self {
-        FORMAT
-    }
-}
-
-impl TryFrom<String> for Format {
-    type Error = String;
-    fn try_from(found: String) -> Result<Self, String> {
-        match found == FORMAT {
-            true => Ok(Format),
-            false => Err(format!("the format is \"{found}\", but this version of the library reads \"{FORMAT}\"")),
-        }
-    }
 }
 
 impl Report {

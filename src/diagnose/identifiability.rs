@@ -101,7 +101,12 @@ pub fn identifiability<M: Model, I: Integrator<M>, P: Predictor<M>, O>(
     let names: Vec<String> = objective.names();
     let slopes: Vec<f64> = estimate.unknowns.iter().map(|u| u.transform.slope(u.value)).collect();
     let (rank, condition) = spectrum(&whole);
-    let generic_rank = generic(&objective, &best, estimate.unknowns.iter().map(|u| u.transform)).max(rank);
+    // Full rank at one point is full rank.
+    let generic_rank = if rank == best.len() {
+        rank
+    } else {
+        generic(&objective, &best, estimate.unknowns.iter().map(|u| u.transform)).max(rank)
+    };
     let collinear = collinear::collinear(&whole, &norms, &names, &slopes);
     let mut excitation = excitation::excitation(&objective, &best)?;
     for ((excited, norm), unknown) in excitation.iter_mut().zip(&norms).zip(&estimate.unknowns) {

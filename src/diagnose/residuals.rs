@@ -20,7 +20,8 @@ use crate::estimate::Prediction;
 use crate::experiment::ExperimentOf;
 use crate::model::Model;
 use crate::signals::{Of, Signals};
-use crate::whiteness::{Autocorrelation, ljung_box};
+use crate::whiteness::ljung_box;
+use core::cell::OnceCell;
 use serde::{Deserialize, Serialize};
 
 /// Lags of correlations: up to 25, and never more than a quarter of the samples.
@@ -146,6 +147,8 @@ struct Series {
     mean: f64,
     /// Standard deviation (`n` in the denominator); zero for a constant.
     deviation: f64,
+    /// Made when first asked for.
+    autocorrelation: OnceCell<Vec<f64>>,
 }
 
 impl Series {
@@ -162,7 +165,17 @@ impl Series {
         let mean = first + raw.iter().filter(|v| v.is_finite()).map(|v| v - first).sum::<f64>() / n;
         let values: Vec<f64> = raw.iter().map(|v| if v.is_finite() { v - mean } else { 0.0 }).collect();
         let deviation = if highest > lowest { (values.iter().map(|v| v * v).sum::<f64>() / n).sqrt() } else { 0.0 };
-        Series { role, name, unit, values, missing, count: count as u64, mean, deviation }
+        Series {
+            role,
+            name,
+            unit,
+            values,
+            missing,
+            count: count as u64,
+            mean,
+            deviation,
+            autocorrelation: OnceCell::new(),
+        }
     }
 
     fn is_missing(&self, k: usize) -> bool {
@@ -173,10 +186,13 @@ impl Series {
         LAGS.min(self.count as usize / 4)
     }
 
-    fn autocorrelation(&self) -> Vec<f64> {
-        let mut sums = Autocorrelation::new(self.lags());
-        sums.add(&self.values, self.count);
-        sums.coefficients()
+    /// At lag 1, 2, ...; zeros for a constant.
+    fn autocorrelation(&self) -> &[f64] {
+        self.autocorrelation.get_or_init(|| {
+            let sums = correlation::lagged(&self.values, &self.values, self.lags());
+            let whole = if sums[0] > 0.0 { sums[0] } else { f64::INFINITY };
+            sums[1..].iter().map(|sum| sum / whole).collect()
+        })
     }
 
     /// The residuals' own story.
@@ -188,7 +204,7 @@ impl Series {
         predicted: &[Series],
         time: &Series,
     ) -> Residuals {
-        let autocorrelation = self.autocorrelation();
+        let autocorrelation = self.autocorrelation().to_vec();
         let correlated: f64 = autocorrelation.iter().take_while(|rho| **rho > 0.0).sum();
         let effective = self.count as f64 / (1.0 + 2.0 * correlated);
         let constant = inputs.iter().filter(|u| u.deviation == 0.0).map(|u| u.name.to_owned()).collect();

@@ -23,6 +23,21 @@ pub struct Correlation {
     pub band: f64,
 }
 
+/// Sum of `a[t] b[t - k]` for `k = 0..=lags`, in pieces that stay close to the processor for all lags.
+pub(super) fn lagged(a: &[f64], b: &[f64], lags: usize) -> Vec<f64> {
+    const PIECE: usize = 1024;
+    let n = a.len().min(b.len());
+    let mut sums = vec![0.0; lags + 1];
+    for begin in (0..n).step_by(PIECE) {
+        let end = (begin + PIECE).min(n);
+        for (k, sum) in sums.iter_mut().enumerate() {
+            let first = begin.max(k).min(end);
+            *sum += dot(&a[first..end], &b[first.saturating_sub(k)..]);
+        }
+    }
+    sums
+}
+
 pub(super) fn between(residuals: &Series, own: &[f64], signal: &Series) -> (Correlation, Test) {
     let lags = residuals.lags();
     let (e, s) = (&residuals.values, &signal.values);
@@ -32,9 +47,8 @@ pub(super) fn between(residuals: &Series, own: &[f64], signal: &Series) -> (Corr
     }
     .max(1.0);
     let scale = (common * residuals.deviation * signal.deviation).recip();
-    let before = (1..=lags).rev().map(|k| dot(&e[..e.len() - k], &s[k..]) * scale);
-    let after = (0..=lags).map(|k| dot(&e[k..], &s[..s.len() - k]) * scale);
-    let values: Vec<f64> = before.chain(after).collect();
+    let (before, after) = (lagged(s, e, lags), lagged(e, s, lags));
+    let values: Vec<f64> = before[1..].iter().rev().chain(&after).map(|sum| sum * scale).collect();
     let both: f64 = own.iter().zip(signal.autocorrelation()).map(|(a, b)| a * b).sum();
     let deviation = ((1.0 + 2.0 * both).max(0.1) / common).sqrt();
 
@@ -71,4 +85,21 @@ pub(super) fn between(residuals: &Series, own: &[f64], signal: &Series) -> (Corr
         band: 2.576 * deviation,
     };
     (correlation, test)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::lagged;
+
+    /// The definition, over more than one piece and fewer samples than lags.
+    #[test]
+    fn pieces_make_the_whole() {
+        for n in [3, 1500] {
+            let (a, b): (Vec<f64>, Vec<f64>) = (0..n).map(|k| ((k as f64 * 0.37).sin(), (k as f64).sqrt())).unzip();
+            for (k, found) in lagged(&a, &b, 5).into_iter().enumerate() {
+                let expected: f64 = (k..n).map(|t| a[t] * b[t - k]).sum();
+                assert!((found - expected).abs() < 1e-9, "{n} samples, lag {k}: {found} {expected}");
+            }
+        }
+    }
 }
