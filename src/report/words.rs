@@ -25,7 +25,7 @@ pub(super) fn sign(severity: Severity) -> &'static str {
 
 /// How the search ended, and what to do about it if it ended badly.
 pub(super) fn search(report: &Report) -> String {
-    let mut text = format!("The search {}.", report.outcome);
+    let mut text = format!("Search: {}.", report.outcome);
     if !report.outcome.converged() {
         text = format!("{text} {}", report.outcome.advice());
     }

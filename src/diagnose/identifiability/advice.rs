@@ -12,6 +12,9 @@ const ONLY: f64 = 0.99;
 /// So much of an unknown's information from one tenth of a record leaves little to the others.
 const ONCE: f64 = 0.9;
 
+/// Sets that are put into words; the strongest come first.
+const MENTIONED: usize = 3;
+
 pub(super) fn advice<M: Model>(
     found: &Identifiability,
     unknowns: &[Unknown],
@@ -33,9 +36,12 @@ pub(super) fn advice<M: Model>(
             found.rank
         ));
     }
-    for set in &found.collinear {
+    for set in found.collinear.iter().take(MENTIONED) {
         let left = set.index.map_or(0.0, f64::recip);
         advice.extend(together(&set.moves, left, unknowns).map(|text| text + "; fix one, or excite them apart"));
+    }
+    if let Some(more @ 1..) = found.collinear.len().checked_sub(MENTIONED) {
+        advice.push(format!("{more} more set(s) of unknowns are hardly known but together"));
     }
     let initial = |excited: &&Excitation| excited.name.contains("(0)");
     for excited in &found.excitation {
