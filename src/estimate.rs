@@ -230,10 +230,15 @@ pub struct Estimate<M: Model, I = Automatic, P = FreeRun> {
 }
 
 impl<M: Model, I, P> Estimate<M, I, P> {
-    /// Degrees of freedom: measurements less unknowns that were determined.
+    /// Degrees of freedom: measurements less unknowns, but for those held at a bound and one for each direction along
+    /// which nothing is known. Zero where there are no more measurements than unknowns.
     pub fn degrees_of_freedom(&self) -> f64 {
-        let known = self.unknowns.iter().filter(|unknown| unknown.knowledge.standard_error().is_some()).count();
-        (self.measurements as f64 - known as f64).max(0.0)
+        if self.measurements <= self.unknowns.len() as u64 {
+            return 0.0;
+        }
+        let held = self.unknowns.iter().filter(|unknown| matches!(unknown.knowledge, Knowledge::Held { .. })).count();
+        let estimated = self.unknowns.len() as f64 - (held + self.directions.len()) as f64;
+        self.measurements as f64 - estimated
     }
 
     /// The worst that is said of this estimate.

@@ -82,8 +82,8 @@
 //! | 3 | learn | `loss`, `weighting`, `prefilter`, [`optimize`], [`regress`], [`numeric`], `fit`, `estimate`, [`online`] |
 //! | 2 | expect | `integrate`, `predict` |
 //! | 1 | say | `model`, `parameter`, `scaling`, `interval`, `experiment`, [`units`] |
-//! | ground | numbers | `scalar`, `lanes`, `dual`, `signals`, `information`, `covariance` |
-//! | wing | the motor | [`pmsm`] |
+//! | ground | numbers | `lanes`, `scalar`, `dual`, `signals`, `information`, `covariance`, `whiteness`, `error` |
+//! | wing | machines | [`pmsm`], [`models`] |
 //!
 //! **The way of a sample through a fit.** [`Experiment`] holds it. The integrator carries the state to it in
 //! [`Dual`] numbers, a value with up to eight slopes, and the predictor turns that into a prediction error and its slopes,
@@ -92,6 +92,9 @@
 //! reads its step off the triangle; initial states, and parameters that each experiment has for itself, are minimized out
 //! of their experiment's triangle before the triangles are merged. When the search has ended, covariance, rank and
 //! directions come from the same triangle. Nothing is kept of the samples, and nothing is allocated for them.
+//!
+//! Only the loop over the samples is compiled for each model. `fit/source.rs` is the door to it: search, noise, covariance
+//! and diagnoses see windows of numbers through it, and are compiled once.
 //!
 //! # Features
 //!

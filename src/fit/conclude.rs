@@ -173,21 +173,7 @@ impl Objective<'_> {
                 .widened((measured as f64 / degrees.max(1.0)).sqrt()),
             _ => whitening.widened(widening),
         };
-        let ml = match noise {
-            Noise::Given(_) => whitening.clone(),
-            _ if self.noise_is_no_matter(noise) => whitening.widened((sum_of_squares / measured as f64).sqrt()),
-            _ => whitening.clone(),
-        };
-        let plain = self.loss.is_none() && !self.source.is_weighted();
-        let deviance = plain.then(|| {
-            // Both differ by a factor at most.
-            let scale = ml.sigma()[0] / whitening.sigma()[0];
-            measured as f64 * ((2.0 * std::f64::consts::PI).ln() + 2.0 * scale.ln())
-                + log_determinant
-                + (sum_of_squares - priors) / (scale * scale)
-        });
-        // Without any error the likelihood has no bound.
-        let deviance = deviance.filter(|deviance| deviance.is_finite());
+        let deviance = self.deviance(noise, measured, log_determinant, sum_of_squares, priors);
         let sigma = widened.sigma();
         let quality = quality.into_iter().zip(sigma).map(|(quality, sigma)| Quality { sigma, ..quality }).collect();
         let covariance_of = match (colored, sandwich, self.prefilter) {
@@ -211,6 +197,20 @@ impl Objective<'_> {
             measurements: measured,
             deviance,
         })
+    }
+
+    /// `-2 ln` of the Gaussian likelihood, if weights and losses leave it one.
+    fn deviance(&self, noise: &Noise, measured: u64, log_det: f64, sum_of_squares: f64, priors: f64) -> Option<f64> {
+        if self.loss.is_some() || self.source.is_weighted() {
+            return None;
+        }
+        let n = measured as f64;
+        // Where the noise was no matter to the search, its most likely variance is still to be put in.
+        let variance = if self.noise_is_no_matter(noise) { sum_of_squares / n } else { 1.0 };
+        let deviance =
+            n * (std::f64::consts::TAU.ln() + variance.ln()) + log_det + (sum_of_squares - priors) / variance;
+        // Without any error the likelihood has no bound.
+        deviance.is_finite().then_some(deviance)
     }
 
     /// A direction of the scaled unknowns as relative changes by name.
