@@ -27,6 +27,10 @@ struct Arguments {
     /// The speed is in revolutions per minute.
     #[arg(long)]
     rpm: bool,
+    /// Voltage and speed hold in the rotor frame from row to row, as in many simulations, not in the stator as an
+    /// inverter's.
+    #[arg(long)]
+    held: bool,
     /// Another name of a column, such as ud=Vd; any number of times.
     #[arg(long, value_name = "SIGNAL=COLUMN", value_parser = renaming)]
     column: Vec<(String, String)>,
@@ -71,10 +75,12 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let file = if arguments.rpm { file.factor("w", units::RPM) } else { file };
     let file = arguments.column.iter().fold(file, |file, (signal, column)| file.column(signal, column));
     let log = file.read(&Surface::new(arguments.pole_pairs)?)?;
-    let model = ExactSurface(ExactStep::new(arguments.pole_pairs, log.sample_time(), HeldIn::Stationary)?);
+    let held = if arguments.held { HeldIn::Rotor } else { HeldIn::Stationary };
+    let model = ExactSurface(ExactStep::new(arguments.pole_pairs, log.sample_time(), held)?);
 
     let next = log.inputs().iter().skip(1).chain(log.inputs().last());
-    let inputs = log.inputs().iter().zip(next).map(|(u, next)| Drive { w: (u.w + next.w) / 2.0, ..*u }).collect();
+    let mean = |(u, next): (&Drive, &Drive)| Drive { w: if arguments.held { u.w } else { (u.w + next.w) / 2.0 }, ..*u };
+    let inputs = log.inputs().iter().zip(next).map(mean).collect();
     let record =
         Experiment::new(&model, log.times().clone(), inputs, log.outputs().to_vec())?.named(log.name().to_owned());
     let estimate = Fit::new(&model, &record)
