@@ -6,9 +6,11 @@ use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::{Executor, KV, State};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::neldermead::NelderMead;
+use argmin::solver::particleswarm::ParticleSwarm;
 use argmin::solver::quasinewton::LBFGS;
 use greybox::optimize::{GaussNewton, LeastSquaresState, LevenbergMarquardt, Outcome, Stop};
 use greybox::*;
+use rand::SeedableRng;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -59,6 +61,25 @@ fn nelder_mead_and_lbfgs_find_the_minimum() {
     let far = problem.estimate(&start).unwrap();
     assert!(!far.outcome.converged(), "a start is no minimum: {far}");
     assert!(problem.estimate(&start[..1]).is_err());
+}
+
+#[test]
+fn a_particle_swarm_finds_the_minimum_without_a_start() {
+    let record = record(1);
+    let best = fit(&record).run().unwrap();
+    let problem = fit(&record).problem().unwrap();
+    // Coordinates: the gain, and the logarithm of the time constant, over four decades.
+    let bounds = (vec![-10.0, f64::ln(1e-3)], vec![10.0, f64::ln(10.0)]);
+    let swarm = ParticleSwarm::new(bounds, 40).with_rng_generator(rand::rngs::StdRng::seed_from_u64(1));
+    let found =
+        Executor::new(problem.objective(), swarm).configure(|state| state.max_iters(200)).ctrlc(false).run().unwrap();
+    let place = &found.state().get_best_param().unwrap().position;
+    let estimate = problem.estimate(place).unwrap();
+    for (found, best) in estimate.unknowns.iter().zip(&best.unknowns) {
+        // The swarm halves its size every few iterations: after 200 it is far smaller than the noise lets matter.
+        let error = best.knowledge.standard_error().unwrap();
+        assert!((found.value - best.value).abs() < 1e-3 * error, "{estimate}");
+    }
 }
 
 struct Count(Arc<AtomicU64>);
