@@ -1,8 +1,8 @@
 //! [`Source`]: model, records and methods of a fit behind one door.
 //!
 //! What asks through it (the cost, the search, the noise, the covariance, the conclusion) is compiled once, whatever the
-//! model; only the loop over the samples is compiled for each. A fit of one more model cost eight seconds of compilation
-//! when all of it was generic.
+//! model; only the loop over the samples is compiled for each. The twenty models of the NIST problems made 1.3 million lines
+//! of intermediate code when all of it was generic, and make 0.46 million so.
 
 use super::unknowns::Place;
 use crate::dispatch::{PORTABLE, Unit, WIDE, has_wide};
