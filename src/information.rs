@@ -62,6 +62,16 @@ impl Information {
         block.clear();
     }
 
+    /// Puts one row into a block of this width that gathers rows, and absorbs the block when it is full.
+    #[inline(always)]
+    pub(crate) fn gather(&mut self, block: &mut Block, phi: &[f64], y: f64) {
+        if !block.push(phi, y) {
+            self.absorb(block);
+            let fits = block.push(phi, y);
+            debug_assert!(fits, "a row of {} slopes for a block of {}", phi.len(), block.columns());
+        }
+    }
+
     #[cold]
     fn absorb_other_width(&mut self, block: &mut Block) {
         let mut other = Information::new(block.columns());

@@ -222,11 +222,7 @@ fn triangle<P: Signals>(rows: impl Iterator<Item = (P::Array<f64>, f64)>) -> Inf
     let mut information = Information::new(P::LEN);
     let mut block = Block::new(P::LEN, BLOCK);
     for (phi, y) in rows {
-        if !block.push(phi.as_ref(), y) {
-            information.absorb(&mut block);
-            let fits = block.push(phi.as_ref(), y);
-            debug_assert!(fits);
-        }
+        information.gather(&mut block, phi.as_ref(), y);
     }
     information.absorb(&mut block);
     information

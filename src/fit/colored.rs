@@ -122,7 +122,7 @@ impl Objective<'_> {
             }
             before.swap(0, 1);
             before[0].copy_from_slice(score);
-            absorb(&mut triangle, &mut block, score);
+            triangle.gather(&mut block, score, 0.0);
             count += 1;
         })?;
         triangle.absorb(&mut block);
@@ -153,7 +153,7 @@ impl Objective<'_> {
                 oldest[i] = new[i];
             }
             recent.push_back(oldest);
-            absorb(&mut triangle, &mut block, &row);
+            triangle.gather(&mut block, &row, 0.0);
         };
         let mut fresh = vec![0.0; n];
         self.each_score(e, coordinates, kept, &mut |score| {
@@ -197,13 +197,5 @@ impl Objective<'_> {
                 visit(&score);
             }
         })
-    }
-}
-
-fn absorb(triangle: &mut Information, block: &mut Block, row: &[f64]) {
-    if !block.push(row, 0.0) {
-        triangle.absorb(block);
-        let fits = block.push(row, 0.0);
-        debug_assert!(fits);
     }
 }

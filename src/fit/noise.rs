@@ -111,13 +111,6 @@ fn factor_of_part(covariance: &SquareMatrix, here: &[usize]) -> SquareMatrix {
     inverse_factor(&part).unwrap_or_else(|| SquareMatrix::zeros(here.len()))
 }
 
-/// Sums over the errors of a fit: what estimates of noise are made of.
-#[derive(Clone, Debug)]
-pub(crate) struct Moments {
-    /// Mean over the measured samples of the products of the errors of two outputs.
-    pub covariance: SquareMatrix,
-}
-
 /// `E[psi^2]` of Huber's loss under the standard normal.
 fn bent_variance(&Huber(c): &Huber) -> f64 {
     let normal = Normal::standard();
@@ -137,7 +130,7 @@ impl Objective<'_> {
         coordinates: &[f64],
         sigma: &[f64],
         bend: Option<&dyn Fn(f64) -> f64>,
-    ) -> Result<Moments, Infeasible> {
+    ) -> Result<SquareMatrix, Infeasible> {
         let outputs = self.outputs();
         let mut sums = SquareMatrix::zeros(outputs);
         let mut pairs = SquareMatrix::zeros(outputs);
@@ -169,7 +162,7 @@ impl Objective<'_> {
         if let Some(variance) = covariance.diagonal().iter().find(|variance| !variance.is_finite()) {
             return Err(Infeasible::Failed(format!("the variance of an output's errors is {variance}")));
         }
-        Ok(Moments { covariance })
+        Ok(covariance)
     }
 
     /// The noise that the errors at a point show: plainly, or robustly by Huber's proposal 2 (Huber, *Robust Statistics*,
@@ -179,8 +172,8 @@ impl Objective<'_> {
         let mut moments = self.moments(coordinates, &vec![1.0; outputs], None)?;
         let size = |size: f64| if size > 0.0 { size } else { 1.0 };
         let floor: Vec<f64> = self.magnitudes().into_iter().map(|magnitude| ROUNDING * size(magnitude)).collect();
-        let sigma = |m: &Moments| -> Vec<f64> {
-            m.covariance.diagonal().iter().zip(&floor).map(|(v, floor)| v.sqrt().max(*floor)).collect()
+        let sigma = |moments: &SquareMatrix| -> Vec<f64> {
+            moments.diagonal().iter().zip(&floor).map(|(v, floor)| v.sqrt().max(*floor)).collect()
         };
         if self.is_robust() {
             let huber = Huber::default();
@@ -188,8 +181,7 @@ impl Objective<'_> {
             for _ in 0..50 {
                 let before = sigma(&moments);
                 moments = self.moments(coordinates, &before, Some(&|z| huber.psi(z)))?;
-                let n = moments.covariance.size();
-                moments.covariance = SquareMatrix::from_fn(n, |i, j| moments.covariance[(i, j)] / kappa);
+                moments = SquareMatrix::from_fn(outputs, |i, j| moments[(i, j)] / kappa);
                 let change = |(a, b): (f64, &f64)| (a / b).ln().abs();
                 if sigma(&moments).into_iter().zip(&before).map(change).fold(0.0, f64::max) < 1e-9 {
                     break;
@@ -198,15 +190,15 @@ impl Objective<'_> {
         }
         let diagonal = Whitening::Diagonal(sigma(&moments));
         Ok(match noise {
-            Noise::Covariance => Whitening::full(moments.covariance).unwrap_or(diagonal),
+            Noise::Covariance => Whitening::full(moments).unwrap_or(diagonal),
             Noise::Given(_) | Noise::PerOutput => diagonal,
         })
     }
 
     /// Whether the model reproduces the data but for rounding, whose errors lead no search anywhere.
     pub(crate) fn reproduces(&self, coordinates: &[f64]) -> bool {
-        let reproduced = |moments: Moments| {
-            let mut variances = moments.covariance.diagonal().into_iter().zip(self.magnitudes());
+        let reproduced = |moments: SquareMatrix| {
+            let mut variances = moments.diagonal().into_iter().zip(self.magnitudes());
             variances.all(|(variance, size)| variance.sqrt() <= REPRODUCED * size)
         };
         self.moments(coordinates, &vec![1.0; self.outputs()], None).is_ok_and(reproduced)

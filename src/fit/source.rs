@@ -35,6 +35,7 @@ pub(crate) enum Located {
     Largest(Failure),
 }
 
+/// What a fit asks of model and records. A trait for its one implementer, because a trait object is what hides the types.
 pub(crate) trait Source: Send + Sync {
     fn kind(&self) -> Kind;
 
