@@ -24,7 +24,7 @@ impl Model for Pmsm {
     type Parameters = Winding;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Currents<S>, u: &Drive<S>, p: &Winding<S>) -> Currents<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Currents<S>, u: &Drive<S>, p: &Winding<S>) -> Currents<S> {
         let we = u.w * 4.0;
         Currents {
             id: (u.ud - p.rs * x.id) / p.ls + we * x.iq,
@@ -33,7 +33,7 @@ impl Model for Pmsm {
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
         *x
     }
 }

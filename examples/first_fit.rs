@@ -29,7 +29,7 @@ impl Model for Pmsm {
     type Parameters = Winding;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Currents<S>, u: &Drive<S>, p: &Winding<S>) -> Currents<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Currents<S>, u: &Drive<S>, p: &Winding<S>) -> Currents<S> {
         let we = u.w * self.pole_pairs;
         Currents {
             id: (u.ud - p.rs * x.id) / p.ls + we * x.iq,
@@ -38,7 +38,7 @@ impl Model for Pmsm {
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
         *x
     }
 }

@@ -46,7 +46,7 @@ impl Model for Axis {
     type Parameters = Friction;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Motion<S>, u: &Reference<S>, p: &Friction<S>) -> Motion<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Reference<S>, p: &Friction<S>) -> Motion<S> {
         let forwards = (x.v / 5e-4).tanh() * 0.5 + 0.5;
         let dry = p.fcp * forwards - p.fcn * (-forwards + 1.0);
         let v = (Self::command(x, u) * GTAU - p.fv * x.v - dry - p.offset) / p.m;
@@ -55,7 +55,7 @@ impl Model for Axis {
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Motion<S>, u: &Reference<S>, _p: &Friction<S>) -> Guided<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Reference<S>, _p: &Friction<S>) -> Guided<S> {
         Guided { qm: x.q, vir: Self::command(x, u) }
     }
 }

@@ -1,7 +1,7 @@
 //! Checks for the tests of those who write losses, models and integrators of their own.
 
 use crate::dual::Dual;
-use crate::integrate::Integrator;
+use crate::integrate::{Integrator, ModelSystem};
 use crate::interval::{Hold, Interval};
 use crate::loss::Loss;
 use crate::model::{Kind, Model};
@@ -91,15 +91,17 @@ pub fn derivatives<M: Model>(
     match M::KIND {
         Kind::Continuous => {
             at.compare::<M::State>("derivative", &|x, u, p| model.derivative(t, x, u, p), &|x, u, p| {
-                model.derivative(t, x, u, p)
+                model.derivative(t.into(), x, u, p)
             })?
         }
         Kind::Discrete => {
-            at.compare::<M::State>("next", &|x, u, p| model.next(t, x, u, p), &|x, u, p| model.next(t, x, u, p))?;
+            at.compare::<M::State>("next", &|x, u, p| model.next(t, x, u, p), &|x, u, p| {
+                model.next(t.into(), x, u, p)
+            })?;
         }
         Kind::Static => {}
     }
-    at.compare::<M::Output>("output", &|x, u, p| model.output(t, x, u, p), &|x, u, p| model.output(t, x, u, p))
+    at.compare::<M::Output>("output", &|x, u, p| model.output(t, x, u, p), &|x, u, p| model.output(t.into(), x, u, p))
 }
 
 /// Columns of a Jacobian per evaluation.
@@ -188,14 +190,14 @@ impl Model for Spiral {
     type Parameters = Rates;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, t: f64, x: &Plane<S>, _u: &Nothing, p: &Rates<S>) -> Plane<S> {
+    fn derivative<S: Scalar>(&self, t: S, x: &Plane<S>, _u: &Nothing, p: &Rates<S>) -> Plane<S> {
         let growth = p.growth * t.cos() * ((x.x * x.x + x.y * x.y) * -1.0 + 1.0);
-        let turn = p.turn * (1.0 + t.sin());
+        let turn = p.turn * (t.sin() + 1.0);
         Plane { x: growth * x.x - turn * x.y, y: growth * x.y + turn * x.x }
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Plane<S>, _u: &Nothing, _p: &Rates<S>) -> Plane<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Plane<S>, _u: &Nothing, _p: &Rates<S>) -> Plane<S> {
         *x
     }
 }
@@ -223,20 +225,20 @@ pub struct Order {
 ///
 /// The answer lies within some 0.2 of the order. It says nothing about an adaptive method (its tolerance does not follow
 /// the interval), unless its tolerance is so large that each interval is one step. `None` where the method is stuck.
-pub fn order<I: Integrator<Spiral>>(integrator: &I) -> Option<Order> {
+pub fn order<I: Integrator>(integrator: &I) -> Option<Order> {
     let ([values, slopes], [finer_values, finer_slopes]) = (errors(integrator, 32)?, errors(integrator, 64)?);
     Some(Order { values: (values / finer_values).log2(), slopes: (slopes / finer_slopes).log2() })
 }
 
 /// Largest errors of values and slopes after one second.
-fn errors<I: Integrator<Spiral>>(integrator: &I, intervals: u32) -> Option<[f64; 2]> {
+fn errors<I: Integrator>(integrator: &I, intervals: u32) -> Option<[f64; 2]> {
     let start = Plane { x: Dual::<4>::variable(0.4, 0), y: Dual::variable(-0.3, 1) };
     let p = Rates { growth: Dual::variable(1.2, 2), turn: Dual::variable(1.5, 3) };
     let (mut x, mut memory) = (start, I::Memory::default());
     let time = |k: u32| f64::from(k) / f64::from(intervals);
     for k in 0..intervals {
         let interval = Interval { t0: time(k), t1: time(k + 1), u0: Nothing, u1: Nothing, hold: Hold::Zero };
-        x = integrator.advance(&Spiral, &interval, x, &p, &mut memory).ok()?;
+        x = ModelSystem { model: &Spiral, interval: &interval, p: &p }.step(integrator, x, &mut memory).ok()?;
     }
     let exact = Spiral.solution(1.0, &start, &p);
     let difference = [x.x - exact.x, x.y - exact.y];

@@ -171,7 +171,7 @@ impl<'a, M: Model> Fit<'a, M> {
 
 impl<'a, M: Model, I, P, O> Fit<'a, M, I, P, O> {
     /// Steps the model by another method.
-    pub fn integrator<J: Integrator<M>>(self, integrator: J) -> Fit<'a, M, J, P, O> {
+    pub fn integrator<J: Integrator>(self, integrator: J) -> Fit<'a, M, J, P, O> {
         let Fit { model, experiments, parameters, predictor, optimizer, weighting, terms, .. } = self;
         Fit { model, experiments, parameters, integrator, predictor, optimizer, weighting, terms }
     }
@@ -252,7 +252,7 @@ struct Setting<R> {
     prepared: Vec<R>,
 }
 
-impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
+impl<M: Model, I: Integrator, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
     /// Checks all that was said, and looks at every record once.
     fn prepare(&self) -> Result<Setting<P::Prepared>, Error> {
         self.check()?;
@@ -285,7 +285,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             let serves = kinds.into_iter().find(|&kind| self.integrator.serves(kind)).map_or("no", word);
             return Err(Error::WrongIntegrator {
                 model: word(M::KIND),
-                integrator: self.integrator.describe(),
+                integrator: self.integrator.describe(M::KIND),
                 serves,
             });
         }

@@ -38,11 +38,11 @@
 //!     type Parameters = Tank;
 //!
 //!     #[inline]
-//!     fn derivative<S: Scalar>(&self, _t: f64, x: &Level<S>, u: &Inflow<S>, p: &Tank<S>) -> Level<S> {
+//!     fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Inflow<S>, p: &Tank<S>) -> Level<S> {
 //!         Level { h: (u.q - p.outlet * (x.h * 19.62).sqrt()) / p.area }
 //!     }
 //!     #[inline]
-//!     fn output<S: Scalar>(&self, _t: f64, x: &Level<S>, _u: &Inflow<S>, _p: &Tank<S>) -> Level<S> {
+//!     fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Inflow<S>, _p: &Tank<S>) -> Level<S> {
 //!         *x
 //!     }
 //! }
@@ -109,6 +109,7 @@ mod dual;
 mod integrate;
 mod interval;
 mod lanes;
+mod layout;
 mod model;
 pub mod models;
 pub mod online;
@@ -164,9 +165,10 @@ pub use {approx, nalgebra, serde};
 
 pub use covariance::{Covariance, Gain};
 pub use dual::Dual;
-pub use integrate::{Automatic, Discrete, Esdirk, Integrator, Rk4, Rk45, Stuck};
+pub use integrate::{Automatic, Discrete, Esdirk, Integrator, ModelSystem, Rk4, Rk45, Square, Stuck, System};
 pub use interval::{Hold, Interval};
-pub use model::{Kind, Model};
+pub use layout::Kind;
+pub use model::Model;
 pub use parameter::{Parameter, Prior, Transform, fixed, free};
 pub use scalar::Scalar;
 pub use signals::{Entry, Nothing, Of, Signals};
@@ -180,6 +182,7 @@ pub use {
     experiment::{Experiment, ExperimentOf, Gap, Initial, Sample, Time},
     fit::{Fit, FitProblem, Objective, Records, Search},
     information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
+    layout::{Layout, Quantity},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
     numeric::{Derivative, Next, Numeric, StateEquation},
     outliers::hampel,

@@ -1,18 +1,8 @@
 //! [`Model`]: the equations, written once.
 
+pub use crate::layout::Kind;
 use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
-
-/// Whether time is continuous, discrete, or plays no part.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub enum Kind {
-    /// `dx/dt = f(t, x, u; p)`, written as [`Model::derivative`].
-    Continuous,
-    /// `x[k+1] = f(t, x[k], u[k]; p)`, written as [`Model::next`].
-    Discrete,
-    /// `y = g(t, u; p)`: no state; only [`Model::output`] is written.
-    Static,
-}
 
 /// A physical system, as arithmetic on named quantities.
 ///
@@ -40,7 +30,7 @@ pub trait Model: Sync {
     #[inline]
     fn derivative<S: Scalar>(
         &self,
-        _t: f64,
+        _t: S,
         _x: &Of<Self::State, S>,
         _u: &Of<Self::Input, S>,
         _p: &Of<Self::Parameters, S>,
@@ -54,7 +44,7 @@ pub trait Model: Sync {
     #[inline]
     fn next<S: Scalar>(
         &self,
-        _t: f64,
+        _t: S,
         _x: &Of<Self::State, S>,
         _u: &Of<Self::Input, S>,
         _p: &Of<Self::Parameters, S>,
@@ -65,7 +55,7 @@ pub trait Model: Sync {
     /// The outputs at time `t` (s).
     fn output<S: Scalar>(
         &self,
-        t: f64,
+        t: S,
         x: &Of<Self::State, S>,
         u: &Of<Self::Input, S>,
         p: &Of<Self::Parameters, S>,

@@ -197,16 +197,16 @@ where
     type Parameters = P;
     const KIND: Kind = F::KIND;
 
-    fn derivative<S: Scalar>(&self, t: f64, x: &Of<X, S>, u: &Of<U, S>, p: &Of<P, S>) -> Of<X, S> {
-        self.lifted::<S, X>(|x, u, p| self.state.value(t, x, u, p), x, u, p)
+    fn derivative<S: Scalar>(&self, t: S, x: &Of<X, S>, u: &Of<U, S>, p: &Of<P, S>) -> Of<X, S> {
+        self.lifted::<S, X>(|x, u, p| self.state.value(t.value(), x, u, p), x, u, p)
     }
 
-    fn next<S: Scalar>(&self, t: f64, x: &Of<X, S>, u: &Of<U, S>, p: &Of<P, S>) -> Of<X, S> {
-        self.lifted::<S, X>(|x, u, p| self.state.value(t, x, u, p), x, u, p)
+    fn next<S: Scalar>(&self, t: S, x: &Of<X, S>, u: &Of<U, S>, p: &Of<P, S>) -> Of<X, S> {
+        self.lifted::<S, X>(|x, u, p| self.state.value(t.value(), x, u, p), x, u, p)
     }
 
-    fn output<S: Scalar>(&self, t: f64, x: &Of<X, S>, u: &Of<U, S>, p: &Of<P, S>) -> Of<Y, S> {
-        self.lifted::<S, Y>(|x, u, p| (self.output)(t, x, u, p), x, u, p)
+    fn output<S: Scalar>(&self, t: S, x: &Of<X, S>, u: &Of<U, S>, p: &Of<P, S>) -> Of<Y, S> {
+        self.lifted::<S, Y>(|x, u, p| (self.output)(t.value(), x, u, p), x, u, p)
     }
 }
 

@@ -20,7 +20,7 @@ pub(crate) use window::{Seed, Target, Trajectory, WINDOW, Window};
 
 use crate::error::Error;
 use crate::experiment::ExperimentOf;
-use crate::integrate::{Integrator, Stuck};
+use crate::integrate::{Integrator, ModelSystem, Stuck};
 use crate::interval::Hold;
 use crate::model::Model;
 use crate::scalar::Scalar;
@@ -49,7 +49,7 @@ pub trait Predictor<M: Model>: Clone + Debug + Send + Sync {
     ///
     /// # Errors
     /// Where the integrator is [`Stuck`].
-    fn state<S: Scalar, I: Integrator<M>>(
+    fn state<S: Scalar, I: Integrator>(
         &self,
         walk: &Walk<'_, M, I>,
         prepared: &Self::Prepared,
@@ -87,7 +87,7 @@ impl<M: Model, I> Clone for Walk<'_, M, I> {
 
 impl<M: Model, I> Copy for Walk<'_, M, I> {}
 
-impl<'a, M: Model, I: Integrator<M>> Walk<'a, M, I> {
+impl<'a, M: Model, I: Integrator> Walk<'a, M, I> {
     /// A model before its first step.
     pub fn new(model: &'a M, integrator: &'a I, experiment: &'a ExperimentOf<M>) -> Self {
         Walk { model, integrator, experiment, hold: experiment.input_hold() }
@@ -105,6 +105,7 @@ impl<'a, M: Model, I: Integrator<M>> Walk<'a, M, I> {
         p: &Of<M::Parameters, S>,
         memory: &mut I::Memory,
     ) -> Result<Of<M::State, S>, Stuck> {
-        self.integrator.advance(self.model, &self.experiment.interval(k, self.hold), x, p, memory)
+        let interval = self.experiment.interval(k, self.hold);
+        ModelSystem { model: self.model, interval: &interval, p }.step(self.integrator, x, memory)
     }
 }

@@ -7,7 +7,7 @@
 //! # impl Model for Hooke {
 //! #     type State = Nothing; type Input = Load; type Output = Length; type Parameters = Spring;
 //! #     const KIND: Kind = Kind::Static;
-//! #     fn output<S: Scalar>(&self, _: f64, _: &Nothing, u: &Load<S>, p: &Spring<S>) -> Length<S> {
+//! #     fn output<S: Scalar>(&self, _: S, _: &Nothing, u: &Load<S>, p: &Spring<S>) -> Length<S> {
 //! #         Length { y: u.f / p.k + p.rest }
 //! #     }
 //! # }

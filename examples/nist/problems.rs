@@ -50,7 +50,7 @@ macro_rules! problems {
 
                         #[inline]
                         fn output<S: Scalar>(
-                            &self, _t: f64, _x: &Nothing, u: &Predictors<S>, p: &$size<S>,
+                            &self, _t: S, _x: &Nothing, u: &Predictors<S>, p: &$size<S>,
                         ) -> Response<S> {
                             let ($($x,)+ $size { $($b),* }) = ($(u.$x,)+ *p);
                             Response { y: $y }

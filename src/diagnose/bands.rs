@@ -27,7 +27,7 @@ pub struct Bands<M: Model> {
 ///
 /// # Errors
 /// No such record, a probability not between 0 and 1, an estimate of another problem, a simulation that fails.
-pub fn bands<M: Model, I: Integrator<M>, P: Predictor<M>, O>(
+pub fn bands<M: Model, I: Integrator, P: Predictor<M>, O>(
     problem: &FitProblem<'_, M, I, P, O>,
     estimate: &Estimate<M, I, P>,
     experiment: usize,

@@ -50,7 +50,7 @@ pub struct Bootstrap {
 ///
 /// # Errors
 /// An estimate of another problem or one that cannot be simulated, and fewer than twenty refits that end.
-pub fn bootstrap<M: Model, I: Integrator<M>, P: Predictor<M>, O: Sync>(
+pub fn bootstrap<M: Model, I: Integrator, P: Predictor<M>, O: Sync>(
     problem: &FitProblem<'_, M, I, P, O>,
     estimate: &Estimate<M, I, P>,
     resampling: Resampling,

@@ -219,13 +219,13 @@ pub type NamedQualities = Vec<(String, Quality)>;
 ///
 /// # Errors
 /// As [`Estimate::predict`]; predicting ahead needs outputs that give the state.
-pub fn validate<M: Model, I: Integrator<M>, P>(
+pub fn validate<M: Model, I: Integrator, P>(
     estimate: &Estimate<M, I, P>,
     model: &M,
     record: &ExperimentOf<M>,
     steps: &[usize],
 ) -> Result<Validation, Error> {
-    fn quality<M: Model, I: Integrator<M>, P, Q: Predictor<M>>(
+    fn quality<M: Model, I: Integrator, P, Q: Predictor<M>>(
         estimate: &Estimate<M, I, P>,
         model: &M,
         record: &ExperimentOf<M>,
@@ -252,7 +252,7 @@ pub fn validate<M: Model, I: Integrator<M>, P>(
 ///
 /// # Errors
 /// Fewer than two records, and those of the fits and simulations.
-pub fn cross_validate<M: Model, I: Integrator<M>, P>(
+pub fn cross_validate<M: Model, I: Integrator, P>(
     model: &M,
     records: &[ExperimentOf<M>],
     fit: impl Fn(&[ExperimentOf<M>]) -> Result<Estimate<M, I, P>, Error>,

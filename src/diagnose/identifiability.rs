@@ -90,7 +90,7 @@ const SEED: u64 = 1;
 ///
 /// # Errors
 /// An estimate of another problem, or one that cannot be simulated any more.
-pub fn identifiability<M: Model, I: Integrator<M>, P: Predictor<M>, O>(
+pub fn identifiability<M: Model, I: Integrator, P: Predictor<M>, O>(
     problem: &FitProblem<'_, M, I, P, O>,
     estimate: &Estimate<M, I, P>,
 ) -> Result<Identifiability, Error> {

@@ -100,7 +100,7 @@ const CLOSE: f64 = 1e-3;
 ///
 /// # Errors
 /// A name that no unknown has, a probability not between 0 and 1, an estimate of another problem.
-pub fn profile<M: Model, I: Integrator<M>, P: Predictor<M>, O>(
+pub fn profile<M: Model, I: Integrator, P: Predictor<M>, O>(
     problem: &FitProblem<'_, M, I, P, O>,
     estimate: &Estimate<M, I, P>,
     name: &str,

@@ -50,7 +50,7 @@ const SAME: f64 = 1e-6;
 ///
 /// # Errors
 /// A reach that is not above one, an estimate of another problem.
-pub fn restarts<M: Model, I: Integrator<M>, P: Predictor<M>, O: Sync>(
+pub fn restarts<M: Model, I: Integrator, P: Predictor<M>, O: Sync>(
     problem: &FitProblem<'_, M, I, P, O>,
     estimate: &Estimate<M, I, P>,
     count: usize,

@@ -31,7 +31,7 @@ use std::path::{Path, PathBuf};
 /// # struct Motor;
 /// # impl Model for Motor {
 /// #     type State = Current; type Input = Supply; type Output = Current; type Parameters = Winding;
-/// #     fn output<S: Scalar>(&self, _: f64, x: &Current<S>, _: &Supply<S>, _: &Winding<S>) -> Current<S> { *x }
+/// #     fn output<S: Scalar>(&self, _: S, x: &Current<S>, _: &Supply<S>, _: &Winding<S>) -> Current<S> { *x }
 /// # }
 /// # let (model, path) = (Motor, std::env::temp_dir().join(format!("greybox_csv_{}.csv", std::process::id())));
 /// # let text = "# bench 3, winding cold\ntime (ms); speed; voltage; i;     remark\n0;         1500;  24,1;    -0,52;\n\

@@ -42,7 +42,7 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     /// # impl Model for Bearing {
     /// #     type State = Nothing; type Input = Speed; type Output = Torque; type Parameters = Friction;
     /// #     const KIND: Kind = Kind::Static;
-    /// #     fn output<S: Scalar>(&self, _: f64, _: &Nothing, u: &Speed<S>, p: &Friction<S>) -> Torque<S> {
+    /// #     fn output<S: Scalar>(&self, _: S, _: &Nothing, u: &Speed<S>, p: &Friction<S>) -> Torque<S> {
     /// #         Torque { m: u.w * p.b }
     /// #     }
     /// # }

@@ -10,7 +10,7 @@ use crate::parameter::fixed;
 use crate::predict::Predictor;
 use crate::signals::{Of, Signals};
 
-impl<M: Model, I: Integrator<M>, P: Predictor<M>> Estimate<M, I, P> {
+impl<M: Model, I: Integrator, P: Predictor<M>> Estimate<M, I, P> {
     /// Predicts the outputs of a record, of the fit or a new one, with these parameters. What the record leaves open of its
     /// initial state is estimated from it, the parameters kept.
     ///

@@ -17,7 +17,7 @@ use crate::predict::{Predictor, Target, Walk};
 use crate::signals::{Of, Signals};
 use std::time::Instant;
 
-impl<M: Model, I: Integrator<M>, P: Predictor<M>, O: Search> Fit<'_, M, I, P, O> {
+impl<M: Model, I: Integrator, P: Predictor<M>, O: Search> Fit<'_, M, I, P, O> {
     /// Searches for the parameters, and says how well they are known.
     ///
     /// A search that does not converge is an outcome of the estimate, not an error.
@@ -40,7 +40,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O: Search> Fit<'_, M, I, P, O>
     }
 }
 
-impl<'a, M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'a, M, I, P, O> {
+impl<'a, M: Model, I: Integrator, P: Predictor<M>, O> Fit<'a, M, I, P, O> {
     /// Simulates (or predicts) the first record with the parameters at their start; only what is free of its initial
     /// state is estimated from it.
     ///
@@ -155,7 +155,7 @@ impl<'a, M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'a, M, I, P, O> {
         let or = |said: Option<String>, other: &str| said.unwrap_or_else(|| other.to_owned());
         let method = Method {
             optimizer: found.name,
-            integrator: self.integrator.describe(),
+            integrator: self.integrator.describe(M::KIND),
             predictor: self.predictor.describe(),
             loss: or(self.terms.loss.as_ref().map(|loss| loss.describe()), "squared"),
             weighting: or(self.weighting.as_ref().map(|weighting| weighting.describe()), "none"),
@@ -190,13 +190,13 @@ impl<'a, M: Model, I: Integrator<M>, P: Predictor<M>, O> Fit<'a, M, I, P, O> {
 }
 
 /// A fit prepared for argmin's own solvers.
-pub struct FitProblem<'a, M: Model, I: Integrator<M>, P: Predictor<M>, O> {
+pub struct FitProblem<'a, M: Model, I: Integrator, P: Predictor<M>, O> {
     fit: Fit<'a, M, I, P, O>,
     setting: Setting<P::Prepared>,
     whitening: Whitening,
 }
 
-impl<M: Model, I: Integrator<M>, P: Predictor<M>, O: Search> FitProblem<'_, M, I, P, O> {
+impl<M: Model, I: Integrator, P: Predictor<M>, O: Search> FitProblem<'_, M, I, P, O> {
     /// As [`Fit::run`], keeping the problem for what is to be asked of the estimate ([`diagnose`](crate::diagnose)).
     ///
     /// # Errors
@@ -211,7 +211,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, O: Search> FitProblem<'_, M, I
     }
 }
 
-impl<M: Model, I: Integrator<M>, P: Predictor<M>, O> FitProblem<'_, M, I, P, O> {
+impl<M: Model, I: Integrator, P: Predictor<M>, O> FitProblem<'_, M, I, P, O> {
     /// The cost with the noise that an estimate of this problem has found, and the coordinates of that estimate.
     ///
     /// # Errors

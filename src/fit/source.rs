@@ -85,7 +85,7 @@ pub(crate) trait Source: Send + Sync {
 }
 
 /// The source that a fit is made of.
-pub(crate) struct Simulated<'a, M: Model, I: Integrator<M>, P: Predictor<M>> {
+pub(crate) struct Simulated<'a, M: Model, I: Integrator, P: Predictor<M>> {
     pub model: &'a M,
     pub experiments: &'a [ExperimentOf<M>],
     pub integrator: I,
@@ -94,7 +94,7 @@ pub(crate) struct Simulated<'a, M: Model, I: Integrator<M>, P: Predictor<M>> {
     pub weighting: Option<&'a dyn Weighting<M>>,
 }
 
-impl<M: Model, I: Integrator<M>, P: Predictor<M>> Simulated<'_, M, I, P> {
+impl<M: Model, I: Integrator, P: Predictor<M>> Simulated<'_, M, I, P> {
     fn state_and_parameters(place: &Place) -> (Of<M::State, f64>, Of<M::Parameters, f64>) {
         (M::State::from_fn(|i| place.x[i]), M::Parameters::from_fn(|j| place.p[j]))
     }
@@ -130,7 +130,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Simulated<'_, M, I, P> {
     }
 }
 
-impl<M: Model, I: Integrator<M>, P: Predictor<M>> Source for Simulated<'_, M, I, P> {
+impl<M: Model, I: Integrator, P: Predictor<M>> Source for Simulated<'_, M, I, P> {
     fn kind(&self) -> Kind {
         M::KIND
     }
@@ -203,7 +203,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Source for Simulated<'_, M, I,
         every: usize,
         visit: &mut dyn FnMut(&Window, Option<&Window>),
     ) -> Result<(), Halt> {
-        let refined = self.integrator.refined();
+        let refined = self.integrator.refined(M::KIND);
         let mut coarse = self.trajectory::<0, PORTABLE>(e, &self.integrator, place, &[]);
         let mut fine = refined.as_ref().map(|refined| self.trajectory::<0, PORTABLE>(e, refined, place, &[]));
         let (mut window, mut finer) = (Window::new(0, M::Output::LEN), Window::new(0, M::Output::LEN));
@@ -222,8 +222,8 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Source for Simulated<'_, M, I,
     }
 
     fn refined<'s>(&'s self) -> Option<(Arc<dyn Source + 's>, String)> {
-        let integrator = self.integrator.refined()?;
-        let name = integrator.describe();
+        let integrator = self.integrator.refined(M::KIND)?;
+        let name = integrator.describe(M::KIND);
         Some((Arc::new(Simulated { integrator, ..*self }), name))
     }
 
@@ -308,7 +308,7 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>> Source for Simulated<'_, M, I,
             (record.name(), record.len(), format!("{:?}{:?}", record.input_hold(), record.initial_state())).hash(hash);
         }
         let weighting = self.weighting.map(|weighting| weighting.describe());
-        (weighting, self.integrator.describe(), self.predictor.describe()).hash(hash);
+        (weighting, self.integrator.describe(M::KIND), self.predictor.describe()).hash(hash);
     }
 }
 

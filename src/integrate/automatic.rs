@@ -1,10 +1,7 @@
 //! [`Automatic`]: the step that the model's kind asks for.
 
-use super::{Discrete, Integrator, Rk4, Stuck};
-use crate::interval::Interval;
-use crate::model::{Kind, Model};
-use crate::scalar::Scalar;
-use crate::signals::Of;
+use super::{Discrete, Integrator, Rk4, Stuck, System};
+use crate::layout::Kind;
 use serde::{Deserialize, Serialize};
 
 /// What a fit uses when nothing is said: [`Rk4`] for continuous models, [`Discrete`] for discrete ones, nothing for
@@ -15,21 +12,20 @@ pub struct Automatic {
     pub continuous: Rk4,
 }
 
-impl<M: Model> Integrator<M> for Automatic {
+impl Integrator for Automatic {
     type Memory = ();
+    const FIXED: bool = true;
 
     #[inline(always)]
-    fn advance<S: Scalar>(
+    fn advance<Y: System>(
         &self,
-        model: &M,
-        interval: &Interval<M::Input>,
-        x: Of<M::State, S>,
-        p: &Of<M::Parameters, S>,
+        system: &Y,
+        x: Y::Vector<Y::Scalar>,
         memory: &mut (),
-    ) -> Result<Of<M::State, S>, Stuck> {
-        match M::KIND {
-            Kind::Continuous => self.continuous.advance(model, interval, x, p, memory),
-            Kind::Discrete => Discrete.advance(model, interval, x, p, memory),
+    ) -> Result<Y::Vector<Y::Scalar>, Stuck> {
+        match system.kind() {
+            Kind::Continuous => self.continuous.advance(system, x, memory),
+            Kind::Discrete => Discrete.advance(system, x, memory),
             Kind::Static => Ok(x),
         }
     }
@@ -38,18 +34,18 @@ impl<M: Model> Integrator<M> for Automatic {
         true
     }
 
-    fn refined(&self) -> Option<Self> {
-        match M::KIND {
-            Kind::Continuous => Integrator::<M>::refined(&self.continuous).map(|continuous| Automatic { continuous }),
+    fn refined(&self, kind: Kind) -> Option<Self> {
+        match kind {
+            Kind::Continuous => self.continuous.refined(kind).map(|continuous| Automatic { continuous }),
             Kind::Discrete | Kind::Static => None,
         }
     }
 
     #[cfg(feature = "std")]
-    fn describe(&self) -> String {
-        match M::KIND {
-            Kind::Continuous => Integrator::<M>::describe(&self.continuous),
-            Kind::Discrete => Integrator::<M>::describe(&Discrete),
+    fn describe(&self, kind: Kind) -> String {
+        match kind {
+            Kind::Continuous => self.continuous.describe(kind),
+            Kind::Discrete => Discrete.describe(kind),
             Kind::Static => "static model".to_owned(),
         }
     }

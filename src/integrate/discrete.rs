@@ -1,41 +1,37 @@
 //! [`Discrete`]: the step of a discrete-time model.
 
-use super::{Integrator, Stuck};
-use crate::interval::Interval;
-use crate::model::{Kind, Model};
-use crate::scalar::Scalar;
-use crate::signals::Of;
+use super::{Integrator, Stuck, System};
+use crate::layout::Kind;
 use serde::{Deserialize, Serialize};
 
-/// The step of a discrete-time model: [`Model::next`], once per sample.
+/// The step of a discrete-time model: [`Model::next`](crate::Model::next), once per sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Discrete;
 
-impl<M: Model> Integrator<M> for Discrete {
+impl Integrator for Discrete {
     type Memory = ();
+    const FIXED: bool = true;
 
     #[inline(always)]
-    fn advance<S: Scalar>(
+    fn advance<Y: System>(
         &self,
-        model: &M,
-        interval: &Interval<M::Input>,
-        x: Of<M::State, S>,
-        p: &Of<M::Parameters, S>,
+        system: &Y,
+        x: Y::Vector<Y::Scalar>,
         _memory: &mut (),
-    ) -> Result<Of<M::State, S>, Stuck> {
-        Ok(model.next(interval.t0, &x, &interval.input::<S>(0.0), p))
+    ) -> Result<Y::Vector<Y::Scalar>, Stuck> {
+        Ok(system.next(&x))
     }
 
     fn serves(&self, kind: Kind) -> bool {
         kind == Kind::Discrete
     }
 
-    fn refined(&self) -> Option<Self> {
+    fn refined(&self, _kind: Kind) -> Option<Self> {
         None
     }
 
     #[cfg(feature = "std")]
-    fn describe(&self) -> String {
+    fn describe(&self, _kind: Kind) -> String {
         "discrete steps".to_owned()
     }
 }

@@ -13,12 +13,10 @@
 //! explicit method gives up after 100,000 steps; a circuit with a stray time constant of 10 ns, sampled every 1 ms, takes
 //! 33 us per sample against 6.1 ms.
 
-use super::{Integrator, Stuck, Tolerance, axpy, combined};
-use crate::dual::Dual;
-use crate::interval::Interval;
-use crate::model::{Kind, Model};
+use super::tolerance::{combined, values};
+use super::{Integrator, Square, Stuck, System, Tolerance};
+use crate::layout::Kind;
 use crate::scalar::Scalar;
-use crate::signals::{Of, Signals};
 use serde::{Deserialize, Serialize};
 
 /// Singly diagonally implicit Runge-Kutta 4(3) with an explicit first stage, stiffly accurate and L-stable: for models
@@ -66,71 +64,69 @@ const ERROR: [f64; STAGES] = [
 
 /// Newton steps per stage before the step is given up.
 const ITERATIONS: usize = 10;
-/// Columns of the Jacobian per evaluation.
-const COLUMNS: usize = 8;
 
 /// The equation `k = f(base + h gamma k)` of a stage, made linear at a guess.
-struct Linearization<X: Signals> {
+struct Linearization<Y: System> {
     /// The guess.
-    k: Of<X, f64>,
+    k: Y::Vector<f64>,
     /// `f(base + h gamma k)`.
-    f: Of<X, f64>,
+    f: Y::Vector<f64>,
     /// `I - h gamma df/dx` in triangles.
-    rows: X::Array<X::Array<f64>>,
+    rows: Y::Matrix,
     /// Where these rows stood.
-    order: X::Array<usize>,
+    order: Y::Vector<usize>,
 }
 
-impl<M: Model> Integrator<M> for Esdirk {
+impl Integrator for Esdirk {
     type Memory = f64;
+    const FIXED: bool = false;
 
     #[inline(always)]
-    fn advance<S: Scalar>(
+    fn advance<Y: System>(
         &self,
-        model: &M,
-        interval: &Interval<M::Input>,
-        x: Of<M::State, S>,
-        p: &Of<M::Parameters, S>,
+        system: &Y,
+        x: Y::Vector<Y::Scalar>,
         memory: &mut f64,
-    ) -> Result<Of<M::State, S>, Stuck> {
-        let length = interval.t1 - interval.t0;
-        let zero = M::State::splat(0.0);
-        let values = |x: &Of<M::State, S>| M::State::map(*x, |v: S| v.value());
-        let p_value = M::Parameters::map(*p, |v: S| v.value());
-        let mut k = [M::State::splat(S::from(0.0)); STAGES];
+    ) -> Result<Y::Vector<Y::Scalar>, Stuck> {
+        let (_, length) = system.interval();
+        let zero = system.vector(|_| 0.0);
+        let mut k: [_; STAGES] = core::array::from_fn(|_| system.vector(|_| Y::Scalar::from(0.0)));
         let (mut start, mut end) = (f64::NAN, f64::NAN);
         let tolerance = Tolerance { relative: self.relative, absolute: self.absolute };
-        tolerance.cross::<M::State, M::Input, S>(4.0, interval, x, memory, |x, tau, h| {
+        tolerance.cross(4.0, system, x, memory, |x, tau, h| {
             if tau == end {
-                (k[0], start) = (k[STAGES - 1], tau);
+                k.swap(0, STAGES - 1);
+                start = tau;
             }
-            let mut stage = *x;
+            let mut stage = x.clone();
             for i in usize::from(tau == start)..STAGES {
-                let base = combined::<M::State, S>(x, h, &A[i][..i], &k);
-                let at = tau + C[i] * h;
-                let (t, s) = (interval.t0 + at, at / length);
+                let base = combined(system, x, h, &A[i][..i], &k);
+                let position = (tau + C[i] * h) / length;
                 // The slope k of the stage solves k = f(base + h gamma k); the first guess keeps the last stage.
-                let (gamma_h, u) = (GAMMA * h, interval.input::<f64>(s));
+                let gamma_h = GAMMA * h;
                 let equation = if i == 0 {
                     None
                 } else {
-                    Some(self.solve(model, t, &u, &p_value, &values(&base), &values(&stage), gamma_h)?)
+                    Some(self.solve(system, position, &values(system, &base), &values(system, &stage), gamma_h)?)
                 };
-                let guess = M::State::map(equation.as_ref().map_or(zero, |e| e.k), S::from);
-                let at_guess = axpy::<M::State, S>(base, gamma_h, guess);
-                let f = model.derivative(t, &at_guess, &interval.input::<S>(s), p);
+                let guess = match &equation {
+                    None => system.vector(|_| Y::Scalar::from(0.0)),
+                    Some(equation) => system.vector(|i| Y::Scalar::from(equation.k.as_ref()[i])),
+                };
+                let at_guess = axpy::<Y, _>(system, &base, gamma_h, &guess);
+                let f = system.derivative(position, &at_guess);
                 k[i] = match &equation {
                     None => f,
-                    Some(equation) => equation.improved::<S>(guess, f),
+                    Some(equation) => equation.improved(system, &guess, &f),
                 };
                 if i == 0 {
                     continue;
                 }
-                stage = axpy::<M::State, S>(base, gamma_h, k[i]);
+                stage = axpy::<Y, _>(system, &base, gamma_h, &k[i]);
             }
             (start, end) = (tau, tau + h);
-            let k = k.map(|k| values(&k));
-            Some((stage, combined::<M::State, f64>(&zero, h, &ERROR, &k)))
+            let slopes = core::array::from_fn::<_, STAGES, _>(|i| values(system, &k[i]));
+            Some((stage, combined(system, &zero, h, &ERROR, &slopes)))
         })
     }
 
@@ -138,7 +134,7 @@ impl<M: Model> Integrator<M> for Esdirk {
         kind == Kind::Continuous
     }
 
-    fn refined(&self) -> Option<Self> {
+    fn refined(&self, _kind: Kind) -> Option<Self> {
         Some(Esdirk { relative: self.relative * 1e-2, absolute: self.absolute * 1e-2 })
     }
 
@@ -148,36 +144,38 @@ impl<M: Model> Integrator<M> for Esdirk {
     }
 
     #[cfg(feature = "std")]
-    fn describe(&self) -> String {
+    fn describe(&self, _kind: Kind) -> String {
         format!("implicit Runge-Kutta 4(3), adaptive, relative {:e}, absolute {:e}", self.relative, self.absolute)
     }
+}
+
+/// `x + a * k`, entry by entry.
+#[inline(always)]
+fn axpy<Y: System, S: Scalar>(system: &Y, x: &Y::Vector<S>, a: f64, k: &Y::Vector<S>) -> Y::Vector<S> {
+    system.vector(|i| x.as_ref()[i].plus_times(k.as_ref()[i], a))
 }
 
 impl Esdirk {
     /// The equation of a stage by Newton's method, but for the last step, which is left to arithmetic with slopes. `None`
     /// where it does not converge.
-    #[expect(clippy::too_many_arguments, reason = "an equation with its coefficients")]
-    fn solve<M: Model>(
+    fn solve<Y: System>(
         &self,
-        model: &M,
-        t: f64,
-        u: &Of<M::Input, f64>,
-        p: &Of<M::Parameters, f64>,
-        base: &Of<M::State, f64>,
-        guess: &Of<M::State, f64>,
+        system: &Y,
+        position: f64,
+        base: &Y::Vector<f64>,
+        guess: &Y::Vector<f64>,
         gamma_h: f64,
-    ) -> Option<Linearization<M::State>> {
+    ) -> Option<Linearization<Y>> {
         // What is left is squared by the last step, so that 1e-10 is as good as it gets.
         let allowed = Tolerance { relative: self.relative.max(1e-10), absolute: self.absolute };
-        let from_base = axpy::<M::State, f64>(*guess, -1.0, *base);
-        let mut k = M::State::map(from_base, |v: f64| v / gamma_h);
+        let mut k = system.vector(|i| (guess.as_ref()[i] - base.as_ref()[i]) / gamma_h);
         let mut before = f64::INFINITY;
         for _ in 0..ITERATIONS {
-            let x = axpy::<M::State, f64>(*base, gamma_h, k);
-            let equation = Linearization::new(model, t, &x, u, p, k, gamma_h)?;
-            let next = equation.improved::<f64>(k, equation.f);
-            let moved = axpy::<M::State, f64>(next, -1.0, k);
-            let ratio = allowed.ratio::<M::State, f64>(&M::State::map(moved, |v: f64| v * gamma_h), &x, &x);
+            let x = axpy::<Y, f64>(system, base, gamma_h, &k);
+            let equation = Linearization::new(system, position, &x, k, gamma_h)?;
+            let next = equation.improved(system, &equation.k, &equation.f);
+            let moved = system.vector(|i| (next.as_ref()[i] - equation.k.as_ref()[i]) * gamma_h);
+            let ratio = allowed.ratio(moved.as_ref(), x.as_ref(), x.as_ref());
             // Small against the tolerance and, for the slopes' sake, against the states, or no longer getting smaller.
             if ratio <= 1e-3 && (ratio * allowed.relative <= 1e-10 || ratio > 0.1 * before) {
                 return Some(equation);
@@ -191,60 +189,46 @@ impl Esdirk {
     }
 }
 
-impl<X: Signals> Linearization<X> {
+impl<Y: System> Linearization<Y> {
     /// At the slope `k`, where the state is `x`; `None` if the equation is singular there or not finite.
-    fn new<M: Model<State = X>>(
-        model: &M,
-        t: f64,
-        x: &Of<X, f64>,
-        u: &Of<M::Input, f64>,
-        p: &Of<M::Parameters, f64>,
-        k: Of<X, f64>,
-        gamma_h: f64,
-    ) -> Option<Self> {
-        let x = X::into_array(*x);
-        let u = M::Input::map(*u, Dual::<COLUMNS>::constant);
-        let p = M::Parameters::map(*p, Dual::<COLUMNS>::constant);
-        let mut f = k;
-        let mut rows = X::array_from_fn(|_| X::array_from_fn(|_| 0.0));
-        for from in (0..X::LEN).step_by(COLUMNS) {
-            let lane = |i: usize| i.checked_sub(from).unwrap_or(COLUMNS);
-            let seeded = X::from_fn(|i| Dual::<COLUMNS>::variable(x.as_ref()[i], lane(i)));
-            let duals = model.derivative(t, &seeded, &u, &p);
-            f = X::map(duals, |v: Dual<COLUMNS>| v.value);
-            let duals = X::into_array(duals);
-            for (i, (row, dual)) in rows.as_mut().iter_mut().zip(duals.as_ref()).enumerate() {
-                for (j, (entry, slope)) in row.as_mut().iter_mut().skip(from).zip(dual.slopes).enumerate() {
-                    *entry = f64::from(u8::from(i == from + j)) - gamma_h * slope;
-                }
+    fn new(system: &Y, position: f64, x: &Y::Vector<f64>, k: Y::Vector<f64>, gamma_h: f64) -> Option<Self> {
+        let (f, mut rows) = system.jacobian(position, x);
+        for i in 0..k.as_ref().len() {
+            for (j, entry) in rows.row_mut(i).iter_mut().enumerate() {
+                *entry = f64::from(u8::from(i == j)) - gamma_h * *entry;
             }
         }
-        Linearization { k, f, rows, order: X::array_from_fn(|i| i) }.eliminated()
+        Linearization { k, f, rows, order: system.vector(|i| i) }.eliminated(system)
     }
 
     /// Gaussian elimination; the pivot is the largest entry against its row, which does not depend on the states' units.
-    fn eliminated(mut self) -> Option<Self> {
-        let largest = |row: &X::Array<f64>| row.as_ref().iter().fold(0.0f64, |m, v| m.max(v.abs()));
-        let (rows, order) = (self.rows.as_mut(), self.order.as_mut());
-        let mut size = X::array_from_fn(|i| largest(&rows[i]));
-        let size = size.as_mut();
-        for j in 0..X::LEN {
-            let against_row = |i: &usize| rows[*i].as_ref()[j].abs() / size[*i];
-            let pivot = (j..X::LEN).max_by(|a, b| against_row(a).total_cmp(&against_row(b)))?;
-            rows.swap(j, pivot);
-            order.swap(j, pivot);
-            size.swap(j, pivot);
-            let top = rows[j];
-            let divisor = top.as_ref()[j];
+    fn eliminated(mut self, system: &Y) -> Option<Self> {
+        let largest = |row: &[f64]| row.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        let rows = &mut self.rows;
+        let mut size = system.vector(|i| largest(rows.row(i)));
+        let (order, size) = (self.order.as_mut(), size.as_mut());
+        let n = size.len();
+        for j in 0..n {
+            let against_row = |i: &usize| rows.row(*i)[j].abs() / size[*i];
+            let pivot = (j..n).max_by(|a, b| against_row(a).total_cmp(&against_row(b)))?;
+            if pivot != j {
+                for column in 0..n {
+                    let (a, b) = (rows.row(j)[column], rows.row(pivot)[column]);
+                    (rows.row_mut(j)[column], rows.row_mut(pivot)[column]) = (b, a);
+                }
+                order.swap(j, pivot);
+                size.swap(j, pivot);
+            }
+            let divisor = rows.row(j)[j];
             if divisor == 0.0 || !divisor.is_finite() {
                 return None;
             }
-            for row in rows[j + 1..].iter_mut() {
-                let row = row.as_mut();
-                row[j] /= divisor;
-                let factor = row[j];
-                for (entry, above) in row[j + 1..].iter_mut().zip(&top.as_ref()[j + 1..]) {
-                    *entry -= factor * above;
+            for i in j + 1..n {
+                let factor = rows.row(i)[j] / divisor;
+                rows.row_mut(i)[j] = factor;
+                for column in j + 1..n {
+                    let above = rows.row(j)[column];
+                    rows.row_mut(i)[column] -= factor * above;
                 }
             }
         }
@@ -254,22 +238,23 @@ impl<X: Signals> Linearization<X> {
     /// Newton's step from the guess `k` (here without slopes of its own) and `f = f(base + h gamma k)`: the solution, with
     /// the slopes that those of `f` give it.
     #[inline(always)]
-    fn improved<S: Scalar>(&self, k: Of<X, S>, f: Of<X, S>) -> Of<X, S> {
-        let residual = X::into_array(axpy::<X, S>(f, -1.0, k));
-        let rows = self.rows.as_ref();
-        let mut step = X::array_from_fn(|i| residual.as_ref()[self.order.as_ref()[i]]);
+    fn improved<S: Scalar>(&self, system: &Y, k: &Y::Vector<S>, f: &Y::Vector<S>) -> Y::Vector<S> {
+        let residual = |i: usize| f.as_ref()[i].plus_times(k.as_ref()[i], -1.0);
+        let mut step = system.vector(|i| residual(self.order.as_ref()[i]));
         let v = step.as_mut();
-        for i in 0..X::LEN {
+        for i in 0..v.len() {
+            let row = self.rows.row(i);
             for j in 0..i {
-                v[i] -= v[j] * rows[i].as_ref()[j];
+                v[i] -= v[j] * row[j];
             }
         }
-        for i in (0..X::LEN).rev() {
-            for j in i + 1..X::LEN {
-                v[i] -= v[j] * rows[i].as_ref()[j];
+        for i in (0..v.len()).rev() {
+            let row = self.rows.row(i);
+            for j in i + 1..v.len() {
+                v[i] -= v[j] * row[j];
             }
-            v[i] /= rows[i].as_ref()[i];
+            v[i] /= row[i];
         }
-        axpy::<X, S>(X::from_array(step), 1.0, k)
+        axpy::<Y, S>(system, &step, 1.0, k)
     }
 }

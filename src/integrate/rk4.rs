@@ -1,10 +1,8 @@
 //! [`Rk4`]: the classical Runge-Kutta method of order 4 (Kutta 1901).
 
-use super::{Integrator, Stuck, axpy};
-use crate::interval::Interval;
-use crate::model::{Kind, Model};
-use crate::scalar::Scalar;
-use crate::signals::{Of, Signals};
+use super::{Integrator, Stuck, System};
+use crate::layout::Kind;
+
 use serde::{Deserialize, Serialize};
 
 /// Classical Runge-Kutta of order 4, with a fixed number of steps from sample to sample.
@@ -26,32 +24,29 @@ impl Default for Rk4 {
 /// Node and weight of each stage.
 const STAGES: [(f64, f64); 4] = [(0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0)];
 
-impl<M: Model> Integrator<M> for Rk4 {
+impl Integrator for Rk4 {
     type Memory = ();
+    const FIXED: bool = true;
 
     // One call site of the derivative: it is inlined once, which the vector unit needs (3 times faster than four).
     #[inline(always)]
-    fn advance<S: Scalar>(
+    fn advance<Y: System>(
         &self,
-        model: &M,
-        interval: &Interval<M::Input>,
-        mut x: Of<M::State, S>,
-        p: &Of<M::Parameters, S>,
+        system: &Y,
+        mut x: Y::Vector<Y::Scalar>,
         _memory: &mut (),
-    ) -> Result<Of<M::State, S>, Stuck> {
+    ) -> Result<Y::Vector<Y::Scalar>, Stuck> {
         let steps = self.substeps.max(1);
-        let h = (interval.t1 - interval.t0) / steps as f64;
-        let fraction = 1.0 / steps as f64;
-        let mut sum = x;
-        let mut k = M::State::splat(S::from(0.0));
+        let part = 1.0 / f64::from(steps);
+        let mut sum = x.clone();
+        let mut k = system.vector(|_| Y::Scalar::from(0.0));
         for step in 0..steps {
             for (node, weight) in STAGES {
-                let position = step as f64 + node;
-                let u = interval.input::<S>(position * fraction);
-                k = model.derivative(interval.t0 + position * h, &axpy::<M::State, S>(x, h * node, k), &u, p);
-                sum = axpy::<M::State, S>(sum, h * weight, k);
+                let at = system.along(&x, part * node, &k);
+                k = system.derivative((f64::from(step) + node) * part, &at);
+                sum = system.along(&sum, part * weight, &k);
             }
-            x = sum;
+            x = sum.clone();
         }
         Ok(x)
     }
@@ -60,12 +55,12 @@ impl<M: Model> Integrator<M> for Rk4 {
         kind == Kind::Continuous
     }
 
-    fn refined(&self) -> Option<Self> {
+    fn refined(&self, _kind: Kind) -> Option<Self> {
         Some(Rk4 { substeps: self.substeps.max(1).saturating_mul(2) })
     }
 
     #[cfg(feature = "std")]
-    fn describe(&self) -> String {
+    fn describe(&self, _kind: Kind) -> String {
         format!("Runge-Kutta 4, {} step(s) per sample", self.substeps.max(1))
     }
 }

@@ -1,11 +1,9 @@
 //! [`Rk45`]: the explicit Runge-Kutta pair of orders 5 and 4 of Dormand and Prince (J. R. Dormand, P. J. Prince, "A family
 //! of embedded Runge-Kutta formulae", Journal of Computational and Applied Mathematics 6, 1980, 19-26, table 2).
 
-use super::{Integrator, Stuck, Tolerance, combined};
-use crate::interval::Interval;
-use crate::model::{Kind, Model};
-use crate::scalar::Scalar;
-use crate::signals::{Of, Signals};
+use super::tolerance::{combined, values};
+use super::{Integrator, Stuck, System, Tolerance};
+use crate::layout::Kind;
 use serde::{Deserialize, Serialize};
 
 /// Explicit Runge-Kutta 5(4) whose steps follow the error of the values; they stop at every sample, where the input
@@ -44,38 +42,37 @@ const A: [[f64; STAGES]; STAGES] = [
 const ERROR: [f64; STAGES] =
     [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
 
-impl<M: Model> Integrator<M> for Rk45 {
+impl Integrator for Rk45 {
     type Memory = f64;
+    const FIXED: bool = false;
 
     // One call site of the derivative, as in Rk4.
     #[inline(always)]
-    fn advance<S: Scalar>(
+    fn advance<Y: System>(
         &self,
-        model: &M,
-        interval: &Interval<M::Input>,
-        x: Of<M::State, S>,
-        p: &Of<M::Parameters, S>,
+        system: &Y,
+        x: Y::Vector<Y::Scalar>,
         memory: &mut f64,
-    ) -> Result<Of<M::State, S>, Stuck> {
-        let length = interval.t1 - interval.t0;
-        let zero = M::State::splat(S::from(0.0));
-        let mut k = [zero; STAGES];
+    ) -> Result<Y::Vector<Y::Scalar>, Stuck> {
+        let (_, length) = system.interval();
+        let zero = system.vector(|_| 0.0);
+        let mut k: [_; STAGES] = core::array::from_fn(|_| system.vector(|_| Y::Scalar::from(0.0)));
         // The times whose derivatives stand in the first and in the last stage.
         let (mut start, mut end) = (f64::NAN, f64::NAN);
         let tolerance = Tolerance { relative: self.relative, absolute: self.absolute };
-        tolerance.cross::<M::State, M::Input, S>(5.0, interval, x, memory, |x, tau, h| {
+        tolerance.cross(5.0, system, x, memory, |x, tau, h| {
             if tau == end {
-                (k[0], start) = (k[STAGES - 1], tau);
+                k.swap(0, STAGES - 1);
+                start = tau;
             }
-            let mut stage = *x;
+            let mut stage = x.clone();
             for i in usize::from(tau == start)..STAGES {
-                stage = combined::<M::State, S>(x, h, &A[i][..i], &k);
-                let at = tau + C[i] * h;
-                k[i] = model.derivative(interval.t0 + at, &stage, &interval.input::<S>(at / length), p);
+                stage = combined(system, x, h, &A[i][..i], &k);
+                k[i] = system.derivative((tau + C[i] * h) / length, &stage);
             }
             (start, end) = (tau, tau + h);
-            let values = k.map(|k| M::State::map(k, |v: S| v.value()));
-            Some((stage, combined::<M::State, f64>(&M::State::splat(0.0), h, &ERROR, &values)))
+            let slopes = core::array::from_fn::<_, STAGES, _>(|i| values(system, &k[i]));
+            Some((stage, combined(system, &zero, h, &ERROR, &slopes)))
         })
     }
 
@@ -83,7 +80,7 @@ impl<M: Model> Integrator<M> for Rk45 {
         kind == Kind::Continuous
     }
 
-    fn refined(&self) -> Option<Self> {
+    fn refined(&self, _kind: Kind) -> Option<Self> {
         Some(Rk45 { relative: self.relative * 1e-2, absolute: self.absolute * 1e-2 })
     }
 
@@ -93,7 +90,7 @@ impl<M: Model> Integrator<M> for Rk45 {
     }
 
     #[cfg(feature = "std")]
-    fn describe(&self) -> String {
+    fn describe(&self, _kind: Kind) -> String {
         format!("Runge-Kutta 5(4), adaptive, relative {:e}, absolute {:e}", self.relative, self.absolute)
     }
 }

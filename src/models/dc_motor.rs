@@ -51,12 +51,12 @@ impl Model for DcMotor {
     type Parameters = Armature;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Rotation<S>, u: &Feed<S>, p: &Armature<S>) -> Rotation<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Rotation<S>, u: &Feed<S>, p: &Armature<S>) -> Rotation<S> {
         Rotation { i: (u.u - p.r * x.i - p.k * x.w) / p.l, w: (p.k * x.i - p.b * x.w - u.tau_l) / p.j }
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Rotation<S>, _u: &Feed<S>, _p: &Armature<S>) -> Rotation<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Rotation<S>, _u: &Feed<S>, _p: &Armature<S>) -> Rotation<S> {
         *x
     }
 }

@@ -91,12 +91,12 @@ impl Model for Positioning {
     type Parameters = Axis;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Motion<S>, u: &Command<S>, p: &Axis<S>) -> Motion<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Command<S>, p: &Axis<S>) -> Motion<S> {
         Motion { q: x.v, v: self.acceleration(x.v, u.vir, p) }
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Motion<S>, _u: &Command<S>, _p: &Axis<S>) -> Position<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, _u: &Command<S>, _p: &Axis<S>) -> Position<S> {
         Position { qm: x.q }
     }
 }
@@ -146,13 +146,13 @@ impl Model for PositioningLoop {
     type Parameters = Axis;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &GuidedMotion<S>, u: &Reference<S>, p: &Axis<S>) -> GuidedMotion<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &GuidedMotion<S>, u: &Reference<S>, p: &Axis<S>) -> GuidedMotion<S> {
         let v = self.axis.acceleration(x.v, self.command(x, u), p);
         GuidedMotion { q: x.v, v, vm: (x.v - x.vm) / self.lag }
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &GuidedMotion<S>, u: &Reference<S>, _p: &Axis<S>) -> Guided<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &GuidedMotion<S>, u: &Reference<S>, _p: &Axis<S>) -> Guided<S> {
         Guided { qm: x.q, vir: self.command(x, u) }
     }
 }

@@ -6,7 +6,7 @@ use super::{Beat, Clock, Divergence, Guard, ObserverError, Outcome, Update, Watc
 use super::{check_all_positive, check_starts, in_bounds, not_finite, prior_std};
 use crate::covariance::Covariance;
 use crate::dual::Dual;
-use crate::integrate::{Automatic, Integrator};
+use crate::integrate::{Automatic, Integrator, ModelSystem};
 use crate::interval::{Hold, Interval};
 use crate::model::Model;
 use crate::parameter::{Parameter, Transform};
@@ -37,7 +37,7 @@ pub struct EkfStart<M: Model> {
 /// `N` is the number of states plus free parameters (a greater one works, and costs). A parameter with a
 /// [`log`](Parameter::log) is filtered as its logarithm: it stays positive.
 #[derive(Clone, Copy)]
-pub struct Ekf<M: Model, const N: usize, I: Integrator<M> = Automatic> {
+pub struct Ekf<M: Model, const N: usize, I: Integrator = Automatic> {
     model: M,
     integrator: I,
     memory: I::Memory,
@@ -66,7 +66,7 @@ impl<M: Model, const N: usize> Ekf<M, N> {
     }
 }
 
-impl<M: Model, const N: usize, I: Integrator<M>> Ekf<M, N, I> {
+impl<M: Model, const N: usize, I: Integrator> Ekf<M, N, I> {
     /// A filter with an integrator of one's own.
     ///
     /// # Errors
@@ -164,8 +164,8 @@ impl<M: Model, const N: usize, I: Integrator<M>> Ekf<M, N, I> {
             _ => Outcome::Started,
         };
 
-        let y_hat =
-            M::Output::into_array(self.model.output(t, &self.x_dual(), &M::Input::map(*u, Dual::from), &self.p_dual()));
+        let u = M::Input::map(*u, Dual::from);
+        let y_hat = M::Output::into_array(self.model.output(Dual::from(t), &self.x_dual(), &u, &self.p_dual()));
         let (y, noise) = (M::Output::into_array(*y), M::Output::into_array(self.start.noise));
         let mut prior = M::Output::array_from_fn(|_| 0.0);
         let (mut whitened, mut deviations) = (prior, prior);
@@ -203,8 +203,8 @@ impl<M: Model, const N: usize, I: Integrator<M>> Ekf<M, N, I> {
     #[inline(always)]
     fn predict(&mut self, interval: &Interval<M::Input>) -> Result<(), Divergence> {
         let (x, p) = (self.x_dual(), self.p_dual());
-        let x =
-            self.integrator.advance(&self.model, interval, x, &p, &mut self.memory).map_err(|_| Divergence::Stuck)?;
+        let system = ModelSystem { model: &self.model, interval, p: &p };
+        let x = system.step(&self.integrator, x, &mut self.memory).map_err(|_| Divergence::Stuck)?;
         self.x = M::State::map(x, |x| x.value);
         self.covariance.predict(M::State::into_array(M::State::map(x, |x| x.slopes)).as_ref(), &self.drift);
         Ok(())

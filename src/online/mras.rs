@@ -12,7 +12,7 @@ pub use law::{Gradient, Law, Moment, Rate};
 
 use super::{Beat, Clock, Divergence, Guard, ObserverError, Outcome, Update, Watch};
 use super::{check_identity, check_starts, in_bounds, not_finite};
-use crate::integrate::{Automatic, Integrator};
+use crate::integrate::{Automatic, ModelSystem};
 use crate::interval::{Hold, Interval};
 use crate::model::{Kind, Model};
 use crate::parameter::Parameter;
@@ -214,13 +214,13 @@ impl<M: Model, L: Law<M>> Mras<M, L> {
             M::State::from_fn(|i| x.as_ref()[i] + e.as_ref()[i] * pull.as_ref()[i])
         };
         if self.start.stepping == Stepping::Euler {
-            let slope = self.model.derivative(t, &x, &M::Input::map(*u, S::from), p);
+            let slope = self.model.derivative(S::from(t), &x, &M::Input::map(*u, S::from), p);
             return Ok(pulled(crate::integrate::axpy::<M::State, S>(x, ts, slope)));
         }
         let interval = Interval { t0: t, t1: t + ts, u0: *u, u1: *u, hold: Hold::Zero };
         let advance = |x| {
-            let integrator = Automatic::default();
-            integrator.advance(&self.model, &interval, x, p, &mut ()).map_err(|_| Divergence::Stuck)
+            let system = ModelSystem { model: &self.model, interval: &interval, p };
+            system.step(&Automatic::default(), x, &mut ()).map_err(|_| Divergence::Stuck)
         };
         match self.start.order {
             Order::UpdateThenPredict => advance(pulled(x)),

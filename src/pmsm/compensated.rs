@@ -50,7 +50,7 @@ impl Model for ExactCompensated {
     #[inline]
     fn next<S: Scalar>(
         &self,
-        _t: f64,
+        _t: S,
         x: &Currents<S>,
         u: &CompensatedDrive<S>,
         p: &CompensatedWinding<S>,
@@ -62,7 +62,7 @@ impl Model for ExactCompensated {
     #[inline]
     fn output<S: Scalar>(
         &self,
-        _t: f64,
+        _t: S,
         x: &Currents<S>,
         _u: &CompensatedDrive<S>,
         _p: &CompensatedWinding<S>,

@@ -114,12 +114,12 @@ impl Model for ExactSurface {
     const KIND: Kind = Kind::Discrete;
 
     #[inline]
-    fn next<S: Scalar>(&self, _t: f64, x: &Currents<S>, u: &Drive<S>, p: &Winding<S>) -> Currents<S> {
+    fn next<S: Scalar>(&self, _t: S, x: &Currents<S>, u: &Drive<S>, p: &Winding<S>) -> Currents<S> {
         self.0.advance(x, u, p)
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
         *x
     }
 }
@@ -177,13 +177,13 @@ impl Model for ExactFed {
     const KIND: Kind = Kind::Discrete;
 
     #[inline]
-    fn next<S: Scalar>(&self, _t: f64, x: &Currents<S>, u: &AngledDrive<S>, p: &FedWinding<S>) -> Currents<S> {
+    fn next<S: Scalar>(&self, _t: S, x: &Currents<S>, u: &AngledDrive<S>, p: &FedWinding<S>) -> Currents<S> {
         let u = self.step.less_dead_time(x, u, p.vdt, self.i0);
         self.step.advance(x, &u, &Winding { rs: p.rs, ls: p.ls, ke: p.ke })
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Currents<S>, _u: &AngledDrive<S>, _p: &FedWinding<S>) -> Currents<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &AngledDrive<S>, _p: &FedWinding<S>) -> Currents<S> {
         *x
     }
 }

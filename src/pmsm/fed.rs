@@ -78,7 +78,7 @@ impl Model for Fed {
     type Parameters = Line;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Currents<S>, u: &AngledDrive<S>, p: &Line<S>) -> Currents<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Currents<S>, u: &AngledDrive<S>, p: &Line<S>) -> Currents<S> {
         let we = self.pole_pairs.electrical(u.w);
         let lost = dead_time(x, p.i0, self.pole_pairs.electrical(u.theta));
         // Into the magnet's frame: the inverter's voltage by its delay and by the resolver's offset, all else by the latter.
@@ -93,7 +93,7 @@ impl Model for Fed {
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Currents<S>, _u: &AngledDrive<S>, _p: &Line<S>) -> Currents<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &AngledDrive<S>, _p: &Line<S>) -> Currents<S> {
         *x
     }
 }

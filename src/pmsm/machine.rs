@@ -73,7 +73,7 @@ impl Model for Machine {
     type Parameters = Rotor;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, t: f64, x: &Motion<S>, u: &Acting<S>, p: &Rotor<S>) -> Motion<S> {
+    fn derivative<S: Scalar>(&self, t: S, x: &Motion<S>, u: &Acting<S>, p: &Rotor<S>) -> Motion<S> {
         let currents = Currents { id: x.id, iq: x.iq };
         let winding = SalientWinding { rs: p.rs, ld: p.ld, lq: p.lq, ke: p.ke };
         let di = self.winding.derivative(t, &currents, &Drive { ud: u.ud, uq: u.uq, w: x.w }, &winding);
@@ -84,7 +84,7 @@ impl Model for Machine {
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Motion<S>, _u: &Acting<S>, _p: &Rotor<S>) -> Motion<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, _u: &Acting<S>, _p: &Rotor<S>) -> Motion<S> {
         *x
     }
 }

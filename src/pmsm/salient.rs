@@ -55,7 +55,7 @@ impl Model for Salient {
     type Parameters = SalientWinding;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Currents<S>, u: &Drive<S>, p: &SalientWinding<S>) -> Currents<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Currents<S>, u: &Drive<S>, p: &SalientWinding<S>) -> Currents<S> {
         let we = self.pole_pairs.electrical(u.w);
         Currents {
             id: (u.ud - p.rs * x.id + we * p.lq * x.iq) / p.ld,
@@ -64,7 +64,7 @@ impl Model for Salient {
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Currents<S>, _u: &Drive<S>, _p: &SalientWinding<S>) -> Currents<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &Drive<S>, _p: &SalientWinding<S>) -> Currents<S> {
         *x
     }
 }

@@ -85,7 +85,7 @@ impl Model for Saturated {
     type Parameters = SaturatedWinding;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Currents<S>, u: &Drive<S>, p: &SaturatedWinding<S>) -> Currents<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Currents<S>, u: &Drive<S>, p: &SaturatedWinding<S>) -> Currents<S> {
         let we = self.pole_pairs.electrical(u.w);
         let (psi_d, psi_q) = self.flux(x, p);
         let (ldd, ldq, lqq) = self.incremental(x, p);
@@ -95,7 +95,7 @@ impl Model for Saturated {
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Currents<S>, _u: &Drive<S>, _p: &SaturatedWinding<S>) -> Currents<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &Drive<S>, _p: &SaturatedWinding<S>) -> Currents<S> {
         *x
     }
 }

@@ -71,12 +71,12 @@ impl Model for Shaft {
     type Parameters = Mechanics;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Turning<S>, u: &Torque<S>, p: &Mechanics<S>) -> Turning<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Turning<S>, u: &Torque<S>, p: &Mechanics<S>) -> Turning<S> {
         Turning { w: (p.ke * u.iq * SQRT_3_2 - self.load(x, p)) / p.j, theta: x.w }
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Turning<S>, _u: &Torque<S>, _p: &Mechanics<S>) -> Turning<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Turning<S>, _u: &Torque<S>, _p: &Mechanics<S>) -> Turning<S> {
         *x
     }
 }

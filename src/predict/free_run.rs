@@ -23,7 +23,7 @@ impl<M: Model> Predictor<M> for FreeRun {
     }
 
     #[inline(always)]
-    fn state<S: Scalar, I: Integrator<M>>(
+    fn state<S: Scalar, I: Integrator>(
         &self,
         walk: &Walk<'_, M, I>,
         _prepared: &(),

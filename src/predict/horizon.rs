@@ -90,7 +90,7 @@ impl<M: Model> Predictor<M> for Horizon {
     }
 
     #[inline(always)]
-    fn state<S: Scalar, I: Integrator<M>>(
+    fn state<S: Scalar, I: Integrator>(
         &self,
         walk: &Walk<'_, M, I>,
         prepared: &Self::Prepared,

@@ -34,7 +34,7 @@ pub(crate) fn state<M: Model>(
         for first in (0..n).step_by(LANES) {
             let seeded = M::State::from_fn(|i| Dual::<LANES>::variable(entries(x).as_ref()[i], i.wrapping_sub(first)));
             let expected =
-                model.output(t, &seeded, &M::Input::map(*u, Dual::from), &M::Parameters::map(*p, Dual::from));
+                model.output(t.into(), &seeded, &M::Input::map(*u, Dual::from), &M::Parameters::map(*p, Dual::from));
             for (j, output) in M::Output::into_array(expected).into_iter().enumerate() {
                 errors[j] = y.as_ref()[j] - output.value;
                 for lane in 0..LANES.min(n - first) {
@@ -76,7 +76,7 @@ pub(crate) fn depends_on_parameter<M: Model>(
     let p = M::Parameters::into_array(*p);
     (0..M::Parameters::LEN).find_map(|i| {
         let seeded = M::Parameters::from_fn(|j| Dual::<1>::variable(p.as_ref()[j], usize::from(i != j)));
-        let y = model.output(t, &M::State::map(*x, Dual::from), &M::Input::map(*u, Dual::from), &seeded);
+        let y = model.output(t.into(), &M::State::map(*x, Dual::from), &M::Input::map(*u, Dual::from), &seeded);
         let depends = M::Output::into_array(y).into_iter().any(|y| y.slopes[0] != 0.0);
         depends.then_some(M::Parameters::NAMES[i])
     })

@@ -76,7 +76,7 @@ impl Window {
 }
 
 /// The states of one experiment with up to `N` slopes, on their way through the record.
-struct Lanes<M: Model, I: Integrator<M>, const N: usize, const UNIT: Unit> {
+struct Lanes<M: Model, I: Integrator, const N: usize, const UNIT: Unit> {
     x: Of<M::State, Dual<N, UNIT>>,
     p: Of<M::Parameters, Dual<N, UNIT>>,
     memory: I::Memory,
@@ -85,7 +85,7 @@ struct Lanes<M: Model, I: Integrator<M>, const N: usize, const UNIT: Unit> {
 }
 
 /// A model on its way through a record, with all the slopes asked for: in as many passes of `N` as it takes.
-pub(crate) struct Trajectory<'a, M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize, const UNIT: Unit> {
+pub(crate) struct Trajectory<'a, M: Model, I: Integrator, P: Predictor<M>, const N: usize, const UNIT: Unit> {
     walk: Walk<'a, M, I>,
     predictor: &'a P,
     prepared: &'a P::Prepared,
@@ -93,9 +93,7 @@ pub(crate) struct Trajectory<'a, M: Model, I: Integrator<M>, P: Predictor<M>, co
     next: usize,
 }
 
-impl<'a, M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize, const UNIT: Unit>
-    Trajectory<'a, M, I, P, N, UNIT>
-{
+impl<'a, M: Model, I: Integrator, P: Predictor<M>, const N: usize, const UNIT: Unit> Trajectory<'a, M, I, P, N, UNIT> {
     pub fn new(
         walk: Walk<'a, M, I>,
         predictor: &'a P,
@@ -168,7 +166,7 @@ impl<'a, M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize, const UNIT
 }
 
 /// One window of one pass. The only caller of the model in a fit.
-struct Fill<'f, 'a, M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize, const UNIT: Unit> {
+struct Fill<'f, 'a, M: Model, I: Integrator, P: Predictor<M>, const N: usize, const UNIT: Unit> {
     lanes: &'f mut Lanes<M, I, N, UNIT>,
     walk: Walk<'a, M, I>,
     predictor: &'a P,
@@ -176,7 +174,7 @@ struct Fill<'f, 'a, M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize,
     window: &'f mut Window,
 }
 
-impl<M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize, const UNIT: Unit> Kernel
+impl<M: Model, I: Integrator, P: Predictor<M>, const N: usize, const UNIT: Unit> Kernel
     for Fill<'_, '_, M, I, P, N, UNIT>
 {
     type Output = Result<(), usize>;
@@ -209,7 +207,8 @@ impl<M: Model, I: Integrator<M>, P: Predictor<M>, const N: usize, const UNIT: Un
                 x = state;
             }
             let u = M::Input::map(walk.experiment.inputs()[sample], Dual::from);
-            let expected = M::Output::into_array(walk.model.output(walk.experiment.time(sample), &state, &u, &p));
+            let expected =
+                M::Output::into_array(walk.model.output(walk.experiment.time(sample).into(), &state, &u, &p));
             let found = M::Output::into_array(walk.experiment.outputs()[sample]);
             for j in 0..M::Output::LEN {
                 let (expected, found) = (expected.as_ref()[j], found.as_ref()[j]);

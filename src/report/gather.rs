@@ -27,7 +27,7 @@ impl Report {
     ///
     /// # Errors
     /// An estimate of another problem; a prediction that fails or is not finite.
-    pub fn new<M: Model, I: Integrator<M>, P: Predictor<M>, O>(
+    pub fn new<M: Model, I: Integrator, P: Predictor<M>, O>(
         problem: &FitProblem<'_, M, I, P, O>,
         estimate: &Estimate<M, I, P>,
     ) -> Result<Report, Error> {

@@ -19,7 +19,7 @@ impl Model for Polynomial {
     const KIND: Kind = Kind::Static;
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, _x: &Nothing, u: &Input<S>, p: &Cubic<S>) -> Output<S> {
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Input<S>, p: &Cubic<S>) -> Output<S> {
         Output { y: p.a + p.b * u.u + p.c * u.u * u.u }
     }
 }
@@ -122,12 +122,12 @@ impl Model for FirstOrder {
     type Parameters = Lag;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Level<S>, u: &Input<S>, p: &Lag<S>) -> Level<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Input<S>, p: &Lag<S>) -> Level<S> {
         Level { x: (p.k * u.u - x.x) / p.tau }
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Level<S>, _u: &Input<S>, _p: &Lag<S>) -> Level<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Input<S>, _p: &Lag<S>) -> Level<S> {
         *x
     }
 }

@@ -22,7 +22,7 @@ impl Model for Amplifier {
     const KIND: Kind = Kind::Static;
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, _x: &Nothing, u: &Drive<S>, p: &Product<S>) -> Reading<S> {
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Drive<S>, p: &Product<S>) -> Reading<S> {
         Reading { y: p.a * p.b * u.u + p.c, z: p.c * u.w }
     }
 }
@@ -76,7 +76,7 @@ impl Model for Binding {
     const KIND: Kind = Kind::Static;
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, _x: &Nothing, u: &Dose<S>, p: &Saturation<S>) -> Answer<S> {
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Dose<S>, p: &Saturation<S>) -> Answer<S> {
         Answer { y: p.top * u.u / (p.half + u.u) }
     }
 }
@@ -182,7 +182,7 @@ impl Model for Emps {
     type Parameters = Slide;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Motion<S>, u: &Command<S>, p: &Slide<S>) -> Motion<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Command<S>, p: &Slide<S>) -> Motion<S> {
         let sign = (x.v * 500.0).tanh();
         let forward = (sign + 1.0) * 0.5;
         let friction = p.fcp * forward - p.fcm * (-forward + 1.0);
@@ -190,7 +190,7 @@ impl Model for Emps {
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Motion<S>, _u: &Command<S>, _p: &Slide<S>) -> Motion<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, _u: &Command<S>, _p: &Slide<S>) -> Motion<S> {
         *x
     }
 }

@@ -25,7 +25,7 @@ impl Model for Friction {
     const KIND: Kind = Kind::Static;
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, _x: &Nothing, u: &Drive<S>, p: &Line<S>) -> Response<S> {
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Drive<S>, p: &Line<S>) -> Response<S> {
         let dry = if u.u.value() > 0.0 { p.forwards } else { -p.backwards };
         Response { y: p.gain * p.scale * (p.slope * u.u + dry + p.offset) }
     }

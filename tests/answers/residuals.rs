@@ -20,7 +20,7 @@ impl Model for Amplifier {
     const KIND: greybox::Kind = greybox::Kind::Static;
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, _x: &Nothing, u: &Drive<S>, p: &Gain<S>) -> Reading<S> {
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Drive<S>, p: &Gain<S>) -> Reading<S> {
         Reading { y: p.k * u.u }
     }
 }

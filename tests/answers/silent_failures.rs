@@ -18,12 +18,12 @@ impl Model for FirstOrder {
     type Parameters = Lag;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Level<S>, u: &Drive<S>, p: &Lag<S>) -> Level<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Drive<S>, p: &Lag<S>) -> Level<S> {
         Level { x: (p.k * u.u - x.x) / p.tau }
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Level<S>, _u: &Drive<S>, _p: &Lag<S>) -> Level<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Drive<S>, _p: &Lag<S>) -> Level<S> {
         *x
     }
 }
@@ -114,7 +114,7 @@ impl Model for Offsets {
     const KIND: Kind = Kind::Static;
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, _x: &Nothing, u: &Drive<S>, p: &Amplified<S>) -> Level<S> {
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Drive<S>, p: &Amplified<S>) -> Level<S> {
         Level { x: p.g * u.u + p.b + p.c + p.idle * 0.0 }
     }
 }
@@ -181,13 +181,13 @@ mod emps {
         type Parameters = Slide;
 
         #[inline]
-        fn derivative<S: Scalar>(&self, _t: f64, x: &Motion<S>, u: &Command<S>, p: &Slide<S>) -> Motion<S> {
+        fn derivative<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Command<S>, p: &Slide<S>) -> Motion<S> {
             let friction = p.fv * x.v + p.fc * (x.v * 500.0).tanh();
             Motion { q: x.v, v: (u.vir * 35.150_651_88 - friction - p.offset) / p.m }
         }
 
         #[inline]
-        fn output<S: Scalar>(&self, _t: f64, x: &Motion<S>, _u: &Command<S>, _p: &Slide<S>) -> Position<S> {
+        fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, _u: &Command<S>, _p: &Slide<S>) -> Position<S> {
             Position { q: x.q }
         }
     }

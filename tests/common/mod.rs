@@ -19,7 +19,7 @@ impl Model for Line {
     type Parameters = Affine;
     const KIND: Kind = Kind::Static;
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, _x: &Nothing, u: &Voltage<S>, p: &Affine<S>) -> Pair<S> {
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Affine<S>) -> Pair<S> {
         Pair { y: p.slope * u.u + p.offset, z: p.offset * u.u - p.slope }
     }
 }
@@ -33,11 +33,11 @@ impl Model for Lag {
     type Output = Current;
     type Parameters = Branch;
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Current<S>, u: &Voltage<S>, p: &Branch<S>) -> Current<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Current<S>, u: &Voltage<S>, p: &Branch<S>) -> Current<S> {
         Current { i: (p.gain * u.u - x.i) / p.tau }
     }
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Current<S>, _u: &Voltage<S>, _p: &Branch<S>) -> Current<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, _p: &Branch<S>) -> Current<S> {
         *x
     }
 }

@@ -21,11 +21,11 @@ impl Model for Stiff {
     type Output = Measured;
     type Parameters = Coil;
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Circuit<S>, u: &Source<S>, p: &Coil<S>) -> Circuit<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Circuit<S>, u: &Source<S>, p: &Coil<S>) -> Circuit<S> {
         currents(x, u, p)
     }
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Circuit<S>, _u: &Source<S>, _p: &Coil<S>) -> Measured<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Circuit<S>, _u: &Source<S>, _p: &Coil<S>) -> Measured<S> {
         Measured { i: x.i }
     }
 }

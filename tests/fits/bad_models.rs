@@ -23,11 +23,11 @@ macro_rules! model {
             type Parameters = Pair;
             const KIND: Kind = $kind;
             #[inline]
-            fn $step<S: Scalar>(&self, _t: f64, $x: &Position<S>, $u: &Force<S>, $p: &Pair<S>) -> Position<S> {
+            fn $step<S: Scalar>(&self, _t: S, $x: &Position<S>, $u: &Force<S>, $p: &Pair<S>) -> Position<S> {
                 Position { x: $dx }
             }
             #[inline]
-            fn output<S: Scalar>(&self, _t: f64, $x: &Position<S>, _u: &Force<S>, _p: &Pair<S>) -> Position<S> {
+            fn output<S: Scalar>(&self, _t: S, $x: &Position<S>, _u: &Force<S>, _p: &Pair<S>) -> Position<S> {
                 Position { x: $y }
             }
         }
@@ -279,11 +279,11 @@ fn one_of_two_outputs() {
         type Output = Two;
         type Parameters = Pair;
         #[inline]
-        fn derivative<S: Scalar>(&self, _t: f64, x: &Position<S>, u: &Force<S>, p: &Pair<S>) -> Position<S> {
+        fn derivative<S: Scalar>(&self, _t: S, x: &Position<S>, u: &Force<S>, p: &Pair<S>) -> Position<S> {
             Position { x: p.b * u.u - p.a * x.x }
         }
         #[inline]
-        fn output<S: Scalar>(&self, _t: f64, x: &Position<S>, _u: &Force<S>, p: &Pair<S>) -> Two<S> {
+        fn output<S: Scalar>(&self, _t: S, x: &Position<S>, _u: &Force<S>, p: &Pair<S>) -> Two<S> {
             Two { x: x.x, z: x.x * 0.0 * p.a }
         }
     }
@@ -346,7 +346,7 @@ fn a_fit_without_any_error() {
         type Parameters = Pair;
         const KIND: Kind = Kind::Static;
         #[inline]
-        fn output<S: Scalar>(&self, _t: f64, _x: &Nothing, u: &Force<S>, p: &Pair<S>) -> Position<S> {
+        fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Force<S>, p: &Pair<S>) -> Position<S> {
             Position { x: p.a * u.u + p.b }
         }
     }

@@ -22,10 +22,10 @@ impl Model for Exact {
     type Input = Force;
     type Output = Place;
     type Parameters = Spring;
-    fn derivative<S: Scalar>(&self, _t: f64, x: &State<S>, u: &Force<S>, p: &Spring<S>) -> State<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &State<S>, u: &Force<S>, p: &Spring<S>) -> State<S> {
         State { x: x.v, v: acceleration(x, u, p) }
     }
-    fn output<S: Scalar>(&self, t: f64, x: &State<S>, u: &Force<S>, p: &Spring<S>) -> Place<S> {
+    fn output<S: Scalar>(&self, t: S, x: &State<S>, u: &Force<S>, p: &Spring<S>) -> Place<S> {
         Place { y: x.x * t.cos() + (u.u / p.k).sin() }
     }
 }
@@ -62,13 +62,13 @@ fn slopes_at_parameters_of_every_magnitude() {
         let (x, u) = (State { x: 0.3, v: -0.7 }, Force { u: 1.9 * magnitude });
         let (xs, us, ps) = seeded(x, u, p);
         let sizes = [1.0, 1.0, u.u, p.m, p.k, p.d];
-        let (found, exact) = (model.derivative(0.4, &xs, &us, &ps), Exact.derivative(0.4, &xs, &us, &ps));
+        let (found, exact) = (model.derivative(0.4.into(), &xs, &us, &ps), Exact.derivative(0.4.into(), &xs, &us, &ps));
         assert_eq!((found.x.value, found.v.value), (x.v, acceleration(&x, &u, &p)));
         assert_slopes(&found.x.slopes, &exact.x.slopes, &sizes);
         assert_slopes(&found.v.slopes, &exact.v.slopes, &sizes);
         // An input far below one is stepped by more than itself, unless its size is said; here it enters a sine.
         if magnitude >= 1.0 {
-            let (found, exact) = (model.output(0.4, &xs, &us, &ps), Exact.output(0.4, &xs, &us, &ps));
+            let (found, exact) = (model.output(0.4.into(), &xs, &us, &ps), Exact.output(0.4.into(), &xs, &us, &ps));
             assert_slopes(&found.y.slopes, &exact.y.slopes, &sizes);
         }
     }
@@ -85,7 +85,7 @@ fn sizes_make_small_inputs_and_passing_zeros_accurate() {
     // d nearly zero, where a step of its own size would drown in the rounding of y.
     let (x, u, p) =
         seeded(State { x: 0.3, v: 0.0 }, Force { u: 1.9 * tiny }, Spring { m: 1.0, k: 3.1 * tiny, d: 1e-14 });
-    let y = model.output(0.0, &x, &u, &p).y;
+    let y = model.output(0.0.into(), &x, &u, &p).y;
     assert_relative_eq!(y.slopes[0], 1.0, max_relative = 1e-8);
     assert_relative_eq!(y.slopes[2], (1.9f64 / 3.1).cos() / (3.1 * tiny), max_relative = 1e-8);
     assert_relative_eq!(y.slopes[5], 1.0, max_relative = 1e-8);
@@ -99,8 +99,12 @@ fn a_numeric_model_simulates_like_the_exact_one() {
     for k in 0..50 {
         let u0 = Force { u: (0.2 * k as f64).sin() };
         let interval = Interval { t0: 0.02 * k as f64, t1: 0.02 * (k + 1) as f64, u0, u1: u0, hold: Hold::Zero };
-        b = Some(Rk4::default().advance(&Exact, &interval, b.unwrap_or(a), &p, &mut ()).unwrap());
-        a = Rk4::default().advance(&numeric(), &interval, a, &p, &mut ()).unwrap();
+        b = Some(
+            ModelSystem { model: &Exact, interval: &interval, p: &p }
+                .step(&Rk4::default(), b.unwrap_or(a), &mut ())
+                .unwrap(),
+        );
+        a = ModelSystem { model: &numeric(), interval: &interval, p: &p }.step(&Rk4::default(), a, &mut ()).unwrap();
     }
     let b = b.unwrap();
     assert_relative_eq!(a.x.value, b.x.value, max_relative = 1e-13);
@@ -120,16 +124,16 @@ fn discrete_and_static_numeric_models() {
         |_t, x, _u, _p| *x,
     );
     let p = Spring { m: Dual::constant(0.0), k: Dual::<1>::variable(0.9, 0), d: Dual::constant(0.0) };
-    let next = discrete.next(0.0, &Place { y: Dual::constant(2.0) }, &Force { u: Dual::constant(1.0) }, &p);
+    let next = discrete.next(0.0.into(), &Place { y: Dual::constant(2.0) }, &Force { u: Dual::constant(1.0) }, &p);
     assert_relative_eq!(next.y.value, 2.8);
     assert_relative_eq!(next.y.slopes[0], 2.0, max_relative = 1e-9);
     let curve = Numeric::<Nothing, Force, Place, Spring>::without_state(|_t, _x, u, p| Place { y: (u.u * p.k).sin() });
-    let y = curve.output(0.0, &Nothing, &Force { u: Dual::constant(2.0) }, &p).y;
+    let y = curve.output(0.0.into(), &Nothing, &Force { u: Dual::constant(2.0) }, &p).y;
     assert_relative_eq!(y.slopes[0], 2.0 * 1.8f64.cos(), max_relative = 1e-9);
     assert_eq!((kind(&numeric()), kind(&discrete), kind(&curve)), (Kind::Continuous, Kind::Discrete, Kind::Static));
     // No variable at all.
     let constant = Numeric::<Nothing, Nothing, Place, Nothing>::without_state(|_t, _x, _u, _p| Place { y: PI });
-    assert_eq!(constant.output::<Dual<1>>(0.0, &Nothing, &Nothing, &Nothing).y.value, PI);
+    assert_eq!(constant.output::<Dual<1>>(0.0.into(), &Nothing, &Nothing, &Nothing).y.value, PI);
     check::derivatives(&constant, 0.0, &Nothing, &Nothing, &Nothing).unwrap();
 }
 
@@ -156,10 +160,10 @@ fn lost_slopes_are_found() {
         type Output = Place;
         type Parameters = Spring;
         const KIND: Kind = Kind::Discrete;
-        fn next<S: Scalar>(&self, _t: f64, x: &State<S>, u: &Force<S>, p: &Spring<S>) -> State<S> {
+        fn next<S: Scalar>(&self, _t: S, x: &State<S>, u: &Force<S>, p: &Spring<S>) -> State<S> {
             State { x: x.x + x.v, v: x.v + u.u / p.m.value() }
         }
-        fn output<S: Scalar>(&self, _t: f64, x: &State<S>, _u: &Force<S>, _p: &Spring<S>) -> Place<S> {
+        fn output<S: Scalar>(&self, _t: S, x: &State<S>, _u: &Force<S>, _p: &Spring<S>) -> Place<S> {
             Place { y: x.x }
         }
     }

@@ -19,11 +19,11 @@ impl Model for DcMotor {
     type Output = Rotor;
     type Parameters = Brushed;
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Rotor<S>, u: &Voltage<S>, p: &Brushed<S>) -> Rotor<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Rotor<S>, u: &Voltage<S>, p: &Brushed<S>) -> Rotor<S> {
         Rotor { i: (u.u - p.r * x.i - p.k * x.w) / p.l, w: (p.k * x.i - p.b * x.w) / p.j }
     }
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Rotor<S>, _u: &Voltage<S>, _p: &Brushed<S>) -> Rotor<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Rotor<S>, _u: &Voltage<S>, _p: &Brushed<S>) -> Rotor<S> {
         *x
     }
 }
@@ -38,11 +38,11 @@ impl Model for Recursion {
     type Parameters = Poles;
     const KIND: Kind = Kind::Discrete;
     #[inline]
-    fn next<S: Scalar>(&self, _t: f64, x: &Pair<S>, u: &Voltage<S>, p: &Poles<S>) -> Pair<S> {
+    fn next<S: Scalar>(&self, _t: S, x: &Pair<S>, u: &Voltage<S>, p: &Poles<S>) -> Pair<S> {
         Pair { y: p.a1 * x.y + x.z, z: p.a2 * x.y + p.gain * u.u }
     }
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Pair<S>, _u: &Voltage<S>, _p: &Poles<S>) -> Voltage<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Pair<S>, _u: &Voltage<S>, _p: &Poles<S>) -> Voltage<S> {
         Voltage { u: x.y }
     }
 }
@@ -220,7 +220,7 @@ fn priors_are_measurements() {
         type Parameters = Unseen;
         const KIND: Kind = Kind::Static;
         #[inline]
-        fn output<S: Scalar>(&self, _t: f64, _x: &Nothing, _u: &Voltage<S>, p: &Unseen<S>) -> Voltage<S> {
+        fn output<S: Scalar>(&self, _t: S, _x: &Nothing, _u: &Voltage<S>, p: &Unseen<S>) -> Voltage<S> {
             Voltage { u: p.offset }
         }
     }

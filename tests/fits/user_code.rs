@@ -18,7 +18,7 @@ impl Model for Pmsm {
     type State = Currents;  type Input = Drive;  type Output = Currents;  type Parameters = Winding;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Currents<S>, u: &Drive<S>, p: &Winding<S>) -> Currents<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Currents<S>, u: &Drive<S>, p: &Winding<S>) -> Currents<S> {
         let we = u.w * self.pole_pairs;
         Currents {
             id: (u.ud - p.rs * x.id) / p.ls + we * x.iq,
@@ -26,7 +26,7 @@ impl Model for Pmsm {
         }
     }
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> { *x }
+    fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> { *x }
 }
 
 /// A record with nothing random in it: half a second of a motor that is turned up and down.

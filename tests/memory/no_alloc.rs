@@ -8,8 +8,8 @@ use greybox::pmsm::{
     RsLyapunov, Winding,
 };
 use greybox::{
-    Butterworth, Dual, Esdirk, Experiment, FilterState, Fit, Hold, Huber, Integrator, Interval, Nothing, Rk4, Rk45,
-    Sample, Time, fixed, free,
+    Butterworth, Dual, Esdirk, Experiment, FilterState, Fit, Hold, Huber, Integrator, Interval, ModelSystem, Nothing,
+    Rk4, Rk45, Sample, Time, fixed, free,
 };
 
 const TS: f64 = 0.126e-3;
@@ -83,12 +83,13 @@ fn rls_allocates_nothing() {
 
 #[test]
 fn integrators_allocate_nothing() {
-    fn run<I: Integrator<Spiral>>(integrator: &I) -> usize {
+    fn run<I: Integrator>(integrator: &I) -> usize {
         let p = Rates { growth: Dual::<2>::variable(1.0, 0), turn: Dual::variable(2.0, 1) };
         let interval = Interval { t0: 0.0, t1: 0.5, u0: Nothing, u1: Nothing, hold: Hold::Zero };
         allocations(|| {
             let start = Plane { x: Dual::constant(0.5), y: Dual::constant(0.0) };
-            integrator.advance(&Spiral, &interval, start, &p, &mut I::Memory::default()).unwrap();
+            let system = ModelSystem { model: &Spiral, interval: &interval, p: &p };
+            system.step(integrator, start, &mut I::Memory::default()).unwrap();
         })
     }
     assert_eq!((run(&Rk4::default()), run(&Rk45::default()), run(&Esdirk::default())), (0, 0, 0));

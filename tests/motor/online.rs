@@ -221,11 +221,11 @@ impl Model for Leak {
     type Parameters = Tank;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Level<S>, _u: &Nothing, p: &Tank<S>) -> Level<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Nothing, p: &Tank<S>) -> Level<S> {
         Level { x: p.b - p.a * x.x }
     }
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Level<S>, _u: &Nothing, _p: &Tank<S>) -> Level<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Nothing, _p: &Tank<S>) -> Level<S> {
         *x
     }
 }
@@ -421,10 +421,10 @@ impl Model for Explosive {
     type Parameters = Tank;
     const KIND: Kind = Kind::Discrete;
 
-    fn next<S: Scalar>(&self, _t: f64, x: &Level<S>, _u: &Nothing, p: &Tank<S>) -> Level<S> {
+    fn next<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Nothing, p: &Tank<S>) -> Level<S> {
         Level { x: (x.x + p.a) * f64::MAX * 4.0 }
     }
-    fn output<S: Scalar>(&self, _t: f64, x: &Level<S>, _u: &Nothing, _p: &Tank<S>) -> Level<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Nothing, _p: &Tank<S>) -> Level<S> {
         *x
     }
 }

@@ -242,7 +242,7 @@ impl Model for Arm {
     type Output = Place;
     type Parameters = Nothing;
     const KIND: Kind = Kind::Static;
-    fn output<S: Scalar>(&self, _t: f64, _x: &Nothing, u: &Force<S>, _p: &Nothing) -> Place<S> {
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Force<S>, _p: &Nothing) -> Place<S> {
         Place { y: u.u, z: u.u }
     }
 }

@@ -319,7 +319,7 @@ impl Model for Blank {
     type Output = Level;
     type Parameters = Nothing;
 
-    fn output<S: Scalar>(&self, _t: f64, x: &Level<S>, _u: &Nothing, _p: &Nothing) -> Level<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Nothing, _p: &Nothing) -> Level<S> {
         Level { x: x.x + self.0.x }
     }
 }

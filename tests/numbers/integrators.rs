@@ -30,7 +30,7 @@ fn orders() {
 }
 
 /// Walks from sample to sample, at `times`, with the inputs held as said.
-fn simulate<M: Model, I: Integrator<M>, S: Scalar>(
+fn simulate<M: Model, I: Integrator, S: Scalar>(
     model: &M,
     integrator: &I,
     times: &[f64],
@@ -43,7 +43,7 @@ fn simulate<M: Model, I: Integrator<M>, S: Scalar>(
     times.windows(2).try_fold(x, |x, t| {
         let u1 = if hold == Hold::First { input(t[1]) } else { input(t[0]) };
         let interval = Interval { t0: t[0], t1: t[1], u0: input(t[0]), u1, hold };
-        integrator.advance(model, &interval, x, p, &mut memory)
+        ModelSystem { model, interval: &interval, p }.step(integrator, x, &mut memory)
     })
 }
 
@@ -63,11 +63,11 @@ impl Model for Lag {
     type Output = Level;
     type Parameters = Time1;
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Level<S>, u: &Source<S>, p: &Time1<S>) -> Level<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Source<S>, p: &Time1<S>) -> Level<S> {
         Level { x: (u.u - x.x) / p.tau }
     }
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Level<S>, _u: &Source<S>, _p: &Time1<S>) -> Level<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Source<S>, _p: &Time1<S>) -> Level<S> {
         *x
     }
 }
@@ -87,7 +87,7 @@ fn lag_exactly(h: f64, steps: usize, hold: Hold, input: impl Fn(f64) -> f64, tau
 /// A step in the middle of the record, at a sample: held inputs are met exactly, so the error is that of a smooth problem.
 #[test]
 fn a_step_of_the_input_costs_no_accuracy() {
-    fn check<I: Integrator<Lag>>(integrator: &I, tolerance: f64) {
+    fn check<I: Integrator>(integrator: &I, tolerance: f64) {
         let (tau, h, steps) = (Dual::<1>::variable(0.3, 0), 0.05, 40);
         let input = |t: f64| if t > 0.9999 { 2.0 } else { 1.0 };
         for hold in [Hold::Zero, Hold::First] {
@@ -98,7 +98,7 @@ fn a_step_of_the_input_costs_no_accuracy() {
             let exact = lag_exactly(h, steps, hold, input, tau);
             println!(
                 "{}: {:e}, {:e}",
-                integrator.describe(),
+                integrator.describe(Kind::Continuous),
                 found.value - exact.value,
                 found.slopes[0] - exact.slopes[0]
             );
@@ -117,7 +117,7 @@ fn a_step_of_the_input_costs_no_accuracy() {
 /// A held input that jumps at every sample: each halving of all steps still divides the error by 2^order.
 #[test]
 fn jumps_at_every_sample_do_not_lower_the_order() {
-    fn errors<I: Integrator<Lag>>(integrator: &I) -> f64 {
+    fn errors<I: Integrator>(integrator: &I) -> f64 {
         let (tau, h, steps) = (Dual::<1>::variable(0.1, 0), 0.05, 20);
         let input = |t: f64| (t * 20.0).round() % 3.0;
         let times = grid(h * steps as f64, steps);
@@ -132,7 +132,7 @@ fn jumps_at_every_sample_do_not_lower_the_order() {
 /// The error follows the tolerance: within a factor of 300 of it, over eight decades, values and slopes.
 #[test]
 fn the_error_is_in_proportion_to_the_tolerance() {
-    fn check<I: Integrator<Spiral>>(make: impl Fn(f64) -> I, finest: i32) {
+    fn check<I: Integrator>(make: impl Fn(f64) -> I, finest: i32) {
         let start = check::Plane { x: Dual::<4>::variable(0.4, 0), y: Dual::variable(-0.3, 1) };
         let p = check::Rates { growth: Dual::variable(1.2, 2), turn: Dual::variable(6.0, 3) };
         let exact = Spiral.solution(4.0, &start, &p);
@@ -155,7 +155,7 @@ fn the_error_is_in_proportion_to_the_tolerance() {
 /// values are off by some 1e-3, they match central differences of the computed values.
 #[test]
 fn slopes_are_those_of_the_numbers_computed() {
-    fn check<I: Integrator<Spiral>>(integrator: &I, tolerance: f64) {
+    fn check<I: Integrator>(integrator: &I, tolerance: f64) {
         let run = |v: [f64; 4]| {
             let (x, p) = (check::Plane { x: v[0], y: v[1] }, check::Rates { growth: v[2], turn: v[3] });
             let x = simulate(&Spiral, integrator, &grid(1.0, 2), Hold::Zero, |_| Nothing, x, &p).unwrap();
@@ -194,12 +194,12 @@ impl Model for Robertson {
     type Output = Species;
     type Parameters = Speeds;
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Species<S>, _u: &Nothing, p: &Speeds<S>) -> Species<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Species<S>, _u: &Nothing, p: &Speeds<S>) -> Species<S> {
         let (forth, back, on) = (p.k1 * x.a, p.k2 * x.b * x.c, p.k3 * x.b * x.b);
         Species { a: back - forth, b: forth - back - on, c: on }
     }
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Species<S>, _u: &Nothing, _p: &Speeds<S>) -> Species<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Species<S>, _u: &Nothing, _p: &Speeds<S>) -> Species<S> {
         *x
     }
 }
@@ -238,11 +238,11 @@ impl Model for VanDerPol {
     type Output = Relaxation;
     type Parameters = Stiffness;
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Relaxation<S>, _u: &Nothing, p: &Stiffness<S>) -> Relaxation<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Relaxation<S>, _u: &Nothing, p: &Stiffness<S>) -> Relaxation<S> {
         Relaxation { x: x.v, v: p.mu * (x.x * x.x * -1.0 + 1.0) * x.v - x.x }
     }
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Relaxation<S>, _u: &Nothing, _p: &Stiffness<S>) -> Relaxation<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Relaxation<S>, _u: &Nothing, _p: &Stiffness<S>) -> Relaxation<S> {
         *x
     }
 }
@@ -295,11 +295,11 @@ impl Model for Snubber {
     type Output = Circuit;
     type Parameters = Parts;
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Circuit<S>, u: &Source<S>, p: &Parts<S>) -> Circuit<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Circuit<S>, u: &Source<S>, p: &Parts<S>) -> Circuit<S> {
         Circuit { il: (u.u - p.r * x.il - x.uc) / p.l, uc: (x.il - x.id) / p.c, id: (x.uc - x.id * 100.0) / p.ls }
     }
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Circuit<S>, _u: &Source<S>, _p: &Parts<S>) -> Circuit<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Circuit<S>, _u: &Source<S>, _p: &Parts<S>) -> Circuit<S> {
         *x
     }
 }
@@ -338,13 +338,13 @@ impl Model for Rod {
     type Input = Source;
     type Output = Many;
     type Parameters = Speed;
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Many<S>, u: &Source<S>, p: &Speed<S>) -> Many<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Many<S>, u: &Source<S>, p: &Speed<S>) -> Many<S> {
         let v: [S; 10] = (*x).into();
         let left = |i: usize| if i == 0 { u.u } else { v[i - 1] };
         let right = |i: usize| if i == 9 { v[9] } else { v[i + 1] };
         std::array::from_fn(|i| p.k * (left(i) - v[i] * 2.0 + right(i))).into()
     }
-    fn output<S: Scalar>(&self, _t: f64, x: &Many<S>, _u: &Source<S>, _p: &Speed<S>) -> Many<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Many<S>, _u: &Source<S>, _p: &Speed<S>) -> Many<S> {
         *x
     }
 }
@@ -371,17 +371,17 @@ impl Model for Broken {
     type Input = Nothing;
     type Output = Level;
     type Parameters = Nothing;
-    fn derivative<S: Scalar>(&self, t: f64, x: &Level<S>, _u: &Nothing, _p: &Nothing) -> Level<S> {
+    fn derivative<S: Scalar>(&self, t: S, x: &Level<S>, _u: &Nothing, _p: &Nothing) -> Level<S> {
         Level { x: if t > self.0 { x.x * f64::NAN } else { x.x * x.x } }
     }
-    fn output<S: Scalar>(&self, _t: f64, x: &Level<S>, _u: &Nothing, _p: &Nothing) -> Level<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Nothing, _p: &Nothing) -> Level<S> {
         *x
     }
 }
 
 #[test]
 fn what_is_not_finite_is_stuck() {
-    fn check<I: Integrator<Broken>>(integrator: &I) {
+    fn check<I: Integrator>(integrator: &I) {
         let run = |model: &Broken, x: f64, end: f64| {
             simulate(model, integrator, &grid(end, 3), Hold::Zero, |_| Nothing, Level { x }, &Nothing)
         };
@@ -403,7 +403,7 @@ fn what_is_not_finite_is_stuck() {
 /// A state that is zero but for rounding, or zero throughout, does not stop the others.
 #[test]
 fn a_state_at_zero() {
-    fn check<I: Integrator<Lag>>(integrator: &I) {
+    fn check<I: Integrator>(integrator: &I) {
         let rest = simulate(
             &Lag,
             integrator,
@@ -434,12 +434,12 @@ fn integrators_describe_and_refine_themselves_and_round_trip() {
     let (rk45, esdirk) = (Rk45::default(), Esdirk::default());
     assert_eq!(serde_json::from_str::<Rk45>(&serde_json::to_string(&rk45).unwrap()).unwrap(), rk45);
     assert_eq!(serde_json::from_str::<Esdirk>(&serde_json::to_string(&esdirk).unwrap()).unwrap(), esdirk);
-    let finer = Integrator::<Lag>::refined(&rk45).unwrap();
+    let finer = rk45.refined(Kind::Continuous).unwrap();
     assert!(finer.relative < 0.1 * rk45.relative && finer.absolute < 0.1 * rk45.absolute);
-    assert!(Integrator::<Lag>::refined(&esdirk).unwrap().relative < 0.1 * esdirk.relative);
-    assert!(Integrator::<Lag>::describe(&rk45).contains("1e-8"));
+    assert!(esdirk.refined(Kind::Continuous).unwrap().relative < 0.1 * esdirk.relative);
+    assert!(rk45.describe(Kind::Continuous).contains("1e-8"));
     for kind in [Kind::Continuous, Kind::Discrete, Kind::Static] {
-        assert_eq!(Integrator::<Lag>::serves(&rk45, kind), kind == Kind::Continuous);
-        assert_eq!(Integrator::<Lag>::serves(&esdirk, kind), kind == Kind::Continuous);
+        assert_eq!(rk45.serves(kind), kind == Kind::Continuous);
+        assert_eq!(esdirk.serves(kind), kind == Kind::Continuous);
     }
 }

@@ -118,7 +118,7 @@ impl Model for Machine {
     type Output = Measured;
     type Parameters = Nothing;
     const KIND: Kind = Kind::Static;
-    fn output<S: Scalar>(&self, _t: f64, _x: &Nothing, u: &Drive<S>, _p: &Nothing) -> Measured<S> {
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Drive<S>, _p: &Nothing) -> Measured<S> {
         Measured { i: u.u }
     }
 }

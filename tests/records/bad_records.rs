@@ -18,7 +18,7 @@ impl Model for Pmsm {
     type Output = Currents;
     type Parameters = Winding;
 
-    fn output<S: Scalar>(&self, _t: f64, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
         *x
     }
 }
@@ -222,7 +222,7 @@ fn writing_two_columns_of_one_name() {
         type Output = Drive;
         type Parameters = Winding;
 
-        fn output<S: Scalar>(&self, _t: f64, _x: &Currents<S>, u: &Drive<S>, _p: &Winding<S>) -> Drive<S> {
+        fn output<S: Scalar>(&self, _t: S, _x: &Currents<S>, u: &Drive<S>, _p: &Winding<S>) -> Drive<S> {
             *u
         }
     }

@@ -19,7 +19,7 @@ impl Model for Pmsm {
     type Output = Currents;
     type Parameters = Winding;
 
-    fn output<S: Scalar>(&self, _t: f64, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
         *x
     }
 }
@@ -160,7 +160,7 @@ impl Model for Line {
     type Parameters = Winding;
     const KIND: Kind = Kind::Static;
 
-    fn output<S: Scalar>(&self, _t: f64, _x: &Nothing, u: &X<S>, p: &Winding<S>) -> Y<S> {
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &X<S>, p: &Winding<S>) -> Y<S> {
         Y { y: u.x * p.rs }
     }
 }

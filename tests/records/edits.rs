@@ -19,7 +19,7 @@ impl Model for Basin {
     type Output = Gauges;
     type Parameters = Tank;
 
-    fn output<S: Scalar>(&self, _t: f64, x: &Level<S>, _u: &Flow<S>, _p: &Tank<S>) -> Gauges<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Flow<S>, _p: &Tank<S>) -> Gauges<S> {
         Gauges { y: x.x, z: x.x }
     }
 }

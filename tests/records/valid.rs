@@ -20,7 +20,7 @@ impl Model for Pmsm {
     type Output = Currents;
     type Parameters = Winding;
 
-    fn output<S: Scalar>(&self, _t: f64, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
         *x
     }
 }

@@ -19,12 +19,12 @@ impl Model for Oscillator {
     type Parameters = Spring;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Motion<S>, u: &Force<S>, p: &Spring<S>) -> Motion<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Force<S>, p: &Spring<S>) -> Motion<S> {
         Motion { q: x.v, v: (u.f - p.damping * x.v - p.stiffness * x.q) / p.mass }
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Motion<S>, _u: &Force<S>, _p: &Spring<S>) -> Position<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, _u: &Force<S>, _p: &Spring<S>) -> Position<S> {
         Position { q: x.q }
     }
 }

@@ -18,12 +18,12 @@ impl Model for FirstOrder {
     type Parameters = Lag;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Level<S>, u: &Drive<S>, p: &Lag<S>) -> Level<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Drive<S>, p: &Lag<S>) -> Level<S> {
         Level { x: (p.k * u.u - x.x) / p.tau }
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Level<S>, _u: &Drive<S>, _p: &Lag<S>) -> Level<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Drive<S>, _p: &Lag<S>) -> Level<S> {
         *x
     }
 }

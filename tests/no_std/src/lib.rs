@@ -27,11 +27,11 @@ impl Model for Warming {
     type Parameters = Heat;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: f64, x: &Rise<S>, _u: &Nothing, p: &Heat<S>) -> Rise<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &Rise<S>, _u: &Nothing, p: &Heat<S>) -> Rise<S> {
         Rise { dt: p.gain - p.loss * x.dt }
     }
     #[inline]
-    fn output<S: Scalar>(&self, _t: f64, x: &Rise<S>, _u: &Nothing, _p: &Heat<S>) -> Rise<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Rise<S>, _u: &Nothing, _p: &Heat<S>) -> Rise<S> {
         *x
     }
 }
@@ -39,7 +39,7 @@ impl Model for Warming {
 /// Slope of the warming with respect to the loss.
 pub fn slope(x: f64) -> f64 {
     let p: Of<Heat, Dual<1>> = Heat { gain: Dual::from(1.0), loss: Dual::variable(0.1, 0) };
-    Warming.derivative(0.0, &Rise { dt: Dual::from(x) }, &Nothing, &p).dt.slopes[0]
+    Warming.derivative(Dual::from(0.0), &Rise { dt: Dual::from(x) }, &Nothing, &p).dt.slopes[0]
 }
 
 /// A filter of the user's own, continuous model.
