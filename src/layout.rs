@@ -1,5 +1,7 @@
 //! [`Layout`]: which quantities a model has, their names and units, known at run time.
 
+#[cfg(feature = "std")]
+use crate::signals::Signals;
 use serde::{Deserialize, Serialize};
 
 /// Whether time is continuous, discrete, or plays no part.
@@ -13,57 +15,51 @@ pub enum Kind {
     Static,
 }
 
+/// The name and the unit of one quantity; `""` or `"1"` for a ratio.
 #[cfg(feature = "std")]
-pub use with_alloc::{Layout, Quantity};
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Quantity {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+}
+
+/// The quantities of a model by role, in the order of its equations.
+#[cfg(feature = "std")]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Layout {
+    /// The kind of the equations.
+    pub kind: Kind,
+    /// The states.
+    pub states: Vec<Quantity>,
+    /// The inputs.
+    pub inputs: Vec<Quantity>,
+    /// The outputs, in the units they are measured in.
+    pub outputs: Vec<Quantity>,
+    /// The parameters.
+    pub parameters: Vec<Quantity>,
+}
 
 #[cfg(feature = "std")]
-mod with_alloc {
-    use super::Kind;
-    use crate::signals::Signals;
-    use serde::{Deserialize, Serialize};
-
-    /// The name and the unit of one quantity; `""` or `"1"` for a ratio.
-    #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
-    pub struct Quantity {
-        /// Name.
-        pub name: String,
-        /// Unit.
-        pub unit: String,
-    }
-
-    /// The quantities of a model by role, in the order of its equations.
-    #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
-    pub struct Layout {
-        /// The kind of the equations.
-        pub kind: Kind,
-        /// The states.
-        pub states: Vec<Quantity>,
-        /// The inputs.
-        pub inputs: Vec<Quantity>,
-        /// The outputs, in the units they are measured in.
-        pub outputs: Vec<Quantity>,
-        /// The parameters.
-        pub parameters: Vec<Quantity>,
-    }
-
-    impl Layout {
-        /// The layout of a model with these signals.
-        pub fn new<X: Signals, U: Signals, Y: Signals, P: Signals>(kind: Kind) -> Self {
-            Layout {
-                kind,
-                states: quantities::<X>(),
-                inputs: quantities::<U>(),
-                outputs: quantities::<Y>(),
-                parameters: quantities::<P>(),
-            }
+impl Layout {
+    /// The layout of a model with these signals.
+    pub fn new<X: Signals, U: Signals, Y: Signals, P: Signals>(kind: Kind) -> Self {
+        Layout {
+            kind,
+            states: quantities::<X>(),
+            inputs: quantities::<U>(),
+            outputs: quantities::<Y>(),
+            parameters: quantities::<P>(),
         }
     }
+}
 
-    /// The quantities of a vector of signals.
-    fn quantities<X: Signals>() -> Vec<Quantity> {
-        let named = X::NAMES.iter().zip(X::UNITS);
-        named.map(|(name, unit)| Quantity { name: (*name).to_owned(), unit: (*unit).to_owned() }).collect()
-    }
+/// The quantities of a vector of signals.
+#[cfg(feature = "std")]
+fn quantities<X: Signals>() -> Vec<Quantity> {
+    let named = X::NAMES.iter().zip(X::UNITS);
+    named.map(|(name, unit)| Quantity { name: (*name).to_owned(), unit: (*unit).to_owned() }).collect()
 }
