@@ -159,6 +159,8 @@ mod scaling;
 mod weighting;
 #[cfg(feature = "std")]
 mod whiteness;
+#[cfg(feature = "std")]
+mod wide;
 
 #[doc(hidden)]
 pub use {approx, nalgebra, serde};

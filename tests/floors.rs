@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// The rooms, floor by floor. Each may import from all the rows above its own, and from nothing else.
 const FLOORS: &[(&str, &[&str])] = &[
     ("ground: hardware", &["lanes"]),
-    ("ground: beside numbers", &["scalar", "units", "dispatch", "random", "whiteness"]),
+    ("ground: beside numbers", &["scalar", "units", "dispatch", "random", "whiteness", "wide"]),
     ("ground: numbers", &["dual", "signals"]),
     ("ground: vectors of numbers", &["information", "covariance", "error", "by_name", "layout"]),
     ("say: words", &["model", "parameter", "scaling", "interval"]),

@@ -1,0 +1,431 @@
+//! [`Wide`]: a vector register's worth of independent numbers, and loops over them compiled for the machine at hand.
+//!
+//! A [`Task`] is written once, generic over `Wide`, and compiled for AVX-512, for AVX2 with FMA and portably; [`run`] picks
+//! the widest that the processor has. All that a task calls in its loops must be `#[inline(always)]`: a function that is not
+//! inlined into the one with the target feature is compiled without it, and 20 to 500 times slower (measured).
+//!
+//! Lanes never mix, and every operation is one IEEE operation with one rounding, so that a lane's bits do not depend on the
+//! width. They do depend on whether the machine fuses a product with a sum: a processor without FMA rounds twice.
+
+#[cfg(target_arch = "x86_64")]
+use core::arch::x86_64::*;
+
+/// Numbers side by side.
+pub(crate) trait Wide: Copy + Send + Sync + 'static {
+    /// How many.
+    const LANES: usize;
+
+    /// The same number in every lane.
+    fn splat(x: f64) -> Self;
+    /// The first `LANES` numbers of a slice, which must have as many.
+    fn load(from: &[f64]) -> Self;
+    /// Into the first `LANES` numbers of a slice, which must have as many.
+    fn store(self, to: &mut [f64]);
+
+    fn add(self, b: Self) -> Self;
+    fn sub(self, b: Self) -> Self;
+    fn mul(self, b: Self) -> Self;
+    fn div(self, b: Self) -> Self;
+    fn sqrt(self) -> Self;
+    /// The sign bit turned over.
+    fn neg(self) -> Self;
+    /// The sign bit cleared.
+    fn abs(self) -> Self;
+    /// `self * a + b`, rounded once where the machine can.
+    fn mul_add(self, a: Self, b: Self) -> Self;
+    /// `b - self * a`, rounded once where the machine can.
+    fn neg_mul_add(self, a: Self, b: Self) -> Self;
+
+    /// `then` in the lanes where `self < than`, else `otherwise`; a NaN on either side takes `otherwise`.
+    fn select_lt(self, than: Self, then: Self, otherwise: Self) -> Self;
+    /// The same with `<=`.
+    fn select_le(self, than: Self, then: Self, otherwise: Self) -> Self;
+    /// The same with `==`.
+    fn select_eq(self, to: Self, then: Self, otherwise: Self) -> Self;
+
+    /// Each lane through a function of one number.
+    #[inline(always)]
+    fn map(self, f: impl Fn(f64) -> f64) -> Self {
+        let mut lanes = [0.0; 8];
+        self.store(&mut lanes);
+        for lane in &mut lanes[..Self::LANES] {
+            *lane = f(*lane);
+        }
+        Self::load(&lanes)
+    }
+
+    /// Each lane of two vectors through a function of two numbers.
+    #[inline(always)]
+    fn zip(self, b: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        let (mut lanes, mut others) = ([0.0; 8], [0.0; 8]);
+        self.store(&mut lanes);
+        b.store(&mut others);
+        for (lane, other) in lanes[..Self::LANES].iter_mut().zip(&others) {
+            *lane = f(*lane, *other);
+        }
+        Self::load(&lanes)
+    }
+}
+
+/// A loop over vectors.
+pub(crate) trait Task {
+    type Output;
+    /// Marked `#[inline(always)]`, as all that it calls.
+    fn run<W: Wide>(self) -> Self::Output;
+}
+
+/// The instructions that a task is compiled for. A value exists only where the processor has them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Width(Instructions);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Instructions {
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    #[cfg(target_arch = "x86_64")]
+    Fma,
+    Portable,
+}
+
+impl Width {
+    /// The widest that this processor has.
+    pub fn widest() -> Self {
+        Self::avx512().or_else(Self::avx2).unwrap_or_else(Self::portable)
+    }
+
+    /// Eight lanes in a register.
+    pub fn avx512() -> Option<Self> {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx512f")
+            && std::arch::is_x86_feature_detected!("avx512vl")
+            && std::arch::is_x86_feature_detected!("avx512dq")
+            && std::arch::is_x86_feature_detected!("fma")
+        {
+            return Some(Width(Instructions::Avx512));
+        }
+        None
+    }
+
+    /// Four lanes in a register.
+    pub fn avx2() -> Option<Self> {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
+            return Some(Width(Instructions::Avx2));
+        }
+        None
+    }
+
+    /// Arrays, left to the compiler; with fused products where the processor has them, so that the bits are the same.
+    pub fn portable() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("fma") {
+            return Width(Instructions::Fma);
+        }
+        Width(Instructions::Portable)
+    }
+
+    /// Lanes of a register.
+    pub fn lanes(self) -> usize {
+        match self.0 {
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx512 => 8,
+            _ => 4,
+        }
+    }
+}
+
+/// Runs a task with these instructions.
+#[inline]
+pub(crate) fn run<T: Task>(width: Width, task: T) -> T::Output {
+    match width.0 {
+        // SAFETY: a `Width` of this kind is made only where the processor has the features.
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx512 => unsafe { with_avx512(task) },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx2 => unsafe { with_avx2(task) },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Fma => unsafe { with_fma(task) },
+        Instructions::Portable => task.run::<Array<{ cfg!(not(target_arch = "x86_64")) }>>(),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,fma")]
+unsafe fn with_avx512<T: Task>(task: T) -> T::Output {
+    task.run::<Zmm>()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+unsafe fn with_avx2<T: Task>(task: T) -> T::Output {
+    task.run::<Ymm>()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "fma")]
+unsafe fn with_fma<T: Task>(task: T) -> T::Output {
+    task.run::<Array<true>>()
+}
+
+/// Four numbers in an array.
+#[derive(Clone, Copy)]
+pub(crate) struct Array<const FUSED: bool>([f64; 4]);
+
+impl<const FUSED: bool> Array<FUSED> {
+    #[inline(always)]
+    fn each(self, b: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (self.0, b.0);
+        Array([f(a0, b0), f(a1, b1), f(a2, b2), f(a3, b3)])
+    }
+
+    #[inline(always)]
+    fn either(self, then: Self, otherwise: Self, b: Self, holds: impl Fn(f64, f64) -> bool) -> Self {
+        let mut chosen = otherwise.0;
+        let mut i = 0;
+        while i < 4 {
+            if holds(self.0[i], b.0[i]) {
+                chosen[i] = then.0[i];
+            }
+            i += 1;
+        }
+        Array(chosen)
+    }
+}
+
+impl<const FUSED: bool> Wide for Array<FUSED> {
+    const LANES: usize = 4;
+
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Array([x; 4])
+    }
+    #[inline(always)]
+    fn load(from: &[f64]) -> Self {
+        Array([from[0], from[1], from[2], from[3]])
+    }
+    #[inline(always)]
+    fn store(self, to: &mut [f64]) {
+        to[..4].copy_from_slice(&self.0);
+    }
+    #[inline(always)]
+    fn add(self, b: Self) -> Self {
+        self.each(b, |a, b| a + b)
+    }
+    #[inline(always)]
+    fn sub(self, b: Self) -> Self {
+        self.each(b, |a, b| a - b)
+    }
+    #[inline(always)]
+    fn mul(self, b: Self) -> Self {
+        self.each(b, |a, b| a * b)
+    }
+    #[inline(always)]
+    fn div(self, b: Self) -> Self {
+        self.each(b, |a, b| a / b)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.each(self, |a, _| a.sqrt())
+    }
+    #[inline(always)]
+    fn neg(self) -> Self {
+        self.each(self, |a, _| -a)
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.each(self, |a, _| a.abs())
+    }
+    #[inline(always)]
+    fn mul_add(self, a: Self, b: Self) -> Self {
+        let product = |i: usize| if FUSED { self.0[i].mul_add(a.0[i], b.0[i]) } else { self.0[i] * a.0[i] + b.0[i] };
+        Array([product(0), product(1), product(2), product(3)])
+    }
+    #[inline(always)]
+    fn neg_mul_add(self, a: Self, b: Self) -> Self {
+        self.neg().mul_add(a, b)
+    }
+    #[inline(always)]
+    fn select_lt(self, than: Self, then: Self, otherwise: Self) -> Self {
+        self.either(then, otherwise, than, |a, b| a < b)
+    }
+    #[inline(always)]
+    fn select_le(self, than: Self, then: Self, otherwise: Self) -> Self {
+        self.either(then, otherwise, than, |a, b| a <= b)
+    }
+    #[inline(always)]
+    fn select_eq(self, to: Self, then: Self, otherwise: Self) -> Self {
+        self.either(then, otherwise, to, |a, b| a == b)
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+macro_rules! register {
+    ($(#[$doc:meta])* $name:ident($register:ty), $lanes:literal; $splat:ident, $load:ident, $store:ident,
+     $add:ident, $sub:ident, $mul:ident, $div:ident, $sqrt:ident, $fma:ident, $fnma:ident,
+     $xor:ident, $andnot:ident, |$a:ident, $b:ident, $then:ident, $otherwise:ident| $lt:expr, $le:expr, $eq:expr) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy)]
+        pub(crate) struct $name($register);
+
+        // SAFETY of all blocks: values of this type live only inside tasks that `run` has started with the target features;
+        // loads and stores check the length of their slices.
+        impl Wide for $name {
+            const LANES: usize = $lanes;
+
+            #[inline(always)]
+            fn splat(x: f64) -> Self {
+                $name(unsafe { $splat(x) })
+            }
+            #[inline(always)]
+            fn load(from: &[f64]) -> Self {
+                assert!(from.len() >= $lanes);
+                $name(unsafe { $load(from.as_ptr()) })
+            }
+            #[inline(always)]
+            fn store(self, to: &mut [f64]) {
+                assert!(to.len() >= $lanes);
+                unsafe { $store(to.as_mut_ptr(), self.0) }
+            }
+            #[inline(always)]
+            fn add(self, b: Self) -> Self {
+                $name(unsafe { $add(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn sub(self, b: Self) -> Self {
+                $name(unsafe { $sub(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn mul(self, b: Self) -> Self {
+                $name(unsafe { $mul(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn div(self, b: Self) -> Self {
+                $name(unsafe { $div(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                $name(unsafe { $sqrt(self.0) })
+            }
+            #[inline(always)]
+            fn neg(self) -> Self {
+                $name(unsafe { $xor(self.0, $splat(-0.0)) })
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                $name(unsafe { $andnot($splat(-0.0), self.0) })
+            }
+            #[inline(always)]
+            fn mul_add(self, a: Self, b: Self) -> Self {
+                $name(unsafe { $fma(self.0, a.0, b.0) })
+            }
+            #[inline(always)]
+            fn neg_mul_add(self, a: Self, b: Self) -> Self {
+                $name(unsafe { $fnma(self.0, a.0, b.0) })
+            }
+            #[inline(always)]
+            fn select_lt(self, than: Self, then: Self, otherwise: Self) -> Self {
+                let ($a, $b, $then, $otherwise) = (self.0, than.0, then.0, otherwise.0);
+                $name(unsafe { $lt })
+            }
+            #[inline(always)]
+            fn select_le(self, than: Self, then: Self, otherwise: Self) -> Self {
+                let ($a, $b, $then, $otherwise) = (self.0, than.0, then.0, otherwise.0);
+                $name(unsafe { $le })
+            }
+            #[inline(always)]
+            fn select_eq(self, to: Self, then: Self, otherwise: Self) -> Self {
+                let ($a, $b, $then, $otherwise) = (self.0, to.0, then.0, otherwise.0);
+                $name(unsafe { $eq })
+            }
+        }
+    };
+}
+
+#[cfg(target_arch = "x86_64")]
+register! {
+    /// Eight numbers in a register of AVX-512.
+    Zmm(__m512d), 8; _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd,
+    _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd, _mm512_sqrt_pd, _mm512_fmadd_pd, _mm512_fnmadd_pd,
+    _mm512_xor_pd, _mm512_andnot_pd, |a, b, then, otherwise|
+    _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(a, b), otherwise, then),
+    _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_LE_OQ>(a, b), otherwise, then),
+    _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_EQ_OQ>(a, b), otherwise, then)
+}
+
+#[cfg(target_arch = "x86_64")]
+register! {
+    /// Four numbers in a register of AVX2.
+    Ymm(__m256d), 4; _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd,
+    _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd, _mm256_sqrt_pd, _mm256_fmadd_pd, _mm256_fnmadd_pd,
+    _mm256_xor_pd, _mm256_andnot_pd, |a, b, then, otherwise|
+    _mm256_blendv_pd(otherwise, then, _mm256_cmp_pd::<_CMP_LT_OQ>(a, b)),
+    _mm256_blendv_pd(otherwise, then, _mm256_cmp_pd::<_CMP_LE_OQ>(a, b)),
+    _mm256_blendv_pd(otherwise, then, _mm256_cmp_pd::<_CMP_EQ_OQ>(a, b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each operation on numbers that overflow, vanish and are none.
+    struct All;
+    const A: [f64; 8] = [1.5, -0.0, f64::NAN, f64::INFINITY, -3.25, 1e308, 4e-320, -2.0];
+    const B: [f64; 8] = [1.5, 0.0, 2.0, f64::INFINITY, 7.125, 1e308, f64::NAN, -3.0];
+    const C: [f64; 8] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8];
+
+    impl Task for All {
+        type Output = Vec<u64>;
+        #[inline(always)]
+        fn run<W: Wide>(self) -> Vec<u64> {
+            let mut bits = vec![];
+            for at in (0..8).step_by(W::LANES) {
+                let (a, b, c) = (W::load(&A[at..]), W::load(&B[at..]), W::load(&C[at..]));
+                let results = [
+                    a.add(b),
+                    a.sub(b),
+                    a.mul(b),
+                    a.div(b),
+                    a.abs().sqrt(),
+                    a.neg(),
+                    a.abs(),
+                    a.mul_add(c, b),
+                    a.neg_mul_add(c, b),
+                    a.select_lt(b, c, a),
+                    a.select_le(b, c, a),
+                    a.select_eq(b, c, a),
+                    a.map(f64::exp),
+                    a.zip(b, f64::hypot),
+                    W::splat(at as f64),
+                ];
+                for (number, result) in results.into_iter().enumerate() {
+                    let mut lanes = [0.0; 8];
+                    result.store(&mut lanes);
+                    for (lane, x) in lanes[..W::LANES].iter().enumerate() {
+                        // The bits of a NaN are the processor's business; the last row tells the width.
+                        let x = if x.is_nan() { f64::NAN } else { *x };
+                        if number < 14 {
+                            bits.push((number * 8 + at + lane, x.to_bits()));
+                        }
+                    }
+                }
+            }
+            bits.sort_unstable();
+            bits.into_iter().map(|(_, bits)| bits).collect()
+        }
+    }
+
+    #[test]
+    fn every_width_gives_the_same_bits() {
+        let reference = run(Width::portable(), All);
+        for width in [Width::avx512(), Width::avx2()].into_iter().flatten() {
+            assert_eq!(run(width, All), reference, "{width:?}");
+        }
+        assert_eq!(f64::from_bits(reference[0]), 3.0);
+        assert_eq!(f64::from_bits(reference[9 * 8]), 1.5, "equal is not less: a stays");
+        assert_eq!(f64::from_bits(reference[10 * 8]), 0.1, "equal is at most: c");
+    }
+}
