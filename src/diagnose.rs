@@ -26,7 +26,7 @@ pub use profile::{End, Profile, ProfilePoint, profile};
 pub use restarts::{Better, Restarts, restarts};
 
 use crate::estimate::p_value;
-use crate::optimize::{Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization};
+use crate::optimize::{Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization, Machine};
 use argmin::core::{Executor, State};
 use serde::{Deserialize, Serialize};
 
@@ -74,8 +74,16 @@ impl<L: LeastSquares> LeastSquares for Pinned<'_, L> {
         self.problem.linearize(x)
     }
 
+    fn curvature(&self, x: &[f64], along: &[f64]) -> Option<Result<Linearization, Infeasible>> {
+        self.problem.curvature(x, along)
+    }
+
     fn bounds(&self) -> Vec<(f64, f64)> {
         self.bounds.clone()
+    }
+
+    fn sizes(&self) -> Vec<Option<f64>> {
+        self.problem.sizes()
     }
 }
 

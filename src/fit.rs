@@ -26,7 +26,7 @@ use crate::experiment::{ExperimentOf, Sample};
 use crate::integrate::{Automatic, Integrator};
 use crate::loss::Loss;
 use crate::model::{Kind, Model};
-use crate::optimize::{GaussNewton, LeastSquaresState, LevenbergMarquardt, Linearization, Outcome};
+use crate::optimize::{GaussNewton, LeastSquaresState, LevenbergMarquardt, Machine};
 use crate::parameter::Parameter;
 use crate::predict::{FreeRun, Predictor};
 use crate::prefilter::Butterworth;
@@ -46,14 +46,10 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use unknowns::Unknowns;
 
-/// A search that a fit can run: one of argmin's solvers that says how it ended.
-pub trait Search: Clone + Serialize + DeserializeOwned + for<'p> Solver<&'p Objective<'p>, LeastSquaresState> {
-    /// How the search ended, if it was its own decision.
-    fn outcome(&self) -> Option<Outcome>;
-
-    /// Cost and slopes where the search stands.
-    fn linearization(&self) -> Option<&Linearization>;
-
+/// A search that a fit can run.
+pub trait Search:
+    Machine + Clone + Serialize + DeserializeOwned + for<'p> Solver<&'p Objective<'p>, LeastSquaresState>
+{
     /// The same search for a cost that is soon to change: it may stop three digits into the minimum.
     fn rough(&self) -> Self;
 
@@ -67,14 +63,6 @@ pub trait Search: Clone + Serialize + DeserializeOwned + for<'p> Solver<&'p Obje
 }
 
 impl<S: Scaling + Serialize + DeserializeOwned> Search for LevenbergMarquardt<S> {
-    fn outcome(&self) -> Option<Outcome> {
-        LevenbergMarquardt::outcome(self)
-    }
-
-    fn linearization(&self) -> Option<&Linearization> {
-        LevenbergMarquardt::linearization(self)
-    }
-
     fn rough(&self) -> Self {
         LevenbergMarquardt::new(self.stop.rough(), self.scaling.clone())
     }
@@ -85,14 +73,6 @@ impl<S: Scaling + Serialize + DeserializeOwned> Search for LevenbergMarquardt<S>
 }
 
 impl Search for GaussNewton {
-    fn outcome(&self) -> Option<Outcome> {
-        GaussNewton::outcome(self)
-    }
-
-    fn linearization(&self) -> Option<&Linearization> {
-        GaussNewton::linearization(self)
-    }
-
     fn rough(&self) -> Self {
         GaussNewton::new(self.stop.rough())
     }
@@ -365,6 +345,7 @@ impl<M: Model, I: Integrator, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
             prefilter: self.terms.prefilter.as_ref(),
             whitening: Whitening::Diagonal(vec![1.0; M::Output::LEN]),
             control: &self.terms.control,
+            data_norm: 0.0,
         }
     }
 }

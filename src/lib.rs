@@ -192,7 +192,7 @@ pub use {
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
     regress::{Assumption, LinearEstimate, Regression, RegressionError},
     report::Report,
-    scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
+    scaling::{JacobianColumns, Nominal, OwnSize, Scaling, Seen, Unscaled},
     weighting::{BySignal, Law, Weighting},
 };
 

@@ -10,7 +10,8 @@ use crate::error::Failure;
 use crate::information::{Block, Information};
 use crate::loss::Loss;
 use crate::optimize::{Infeasible, LeastSquares, Linearization};
-use crate::predict::{WINDOW, Window};
+use crate::parameter::Transform;
+use crate::predict::{Seed, WINDOW, Window};
 use crate::prefilter::{Butterworth, FilterState};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -29,6 +30,8 @@ pub struct Objective<'a> {
     pub(crate) prefilter: Option<&'a Butterworth>,
     pub(crate) whitening: Whitening,
     pub(crate) control: &'a Control,
+    /// Norm of the measurements, standardized and weighted as the errors.
+    pub(crate) data_norm: f64,
 }
 
 /// Who may stop an evaluation.
@@ -74,7 +77,23 @@ impl Objective<'_> {
 
     /// The same with errors standardized otherwise.
     pub(crate) fn with(&self, whitening: Whitening) -> Self {
-        Objective { whitening, ..self.clone() }
+        let mut objective = Objective { whitening, ..self.clone() };
+        objective.data_norm = objective.norm_of_data();
+        objective
+    }
+
+    fn norm_of_data(&self) -> f64 {
+        let mut squares = 0.0;
+        for (output, sigma) in self.whitening.sigma().into_iter().enumerate() {
+            for e in 0..self.experiments() {
+                let mut values = vec![0.0; self.source.samples(e)];
+                self.source.measured(e, output, 0..values.len(), &mut values);
+                for (k, y) in values.into_iter().enumerate().filter(|(_, y)| !y.is_nan()) {
+                    squares += self.source.weight(e, k) * (y / sigma).powi(2);
+                }
+            }
+        }
+        squares.sqrt()
     }
 
     /// Number of experiments.
@@ -96,10 +115,20 @@ impl Objective<'_> {
         visit: &mut dyn FnMut(Rows<'_>),
     ) -> Result<(), Halt> {
         let seeds = if slopes { self.unknowns.seeds(experiment, coordinates) } else { vec![] };
+        self.walk_along(experiment, coordinates, &seeds, visit)
+    }
+
+    fn walk_along(
+        &self,
+        experiment: usize,
+        coordinates: &[f64],
+        seeds: &[Seed],
+        visit: &mut dyn FnMut(Rows<'_>),
+    ) -> Result<(), Halt> {
         let filtered = if self.prefilter.is_some() { (seeds.len() + 1) * self.outputs() } else { 0 };
         let mut states = vec![FilterState::default(); filtered];
         let place = self.unknowns.place(experiment, coordinates);
-        self.source.walk(experiment, &place, &seeds, &mut |window| {
+        self.source.walk(experiment, &place, seeds, &mut |window| {
             if self.control.stops() {
                 return Err(Halt::Cancelled);
             }
@@ -117,15 +146,36 @@ impl Objective<'_> {
         })
     }
 
-    /// Cost and triangle of one experiment, priors left out.
+    /// Cost and triangle of one experiment, priors left out. Where slopes are infinite, those of the unknowns on their bounds
+    /// (the root of an initial level of zero) are left out.
     pub(crate) fn experiment(&self, experiment: usize, coordinates: &[f64]) -> Result<(f64, Information), Halt> {
+        let mut seeds = self.unknowns.seeds(experiment, coordinates);
+        let result = self.experiment_along(experiment, coordinates, &seeds);
+        let bounds = self.unknowns.bounds();
+        let on_bound = |i: usize| coordinates[i] <= bounds[i].0 || coordinates[i] >= bounds[i].1;
+        let columns: Vec<usize> = self.unknowns.columns(experiment).collect();
+        if !matches!(result, Err(Halt::Failed { .. })) || !columns.iter().any(|&i| on_bound(i)) {
+            return result;
+        }
+        for (seed, _) in seeds.iter_mut().zip(&columns).filter(|(_, i)| on_bound(**i)) {
+            seed.slope = 0.0;
+        }
+        self.experiment_along(experiment, coordinates, &seeds)
+    }
+
+    fn experiment_along(
+        &self,
+        experiment: usize,
+        coordinates: &[f64],
+        seeds: &[Seed],
+    ) -> Result<(f64, Information), Halt> {
         let columns = self.unknowns.columns(experiment).count();
         let rows = self.outputs() * WINDOW;
         let mut information = Information::new(columns);
         let mut block = Block::new(columns, rows);
         let mut roots = vec![0.0; if self.source.is_weighted() || self.loss.is_some() { rows } else { 0 }];
         let (mut cost, mut measured) = (0.0, 0u64);
-        self.walk(experiment, coordinates, true, &mut |Rows { begin, samples, window }| {
+        self.walk_along(experiment, coordinates, seeds, &mut |Rows { begin, samples, window }| {
             measured += window.measured.iter().filter(|&&here| here).count() as u64;
             if roots.is_empty() {
                 cost += 0.5 * sum_of_squares(window.errors());
@@ -176,7 +226,7 @@ impl Objective<'_> {
             blocks[e].absorb_row(&row, error);
             cost += 0.5 * error * error;
         }
-        Ok(Linearization::new(cost, self.unknowns.shared(), blocks))
+        Ok(Linearization::new(cost, self.unknowns.shared(), blocks).with_data_norm(self.data_norm))
     }
 
     /// The cost alone.
@@ -250,6 +300,11 @@ impl LeastSquares for Objective<'_> {
 
     fn bounds(&self) -> Vec<(f64, f64)> {
         self.unknowns.bounds()
+    }
+
+    fn sizes(&self) -> Vec<Option<f64>> {
+        let size = |transform| (transform == Transform::Log).then_some(1.0);
+        self.unknowns.row.iter().map(|unknown| size(unknown.parameter.transform)).collect()
     }
 }
 

@@ -14,6 +14,8 @@ pub struct Linearization {
     pub cost: f64,
     shared: usize,
     blocks: Vec<Information>,
+    data_norm: Option<f64>,
+    roughness: f64,
 }
 
 /// See [`Linearization::reduce`].
@@ -22,7 +24,27 @@ pub(crate) type Reduced = (Information, Vec<usize>, Vec<(Information, Vec<usize>
 impl Linearization {
     /// From the cost, the number of shared unknowns, and one triangle per block.
     pub fn new(cost: f64, shared: usize, blocks: Vec<Information>) -> Self {
-        Linearization { cost, shared, blocks }
+        Linearization { cost, shared, blocks, data_norm: None, roughness: 0.0 }
+    }
+
+    /// With the norm of the data themselves, weighted as the rows are: what residuals are small against.
+    pub fn with_data_norm(self, norm: f64) -> Self {
+        Linearization { data_norm: Some(norm), ..self }
+    }
+
+    /// With a part of the cost by which it may jump from point to point: that of an integrator with a tolerance.
+    pub fn with_roughness(self, roughness: f64) -> Self {
+        Linearization { roughness, ..self }
+    }
+
+    /// Norm of the data, if it was said.
+    pub fn data_norm(&self) -> Option<f64> {
+        self.data_norm
+    }
+
+    /// By which part of itself the cost may jump; zero unless said otherwise.
+    pub fn roughness(&self) -> f64 {
+        self.roughness
     }
 
     /// Number of unknowns.

@@ -178,5 +178,5 @@ fn settings_of_optimizers_come_back_from_json() {
     same(LevenbergMarquardt::new(stop, Unscaled));
     same(LevenbergMarquardt::new(stop, Nominal(vec![1.0, 0.1])));
     same(GaussNewton::default());
-    same(Outcome::Stalled { gradient: 0.1, failed: 3 });
+    same(Outcome::Stalled { gradient: 0.1, step: 0.2, failed: 3 });
 }
