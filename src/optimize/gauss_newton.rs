@@ -18,8 +18,6 @@ pub struct GaussNewton {
     pub stop: Stop,
     x: Vec<f64>,
     trials: u64,
-    /// Directions without influence at the start.
-    unseen: usize,
     outcome: Option<Outcome>,
     #[serde(skip)]
     domain: Domain,
@@ -56,7 +54,6 @@ impl GaussNewton {
             stop,
             x: vec![],
             trials: 0,
-            unseen: 0,
             outcome: None,
             domain: Domain::default(),
             point: None,
@@ -89,8 +86,7 @@ impl GaussNewton {
     }
 
     fn end(&mut self, point: Point, outcome: Outcome) {
-        self.outcome = Some(point.unless_lost(outcome, self.unseen));
-        self.point = Some(point);
+        (self.outcome, self.point) = (Some(outcome), Some(point));
     }
 
     /// Whether a trial lowers the cost enough.
@@ -141,12 +137,7 @@ impl Machine for GaussNewton {
         let Some(point) = self.point.take() else {
             match told.and_then(|linear| Point::new(self.x.clone(), linear, &self.domain)) {
                 None => self.outcome = Some(Outcome::Stalled { gradient: 0.0, step: 0.0, failed: 1 }),
-                Some(point) => {
-                    if self.trials == 0 {
-                        self.unseen = point.lost_rank();
-                    }
-                    self.go_on(point);
-                }
+                Some(point) => self.go_on(point),
             }
             return;
         };

@@ -34,9 +34,10 @@ pub struct LevenbergMarquardt<S = OwnSize> {
     descent: Descent,
     /// The fewest directions without influence that were met.
     unseen: usize,
-    /// The unknowns before this one have been tried inside their bounds.
-    tried: usize,
+    /// Steps taken.
     steps: u64,
+    /// Steps taken where slopes show no way.
+    leaps: u64,
     first: Option<Try>,
     outcome: Option<Outcome>,
     /// Whether the problem may have second derivatives.
@@ -72,16 +73,33 @@ enum Stage {
     Step(Trial),
     /// The second derivative along a step.
     Bend(Trial),
-    /// Those beside a bound that an unknown without slopes sits on, before the search ends like this.
-    Inside { x: Vec<f64>, outcome: Outcome },
+    /// Those at points around the end, where slopes show nothing.
+    Look(Look),
     /// Those where the first try ended, which was the better one.
     Return,
+}
+
+/// A search that is to end like this, unless the cost is lower at one of these points.
+#[derive(Clone, Debug)]
+struct Look {
+    outcome: Outcome,
+    /// The last one next.
+    points: Vec<Vec<f64>>,
+    /// How many of these points lie along directions that have lost their influence, and how many such directions.
+    beside: usize,
+    lost: usize,
+    /// At how many of them the cost is the same.
+    flat: usize,
 }
 
 const FIRST: Reach = Reach { first: 0.1, later: 1.0 };
 const SECOND: Reach = Reach { first: 10.0, later: 10.0 };
 /// A first try that has not ended after so many trials is given up.
 const FIRST_TRIALS: u64 = 2500;
+/// So often a search goes on that found a lower cost beside its end.
+const LEAPS: u64 = 10;
+/// Where the cost changes by less than this part over a hundredth of the unknowns' sizes, there is nothing to see.
+const FLAT: f64 = 1e-9;
 /// A step is bent where twice the bend is no longer than this part of it (Transtrum and Sethna 2012).
 const BEND: f64 = 0.75;
 
@@ -95,8 +113,8 @@ impl<S: Scaling> LevenbergMarquardt<S> {
             seen: Seen::default(),
             descent: Descent::new(FIRST),
             unseen: usize::MAX,
-            tried: 0,
             steps: 0,
+            leaps: 0,
             first: None,
             outcome: None,
             curved: true,
@@ -157,13 +175,33 @@ impl<S: Scaling> LevenbergMarquardt<S> {
         scales
     }
 
-    /// The end of a try: of the search, unless another try may do better or the one before did.
+    /// Ends here like this, unless there is something that slopes do not show.
     fn end(&mut self, point: Point, outcome: Outcome) {
-        if let Some((unknown, x)) = point.inside(self.tried, &self.seen) {
-            (self.tried, self.stage, self.point) = (unknown + 1, Stage::Inside { x, outcome }, Some(point));
-            return;
+        let look = self.look(&point, outcome);
+        match look.points.is_empty() {
+            true => self.end_try(point, outcome),
+            false => (self.stage, self.point) = (Stage::Look(look), Some(point)),
         }
-        let outcome = point.unless_lost(outcome, self.unseen);
+    }
+
+    /// Where to look before the search ends: inside bounds where an unknown has no slopes, and along directions that have
+    /// lost their influence on the way.
+    fn look(&self, point: &Point, outcome: Outcome) -> Look {
+        let mut look = Look { outcome, points: vec![], beside: 0, lost: 0, flat: 0 };
+        if self.leaps >= LEAPS {
+            return look;
+        }
+        let blind = point.blind();
+        if blind.len() > self.unseen && matches!(outcome, Outcome::Converged { .. } | Outcome::LimitOfPrecision { .. }) {
+            look.points = blind.iter().flat_map(|direction| point.beside(direction, &self.seen)).collect();
+            (look.beside, look.lost) = (look.points.len(), blind.len() - self.unseen);
+        }
+        look.points.extend(point.inside(&self.seen));
+        look
+    }
+
+    /// The end of a try: of the search, unless another try may do better or the one before did.
+    fn end_try(&mut self, point: Point, outcome: Outcome) {
         let trials = self.trials();
         match self.first.take() {
             None if !outcome.converged() && trials < self.stop.iterations => {
@@ -193,7 +231,7 @@ impl<S: Scaling> LevenbergMarquardt<S> {
     fn begin_try(&mut self, start: Vec<f64>, reach: Reach) {
         self.seen = Seen::new(&start, &self.domain.sizes);
         self.descent = Descent::new(reach);
-        (self.tried, self.x) = (0, start);
+        (self.leaps, self.x) = (0, start);
         self.point = None;
         self.stage = Stage::Start;
     }
@@ -226,15 +264,25 @@ impl<S: Scaling> LevenbergMarquardt<S> {
         }
     }
 
-    /// Leaves the bound if that lowers the cost.
-    fn judge_inside(&mut self, point: Point, next: Option<Point>, outcome: Outcome) {
-        match next.filter(|next| next.cost() < point.cost()) {
-            None => self.end(point, outcome),
-            Some(next) => {
-                self.tried = 0;
+    /// Goes to a point beside the end if the cost is lower there.
+    fn judge_look(&mut self, point: Point, mut look: Look, next: Option<Point>) {
+        let resolution = point.resolution();
+        match next {
+            Some(next) if next.cost() < point.cost() - resolution => {
+                self.leaps += 1;
                 self.take(&next);
-                self.go_on(next);
+                return self.go_on(next);
             }
+            Some(next) if look.points.len() < look.beside && next.cost() <= point.cost() * (1.0 + FLAT) => look.flat += 1,
+            _ => {}
+        }
+        if !look.points.is_empty() {
+            (self.stage, self.point) = (Stage::Look(look), Some(point));
+        } else if look.flat > 0 {
+            let gradient = point.cosine();
+            self.end_try(point, Outcome::Plateau { lost: look.lost, gradient });
+        } else {
+            self.end_try(point, look.outcome);
         }
     }
 
@@ -263,7 +311,7 @@ impl<S: Scaling> LevenbergMarquardt<S> {
         self.x.clone_from(&point.x);
         // Rank is looked at ever more seldom: a decomposition at each step would be dear with many unknowns.
         if self.steps == 0 || self.steps.is_power_of_two() {
-            self.unseen = self.unseen.min(point.lost_rank());
+            self.unseen = self.unseen.min(point.blind().len());
         }
         self.steps += 1;
     }
@@ -283,7 +331,8 @@ impl<S: Scaling> Machine for LevenbergMarquardt<S> {
         match (&self.stage, self.outcome) {
             (_, Some(outcome)) => Request::Ended(outcome),
             (Stage::Resume | Stage::Start | Stage::Return, None) => Request::Linearize(&self.x),
-            (Stage::Step(Trial { x, .. }) | Stage::Inside { x, .. }, None) => Request::Linearize(x),
+            (Stage::Step(trial), None) => Request::Linearize(&trial.x),
+            (Stage::Look(look), None) => Request::Linearize(look.points.last().unwrap_or(&self.x)),
             (Stage::Bend(trial), None) => Request::Curvature { x: &self.x, along: &trial.step },
         }
     }
@@ -300,10 +349,11 @@ impl<S: Scaling> Machine for LevenbergMarquardt<S> {
                 let next = told.and_then(|linear| Point::new(trial.x.clone(), linear, &self.domain));
                 self.judge_trial(point, &trial, next);
             }
-            (Stage::Inside { x, outcome }, Some(point), first) => {
+            (Stage::Look(mut look), Some(point), first) => {
                 self.first = first;
+                let x = look.points.pop().unwrap_or_default();
                 let next = told.and_then(|linear| Point::new(x, linear, &self.domain));
-                self.judge_inside(point, next, outcome);
+                self.judge_look(point, look, next);
             }
             (stage, _, first) => {
                 let point = told.and_then(|linear| Point::new(self.x.clone(), linear, &self.domain));

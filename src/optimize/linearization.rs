@@ -62,6 +62,11 @@ impl Linearization {
         &self.blocks
     }
 
+    /// How many rows the triangles stand for.
+    pub fn rows(&self) -> u64 {
+        self.blocks.iter().map(Information::rows).sum()
+    }
+
     /// The unknown behind each column of each block.
     pub fn columns(&self) -> impl Iterator<Item = (&Information, Vec<usize>)> {
         let mut next = self.shared;

@@ -34,6 +34,8 @@ const ROUNDINGS: f64 = 10.0;
 /// are damped.
 const RANK: f64 = 1e-10;
 
+/// How far away it is looked along a direction without influence, as a part of the unknowns' sizes.
+const BESIDE: f64 = 1e-2;
 /// How far inside its bound an unknown without slopes is tried, as a part of its size.
 const INSIDE: f64 = 1e-3;
 
@@ -72,16 +74,12 @@ impl Point {
 
     /// Largest part of itself, or of the standard error it has at least, by which the full step moves an unknown.
     pub fn relative_step(&self) -> f64 {
-        let sigma = (self.linear.sum_of_squares() / self.rows().max(1) as f64).sqrt();
+        let sigma = (self.linear.sum_of_squares() / self.linear.rows().max(1) as f64).sqrt();
         let size = |step: &Vec<f64>| {
             let moved = self.free().filter(|&i| step[i] != 0.0);
             moved.map(|i| step[i].abs() / (self.x[i].abs() + sigma / self.norms[i])).fold(0.0, f64::max)
         };
         self.full.as_ref().map_or(f64::MAX, size).min(f64::MAX)
-    }
-
-    fn rows(&self) -> u64 {
-        self.linear.blocks().iter().map(|block| block.rows()).sum()
     }
 
     /// Slope of the cost along a step; negative downhill.
@@ -103,35 +101,55 @@ impl Point {
         (0..self.x.len()).map(along).collect()
     }
 
-    /// The first unknown from this one on that sits on its bound without slopes, and a point with it inside: slopes that are
-    /// infinite at a bound are given as zeros.
-    pub fn inside(&self, from: usize, seen: &Seen) -> Option<(usize, Vec<f64>)> {
-        let free = |i: usize| (self.room[i].0 < 0.0) != (self.room[i].1 > 0.0);
-        let unknown = (from..self.x.len()).find(|&i| self.norms[i] == 0.0 && free(i))?;
-        let (down, up) = self.room[unknown];
-        let width = up.max(-down).min(1.0);
-        let size = if seen.size(unknown) > 0.0 { seen.size(unknown).min(width) } else { width };
-        let mut x = self.x.clone();
-        x[unknown] += if up > 0.0 { INSIDE * size } else { -INSIDE * size };
-        Some((unknown, x))
-    }
-
     /// The smallest difference that the cost resolves, in its own unit.
     pub fn resolution(&self) -> f64 {
         RESOLUTION.max(self.linear.roughness()) * self.cost()
     }
 
-    /// How many directions among the unknowns that are not on a bound have no influence.
-    pub fn lost_rank(&self) -> usize {
+    /// The directions, of unknowns that are not on a bound, that have no influence.
+    pub fn blind(&self) -> Vec<Vec<f64>> {
         let inside = |i: &usize| self.room[*i].0 < 0.0 && self.room[*i].1 > 0.0;
+        let along = |entries: &mut dyn Iterator<Item = (usize, f64)>| {
+            let mut direction = vec![0.0; self.x.len()];
+            entries.for_each(|(i, entry)| direction[i] = entry);
+            direction
+        };
+        let idle = (0..self.x.len()).filter(inside).filter(|&i| self.norms[i] == 0.0);
+        let mut directions: Vec<Vec<f64>> = idle.map(|i| along(&mut std::iter::once((i, 1.0)))).collect();
         let shared = self.linear.shared_information();
-        let columns: Vec<usize> = (0..shared.columns()).filter(inside).collect();
-        let shared = shared.select(&columns);
-        let inverse: Vec<f64> =
-            shared.column_norms().iter().map(|&norm| if norm > 0.0 { 1.0 / norm } else { 0.0 }).collect();
-        let rank = shared.decomposition(&inverse).map_or(0, |spectrum| spectrum.rank(RANK));
-        let own = (self.linear.shared()..self.x.len()).filter(inside);
-        columns.len() - rank + own.filter(|&i| self.norms[i] == 0.0).count()
+        let norms = shared.column_norms();
+        let columns: Vec<usize> = (0..norms.len()).filter(inside).filter(|&i| norms[i] > 0.0).collect();
+        let inverse: Vec<f64> = columns.iter().map(|&i| 1.0 / norms[i]).collect();
+        if let Ok(spectrum) = shared.select(&columns).decomposition(&inverse) {
+            for null in spectrum.null_directions(RANK) {
+                let entries = columns.iter().zip(inverse.iter().zip(null)).map(|(&i, (scale, entry))| (i, scale * entry));
+                directions.push(along(&mut { entries }));
+            }
+        }
+        directions
+    }
+
+    /// Points to either side along a direction, a hundredth of the unknowns' sizes away.
+    pub fn beside(&self, direction: &[f64], seen: &Seen) -> Vec<Vec<f64>> {
+        let sizes = (0..self.x.len()).filter(|&i| seen.size(i) > 0.0).map(|i| direction[i].abs() / seen.size(i));
+        let length = BESIDE / sizes.fold(0.0, f64::max);
+        let side = |sign: f64| self.towards(&direction.iter().map(|d| sign * length * d).collect::<Vec<f64>>());
+        if length.is_finite() { vec![side(1.0), side(-1.0)] } else { vec![] }
+    }
+
+    /// Points with an unknown inside that sits on its bound without slopes, one for each such unknown: slopes that are infinite
+    /// at a bound are given as zeros.
+    pub fn inside(&self, seen: &Seen) -> Vec<Vec<f64>> {
+        let free = |i: &usize| self.norms[*i] == 0.0 && (self.room[*i].0 < 0.0) != (self.room[*i].1 > 0.0);
+        let moved = |unknown: usize| {
+            let (down, up) = self.room[unknown];
+            let width = up.max(-down).min(1.0);
+            let size = if seen.size(unknown) > 0.0 { seen.size(unknown).min(width) } else { width };
+            let mut x = self.x.clone();
+            x[unknown] += if up > 0.0 { INSIDE * size } else { -INSIDE * size };
+            x
+        };
+        (0..self.x.len()).filter(free).map(moved).collect()
     }
 
     /// Whether the residual is the rounding of the data and of the unknowns.
@@ -166,17 +184,6 @@ impl Point {
         stop.cost > 0.0 && decrease <= stop.cost && self.potential <= stop.cost * before
     }
 
-    /// An outcome that claims a minimum, unless more directions are without influence here than were before.
-    pub fn unless_lost(&self, outcome: Outcome, before: usize) -> Outcome {
-        if !matches!(outcome, Outcome::Converged { .. } | Outcome::LimitOfPrecision { .. }) {
-            return outcome;
-        }
-        match self.lost_rank() {
-            lost if lost > before => Outcome::Plateau { lost: lost - before, gradient: self.cosine() },
-            _ => outcome,
-        }
-    }
-
     /// How a search ends here that no step leads away from. `noise` is how far, as a part of the cost, the last trials were
     /// off what the slopes promised.
     pub fn stuck(&self, failed: u64, noise: f64) -> Outcome {
@@ -189,7 +196,7 @@ impl Point {
             Outcome::LimitOfPrecision { gradient, step }
         } else if left <= noise {
             // A step of `d` standard errors gains `d^2 / (2 rows)` of the sum of squares.
-            Outcome::Rough { noise, errors: (left * self.rows() as f64).sqrt() }
+            Outcome::Rough { noise, errors: (left * self.linear.rows() as f64).sqrt() }
         } else {
             Outcome::Stalled { gradient, step, failed }
         }
