@@ -82,7 +82,7 @@
 //! | 3 | learn | `loss`, `weighting`, `prefilter`, [`optimize`], [`regress`], [`numeric`], `fit`, `estimate`, [`online`] |
 //! | 2 | expect | `integrate`, `predict` |
 //! | 1 | say | `model`, `parameter`, `scaling`, `interval`, `experiment`, [`units`] |
-//! | ground | numbers | `lanes`, `scalar`, `dual`, `signals`, `information`, `covariance`, `whiteness`, `error` |
+//! | ground | numbers | `lanes`, `scalar`, `dual`, `signals`, `information`, `whiteness`, `error` |
 //! | wing | machines | [`pmsm`], [`models`] |
 //!
 //! **The way of a sample through a fit.** [`Experiment`] holds it. The integrator carries the state to it in
@@ -102,7 +102,6 @@
 //! integrators and [`online`] observers build without `alloc` too.
 #![cfg_attr(not(feature = "std"), no_std)]
 
-mod covariance;
 #[cfg(feature = "std")]
 mod dispatch;
 mod dual;
@@ -165,7 +164,6 @@ mod wide;
 #[doc(hidden)]
 pub use {approx, nalgebra, serde};
 
-pub use covariance::{Covariance, Gain};
 pub use dual::Dual;
 pub use integrate::{Automatic, Discrete, Esdirk, Integrator, ModelSystem, Rk4, Rk45, Square, Stuck, System};
 pub use interval::{Hold, Interval};
