@@ -16,11 +16,13 @@ mod matrix;
 mod reflect;
 mod solve;
 mod spectrum;
+mod triangles;
 
 pub use block::Block;
 pub use matrix::SquareMatrix;
 pub use solve::RankDeficient;
 pub use spectrum::{NoSpectrum, Spectrum};
+pub use triangles::Triangles;
 
 use serde::{Deserialize, Serialize};
 
