@@ -181,7 +181,10 @@ pub use {
     estimate::{Direction, Estimate, Knowledge, Method, Prediction, Quality, Share, Unknown, Warning},
     experiment::{Experiment, ExperimentOf, Gap, Initial, Sample, Time},
     fit::{Fit, FitProblem, Objective, Records, Search},
-    information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix, Triangles},
+    information::{
+        BadPiece, Block, Covariance, Elimination, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix,
+        Triangles, Undetermined,
+    },
     layout::{Layout, Quantity},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
     numeric::{Derivative, Next, Numeric, StateEquation},
