@@ -22,7 +22,8 @@ use super::Information;
 #[derive(Clone, Debug)]
 pub struct Elimination {
     shared: usize,
-    unknowns: usize,
+    /// Norm of each unknown's column, over all pieces.
+    norms: Vec<f64>,
     pieces: Vec<Piece>,
     /// The pieces directly below the shared unknowns.
     top: Vec<usize>,
@@ -60,7 +61,7 @@ pub enum BadPiece {
 impl Elimination {
     /// No pieces yet, and this many shared unknowns: numbers `0..shared`.
     pub fn new(shared: usize) -> Self {
-        Elimination { shared, unknowns: shared, pieces: vec![], top: vec![] }
+        Elimination { shared, norms: vec![0.0; shared], pieces: vec![], top: vec![] }
     }
 
     /// Pieces directly below the shared unknowns, the columns of whose triangles are their own unknowns and then all the
@@ -101,8 +102,11 @@ impl Elimination {
     fn push(&mut self, parent: Option<usize>, border: Vec<usize>, mut triangle: Information) -> usize {
         triangle.widen(border.len());
         let (number, own) = (self.pieces.len(), triangle.columns() - border.len());
-        let columns = (self.unknowns..self.unknowns + own).chain(border).collect();
-        self.unknowns += own;
+        let columns: Vec<usize> = (self.norms.len()..self.norms.len() + own).chain(border).collect();
+        self.norms.resize(self.norms.len() + own, 0.0);
+        for (&unknown, norm) in columns.iter().zip(triangle.column_norms()) {
+            self.norms[unknown] = self.norms[unknown].hypot(norm);
+        }
         match parent {
             None => self.top.push(number),
             Some(parent) => self.pieces[parent].children.push(number),
@@ -123,7 +127,7 @@ impl Elimination {
 
     /// Number of unknowns, shared and own.
     pub fn unknowns(&self) -> usize {
-        self.unknowns
+        self.norms.len()
     }
 
     /// How many rows the triangles stand for.
@@ -138,7 +142,7 @@ impl Elimination {
 
     /// Gradient of half the sum of squares.
     pub fn gradient(&self) -> Vec<f64> {
-        let mut gradient = vec![0.0; self.unknowns];
+        let mut gradient = vec![0.0; self.unknowns()];
         for (triangle, columns) in self.columns() {
             for (&unknown, slope) in columns.iter().zip(triangle.gradient()) {
                 gradient[unknown] += slope;
@@ -149,13 +153,7 @@ impl Elimination {
 
     /// Norm of each unknown's column of the Jacobian.
     pub fn column_norms(&self) -> Vec<f64> {
-        let mut norms = vec![0.0f64; self.unknowns];
-        for (triangle, columns) in self.columns() {
-            for (&unknown, norm) in columns.iter().zip(triangle.column_norms()) {
-                norms[unknown] = norms[unknown].hypot(norm);
-            }
-        }
-        norms
+        self.norms.clone()
     }
 
     /// Sum of squares at the point itself.

@@ -46,14 +46,8 @@ impl Information {
 
     /// Checks every pivot against its column; the column norms if all are usable.
     pub(super) fn full_rank(&self) -> Result<Vec<f64>, RankDeficient> {
-        self.determined(self.columns())?;
-        Ok(self.column_norms())
-    }
-
-    /// Checks the pivots of the first columns.
-    pub(super) fn determined(&self, columns: usize) -> Result<(), RankDeficient> {
-        for column in 0..columns {
-            let norm = self.column_norm(column);
+        let norms = self.column_norms();
+        for (column, &norm) in norms.iter().enumerate() {
             let independence = self.at(column, column) / norm;
             // Also false for NaN.
             let usable = independence > self.tolerance() && norm.is_finite();
@@ -62,6 +56,6 @@ impl Information {
                 return Err(RankDeficient { column, norm, independence });
             }
         }
-        Ok(())
+        Ok(norms)
     }
 }

@@ -12,9 +12,9 @@ impl Elimination {
     pub fn step_within(&self, damping: &[f64], held: &[bool], room: &[(f64, f64)]) -> Option<Vec<f64>> {
         let free_step = self.step(damping, held)?;
         let mut stage = Stage {
-            held: (0..self.unknowns).map(|i| held.get(i).copied().unwrap_or(false)).collect(),
-            at: vec![0.0; self.unknowns],
-            put: vec![0.0; self.unknowns],
+            held: (0..self.unknowns()).map(|i| held.get(i).copied().unwrap_or(false)).collect(),
+            at: vec![0.0; self.unknowns()],
+            put: vec![0.0; self.unknowns()],
             step: free_step,
         };
         let depths = self.depths();

@@ -33,7 +33,7 @@ impl Elimination {
     /// or a score is not finite.
     pub fn sandwich(&self, held: &[bool], scores: &[Information]) -> Option<Covariance> {
         let responses = self.responses(held)?;
-        let mut space = Space::new(self.unknowns);
+        let mut space = Space::new(self.unknowns());
         // Rows of scores that a part and those below it leave for its border; the last part stands first.
         let mut passed: Vec<DMatrix<f64>> = Vec::with_capacity(responses.len());
         let mut parts = Vec::with_capacity(responses.len());
@@ -85,7 +85,7 @@ impl Elimination {
     }
 
     fn finite(&self, parts: Vec<Part>) -> Option<Covariance> {
-        let mut part_of = vec![0; self.unknowns];
+        let mut part_of = vec![0; self.unknowns()];
         for (number, piece) in self.pieces.iter().enumerate() {
             piece.columns[..piece.own].iter().for_each(|&unknown| part_of[unknown] = number + 1);
         }

@@ -23,17 +23,17 @@ impl Elimination {
     /// Each piece's own unknowns are examined given its border, with what the pieces below say of them; what is not
     /// determined there is held before the others are examined.
     pub fn undetermined(&self, held: &[bool], tolerance: f64) -> Undetermined {
-        let norms = self.column_norms();
-        let mut held: Vec<bool> = (0..self.unknowns).map(|i| held.get(i).copied().unwrap_or(false)).collect();
-        let idle: Vec<usize> = (0..self.unknowns).filter(|&i| !held[i] && norms[i] == 0.0).collect();
+        let norms = &self.norms;
+        let mut held: Vec<bool> = (0..self.unknowns()).map(|i| held.get(i).copied().unwrap_or(false)).collect();
+        let idle: Vec<usize> = (0..self.unknowns()).filter(|&i| !held[i] && norms[i] == 0.0).collect();
         idle.iter().for_each(|&i| held[i] = true);
-        let mut space = Space::new(self.unknowns);
+        let mut space = Space::new(self.unknowns());
         let mut done: Vec<Reduced<'_>> = Vec::with_capacity(self.pieces.len());
         // Of each piece, the last first.
         let mut local = vec![];
         for number in (0..self.pieces.len()).rev() {
             let mut piece = self.reduce_piece(number, &done, Terms { held: &held, ..Terms::default() }, &mut space);
-            let found = null_directions(&piece, &norms, tolerance);
+            let found = null_directions(&piece, norms, tolerance);
             if !found.is_empty() {
                 fix(&found, &mut held);
                 piece = self.reduce_piece(number, &done, Terms { held: &held, ..Terms::default() }, &mut space);
@@ -42,15 +42,15 @@ impl Elimination {
             local.extend(found.into_iter().rev().map(|direction| (Some(number), direction)));
         }
         let total = self.reduce_shared(&done, Terms { held: &held, ..Terms::default() }, &mut space);
-        let found = null_directions(&total, &norms, tolerance);
+        let found = null_directions(&total, norms, tolerance);
         fix(&found, &mut held);
         local.extend(found.into_iter().rev().map(|direction| (None, direction)));
 
         done.reverse();
-        let mut change = vec![0.0; self.unknowns];
+        let mut change = vec![0.0; self.unknowns()];
         let mut directions: Vec<Vec<(usize, f64)>> = idle.into_iter().map(|i| vec![(i, 1.0)]).collect();
         for (number, direction) in local.into_iter().rev() {
-            directions.push(self.with_those_below(number, direction, &done, &norms, &mut change));
+            directions.push(self.with_those_below(number, direction, &done, &mut change));
         }
         Undetermined { directions, held }
     }
@@ -62,10 +62,9 @@ impl Elimination {
         number: Option<usize>,
         mut direction: Vec<(usize, f64)>,
         reduced: &[Reduced<'_>],
-        norms: &[f64],
         change: &mut [f64],
     ) -> Vec<(usize, f64)> {
-        direction.iter().for_each(|&(i, d)| change[i] = d / norms[i]);
+        direction.iter().for_each(|&(i, d)| change[i] = d / self.norms[i]);
         let mut open: Vec<usize> = self.children(number).iter().rev().copied().collect();
         while let Some(next) = open.pop() {
             let piece = &reduced[next];
@@ -75,7 +74,7 @@ impl Elimination {
                 let unknown = piece.columns[i];
                 change[unknown] = -known / row[0];
                 if change[unknown] != 0.0 {
-                    direction.push((unknown, change[unknown] * norms[unknown]));
+                    direction.push((unknown, change[unknown] * self.norms[unknown]));
                 }
             }
             open.extend(self.children(Some(next)).iter().rev());

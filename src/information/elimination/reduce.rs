@@ -1,7 +1,7 @@
 //! The elimination itself: from the leaves to the shared unknowns, and the solution back down.
 
 use super::{Elimination, entry};
-use crate::information::{Block, Information, RankDeficient};
+use crate::information::{Block, Information};
 use std::borrow::Cow;
 
 /// Rows gathered for one absorption.
@@ -51,7 +51,7 @@ impl Space {
 
 impl Elimination {
     pub(super) fn reduce(&self, terms: Terms<'_>) -> Reduction<'_> {
-        let mut space = Space::new(self.unknowns);
+        let mut space = Space::new(self.unknowns());
         // Children have higher numbers than their parents; piece `k` stands at `pieces.len() - 1 - k` until the end.
         let mut done = Vec::with_capacity(self.pieces.len());
         for number in (0..self.pieces.len()).rev() {
@@ -108,10 +108,9 @@ impl Elimination {
     /// The minimizer, counted from the origin.
     pub(super) fn solve(&self, terms: Terms<'_>) -> Option<Vec<f64>> {
         let Reduction { total, pieces } = self.reduce(terms);
-        let mut step = vec![0.0; self.unknowns];
-        total.substitute(&mut step).ok()?;
-        for piece in &pieces {
-            piece.substitute(&mut step).ok()?;
+        let mut step = vec![0.0; self.unknowns()];
+        for piece in std::iter::once(&total).chain(&pieces) {
+            piece.is_determined(&self.norms, terms.damping).then(|| piece.substitute(&mut step))?;
         }
         step.iter().all(|d| d.is_finite()).then_some(step)
     }
@@ -129,15 +128,23 @@ impl Terms<'_> {
 }
 
 impl Reduced<'_> {
+    /// Whether each own unknown has more of its column for itself than rounding.
+    fn is_determined(&self, norms: &[f64], damping: &[f64]) -> bool {
+        let usable = |(i, &unknown): (usize, &usize)| {
+            let norm = norms[unknown].hypot(entry(damping, unknown));
+            // Also false for NaN.
+            norm.is_finite() && self.triangle.at(i, i) / norm > self.triangle.tolerance()
+        };
+        self.columns[..self.own].iter().enumerate().all(usable)
+    }
+
     /// Puts the own unknowns into a step whose border is known.
-    fn substitute(&self, step: &mut [f64]) -> Result<(), RankDeficient> {
-        self.triangle.determined(self.own)?;
+    fn substitute(&self, step: &mut [f64]) {
         for i in (0..self.own).rev() {
             let (y, row) = self.triangle.row(i);
             let known: f64 = row.iter().zip(&self.columns[i..]).skip(1).map(|(r, &unknown)| r * step[unknown]).sum();
             step[self.columns[i]] = (y - known) / row[0];
         }
-        Ok(())
     }
 }
 
@@ -165,10 +172,7 @@ impl<'s> Gather<'s> {
     /// column here are left out.
     pub fn own_rows(&mut self, triangle: &Information, columns: &[usize], origin: &[f64]) {
         for i in 0..=triangle.columns() {
-            let (y, row) = triangle.row(i);
-            let columns = columns.get(i..).unwrap_or_default();
-            let moved: f64 = row.iter().zip(columns).map(|(r, &unknown)| r * entry(origin, unknown)).sum();
-            self.push(row, columns, y - moved);
+            self.take(triangle, i, columns, origin);
         }
         self.rows += triangle.rows();
     }
@@ -176,10 +180,24 @@ impl<'s> Gather<'s> {
     /// The rows that a reduced piece passes to its parent.
     fn passed_up(&mut self, child: &Reduced<'_>) {
         for i in child.own..=child.columns.len() {
-            let (y, row) = child.triangle.row(i);
-            self.push(row, &child.columns[i..], y);
+            self.take(&child.triangle, i, &child.columns, &[]);
         }
         self.rows += child.triangle.rows();
+    }
+
+    /// Row `i` of a triangle. Where its pivot is no more than rounding of its column, so are entries that are as small:
+    /// left in, they would pull damped steps along directions of which nothing is known.
+    fn take(&mut self, triangle: &Information, i: usize, columns: &[usize], origin: &[f64]) {
+        let (y, row) = triangle.row(i);
+        let columns = columns.get(i..).unwrap_or_default();
+        let moved: f64 = row.iter().zip(columns).map(|(r, &unknown)| r * entry(origin, unknown)).sum();
+        let rounding = |r: f64, column: usize| r.abs() <= triangle.tolerance() * triangle.column_norm(column);
+        if row.first().is_some_and(|&pivot| pivot != 0.0 && rounding(pivot, i)) {
+            let cleaned = row.iter().enumerate().map(|(j, &r)| if rounding(r, i + j) { 0.0 } else { r });
+            self.push(&cleaned.collect::<Vec<f64>>(), columns, y - moved);
+        } else {
+            self.push(row, columns, y - moved);
+        }
     }
 
     fn damping(&mut self, own: &[usize], damping: &[f64]) {
