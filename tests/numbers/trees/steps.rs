@@ -115,36 +115,38 @@ fn segments_joined_by_heavy_rows_give_the_dense_step() {
     }
 }
 
-/// A bounded step cannot be lowered by any move that the bounds allow, but away from where unknowns were put.
+/// A step is the minimizer within its room exactly if no slope pulls any unknown that it does not hold in place: zero
+/// inside the room, outward on its ends (Karush, Kuhn and Tucker).
 #[test]
-fn a_bounded_step_is_the_minimizer_among_the_unknowns_that_are_not_on_an_end() {
+fn a_bounded_step_is_the_minimizer_within_its_room() {
     let mut on_ends = 0;
     for (problem, mut random) in problems() {
         let n = problem.unknowns();
         let damping = vec![0.1; n];
-        let free = problem.tree.step(&damping, &[]).expect("it is determined");
-        let room: Vec<(f64, f64)> =
-            free.iter().map(|d| (-(d * random.next()).abs(), (d * random.next()).abs())).collect();
-        let step = problem.tree.step_within(&damping, &[], &room).expect("it is determined");
-        assert!(step.iter().zip(&room).all(|(d, room)| room.0 <= *d && *d <= room.1), "{step:?} {room:?}");
-        let gain = |step: &[f64]| {
-            problem.tree.predicted_reduction(step) - 0.5 * step.iter().map(|d| (0.1 * d).powi(2)).sum::<f64>()
-        };
-        assert!(gain(&step) >= 0.0);
+        let held: Vec<bool> = (0..n).map(|_| random.next() > 0.8).collect();
+        let free = problem.tree.step(&damping, &held).expect("it is determined");
+        let mut end = |d: &f64| if random.next() > 0.8 { 0.0 } else { (d * random.next()).abs() };
+        let room: Vec<(f64, f64)> = free.iter().map(|d| (-end(d), end(d))).collect();
+        let step = problem.tree.step_within(&damping, &held, &room).expect("it is determined");
         let residual = &problem.y - &problem.jacobian * DVector::from_column_slice(&step);
         for i in 0..n {
-            let slope = problem.jacobian.column(i).dot(&residual) - 0.01 * step[i];
-            if step[i] == room[i].0 || step[i] == room[i].1 {
-                on_ends += 1;
-            } else {
-                assert!(slope.abs() < ROUNDING, "unknown {i} of {n}");
+            let pull = problem.jacobian.column(i).dot(&residual) - 0.01 * step[i];
+            match step[i] {
+                d if held[i] || room[i].0 == room[i].1 => assert_eq!(d, 0.0),
+                d if d == room[i].0 => assert!(pull < ROUNDING, "unknown {i} of {n} is pulled inward: {pull}"),
+                d if d == room[i].1 => assert!(pull > -ROUNDING, "unknown {i} of {n} is pulled inward: {pull}"),
+                d => assert!(room[i].0 < d && d < room[i].1 && pull.abs() < ROUNDING, "unknown {i} of {n}: {pull}"),
             }
+            on_ends += usize::from(!held[i] && (step[i] == room[i].0 || step[i] == room[i].1));
         }
+        let wide = vec![(f64::NEG_INFINITY, f64::INFINITY); n];
+        assert_eq!(problem.tree.step_within(&damping, &held, &wide), Some(free));
     }
     assert!(on_ends > 100, "{on_ends}");
 }
 
-/// Records that share nothing: together each gets the step that it has alone, and in as many stages.
+/// Records that share nothing: each gets the step that it has alone. (With one unknown put on an end at a time this would
+/// take minutes.)
 #[test]
 fn bounds_of_independent_records_do_not_wait_for_one_another() {
     let records = 3000;
@@ -161,7 +163,7 @@ fn bounds_of_independent_records_do_not_wait_for_one_another() {
         room.extend(own);
     }
     let together = tree.step_within(&[], &[], &room).expect("it is determined");
-    // The way to the second end of a record starts from another point: rounding of numbers of order one.
+    // Rounding of numbers of order one.
     close(&together, &alone, 1e-13);
 }
 
