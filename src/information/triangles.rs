@@ -70,7 +70,7 @@ impl Triangles {
     /// (64 bytes). A slice that is too short is absorbed as far as it goes.
     pub fn absorb(&mut self, rows: &mut [f64], count: usize) {
         let stride = (self.columns + 1) * self.lanes;
-        let count = if stride == 0 { 0 } else { count.min(rows.len() / stride) };
+        let count = count.min(rows.len().checked_div(stride).unwrap_or(0));
         self.rows += count as u64;
         let task = absorb::Absorb {
             columns: self.columns + 1,

@@ -12,8 +12,11 @@ pub struct Random(u64);
 
 impl Random {
     pub fn new(seed: u64) -> Self {
+        // Seeds next to one another begin alike.
         let mut random = Random(seed);
-        (0..3).for_each(|_| drop(random.next()));
+        for _ in 0..3 {
+            random.next();
+        }
         random
     }
 
