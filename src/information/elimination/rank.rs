@@ -132,3 +132,16 @@ fn fix(directions: &[Vec<(usize, f64)>], held: &mut [bool]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::fix;
+
+    /// Both directions are largest in the first unknown: after it was held for one, the other moves the second alone.
+    #[test]
+    fn directions_with_the_same_largest_unknown_hold_two() {
+        let mut held = [false; 3];
+        fix(&[vec![(0, 0.8), (2, 0.6)], vec![(0, 0.9), (2, -0.4)]], &mut held);
+        assert_eq!(held, [true, false, true]);
+    }
+}

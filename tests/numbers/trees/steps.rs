@@ -181,21 +181,85 @@ fn what_is_not_a_number_or_not_determined_has_no_step() {
     bad.add(None, vec![0], nan).expect("the shared unknown");
     assert_eq!(bad.step(&[], &[]), None);
     assert_eq!(bad.covariance(&[]), None);
-    // An own unknown that stands in for the shared one in every record.
-    let mut offsets = Elimination::new(1);
-    for k in 0..50 {
+}
+
+/// An own unknown that stands in for the shared one in every record: what is left of the shared one is rounding, which
+/// must neither pass for information nor pull a damped step.
+#[test]
+fn rounding_is_no_information() {
+    let (records, mut random) = (50, Random::new(11));
+    let (mut tree, mut outputs) = (Elimination::new(1), vec![]);
+    for _ in 0..records {
         let mut triangle = Information::new(2);
-        (0..20).for_each(|i| triangle.absorb_row(&[0.3, 0.7], f64::from(i % 3) + f64::from(k)));
-        offsets.add(None, vec![0], triangle).expect("the shared unknown");
+        let (mut product, mut squares) = (0.0, 0.0);
+        for _ in 0..20 {
+            let (v, y) = (random.next(), random.next());
+            triangle.absorb_row(&[0.3 * v, 0.7 * v], y);
+            (product, squares) = (product + v * y, squares + v * v);
+        }
+        tree.add(None, vec![0], triangle).expect("the shared unknown");
+        outputs.push(product / squares);
     }
-    assert_eq!(offsets.step(&[], &[]), None);
-    let held: Vec<bool> = (0..51).map(|i| i == 0).collect();
-    let step = offsets.step(&[], &held).expect("what is left is determined");
-    // The mean of i % 3 over twenty is 0.95.
-    (0..50).for_each(|k| assert!((step[1 + k] - (0.95 + k as f64) / 0.3).abs() < 1e-11));
-    // A little damping shares the mean evenly by the slopes, and the outputs are the same.
-    let damped = offsets.step(&[1e-6; 51], &[]).expect("damping determines it");
-    (0..50).for_each(|k| assert!((damped[0] * 0.7 + damped[1 + k] * 0.3 - step[1 + k] * 0.3).abs() < 1e-9));
+    assert_eq!(tree.step(&[], &[]), None);
+    let held: Vec<bool> = (0..=records).map(|i| i == 0).collect();
+    let step = tree.step(&[], &held).expect("what is left is determined");
+    // The minimum of |y - 0.3 v d|^2 record by record.
+    let alone: Vec<f64> = outputs.iter().map(|output| output / 0.3).collect();
+    close(&step[1..], &alone, 1e-13);
+    // Damping by a 1e-8th of the norms: the outputs stay, and of all such steps it is the shortest, which minimizes
+    // |0.7 N d0|^2 + sum |0.3 n_e d_e|^2 over d0.
+    let norms = tree.column_norms();
+    let damping: Vec<f64> = norms.iter().map(|norm| 1e-8 * norm).collect();
+    let damped = tree.step(&damping, &[]).expect("damping determines it");
+    let sum = |f: &dyn Fn(usize) -> f64| (0..records).map(f).sum::<f64>();
+    let weight = |e: usize| (norms[1 + e] / 0.3).powi(2);
+    let shared = sum(&|e| weight(e) * outputs[e]) * 0.7 / (norms[0].powi(2) + 0.49 * sum(&weight));
+    // The damping acts on the outputs by its square, 1e-16; rounding is magnified by its inverse, 1e8.
+    close(&damped[..1], &[shared], 1e-7);
+    let of_record: Vec<f64> = (0..records).map(|e| 0.7 * damped[0] + 0.3 * damped[1 + e]).collect();
+    close(&of_record, &outputs, 1e-13);
+}
+
+/// What segments of two rows leave of the shared column is a 1e-8th of it, which their record's unknown accounts for but
+/// for rounding: a 1e-16th of the column is no information, if a 1e-8th of what was left.
+#[test]
+fn rounding_is_no_information_two_levels_up() {
+    let mut random = Random::new(12);
+    for _ in 0..50 {
+        let mut tree = Elimination::new(1);
+        let record = tree.add(None, vec![0], Information::new(2)).expect("the shared unknown");
+        for _ in 0..20 {
+            let mut triangle = Information::new(3);
+            for _ in 0..2 {
+                let (u, w) = (random.next(), random.next());
+                triangle.absorb_row(&[u, w, 0.7 * u + 1e-8 * w], random.next());
+            }
+            tree.add(Some(record), vec![1, 0], triangle).expect("what the record knows");
+        }
+        assert_eq!(tree.step(&[], &[]), None);
+        assert!(tree.step(&[], &[false, true]).is_some(), "without the record's unknown a 1e-8th is enough");
+    }
+}
+
+/// Two columns that are alike but for rounding, among large residuals.
+#[test]
+fn a_damped_step_does_not_move_along_what_is_not_determined() {
+    let mut random = Random::new(13);
+    for _ in 0..50 {
+        let (a, b) = (random.next(), random.next());
+        let mut triangle = Information::new(2);
+        for _ in 0..30 {
+            let v = random.next();
+            triangle.absorb_row(&[a * v, b * v], 1e3 * random.next());
+        }
+        let tree = Elimination::of_records(2, vec![triangle]);
+        let norms = tree.column_norms();
+        let damping: Vec<f64> = norms.iter().map(|norm| 1e-8 * norm).collect();
+        let step = tree.step(&damping, &[]).expect("damping determines it");
+        // The shortest step in scaled unknowns moves both alike.
+        let (first, second) = (step[0] * norms[0] * a.signum(), step[1] * norms[1] * b.signum());
+        assert!((first - second).abs() <= 1e-6 * first.abs(), "{first} and {second}");
+    }
 }
 
 #[test]
