@@ -12,7 +12,7 @@ const LINE: usize = 8;
 
 /// The square-root triangles of `lanes` independent pieces (records, or segments of one), all with the same columns. Rows
 /// of all lanes are absorbed together by Householder reflections in vector registers (six columns: 1.5 ns per row and lane,
-/// where [`Information::absorb`] takes 2.3).
+/// where [`Information::absorb`] takes 2).
 ///
 /// A lane's triangle depends on its own rows only, to the last bit, and on their number; not on the other lanes and not on
 /// the vector registers of the processor, but for whether it fuses a product with a sum. A lane with a NaN leaves the
