@@ -3,9 +3,9 @@
 use super::reduce::Terms;
 use super::{Elimination, entry};
 
-/// How often unknowns are let go from the ends of their room; a few times suffice.
+/// How often unknowns are released from the ends of their room; a few times suffice.
 const RELEASES: usize = 20;
-/// How often the way along the bounds is halved before only its first part is gone.
+/// How often the way along the bounds is halved before only the part to the first end is gone.
 const HALVINGS: usize = 10;
 /// An unknown is kept on an end where the cosine between the residual and its column is below.
 const NEGLIGIBLE: f64 = 1e-12;
@@ -17,7 +17,7 @@ impl Elimination {
     /// The way to a minimizer is projected on the room: unknowns that would leave it stay on its end. As much of the way
     /// is gone, all or a half or a quarter and so on, as lowers the damped sum of squares further than to go straight
     /// and stop where the first unknown gets to its end. The unknowns on their ends are kept there and the others
-    /// minimized again, until all stay within their room; then those that the slopes pull inward are let go
+    /// minimized again, until all stay within their room; then those whose slopes fall inward are released
     /// (Bertsekas, SIAM J. Control Optim. 20 (1982) 221). Many pieces do so in as few stages as one.
     pub fn step_within(&self, damping: &[f64], held: &[bool], room: &[(f64, f64)]) -> Option<Vec<f64>> {
         let n = self.unknowns();
@@ -135,7 +135,7 @@ impl Stage {
         }
     }
 
-    /// Lets go of the unknowns that the slopes pull inward; whether there were any.
+    /// Releases the unknowns whose slopes fall inward; whether there were any.
     fn release(&mut self, slopes: &[f64]) -> bool {
         let mut any = false;
         for (unknown, side) in self.on_end.iter_mut().enumerate() {

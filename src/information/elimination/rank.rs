@@ -55,7 +55,7 @@ impl Elimination {
         Undetermined { directions, held }
     }
 
-    /// The direction of a piece's own unknowns with the answer of the unknowns below it. `change` is zeros before and
+    /// The direction of a piece's own unknowns with the response of the unknowns below it. `change` is zeros before and
     /// after.
     fn with_those_below(
         &self,

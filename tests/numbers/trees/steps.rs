@@ -115,8 +115,8 @@ fn segments_joined_by_heavy_rows_give_the_dense_step() {
     }
 }
 
-/// A step is the minimizer within its room exactly if no slope pulls any unknown that it does not hold in place: zero
-/// inside the room, outward on its ends (Karush, Kuhn and Tucker).
+/// A step is the minimizer within its room exactly if the slope along each unknown is zero inside the room, and falls
+/// outward on its ends (Karush, Kuhn and Tucker).
 #[test]
 fn a_bounded_step_is_the_minimizer_within_its_room() {
     let mut on_ends = 0;
@@ -130,12 +130,12 @@ fn a_bounded_step_is_the_minimizer_within_its_room() {
         let step = problem.tree.step_within(&damping, &held, &room).expect("it is determined");
         let residual = &problem.y - &problem.jacobian * DVector::from_column_slice(&step);
         for i in 0..n {
-            let pull = problem.jacobian.column(i).dot(&residual) - 0.01 * step[i];
+            let fall = problem.jacobian.column(i).dot(&residual) - 0.01 * step[i];
             match step[i] {
                 d if held[i] || room[i].0 == room[i].1 => assert_eq!(d, 0.0),
-                d if d == room[i].0 => assert!(pull < ROUNDING, "unknown {i} of {n} is pulled inward: {pull}"),
-                d if d == room[i].1 => assert!(pull > -ROUNDING, "unknown {i} of {n} is pulled inward: {pull}"),
-                d => assert!(room[i].0 < d && d < room[i].1 && pull.abs() < ROUNDING, "unknown {i} of {n}: {pull}"),
+                d if d == room[i].0 => assert!(fall < ROUNDING, "unknown {i} of {n} falls inward: {fall}"),
+                d if d == room[i].1 => assert!(fall > -ROUNDING, "unknown {i} of {n} falls inward: {fall}"),
+                d => assert!(room[i].0 < d && d < room[i].1 && fall.abs() < ROUNDING, "unknown {i} of {n}: {fall}"),
             }
             on_ends += usize::from(!held[i] && (step[i] == room[i].0 || step[i] == room[i].1));
         }
@@ -148,7 +148,7 @@ fn a_bounded_step_is_the_minimizer_within_its_room() {
 /// Records that share nothing: each gets the step that it has alone. (With one unknown put on an end at a time this would
 /// take minutes.)
 #[test]
-fn bounds_of_independent_records_do_not_wait_for_one_another() {
+fn bounds_of_many_records_are_met_in_few_stages() {
     let records = 3000;
     let (mut random, mut tree, mut alone) = (Random::new(3), Elimination::new(0), vec![]);
     let mut room = vec![];
@@ -184,7 +184,7 @@ fn what_is_not_a_number_or_not_determined_has_no_step() {
 }
 
 /// An own unknown that stands in for the shared one in every record: what is left of the shared one is rounding, which
-/// must neither pass for information nor pull a damped step.
+/// must neither count as information nor move a damped step.
 #[test]
 fn rounding_is_no_information() {
     let (records, mut random) = (50, Random::new(11));
