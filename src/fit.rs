@@ -16,7 +16,6 @@ mod unknowns;
 mod warnings;
 
 pub(crate) use conclude::held_or_unseen;
-pub(crate) use covariance::classical;
 pub use objective::Objective;
 pub(crate) use objective::{Rows, each};
 pub use run::FitProblem;

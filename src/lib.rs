@@ -82,16 +82,16 @@
 //! | 3 | learn | `loss`, `weighting`, `prefilter`, [`optimize`], [`regress`], [`numeric`], `fit`, `estimate`, [`online`] |
 //! | 2 | expect | `integrate`, `predict` |
 //! | 1 | say | `model`, `parameter`, `scaling`, `interval`, `experiment`, [`units`] |
-//! | ground | numbers | `lanes`, `scalar`, `dual`, `signals`, `information`, `covariance`, `whiteness`, `error` |
+//! | ground | numbers | `lanes`, `scalar`, `dual`, `signals`, `information`, `whiteness`, `error` |
 //! | wing | machines | [`pmsm`], [`models`] |
 //!
 //! **The way of a sample through a fit.** [`Experiment`] holds it. The integrator carries the state to it in
 //! [`Dual`] numbers, a value with up to eight slopes, and the predictor turns that into a prediction error and its slopes,
 //! column by column in a window of 128 samples. The fit filters the window, divides it by the noise, weights it. The
 //! [`Information`] triangle absorbs its rows by orthogonal reflections and forgets them. After the last window the optimizer
-//! reads its step off the triangle; initial states, and parameters that each experiment has for itself, are minimized out
-//! of their experiment's triangle before the triangles are merged. When the search has ended, covariance, rank and
-//! directions come from the same triangle. Nothing is kept of the samples, and nothing is allocated for them.
+//! reads its step off the triangles; initial states, and parameters that each experiment has for itself, are minimized out
+//! of their experiment's triangle first ([`Elimination`]), so that many experiments cost no more than their samples. When
+//! the search has ended, covariance, rank and directions come from the same triangles. Nothing is kept of the samples, and nothing is allocated for them.
 //!
 //! Only the loop over the samples is compiled for each model. `fit/source.rs` is the door to it: search, noise, covariance
 //! and diagnoses see windows of numbers through it, and are compiled once.
@@ -102,7 +102,6 @@
 //! integrators and [`online`] observers build without `alloc` too.
 #![cfg_attr(not(feature = "std"), no_std)]
 
-mod covariance;
 #[cfg(feature = "std")]
 mod dispatch;
 mod dual;
@@ -165,7 +164,6 @@ mod wide;
 #[doc(hidden)]
 pub use {approx, nalgebra, serde};
 
-pub use covariance::{Covariance, Gain};
 pub use dual::Dual;
 pub use integrate::{Automatic, Discrete, Esdirk, Integrator, ModelSystem, Rk4, Rk45, Square, Stuck, System};
 pub use interval::{Hold, Interval};
@@ -183,7 +181,10 @@ pub use {
     estimate::{Direction, Estimate, Knowledge, Method, Prediction, Quality, Share, Unknown, Warning},
     experiment::{Experiment, ExperimentOf, Gap, Initial, Sample, Time},
     fit::{Fit, FitProblem, Objective, Records, Search},
-    information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
+    information::{
+        BadPiece, Block, Covariance, Elimination, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix,
+        Triangles, Undetermined,
+    },
     layout::{Layout, Quantity},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
     numeric::{Derivative, Next, Numeric, StateEquation},

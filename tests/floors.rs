@@ -12,7 +12,7 @@ const FLOORS: &[(&str, &[&str])] = &[
     ("ground: hardware", &["lanes"]),
     ("ground: beside numbers", &["scalar", "units", "dispatch", "random", "whiteness", "wide"]),
     ("ground: numbers", &["dual", "signals"]),
-    ("ground: vectors of numbers", &["information", "covariance", "error", "by_name", "layout"]),
+    ("ground: vectors of numbers", &["information", "error", "by_name", "layout"]),
     ("say: words", &["model", "parameter", "scaling", "interval"]),
     ("say: records", &["experiment"]),
     // Filtering a record is editing it, and a horizon may start from filtered states.

@@ -6,7 +6,7 @@
 use super::{Pinned, minimize};
 use crate::error::Error;
 use crate::estimate::{Estimate, Knowledge, student};
-use crate::fit::{FitProblem, classical, held_or_unseen};
+use crate::fit::{FitProblem, held_or_unseen};
 use crate::integrate::Integrator;
 use crate::model::Model;
 use crate::optimize::{LeastSquares, Severity};
@@ -119,13 +119,13 @@ pub fn profile<M: Model, I: Integrator, P: Predictor<M>, O>(
     let unknown = &estimate.unknowns[index];
     let linear = objective.linearize(&best).map_err(|error| Error::Optimizer(error.to_string()))?;
     let at_bound = |i: usize| i != index && matches!(estimate.unknowns[i].knowledge, Knowledge::Held { .. });
-    let held = held_or_unseen(&linear, (0..best.len()).map(at_bound).collect());
-    let covariance = classical(&linear, &held);
+    let held = held_or_unseen(&linear, &(0..best.len()).map(at_bound).collect::<Vec<bool>>());
+    let covariance = linear.covariance(&held);
     // How far one standard error is, and how the others go along.
-    let error = covariance.as_ref().map(|c| c[(index, index)].sqrt()).filter(|e| e.is_finite() && *e > 0.0);
+    let error = covariance.as_ref().map(|c| c.standard_error(index)).filter(|e| e.is_finite() && *e > 0.0);
     let along: Vec<f64> = (0..best.len())
         .map(|j| match (&covariance, error) {
-            (Some(c), Some(error)) if !held[j] => c[(j, index)] / (error * error),
+            (Some(c), Some(error)) if !held[j] => c.get(j, index) / (error * error),
             _ => f64::from(u8::from(j == index)),
         })
         .collect();

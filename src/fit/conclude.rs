@@ -1,13 +1,12 @@
 //! From where a search ended to what is known.
 
-use super::covariance::classical;
 use super::noise::{Noise, Whitening};
 use super::objective::Objective;
 use super::reproduce::Reproduced;
 use super::search::Found;
 use crate::error::Error;
 use crate::estimate::{Direction, Knowledge, Quality, Unknown, Warning, student};
-use crate::information::{Information, SquareMatrix};
+use crate::information::{Covariance, SquareMatrix, Undetermined};
 use crate::model::Kind;
 use crate::optimize::{Linearization, Severity};
 
@@ -65,20 +64,19 @@ impl Objective<'_> {
         let slopes: Vec<f64> = (0..n).map(|i| unknowns.row[i].parameter.transform.slope(values[i])).collect();
         let held_at: Vec<Option<f64>> = (0..n).map(at_bound).collect();
         let mut free: Vec<bool> = held_at.iter().map(Option::is_none).collect();
-        let unseen = unseen_directions(linear, &free, &norms);
+        let at_bounds: Vec<bool> = held_at.iter().map(Option::is_some).collect();
+        let Undetermined { directions: unseen, held } = linear.undetermined(&at_bounds, RANK);
         let mut unidentified = vec![false; n];
         for direction in &unseen {
-            let largest = direction.iter().fold(0.0f64, |m, d| m.max(d.abs()));
-            for i in 0..n {
-                unidentified[i] |= direction[i].abs() > SHARE * largest;
+            let largest = direction.iter().fold(0.0f64, |m, (_, d)| m.max(d.abs()));
+            for &(i, d) in direction {
+                unidentified[i] |= d.abs() > SHARE * largest;
             }
         }
         (0..n).for_each(|i| free[i] &= !unidentified[i]);
         let directions: Vec<Direction> = unseen.iter().map(|d| self.direction(d, &norms, &values, &slopes)).collect();
 
         // The covariance in the optimizer's coordinates, then in the unknowns' own units.
-        let mut held: Vec<bool> = held_at.iter().map(Option::is_some).collect();
-        fix_directions(&unseen, &mut held);
         let estimated = held.iter().filter(|held| !**held).count() as f64;
         // With no more measurements than unknowns nothing is left to tell the noise from.
         let degrees = if measured <= n as u64 { 0.0 } else { measured as f64 - estimated };
@@ -88,7 +86,7 @@ impl Objective<'_> {
             _ if self.noise_is_no_matter(noise) => (sum_of_squares / degrees.max(1.0)).sqrt(),
             _ => (measured as f64 / degrees.max(1.0)).sqrt(),
         };
-        let unit = classical(linear, &held);
+        let unit = linear.covariance(&held);
         let sandwich = self.needs_sandwich();
         let priors: f64 = unknowns.priors(coordinates).map(|(_, _, error)| error * error).sum();
         let small_sample = measured as f64 / degrees.max(1.0);
@@ -106,17 +104,15 @@ impl Objective<'_> {
             // The noise is wider than the errors, the priors are not.
             (None, false) if widening != 1.0 && unknowns.priors(coordinates).next().is_some() => {
                 let widened = self.with(whitening.widened(widening));
-                (widened.evaluate(coordinates).ok().and_then(|linear| classical(&linear, &held)), 1.0)
+                (widened.evaluate(coordinates).ok().and_then(|linear| linear.covariance(&held)), 1.0)
             }
             (None, false) => (unit.clone(), widening * widening),
         };
         let singular = covariance.is_none();
-        let covariance = covariance.unwrap_or_else(|| SquareMatrix::zeros(n));
+        let covariance = covariance.unwrap_or_else(|| Covariance::zeros(n));
         let known = |i: usize| free[i] && !singular && degrees > 0.0;
-        let covariance = SquareMatrix::from_fn(n, |i, j| match free[i] && free[j] {
-            true => covariance[(i, j)] * factor * slopes[i] * slopes[j],
-            false => 0.0,
-        });
+        let in_units: Vec<f64> = (0..n).map(|i| if free[i] { slopes[i] } else { 0.0 }).collect();
+        let covariance = covariance.times(factor).scaled(&in_units).dense(&(0..n).collect::<Vec<_>>());
 
         let rows: Vec<Unknown> = (0..n)
             .map(|i| {
@@ -141,7 +137,7 @@ impl Objective<'_> {
                     value,
                     start: unknown.parameter.start,
                     knowledge,
-                    error_index: unit.as_ref().and_then(|unit| index(unit[(i, i)].sqrt())),
+                    error_index: unit.as_ref().and_then(|unit| index(unit.standard_error(i))),
                     error_index_held: index(1.0 / norms[i]),
                     transform,
                 }
@@ -160,7 +156,7 @@ impl Objective<'_> {
             warnings.push(Warning { severity: Severity::Usable, text });
         }
         if let Some(color) = color {
-            let white = |i: usize| unit.as_ref().map(|unit| unit[(i, i)].sqrt() * widening * slopes[i].abs());
+            let white = |i: usize| unit.as_ref().map(|unit| unit.standard_error(i) * widening * slopes[i].abs());
             let widened = |i: usize| Some(covariance[(i, i)].sqrt() / white(i).filter(|error| *error > 0.0)?);
             let widest = (0..n).filter_map(widened).fold(0.0, f64::max);
             warnings.push(color.warning(colored.as_ref().map(|(_, lags)| (*lags, widest))));
@@ -214,16 +210,15 @@ impl Objective<'_> {
     }
 
     /// A direction of the scaled unknowns as relative changes by name.
-    fn direction(&self, direction: &[f64], norms: &[f64], values: &[f64], slopes: &[f64]) -> Direction {
-        let change = |i: usize| {
-            let step = direction[i] / if norms[i] > 0.0 { norms[i] } else { 1.0 } * slopes[i];
+    fn direction(&self, direction: &[(usize, f64)], norms: &[f64], values: &[f64], slopes: &[f64]) -> Direction {
+        let change = |i: usize, d: f64| {
+            let step = d / if norms[i] > 0.0 { norms[i] } else { 1.0 } * slopes[i];
             if values[i] == 0.0 { step } else { step / values[i].abs() }
         };
-        let largest = direction.iter().fold(0.0f64, |m, d| m.max(d.abs()));
-        let mut moves: Vec<(String, f64)> = (0..direction.len())
-            .filter(|&i| direction[i].abs() > SHARE * largest)
-            .map(|i| (self.unknowns.row[i].name.clone(), change(i)))
-            .collect();
+        let largest = direction.iter().fold(0.0f64, |m, (_, d)| m.max(d.abs()));
+        let large = direction.iter().filter(|(_, d)| d.abs() > SHARE * largest);
+        let mut moves: Vec<(String, f64)> =
+            large.map(|&(i, d)| (self.unknowns.row[i].name.clone(), change(i, d))).collect();
         let unit = moves.iter().map(|(_, by)| *by).fold(0.0, |m: f64, by| if by.abs() > m.abs() { by } else { m });
         moves.iter_mut().for_each(|(_, by)| *by /= unit);
         Direction { moves }
@@ -232,57 +227,6 @@ impl Objective<'_> {
 
 /// The unknowns to hold so that the others have a covariance: those in `held`, and one for each direction along which
 /// nothing is known.
-pub(crate) fn held_or_unseen(linear: &Linearization, mut held: Vec<bool>) -> Vec<bool> {
-    let free: Vec<bool> = held.iter().map(|held| !held).collect();
-    fix_directions(&unseen_directions(linear, &free, &linear.column_norms()), &mut held);
-    held
-}
-
-/// Holds one unknown for each direction. To hold all that take part would count what is known of them together as known
-/// of each, and intervals of the others, which depend on that, would be too narrow. Which one does not matter to what is
-/// known; the largest is the surest to take.
-fn fix_directions(unseen: &[Vec<f64>], held: &mut [bool]) {
-    let mut rows = unseen.to_vec();
-    while let Some(row) = rows.pop() {
-        let Some(pivot) = (0..row.len()).max_by(|&i, &j| row[i].abs().total_cmp(&row[j].abs())) else { continue };
-        held[pivot] = true;
-        for other in &mut rows {
-            let factor = other[pivot] / row[pivot];
-            other.iter_mut().zip(&row).for_each(|(other, row)| *other -= factor * row);
-        }
-    }
-}
-
-/// Directions in the space of the scaled unknowns along which nothing is known.
-fn unseen_directions(linear: &Linearization, free: &[bool], norms: &[f64]) -> Vec<Vec<f64>> {
-    let n = free.len();
-    let unit = |i: usize| (0..n).map(|j| if i == j { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
-    let mut unseen: Vec<Vec<f64>> = (0..n).filter(|&i| free[i] && norms[i] == 0.0).map(unit).collect();
-    let seen: Vec<bool> = (0..n).map(|i| free[i] && norms[i] > 0.0).collect();
-    let mut look = |information: &Information, unknowns: &[usize]| {
-        let kept: Vec<usize> = (0..unknowns.len()).filter(|&c| seen[unknowns[c]]).collect();
-        let scales: Vec<f64> = kept.iter().map(|&c| 1.0 / norms[unknowns[c]]).collect();
-        if let Ok(spectrum) = information.select(&kept).decomposition(&scales) {
-            for null in spectrum.null_directions(RANK) {
-                let mut direction = vec![0.0; n];
-                kept.iter().zip(null).for_each(|(&c, d)| direction[unknowns[c]] = *d);
-                unseen.push(direction);
-            }
-        }
-    };
-    match linear.blocks() {
-        // One block holds everything.
-        [block] => {
-            let columns: Vec<usize> = linear.columns().flat_map(|(_, columns)| columns).collect();
-            look(block, &columns);
-        }
-        blocks => {
-            for (block, columns) in blocks.iter().zip(linear.columns().map(|(_, columns)| columns)) {
-                let own = columns.len() - linear.shared();
-                look(&block.select(&(0..own).collect::<Vec<_>>()), &columns[..own]);
-            }
-            look(&linear.shared_information(), &(0..linear.shared()).collect::<Vec<_>>());
-        }
-    }
-    unseen
+pub(crate) fn held_or_unseen(linear: &Linearization, held: &[bool]) -> Vec<bool> {
+    linear.undetermined(held, RANK).held
 }
