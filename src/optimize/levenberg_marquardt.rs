@@ -93,11 +93,11 @@ struct Look {
 }
 
 const FIRST: Reach = Reach { first: 0.1, later: 1.0 };
-const SECOND: Reach = Reach { first: 10.0, later: 10.0 };
+const SECOND: Reach = Reach { first: 30.0, later: 30.0 };
 /// A first try that has not ended after so many trials is given up.
 const FIRST_TRIALS: u64 = 2500;
 /// So often a search goes on that found a lower cost beside its end.
-const LEAPS: u64 = 10;
+const LEAPS: u64 = 5;
 /// Where the cost changes by less than this part over a hundredth of the unknowns' sizes, there is nothing to see.
 const FLAT: f64 = 1e-9;
 /// A step is bent where twice the bend is no longer than this part of it (Transtrum and Sethna 2012).
@@ -179,7 +179,7 @@ impl<S: Scaling> LevenbergMarquardt<S> {
     fn end(&mut self, point: Point, outcome: Outcome) {
         let look = self.look(&point, outcome);
         match look.points.is_empty() {
-            true => self.end_try(point, outcome),
+            true => self.end_look(point, &look),
             false => (self.stage, self.point) = (Stage::Look(look), Some(point)),
         }
     }
@@ -188,15 +188,16 @@ impl<S: Scaling> LevenbergMarquardt<S> {
     /// lost their influence on the way.
     fn look(&self, point: &Point, outcome: Outcome) -> Look {
         let mut look = Look { outcome, points: vec![], beside: 0, lost: 0, flat: 0 };
-        if self.leaps >= LEAPS {
-            return look;
-        }
         let blind = point.blind();
         if blind.len() > self.unseen && matches!(outcome, Outcome::Converged { .. } | Outcome::LimitOfPrecision { .. }) {
+            look.lost = blind.len() - self.unseen;
             look.points = blind.iter().flat_map(|direction| point.beside(direction, &self.seen)).collect();
-            (look.beside, look.lost) = (look.points.len(), blind.len() - self.unseen);
+            look.beside = look.points.len();
         }
         look.points.extend(point.inside(&self.seen));
+        if self.leaps >= LEAPS {
+            look.points.clear();
+        }
         look
     }
 
@@ -276,14 +277,21 @@ impl<S: Scaling> LevenbergMarquardt<S> {
             Some(next) if look.points.len() < look.beside && next.cost() <= point.cost() * (1.0 + FLAT) => look.flat += 1,
             _ => {}
         }
-        if !look.points.is_empty() {
-            (self.stage, self.point) = (Stage::Look(look), Some(point));
-        } else if look.flat > 0 {
-            let gradient = point.cosine();
-            self.end_try(point, Outcome::Plateau { lost: look.lost, gradient });
-        } else {
-            self.end_try(point, look.outcome);
+        match look.points.is_empty() {
+            true => self.end_look(point, &look),
+            false => (self.stage, self.point) = (Stage::Look(look), Some(point)),
         }
+    }
+
+    /// Ends a try after a look around.
+    fn end_look(&mut self, point: Point, look: &Look) {
+        // Of several lost directions the flat one may lie between those looked along; and a saddle that the search comes back
+        // to is no minimum either.
+        let outcome = match look.flat > 0 || look.lost > 1 || look.lost > 0 && self.leaps >= LEAPS {
+            true => Outcome::Plateau { lost: look.lost, gradient: point.cosine() },
+            false => look.outcome,
+        };
+        self.end_try(point, outcome);
     }
 
     /// Bends a step by half the geodesic acceleration, unless that is too long to be trusted.

@@ -108,25 +108,15 @@ impl Point {
 
     /// The directions, of unknowns that are not on a bound, that have no influence.
     pub fn blind(&self) -> Vec<Vec<f64>> {
-        let inside = |i: &usize| self.room[*i].0 < 0.0 && self.room[*i].1 > 0.0;
-        let along = |entries: &mut dyn Iterator<Item = (usize, f64)>| {
+        let on_bound: Vec<bool> = self.room.iter().map(|(down, up)| *down >= 0.0 || *up <= 0.0).collect();
+        let direction = |entries: Vec<(usize, f64)>| {
             let mut direction = vec![0.0; self.x.len()];
-            entries.for_each(|(i, entry)| direction[i] = entry);
+            for (i, entry) in entries {
+                direction[i] = if self.norms[i] > 0.0 { entry / self.norms[i] } else { entry };
+            }
             direction
         };
-        let idle = (0..self.x.len()).filter(inside).filter(|&i| self.norms[i] == 0.0);
-        let mut directions: Vec<Vec<f64>> = idle.map(|i| along(&mut std::iter::once((i, 1.0)))).collect();
-        let shared = self.linear.shared_information();
-        let norms = shared.column_norms();
-        let columns: Vec<usize> = (0..norms.len()).filter(inside).filter(|&i| norms[i] > 0.0).collect();
-        let inverse: Vec<f64> = columns.iter().map(|&i| 1.0 / norms[i]).collect();
-        if let Ok(spectrum) = shared.select(&columns).decomposition(&inverse) {
-            for null in spectrum.null_directions(RANK) {
-                let entries = columns.iter().zip(inverse.iter().zip(null)).map(|(&i, (scale, entry))| (i, scale * entry));
-                directions.push(along(&mut { entries }));
-            }
-        }
-        directions
+        self.linear.undetermined(&on_bound, RANK).directions.into_iter().map(direction).collect()
     }
 
     /// Points to either side along a direction, a hundredth of the unknowns' sizes away.
