@@ -134,7 +134,11 @@ mod experiment;
 #[cfg(feature = "std")]
 mod fit;
 #[cfg(feature = "std")]
+mod functions;
+#[cfg(feature = "std")]
 mod information;
+#[cfg(feature = "std")]
+mod judge;
 #[cfg(feature = "std")]
 mod loss;
 #[cfg(feature = "std")]
@@ -148,13 +152,21 @@ mod predict;
 #[cfg(feature = "std")]
 mod prefilter;
 #[cfg(feature = "std")]
+pub mod problem;
+#[cfg(feature = "std")]
 mod random;
+#[cfg(feature = "std")]
+pub mod record;
 #[cfg(feature = "std")]
 pub mod regress;
 #[cfg(feature = "std")]
 pub mod report;
 #[cfg(feature = "std")]
 mod scaling;
+#[cfg(feature = "std")]
+mod simulate;
+#[cfg(feature = "std")]
+pub mod sweep;
 #[cfg(feature = "std")]
 mod weighting;
 #[cfg(feature = "std")]
@@ -176,22 +188,28 @@ pub use scalar::Scalar;
 pub use signals::{Entry, Nothing, Of, Signals};
 
 #[cfg(feature = "csv")]
-pub use experiment::CsvFile;
+pub use record::CsvFile;
 #[cfg(feature = "std")]
 pub use {
     error::{Error, Failure},
-    estimate::{Direction, Estimate, Knowledge, Method, Prediction, Quality, Share, Unknown, Warning},
-    experiment::{Experiment, ExperimentOf, Gap, Initial, Sample, Time},
-    fit::{Fit, FitProblem, Objective, Records, Search},
+    estimate::{
+        CovarianceMethod, Direction, Estimate, Knowledge, Method, NoiseModel, OutputFit, Prediction, Summary, Unknown,
+        Warning,
+    },
+    experiment::{Experiment, ExperimentOf, Sample},
+    fit::{Fit, Records},
     information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
     layout::{Layout, Quantity},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
     numeric::{Derivative, Next, Numeric, StateEquation},
     outliers::hampel,
-    predict::{FreeRun, Horizon, Predictor, Walk},
+    predict::{FreeRun, Horizon, Kalman, Plant, Predictor},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
+    problem::{Objective, Problem, Search},
+    record::{Gap, Initial, Time},
     regress::{Assumption, LinearEstimate, Regression, RegressionError},
     report::Report,
+    simulate::{Simulation, Simulator, simulate},
     scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
     weighting::{BySignal, Law, Weighting},
 };

@@ -55,7 +55,7 @@ pub use trace::{Band, Trace};
 
 use crate::diagnose::{Bootstrap, Identifiability, Profile, Restarts, residuals::Residuals};
 use crate::error::Error;
-use crate::estimate::{Direction, Method, Quality, Unknown, Warning};
+use crate::estimate::{Direction, Method, OutputFit as Fitted, Unknown, Warning};
 use crate::information::SquareMatrix;
 use crate::optimize::{Outcome, Severity};
 use crate::parameter::Parameter;
@@ -130,7 +130,7 @@ pub struct Output {
     /// Unit.
     pub unit: String,
     /// The numbers.
-    pub quality: Quality,
+    pub quality: Fitted,
 }
 
 /// One record of the fit.
@@ -192,7 +192,7 @@ pub struct OutputFit {
     pub name: String,
     /// Unit.
     pub unit: String,
-    /// Fit (%) as in [`Quality`].
+    /// Fit (%) as in [`OutputFit`](crate::OutputFit).
     pub fit_percent: Option<f64>,
     /// Samples for which the method has no prediction; they are drawn as gaps.
     pub unpredicted: u64,

@@ -29,9 +29,10 @@ impl Autocorrelation {
         self.count += count;
     }
 
-    /// Forgets the past: what comes next belongs to another record.
-    pub fn restart(&mut self) {
-        self.values.fill(0.0);
+    /// Adds the sums of another record.
+    pub fn append(&mut self, other: &Autocorrelation) {
+        self.sums.iter_mut().zip(&other.sums).for_each(|(sum, other)| *sum += other);
+        self.count += other.count;
     }
 
     /// How many values were measured.

@@ -5,12 +5,10 @@
 
 use super::{Pinned, minimize};
 use crate::error::Error;
-use crate::estimate::{Estimate, Knowledge, student};
-use crate::fit::{FitProblem, classical, held_or_unseen};
-use crate::integrate::Integrator;
-use crate::model::Model;
+use crate::estimate::{Knowledge, Summary, student};
+use crate::judge::{classical, held_or_unseen};
 use crate::optimize::{LeastSquares, Severity};
-use crate::predict::Predictor;
+use crate::problem::Problem;
 use serde::{Deserialize, Serialize};
 
 /// The profile of one unknown.
@@ -100,9 +98,9 @@ const CLOSE: f64 = 1e-3;
 ///
 /// # Errors
 /// A name that no unknown has, a probability not between 0 and 1, an estimate of another problem.
-pub fn profile<M: Model, I: Integrator, P: Predictor<M>, O>(
-    problem: &FitProblem<'_, M, I, P, O>,
-    estimate: &Estimate<M, I, P>,
+pub fn profile(
+    problem: &Problem<'_>,
+    estimate: &Summary,
     name: &str,
     probability: f64,
 ) -> Result<Profile, Error> {
@@ -164,7 +162,7 @@ pub fn profile<M: Model, I: Integrator, P: Predictor<M>, O>(
         let (mut inside, mut place) = ((best[index], 0.0), best.clone());
         let mut step = sign * scale * quantile / 2.0;
         for number in 0..POINTS {
-            // A profile that has not left the ground by now will not.
+            // Flat so far: the interval is open on this side.
             if number >= FLAT.0 && bound.is_infinite() && inside.1 < FLAT.1 * quantile {
                 break;
             }

@@ -104,7 +104,7 @@ fn a_numeric_model_simulates_like_the_exact_one() {
                 .step(&Rk4::default(), b.unwrap_or(a), &mut ())
                 .unwrap(),
         );
-        a = ModelSystem { model: &numeric(), interval: &interval, p: &p }.step(&Rk4::default(), a, &mut ()).unwrap();
+        a = ModelSystem { model: &numeric(), interval: &interval, p: &p }.step(&Rk4::default(), a, &mut 0.0).unwrap();
     }
     let b = b.unwrap();
     assert_relative_eq!(a.x.value, b.x.value, max_relative = 1e-13);

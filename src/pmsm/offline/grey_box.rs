@@ -1,6 +1,7 @@
 use super::Spans;
 use crate::error::Error;
-use crate::experiment::{Experiment, Time};
+use crate::experiment::Experiment;
+use crate::record::Time;
 use crate::pmsm::{CompensatedDrive, Currents, ExactCompensated, dead_time};
 
 impl Spans {

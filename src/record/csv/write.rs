@@ -2,17 +2,14 @@
 
 use super::table::cannot;
 use crate::error::Error;
-use crate::experiment::Experiment;
-use crate::signals::Signals;
+use crate::record::{Channel, Record};
 use std::fs::{self, File};
 use std::path::Path;
 
 /// Writes the record to `path`: beside it first, so that there is never half a file.
-pub(super) fn write<X: Signals, U: Signals, Y: Signals>(
-    record: &Experiment<X, U, Y>,
-    path: &Path,
-) -> Result<(), Error> {
-    let names: Vec<&str> = ["t"].iter().chain(U::NAMES).chain(Y::NAMES).copied().collect();
+pub(super) fn write(record: &Record, path: &Path) -> Result<(), Error> {
+    let channels: Vec<&Channel> = record.inputs.iter().chain(&record.outputs).collect();
+    let names: Vec<&str> = ["t"].into_iter().chain(channels.iter().map(|channel| channel.name.as_str())).collect();
     for (second, name) in names.iter().enumerate() {
         if let Some(first) = names[..second].iter().position(|earlier| earlier == name) {
             let (path, column) = (path.to_owned(), (*name).to_owned());
@@ -34,18 +31,14 @@ pub(super) fn write<X: Signals, U: Signals, Y: Signals>(
     })
 }
 
-fn rows<X: Signals, U: Signals, Y: Signals>(
-    record: &Experiment<X, U, Y>,
-    names: &[&str],
-    path: &Path,
-) -> Result<(), csv::Error> {
+fn rows(record: &Record, names: &[&str], path: &Path) -> Result<(), csv::Error> {
     let mut file =
         csv::WriterBuilder::new().has_headers(false).buffer_capacity(1 << 16).from_writer(File::create(path)?);
     file.write_record(names)?;
-    for (k, (u, y)) in record.inputs().iter().zip(record.outputs()).enumerate() {
-        let (u, y) = (U::into_array(*u), Y::into_array(*y));
-        let measured = Y::array_from_fn(|j| Some(y.as_ref()[j]).filter(|value| !value.is_nan()));
-        file.serialize((record.time(k), u.as_ref(), measured.as_ref()))?;
+    let columns: Vec<&[f64]> = record.inputs.iter().chain(&record.outputs).map(|channel| &*channel.values).collect();
+    for k in 0..record.len() {
+        let row = columns.iter().map(|column| Some(column[k]).filter(|value| !value.is_nan()));
+        file.serialize([Some(record.time(k))].into_iter().chain(row).collect::<Vec<Option<f64>>>())?;
     }
     Ok(file.flush()?)
 }

@@ -3,9 +3,10 @@
 //! Cost and gradient serve the line-search and population methods; the dense residual, Jacobian and Gauss-Newton Hessian
 //! are made on request only. Where the model cannot be evaluated, or a bound is crossed, the cost is infinite.
 
-use super::objective::{Objective, Rows};
+use super::linearize::Weighing;
+use super::{Accumulate, Objective};
 use crate::optimize::{Infeasible, LeastSquares};
-use crate::predict::WINDOW;
+use crate::sweep::Window;
 use argmin::core::{CostFunction, Error, Gradient, Hessian, Jacobian, Operator};
 
 impl CostFunction for Objective<'_> {
@@ -74,28 +75,17 @@ impl Hessian for Objective<'_> {
 impl Objective<'_> {
     /// Every weighted residual with its slopes: sample by sample, output by output, the priors last.
     fn dense(&self, x: &[f64], slopes: bool) -> Result<Vec<(f64, Vec<f64>)>, Infeasible> {
+        let unknowns = &self.problem.unknowns;
         let width = if slopes { x.len() } else { 0 };
-        let mut rows = vec![];
-        for e in 0..self.experiments() {
-            let columns: Vec<usize> = if slopes { self.unknowns.columns(e).collect() } else { vec![] };
-            let visit = &mut |Rows { begin, samples, window }: Rows<'_>| {
-                let measured = window.measured.clone();
-                let columns_of: Vec<&mut [f64]> = window.columns_mut().collect();
-                for k in 0..samples {
-                    for row in (k..measured.len()).step_by(WINDOW).filter(|&row| measured[row]) {
-                        let z = columns_of[columns_of.len() - 1][row];
-                        let root = (self.source.weight(e, begin + k) * self.loss.map_or(1.0, |l| l.weight(z))).sqrt();
-                        let mut dense = vec![0.0; width];
-                        for (column, &i) in columns_of.iter().zip(&columns) {
-                            dense[i] = root * column[row];
-                        }
-                        rows.push((-root * z, dense));
-                    }
-                }
-            };
-            self.walk(e, x, slopes, visit).map_err(|halt| self.infeasible(e, x, halt))?;
-        }
-        for (i, slope, error) in self.unknowns.priors(x) {
+        let make = |experiment: usize| DenseRows {
+            weighing: Weighing::new(self, experiment),
+            columns: if slopes { unknowns.columns(experiment).collect() } else { vec![] },
+            width,
+            rows: vec![],
+        };
+        let mut rows: Vec<(f64, Vec<f64>)> =
+            self.gather(x, slopes, make)?.into_iter().flat_map(|dense| dense.rows).collect();
+        for (i, slope, error) in unknowns.priors(x) {
             let mut dense = vec![0.0; width];
             if slopes {
                 dense[i] = slope;
@@ -103,5 +93,33 @@ impl Objective<'_> {
             rows.push((-error, dense));
         }
         Ok(rows)
+    }
+}
+
+/// Residuals and slopes of one experiment.
+struct DenseRows<'d> {
+    weighing: Weighing<'d>,
+    columns: Vec<usize>,
+    width: usize,
+    rows: Vec<(f64, Vec<f64>)>,
+}
+
+impl Accumulate for DenseRows<'_> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        for k in 0..window.samples[lane] {
+            for j in (0..window.outputs()).filter(|&j| window.is_measured(k, j, lane)) {
+                let [first, second] = self.weighing.rows(window, k, j, lane);
+                let row = |(root, error): (f64, f64), values: &[f64]| {
+                    let mut dense = vec![0.0; self.width];
+                    let values = values.iter().skip(lane).step_by(window.lanes());
+                    self.columns.iter().zip(values).for_each(|(&i, value)| dense[i] = root * value);
+                    (-error, dense)
+                };
+                self.rows.push(row(first, window.row(k, j)));
+                if window.has_variances() {
+                    self.rows.push(row(second, window.variance_row(k, j)));
+                }
+            }
+        }
     }
 }

@@ -21,9 +21,10 @@ pub(crate) struct CheckpointFile {
     pub fingerprint: String,
     /// The solver as it is set in this run, as text.
     pub settings: String,
+    /// Iterations of earlier runs.
     pub before: u64,
     /// What went wrong while saving; the search goes on all the same.
-    pub trouble: Arc<Mutex<Option<String>>>,
+    trouble: Arc<Mutex<Option<String>>>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -44,6 +45,25 @@ const FORMAT: &str = "greybox checkpoint 1";
 type Resumed<S> = (Vec<f64>, u64, Option<S>);
 
 impl CheckpointFile {
+    /// A file for the search of one problem.
+    pub fn new(path: PathBuf, every: u64, fingerprint: String, settings: String) -> Self {
+        CheckpointFile { path, every, fingerprint, settings, before: 0, trouble: Arc::default() }
+    }
+
+    /// What went wrong while saving.
+    pub fn trouble(&self) -> Option<String> {
+        self.trouble.lock().ok().and_then(|trouble| trouble.clone())
+    }
+
+    /// Remembers what went wrong.
+    pub fn note(&self, written: Result<(), Error>) {
+        if let Err(error) = written
+            && let Ok(mut trouble) = self.trouble.lock()
+        {
+            *trouble = Some(error.to_string());
+        }
+    }
+
     /// The place, the iterations so far and, if it was set as it is now, the solver of an earlier run; `None` if there is
     /// no file yet.
     pub fn load<S: DeserializeOwned>(&self) -> Result<Option<Resumed<S>>, Error> {
@@ -92,11 +112,7 @@ impl CheckpointFile {
 impl<S: Serialize> Checkpoint<S, LeastSquaresState> for CheckpointFile {
     fn save(&self, solver: &S, state: &LeastSquaresState) -> Result<(), argmin::core::Error> {
         let place = state.get_param().map(Vec::as_slice).unwrap_or_default();
-        if let Err(error) = self.write(place, state.get_iter(), solver)
-            && let Ok(mut trouble) = self.trouble.lock()
-        {
-            *trouble = Some(error.to_string());
-        }
+        self.note(self.write(place, state.get_iter(), solver));
         Ok(())
     }
 

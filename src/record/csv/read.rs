@@ -3,10 +3,9 @@
 use super::table::Table;
 use super::{Column, CsvFile};
 use crate::error::Error;
-use crate::experiment::{Clock, Experiment, ExperimentOf, Initial, Time};
 use crate::interval::Hold;
-use crate::model::{Kind, Model};
-use crate::signals::{Of, Signals};
+use crate::layout::{Kind, Layout, Quantity};
+use crate::record::{Channel, Clock, Initial, Record, Time};
 
 /// Where the number of one signal comes from.
 #[derive(Clone, Copy, Debug, Default)]
@@ -17,32 +16,29 @@ struct Source {
 }
 
 impl CsvFile {
-    /// Reads the record of a model; it is named after the file.
+    /// Reads a record of the inputs and outputs of a layout; it is named after the file.
     ///
     /// # Errors
-    /// A file that cannot be read; a missing or ambiguous column (the message lists those there); a cell that is no
-    /// number, a missing input, time that does not increase, a row of another length (each with its line); a factor that
-    /// is not positive; a signal that the model does not have; whatever [`Experiment::new`] refuses.
-    pub fn read<M: Model>(&self, _model: &M) -> Result<ExperimentOf<M>, Error> {
-        self.check::<M>()?;
+    /// As [`read`](Self::read).
+    pub fn read_record(&self, layout: &Layout) -> Result<Record, Error> {
+        self.check(layout)?;
         let mut table = Table::open(self)?;
         let name = self.path.file_stem().map_or("record".into(), |stem| stem.to_string_lossy().into_owned());
 
         // A static model needs no time: without one its rows are numbered.
         let timed =
             self.columns.iter().any(|column| column.signal == "t") || table.names().iter().any(|name| name == "t");
-        let sample_time = self.sample_time.or((M::KIND == Kind::Static && !timed).then_some(1.0));
+        let sample_time = self.sample_time.or((layout.kind == Kind::Static && !timed).then_some(1.0));
         let t = if sample_time.is_none() { Some(self.source(&table, "t")?) } else { None };
-        let inputs = self.sources::<M::Input>(&table)?;
-        let outputs = self.sources::<M::Output>(&table)?;
+        let signals: Vec<&Quantity> = layout.inputs.iter().chain(&layout.outputs).collect();
+        let sources = signals.iter().map(|signal| self.source(&table, &signal.name)).collect::<Result<Vec<_>, _>>()?;
 
-        let mut us: Vec<Of<M::Input, f64>> = Vec::new();
-        let mut ys: Vec<Of<M::Output, f64>> = Vec::new();
+        let mut columns: Vec<Vec<f64>> = vec![Vec::new(); signals.len()];
         let mut clock = Clock::default();
         // A pipe cannot be read again, so that its stamps are kept until the end.
         let mut stamps = if self.path.is_file() { None } else { Some(Vec::new()) };
+        let mut sample = 0;
         while table.next()? {
-            let sample = us.len();
             let mut time = sample as f64 * sample_time.unwrap_or_default();
             if let Some(t) = t {
                 let Some(stamp) = self.value(&table, t).filter(|stamp| stamp.is_finite()) else {
@@ -62,27 +58,17 @@ impl CsvFile {
                     stamps = Some(all);
                 }
             }
-            let mut bad = None;
-            us.push(M::Input::from_fn(|i| {
-                let value = self.value(&table, inputs.as_ref()[i]).filter(|value| value.is_finite());
-                value.unwrap_or_else(|| {
-                    bad.get_or_insert((M::Input::NAMES[i], inputs.as_ref()[i]));
-                    f64::NAN
-                })
-            }));
-            ys.push(M::Output::from_fn(|i| {
-                let value = self.value(&table, outputs.as_ref()[i]).filter(|value| !value.is_infinite());
-                value.unwrap_or_else(|| {
-                    bad.get_or_insert((M::Output::NAMES[i], outputs.as_ref()[i]));
-                    f64::NAN
-                })
-            }));
-            if let Some((signal, source)) = bad {
-                return Err(self.bad_cell(&table, source, &name, signal, sample, time));
+            for (i, (column, source)) in columns.iter_mut().zip(&sources).enumerate() {
+                let value = self.value(&table, *source);
+                // An output may be missing, an input may not.
+                let good = |value: &f64| if i < layout.inputs.len() { value.is_finite() } else { !value.is_infinite() };
+                let Some(value) = value.filter(good) else {
+                    return Err(self.bad_cell(&table, *source, &name, &signals[i].name, sample, time));
+                };
+                column.push(value);
             }
+            sample += 1;
         }
-        us.shrink_to_fit();
-        ys.shrink_to_fit();
         let time = match sample_time {
             Some(step) => Time::Uniform { start: 0.0, step },
             None => match clock.uniform() {
@@ -90,8 +76,15 @@ impl CsvFile {
                 None => Time::Stamps(stamps.unwrap_or_else(|| clock.last().into_iter().collect())),
             },
         };
-        let (hold, initial) = (Hold::default(), Initial::Estimated);
-        Experiment { name, time, inputs: us, outputs: ys, hold, initial }.checked()
+        let named = |(values, signal): (Vec<f64>, &&Quantity)| {
+            let mut values = values;
+            values.shrink_to_fit();
+            Channel::new(&signal.name, &signal.unit, values)
+        };
+        let mut inputs: Vec<Channel> = columns.into_iter().zip(&signals).map(named).collect();
+        let outputs = inputs.split_off(layout.inputs.len());
+        let (states, hold, initial) = (layout.states.clone(), Hold::default(), Initial::default());
+        Record { name, states, time, inputs, outputs, hold, initial }.checked()
     }
 
     /// The time stamps of the first rows, for a clock that turned out uneven.
@@ -105,8 +98,9 @@ impl CsvFile {
     }
 
     /// Refuses what makes no sense whatever the file holds.
-    fn check<M: Model>(&self) -> Result<(), Error> {
-        let known = || M::Input::NAMES.iter().chain(M::Output::NAMES).chain(&["t"]);
+    fn check(&self, layout: &Layout) -> Result<(), Error> {
+        let signals = layout.inputs.iter().chain(&layout.outputs).map(|signal| signal.name.as_str());
+        let known = || signals.clone().chain(["t"]);
         for Column { signal, factor, offset, .. } in &self.columns {
             if !known().any(|name| name == signal) {
                 let available = known().map(|name| (*name).to_owned()).collect();
@@ -130,14 +124,6 @@ impl CsvFile {
 
     fn said(&self, signal: &str) -> Column {
         self.columns.iter().find(|column| column.signal == signal).cloned().unwrap_or_else(|| Column::new(signal))
-    }
-
-    fn sources<S: Signals>(&self, table: &Table) -> Result<S::Array<Source>, Error> {
-        let mut sources = S::array_from_fn(|_| Source::default());
-        for (source, signal) in sources.as_mut().iter_mut().zip(S::NAMES) {
-            *source = self.source(table, signal)?;
-        }
-        Ok(sources)
     }
 
     fn source(&self, table: &Table, signal: &str) -> Result<Source, Error> {

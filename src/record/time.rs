@@ -40,12 +40,36 @@ impl Time {
         }
     }
 
-    /// Refuses time that is not finite, does not increase, or does not go with so many samples.
-    pub(crate) fn check(&self, experiment: &str, samples: usize) -> Result<(), Error> {
+    /// Median time from sample to sample (s); zero where there are not two.
+    pub(crate) fn median_step(&self) -> f64 {
+        match self {
+            Time::Uniform { step, .. } => *step,
+            Time::Stamps(stamps) => {
+                let mut steps: Vec<f64> = stamps.windows(2).map(|w| w[1] - w[0]).collect();
+                if steps.is_empty() {
+                    return 0.0;
+                }
+                let middle = steps.len() / 2;
+                *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+            }
+        }
+    }
+
+    /// The times of some of the samples.
+    pub(crate) fn part(&self, samples: std::ops::Range<usize>) -> Time {
+        match self {
+            Time::Uniform { step, .. } => Time::Uniform { start: self.at(samples.start), step: *step },
+            Time::Stamps(stamps) => Time::Stamps(stamps[samples].to_vec()),
+        }
+    }
+
+    /// Refuses time that is not finite, does not increase, or does not go with the samples of the channel `reference`.
+    pub(crate) fn check(&self, experiment: &str, samples: usize, reference: &str) -> Result<(), Error> {
         if let Time::Stamps(stamps) = self
             && stamps.len() != samples
         {
-            let (experiment, what, found, reference) = (experiment.to_owned(), "time", stamps.len(), "the input");
+            let (experiment, what, found) = (experiment.to_owned(), "time".to_owned(), stamps.len());
+            let reference = format!("`{reference}`");
             return Err(Error::Lengths { experiment, what, found, reference, expected: samples });
         }
         if let Time::Uniform { step: value, .. } = *self
