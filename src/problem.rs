@@ -12,7 +12,7 @@ mod simulate;
 mod unknowns;
 mod whitening;
 
-pub(crate) use checkpoint::{CheckpointFile, write_whole};
+pub(crate) use checkpoint::CheckpointFile;
 pub(crate) use control::Control;
 pub use objective::Objective;
 pub(crate) use pass::{Accumulate, each};

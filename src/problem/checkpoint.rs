@@ -127,7 +127,7 @@ impl<S: Serialize> Checkpoint<S, LeastSquaresState> for CheckpointFile {
 }
 
 /// Writes a file beside its place and renames it: whoever reads finds the old or the new one whole.
-pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut beside = path.as_os_str().to_owned();
     beside.push(format!(".{}.part", std::process::id()));
     let beside = PathBuf::from(beside);
