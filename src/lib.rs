@@ -134,6 +134,8 @@ mod experiment;
 #[cfg(feature = "std")]
 mod fit;
 #[cfg(feature = "std")]
+mod fused;
+#[cfg(feature = "std")]
 mod information;
 #[cfg(feature = "std")]
 mod loss;
@@ -172,7 +174,7 @@ pub use interval::{Hold, Interval};
 pub use layout::Kind;
 pub use model::Model;
 pub use parameter::{Parameter, Prior, Transform, fixed, free};
-pub use scalar::Scalar;
+pub use scalar::{Comparison, Scalar};
 pub use signals::{Entry, Nothing, Of, Signals};
 
 #[cfg(feature = "csv")]

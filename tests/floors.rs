@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 const FLOORS: &[(&str, &[&str])] = &[
     ("ground: hardware", &["lanes"]),
     ("ground: beside numbers", &["scalar", "units", "dispatch", "random", "whiteness", "wide"]),
-    ("ground: numbers", &["dual", "signals"]),
+    ("ground: numbers", &["dual", "fused", "signals"]),
     ("ground: vectors of numbers", &["information", "covariance", "error", "by_name", "layout"]),
     ("say: words", &["model", "parameter", "scaling", "interval"]),
     ("say: records", &["experiment"]),

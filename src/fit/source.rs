@@ -5,13 +5,16 @@
 //! of intermediate code when all of it was generic, and make 0.46 million so.
 
 use super::unknowns::Place;
-use crate::dispatch::{PORTABLE, Unit, WIDE, has_wide};
+use crate::dispatch::has_wide;
 use crate::error::Failure;
 use crate::experiment::{ExperimentOf, Sample};
+use crate::fused::Fused;
 use crate::integrate::Integrator;
 use crate::interval::Hold;
+use crate::lanes::Number;
 use crate::model::{Kind, Model};
 use crate::predict::{Predictor, Seed, Trajectory, Walk, Window};
+use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
 use crate::weighting::Weighting;
 use std::hash::{DefaultHasher, Hash};
@@ -103,25 +106,25 @@ impl<M: Model, I: Integrator, P: Predictor<M>> Simulated<'_, M, I, P> {
         Walk::new(self.model, integrator, &self.experiments[e])
     }
 
-    fn trajectory<'s, const N: usize, const UNIT: Unit>(
+    fn trajectory<'s, const N: usize, T: Scalar + Number>(
         &'s self,
         e: usize,
         integrator: &'s I,
         place: &Place,
         seeds: &[Seed],
-    ) -> Trajectory<'s, M, I, P, N, UNIT> {
+    ) -> Trajectory<'s, M, I, P, N, T> {
         let (x, p) = Self::state_and_parameters(place);
         Trajectory::new(self.step(e, integrator), self.predictor, &self.prepared[e], x, p, seeds)
     }
 
-    fn walk_in<const N: usize, const UNIT: Unit>(
+    fn walk_in<const N: usize, T: Scalar + Number>(
         &self,
         e: usize,
         place: &Place,
         seeds: &[Seed],
         visit: Visit<'_>,
     ) -> Result<(), Halt> {
-        let mut trajectory = self.trajectory::<N, UNIT>(e, &self.integrator, place, seeds);
+        let mut trajectory = self.trajectory::<N, T>(e, &self.integrator, place, seeds);
         let mut window = Window::new(seeds.len(), M::Output::LEN);
         while trajectory.fill(&mut window).map_err(|sample| Halt::Failed { sample })? {
             visit(&mut window)?;
@@ -180,19 +183,19 @@ impl<M: Model, I: Integrator, P: Predictor<M>> Source for Simulated<'_, M, I, P>
         // A build that is not made for speed is soon compiled: same numbers, more passes.
         #[cfg(debug_assertions)]
         return match (seeds.len(), wide) {
-            (0, _) => self.walk_in::<0, PORTABLE>(e, place, seeds, visit),
-            (_, false) => self.walk_in::<4, PORTABLE>(e, place, seeds, visit),
-            (_, true) => self.walk_in::<4, WIDE>(e, place, seeds, visit),
+            (0, _) => self.walk_in::<0, f64>(e, place, seeds, visit),
+            (_, false) => self.walk_in::<4, f64>(e, place, seeds, visit),
+            (_, true) => self.walk_in::<4, Fused>(e, place, seeds, visit),
         };
         #[cfg(not(debug_assertions))]
         match (seeds.len(), wide) {
-            (0, _) => self.walk_in::<0, PORTABLE>(e, place, seeds, visit),
-            (1..=4, false) => self.walk_in::<4, PORTABLE>(e, place, seeds, visit),
-            (5 | 6 | 9..=12, false) => self.walk_in::<6, PORTABLE>(e, place, seeds, visit),
-            (_, false) => self.walk_in::<8, PORTABLE>(e, place, seeds, visit),
-            (1..=4, true) => self.walk_in::<4, WIDE>(e, place, seeds, visit),
-            (5 | 6 | 9..=12, true) => self.walk_in::<6, WIDE>(e, place, seeds, visit),
-            (_, true) => self.walk_in::<8, WIDE>(e, place, seeds, visit),
+            (0, _) => self.walk_in::<0, f64>(e, place, seeds, visit),
+            (1..=4, false) => self.walk_in::<4, f64>(e, place, seeds, visit),
+            (5 | 6 | 9..=12, false) => self.walk_in::<6, f64>(e, place, seeds, visit),
+            (_, false) => self.walk_in::<8, f64>(e, place, seeds, visit),
+            (1..=4, true) => self.walk_in::<4, Fused>(e, place, seeds, visit),
+            (5 | 6 | 9..=12, true) => self.walk_in::<6, Fused>(e, place, seeds, visit),
+            (_, true) => self.walk_in::<8, Fused>(e, place, seeds, visit),
         }
     }
 
@@ -204,8 +207,8 @@ impl<M: Model, I: Integrator, P: Predictor<M>> Source for Simulated<'_, M, I, P>
         visit: &mut dyn FnMut(&Window, Option<&Window>),
     ) -> Result<(), Halt> {
         let refined = self.integrator.refined(M::KIND);
-        let mut coarse = self.trajectory::<0, PORTABLE>(e, &self.integrator, place, &[]);
-        let mut fine = refined.as_ref().map(|refined| self.trajectory::<0, PORTABLE>(e, refined, place, &[]));
+        let mut coarse = self.trajectory::<0, f64>(e, &self.integrator, place, &[]);
+        let mut fine = refined.as_ref().map(|refined| self.trajectory::<0, f64>(e, refined, place, &[]));
         let (mut window, mut finer) = (Window::new(0, M::Output::LEN), Window::new(0, M::Output::LEN));
         for number in 0.. {
             let fine = fine.as_mut().filter(|_| number % every == 0);

@@ -2,11 +2,13 @@
 
 use super::{Predictor, Walk};
 
-use crate::dispatch::{Kernel, Unit, WIDE, run};
+use crate::dispatch::{Kernel, run};
 use crate::dual::Dual;
 use crate::integrate::{Integrator, Stuck};
 use crate::interval::Hold;
+use crate::lanes::Number;
 use crate::model::Model;
+use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
 
 /// Samples per window: short enough for two outputs and eight slopes to stay in the nearest cache.
@@ -76,24 +78,24 @@ impl Window {
 }
 
 /// The states of one experiment with up to `N` slopes, on their way through the record.
-struct Lanes<M: Model, I: Integrator, const N: usize, const UNIT: Unit> {
-    x: Of<M::State, Dual<N, UNIT>>,
-    p: Of<M::Parameters, Dual<N, UNIT>>,
+struct Lanes<M: Model, I: Integrator, const N: usize, T: Scalar> {
+    x: Of<M::State, Dual<N, T>>,
+    p: Of<M::Parameters, Dual<N, T>>,
     memory: I::Memory,
     first: usize,
     used: usize,
 }
 
 /// A model on its way through a record, with all the slopes asked for: in as many passes of `N` as it takes.
-pub(crate) struct Trajectory<'a, M: Model, I: Integrator, P: Predictor<M>, const N: usize, const UNIT: Unit> {
+pub(crate) struct Trajectory<'a, M: Model, I: Integrator, P: Predictor<M>, const N: usize, T: Scalar> {
     walk: Walk<'a, M, I>,
     predictor: &'a P,
     prepared: &'a P::Prepared,
-    passes: Vec<Lanes<M, I, N, UNIT>>,
+    passes: Vec<Lanes<M, I, N, T>>,
     next: usize,
 }
 
-impl<'a, M: Model, I: Integrator, P: Predictor<M>, const N: usize, const UNIT: Unit> Trajectory<'a, M, I, P, N, UNIT> {
+impl<'a, M: Model, I: Integrator, P: Predictor<M>, const N: usize, T: Scalar + Number> Trajectory<'a, M, I, P, N, T> {
     pub fn new(
         walk: Walk<'a, M, I>,
         predictor: &'a P,
@@ -107,10 +109,10 @@ impl<'a, M: Model, I: Integrator, P: Predictor<M>, const N: usize, const UNIT: U
                 let first = pass * N;
                 let mine = &seeds[first..seeds.len().min(first + N)];
                 let seeded = |target: Target, value: f64| {
-                    let mut dual = Dual::from(value);
+                    let mut dual = Dual::<N, T>::from(value);
                     for (slope, seed) in dual.slopes.iter_mut().zip(mine) {
                         if seed.target == target {
-                            *slope = seed.slope;
+                            *slope = T::from(seed.slope);
                         }
                     }
                     dual
@@ -152,13 +154,7 @@ impl<'a, M: Model, I: Integrator, P: Predictor<M>, const N: usize, const UNIT: U
             window.measured.fill(false);
         }
         for lanes in &mut self.passes {
-            run::<UNIT, _>(Fill {
-                lanes,
-                walk: self.walk,
-                predictor: self.predictor,
-                prepared: self.prepared,
-                window,
-            })?;
+            run(Fill { lanes, walk: self.walk, predictor: self.predictor, prepared: self.prepared, window })?;
         }
         self.next += samples;
         Ok(true)
@@ -166,23 +162,24 @@ impl<'a, M: Model, I: Integrator, P: Predictor<M>, const N: usize, const UNIT: U
 }
 
 /// One window of one pass. The only caller of the model in a fit.
-struct Fill<'f, 'a, M: Model, I: Integrator, P: Predictor<M>, const N: usize, const UNIT: Unit> {
-    lanes: &'f mut Lanes<M, I, N, UNIT>,
+struct Fill<'f, 'a, M: Model, I: Integrator, P: Predictor<M>, const N: usize, T: Scalar> {
+    lanes: &'f mut Lanes<M, I, N, T>,
     walk: Walk<'a, M, I>,
     predictor: &'a P,
     prepared: &'a P::Prepared,
     window: &'f mut Window,
 }
 
-impl<M: Model, I: Integrator, P: Predictor<M>, const N: usize, const UNIT: Unit> Kernel
-    for Fill<'_, '_, M, I, P, N, UNIT>
+impl<M: Model, I: Integrator, P: Predictor<M>, const N: usize, T: Scalar + Number> Kernel
+    for Fill<'_, '_, M, I, P, N, T>
 {
+    type Number = T;
     type Output = Result<(), usize>;
 
     #[inline(always)]
     fn run(self) -> Result<(), usize> {
         let Fill { lanes, mut walk, predictor, prepared, window } = self;
-        if UNIT == WIDE {
+        if T::FUSED {
             // Known to the compiler, which then computes once per interval what depends on the input alone.
             walk.hold = Hold::Zero;
         }
@@ -215,16 +212,16 @@ impl<M: Model, I: Integrator, P: Predictor<M>, const N: usize, const UNIT: Unit>
                 let row = j * WINDOW + k;
                 let here = !found.is_nan();
                 measured[row] = here;
-                errors[row] = if here { found - expected.value } else { 0.0 };
+                errors[row] = if here { found - expected.value() } else { 0.0 };
                 for (column, slope) in slopes.chunks_exact_mut(rows).zip(expected.slopes) {
-                    column[row] = if here { slope } else { 0.0 };
+                    column[row] = if here { slope.value() } else { 0.0 };
                 }
             }
         }
         lanes.x = M::State::map(x, |mut dual| {
             for slope in &mut dual.slopes {
                 if slope.abs() < NEGLIGIBLE {
-                    *slope = 0.0;
+                    *slope = T::from(0.0);
                 }
             }
             dual
