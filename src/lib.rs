@@ -136,6 +136,10 @@ mod fit;
 #[cfg(feature = "std")]
 mod fused;
 #[cfg(feature = "std")]
+mod equations;
+#[cfg(feature = "std")]
+pub mod graph;
+#[cfg(feature = "std")]
 mod information;
 #[cfg(feature = "std")]
 mod loss;
@@ -181,6 +185,7 @@ pub use signals::{Entry, Nothing, Of, Signals};
 pub use experiment::CsvFile;
 #[cfg(feature = "std")]
 pub use {
+    equations::{Equations, InvalidEquations},
     error::{Error, Failure},
     estimate::{Direction, Estimate, Knowledge, Method, Prediction, Quality, Share, Unknown, Warning},
     experiment::{Experiment, ExperimentOf, Gap, Initial, Sample, Time},

@@ -12,9 +12,9 @@ const FLOORS: &[(&str, &[&str])] = &[
     ("ground: hardware", &["lanes"]),
     ("ground: beside numbers", &["scalar", "units", "dispatch", "random", "whiteness", "wide"]),
     ("ground: numbers", &["dual", "fused", "signals"]),
-    ("ground: vectors of numbers", &["information", "covariance", "error", "by_name", "layout"]),
+    ("ground: vectors of numbers", &["information", "covariance", "error", "by_name", "layout", "graph"]),
     ("say: words", &["model", "parameter", "scaling", "interval"]),
-    ("say: records", &["experiment"]),
+    ("say: records", &["experiment", "equations"]),
     // Filtering a record is editing it, and a horizon may start from filtered states.
     ("expect: one step", &["integrate", "prefilter"]),
     ("expect: a record", &["predict"]),
