@@ -79,7 +79,7 @@ impl<const N: usize, T: Scalar> Dual<N, T> {
     /// The chain rule.
     #[inline(always)]
     fn chained(self, f: T, df: T) -> Self {
-        Dual { value: f, slopes: T::slopes_times(self.slopes, df) }
+        Dual { value: f, slopes: T::slopes_times(&self.slopes, df) }
     }
 }
 
@@ -129,7 +129,7 @@ impl<const N: usize, T: Scalar> Neg for Dual<N, T> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Dual { value: -self.value, slopes: T::slopes_times(self.slopes, T::from(-1.0)) }
+        Dual { value: -self.value, slopes: T::slopes_times(&self.slopes, T::from(-1.0)) }
     }
 }
 
@@ -137,7 +137,7 @@ impl<const N: usize, T: Scalar> Add for Dual<N, T> {
     type Output = Self;
     #[inline(always)]
     fn add(self, b: Self) -> Self {
-        Dual { value: self.value + b.value, slopes: T::slopes_plus(self.slopes, b.slopes) }
+        Dual { value: self.value + b.value, slopes: T::slopes_plus(&self.slopes, &b.slopes) }
     }
 }
 
@@ -145,7 +145,7 @@ impl<const N: usize, T: Scalar> Sub for Dual<N, T> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, b: Self) -> Self {
-        Dual { value: self.value - b.value, slopes: T::slopes_minus(self.slopes, b.slopes) }
+        Dual { value: self.value - b.value, slopes: T::slopes_minus(&self.slopes, &b.slopes) }
     }
 }
 
@@ -153,7 +153,7 @@ impl<const N: usize, T: Scalar> Mul for Dual<N, T> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, b: Self) -> Self {
-        let slopes = T::slopes_of_product(self.slopes, b.value, b.slopes, self.value);
+        let slopes = T::slopes_of_product(&self.slopes, b.value, &b.slopes, self.value);
         Dual { value: self.value * b.value, slopes }
     }
 }
@@ -164,7 +164,7 @@ impl<const N: usize, T: Scalar> Div for Dual<N, T> {
     fn div(self, b: Self) -> Self {
         let reciprocal = T::from(1.0) / b.value;
         let value = self.value * reciprocal;
-        Dual { value, slopes: T::slopes_of_quotient(self.slopes, b.slopes, value, reciprocal) }
+        Dual { value, slopes: T::slopes_of_quotient(&self.slopes, &b.slopes, value, reciprocal) }
     }
 }
 
@@ -188,7 +188,7 @@ impl<const N: usize, T: Scalar> Mul<f64> for Dual<N, T> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, b: f64) -> Self {
-        Dual { value: self.value * b, slopes: T::slopes_times(self.slopes, T::from(b)) }
+        Dual { value: self.value * b, slopes: T::slopes_times(&self.slopes, T::from(b)) }
     }
 }
 
@@ -231,7 +231,7 @@ impl<const N: usize, T: Scalar> Scalar for Dual<N, T> {
     }
     #[inline(always)]
     fn plus_times(self, k: Self, a: f64) -> Self {
-        let slopes = T::slopes_plus_times(self.slopes, k.slopes, a);
+        let slopes = T::slopes_plus_times(&self.slopes, &k.slopes, a);
         Dual { value: self.value + k.value * a, slopes }
     }
     #[inline(always)]

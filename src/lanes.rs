@@ -156,7 +156,7 @@ macro_rules! lanes {
             $(let $s = $crate::lanes::Pair::splat($scalar);)*
             let mut pair = 0;
             while pair + 2 <= $n {
-                $(let $x = $crate::lanes::Pair::load(&$a, pair);)+
+                $(let $x = $crate::lanes::Pair::load($a, pair);)+
                 $crate::lanes::Pair::store($expression, &mut slopes, pair);
                 pair += 2;
             }
@@ -175,27 +175,27 @@ pub(crate) use lanes;
 macro_rules! slopes_in_pairs {
     ($fused:literal) => {
         #[inline(always)]
-        fn slopes_plus<const N: usize>(x: [Self; N], y: [Self; N]) -> [Self; N] {
+        fn slopes_plus<const N: usize>(x: &[Self; N], y: &[Self; N]) -> [Self; N] {
             $crate::lanes::lanes!(N; x in x, y in y;; x + y)
         }
         #[inline(always)]
-        fn slopes_minus<const N: usize>(x: [Self; N], y: [Self; N]) -> [Self; N] {
+        fn slopes_minus<const N: usize>(x: &[Self; N], y: &[Self; N]) -> [Self; N] {
             $crate::lanes::lanes!(N; x in x, y in y;; x - y)
         }
         #[inline(always)]
-        fn slopes_times<const N: usize>(x: [Self; N], v: Self) -> [Self; N] {
+        fn slopes_times<const N: usize>(x: &[Self; N], v: Self) -> [Self; N] {
             $crate::lanes::lanes!(N; x in x; v = v; x * v)
         }
         #[inline(always)]
-        fn slopes_of_product<const N: usize>(x: [Self; N], v: Self, y: [Self; N], u: Self) -> [Self; N] {
+        fn slopes_of_product<const N: usize>(x: &[Self; N], v: Self, y: &[Self; N], u: Self) -> [Self; N] {
             $crate::lanes::lanes!(N; x in x, y in y; u = u, v = v; y.times_plus::<$fused>(u, x * v))
         }
         #[inline(always)]
-        fn slopes_of_quotient<const N: usize>(x: [Self; N], y: [Self; N], q: Self, r: Self) -> [Self; N] {
+        fn slopes_of_quotient<const N: usize>(x: &[Self; N], y: &[Self; N], q: Self, r: Self) -> [Self; N] {
             $crate::lanes::lanes!(N; x in x, y in y; q = q, r = r; y.times_from::<$fused>(q, x) * r)
         }
         #[inline(always)]
-        fn slopes_plus_times<const N: usize>(x: [Self; N], y: [Self; N], a: f64) -> [Self; N] {
+        fn slopes_plus_times<const N: usize>(x: &[Self; N], y: &[Self; N], a: f64) -> [Self; N] {
             $crate::lanes::lanes!(N; x in x, y in y; v = <Self as core::convert::From<f64>>::from(a);
                 y.times_plus::<$fused>(v, x))
         }

@@ -126,6 +126,11 @@ pub mod check;
 #[cfg(feature = "std")]
 pub mod diagnose;
 #[cfg(feature = "std")]
+#[doc(hidden)]
+pub mod engine;
+#[cfg(feature = "std")]
+mod equations;
+#[cfg(feature = "std")]
 mod error;
 #[cfg(feature = "std")]
 mod estimate;
@@ -135,8 +140,6 @@ mod experiment;
 mod fit;
 #[cfg(feature = "std")]
 mod fused;
-#[cfg(feature = "std")]
-mod equations;
 #[cfg(feature = "std")]
 pub mod graph;
 #[cfg(feature = "std")]
@@ -155,6 +158,8 @@ mod predict;
 mod prefilter;
 #[cfg(feature = "std")]
 mod random;
+#[cfg(feature = "std")]
+mod recurrence;
 #[cfg(feature = "std")]
 pub mod regress;
 #[cfg(feature = "std")]
@@ -185,7 +190,7 @@ pub use signals::{Entry, Nothing, Of, Signals};
 pub use experiment::CsvFile;
 #[cfg(feature = "std")]
 pub use {
-    equations::{Equations, InvalidEquations},
+    equations::{Dependence, Equations, InvalidEquations},
     error::{Error, Failure},
     estimate::{Direction, Estimate, Knowledge, Method, Prediction, Quality, Share, Unknown, Warning},
     experiment::{Experiment, ExperimentOf, Gap, Initial, Sample, Time},
@@ -197,6 +202,7 @@ pub use {
     outliers::hampel,
     predict::{FreeRun, Horizon, Predictor, Walk},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
+    recurrence::{InvalidRecurrence, Recurrence},
     regress::{Assumption, LinearEstimate, Regression, RegressionError},
     report::Report,
     scaling::{JacobianColumns, Nominal, Scaling, Unscaled},

@@ -173,37 +173,37 @@ pub trait Scalar:
     /// `x + y`, entry by entry: slope arithmetic of [`Dual`](crate::Dual), as all that follows.
     #[doc(hidden)]
     #[inline(always)]
-    fn slopes_plus<const N: usize>(x: [Self; N], y: [Self; N]) -> [Self; N] {
+    fn slopes_plus<const N: usize>(x: &[Self; N], y: &[Self; N]) -> [Self; N] {
         core::array::from_fn(|i| x[i] + y[i])
     }
     /// `x - y`.
     #[doc(hidden)]
     #[inline(always)]
-    fn slopes_minus<const N: usize>(x: [Self; N], y: [Self; N]) -> [Self; N] {
+    fn slopes_minus<const N: usize>(x: &[Self; N], y: &[Self; N]) -> [Self; N] {
         core::array::from_fn(|i| x[i] - y[i])
     }
     /// `x v`.
     #[doc(hidden)]
     #[inline(always)]
-    fn slopes_times<const N: usize>(x: [Self; N], v: Self) -> [Self; N] {
+    fn slopes_times<const N: usize>(x: &[Self; N], v: Self) -> [Self; N] {
         core::array::from_fn(|i| x[i] * v)
     }
     /// `y u + x v`.
     #[doc(hidden)]
     #[inline(always)]
-    fn slopes_of_product<const N: usize>(x: [Self; N], v: Self, y: [Self; N], u: Self) -> [Self; N] {
+    fn slopes_of_product<const N: usize>(x: &[Self; N], v: Self, y: &[Self; N], u: Self) -> [Self; N] {
         core::array::from_fn(|i| y[i] * u + x[i] * v)
     }
     /// `(x - y q) r`.
     #[doc(hidden)]
     #[inline(always)]
-    fn slopes_of_quotient<const N: usize>(x: [Self; N], y: [Self; N], q: Self, r: Self) -> [Self; N] {
+    fn slopes_of_quotient<const N: usize>(x: &[Self; N], y: &[Self; N], q: Self, r: Self) -> [Self; N] {
         core::array::from_fn(|i| (x[i] - y[i] * q) * r)
     }
     /// `x + y a`.
     #[doc(hidden)]
     #[inline(always)]
-    fn slopes_plus_times<const N: usize>(x: [Self; N], y: [Self; N], a: f64) -> [Self; N] {
+    fn slopes_plus_times<const N: usize>(x: &[Self; N], y: &[Self; N], a: f64) -> [Self; N] {
         core::array::from_fn(|i| x[i].plus_times(y[i], a))
     }
 }

@@ -17,6 +17,8 @@ const FLOORS: &[(&str, &[&str])] = &[
     ("say: records", &["experiment", "equations"]),
     // Filtering a record is editing it, and a horizon may start from filtered states.
     ("expect: one step", &["integrate", "prefilter"]),
+    ("expect: a step as a graph", &["recurrence"]),
+    ("expect: a step as a program", &["engine"]),
     ("expect: a record", &["predict"]),
     ("learn: parts", &["loss", "weighting", "outliers", "optimize", "regress", "numeric", "online"]),
     ("learn: the answer", &["estimate"]),

@@ -90,7 +90,8 @@ impl Pattern {
         }));
         let influence = forward::influence(tape, &all, next);
         let parameter = |s: usize| matches!(seeds[s], Seed::Parameter(_));
-        let mut there: Vec<Vec<bool>> = (0..n).map(|i| seeds.iter().map(|seed| *seed == Seed::Carry(i)).collect()).collect();
+        let mut there: Vec<Vec<bool>> =
+            (0..n).map(|i| seeds.iter().map(|seed| *seed == Seed::Carry(i)).collect()).collect();
         let mut grew = true;
         while grew {
             grew = false;

@@ -78,9 +78,7 @@ fn expression(node: &Node, naming: Naming<'_>, texts: &[Text]) -> Text {
         }
         Node::Power(a, n) => (format!("{}^{n}", within(a, Binding::Atom)), Binding::Product),
         Node::Function(function, a) => (format!("{}({})", function.name(), plain(a)), Binding::Atom),
-        Node::Function2(function, a, b) => {
-            (format!("{}({}, {})", function.name(), plain(a), plain(b)), Binding::Atom)
-        }
+        Node::Function2(function, a, b) => (format!("{}({}, {})", function.name(), plain(a), plain(b)), Binding::Atom),
         Node::Select(comparison, [a, b, c, d]) => {
             let sign = match comparison {
                 Comparison::Less => "<",

@@ -57,7 +57,8 @@ impl Tape {
     }
 
     fn rule_of_function(&mut self, function: Function, f: Id, x: Id) -> Rule {
-        let singular = matches!(function, Function::Sqrt | Function::Cbrt | Function::Asin | Function::Acos | Function::Acosh);
+        let singular =
+            matches!(function, Function::Sqrt | Function::Cbrt | Function::Asin | Function::Acos | Function::Acosh);
         match self.slope_of_function(function, f, x) {
             None => Rule::Flat,
             Some(slope) if singular => Rule::Singular(vec![(x, slope)]),

@@ -228,7 +228,8 @@ impl Graph {
                 if then.len() != roots.len() {
                     return Err(Untraceable::new("it returns vectors of different lengths"));
                 }
-                let select = |(then, otherwise): (Id, Id)| self.select(last.comparison, last.a, last.b, then, otherwise);
+                let select =
+                    |(then, otherwise): (Id, Id)| self.select(last.comparison, last.a, last.b, then, otherwise);
                 roots = then.into_iter().zip(roots).map(select).collect();
                 path = before;
             }

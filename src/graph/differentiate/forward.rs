@@ -33,7 +33,9 @@ pub(super) fn influence(tape: &Tape, leaves: &[Id], roots: &[Id]) -> Vec<Vec<boo
 pub(super) fn varying_operands(node: &Node) -> impl Iterator<Item = Id> + use<> {
     let (skip, take) = match node {
         Node::Select(..) => (2, 2),
-        Node::Function(Function::Signum | Function::Floor | Function::Ceil | Function::Round | Function::Trunc, _) => (0, 0),
+        Node::Function(Function::Signum | Function::Floor | Function::Ceil | Function::Round | Function::Trunc, _) => {
+            (0, 0)
+        }
         Node::Function2(Function2::Copysign | Function2::RemEuclid, ..) => (0, 1),
         _ => (0, 4),
     };
@@ -95,7 +97,10 @@ pub(super) fn tangent(tape: &mut Tape, rule: &Rule, tangents: &Tangents, seeds: 
         Rule::Flat => None,
         Rule::Linear(terms) => {
             let terms = terms.iter().filter_map(|(operand, partial)| of(operand, s).map(|slope| (slope, *partial)));
-            terms.collect::<Vec<_>>().into_iter().fold(None, |sum, (slope, partial)| plus_times(tape, sum, slope, partial))
+            terms
+                .collect::<Vec<_>>()
+                .into_iter()
+                .fold(None, |sum, (slope, partial)| plus_times(tape, sum, slope, partial))
         }
         Rule::Singular(terms) => {
             let mut sum = None;

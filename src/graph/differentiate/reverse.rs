@@ -2,9 +2,9 @@
 
 use super::Tangent;
 use super::forward::{active, plus_times};
+use crate::graph::Id;
 use crate::graph::partials::{Partial, Rule};
 use crate::graph::tape::Tape;
-use crate::graph::Id;
 
 /// The gradient of each root with respect to the leaves: one sweep for each.
 pub(super) fn gradients(tape: &mut Tape, roots: &[Id], leaves: &[Id]) -> Vec<Tangent> {

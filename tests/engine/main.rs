@@ -1,0 +1,3 @@
+//! Models as graphs, and the engine that runs them: against duals and plain arithmetic.
+
+mod steps;
