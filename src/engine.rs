@@ -7,12 +7,15 @@
 //! The interpreter runs everywhere. Where the processor is an x86-64 with AVX2, and the feature `jit` is on, the instructions
 //! become machine code.
 
+mod choice;
 mod code;
 mod derive;
 mod functions;
 mod fusion;
 mod group;
 mod interpret;
+#[cfg(all(feature = "jit", target_arch = "x86_64"))]
+mod machine;
 mod schedule;
 mod step;
 
@@ -23,6 +26,7 @@ pub use schedule::TooLarge;
 use crate::graph::{Leaf, Node, Pattern, Seed};
 use crate::recurrence::Recurrence;
 use crate::wide::Width;
+use choice::Machine;
 use code::Code;
 use derive::Derivation;
 use schedule::{Roots, schedule};
@@ -61,6 +65,7 @@ struct Compiled {
     variances: usize,
     width: Width,
     trajectories: Trajectories,
+    machine: Option<Machine>,
 }
 
 impl Program {
@@ -83,15 +88,18 @@ impl Program {
         };
         let parameters = recurrence.graph().nodes().iter().filter_map(parameter).max().unwrap_or(0);
         let whole = Roots { tape: &step.tape, next: &step.next, rows: &step.rows, parameters, derived: &derived };
+        let code = schedule(&whole)?;
+        let (width, machine) = choice::engine(&code, trajectories);
         Ok(Program(Arc::new(Compiled {
-            code: schedule(&whole)?,
+            code,
             derivation: Derivation::new(&step.tape, &derived)?,
             pattern: step.pattern,
             seeds: seeds.to_vec(),
             outputs: recurrence.mean().len(),
             variances: recurrence.variance().len(),
-            width: if trajectories == Trajectories::One { Width::single() } else { Width::widest() },
+            width,
             trajectories,
+            machine,
         })))
     }
 
@@ -145,6 +153,11 @@ impl Program {
         (self.0.code.output.len() + self.0.code.advance.len(), self.0.code.once.len())
     }
 
+    /// Bytes of machine code; zero, where instructions are interpreted.
+    pub fn machine_code(&self) -> usize {
+        self.0.machine.as_ref().map_or(0, Machine::len)
+    }
+
     /// The columns that [`derive`](Self::derive) reads, in order; at the next sample, too, if the second says so.
     pub fn derived_from(&self) -> (&[Column], bool) {
         self.0.derivation.reads()
@@ -164,7 +177,7 @@ impl Compiled {
     /// Registers side by side for so many lanes.
     fn registers(&self, lanes: usize) -> usize {
         match lanes.div_ceil(self.width.lanes()) {
-            _ if self.trajectories == Trajectories::One => 1,
+            _ if self.trajectories == Trajectories::One || self.machine.is_some() => 1,
             0 | 1 => 1,
             2 => 2,
             _ => 4,

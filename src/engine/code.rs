@@ -122,6 +122,9 @@ pub(super) struct Code {
     /// The slot of the step's length, if it is the same for all samples and anything depends on it.
     pub step: Option<Slot>,
     pub constants: Vec<(Slot, f64)>,
+    /// The slot of 1, and of the number whose only bit is the sign's.
+    pub one: Slot,
+    pub sign: Slot,
     /// Once a pass.
     pub once: Vec<Instruction>,
     pub columns: Vec<Column>,
@@ -146,7 +149,7 @@ impl Code {
         let instructions = self.once.iter().chain(&self.output).chain(&self.advance);
         let all = instructions.flat_map(|instruction| instruction.reads().chain([instruction.to]));
         let others = self.constants.iter().map(|(slot, _)| *slot).chain(self.reads.iter().map(|read| read.to));
-        let others = others.chain(self.rows.iter().copied()).chain(self.step);
+        let others = others.chain(self.rows.iter().copied()).chain(self.step).chain([self.one, self.sign]);
         let columns = self.reads.iter().all(|read| read.column < self.columns.len());
         columns
             && self.carried + self.parameters <= self.slots

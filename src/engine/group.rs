@@ -133,7 +133,11 @@ impl Group {
     pub fn run(&mut self, inputs: &[f64], rows: &mut [f64], samples: usize) {
         let program = Arc::clone(&self.program);
         self.clear_negligible();
+        let lanes = self.lanes();
         let (code, slots) = (&program.code, &mut self.numbers[self.first..]);
+        if let Some(machine) = &program.machine {
+            return machine.run(code, lanes, slots, inputs, rows, samples);
+        }
         match self.registers {
             1 => run(program.width, Run::<1> { code, slots, inputs, rows, samples }),
             2 => run(program.width, Run::<2> { code, slots, inputs, rows, samples }),

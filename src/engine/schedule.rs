@@ -70,6 +70,8 @@ impl<'a> Scheduler<'a> {
             parameters: roots.parameters,
             step: None,
             constants: vec![],
+            one: 0,
+            sign: 0,
             once: vec![],
             columns: vec![],
             reads: vec![],
@@ -167,7 +169,8 @@ impl<'a> Scheduler<'a> {
         }
         // What every sum may need, while slots are still given for good.
         self.constant(0.0)?;
-        self.constant(1.0)?;
+        self.code.one = self.constant(1.0)?;
+        self.code.sign = self.constant(-0.0)?;
         Ok(())
     }
 

@@ -90,6 +90,38 @@ pub enum Function {
 }
 
 impl Function {
+    /// All of them.
+    pub(crate) const ALL: [Function; 28] = [
+        Function::Recip,
+        Function::Sqrt,
+        Function::Cbrt,
+        Function::Exp,
+        Function::Exp2,
+        Function::ExpM1,
+        Function::Ln,
+        Function::Ln1p,
+        Function::Log2,
+        Function::Log10,
+        Function::Sin,
+        Function::Cos,
+        Function::Tan,
+        Function::Asin,
+        Function::Acos,
+        Function::Atan,
+        Function::Sinh,
+        Function::Cosh,
+        Function::Tanh,
+        Function::Asinh,
+        Function::Acosh,
+        Function::Atanh,
+        Function::Abs,
+        Function::Signum,
+        Function::Floor,
+        Function::Ceil,
+        Function::Round,
+        Function::Trunc,
+    ];
+
     /// The function's value.
     pub fn of<S: Scalar>(self, x: S) -> S {
         match self {
@@ -179,6 +211,17 @@ pub enum Function2 {
 }
 
 impl Function2 {
+    /// All of them.
+    pub(crate) const ALL: [Function2; 7] = [
+        Function2::Pow,
+        Function2::Atan2,
+        Function2::Hypot,
+        Function2::Max,
+        Function2::Min,
+        Function2::Copysign,
+        Function2::RemEuclid,
+    ];
+
     /// The function's value.
     pub fn of<S: Scalar>(self, x: S, y: S, constant: Option<f64>) -> S {
         match (self, constant) {

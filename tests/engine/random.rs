@@ -10,10 +10,34 @@ use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 pub const FUNCTIONS: [Function; 28] = [
-    Function::Recip, Function::Sqrt, Function::Cbrt, Function::Exp, Function::Exp2, Function::ExpM1, Function::Ln,
-    Function::Ln1p, Function::Log2, Function::Log10, Function::Sin, Function::Cos, Function::Tan, Function::Asin,
-    Function::Acos, Function::Atan, Function::Sinh, Function::Cosh, Function::Tanh, Function::Asinh, Function::Acosh,
-    Function::Atanh, Function::Abs, Function::Signum, Function::Floor, Function::Ceil, Function::Round, Function::Trunc,
+    Function::Recip,
+    Function::Sqrt,
+    Function::Cbrt,
+    Function::Exp,
+    Function::Exp2,
+    Function::ExpM1,
+    Function::Ln,
+    Function::Ln1p,
+    Function::Log2,
+    Function::Log10,
+    Function::Sin,
+    Function::Cos,
+    Function::Tan,
+    Function::Asin,
+    Function::Acos,
+    Function::Atan,
+    Function::Sinh,
+    Function::Cosh,
+    Function::Tanh,
+    Function::Asinh,
+    Function::Acosh,
+    Function::Atanh,
+    Function::Abs,
+    Function::Signum,
+    Function::Floor,
+    Function::Ceil,
+    Function::Round,
+    Function::Trunc,
 ];
 pub const FUNCTIONS2: [Function2; 6] =
     [Function2::Pow, Function2::Atan2, Function2::Hypot, Function2::Max, Function2::Min, Function2::Copysign];
@@ -165,7 +189,26 @@ fn random_expressions_have_the_slopes_of_duals() {
 
 #[test]
 fn every_function_has_the_slopes_of_duals() {
-    let axis = [0.0, -0.0, 1.0, -1.0, 0.3, -0.7, 2.0, -3.5, 1.5, 40.0, -40.0, 0.5, -0.5, 710.0, -745.0, 1e-310, 1e308, f64::NAN];
+    let axis = [
+        0.0,
+        -0.0,
+        1.0,
+        -1.0,
+        0.3,
+        -0.7,
+        2.0,
+        -3.5,
+        1.5,
+        40.0,
+        -40.0,
+        0.5,
+        -0.5,
+        710.0,
+        -745.0,
+        1e-310,
+        1e308,
+        f64::NAN,
+    ];
     let mut points = vec![];
     for a in axis.into_iter().chain([f64::INFINITY, f64::NEG_INFINITY]) {
         for b in [0.0, -0.0, 1.0, 0.3, -2.0, a, -a, f64::NAN] {

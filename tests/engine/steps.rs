@@ -2,7 +2,9 @@
 
 use greybox::engine::{Column, Program, Sampling, Trajectories};
 use greybox::graph::Seed;
-use greybox::{Dual, Equations, Hold, Integrator, Interval, Model, ModelSystem, Of, Recurrence, Rk4, Scalar, Signals, signals};
+use greybox::{
+    Dual, Equations, Hold, Integrator, Interval, Model, ModelSystem, Of, Recurrence, Rk4, Scalar, Signals, signals,
+};
 
 signals! {
     pub struct Currents { id: "A", iq: "A" }
@@ -94,7 +96,8 @@ fn agrees<M: Model, I: Integrator, const N: usize>(
                     let size = y.slopes.iter().fold(0.0f64, |m, s| m.max(s.abs()));
                     (0..N).for_each(|s| same_within(row(s), y.slopes[s], 1e-12 * size + 1e-300));
                 }
-                let interval = Interval { t0: k as f64 * step, t1: (k + 1) as f64 * step, u0: inputs[k], u1: inputs[k + 1], hold };
+                let interval =
+                    Interval { t0: k as f64 * step, t1: (k + 1) as f64 * step, u0: inputs[k], u1: inputs[k + 1], hold };
                 let system = ModelSystem { model, interval: &interval, p: &p };
                 x = system.step(integrator, x, &mut I::Memory::default()).unwrap();
             }
