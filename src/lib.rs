@@ -126,6 +126,11 @@ pub mod check;
 #[cfg(feature = "std")]
 pub mod diagnose;
 #[cfg(feature = "std")]
+#[doc(hidden)]
+pub mod engine;
+#[cfg(feature = "std")]
+mod equations;
+#[cfg(feature = "std")]
 mod error;
 #[cfg(feature = "std")]
 mod estimate;
@@ -135,6 +140,10 @@ mod experiment;
 mod fit;
 #[cfg(feature = "std")]
 mod functions;
+#[cfg(feature = "std")]
+mod fused;
+#[cfg(feature = "std")]
+pub mod graph;
 #[cfg(feature = "std")]
 mod information;
 #[cfg(feature = "std")]
@@ -157,6 +166,8 @@ pub mod problem;
 mod random;
 #[cfg(feature = "std")]
 pub mod record;
+#[cfg(feature = "std")]
+mod recurrence;
 #[cfg(feature = "std")]
 pub mod regress;
 #[cfg(feature = "std")]
@@ -184,13 +195,14 @@ pub use interval::{Hold, Interval};
 pub use layout::Kind;
 pub use model::Model;
 pub use parameter::{Parameter, Prior, Transform, fixed, free};
-pub use scalar::Scalar;
+pub use scalar::{Comparison, Scalar};
 pub use signals::{Entry, Nothing, Of, Signals};
 
 #[cfg(feature = "csv")]
 pub use record::CsvFile;
 #[cfg(feature = "std")]
 pub use {
+    equations::{Dependence, Equations, InvalidEquations},
     error::{Error, Failure},
     estimate::{
         CovarianceMethod, Direction, Estimate, Knowledge, Method, NoiseModel, OutputFit, Prediction, Summary, Unknown,
@@ -207,6 +219,7 @@ pub use {
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
     problem::{Objective, Problem, Search},
     record::{Gap, Initial, Time},
+    recurrence::{InvalidRecurrence, Recurrence},
     regress::{Assumption, LinearEstimate, Regression, RegressionError},
     report::Report,
     simulate::{Simulation, Simulator, simulate},

@@ -1,0 +1,4 @@
+//! Models as graphs, and the engine that runs them: against duals and plain arithmetic.
+
+mod random;
+mod steps;
