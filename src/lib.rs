@@ -82,7 +82,7 @@
 //! | 3 | learn | `loss`, `weighting`, `prefilter`, [`optimize`], [`regress`], [`numeric`], `fit`, `estimate`, [`online`] |
 //! | 2 | expect | `integrate`, `predict` |
 //! | 1 | say | `model`, `parameter`, `scaling`, `interval`, `experiment`, [`units`] |
-//! | ground | numbers | `lanes`, `scalar`, `dual`, `signals`, `information`, `covariance`, `whiteness`, `error` |
+//! | ground | numbers | `lanes`, `scalar`, `dual`, `signals`, `information`, `whiteness`, `error` |
 //! | wing | machines | [`pmsm`], [`models`] |
 //!
 //! **The way of a sample through a fit.** [`Experiment`] holds it. The integrator carries the state to it in
@@ -102,7 +102,6 @@
 //! integrators and [`online`] observers build without `alloc` too.
 #![cfg_attr(not(feature = "std"), no_std)]
 
-mod covariance;
 #[cfg(feature = "std")]
 mod dispatch;
 mod dual;
@@ -188,7 +187,6 @@ mod wide;
 #[doc(hidden)]
 pub use {approx, nalgebra, serde};
 
-pub use covariance::{Covariance, Gain};
 pub use dual::Dual;
 pub use integrate::{Automatic, Discrete, Esdirk, Integrator, ModelSystem, Rk4, Rk45, Square, Stuck, System};
 pub use interval::{Hold, Interval};
@@ -210,7 +208,10 @@ pub use {
     },
     experiment::{Experiment, ExperimentOf, Sample},
     fit::{Fit, Records},
-    information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
+    information::{
+        BadPiece, Block, Covariance, Elimination, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix,
+        Triangles, Undetermined,
+    },
     layout::{Layout, Quantity},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
     numeric::{Derivative, Next, Numeric, StateEquation},
@@ -222,8 +223,8 @@ pub use {
     recurrence::{InvalidRecurrence, Recurrence},
     regress::{Assumption, LinearEstimate, Regression, RegressionError},
     report::Report,
-    simulate::{Simulation, Simulator, simulate},
     scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
+    simulate::{Simulation, Simulator, simulate},
     weighting::{BySignal, Law, Weighting},
 };
 

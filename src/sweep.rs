@@ -147,7 +147,13 @@ pub trait Sweep: Send + Sync {
     ///
     /// # Errors
     /// Why the outputs do not give it.
-    fn measured_state(&self, record: &Record, sample: usize, parameters: &[f64], alone: bool) -> Result<Vec<f64>, String> {
+    fn measured_state(
+        &self,
+        record: &Record,
+        sample: usize,
+        parameters: &[f64],
+        alone: bool,
+    ) -> Result<Vec<f64>, String> {
         let _ = (record, sample, parameters, alone);
         Err("the sweep does not solve outputs for states".to_owned())
     }

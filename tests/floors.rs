@@ -12,7 +12,7 @@ const FLOORS: &[(&str, &[&str])] = &[
     ("ground: hardware", &["lanes"]),
     ("ground: beside numbers", &["scalar", "units", "dispatch", "random", "whiteness", "wide"]),
     ("ground: numbers", &["dual", "fused", "signals"]),
-    ("ground: vectors of numbers", &["information", "covariance", "error", "by_name", "layout", "graph"]),
+    ("ground: vectors of numbers", &["information", "error", "by_name", "layout", "graph"]),
     ("say: words", &["model", "parameter", "scaling", "interval"]),
     ("say: records", &["experiment", "equations"]),
     // Filtering a record is editing it, and a horizon may start from filtered states.

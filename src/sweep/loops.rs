@@ -4,7 +4,7 @@
 //! `exp(-t / T)`; after some ten thousand samples they are denormal numbers, on which processors are up to 60 times slower;
 //! so slopes below 1e-150 are set to zero between windows.
 
-use super::{RunError, Piece, Reached, Seed, Visit, Window};
+use super::{Piece, Reached, RunError, Seed, Visit, Window};
 use crate::dispatch::{Kernel, has_wide, run};
 use crate::dual::Dual;
 use crate::fused::Fused;
@@ -231,7 +231,13 @@ struct Fill<'f, 't, M: Model, I, D: Number> {
 impl<M: Model, I: Integrator, D: Number> Fill<'_, '_, M, I, D> {
     /// The state at the sample after `k`, both counted from the window's begin.
     #[inline(always)]
-    fn advance(&self, k: usize, x: Of<M::State, D>, p: &Of<M::Parameters, D>, step: &mut f64) -> Result<Of<M::State, D>, Stuck> {
+    fn advance(
+        &self,
+        k: usize,
+        x: Of<M::State, D>,
+        p: &Of<M::Parameters, D>,
+        step: &mut f64,
+    ) -> Result<Of<M::State, D>, Stuck> {
         // Known to the compiler in the wide loop, which then computes once per interval what depends on the input alone.
         let hold = if <D::Slope as lanes::Number>::FUSED { Hold::Zero } else { self.task.piece.record.input_hold() };
         let u0 = self.rows.inputs[k];
@@ -241,7 +247,12 @@ impl<M: Model, I: Integrator, D: Number> Fill<'_, '_, M, I, D> {
     }
 
     /// The state that sample `sample` is predicted from, `restart` samples after it was measured; `None` if it was not.
-    fn restarted(&self, sample: usize, restart: usize, p: &Of<M::Parameters, D>) -> Result<Option<Of<M::State, D>>, Stuck> {
+    fn restarted(
+        &self,
+        sample: usize,
+        restart: usize,
+        p: &Of<M::Parameters, D>,
+    ) -> Result<Option<Of<M::State, D>>, Stuck> {
         let (piece, n) = (self.task.piece, M::State::LEN);
         let (mut x, first) = if sample < restart {
             (self.pass.start, 0)
@@ -260,7 +271,11 @@ impl<M: Model, I: Integrator, D: Number> Fill<'_, '_, M, I, D> {
             let u0 = input(k);
             let u1 = if hold == Hold::First { input(k + 1) } else { u0 };
             let interval = Interval { t0: record.time(k), t1: record.time(k + 1), u0, u1, hold };
-            x = ModelSystem { model: self.task.model, interval: &interval, p }.step(self.task.integrator, x, &mut step)?;
+            x = ModelSystem { model: self.task.model, interval: &interval, p }.step(
+                self.task.integrator,
+                x,
+                &mut step,
+            )?;
         }
         Ok(Some(x))
     }
