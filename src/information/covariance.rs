@@ -15,7 +15,7 @@ pub struct Covariance {
     scales: Vec<f64>,
     /// The shared unknowns first, then the pieces, parents before children.
     parts: Vec<Part>,
-    /// The part that each unknown belongs to.
+    /// The part that each unknown belongs to, the first for those that were held.
     part_of: Vec<usize>,
 }
 
@@ -54,11 +54,15 @@ struct Path(Vec<(usize, Vec<f64>)>);
 impl Covariance {
     /// Of `size` unknowns none of which has a variance.
     pub fn zeros(size: usize) -> Self {
-        Self::of_parts(vec![Part::default()], vec![0; size])
+        Self::of_parts(vec![1.0; size], vec![Part::default()])
     }
 
-    pub(super) fn of_parts(parts: Vec<Part>, part_of: Vec<usize>) -> Self {
-        Covariance { scales: vec![1.0; part_of.len()], parts, part_of }
+    pub(super) fn of_parts(scales: Vec<f64>, parts: Vec<Part>) -> Self {
+        let mut part_of = vec![0; scales.len()];
+        for (number, part) in parts.iter().enumerate() {
+            part.own.iter().for_each(|&unknown| part_of[unknown] = number);
+        }
+        Covariance { scales, parts, part_of }
     }
 
     /// Number of unknowns.

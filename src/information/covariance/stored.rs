@@ -20,7 +20,7 @@ impl TryFrom<Stored> for Covariance {
     type Error = String;
 
     fn try_from(Stored { scales, parts }: Stored) -> Result<Self, String> {
-        let mut part_of = vec![0; scales.len()];
+        let mut taken = vec![false; scales.len()];
         if parts.is_empty() {
             return Err("a covariance has at least the part of the shared unknowns".to_owned());
         }
@@ -37,7 +37,7 @@ impl TryFrom<Stored> for Covariance {
             if part.scores.is_some() != parts[0].scores.is_some() {
                 return wrong("has scores where another has none");
             }
-            if !part.own.is_sorted_by(|a, b| a < b) || part.own.iter().any(|&i| i >= scales.len() || part_of[i] != 0) {
+            if !part.own.is_sorted_by(|a, b| a < b) || part.own.iter().any(|&i| i >= scales.len() || taken[i]) {
                 return wrong("has own unknowns out of order, out of range, or of another part");
             }
             let parent = &parts[part.parent];
@@ -45,8 +45,8 @@ impl TryFrom<Stored> for Covariance {
             if number > 0 && !part.border.iter().all(known) {
                 return wrong("has a border that its parent does not know");
             }
-            part.own.iter().for_each(|&i| part_of[i] = number);
+            part.own.iter().for_each(|&i| taken[i] = true);
         }
-        Ok(Covariance { scales, parts, part_of })
+        Ok(Covariance::of_parts(scales, parts))
     }
 }

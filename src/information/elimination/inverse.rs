@@ -85,11 +85,7 @@ impl Elimination {
     }
 
     fn finite(&self, parts: Vec<Part>) -> Option<Covariance> {
-        let mut part_of = vec![0; self.unknowns()];
-        for (number, piece) in self.pieces.iter().enumerate() {
-            piece.columns[..piece.own].iter().for_each(|&unknown| part_of[unknown] = number + 1);
-        }
-        let covariance = Covariance::of_parts(parts, part_of);
+        let covariance = Covariance::of_parts(vec![1.0; self.unknowns()], parts);
         covariance.is_finite().then_some(covariance)
     }
 
