@@ -27,7 +27,7 @@ use crate::graph::{Leaf, Node, Pattern, Seed};
 use crate::recurrence::Recurrence;
 use crate::wide::Width;
 use choice::Machine;
-use code::Code;
+use code::Sound;
 use derive::Derivation;
 use schedule::{Roots, schedule};
 use std::sync::Arc;
@@ -57,7 +57,7 @@ pub struct Program(Arc<Compiled>);
 
 #[derive(Debug)]
 struct Compiled {
-    code: Code,
+    code: Sound,
     derivation: Derivation,
     pattern: Pattern,
     seeds: Vec<Seed>,

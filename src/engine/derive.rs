@@ -1,6 +1,6 @@
 //! What depends on a record alone and is dear: computed once a record, and read as a column.
 
-use super::code::{Code, Column};
+use super::code::{Column, Sound};
 use super::interpret::{Once, Run};
 use super::schedule::{Roots, TooLarge, schedule};
 use crate::graph::{Id, Node, Tape};
@@ -14,7 +14,7 @@ pub(super) fn dear(tape: &Tape, roots: &[Id]) -> Vec<Id> {
     roots.iter().for_each(|root| read[root.index()] = true);
     for (i, node) in tape.graph.nodes().iter().enumerate().filter(|(i, _)| reached[*i]) {
         if tape.depends[i].on_record_alone() {
-            let costly = matches!(node, Node::Function(..) | Node::Function2(..));
+            let costly = matches!(node, Node::Function(..) | Node::Function2(..) | Node::Table { .. });
             dear[i] = costly || node.operands().any(|operand| dear[operand.index()]);
         } else {
             node.operands().for_each(|operand| read[operand.index()] = true);
@@ -25,7 +25,7 @@ pub(super) fn dear(tape: &Tape, roots: &[Id]) -> Vec<Id> {
 
 /// The program of the derived columns: consecutive samples are its lanes.
 #[derive(Debug)]
-pub(super) struct Derivation(Code);
+pub(super) struct Derivation(Sound);
 
 impl Derivation {
     pub fn new(tape: &Tape, derived: &[Id]) -> Result<Self, TooLarge> {

@@ -275,6 +275,15 @@ pub enum Node {
     Function(Function, Id),
     /// A function of two numbers.
     Function2(Function2, Id, Id),
+    /// What a table of the graph has at a place, or its derivative of these orders there.
+    Table {
+        /// Which one.
+        table: u32,
+        /// Of the derivative, in each argument; zero for the value.
+        order: [u8; 2],
+        /// The arguments.
+        at: [Id; 2],
+    },
     /// The third, where the first two compare so; else the fourth. Where one of the two is not a number, the fourth.
     Select(Comparison, [Id; 4]),
 }
@@ -289,6 +298,7 @@ impl Node {
             Node::Add(a, b) | Node::Sub(a, b) | Node::Mul(a, b) | Node::Div(a, b) | Node::Function2(_, a, b) => {
                 ([a, b, none, none], 2)
             }
+            Node::Table { at: [a, b], .. } => ([a, b, none, none], 2),
             Node::MulAdd([a, b, c]) => ([a, b, c, none], 3),
             Node::Select(_, all) => (all, 4),
         };
@@ -307,6 +317,7 @@ impl Node {
             Node::Mul(a, b) => Node::Mul(f(a), f(b)),
             Node::Div(a, b) => Node::Div(f(a), f(b)),
             Node::Function2(function, a, b) => Node::Function2(function, f(a), f(b)),
+            Node::Table { table, order, at } => Node::Table { table, order, at: at.map(f) },
             Node::MulAdd(all) => Node::MulAdd(all.map(f)),
             Node::Select(comparison, all) => Node::Select(comparison, all.map(f)),
         }

@@ -104,6 +104,10 @@ impl Tape {
         let mut new = vec![Id::default(); other.len()];
         for (i, node) in other.nodes().iter().enumerate().filter(|(i, _)| reached[*i]) {
             let node = node.with_operands(|id| new[id.index()]);
+            if let Node::Table { table, order, at } = node {
+                new[i] = self.strict(|graph| graph.table(&other.tables()[table as usize], order, at));
+                continue;
+            }
             new[i] = self.imported(node);
         }
         roots.iter().map(|root| new[root.index()]).collect()
@@ -128,7 +132,7 @@ impl Tape {
                 Node::Function(function, a) => graph.function(function, a),
                 Node::Function2(function, a, b) => graph.function2(function, a, b),
                 Node::Select(comparison, [a, b, c, d]) => graph.select(comparison, a, b, c, d),
-                Node::Constant(_) | Node::Leaf(_) | Node::MulAdd(_) => graph.put(node),
+                Node::Constant(_) | Node::Leaf(_) | Node::MulAdd(_) | Node::Table { .. } => graph.put(node),
             }),
         }
     }

@@ -3,4 +3,5 @@
 mod bits;
 mod random;
 mod steps;
+mod tables;
 mod traced;

@@ -266,7 +266,10 @@ fn equations_are_data() {
     }
     let json = serde_json::to_string(&graph).unwrap();
     assert_eq!(serde_json::from_str::<Graph>(&json).unwrap(), graph);
-    assert!(serde_json::from_str::<Graph>(r#"[{"Neg":0}]"#).is_err(), "an operand that does not come before");
+    assert!(
+        serde_json::from_str::<Graph>(r#"{"nodes":[{"Neg":0}],"tables":[]}"#).is_err(),
+        "an operand that does not come before"
+    );
 }
 
 #[test]

@@ -4,6 +4,8 @@ use super::super::code::{Code, Instruction, Operation, Slot};
 use super::registers::{Freed, NEVER, Registers};
 use super::unit::Unit;
 use crate::graph::{Function, Function2};
+use std::sync::Arc;
+
 use iced_x86::{Encoder, IcedError, Instruction as Machine, MemoryOperand, Register};
 
 /// Where slots, inputs and rows stand, and how many samples are left.
@@ -270,6 +272,13 @@ impl<'a> Emitter<'a> {
             Operation::Function2(function) => {
                 let number = Function2::ALL.iter().position(|known| *known == function).unwrap_or(0);
                 self.call(number, self.unit.binary as *const () as u64, &[a, b, instruction.to], instruction.to)
+            }
+            Operation::Table(order) => {
+                use iced_x86::Code as Op;
+                let table = self.code.tables.get(usize::from(instruction.init)).map_or(core::ptr::null(), Arc::as_ptr);
+                self.put(Machine::with2(Op::Mov_r64_imm64, Register::R8, table as u64))?;
+                let routine = self.unit.look_up as *const () as u64;
+                self.call(order.into(), routine, &[a, b, instruction.to], instruction.to)
             }
             _ => self.of_one(instruction, [a, b, c, d]),
         }

@@ -2,6 +2,7 @@
 
 use crate::engine::functions::{function, function2};
 use crate::graph::{Function, Function2};
+use crate::scalar::Table;
 use crate::wide::{Task, Wide, Width, run};
 
 /// The function's number, where its argument stands, where its value goes.
@@ -9,14 +10,17 @@ pub(super) type Unary = unsafe extern "sysv64" fn(usize, *const f64, *mut f64);
 /// The function's number, where its arguments stand, where its value goes.
 pub(super) type Binary = unsafe extern "sysv64" fn(usize, *const f64, *const f64, *mut f64);
 
+/// The orders of a derivative, its arguments, where it goes, and the table.
+pub(super) type LookUp = unsafe extern "sysv64" fn(usize, *const f64, *const f64, *mut f64, *const Table);
+
 /// The routines of a width that machine code is written for.
-pub(super) fn routines(width: Width) -> Option<(Unary, Binary)> {
+pub(super) fn routines(width: Width) -> Option<(Unary, Binary, LookUp)> {
     if Some(width) == Width::avx512() {
-        Some((unary::<0>, binary::<0>))
+        Some((unary::<0>, binary::<0>, look_up::<8>))
     } else if Some(width) == Width::avx2() {
-        Some((unary::<1>, binary::<1>))
+        Some((unary::<1>, binary::<1>, look_up::<4>))
     } else if width == Width::single() && Width::avx2().is_some() {
-        Some((unary::<2>, binary::<2>))
+        Some((unary::<2>, binary::<2>, look_up::<1>))
     } else {
         None
     }
@@ -41,6 +45,24 @@ unsafe extern "sysv64" fn unary<const W: usize>(number: usize, a: *const f64, to
 /// All addresses must be those of a register of this width.
 unsafe extern "sysv64" fn binary<const W: usize>(number: usize, a: *const f64, b: *const f64, to: *mut f64) {
     run(width::<W>(), Two { of: Function2::ALL[number % Function2::ALL.len()], a, b, to });
+}
+
+/// # Safety
+/// All addresses must be those of a register of this many lanes, the last that of a table.
+unsafe extern "sysv64" fn look_up<const LANES: usize>(
+    order: usize,
+    x: *const f64,
+    y: *const f64,
+    to: *mut f64,
+    table: *const Table,
+) {
+    // SAFETY: as the caller says; arguments may be where the value goes, hence lane by lane.
+    unsafe {
+        let (grid, order) = ((*table).grid(), [(order >> 4) as u8, order as u8 & 15]);
+        for lane in 0..LANES {
+            *to.add(lane) = grid.derivative([*x.add(lane), *y.add(lane)], order);
+        }
+    }
 }
 
 struct One {

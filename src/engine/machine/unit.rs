@@ -1,6 +1,6 @@
 //! [`Unit`]: the registers of a processor and its instructions for them.
 
-use super::routines::{Binary, Unary, routines};
+use super::routines::{Binary, LookUp, Unary, routines};
 use crate::wide::Width;
 use iced_x86::{Code, Register};
 
@@ -30,12 +30,13 @@ pub(super) struct Unit {
     pub blend: Code,
     pub unary: Unary,
     pub binary: Binary,
+    pub look_up: LookUp,
 }
 
 impl Unit {
     /// None for what machine code is not written for.
     pub fn of(width: Width) -> Option<Self> {
-        let (unary, binary) = routines(width)?;
+        let (unary, binary, look_up) = routines(width)?;
         let unit = match width.lanes() {
             8 => Unit {
                 bytes: 64,
@@ -60,6 +61,7 @@ impl Unit {
                 blend: Code::EVEX_Vblendmpd_zmm_k1z_zmm_zmmm512b64,
                 unary,
                 binary,
+                look_up,
             },
             4 => Unit {
                 bytes: 32,
@@ -84,6 +86,7 @@ impl Unit {
                 blend: Code::VEX_Vblendvpd_ymm_ymm_ymmm256_ymm,
                 unary,
                 binary,
+                look_up,
             },
             _ => Unit {
                 bytes: 8,
@@ -108,6 +111,7 @@ impl Unit {
                 blend: Code::VEX_Vblendvpd_xmm_xmm_xmmm128_xmm,
                 unary,
                 binary,
+                look_up,
             },
         };
         Some(unit)

@@ -116,6 +116,7 @@ fn growth(tape: &Tape) -> Vec<u32> {
             Node::Mul(a, b) => of(a).saturating_add(of(b)),
             Node::MulAdd([a, b, c]) => of(a).saturating_add(of(b)).max(of(c)),
             Node::Select(_, [_, _, c, d]) => of(c).max(of(d)),
+            Node::Table { at: [a, b], .. } => of(a).max(of(b)),
             Node::Function(function, a) => match function {
                 Function::Abs | Function::Floor | Function::Ceil | Function::Round | Function::Trunc => of(a),
                 Function::Sin | Function::Cos | Function::Tanh | Function::Atan | Function::Signum => match of(a) {
@@ -135,6 +136,7 @@ fn has_finite_partials(node: &Node, growth: &[u32]) -> bool {
     let of = |id: Id| growth[id.index()] <= 2;
     match *node {
         Node::Constant(_) | Node::Leaf(_) | Node::Neg(_) | Node::Add(..) | Node::Sub(..) | Node::Select(..) => true,
+        Node::Table { at: [a, b], .. } => of(a) && of(b),
         Node::Mul(a, b) | Node::MulAdd([a, b, _]) => of(a) && of(b),
         Node::Function(function, a) => {
             let bounded = matches!(
