@@ -14,6 +14,7 @@ mod functions;
 mod fusion;
 mod group;
 mod interpret;
+mod jets;
 #[cfg(all(feature = "jit", target_arch = "x86_64"))]
 mod machine;
 mod schedule;
@@ -60,12 +61,32 @@ struct Compiled {
     code: Sound,
     derivation: Derivation,
     pattern: Pattern,
-    seeds: Vec<Seed>,
+    shape: Shape,
     outputs: usize,
     variances: usize,
     width: Width,
     trajectories: Trajectories,
     machine: Option<Machine>,
+}
+
+/// What slopes there are.
+#[derive(Debug)]
+struct Shape {
+    seeds: Vec<Seed>,
+    /// Slopes of each output.
+    slopes: usize,
+    parameters: usize,
+    /// The first of the parameters that are a direction.
+    direction: Option<usize>,
+}
+
+/// As many parameters as a recurrence depends on, and those before them.
+fn parameters(recurrence: &Recurrence) -> usize {
+    let parameter = |node: &Node| match node {
+        Node::Leaf(Leaf::Parameter(j)) => Some(*j as usize + 1),
+        _ => None,
+    };
+    recurrence.graph().nodes().iter().filter_map(parameter).max().unwrap_or(0)
 }
 
 impl Program {
@@ -80,21 +101,39 @@ impl Program {
         trajectories: Trajectories,
     ) -> Result<Self, TooLarge> {
         let step = Step::new(recurrence, seeds, sampling == Sampling::Uniform);
+        let shape =
+            Shape { seeds: seeds.to_vec(), slopes: seeds.len(), parameters: parameters(recurrence), direction: None };
+        Program::of_step(step, recurrence, shape, trajectories)
+    }
+
+    /// What is carried and the outputs, with their first and second derivatives along a direction in the space of the
+    /// seeds that each lane is told ([`Group::set_direction`]): two slopes per output, the first derivative and the second.
+    ///
+    /// # Errors
+    /// If it needs too many numbers at a time.
+    pub fn compile_second(recurrence: &Recurrence, seeds: &[Seed], sampling: Sampling) -> Result<Self, TooLarge> {
+        let own = parameters(recurrence);
+        let step = jets::second_along(recurrence, seeds, own, sampling == Sampling::Uniform);
+        let shape = Shape { seeds: seeds.to_vec(), slopes: 2, parameters: own + seeds.len(), direction: Some(own) };
+        Program::of_step(step, recurrence, shape, Trajectories::Many)
+    }
+
+    fn of_step(
+        step: Step,
+        recurrence: &Recurrence,
+        shape: Shape,
+        trajectories: Trajectories,
+    ) -> Result<Self, TooLarge> {
         let roots: Vec<_> = step.rows.iter().flatten().chain(&step.next).copied().collect();
         let derived = derive::dear(&step.tape, &roots);
-        let parameter = |node: &Node| match node {
-            Node::Leaf(Leaf::Parameter(j)) => Some(*j as usize + 1),
-            _ => None,
-        };
-        let parameters = recurrence.graph().nodes().iter().filter_map(parameter).max().unwrap_or(0);
-        let whole = Roots { tape: &step.tape, next: &step.next, rows: &step.rows, parameters, derived: &derived };
-        let code = schedule(&whole)?;
+        let (tape, parameters) = (&step.tape, shape.parameters);
+        let code = schedule(&Roots { tape, next: &step.next, rows: &step.rows, parameters, derived: &derived })?;
         let (width, machine) = choice::engine(&code, trajectories);
         Ok(Program(Arc::new(Compiled {
             code,
             derivation: Derivation::new(&step.tape, &derived)?,
             pattern: step.pattern,
-            seeds: seeds.to_vec(),
+            shape,
             outputs: recurrence.mean().len(),
             variances: recurrence.variance().len(),
             width,
@@ -125,12 +164,12 @@ impl Program {
 
     /// What slopes are taken with respect to.
     pub fn seeds(&self) -> &[Seed] {
-        &self.0.seeds
+        &self.0.shape.seeds
     }
 
     /// Numbers that each sample's rows have: for each output the slopes and the mean, then for each variance the same.
     pub fn row_length(&self) -> usize {
-        (self.0.outputs + self.0.variances) * (self.0.seeds.len() + 1)
+        (self.0.outputs + self.0.variances) * (self.0.shape.slopes + 1)
     }
 
     /// Outputs.

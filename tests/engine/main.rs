@@ -2,6 +2,7 @@
 
 mod bits;
 mod random;
+mod second;
 mod steps;
 mod tables;
 mod traced;

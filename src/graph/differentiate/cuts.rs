@@ -32,6 +32,11 @@ impl Cuts {
         Cuts(cuts)
     }
 
+    /// How many.
+    pub fn count(&self) -> usize {
+        self.0.len()
+    }
+
     /// The slopes of the roots by gradients and the chain rule.
     pub fn slopes(&self, tape: &mut Tape, roots: &[Id], variables: &Variables, gradients: Gradients) -> Vec<Tangent> {
         let leaves: Vec<Id> = variables.leaves.iter().chain(&self.0).copied().collect();
