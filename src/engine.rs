@@ -19,11 +19,14 @@ mod jets;
 mod machine;
 mod schedule;
 mod step;
+mod system;
 
 pub use code::Column;
 pub use group::Group;
 pub use schedule::TooLarge;
+pub use system::{Differentiated, DifferentiatedSystem};
 
+use crate::equations::Equations;
 use crate::graph::{Leaf, Node, Pattern, Seed};
 use crate::recurrence::Recurrence;
 use crate::wide::Width;
@@ -78,6 +81,8 @@ struct Shape {
     parameters: usize,
     /// The first of the parameters that are a direction.
     direction: Option<usize>,
+    /// Whether what depends on the record alone comes as columns.
+    derives: bool,
 }
 
 /// As many parameters as a recurrence depends on, and those before them.
@@ -101,8 +106,13 @@ impl Program {
         trajectories: Trajectories,
     ) -> Result<Self, TooLarge> {
         let step = Step::new(recurrence, seeds, sampling == Sampling::Uniform);
-        let shape =
-            Shape { seeds: seeds.to_vec(), slopes: seeds.len(), parameters: parameters(recurrence), direction: None };
+        let shape = Shape {
+            seeds: seeds.to_vec(),
+            slopes: seeds.len(),
+            parameters: parameters(recurrence),
+            direction: None,
+            derives: true,
+        };
         Program::of_step(step, recurrence, shape, trajectories)
     }
 
@@ -114,8 +124,22 @@ impl Program {
     pub fn compile_second(recurrence: &Recurrence, seeds: &[Seed], sampling: Sampling) -> Result<Self, TooLarge> {
         let own = parameters(recurrence);
         let step = jets::second_along(recurrence, seeds, own, sampling == Sampling::Uniform);
-        let shape = Shape { seeds: seeds.to_vec(), slopes: 2, parameters: own + seeds.len(), direction: Some(own) };
+        let shape = Shape {
+            seeds: seeds.to_vec(),
+            slopes: 2,
+            parameters: own + seeds.len(),
+            direction: Some(own),
+            derives: true,
+        };
         Program::of_step(step, recurrence, shape, Trajectories::Many)
+    }
+
+    /// The right-hand side of equations with one tangent per lane.
+    fn right_hand_side(equations: &Equations) -> Result<Self, TooLarge> {
+        let recurrence = jets::right_hand_side(equations);
+        let parameters = 2 * equations.layout().parameters.len();
+        let shape = Shape { seeds: vec![], slopes: 0, parameters, direction: None, derives: false };
+        Program::of_step(Step::new(&recurrence, &[], true), &recurrence, shape, Trajectories::Many)
     }
 
     fn of_step(
@@ -125,7 +149,7 @@ impl Program {
         trajectories: Trajectories,
     ) -> Result<Self, TooLarge> {
         let roots: Vec<_> = step.rows.iter().flatten().chain(&step.next).copied().collect();
-        let derived = derive::dear(&step.tape, &roots);
+        let derived = if shape.derives { derive::dear(&step.tape, &roots) } else { vec![] };
         let (tape, parameters) = (&step.tape, shape.parameters);
         let code = schedule(&Roots { tape, next: &step.next, rows: &step.rows, parameters, derived: &derived })?;
         let (width, machine) = choice::engine(&code, trajectories);

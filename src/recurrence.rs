@@ -182,14 +182,14 @@ impl System for SymbolicSystem<'_> {
 
 /// A square matrix by rows whose size is known at run time.
 #[derive(Clone, Debug)]
-pub(crate) struct DenseRows {
+pub struct DenseRows {
     size: usize,
     entries: Vec<f64>,
 }
 
 impl DenseRows {
     /// Zeros.
-    pub fn new(size: usize) -> Self {
+    pub(crate) fn new(size: usize) -> Self {
         DenseRows { size, entries: vec![0.0; size * size] }
     }
 }

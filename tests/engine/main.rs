@@ -1,5 +1,6 @@
 //! Models as graphs, and the engine that runs them: against duals and plain arithmetic.
 
+mod adaptive;
 mod bits;
 mod random;
 mod second;

@@ -26,6 +26,7 @@ fn swing<U: Signals>(amplitudes: U::Of<f64>, n: usize) -> Vec<U::Of<f64>> {
 macro_rules! model {
     ($name:ident, $kind:expr, |$t:ident, $x:ident, $u:ident, $p:ident| $state:expr, $output:expr) => {
         struct $name;
+        #[allow(unused_variables, reason = "not every model needs every quantity")]
         impl Model for $name {
             type State = Pair;
             type Input = Push;
