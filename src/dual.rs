@@ -391,11 +391,14 @@ impl<const N: usize, T: Scalar> Scalar for Dual<N, T> {
     fn signum(self) -> Self {
         Self::constant(self.value.signum())
     }
+    // Only what is not a number differs from itself.
     #[inline(always)]
+    #[allow(clippy::eq_op)]
     fn max(self, other: Self) -> Self {
         if self.value >= other.value || other.value != other.value { self } else { other }
     }
     #[inline(always)]
+    #[allow(clippy::eq_op)]
     fn min(self, other: Self) -> Self {
         if self.value <= other.value || other.value != other.value { self } else { other }
     }

@@ -22,6 +22,7 @@ mod build;
 mod differentiate;
 mod display;
 mod evaluate;
+mod function;
 mod node;
 mod partials;
 mod serial;
@@ -31,7 +32,8 @@ mod trace;
 
 pub use differentiate::Seed;
 pub(crate) use differentiate::{Pattern, Tangent, Variables, Way, slopes};
-pub use node::{Constant, Function, Function2, Id, Leaf, Node};
+pub use function::{Function, Function2};
+pub use node::{Constant, Id, Leaf, Node};
 pub use serial::InvalidGraph;
 pub use symbol::Symbol;
 pub(crate) use tape::Tape;

@@ -21,11 +21,6 @@ impl Symbol {
         Symbol::made(|graph| graph.leaf(leaf))
     }
 
-    /// A node of the graph that is being read.
-    pub(crate) fn node(id: Id) -> Self {
-        Symbol::made(|_| id)
-    }
-
     /// The node, if it is one of this trace.
     pub(super) fn of(self, trace: u64) -> Option<Id> {
         (self.trace == trace).then_some(self.id)

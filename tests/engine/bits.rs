@@ -102,21 +102,16 @@ fn digest() -> u64 {
         let (graph, roots) = expression(&mut random, 4 + case % 40);
         of_expression(&mut digest, &mut random, graph, &roots);
     }
-    let each: Vec<Box<dyn Fn(&mut Graph, Id, Id) -> Id>> = FUNCTIONS
-        .iter()
-        .map(|f| Box::new(|graph: &mut Graph, x, _| graph.function(*f, x)) as Box<dyn Fn(&mut Graph, Id, Id) -> Id>)
-        .chain(FUNCTIONS2.iter().map(|f| {
-            Box::new(|graph: &mut Graph, x, y| graph.function2(*f, x, y)) as Box<dyn Fn(&mut Graph, Id, Id) -> Id>
-        }))
-        .collect();
-    for build in each {
+    let mut each = |build: &dyn Fn(&mut Graph, Id, Id) -> Id| {
         for _ in 0..20 {
             let mut graph = Graph::default();
             let [x, y] = [Leaf::State(0), Leaf::State(1)].map(|leaf| graph.leaf(leaf));
             let root = build(&mut graph, x, y);
             of_expression(&mut digest, &mut random, graph, &[root]);
         }
-    }
+    };
+    FUNCTIONS.iter().for_each(|function| each(&|graph, x, _| graph.function(*function, x)));
+    FUNCTIONS2.iter().for_each(|function| each(&|graph, x, y| graph.function2(*function, x, y)));
     digest.0
 }
 

@@ -2,6 +2,7 @@
 
 mod adaptive;
 mod bits;
+mod groups;
 mod random;
 mod second;
 mod steps;

@@ -73,7 +73,7 @@ pub fn expression(random: &mut Random, size: usize) -> (Graph, Vec<Id>) {
     let mut nodes: Vec<Id> = (0..STATES as u32).map(|i| graph.leaf(Leaf::State(i))).collect();
     nodes.extend((0..PARAMETERS as u32).map(|j| graph.leaf(Leaf::Parameter(j))));
     for _ in 0..size {
-        let mut any = |random: &mut Random, graph: &mut Graph| {
+        let any = |random: &mut Random, graph: &mut Graph| {
             // Late nodes more often, so that expressions are deep.
             let n = nodes.len();
             match random.below(12) {
@@ -151,7 +151,7 @@ pub fn agrees(graph: &Graph, roots: &[Id], points: &[[f64; SEEDS]]) -> usize {
                     nearby.iter().map(|near| (of(&near[root]) - of(expected)).abs()).fold(0.0, f64::max)
                 };
                 let check = |found: f64, expected: f64, moved: f64, what: &str| {
-                    let moved = if what == "slope" { moved + 1e-16 * largest } else { moved };
+                    let moved = if what == "slope" { moved + 1e-13 * (1.0 + largest) } else { moved };
                     let fine = found == expected
                         || found.is_nan() && expected.is_nan()
                         || (found - expected).abs() <= 1e-12 * expected.abs() + 64.0 * moved
@@ -176,12 +176,12 @@ pub fn agrees(graph: &Graph, roots: &[Id], points: &[[f64; SEEDS]]) -> usize {
 fn random_expressions_have_the_slopes_of_duals() {
     let mut random = Random::new(8);
     let mut compared = 0;
-    for case in 0..2000 {
+    for case in 0..10_000 {
         let (graph, roots) = expression(&mut random, 4 + case % 20);
         let points: Vec<_> = (0..16).map(|_| core::array::from_fn(|_| random.number())).collect();
         compared += agrees(&graph, &roots, &points);
     }
-    assert!(compared > 100_000, "{compared} slopes");
+    assert!(compared > 500_000, "{compared} slopes");
 }
 
 #[test]

@@ -159,7 +159,7 @@ model! { Chains, Kind::Continuous, |_t, x, _u, _p| Pair { a: x.a.chain(1.0, 2.0)
 model! { NeverEnds, Kind::Continuous, |_t, x, _u, p| {
     let mut a = x.a;
     while a > p.k {
-        a = a * 0.5;
+        a *= 0.5;
     }
     Pair { a, b: x.b }
 }, *x }
