@@ -4,7 +4,7 @@
 //! rounding is seen by moving its arguments by a few units in the last place: what that changes is allowed.
 
 use greybox::engine::{Program, Sampling, Trajectories};
-use greybox::graph::{Function, Function2, Graph, Id, Leaf, Seed};
+use greybox::graph::{Function, Function2, Graph, Id, Leaf, Node, Seed};
 use greybox::{Comparison, Dual, Recurrence};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -109,7 +109,7 @@ fn duals(graph: &Graph, roots: &[Id], at: &[f64; SEEDS]) -> Vec<Dual<SEEDS>> {
 }
 
 /// Compares a graph's values and slopes at these points with duals; tells how many slopes were compared.
-pub fn agrees(graph: &Graph, roots: &[Id], points: &[[f64; SEEDS]]) -> usize {
+pub fn agrees(graph: &Graph, roots: &[Id], points: &[[f64; SEEDS]], random: bool) -> usize {
     let mut with_states = graph.clone();
     let next: Vec<Id> = (0..STATES as u32).map(|i| with_states.leaf(Leaf::State(i))).collect();
     let recurrence = Recurrence::from_roots(&with_states, &next, roots, &[]).unwrap();
@@ -136,8 +136,25 @@ pub fn agrees(graph: &Graph, roots: &[Id], points: &[[f64; SEEDS]]) -> usize {
                 Leaf::Parameter(j) => Dual::variable(point[STATES + j as usize], STATES + j as usize),
                 other => panic!("{other:?}"),
             });
+            // Where a slope is infinite, or nearly so, rounding decides what the argument's slope makes of it.
+            let near = |x: &Id, edge: f64| (all[x.index()].value.abs() - edge).abs() < 1e-6;
+            let at_the_edge = |node: &Node| match node {
+                Node::Function(Function::Asin | Function::Acos | Function::Acosh | Function::Atanh, x) => near(x, 1.0),
+                Node::Function(Function::Sqrt | Function::Cbrt, x) => near(x, 0.0),
+                Node::Function2(Function2::Hypot | Function2::Pow, x, _) => near(x, 0.0),
+                _ => false,
+            };
+            let at_the_edge = random && graph.nodes().iter().any(at_the_edge);
             let numbers = all.iter().zip(&reached).filter(|(_, reached)| **reached).map(|(x, _)| x);
             let largest = numbers.clone().flat_map(|x| x.slopes).fold(0.0, |m: f64, slope| m.max(slope.abs()));
+            // What is not a number has a sign all the same, by which nothing can go.
+            let copied = |node: &Node| match node {
+                Node::Function2(Function2::Copysign, _, sign) => all[sign.index()].value.is_nan(),
+                _ => false,
+            };
+            if graph.nodes().iter().any(copied) {
+                continue;
+            }
             let tame = numbers.clone().all(|x| moderate(x.value) && x.slopes.iter().all(|slope| slope.abs() < 1e8));
             let expected = duals(graph, roots, point);
             let nearby: Vec<_> = [1.0, -1.0, 2.0, -3.0]
@@ -160,7 +177,7 @@ pub fn agrees(graph: &Graph, roots: &[Id], points: &[[f64; SEEDS]]) -> usize {
                 };
                 let value = row(root, SEEDS);
                 check(value, expected.value, moved(&|dual| dual.value), "value");
-                if tame {
+                if tame && !at_the_edge {
                     for s in 0..SEEDS {
                         check(row(root, s), expected.slopes[s], moved(&|dual| dual.slopes[s]), "slope");
                         compared += 1;
@@ -179,7 +196,7 @@ fn random_expressions_have_the_slopes_of_duals() {
     for case in 0..10_000 {
         let (graph, roots) = expression(&mut random, 4 + case % 20);
         let points: Vec<_> = (0..16).map(|_| core::array::from_fn(|_| random.number())).collect();
-        compared += agrees(&graph, &roots, &points);
+        compared += agrees(&graph, &roots, &points, true);
     }
     assert!(compared > 500_000, "{compared} slopes");
 }
@@ -219,7 +236,7 @@ fn every_function_has_the_slopes_of_duals() {
             let [x, y, z] = [Leaf::State(0), Leaf::State(1), Leaf::Parameter(0)].map(|leaf| graph.leaf(leaf));
             let x = if scaled { graph.mul(x, z) } else { x };
             let root = build(&mut graph, x, y);
-            compared += agrees(&graph, &[root], &points);
+            compared += agrees(&graph, &[root], &points, false);
         }
     };
     for function in FUNCTIONS {
