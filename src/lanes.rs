@@ -29,11 +29,13 @@ pub(crate) unsafe trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
 {
     /// Whether slopes are multiplied and added in one instruction: only where the machine has FMA.
+    #[cfg(feature = "std")]
     const FUSED: bool;
 }
 
 // SAFETY: the same type.
 unsafe impl Number for f64 {
+    #[cfg(feature = "std")]
     const FUSED: bool = false;
 }
 

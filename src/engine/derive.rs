@@ -47,7 +47,7 @@ impl Derivation {
         for (slot, value) in &code.constants {
             slots[usize::from(*slot) * lanes..][..lanes].fill(*value);
         }
-        run(width, Once::<1> { code, slots: &mut slots });
+        run(width, Once::<1> { code, slots: &mut slots, width });
         let mut inputs = vec![0.0; 2 * columns.len() * lanes];
         let mut rows = vec![0.0; code.rows.len() * lanes];
         for begin in (0..samples).step_by(lanes) {
@@ -59,7 +59,7 @@ impl Derivation {
                     }
                 }
             }
-            run(width, Run::<1> { code, slots: &mut slots, inputs: &inputs, rows: &mut rows, samples: 1 });
+            run(width, Run::<1> { code, slots: &mut slots, inputs: &inputs, rows: &mut rows, samples: 1, width });
             for (derived, row) in derived.iter_mut().zip(rows.chunks_exact(lanes)) {
                 derived.extend(&row[..there]);
             }

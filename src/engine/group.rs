@@ -81,11 +81,11 @@ impl Group {
     /// Computes what depends on parameters and steps alone: after they have been set, before anything runs.
     pub fn prepare(&mut self) {
         let program = Arc::clone(&self.program);
-        let (code, slots) = (&program.code, &mut self.numbers[self.first..]);
+        let (code, slots, width) = (&program.code, &mut self.numbers[self.first..], program.width);
         match self.registers {
-            1 => run(program.width, Once::<1> { code, slots }),
-            2 => run(program.width, Once::<2> { code, slots }),
-            _ => run(program.width, Once::<4> { code, slots }),
+            1 => run(width, Once::<1> { code, slots, width }),
+            2 => run(width, Once::<2> { code, slots, width }),
+            _ => run(width, Once::<4> { code, slots, width }),
         }
     }
 
@@ -160,14 +160,14 @@ impl Group {
         let program = Arc::clone(&self.program);
         self.clear_negligible();
         let lanes = self.lanes();
-        let (code, slots) = (&program.code, &mut self.numbers[self.first..]);
+        let (code, slots, width) = (&program.code, &mut self.numbers[self.first..], program.width);
         if let Some(machine) = &program.machine {
             return machine.run(code, lanes, slots, inputs, rows, samples);
         }
         match self.registers {
-            1 => run(program.width, Run::<1> { code, slots, inputs, rows, samples }),
-            2 => run(program.width, Run::<2> { code, slots, inputs, rows, samples }),
-            _ => run(program.width, Run::<4> { code, slots, inputs, rows, samples }),
+            1 => run(width, Run::<1> { code, slots, inputs, rows, samples, width }),
+            2 => run(width, Run::<2> { code, slots, inputs, rows, samples, width }),
+            _ => run(width, Run::<4> { code, slots, inputs, rows, samples, width }),
         }
     }
 

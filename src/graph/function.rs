@@ -38,7 +38,8 @@ pub enum Function {
 }
 
 impl Function {
-    /// All of them.
+    /// All of them; machine code calls them by number.
+    #[cfg(feature = "jit")]
     pub(crate) const ALL: [Function; 28] = [
         Function::Recip,
         Function::Sqrt,
@@ -159,7 +160,8 @@ pub enum Function2 {
 }
 
 impl Function2 {
-    /// All of them.
+    /// All of them; machine code calls them by number.
+    #[cfg(feature = "jit")]
     pub(crate) const ALL: [Function2; 7] = [
         Function2::Pow,
         Function2::Atan2,
