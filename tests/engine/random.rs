@@ -264,3 +264,55 @@ fn every_function_has_the_slopes_of_duals() {
     each(&|graph, x, y| graph.div(x, y));
     assert!(compared > 30_000, "{compared} slopes");
 }
+
+/// Values of sums, products, roots and selects have the very bits of the text: each operation is rounded, in its order.
+#[test]
+fn values_have_the_bits_of_the_text() {
+    let mut random = Random::new(3);
+    let mut compared = 0;
+    for _ in 0..500 {
+        let mut graph = Graph::default();
+        let mut nodes: Vec<Id> = (0..3).map(|i| graph.leaf(Leaf::State(i))).collect();
+        for _ in 0..25 {
+            let n = nodes.len();
+            let [a, b, c, d] = core::array::from_fn(|_| nodes[n - 1 - random.below(n.min(6))]);
+            nodes.push(match random.below(12) {
+                0..=3 => graph.mul(a, b),
+                4 | 5 => graph.add(a, b),
+                6 | 7 => graph.sub(a, b),
+                8 => graph.neg(a),
+                9 => graph.function([Function::Sqrt, Function::Abs, Function::Floor][random.below(3)], a),
+                10 => graph.function2([Function2::Max, Function2::Min][random.below(2)], a, b),
+                _ => graph.select(COMPARISONS[random.below(3)], a, b, c, d),
+            });
+        }
+        let (next, roots) = (nodes[..3].to_vec(), nodes[20..].to_vec());
+        let recurrence = Recurrence::from_roots(&graph, &next, &roots, &[]).unwrap();
+        for seeds in [&[][..], &[Seed::Carry(0), Seed::Carry(1), Seed::Carry(2)]] {
+            let program = Program::compile(&recurrence, seeds, Sampling::Uniform, Trajectories::Many).unwrap();
+            let mut group = program.group(1);
+            let points: Vec<[f64; 3]> = (0..group.lanes()).map(|_| core::array::from_fn(|_| random.number())).collect();
+            points.iter().enumerate().for_each(|(lane, point)| group.start(lane, point));
+            group.prepare();
+            let mut rows = vec![0.0; program.row_length() * group.lanes()];
+            group.run(&[], &mut rows, 1);
+            for (lane, point) in points.iter().enumerate() {
+                let expected = graph.evaluate(&roots, |leaf| match leaf {
+                    Leaf::State(i) => point[i as usize],
+                    other => panic!("{other:?}"),
+                });
+                for (root, expected) in expected.iter().enumerate() {
+                    let found = rows[(root * (seeds.len() + 1) + seeds.len()) * group.lanes() + lane];
+                    // Which of two zeros is the larger is not said.
+                    let same = found == *expected && (found == 0.0 || found.to_bits() == expected.to_bits());
+                    assert!(
+                        same || found.is_nan() && expected.is_nan(),
+                        "{found:e} {expected:e} at {point:?}\n{graph}"
+                    );
+                    compared += usize::from(found.is_finite());
+                }
+            }
+        }
+    }
+    assert!(compared > 20_000, "{compared}");
+}
