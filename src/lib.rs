@@ -80,9 +80,9 @@
 //! |---|---|---|
 //! | roof | read | [`report`], which reads [`diagnose`]; [`check`] |
 //! | 3 | learn | `loss`, `weighting`, `prefilter`, [`optimize`], [`regress`], [`numeric`], `fit`, `estimate`, [`online`] |
-//! | 2 | expect | `integrate`, `predict` |
-//! | 1 | say | `model`, `parameter`, `scaling`, `interval`, `experiment`, [`units`] |
-//! | ground | numbers | `lanes`, `scalar`, `dual`, `signals`, `information`, `covariance`, `whiteness`, `error` |
+//! | 2 | expect | `integrate`, `recurrence`, `engine`, `predict` |
+//! | 1 | say | `model`, `equations`, `parameter`, `scaling`, `interval`, `experiment`, [`units`] |
+//! | ground | numbers | `lanes`, `wide`, `scalar`, `dual`, [`graph`], `signals`, `information`, `covariance`, `whiteness`, `error` |
 //! | wing | machines | [`pmsm`], [`models`] |
 //!
 //! **The way of a sample through a fit.** [`Experiment`] holds it. The integrator carries the state to it in
@@ -98,7 +98,7 @@
 //!
 //! # Features
 //!
-//! `std`, `csv` and `parallel` are on by default; without `std` the ground floor (but for the triangle), models,
+//! `std`, `csv`, `jit` (machine code for models that can be read as a graph) and `parallel` are on by default; without `std` the ground floor (but for the triangle), models,
 //! integrators and [`online`] observers build without `alloc` too.
 #![cfg_attr(not(feature = "std"), no_std)]
 
