@@ -5,7 +5,7 @@ use super::{Compiled, Seed};
 use crate::wide::run;
 use std::sync::Arc;
 
-/// Slopes below this are gone for good; squared they are denormal, on which processors are up to 60 times slower.
+/// Slopes below this are set to zero between blocks: squared they are denormal, which slows processors down up to 60 times.
 const NEGLIGIBLE: f64 = 1e-150;
 
 /// Numbers in a cache line.

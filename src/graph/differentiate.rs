@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn the_side_not_taken_leaves_no_trace() {
+    fn the_side_not_taken_does_not_reach_the_slopes() {
         agrees(|graph, [x, _, p, _]| {
             let (zero, root) = (graph.constant(0.0), graph.function(Function::Sqrt, x));
             let chosen = graph.select(Comparison::Less, x, zero, zero, root);

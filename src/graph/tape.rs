@@ -122,7 +122,7 @@ impl Tape {
             }
             Node::Function2(Function2::Max, a, b) => self.either([b, a], a, b),
             Node::Function2(Function2::Min, a, b) => self.either([a, b], a, b),
-            // The sign of what is not a number is the processor's business; here it is positive.
+            // The sign of what is not a number depends on the processor; here it is positive.
             Node::Function2(Function2::Copysign, a, b) => self.strict(|graph| {
                 let zero = graph.constant(0.0);
                 let sign = graph.select(Comparison::Equal, b, b, b, zero);

@@ -109,9 +109,12 @@ impl Arena {
             return comparison.holds(x, y);
         }
         if cfg!(panic = "abort") {
-            // Odd answers could make the code panic, which nothing would catch. All are no, as for what is not a number.
+            // Odd answers could make the code panic, which nothing would catch. All are no, as for what is not a number;
+            // but a loop that goes on for long gets answers of both kinds, in no order.
             self.fail("it compares numbers, which a program built with panic = \"abort\" cannot follow both ways");
-            return self.operations > MAX_OPERATIONS && self.operations.is_multiple_of(2);
+            self.asked += 1;
+            let scattered = (self.asked as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 63;
+            return self.asked > 10_000 && scattered == 1;
         }
         let (pair, swapped) = if a <= b { ((a, b), false) } else { ((b, a), true) };
         let yes = match comparison {

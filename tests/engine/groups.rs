@@ -1,4 +1,4 @@
-//! Groups of lanes: lanes that do not know of each other, blocks, what is read back, irregular steps, large models.
+//! Groups of lanes: independence of lanes, blocks, what is read back, irregular steps, large models.
 
 use crate::steps::{Currents, Drive, Pmsm, Winding};
 use greybox::engine::{Column, Group, Program, Sampling, Trajectories};
@@ -42,7 +42,7 @@ fn carried(group: &Group, lane: usize) -> (Vec<f64>, Vec<f64>) {
 }
 
 #[test]
-fn lanes_do_not_know_of_their_neighbors_nor_of_blocks() {
+fn lanes_depend_neither_on_their_neighbors_nor_on_blocks() {
     let program = Program::compile(&recurrence(Hold::Zero), &SEEDS, Sampling::Uniform, Trajectories::Many).unwrap();
     let mut group = ready(&program, program.lanes());
     let lanes = group.lanes();
@@ -130,9 +130,9 @@ fn steps_may_differ_from_sample_to_sample() {
     }
 }
 
-/// Slopes that have died away are zero, not denormal.
+/// Slopes that have decayed become zero, not denormal.
 #[test]
-fn slopes_that_have_died_away_are_gone() {
+fn negligible_slopes_are_set_to_zero() {
     let mut graph = Graph::default();
     let (x, k) = (graph.leaf(Leaf::State(0)), graph.leaf(Leaf::Parameter(0)));
     let next = graph.mul(x, k);

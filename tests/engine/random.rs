@@ -147,7 +147,7 @@ pub fn agrees(graph: &Graph, roots: &[Id], points: &[[f64; SEEDS]], random: bool
             let at_the_edge = random && graph.nodes().iter().any(at_the_edge);
             let numbers = all.iter().zip(&reached).filter(|(_, reached)| **reached).map(|(x, _)| x);
             let largest = numbers.clone().flat_map(|x| x.slopes).fold(0.0, |m: f64, slope| m.max(slope.abs()));
-            // What is not a number has a sign all the same, by which nothing can go.
+            // The sign of what is not a number depends on the processor.
             let copied = |node: &Node| match node {
                 Node::Function2(Function2::Copysign, _, sign) => all[sign.index()].value.is_nan(),
                 _ => false,

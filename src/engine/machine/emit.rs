@@ -218,7 +218,7 @@ impl<'a> Emitter<'a> {
         if let Some(register) = self.registers.find(slot) {
             return Ok(Place::Register(self.unit.register(register)));
         }
-        if self.registers.deserves(self.registers.next[usize::from(slot)]) {
+        if self.registers.is_worth_loading(self.registers.next[usize::from(slot)]) {
             return self.load(slot).map(Place::Register);
         }
         Ok(Place::Memory(self.home(slot)))
