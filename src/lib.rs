@@ -98,7 +98,7 @@
 //!
 //! # Features
 //!
-//! `std`, `csv` and `parallel` are on by default; without `std` the ground floor (but for the triangle), models,
+//! `std`, `csv`, `jit` (machine code for models that can be read as a graph) and `parallel` are on by default; without `std` the ground floor (but for the triangle), models,
 //! integrators and [`online`] observers build without `alloc` too.
 #![cfg_attr(not(feature = "std"), no_std)]
 
@@ -193,7 +193,7 @@ pub use interval::{Hold, Interval};
 pub use layout::Kind;
 pub use model::Model;
 pub use parameter::{Parameter, Prior, Transform, fixed, free};
-pub use scalar::{Comparison, Scalar};
+pub use scalar::{Comparison, Extrapolation, Grid, Interpolation, Scalar, TableError};
 pub use signals::{Entry, Nothing, Of, Signals};
 
 #[cfg(feature = "csv")]
@@ -223,6 +223,7 @@ pub use {
     recurrence::{InvalidRecurrence, Recurrence},
     regress::{Assumption, LinearEstimate, Regression, RegressionError},
     report::Report,
+    scalar::Table,
     scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
     simulate::{Simulation, Simulator, simulate},
     weighting::{BySignal, Law, Weighting},
