@@ -89,9 +89,9 @@
 //! [`Dual`] numbers, a value with up to eight slopes, and the predictor turns that into a prediction error and its slopes,
 //! column by column in a window of 128 samples. The fit filters the window, divides it by the noise, weights it. The
 //! [`Information`] triangle absorbs its rows by orthogonal reflections and forgets them. After the last window the optimizer
-//! reads its step off the triangle; initial states, and parameters that each experiment has for itself, are minimized out
-//! of their experiment's triangle before the triangles are merged. When the search has ended, covariance, rank and
-//! directions come from the same triangle. Nothing is kept of the samples, and nothing is allocated for them.
+//! reads its step off the triangles; initial states, and parameters that each experiment has for itself, are minimized out
+//! of their experiment's triangle first ([`Elimination`]), so that many experiments cost no more than their samples. When
+//! the search has ended, covariance, rank and directions come from the same triangles. Nothing is kept of the samples, and nothing is allocated for them.
 //!
 //! Only the loop over the samples is compiled for each model. `fit/source.rs` is the door to it: search, noise, covariance
 //! and diagnoses see windows of numbers through it, and are compiled once.
