@@ -17,9 +17,6 @@ mod elimination;
 mod inverse;
 mod matrix;
 mod reflect;
-// The sweep over a record in segments is to use it.
-#[cfg_attr(not(test), expect(dead_code))]
-pub(crate) mod segments;
 mod solve;
 mod spectrum;
 mod triangles;

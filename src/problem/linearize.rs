@@ -30,6 +30,7 @@ impl Objective<'_> {
         if !exact && found.moved > MOVED * 2.0 * found.cost {
             found = self.triangles(coordinates, &values, found.borders.as_ref())?;
         }
+        if std::env::var("DBG").is_ok() { eprintln!("{coordinates:?} {:?} {:?}", found.cost, found.blocks[0]); }
         let Triangulation { mut cost, mut blocks, borders, .. } = found;
         if let Some(borders) = borders {
             self.memory.keep(Arc::new(borders));

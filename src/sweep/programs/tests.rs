@@ -29,7 +29,7 @@ impl Model for Pendulum {
         Angle { phi: x.w, w: u.m * p.b - pull * p.g - x.w * p.d + (t * 3.0).sin() * 0.1 }
     }
     fn output<S: Scalar>(&self, _t: S, x: &Angle<S>, u: &Torque<S>, p: &Given<S>) -> Angle<S> {
-        Angle { phi: x.phi, w: x.w + u.m * p.b * 0.01 }
+        Angle { phi: x.phi, w: x.w + u.m * 0.01 }
     }
     fn diffusion<S: Scalar>(&self, p: &Given<S>) -> Angle<S> {
         Angle { phi: S::from(0.0), w: p.q }
@@ -103,28 +103,24 @@ fn compare(model: &Pendulum, predictor: impl crate::Predictor, uniform: bool, ho
     let prepared: Vec<Prepared> = records.iter().zip(&all_p).map(|(r, p)| plain.prepare(r, p).unwrap()).collect();
     for seeds in [vec![], vec![Seed::Carry(1), Seed::Parameter(0), Seed::Parameter(2), Seed::Parameter(3), Seed::Parameter(4)]] {
         let piece = |i: usize| {
-            let Reached { carry, slopes } = plain.start(&records[i], &[0.3, -0.2], &all_p[i]);
+            let Reached { carry, slopes: all } = plain.start(&records[i], &[0.3, -0.2], &all_p[i]);
             let column = |seed: &Seed| match *seed {
                 Seed::Carry(i) => i,
                 Seed::Parameter(j) => 2 + j,
             };
-            let slopes = (0..carry.len()).flat_map(|row| seeds.iter().map(move |seed| (row, seed)));
-            let slopes = slopes.map(|(row, seed)| plain.start(&records[i], &[0.3, -0.2], &all_p[i]).slopes[row * 7 + column(seed)] + slopes_at(&slopes, row, seed)).collect();
+            let row = |row: usize| seeds.iter().map(|seed| all[row * 7 + column(seed)]).collect::<Vec<f64>>();
+            let slopes = (0..carry.len()).flat_map(row).collect();
             let (record, prepared, parameters) = (&records[i], &prepared[i], &all_p[i][..]);
-            Piece { record, prepared, samples: 0..lengths[i].min(record.len()), carry, slopes, parameters }
+            Piece { record, prepared, samples: 0..lengths[i], carry, slopes, parameters }
         };
-        fn slopes_at(_: &[f64], _: usize, _: &Seed) -> f64 {
-            0.0
-        }
         let pieces: Vec<Piece<'_>> = (0..lengths.len()).map(piece).collect();
         let lanes = programs.lanes(&records[0], &seeds);
-        let (expected, ends) = rows(&*plain, &pieces, &seeds);
-        let (mut found, mut reached) = (vec![], vec![]);
-        for pieces in pieces.chunks(lanes) {
-            let (rows, ends) = rows(&programs, pieces, &seeds);
-            found.extend(rows);
-            reached.extend(ends);
-        }
+        let all = |sweep: &dyn Sweep, lanes: usize| {
+            let found: Vec<_> = pieces.chunks(lanes).map(|pieces| rows(sweep, pieces, &seeds)).collect();
+            let (rows, reached): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+            (rows.concat(), reached.concat())
+        };
+        let ((expected, ends), (found, reached)) = (all(&*plain, 1), all(&programs, lanes));
         for lane in 0..pieces.len() {
             assert_eq!(expected[lane].len(), found[lane].len());
             for (at, (a, b)) in expected[lane].iter().zip(&found[lane]).enumerate() {
