@@ -23,7 +23,6 @@ impl Model for Pmsm {
     type Output = Currents;
     type Parameters = Winding;
 
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Currents<S>, u: &Drive<S>, p: &Winding<S>) -> Currents<S> {
         let we = u.w * 4.0;
         Currents {
@@ -32,7 +31,6 @@ impl Model for Pmsm {
         }
     }
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
         *x
     }

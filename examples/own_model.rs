@@ -31,14 +31,12 @@ impl Model for Cooling {
     type Parameters = Mug;
     const KIND: Kind = Kind::Discrete;
 
-    #[inline]
     fn next<S: Scalar>(&self, _t: S, x: &Heat<S>, u: &Surroundings<S>, p: &Mug<S>) -> Heat<S> {
         let rest = u.ambient + u.power / p.loss;
         let decay = (-p.loss * self.step / p.capacity).exp();
         Heat { temperature: rest + (x.temperature - rest) * decay }
     }
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Heat<S>, _u: &Surroundings<S>, p: &Mug<S>) -> Thermistor<S> {
         Thermistor { resistance: p.r25 * (p.beta * (x.temperature.recip() - 1.0 / 298.15)).exp() }
     }

@@ -33,7 +33,6 @@ const KP: f64 = 160.18; // 1/s
 const KV: f64 = 243.45; // V s/m
 
 impl Axis {
-    #[inline]
     fn command<S: Scalar>(x: &Motion<S>, u: &Reference<S>) -> S {
         (((u.qg - x.q) * KP - x.vm) * KV).clamp(-10.0, 10.0)
     }
@@ -45,7 +44,6 @@ impl Model for Axis {
     type Output = Guided;
     type Parameters = Friction;
 
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Reference<S>, p: &Friction<S>) -> Motion<S> {
         let forwards = (x.v / 5e-4).tanh() * 0.5 + 0.5;
         let dry = p.fcp * forwards - p.fcn * (-forwards + 1.0);
@@ -54,7 +52,6 @@ impl Model for Axis {
         Motion { q: x.v, v, vm: (x.v - x.vm) / 1e-3 }
     }
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Reference<S>, _p: &Friction<S>) -> Guided<S> {
         Guided { qm: x.q, vir: Self::command(x, u) }
     }

@@ -37,11 +37,9 @@
 //!     type Output = Level;
 //!     type Parameters = Tank;
 //!
-//!     #[inline]
 //!     fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Inflow<S>, p: &Tank<S>) -> Level<S> {
 //!         Level { h: (u.q - p.outlet * (x.h * 19.62).sqrt()) / p.area }
 //!     }
-//!     #[inline]
 //!     fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Inflow<S>, _p: &Tank<S>) -> Level<S> {
 //!         *x
 //!     }

@@ -18,7 +18,6 @@ impl Model for Polynomial {
     type Parameters = Cubic;
     const KIND: Kind = Kind::Static;
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Input<S>, p: &Cubic<S>) -> Output<S> {
         Output { y: p.a + p.b * u.u + p.c * u.u * u.u }
     }
@@ -121,12 +120,10 @@ impl Model for FirstOrder {
     type Output = Level;
     type Parameters = Lag;
 
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Input<S>, p: &Lag<S>) -> Level<S> {
         Level { x: (p.k * u.u - x.x) / p.tau }
     }
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Input<S>, _p: &Lag<S>) -> Level<S> {
         *x
     }

@@ -21,7 +21,6 @@ impl Model for Amplifier {
     type Parameters = Product;
     const KIND: Kind = Kind::Static;
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Drive<S>, p: &Product<S>) -> Reading<S> {
         Reading { y: p.a * p.b * u.u + p.c, z: p.c * u.w }
     }
@@ -75,7 +74,6 @@ impl Model for Binding {
     type Parameters = Saturation;
     const KIND: Kind = Kind::Static;
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Dose<S>, p: &Saturation<S>) -> Answer<S> {
         Answer { y: p.top * u.u / (p.half + u.u) }
     }
@@ -181,7 +179,6 @@ impl Model for Emps {
     type Output = Motion;
     type Parameters = Slide;
 
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Command<S>, p: &Slide<S>) -> Motion<S> {
         let sign = (x.v * 500.0).tanh();
         let forward = (sign + 1.0) * 0.5;
@@ -189,7 +186,6 @@ impl Model for Emps {
         Motion { q: x.v, v: (u.vir * GTAU - p.fv * x.v - friction - p.offset) / p.m }
     }
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, _u: &Command<S>, _p: &Slide<S>) -> Motion<S> {
         *x
     }

@@ -24,7 +24,6 @@ impl Model for Friction {
     type Parameters = Line;
     const KIND: Kind = Kind::Static;
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Drive<S>, p: &Line<S>) -> Response<S> {
         let dry = if u.u.value() > 0.0 { p.forwards } else { -p.backwards };
         Response { y: p.gain * p.scale * (p.slope * u.u + dry + p.offset) }

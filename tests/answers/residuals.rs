@@ -19,7 +19,6 @@ impl Model for Amplifier {
     type Parameters = Gain;
     const KIND: greybox::Kind = greybox::Kind::Static;
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Drive<S>, p: &Gain<S>) -> Reading<S> {
         Reading { y: p.k * u.u }
     }

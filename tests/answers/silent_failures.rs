@@ -17,12 +17,10 @@ impl Model for FirstOrder {
     type Output = Level;
     type Parameters = Lag;
 
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Drive<S>, p: &Lag<S>) -> Level<S> {
         Level { x: (p.k * u.u - x.x) / p.tau }
     }
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Drive<S>, _p: &Lag<S>) -> Level<S> {
         *x
     }
@@ -113,7 +111,6 @@ impl Model for Offsets {
     type Parameters = Amplified;
     const KIND: Kind = Kind::Static;
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Drive<S>, p: &Amplified<S>) -> Level<S> {
         Level { x: p.g * u.u + p.b + p.c + p.idle * 0.0 }
     }
@@ -180,13 +177,11 @@ mod emps {
         type Output = Position;
         type Parameters = Slide;
 
-        #[inline]
         fn derivative<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Command<S>, p: &Slide<S>) -> Motion<S> {
             let friction = p.fv * x.v + p.fc * (x.v * 500.0).tanh();
             Motion { q: x.v, v: (u.vir * 35.150_651_88 - friction - p.offset) / p.m }
         }
 
-        #[inline]
         fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, _u: &Command<S>, _p: &Slide<S>) -> Position<S> {
             Position { q: x.q }
         }

@@ -18,12 +18,10 @@ impl Model for Oscillator {
     type Output = Position;
     type Parameters = Spring;
 
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Force<S>, p: &Spring<S>) -> Motion<S> {
         Motion { q: x.v, v: (u.f - p.damping * x.v - p.stiffness * x.q) / p.mass }
     }
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, _u: &Force<S>, _p: &Spring<S>) -> Position<S> {
         Position { q: x.q }
     }

@@ -17,12 +17,10 @@ impl Model for FirstOrder {
     type Output = Level;
     type Parameters = Lag;
 
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Drive<S>, p: &Lag<S>) -> Level<S> {
         Level { x: (p.k * u.u - x.x) / p.tau }
     }
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Drive<S>, _p: &Lag<S>) -> Level<S> {
         *x
     }
