@@ -1,8 +1,10 @@
 //! Comparison, validation, drift and derived quantities against values known beforehand.
 
 use crate::random::Random;
-use greybox::diagnose::{Comparison, Summary, cross_validate, derived, drift, f_test, likelihood_ratio, validate};
-use greybox::{Error, Estimate, Experiment, Fit, Kind, Model, Nothing, Parameter, Scalar, Time, fixed, free, signals};
+use greybox::diagnose::{Candidate, Comparison, cross_validate, derived, drift, f_test, likelihood_ratio, validate};
+use greybox::{
+    Error, Estimate, Experiment, Fit, Kind, Model, Nothing, Parameter, Scalar, Summary, Time, fixed, free, signals,
+};
 
 signals! { struct Input { u: "V" } }
 signals! { struct Output { y: "A" } }
@@ -44,8 +46,8 @@ fn nested_models_are_told_apart() {
     let (mut by_ratio, mut by_f) = (0, 0);
     for seed in 0..1000 {
         let record = [record(seed, 2.0, 0.0)];
-        let line = Summary::of("line", &fit(&record, fixed(0.0)).unwrap());
-        let parabola = Summary::of("parabola", &fit(&record, free(0.1)).unwrap());
+        let line = Candidate::new("line", &fit(&record, fixed(0.0)).unwrap());
+        let parabola = Candidate::new("parabola", &fit(&record, free(0.1)).unwrap());
         by_ratio += u32::from(!likelihood_ratio(&line, &parabola).unwrap().passed);
         by_f += u32::from(!f_test(&line, &parabola).unwrap().passed);
         assert!(likelihood_ratio(&parabola, &line).is_err());
@@ -54,11 +56,12 @@ fn nested_models_are_told_apart() {
     assert!((2..=22).contains(&by_f) && (2..=26).contains(&by_ratio), "{by_f} {by_ratio}");
 
     let record = [record(1, 2.0, 0.3)];
-    let line = Summary::of("line", &fit(&record, fixed(0.0)).unwrap());
-    let parabola = Summary::of("parabola", &fit(&record, free(0.1)).unwrap());
+    let line = Candidate::new("line", &fit(&record, fixed(0.0)).unwrap());
+    let parabola = Candidate::new("parabola", &fit(&record, free(0.1)).unwrap());
     let test = f_test(&line, &parabola).unwrap();
     assert!(!test.passed && test.meaning.contains("`line` misses something"), "{test:?}");
-    assert!(parabola.aicc < line.aicc && parabola.bic < line.bic);
+    let (few, many) = (&line.estimate, &parabola.estimate);
+    assert!(many.aicc() < few.aicc() && many.bic() < few.bic());
     let table = Comparison(vec![line, parabola]).to_string();
     println!("{table}");
     assert!(table.lines().any(|line| line.starts_with("c ") && line.contains(" - ")), "{table}");
@@ -94,7 +97,7 @@ fn unseen_data_and_drift() {
 
     let each = |first: u64, b: &dyn Fn(u64) -> f64| -> Vec<Summary> {
         let estimates = (0..8).map(|day| fit(&[record(first + day, b(day), 0.3)], free(0.0)).unwrap());
-        estimates.map(|estimate| Summary::of("day", &estimate)).collect()
+        estimates.map(Estimate::into_summary).collect()
     };
     // Nothing drifts: each test refuses about once in a hundred times; 300 of each, three deviations above 1.4 % (the tail of
     // Student's t with 37 degrees of freedom where a normal one has 1 %).
