@@ -3,8 +3,8 @@
 use crate::dual::Dual;
 use crate::integrate::{Integrator, ModelSystem};
 use crate::interval::{Hold, Interval};
-use crate::loss::Loss;
 use crate::layout::Kind;
+use crate::loss::Loss;
 use crate::model::Model;
 use crate::numeric::{central_jacobian, joined, taken};
 use crate::scalar::Scalar;

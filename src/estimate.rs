@@ -7,7 +7,7 @@ pub(crate) mod student;
 pub(crate) use display::{number, p_value};
 pub use prediction::Prediction;
 
-use crate::information::SquareMatrix;
+use crate::information::{Covariance, SquareMatrix};
 use crate::layout::Layout;
 use crate::model::Model;
 use crate::optimize::{Outcome, Severity};
@@ -260,8 +260,9 @@ pub struct Summary {
     pub outputs: Vec<OutputEstimate>,
     /// All free quantities in the order of the covariance: common parameters, then experiment by experiment.
     pub unknowns: Vec<Unknown>,
-    /// Covariance of the unknowns, in products of their units; zero where there is no interval.
-    pub covariance: SquareMatrix,
+    /// Covariance of the unknowns, in products of their units and in their order; zero where there is no interval. Its
+    /// memory is linear in their number.
+    pub covariance: Covariance,
     /// Covariance of the noise between outputs, where it was estimated in full.
     pub noise_covariance: Option<SquareMatrix>,
     /// What the data cannot tell apart.
@@ -315,9 +316,9 @@ impl Summary {
         Some(student::interval(unknown.value, error, unknown.transform, probability, self.degrees_of_freedom()))
     }
 
-    /// Correlation of the unknowns; zero where there is no interval, one on the diagonal.
-    pub fn correlation(&self) -> SquareMatrix {
-        let c = &self.covariance;
+    /// Correlation of some unknowns, by their numbers; zero where there is no interval, one on the diagonal.
+    pub fn correlation(&self, unknowns: &[usize]) -> SquareMatrix {
+        let c = self.covariance.dense(unknowns);
         SquareMatrix::from_fn(c.size(), |i, j| {
             let scale = (c[(i, i)] * c[(j, j)]).sqrt();
             if i == j {

@@ -12,15 +12,21 @@
 
 mod block;
 mod covariance;
+mod elimination;
+mod inverse;
 mod matrix;
 mod reflect;
 mod solve;
 mod spectrum;
+mod triangles;
 
 pub use block::Block;
+pub use covariance::Covariance;
+pub use elimination::{BadPiece, Elimination, Undetermined};
 pub use matrix::SquareMatrix;
 pub use solve::RankDeficient;
 pub use spectrum::{NoSpectrum, Spectrum};
+pub use triangles::Triangles;
 
 use serde::{Deserialize, Serialize};
 
@@ -122,6 +128,18 @@ impl Information {
         Information { columns, rows: self.rows, triangle }
     }
 
+    /// The first columns of `Phi` alone, as far as their rows reach; with `y` zero.
+    fn leading(&self, columns: usize) -> Information {
+        let mut leading = Information::new(columns);
+        leading.rows = self.rows;
+        let mut start = 0;
+        for i in 0..columns {
+            leading.triangle[start..start + columns - i].copy_from_slice(&self.row(i).1[..columns - i]);
+            start += columns + 1 - i;
+        }
+        leading
+    }
+
     /// What is known of these columns, in this order, with all others held at a zero step.
     pub fn select(&self, columns: &[usize]) -> Information {
         let mut selected = Information::new(columns.len());
@@ -173,13 +191,25 @@ impl Information {
 
     /// Euclidean norm of each column of `Phi`.
     pub fn column_norms(&self) -> Vec<f64> {
-        (0..self.columns).map(|j| norm((0..=j).map(|i| self.at(i, j)))).collect()
+        (0..self.columns).map(|j| self.column_norm(j)).collect()
+    }
+
+    fn column_norm(&self, j: usize) -> f64 {
+        norm((0..=j).map(|i| self.at(i, j)))
     }
 
     /// Entry of the triangle, `i <= j`, the column `columns` being `y`; zero below the diagonal.
     pub fn at(&self, i: usize, j: usize) -> f64 {
         let width = self.columns + 1;
         if i > j || j >= width { 0.0 } else { self.triangle[i * (2 * width + 1 - i) / 2 + j - i] }
+    }
+
+    // Row `i` of the triangle: its `y`, and its slopes from the diagonal on.
+    fn row(&self, i: usize) -> (f64, &[f64]) {
+        let width = self.columns + 1;
+        let start = i * (2 * width + 1 - i) / 2;
+        let (slopes, y) = self.triangle[start..].split_at(self.columns - i);
+        (y[0], slopes)
     }
 
     // The triangle's rows as a block, with these columns.
@@ -209,8 +239,9 @@ impl Information {
 }
 
 // Euclidean norm without overflow or underflow.
-fn norm(entries: impl Iterator<Item = f64>) -> f64 {
-    entries.fold(0.0, f64::hypot)
+fn norm(entries: impl Iterator<Item = f64> + Clone) -> f64 {
+    let squares: f64 = entries.clone().map(|entry| entry * entry).sum();
+    if (1e-200..1e200).contains(&squares) { squares.sqrt() } else { entries.fold(0.0, f64::hypot) }
 }
 
 #[derive(Deserialize)]

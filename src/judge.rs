@@ -1,7 +1,6 @@
 //! From where a search ended to what is known: noise, covariance, directions, warnings.
 
 mod conclude;
-mod covariance;
 mod directions;
 mod hac;
 pub(crate) mod noise;
@@ -10,6 +9,5 @@ mod sandwich;
 mod warnings;
 
 pub(crate) use conclude::{SearchEnd, conclude};
-pub(crate) use covariance::classical;
-pub(crate) use directions::held_or_unseen;
+pub(crate) use directions::undetermined;
 pub(crate) use residual_pass::output_fit;

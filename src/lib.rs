@@ -80,7 +80,7 @@
 //! | 3 | learn | `loss`, `weighting`, `prefilter`, [`optimize`], [`regress`], [`numeric`], `fit`, `estimate`, [`online`] |
 //! | 2 | expect | `integrate`, `predict` |
 //! | 1 | say | `model`, `parameter`, `scaling`, `interval`, `experiment`, [`units`] |
-//! | ground | numbers | `lanes`, `scalar`, `dual`, `signals`, `information`, `covariance`, `whiteness`, `error` |
+//! | ground | numbers | `lanes`, `scalar`, `dual`, `signals`, `information`, `whiteness`, `error` |
 //! | wing | machines | [`pmsm`], [`models`] |
 //!
 //! **The way of a sample through a fit.** [`Experiment`] holds it. The integrator carries the state to it in
@@ -100,7 +100,6 @@
 //! integrators and [`online`] observers build without `alloc` too.
 #![cfg_attr(not(feature = "std"), no_std)]
 
-mod covariance;
 #[cfg(feature = "std")]
 mod dispatch;
 mod dual;
@@ -124,6 +123,11 @@ pub mod check;
 #[cfg(feature = "std")]
 pub mod diagnose;
 #[cfg(feature = "std")]
+#[doc(hidden)]
+pub mod engine;
+#[cfg(feature = "std")]
+mod equations;
+#[cfg(feature = "std")]
 mod error;
 #[cfg(feature = "std")]
 mod estimate;
@@ -133,6 +137,10 @@ mod experiment;
 mod fit;
 #[cfg(feature = "std")]
 mod functions;
+#[cfg(feature = "std")]
+mod fused;
+#[cfg(feature = "std")]
+pub mod graph;
 #[cfg(feature = "std")]
 mod information;
 #[cfg(feature = "std")]
@@ -156,6 +164,8 @@ mod random;
 #[cfg(feature = "std")]
 pub mod record;
 #[cfg(feature = "std")]
+mod recurrence;
+#[cfg(feature = "std")]
 pub mod regress;
 #[cfg(feature = "std")]
 pub mod report;
@@ -175,20 +185,20 @@ mod wide;
 #[doc(hidden)]
 pub use {approx, nalgebra, serde};
 
-pub use covariance::{Covariance, Gain};
 pub use dual::Dual;
 pub use integrate::{Automatic, Discrete, Esdirk, Integrator, ModelSystem, Rk4, Rk45, Square, Stuck, System};
 pub use interval::{Hold, Interval};
 pub use layout::Kind;
 pub use model::Model;
 pub use parameter::{Parameter, Prior, Transform, fixed, free};
-pub use scalar::Scalar;
+pub use scalar::{Comparison, Scalar};
 pub use signals::{Entry, Nothing, Of, Signals};
 
 #[cfg(feature = "csv")]
 pub use record::CsvFile;
 #[cfg(feature = "std")]
 pub use {
+    equations::{Dependence, Equations, InvalidEquations},
     error::{Error, Failure},
     estimate::{
         CovarianceMethod, Direction, Estimate, Knowledge, Method, NoiseModel, OutputFit, Prediction, Summary, Unknown,
@@ -196,7 +206,10 @@ pub use {
     },
     experiment::{Experiment, ExperimentOf, Sample},
     fit::{Fit, Records},
-    information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
+    information::{
+        BadPiece, Block, Covariance, Elimination, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix,
+        Triangles, Undetermined,
+    },
     layout::{Layout, Quantity},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
     numeric::{Derivative, Next, Numeric, StateEquation},
@@ -205,10 +218,11 @@ pub use {
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
     problem::{Objective, Problem, Search},
     record::{Gap, Initial, Time},
+    recurrence::{InvalidRecurrence, Recurrence},
     regress::{Assumption, LinearEstimate, Regression, RegressionError},
     report::Report,
-    simulate::{Simulation, Simulator, simulate},
     scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
+    simulate::{Simulation, Simulator, simulate},
     weighting::{BySignal, Law, Weighting},
 };
 

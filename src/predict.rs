@@ -9,8 +9,8 @@ mod plant;
 pub use free_run::FreeRun;
 pub use horizon::Horizon;
 pub use kalman::Kalman;
-pub(crate) use plant::{Between, SlicePlant, Stepped};
 pub use plant::Plant;
+pub(crate) use plant::{Between, SlicePlant, Stepped};
 
 use crate::error::Error;
 use crate::integrate::{Duals, Stuck};

@@ -56,12 +56,7 @@ impl Record {
     /// # Errors
     /// No signal at all, fewer than two samples (one, without state), lengths that differ, time that does not increase, a
     /// time or input that is not finite, an infinite output.
-    pub fn new(
-        states: Vec<Quantity>,
-        time: Time,
-        inputs: Vec<Channel>,
-        outputs: Vec<Channel>,
-    ) -> Result<Self, Error> {
+    pub fn new(states: Vec<Quantity>, time: Time, inputs: Vec<Channel>, outputs: Vec<Channel>) -> Result<Self, Error> {
         let (name, hold, initial) = ("record".to_owned(), Hold::default(), Initial::default());
         Record { name, states, time, inputs, outputs, hold, initial }.checked()
     }

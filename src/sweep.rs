@@ -12,20 +12,13 @@ pub(crate) use duals::{DualSweep, OVERFLOW};
 pub(crate) use loops::Loops;
 pub use window::Window;
 
+pub use crate::graph::Seed;
+
 use crate::error::{Error, Failure};
 use crate::layout::Layout;
 use crate::record::Record;
 use std::ops::Range;
 use std::sync::Arc;
-
-/// What a column of slopes is taken with respect to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Seed {
-    /// Parameter number.
-    Parameter(usize),
-    /// Number of an entry of the carry at the begin of the piece: a state, or what a predictor carries besides.
-    Carry(usize),
-}
 
 /// What a sweep made of a record before the search.
 #[derive(Clone, Debug, Default)]
@@ -147,7 +140,13 @@ pub trait Sweep: Send + Sync {
     ///
     /// # Errors
     /// Why the outputs do not give it.
-    fn measured_state(&self, record: &Record, sample: usize, parameters: &[f64], alone: bool) -> Result<Vec<f64>, String> {
+    fn measured_state(
+        &self,
+        record: &Record,
+        sample: usize,
+        parameters: &[f64],
+        alone: bool,
+    ) -> Result<Vec<f64>, String> {
         let _ = (record, sample, parameters, alone);
         Err("the sweep does not solve outputs for states".to_owned())
     }

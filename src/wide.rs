@@ -21,6 +21,16 @@ pub(crate) trait Wide: Copy + Send + Sync + 'static {
     fn load(from: &[f64]) -> Self;
     /// Into the first `LANES` numbers of a slice, which must have as many.
     fn store(self, to: &mut [f64]);
+    /// `LANES` numbers from an address.
+    ///
+    /// # Safety
+    /// They must be readable.
+    unsafe fn read(from: *const f64) -> Self;
+    /// `LANES` numbers to an address.
+    ///
+    /// # Safety
+    /// They must be writable.
+    unsafe fn write(self, to: *mut f64);
 
     fn add(self, b: Self) -> Self;
     fn sub(self, b: Self) -> Self;
@@ -29,8 +39,14 @@ pub(crate) trait Wide: Copy + Send + Sync + 'static {
     fn sqrt(self) -> Self;
     /// The sign bit turned over.
     fn neg(self) -> Self;
+    /// The sign bit turned over where that of `sign`, a zero, is set.
+    fn xor(self, sign: Self) -> Self;
     /// The sign bit cleared.
     fn abs(self) -> Self;
+    /// With the sign bit of `sign`.
+    fn copysign(self, sign: Self) -> Self;
+    /// Times two to the power of `n`, a whole number between -2100 and 2100 (not checked), rounded once.
+    fn scale2(self, n: Self) -> Self;
     /// `self * a + b`, rounded once where the machine can.
     fn mul_add(self, a: Self, b: Self) -> Self;
     /// `b - self * a`, rounded once where the machine can.
@@ -87,6 +103,9 @@ enum Instructions {
     #[cfg(target_arch = "x86_64")]
     Fma,
     Portable,
+    #[cfg(target_arch = "x86_64")]
+    FmaSingle,
+    Single,
 }
 
 impl Width {
@@ -126,11 +145,23 @@ impl Width {
         Width(Instructions::Portable)
     }
 
+    /// One number at a time, with fused products where the processor has them.
+    pub fn single() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("fma") {
+            return Width(Instructions::FmaSingle);
+        }
+        Width(Instructions::Single)
+    }
+
     /// Lanes of a register.
     pub fn lanes(self) -> usize {
         match self.0 {
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx512 => 8,
+            #[cfg(target_arch = "x86_64")]
+            Instructions::FmaSingle => 1,
+            Instructions::Single => 1,
             _ => 4,
         }
     }
@@ -150,6 +181,10 @@ pub(crate) fn run<T: Task>(width: Width, task: T) -> T::Output {
         #[cfg(target_arch = "x86_64")]
         Instructions::Fma => unsafe { with_fma(task) },
         Instructions::Portable => task.run::<Array<{ cfg!(not(target_arch = "x86_64")) }>>(),
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        Instructions::FmaSingle => unsafe { one_with_fma(task) },
+        Instructions::Single => task.run::<One<{ cfg!(not(target_arch = "x86_64")) }>>(),
     }
 }
 
@@ -169,6 +204,12 @@ unsafe fn with_avx2<T: Task>(task: T) -> T::Output {
 #[target_feature(enable = "fma")]
 unsafe fn with_fma<T: Task>(task: T) -> T::Output {
     task.run::<Array<true>>()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "fma")]
+unsafe fn one_with_fma<T: Task>(task: T) -> T::Output {
+    task.run::<One<true>>()
 }
 
 /// Four numbers in an array.
@@ -196,6 +237,15 @@ impl<const FUSED: bool> Array<FUSED> {
     }
 }
 
+/// `a 2^n` in two factors, neither of which overflows where the result does not.
+#[inline(always)]
+fn scaled(a: f64, n: f64) -> f64 {
+    let n = n as i64;
+    let half = n >> 1;
+    let power = |n: i64| f64::from_bits(((n + 1023) as u64) << 52);
+    a * power(half) * power(n - half)
+}
+
 impl<const FUSED: bool> Wide for Array<FUSED> {
     const LANES: usize = 4;
 
@@ -210,6 +260,16 @@ impl<const FUSED: bool> Wide for Array<FUSED> {
     #[inline(always)]
     fn store(self, to: &mut [f64]) {
         to[..4].copy_from_slice(&self.0);
+    }
+    #[inline(always)]
+    unsafe fn read(from: *const f64) -> Self {
+        // SAFETY: as the caller says.
+        Array(unsafe { from.cast::<[f64; 4]>().read() })
+    }
+    #[inline(always)]
+    unsafe fn write(self, to: *mut f64) {
+        // SAFETY: as the caller says.
+        unsafe { to.cast::<[f64; 4]>().write(self.0) }
     }
     #[inline(always)]
     fn add(self, b: Self) -> Self {
@@ -236,8 +296,20 @@ impl<const FUSED: bool> Wide for Array<FUSED> {
         self.each(self, |a, _| -a)
     }
     #[inline(always)]
+    fn xor(self, sign: Self) -> Self {
+        self.each(sign, |a, sign| f64::from_bits(a.to_bits() ^ sign.to_bits()))
+    }
+    #[inline(always)]
     fn abs(self) -> Self {
         self.each(self, |a, _| a.abs())
+    }
+    #[inline(always)]
+    fn copysign(self, sign: Self) -> Self {
+        self.each(sign, |a, sign| a.copysign(sign))
+    }
+    #[inline(always)]
+    fn scale2(self, n: Self) -> Self {
+        self.each(n, scaled)
     }
     #[inline(always)]
     fn mul_add(self, a: Self, b: Self) -> Self {
@@ -262,11 +334,102 @@ impl<const FUSED: bool> Wide for Array<FUSED> {
     }
 }
 
+/// One number: for trajectories that run alone.
+#[derive(Clone, Copy)]
+pub(crate) struct One<const FUSED: bool>(f64);
+
+impl<const FUSED: bool> Wide for One<FUSED> {
+    const LANES: usize = 1;
+
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        One(x)
+    }
+    #[inline(always)]
+    fn load(from: &[f64]) -> Self {
+        One(from[0])
+    }
+    #[inline(always)]
+    fn store(self, to: &mut [f64]) {
+        to[0] = self.0;
+    }
+    #[inline(always)]
+    unsafe fn read(from: *const f64) -> Self {
+        // SAFETY: as the caller says.
+        One(unsafe { from.read() })
+    }
+    #[inline(always)]
+    unsafe fn write(self, to: *mut f64) {
+        // SAFETY: as the caller says.
+        unsafe { to.write(self.0) }
+    }
+    #[inline(always)]
+    fn add(self, b: Self) -> Self {
+        One(self.0 + b.0)
+    }
+    #[inline(always)]
+    fn sub(self, b: Self) -> Self {
+        One(self.0 - b.0)
+    }
+    #[inline(always)]
+    fn mul(self, b: Self) -> Self {
+        One(self.0 * b.0)
+    }
+    #[inline(always)]
+    fn div(self, b: Self) -> Self {
+        One(self.0 / b.0)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        One(self.0.sqrt())
+    }
+    #[inline(always)]
+    fn neg(self) -> Self {
+        One(-self.0)
+    }
+    #[inline(always)]
+    fn xor(self, sign: Self) -> Self {
+        One(f64::from_bits(self.0.to_bits() ^ sign.0.to_bits()))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        One(self.0.abs())
+    }
+    #[inline(always)]
+    fn copysign(self, sign: Self) -> Self {
+        One(self.0.copysign(sign.0))
+    }
+    #[inline(always)]
+    fn scale2(self, n: Self) -> Self {
+        One(scaled(self.0, n.0))
+    }
+    #[inline(always)]
+    fn mul_add(self, a: Self, b: Self) -> Self {
+        One(if FUSED { self.0.mul_add(a.0, b.0) } else { self.0 * a.0 + b.0 })
+    }
+    #[inline(always)]
+    fn neg_mul_add(self, a: Self, b: Self) -> Self {
+        self.neg().mul_add(a, b)
+    }
+    #[inline(always)]
+    fn select_lt(self, than: Self, then: Self, otherwise: Self) -> Self {
+        if self.0 < than.0 { then } else { otherwise }
+    }
+    #[inline(always)]
+    fn select_le(self, than: Self, then: Self, otherwise: Self) -> Self {
+        if self.0 <= than.0 { then } else { otherwise }
+    }
+    #[inline(always)]
+    fn select_eq(self, to: Self, then: Self, otherwise: Self) -> Self {
+        if self.0 == to.0 { then } else { otherwise }
+    }
+}
+
 #[cfg(target_arch = "x86_64")]
 macro_rules! register {
     ($(#[$doc:meta])* $name:ident($register:ty), $lanes:literal; $splat:ident, $load:ident, $store:ident,
      $add:ident, $sub:ident, $mul:ident, $div:ident, $sqrt:ident, $fma:ident, $fnma:ident,
-     $xor:ident, $andnot:ident, |$a:ident, $b:ident, $then:ident, $otherwise:ident| $lt:expr, $le:expr, $eq:expr) => {
+     $xor:ident, $andnot:ident, $and:ident, $or:ident, |$x:ident, $n:ident| $scale:expr, |$a:ident, $b:ident, $then:ident, $otherwise:ident| $lt:expr, $le:expr, $eq:expr) => {
         $(#[$doc])*
         #[derive(Clone, Copy)]
         pub(crate) struct $name($register);
@@ -289,6 +452,14 @@ macro_rules! register {
             fn store(self, to: &mut [f64]) {
                 assert!(to.len() >= $lanes);
                 unsafe { $store(to.as_mut_ptr(), self.0) }
+            }
+            #[inline(always)]
+            unsafe fn read(from: *const f64) -> Self {
+                $name(unsafe { $load(from) })
+            }
+            #[inline(always)]
+            unsafe fn write(self, to: *mut f64) {
+                unsafe { $store(to, self.0) }
             }
             #[inline(always)]
             fn add(self, b: Self) -> Self {
@@ -315,8 +486,21 @@ macro_rules! register {
                 $name(unsafe { $xor(self.0, $splat(-0.0)) })
             }
             #[inline(always)]
+            fn xor(self, sign: Self) -> Self {
+                $name(unsafe { $xor(self.0, sign.0) })
+            }
+            #[inline(always)]
             fn abs(self) -> Self {
                 $name(unsafe { $andnot($splat(-0.0), self.0) })
+            }
+            #[inline(always)]
+            fn copysign(self, sign: Self) -> Self {
+                $name(unsafe { $or($andnot($splat(-0.0), self.0), $and($splat(-0.0), sign.0)) })
+            }
+            #[inline(always)]
+            fn scale2(self, n: Self) -> Self {
+                let ($x, $n) = (self.0, n.0);
+                $name(unsafe { $scale })
             }
             #[inline(always)]
             fn mul_add(self, a: Self, b: Self) -> Self {
@@ -350,7 +534,7 @@ register! {
     /// Eight numbers in a register of AVX-512.
     Zmm(__m512d), 8; _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd,
     _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd, _mm512_sqrt_pd, _mm512_fmadd_pd, _mm512_fnmadd_pd,
-    _mm512_xor_pd, _mm512_andnot_pd, |a, b, then, otherwise|
+    _mm512_xor_pd, _mm512_andnot_pd, _mm512_and_pd, _mm512_or_pd, |x, n| _mm512_scalef_pd(x, n), |a, b, then, otherwise|
     _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(a, b), otherwise, then),
     _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_LE_OQ>(a, b), otherwise, then),
     _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_EQ_OQ>(a, b), otherwise, then)
@@ -361,7 +545,13 @@ register! {
     /// Four numbers in a register of AVX2.
     Ymm(__m256d), 4; _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd,
     _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd, _mm256_sqrt_pd, _mm256_fmadd_pd, _mm256_fnmadd_pd,
-    _mm256_xor_pd, _mm256_andnot_pd, |a, b, then, otherwise|
+    _mm256_xor_pd, _mm256_andnot_pd, _mm256_and_pd, _mm256_or_pd, |x, n| {
+        let n = _mm256_cvtepi32_epi64(_mm256_cvtpd_epi32(n));
+        // Half of it, rounded down; shifts of 64 bits have no sign here.
+        let half = _mm256_sub_epi64(_mm256_srli_epi64::<1>(_mm256_add_epi64(n, _mm256_set1_epi64x(4096))), _mm256_set1_epi64x(2048));
+        let power = |n| _mm256_castsi256_pd(_mm256_slli_epi64::<52>(_mm256_add_epi64(n, _mm256_set1_epi64x(1023))));
+        _mm256_mul_pd(_mm256_mul_pd(x, power(half)), power(_mm256_sub_epi64(n, half)))
+    }, |a, b, then, otherwise|
     _mm256_blendv_pd(otherwise, then, _mm256_cmp_pd::<_CMP_LT_OQ>(a, b)),
     _mm256_blendv_pd(otherwise, then, _mm256_cmp_pd::<_CMP_LE_OQ>(a, b)),
     _mm256_blendv_pd(otherwise, then, _mm256_cmp_pd::<_CMP_EQ_OQ>(a, b))
@@ -392,6 +582,9 @@ mod tests {
                     a.abs().sqrt(),
                     a.neg(),
                     a.abs(),
+                    a.copysign(b),
+                    a.scale2(W::splat(5.0)),
+                    a.scale2(W::splat(-1070.0)),
                     a.mul_add(c, b),
                     a.neg_mul_add(c, b),
                     a.select_lt(b, c, a),
@@ -407,7 +600,7 @@ mod tests {
                     for (lane, x) in lanes[..W::LANES].iter().enumerate() {
                         // The bits of a NaN are the processor's business; the last row tells the width.
                         let x = if x.is_nan() { f64::NAN } else { *x };
-                        if number < 14 {
+                        if number < 17 {
                             bits.push((number * 8 + at + lane, x.to_bits()));
                         }
                     }
@@ -425,7 +618,7 @@ mod tests {
             assert_eq!(run(width, All), reference, "{width:?}");
         }
         assert_eq!(f64::from_bits(reference[0]), 3.0);
-        assert_eq!(f64::from_bits(reference[9 * 8]), 1.5, "equal is not less: a stays");
-        assert_eq!(f64::from_bits(reference[10 * 8]), 0.1, "equal is at most: c");
+        assert_eq!(f64::from_bits(reference[12 * 8]), 1.5, "equal is not less: a stays");
+        assert_eq!(f64::from_bits(reference[13 * 8]), 0.1, "equal is at most: c");
     }
 }

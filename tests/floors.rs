@@ -11,12 +11,14 @@ use std::path::{Path, PathBuf};
 const FLOORS: &[(&str, &[&str])] = &[
     ("ground: hardware", &["lanes"]),
     ("ground: beside numbers", &["scalar", "units", "dispatch", "random", "whiteness", "wide"]),
-    ("ground: numbers", &["dual", "signals"]),
-    ("ground: vectors of numbers", &["information", "covariance", "error", "by_name", "layout"]),
+    ("ground: numbers", &["dual", "fused", "signals"]),
+    ("ground: vectors of numbers", &["information", "error", "by_name", "layout", "graph"]),
     ("say: words", &["model", "parameter", "scaling", "interval"]),
-    ("say: records", &["experiment"]),
+    ("say: records", &["experiment", "equations"]),
     // Filtering a record is editing it, and a horizon may start from filtered states.
     ("expect: one step", &["integrate", "prefilter"]),
+    ("expect: a step as a graph", &["recurrence"]),
+    ("expect: a step as a program", &["engine"]),
     ("expect: a record", &["predict"]),
     ("learn: parts", &["loss", "weighting", "outliers", "optimize", "regress", "numeric", "online"]),
     ("learn: the answer", &["estimate"]),

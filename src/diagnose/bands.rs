@@ -22,12 +22,7 @@ pub struct Bands {
 ///
 /// # Errors
 /// No such record, a probability not between 0 and 1, an estimate of another problem, a simulation that fails.
-pub fn bands(
-    problem: &Problem<'_>,
-    estimate: &Summary,
-    experiment: usize,
-    probability: f64,
-) -> Result<Bands, Error> {
+pub fn bands(problem: &Problem<'_>, estimate: &Summary, experiment: usize, probability: f64) -> Result<Bands, Error> {
     let (objective, best) = problem.at(estimate)?;
     let count = problem.records().len();
     if experiment >= count {
@@ -61,10 +56,8 @@ pub(crate) fn widths(
     let columns: Vec<usize> = objective.problem.unknowns.columns(experiment).collect();
     let slope = |i: usize| estimate.unknowns[i].transform.slope(estimate.unknowns[i].value);
     let n = columns.len();
-    let covariance = (0..n * n).map(|ij| {
-        let (i, j) = (columns[ij / n], columns[ij % n]);
-        estimate.covariance[(i, j)] / (slope(i) * slope(j))
-    });
+    let dense = estimate.covariance.dense(&columns);
+    let covariance = (0..n * n).map(|ij| dense[(ij / n, ij % n)] / (slope(columns[ij / n]) * slope(columns[ij % n])));
     let zero = vec![vec![0.0; objective.problem.records()[experiment].len()]; objective.outputs()];
     let found = Widths { confidence: zero.clone(), prediction: zero };
     let gather = Gather { covariance: covariance.collect(), quantile, sigma: estimate.sigma(), found };

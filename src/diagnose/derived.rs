@@ -52,10 +52,10 @@ pub fn derived<M: Model>(
             }
         }
     }
-    let c = &estimate.covariance;
-    let n = gradient.len();
-    let variance: f64 =
-        (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).map(|(i, j)| gradient[i] * c[(i, j)] * gradient[j]).sum();
+    let moved: Vec<usize> = (0..gradient.len()).filter(|&i| gradient[i] != 0.0).collect();
+    let c = estimate.covariance.dense(&moved);
+    let pairs = (0..moved.len()).flat_map(|a| (0..moved.len()).map(move |b| (a, b)));
+    let variance: f64 = pairs.map(|(a, b)| gradient[moved[a]] * c[(a, b)] * gradient[moved[b]]).sum();
     let standard_error = Some(variance.max(0.0).sqrt()).filter(|error| known && error.is_finite() && value.is_finite());
     let degrees = estimate.degrees_of_freedom();
     let interval = standard_error.map(|error| student::interval(value, error, Transform::Identity, 0.95, degrees));

@@ -85,9 +85,8 @@ pub fn examine(prediction: &Simulated, record: &Record) -> Result<Vec<Residuals>
             expected: record.len(),
         });
     }
-    let series = |what: &'static str, channel: &Channel, values: &[f64]| {
-        Series::new(what, &channel.name, &channel.unit, values)
-    };
+    let series =
+        |what: &'static str, channel: &Channel, values: &[f64]| Series::new(what, &channel.name, &channel.unit, values);
     let inputs: Vec<Series> = record.inputs().iter().map(|channel| series("input", channel, &channel.values)).collect();
     let outputs: Vec<Series> =
         record.outputs().iter().map(|channel| series("measured output", channel, &channel.values)).collect();

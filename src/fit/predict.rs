@@ -15,11 +15,7 @@ use crate::sweep::Sweep;
 use std::sync::Arc;
 
 /// Predicts the outputs of a record with the parameters of an estimate.
-pub(super) fn predict<'a>(
-    sweep: Arc<dyn Sweep + 'a>,
-    record: &Record,
-    estimate: &Summary,
-) -> Result<Simulated, Error> {
+pub(super) fn predict<'a>(sweep: Arc<dyn Sweep + 'a>, record: &Record, estimate: &Summary) -> Result<Simulated, Error> {
     let parameters: Vec<_> = estimate.parameters.iter().map(|parameter| fixed(parameter.value)).collect();
     // An output without any error tells no noise; that of this record does then.
     let sigma = estimate.sigma();

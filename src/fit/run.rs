@@ -57,8 +57,7 @@ impl Problem<'_> {
             )));
         }
         let objective = self.objective()?;
-        let linear =
-            objective.linearize(coordinates).map_err(|error| start_error(&objective, coordinates, error))?;
+        let linear = objective.linearize(coordinates).map_err(|error| start_error(&objective, coordinates, error))?;
         let outcome = LevenbergMarquardt::default().judge(coordinates, &linear, &objective.bounds());
         let whitening = match noise::is_estimated(&objective) {
             true => noise::estimate(&objective, coordinates).unwrap_or_else(|_| objective.whitening.clone()),
@@ -125,7 +124,11 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// As [`run`](Self::run), and a simulation that fails.
-    pub fn predict(&self, estimate: &Summary, record: &crate::record::Record) -> Result<crate::problem::Simulated, Error> {
+    pub fn predict(
+        &self,
+        estimate: &Summary,
+        record: &crate::record::Record,
+    ) -> Result<crate::problem::Simulated, Error> {
         super::predict::predict(self.sweep.clone(), record, estimate)
     }
 }

@@ -19,8 +19,7 @@ pub(super) fn search(plain: &Objective<'_>, optimizer: &Arc<dyn Optimizer>) -> R
     let mut next = optimizer.clone();
     let mut file = None;
     if let Some((path, every)) = &problem.settings.checkpoint {
-        let mut checkpoint =
-            CheckpointFile::new(path.clone(), *every, fingerprint(problem), optimizer.settings()?);
+        let mut checkpoint = CheckpointFile::new(path.clone(), *every, fingerprint(problem), optimizer.settings()?);
         match optimizer.resume(&checkpoint)? {
             Some((place, iterations, saved)) if place.len() == coordinates.len() => {
                 (coordinates, checkpoint.before) = (place, iterations);
@@ -128,8 +127,7 @@ fn fingerprint(problem: &Problem<'_>) -> String {
     let (sweep, settings) = (&problem.sweep, &problem.settings);
     (sweep.identity(), sweep.layout(), sweep.integrator(), sweep.predictor()).hash(&mut hash);
     for record in &problem.records {
-        (record.name(), record.len(), format!("{:?}{:?}", record.input_hold(), record.initial_state()))
-            .hash(&mut hash);
+        (record.name(), record.len(), format!("{:?}{:?}", record.input_hold(), record.initial_state())).hash(&mut hash);
         (0..record.len()).for_each(|k| record.time(k).to_bits().hash(&mut hash));
         for channel in record.inputs().iter().chain(record.outputs()) {
             channel.values.iter().for_each(|value| value.to_bits().hash(&mut hash));

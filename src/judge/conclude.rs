@@ -1,6 +1,5 @@
 //! From where a search ended to a [`Summary`].
 
-use super::covariance::classical;
 use super::directions;
 use super::hac::{Hac, hac};
 use super::residual_pass::{Residuals, reason, residual_pass};
@@ -10,7 +9,7 @@ use crate::estimate::{
     CovarianceMethod, ExperimentEstimate, Knowledge, Method, NoiseModel, OutputEstimate, ParameterEstimate, Summary,
     Unknown, student,
 };
-use crate::information::SquareMatrix;
+use crate::information::{Covariance, Undetermined};
 use crate::layout::{Kind, Quantity};
 use crate::optimize::{Linearization, Outcome};
 use crate::problem::{Noise, Objective, Role, Whitening};
@@ -49,10 +48,9 @@ pub(super) struct Judgement<'j> {
     pub norms: Vec<f64>,
     /// The bound that each unknown is held at.
     pub held_at: Vec<Option<f64>>,
-    /// Directions of the scaled unknowns along which nothing is known.
-    pub unseen: Vec<Vec<f64>>,
-    /// Unknowns held for the covariance: at a bound, or one for each unseen direction.
-    pub held: Vec<bool>,
+    /// Directions of the scaled unknowns along which nothing is known; and the unknowns held for the covariance: at a
+    /// bound, or one for each such direction.
+    pub undetermined: Undetermined,
     /// Measurements less estimated unknowns; zero where nothing is left.
     pub degrees: f64,
     /// By how much the noise is wider than what the errors were divided by.
@@ -63,9 +61,9 @@ pub(super) struct Judgement<'j> {
 
 /// The covariance of the unknowns in their own units, how it was made, and that of unit noise in coordinates.
 pub(super) struct Covariances {
-    pub unknowns: Option<SquareMatrix>,
+    pub unknowns: Option<Covariance>,
     pub method: CovarianceMethod,
-    pub unit: Option<SquareMatrix>,
+    pub unit: Option<Covariance>,
 }
 
 /// What is known at the end of a search; the objective has the whitening that it ended with.
@@ -92,7 +90,7 @@ pub(crate) fn conclude(objective: &Objective<'_>, end: &SearchEnd, seconds: f64)
         experiments: judgement.experiments(),
         outputs: judgement.outputs(&noise),
         deviance: judgement.deviance(),
-        covariance: covariances.unknowns.unwrap_or_else(|| SquareMatrix::zeros(unknowns.len())),
+        covariance: covariances.unknowns.unwrap_or_else(|| Covariance::zeros(unknowns.len())),
         unknowns,
         noise_covariance: match noise {
             Whitening::Full { covariance, .. } => Some(covariance),
@@ -145,13 +143,11 @@ impl<'j> Judgement<'j> {
             low.or((x >= upper && gradient[i] <= 0.0).then_some(parameter.upper))
         };
         let held_at: Vec<Option<f64>> = (0..n).map(at_bound).collect();
-        let free: Vec<bool> = held_at.iter().map(Option::is_none).collect();
-        let unseen = directions::unseen(linear, &free, &norms);
-        let mut held: Vec<bool> = held_at.iter().map(Option::is_some).collect();
-        directions::fix(&unseen, &mut held);
+        let at_bounds: Vec<bool> = held_at.iter().map(Option::is_some).collect();
+        let undetermined = directions::undetermined(linear, &at_bounds);
         let values = unknowns.values(coordinates);
         let slopes = (0..n).map(|i| unknowns.row[i].parameter.transform.slope(values[i])).collect();
-        let estimated = held.iter().filter(|held| !**held).count() as f64;
+        let estimated = undetermined.held.iter().filter(|held| !**held).count() as f64;
         let measured = residuals.measured;
         // With no more measurements than unknowns nothing is left to tell the noise from.
         let degrees = if measured <= n as u64 { 0.0 } else { measured as f64 - estimated };
@@ -173,8 +169,7 @@ impl<'j> Judgement<'j> {
             slopes,
             norms,
             held_at,
-            unseen,
-            held,
+            undetermined,
             degrees,
             widening,
             rounding,
@@ -184,8 +179,8 @@ impl<'j> Judgement<'j> {
     /// Whether an unknown is neither held at a bound nor part of a direction along which nothing is known.
     fn seen(&self) -> Vec<bool> {
         let mut seen: Vec<bool> = self.held_at.iter().map(Option::is_none).collect();
-        for direction in &self.unseen {
-            seen.iter_mut().zip(directions::takes_part(direction)).for_each(|(seen, part)| *seen &= !part);
+        for direction in &self.undetermined.directions {
+            directions::taking_part(direction).for_each(|(i, _)| seen[i] = false);
         }
         seen
     }
@@ -197,35 +192,32 @@ impl<'j> Judgement<'j> {
 
     fn covariances(&self) -> Covariances {
         let (objective, x) = (self.objective, &self.end.coordinates);
-        let unit = classical(self.linear, &self.held);
+        let unit = self.linear.covariance(&self.undetermined.held);
         let small_sample = self.residuals.measured as f64 / self.degrees.max(1.0);
         let autocorrelated = self.autocorrelated().filter(|_| {
             objective.problem.layout().kind != Kind::Static && self.residuals.measured >= CORRELATED_SAMPLES
         });
-        let found = autocorrelated.and_then(|_| hac(objective, x, self.linear, &self.held));
-        let found = found.and_then(|Hac { sandwich, lags }| Some((sandwich.covariance(&self.held)?, lags)));
+        let found = autocorrelated.and_then(|_| hac(objective, x, self.linear, &self.undetermined.held));
+        let found =
+            found.and_then(|Hac { sandwich, lags }| Some((sandwich.covariance(&self.undetermined.held)?, lags)));
         let (found, method, factor) = match found {
             Some((covariance, lags)) => (Some(covariance), CovarianceMethod::Hac { lags: lags as u64 }, small_sample),
             None if sandwich::is_needed(objective) => {
                 let filtered = objective.problem.settings.prefilter.is_some();
                 let method = if filtered { CovarianceMethod::FilteredSandwich } else { CovarianceMethod::Sandwich };
-                (sandwich::sandwich(objective, x, &self.held).ok().flatten(), method, 1.0)
+                (sandwich::sandwich(objective, x, &self.undetermined.held).ok().flatten(), method, 1.0)
             }
             // The noise is wider than the errors, the priors are not.
             None if self.widening != 1.0 && objective.problem.unknowns.priors(x).next().is_some() => {
                 let widened = objective.with(objective.whitening.widened(self.widening));
-                let covariance = widened.evaluate(x).ok().and_then(|linear| classical(&linear, &self.held));
+                let covariance = widened.evaluate(x).ok().and_then(|linear| linear.covariance(&self.undetermined.held));
                 (covariance, CovarianceMethod::Classical, 1.0)
             }
             None => (unit.clone(), CovarianceMethod::Classical, self.widening * self.widening),
         };
-        let seen = self.seen();
-        let unknowns = found.map(|covariance| {
-            SquareMatrix::from_fn(seen.len(), |i, j| match seen[i] && seen[j] {
-                true => covariance[(i, j)] * factor * self.slopes[i] * self.slopes[j],
-                false => 0.0,
-            })
-        });
+        let seen = self.seen().into_iter().zip(&self.slopes);
+        let in_units: Vec<f64> = seen.map(|(seen, slope)| if seen { *slope } else { 0.0 }).collect();
+        let unknowns = found.map(|covariance| covariance.times(factor).scaled(&in_units));
         Covariances { unknowns, method, unit }
     }
 
@@ -240,7 +232,7 @@ impl<'j> Judgement<'j> {
                 (Some(bound), _) => Knowledge::Held { bound },
                 (None, None) => Knowledge::Unidentified,
                 (None, Some(covariance)) => {
-                    let standard_error = covariance[(i, i)].sqrt();
+                    let standard_error = covariance.standard_error(i);
                     let (lower, upper) = student::interval(value, standard_error, transform, 0.95, self.degrees);
                     Knowledge::Known { standard_error, lower, upper }
                 }
@@ -257,7 +249,7 @@ impl<'j> Judgement<'j> {
                 value,
                 start: unknown.parameter.start,
                 knowledge,
-                error_index: covariances.unit.as_ref().and_then(|unit| index(unit[(i, i)].sqrt())),
+                error_index: covariances.unit.as_ref().and_then(|unit| index(unit.standard_error(i))),
                 error_index_held: index(1.0 / self.norms[i]),
                 transform,
             }
@@ -267,8 +259,8 @@ impl<'j> Judgement<'j> {
 
     fn directions(&self) -> Vec<crate::estimate::Direction> {
         let unknowns = &self.objective.problem.unknowns;
-        let named = |d: &Vec<f64>| directions::named(unknowns, d, &self.norms, &self.values, &self.slopes);
-        self.unseen.iter().map(named).collect()
+        let named = |d: &Vec<(usize, f64)>| directions::named(unknowns, d, &self.norms, &self.values, &self.slopes);
+        self.undetermined.directions.iter().map(named).collect()
     }
 
     fn parameters(&self, unknowns: &[Unknown]) -> Vec<ParameterEstimate> {

@@ -10,8 +10,7 @@
 //! The autoregression works on scores of unit covariance: so its singular values are below one, and the result does not
 //! depend on the choice of units or parameters.
 
-use super::covariance::Sandwich;
-use super::sandwich;
+use super::sandwich::{self, Sandwich};
 use crate::information::{Block, Information};
 use crate::optimize::Linearization;
 use crate::problem::{Accumulate, Objective, each};
@@ -71,12 +70,7 @@ pub(crate) fn hac(
 }
 
 /// A root (rows) of the long-run covariance of one experiment's scores times their number, and the lags it took.
-fn long_run(
-    objective: &Objective<'_>,
-    e: usize,
-    coordinates: &[f64],
-    kept: &[usize],
-) -> Option<(DMatrix<f64>, usize)> {
+fn long_run(objective: &Objective<'_>, e: usize, coordinates: &[f64], kept: &[usize]) -> Option<(DMatrix<f64>, usize)> {
     let n = kept.len();
     if n == 0 {
         return Some((DMatrix::zeros(0, 0), 0));

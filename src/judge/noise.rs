@@ -63,8 +63,7 @@ fn moments(
     let outputs = objective.outputs();
     let plain = objective.in_units();
     let empty = || SquareMatrix::zeros(outputs);
-    let make =
-        |experiment| Moments { objective: &plain, experiment, sigma, bend, sums: empty(), pairs: empty() };
+    let make = |experiment| Moments { objective: &plain, experiment, sigma, bend, sums: empty(), pairs: empty() };
     let all = plain.gather(coordinates, false, make)?;
     let sum = |part: &dyn Fn(&Moments<'_>) -> f64| all.iter().map(part).sum::<f64>();
     let covariance = SquareMatrix::from_fn(outputs, |i, j| {
@@ -146,4 +145,3 @@ fn magnitudes(objective: &Objective<'_>) -> Vec<f64> {
     };
     (0..objective.outputs()).map(of).collect()
 }
-

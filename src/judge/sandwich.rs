@@ -10,8 +10,7 @@
 //! the record to its first sample. A forward pass instead counts what happens at the begin of a record wrongly: errors of
 //! initial states came out several times too large.
 
-use super::covariance::{Sandwich, classical};
-use crate::information::{Block, Information, SquareMatrix};
+use crate::information::{Block, Covariance, Information};
 use crate::optimize::{Infeasible, Linearization};
 use crate::prefilter::{Butterworth, FilterState};
 use crate::problem::{Accumulate, Objective};
@@ -22,6 +21,29 @@ use nalgebra::DMatrix;
 const ALONE: f64 = 1e-6;
 /// Rows that are absorbed together.
 const ROWS: usize = 256;
+
+/// Curvature of the cost and triangles of the scores, a pair per experiment.
+pub(crate) struct Sandwich {
+    bread: Linearization,
+    pub scores: Vec<Information>,
+    /// Mean of `psi'`, by which the curvature is to be multiplied.
+    curvature: f64,
+    /// By which the squares of the scores are to be multiplied.
+    pub scale: f64,
+}
+
+impl Sandwich {
+    /// The curvature of plain least squares, still without scores.
+    pub fn plain(linear: &Linearization) -> Self {
+        Sandwich { bread: linear.clone(), scores: vec![], curvature: 1.0, scale: 1.0 }
+    }
+
+    /// `A^-1 B A^-1` over all unknowns that are not held.
+    pub fn covariance(&self, held: &[bool]) -> Option<Covariance> {
+        let scale = self.scale / (self.curvature * self.curvature);
+        Some(self.bread.sandwich(held, &self.scores)?.times(scale))
+    }
+}
 
 /// What the first pass sums up over all measurements.
 pub(crate) struct Tally {
@@ -43,7 +65,7 @@ pub(crate) fn sandwich(
     objective: &Objective<'_>,
     coordinates: &[f64],
     held: &[bool],
-) -> Result<Option<SquareMatrix>, Infeasible> {
+) -> Result<Option<Covariance>, Infeasible> {
     Passes { objective, coordinates }.sandwich(held)
 }
 
@@ -64,10 +86,9 @@ struct Passes<'p> {
 }
 
 impl Passes<'_> {
-
-    fn sandwich(&self, held: &[bool]) -> Result<Option<SquareMatrix>, Infeasible> {
+    fn sandwich(&self, held: &[bool]) -> Result<Option<Covariance>, Infeasible> {
         let (sandwich, tally) = self.without_scores()?;
-        let Some(inverse) = classical(&sandwich.bread, held) else { return Ok(None) };
+        let Some(inverse) = sandwich.bread.covariance(held) else { return Ok(None) };
         let (mut scores, scale) = match &self.objective.problem.settings.prefilter {
             Some(filter) => self.filtered_scores(&inverse, filter, &tally)?,
             None => (self.scores(&inverse)?, 1.0),
@@ -114,14 +135,15 @@ impl Passes<'_> {
         for (i, slope, _) in self.objective.problem.unknowns.priors(self.coordinates) {
             let e = self.objective.problem.unknowns.row[i].experiment.unwrap_or(0);
             // A prior is a measurement of unit variance; the bread is multiplied by the mean curvature later.
-            blocks[e].absorb_row(&prior_row(self.objective, e, i, slope / curvature.max(f64::MIN_POSITIVE).sqrt()), 0.0);
+            blocks[e]
+                .absorb_row(&prior_row(self.objective, e, i, slope / curvature.max(f64::MIN_POSITIVE).sqrt()), 0.0);
         }
         let bread = Linearization::new(0.0, self.objective.problem.unknowns.shared(), blocks);
         Ok((Sandwich { bread, scores: vec![], curvature, scale: 1.0 }, tally))
     }
 
     /// The triangle of each experiment's scores, sample by sample.
-    fn scores(&self, inverse: &SquareMatrix) -> Result<Vec<Information>, Infeasible> {
+    fn scores(&self, inverse: &Covariance) -> Result<Vec<Information>, Infeasible> {
         let make = |experiment: usize| {
             let inverse = self.of_experiment(inverse, experiment);
             let columns = inverse.nrows();
@@ -140,7 +162,7 @@ impl Passes<'_> {
     /// which the noise is larger than the errors. Holds the slopes of one experiment at a time.
     fn filtered_scores(
         &self,
-        inverse: &SquareMatrix,
+        inverse: &Covariance,
         filter: &Butterworth,
         tally: &Tally,
     ) -> Result<(Vec<Information>, f64), Infeasible> {
@@ -174,9 +196,9 @@ impl Passes<'_> {
     }
 
     /// The rows and columns of one experiment.
-    fn of_experiment(&self, matrix: &SquareMatrix, e: usize) -> DMatrix<f64> {
+    fn of_experiment(&self, covariance: &Covariance, e: usize) -> DMatrix<f64> {
         let columns: Vec<usize> = self.objective.problem.unknowns.columns(e).collect();
-        DMatrix::from_fn(columns.len(), columns.len(), |a, b| matrix[(columns[a], columns[b])])
+        DMatrix::from(&covariance.dense(&columns))
     }
 }
 

@@ -114,9 +114,9 @@ impl Judgement<'_> {
         };
         let white = |i: usize| {
             let unit = covariances.unit.as_ref()?;
-            Some(unit[(i, i)].sqrt() * self.widening * self.slopes[i].abs()).filter(|error| *error > 0.0)
+            Some(unit.standard_error(i) * self.widening * self.slopes[i].abs()).filter(|error| *error > 0.0)
         };
-        let widened = |i: usize| Some(covariances.unknowns.as_ref()?[(i, i)].sqrt() / white(i)?);
+        let widened = |i: usize| Some(covariances.unknowns.as_ref()?.standard_error(i) / white(i)?);
         let widest = (0..self.slopes.len()).filter_map(widened).fold(0.0, f64::max);
         text += &format!(
             "; the intervals allow for it (HAC over {lags} lag(s), prewhitened), up to {widest:.2} times those for white errors"

@@ -2,9 +2,8 @@
 //! Jacobians are the exact slopes of the model's own text. States come first in the joint vector: `U D U^T` then keeps
 //! the parameters' covariance in a block of its own, which survives when the state must start anew.
 
-use super::{Beat, Clock, Divergence, Guard, ObserverError, Outcome, Update, Watch};
+use super::{Beat, Clock, Divergence, Guard, ObserverError, Outcome, UdFactors, Update, Watch};
 use super::{check_all_positive, check_starts, in_bounds, not_finite, prior_std};
-use crate::covariance::Covariance;
 use crate::dual::Dual;
 use crate::integrate::{Automatic, Integrator, ModelSystem};
 use crate::interval::{Hold, Interval};
@@ -48,7 +47,7 @@ pub struct Ekf<M: Model, const N: usize, I: Integrator = Automatic> {
     input: Option<Of<M::Input, f64>>,
     x: Of<M::State, f64>,
     p: Of<M::Parameters, f64>,
-    covariance: Covariance<N>,
+    covariance: UdFactors<N>,
     nis: f64,
     guard: Guard<M::Output>,
     stopped: Option<Divergence>,
@@ -108,7 +107,7 @@ impl<M: Model, const N: usize, I: Integrator> Ekf<M, N, I> {
             input: None,
             x: M::State::map(start.state, |known| known.start),
             p: M::Parameters::map(start.parameters, |known| known.start),
-            covariance: Covariance::diagonal(variances),
+            covariance: UdFactors::diagonal(variances),
             nis: 0.0,
             guard: Guard::new(start.watch),
             stopped: None,
@@ -274,7 +273,7 @@ impl<M: Model, const N: usize, I: Integrator> Ekf<M, N, I> {
     }
 
     /// Covariance of states, then free parameters in order of declaration (in logarithms where those are filtered).
-    pub fn covariance(&self) -> &Covariance<N> {
+    pub fn covariance(&self) -> &UdFactors<N> {
         &self.covariance
     }
 

@@ -79,7 +79,7 @@ impl Point {
 
     /// Largest part of itself, or of the standard error it has at least, by which the full step moves an unknown.
     fn relative_step(&self) -> f64 {
-        let rows: u64 = self.linear.blocks().iter().map(|block| block.rows()).sum();
+        let rows = self.linear.rows();
         let sigma = (self.linear.sum_of_squares() / rows.max(1) as f64).sqrt();
         let size = |step: &Vec<f64>| {
             let free = (0..self.x.len()).filter(|&i| !self.held[i] && step[i] != 0.0);

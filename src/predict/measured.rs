@@ -23,8 +23,7 @@ pub(crate) fn state(
     if n == 0 {
         return Ok(x);
     }
-    let names =
-        |quantities: &[Quantity]| quantities.iter().map(|q| q.name.as_str()).collect::<Vec<&str>>().join(", ");
+    let names = |quantities: &[Quantity]| quantities.iter().map(|q| q.name.as_str()).collect::<Vec<&str>>().join(", ");
     let found = y.iter().filter(|y| y.is_finite()).count();
     if found < n {
         let (states, outputs) = (names(&layout.states), names(&layout.outputs));
@@ -79,8 +78,7 @@ pub(crate) fn depends_on_parameter(
     let (x, u) = (constants(x), constants(u));
     let mut y = vec![Dual::constant(0.0); layout.outputs.len()];
     for first in (0..p.len()).step_by(LANES) {
-        let seeded: Vec<Duals> =
-            p.iter().enumerate().map(|(i, p)| Dual::variable(*p, i.wrapping_sub(first))).collect();
+        let seeded: Vec<Duals> = p.iter().enumerate().map(|(i, p)| Dual::variable(*p, i.wrapping_sub(first))).collect();
         functions.output(Dual::constant(t), &x, &u, &seeded, &mut y);
         let depends = |lane: &usize| y.iter().any(|y| y.slopes[*lane] != 0.0);
         if let Some(lane) = (0..LANES.min(p.len() - first)).find(depends) {

@@ -89,8 +89,7 @@ pub(crate) struct SlicePlant<'a, S> {
 
 /// What numbers an object-safe method can step.
 pub(crate) trait Stepped: Scalar {
-    fn advance(method: &dyn Method, field: &Field<'_, Self>, x: Vec<Self>, step: &mut f64)
-    -> Result<Vec<Self>, Stuck>;
+    fn advance(method: &dyn Method, field: &Field<'_, Self>, x: Vec<Self>, step: &mut f64) -> Result<Vec<Self>, Stuck>;
 }
 
 impl Stepped for f64 {

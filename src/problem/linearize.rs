@@ -26,8 +26,7 @@ impl Objective<'_> {
         }
         for (i, slope, error) in self.problem.unknowns.priors(coordinates) {
             let e = self.problem.unknowns.row[i].experiment.unwrap_or(0);
-            let row: Vec<f64> =
-                self.problem.unknowns.columns(e).map(|c| if c == i { slope } else { 0.0 }).collect();
+            let row: Vec<f64> = self.problem.unknowns.columns(e).map(|c| if c == i { slope } else { 0.0 }).collect();
             blocks[e].absorb_row(&row, error);
             cost += 0.5 * error * error;
         }

@@ -43,7 +43,12 @@ impl Objective<'_> {
         let slopes = (0..carry.len()).flat_map(|row| seeds.iter().map(move |seed| (row, column(seed))));
         let slopes = slopes.map(|(row, column)| all[row * width + column]).collect();
         let (prepared, samples) = (&problem.prepared[e], 0..record.len());
-        Job { experiment: e, seeds, scales, piece: Piece { record, prepared, samples, carry, slopes, parameters: &values.p } }
+        Job {
+            experiment: e,
+            seeds,
+            scales,
+            piece: Piece { record, prepared, samples, carry, slopes, parameters: &values.p },
+        }
     }
 
     /// Initial state and parameters of each experiment.

@@ -3,9 +3,7 @@
 use super::checkpoint::CheckpointFile;
 use super::{Objective, Observer};
 use crate::error::Error;
-use crate::optimize::{
-    GaussNewton, Infeasible, LeastSquaresState, LevenbergMarquardt, Linearization, Outcome,
-};
+use crate::optimize::{GaussNewton, Infeasible, LeastSquaresState, LevenbergMarquardt, Linearization, Outcome};
 use crate::scaling::Scaling;
 use argmin::core::observers::Observe;
 use argmin::core::{Executor, KV, Solver, State, TerminationReason, TerminationStatus};

@@ -66,8 +66,9 @@ impl Unknowns {
             let name = experiment.map_or(name.clone(), |e| format!("{name} [{}]", labels[e]));
             Free { name, unit, role: Role::Parameter(i), experiment, parameter: parameters[i] }
         };
-        let chosen =
-            |own: bool| (0..parameters.len()).filter(move |&i| parameters[i].free && parameters[i].per_experiment == own);
+        let chosen = |own: bool| {
+            (0..parameters.len()).filter(move |&i| parameters[i].free && parameters[i].per_experiment == own)
+        };
         let mut row: Vec<Free> = chosen(false).map(|i| free_of(i, None)).collect();
         let (mut begins, mut initial) = (vec![], vec![]);
         for (e, record) in records.iter().enumerate() {

@@ -5,8 +5,8 @@ use super::{Declared, Figures, Format, Histogram, Output, OutputFit, Record, Rep
 use crate::diagnose::residuals::{self, Residuals};
 use crate::diagnose::{self, Widths};
 use crate::error::Error;
-use crate::judge::output_fit as output_fit_of;
 use crate::estimate::{ParameterEstimate, Summary};
+use crate::judge::output_fit as output_fit_of;
 use crate::problem::{Problem, Simulated};
 use crate::record::{Channel, Record as Measured};
 
@@ -47,7 +47,7 @@ impl Report {
             warnings: estimate.warnings.iter().map(reworded).collect(),
             unknowns: estimate.unknowns.clone(),
             declared: estimate.parameters.iter().map(declared).collect(),
-            correlation: estimate.correlation(),
+            correlation: estimate.correlation(&(0..estimate.unknowns.len()).collect::<Vec<usize>>()),
             directions: estimate.directions.clone(),
             outputs: estimate
                 .outputs
@@ -85,12 +85,7 @@ fn declared(parameter: &ParameterEstimate) -> Declared {
     Declared { name, unit, parameter: declared }
 }
 
-fn summary(
-    name: &str,
-    record: &Measured,
-    prediction: &Simulated,
-    widths: Option<&Widths>,
-) -> Result<Record, Error> {
+fn summary(name: &str, record: &Measured, prediction: &Simulated, widths: Option<&Widths>) -> Result<Record, Error> {
     let inputs = record.inputs().iter().map(|channel| signal(channel, Role::Input));
     let outputs = record.outputs().iter().map(|channel| signal(channel, Role::Output));
     let examined = residuals::examine(prediction, record)?.into_iter().enumerate();

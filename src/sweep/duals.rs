@@ -1,7 +1,7 @@
 //! [`DualSweep`]: models run in numbers with slopes, one piece at a time.
 
 use super::filtered::Filter;
-use super::{RunError, Located, Loops, Piece, Prepared, Reached, Seed, Sweep, Visit};
+use super::{Located, Loops, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
 use crate::error::{Error, Failure};
 use crate::functions::{Functions, Handle};
 use crate::integrate::{Duals, Method, Stuck};
@@ -87,7 +87,8 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
         sigma: &[f64],
     ) -> Option<Located> {
         let layout = &*self.layout;
-        let search = FailureSearch { layout, values: &self.model, duals: &self.model, method: &*self.method, record, label };
+        let search =
+            FailureSearch { layout, values: &self.model, duals: &self.model, method: &*self.method, record, label };
         Some(search.locate(state, parameters, sample, sigma))
     }
 

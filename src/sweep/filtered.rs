@@ -1,6 +1,6 @@
 //! A piece run by a [`Predictor`](crate::Predictor) of any kind, on vectors of run-time length.
 
-use super::{RunError, Piece, Reached, Seed, Visit, Window};
+use super::{Piece, Reached, RunError, Seed, Visit, Window};
 use crate::dual::Dual;
 use crate::functions::Functions;
 use crate::integrate::{Duals, Method, Stuck};

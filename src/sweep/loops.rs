@@ -4,11 +4,13 @@
 //! `exp(-t / T)`; after some ten thousand samples they are denormal numbers, on which processors are up to 60 times slower;
 //! so slopes below 1e-150 are set to zero between windows.
 
-use super::{RunError, Piece, Reached, Seed, Visit, Window};
-use crate::dispatch::{Kernel, PORTABLE, Unit, WIDE, has_wide, run};
+use super::{Piece, Reached, RunError, Seed, Visit, Window};
+use crate::dispatch::{Kernel, has_wide, run};
 use crate::dual::Dual;
+use crate::fused::Fused;
 use crate::integrate::{Integrator, Method, ModelSystem, Stuck};
 use crate::interval::{Hold, Interval};
+use crate::lanes;
 use crate::layout::Kind;
 use crate::model::Model;
 use crate::scalar::Scalar;
@@ -23,6 +25,8 @@ const NEGLIGIBLE: f64 = 1e-150;
 
 /// A number with a fixed count of slopes.
 trait Number: Scalar {
+    /// What the slopes are made of.
+    type Slope: lanes::Number;
     const SLOPES: usize;
     fn with(value: f64, slope: impl Fn(usize) -> f64) -> Self;
     fn slope(&self, i: usize) -> f64;
@@ -30,6 +34,7 @@ trait Number: Scalar {
 }
 
 impl Number for f64 {
+    type Slope = f64;
     const SLOPES: usize = 0;
     #[inline(always)]
     fn with(value: f64, _slope: impl Fn(usize) -> f64) -> Self {
@@ -45,23 +50,24 @@ impl Number for f64 {
     }
 }
 
-impl<const N: usize, const UNIT: u8> Number for Dual<N, UNIT> {
+impl<const N: usize, T: Scalar + lanes::Number> Number for Dual<N, T> {
+    type Slope = T;
     const SLOPES: usize = N;
     #[inline(always)]
     fn with(value: f64, slope: impl Fn(usize) -> f64) -> Self {
         let mut dual = Self::from(value);
-        dual.slopes.iter_mut().enumerate().for_each(|(i, s)| *s = slope(i));
+        dual.slopes.iter_mut().enumerate().for_each(|(i, s)| *s = T::from(slope(i)));
         dual
     }
     #[inline(always)]
     fn slope(&self, i: usize) -> f64 {
-        self.slopes[i]
+        self.slopes[i].value()
     }
     #[inline(always)]
     fn flushed(mut self) -> Self {
         for slope in &mut self.slopes {
-            if slope.abs() < NEGLIGIBLE {
-                *slope = 0.0;
+            if slope.value().abs() < NEGLIGIBLE {
+                *slope = T::from(0.0);
             }
         }
         self
@@ -146,19 +152,19 @@ impl<M: Model, I: Integrator> Loops<M> for I {
         // A build that is not made for speed is soon compiled: same numbers, more passes.
         #[cfg(debug_assertions)]
         return match (seeds.len(), wide) {
-            (0, _) => task.walk::<f64, PORTABLE>(visit),
-            (_, false) => task.walk::<Dual<4>, PORTABLE>(visit),
-            (_, true) => task.walk::<Dual<4, WIDE>, WIDE>(visit),
+            (0, _) => task.walk::<f64>(visit),
+            (_, false) => task.walk::<Dual<4>>(visit),
+            (_, true) => task.walk::<Dual<4, Fused>>(visit),
         };
         #[cfg(not(debug_assertions))]
         match (seeds.len(), wide) {
-            (0, _) => task.walk::<f64, PORTABLE>(visit),
-            (1..=4, false) => task.walk::<Dual<4>, PORTABLE>(visit),
-            (5 | 6 | 9..=12, false) => task.walk::<Dual<6>, PORTABLE>(visit),
-            (_, false) => task.walk::<Dual<8>, PORTABLE>(visit),
-            (1..=4, true) => task.walk::<Dual<4, WIDE>, WIDE>(visit),
-            (5 | 6 | 9..=12, true) => task.walk::<Dual<6, WIDE>, WIDE>(visit),
-            (_, true) => task.walk::<Dual<8, WIDE>, WIDE>(visit),
+            (0, _) => task.walk::<f64>(visit),
+            (1..=4, false) => task.walk::<Dual<4>>(visit),
+            (5 | 6 | 9..=12, false) => task.walk::<Dual<6>>(visit),
+            (_, false) => task.walk::<Dual<8>>(visit),
+            (1..=4, true) => task.walk::<Dual<4, Fused>>(visit),
+            (5 | 6 | 9..=12, true) => task.walk::<Dual<6, Fused>>(visit),
+            (_, true) => task.walk::<Dual<8, Fused>>(visit),
         }
     }
 
@@ -178,7 +184,7 @@ struct Task<'t, M: Model, I> {
 }
 
 impl<M: Model, I: Integrator> Task<'_, M, I> {
-    fn walk<D: Number, const UNIT: Unit>(&self, visit: Visit<'_>) -> Result<Reached, RunError> {
+    fn walk<D: Number>(&self, visit: Visit<'_>) -> Result<Reached, RunError> {
         let (piece, seeds) = (self.piece, self.seeds);
         let count = seeds.len().div_ceil(D::SLOPES.max(1)).max(1);
         let mut passes: Vec<Pass<M, D>> = (0..count).map(|i| Pass::new(piece, seeds, i * D::SLOPES)).collect();
@@ -193,7 +199,7 @@ impl<M: Model, I: Integrator> Task<'_, M, I> {
                 *entry = x.value();
             }
             for pass in &mut passes {
-                run::<UNIT, _>(Fill::<_, _, _, UNIT> { task: self, pass, rows: &rows, window: &mut window })?;
+                run(Fill { task: self, pass, rows: &rows, window: &mut window })?;
             }
             if !visit(&mut window) {
                 return Err(RunError::Stopped);
@@ -215,19 +221,25 @@ impl<M: Model, I: Integrator> Task<'_, M, I> {
 }
 
 /// One window of one pass.
-struct Fill<'f, 't, M: Model, I, D: Number, const UNIT: Unit> {
+struct Fill<'f, 't, M: Model, I, D: Number> {
     task: &'f Task<'t, M, I>,
     pass: &'f mut Pass<M, D>,
     rows: &'f Rows<M>,
     window: &'f mut Window,
 }
 
-impl<M: Model, I: Integrator, D: Number, const UNIT: Unit> Fill<'_, '_, M, I, D, UNIT> {
+impl<M: Model, I: Integrator, D: Number> Fill<'_, '_, M, I, D> {
     /// The state at the sample after `k`, both counted from the window's begin.
     #[inline(always)]
-    fn advance(&self, k: usize, x: Of<M::State, D>, p: &Of<M::Parameters, D>, step: &mut f64) -> Result<Of<M::State, D>, Stuck> {
+    fn advance(
+        &self,
+        k: usize,
+        x: Of<M::State, D>,
+        p: &Of<M::Parameters, D>,
+        step: &mut f64,
+    ) -> Result<Of<M::State, D>, Stuck> {
         // Known to the compiler in the wide loop, which then computes once per interval what depends on the input alone.
-        let hold = if UNIT == WIDE { Hold::Zero } else { self.task.piece.record.input_hold() };
+        let hold = if <D::Slope as lanes::Number>::FUSED { Hold::Zero } else { self.task.piece.record.input_hold() };
         let u0 = self.rows.inputs[k];
         let u1 = if hold == Hold::First { self.rows.inputs[k + 1] } else { u0 };
         let interval = Interval { t0: self.rows.times[k], t1: self.rows.times[k + 1], u0, u1, hold };
@@ -235,7 +247,12 @@ impl<M: Model, I: Integrator, D: Number, const UNIT: Unit> Fill<'_, '_, M, I, D,
     }
 
     /// The state that sample `sample` is predicted from, `restart` samples after it was measured; `None` if it was not.
-    fn restarted(&self, sample: usize, restart: usize, p: &Of<M::Parameters, D>) -> Result<Option<Of<M::State, D>>, Stuck> {
+    fn restarted(
+        &self,
+        sample: usize,
+        restart: usize,
+        p: &Of<M::Parameters, D>,
+    ) -> Result<Option<Of<M::State, D>>, Stuck> {
         let (piece, n) = (self.task.piece, M::State::LEN);
         let (mut x, first) = if sample < restart {
             (self.pass.start, 0)
@@ -254,13 +271,18 @@ impl<M: Model, I: Integrator, D: Number, const UNIT: Unit> Fill<'_, '_, M, I, D,
             let u0 = input(k);
             let u1 = if hold == Hold::First { input(k + 1) } else { u0 };
             let interval = Interval { t0: record.time(k), t1: record.time(k + 1), u0, u1, hold };
-            x = ModelSystem { model: self.task.model, interval: &interval, p }.step(self.task.integrator, x, &mut step)?;
+            x = ModelSystem { model: self.task.model, interval: &interval, p }.step(
+                self.task.integrator,
+                x,
+                &mut step,
+            )?;
         }
         Ok(Some(x))
     }
 }
 
-impl<M: Model, I: Integrator, D: Number, const UNIT: Unit> Kernel for Fill<'_, '_, M, I, D, UNIT> {
+impl<M: Model, I: Integrator, D: Number> Kernel for Fill<'_, '_, M, I, D> {
+    type Number = D::Slope;
     type Output = Result<(), RunError>;
 
     #[inline(always)]

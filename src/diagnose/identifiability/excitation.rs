@@ -44,8 +44,7 @@ pub(super) fn excitation(objective: &Objective<'_>, best: &[f64]) -> Result<Vec<
             by_segment: vec![vec![0.0; samples.div_ceil(length)]; n],
         }
     };
-    let gathered =
-        objective.gather(best, true, make).map_err(|_| Error::Simulation(objective.locate(0, best, 0)))?;
+    let gathered = objective.gather(best, true, make).map_err(|_| Error::Simulation(objective.locate(0, best, 0)))?;
     let mut by_output = vec![vec![0.0; outputs]; n];
     let mut by_segment = vec![vec![]; n];
     let mut begins = vec![];

@@ -1,4 +1,4 @@
-//! [`Covariance`]: what is not known of `N` quantities, as `P = U D U^T` with `U` unit upper triangular.
+//! [`UdFactors`]: a covariance of `N` quantities, kept as `P = U D U^T` with `U` unit upper triangular.
 //!
 //! In this form (G. J. Bierman, *Factorization Methods for Discrete Sequential Estimation*, 1977) variances cannot turn
 //! negative by rounding: a measurement multiplies each entry of `D` by a factor between 0 and 1, a prediction sums
@@ -6,16 +6,16 @@
 
 use nalgebra::SMatrix;
 
-/// Covariance of `N` quantities. A quantity whose variance is zero is known exactly and is left alone.
+/// The factors of the covariance of `N` quantities. A quantity whose variance is zero is known exactly and is left alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Covariance<const N: usize> {
+pub struct UdFactors<const N: usize> {
     u: [[f64; N]; N],
     d: [f64; N],
 }
 
-/// What one scalar measurement told: see [`Covariance::absorb`].
+/// Gain of one scalar measurement: see [`UdFactors::absorb`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gain<const N: usize> {
+pub struct MeasurementGain<const N: usize> {
     /// Correction of each quantity per unit of innovation.
     pub gain: [f64; N],
     /// Variance of the innovation, `h P h^T + r`.
@@ -23,14 +23,14 @@ pub struct Gain<const N: usize> {
 }
 
 #[expect(clippy::needless_range_loop, reason = "matrix algebra is written in indices")]
-impl<const N: usize> Covariance<N> {
+impl<const N: usize> UdFactors<N> {
     /// Independent quantities with these variances (negative ones count as zero).
     pub fn diagonal(variances: [f64; N]) -> Self {
         let mut u = [[0.0; N]; N];
         for (i, row) in u.iter_mut().enumerate() {
             row[i] = 1.0;
         }
-        Covariance { u, d: variances.map(|v| if v > 0.0 { v } else { 0.0 }) }
+        UdFactors { u, d: variances.map(|v| if v > 0.0 { v } else { 0.0 }) }
     }
 
     /// Variance of quantity `i`; zero for `i >= N`.
@@ -52,7 +52,7 @@ impl<const N: usize> Covariance<N> {
     /// Absorbs one measurement `y = h z + noise` of variance `r > 0` (Bierman 1977, ch. V.3); the estimate is then
     /// corrected by the gain times `y - h z`.
     #[inline]
-    pub fn absorb(&mut self, h: &[f64; N], r: f64) -> Gain<N> {
+    pub fn absorb(&mut self, h: &[f64; N], r: f64) -> MeasurementGain<N> {
         let mut gain = [0.0; N];
         let mut alpha = r;
         for j in 0..N {
@@ -73,7 +73,7 @@ impl<const N: usize> Covariance<N> {
             gain[j] = v;
         }
         let scale = 1.0 / alpha;
-        Gain { gain: gain.map(|g| g * scale), variance: alpha }
+        MeasurementGain { gain: gain.map(|g| g * scale), variance: alpha }
     }
 
     /// Predicts: `P <- F P F^T + diag(q)`, where `f` holds the first rows of `F` and the others are those of the

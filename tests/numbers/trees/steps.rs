@@ -1,0 +1,213 @@
+//! Steps, damped and bounded.
+
+use super::{Problem, Random, close, random_tree};
+use greybox::nalgebra::DVector;
+use greybox::{BadPiece, Elimination, Information};
+
+/// Random rows, nine for each piece of at most seven columns: condition below a few hundred, so that 1e-12 is some
+/// thousand roundings.
+const ROUNDING: f64 = 1e-12;
+
+fn problems() -> impl Iterator<Item = (Problem, Random)> {
+    (0..60).map(|seed| {
+        let mut random = Random::new(seed);
+        let (shared, records) = (1 + random.below(3), 1 + random.below(4));
+        let pieces = random_tree(shared, records, &mut random);
+        (Problem::new(shared, &pieces, 9, &mut random, |_, x| x), random)
+    })
+}
+
+#[test]
+fn sums_over_the_pieces_are_the_dense_ones() {
+    for (problem, mut random) in problems() {
+        let Problem { tree, jacobian, y, .. } = &problem;
+        close(&tree.gradient(), (-jacobian.transpose() * y).as_slice(), ROUNDING);
+        let norms: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
+        close(&tree.column_norms(), &norms, ROUNDING);
+        close(&[tree.sum_of_squares()], &[y.norm_squared()], ROUNDING);
+        assert_eq!(tree.rows(), y.len() as u64);
+        for scale in [1.0, 1e-9] {
+            let step: Vec<f64> = (0..problem.unknowns()).map(|_| random.next() * scale).collect();
+            let change = jacobian * DVector::from_column_slice(&step);
+            // |y|^2 - |y - J d|^2 without cancellation.
+            let expected = change.dot(&(y - 0.5 * &change));
+            close(&[tree.predicted_reduction(&step) / scale], &[expected / scale], ROUNDING);
+        }
+    }
+}
+
+#[test]
+fn a_step_is_the_dense_minimizer() {
+    for (problem, mut random) in problems() {
+        let n = problem.unknowns();
+        for case in 0..8 {
+            let held: Vec<bool> = (0..n).map(|_| case & 1 == 1 && random.next() > 0.3).collect();
+            let damping: Vec<f64> = (0..n).map(|_| if case & 2 == 2 { random.next().max(0.0) } else { 0.0 }).collect();
+            let step = problem.tree.step(&damping, &held).expect("it is determined");
+            close(&step, problem.dense_step(&damping, &held).as_slice(), ROUNDING);
+            assert!(step.iter().zip(&held).all(|(d, held)| !held || *d == 0.0));
+        }
+        let full = problem.tree.step(&[], &[]).expect("what is missing is zero and not held");
+        let shared = problem.tree.shared_information();
+        close(&shared.solve().expect("it is determined"), &full[..problem.tree.shared()], ROUNDING);
+        let left = (&problem.y - &problem.jacobian * DVector::from_column_slice(&full)).norm_squared();
+        close(&[shared.residual()], &[left], ROUNDING);
+        assert_eq!(shared.rows(), problem.y.len() as u64);
+    }
+}
+
+/// Multiple shooting: the states at the borders of segments are unknowns, each segment's rows depend on its own state and
+/// on the parameters, and heavily weighted rows ask its end to be the next one's start. Each segment stands below the
+/// next one, with the next state and the parameters for a border.
+#[test]
+fn segments_joined_by_heavy_rows_give_the_dense_step() {
+    const SEGMENTS: usize = 40;
+    const WEIGHT: f64 = 1e4;
+    let (mut random, parameters) = (Random::new(5), 2);
+    let mut tree = Elimination::new(parameters);
+    // From the last segment to the first: state `s` is unknown `parameters + SEGMENTS - 1 - s`.
+    let state = |s: usize| parameters + SEGMENTS - 1 - s;
+    let (mut rows, mut parent) = (vec![], None);
+    for s in (0..SEGMENTS).rev() {
+        let last = s == SEGMENTS - 1;
+        let border: Vec<usize> = if last { vec![0, 1] } else { vec![state(s + 1), 0, 1] };
+        let columns: Vec<usize> = std::iter::once(state(s)).chain(border.iter().copied()).collect();
+        let mut triangle = Information::new(columns.len());
+        let mut absorb = |slopes: Vec<(usize, f64)>, y: f64| {
+            let slope = |i: &usize| slopes.iter().find(|(j, _)| j == i).map_or(0.0, |(_, slope)| *slope);
+            triangle.absorb_row(&columns.iter().map(slope).collect::<Vec<f64>>(), y);
+            rows.push((slopes, y));
+        };
+        for _ in 0..5 {
+            absorb(vec![(state(s), random.next()), (0, random.next()), (1, random.next())], random.next());
+        }
+        if !last {
+            // end + 0.9 dx_s + Psi dp - x_(s+1) = 0, times the weight.
+            let (a, b, defect) = (random.next(), random.next(), random.next());
+            let slopes = [(state(s), 0.9), (0, a), (1, b), (state(s + 1), -1.0)].map(|(i, x)| (i, WEIGHT * x));
+            absorb(slopes.to_vec(), WEIGHT * 0.01 * defect);
+        }
+        parent = Some(tree.add(parent, border, triangle).expect("a chain"));
+    }
+    let n = tree.unknowns();
+    let mut problem = Problem {
+        jacobian: greybox::nalgebra::DMatrix::zeros(rows.len(), n),
+        y: DVector::from_iterator(rows.len(), rows.iter().map(|row| row.1)),
+        rows_of: vec![],
+        tree,
+    };
+    for (row, (slopes, _)) in rows.iter().enumerate() {
+        slopes.iter().for_each(|&(i, slope)| problem.jacobian[(row, i)] = slope);
+    }
+    let held: Vec<bool> = (0..n).map(|i| i == state(0)).collect();
+    for held in [vec![false; n], held] {
+        let damping = vec![0.1; n];
+        // Rows of weight 1e4 among rows of one: four digits fewer.
+        let step = problem.tree.step(&damping, &held).expect("it is determined");
+        close(&step, problem.dense_step(&damping, &held).as_slice(), 1e-9);
+        let covariance = problem.tree.covariance(&held).expect("it is determined");
+        let dense = problem.dense_inverse(&held);
+        for (i, j) in
+            [(0, 0), (0, 1), (state(0), 0), (state(0), state(39)), (state(20), state(21)), (state(3), state(30))]
+        {
+            assert!((covariance.get(i, j) - dense[(i, j)]).abs() < 1e-9, "{i} {j}");
+        }
+    }
+}
+
+/// A bounded step cannot be lowered by any move that the bounds allow, but away from where unknowns were put.
+#[test]
+fn a_bounded_step_is_the_minimizer_among_the_unknowns_that_are_not_on_an_end() {
+    let mut on_ends = 0;
+    for (problem, mut random) in problems() {
+        let n = problem.unknowns();
+        let damping = vec![0.1; n];
+        let free = problem.tree.step(&damping, &[]).expect("it is determined");
+        let room: Vec<(f64, f64)> =
+            free.iter().map(|d| (-(d * random.next()).abs(), (d * random.next()).abs())).collect();
+        let step = problem.tree.step_within(&damping, &[], &room).expect("it is determined");
+        assert!(step.iter().zip(&room).all(|(d, room)| room.0 <= *d && *d <= room.1), "{step:?} {room:?}");
+        let gain = |step: &[f64]| {
+            problem.tree.predicted_reduction(step) - 0.5 * step.iter().map(|d| (0.1 * d).powi(2)).sum::<f64>()
+        };
+        assert!(gain(&step) >= 0.0);
+        let residual = &problem.y - &problem.jacobian * DVector::from_column_slice(&step);
+        for i in 0..n {
+            let slope = problem.jacobian.column(i).dot(&residual) - 0.01 * step[i];
+            if step[i] == room[i].0 || step[i] == room[i].1 {
+                on_ends += 1;
+            } else {
+                assert!(slope.abs() < ROUNDING, "unknown {i} of {n}");
+            }
+        }
+    }
+    assert!(on_ends > 100, "{on_ends}");
+}
+
+/// Records that share nothing: together each gets the step that it has alone, and in as many stages.
+#[test]
+fn bounds_of_independent_records_do_not_wait_for_one_another() {
+    let records = 3000;
+    let (mut random, mut tree, mut alone) = (Random::new(3), Elimination::new(0), vec![]);
+    let mut room = vec![];
+    for _ in 0..records {
+        let mut triangle = Information::new(2);
+        (0..4).for_each(|_| triangle.absorb_row(&[random.next(), random.next()], random.next()));
+        let own: Vec<(f64, f64)> = (0..2).map(|_| (random.next().min(0.0), random.next().max(0.0))).collect();
+        let mut single = Elimination::new(0);
+        single.add(None, vec![], triangle.clone()).expect("no border");
+        alone.extend(single.step_within(&[], &[], &own).expect("it is determined"));
+        tree.add(None, vec![], triangle).expect("no border");
+        room.extend(own);
+    }
+    let together = tree.step_within(&[], &[], &room).expect("it is determined");
+    // The way to the second end of a record starts from another point: rounding of numbers of order one.
+    close(&together, &alone, 1e-13);
+}
+
+#[test]
+fn what_is_not_a_number_or_not_determined_has_no_step() {
+    let mut tree = Elimination::new(1);
+    let mut good = Information::new(2);
+    good.absorb_row(&[1.0, 0.5], 1.0);
+    good.absorb_row(&[0.5, 1.0], 2.0);
+    tree.add(None, vec![0], good.clone()).expect("the shared unknown");
+    assert!(tree.step(&[], &[]).is_some());
+    let mut nan = good.clone();
+    nan.absorb_row(&[f64::NAN, 1.0], 0.0);
+    let mut bad = tree.clone();
+    bad.add(None, vec![0], nan).expect("the shared unknown");
+    assert_eq!(bad.step(&[], &[]), None);
+    assert_eq!(bad.covariance(&[]), None);
+    // An own unknown that stands in for the shared one in every record.
+    let mut offsets = Elimination::new(1);
+    for k in 0..50 {
+        let mut triangle = Information::new(2);
+        (0..20).for_each(|i| triangle.absorb_row(&[0.3, 0.7], f64::from(i % 3) + f64::from(k)));
+        offsets.add(None, vec![0], triangle).expect("the shared unknown");
+    }
+    assert_eq!(offsets.step(&[], &[]), None);
+    let held: Vec<bool> = (0..51).map(|i| i == 0).collect();
+    let step = offsets.step(&[], &held).expect("what is left is determined");
+    // The mean of i % 3 over twenty is 0.95.
+    (0..50).for_each(|k| assert!((step[1 + k] - (0.95 + k as f64) / 0.3).abs() < 1e-11));
+    // A little damping shares the mean evenly by the slopes, and the outputs are the same.
+    let damped = offsets.step(&[1e-6; 51], &[]).expect("damping determines it");
+    (0..50).for_each(|k| assert!((damped[0] * 0.7 + damped[1 + k] * 0.3 - step[1 + k] * 0.3).abs() < 1e-9));
+}
+
+#[test]
+fn a_piece_must_stand_below_what_its_border_holds() {
+    let mut tree = Elimination::new(2);
+    let record = tree.add(None, vec![0, 1], Information::new(3)).expect("the shared unknowns");
+    assert_eq!(tree.add(Some(7), vec![], Information::new(1)), Err(BadPiece::Parent { parent: 7, pieces: 1 }));
+    assert_eq!(tree.add(None, vec![2], Information::new(1)), Err(BadPiece::Border { unknown: 2 }));
+    assert_eq!(tree.add(None, vec![1, 1], Information::new(2)), Err(BadPiece::Border { unknown: 1 }));
+    assert_eq!(tree.add(Some(record), vec![2, 0], Information::new(5)), Ok(1));
+    assert_eq!(tree.unknowns(), 6);
+    // Of the record itself: it does not know unknown 4, which is the segment's.
+    assert_eq!(tree.add(Some(record), vec![4], Information::new(1)), Err(BadPiece::Border { unknown: 4 }));
+    // Fewer columns than the border: the missing ones are zeros.
+    tree.add(None, vec![0, 1], Information::new(1)).expect("the shared unknowns");
+    assert_eq!(tree.columns().map(|(triangle, _)| triangle.columns()).collect::<Vec<_>>(), [3, 5, 2]);
+}
