@@ -59,6 +59,14 @@ pub(crate) trait Wide: Copy + Send + Sync + 'static {
     /// The same with `==`.
     fn select_eq(self, to: Self, then: Self, otherwise: Self) -> Self;
 
+    /// Whether all lanes are below a limit.
+    #[inline(always)]
+    fn all_below(self, limit: f64) -> bool {
+        let mut lanes = [f64::NEG_INFINITY; 8];
+        self.store(&mut lanes);
+        lanes.iter().all(|lane| *lane < limit)
+    }
+
     /// Each lane through a function of one number.
     #[inline(always)]
     fn map(self, f: impl Fn(f64) -> f64) -> Self {

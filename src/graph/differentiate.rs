@@ -125,3 +125,107 @@ pub(crate) fn slopes(tape: &mut Tape, roots: &[Id], variables: &Variables, way: 
         Way::Reverse => Cuts::new(tape, roots, variables).slopes(tape, roots, variables, reverse::gradients),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dual::Dual;
+    use crate::graph::{Function, Function2, Graph};
+    use crate::scalar::Comparison;
+
+    const SEEDS: usize = 4;
+    const POINTS: [[f64; SEEDS]; 8] = [
+        [0.0, 1.0, 0.5, 2.0],
+        [0.0, 0.0, 0.5, 2.0],
+        [-1.0, 0.3, 0.7, -2.0],
+        [1.0, 1.0, -0.5, 0.0],
+        [4.0, -3.0, 0.0, 0.2],
+        [0.25, 0.25, 1.0, 1.0],
+        [-0.0, 2.0, 1.5, 0.1],
+        [1e-3, -1e-3, 3.0, 0.4],
+    ];
+
+    /// Two states whose slopes are carried and two parameters; each expression is differentiated in all three ways.
+    fn agrees(build: impl Fn(&mut Graph, [Id; 4]) -> Vec<Id>) {
+        let mut graph = Graph::default();
+        let leaves =
+            [Leaf::State(0), Leaf::State(1), Leaf::Parameter(0), Leaf::Parameter(1)].map(|leaf| graph.leaf(leaf));
+        let roots = build(&mut graph, leaves);
+        let seeds = [Seed::Carry(0), Seed::Carry(1), Seed::Parameter(0), Seed::Parameter(1)];
+        for way in [Way::Carried, Way::Forward, Way::Reverse] {
+            let mut tape = Tape::new(true);
+            let values = tape.import(&graph, &roots);
+            // All slopes may be there; those of the parameters are zero at the start.
+            let row = |i: usize| (0..SEEDS).map(|s| Some(2 + i * SEEDS + s)).collect();
+            let pattern = Pattern { rows: vec![row(0), row(1)] };
+            let variables = Variables::new(&mut tape, &seeds, &pattern);
+            let tangents = slopes(&mut tape, &values, &variables, way);
+            for point in POINTS {
+                let value = |leaf| match leaf {
+                    Leaf::State(i) if i < 2 => point[i as usize],
+                    Leaf::State(i) => f64::from(u8::from((i as usize - 2) / SEEDS == (i as usize - 2) % SEEDS)),
+                    Leaf::Parameter(j) => point[2 + j as usize],
+                    _ => f64::NAN,
+                };
+                let expected = graph.evaluate(&roots, |leaf| match leaf {
+                    Leaf::State(i) => Dual::<SEEDS>::variable(point[i as usize], i as usize),
+                    Leaf::Parameter(j) => Dual::variable(point[2 + j as usize], 2 + j as usize),
+                    _ => Dual::from(f64::NAN),
+                });
+                let mut all = vec![];
+                tape.graph.evaluate_all(&mut all, value);
+                for (expected, tangent) in expected.iter().zip(&tangents) {
+                    if !expected.value.is_finite() {
+                        continue;
+                    }
+                    for (s, expected) in expected.slopes.iter().enumerate() {
+                        let found = tangent[s].map_or(0.0, |slope| all[slope.index()]);
+                        let same = found == *expected
+                            || (found - expected).abs() <= 1e-13 * expected.abs().max(1.0)
+                            || found.is_nan() && expected.is_nan();
+                        assert!(same, "{way:?} at {point:?}: slope {s} is {found}, not {expected}, of\n{graph}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_side_not_taken_leaves_no_trace() {
+        agrees(|graph, [x, _, p, _]| {
+            let (zero, root) = (graph.constant(0.0), graph.function(Function::Sqrt, x));
+            let chosen = graph.select(Comparison::Less, x, zero, zero, root);
+            vec![graph.mul(chosen, p)]
+        });
+        agrees(|graph, [x, y, p, q]| {
+            let (one, ratio) = (graph.constant(1.0), graph.div(p, x));
+            let inner = graph.select(Comparison::Equal, x, y, one, ratio);
+            let outer = graph.select(Comparison::LessOrEqual, inner, q, y, inner);
+            vec![graph.mul(outer, outer), graph.add(inner, outer)]
+        });
+    }
+
+    #[test]
+    fn what_does_not_vary_contributes_nothing_to_an_infinite_slope() {
+        agrees(|graph, [x, y, p, q]| {
+            let (xx, yy) = (graph.mul(x, x), graph.mul(y, y));
+            let sum = graph.add(xx, yy);
+            let root = graph.function(Function::Sqrt, sum);
+            let length = graph.function2(Function2::Hypot, x, y);
+            let scaled = graph.mul(root, p);
+            let power = graph.function2(Function2::Pow, sum, q);
+            vec![graph.mul(scaled, q), graph.mul(length, p), root, power]
+        });
+        // Two steps of a tank that runs dry: the second root depends on the first.
+        agrees(|graph, [x, _, p, q]| {
+            let mut level = x;
+            for _ in 0..3 {
+                let root = graph.function(Function::Sqrt, level);
+                let flow = graph.mul(root, p);
+                let change = graph.sub(q, flow);
+                level = graph.mul_add(change, q, level);
+            }
+            vec![level]
+        });
+    }
+}

@@ -3,3 +3,4 @@
 mod bits;
 mod random;
 mod steps;
+mod traced;

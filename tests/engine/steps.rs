@@ -36,7 +36,7 @@ impl Model for Pmsm {
 
 /// Runs a model's program from a start over samples of these inputs, all lanes alike but for their parameters, and compares
 /// rows and what is carried with duals.
-fn agrees<M: Model, I: Integrator, const N: usize>(
+pub fn agrees<M: Model, I: Integrator, const N: usize>(
     model: &M,
     integrator: &I,
     hold: Hold,
@@ -51,7 +51,12 @@ fn agrees<M: Model, I: Integrator, const N: usize>(
     let seeds: Vec<Seed> = (0..np).map(Seed::Parameter).chain((0..nx).map(Seed::Carry)).collect();
     assert_eq!(N, seeds.len());
     let program = Program::compile(&recurrence, &seeds, Sampling::Uniform, Trajectories::Many).unwrap();
-    println!("{:?} instructions, columns {:?}", program.instructions(), program.columns());
+    println!(
+        "{:?} instructions, columns {:?}, {:?}",
+        program.instructions(),
+        program.columns(),
+        program.derived_from()
+    );
     let samples = inputs.len() - 1;
     for wanted in [1, program.lanes()] {
         let mut group = program.group(wanted);
@@ -63,17 +68,24 @@ fn agrees<M: Model, I: Integrator, const N: usize>(
             group.start(lane, M::State::into_array(start).as_ref());
         }
         group.prepare();
-        let (from, next) = program.derived_from();
-        assert!(from.is_empty() && !next);
+        let (from, reads_next) = program.derived_from();
         let value = |column: &Column, k: usize| match column {
             Column::Input(i) => M::Input::into_array(inputs[k]).as_ref()[*i],
             Column::Time => k as f64 * step,
             other => panic!("{other:?}"),
         };
+        let sources: Vec<Vec<f64>> =
+            from.iter().map(|column| (0..inputs.len()).map(|k| value(column, k)).collect()).collect();
+        let sources: Vec<&[f64]> = sources.iter().map(Vec::as_slice).collect();
+        let derived = program.derive(&sources, if reads_next { samples } else { samples + 1 });
         let mut block = vec![];
         for k in 0..inputs.len() {
             for column in program.columns() {
-                block.extend(std::iter::repeat_n(value(column, k), lanes));
+                let value = match column {
+                    Column::Derived(d) => derived[*d].get(k).copied().unwrap_or(f64::NAN),
+                    column => value(column, k),
+                };
+                block.extend(std::iter::repeat_n(value, lanes));
             }
         }
         let mut rows = vec![f64::NAN; samples * program.row_length() * lanes];
@@ -94,7 +106,16 @@ fn agrees<M: Model, I: Integrator, const N: usize>(
                     largest = largest.max(y.value.abs());
                     same_within(row(N), y.value, 1e-12 * largest);
                     let size = y.slopes.iter().fold(0.0f64, |m, s| m.max(s.abs()));
-                    (0..N).for_each(|s| same_within(row(s), y.slopes[s], 1e-12 * size + 1e-300));
+                    (0..N).for_each(|s| {
+                        if row(s).is_nan() && !y.slopes[s].is_nan() {
+                            println!(
+                                "k {k} j {j} s {s} lane {lane} {:?} {:?}",
+                                (0..=N).map(row).collect::<Vec<_>>(),
+                                y
+                            );
+                        }
+                        same_within(row(s), y.slopes[s], 1e-12 * size + 1e-300)
+                    });
                 }
                 let interval =
                     Interval { t0: k as f64 * step, t1: (k + 1) as f64 * step, u0: inputs[k], u1: inputs[k + 1], hold };

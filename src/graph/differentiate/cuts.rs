@@ -15,12 +15,13 @@ pub(super) struct Cuts(Vec<Id>);
 impl Cuts {
     pub fn new(tape: &Tape, roots: &[Id], variables: &Variables) -> Self {
         let active = active(tape, &variables.leaves, roots);
-        let growth = growth(tape);
+        let (growth, positive) = (growth(tape), positive(tape));
         let mut sound = vec![true; tape.graph.len()];
         let mut cuts = vec![];
         for (i, node) in tape.graph.nodes().iter().enumerate().filter(|(i, _)| active[*i]) {
             let operands_sound = varying_operands(node).all(|id| !active[id.index()] || sound[id.index()]);
-            let singular = is_singular(tape, node);
+            let regular = matches!(*node, Node::Function(Function::Sqrt, a) if positive[a.index()] == Some(true));
+            let singular = !regular && is_singular(tape, node);
             if singular || matches!(node, Node::Select(..)) && !operands_sound {
                 cuts.push(Id::new(i));
                 sound[i] = false;
@@ -77,6 +78,24 @@ fn is_singular(tape: &Tape, node: &Node) -> bool {
         Node::Function2(Function2::Pow, _, n) => tape.graph.known(n).is_none_or(|n| n < 1.0),
         _ => false,
     }
+}
+
+/// Whether each value is above a positive number (true) or at least not negative (false), if that can be said.
+fn positive(tape: &Tape) -> Vec<Option<bool>> {
+    let mut positive: Vec<Option<bool>> = Vec::with_capacity(tape.graph.len());
+    for node in tape.graph.nodes() {
+        let of = |id: Id| positive[id.index()];
+        positive.push(match *node {
+            Node::Constant(constant) if constant.value() >= 0.0 => Some(constant.value() > 0.0),
+            Node::Mul(a, b) if a == b => Some(of(a) == Some(true)),
+            Node::Mul(a, b) => of(a).zip(of(b)).map(|_| false),
+            Node::Add(a, b) => of(a).zip(of(b)).map(|(a, b)| a || b),
+            Node::Function(Function::Abs | Function::Sqrt | Function::Exp, _) => Some(false),
+            Node::Function(Function::Cosh, _) => Some(true),
+            _ => None,
+        });
+    }
+    positive
 }
 
 /// Without bound, or not a number.

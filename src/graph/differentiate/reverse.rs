@@ -38,8 +38,13 @@ fn gradient(tape: &mut Tape, root: Id, leaves: &[Id]) -> Tangent {
                 let of_otherwise = tape.select(comparison, a, b, zero, adjoint);
                 give(tape, otherwise, of_otherwise, Partial::One);
             }
-            // Both are cuts, hence leaves, wherever they vary.
-            Rule::Flat | Rule::Singular(_) | Rule::Length(..) => {}
+            // Where its slope is finite; else it is a cut, hence a leaf, as lengths are.
+            Rule::Singular(terms) => {
+                for (operand, partial) in terms {
+                    give(tape, operand, adjoint, Partial::Node(partial));
+                }
+            }
+            Rule::Flat | Rule::Length(..) => {}
         }
     }
     leaves.iter().map(|leaf| if active[leaf.index()] { adjoints[leaf.index()] } else { None }).collect()
