@@ -73,7 +73,7 @@ fn delta_method_by_hand() {
     let estimate = fit(&[record(3, 2.0, 0.4)], free(0.1)).unwrap();
     let (p, c) = (estimate.parameters, &estimate.covariance);
     let product = derived(&estimate, "a b", |p| p.a * p.b);
-    let expected = (p.b * p.b * c[(0, 0)] + p.a * p.a * c[(1, 1)] + 2.0 * p.a * p.b * c[(0, 1)]).sqrt();
+    let expected = (p.b * p.b * c.get(0, 0) + p.a * p.a * c.get(1, 1) + 2.0 * p.a * p.b * c.get(0, 1)).sqrt();
     assert!((product.value - p.a * p.b).abs() < 1e-15);
     assert!((product.standard_error.unwrap() / expected - 1.0).abs() < 1e-12);
     let (lower, upper) = product.interval.unwrap();

@@ -157,9 +157,9 @@ fn the_committed_example_still_reads() {
     assert_eq!(report.to_json().unwrap(), text);
     assert_eq!(report.title, "An example of the schema");
     assert_well_formed(&report.to_html());
-    let newer = text.replace("greybox report 2", "greybox report 3");
+    let newer = text.replace("greybox report 3", "greybox report 4");
     let refused = Report::from_json(&newer).unwrap_err().to_string();
-    assert!(refused.contains("greybox report 3") && refused.contains("reads \"greybox report 2\""), "{refused}");
+    assert!(refused.contains("greybox report 4") && refused.contains("reads \"greybox report 3\""), "{refused}");
 }
 
 /// A shift of both frictions against the offset changes nothing; the report says so in these words, in every form.

@@ -39,11 +39,11 @@ fn simulate<M: Model, I: Integrator, S: Scalar>(
     x: Of<M::State, S>,
     p: &Of<M::Parameters, S>,
 ) -> Result<Of<M::State, S>, Stuck> {
-    let mut memory = I::Memory::default();
+    let mut step = 0.0;
     times.windows(2).try_fold(x, |x, t| {
         let u1 = if hold == Hold::First { input(t[1]) } else { input(t[0]) };
         let interval = Interval { t0: t[0], t1: t[1], u0: input(t[0]), u1, hold };
-        ModelSystem { model, interval: &interval, p }.step(integrator, x, &mut memory)
+        ModelSystem { model, interval: &interval, p }.step(integrator, x, &mut step)
     })
 }
 
