@@ -102,7 +102,7 @@ fn duals<M: Model, const N: usize>(bencher: Bencher, model: &M, p: &[f64]) {
         for k in 0..SAMPLES {
             let u: Of<M::Input, f64> = M::Input::from_fn(|i| (0.37 * (k * 3 + i) as f64).sin());
             let interval = Interval { t0: k as f64 * STEP, t1: (k + 1) as f64 * STEP, u0: u, u1: u, hold: Hold::Zero };
-            x = ModelSystem { model, interval: &interval, p: &p }.step(&Rk4::default(), x, &mut ()).unwrap();
+            x = ModelSystem { model, interval: &interval, p: &p }.step(&Rk4::default(), x, &mut 0.0).unwrap();
             black_box(&x);
         }
     });

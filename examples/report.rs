@@ -26,6 +26,7 @@ signals! { pub struct Friction { m: "kg", fv: "N s/m", fcp: "N", fcn: "N", offse
 
 /// The electro-mechanical positioning system of A. Janot, M. Gautier, M. Brunot, *Data set and reference models of EMPS*,
 /// 2019, in closed loop; dry friction is `fcp` forwards and `fcn` backwards.
+#[derive(Clone)]
 struct Axis;
 
 const GTAU: f64 = 35.150_651_88; // N/V
@@ -80,13 +81,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn report<M: Model>(
+fn report<M: Model + Clone>(
     model: &M,
     record: &ExperimentOf<M>,
     parameters: Of<M::Parameters, Parameter>,
     profiles: bool,
 ) -> Result<Report, greybox::Error> {
-    let mut problem = Fit::new(model, record).parameters(parameters).problem()?;
+    let problem = Fit::new(model, record).parameters(parameters).problem()?;
     let estimate = problem.run()?;
     let mut report = Report::new(&problem, &estimate)?.titled(format!("Estimate from {}", record.name()));
     for unknown in estimate.unknowns.iter().filter(|_| profiles) {

@@ -73,7 +73,7 @@ pub fn expression(random: &mut Random, size: usize) -> (Graph, Vec<Id>) {
     let mut nodes: Vec<Id> = (0..STATES as u32).map(|i| graph.leaf(Leaf::State(i))).collect();
     nodes.extend((0..PARAMETERS as u32).map(|j| graph.leaf(Leaf::Parameter(j))));
     for _ in 0..size {
-        let mut any = |random: &mut Random, graph: &mut Graph| {
+        let any = |random: &mut Random, graph: &mut Graph| {
             // Late nodes more often, so that expressions are deep.
             let n = nodes.len();
             match random.below(12) {
