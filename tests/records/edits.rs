@@ -252,7 +252,7 @@ fn json_that_is_no_record() {
     refused("/inputs/u", vec![1.0].into(), &["`y` has 3 rows", "`u` has 1"]);
     refused("/inputs", serde_json::json!({"v": [1, 2, 3]}), &["unknown field `v`", "`u`"]);
     refused("/outputs", serde_json::json!({"y": [1, 2, 3]}), &["missing field `z`"]);
-    refused("/outputs", 3.into(), &["one value for each of: y, z"]);
+    refused("/outputs", 3.into(), &["a map of values by name"]);
     refused("/time/Uniform/step", 0.into(), &["sample time", "0"]);
     refused("/time", serde_json::json!({"Stamps": [0, 2, 1]}), &["sample 2", "2 s is followed by 1 s"]);
     refused("/time", serde_json::json!({"Stamps": [0, 2]}), &["time has 2 rows", "3"]);
