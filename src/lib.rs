@@ -74,9 +74,9 @@
 //! | floor | what | files |
 //! |---|---|---|
 //! | roof | read | [`report`], which reads [`diagnose`]; [`check`] |
-//! | 3 | learn | `loss`, `weighting`, `prefilter`, [`optimize`], [`regress`], [`numeric`], `fit`, `estimate`, [`online`] |
-//! | 2 | expect | `integrate`, `predict` |
-//! | 1 | say | `model`, `parameter`, `scaling`, `interval`, `experiment`, [`units`] |
+//! | 3 | learn | `loss`, `weighting`, [`optimize`], [`regress`], [`numeric`], [`problem`], `estimate`, `judge`, `fit`, [`online`] |
+//! | 2 | expect | `integrate`, `prefilter`, `recurrence`, `predict`, `simulate`, [`sweep`] |
+//! | 1 | say | `model`, `parameter`, `scaling`, `interval`, [`record`], `functions`, `equations`, `experiment`, [`units`] |
 //! | ground | numbers | `lanes`, `scalar`, `dual`, `signals`, `information`, `whiteness`, `error` |
 //! | wing | machines | [`pmsm`], [`models`] |
 //!
