@@ -77,7 +77,7 @@
 //! | 3 | learn | `loss`, `weighting`, [`optimize`], [`regress`], [`numeric`], [`problem`], `estimate`, `judge`, `fit`, [`online`] |
 //! | 2 | expect | `integrate`, `prefilter`, `recurrence`, `predict`, `simulate`, [`sweep`] |
 //! | 1 | say | `model`, `parameter`, `scaling`, `interval`, [`record`], `functions`, `equations`, `experiment`, [`units`] |
-//! | ground | numbers | `lanes`, `scalar`, `dual`, `signals`, `information`, `whiteness`, `error` |
+//! | ground | numbers | `lanes`, `scalar`, `dual`, `signals`, `layout`, [`graph`], `information`, `whiteness`, `error` |
 //! | wing | machines | [`pmsm`], [`models`] |
 //!
 //! **The way of a sample through a fit.** [`Experiment`] holds it. The integrator carries the state to it in
