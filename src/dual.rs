@@ -5,7 +5,7 @@
 //! quotient multiplies by the reciprocal of its divisor, which is computed once where the divisor does not change (a
 //! parameter inside a time loop); its value may therefore differ from `a / b` in the last bit.
 
-use crate::scalar::{Comparison, Scalar};
+use crate::scalar::{Comparison, Grid, Scalar};
 use core::cmp::Ordering;
 use core::iter::Sum;
 use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
@@ -391,11 +391,14 @@ impl<const N: usize, T: Scalar> Scalar for Dual<N, T> {
     fn signum(self) -> Self {
         Self::constant(self.value.signum())
     }
+    // Only what is not a number differs from itself.
     #[inline(always)]
+    #[allow(clippy::eq_op)]
     fn max(self, other: Self) -> Self {
         if self.value >= other.value || other.value != other.value { self } else { other }
     }
     #[inline(always)]
+    #[allow(clippy::eq_op)]
     fn min(self, other: Self) -> Self {
         if self.value <= other.value || other.value != other.value { self } else { other }
     }
@@ -436,5 +439,14 @@ impl<const N: usize, T: Scalar> Scalar for Dual<N, T> {
     #[inline(always)]
     fn copysign(self, sign: Self) -> Self {
         self.chained(self.value.copysign(sign.value), self.value.signum() * sign.value.signum())
+    }
+    fn look_up(table: &Grid<'_>, [x, y]: [Self; 2], [i, j]: [u8; 2]) -> Self {
+        let at = [x.value, y.value];
+        let (value, dx) = (T::look_up(table, at, [i, j]), T::look_up(table, at, [i.saturating_add(1), j]));
+        if !table.is_surface() {
+            return x.chained(value, dx);
+        }
+        let dy = T::look_up(table, at, [i, j.saturating_add(1)]);
+        Dual { value, slopes: T::slopes_of_product(&x.slopes, dx, &y.slopes, dy) }
     }
 }

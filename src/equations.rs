@@ -1,8 +1,10 @@
 //! [`Equations`]: a model as data.
 
+use crate::functions::Functions;
 use crate::graph::{Graph, Id, Leaf, Node, Symbol, Untraceable};
 use crate::layout::{Kind, Layout};
 use crate::model::Model;
+use crate::scalar::Scalar;
 use crate::signals::Signals;
 use core::fmt::{self, Display};
 use serde::{Deserialize, Serialize};
@@ -17,6 +19,9 @@ pub struct Equations {
     graph: Graph,
     state: Vec<Id>,
     output: Vec<Id>,
+    /// Empty where not said.
+    diffusion: Vec<Id>,
+    noise: Vec<Id>,
 }
 
 /// What is written of equations.
@@ -27,6 +32,10 @@ struct Parts {
     graph: Graph,
     state: Vec<Id>,
     output: Vec<Id>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    diffusion: Vec<Id>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    noise: Vec<Id>,
 }
 
 /// A graph that does not make up equations of its layout.
@@ -77,23 +86,41 @@ impl Equations {
     /// # Errors
     /// If they do not fit the layout.
     pub fn new(layout: Layout, graph: &Graph, state: &[Id], output: &[Id]) -> Result<Self, InvalidEquations> {
+        Equations::with_noise(layout, graph, [state, output, &[], &[]])
+    }
+
+    /// The same with process noise and measurement noise, as [`Model::diffusion`] and [`Model::noise`] say them: roots of
+    /// the states, the outputs, the diffusion of each state and the noise of each output. Either may be left empty.
+    ///
+    /// # Errors
+    /// If they do not fit the layout, or noise depends on more than parameters.
+    pub fn with_noise(layout: Layout, graph: &Graph, roots: [&[Id]; 4]) -> Result<Self, InvalidEquations> {
         let count = |role, expected: usize, found: usize| match expected == found {
             true => Ok(()),
             false => Err(InvalidEquations::Count { role, expected, found }),
         };
+        let [state, output, diffusion, noise] = roots;
         count("states", if layout.kind == Kind::Static { 0 } else { layout.states.len() }, state.len())?;
         count("outputs", layout.outputs.len(), output.len())?;
-        let roots = [state, output].concat();
-        if let Some(root) = roots.iter().find(|root| root.index() >= graph.len()) {
+        if !diffusion.is_empty() {
+            count("diffusions of states", layout.states.len(), diffusion.len())?;
+        }
+        if !noise.is_empty() {
+            count("noises of outputs", layout.outputs.len(), noise.len())?;
+        }
+        let all = roots.concat();
+        if let Some(root) = all.iter().find(|root| root.index() >= graph.len()) {
             return Err(InvalidEquations::NoSuchNode { node: root.index(), nodes: graph.len() });
         }
-        let (graph, roots) = graph.pruned(&roots);
-        for node in graph.nodes() {
+        let (graph, all) = graph.pruned(&all);
+        let (drift, levels) = all.split_at(state.len() + output.len());
+        let constant = graph.reached(levels);
+        for (node, constant) in graph.nodes().iter().zip(constant) {
             let Node::Leaf(leaf) = *node else { continue };
             let there = match leaf {
-                Leaf::Time => true,
-                Leaf::State(i) => (i as usize) < layout.states.len(),
-                Leaf::Input(i) => (i as usize) < layout.inputs.len(),
+                Leaf::Time => !constant,
+                Leaf::State(i) => (i as usize) < layout.states.len() && !constant,
+                Leaf::Input(i) => (i as usize) < layout.inputs.len() && !constant,
                 Leaf::Parameter(i) => (i as usize) < layout.parameters.len(),
                 Leaf::Step | Leaf::NextInput(_) | Leaf::Measured(_) => false,
             };
@@ -101,8 +128,10 @@ impl Equations {
                 return Err(InvalidEquations::NoSuchQuantity { leaf });
             }
         }
-        let (state, output) = roots.split_at(state.len());
-        Ok(Equations { layout, state: state.to_vec(), output: output.to_vec(), graph })
+        let (state, output) = drift.split_at(state.len());
+        let (diffusion, noise) = levels.split_at(diffusion.len());
+        let [state, output, diffusion, noise] = [state, output, diffusion, noise].map(<[Id]>::to_vec);
+        Ok(Equations { layout, graph, state, output, diffusion, noise })
     }
 
     /// Reads a Rust model.
@@ -135,7 +164,21 @@ impl Equations {
             let (t, x, u, p) = leaves();
             M::Output::into_array(model.output(t, &x, &u, &p)).as_ref().to_vec()
         })?;
-        Equations::new(layout, &graph, &state, &output).map_err(|wrong| Untraceable { reason: wrong.to_string() })
+        let levels = graph.trace(|| {
+            let p = leaves().3;
+            let diffusion = M::State::into_array(model.diffusion(&p));
+            let noise = M::Output::into_array(model.noise(&p));
+            diffusion.as_ref().iter().chain(noise.as_ref()).copied().collect()
+        })?;
+        let (diffusion, noise) = levels.split_at(M::State::LEN);
+        // What was not written is no noise.
+        let said = |levels: &[Id], unsaid: fn(f64) -> bool| {
+            let unsaid = |id: &Id| graph.known(*id).is_some_and(unsaid);
+            if levels.iter().all(unsaid) { vec![] } else { levels.to_vec() }
+        };
+        let (diffusion, noise) = (said(diffusion, |level| level == 0.0), said(noise, f64::is_nan));
+        let roots: [&[Id]; 4] = [&state, &output, &diffusion, &noise];
+        Equations::with_noise(layout, &graph, roots).map_err(|wrong| Untraceable { reason: wrong.to_string() })
     }
 
     /// The quantities.
@@ -181,6 +224,19 @@ impl Equations {
             list.sort_unstable();
         }
         on
+    }
+
+    /// The values of roots; without time, states and inputs for what depends on parameters alone.
+    fn values<S: Scalar>(&self, roots: &[Id], at: Option<(S, &[S], &[S])>, p: &[S], to: &mut [S]) {
+        let unknown = || S::from(f64::NAN);
+        let found = self.graph.evaluate(roots, |leaf| match (leaf, at) {
+            (Leaf::Parameter(i), _) => p[i as usize],
+            (Leaf::Time, Some((t, ..))) => t,
+            (Leaf::State(i), Some((_, x, _))) => x[i as usize],
+            (Leaf::Input(i), Some((_, _, u))) => u[i as usize],
+            _ => unknown(),
+        });
+        to.iter_mut().zip(found).for_each(|(to, found)| *to = found);
     }
 
     fn name(&self, leaf: Leaf) -> String {
@@ -232,17 +288,41 @@ fn degrees(graph: &Graph) -> Vec<Degree> {
     degrees
 }
 
+impl<S: Scalar> Functions<S> for Equations {
+    fn state(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        match self.layout.kind {
+            Kind::Static => to.copy_from_slice(x),
+            _ => self.values(&self.state, Some((t, x, u)), p, to),
+        }
+    }
+
+    fn output(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        self.values(&self.output, Some((t, x, u)), p, to);
+    }
+
+    fn diffusion(&self, p: &[S], to: &mut [S]) {
+        to.fill(S::from(0.0));
+        self.values(&self.diffusion, None, p, to);
+    }
+
+    fn noise(&self, p: &[S], to: &mut [S]) {
+        to.fill(S::from(f64::NAN));
+        self.values(&self.noise, None, p, to);
+    }
+}
+
 impl From<Equations> for Parts {
-    fn from(Equations { layout, graph, state, output }: Equations) -> Self {
-        Parts { layout, graph, state, output }
+    fn from(Equations { layout, graph, state, output, diffusion, noise }: Equations) -> Self {
+        Parts { layout, graph, state, output, diffusion, noise }
     }
 }
 
 impl TryFrom<Parts> for Equations {
     type Error = InvalidEquations;
 
-    fn try_from(Parts { layout, graph, state, output }: Parts) -> Result<Self, InvalidEquations> {
-        Equations::new(layout, &graph, &state, &output)
+    fn try_from(parts: Parts) -> Result<Self, InvalidEquations> {
+        let Parts { layout, graph, state, output, diffusion, noise } = parts;
+        Equations::with_noise(layout, &graph, [&state, &output, &diffusion, &noise])
     }
 }
 

@@ -4,6 +4,7 @@ mod predict;
 mod run;
 mod search;
 
+use crate::equations::Equations;
 use crate::error::Error;
 use crate::estimate::Estimate;
 use crate::experiment::{ExperimentOf, Sample};
@@ -19,7 +20,7 @@ use crate::prefilter::Butterworth;
 use crate::problem::{Problem, Search, Settings, Weights};
 use crate::record::Record;
 use crate::signals::{Of, Signals};
-use crate::sweep::{DualSweep, Loops, Sweep};
+use crate::sweep::{DualSweep, Loops, ProgramSweep, Sweep};
 use crate::weighting::Weighting;
 use argmin::core::observers::{Observe, ObserverMode};
 use core::marker::PhantomData;
@@ -217,8 +218,18 @@ where
     method.check()?;
     let layout = Arc::new(Layout::of::<M>());
     predictor.check(&layout)?;
-    let reason = "the equations as compiled".to_owned();
-    Ok(Arc::new(DualSweep { layout, model, loops, method, predictor: predictor.clone(), reason }))
+    let traced = Equations::trace(&*model);
+    let reason = match &traced {
+        Ok(_) => String::new(),
+        Err(untraceable) => untraceable.reason.clone(),
+    };
+    let (method_, predictor_) = (method.clone(), predictor.clone());
+    let plain = Arc::new(DualSweep { layout, model, loops, method, predictor: predictor.clone(), reason });
+    let Ok(equations) = traced else { return Ok(plain) };
+    Ok(match ProgramSweep::new(Arc::new(equations), method_, predictor_, plain.clone()) {
+        Ok(sweep) => Arc::new(sweep),
+        Err(_) => plain,
+    })
 }
 
 /// A typed weighting by position.

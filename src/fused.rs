@@ -1,7 +1,7 @@
 //! [`Fused`]: a number whose slopes are multiplied and added in one instruction.
 
 use crate::lanes::{Number, Sums, slopes_in_pairs};
-use crate::scalar::Scalar;
+use crate::scalar::{Grid, Scalar};
 use core::iter::Sum;
 use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
@@ -109,6 +109,9 @@ impl Scalar for Fused {
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         (self.sin(), self.cos())
+    }
+    fn look_up(table: &Grid<'_>, [x, y]: [Self; 2], order: [u8; 2]) -> Self {
+        Fused(table.derivative([x.0, y.0], order))
     }
     slopes_in_pairs!(true);
 }

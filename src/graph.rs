@@ -22,6 +22,7 @@ mod build;
 mod differentiate;
 mod display;
 mod evaluate;
+mod function;
 mod node;
 mod partials;
 mod serial;
@@ -31,25 +32,29 @@ mod trace;
 
 pub use differentiate::Seed;
 pub(crate) use differentiate::{Pattern, Tangent, Variables, Way, slopes};
-pub use node::{Constant, Function, Function2, Id, Leaf, Node};
+pub use function::{Function, Function2};
+pub use node::{Constant, Id, Leaf, Node};
 pub use serial::InvalidGraph;
 pub use symbol::Symbol;
 pub(crate) use tape::Tape;
 pub use trace::Untraceable;
 
+use crate::scalar::Table;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Arithmetic as a value: nodes, each after its operands.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 #[serde(into = "serial::Nodes", try_from = "serial::Nodes")]
 pub struct Graph {
     nodes: Vec<Node>,
+    tables: Vec<Arc<Table>>,
     known: HashMap<Node, Id>,
 }
 
 impl PartialEq for Graph {
     fn eq(&self, other: &Self) -> bool {
-        self.nodes == other.nodes
+        self.nodes == other.nodes && self.tables == other.tables
     }
 }
 
@@ -57,6 +62,16 @@ impl Graph {
     /// All nodes, in an order in which each comes after its operands.
     pub fn nodes(&self) -> &[Node] {
         &self.nodes
+    }
+
+    /// The tables that nodes name by their numbers.
+    pub fn tables(&self) -> &[Arc<Table>] {
+        &self.tables
+    }
+
+    /// Takes the tables of another graph for its own, by the same numbers.
+    pub(crate) fn share_tables(&mut self, other: &Graph) {
+        self.tables.clone_from(&other.tables);
     }
 
     /// The node of an identifier; not a number, if the graph has no such node.
@@ -95,7 +110,7 @@ impl Graph {
     /// The graph of these roots alone, and where they stand in it.
     pub fn pruned(&self, roots: &[Id]) -> (Graph, Vec<Id>) {
         let reached = self.reached(roots);
-        let mut graph = Graph::default();
+        let mut graph = Graph { tables: self.tables.clone(), ..Graph::default() };
         let mut new = vec![Id::default(); self.nodes.len()];
         for (i, node) in self.nodes.iter().enumerate().filter(|(i, _)| reached[*i]) {
             new[i] = graph.put(node.with_operands(|id| new[id.index()]));

@@ -29,11 +29,13 @@ pub(crate) unsafe trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
 {
     /// Whether slopes are multiplied and added in one instruction: only where the machine has FMA.
+    #[cfg(feature = "std")]
     const FUSED: bool;
 }
 
 // SAFETY: the same type.
 unsafe impl Number for f64 {
+    #[cfg(feature = "std")]
     const FUSED: bool = false;
 }
 
@@ -183,16 +185,16 @@ macro_rules! slopes_in_pairs {
             $crate::lanes::lanes!(N; x in x, y in y;; x - y)
         }
         #[inline(always)]
-        fn slopes_times<const N: usize>(x: &[Self; N], v: Self) -> [Self; N] {
-            $crate::lanes::lanes!(N; x in x; v = v; x * v)
+        fn slopes_times<const N: usize>(x: &[Self; N], factor: Self) -> [Self; N] {
+            $crate::lanes::lanes!(N; x in x; v = factor; x * v)
         }
         #[inline(always)]
-        fn slopes_of_product<const N: usize>(x: &[Self; N], v: Self, y: &[Self; N], u: Self) -> [Self; N] {
-            $crate::lanes::lanes!(N; x in x, y in y; u = u, v = v; y.times_plus::<$fused>(u, x * v))
+        fn slopes_of_product<const N: usize>(x: &[Self; N], by: Self, y: &[Self; N], with: Self) -> [Self; N] {
+            $crate::lanes::lanes!(N; x in x, y in y; u = with, v = by; y.times_plus::<$fused>(u, x * v))
         }
         #[inline(always)]
-        fn slopes_of_quotient<const N: usize>(x: &[Self; N], y: &[Self; N], q: Self, r: Self) -> [Self; N] {
-            $crate::lanes::lanes!(N; x in x, y in y; q = q, r = r; y.times_from::<$fused>(q, x) * r)
+        fn slopes_of_quotient<const N: usize>(x: &[Self; N], y: &[Self; N], value: Self, over: Self) -> [Self; N] {
+            $crate::lanes::lanes!(N; x in x, y in y; q = value, r = over; y.times_from::<$fused>(q, x) * r)
         }
         #[inline(always)]
         fn slopes_plus_times<const N: usize>(x: &[Self; N], y: &[Self; N], a: f64) -> [Self; N] {

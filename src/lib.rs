@@ -84,16 +84,16 @@
 //! [`Dual`] numbers, a value with up to eight slopes, and the predictor turns that into a prediction error and its slopes,
 //! column by column in a window of 128 samples. The fit filters the window, divides it by the noise, weights it. The
 //! [`Information`] triangle absorbs its rows by orthogonal reflections and forgets them. After the last window the optimizer
-//! reads its step off the triangle; initial states, and parameters that each experiment has for itself, are minimized out
-//! of their experiment's triangle before the triangles are merged. When the search has ended, covariance, rank and
-//! directions come from the same triangle. Nothing is kept of the samples, and nothing is allocated for them.
+//! reads its step off the triangles; initial states, and parameters that each experiment has for itself, are minimized out
+//! of their experiment's triangle first ([`Elimination`]), so that many experiments cost no more than their samples. When
+//! the search has ended, covariance, rank and directions come from the same triangles. Nothing is kept of the samples, and nothing is allocated for them.
 //!
 //! Only the loop over the samples depends on the type of the model; [`sweep`] separates it from search, noise, covariance
 //! and diagnoses, which are given windows of numbers and are compiled once.
 //!
 //! # Features
 //!
-//! `std`, `csv` and `parallel` are on by default; without `std` the ground floor (but for the triangle), models,
+//! `std`, `csv`, `jit` (machine code for models that can be read as a graph) and `parallel` are on by default; without `std` the ground floor (but for the triangle), models,
 //! integrators and [`online`] observers build without `alloc` too.
 #![cfg_attr(not(feature = "std"), no_std)]
 
@@ -188,7 +188,7 @@ pub use interval::{Hold, Interval};
 pub use layout::Kind;
 pub use model::Model;
 pub use parameter::{Parameter, Prior, Transform, fixed, free};
-pub use scalar::{Comparison, Scalar};
+pub use scalar::{Comparison, Extrapolation, Grid, Interpolation, Scalar, TableError};
 pub use signals::{Entry, Nothing, Of, Signals};
 
 #[cfg(feature = "csv")]
@@ -218,6 +218,7 @@ pub use {
     recurrence::{InvalidRecurrence, Recurrence},
     regress::{Assumption, LinearEstimate, Regression, RegressionError},
     report::Report,
+    scalar::Table,
     scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
     simulate::{Simulation, Simulator, simulate},
     weighting::{BySignal, Law, Weighting},

@@ -5,14 +5,17 @@ mod horizon;
 mod kalman;
 pub(crate) mod measured;
 mod plant;
+mod symbolic;
 
 pub use free_run::FreeRun;
 pub use horizon::Horizon;
 pub use kalman::Kalman;
 pub use plant::Plant;
 pub(crate) use plant::{Between, SlicePlant, Stepped};
+pub(crate) use symbolic::recurrence;
 
 use crate::error::Error;
+use crate::graph::Symbol;
 use crate::integrate::{Duals, Stuck};
 use crate::layout::Layout;
 use crate::scalar::Scalar;
@@ -92,6 +95,7 @@ pub(crate) trait Prediction: Debug + Send + Sync {
     fn describe(&self) -> String;
     fn values(&self) -> &dyn Steps<f64>;
     fn duals(&self) -> &dyn Steps<Duals>;
+    fn symbols(&self) -> &dyn Steps<Symbol>;
 }
 
 /// The functions of a [`Predictor`] in numbers of one type.
@@ -150,6 +154,10 @@ impl<P: Predictor> Prediction for P {
     }
 
     fn duals(&self) -> &dyn Steps<Duals> {
+        self
+    }
+
+    fn symbols(&self) -> &dyn Steps<Symbol> {
         self
     }
 }

@@ -1,5 +1,6 @@
 //! [`Problem`]: what a fit minimizes, with its records, as a value that knows quantities by position and name.
 
+mod absorb;
 mod as_argmin;
 mod checkpoint;
 mod control;
@@ -7,9 +8,12 @@ mod linearize;
 mod objective;
 mod pass;
 mod search;
+mod segments;
 mod settings;
 mod simulate;
+mod standardize;
 mod unknowns;
+mod weighing;
 mod whitening;
 
 pub(crate) use checkpoint::CheckpointFile;
@@ -17,12 +21,14 @@ pub(crate) use control::Control;
 pub use objective::Objective;
 pub(crate) use pass::{Accumulate, each};
 pub use search::Search;
+use segments::{Cuts, Memory};
 pub(crate) use search::{Optimizer, RoundError};
 pub use settings::Settings;
 pub(crate) use settings::{Observer, Weights};
 pub use simulate::Simulated;
 pub use unknowns::Role;
 pub(crate) use unknowns::{Unknowns, Values};
+use weighing::Weighing;
 pub(crate) use whitening::{Noise, Whitening};
 
 use crate::error::Error;
@@ -46,6 +52,7 @@ pub struct Problem<'a> {
     pub(crate) settings: Settings<'a>,
     /// Mean of `psi(z) z` for Gaussian `z`; needed where variances are predicted, one for least squares.
     pub(crate) kappa: f64,
+    pub(crate) cuts: Cuts,
 }
 
 impl<'a> Problem<'a> {
@@ -87,7 +94,8 @@ impl<'a> Problem<'a> {
             Some(loss) if sweep.predicts_variance() => expectations(&**loss).slope,
             _ => 1.0,
         };
-        Ok(Problem { sweep, records, prepared, unknowns, settings, kappa })
+        let cuts = Cuts::new(&*sweep, &records, settings.prefilter.is_some());
+        Ok(Problem { sweep, records, prepared, unknowns, settings, kappa, cuts })
     }
 
     fn prepared(sweep: &dyn Sweep, records: &[Record], parameters: &[Parameter]) -> Result<Vec<Prepared>, Error> {
@@ -136,6 +144,7 @@ impl<'a> Problem<'a> {
     /// The cost to minimize, with errors in the units of the outputs.
     pub(crate) fn in_units<'p>(&'p self, control: &'p Control) -> Objective<'p> {
         let whitening = Whitening::none(self.layout().outputs.len());
-        Objective { problem: self, sweep: &*self.sweep, whitening, control }
+        let memory = Memory::default();
+        Objective { problem: self, sweep: &*self.sweep, whitening, control, memory }
     }
 }

@@ -2,10 +2,9 @@
 
 use crate::equations::Equations;
 use crate::graph::{Graph, Id, Leaf, Node, Symbol, Untraceable};
-use crate::integrate::{Integrator, Square, System};
+use crate::integrate::{Integrator, Method, SymbolicField};
 use crate::interval::Hold;
 use crate::layout::Kind;
-use crate::signals::Entry;
 
 /// A recurrence: what it carries from sample to sample, what it expects of each output.
 ///
@@ -48,21 +47,22 @@ impl Recurrence {
     /// # Errors
     /// If the method looks at the numbers that it steps.
     pub fn new<I: Integrator>(equations: &Equations, integrator: &I, hold: Hold) -> Result<Self, Untraceable> {
-        if !I::FIXED {
-            return Err(Untraceable { reason: "the steps of its integrator depend on the state".to_owned() });
-        }
         let mut graph = Graph::default();
         let mean = graph.import(equations.graph(), equations.output(), Graph::leaf);
         let states = u32::try_from(equations.layout().states.len()).unwrap_or(u32::MAX);
+        let between = SymbolicInterval { equations, method: integrator, hold };
         let next = graph.trace(|| {
-            let system = SymbolicSystem { equations, hold };
-            let x = (0..states).map(|i| Symbol::leaf(Leaf::State(i))).collect();
-            integrator.advance(&system, x, &mut 0.0).unwrap_or_else(|_| {
-                Symbol::fail("its integrator cannot cross an interval");
-                vec![]
-            })
+            let mut x: Vec<Symbol> = (0..states).map(|i| Symbol::leaf(Leaf::State(i))).collect();
+            between.next(&mut x);
+            x
         })?;
         Recurrence::from_roots(&graph, &next, &mean, &[]).map_err(|wrong| Untraceable { reason: wrong.to_string() })
+    }
+
+    /// The same that carries no outputs.
+    pub(crate) fn without_outputs(&self) -> Self {
+        let (graph, next) = self.graph.pruned(&self.next);
+        Recurrence { graph, next, mean: vec![], variance: vec![] }
     }
 
     /// A recurrence by the nodes of what is carried next, of the outputs' means, and of their variances, if it has any.
@@ -86,6 +86,12 @@ impl Recurrence {
         Ok(Recurrence { next: next.to_vec(), mean: mean.to_vec(), variance: variance.to_vec(), graph })
     }
 
+    /// What is expected of outputs that depend on nothing that is carried.
+    pub(crate) fn of_outputs(graph: &Graph, mean: &[Id]) -> Self {
+        let (graph, mean) = graph.pruned(mean);
+        Recurrence { graph, next: vec![], mean, variance: vec![] }
+    }
+
     /// The arithmetic.
     pub fn graph(&self) -> &Graph {
         &self.graph
@@ -107,13 +113,14 @@ impl Recurrence {
     }
 }
 
-/// The equations of one interval in symbols.
-pub(crate) struct SymbolicSystem<'a> {
+/// The equations from one sample to the next, in symbols: what is computed with it belongs to a trace.
+pub(crate) struct SymbolicInterval<'a> {
     pub equations: &'a Equations,
+    pub method: &'a dyn Method,
     pub hold: Hold,
 }
 
-impl SymbolicSystem<'_> {
+impl SymbolicInterval<'_> {
     fn input(&self, i: u32, position: f64) -> Symbol {
         let u0 = Symbol::leaf(Leaf::Input(i));
         match self.hold {
@@ -122,77 +129,42 @@ impl SymbolicSystem<'_> {
         }
     }
 
-    fn right_hand_side(&self, position: f64, x: &[Symbol]) -> Vec<Symbol> {
+    fn at(&self, roots: &[Id], position: f64, x: &[Symbol]) -> Vec<Symbol> {
         let begin = Symbol::leaf(Leaf::Time);
         let t = if position == 0.0 { begin } else { begin + Symbol::leaf(Leaf::Step) * position };
-        self.equations.graph().evaluate(self.equations.state(), |leaf| match leaf {
+        self.equations.graph().evaluate(roots, |leaf| match leaf {
             Leaf::Time => t,
             Leaf::State(i) => x.get(i as usize).copied().unwrap_or_default(),
             Leaf::Input(i) => self.input(i, position),
             _ => Symbol::leaf(leaf),
         })
     }
-}
 
-impl System for SymbolicSystem<'_> {
-    type Scalar = Symbol;
-    type Vector<T: Entry> = Vec<T>;
-    type Matrix = DenseRows;
-
-    fn kind(&self) -> Kind {
-        self.equations.layout().kind
+    /// `dx/dt`, or the next state of discrete equations.
+    pub fn rate(&self, position: f64, x: &[Symbol], to: &mut [Symbol]) {
+        let found = self.at(self.equations.state(), position, x);
+        to.iter_mut().zip(found).for_each(|(to, found)| *to = found);
     }
 
-    fn interval(&self) -> (f64, f64) {
-        Symbol::fail("its integrator asks for the interval in numbers");
-        (f64::NAN, f64::NAN)
+    /// The outputs at the sample.
+    pub fn output(&self, x: &[Symbol]) -> Vec<Symbol> {
+        self.at(self.equations.output(), 0.0, x)
     }
 
-    fn vector<T: Entry>(&self, f: impl FnMut(usize) -> T) -> Vec<T> {
-        (0..self.equations.layout().states.len()).map(f).collect()
+    /// The state at the next sample.
+    pub fn next(&self, x: &mut [Symbol]) {
+        let kind = self.equations.layout().kind;
+        self.cross(kind, x, &|position, x, to| self.rate(position, x, to));
     }
 
-    fn derivative(&self, position: f64, x: &Vec<Symbol>) -> Vec<Symbol> {
-        self.right_hand_side(position, x)
-    }
-
-    fn next(&self, x: &Vec<Symbol>) -> Vec<Symbol> {
-        self.right_hand_side(0.0, x)
-    }
-
-    fn jacobian(&self, _position: f64, x: &Vec<f64>) -> (Vec<f64>, DenseRows) {
-        Symbol::fail("its integrator asks for a Jacobian in numbers");
-        (vec![f64::NAN; x.len()], DenseRows::new(x.len()))
-    }
-
-    fn along(&self, x: &Vec<Symbol>, part: f64, k: &Vec<Symbol>) -> Vec<Symbol> {
-        if part == 0.0 {
-            return x.clone();
+    /// Any vector at the next sample, by its rate.
+    pub fn cross(&self, kind: Kind, z: &mut [Symbol], rate: &dyn Fn(f64, &[Symbol], &mut [Symbol])) {
+        if !self.method.is_fixed() {
+            return Symbol::fail("the steps of its integrator depend on the state");
         }
-        let h = Symbol::leaf(Leaf::Step) * part;
-        x.iter().zip(k).map(|(x, k)| x.along(*k, h)).collect()
-    }
-}
-
-/// A square matrix by rows whose size is known at run time.
-#[derive(Clone, Debug)]
-pub(crate) struct DenseRows {
-    size: usize,
-    entries: Vec<f64>,
-}
-
-impl DenseRows {
-    /// Zeros.
-    pub fn new(size: usize) -> Self {
-        DenseRows { size, entries: vec![0.0; size * size] }
-    }
-}
-
-impl Square for DenseRows {
-    fn row(&self, i: usize) -> &[f64] {
-        &self.entries[i * self.size..][..self.size]
-    }
-    fn row_mut(&mut self, i: usize) -> &mut [f64] {
-        &mut self.entries[i * self.size..][..self.size]
+        match self.method.advance_symbols(&SymbolicField { kind, states: z.len(), rate }, z.to_vec()) {
+            Ok(end) => z.copy_from_slice(&end),
+            Err(_) => Symbol::fail("its integrator cannot cross an interval"),
+        }
     }
 }

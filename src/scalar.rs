@@ -4,6 +4,12 @@
 //! [`Dual`](crate::Dual) (exact slopes). Constants stand to the right of an operator: `x * 2.0`, not `2.0 * x`, because
 //! Rust lets a library add operators to its own type on the left only.
 
+mod table;
+
+#[cfg(feature = "std")]
+pub use table::Table;
+pub use table::{Extrapolation, Grid, Interpolation, TableError};
+
 use crate::lanes::{Sums, slopes_in_pairs};
 use core::fmt::Debug;
 use core::iter::Sum;
@@ -170,6 +176,9 @@ pub trait Scalar:
     /// `self` with the sign of `sign`.
     fn copysign(self, sign: Self) -> Self;
 
+    /// What a table has at a place, or its derivative of these orders there; [`Grid::at`] is shorter.
+    fn look_up(table: &Grid<'_>, at: [Self; 2], order: [u8; 2]) -> Self;
+
     /// `x + y`, entry by entry: slope arithmetic of [`Dual`](crate::Dual), as all that follows.
     #[doc(hidden)]
     #[inline(always)]
@@ -299,6 +308,10 @@ impl Scalar for f64 {
     #[inline(always)]
     fn copysign(self, sign: f64) -> f64 {
         f64::copysign(self, sign)
+    }
+    #[inline]
+    fn look_up(table: &Grid<'_>, at: [f64; 2], order: [u8; 2]) -> f64 {
+        table.derivative(at, order)
     }
     slopes_in_pairs!(false);
 }

@@ -6,10 +6,12 @@
 mod duals;
 mod filtered;
 mod loops;
+mod programs;
 mod window;
 
 pub(crate) use duals::{DualSweep, OVERFLOW};
 pub(crate) use loops::Loops;
+pub(crate) use programs::ProgramSweep;
 pub use window::Window;
 
 pub use crate::graph::Seed;
@@ -104,8 +106,10 @@ pub trait Sweep: Send + Sync {
         false
     }
 
-    /// How many pieces it runs side by side; [`run`](Sweep::run) is never given more.
-    fn lanes(&self) -> usize {
+    /// How many pieces of records like this one it runs side by side; [`run`](Sweep::run) is never given more, nor pieces
+    /// of records with different holds or with even and uneven time.
+    fn lanes(&self, record: &Record, seeds: &[Seed]) -> usize {
+        let _ = (record, seeds);
         1
     }
 
@@ -134,6 +138,25 @@ pub trait Sweep: Send + Sync {
 
     /// Runs pieces side by side and shows each window of them.
     fn run(&self, pieces: &[Piece<'_>], seeds: &[Seed], visit: Visit<'_>) -> Vec<Result<Reached, RunError>>;
+
+    /// The carry at some samples, which rise, of a record that is run from its begin.
+    ///
+    /// # Errors
+    /// Where it could not be run.
+    fn follow(&self, piece: &Piece<'_>, at: &[usize]) -> Result<Vec<Vec<f64>>, RunError> {
+        let mut from = Piece { slopes: vec![], ..piece.clone() };
+        let mut found = Vec::with_capacity(at.len());
+        for &sample in at {
+            from.samples.end = sample;
+            if !from.samples.is_empty() {
+                let reached = self.run(std::slice::from_ref(&from), &[], &mut |_| true);
+                from.carry = reached.into_iter().next().ok_or(RunError::Stopped)??.carry;
+            }
+            from.samples.start = sample;
+            found.push(from.carry.clone());
+        }
+        Ok(found)
+    }
 
     /// The state that the outputs of a sample give; why not, where there is none. With `alone`, they must not depend on
     /// the parameters besides.

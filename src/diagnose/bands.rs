@@ -58,22 +58,25 @@ pub(crate) fn widths(
     let n = columns.len();
     let dense = estimate.covariance.dense(&columns);
     let covariance = (0..n * n).map(|ij| dense[(ij / n, ij % n)] / (slope(columns[ij / n]) * slope(columns[ij % n])));
-    let zero = vec![vec![0.0; objective.problem.records()[experiment].len()]; objective.outputs()];
-    let found = Widths { confidence: zero.clone(), prediction: zero };
-    let gather = Gather { covariance: covariance.collect(), quantile, sigma: estimate.sigma(), found };
-    let gathered = objective.gather_one(best, experiment, gather);
+    let (covariance, sigma): (Vec<f64>, Vec<f64>) = (covariance.collect(), estimate.sigma());
+    let make = || {
+        let none = vec![vec![]; sigma.len()];
+        let found = Widths { confidence: none.clone(), prediction: none };
+        Gather { covariance: &covariance, quantile, sigma: &sigma, found }
+    };
+    let gathered = objective.gather_one(best, experiment, true, make);
     gathered.map(|gather| gather.found).map_err(|_| Error::Simulation(objective.locate(experiment, best, 0)))
 }
 
 /// The half widths of the rows of each window.
-struct Gather {
-    covariance: Vec<f64>,
+struct Gather<'g> {
+    covariance: &'g [f64],
     quantile: f64,
-    sigma: Vec<f64>,
+    sigma: &'g [f64],
     found: Widths,
 }
 
-impl Accumulate for Gather {
+impl Accumulate for Gather<'_> {
     fn add(&mut self, window: &Window, lane: usize) {
         let n = window.columns() - 1;
         for k in 0..window.samples[lane] {
@@ -81,10 +84,17 @@ impl Accumulate for Gather {
                 let g = |c: usize| window.at(k, j, c, lane);
                 let row = |i: usize| (0..n).map(|c| g(c) * self.covariance[i * n + c]).sum::<f64>() * g(i);
                 let deviation = (0..n).map(row).sum::<f64>().max(0.0).sqrt();
-                let at = window.begin[lane] + k;
-                self.found.confidence[j][at] = self.quantile * deviation;
-                self.found.prediction[j][at] = self.quantile * deviation.hypot(*sigma);
+                self.found.confidence[j].push(self.quantile * deviation);
+                self.found.prediction[j].push(self.quantile * deviation.hypot(*sigma));
             }
         }
+    }
+
+    fn append(&mut self, later: Self) {
+        let extend = |all: &mut [Vec<f64>], later: Vec<Vec<f64>>| {
+            all.iter_mut().zip(later).for_each(|(all, later)| all.extend(later));
+        };
+        extend(&mut self.found.confidence, later.found.confidence);
+        extend(&mut self.found.prediction, later.found.prediction);
     }
 }

@@ -73,7 +73,7 @@ pub fn bootstrap(
             resampled(record, prediction, draw(residuals, record.len(), resampling, &mut random))
         });
         let again = problem.with_records(records.collect()).ok()?;
-        let again = Objective { problem: &again, ..objective.clone() };
+        let again = objective.of(&again, objective.sweep);
         let (place, _) = minimize(Pinned { problem: &again, bounds: again.bounds() }, best.clone())?;
         Some(estimate.unknowns.iter().zip(&place).map(|(u, &c)| u.transform.to_value(c)).collect())
     };

@@ -1,7 +1,7 @@
 //! What runs a program on this machine.
 
 use super::Trajectories;
-use super::code::Code;
+use super::code::Sound;
 use crate::wide::Width;
 
 #[cfg(all(feature = "jit", target_arch = "x86_64"))]
@@ -14,13 +14,13 @@ pub(super) enum Machine {}
 
 #[cfg(not(all(feature = "jit", target_arch = "x86_64")))]
 impl Machine {
-    pub fn new(_code: &Code, _width: Width) -> Option<Self> {
+    pub fn new(_code: &Sound, _width: Width) -> Option<Self> {
         None
     }
     pub fn len(&self) -> usize {
         match *self {}
     }
-    pub fn run(&self, _: &Code, _: usize, _: &mut [f64], _: &[f64], _: &mut [f64], _: usize) {
+    pub fn run(&self, _: &Sound, _: usize, _: &mut [f64], _: &[f64], _: &mut [f64], _: usize) {
         match *self {}
     }
 }
@@ -29,7 +29,7 @@ impl Machine {
 const VARIABLE: &str = "GREYBOX_ENGINE";
 
 /// The registers and, if it can be and pays, the machine code for a step.
-pub(super) fn engine(code: &Code, trajectories: Trajectories) -> (Width, Option<Machine>) {
+pub(super) fn engine(code: &Sound, trajectories: Trajectories) -> (Width, Option<Machine>) {
     let wanted = std::env::var(VARIABLE).unwrap_or_default();
     let narrow = wanted.ends_with("avx2");
     let width = match (wanted.as_str(), trajectories) {

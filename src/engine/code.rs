@@ -1,6 +1,8 @@
 //! [`Code`]: a step as a list of instructions on numbered slots, for one lane or many.
 
 use crate::graph::{Function, Function2, Leaf};
+use crate::scalar::Table;
+use std::sync::Arc;
 
 /// Where a number of each lane stands.
 pub(super) type Slot = u16;
@@ -32,6 +34,8 @@ pub(super) enum Operation {
     RoundedProducts,
     Function(Function),
     Function2(Function2),
+    /// The table named by `init`, or its derivative of the orders in the upper and the lower four bits.
+    Table(u8),
 }
 
 /// One instruction.
@@ -64,9 +68,8 @@ impl Instruction {
             Operation::Fused | Operation::Rounded => (Some(self.init), 2 * self.count),
             Operation::FusedProducts | Operation::RoundedProducts => (None, 2 * self.count),
             Operation::Less | Operation::LessOrEqual | Operation::Equal => (None, 4),
-            Operation::Add | Operation::Sub | Operation::Mul | Operation::Copysign | Operation::Function2(_) => {
-                (None, 2)
-            }
+            Operation::Add | Operation::Sub | Operation::Mul | Operation::Copysign => (None, 2),
+            Operation::Function2(_) | Operation::Table(_) => (None, 2),
             _ => (None, 1),
         };
         let [_, _, [e, f], [g, h]] = self.pairs;
@@ -136,6 +139,25 @@ pub(super) struct Code {
     /// At each sample, after the rows.
     pub advance: Vec<Instruction>,
     pub slots: usize,
+    pub tables: Vec<Arc<Table>>,
+}
+
+/// A code all of whose slots, columns and tables are there: what reads and writes without looking relies on it.
+#[derive(Clone, Debug)]
+pub(super) struct Sound(Code);
+
+impl Sound {
+    /// None for a code that is not sound.
+    pub fn new(code: Code) -> Option<Self> {
+        code.is_sound().then_some(Sound(code))
+    }
+}
+
+impl core::ops::Deref for Sound {
+    type Target = Code;
+    fn deref(&self) -> &Code {
+        &self.0
+    }
 }
 
 impl Code {
@@ -145,13 +167,19 @@ impl Code {
     }
 
     /// Slots of every instruction and list lie below `slots`.
-    pub fn is_sound(&self) -> bool {
+    fn is_sound(&self) -> bool {
         let instructions = self.once.iter().chain(&self.output).chain(&self.advance);
         let all = instructions.flat_map(|instruction| instruction.reads().chain([instruction.to]));
         let others = self.constants.iter().map(|(slot, _)| *slot).chain(self.reads.iter().map(|read| read.to));
         let others = others.chain(self.rows.iter().copied()).chain(self.step).chain([self.one, self.sign]);
         let columns = self.reads.iter().all(|read| read.column < self.columns.len());
-        columns
+        let mut instructions = self.once.iter().chain(&self.output).chain(&self.advance);
+        let tables = instructions.all(|instruction| match instruction.operation {
+            Operation::Table(_) => usize::from(instruction.init) < self.tables.len(),
+            _ => true,
+        });
+        tables
+            && columns
             && self.carried + self.parameters <= self.slots
             && all.chain(others).all(|slot| usize::from(slot) < self.slots)
     }

@@ -1,6 +1,6 @@
 //! What depends on a record alone and is dear: computed once a record, and read as a column.
 
-use super::code::{Code, Column};
+use super::code::{Column, Sound};
 use super::interpret::{Once, Run};
 use super::schedule::{Roots, TooLarge, schedule};
 use crate::graph::{Id, Node, Tape};
@@ -14,7 +14,7 @@ pub(super) fn dear(tape: &Tape, roots: &[Id]) -> Vec<Id> {
     roots.iter().for_each(|root| read[root.index()] = true);
     for (i, node) in tape.graph.nodes().iter().enumerate().filter(|(i, _)| reached[*i]) {
         if tape.depends[i].on_record_alone() {
-            let costly = matches!(node, Node::Function(..) | Node::Function2(..));
+            let costly = matches!(node, Node::Function(..) | Node::Function2(..) | Node::Table { .. });
             dear[i] = costly || node.operands().any(|operand| dear[operand.index()]);
         } else {
             node.operands().for_each(|operand| read[operand.index()] = true);
@@ -25,7 +25,7 @@ pub(super) fn dear(tape: &Tape, roots: &[Id]) -> Vec<Id> {
 
 /// The program of the derived columns: consecutive samples are its lanes.
 #[derive(Debug)]
-pub(super) struct Derivation(Code);
+pub(super) struct Derivation(Sound);
 
 impl Derivation {
     pub fn new(tape: &Tape, derived: &[Id]) -> Result<Self, TooLarge> {
@@ -47,7 +47,7 @@ impl Derivation {
         for (slot, value) in &code.constants {
             slots[usize::from(*slot) * lanes..][..lanes].fill(*value);
         }
-        run(width, Once::<1> { code, slots: &mut slots });
+        run(width, Once::<1> { code, slots: &mut slots, width });
         let mut inputs = vec![0.0; 2 * columns.len() * lanes];
         let mut rows = vec![0.0; code.rows.len() * lanes];
         for begin in (0..samples).step_by(lanes) {
@@ -59,7 +59,7 @@ impl Derivation {
                     }
                 }
             }
-            run(width, Run::<1> { code, slots: &mut slots, inputs: &inputs, rows: &mut rows, samples: 1 });
+            run(width, Run::<1> { code, slots: &mut slots, inputs: &inputs, rows: &mut rows, samples: 1, width });
             for (derived, row) in derived.iter_mut().zip(rows.chunks_exact(lanes)) {
                 derived.extend(&row[..there]);
             }

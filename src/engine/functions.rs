@@ -3,13 +3,42 @@
 //! Those that models call most are written on whole registers, to about 1e-15; the others take one lane after the other. Each
 //! lane has the bits that it would have alone.
 
-use crate::graph::{Function, Function2};
-use crate::wide::Wide;
+use crate::graph::Function;
+use crate::wide::{Task, Wide, Width, run};
 use core::f64::consts::{FRAC_2_PI, LOG2_E};
+
+/// A function of the numbers in registers, which are then in others.
+///
+/// A function of its own, and no part of the interpreter's loop, which would be slower by it.
+///
+/// # Safety
+/// At both addresses there must be so many registers of this width.
+#[inline(never)]
+pub(super) unsafe fn apply(width: Width, of: Function, a: *const f64, to: *mut f64, registers: usize) {
+    run(width, Apply { of, a, to, registers });
+}
+
+struct Apply {
+    of: Function,
+    a: *const f64,
+    to: *mut f64,
+    registers: usize,
+}
+
+impl Task for Apply {
+    type Output = ();
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        for k in 0..self.registers {
+            // SAFETY: whoever calls `apply` says that the registers are there.
+            unsafe { function(self.of, W::read(self.a.add(k * W::LANES))).write(self.to.add(k * W::LANES)) }
+        }
+    }
+}
 
 /// A function of one number, lane by lane.
 #[inline(always)]
-pub(super) fn function<W: Wide>(function: Function, a: W) -> W {
+fn function<W: Wide>(function: Function, a: W) -> W {
     match function {
         Function::Exp => exp(a),
         Function::Tanh => tanh(a),
@@ -17,12 +46,6 @@ pub(super) fn function<W: Wide>(function: Function, a: W) -> W {
         Function::Cos => sin_or_cos::<W, 1>(a),
         _ => a.map(|x| function.of(x)),
     }
-}
-
-/// A function of two numbers, lane by lane.
-#[inline(always)]
-pub(super) fn function2<W: Wide>(function: Function2, a: W, b: W) -> W {
-    a.zip(b, |x, y| function.of(x, y, Some(y)))
 }
 
 /// The nearest whole number, of what is below 2^51.
@@ -140,7 +163,6 @@ fn sin_or_cos<W: Wide, const QUARTERS: u8>(x: W) -> W {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wide::{Task, Width, run};
 
     struct Of<'a>(Function, &'a [f64]);
 

@@ -21,6 +21,8 @@ pub(super) enum Work {
     Sum { rounded: bool, init: Option<Id>, terms: Vec<Term> },
     /// Any other operation.
     Operation(Operation, Vec<Id>),
+    /// A table's value or derivative.
+    Table { table: u32, order: u8, at: [Id; 2] },
 }
 
 impl Work {
@@ -31,6 +33,7 @@ impl Work {
                 init.iter().copied().chain(terms.iter().flat_map(|term| [Some(term.a), term.b]).flatten()).collect()
             }
             Work::Operation(_, operands) => operands.clone(),
+            Work::Table { at, .. } => at.to_vec(),
         }
     }
 }
@@ -46,7 +49,7 @@ pub(super) fn instructions(tape: &Tape, roots: &[Id]) -> usize {
         .filter_map(|(_, work)| work.as_ref())
         .map(|work| match work {
             Work::Sum { terms, .. } => terms.len().div_ceil(TERMS),
-            Work::Operation(Operation::Function(_) | Operation::Function2(_), _) => 10,
+            Work::Operation(Operation::Function(_) | Operation::Function2(_), _) | Work::Table { .. } => 10,
             Work::Operation(..) => 1,
         })
         .sum()
@@ -89,6 +92,9 @@ impl Fusion<'_> {
             Node::Function2(Function2::Copysign, a, b) => operation(Operation::Copysign, &[a, b]),
             Node::Function2(function, a, b) => operation(Operation::Function2(function), &[a, b]),
             Node::Select(comparison, all) => operation(of_comparison(comparison), &all),
+            Node::Table { table, order: [i, j], at } => {
+                Some(Work::Table { table, order: i.min(15) << 4 | j.min(15), at })
+            }
             // Not on a tape whose operations are those of registers.
             Node::Div(..) | Node::MulAdd(_) | Node::Power(..) => None,
         }

@@ -5,7 +5,7 @@ use super::{Compiled, Seed};
 use crate::wide::run;
 use std::sync::Arc;
 
-/// Slopes below this are gone for good; squared they are denormal, on which processors are up to 60 times slower.
+/// Slopes below this are set to zero between blocks: squared they are denormal, which slows processors down up to 60 times.
 const NEGLIGIBLE: f64 = 1e-150;
 
 /// Numbers in a cache line.
@@ -64,7 +64,8 @@ impl Group {
 
     /// A lane's parameters; those that nothing depends on may be left out at the end.
     pub fn set_parameters(&mut self, lane: usize, values: &[f64]) {
-        let (carried, parameters) = (self.program.code.carried, self.program.code.parameters);
+        let shape = &self.program.shape;
+        let (carried, parameters) = (self.program.code.carried, shape.direction.unwrap_or(shape.parameters));
         for (j, value) in values[..].iter().take(parameters).enumerate() {
             self.slot(carried + j)[lane] = *value;
         }
@@ -80,11 +81,36 @@ impl Group {
     /// Computes what depends on parameters and steps alone: after they have been set, before anything runs.
     pub fn prepare(&mut self) {
         let program = Arc::clone(&self.program);
-        let (code, slots) = (&program.code, &mut self.numbers[self.first..]);
+        let (code, slots, width) = (&program.code, &mut self.numbers[self.first..], program.width);
         match self.registers {
-            1 => run(program.width, Once::<1> { code, slots }),
-            2 => run(program.width, Once::<2> { code, slots }),
-            _ => run(program.width, Once::<4> { code, slots }),
+            1 => run(width, Once::<1> { code, slots, width }),
+            2 => run(width, Once::<2> { code, slots, width }),
+            _ => run(width, Once::<4> { code, slots, width }),
+        }
+    }
+
+    /// The direction of a lane, one component for each seed, of a program of second derivatives; before
+    /// [`prepare`](Self::prepare) and [`start`](Self::start).
+    pub fn set_direction(&mut self, lane: usize, direction: &[f64]) {
+        if let Some(first) = self.program.shape.direction {
+            let first = self.program.code.carried + first;
+            for (s, component) in direction.iter().take(self.program.shape.seeds.len()).enumerate() {
+                self.slot(first + s)[lane] = *component;
+            }
+        }
+    }
+
+    /// Slope `number` of entry `i` at the start.
+    fn slope_at_start(&self, lane: usize, i: usize, number: usize) -> f64 {
+        let (seeds, own) = (&self.program.shape.seeds, Seed::Carry(i));
+        let component = |first: usize| {
+            let seeded = (0..seeds.len()).filter(|s| seeds[*s] == own);
+            seeded.map(|s| self.number(self.program.code.carried + first + s, lane)).sum()
+        };
+        match self.program.shape.direction {
+            None => f64::from(u8::from(seeds[number] == own)),
+            Some(first) if number == 0 => component(first),
+            Some(_) => 0.0,
         }
     }
 
@@ -93,9 +119,9 @@ impl Group {
         let program = Arc::clone(&self.program);
         for (i, row) in program.pattern.rows.iter().enumerate() {
             self.slot(i)[lane] = carry[i];
-            for (at, seed) in row.iter().zip(&program.seeds) {
+            for (number, at) in row.iter().enumerate() {
                 if let Some(at) = at {
-                    self.slot(*at)[lane] = f64::from(u8::from(*seed == Seed::Carry(i)));
+                    self.slot(*at)[lane] = self.slope_at_start(lane, i, number);
                 }
             }
         }
@@ -134,14 +160,14 @@ impl Group {
         let program = Arc::clone(&self.program);
         self.clear_negligible();
         let lanes = self.lanes();
-        let (code, slots) = (&program.code, &mut self.numbers[self.first..]);
+        let (code, slots, width) = (&program.code, &mut self.numbers[self.first..], program.width);
         if let Some(machine) = &program.machine {
             return machine.run(code, lanes, slots, inputs, rows, samples);
         }
         match self.registers {
-            1 => run(program.width, Run::<1> { code, slots, inputs, rows, samples }),
-            2 => run(program.width, Run::<2> { code, slots, inputs, rows, samples }),
-            _ => run(program.width, Run::<4> { code, slots, inputs, rows, samples }),
+            1 => run(width, Run::<1> { code, slots, inputs, rows, samples, width }),
+            2 => run(width, Run::<2> { code, slots, inputs, rows, samples, width }),
+            _ => run(width, Run::<4> { code, slots, inputs, rows, samples, width }),
         }
     }
 

@@ -2,13 +2,16 @@
 //!
 //! An instruction costs a jump that is hard to foresee, so that it pays to do much in each: four registers of eight lanes.
 
-use super::code::{Code, Instruction, Operation};
-use super::functions::{function, function2};
-use crate::wide::{Task, Wide};
+use super::code::{Instruction, Operation, Sound};
+use super::functions::apply;
+use crate::graph::Function;
+use crate::scalar::Table;
+use crate::wide::{Task, Wide, Width};
+use std::sync::Arc;
 
 /// Numbers per slot and register, sample by sample: what a run reads and writes.
 pub(super) struct Run<'a, const K: usize> {
-    pub code: &'a Code,
+    pub code: &'a Sound,
     /// Slots of `K` registers each.
     pub slots: &'a mut [f64],
     /// Sample, column, lane; one sample more if the next inputs are read.
@@ -16,6 +19,8 @@ pub(super) struct Run<'a, const K: usize> {
     /// Sample, row, lane.
     pub rows: &'a mut [f64],
     pub samples: usize,
+    /// The registers'.
+    pub width: Width,
 }
 
 impl<const K: usize> Task for Run<'_, K> {
@@ -23,21 +28,21 @@ impl<const K: usize> Task for Run<'_, K> {
 
     #[inline(always)]
     fn run<W: Wide>(self) {
-        let Run { code, slots, inputs, rows, samples } = self;
+        let Run { code, slots, inputs, rows, samples, width } = self;
         let lanes = K * W::LANES;
         let (columns, height) = (code.columns.len() * lanes, code.rows.len() * lanes);
-        assert!(code.is_sound() && slots.len() >= code.slots * lanes);
+        assert!(width.lanes() == W::LANES && slots.len() >= code.slots * lanes);
         assert!(inputs.len() >= (samples + usize::from(code.reads_next())) * columns && rows.len() >= samples * height);
         let (slots, inputs, rows) = (slots.as_mut_ptr(), inputs.as_ptr(), rows.as_mut_ptr());
         for sample in 0..samples {
             for read in &code.reads {
                 let from = (sample + usize::from(read.next)) * columns + read.column * lanes;
                 // SAFETY: the column lies within its sample's row of inputs, of which there are enough; the slot within
-                // the slots, as `is_sound` says. So it is for all that follows.
+                // the slots, since the code is sound. So it is for all that follows.
                 unsafe { copy::<W, K>(inputs.add(from), slots.add(usize::from(read.to) * lanes)) };
             }
             // SAFETY: as above.
-            unsafe { interpret::<W, K>(&code.output, slots) };
+            unsafe { interpret::<W, K>(&code.output, &code.tables, slots, width) };
             for (number, slot) in code.rows.iter().enumerate() {
                 // SAFETY: as above; the row lies within its sample's rows, of which there are enough.
                 unsafe {
@@ -45,15 +50,17 @@ impl<const K: usize> Task for Run<'_, K> {
                 };
             }
             // SAFETY: as above.
-            unsafe { interpret::<W, K>(&code.advance, slots) };
+            unsafe { interpret::<W, K>(&code.advance, &code.tables, slots, width) };
         }
     }
 }
 
 /// What is computed once a pass.
 pub(super) struct Once<'a, const K: usize> {
-    pub code: &'a Code,
+    pub code: &'a Sound,
     pub slots: &'a mut [f64],
+    /// The registers'.
+    pub width: Width,
 }
 
 impl<const K: usize> Task for Once<'_, K> {
@@ -61,9 +68,9 @@ impl<const K: usize> Task for Once<'_, K> {
 
     #[inline(always)]
     fn run<W: Wide>(self) {
-        assert!(self.code.is_sound() && self.slots.len() >= self.code.slots * K * W::LANES);
-        // SAFETY: all slots of the instructions lie within the slots, as was just seen.
-        unsafe { interpret::<W, K>(&self.code.once, self.slots.as_mut_ptr()) };
+        assert!(self.width.lanes() == W::LANES && self.slots.len() >= self.code.slots * K * W::LANES);
+        // SAFETY: all slots of the instructions lie within the slots, since the code is sound and the slots are all there.
+        unsafe { interpret::<W, K>(&self.code.once, &self.code.tables, self.slots.as_mut_ptr(), self.width) };
     }
 }
 
@@ -80,9 +87,14 @@ unsafe fn copy<W: Wide, const K: usize>(from: *const f64, to: *mut f64) {
 }
 
 /// # Safety
-/// All slots that the instructions name must be there, `K` registers each.
+/// All slots that the instructions name must be there, `K` registers each, and `width` must be that of `W`.
 #[inline(always)]
-unsafe fn interpret<W: Wide, const K: usize>(code: &[Instruction], slots: *mut f64) {
+unsafe fn interpret<W: Wide, const K: usize>(
+    code: &[Instruction],
+    tables: &[Arc<Table>],
+    slots: *mut f64,
+    width: Width,
+) {
     for instruction in code {
         // SAFETY: as the caller says.
         let of = Operands::<W, K> { slots, instruction, lanes: core::marker::PhantomData };
@@ -106,8 +118,12 @@ unsafe fn interpret<W: Wide, const K: usize>(code: &[Instruction], slots: *mut f
                 Operation::FusedProducts => of.sum::<false, false>(),
                 Operation::Rounded => of.sum::<true, true>(),
                 Operation::RoundedProducts => of.sum::<false, true>(),
-                Operation::Function(of_one) => of.each(|[[a, _], ..]| function(of_one, a)),
-                Operation::Function2(of_two) => of.each(|[[a, b], ..]| function2(of_two, a, b)),
+                Operation::Function(of_one) => of.function(width, of_one),
+                Operation::Table(order) => {
+                    let (table, order) = (tables[usize::from(instruction.init)].grid(), [order >> 4, order & 15]);
+                    of.each(|[[a, b], ..]| a.zip(b, |x, y| table.derivative([x, y], order)))
+                }
+                Operation::Function2(of_two) => of.each(|[[a, b], ..]| a.zip(b, |x, y| of_two.of(x, y, Some(y)))),
             }
         }
     }
@@ -148,6 +164,13 @@ impl<W: Wide, const K: usize> Operands<'_, W, K> {
             unsafe { self.put(k, f([[self.at(a, k), self.at(b, k)], [self.at(c, k), self.at(d, k)]])) };
             k += 1;
         }
+    }
+
+    #[inline(always)]
+    unsafe fn function(&self, width: Width, of: Function) {
+        let at = |slot: u16| self.slots.wrapping_add(usize::from(slot) * K * W::LANES);
+        // SAFETY: the slots are there, as `interpret` demands, and the width is that of `W`.
+        unsafe { apply(width, of, at(self.instruction.pairs[0][0]), at(self.instruction.to), K) };
     }
 
     /// A sum of `N` pairs: from `init`, or from the first product; each operation rounded, or each product with its sum.

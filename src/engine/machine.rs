@@ -10,10 +10,12 @@ mod registers;
 mod routines;
 mod unit;
 
-use super::code::Code;
+use super::code::Sound;
+use crate::scalar::Table;
 use crate::wide::Width;
 use emit::Emitter;
 use memmap2::{Mmap, MmapMut};
+use std::sync::Arc;
 use unit::Unit;
 
 /// Slots, inputs, rows, samples.
@@ -23,19 +25,18 @@ type Entry = unsafe extern "sysv64" fn(*mut f64, *const f64, *mut f64, usize);
 #[derive(Debug)]
 pub(super) struct Machine {
     code: Mmap,
+    /// Those that the code names by their addresses.
+    _tables: Vec<Arc<Table>>,
 }
 
 impl Machine {
     /// None where the processor or the system does not allow it.
-    pub fn new(code: &Code, width: Width) -> Option<Self> {
+    pub fn new(code: &Sound, width: Width) -> Option<Self> {
         let unit = Unit::of(width)?;
-        if !code.is_sound() {
-            return None;
-        }
         let bytes = Emitter::new(code, unit).emit().ok()?;
         let mut pages = MmapMut::map_anon(bytes.len()).ok()?;
         pages.copy_from_slice(&bytes);
-        pages.make_exec().ok().map(|code| Machine { code })
+        pages.make_exec().ok().map(|pages| Machine { code: pages, _tables: code.tables.clone() })
     }
 
     /// Bytes of code.
@@ -47,7 +48,7 @@ impl Machine {
     ///
     /// # Panics
     /// If a slice is too short.
-    pub fn run(&self, code: &Code, lanes: usize, slots: &mut [f64], inputs: &[f64], rows: &mut [f64], samples: usize) {
+    pub fn run(&self, code: &Sound, lanes: usize, slots: &mut [f64], inputs: &[f64], rows: &mut [f64], samples: usize) {
         let (columns, height) = (code.columns.len() * lanes, code.rows.len() * lanes);
         assert!(slots.len() >= code.slots * lanes && rows.len() >= samples * height);
         assert!(inputs.len() >= (samples + usize::from(code.reads_next())) * columns);

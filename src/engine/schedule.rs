@@ -5,7 +5,7 @@
 
 mod slots;
 
-use super::code::{Code, Column, Instruction, Operation, Read, Slot};
+use super::code::{Code, Column, Instruction, Operation, Read, Slot, Sound};
 use super::fusion::{TERMS, Term, Work, works};
 use crate::graph::{Id, Leaf, Node, Tape};
 use slots::Slots;
@@ -32,7 +32,7 @@ pub(super) struct Roots<'a> {
 }
 
 /// The instructions of a step.
-pub(super) fn schedule(roots: &Roots<'_>) -> Result<Code, TooLarge> {
+pub(super) fn schedule(roots: &Roots<'_>) -> Result<Sound, TooLarge> {
     let mut all: Vec<Id> = roots.rows.iter().flatten().chain(roots.next).copied().collect();
     all.extend(roots.derived);
     let works = works(roots.tape, &all);
@@ -43,7 +43,8 @@ pub(super) fn schedule(roots: &Roots<'_>) -> Result<Code, TooLarge> {
     let mut order = scheduler.order(&outputs);
     let first = order.len();
     order.extend(scheduler.order(roots.next));
-    scheduler.run(&order, first)
+    let code = scheduler.run(&order, first)?;
+    Sound::new(code).ok_or(TooLarge { limit: usize::from(Slot::MAX) })
 }
 
 struct Scheduler<'a> {
@@ -79,6 +80,7 @@ impl<'a> Scheduler<'a> {
             rows: vec![],
             advance: vec![],
             slots: 0,
+            tables: roots.tape.graph.tables().to_vec(),
         };
         let slots = Slots::after(roots.next.len() + roots.parameters);
         Scheduler { roots, works, visited, at: HashMap::new(), slots, numbers: HashMap::new(), code }
@@ -295,6 +297,11 @@ impl<'a> Scheduler<'a> {
             Work::Operation(operation, operands) => {
                 let operands: Vec<Slot> = operands.iter().map(at).collect();
                 Ok(vec![Instruction::new(*operation, to, &operands)])
+            }
+            Work::Table { table, order, at: places } => {
+                let mut instruction = Instruction::new(Operation::Table(*order), to, &[at(&places[0]), at(&places[1])]);
+                instruction.init = slots::narrow(*table as usize)?;
+                Ok(vec![instruction])
             }
             Work::Sum { rounded, init, terms } => {
                 let mut init = init.as_ref().map(at);

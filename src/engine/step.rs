@@ -46,7 +46,7 @@ impl Step {
     }
 
     /// The same step in operations that registers have.
-    fn lowered(self) -> Self {
+    pub fn lowered(self) -> Self {
         let roots: Vec<Id> = self.next.iter().chain(self.rows.iter().flatten()).copied().collect();
         let (tape, new) = lowered(&self.tape, &roots);
         let (next, rest) = new.split_at(self.next.len());
@@ -91,6 +91,7 @@ fn best(tape: &Tape, outputs: &[Id], next: &[Id], seeds: &[Seed], pattern: &Patt
 /// Quotients as products with reciprocals, whole powers as products.
 fn lowered(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
     let mut lower = Tape::new(tape.uniform);
+    lower.graph.share_tables(&tape.graph);
     let reached = tape.graph.reached(roots);
     let mut new = vec![Id::default(); tape.graph.len()];
     for (i, node) in tape.graph.nodes().iter().enumerate().filter(|(i, _)| reached[*i]) {

@@ -3,7 +3,8 @@
 //! Only what changes no bit of any result is simplified (`-(-x)`, `x * 1`, `(-a) * b`): `x + 0` is not `x` where `x` is -0.
 
 use super::{Constant, Function, Function2, Graph, Id, Leaf, Node};
-use crate::scalar::{Comparison, Scalar};
+use crate::scalar::{Comparison, Scalar, Table};
+use std::sync::Arc;
 
 impl Graph {
     /// The identifier of a node as it stands; a new one if there is none like it.
@@ -179,6 +180,26 @@ impl Graph {
         }
     }
 
+    /// What a table has at a place, or its derivative of these orders; a table of one argument takes the first.
+    pub fn table(&mut self, table: &Table, order: [u8; 2], at: [Id; 2]) -> Id {
+        let number = self.tables.iter().position(|known| **known == *table).unwrap_or_else(|| {
+            self.tables.push(Arc::new(table.clone()));
+            self.tables.len() - 1
+        });
+        self.look_up(number, order, at)
+    }
+
+    /// The same by the table's number among those of this graph.
+    pub(crate) fn look_up(&mut self, number: usize, order: [u8; 2], at: [Id; 2]) -> Id {
+        let Some(table) = self.tables.get(number).cloned() else { return self.constant(f64::NAN) };
+        let [x, y] = at.map(|id| self.own(id));
+        let y = if table.grid().is_surface() { y } else { x };
+        match (self.known(x), self.known(y)) {
+            (Some(x), Some(y)) => self.constant(table.grid().derivative([x, y], order)),
+            _ => self.put(Node::Table { table: Id::new(number).0, order, at: [x, y] }),
+        }
+    }
+
     /// `then`, where the comparison of `a` with `b` holds, else `otherwise`.
     pub fn select(&mut self, comparison: Comparison, a: Id, b: Id, then: Id, otherwise: Id) -> Id {
         let [a, b, then, otherwise] = [a, b, then, otherwise].map(|id| self.own(id));
@@ -216,6 +237,9 @@ impl Graph {
                 Node::Power(a, n) => self.power(at(a), n),
                 Node::Function(function, a) => self.function(function, at(a)),
                 Node::Function2(function, a, b) => self.function2(function, at(a), at(b)),
+                Node::Table { table, order, at: [a, b] } => {
+                    self.table(&other.tables[table as usize], order, [at(a), at(b)])
+                }
                 Node::Select(comparison, [a, b, c, d]) => self.select(comparison, at(a), at(b), at(c), at(d)),
             };
         }

@@ -39,6 +39,9 @@ pub enum Seed {
     Parameter(usize),
 }
 
+/// With more cuts than this, slopes are carried.
+const MAX_CUTS: usize = 64;
+
 /// The leaves that vary with the seeds, and how.
 pub(crate) struct Variables {
     pub leaves: Vec<Id>,
@@ -119,10 +122,14 @@ pub(crate) fn slopes(tape: &mut Tape, roots: &[Id], variables: &Variables, way: 
     if variables.seeds == 0 || variables.leaves.is_empty() {
         return vec![vec![None; variables.seeds]; roots.len()];
     }
-    match way {
-        Way::Carried => forward::carried(tape, roots, variables),
-        Way::Forward => Cuts::new(tape, roots, variables).slopes(tape, roots, variables, forward::gradients),
-        Way::Reverse => Cuts::new(tape, roots, variables).slopes(tape, roots, variables, reverse::gradients),
+    if way == Way::Carried {
+        return forward::carried(tape, roots, variables);
+    }
+    match (Cuts::new(tape, roots, variables), way) {
+        // Each takes gradients of its own.
+        (cuts, _) if cuts.count() > MAX_CUTS => forward::carried(tape, roots, variables),
+        (cuts, Way::Forward) => cuts.slopes(tape, roots, variables, forward::gradients),
+        (cuts, _) => cuts.slopes(tape, roots, variables, reverse::gradients),
     }
 }
 
@@ -191,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn the_side_not_taken_leaves_no_trace() {
+    fn the_side_not_taken_does_not_reach_the_slopes() {
         agrees(|graph, [x, _, p, _]| {
             let (zero, root) = (graph.constant(0.0), graph.function(Function::Sqrt, x));
             let chosen = graph.select(Comparison::Less, x, zero, zero, root);

@@ -79,6 +79,12 @@ fn expression(node: &Node, naming: Naming<'_>, texts: &[Text]) -> Text {
         Node::Power(a, n) => (format!("{}^{n}", within(a, Binding::Atom)), Binding::Product),
         Node::Function(function, a) => (format!("{}({})", function.name(), plain(a)), Binding::Atom),
         Node::Function2(function, a, b) => (format!("{}({}, {})", function.name(), plain(a), plain(b)), Binding::Atom),
+        Node::Table { table, order, at: [a, b] } => {
+            let primes = |order: u8, name: &str| name.repeat(order.into());
+            let name = format!("table{table}{}{}", primes(order[0], "_x"), primes(order[1], "_y"));
+            let second = if a == b { String::new() } else { format!(", {}", plain(b)) };
+            (format!("{name}({}{second})", plain(a)), Binding::Atom)
+        }
         Node::Select(comparison, [a, b, c, d]) => {
             let sign = match comparison {
                 Comparison::Less => "<",

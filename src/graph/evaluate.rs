@@ -30,6 +30,9 @@ impl Graph {
                 Node::Power(a, n) => at(a).powi(n),
                 Node::Function(function, a) => function.of(at(a)),
                 Node::Function2(function, a, b) => function.of(at(a), at(b), self.known(b)),
+                Node::Table { table, order, at: [a, b] } => {
+                    S::look_up(&self.tables()[table as usize].grid(), [at(a), at(b)], order)
+                }
                 Node::Select(comparison, [a, b, c, d]) => S::select(comparison, at(a), at(b), at(c), at(d)),
             };
             values.push(value);

@@ -52,6 +52,17 @@ impl Tape {
             }
             Node::Function(function, a) => self.rule_of_function(function, id, a),
             Node::Function2(function, a, b) => self.rule_of_function2(function, id, a, b),
+            Node::Table { table, order: [i, j], at: [x, y] } => {
+                let slope = |tape: &mut Self, order| {
+                    Partial::Node(tape.free(|graph| graph.look_up(table as usize, order, [x, y])))
+                };
+                let dx = slope(self, [i.saturating_add(1), j]);
+                if !self.graph.tables()[table as usize].grid().is_surface() {
+                    return Rule::Linear(vec![(x, dx)]);
+                }
+                let dy = slope(self, [i, j.saturating_add(1)]);
+                Rule::Linear(vec![(x, dx), (y, dy)])
+            }
             Node::Select(comparison, all) => Rule::Select(comparison, all),
         }
     }

@@ -2,7 +2,7 @@
 
 use super::trace::with;
 use super::{Function, Function2, Graph, Id, Leaf};
-use crate::scalar::{Comparison, Scalar};
+use crate::scalar::{Comparison, Grid, Scalar, Table};
 use core::cmp::Ordering;
 use core::iter::Sum;
 use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
@@ -19,11 +19,6 @@ impl Symbol {
     /// A quantity that comes from outside.
     pub fn leaf(leaf: Leaf) -> Self {
         Symbol::made(|graph| graph.leaf(leaf))
-    }
-
-    /// A node of the graph that is being read.
-    pub(crate) fn node(id: Id) -> Self {
-        Symbol::made(|_| id)
     }
 
     /// The node, if it is one of this trace.
@@ -214,6 +209,9 @@ impl Scalar for Symbol {
         let (low, high) = (Symbol::from(low), Symbol::from(high));
         let above = Symbol::select(Comparison::Less, self, low, low, self);
         Symbol::select(Comparison::Less, high, self, high, above)
+    }
+    fn look_up(table: &Grid<'_>, at: [Self; 2], order: [u8; 2]) -> Self {
+        Symbol::combined(at, |graph, at| graph.table(&Table::from(table), order, at))
     }
     fn fract(self) -> Self {
         self - self.trunc()

@@ -104,6 +104,10 @@ impl Tape {
         let mut new = vec![Id::default(); other.len()];
         for (i, node) in other.nodes().iter().enumerate().filter(|(i, _)| reached[*i]) {
             let node = node.with_operands(|id| new[id.index()]);
+            if let Node::Table { table, order, at } = node {
+                new[i] = self.strict(|graph| graph.table(&other.tables()[table as usize], order, at));
+                continue;
+            }
             new[i] = self.imported(node);
         }
         roots.iter().map(|root| new[root.index()]).collect()
@@ -118,6 +122,12 @@ impl Tape {
             }
             Node::Function2(Function2::Max, a, b) => self.either([b, a], a, b),
             Node::Function2(Function2::Min, a, b) => self.either([a, b], a, b),
+            // The sign of what is not a number depends on the processor; here it is positive.
+            Node::Function2(Function2::Copysign, a, b) => self.strict(|graph| {
+                let zero = graph.constant(0.0);
+                let sign = graph.select(Comparison::Equal, b, b, b, zero);
+                graph.function2(Function2::Copysign, a, sign)
+            }),
             _ => self.strict(|graph| match node {
                 Node::Neg(a) => graph.neg(a),
                 Node::Add(a, b) => graph.add(a, b),
@@ -128,7 +138,7 @@ impl Tape {
                 Node::Function(function, a) => graph.function(function, a),
                 Node::Function2(function, a, b) => graph.function2(function, a, b),
                 Node::Select(comparison, [a, b, c, d]) => graph.select(comparison, a, b, c, d),
-                Node::Constant(_) | Node::Leaf(_) | Node::MulAdd(_) => graph.put(node),
+                Node::Constant(_) | Node::Leaf(_) | Node::MulAdd(_) | Node::Table { .. } => graph.put(node),
             }),
         }
     }

@@ -5,7 +5,7 @@
 //! symbols' graph belongs to the thread while a trace runs, and to nobody else.
 
 use super::symbol::Symbol;
-use super::{Graph, Id, Node};
+use super::{Graph, Id};
 use crate::scalar::Comparison;
 use core::any::Any;
 use core::cell::RefCell;
@@ -109,9 +109,12 @@ impl Arena {
             return comparison.holds(x, y);
         }
         if cfg!(panic = "abort") {
-            // Odd answers could make the code panic, which nothing would catch. All are no, as for what is not a number.
+            // Odd answers could make the code panic, which nothing would catch. All are no, as for what is not a number;
+            // but a loop that goes on for long gets answers of both kinds, in no order.
             self.fail("it compares numbers, which a program built with panic = \"abort\" cannot follow both ways");
-            return self.operations > MAX_OPERATIONS && self.operations % 2 == 0;
+            self.asked += 1;
+            let scattered = (self.asked as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 63;
+            return self.asked > 10_000 && scattered == 1;
         }
         let (pair, swapped) = if a <= b { ((a, b), false) } else { ((b, a), true) };
         let yes = match comparison {
@@ -236,11 +239,6 @@ impl Graph {
             open.push((path, roots));
         }
         Ok(open.pop().map(|(_, roots)| roots).unwrap_or_default())
-    }
-
-    /// Whether a node is a number, or made of numbers alone.
-    pub(crate) fn is_constant(&self, id: Id) -> bool {
-        matches!(self.node(id), Node::Constant(_))
     }
 }
 

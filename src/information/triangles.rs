@@ -12,7 +12,7 @@ const LINE: usize = 8;
 
 /// The square-root triangles of `lanes` independent pieces (records, or segments of one), all with the same columns. Rows
 /// of all lanes are absorbed together by Householder reflections in vector registers (six columns: 1.5 ns per row and lane,
-/// where [`Information::absorb`] takes 2.3).
+/// where [`Information::absorb`] takes 2).
 ///
 /// A lane's triangle depends on its own rows only, to the last bit, and on their number; not on the other lanes and not on
 /// the vector registers of the processor, but for whether it fuses a product with a sum. A lane with a NaN leaves the
@@ -70,7 +70,7 @@ impl Triangles {
     /// (64 bytes). A slice that is too short is absorbed as far as it goes.
     pub fn absorb(&mut self, rows: &mut [f64], count: usize) {
         let stride = (self.columns + 1) * self.lanes;
-        let count = if stride == 0 { 0 } else { count.min(rows.len() / stride) };
+        let count = count.min(rows.len().checked_div(stride).unwrap_or(0));
         self.rows += count as u64;
         let task = absorb::Absorb {
             columns: self.columns + 1,

@@ -3,6 +3,7 @@
 use super::{Integrator, Square, Stuck, System};
 use crate::dual::Dual;
 use crate::error::Error;
+use crate::graph::{Leaf, Symbol};
 use crate::layout::Kind;
 use crate::scalar::Scalar;
 use crate::signals::Entry;
@@ -74,10 +75,60 @@ impl<S: Scalar> System for Field<'_, S> {
     }
 }
 
+/// An interval of a system in symbols: its begin is [`Leaf::Time`], its length [`Leaf::Step`].
+pub(crate) struct SymbolicField<'a> {
+    pub kind: Kind,
+    pub states: usize,
+    pub rate: Rate<'a, Symbol>,
+}
+
+impl System for SymbolicField<'_> {
+    type Scalar = Symbol;
+    type Vector<T: Entry> = Vec<T>;
+    type Matrix = Vec<Vec<f64>>;
+
+    fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    fn interval(&self) -> (f64, f64) {
+        Symbol::fail("its integrator asks for the interval in numbers");
+        (f64::NAN, f64::NAN)
+    }
+
+    fn vector<T: Entry>(&self, f: impl FnMut(usize) -> T) -> Vec<T> {
+        (0..self.states).map(f).collect()
+    }
+
+    fn derivative(&self, position: f64, x: &Vec<Symbol>) -> Vec<Symbol> {
+        let mut to = vec![Symbol::default(); self.states];
+        (self.rate)(position, x, &mut to);
+        to
+    }
+
+    fn next(&self, x: &Vec<Symbol>) -> Vec<Symbol> {
+        self.derivative(0.0, x)
+    }
+
+    fn jacobian(&self, _position: f64, x: &Vec<f64>) -> (Vec<f64>, Vec<Vec<f64>>) {
+        Symbol::fail("its integrator asks for a Jacobian in numbers");
+        (x.clone(), vec![x.clone(); x.len()])
+    }
+
+    fn along(&self, x: &Vec<Symbol>, part: f64, k: &Vec<Symbol>) -> Vec<Symbol> {
+        if part == 0.0 {
+            return x.clone();
+        }
+        let h = Symbol::leaf(Leaf::Step) * part;
+        x.iter().zip(k).map(|(x, k)| x.along(*k, h)).collect()
+    }
+}
+
 /// An [`Integrator`] as an object.
 pub(crate) trait Method: Debug + Send + Sync {
     fn advance_values(&self, field: &Field<'_, f64>, x: Vec<f64>, step: &mut f64) -> Result<Vec<f64>, Stuck>;
     fn advance_duals(&self, field: &Field<'_, Duals>, x: Vec<Duals>, step: &mut f64) -> Result<Vec<Duals>, Stuck>;
+    fn advance_symbols(&self, field: &SymbolicField<'_>, x: Vec<Symbol>) -> Result<Vec<Symbol>, Stuck>;
     fn is_fixed(&self) -> bool;
     fn serves(&self, kind: Kind) -> bool;
     fn refined(&self, kind: Kind) -> Option<Arc<dyn Method>>;
@@ -92,6 +143,10 @@ impl<I: Integrator> Method for I {
 
     fn advance_duals(&self, field: &Field<'_, Duals>, x: Vec<Duals>, step: &mut f64) -> Result<Vec<Duals>, Stuck> {
         self.advance(field, x, step)
+    }
+
+    fn advance_symbols(&self, field: &SymbolicField<'_>, x: Vec<Symbol>) -> Result<Vec<Symbol>, Stuck> {
+        self.advance(field, x, &mut 0.0)
     }
 
     fn is_fixed(&self) -> bool {

@@ -75,7 +75,8 @@ fn long_run(objective: &Objective<'_>, e: usize, coordinates: &[f64], kept: &[us
     if n == 0 {
         return Some((DMatrix::zeros(0, 0), 0));
     }
-    let lagged = objective.gather_one(coordinates, e, EachScore::new(objective, e, kept, Lagged::new(n))).ok()?.into;
+    let each_score = || EachScore::new(objective, e, kept, Lagged::new(n));
+    let lagged = objective.gather_one(coordinates, e, true, each_score).ok()?.into;
     let Lagged { count, mut triangle, mut block, products, .. } = lagged;
     triangle.absorb(&mut block);
     let length = count as f64;
@@ -89,9 +90,8 @@ fn long_run(objective: &Objective<'_>, e: usize, coordinates: &[f64], kept: &[us
     let a = svd.recompose().ok()?;
     let window = bandwidth(&one, &two, &a, count);
 
-    let sums = MovingSums::new(w, a.clone(), window);
-    let mut sums = objective.gather_one(coordinates, e, EachScore::new(objective, e, kept, sums)).ok()?.into;
-    let sums = sums.triangle();
+    let each_score = || EachScore::new(objective, e, kept, MovingSums::new(&w, &a, window));
+    let sums = objective.gather_one(coordinates, e, true, each_score).ok()?.into.triangle();
     let recolor = (DMatrix::identity(n, n) - &a).try_inverse()?;
     let result = DMatrix::from_fn(n, n, |i, j| sums.at(i, j)) * recolor.transpose() * root;
     result.iter().all(|value| value.is_finite()).then_some((result, window - 1))
@@ -123,6 +123,8 @@ fn bandwidth(one: &DMatrix<f64>, two: &DMatrix<f64>, a: &DMatrix<f64>, count: us
 /// Takes scores in order of time.
 trait TakeScore: Send {
     fn take(&mut self, score: &[f64]);
+    /// Takes what the scores that follow have come to.
+    fn append(&mut self, later: Self);
 }
 
 /// The score of each sample, `sum over the outputs of w psi(z) g`, in the columns kept.
@@ -164,6 +166,10 @@ impl<T: TakeScore> Accumulate for EachScore<'_, T> {
             self.into.take(&self.score);
         }
     }
+
+    fn append(&mut self, later: Self) {
+        self.into.append(later.into);
+    }
 }
 
 /// Sums of products of the scores with those one and two samples before, and the triangle of the scores themselves.
@@ -172,7 +178,10 @@ struct Lagged {
     triangle: Information,
     block: Block,
     products: [DMatrix<f64>; 2],
+    /// The last two scores, the last one first.
     before: [Vec<f64>; 2],
+    /// The first two.
+    first: Vec<Vec<f64>>,
 }
 
 impl Lagged {
@@ -183,31 +192,66 @@ impl Lagged {
             block: Block::new(n, ROWS),
             products: [DMatrix::zeros(n, n), DMatrix::zeros(n, n)],
             before: [vec![0.0; n], vec![0.0; n]],
+            first: vec![],
         }
     }
-}
 
-impl TakeScore for Lagged {
-    fn take(&mut self, score: &[f64]) {
-        let n = score.len();
+    /// Products of a score with those before it.
+    fn multiply(&mut self, score: &[f64]) {
         for (product, before) in self.products.iter_mut().zip(&self.before) {
-            for j in 0..n {
-                for i in 0..n {
-                    product[(i, j)] += score[i] * before[j];
+            for (j, before) in before.iter().enumerate() {
+                for (i, score) in score.iter().enumerate() {
+                    product[(i, j)] += score * before;
                 }
             }
         }
         self.before.swap(0, 1);
         self.before[0].copy_from_slice(score);
+    }
+}
+
+impl TakeScore for Lagged {
+    fn take(&mut self, score: &[f64]) {
+        if self.first.len() < 2 {
+            self.first.push(score.to_vec());
+        }
+        self.multiply(score);
         self.triangle.gather(&mut self.block, score, 0.0);
         self.count += 1;
+    }
+
+    fn append(&mut self, mut later: Self) {
+        // The products of its first scores among themselves are those of both: they are counted once, here.
+        let nothing = || vec![0.0; later.before[0].len()];
+        let mut alone = Lagged { before: [nothing(), nothing()], ..Lagged::new(later.before[0].len()) };
+        for score in &later.first {
+            self.multiply(score);
+            alone.multiply(score);
+            if self.first.len() < 2 {
+                self.first.push(score.clone());
+            }
+        }
+        for (i, product) in self.products.iter_mut().enumerate() {
+            *product += &later.products[i] - &alone.products[i];
+        }
+        if later.count >= 2 {
+            self.before = later.before;
+        }
+        self.triangle.absorb(&mut self.block);
+        later.triangle.absorb(&mut later.block);
+        self.triangle.merge(&later.triangle);
+        self.count += later.count;
     }
 }
 
 /// Triangle of the moving sums of `window` prewhitened scores, each divided by the root of the window.
-struct MovingSums {
-    w: DMatrix<f64>,
-    a: DMatrix<f64>,
+struct MovingSums<'m> {
+    w: &'m DMatrix<f64>,
+    a: &'m DMatrix<f64>,
+    window: usize,
+    /// The first `window` scores, with which a sum reaches back to those before; they are prewhitened and summed when these are
+    /// known.
+    first: Vec<Vec<f64>>,
     recent: VecDeque<Vec<f64>>,
     sums: Vec<f64>,
     before: Vec<f64>,
@@ -215,12 +259,14 @@ struct MovingSums {
     block: Block,
 }
 
-impl MovingSums {
-    fn new(w: DMatrix<f64>, a: DMatrix<f64>, window: usize) -> Self {
+impl<'m> MovingSums<'m> {
+    fn new(w: &'m DMatrix<f64>, a: &'m DMatrix<f64>, window: usize) -> Self {
         let n = a.nrows();
         MovingSums {
             w,
             a,
+            window,
+            first: vec![],
             recent: (0..window).map(|_| vec![0.0; n]).collect(),
             sums: vec![0.0; n],
             before: vec![0.0; n],
@@ -229,36 +275,64 @@ impl MovingSums {
         }
     }
 
-    fn slide(&mut self, new: &[f64]) {
-        let part = (self.recent.len() as f64).sqrt().recip();
+    /// A score of unit covariance, prewhitened by the one before it.
+    fn prewhitened(&mut self, score: &[f64]) -> Vec<f64> {
+        let n = score.len();
+        let z: Vec<f64> = (0..n).map(|j| (0..=j).map(|i| score[i] * self.w[(i, j)]).sum()).collect();
+        let rest = |i: usize| z[i] - (0..n).map(|j| self.a[(i, j)] * self.before[j]).sum::<f64>();
+        let fresh = (0..n).map(rest).collect();
+        self.before = z;
+        fresh
+    }
+
+    fn slide(&mut self, new: &[f64], counts: bool) {
+        let part = (self.window as f64).sqrt().recip();
         let mut oldest = self.recent.pop_front().unwrap_or_default();
         for i in 0..new.len() {
             self.sums[i] += new[i] - oldest[i];
             oldest[i] = new[i];
         }
         self.recent.push_back(oldest);
-        let row: Vec<f64> = self.sums.iter().map(|sum| sum * part).collect();
-        self.triangle.gather(&mut self.block, &row, 0.0);
+        if counts {
+            let row: Vec<f64> = self.sums.iter().map(|sum| sum * part).collect();
+            self.triangle.gather(&mut self.block, &row, 0.0);
+        }
     }
 
-    /// The triangle, once the last scores have left the window.
-    fn triangle(&mut self) -> &Information {
-        let nothing = vec![0.0; self.sums.len()];
-        for _ in 1..self.recent.len() {
-            self.slide(&nothing);
+    /// The triangle, once the first scores have been summed from rest, and the last ones have left the window.
+    fn triangle(self) -> Information {
+        let n = self.sums.len();
+        let mut whole = MovingSums { first: vec![vec![]; self.window], ..MovingSums::new(self.w, self.a, self.window) };
+        whole.append(self);
+        let nothing = vec![0.0; n];
+        for _ in 1..whole.window {
+            whole.slide(&nothing, true);
         }
-        self.triangle.absorb(&mut self.block);
-        &self.triangle
+        whole.triangle.absorb(&mut whole.block);
+        whole.triangle
     }
 }
 
-impl TakeScore for MovingSums {
+impl TakeScore for MovingSums<'_> {
     fn take(&mut self, score: &[f64]) {
-        let n = score.len();
-        let z: Vec<f64> = (0..n).map(|j| (0..=j).map(|i| score[i] * self.w[(i, j)]).sum()).collect();
-        let fresh: Vec<f64> =
-            (0..n).map(|i| z[i] - (0..n).map(|j| self.a[(i, j)] * self.before[j]).sum::<f64>()).collect();
-        self.before = z;
-        self.slide(&fresh);
+        let counts = self.first.len() == self.window;
+        if !counts {
+            self.first.push(score.to_vec());
+        }
+        let fresh = self.prewhitened(score);
+        self.slide(&fresh, counts);
+    }
+
+    fn append(&mut self, mut later: Self) {
+        for score in &later.first {
+            self.take(score);
+        }
+        // With so many scores of its own it has forgotten those before.
+        if later.first.len() == later.window {
+            (self.recent, self.sums, self.before) = (later.recent, later.sums, later.before);
+        }
+        self.triangle.absorb(&mut self.block);
+        later.triangle.absorb(&mut later.block);
+        self.triangle.merge(&later.triangle);
     }
 }

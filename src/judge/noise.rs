@@ -50,6 +50,13 @@ impl Accumulate for Moments<'_> {
             }
         }
     }
+
+    fn append(&mut self, later: Self) {
+        let n = self.sums.size();
+        let added = |a: &SquareMatrix, b: &SquareMatrix| SquareMatrix::from_fn(n, |i, j| a[(i, j)] + b[(i, j)]);
+        self.sums = added(&self.sums, &later.sums);
+        self.pairs = added(&self.pairs, &later.pairs);
+    }
 }
 
 /// Second moments of the (filtered) errors in the units of the outputs; each error through `bend` in units of

@@ -45,9 +45,8 @@ struct Sums<'s> {
     measured: u64,
     log_determinant: f64,
     autocorrelations: Vec<Autocorrelation>,
-    /// The windows to be simulated again, and the sample from which on the next one is taken.
+    /// The windows to be simulated again.
     again: Vec<Sampled>,
-    next: usize,
     run: Vec<f64>,
 }
 
@@ -96,22 +95,35 @@ impl Accumulate for Sums<'_> {
             }
             self.autocorrelations[j].add(&self.run, count);
         }
-        if begin >= self.next && !window.carry.is_empty() {
+        // Those in which a multiple of the distance lies.
+        let distance = (EVERY * window.capacity()).max(record.len() / AGAIN);
+        if begin.next_multiple_of(distance) < begin + samples && !window.carry.is_empty() {
             let errors = (0..samples).flat_map(|k| (0..outputs).map(move |j| window.error(k, j, lane))).collect();
             let carry = window.carry.iter().skip(lane).step_by(window.lanes()).copied().collect();
             self.again.push(Sampled { begin, errors, carry });
-            self.next = begin + (EVERY * window.capacity()).max(record.len() / AGAIN);
         }
+    }
+
+    fn append(&mut self, later: Self) {
+        self.measured += later.measured;
+        self.log_determinant += later.log_determinant;
+        self.outputs.iter_mut().zip(&later.outputs).for_each(|(sums, later)| sums.append(later));
+        self.autocorrelations.iter_mut().zip(&later.autocorrelations).for_each(|(sums, later)| sums.follow(later));
+        self.again.extend(later.again);
     }
 }
 
 /// What is left unexplained at a point, in the units of the outputs.
 pub(crate) fn residual_pass(objective: &Objective<'_>, coordinates: &[f64]) -> Result<Residuals, Error> {
     // Without a pre-filter: the errors as they are.
-    let plain = objective.in_units();
-    let mut problem = objective.problem.clone();
-    problem.settings.prefilter = None;
-    let plain = Objective { problem: &problem, ..plain };
+    let mut plain = objective.in_units();
+    let unfiltered;
+    if objective.problem.settings.prefilter.is_some() {
+        let mut problem = objective.problem.clone();
+        problem.settings.prefilter = None;
+        unfiltered = problem;
+        plain = Objective { problem: &unfiltered, ..plain };
+    }
     let outputs = objective.outputs();
     let make = |experiment: usize| Sums {
         objective,
@@ -121,7 +133,6 @@ pub(crate) fn residual_pass(objective: &Objective<'_>, coordinates: &[f64]) -> R
         log_determinant: 0.0,
         autocorrelations: vec![Autocorrelation::new(LAGS); outputs],
         again: vec![],
-        next: 0,
         run: vec![],
     };
     let all = plain.gather(coordinates, false, make).map_err(|_| failed(objective, coordinates))?;

@@ -55,6 +55,15 @@ pub(crate) struct Tally {
     expected: Vec<f64>,
 }
 
+impl Tally {
+    fn add(&mut self, other: Tally) {
+        self.weights += other.weights;
+        self.curvature += other.curvature;
+        self.influence += other.influence;
+        self.expected.iter_mut().zip(other.expected).for_each(|(sum, other)| *sum += other);
+    }
+}
+
 /// Whether the classical covariance would be wrong whatever the data say.
 pub(crate) fn is_needed(objective: &Objective<'_>) -> bool {
     objective.is_weighted() || objective.problem.settings.prefilter.is_some() || objective.is_robust()
@@ -126,10 +135,7 @@ impl Passes<'_> {
         for mut one in all {
             one.bread.absorb(&mut one.block);
             blocks.push(one.bread);
-            tally.weights += one.tally.weights;
-            tally.curvature += one.tally.curvature;
-            tally.influence += one.tally.influence;
-            tally.expected.iter_mut().zip(one.tally.expected).for_each(|(sum, one)| *sum += one);
+            tally.add(one.tally);
         }
         let curvature = tally.curvature / tally.weights;
         for (i, slope, _) in self.objective.problem.unknowns.priors(self.coordinates) {
@@ -186,7 +192,7 @@ impl Passes<'_> {
         };
         let (mut scores, mut taken) = (vec![], 0.0);
         for e in 0..self.objective.experiments() {
-            let mut gathered = self.objective.gather_one(self.coordinates, e, make(e))?;
+            let mut gathered = self.objective.gather_one(self.coordinates, e, true, || make(e))?;
             let (triangle, part) = gathered.scores(filter, &factor, &self.of_experiment(inverse, e), outputs);
             scores.push(triangle);
             taken += part;
@@ -237,6 +243,13 @@ impl Accumulate for Curvature<'_> {
             }
         }
     }
+
+    fn append(&mut self, mut later: Self) {
+        later.bread.absorb(&mut later.block);
+        self.bread.absorb(&mut self.block);
+        self.bread.merge(&later.bread);
+        self.tally.add(later.tally);
+    }
 }
 
 /// The triangle of the scores.
@@ -267,6 +280,12 @@ impl Accumulate for Scores<'_> {
             self.scores.gather(&mut self.block, &self.row, 0.0);
         }
     }
+
+    fn append(&mut self, mut later: Self) {
+        later.scores.absorb(&mut later.block);
+        self.scores.absorb(&mut self.block);
+        self.scores.merge(&later.scores);
+    }
 }
 
 /// The weighted slopes of an experiment backward in time: column by column, output by output.
@@ -292,6 +311,11 @@ impl Accumulate for Backward<'_> {
                 }
             }
         }
+    }
+
+    fn append(&mut self, later: Self) {
+        self.slopes.iter_mut().zip(later.slopes).for_each(|(slope, later)| *slope += later);
+        self.measured.iter_mut().zip(later.measured).for_each(|(measured, later)| *measured |= later);
     }
 }
 

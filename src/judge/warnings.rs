@@ -88,7 +88,7 @@ impl Judgement<'_> {
             return None;
         }
         let finer = self.objective.sweep.refined()?;
-        let objective = Objective { sweep: &*finer, ..self.objective.clone() };
+        let objective = self.objective.of(self.objective.problem, &*finer);
         let (name, shift, part) = shift(&objective, &self.end.coordinates, unknowns)?;
         let finer = finer.integrator();
         (shift > STEP_SHIFT).then(|| {

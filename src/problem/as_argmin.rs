@@ -3,8 +3,7 @@
 //! Cost and gradient serve the line-search and population methods; the dense residual, Jacobian and Gauss-Newton Hessian
 //! are made on request only. Where the model cannot be evaluated, or a bound is crossed, the cost is infinite.
 
-use super::linearize::Weighing;
-use super::{Accumulate, Objective};
+use super::{Accumulate, Objective, Weighing};
 use crate::optimize::{Infeasible, LeastSquares};
 use crate::sweep::Window;
 use argmin::core::{CostFunction, Error, Gradient, Hessian, Jacobian, Operator};
@@ -121,5 +120,9 @@ impl Accumulate for DenseRows<'_> {
                 }
             }
         }
+    }
+
+    fn append(&mut self, later: Self) {
+        self.rows.extend(later.rows);
     }
 }

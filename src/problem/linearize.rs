@@ -1,28 +1,38 @@
 //! Cost and triangles of an objective.
 
-use super::pass::Job;
-use super::{Accumulate, Objective, each};
-use crate::information::{Block, Information};
-use crate::loss::Loss;
+use super::absorb::Absorber;
+use super::pass::{Broken, Job};
+use super::segments::{Border, Borders};
+use super::{Objective, Values, Weighing};
+use crate::information::{Chain, Information};
 use crate::optimize::{Infeasible, Linearization};
-use crate::sweep::{RunError, Window};
+use crate::sweep::{Piece, Reached, RunError, Seed};
+use std::sync::Arc;
 
-/// Rows that are absorbed together.
-const ROWS: usize = 256;
+/// Part of the squared errors that the correction of guessed borders may change before the slopes are computed anew.
+const MOVED: f64 = 1e-6;
+
+/// What one segment comes to.
+struct Part {
+    cost: f64,
+    triangle: Information,
+    reached: Reached,
+}
 
 impl Objective<'_> {
     /// Cost and triangles of all experiments and the priors.
     pub(crate) fn evaluate(&self, coordinates: &[f64]) -> Result<Linearization, Infeasible> {
         let values = self.values(coordinates);
-        let one = |e: usize| {
-            let job = self.job(e, &values[e], coordinates, true);
-            self.triangle(&job).map_err(|error| self.infeasible(e, coordinates, error))
-        };
-        let (mut cost, mut blocks) = (0.0, Vec::with_capacity(self.experiments()));
-        for result in each(self.experiments(), one) {
-            let (part, information) = result?;
-            cost += part;
-            blocks.push(information);
+        let cuts = &self.problem.cuts;
+        let chained = (0..self.experiments()).any(|e| cuts.is_chained(e));
+        let (guess, exact) = if chained { self.guess(coordinates, &values)? } else { (None, true) };
+        let mut found = self.triangles(coordinates, &values, guess.as_ref())?;
+        if !exact && found.moved > MOVED * 2.0 * found.cost {
+            found = self.triangles(coordinates, &values, found.borders.as_ref())?;
+        }
+        let Triangulation { mut cost, mut blocks, borders, .. } = found;
+        if let Some(borders) = borders {
+            self.memory.keep(Arc::new(borders));
         }
         for (i, slope, error) in self.problem.unknowns.priors(coordinates) {
             let e = self.problem.unknowns.row[i].experiment.unwrap_or(0);
@@ -33,43 +43,145 @@ impl Objective<'_> {
         Ok(Linearization::new(cost, self.problem.unknowns.shared(), blocks))
     }
 
-    /// Cost and triangle of one experiment, priors left out.
-    fn triangle(&self, job: &Job<'_>) -> Result<(f64, Information), RunError> {
-        let columns = job.seeds.len();
-        let mut information = Information::new(columns);
-        let mut block = Block::new(columns, ROWS);
-        let mut weighing = Weighing::new(self, job.experiment);
-        let mut row = vec![0.0; columns];
-        self.run(std::slice::from_ref(job), &mut |window| {
-            for k in 0..window.samples[0] {
-                for j in 0..window.outputs() {
-                    if !window.is_measured(k, j, 0) {
-                        continue;
-                    }
-                    let [(root, error), second] = weighing.rows(window, k, j, 0);
-                    let values = window.row(k, j);
-                    row.iter_mut().zip(values).for_each(|(to, from)| *to = from * root);
-                    information.gather(&mut block, &row, error);
-                    if window.has_variances() {
-                        let (root, error) = second;
-                        let values = window.variance_row(k, j);
-                        row.iter_mut().zip(values).for_each(|(to, from)| *to = from * root);
-                        information.gather(&mut block, &row, error);
-                    }
-                }
-            }
-        })?;
-        information.absorb(&mut block);
-        let cost = weighing.cost;
-        if !cost.is_finite() || information.column_norms().iter().any(|norm| !norm.is_finite()) {
-            return Err(RunError::Failed { sample: job.piece.samples.start });
+    /// Where the segments begin, and whether that is exact. A guess will do where it can be corrected: the cost is a sum of
+    /// squares, the model affine.
+    fn guess(&self, coordinates: &[f64], values: &[Values]) -> Result<(Option<Borders>, bool), Infeasible> {
+        if let Some(known) = self.memory.at(coordinates) {
+            return Ok((Some((*known).clone()), true));
         }
-        Ok((cost, information))
+        let corrigible = self.problem.cuts.affine && self.loss().is_none();
+        let Some(best) = self.memory.best().filter(|_| corrigible) else {
+            return Ok((Some(self.simulated_borders(coordinates, values)?), true));
+        };
+        let mut guess = Borders { point: coordinates.to_vec(), values: values.to_vec(), ..(*best).clone() };
+        for (e, borders) in guess.of.iter_mut().enumerate() {
+            let quantity = |values: &Values, seed: &Seed| match *seed {
+                Seed::Carry(i) => values.x[i],
+                Seed::Parameter(j) => values.p[j],
+            };
+            let seeds = self.problem.unknowns.seeds(e);
+            let change = |seed| quantity(&values[e], seed) - quantity(&best.values[e], seed);
+            let change: Vec<f64> = seeds.iter().map(change).collect();
+            for (s, border) in borders.iter_mut().enumerate() {
+                *border = Border { carry: best.moved(e, s + 1, &change), slopes: vec![] };
+            }
+        }
+        Ok((Some(guess), false))
+    }
+
+    /// The triangles of all experiments, priors left out.
+    fn triangles(
+        &self,
+        coordinates: &[f64],
+        values: &[Values],
+        guess: Option<&Borders>,
+    ) -> Result<Triangulation, Infeasible> {
+        let jobs: Vec<Job<'_>> =
+            (0..self.experiments()).flat_map(|e| self.linear_jobs(e, &values[e], coordinates, guess)).collect();
+        let mut parts = self.in_batches(&jobs, coordinates, |jobs| self.parts(jobs))?.into_iter();
+        let mut found = Triangulation { cost: 0.0, moved: 0.0, blocks: vec![], borders: None };
+        let mut of = vec![];
+        for (e, segments) in self.problem.cuts.segments.iter().enumerate() {
+            let parts: Vec<Part> = parts.by_ref().take(segments.len()).collect();
+            if self.problem.cuts.is_chained(e) {
+                let guess = guess.map_or(&[][..], |guess| &guess.of[e]);
+                of.push(self.chain(e, &values[e], coordinates, parts, guess, &mut found));
+            } else {
+                let mut parts = parts.into_iter();
+                let Some(Part { cost, triangle: mut whole, .. }) = parts.next() else { continue };
+                found.cost += cost;
+                for part in parts {
+                    found.cost += part.cost;
+                    whole.merge(&part.triangle);
+                }
+                whole.scale_columns(&self.problem.unknowns.scales(e, coordinates));
+                found.blocks.push(whole);
+                of.push(vec![]);
+            }
+        }
+        if !found.cost.is_finite() || found.blocks.iter().any(|block| !block.is_finite()) {
+            return Err(self.infeasible(0, coordinates, RunError::Failed { sample: 0 }));
+        }
+        if guess.is_some() {
+            let (point, cost, values) = (coordinates.to_vec(), found.cost, values.to_vec());
+            found.borders = Some(Borders { point, cost, values, of });
+        }
+        Ok(found)
+    }
+
+    /// One triangle of the segments of an experiment, each of which began with a guess; the borders as they ought to be.
+    fn chain(
+        &self,
+        e: usize,
+        values: &Values,
+        coordinates: &[f64],
+        parts: Vec<Part>,
+        guess: &[Border],
+        found: &mut Triangulation,
+    ) -> Vec<Border> {
+        let whole = self.job(e, values, coordinates, true);
+        let is_parameter = |i: &usize| matches!(whole.seeds[*i], Seed::Parameter(_));
+        let parameters: Vec<usize> = (0..whole.seeds.len()).filter(is_parameter).collect();
+        let Piece { carry, slopes, .. } = whole.piece;
+        let mut chain = Chain::new(carry.len(), slopes, &parameters, &whole.scales);
+        let mut borders = Vec::with_capacity(guess.len());
+        let simulated = parts.iter().map(|part| part.cost).sum::<f64>();
+        for (s, part) in parts.iter().enumerate() {
+            chain.add(&part.triangle);
+            if let Some(Border { carry, .. }) = guess.get(s) {
+                chain.go_on(&part.reached.carry, &part.reached.slopes, carry);
+                if !self.problem.cuts.affine {
+                    chain.without_defect();
+                }
+                let (defect, slopes) = chain.begin();
+                let carry = carry.iter().zip(defect).map(|(carry, defect)| carry + defect).collect();
+                borders.push(Border { carry, slopes: slopes.to_vec() });
+            }
+        }
+        found.moved += chain.moved;
+        found.cost += if chain.moved > 0.0 { 0.5 * chain.squares } else { simulated };
+        found.blocks.push(chain.triangle());
+        borders
+    }
+
+    /// The segments of an experiment with slopes in the quantities themselves; chained ones with respect to all that they
+    /// begin with.
+    fn linear_jobs<'p>(
+        &'p self,
+        e: usize,
+        values: &'p Values,
+        coordinates: &[f64],
+        guess: Option<&Borders>,
+    ) -> Vec<Job<'p>> {
+        let mut jobs = self.segments(e, values, coordinates, true, guess);
+        let chained = self.problem.cuts.is_chained(e);
+        for job in &mut jobs {
+            job.scales.clear();
+            if chained {
+                let carried = job.piece.carry.len();
+                job.seeds.retain(|seed| matches!(seed, Seed::Parameter(_)));
+                job.seeds.splice(0..0, (0..carried).map(Seed::Carry));
+                let width = job.seeds.len();
+                job.piece.slopes = (0..carried * width).map(|at| f64::from(u8::from(at % width == at / width))).collect();
+            }
+        }
+        jobs
+    }
+
+    /// Costs and triangles of jobs that run side by side.
+    fn parts(&self, jobs: &[&Job<'_>]) -> Result<Vec<Part>, Broken> {
+        let mut absorbers: Absorber<'_> = Absorber::new(self, jobs);
+        let reached = self.run(jobs, &mut |window| absorbers.absorb(window))?;
+        let parts = reached.into_iter().enumerate();
+        parts.map(|(lane, reached)| {
+            let (cost, triangle) = absorbers.part(lane);
+            Ok(Part { cost, triangle, reached })
+        }).collect()
     }
 
     /// The cost of one experiment alone, priors left out.
     pub(crate) fn cost_of(&self, e: usize, coordinates: &[f64]) -> Result<f64, Infeasible> {
-        self.gather_one(coordinates, e, Weighing::new(self, e)).map(|weighing| weighing.cost)
+        self.gather_one(coordinates, e, true, || Weighing::new(self, e)).map(|weighing| weighing.cost)
     }
 
     /// The cost alone.
@@ -80,52 +192,11 @@ impl Objective<'_> {
     }
 }
 
-/// Weights and loss, and the cost that they sum up to.
-pub(crate) struct Weighing<'o> {
-    objective: &'o Objective<'o>,
-    experiment: usize,
-    loss: Option<&'o dyn Loss>,
-    kappa: f64,
-    pub cost: f64,
-}
-
-impl<'o> Weighing<'o> {
-    pub fn new(objective: &'o Objective<'o>, experiment: usize) -> Self {
-        let (loss, kappa) = (objective.loss(), objective.problem.kappa);
-        Weighing { objective, experiment, loss, kappa, cost: 0.0 }
-    }
-
-    /// Counts the cost of a standardized error; for its row, and for that of its variance, the factor of the slopes and
-    /// the weighted error.
-    #[inline]
-    pub(super) fn rows(&mut self, window: &Window, k: usize, j: usize, lane: usize) -> [(f64, f64); 2] {
-        let z = window.error(k, j, lane);
-        let weight = if self.objective.is_weighted() {
-            self.objective.weight(self.experiment, window.begin[lane] + k)
-        } else {
-            1.0
-        };
-        self.cost += weight * self.loss.map_or(0.5 * z * z, |loss| loss.rho(z));
-        let root = (weight * self.loss.map_or(1.0, |loss| loss.weight(z))).sqrt();
-        if !window.has_variances() {
-            return [(root, root * z), (0.0, 0.0)];
-        }
-        let number = (k * window.outputs() + j) * window.lanes() + lane;
-        self.cost += weight * 0.5 * self.kappa * window.log_variances[number];
-        let influence = self.loss.map_or(z * z, |loss| loss.psi(z) * z);
-        let second = (weight * self.kappa).sqrt();
-        [(root, root * z), (second, (influence - self.kappa) * (weight / (2.0 * self.kappa)).sqrt())]
-    }
-}
-
-impl Accumulate for Weighing<'_> {
-    fn add(&mut self, window: &Window, lane: usize) {
-        for k in 0..window.samples[lane] {
-            for j in 0..window.outputs() {
-                if window.is_measured(k, j, lane) {
-                    self.rows(window, k, j, lane);
-                }
-            }
-        }
-    }
+/// Costs and triangles of all experiments at a point.
+struct Triangulation {
+    cost: f64,
+    /// Sum of squares of what the correction of guessed borders changed.
+    moved: f64,
+    blocks: Vec<Information>,
+    borders: Option<Borders>,
 }

@@ -1,5 +1,6 @@
 //! [`Objective`]: the cost of a fit as a function of its unknowns.
 
+use super::segments::Memory;
 use super::{Control, Problem, Whitening};
 use crate::error::Failure;
 use crate::loss::Loss;
@@ -19,6 +20,8 @@ pub struct Objective<'p> {
     pub(crate) sweep: &'p dyn Sweep,
     pub(crate) whitening: Whitening,
     pub(crate) control: &'p Control,
+    /// Where the segments of records begin at points that were evaluated.
+    pub(crate) memory: Memory,
 }
 
 impl<'p> Objective<'p> {
@@ -40,6 +43,12 @@ impl<'p> Objective<'p> {
     /// The same with errors standardized otherwise.
     pub(crate) fn with(&self, whitening: Whitening) -> Self {
         Objective { whitening, ..self.clone() }
+    }
+
+    /// The same with another sweep, or records that differ in what was measured.
+    pub(crate) fn of<'q>(&'q self, problem: &'q Problem<'q>, sweep: &'q dyn Sweep) -> Objective<'q> {
+        let whitening = self.whitening.clone();
+        Objective { problem, sweep, whitening, control: self.control, memory: Memory::default() }
     }
 
     /// Number of experiments.

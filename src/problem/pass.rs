@@ -1,18 +1,24 @@
-//! Passes over the data: the pieces of all experiments, run side by side and in parallel, and what is gathered from their
+//! Passes over the data: the segments of all records, run side by side and in parallel, and what is gathered from their
 //! windows.
 
+use super::segments::{Border, Borders};
+use super::standardize::Standardize;
 use super::{Objective, Values};
 use crate::optimize::Infeasible;
-use crate::prefilter::Butterworth;
+use crate::record::Time;
 use crate::sweep::{Piece, Reached, RunError, Seed, Visit, Window};
+use std::sync::Arc;
 
-/// What a pass gathers from the windows of an experiment.
-pub(crate) trait Accumulate: Send {
+/// What a pass gathers from the windows of a segment of an experiment.
+pub(crate) trait Accumulate: Send + Sized {
     /// Takes in one lane of a window of standardized errors.
     fn add(&mut self, window: &Window, lane: usize);
+
+    /// Takes in what was gathered from the segment that follows.
+    fn append(&mut self, later: Self);
 }
 
-/// A piece of an experiment, and what its windows need.
+/// A segment of an experiment, and what its windows need.
 pub(crate) struct Job<'p> {
     pub experiment: usize,
     pub seeds: Vec<Seed>,
@@ -21,13 +27,16 @@ pub(crate) struct Job<'p> {
     pub piece: Piece<'p>,
 }
 
-impl Objective<'_> {
-    /// Each experiment as one piece.
-    fn jobs<'p>(&'p self, values: &'p [Values], coordinates: &[f64], slopes: bool) -> Vec<Job<'p>> {
-        let job = |(experiment, values): (usize, &'p Values)| self.job(experiment, values, coordinates, slopes);
-        values.iter().enumerate().map(job).collect()
-    }
+/// Which of the pieces that ran side by side was not run to its end, and why.
+pub(super) struct Broken {
+    pub lane: usize,
+    pub error: RunError,
+}
 
+/// Samples times columns that are worth another thread.
+const WORTH_A_THREAD: usize = 50_000;
+
+impl Objective<'_> {
     /// An experiment as one piece.
     pub(super) fn job<'p>(&'p self, e: usize, values: &'p Values, coordinates: &[f64], slopes: bool) -> Job<'p> {
         let (problem, unknowns) = (self.problem, &self.problem.unknowns);
@@ -51,6 +60,28 @@ impl Objective<'_> {
         }
     }
 
+    /// The segments of an experiment, the begins of which are known.
+    pub(super) fn segments<'p>(
+        &'p self,
+        e: usize,
+        values: &'p Values,
+        coordinates: &[f64],
+        slopes: bool,
+        borders: Option<&Borders>,
+    ) -> Vec<Job<'p>> {
+        let whole = self.job(e, values, coordinates, slopes);
+        let segments = self.problem.cuts.segments[e].iter().enumerate();
+        let job = |(s, samples): (usize, &std::ops::Range<usize>)| {
+            let border = borders.filter(|_| s > 0).and_then(|borders| borders.of[e].get(s - 1));
+            let from = |own: &Vec<f64>, border: Option<&Vec<f64>>| border.unwrap_or(own).clone();
+            let carry = from(&whole.piece.carry, border.map(|border| &border.carry));
+            let slopes = from(&whole.piece.slopes, border.map(|border| &border.slopes).filter(|_| slopes));
+            let (seeds, scales) = (whole.seeds.clone(), whole.scales.clone());
+            Job { experiment: e, seeds, scales, piece: Piece { samples: samples.clone(), carry, slopes, ..whole.piece.clone() } }
+        };
+        segments.map(job).collect()
+    }
+
     /// Initial state and parameters of each experiment.
     pub(super) fn values(&self, coordinates: &[f64]) -> Vec<Values> {
         (0..self.experiments()).map(|e| self.problem.unknowns.of_experiment(e, coordinates)).collect()
@@ -71,6 +102,43 @@ impl Objective<'_> {
         reached.into_iter().next().map_or(Ok(()), |reached| reached.map(|_| ()))
     }
 
+    /// The borders of the segments at a point, with their slopes if they are asked for; `None` where nothing is chained.
+    fn borders(&self, coordinates: &[f64], values: &[Values], slopes: bool) -> Result<Option<Arc<Borders>>, Infeasible> {
+        let cuts = &self.problem.cuts;
+        if !(0..self.experiments()).any(|e| cuts.is_chained(e)) {
+            return Ok(None);
+        }
+        let known = |found: &Arc<Borders>| !slopes || found.has_slopes();
+        if let Some(found) = self.memory.at(coordinates).filter(known) {
+            return Ok(Some(found));
+        }
+        if slopes {
+            self.evaluate(coordinates)?;
+            if let Some(found) = self.memory.at(coordinates) {
+                return Ok(Some(found));
+            }
+        }
+        let found = Arc::new(self.simulated_borders(coordinates, values)?);
+        self.memory.keep(found.clone());
+        Ok(Some(found))
+    }
+
+    /// The borders of the segments at a point, simulated in values.
+    pub(super) fn simulated_borders(&self, coordinates: &[f64], values: &[Values]) -> Result<Borders, Infeasible> {
+        let one = |e: usize| {
+            let segments = &self.problem.cuts.segments[e];
+            if !self.problem.cuts.is_chained(e) {
+                return Ok(vec![]);
+            }
+            let job = self.job(e, &values[e], coordinates, false);
+            let at: Vec<usize> = segments[1..].iter().map(|samples| samples.start).collect();
+            self.sweep.follow(&job.piece, &at).map_err(|error| self.infeasible(e, coordinates, error))
+        };
+        let borders = |carries: Vec<Vec<f64>>| carries.into_iter().map(|carry| Border { carry, slopes: vec![] }).collect();
+        let of: Result<Vec<_>, Infeasible> = each(self.experiments(), one).into_iter().map(|e| e.map(borders)).collect();
+        Ok(Borders { point: coordinates.to_vec(), cost: f64::INFINITY, values: values.to_vec(), of: of? })
+    }
+
     /// One pass over all data: a gatherer per experiment, fed with the experiment's windows in order of time.
     pub(crate) fn gather<A: Accumulate>(
         &self,
@@ -79,25 +147,119 @@ impl Objective<'_> {
         make: impl Fn(usize) -> A + Sync,
     ) -> Result<Vec<A>, Infeasible> {
         let values = self.values(coordinates);
-        let jobs = self.jobs(&values, coordinates, slopes);
-        let one = |i: usize| {
-            let mut gatherer = make(jobs[i].experiment);
-            self.run(&jobs[i..=i], &mut |window| gatherer.add(window, 0)).map(|()| gatherer)
-        };
-        let found = each(jobs.len(), one).into_iter().enumerate();
-        found.map(|(i, found)| found.map_err(|error| self.infeasible(jobs[i].experiment, coordinates, error))).collect()
+        let borders = self.borders(coordinates, &values, slopes)?;
+        let jobs = (0..self.experiments())
+            .flat_map(|e| self.segments(e, &values[e], coordinates, slopes, borders.as_deref()))
+            .collect();
+        let found = self.run_jobs(jobs, coordinates, &make)?;
+        let mut all: Vec<A> = Vec::with_capacity(self.experiments());
+        let mut found = found.into_iter();
+        for segments in &self.problem.cuts.segments {
+            let mut parts = found.by_ref().take(segments.len());
+            let Some(mut whole) = parts.next() else { break };
+            parts.for_each(|part| whole.append(part));
+            all.push(whole);
+        }
+        Ok(all)
     }
 
-    /// The same of one experiment, into one gatherer.
-    pub(crate) fn gather_one<A: Accumulate>(&self, x: &[f64], e: usize, mut into: A) -> Result<A, Infeasible> {
-        let values = self.problem.unknowns.of_experiment(e, x);
-        let job = self.job(e, &values, x, true);
-        let done = self.run(std::slice::from_ref(&job), &mut |window| into.add(window, 0));
-        done.map(|()| into).map_err(|error| self.infeasible(e, x, error))
+    /// The same of one experiment.
+    pub(crate) fn gather_one<A: Accumulate>(
+        &self,
+        coordinates: &[f64],
+        e: usize,
+        slopes: bool,
+        make: impl Fn() -> A + Sync,
+    ) -> Result<A, Infeasible> {
+        let values = self.values(coordinates);
+        let borders = self.borders(coordinates, &values, slopes)?;
+        let jobs = self.segments(e, &values[e], coordinates, slopes, borders.as_deref());
+        let mut found = self.run_jobs(jobs, coordinates, &|_| make())?.into_iter();
+        let mut whole = found.next().unwrap_or_else(make);
+        found.for_each(|part| whole.append(part));
+        Ok(whole)
+    }
+
+    /// Runs jobs side by side and gathers from each.
+    fn run_jobs<A: Accumulate>(
+        &self,
+        jobs: Vec<Job<'_>>,
+        coordinates: &[f64],
+        make: &(impl Fn(usize) -> A + Sync),
+    ) -> Result<Vec<A>, Infeasible> {
+        let batch = |jobs: &[&Job<'_>]| {
+            let mut gatherers: Vec<A> = jobs.iter().map(|job| make(job.experiment)).collect();
+            self.run(jobs, &mut |window| {
+                for (lane, gatherer) in gatherers.iter_mut().enumerate().filter(|(lane, _)| window.samples[*lane] > 0) {
+                    gatherer.add(window, lane);
+                }
+            })
+            .map(|_| gatherers)
+        };
+        self.in_batches(&jobs, coordinates, batch)
+    }
+
+    /// Runs jobs in batches of those that can go side by side; the results in the order of the jobs.
+    pub(super) fn in_batches<T: Send>(
+        &self,
+        jobs: &[Job<'_>],
+        coordinates: &[f64],
+        batch: impl Fn(&[&Job<'_>]) -> Result<Vec<T>, Broken> + Sync,
+    ) -> Result<Vec<T>, Infeasible> {
+        let batches = self.batches(jobs);
+        let one = |b: usize| {
+            let members: Vec<&Job<'_>> = batches[b].iter().map(|&i| &jobs[i]).collect();
+            batch(&members)
+        };
+        let work = jobs.iter().map(|job| job.piece.samples.len() * (job.seeds.len() + 1)).sum::<usize>();
+        let results = match work / batches.len().max(1) > WORTH_A_THREAD || work > 8 * WORTH_A_THREAD {
+            true => each(batches.len(), one),
+            false => (0..batches.len()).map(one).collect(),
+        };
+        let mut found: Vec<Option<T>> = (0..jobs.len()).map(|_| None).collect();
+        for (members, result) in batches.iter().zip(results) {
+            let result = result.map_err(|Broken { lane, error }| {
+                self.infeasible(jobs[members[lane]].experiment, coordinates, error)
+            })?;
+            members.iter().zip(result).for_each(|(&i, value)| found[i] = Some(value));
+        }
+        Ok(found.into_iter().flatten().collect())
+    }
+
+    /// The numbers of the jobs that go side by side: of records alike, the long ones first.
+    fn batches(&self, jobs: &[Job<'_>]) -> Vec<Vec<usize>> {
+        let alike = |a: &Job<'_>, b: &Job<'_>| {
+            let (one, other) = (a.piece.record, b.piece.record);
+            let uniform = |time: &Time| matches!(time, Time::Uniform { .. });
+            one.input_hold() == other.input_hold()
+                && uniform(one.times()) == uniform(other.times())
+                && a.seeds == b.seeds
+        };
+        let mut kinds: Vec<Vec<usize>> = vec![];
+        for (i, job) in jobs.iter().enumerate() {
+            match kinds.iter_mut().find(|kind| alike(&jobs[kind[0]], job)) {
+                Some(kind) => kind.push(i),
+                None => kinds.push(vec![i]),
+            }
+        }
+        let mut batches = vec![];
+        for mut kind in kinds {
+            let first = &jobs[kind[0]];
+            let lanes = self.sweep.lanes(first.piece.record, &first.seeds).max(1);
+            if lanes > 1 {
+                kind.sort_by_key(|&i| std::cmp::Reverse(jobs[i].piece.samples.len()));
+            }
+            batches.extend(kind.chunks(lanes).map(<[usize]>::to_vec));
+        }
+        batches
     }
 
     /// Runs pieces side by side and shows their windows of standardized errors.
-    pub(super) fn run(&self, jobs: &[Job<'_>], show: &mut dyn FnMut(&mut Window)) -> Result<(), RunError> {
+    pub(super) fn run(
+        &self,
+        jobs: &[&Job<'_>],
+        show: &mut dyn FnMut(&mut Window),
+    ) -> Result<Vec<Reached>, Broken> {
         let pieces: Vec<Piece<'_>> = jobs.iter().map(|job| job.piece.clone()).collect();
         let mut standardize = Standardize::new(self, jobs);
         let mut failed = None;
@@ -105,8 +267,8 @@ impl Objective<'_> {
             if self.control.stops() {
                 return false;
             }
-            if let Err(sample) = standardize.apply(window) {
-                failed = Some(RunError::Failed { sample });
+            if let Err((lane, sample)) = standardize.apply(window) {
+                failed = Some(Broken { lane, error: RunError::Failed { sample } });
                 return false;
             }
             show(window);
@@ -115,97 +277,12 @@ impl Objective<'_> {
         let reached = self.sweep.run(&pieces, &jobs[0].seeds, visit);
         match failed {
             Some(failed) => Err(failed),
-            None => reached.into_iter().try_for_each(|reached| reached.map(|_| ())),
-        }
-    }
-}
-
-/// From errors and slopes in the units of the outputs to standardized ones, with respect to the coordinates.
-struct Standardize<'s> {
-    objective: &'s Objective<'s>,
-    prefilter: Option<(&'s Butterworth, Vec<f64>)>,
-    /// Per column, then per lane; empty where all are one.
-    scales: Vec<f64>,
-}
-
-impl<'s> Standardize<'s> {
-    fn new(objective: &'s Objective<'s>, jobs: &[Job<'_>]) -> Self {
-        let prefilter = objective.problem.settings.prefilter.as_ref().map(|filter| (filter, vec![]));
-        let plain = jobs.iter().all(|job| job.scales.iter().all(|scale| *scale == 1.0));
-        let columns = if plain { 0 } else { jobs[0].scales.len() };
-        let lanes = objective.sweep.lanes();
-        let scale = |at: usize| jobs.get(at % lanes).map_or(1.0, |job| job.scales[at / lanes]);
-        Standardize { objective, prefilter, scales: (0..columns * lanes).map(scale).collect() }
-    }
-
-    /// The sample whose error is not finite, where there is one.
-    fn apply(&mut self, window: &mut Window) -> Result<(), usize> {
-        let (len, outputs, lanes) = (window.len(), window.outputs(), window.lanes());
-        let last = window.columns() - 1;
-        for k in 0..len {
-            for j in 0..outputs {
-                let errors = &window.row(k, j)[last * lanes..];
-                if let Some(lane) = errors.iter().position(|error| !error.is_finite()) {
-                    return Err(window.begin[lane] + k);
-                }
-            }
-        }
-        if let Some((filter, states)) = &mut self.prefilter {
-            let width = outputs * window.columns() * lanes;
-            filter.filter_rows(window.rows_mut(), width, states);
-            window.clear_unmeasured();
-        }
-        if window.has_variances() {
-            by_variance(window)?;
-        } else {
-            self.objective.whitening.apply(window);
-        }
-        if !self.scales.is_empty() {
-            for k in 0..len {
-                for j in 0..outputs {
-                    scale(window.row_mut(k, j), &self.scales);
-                    if window.has_variances() {
-                        scale(window.variance_row_mut(k, j), &self.scales);
-                    }
-                }
-            }
-        }
-        Ok(())
-    }
-}
-
-fn scale(row: &mut [f64], scales: &[f64]) {
-    row.iter_mut().zip(scales).for_each(|(value, scale)| *value *= scale);
-}
-
-/// Standardizes errors by their predicted variances `v`: rows `dy / sqrt(v), z = e / sqrt(v)`, and in the place of the
-/// variances the rows `dv / (sqrt(2) v), (z^2 - 1) / sqrt(2)`, whose least-squares gradient is that of the likelihood.
-fn by_variance(window: &mut Window) -> Result<(), usize> {
-    let (lanes, last) = (window.lanes(), window.columns() - 1);
-    for k in 0..window.len() {
-        for j in 0..window.outputs() {
-            for lane in 0..lanes {
-                if !window.is_measured(k, j, lane) {
-                    continue;
-                }
-                let v = window.variance(k, j, lane);
-                if !(v > 0.0 && v.is_finite()) {
-                    return Err(window.begin[lane] + k);
-                }
-                let (root, half) = (v.sqrt(), std::f64::consts::FRAC_1_SQRT_2);
-                let number = (k * window.outputs() + j) * lanes + lane;
-                window.log_variances[number] = v.ln();
-                let at = |column: usize| column * lanes + lane;
-                let row = window.row_mut(k, j);
-                (0..=last).for_each(|column| row[at(column)] /= root);
-                let z = row[at(last)];
-                let second = window.variance_row_mut(k, j);
-                (0..last).for_each(|column| second[at(column)] *= half / v);
-                second[at(last)] = (z * z - 1.0) * half;
+            None => {
+                let lanes = reached.into_iter().enumerate();
+                lanes.map(|(lane, reached)| reached.map_err(|error| Broken { lane, error })).collect()
             }
         }
     }
-    Ok(())
 }
 
 /// `f(0), f(1), ...`, in parallel where the feature `parallel` is on; in order.

@@ -24,7 +24,7 @@ impl Objective<'_> {
         // A filter needs the measurements; else, predictions are wanted where nothing was measured, too.
         let filters = self.sweep.predicts_variance();
         let compared = if filters { self.problem.clone() } else { self.problem.against_zero() };
-        let objective = Objective { problem: &compared, ..self.clone() };
+        let objective = self.of(&compared, self.sweep);
         let mut outputs = vec![vec![f64::NAN; record.len()]; measured.len()];
         let mut failed = None;
         let result = objective.run_alone(e, coordinates, false, &mut |window| {

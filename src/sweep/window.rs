@@ -88,6 +88,17 @@ impl Window {
         &mut self.values[..used]
     }
 
+    /// The same of the variances.
+    pub fn variance_rows_mut(&mut self) -> &mut [f64] {
+        let used = self.len() * self.outputs * self.columns * self.lanes;
+        &mut self.variances[..used]
+    }
+
+    /// All rows that there is room for.
+    pub fn all_rows_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
+
     /// The row of an output of a sample: entry by entry, each with its lanes.
     pub fn row(&self, sample: usize, output: usize) -> &[f64] {
         let width = self.columns * self.lanes;
@@ -159,6 +170,22 @@ impl Window {
     #[inline(always)]
     pub fn set_measured(&mut self, sample: usize, output: usize, lanes: u32) {
         self.measured[sample * self.outputs + output] = lanes;
+    }
+
+    /// Sets a row to zero in the lanes without a measurement.
+    pub fn clear_unmeasured_row(&mut self, sample: usize, output: usize) {
+        let (lanes, measured) = (self.lanes, self.measured(sample, output));
+        let mut clear = |row: &mut [f64]| {
+            for (at, value) in row.iter_mut().enumerate() {
+                if measured >> (at % lanes) & 1 == 0 {
+                    *value = 0.0;
+                }
+            }
+        };
+        clear(self.row_mut(sample, output));
+        if self.has_variances() {
+            clear(self.variance_row_mut(sample, output));
+        }
     }
 
     /// Sets rows without a measurement to zero, after something has run over them.

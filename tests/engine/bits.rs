@@ -2,10 +2,11 @@
 
 use crate::random::{FUNCTIONS, FUNCTIONS2, Random, expression};
 use crate::steps::Pmsm;
+use crate::tables::Mapped;
 use greybox::engine::{Program, Sampling, Trajectories};
 use greybox::graph::{Graph, Id, Leaf, Seed};
 use greybox::pmsm::{Machine, Salient};
-use greybox::{Equations, Hold, Model, Recurrence, Rk4};
+use greybox::{Equations, Extrapolation, Hold, Interpolation, Model, Recurrence, Rk4};
 use std::process::Command;
 
 /// A number made of all bits of all rows (FNV-1a); all numbers that are none count as one.
@@ -93,26 +94,24 @@ fn digest() -> u64 {
     of_model(&mut digest, &Pmsm { pole_pairs: 4.0 }, &[0.6, 3.5e-3, 0.9]);
     of_model(&mut digest, &Salient::new(4).unwrap(), &[0.63, 4e-3, 5e-3, 0.95]);
     of_model(&mut digest, &Machine::new(4, 100.0).unwrap(), &[0.63, 4e-3, 5e-3, 0.95, 0.012, 4e-3, 1.2, 1.0]);
+    for between in [Interpolation::Linear, Interpolation::Smooth] {
+        of_model(&mut digest, &Mapped::new(between, Extrapolation::Linear), &[1.0, 0.7]);
+    }
     let mut random = Random::new(88);
     for case in 0..1500 {
         let (graph, roots) = expression(&mut random, 4 + case % 40);
         of_expression(&mut digest, &mut random, graph, &roots);
     }
-    let each: Vec<Box<dyn Fn(&mut Graph, Id, Id) -> Id>> = FUNCTIONS
-        .iter()
-        .map(|f| Box::new(|graph: &mut Graph, x, _| graph.function(*f, x)) as Box<dyn Fn(&mut Graph, Id, Id) -> Id>)
-        .chain(FUNCTIONS2.iter().map(|f| {
-            Box::new(|graph: &mut Graph, x, y| graph.function2(*f, x, y)) as Box<dyn Fn(&mut Graph, Id, Id) -> Id>
-        }))
-        .collect();
-    for build in each {
+    let mut each = |build: &dyn Fn(&mut Graph, Id, Id) -> Id| {
         for _ in 0..20 {
             let mut graph = Graph::default();
             let [x, y] = [Leaf::State(0), Leaf::State(1)].map(|leaf| graph.leaf(leaf));
             let root = build(&mut graph, x, y);
             of_expression(&mut digest, &mut random, graph, &[root]);
         }
-    }
+    };
+    FUNCTIONS.iter().for_each(|function| each(&|graph, x, _| graph.function(*function, x)));
+    FUNCTIONS2.iter().for_each(|function| each(&|graph, x, y| graph.function2(*function, x, y)));
     digest.0
 }
 

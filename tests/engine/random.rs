@@ -4,7 +4,7 @@
 //! rounding is seen by moving its arguments by a few units in the last place: what that changes is allowed.
 
 use greybox::engine::{Program, Sampling, Trajectories};
-use greybox::graph::{Function, Function2, Graph, Id, Leaf, Seed};
+use greybox::graph::{Function, Function2, Graph, Id, Leaf, Node, Seed};
 use greybox::{Comparison, Dual, Recurrence};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -109,7 +109,7 @@ fn duals(graph: &Graph, roots: &[Id], at: &[f64; SEEDS]) -> Vec<Dual<SEEDS>> {
 }
 
 /// Compares a graph's values and slopes at these points with duals; tells how many slopes were compared.
-pub fn agrees(graph: &Graph, roots: &[Id], points: &[[f64; SEEDS]]) -> usize {
+pub fn agrees(graph: &Graph, roots: &[Id], points: &[[f64; SEEDS]], random: bool) -> usize {
     let mut with_states = graph.clone();
     let next: Vec<Id> = (0..STATES as u32).map(|i| with_states.leaf(Leaf::State(i))).collect();
     let recurrence = Recurrence::from_roots(&with_states, &next, roots, &[]).unwrap();
@@ -136,8 +136,25 @@ pub fn agrees(graph: &Graph, roots: &[Id], points: &[[f64; SEEDS]]) -> usize {
                 Leaf::Parameter(j) => Dual::variable(point[STATES + j as usize], STATES + j as usize),
                 other => panic!("{other:?}"),
             });
+            // Where a slope is infinite, or nearly so, rounding decides what the argument's slope makes of it.
+            let near = |x: &Id, edge: f64| (all[x.index()].value.abs() - edge).abs() < 1e-6;
+            let at_the_edge = |node: &Node| match node {
+                Node::Function(Function::Asin | Function::Acos | Function::Acosh | Function::Atanh, x) => near(x, 1.0),
+                Node::Function(Function::Sqrt | Function::Cbrt, x) => near(x, 0.0),
+                Node::Function2(Function2::Hypot | Function2::Pow, x, _) => near(x, 0.0),
+                _ => false,
+            };
+            let at_the_edge = random && graph.nodes().iter().any(at_the_edge);
             let numbers = all.iter().zip(&reached).filter(|(_, reached)| **reached).map(|(x, _)| x);
             let largest = numbers.clone().flat_map(|x| x.slopes).fold(0.0, |m: f64, slope| m.max(slope.abs()));
+            // The sign of what is not a number depends on the processor.
+            let copied = |node: &Node| match node {
+                Node::Function2(Function2::Copysign, _, sign) => all[sign.index()].value.is_nan(),
+                _ => false,
+            };
+            if graph.nodes().iter().any(copied) {
+                continue;
+            }
             let tame = numbers.clone().all(|x| moderate(x.value) && x.slopes.iter().all(|slope| slope.abs() < 1e8));
             let expected = duals(graph, roots, point);
             let nearby: Vec<_> = [1.0, -1.0, 2.0, -3.0]
@@ -151,7 +168,7 @@ pub fn agrees(graph: &Graph, roots: &[Id], points: &[[f64; SEEDS]]) -> usize {
                     nearby.iter().map(|near| (of(&near[root]) - of(expected)).abs()).fold(0.0, f64::max)
                 };
                 let check = |found: f64, expected: f64, moved: f64, what: &str| {
-                    let moved = if what == "slope" { moved + 1e-16 * largest } else { moved };
+                    let moved = if what == "slope" { moved + 1e-13 * (1.0 + largest) } else { moved };
                     let fine = found == expected
                         || found.is_nan() && expected.is_nan()
                         || (found - expected).abs() <= 1e-12 * expected.abs() + 64.0 * moved
@@ -160,7 +177,7 @@ pub fn agrees(graph: &Graph, roots: &[Id], points: &[[f64; SEEDS]]) -> usize {
                 };
                 let value = row(root, SEEDS);
                 check(value, expected.value, moved(&|dual| dual.value), "value");
-                if tame {
+                if tame && !at_the_edge {
                     for s in 0..SEEDS {
                         check(row(root, s), expected.slopes[s], moved(&|dual| dual.slopes[s]), "slope");
                         compared += 1;
@@ -176,12 +193,12 @@ pub fn agrees(graph: &Graph, roots: &[Id], points: &[[f64; SEEDS]]) -> usize {
 fn random_expressions_have_the_slopes_of_duals() {
     let mut random = Random::new(8);
     let mut compared = 0;
-    for case in 0..2000 {
+    for case in 0..10_000 {
         let (graph, roots) = expression(&mut random, 4 + case % 20);
         let points: Vec<_> = (0..16).map(|_| core::array::from_fn(|_| random.number())).collect();
-        compared += agrees(&graph, &roots, &points);
+        compared += agrees(&graph, &roots, &points, true);
     }
-    assert!(compared > 100_000, "{compared} slopes");
+    assert!(compared > 500_000, "{compared} slopes");
 }
 
 #[test]
@@ -219,7 +236,7 @@ fn every_function_has_the_slopes_of_duals() {
             let [x, y, z] = [Leaf::State(0), Leaf::State(1), Leaf::Parameter(0)].map(|leaf| graph.leaf(leaf));
             let x = if scaled { graph.mul(x, z) } else { x };
             let root = build(&mut graph, x, y);
-            compared += agrees(&graph, &[root], &points);
+            compared += agrees(&graph, &[root], &points, false);
         }
     };
     for function in FUNCTIONS {
@@ -246,4 +263,56 @@ fn every_function_has_the_slopes_of_duals() {
     });
     each(&|graph, x, y| graph.div(x, y));
     assert!(compared > 30_000, "{compared} slopes");
+}
+
+/// Values of sums, products, roots and selects have the very bits of the text: each operation is rounded, in its order.
+#[test]
+fn values_have_the_bits_of_the_text() {
+    let mut random = Random::new(3);
+    let mut compared = 0;
+    for _ in 0..500 {
+        let mut graph = Graph::default();
+        let mut nodes: Vec<Id> = (0..3).map(|i| graph.leaf(Leaf::State(i))).collect();
+        for _ in 0..25 {
+            let n = nodes.len();
+            let [a, b, c, d] = core::array::from_fn(|_| nodes[n - 1 - random.below(n.min(6))]);
+            nodes.push(match random.below(12) {
+                0..=3 => graph.mul(a, b),
+                4 | 5 => graph.add(a, b),
+                6 | 7 => graph.sub(a, b),
+                8 => graph.neg(a),
+                9 => graph.function([Function::Sqrt, Function::Abs, Function::Floor][random.below(3)], a),
+                10 => graph.function2([Function2::Max, Function2::Min][random.below(2)], a, b),
+                _ => graph.select(COMPARISONS[random.below(3)], a, b, c, d),
+            });
+        }
+        let (next, roots) = (nodes[..3].to_vec(), nodes[20..].to_vec());
+        let recurrence = Recurrence::from_roots(&graph, &next, &roots, &[]).unwrap();
+        for seeds in [&[][..], &[Seed::Carry(0), Seed::Carry(1), Seed::Carry(2)]] {
+            let program = Program::compile(&recurrence, seeds, Sampling::Uniform, Trajectories::Many).unwrap();
+            let mut group = program.group(1);
+            let points: Vec<[f64; 3]> = (0..group.lanes()).map(|_| core::array::from_fn(|_| random.number())).collect();
+            points.iter().enumerate().for_each(|(lane, point)| group.start(lane, point));
+            group.prepare();
+            let mut rows = vec![0.0; program.row_length() * group.lanes()];
+            group.run(&[], &mut rows, 1);
+            for (lane, point) in points.iter().enumerate() {
+                let expected = graph.evaluate(&roots, |leaf| match leaf {
+                    Leaf::State(i) => point[i as usize],
+                    other => panic!("{other:?}"),
+                });
+                for (root, expected) in expected.iter().enumerate() {
+                    let found = rows[(root * (seeds.len() + 1) + seeds.len()) * group.lanes() + lane];
+                    // Which of two zeros is the larger is not said.
+                    let same = found == *expected && (found == 0.0 || found.to_bits() == expected.to_bits());
+                    assert!(
+                        same || found.is_nan() && expected.is_nan(),
+                        "{found:e} {expected:e} at {point:?}\n{graph}"
+                    );
+                    compared += usize::from(found.is_finite());
+                }
+            }
+        }
+    }
+    assert!(compared > 20_000, "{compared}");
 }

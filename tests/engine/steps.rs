@@ -34,6 +34,25 @@ impl Model for Pmsm {
     }
 }
 
+/// The columns of `n` samples, the same in all lanes.
+pub fn columns_of(program: &Program, n: usize, lanes: usize, value: impl Fn(&Column, usize) -> f64) -> Vec<f64> {
+    let (from, reads_next) = program.derived_from();
+    let sources: Vec<Vec<f64>> = from.iter().map(|column| (0..n).map(|k| value(column, k)).collect()).collect();
+    let sources: Vec<&[f64]> = sources.iter().map(Vec::as_slice).collect();
+    let derived = program.derive(&sources, if reads_next { n - 1 } else { n });
+    let mut block = vec![];
+    for k in 0..n {
+        for column in program.columns() {
+            let value = match column {
+                Column::Derived(d) => derived[*d].get(k).copied().unwrap_or(f64::NAN),
+                column => value(column, k),
+            };
+            block.extend(std::iter::repeat_n(value, lanes));
+        }
+    }
+    block
+}
+
 /// Runs a model's program from a start over samples of these inputs, all lanes alike but for their parameters, and compares
 /// rows and what is carried with duals.
 pub fn agrees<M: Model, I: Integrator, const N: usize>(
@@ -68,26 +87,12 @@ pub fn agrees<M: Model, I: Integrator, const N: usize>(
             group.start(lane, M::State::into_array(start).as_ref());
         }
         group.prepare();
-        let (from, reads_next) = program.derived_from();
         let value = |column: &Column, k: usize| match column {
             Column::Input(i) => M::Input::into_array(inputs[k]).as_ref()[*i],
             Column::Time => k as f64 * step,
             other => panic!("{other:?}"),
         };
-        let sources: Vec<Vec<f64>> =
-            from.iter().map(|column| (0..inputs.len()).map(|k| value(column, k)).collect()).collect();
-        let sources: Vec<&[f64]> = sources.iter().map(Vec::as_slice).collect();
-        let derived = program.derive(&sources, if reads_next { samples } else { samples + 1 });
-        let mut block = vec![];
-        for k in 0..inputs.len() {
-            for column in program.columns() {
-                let value = match column {
-                    Column::Derived(d) => derived[*d].get(k).copied().unwrap_or(f64::NAN),
-                    column => value(column, k),
-                };
-                block.extend(std::iter::repeat_n(value, lanes));
-            }
-        }
+        let block = columns_of(&program, inputs.len(), lanes, value);
         let mut rows = vec![f64::NAN; samples * program.row_length() * lanes];
         group.run(&block, &mut rows, samples);
         for lane in 0..lanes {

@@ -12,8 +12,11 @@ pub struct Random(u64);
 
 impl Random {
     pub fn new(seed: u64) -> Self {
+        // Seeds next to one another begin alike.
         let mut random = Random(seed);
-        (0..3).for_each(|_| drop(random.next()));
+        for _ in 0..3 {
+            random.next();
+        }
         random
     }
 
@@ -108,8 +111,8 @@ impl Problem {
     }
 }
 
-/// Records of one to three segments below `shared` unknowns, each with up to two own unknowns. A segment's border is all
-/// that its record knows, or a part of it.
+/// Records of up to two segments below `shared` unknowns, each with up to two own unknowns. A segment's border is all that
+/// its record knows, or a part of it, in one order or the other.
 pub fn random_tree(shared: usize, records: usize, random: &mut Random) -> Vec<(Option<usize>, Vec<usize>, usize)> {
     let (mut pieces, mut unknowns) = (vec![], shared);
     for _ in 0..records {
@@ -119,7 +122,10 @@ pub fn random_tree(shared: usize, records: usize, random: &mut Random) -> Vec<(O
         unknowns += own;
         for _ in 0..random.below(3) {
             let (own, without) = (random.below(3), random.below(known.len() + 1));
-            let border = (0..known.len()).filter(|&c| c != without).map(|c| known[c]).collect();
+            let mut border: Vec<usize> = (0..known.len()).filter(|&c| c != without).map(|c| known[c]).collect();
+            if random.next() > 0.0 {
+                border.reverse();
+            }
             pieces.push((Some(record), border, own));
             unknowns += own;
         }

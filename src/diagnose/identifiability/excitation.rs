@@ -29,6 +29,15 @@ impl Accumulate for Squares {
             }
         }
     }
+
+    fn append(&mut self, later: Self) {
+        let add = |sums: &mut [Vec<f64>], later: Vec<Vec<f64>>| {
+            let pairs = sums.iter_mut().flatten().zip(later.into_iter().flatten());
+            pairs.for_each(|(sum, later)| *sum += later);
+        };
+        add(&mut self.by_output, later.by_output);
+        add(&mut self.by_segment, later.by_segment);
+    }
 }
 
 /// The excitation of each unknown, its strength in the optimizer's coordinates.

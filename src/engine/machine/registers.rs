@@ -42,8 +42,8 @@ impl Registers {
         found
     }
 
-    /// Whether a number read again at `next` deserves a register.
-    pub fn deserves(&self, next: usize) -> bool {
+    /// Whether a number read again at `next` is worth a register.
+    pub fn is_worth_loading(&self, next: usize) -> bool {
         next != NEVER
             && self
                 .slot_in

@@ -32,6 +32,11 @@ impl Cuts {
         Cuts(cuts)
     }
 
+    /// How many.
+    pub fn count(&self) -> usize {
+        self.0.len()
+    }
+
     /// The slopes of the roots by gradients and the chain rule.
     pub fn slopes(&self, tape: &mut Tape, roots: &[Id], variables: &Variables, gradients: Gradients) -> Vec<Tangent> {
         let leaves: Vec<Id> = variables.leaves.iter().chain(&self.0).copied().collect();
@@ -116,6 +121,7 @@ fn growth(tape: &Tape) -> Vec<u32> {
             Node::Mul(a, b) => of(a).saturating_add(of(b)),
             Node::MulAdd([a, b, c]) => of(a).saturating_add(of(b)).max(of(c)),
             Node::Select(_, [_, _, c, d]) => of(c).max(of(d)),
+            Node::Table { at: [a, b], .. } => of(a).max(of(b)),
             Node::Function(function, a) => match function {
                 Function::Abs | Function::Floor | Function::Ceil | Function::Round | Function::Trunc => of(a),
                 Function::Sin | Function::Cos | Function::Tanh | Function::Atan | Function::Signum => match of(a) {
@@ -135,6 +141,7 @@ fn has_finite_partials(node: &Node, growth: &[u32]) -> bool {
     let of = |id: Id| growth[id.index()] <= 2;
     match *node {
         Node::Constant(_) | Node::Leaf(_) | Node::Neg(_) | Node::Add(..) | Node::Sub(..) | Node::Select(..) => true,
+        Node::Table { at: [a, b], .. } => of(a) && of(b),
         Node::Mul(a, b) | Node::MulAdd([a, b, _]) => of(a) && of(b),
         Node::Function(function, a) => {
             let bounded = matches!(

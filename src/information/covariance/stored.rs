@@ -1,4 +1,4 @@
-//! How a [`Covariance`] is stored, and what is checked before it is believed.
+//! How a [`Covariance`] is stored, and what is checked of a stored one.
 
 use super::{Covariance, Part};
 use serde::{Deserialize, Serialize};

@@ -7,7 +7,7 @@ use crate::information::Information;
 use crate::information::covariance::{Covariance, Part, Scores};
 use nalgebra::DMatrix;
 
-/// How the own unknowns of a piece answer their scores, and a change of the border.
+/// How the own unknowns of a piece respond to their scores and to a change of the border.
 struct Response {
     parent: usize,
     own: Vec<usize>,

@@ -55,7 +55,7 @@ impl Elimination {
         Undetermined { directions, held }
     }
 
-    /// The direction of a piece's own unknowns with the answer of the unknowns below it. `change` is zeros before and
+    /// The direction of a piece's own unknowns with the response of the unknowns below it. `change` is zeros before and
     /// after.
     fn with_those_below(
         &self,
@@ -130,5 +130,18 @@ fn fix(directions: &[Vec<(usize, f64)>], held: &mut [bool]) {
             let factor = other[pivot].1 / row[pivot].1;
             other.iter_mut().zip(&row).for_each(|(other, row)| other.1 -= factor * row.1);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fix;
+
+    /// Both directions are largest in the first unknown: after it was held for one, the other moves the second alone.
+    #[test]
+    fn directions_with_the_same_largest_unknown_hold_two() {
+        let mut held = [false; 3];
+        fix(&[vec![(0, 0.8), (2, 0.6)], vec![(0, 0.9), (2, -0.4)]], &mut held);
+        assert_eq!(held, [true, false, true]);
     }
 }

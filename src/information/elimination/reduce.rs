@@ -186,7 +186,7 @@ impl<'s> Gather<'s> {
     }
 
     /// Row `i` of a triangle. Where its pivot is no more than rounding of its column, so are entries that are as small:
-    /// left in, they would pull damped steps along directions of which nothing is known.
+    /// kept, they would move damped steps along directions of which nothing is known.
     fn take(&mut self, triangle: &Information, i: usize, columns: &[usize], origin: &[f64]) {
         let (y, row) = triangle.row(i);
         let columns = columns.get(i..).unwrap_or_default();

@@ -53,27 +53,34 @@ impl Absorb<'_> {
         // Distance from one entry of a triangle to the next, in registers.
         let stride = lanes.next_multiple_of(8) / L;
         for rows in rows.chunks_mut(ROWS * columns * lanes) {
-            if lanes == L {
-                reflect::<W, L, GROUP>(triangles, stride, rows.as_chunks_mut().0, columns, factors);
-                continue;
-            }
             for first in (0..lanes).step_by(L) {
-                let used = L.min(lanes - first);
-                let mut copied = 0;
-                for (from, to) in rows.chunks_exact(lanes).zip(scratch.iter_mut()) {
-                    if used == L {
-                        to.copy_from_slice(&from[first..first + L]);
-                    } else {
-                        *to = [0.0; L];
-                        to[..used].copy_from_slice(&from[first..]);
-                    }
-                    copied += 1;
-                }
-                let triangles = &mut triangles[first / L..];
-                reflect::<W, L, GROUP>(triangles, stride, &mut scratch[..copied], columns, factors);
+                let rows = if lanes == L { rows.as_chunks_mut().0 } else { copied(rows, lanes, first, scratch) };
+                reflect::<W, L, GROUP>(&mut triangles[first / L..], stride, rows, columns, factors);
             }
         }
     }
+}
+
+/// The lanes of one register, from `first` on, side by side; beyond the last there are zeros.
+#[inline(always)]
+fn copied<'s, const L: usize>(
+    rows: &[f64],
+    lanes: usize,
+    first: usize,
+    scratch: &'s mut [[f64; L]],
+) -> &'s mut [[f64; L]] {
+    let mut count = 0;
+    for (from, to) in rows.chunks_exact(lanes).zip(scratch.iter_mut()) {
+        match from[first..].first_chunk() {
+            Some(from) => *to = *from,
+            None => {
+                *to = [0.0; L];
+                to[..lanes - first].copy_from_slice(&from[first..]);
+            }
+        }
+        count += 1;
+    }
+    &mut scratch[..count]
 }
 
 /// Absorbs the rows, `[row][column]`, of one register's lanes; entry `i` of their triangles stands at `i * stride`.
