@@ -119,20 +119,20 @@ fn adaptive<M: Model, I: Integrator>(bencher: Bencher, model: &M, integrator: &I
     let input = |k: usize| -> Of<M::Input, f64> { M::Input::from_fn(|i| (0.037 * (k * 3 + i) as f64).sin()) };
     let time = |k: usize| (k as f64 * 1e-2, (k + 1) as f64 * 1e-2);
     bencher.counter(ItemsCount::new(100usize)).bench_local(|| {
-        let (mut memory, start) = (I::Memory::default(), M::State::from_fn(|_| Dual::<8>::constant(0.1)));
+        let (mut step, start) = (0.0, M::State::from_fn(|_| Dual::<8>::constant(0.1)));
         if compiled {
             let mut x = M::State::into_array(start).as_ref().iter().copied().collect();
             for k in 0..100 {
                 let u = M::Input::into_array(input(k));
                 system.set_interval(time(k).0, time(k).1, u.as_ref(), u.as_ref(), Hold::Zero);
-                x = integrator.advance(&system, x, &mut memory).unwrap();
+                x = integrator.advance(&system, x, &mut step).unwrap();
             }
             black_box(x);
         } else {
             let mut x = start;
             for k in 0..100 {
                 let interval = Interval { t0: time(k).0, t1: time(k).1, u0: input(k), u1: input(k), hold: Hold::Zero };
-                x = ModelSystem { model, interval: &interval, p: &p }.step(integrator, x, &mut memory).unwrap();
+                x = ModelSystem { model, interval: &interval, p: &p }.step(integrator, x, &mut step).unwrap();
             }
             black_box(x);
         }

@@ -8,9 +8,8 @@ use crate::signals::{Of, Signals};
 
 /// A physical system, as arithmetic on named quantities.
 ///
-/// The functions are generic over [`Scalar`], so that one text serves simulation, exact slopes and observers. Put
-/// `#[inline]` on them: a fit runs them inside a loop compiled for the vector unit of the machine at hand, and can only
-/// do so with what is inlined there. Constants multiply from the right (`x * 2.0`).
+/// The functions are generic over [`Scalar`], so that one text serves simulation, exact slopes and observers. Constants
+/// multiply from the right (`x * 2.0`).
 ///
 /// The names and units of all quantities come from the four signal types.
 pub trait Model: Send + Sync {

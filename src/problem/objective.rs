@@ -103,48 +103,47 @@ impl<'p> Objective<'p> {
         };
         match found {
             Some(Located::Broken(failure)) => failure,
-            Some(Located::Largest(largest)) => self.unsound_slope(e, coordinates).unwrap_or(largest),
+            Some(Located::Largest(largest)) => self.unsound_prediction(e, coordinates).unwrap_or(largest),
             None => self
-                .unsound_slope(e, coordinates)
+                .unsound_prediction(e, coordinates)
                 .unwrap_or_else(|| failure("the prediction".to_owned(), f64::NAN, UNSOUND)),
         }
     }
 
-    /// The first slope that is not finite.
-    fn unsound_slope(&self, e: usize, coordinates: &[f64]) -> Option<Failure> {
-        let unknowns: Vec<usize> = self.problem.unknowns.columns(e).collect();
-        let mut first: Option<(usize, usize, usize, f64)> = None;
+    /// The first predicted variance that is not positive, or slope that is not finite.
+    fn unsound_prediction(&self, e: usize, coordinates: &[f64]) -> Option<Failure> {
+        let outputs = &self.problem.layout().outputs;
+        let unknowns: Vec<&str> =
+            self.problem.unknowns.columns(e).map(|i| self.problem.unknowns.row[i].name.as_str()).collect();
+        let mut first: Option<(usize, String, f64, &'static str)> = None;
         let visit = &mut |window: &mut Window| {
-            for k in 0..window.samples[0] {
-                for j in 0..window.outputs() {
-                    for (column, &unknown) in unknowns.iter().enumerate() {
-                        let slope = window.at(k, j, column, 0);
-                        if !slope.is_finite() && first.is_none() {
-                            first = Some((window.begin[0] + k, j, unknown, slope));
-                        }
-                    }
+            for (k, j) in (0..window.samples[0]).flat_map(|k| (0..outputs.len()).map(move |j| (k, j))) {
+                let (sample, output, variance) = (window.begin[0] + k, &outputs[j].name, window.variance(k, j, 0));
+                if window.is_measured(k, j, 0) && !(variance > 0.0 && variance.is_finite()) {
+                    let signal = format!("the predicted variance of output `{output}`");
+                    first.get_or_insert((sample, signal, variance, NO_NOISE));
+                }
+                let slopes = unknowns.iter().enumerate().map(|(column, name)| (name, window.at(k, j, column, 0)));
+                for (unknown, slope) in slopes.filter(|(_, slope)| !slope.is_finite()) {
+                    let signal = format!("the slope of output `{output}` with respect to `{unknown}`");
+                    first.get_or_insert((sample, signal, slope, if slope.is_nan() { STEEP } else { OVERFLOW }));
                 }
             }
             first.is_none()
         };
         // It fails, where it fails, after what is looked for.
         let _ = self.run_alone(e, coordinates, true, visit);
-        let (sample, output, unknown, value) = first?;
-        let output = &self.problem.layout().outputs[output].name;
-        let unknown = &self.problem.unknowns.row[unknown].name;
-        Some(Failure {
-            experiment: self.problem.unknowns.labels[e].clone(),
-            sample,
-            time: self.problem.records[e].time(sample),
-            signal: format!("the slope of output `{output}` with respect to `{unknown}`"),
-            value,
-            hint: if value.is_nan() { STEEP } else { OVERFLOW },
-        })
+        let (sample, signal, value, hint) = first?;
+        let experiment = self.problem.unknowns.labels[e].clone();
+        let time = self.problem.records[e].time(sample);
+        Some(Failure { experiment, sample, time, signal, value, hint })
     }
 }
 
 const STEEP: &str = "; the value is finite but has no slope there (a root or a power at zero): start elsewhere, or write \
                      the model so that it is smooth there";
+const NO_NOISE: &str = "; it must be positive: write Model::noise, and keep the noise levels away \
+                        from zero (with .log())";
 const UNSOUND: &str = "; it is not a finite number: bound the parameters or start elsewhere";
 
 impl LeastSquares for Objective<'_> {

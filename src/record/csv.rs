@@ -48,9 +48,9 @@ use std::path::{Path, PathBuf};
 ///     .hold(Hold::First);
 ///
 /// assert_eq!(record.times(), &Time::Uniform { start: 0.0, step: 1e-3 });
-/// assert_eq!(record.inputs()[0].w, 1500.0 * units::RPM);
-/// assert_eq!(record.outputs()[0].i, 0.52);
-/// assert!(record.outputs()[1].i.is_nan());
+/// assert_eq!(record.input(0).w, 1500.0 * units::RPM);
+/// assert_eq!(record.output(0).i, 0.52);
+/// assert!(record.output(1).i.is_nan());
 /// # std::fs::remove_file(path).unwrap();
 /// # Ok::<(), greybox::Error>(())
 /// ```

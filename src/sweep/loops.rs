@@ -13,6 +13,7 @@ use crate::interval::{Hold, Interval};
 use crate::lanes;
 use crate::layout::Kind;
 use crate::model::Model;
+use crate::record::Record;
 use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
 use std::sync::Arc;
@@ -74,24 +75,37 @@ impl<const N: usize, T: Scalar + lanes::Number> Number for Dual<N, T> {
     }
 }
 
-/// The rows of one window, with the sample after its last one.
-struct Rows<M: Model> {
+/// The rows of one window, with the sample after its last one; made once, and filled for each window.
+struct Rows<'p, M: Model> {
+    record: &'p Record,
+    input_columns: Vec<&'p [f64]>,
+    output_columns: Vec<&'p [f64]>,
     times: Vec<f64>,
     inputs: Vec<Of<M::Input, f64>>,
     outputs: Vec<Of<M::Output, f64>>,
 }
 
-impl<M: Model> Rows<M> {
-    fn read(piece: &Piece<'_>, begin: usize, samples: usize) -> Self {
-        let record = piece.record;
-        let all = record.len().min(begin + samples + 1);
-        let inputs: Vec<&[f64]> = record.inputs().iter().map(|channel| &channel.values[begin..all]).collect();
-        let outputs: Vec<&[f64]> = record.outputs().iter().map(|channel| &channel.values[begin..all]).collect();
+impl<'p, M: Model> Rows<'p, M> {
+    fn new(record: &'p Record) -> Self {
         Rows {
-            times: (begin..all).map(|k| record.time(k)).collect(),
-            inputs: (0..all - begin).map(|k| M::Input::from_fn(|i| inputs[i][k])).collect(),
-            outputs: (0..samples).map(|k| M::Output::from_fn(|j| outputs[j][k])).collect(),
+            record,
+            input_columns: record.inputs().iter().map(|channel| &*channel.values).collect(),
+            output_columns: record.outputs().iter().map(|channel| &*channel.values).collect(),
+            times: Vec::with_capacity(WINDOW + 1),
+            inputs: Vec::with_capacity(WINDOW + 1),
+            outputs: Vec::with_capacity(WINDOW),
         }
+    }
+
+    fn read(&mut self, begin: usize, samples: usize) {
+        let (record, inputs, outputs) = (self.record, &self.input_columns, &self.output_columns);
+        let all = record.len().min(begin + samples + 1);
+        self.times.clear();
+        self.times.extend((begin..all).map(|k| record.time(k)));
+        self.inputs.clear();
+        self.inputs.extend((begin..all).map(|k| M::Input::from_fn(|i| inputs[i][k])));
+        self.outputs.clear();
+        self.outputs.extend((begin..begin + samples).map(|k| M::Output::from_fn(|j| outputs[j][k])));
     }
 }
 
@@ -190,11 +204,12 @@ impl<M: Model, I: Integrator> Task<'_, M, I> {
         let mut passes: Vec<Pass<M, D>> = (0..count).map(|i| Pass::new(piece, seeds, i * D::SLOPES)).collect();
         let mut window = Window::new(1, M::Output::LEN, seeds.len(), WINDOW, false);
         window.carry = vec![0.0; M::State::LEN];
+        let mut rows = Rows::<M>::new(piece.record);
         let mut begin = piece.samples.start;
         while begin < piece.samples.end {
             let samples = WINDOW.min(piece.samples.end - begin);
             (window.begin[0], window.samples[0]) = (begin, samples);
-            let rows = Rows::<M>::read(piece, begin, samples);
+            rows.read(begin, samples);
             for (entry, x) in window.carry.iter_mut().zip(M::State::into_array(passes[0].x)) {
                 *entry = x.value();
             }
@@ -224,7 +239,7 @@ impl<M: Model, I: Integrator> Task<'_, M, I> {
 struct Fill<'f, 't, M: Model, I, D: Number> {
     task: &'f Task<'t, M, I>,
     pass: &'f mut Pass<M, D>,
-    rows: &'f Rows<M>,
+    rows: &'f Rows<'f, M>,
     window: &'f mut Window,
 }
 

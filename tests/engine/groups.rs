@@ -119,7 +119,7 @@ fn steps_may_differ_from_sample_to_sample() {
         let interval = Interval { t0, t1: t0 + step(k), u0: input(k), u1: input(k + 1), hold: Hold::First };
         t0 = interval.t1;
         let model = Pmsm { pole_pairs: 4.0 };
-        x = ModelSystem { model: &model, interval: &interval, p: &p }.step(&Rk4::default(), x, &mut ()).unwrap();
+        x = ModelSystem { model: &model, interval: &interval, p: &p }.step(&Rk4::default(), x, &mut 0.0).unwrap();
     }
     let (carry, slopes) = carried(&group, 0);
     for (i, x) in [x.id, x.iq].into_iter().enumerate() {

@@ -69,7 +69,7 @@ fn agrees<M: Model>(
             }
             let u = input(k);
             let interval = Interval { t0: k as f64 * step, t1: (k + 1) as f64 * step, u0: u, u1: u, hold: Hold::Zero };
-            x = ModelSystem { model, interval: &interval, p: &p }.step(&Rk4::default(), x, &mut ()).unwrap();
+            x = ModelSystem { model, interval: &interval, p: &p }.step(&Rk4::default(), x, &mut 0.0).unwrap();
         }
         assert!(largest[1] > 1e-9, "the second derivative is not zero throughout");
     }

@@ -127,7 +127,7 @@ fn evaluation(samples: usize) -> usize {
         .prefilter(Butterworth::low_pass(4, 100.0, TS).unwrap())
         .problem()
         .unwrap();
-    let objective = problem.objective();
+    let objective = problem.objective().unwrap();
     let start = objective.start();
     let count = allocations(|| {
         objective.linearize(&start).unwrap();
