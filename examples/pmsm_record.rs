@@ -78,11 +78,11 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let held = if arguments.held { HeldIn::Rotor } else { HeldIn::Stationary };
     let model = ExactSurface(ExactStep::new(arguments.pole_pairs, log.sample_time(), held)?);
 
-    let next = log.inputs().iter().skip(1).chain(log.inputs().last());
-    let mean = |(u, next): (&Drive, &Drive)| Drive { w: if arguments.held { u.w } else { (u.w + next.w) / 2.0 }, ..*u };
-    let inputs = log.inputs().iter().zip(next).map(mean).collect();
+    let next = log.inputs().skip(1).chain(log.inputs().last());
+    let mean = |(u, next): (Drive, Drive)| Drive { w: if arguments.held { u.w } else { (u.w + next.w) / 2.0 }, ..u };
+    let inputs = log.inputs().zip(next).map(mean).collect();
     let record =
-        Experiment::new(&model, log.times().clone(), inputs, log.outputs().to_vec())?.named(log.name().to_owned());
+        Experiment::new(&model, log.times().clone(), inputs, log.outputs().collect())?.named(log.name().to_owned());
     let estimate = Fit::new(&model, &record)
         .parameters(Winding { rs: free(1.0).log(), ls: free(1e-2).log(), ke: free(1.0).log() })
         .observe(Progress(ProgressBar::new_spinner()), ObserverMode::Always)

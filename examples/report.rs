@@ -26,6 +26,7 @@ signals! { pub struct Friction { m: "kg", fv: "N s/m", fcp: "N", fcn: "N", offse
 
 /// The electro-mechanical positioning system of A. Janot, M. Gautier, M. Brunot, *Data set and reference models of EMPS*,
 /// 2019, in closed loop; dry friction is `fcp` forwards and `fcn` backwards.
+#[derive(Clone)]
 struct Axis;
 
 const GTAU: f64 = 35.150_651_88; // N/V
@@ -33,7 +34,6 @@ const KP: f64 = 160.18; // 1/s
 const KV: f64 = 243.45; // V s/m
 
 impl Axis {
-    #[inline]
     fn command<S: Scalar>(x: &Motion<S>, u: &Reference<S>) -> S {
         (((u.qg - x.q) * KP - x.vm) * KV).clamp(-10.0, 10.0)
     }
@@ -45,7 +45,6 @@ impl Model for Axis {
     type Output = Guided;
     type Parameters = Friction;
 
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Reference<S>, p: &Friction<S>) -> Motion<S> {
         let forwards = (x.v / 5e-4).tanh() * 0.5 + 0.5;
         let dry = p.fcp * forwards - p.fcn * (-forwards + 1.0);
@@ -54,7 +53,6 @@ impl Model for Axis {
         Motion { q: x.v, v, vm: (x.v - x.vm) / 1e-3 }
     }
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Reference<S>, _p: &Friction<S>) -> Guided<S> {
         Guided { qm: x.q, vir: Self::command(x, u) }
     }
@@ -83,13 +81,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn report<M: Model>(
+fn report<M: Model + Clone>(
     model: &M,
     record: &ExperimentOf<M>,
     parameters: Of<M::Parameters, Parameter>,
     profiles: bool,
 ) -> Result<Report, greybox::Error> {
-    let mut problem = Fit::new(model, record).parameters(parameters).problem()?;
+    let problem = Fit::new(model, record).parameters(parameters).problem()?;
     let estimate = problem.run()?;
     let mut report = Report::new(&problem, &estimate)?.titled(format!("Estimate from {}", record.name()));
     for unknown in estimate.unknowns.iter().filter(|_| profiles) {

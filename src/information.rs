@@ -11,19 +11,18 @@
 //! Triangles of different widths fit together: a column that a triangle or a row does not have is a column of zeros.
 
 mod block;
+mod chain;
 mod covariance;
 mod elimination;
 mod inverse;
 mod matrix;
 mod reflect;
-// The sweep over a record in segments is to use it.
-#[cfg_attr(not(test), expect(dead_code))]
-pub(crate) mod segments;
 mod solve;
 mod spectrum;
 mod triangles;
 
 pub use block::Block;
+pub(crate) use chain::Chain;
 pub use covariance::Covariance;
 pub use elimination::{BadPiece, Elimination, Undetermined};
 pub use matrix::SquareMatrix;
@@ -111,6 +110,28 @@ impl Information {
             (rest, triangle) = (tail, below);
         }
         self.rows += 1;
+    }
+
+    /// The same, said to be made of so many rows.
+    pub(crate) fn of_rows(self, rows: u64) -> Self {
+        Information { rows, ..self }
+    }
+
+    /// Whether all its numbers are finite.
+    pub(crate) fn is_finite(&self) -> bool {
+        self.triangle.iter().all(|entry| entry.is_finite())
+    }
+
+    /// Multiplies each column by a positive number, as if the slopes had been taken with respect to unknowns in other units.
+    pub(crate) fn scale_columns(&mut self, scales: &[f64]) {
+        let mut at = 0;
+        for i in 0..=self.columns {
+            for scale in scales.get(i..self.columns).unwrap_or_default() {
+                self.triangle[at] *= scale;
+                at += 1;
+            }
+            at += 1;
+        }
     }
 
     /// Adds all that `other` knows: the result is as if its rows had been absorbed here.

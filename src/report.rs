@@ -3,6 +3,7 @@
 //! ```
 //! # use greybox::{Experiment, Fit, Kind, Model, Nothing, Report, Scalar, Time, diagnose, free, signals};
 //! # signals! { pub struct Load { f: "N" } pub struct Length { y: "m" } pub struct Spring { k: "N/m", rest: "m" } }
+//! # #[derive(Clone)]
 //! # struct Hooke;
 //! # impl Model for Hooke {
 //! #     type State = Nothing; type Input = Load; type Output = Length; type Parameters = Spring;
@@ -17,7 +18,7 @@
 //! # let record = Experiment::new(&Hooke, Time::Uniform { start: 0.0, step: 1.0 }, loads, lengths)?;
 //! # let path = std::env::temp_dir().join(format!("greybox_spring_{}.html", std::process::id()));
 //! # let (model, parameters) = (Hooke, Spring { k: free(10.0), rest: free(0.0) });
-//! let mut problem = Fit::new(&model, &record).parameters(parameters).problem()?;
+//! let problem = Fit::new(&model, &record).parameters(parameters).problem()?;
 //! let estimate = problem.run()?;
 //! let report = Report::new(&problem, &estimate)? // with tests of the residuals, identifiability and bands
 //!     .titled("Spring of bench 3")
@@ -55,7 +56,7 @@ pub use trace::{Band, Trace};
 
 use crate::diagnose::{Bootstrap, Identifiability, Profile, Restarts, residuals::Residuals};
 use crate::error::Error;
-use crate::estimate::{Direction, Method, Quality, Unknown, Warning};
+use crate::estimate::{Direction, Method, OutputFit as Fitted, Unknown, Warning};
 use crate::information::SquareMatrix;
 use crate::optimize::{Outcome, Severity};
 use crate::parameter::Parameter;
@@ -130,7 +131,7 @@ pub struct Output {
     /// Unit.
     pub unit: String,
     /// The numbers.
-    pub quality: Quality,
+    pub quality: Fitted,
 }
 
 /// One record of the fit.
@@ -192,7 +193,7 @@ pub struct OutputFit {
     pub name: String,
     /// Unit.
     pub unit: String,
-    /// Fit (%) as in [`Quality`].
+    /// Fit (%) as in [`OutputFit`](crate::OutputFit).
     pub fit_percent: Option<f64>,
     /// Samples for which the method has no prediction; they are drawn as gaps.
     pub unpredicted: u64,

@@ -5,12 +5,10 @@
 
 use super::{Pinned, minimize};
 use crate::error::Error;
-use crate::estimate::{Estimate, Knowledge, student};
-use crate::fit::{FitProblem, held_or_unseen};
-use crate::integrate::Integrator;
-use crate::model::Model;
+use crate::estimate::{Knowledge, Summary, student};
+use crate::judge::undetermined;
 use crate::optimize::{LeastSquares, Severity};
-use crate::predict::Predictor;
+use crate::problem::Problem;
 use serde::{Deserialize, Serialize};
 
 /// The profile of one unknown.
@@ -100,12 +98,7 @@ const CLOSE: f64 = 1e-3;
 ///
 /// # Errors
 /// A name that no unknown has, a probability not between 0 and 1, an estimate of another problem.
-pub fn profile<M: Model, I: Integrator, P: Predictor<M>, O>(
-    problem: &FitProblem<'_, M, I, P, O>,
-    estimate: &Estimate<M, I, P>,
-    name: &str,
-    probability: f64,
-) -> Result<Profile, Error> {
+pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probability: f64) -> Result<Profile, Error> {
     let (objective, best) = problem.at(estimate)?;
     let Some(index) = estimate.unknowns.iter().position(|unknown| unknown.name == name) else {
         let available = estimate.unknowns.iter().map(|unknown| unknown.name.clone()).collect();
@@ -119,7 +112,7 @@ pub fn profile<M: Model, I: Integrator, P: Predictor<M>, O>(
     let unknown = &estimate.unknowns[index];
     let linear = objective.linearize(&best).map_err(|error| Error::Optimizer(error.to_string()))?;
     let at_bound = |i: usize| i != index && matches!(estimate.unknowns[i].knowledge, Knowledge::Held { .. });
-    let held = held_or_unseen(&linear, &(0..best.len()).map(at_bound).collect::<Vec<bool>>());
+    let held = undetermined(&linear, &(0..best.len()).map(at_bound).collect::<Vec<bool>>()).held;
     let covariance = linear.covariance(&held);
     // How far one standard error is, and how the others go along.
     let error = covariance.as_ref().map(|c| c.standard_error(index)).filter(|e| e.is_finite() && *e > 0.0);
@@ -164,7 +157,7 @@ pub fn profile<M: Model, I: Integrator, P: Predictor<M>, O>(
         let (mut inside, mut place) = ((best[index], 0.0), best.clone());
         let mut step = sign * scale * quantile / 2.0;
         for number in 0..POINTS {
-            // A profile that has not left the ground by now will not.
+            // Flat so far: the interval is open on this side.
             if number >= FLAT.0 && bound.is_infinite() && inside.1 < FLAT.1 * quantile {
                 break;
             }

@@ -1,9 +1,7 @@
 //! The report of an estimate as plain text.
 
-use super::{Estimate, Knowledge};
-use crate::model::Model;
+use super::{Knowledge, Summary};
 use crate::optimize::Severity;
-use crate::signals::Signals;
 use core::fmt;
 
 impl fmt::Display for Severity {
@@ -16,7 +14,7 @@ impl fmt::Display for Severity {
     }
 }
 
-impl<M: Model, I, P> fmt::Display for Estimate<M, I, P> {
+impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "Verdict: {}. Search: {}.", self.severity(), self.outcome)?;
         if !self.outcome.converged() {
@@ -32,9 +30,9 @@ impl<M: Model, I, P> fmt::Display for Estimate<M, I, P> {
         }
         writeln!(f)?;
         let width = self.unknowns.iter().map(|u| u.name.len()).max().unwrap_or(0);
-        let width = M::Parameters::NAMES.iter().map(|name| name.len()).max().unwrap_or(0).max(width).max(9);
-        let declared = M::Parameters::UNITS.iter().chain(M::Output::UNITS).copied();
-        let units = self.unknowns.iter().map(|u| u.unit.as_str()).chain(declared).map(|unit| unit.chars().count());
+        let width = self.parameters.iter().map(|p| p.name.len()).max().unwrap_or(0).max(width).max(9);
+        let declared = self.parameters.iter().map(|p| &p.unit).chain(self.outputs.iter().map(|output| &output.unit));
+        let units = self.unknowns.iter().map(|u| &u.unit).chain(declared).map(|unit| unit.chars().count());
         let units = units.max().unwrap_or(0).max(4);
         let title = ["value", "unit", "std. error", "95 % interval", "index"];
         writeln!(
@@ -61,20 +59,16 @@ impl<M: Model, I, P> fmt::Display for Estimate<M, I, P> {
                 Knowledge::Fixed => writeln!(f, "fixed")?,
             }
         }
-        let (values, knowledge) =
-            (M::Parameters::into_array(self.parameters), M::Parameters::into_array(self.knowledge));
-        for (i, value) in values.as_ref().iter().enumerate() {
-            if knowledge.as_ref()[i] == Knowledge::Fixed {
-                let (name, unit) = (M::Parameters::NAMES[i], M::Parameters::UNITS[i]);
-                writeln!(f, "{name:<width$} {:>14} {unit:<units$} fixed", number(*value, 7))?;
-            }
+        for parameter in self.parameters.iter().filter(|parameter| parameter.knowledge == Knowledge::Fixed) {
+            let (name, unit) = (&parameter.name, &parameter.unit);
+            writeln!(f, "{name:<width$} {:>14} {unit:<units$} fixed", number(parameter.value, 7))?;
         }
         writeln!(f)?;
         writeln!(f, "{:<width$} {:>14} {:<units$} {:>11} {:>9}", "output", "rmse", "unit", "noise", "fit")?;
-        for (j, quality) in M::Output::into_array(self.quality).into_iter().enumerate() {
-            let (name, unit) = (M::Output::NAMES[j], M::Output::UNITS[j]);
-            let fit = quality.fit_percent.map_or("-".to_owned(), |fit| format!("{fit:.3} %"));
-            let (rmse, sigma) = (number(quality.rmse, 4), number(quality.sigma, 4));
+        for output in &self.outputs {
+            let (name, unit) = (&output.name, &output.unit);
+            let fit = output.fit.fit_percent.map_or("-".to_owned(), |fit| format!("{fit:.3} %"));
+            let (rmse, sigma) = (number(output.fit.rmse, 4), number(output.fit.sigma, 4));
             writeln!(f, "{name:<width$} {rmse:>14} {unit:<units$} {sigma:>11} {fit:>9}")?;
         }
         writeln!(f)?;

@@ -39,7 +39,7 @@ pub struct EkfStart<M: Model> {
 pub struct Ekf<M: Model, const N: usize, I: Integrator = Automatic> {
     model: M,
     integrator: I,
-    memory: I::Memory,
+    step: f64,
     start: EkfStart<M>,
     lanes: <M::Parameters as Signals>::Array<usize>,
     drift: [f64; N],
@@ -100,7 +100,7 @@ impl<M: Model, const N: usize, I: Integrator> Ekf<M, N, I> {
         Ok(Ekf {
             model,
             integrator,
-            memory: I::Memory::default(),
+            step: 0.0,
             lanes,
             drift,
             clock: Clock::new(ts)?,
@@ -203,7 +203,7 @@ impl<M: Model, const N: usize, I: Integrator> Ekf<M, N, I> {
     fn predict(&mut self, interval: &Interval<M::Input>) -> Result<(), Divergence> {
         let (x, p) = (self.x_dual(), self.p_dual());
         let system = ModelSystem { model: &self.model, interval, p: &p };
-        let x = system.step(&self.integrator, x, &mut self.memory).map_err(|_| Divergence::Stuck)?;
+        let x = system.step(&self.integrator, x, &mut self.step).map_err(|_| Divergence::Stuck)?;
         self.x = M::State::map(x, |x| x.value);
         self.covariance.predict(M::State::into_array(M::State::map(x, |x| x.slopes)).as_ref(), &self.drift);
         Ok(())

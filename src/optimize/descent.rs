@@ -114,10 +114,10 @@ impl Descent {
 
     /// Whether the trials get nowhere.
     pub fn creeps(&mut self, point: &Point) -> bool {
-        if point.cost() < self.mark.1 * (1.0 - CREEPING.1) {
+        if point.cost() < self.mark.1 - CREEPING.1 * point.cost_size() {
             self.mark = (self.trials, point.cost());
         }
-        self.trials - self.mark.0 > CREEPING.0 && point.potential > CREEPING.1 * point.cost()
+        self.trials - self.mark.0 > CREEPING.0 && point.potential > CREEPING.1 * point.cost_size()
     }
 
     /// Whether to go to the point that a trial led to (`None` if it has no cost); adapts damping and length of the next step.
@@ -130,11 +130,11 @@ impl Descent {
             Some(next) => self.blind_gain(point, trial, next),
         };
         if gain <= ACCEPT {
-            self.reject(trial, gain, cost, next.is_none());
+            self.reject(trial, gain, point.cost_size(), next.is_none());
             return false;
         }
         let next_cost = next.map_or(cost, Point::cost);
-        self.slow = if trial.resolved && next_cost > (1.0 - SLOW.1) * cost { self.slow + 1 } else { 0 };
+        self.slow = if trial.resolved && cost - next_cost < SLOW.1 * point.cost_size() { self.slow + 1 } else { 0 };
         (self.blind, self.failed, self.noise, self.longest) = (0, 0, 0.0, Longest::Later);
         if gain > GOOD {
             // Ten times faster with each good step, so that a good start is not held up by the damping.
@@ -166,7 +166,7 @@ impl Descent {
         let part = again.map_or(f64::INFINITY, |again| next.slope(&again) / point.slope(&trial.step));
         let rounding = COST_ROUNDING.max(point.linear.roughness());
         match part {
-            _ if next.cost() > point.cost() * (1.0 + rounding) => 0.0,
+            _ if next.cost() > point.cost() + rounding * point.cost_size() => 0.0,
             part if part < 0.25 => 1.0,
             part if part < 1.0 => GOOD,
             _ => 0.0,

@@ -91,14 +91,14 @@ impl GaussNewton {
 
     /// Whether a trial lowers the cost enough.
     fn accepts(&mut self, point: &Point, next: &Point) -> bool {
-        let (slope, cost) = (point.slope(&self.line.step), point.cost());
-        let decrease = cost - next.cost();
+        let slope = point.slope(&self.line.step);
+        let decrease = point.cost() - next.cost();
         // Where the cost decides nothing, what the full step would still gain does.
         let enough = match -slope <= point.resolution() {
             true => next.potential < point.potential,
             false => decrease > 0.0 && decrease >= -SUFFICIENT * slope,
         };
-        self.line.noise = ((decrease + slope).abs() / cost).max(0.125 * self.line.noise);
+        self.line.noise = ((decrease + slope).abs() / point.cost_size()).max(0.125 * self.line.noise);
         // A plateau, that no slope leads back from.
         let lost = point.norms.iter().zip(&next.norms).any(|(before, after)| *after < LOST * before);
         enough && !lost
@@ -144,8 +144,8 @@ impl Machine for GaussNewton {
         self.trials += 1;
         match told.and_then(|linear| Point::new(self.line.trial.clone(), linear, &self.domain)) {
             Some(next) if self.accepts(&point, &next) => {
-                let decrease = (point.cost() - next.cost()) / point.cost();
-                match next.gains_too_little(decrease, point.cost(), &self.stop) {
+                let decrease = (point.cost() - next.cost()) / point.cost_size();
+                match next.gains_too_little(decrease, point.cost_size(), &self.stop) {
                     true => {
                         self.x.clone_from(&next.x);
                         self.end(next, Outcome::CostUnchanged { decrease });

@@ -160,7 +160,7 @@ impl<S: Scaling> LevenbergMarquardt<S> {
         if all >= self.stop.iterations || self.first.is_none() && trials >= FIRST_TRIALS {
             return Some(Outcome::IterationLimit { iterations: all });
         }
-        let promised = point.potential / point.cost();
+        let promised = point.potential / point.cost_size();
         self.descent.creeps(point).then_some(Outcome::Creeping { trials, promised })
     }
 
@@ -189,7 +189,8 @@ impl<S: Scaling> LevenbergMarquardt<S> {
     fn look(&self, point: &Point, outcome: Outcome) -> Look {
         let mut look = Look { outcome, points: vec![], beside: 0, lost: 0, flat: 0 };
         let blind = point.blind();
-        if blind.len() > self.unseen && matches!(outcome, Outcome::Converged { .. } | Outcome::LimitOfPrecision { .. }) {
+        if blind.len() > self.unseen && matches!(outcome, Outcome::Converged { .. } | Outcome::LimitOfPrecision { .. })
+        {
             look.lost = blind.len() - self.unseen;
             look.points = blind.iter().flat_map(|direction| point.beside(direction, &self.seen)).collect();
             look.beside = look.points.len();
@@ -255,11 +256,12 @@ impl<S: Scaling> LevenbergMarquardt<S> {
     }
 
     fn judge_trial(&mut self, point: Point, trial: &Trial, next: Option<Point>) {
-        let (cost, accepted) = (point.cost(), self.descent.judge(&point, trial, next.as_ref()));
+        let (cost, size) = (point.cost(), point.cost_size());
+        let accepted = self.descent.judge(&point, trial, next.as_ref());
         let Some(next) = next.filter(|_| accepted) else { return self.go_on(point) };
         self.take(&next);
-        let decrease = (cost - next.cost()) / cost;
-        match next.gains_too_little(decrease, cost, &self.stop) {
+        let decrease = (cost - next.cost()) / size;
+        match next.gains_too_little(decrease, size, &self.stop) {
             true => self.end(next, Outcome::CostUnchanged { decrease }),
             false => self.go_on(next),
         }
@@ -274,7 +276,9 @@ impl<S: Scaling> LevenbergMarquardt<S> {
                 self.take(&next);
                 return self.go_on(next);
             }
-            Some(next) if look.points.len() < look.beside && next.cost() <= point.cost() * (1.0 + FLAT) => look.flat += 1,
+            Some(next) if look.points.len() < look.beside && next.cost() <= point.cost() + FLAT * point.cost_size() => {
+                look.flat += 1
+            }
             _ => {}
         }
         match look.points.is_empty() {

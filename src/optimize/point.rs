@@ -62,6 +62,12 @@ impl Point {
         self.linear.cost
     }
 
+    /// Size of the terms of the cost, by which its changes are measured. Where variances are predicted, their logarithms
+    /// may leave a sum that is negative or next to zero.
+    pub fn cost_size(&self) -> f64 {
+        self.cost().abs().max(0.5 * self.linear.sum_of_squares())
+    }
+
     fn free(&self) -> impl Iterator<Item = usize> {
         (0..self.x.len()).filter(|&i| !self.held[i])
     }
@@ -103,7 +109,7 @@ impl Point {
 
     /// The smallest difference that the cost resolves, in its own unit.
     pub fn resolution(&self) -> f64 {
-        RESOLUTION.max(self.linear.roughness()) * self.cost()
+        RESOLUTION.max(self.linear.roughness()) * self.cost_size()
     }
 
     /// The directions, of unknowns that are not on a bound, that have no influence.
@@ -147,7 +153,7 @@ impl Point {
         let left = self.linear.sum_of_squares();
         let unknowns: f64 = self.x.iter().zip(&self.norms).map(|(x, norm)| (f64::EPSILON * x * norm).powi(2)).sum();
         let small = self.linear.data_norm().is_none_or(|norm| left <= (ROUNDING * norm).powi(2));
-        self.cost() == 0.0 || left > 0.0 && small && left <= ROUNDINGS.powi(2) * unknowns
+        left == 0.0 || left > 0.0 && small && left <= ROUNDINGS.powi(2) * unknowns
     }
 
     /// Whether the residual is far below the data.
@@ -179,7 +185,7 @@ impl Point {
     pub fn stuck(&self, failed: u64, noise: f64) -> Outcome {
         let (step, gradient) = (self.relative_step(), self.cosine());
         let noise = noise.max(self.linear.roughness());
-        let left = self.potential / self.cost();
+        let left = self.potential / self.cost_size();
         if self.is_next_to_data() {
             Outcome::Exact
         } else if gradient <= PRECISION {

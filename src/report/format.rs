@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[serde(try_from = "String", into = "&'static str")]
 pub struct Format;
 
-const FORMAT: &str = "greybox report 2";
+const FORMAT: &str = "greybox report 3";
 
 impl From<Format> for &'static str {
     fn from(_: Format) -> Self {

@@ -5,13 +5,10 @@ use super::{Declared, Figures, Format, Histogram, Output, OutputFit, Record, Rep
 use crate::diagnose::residuals::{self, Residuals};
 use crate::diagnose::{self, Widths};
 use crate::error::Error;
-use crate::estimate::{Estimate, Prediction};
-use crate::experiment::ExperimentOf;
-use crate::fit::FitProblem;
-use crate::integrate::Integrator;
-use crate::model::Model;
-use crate::predict::Predictor;
-use crate::signals::{Of, Signals};
+use crate::estimate::{ParameterEstimate, Summary};
+use crate::judge::output_fit as output_fit_of;
+use crate::problem::{Problem, Simulated};
+use crate::record::{Channel, Record as Measured};
 
 /// So many pictures of records a reader will look at; of more, the worst are drawn.
 const DRAWN: usize = 12;
@@ -27,25 +24,20 @@ impl Report {
     ///
     /// # Errors
     /// An estimate of another problem; a prediction that fails or is not finite.
-    pub fn new<M: Model, I: Integrator, P: Predictor<M>, O>(
-        problem: &FitProblem<'_, M, I, P, O>,
-        estimate: &Estimate<M, I, P>,
-    ) -> Result<Report, Error> {
+    pub fn new(problem: &Problem<'_>, estimate: &Summary) -> Result<Report, Error> {
         let identifiability = diagnose::identifiability(problem, estimate)?;
         let (objective, best) = problem.at(estimate)?;
         let mut records = vec![];
-        for (e, record) in problem.experiments().iter().enumerate() {
-            let prediction = problem.prediction(&objective, e, &best)?;
-            let widths = match objective.prefilter {
+        for (e, record) in problem.records().iter().enumerate() {
+            let prediction = objective.predict(e, &best)?;
+            let widths = match problem.settings.prefilter {
                 Some(_) => None,
                 None => Some(diagnose::widths(&objective, &best, estimate, e, BAND)?),
             };
             let name = &estimate.experiments[e].name;
-            records.push(summary::<M>(name, record, &prediction, widths.as_ref())?);
+            records.push(summary(name, record, &prediction, widths.as_ref())?);
         }
-        thin(&mut records, M::Output::LEN);
-        let quality = M::Output::into_array(estimate.quality);
-        let declared = M::Parameters::into_array(estimate.declared);
+        thin(&mut records, estimate.outputs.len());
         let reworded = |warning| diagnose::reworded(warning, &estimate.directions, &estimate.unknowns);
         let report = Report {
             format: Format,
@@ -54,15 +46,13 @@ impl Report {
             outcome: estimate.outcome,
             warnings: estimate.warnings.iter().map(reworded).collect(),
             unknowns: estimate.unknowns.clone(),
-            declared: named::<M::Parameters>()
-                .zip(declared)
-                .map(|((name, unit), parameter)| Declared { name, unit, parameter })
-                .collect(),
-            correlation: estimate.correlation(),
+            declared: estimate.parameters.iter().map(declared).collect(),
+            correlation: estimate.correlation(&(0..estimate.unknowns.len()).collect::<Vec<usize>>()),
             directions: estimate.directions.clone(),
-            outputs: named::<M::Output>()
-                .zip(quality)
-                .map(|((name, unit), quality)| Output { name, unit, quality })
+            outputs: estimate
+                .outputs
+                .iter()
+                .map(|output| Output { name: output.name.clone(), unit: output.unit.clone(), quality: output.fit })
                 .collect(),
             records,
             identifiability,
@@ -90,25 +80,14 @@ impl Report {
     }
 }
 
-fn named<S: Signals>() -> impl Iterator<Item = (String, String)> {
-    S::NAMES.iter().zip(S::UNITS).map(|(name, unit)| ((*name).to_owned(), (*unit).to_owned()))
+fn declared(parameter: &ParameterEstimate) -> Declared {
+    let ParameterEstimate { name, unit, declared, .. } = parameter.clone();
+    Declared { name, unit, parameter: declared }
 }
 
-/// One signal of each row.
-fn column<S: Signals>(rows: &[Of<S, f64>], signal: usize) -> Vec<f64> {
-    rows.iter().map(|row| S::into_array(*row).as_ref()[signal]).collect()
-}
-
-fn summary<M: Model>(
-    name: &str,
-    record: &ExperimentOf<M>,
-    prediction: &Prediction<M>,
-    widths: Option<&Widths<M>>,
-) -> Result<Record, Error> {
-    let inputs = named::<M::Input>().enumerate();
-    let inputs = inputs.map(|(i, name)| signal(name, Role::Input, &column::<M::Input>(record.inputs(), i)));
-    let outputs = named::<M::Output>().enumerate();
-    let outputs = outputs.map(|(j, name)| signal(name, Role::Output, &column::<M::Output>(record.outputs(), j)));
+fn summary(name: &str, record: &Measured, prediction: &Simulated, widths: Option<&Widths>) -> Result<Record, Error> {
+    let inputs = record.inputs().iter().map(|channel| signal(channel, Role::Input));
+    let outputs = record.outputs().iter().map(|channel| signal(channel, Role::Output));
     let examined = residuals::examine(prediction, record)?.into_iter().enumerate();
     Ok(Record {
         name: name.to_owned(),
@@ -118,11 +97,12 @@ fn summary<M: Model>(
         sample_time: record.sample_time(),
         gaps: record.gaps().len() as u64,
         signals: inputs.chain(outputs).collect(),
-        fits: examined.map(|(j, residuals)| output_fit::<M>(record, prediction, widths, residuals, j)).collect(),
+        fits: examined.map(|(j, residuals)| output_fit(record, prediction, widths, residuals, j)).collect(),
     })
 }
 
-fn signal((name, unit): (String, String), role: Role, values: &[f64]) -> Signal {
+fn signal(channel: &Channel, role: Role) -> Signal {
+    let (name, unit, values) = (channel.name.clone(), channel.unit.clone(), &*channel.values);
     let measured = || values.iter().copied().filter(|value| !value.is_nan());
     let count = measured().count();
     Signal {
@@ -136,40 +116,34 @@ fn signal((name, unit): (String, String), role: Role, values: &[f64]) -> Signal 
     }
 }
 
-fn output_fit<M: Model>(
-    record: &ExperimentOf<M>,
-    prediction: &Prediction<M>,
-    widths: Option<&Widths<M>>,
+fn output_fit(
+    record: &Measured,
+    prediction: &Simulated,
+    widths: Option<&Widths>,
     examined: Residuals,
     j: usize,
 ) -> OutputFit {
-    let measured = column::<M::Output>(record.outputs(), j);
-    let predicted = column::<M::Output>(&prediction.outputs, j);
-    let residuals = column::<M::Output>(&prediction.residuals, j);
-    let confidence = widths.map_or(vec![], |widths| column::<M::Output>(&widths.confidence, j));
-    let prediction_width = widths.map_or(vec![], |widths| column::<M::Output>(&widths.prediction, j));
-    let rows = Rows {
-        t: &prediction.t,
-        measured: &measured,
-        predicted: &predicted,
-        confidence: &confidence,
-        prediction: &prediction_width,
-    };
+    let channel = &record.outputs()[j];
+    let (measured, predicted, residuals) = (&*channel.values, &prediction.outputs[j], &prediction.residuals[j]);
+    let width = |column: fn(&Widths) -> &Vec<Vec<f64>>| widths.map_or(&[][..], |widths| &column(widths)[j]);
+    let (confidence, prediction) = (width(|widths| &widths.confidence), width(|widths| &widths.prediction));
+    let t: Vec<f64> = (0..record.len()).map(|k| record.time(k)).collect();
+    let rows = Rows { t: &t, measured, predicted, confidence, prediction };
     let overview = Trace::new(&rows, 0..measured.len(), COLUMNS);
-    let largest = largest(&residuals);
+    let largest = largest(residuals);
     let closeup = largest.filter(|_| overview.samples_per_column > 1).map(|worst| {
         let begin = worst.saturating_sub(CLOSE / 2).min(measured.len().saturating_sub(CLOSE));
         Trace::new(&rows, begin..(begin + CLOSE).min(measured.len()), CLOSE)
     });
     OutputFit {
-        name: M::Output::NAMES[j].to_owned(),
-        unit: M::Output::UNITS[j].to_owned(),
-        fit_percent: M::Output::into_array(prediction.quality).as_ref()[j].fit_percent,
+        name: channel.name.clone(),
+        unit: channel.unit.clone(),
+        fit_percent: output_fit_of(measured, residuals).fit_percent,
         unpredicted: predicted.iter().filter(|value| !value.is_finite()).count() as u64,
         residuals: examined,
         largest: largest.map_or(0.0, |k| residuals[k]),
         largest_at: record.time(largest.unwrap_or(0)),
-        histogram: Histogram::new(&residuals),
+        histogram: Histogram::new(residuals),
         overview: Some(overview),
         closeup,
     }

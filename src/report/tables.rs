@@ -152,17 +152,17 @@ pub(super) fn declared(report: &Report) -> Table {
 pub(super) fn settings(report: &Report) -> Table {
     let m = &report.method;
     let rows = [
-        ("optimizer", &m.optimizer),
-        ("prediction", &m.predictor),
-        ("integrator", &m.integrator),
-        ("loss", &m.loss),
-        ("weighting", &m.weighting),
-        ("pre-filter", &m.prefilter),
-        ("noise", &m.noise),
-        ("covariance", &m.covariance),
-        ("greybox version", &m.version),
+        ("optimizer", m.optimizer.clone()),
+        ("prediction", m.predictor.clone()),
+        ("integrator", m.integrator.clone()),
+        ("loss", m.loss.clone()),
+        ("weighting", m.weighting.clone()),
+        ("pre-filter", m.prefilter.clone()),
+        ("noise", m.noise.to_string()),
+        ("covariance", m.covariance.to_string()),
+        ("greybox version", m.version.clone()),
     ];
-    Table { columns: &["setting", "value"], rows: rows.map(|(name, value)| row([name, value])).to_vec() }
+    Table { columns: &["setting", "value"], rows: rows.map(|(name, value)| row([name, &value])).to_vec() }
 }
 
 /// Sums and criteria.

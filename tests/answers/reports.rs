@@ -15,6 +15,7 @@ signals! {
 }
 
 /// `y = gain scale (slope u + forwards [u > 0] - backwards [u <= 0] + offset)`
+#[derive(Clone)]
 struct Friction;
 
 impl Model for Friction {
@@ -24,7 +25,6 @@ impl Model for Friction {
     type Parameters = Line;
     const KIND: Kind = Kind::Static;
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Drive<S>, p: &Line<S>) -> Response<S> {
         let dry = if u.u.value() > 0.0 { p.forwards } else { -p.backwards };
         Response { y: p.gain * p.scale * (p.slope * u.u + dry + p.offset) }
@@ -53,14 +53,14 @@ fn line() -> Line<greybox::Parameter> {
 }
 
 fn report(record: &ExperimentOf<Friction>, line: Line<greybox::Parameter>) -> Report {
-    let mut problem = Fit::new(&Friction, record).parameters(line).problem().unwrap();
+    let problem = Fit::new(&Friction, record).parameters(line).problem().unwrap();
     let estimate = problem.run().unwrap();
     Report::new(&problem, &estimate).unwrap()
 }
 
 fn with_everything() -> Report {
     let record = record(500).named(HOSTILE);
-    let mut problem = Fit::new(&Friction, &record).parameters(line()).problem().unwrap();
+    let problem = Fit::new(&Friction, &record).parameters(line()).problem().unwrap();
     let mut estimate = problem.run().unwrap();
     // What differs from run to run is no part of an example.
     estimate.seconds = 0.25;
@@ -157,9 +157,9 @@ fn the_committed_example_still_reads() {
     assert_eq!(report.to_json().unwrap(), text);
     assert_eq!(report.title, "An example of the schema");
     assert_well_formed(&report.to_html());
-    let newer = text.replace("greybox report 2", "greybox report 3");
+    let newer = text.replace("greybox report 3", "greybox report 4");
     let refused = Report::from_json(&newer).unwrap_err().to_string();
-    assert!(refused.contains("greybox report 3") && refused.contains("reads \"greybox report 2\""), "{refused}");
+    assert!(refused.contains("greybox report 4") && refused.contains("reads \"greybox report 3\""), "{refused}");
 }
 
 /// A shift of both frictions against the offset changes nothing; the report says so in these words, in every form.
@@ -189,9 +189,9 @@ fn a_product_and_a_factor_are_named() {
 #[test]
 fn missing_outputs_are_gaps() {
     let whole = record(300);
-    let mut outputs = whole.outputs().to_vec();
+    let mut outputs: Vec<_> = whole.outputs().collect();
     outputs[100..200].fill(Response::splat(f64::NAN));
-    let record = Experiment::new(&Friction, whole.times().clone(), whole.inputs().to_vec(), outputs).unwrap();
+    let record = Experiment::new(&Friction, whole.times().clone(), whole.inputs().collect(), outputs).unwrap();
     let report = report(&record, line());
     let fit = &report.records[0].fits[0];
     assert_eq!((report.records[0].signals[1].missing, fit.unpredicted, fit.residuals.samples), (100, 0, 200));
@@ -261,9 +261,9 @@ fn every_form_is_saved_by_its_ending() {
 #[cfg_attr(debug_assertions, ignore = "ten million samples take an optimized build")]
 fn a_long_record_makes_a_small_page() {
     let long = record(10_000_000);
-    let mut outputs = long.outputs().to_vec();
+    let mut outputs: Vec<_> = long.outputs().collect();
     outputs[7_654_321].y += 100.0;
-    let record = Experiment::new(&Friction, long.times().clone(), long.inputs().to_vec(), outputs).unwrap();
+    let record = Experiment::new(&Friction, long.times().clone(), long.inputs().collect(), outputs).unwrap();
     let report = report(&record, line());
     let fit = &report.records[0].fits[0];
     assert!((fit.largest - 100.0).abs() < 0.1 && fit.largest_at == record.time(7_654_321));

@@ -220,11 +220,9 @@ impl Model for Leak {
     type Output = Level;
     type Parameters = Tank;
 
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Nothing, p: &Tank<S>) -> Level<S> {
         Level { x: p.b - p.a * x.x }
     }
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Nothing, _p: &Tank<S>) -> Level<S> {
         *x
     }
