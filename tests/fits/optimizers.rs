@@ -1,6 +1,7 @@
 //! Every optimizer on every problem of a list: it reaches a known minimum, or says that it did not converge.
 
 mod bounds;
+mod far;
 mod others;
 mod problems;
 
