@@ -30,6 +30,8 @@ pub(super) struct Descent {
     longest: Longest,
     /// Trials in a row that were rejected where the cost resolves nothing.
     blind: u32,
+    /// Trials since the cost last resolved one.
+    unresolved: u32,
     /// Trials in a row that could not be evaluated.
     pub failed: u64,
     /// How far, as a part of the cost, the last rejected trials were off what the slopes promised.
@@ -62,6 +64,8 @@ const ACCEPT: f64 = 1e-4;
 const SHORTER: f64 = 0.25;
 /// Five trials are enough where the cost has no digits left.
 const BLIND: u32 = 5;
+/// And so many where the slopes still lead on: enough to win ten digits at half the distance a step.
+const UNRESOLVED: u32 = 60;
 const COST_ROUNDING: f64 = 1e-10;
 /// Trials that together lower the cost by less than this part creep.
 const CREEPING: (u64, f64) = (300, 0.01);
@@ -76,6 +80,7 @@ impl Descent {
             fall: FALL,
             longest: Longest::First,
             blind: 0,
+            unresolved: 0,
             failed: 0,
             noise: 0.0,
             trials: 0,
@@ -104,7 +109,8 @@ impl Descent {
         let resolved = promised > point.resolution();
         let damping = damping(scales, lambda);
         let length = length(scales, &step);
-        (x != point.x && self.blind < BLIND).then_some(Trial { x, step, damping, length, promised, resolved })
+        let spent = self.blind >= BLIND || self.unresolved >= UNRESOLVED && !resolved;
+        (x != point.x && !spent).then_some(Trial { x, step, damping, length, promised, resolved })
     }
 
     /// Whether the second derivative along a step is worth an evaluation: in a curved valley, where steps are good and short.
@@ -123,6 +129,7 @@ impl Descent {
     /// Whether to go to the point that a trial led to (`None` if it has no cost); adapts damping and length of the next step.
     pub fn judge(&mut self, point: &Point, trial: &Trial, next: Option<&Point>) -> bool {
         self.trials += 1;
+        self.unresolved = if trial.resolved { 0 } else { self.unresolved + 1 };
         let cost = point.cost();
         let gain = match next {
             None => f64::NEG_INFINITY,
