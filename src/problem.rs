@@ -23,7 +23,7 @@ pub use objective::Objective;
 pub(crate) use pass::{Accumulate, each};
 pub use search::Search;
 pub(crate) use search::{Optimizer, RoundError};
-use segments::{Cuts, Memory};
+use segments::Cuts;
 pub use settings::Settings;
 pub(crate) use settings::{Observer, Weights};
 pub use simulate::Simulated;
@@ -145,8 +145,6 @@ impl<'a> Problem<'a> {
     /// The cost to minimize, with errors in the units of the outputs.
     pub(crate) fn in_units<'p>(&'p self, control: &'p Control) -> Objective<'p> {
         let whitening = Whitening::none(self.layout().outputs.len());
-        let memory = Memory::default();
-        let objective = Objective { problem: self, sweep: &*self.sweep, whitening, control, data_norm: None, memory };
-        objective.with_data_norm()
+        Objective::new(self, &*self.sweep, whitening, control)
     }
 }

@@ -22,6 +22,14 @@ struct Part {
 impl Objective<'_> {
     /// Cost and triangles of all experiments and the priors.
     pub(crate) fn evaluate(&self, coordinates: &[f64]) -> Result<Linearization, Infeasible> {
+        let found = self.evaluate_all(coordinates);
+        match (&found, self.inside_bounds(coordinates)) {
+            (Err(Infeasible::Failed(_)), Some(inside)) => inside.evaluate_all(coordinates).or(found),
+            _ => found,
+        }
+    }
+
+    fn evaluate_all(&self, coordinates: &[f64]) -> Result<Linearization, Infeasible> {
         let values = self.values(coordinates);
         let cuts = &self.problem.cuts;
         let chained = (0..self.experiments()).any(|e| cuts.is_chained(e));
@@ -163,17 +171,28 @@ impl Objective<'_> {
         let mut jobs = self.segments(e, values, coordinates, true, guess);
         let chained = self.problem.cuts.is_chained(e);
         for job in &mut jobs {
-            job.scales.clear();
+            // What is left out stays so.
+            job.scales.iter_mut().filter(|scale| **scale != 0.0).for_each(|scale| *scale = 1.0);
             if chained {
+                let moves = self.carry_moves(job);
+                job.scales.clear();
                 let carried = job.piece.carry.len();
                 job.seeds.retain(|seed| matches!(seed, Seed::Parameter(_)));
                 job.seeds.splice(0..0, (0..carried).map(Seed::Carry));
                 let width = job.seeds.len();
-                job.piece.slopes =
-                    (0..carried * width).map(|at| f64::from(u8::from(at % width == at / width))).collect();
+                let slope = |at| f64::from(u8::from(at % width == at / width && moves[at / width]));
+                job.piece.slopes = (0..carried * width).map(slope).collect();
             }
         }
         jobs
+    }
+
+    /// Which entries of the carry that a segment begins with depend on the unknowns: at the begin of a record those that are
+    /// given do not, and slopes with respect to them may be infinite.
+    fn carry_moves(&self, job: &Job<'_>) -> Vec<bool> {
+        let Piece { carry, slopes, samples, .. } = &job.piece;
+        let row = |i: usize| &slopes[i * job.seeds.len()..][..job.seeds.len()];
+        (0..carry.len()).map(|i| samples.start > 0 || row(i).iter().any(|slope| *slope != 0.0)).collect()
     }
 
     /// Costs and triangles of jobs that run side by side.

@@ -23,6 +23,8 @@ pub struct Objective<'p> {
     pub(crate) control: &'p Control,
     /// Norm of the measurements, standardized and weighted as the errors; unknown where variances are predicted.
     pub(crate) data_norm: Option<f64>,
+    /// Unknowns whose slopes count as zero; empty for none.
+    pub(crate) left_out: Vec<bool>,
     /// Where the segments of records begin at points that were evaluated.
     pub(crate) memory: Memory,
 }
@@ -38,6 +40,25 @@ impl<'p> Objective<'p> {
         self.problem.unknowns.start()
     }
 
+    pub(super) fn new(
+        problem: &'p Problem<'p>,
+        sweep: &'p dyn Sweep,
+        whitening: Whitening,
+        control: &'p Control,
+    ) -> Objective<'p> {
+        let (data_norm, left_out, memory) = (None, vec![], Memory::default());
+        Objective { problem, sweep, whitening, control, data_norm, left_out, memory }.with_data_norm()
+    }
+
+    /// The same without the slopes of the unknowns on their bounds, which may be infinite there (the root of an initial level
+    /// of zero); `None` where none is, or where they have been left out already.
+    pub(super) fn inside_bounds(&self, coordinates: &[f64]) -> Option<Self> {
+        let bounds = self.problem.unknowns.bounds();
+        let left_out: Vec<bool> = bounds.iter().zip(coordinates).map(|((low, high), x)| x <= low || x >= high).collect();
+        let some = self.left_out.is_empty() && left_out.contains(&true);
+        some.then(|| Objective { left_out, ..self.clone() })
+    }
+
     /// The same with errors and slopes in the units of the outputs.
     pub(crate) fn in_units(&self) -> Self {
         self.with(Whitening::none(self.outputs()))
@@ -48,7 +69,7 @@ impl<'p> Objective<'p> {
         Objective { whitening, ..self.clone() }.with_data_norm()
     }
 
-    pub(super) fn with_data_norm(mut self) -> Self {
+    fn with_data_norm(mut self) -> Self {
         self.data_norm = (!self.sweep.predicts_variance()).then(|| self.norm_of_data());
         self
     }
@@ -69,9 +90,7 @@ impl<'p> Objective<'p> {
     /// The same with another sweep, or records that differ in what was measured.
     pub(crate) fn of<'q>(&'q self, problem: &'q Problem<'q>, sweep: &'q dyn Sweep) -> Objective<'q> {
         let whitening = self.whitening.clone();
-        let objective =
-            Objective { problem, sweep, whitening, control: self.control, data_norm: None, memory: Memory::default() };
-        objective.with_data_norm()
+        Objective::new(problem, sweep, whitening, self.control)
     }
 
     /// Number of experiments.

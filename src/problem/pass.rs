@@ -22,7 +22,7 @@ pub(crate) trait Accumulate: Send + Sized {
 pub(crate) struct Job<'p> {
     pub experiment: usize,
     pub seeds: Vec<Seed>,
-    /// How fast the quantity of each seed moves with its coordinate.
+    /// How fast the quantity of each seed moves with its coordinate; zero where its slopes are left out.
     pub scales: Vec<f64>,
     pub piece: Piece<'p>,
 }
@@ -42,15 +42,22 @@ impl Objective<'_> {
         let (problem, unknowns) = (self.problem, &self.problem.unknowns);
         let record = &problem.records[e];
         let seeds = if slopes { unknowns.seeds(e) } else { vec![] };
-        let scales = if slopes { unknowns.scales(e, coordinates) } else { vec![] };
+        let mut scales = if slopes { unknowns.scales(e, coordinates) } else { vec![] };
+        for (scale, i) in scales.iter_mut().zip(unknowns.columns(e)) {
+            if self.left_out.get(i) == Some(&true) {
+                *scale = 0.0;
+            }
+        }
         let Reached { carry, slopes: all } = self.sweep.start(record, &values.x, &values.p);
         let (states, width) = (values.x.len(), values.x.len() + values.p.len());
         let column = |seed: &Seed| match *seed {
             Seed::Carry(i) => i,
             Seed::Parameter(j) => states + j,
         };
-        let slopes = (0..carry.len()).flat_map(|row| seeds.iter().map(move |seed| (row, column(seed))));
-        let slopes = slopes.map(|(row, column)| all[row * width + column]).collect();
+        let known = seeds.iter().zip(&scales);
+        let slopes = (0..carry.len()).flat_map(|row| known.clone().map(move |(seed, scale)| (row, column(seed), *scale)));
+        let slope = |(row, column, scale): (usize, usize, f64)| if scale == 0.0 { 0.0 } else { all[row * width + column] };
+        let slopes = slopes.map(slope).collect();
         let (prepared, samples) = (&problem.prepared[e], 0..record.len());
         Job {
             experiment: e,
@@ -146,12 +153,25 @@ impl Objective<'_> {
         slopes: bool,
         make: impl Fn(usize) -> A + Sync,
     ) -> Result<Vec<A>, Infeasible> {
+        let found = self.gather_all(coordinates, slopes, &make);
+        match (&found, self.inside_bounds(coordinates)) {
+            (Err(Infeasible::Failed(_)), Some(inside)) if slopes => inside.gather_all(coordinates, slopes, &make).or(found),
+            _ => found,
+        }
+    }
+
+    fn gather_all<A: Accumulate>(
+        &self,
+        coordinates: &[f64],
+        slopes: bool,
+        make: &(impl Fn(usize) -> A + Sync),
+    ) -> Result<Vec<A>, Infeasible> {
         let values = self.values(coordinates);
         let borders = self.borders(coordinates, &values, slopes)?;
         let jobs = (0..self.experiments())
             .flat_map(|e| self.segments(e, &values[e], coordinates, slopes, borders.as_deref()))
             .collect();
-        let found = self.run_jobs(jobs, coordinates, &make)?;
+        let found = self.run_jobs(jobs, coordinates, make)?;
         let mut all: Vec<A> = Vec::with_capacity(self.experiments());
         let mut found = found.into_iter();
         for segments in &self.problem.cuts.segments {

@@ -56,7 +56,9 @@ impl<'s> Standardize<'s> {
 }
 
 fn scale(row: &mut [f64], scales: &[f64], lane: usize, lanes: usize) {
-    row.iter_mut().skip(lane).step_by(lanes).zip(scales).for_each(|(value, scale)| *value *= scale);
+    row.iter_mut().skip(lane).step_by(lanes).zip(scales).for_each(|(value, scale)| {
+        *value = if *scale == 0.0 { 0.0 } else { *value * scale };
+    });
 }
 
 /// Standardizes errors by their predicted variances `v`: rows `dy / sqrt(v), z = e / sqrt(v)`, and in the place of the
