@@ -38,8 +38,8 @@ pub(super) struct Descent {
     pub noise: f64,
     /// Trials so far.
     pub trials: u64,
-    /// At which trial the cost had last fallen by a hundredth, and the cost then.
-    mark: (u64, f64),
+    /// The last trial that was worth a mark, and cost and potential then.
+    mark: (u64, f64, f64),
     /// Accepted steps in a row that lowered the cost by less than a tenth.
     slow: u32,
 }
@@ -67,8 +67,11 @@ const BLIND: u32 = 5;
 /// And so many where the slopes still lead on: enough to win ten digits at half the distance a step.
 const UNRESOLVED: u32 = 60;
 const COST_ROUNDING: f64 = 1e-10;
-/// Trials that together lower the cost by less than this part creep.
-const CREEPING: (u64, f64) = (300, 0.01);
+/// So many trials creep that together neither lower the cost by this part
+const CREEPING: u64 = 300;
+const CREEPING_FALL: f64 = 0.01;
+/// nor leave the next full step no more than this part of what it would have gained before.
+const CREEPING_GAIN: f64 = 0.1;
 /// Second derivatives are worth their evaluation after so many steps that each lower the cost by less than this part.
 const SLOW: (u32, f64) = (20, 0.1);
 
@@ -84,7 +87,7 @@ impl Descent {
             failed: 0,
             noise: 0.0,
             trials: 0,
-            mark: (0, f64::MAX),
+            mark: (0, f64::MAX, f64::MAX),
             slow: 0,
         }
     }
@@ -120,10 +123,11 @@ impl Descent {
 
     /// Whether the trials get nowhere.
     pub fn creeps(&mut self, point: &Point) -> bool {
-        if point.cost() < self.mark.1 - CREEPING.1 * point.cost_size() {
-            self.mark = (self.trials, point.cost());
+        let (_, cost, potential) = self.mark;
+        if point.cost() < cost - CREEPING_FALL * point.cost_size() || point.potential < CREEPING_GAIN * potential {
+            self.mark = (self.trials, point.cost(), point.potential);
         }
-        self.trials - self.mark.0 > CREEPING.0 && point.potential > CREEPING.1 * point.cost_size()
+        self.trials - self.mark.0 > CREEPING
     }
 
     /// Whether to go to the point that a trial led to (`None` if it has no cost); adapts damping and length of the next step.

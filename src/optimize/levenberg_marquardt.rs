@@ -73,16 +73,16 @@ enum Stage {
     Step(Trial),
     /// The second derivative along a step.
     Bend(Trial),
-    /// Those at points around the end, where slopes show nothing.
+    /// Those at points around the start or the end, where slopes show nothing.
     Look(Look),
     /// Those where the first try ended, which was the better one.
     Return,
 }
 
-/// A search that is to end like this, unless the cost is lower at one of these points.
+/// A search that is to end like this, or to go on if it has just begun, unless the cost is lower at one of these points.
 #[derive(Clone, Debug)]
 struct Look {
-    outcome: Outcome,
+    outcome: Option<Outcome>,
     /// The last one next.
     points: Vec<Vec<f64>>,
     /// How many of these points lie along directions that have lost their influence, and how many such directions.
@@ -160,8 +160,11 @@ impl<S: Scaling> LevenbergMarquardt<S> {
         if all >= self.stop.iterations || self.first.is_none() && trials >= FIRST_TRIALS {
             return Some(Outcome::IterationLimit { iterations: all });
         }
-        let promised = point.potential / point.cost_size();
-        self.descent.creeps(point).then_some(Outcome::Creeping { trials, promised })
+        if !self.descent.creeps(point) {
+            return None;
+        }
+        let (promised, stuck) = (point.potential / point.cost_size(), point.stuck(0, self.descent.noise));
+        Some(if stuck.converged() { stuck } else { Outcome::Creeping { trials, promised } })
     }
 
     fn scales(&self) -> Vec<f64> {
@@ -178,6 +181,10 @@ impl<S: Scaling> LevenbergMarquardt<S> {
     /// Ends here like this, unless there is something that slopes do not show.
     fn end(&mut self, point: Point, outcome: Outcome) {
         let look = self.look(&point, outcome);
+        self.go_look(point, look);
+    }
+
+    fn go_look(&mut self, point: Point, look: Look) {
         match look.points.is_empty() {
             true => self.end_look(point, &look),
             false => (self.stage, self.point) = (Stage::Look(look), Some(point)),
@@ -187,7 +194,7 @@ impl<S: Scaling> LevenbergMarquardt<S> {
     /// Where to look before the search ends: inside bounds where an unknown has no slopes, and along directions that have
     /// lost their influence on the way.
     fn look(&self, point: &Point, outcome: Outcome) -> Look {
-        let mut look = Look { outcome, points: vec![], beside: 0, lost: 0, flat: 0 };
+        let mut look = Look { outcome: Some(outcome), points: vec![], beside: 0, lost: 0, flat: 0 };
         let blind = point.blind();
         if blind.len() > self.unseen && matches!(outcome, Outcome::Converged { .. } | Outcome::LimitOfPrecision { .. })
         {
@@ -245,12 +252,14 @@ impl<S: Scaling> LevenbergMarquardt<S> {
             (_, None, Some(first)) => self.return_to(first),
             (_, None, None) => self.outcome = Some(Outcome::Stalled { gradient: 0.0, step: 0.0, failed: 1 }),
             (stage, Some(point), first) => {
-                if matches!(stage, Stage::Start) {
-                    (self.steps, self.unseen) = (0, usize::MAX);
-                    self.take(&point);
-                }
                 self.first = first;
-                self.go_on(point);
+                if !matches!(stage, Stage::Start) {
+                    return self.go_on(point);
+                }
+                (self.steps, self.unseen) = (0, usize::MAX);
+                self.take(&point);
+                let points = point.inside(&self.seen);
+                self.go_look(point, Look { outcome: None, points, beside: 0, lost: 0, flat: 0 });
             }
         }
     }
@@ -281,19 +290,17 @@ impl<S: Scaling> LevenbergMarquardt<S> {
             }
             _ => {}
         }
-        match look.points.is_empty() {
-            true => self.end_look(point, &look),
-            false => (self.stage, self.point) = (Stage::Look(look), Some(point)),
-        }
+        self.go_look(point, look);
     }
 
-    /// Ends a try after a look around.
+    /// Ends a try after a look around, or goes on with it.
     fn end_look(&mut self, point: Point, look: &Look) {
+        let Some(outcome) = look.outcome else { return self.go_on(point) };
         // Of several lost directions the flat one may lie between those looked along; and a saddle that the search comes back
         // to is no minimum either.
         let outcome = match look.flat > 0 || look.lost > 1 || look.lost > 0 && self.leaps >= LEAPS {
             true => Outcome::Plateau { lost: look.lost, gradient: point.cosine() },
-            false => look.outcome,
+            false => outcome,
         };
         self.end_try(point, outcome);
     }
