@@ -104,7 +104,7 @@ impl Objective<'_> {
     ) -> Result<Triangulation, Infeasible> {
         let jobs: Vec<Job<'_>> =
             (0..self.experiments()).flat_map(|e| self.linear_jobs(e, &values[e], coordinates, guess)).collect();
-        let mut parts = self.in_batches(&jobs, coordinates, |jobs| self.parts(jobs))?.into_iter();
+        let mut parts = self.in_batches(&jobs, |jobs| self.parts(jobs))?.into_iter();
         let mut found = Triangulation { cost: 0.0, moved: 0.0, blocks: vec![], borders: None };
         let mut of = vec![];
         for (e, segments) in self.problem.cuts.segments.iter().enumerate() {
@@ -126,7 +126,7 @@ impl Objective<'_> {
             }
         }
         if !found.cost.is_finite() || found.blocks.iter().any(|block| !block.is_finite()) {
-            return Err(self.infeasible(0, coordinates, RunError::Failed { sample: 0 }));
+            return Err(self.infeasible(0, RunError::Failed { sample: 0 }));
         }
         if guess.is_some() {
             let (point, cost, values) = (coordinates.to_vec(), found.cost, values.to_vec());

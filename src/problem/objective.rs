@@ -122,10 +122,14 @@ impl<'p> Objective<'p> {
         weights.map_or(1.0, |weights| weights.weight(&self.problem.records[experiment], sample))
     }
 
-    pub(crate) fn infeasible(&self, experiment: usize, coordinates: &[f64], error: RunError) -> Infeasible {
+    pub(crate) fn infeasible(&self, experiment: usize, error: RunError) -> Infeasible {
         match error {
             RunError::Stopped => Infeasible::Cancelled,
-            RunError::Failed { sample } => Infeasible::Failed(self.locate(experiment, coordinates, sample).to_string()),
+            // A search only wants to know that it failed: what exactly would cost it another simulation.
+            RunError::Failed { sample } => {
+                let label = &self.problem.unknowns.labels[experiment];
+                Infeasible::Failed(format!("experiment `{label}` cannot be evaluated (noticed at sample {sample})"))
+            }
         }
     }
 
@@ -134,7 +138,8 @@ impl<'p> Objective<'p> {
         let (problem, sigma) = (self.problem, self.whitening.sigma());
         let (label, record) = (&problem.unknowns.labels[e], &problem.records[e]);
         let values = problem.unknowns.of_experiment(e, coordinates);
-        let found = self.sweep.locate(record, label, &values.x, &values.p, sample, &sigma);
+        let stops = || self.control.stops();
+        let found = self.sweep.locate(record, &values.x, &values.p, sample, &sigma, &stops);
         let failure = |signal: String, value: f64, hint| Failure {
             experiment: label.clone(),
             sample,
@@ -144,8 +149,11 @@ impl<'p> Objective<'p> {
             hint,
         };
         match found {
-            Some(Located::Broken(failure)) => failure,
-            Some(Located::Largest(largest)) => self.unsound_prediction(e, coordinates).unwrap_or(largest),
+            Some(Located::Broken(failure)) => Failure { experiment: label.clone(), ..failure },
+            Some(Located::Largest(largest)) => {
+                let largest = Failure { experiment: label.clone(), ..largest };
+                self.unsound_prediction(e, coordinates).unwrap_or(largest)
+            }
             None => self
                 .unsound_prediction(e, coordinates)
                 .unwrap_or_else(|| failure("the prediction".to_owned(), f64::NAN, UNSOUND)),

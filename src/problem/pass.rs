@@ -149,7 +149,7 @@ impl Objective<'_> {
             }
             let job = self.job(e, &values[e], coordinates, false);
             let at: Vec<usize> = segments[1..].iter().map(|samples| samples.start).collect();
-            self.sweep.follow(&job.piece, &at).map_err(|error| self.infeasible(e, coordinates, error))
+            self.sweep.follow(&job.piece, &at).map_err(|error| self.infeasible(e, error))
         };
         let borders =
             |carries: Vec<Vec<f64>>| carries.into_iter().map(|carry| Border { carry, slopes: vec![] }).collect();
@@ -183,7 +183,7 @@ impl Objective<'_> {
         let jobs = (0..self.experiments())
             .flat_map(|e| self.segments(e, &values[e], coordinates, slopes, borders.as_deref()))
             .collect();
-        let found = self.run_jobs(jobs, coordinates, make)?;
+        let found = self.run_jobs(jobs, make)?;
         let mut all: Vec<A> = Vec::with_capacity(self.experiments());
         let mut found = found.into_iter();
         for segments in &self.problem.cuts.segments {
@@ -206,7 +206,7 @@ impl Objective<'_> {
         let values = self.values(coordinates);
         let borders = self.borders(coordinates, &values, slopes)?;
         let jobs = self.segments(e, &values[e], coordinates, slopes, borders.as_deref());
-        let mut found = self.run_jobs(jobs, coordinates, &|_| make())?.into_iter();
+        let mut found = self.run_jobs(jobs, &|_| make())?.into_iter();
         let mut whole = found.next().unwrap_or_else(make);
         found.for_each(|part| whole.append(part));
         Ok(whole)
@@ -216,7 +216,6 @@ impl Objective<'_> {
     fn run_jobs<A: Accumulate>(
         &self,
         jobs: Vec<Job<'_>>,
-        coordinates: &[f64],
         make: &(impl Fn(usize) -> A + Sync),
     ) -> Result<Vec<A>, Infeasible> {
         let batch = |jobs: &[&Job<'_>]| {
@@ -228,14 +227,13 @@ impl Objective<'_> {
             })
             .map(|_| gatherers)
         };
-        self.in_batches(&jobs, coordinates, batch)
+        self.in_batches(&jobs, batch)
     }
 
     /// Runs jobs in batches of those that can go side by side; the results in the order of the jobs.
     pub(super) fn in_batches<T: Send>(
         &self,
         jobs: &[Job<'_>],
-        coordinates: &[f64],
         batch: impl Fn(&[&Job<'_>]) -> Result<Vec<T>, Broken> + Sync,
     ) -> Result<Vec<T>, Infeasible> {
         let batches = self.batches(jobs);
@@ -251,7 +249,7 @@ impl Objective<'_> {
         let mut found: Vec<Option<T>> = (0..jobs.len()).map(|_| None).collect();
         for (members, result) in batches.iter().zip(results) {
             let result = result.map_err(|Broken { lane, error }| {
-                self.infeasible(jobs[members[lane]].experiment, coordinates, error)
+                self.infeasible(jobs[members[lane]].experiment, error)
             })?;
             members.iter().zip(result).for_each(|(&i, value)| found[i] = Some(value));
         }
