@@ -4,6 +4,7 @@ mod absorb;
 mod as_argmin;
 mod checkpoint;
 mod control;
+mod curvature;
 mod linearize;
 mod objective;
 mod pass;
@@ -145,7 +146,6 @@ impl<'a> Problem<'a> {
     /// The cost to minimize, with errors in the units of the outputs.
     pub(crate) fn in_units<'p>(&'p self, control: &'p Control) -> Objective<'p> {
         let whitening = Whitening::none(self.layout().outputs.len());
-        let memory = Memory::default();
-        Objective { problem: self, sweep: &*self.sweep, whitening, control, memory }
+        Objective::new(self, &*self.sweep, whitening, control)
     }
 }
