@@ -204,7 +204,7 @@ fn first_axis(report: &mut Report, run: &Run, both: &[(f64, LinearEstimate<Windi
 /// Extended least squares on a whole record: motor and cable resistance, Ke.
 fn whole(run: &Run) -> Result<(Estimated, Estimated)> {
     let filter = low_pass()?;
-    let i0 = search_i0(0.03, 1.0, |i0| extended(&run.spans, i0).prefiltered(&filter))?;
+    let i0 = search_i0(0.03, 1.0, |i0| extended(&run.spans, i0).prefiltered(&filter).least_squares())?;
     let found = extended(&run.spans, i0).prefiltered(&filter).solve()?;
     let (p, s) = (found.parameters, found.standard_errors);
     Ok((Estimated { value: p.r, std: s.r }, Estimated { value: p.ke, std: s.ke }))

@@ -30,7 +30,7 @@ fn solve_plain(spans: &Spans) -> Result<Winding> {
 
 fn solve_extended(spans: &Spans) -> Result<LinearEstimate<Extended>> {
     let filter = Butterworth::low_pass(4, 100.0, TS)?;
-    let i0 = search_i0(0.03, 1.0, |i0| extended(spans, i0).prefiltered(&filter))?;
+    let i0 = search_i0(0.03, 1.0, |i0| extended(spans, i0).prefiltered(&filter).least_squares())?;
     Ok(extended(spans, i0).prefiltered(&filter).solve()?)
 }
 

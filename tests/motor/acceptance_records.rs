@@ -17,7 +17,7 @@ pub struct Record {
     pub axis: Axis,
     log: Log,
     pub spans: Spans,
-    cycles: Vec<Cycle>,
+    pub cycles: Vec<Cycle>,
 }
 
 pub fn record(simulation: Simulation, program: Program) -> Record {
@@ -36,7 +36,7 @@ pub fn cycles(number: u8) -> &'static Record {
     })
 }
 
-fn filter() -> Butterworth {
+pub fn filter() -> Butterworth {
     Butterworth::low_pass(4, 100.0, TS).unwrap()
 }
 
@@ -45,7 +45,7 @@ fn ls(spans: &Spans, form: Form) -> LinearEstimate<Winding> {
 }
 
 /// Step through what a test is to look at: one in release, `n` in a debug build.
-fn every(n: usize) -> usize {
+pub fn every(n: usize) -> usize {
     if cfg!(debug_assertions) {
         println!("one in {n}, this being a debug build; `cargo test --release --test motor` looks at all");
         n
@@ -55,10 +55,10 @@ fn every(n: usize) -> usize {
 }
 
 /// The largest magnitude of each column (%), for those who run the tests with `--nocapture`.
-struct Worst<const N: usize>([f64; N]);
+pub struct Worst<const N: usize>(pub [f64; N]);
 
 impl<const N: usize> Worst<N> {
-    fn see(&mut self, errors: [f64; N]) {
+    pub fn see(&mut self, errors: [f64; N]) {
         self.0.iter_mut().zip(errors).for_each(|(worst, error)| *worst = worst.max(error.abs()));
     }
 }
@@ -141,7 +141,7 @@ fn extended_least_squares_at_every_speed() {
         for cycle in cycles.iter().step_by(every(6)) {
             let spans = spans.cut(cycle.samples.clone());
             let equations = |i0| extended(&spans, i0).prefiltered(&filter());
-            let i0 = search_i0(0.03, 1.0, equations).unwrap();
+            let i0 = search_i0(0.03, 1.0, |i0| equations(i0).least_squares()).unwrap();
             let found = equations(i0).solve().unwrap();
             let p = found.parameters;
             let (ke, r) = (percent(p.ke, axis.ke), percent(p.r, axis.rs + axis.r_cable));
