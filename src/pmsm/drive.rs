@@ -13,7 +13,7 @@ use super::program::Program;
 use super::robot::{Axis, TS, V_MAX};
 use super::sensors::{CurrentSensors, Resolver};
 use super::temperature::Celsius;
-use super::{Bridge, Currents, Error, Injection, Motion, SQRT_3_2};
+use super::{Currents, Error, Injection, MachineState, SQRT_3_2, SwitchingInverter};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
@@ -197,12 +197,12 @@ impl Simulation {
         let blend = 1.0 - (-2.0 * core::f64::consts::PI * SPEED_FILTER * TS).exp();
 
         let mut log = Log { rows: Vec::with_capacity(program.targets.len()), voltage_limited: 0, current_limited: 0 };
-        let mut x = Motion::default();
+        let mut x = MachineState::default();
         let mut last_theta = None;
         let mut wf = 0.0;
-        let mut bridge = match self.inverter {
+        let mut switching = match self.inverter {
             Inverter::Averaged => None,
-            Inverter::Switching { vdc, carrier } => Some(Bridge::new(&self.plant, vdc, carrier)),
+            Inverter::Switching { vdc, carrier } => Some(SwitchingInverter::new(&self.plant, vdc, carrier)),
         };
         let (mut acting, mut held) = (Command::default(), Stator::default());
         for (k, target) in program.targets.iter().enumerate() {
@@ -223,9 +223,9 @@ impl Simulation {
             log.current_limited += usize::from(current_limited);
             log.rows.push(Row { ud: acting.ud, uq: acting.uq, w, id, iq, theta, iq_ref, w_ref: target.w, truth: x });
 
-            x = match &mut bridge {
+            x = match &mut switching {
                 None => self.plant.advance(x, held, TS, self.substeps),
-                Some(bridge) => bridge.advance(x, held, TS, self.substeps, |_, _| {}),
+                Some(switching) => switching.advance(x, held, TS, self.substeps, |_, _| {}),
             };
             held = aim((command.ud, command.uq), np.electrical(theta), wf, np, TS);
             acting = command;

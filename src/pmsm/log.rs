@@ -1,7 +1,7 @@
 //! What a run of a drive leaves behind.
 
 use super::robot::TS;
-use super::{Currents, Drive, Motion, Surface};
+use super::{Currents, Drive, MachineState, Surface};
 use crate::experiment::Experiment;
 use crate::record::Time;
 use serde::{Deserialize, Serialize};
@@ -26,7 +26,7 @@ pub struct Row {
     /// Reference of the speed (rad/s).
     pub w_ref: f64,
     /// The plant's true motion.
-    pub truth: Motion,
+    pub truth: MachineState,
 }
 
 /// What a run of a drive left behind.

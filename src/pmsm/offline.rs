@@ -13,7 +13,7 @@ mod validate;
 
 pub use equations::{Equations, WEAK, hardly_seen};
 pub use extended::{Extended, extended, search_i0};
-pub use mechanics::{Inertia, mechanics};
+pub use mechanics::mechanics;
 pub use plain::{Axes, Form, plain};
 pub use validate::{Validation, voltages};
 

@@ -12,7 +12,7 @@ use greybox::pmsm::offline::extended;
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::{Axis, TS};
 use greybox::pmsm::{
-    AngledDrive, Currents, DeadZone, ExactStep, ExactSurface, HeldIn, KeLyapunov, MotorLaw, Normalized, Resting,
+    AngledDrive, Currents, DeadZone, ExactStep, ExactSurface, HeldIn, KeLyapunov, MotorLaw, Normalized, NotAdapted,
     Winding,
 };
 use greybox::{Butterworth, fixed, free};
@@ -47,8 +47,8 @@ fn normalized(gain: f64) -> Normalized<KeLyapunov> {
     Normalized { law: lyapunov(gain), speed: 100.0 }
 }
 
-fn only<K>(ke: K) -> MotorLaw<Resting, K> {
-    MotorLaw { rs: Resting, ke }
+fn only<K>(ke: K) -> MotorLaw<NotAdapted, K> {
+    MotorLaw { rs: NotAdapted, ke }
 }
 
 const STILL: HeldIn = HeldIn::Stationary;

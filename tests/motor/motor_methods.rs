@@ -5,8 +5,18 @@ use greybox::pmsm::frames::rotate_out_of;
 use greybox::pmsm::offline::{Axes, Form, Spans, extended, hardly_seen, mechanics, plain};
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::{Axis, TS};
-use greybox::pmsm::{AngledDrive, Currents, Fed, Injection, Line, Mechanics, Shaft, Surface, Torque, Turning, Winding};
-use greybox::{Butterworth, BySignal, Experiment, Fit, Horizon, Law, Time, fixed, free, hampel};
+use greybox::pmsm::{
+    AngledDrive, Cabled, Currents, Injection, InverterFed, Mechanics, Misaligned, Salient, Shaft, ShaftMotion, Surface,
+    Torque, Winding,
+};
+use greybox::{Butterworth, BySignal, Experiment, Fit, Horizon, Law, Time, fixed, free, hampel, signals};
+
+signals! {
+    /// A salient motor behind cable and inverter, and how its record is aligned.
+    pub struct Line {
+        rs: "ohm", r_cable: "ohm", ld: "H", lq: "H", ke: "V s/rad", vdt: "V", i0: "A", tau: "s", delta: "rad",
+    }
+}
 
 fn cycles(simulation: Simulation, count: usize) -> Log {
     simulation.run(&Program::speed_cycles(&simulation.nominal, count, 1.0).unwrap())
@@ -40,7 +50,9 @@ fn alignment_delay_and_angle_offset_are_found_together() {
             (AngledDrive { ud, uq, w: span.w, theta: span.theta }, span.i0)
         })
         .unzip();
-    let model = Fed::new(4).unwrap();
+    let model = Misaligned::<InverterFed<Cabled<Salient, Line>, Line>, Line>::new(InverterFed::new(Cabled::new(
+        Salient::new(4).unwrap(),
+    )));
     let record = Experiment::new(&model, Time::Uniform { start: 0.0, step: TS }, inputs, outputs).unwrap();
     let start = Line {
         rs: free(0.4),
@@ -85,7 +97,7 @@ fn inertia_friction_and_gravity_by_regression_and_by_fit() {
         .chunks_exact(EVERY)
         .map(|rows| {
             let iq = rows.iter().map(|row| row.iq).sum::<f64>() / EVERY as f64;
-            (Torque { iq }, Turning { w: rows[0].w, theta: rows[0].theta })
+            (Torque { iq }, ShaftMotion { w: rows[0].w, theta: rows[0].theta })
         })
         .unzip();
     let time = Time::Uniform { start: 0.0, step: EVERY as f64 * TS };
