@@ -5,7 +5,7 @@ use super::{Pinned, minimize};
 use crate::error::Error;
 use crate::estimate::Summary;
 use crate::optimize::LeastSquares;
-use crate::problem::{Objective, Problem, Simulated, each};
+use crate::problem::{Problem, Simulated, each};
 use crate::random::Random;
 use crate::record::Record;
 use serde::{Deserialize, Serialize};
