@@ -3,7 +3,7 @@
 
 use argmin::core::CostFunction;
 use divan::{Bencher, counter::ItemsCount};
-use greybox::models::{Armature, Axis, Command, DcMotor, Feed, Guided, Positioning, PositioningLoop, Reference};
+use greybox::models::{Armature, Axis, Command, DcMotor, Feed, ControlledAxisOutput, Positioning, PositioningLoop, Reference};
 use greybox::optimize::{LeastSquares, LevenbergMarquardt, Linearization};
 use greybox::pmsm::{Drive, Machine, MachineParameters, Salient, SalientWinding, Surface, VoltageAndLoad, Winding};
 use greybox::{Experiment, Fit, Information, Model, Of, Signals, Time, free};
@@ -93,7 +93,7 @@ fn read_csv(bencher: Bencher) {
     let path = std::env::temp_dir().join(format!("greybox_bench_{}.csv", std::process::id()));
     let value = |k: usize| (k as f64 * 0.377).sin();
     let inputs = (0..SAMPLES).map(|k| Reference { qg: value(k) }).collect();
-    let outputs = (0..SAMPLES).map(|k| Guided { qm: value(k + 1), vir: value(k + 2) }).collect();
+    let outputs = (0..SAMPLES).map(|k| ControlledAxisOutput { qm: value(k + 1), vir: value(k + 2) }).collect();
     let record = Experiment::new(&model, Time::Uniform { start: 0.0, step: STEP }, inputs, outputs).unwrap();
     record.to_csv(&path).unwrap();
     bencher.counter(ItemsCount::new(SAMPLES)).bench_local(|| Experiment::from_csv(&model, &path).unwrap());

@@ -3,7 +3,7 @@
 use crate::steps::agrees;
 use greybox::graph::{Function, Graph, Leaf, Symbol};
 use greybox::models::{
-    Armature, Axis, Command, DcMotor, Feed, GuidedMotion, Motion, Positioning, PositioningLoop, Reference, Rotation,
+    Armature, Axis, Command, DcMotor, Feed, ControlledAxisMotion, AxisMotion, Positioning, PositioningLoop, Reference, Rotation,
 };
 use greybox::pmsm::{
     AngledDrive, Cabled, Compensated, CompensatedDrive, CompensatedSalientWinding, CompensatedWinding, Currents, Drive,
@@ -190,9 +190,9 @@ fn shipped_models_run_on_lanes() {
     agrees::<_, _, 7>(&DcMotor, &rk4, Hold::Zero, Rotation::from([0.5, 10.0]), armature, &feed, 1e-4);
     let axis = Axis { m: 95.0, fv: 200.0, fc: 20.0, offset: -3.0 };
     let command = swing::<Command>(Command { vir: 2.0 }, 60);
-    agrees::<_, _, 6>(&Positioning::EMPS, &rk4, Hold::Zero, Motion { q: 0.1, v: 0.0 }, axis, &command, 1e-3);
+    agrees::<_, _, 6>(&Positioning::EMPS, &rk4, Hold::Zero, AxisMotion { q: 0.1, v: 0.0 }, axis, &command, 1e-3);
     let reference = swing::<Reference>(Reference { qg: 0.1 }, 60);
-    let start = GuidedMotion { q: 0.1, v: 0.0, vm: 0.0 };
+    let start = ControlledAxisMotion { q: 0.1, v: 0.0, vm: 0.0 };
     agrees::<_, _, 7>(&PositioningLoop::EMPS, &rk4, Hold::First, start, axis, &reference, 1e-3);
 }
 
