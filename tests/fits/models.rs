@@ -18,7 +18,7 @@ proptest! {
 
     #[test]
     fn slopes_of_the_axis(q in -0.2..0.2, v in -0.3..0.3, vm in -0.02..0.02, vir in -5.0..5.0, e in -1e-4..1e-4) {
-        let open = check::derivatives(&Positioning::EMPS, 0.0, &Motion { q, v }, &Command { vir }, &AXIS);
+        let open = check::derivatives(&Positioning::EMPS, 0.0, &AxisMotion { q, v }, &Command { vir }, &AXIS);
         prop_assert_eq!(open, Ok(()));
         let x = ControlledAxisMotion { q, v, vm };
         prop_assert_eq!(check::derivatives(&PositioningLoop::EMPS, 0.0, &x, &Reference { qg: q + e }, &AXIS), Ok(()));
@@ -44,7 +44,7 @@ proptest! {
         prop_assert_eq!(vir, (closed.kv * (closed.kp * (qg - q) - v)).clamp(-10.0, 10.0));
         let (dx, open) = (
             closed.derivative(0.0, &x, &u, &AXIS),
-            closed.axis.derivative(0.0, &Motion { q, v }, &Command { vir }, &AXIS),
+            closed.axis.derivative(0.0, &AxisMotion { q, v }, &Command { vir }, &AXIS),
         );
         prop_assert_eq!((dx.q, dx.v, dx.vm), (open.q, open.v, 0.0));
     }
