@@ -5,7 +5,7 @@
 
 use clap::Parser;
 use greybox::diagnose::profile;
-use greybox::models::{Guided, GuidedMotion as Motion, Reference};
+use greybox::models::{ControlledAxisOutput, ControlledAxisMotion as Motion, Reference};
 use greybox::pmsm::{Surface, Winding};
 use greybox::{CsvFile, ExperimentOf, Fit, Hold, Model, Of, Parameter, Report, Scalar, fixed, free, signals};
 use std::{error::Error, fs::File, io::BufRead, io::BufReader, io::IsTerminal, path::PathBuf};
@@ -42,7 +42,7 @@ impl Axis {
 impl Model for Axis {
     type State = Motion;
     type Input = Reference;
-    type Output = Guided;
+    type Output = ControlledAxisOutput;
     type Parameters = Friction;
 
     fn derivative<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Reference<S>, p: &Friction<S>) -> Motion<S> {
@@ -53,8 +53,8 @@ impl Model for Axis {
         Motion { q: x.v, v, vm: (x.v - x.vm) / 1e-3 }
     }
 
-    fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Reference<S>, _p: &Friction<S>) -> Guided<S> {
-        Guided { qm: x.q, vir: Self::command(x, u) }
+    fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Reference<S>, _p: &Friction<S>) -> ControlledAxisOutput<S> {
+        ControlledAxisOutput { qm: x.q, vir: Self::command(x, u) }
     }
 }
 

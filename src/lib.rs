@@ -216,7 +216,7 @@ pub use {
     problem::{Objective, Problem, Search},
     record::{Gap, Initial, Time},
     recurrence::{InvalidRecurrence, Recurrence},
-    regress::{Assumption, LinearEstimate, Regression, RegressionError},
+    regress::{Assumption, LinearEstimate, PooledRegression, Regression, RegressionError},
     report::Report,
     scalar::Table,
     scaling::{JacobianColumns, Nominal, OwnSize, Scaling, Seen, Unscaled},

@@ -24,6 +24,7 @@ pub(crate) use pass::{Accumulate, each};
 pub use search::Search;
 pub(crate) use search::{Optimizer, RoundError};
 use segments::Cuts;
+pub(crate) use segments::Memory;
 pub use settings::Settings;
 pub(crate) use settings::{Observer, Weights};
 pub use simulate::Simulated;

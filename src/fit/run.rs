@@ -29,6 +29,7 @@ impl Problem<'_> {
         let end = search(&self.in_units(&control), &settings.optimizer)?;
         // What was found is concluded even if the time is over.
         let objective = self.in_units(&NEVER).with(end.whitening.clone());
+        let objective = Objective { memory: end.memory.clone(), ..objective };
         conclude(&objective, &end, begin.elapsed().as_secs_f64())
     }
 
@@ -77,6 +78,7 @@ impl Problem<'_> {
             evaluations: 1,
             name: "search by argmin".to_owned(),
             trouble: None,
+            memory: objective.memory.clone(),
         };
         conclude(&objective.with(whitening), &end, begin.elapsed().as_secs_f64())
     }

@@ -39,8 +39,9 @@ pub(super) fn search(plain: &Objective<'_>, optimizer: &Arc<dyn Optimizer>) -> R
     if !known && file.is_none() {
         next = optimizer.rough();
     }
+    let mut memory = plain.memory.clone();
     for round in 1.. {
-        let objective = plain.with(whitening.clone());
+        let objective = Objective { memory, ..plain.with(whitening.clone()) };
         let result = next.round(&objective, coordinates.clone(), file.as_ref()).map_err(|error| match error {
             RoundError::Start(error) => start_error(plain, &coordinates, error),
             RoundError::Optimizer(text) => Error::Optimizer(text),
@@ -71,9 +72,21 @@ pub(super) fn search(plain: &Objective<'_>, optimizer: &Arc<dyn Optimizer>) -> R
         if settled {
             let trouble = file.and_then(|file| file.trouble());
             let name = result.name;
-            return Ok(SearchEnd { coordinates, whitening, linear, outcome, iterations, evaluations, name, trouble });
+            let memory = objective.memory;
+            return Ok(SearchEnd {
+                coordinates,
+                whitening,
+                linear,
+                outcome,
+                iterations,
+                evaluations,
+                name,
+                trouble,
+                memory,
+            });
         }
         next = optimizer.clone();
+        memory = objective.memory;
     }
     Err(Error::Optimizer("the search never began".to_owned()))
 }
