@@ -64,32 +64,56 @@ fn oxygen(x: &[D]) -> Vec<D> {
     data.iter().map(|(t, y)| x[0] * (-(-x[1] * *t).exp() + 1.0) - *y).collect()
 }
 
+/// Rat43 of the same: a sigmoid, whose third and fourth parameter lose their influence far out.
+fn onions(x: &[D]) -> Vec<D> {
+    let weights = [
+        16.08, 33.83, 65.8, 97.2, 191.55, 326.2, 386.87, 520.53, 590.03, 651.92, 724.93, 699.56, 689.96, 637.56, 717.41,
+    ];
+    let at = |t: usize| x[0] / ((x[1] - x[2] * (t + 1) as f64).exp() + 1.0).pow(x[3].recip());
+    weights.iter().enumerate().map(|(t, y)| at(t) - *y).collect()
+}
+
+/// From these starts the first edition converged on plateaus, with a standard deviation of 130 for 26.
 #[test]
 fn a_plateau_is_left_or_not_called_a_minimum() {
+    let (oxygen, onions) = (oxygen as fn(&[D]) -> Vec<D>, onions as fn(&[D]) -> Vec<D>);
+    // The certified sums of squares.
+    let (least, smallest) = (1_168.008_876_555_5, 8_786.404_907_963_1);
+    let starts: [(fn(&[D]) -> Vec<D>, f64, &'static [f64]); 7] = [
+        (oxygen, least, &[1.0, 10.0]),
+        (oxygen, least, &[1e4, 5.0]),
+        (oxygen, least, &[50.0, 20.0]),
+        (onions, smallest, &[913.0, 49.23, 2.45, 0.4425]),
+        (onions, smallest, &[337.7, 77.87, 0.5791, 3.106]),
+        (onions, smallest, &[500.5, 40.8, 0.6541, 1.687]),
+        (onions, smallest, &[130.0, 65.9, 0.2293, 3.643]),
+    ];
     let mut right = 0;
-    for start in [[1.0, 1.0], [1.0, 10.0], [100.0, 0.01], [1e4, 0.1], [1e4, 5.0], [1e-3, 3.0], [50.0, 20.0], [2.0, 15.0]] {
-        let problem = problem(&[], oxygen);
-        let Ended { sum_of_squares, outcome, .. } = levenberg_marquardt(&problem, &start, OwnSize);
-        // The certified sum of squares.
-        let best = (sum_of_squares / 1_168.008_876_555_5 - 1.0).abs() < 1e-9;
+    for (residuals, minimum, start) in starts {
+        let Ended { sum_of_squares, outcome, .. } = levenberg_marquardt(&problem(start, residuals), start, OwnSize);
+        let outcome = outcome.expect("an outcome");
+        // Eleven digits are certified, and the cost is twice as exact as the unknowns.
+        let best = (sum_of_squares / minimum - 1.0).abs() < 1e-9;
+        println!("{start:?}: {sum_of_squares} {outcome}");
         right += u32::from(best);
-        assert!(best || !outcome.expect("an outcome").converged(), "{start:?}: {sum_of_squares}, {outcome:?}");
+        assert!(best || !outcome.converged(), "{start:?}: {sum_of_squares}, {outcome}");
     }
-    assert_eq!(right, 8);
+    assert!(right >= 5, "{right} of 7 right");
 }
 
 /// J. E. Dennis, R. B. Schnabel, *Numerical Methods for Unconstrained Optimization* (1983), example 10.2.4: full steps lead
 /// away from the minimum at zero where the factor is below minus one.
 #[test]
 fn a_minimum_that_full_steps_lead_away_from_is_found_in_tens_of_trials() {
-    for (start, residuals) in [
-        (&[1.0], (|x| vec![x[0] + 1.0, x[0] * x[0] * -5.0 + x[0] - 1.0]) as fn(&[D]) -> Vec<D>),
+    let starts: [(&'static [f64], fn(&[D]) -> Vec<D>); 3] = [
+        (&[1.0], |x| vec![x[0] + 1.0, x[0] * x[0] * -5.0 + x[0] - 1.0]),
         (&[1.0], |x| vec![x[0] + 1.0, x[0] * x[0] * -30.0 + x[0] - 1.0]),
         (&[0.3], |x| vec![x[0] + 1.0, x[0] * x[0] * -300.0 + x[0] - 1.0]),
-    ] {
+    ];
+    for (start, residuals) in starts {
         let problem = problem(start, residuals);
         let ended = levenberg_marquardt(&problem, start, OwnSize);
         let outcome = ended.outcome.expect("an outcome");
-        assert!(outcome.converged() && ended.evaluations < 150, "{outcome} after {}", ended.evaluations);
+        assert!(outcome.converged() && ended.evaluations < 60, "{outcome} after {}", ended.evaluations);
     }
 }
