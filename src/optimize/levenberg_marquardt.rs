@@ -148,7 +148,7 @@ impl<S: Scaling> LevenbergMarquardt<S> {
             Some(trial) if self.curved && self.descent.is_slow(&trial) => self.stage = Stage::Bend(trial),
             Some(trial) => self.stage = Stage::Step(trial),
             None => {
-                let outcome = ended.unwrap_or_else(|| point.stuck(self.descent.failed, self.descent.noise));
+                let outcome = ended.unwrap_or_else(|| point.stuck(self.descent.failed, self.descent.noise, self.descent.is_rough()));
                 return self.end(point, outcome);
             }
         }
@@ -163,7 +163,7 @@ impl<S: Scaling> LevenbergMarquardt<S> {
         if !self.descent.creeps(point) {
             return None;
         }
-        let (promised, stuck) = (point.potential / point.cost_size(), point.stuck(0, self.descent.noise));
+        let (promised, stuck) = (point.potential / point.cost_size(), point.stuck(0, self.descent.noise, false));
         Some(if stuck.converged() { stuck } else { Outcome::Creeping { trials, promised } })
     }
 
