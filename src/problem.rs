@@ -2,6 +2,7 @@
 
 mod absorb;
 mod as_argmin;
+mod batches;
 mod checkpoint;
 mod control;
 mod curvature;
@@ -20,7 +21,8 @@ mod whitening;
 pub(crate) use checkpoint::CheckpointFile;
 pub(crate) use control::Control;
 pub use objective::Objective;
-pub(crate) use pass::{Accumulate, each};
+pub(crate) use batches::each;
+pub(crate) use pass::Accumulate;
 pub use search::Search;
 pub(crate) use search::{Optimizer, RoundError};
 use segments::Cuts;

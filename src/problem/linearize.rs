@@ -1,7 +1,8 @@
 //! Cost and triangles of an objective.
 
 use super::absorb::Absorber;
-use super::pass::{Broken, Job};
+use super::batches::{Broken, in_batches, run};
+use super::pass::Job;
 use super::segments::{Border, Borders};
 use super::{Objective, Values, Weighing};
 use crate::information::{Chain, Information};
@@ -50,7 +51,7 @@ impl Objective<'_> {
             cost += 0.5 * error * error;
         }
         let linear = Linearization::new(cost, self.problem.unknowns.shared(), blocks);
-        Ok(match self.data_norm {
+        Ok(match self.data_norm() {
             Some(norm) => linear.with_data_norm(norm),
             None => linear,
         })
@@ -104,7 +105,8 @@ impl Objective<'_> {
     ) -> Result<Triangulation, Infeasible> {
         let jobs: Vec<Job<'_>> =
             (0..self.experiments()).flat_map(|e| self.linear_jobs(e, &values[e], coordinates, guess)).collect();
-        let mut parts = self.in_batches(&jobs, |jobs| self.parts(jobs))?.into_iter();
+        let parts = in_batches(&jobs, parts).map_err(|(job, error)| self.infeasible(jobs[job].experiment, error))?;
+        let mut parts = parts.into_iter();
         let mut found = Triangulation { cost: 0.0, moved: 0.0, blocks: vec![], borders: None };
         let mut of = vec![];
         for (e, segments) in self.problem.cuts.segments.iter().enumerate() {
@@ -206,19 +208,6 @@ impl Objective<'_> {
         (0..carry.len()).map(|i| samples.start > 0 || row(i).iter().any(|slope| *slope != 0.0)).collect()
     }
 
-    /// Costs and triangles of jobs that run side by side.
-    fn parts(&self, jobs: &[&Job<'_>]) -> Result<Vec<Part>, Broken> {
-        let mut absorbers: Absorber<'_> = Absorber::new(self, jobs);
-        let reached = self.run(jobs, &mut |window| absorbers.absorb(window))?;
-        let parts = reached.into_iter().enumerate();
-        parts
-            .map(|(lane, reached)| {
-                let (cost, triangle) = absorbers.part(lane);
-                Ok(Part { cost, triangle, reached })
-            })
-            .collect()
-    }
-
     /// The cost of one experiment alone, priors left out.
     pub(crate) fn cost_of(&self, e: usize, coordinates: &[f64]) -> Result<f64, Infeasible> {
         self.gather_one(coordinates, e, true, || Weighing::new(self, e)).map(|weighing| weighing.cost)
@@ -230,6 +219,19 @@ impl Objective<'_> {
         let priors = self.problem.unknowns.priors(coordinates).map(|(_, _, error)| 0.5 * error * error);
         Ok(found.iter().map(|weighing| weighing.cost).sum::<f64>() + priors.sum::<f64>())
     }
+}
+
+/// Costs and triangles of jobs that run side by side.
+fn parts(jobs: &[&Job<'_>]) -> Result<Vec<Part>, Broken> {
+    let mut absorbers: Absorber<'_> = Absorber::new(jobs);
+    let reached = run(jobs, &mut |window| absorbers.absorb(window))?;
+    let parts = reached.into_iter().enumerate();
+    parts
+        .map(|(lane, reached)| {
+            let (cost, triangle) = absorbers.part(lane);
+            Ok(Part { cost, triangle, reached })
+        })
+        .collect()
 }
 
 /// Costs and triangles of all experiments at a point.
