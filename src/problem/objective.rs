@@ -57,7 +57,8 @@ impl<'p> Objective<'p> {
     /// of zero); `None` where none is, or where they have been left out already.
     pub(super) fn inside_bounds(&self, coordinates: &[f64]) -> Option<Self> {
         let bounds = self.problem.unknowns.bounds();
-        let left_out: Vec<bool> = bounds.iter().zip(coordinates).map(|((low, high), x)| x <= low || x >= high).collect();
+        let left_out: Vec<bool> =
+            bounds.iter().zip(coordinates).map(|((low, high), x)| x <= low || x >= high).collect();
         let some = self.left_out.is_empty() && left_out.contains(&true);
         some.then(|| Objective { left_out, ..self.clone() })
     }

@@ -1,7 +1,7 @@
 //! Passes over the data: the segments of all records, run side by side and in parallel, and what is gathered from their
 //! windows.
 
-use super::batches::{each, in_batches, run};
+use super::batches::{Broken, each, in_batches, run};
 use super::segments::{Border, Borders};
 use super::{Objective, Values};
 use crate::optimize::Infeasible;
@@ -46,8 +46,10 @@ impl Objective<'_> {
             Seed::Parameter(j) => states + j,
         };
         let known = seeds.iter().zip(&scales);
-        let slopes = (0..carry.len()).flat_map(|row| known.clone().map(move |(seed, scale)| (row, column(seed), *scale)));
-        let slope = |(row, column, scale): (usize, usize, f64)| if scale == 0.0 { 0.0 } else { all[row * width + column] };
+        let slopes =
+            (0..carry.len()).flat_map(|row| known.clone().map(move |(seed, scale)| (row, column(seed), *scale)));
+        let slope =
+            |(row, column, scale): (usize, usize, f64)| if scale == 0.0 { 0.0 } else { all[row * width + column] };
         let slopes = slopes.map(slope).collect();
         let (prepared, samples) = (&problem.prepared[e], 0..record.len());
         Job {
@@ -160,7 +162,9 @@ impl Objective<'_> {
     ) -> Result<Vec<A>, Infeasible> {
         let found = self.gather_all(coordinates, slopes, &make);
         match (&found, self.inside_bounds(coordinates)) {
-            (Err(Infeasible::Failed(_)), Some(inside)) if slopes => inside.gather_all(coordinates, slopes, &make).or(found),
+            (Err(Infeasible::Failed(_)), Some(inside)) if slopes => {
+                inside.gather_all(coordinates, slopes, &make).or(found)
+            }
             _ => found,
         }
     }
@@ -211,15 +215,18 @@ impl Objective<'_> {
         jobs: Vec<Job<'_>>,
         make: &(impl Fn(usize) -> A + Sync),
     ) -> Result<Vec<A>, Infeasible> {
-        let batch = |jobs: &[&Job<'_>]| {
-            let mut gatherers: Vec<A> = jobs.iter().map(|job| make(job.experiment)).collect();
-            run(jobs, &mut |window| {
-                for (lane, gatherer) in gatherers.iter_mut().enumerate().filter(|(lane, _)| window.samples[*lane] > 0) {
-                    gatherer.add(window, lane);
-                }
-            })
-            .map(|_| gatherers)
-        };
+        let batch =
+            |_: &[usize], jobs: &[&Job<'_>]| gather(jobs, jobs.iter().map(|job| make(job.experiment)).collect());
         in_batches(&jobs, batch).map_err(|(job, error)| self.infeasible(jobs[job].experiment, error))
     }
+}
+
+/// Runs jobs side by side and gathers from each.
+pub(super) fn gather<A: Accumulate>(jobs: &[&Job<'_>], mut gatherers: Vec<A>) -> Result<Vec<A>, Broken> {
+    run(jobs, &mut |window| {
+        for (lane, gatherer) in gatherers.iter_mut().enumerate().filter(|(lane, _)| window.samples[*lane] > 0) {
+            gatherer.add(window, lane);
+        }
+    })
+    .map(|_| gatherers)
 }
