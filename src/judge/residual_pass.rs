@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// Lags of the whiteness test.
 const LAGS: usize = 20;
 /// One window in so many is simulated once more with a finer step, and so many of a record at most.
-const EVERY: usize = 8;
+const EVERY: usize = 16;
 const AGAIN: usize = 16;
 
 /// What a pass over the residuals found.
