@@ -28,7 +28,7 @@ pub use restarts::{Better, Restarts, restarts};
 use crate::error::Error;
 use crate::estimate::p_value;
 use crate::optimize::{Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization, Machine};
-use crate::problem::{Control, Problem};
+use crate::problem::{Control, Objective, Problem};
 use argmin::core::{Executor, State};
 use serde::{Deserialize, Serialize};
 
@@ -101,6 +101,14 @@ fn check_complete(problem: &Problem<'_>, control: &Control, what: &str) -> Resul
         ),
         _ => format!("{what} was cancelled; lower the flag to run it"),
     }))
+}
+
+/// Cost and slopes at an estimate.
+fn linearize(objective: &Objective<'_>, best: &[f64], what: &str) -> Result<Linearization, Error> {
+    objective.linearize(best).map_err(|error| {
+        let stopped = check_complete(objective.problem, objective.control, what).err();
+        stopped.unwrap_or(Error::Optimizer(error.to_string()))
+    })
 }
 
 /// Place and cost of the minimum that a search from `start` ends in; `None` where it cannot begin or does not end.

@@ -3,7 +3,7 @@
 //! Watts, *Nonlinear Regression Analysis and Its Applications*, 1988, section 6.1; Raue et al., Bioinformatics 25 (2009)
 //! 1923).
 
-use super::{Pinned, check_complete, minimize};
+use super::{Pinned, check_complete, linearize, minimize};
 use crate::error::Error;
 use crate::estimate::{Knowledge, Summary, student};
 use crate::judge::undetermined;
@@ -113,7 +113,7 @@ pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probabilit
         )));
     }
     let unknown = &estimate.unknowns[index];
-    let linear = objective.linearize(&best).map_err(|error| Error::Optimizer(error.to_string()))?;
+    let linear = linearize(&objective, &best, "the profile")?;
     let at_bound = |i: usize| i != index && matches!(estimate.unknowns[i].knowledge, Knowledge::Held { .. });
     let held = undetermined(&linear, &(0..best.len()).map(at_bound).collect::<Vec<bool>>()).held;
     let covariance = linear.covariance(&held);

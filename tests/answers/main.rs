@@ -9,3 +9,4 @@ mod residuals;
 #[path = "../common/shared.rs"]
 mod shared;
 mod silent_failures;
+mod stops;
