@@ -4,13 +4,13 @@ mod display;
 mod prediction;
 pub(crate) mod student;
 
-pub(crate) use display::{number, p_value};
 pub use prediction::Prediction;
 
 use crate::by_name;
 use crate::information::SquareMatrix;
 use crate::integrate::Automatic;
 use crate::model::Model;
+use crate::numeral::{number, or_nan, pairs_or_nan};
 use crate::optimize::{Outcome, Severity};
 use crate::parameter::{Parameter, Transform, unbounded_above, unbounded_below};
 use crate::predict::FreeRun;
@@ -24,6 +24,7 @@ pub enum Knowledge {
     /// It was estimated; the interval covers it with 95 % probability (asymmetric, if its logarithm was estimated).
     Known {
         /// Standard error, in its own unit.
+        #[serde(deserialize_with = "or_nan")]
         standard_error: f64,
         /// Lower end of the 95 % interval; `null` in JSON stands for none.
         #[serde(with = "unbounded_below")]
@@ -62,8 +63,10 @@ pub struct Unknown {
     /// Unit.
     pub unit: String,
     /// Estimated value.
+    #[serde(deserialize_with = "or_nan")]
     pub value: f64,
     /// Where the search started.
+    #[serde(deserialize_with = "or_nan")]
     pub start: f64,
     /// What is known of it.
     pub knowledge: Knowledge,
@@ -83,10 +86,12 @@ pub struct Quality {
     /// Samples measured.
     pub samples: u64,
     /// Root of the mean squared prediction error, in the output's unit, before any pre-filter.
+    #[serde(deserialize_with = "or_nan")]
     pub rmse: f64,
     /// Fit (%): `100 (1 - |y - y_hat| / |y - mean y|)`; `None` if the measurement is constant.
     pub fit_percent: Option<f64>,
     /// Standard deviation of the noise: given, or estimated from the (filtered) errors with `N - p` in the denominator.
+    #[serde(deserialize_with = "or_nan")]
     pub sigma: f64,
 }
 
@@ -95,6 +100,7 @@ pub struct Quality {
 pub struct Direction {
     /// Name and relative change (to the largest among them) of each; moving them together so changes no prediction.
     /// Absolute, where the value is zero.
+    #[serde(deserialize_with = "pairs_or_nan")]
     pub moves: Vec<(String, f64)>,
 }
 
@@ -104,7 +110,9 @@ impl fmt::Display for Direction {
             return write!(f, "`{name}` has no influence on the outputs");
         }
         let names: Vec<String> = self.moves.iter().map(|(name, _)| format!("`{name}`")).collect();
-        let moves: Vec<String> = self.moves.iter().map(|(name, by)| format!("{name} {:+.3} %", by)).collect();
+        let sign = |by: f64| if by < 0.0 { '-' } else { '+' };
+        let step = |(name, by): &(String, f64)| format!("{name} {}{} %", sign(*by), number(by.abs(), 3));
+        let moves: Vec<String> = self.moves.iter().map(step).collect();
         write!(f, "{} are known only together: {} changes nothing", names.join(", "), moves.join(" with "))
     }
 }

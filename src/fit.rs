@@ -26,6 +26,7 @@ use crate::experiment::{ExperimentOf, Sample};
 use crate::integrate::{Automatic, Integrator};
 use crate::loss::Loss;
 use crate::model::{Kind, Model};
+use crate::numeral::exact;
 use crate::optimize::{GaussNewton, LeastSquaresState, LevenbergMarquardt, Linearization, Outcome};
 use crate::parameter::Parameter;
 use crate::predict::{FreeRun, Predictor};
@@ -329,8 +330,10 @@ impl<M: Model, I: Integrator, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
                 if !(weight >= 0.0 && weight.is_finite()) {
                     let name = record.name();
                     return Err(Error::Option(format!(
-                        "weighting: the weight of sample {k} (t = {t} s) of experiment `{name}` is {weight}; weights must \
-                         be finite and not negative"
+                        "weighting: the weight of sample {k} (t = {} s) of experiment `{name}` is {}; weights must be \
+                         finite and not negative",
+                        exact(t),
+                        exact(weight)
                     )));
                 }
                 counts |= weight > 0.0 && M::Output::into_array(y).as_ref().iter().any(|y| !y.is_nan());

@@ -138,6 +138,8 @@ mod information;
 #[cfg(feature = "std")]
 mod loss;
 #[cfg(feature = "std")]
+mod numeral;
+#[cfg(feature = "std")]
 pub mod numeric;
 #[cfg(feature = "std")]
 pub mod optimize;
@@ -155,6 +157,8 @@ pub mod regress;
 pub mod report;
 #[cfg(feature = "std")]
 mod scaling;
+#[cfg(feature = "std")]
+mod section;
 #[cfg(feature = "std")]
 mod weighting;
 #[cfg(feature = "std")]

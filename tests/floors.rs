@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// The rooms, floor by floor. Each may import from all the rows above its own, and from nothing else.
 const FLOORS: &[(&str, &[&str])] = &[
     ("ground: hardware", &["lanes"]),
-    ("ground: beside numbers", &["scalar", "units", "dispatch", "random", "whiteness", "wide"]),
+    ("ground: beside numbers", &["scalar", "units", "dispatch", "random", "numeral", "whiteness", "wide"]),
     ("ground: numbers", &["dual", "signals"]),
     ("ground: vectors of numbers", &["information", "covariance", "error", "by_name", "layout"]),
     ("say: words", &["model", "parameter", "scaling", "interval"]),
@@ -19,6 +19,7 @@ const FLOORS: &[(&str, &[&str])] = &[
     ("expect: one step", &["integrate", "prefilter"]),
     ("expect: a record", &["predict"]),
     ("learn: parts", &["loss", "weighting", "outliers", "optimize", "regress", "numeric", "online"]),
+    ("learn: words and figures for a reader", &["section"]),
     ("learn: the answer", &["estimate"]),
     ("learn: the fit", &["fit"]),
     ("roof: answers", &["diagnose", "check"]),

@@ -8,9 +8,11 @@ use crate::experiment::ExperimentOf;
 use crate::fit::{FitProblem, each};
 use crate::integrate::Integrator;
 use crate::model::Model;
+use crate::numeral::resolved;
 use crate::optimize::LeastSquares;
 use crate::predict::Predictor;
 use crate::random::Random;
+use crate::section::{Cell, Section, Table};
 use crate::signals::{Of, Signals};
 use serde::{Deserialize, Serialize};
 
@@ -170,4 +172,27 @@ fn draw<Y: Copy>(residuals: &[Y], count: usize, resampling: Resampling, random: 
     }
     drawn.truncate(count);
     drawn
+}
+
+/// Standard errors, bias and intervals as a table.
+impl From<&Bootstrap> for Section {
+    fn from(found: &Bootstrap) -> Section {
+        let Bootstrap { unknowns, converged, tried, standard_errors, bias, intervals, seed } = found;
+        let row = |i: usize| {
+            let (error, (lower, upper)) = (standard_errors[i], intervals[i]);
+            let interval = format!("{} … {}", resolved(lower, error), resolved(upper, error));
+            [unknowns[i].as_str().into(), Cell::error(error), Cell::number(bias[i], 2), interval.into()]
+        };
+        let rows = unknowns.len().min(standard_errors.len()).min(bias.len()).min(intervals.len());
+        let columns = ["unknown", "std. error", "bias", "95 % interval"];
+        let table = Table::new("Refits of resampled records", columns).rows((0..rows).map(row));
+        let text = format!("{converged} of {tried} refits ended; the seed {seed} makes the same again.");
+        Section::new("bootstrap", "Bootstrap").says(text).table(table.at_most(40))
+    }
+}
+
+impl From<Bootstrap> for Section {
+    fn from(found: Bootstrap) -> Section {
+        Section::from(&found)
+    }
 }

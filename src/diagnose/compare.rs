@@ -1,12 +1,16 @@
 //! Estimates side by side, tests between nested ones, and data not used for the fit.
 
+mod section;
+
 use super::Test;
 use crate::error::Error;
-use crate::estimate::{Estimate, Knowledge, Quality, Unknown};
+use crate::estimate::{Direction, Estimate, Method, Quality, Unknown, Warning};
 use crate::experiment::ExperimentOf;
 use crate::fit::Fit;
+use crate::information::SquareMatrix;
 use crate::integrate::Integrator;
 use crate::model::Model;
+use crate::numeral::or_nan;
 use crate::optimize::Severity;
 use crate::parameter::fixed;
 use crate::predict::{FreeRun, Horizon, Predictor};
@@ -31,6 +35,7 @@ pub struct Summary {
     /// Measurements used.
     pub measurements: u64,
     /// The minimized cost.
+    #[serde(deserialize_with = "or_nan")]
     pub cost: f64,
     /// `-2 ln` of the likelihood, where there is one.
     pub deviance: Option<f64>,
@@ -42,12 +47,34 @@ pub struct Summary {
     pub aicc: Option<f64>,
     /// Bayes' criterion.
     pub bic: Option<f64>,
+    /// Akaike's final prediction error.
+    pub fpe: Option<f64>,
+    /// Measurements less what was estimated from them.
+    #[serde(deserialize_with = "or_nan")]
+    pub degrees_of_freedom: f64,
+    /// Covariance of the unknowns, in products of their units; zero where there is no interval.
+    pub covariance: SquareMatrix,
+    /// What the data cannot tell apart.
+    pub directions: Vec<Direction>,
+    /// What the reader must know.
+    pub warnings: Vec<Warning>,
     /// How the search ended, in words.
     pub outcome: String,
+    /// Whether it ended in a minimum.
+    pub converged: bool,
+    /// What to do, if it did not.
+    pub advice: String,
     /// The worst that is said of it.
     pub severity: Severity,
-    /// Which prediction error was minimized.
-    pub predictor: String,
+    /// Trial steps of the search.
+    pub iterations: u64,
+    /// Passes over the data with slopes.
+    pub evaluations: u64,
+    /// Time taken (s).
+    #[serde(deserialize_with = "or_nan")]
+    pub seconds: f64,
+    /// How it was made.
+    pub method: Method,
 }
 
 impl Summary {
@@ -67,21 +94,36 @@ impl Summary {
             aic: estimate.aic(),
             aicc: estimate.aicc(),
             bic: estimate.bic(),
+            fpe: estimate.fpe(),
+            degrees_of_freedom: estimate.degrees_of_freedom(),
+            covariance: estimate.covariance.clone(),
+            directions: estimate.directions.clone(),
+            warnings: estimate.warnings.clone(),
             outcome: estimate.outcome.to_string(),
+            converged: estimate.outcome.converged(),
+            advice: estimate.outcome.advice().to_owned(),
             severity: estimate.severity(),
-            predictor: estimate.method.predictor.clone(),
+            iterations: estimate.iterations,
+            evaluations: estimate.evaluations,
+            seconds: estimate.seconds,
+            method: estimate.method.clone(),
         }
     }
 
     fn same_data(&self, other: &Summary) -> Result<(), Error> {
-        let data = |s: &Summary| (s.measurements, s.experiments.clone(), s.predictor.clone());
+        let data = |s: &Summary| (s.measurements, s.experiments.clone(), s.method.predictor.clone());
         if data(self) == data(other) {
             return Ok(());
         }
         Err(Error::Option(format!(
             "`{}` and `{}` are not fits of the same data by the same prediction error ({} measurements by {}, {} by {}): \
              their likelihoods do not compare",
-            self.title, other.title, self.measurements, self.predictor, other.measurements, other.predictor
+            self.title,
+            other.title,
+            self.measurements,
+            self.method.predictor,
+            other.measurements,
+            other.method.predictor
         )))
     }
 }
@@ -144,60 +186,13 @@ fn verdict(name: String, statistic: f64, p_value: f64, restricted: &Summary, ful
     Test::new(name, statistic, p_value, &passed, &failed)
 }
 
-/// Summaries side by side; prints as a table.
+/// Summaries side by side; prints as a table, and is a section of a report.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Comparison(pub Vec<Summary>);
 
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut names: Vec<&str> = vec![];
-        for unknown in self.0.iter().flat_map(|summary| &summary.unknowns) {
-            if !names.contains(&unknown.name.as_str()) {
-                names.push(&unknown.name);
-            }
-        }
-        let width = names.iter().map(|name| name.len()).max().unwrap_or(0).max(12);
-        write!(f, "{:<width$}", "")?;
-        self.0.iter().try_for_each(|summary| write!(f, " {:>24}", summary.title))?;
-        writeln!(f)?;
-        for name in names {
-            write!(f, "{name:<width$}")?;
-            for summary in &self.0 {
-                let cell = summary.unknowns.iter().find(|u| u.name == name).map_or("-".to_owned(), |unknown| {
-                    match unknown.knowledge {
-                        Knowledge::Known { standard_error, .. } => {
-                            format!("{:.5e} +- {standard_error:.1e}", unknown.value)
-                        }
-                        Knowledge::Held { .. } => format!("{:.5e} (bound)", unknown.value),
-                        Knowledge::Unidentified => "not determined".to_owned(),
-                        Knowledge::Fixed => format!("{:.5e} (fixed)", unknown.value),
-                    }
-                });
-                write!(f, " {cell:>24}")?;
-            }
-            writeln!(f)?;
-        }
-        let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.3}"));
-        let fit = |s: &Summary| {
-            let fits: Vec<String> = s.outputs.iter().map(|(_, _, q)| number(q.fit_percent)).collect();
-            fits.join(" / ")
-        };
-        type Row<'a> = (&'a str, &'a dyn Fn(&Summary) -> String);
-        let rows: [Row<'_>; 7] = [
-            ("fit %", &fit),
-            ("measurements", &|s| s.measurements.to_string()),
-            ("unknowns", &|s| s.unknowns.len().to_string()),
-            ("AIC", &|s| number(s.aic)),
-            ("AICc", &|s| number(s.aicc)),
-            ("BIC", &|s| number(s.bic)),
-            ("verdict", &|s| s.severity.to_string()),
-        ];
-        for (label, cell) in rows {
-            write!(f, "{label:<width$}")?;
-            self.0.iter().try_for_each(|summary| write!(f, " {:>24}", cell(summary)))?;
-            writeln!(f)?;
-        }
-        Ok(())
+        fmt::Display::fmt(&self.table(), f)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::{Experiment, Sample, Time, least};
 use crate::model::Model;
+use crate::numeral::exact;
 use crate::signals::{Of, Signals};
 use core::fmt;
 use std::ops::Range;
@@ -19,7 +20,7 @@ pub struct Gap {
 
 impl fmt::Display for Gap {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "no sample from {} s to {} s (before sample {})", self.from, self.to, self.sample)
+        write!(f, "no sample from {} s to {} s (before sample {})", exact(self.from), exact(self.to), self.sample)
     }
 }
 

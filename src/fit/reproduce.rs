@@ -4,6 +4,7 @@ use super::objective::Objective;
 use super::source::Halt;
 use crate::error::Error;
 use crate::estimate::{Quality, Warning};
+use crate::numeral::{counted, number, p_value as p_value_in_words};
 use crate::optimize::Severity;
 use crate::predict::WINDOW;
 use crate::whiteness::{Autocorrelation, ljung_box};
@@ -108,17 +109,19 @@ impl Color {
     pub fn warning(&self, allowed: Option<(usize, f64)>) -> Warning {
         let Color { output, p_value, first } = self;
         let mut text = format!(
-            "the errors of `{output}` are not white (Ljung-Box {}, correlation with the error before {first:.3}): the \
-             model misses a part, or the noise is colored",
-            crate::estimate::p_value(p_value.min(1.0))
+            "the errors of `{output}` are not white (Ljung-Box {}, correlation with the error before {}): the model misses a \
+             part, or the noise is colored",
+            p_value_in_words(p_value.min(1.0)),
+            number(*first, 2)
         );
         let Some((lags, widest)) = allowed else {
             text += "; the intervals take them as white and are too narrow if the order of the samples matters";
             return Warning { severity: Severity::UsableWithCare, text };
         };
-        text += &format!(
-            "; the intervals allow for it (HAC over {lags} lag(s), prewhitened), up to {widest:.2} times those for white errors"
-        );
+        text += &format!("; the intervals allow for it (HAC over {}, prewhitened)", counted(lags as u64, "lag"));
+        if widest > 1.0 {
+            text += &format!(", which makes them up to {} times as wide as for white errors", number(widest, 3));
+        }
         let severity = if widest > COLOR_MATTERS { Severity::UsableWithCare } else { Severity::Usable };
         Warning { severity, text }
     }

@@ -3,6 +3,7 @@
 use super::objective::Objective;
 use crate::estimate::{Direction, Knowledge, Unknown, Warning};
 use crate::model::Kind;
+use crate::numeral::{counted, exact, number, percent};
 use crate::optimize::Severity;
 
 /// A finer step may move a parameter by this part of its standard error without a word.
@@ -35,15 +36,21 @@ impl Objective<'_> {
         for e in (0..self.experiments()).filter(|_| self.source.kind() != Kind::Static) {
             if let Some((count, first)) = self.source.gaps(e) {
                 warnings.push(care(format!(
-                    "time jumps in experiment `{}` ({count} gap(s), the first: {first}): the input is taken as held meanwhile, \
+                    "time jumps in experiment `{}` ({}, the first: {first}): the input is taken as held meanwhile, \
                      which is seldom what happened; fit the pieces between (Experiment::without_gaps)",
-                    self.unknowns.labels[e]
+                    self.unknowns.labels[e],
+                    counted(count as u64, "gap")
                 )));
             }
         }
         for row in rows {
             if let Knowledge::Held { bound } = row.knowledge {
-                let text = format!("`{}` is held at its bound {bound} {}: the data want it beyond", row.name, row.unit);
+                let text = format!(
+                    "`{}` is held at its bound {} {}: the data want it beyond",
+                    row.name,
+                    exact(bound),
+                    row.unit
+                );
                 warnings.push(care(text));
             }
         }
@@ -57,8 +64,10 @@ impl Objective<'_> {
             && shift > STEP_SHIFT
         {
             warnings.push(care(format!(
-                "the step is too coarse: with {finer} `{name}` would move by {part:.1e} of itself ({shift:.1} standard \
-                 errors); use a finer step"
+                "the step is too coarse: with {finer} `{name}` would move by {} of itself ({} standard errors); use \
+                 a finer step",
+                percent(part, 2),
+                number(shift, 2)
             )));
         }
         warnings

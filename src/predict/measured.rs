@@ -3,6 +3,7 @@
 use crate::dual::Dual;
 use crate::information::Information;
 use crate::model::Model;
+use crate::numeral::exact;
 use crate::signals::{Of, Signals};
 
 const LANES: usize = 8;
@@ -25,7 +26,10 @@ pub(crate) fn state<M: Model>(
     let found = y.as_ref().iter().filter(|y| y.is_finite()).count();
     if found < n {
         let (states, outputs) = (M::State::NAMES.join(", "), M::Output::NAMES.join(", "));
-        return Err(format!("{n} state(s), {states}, but {found} measured of the output(s) {outputs} at t = {t} s"));
+        return Err(format!(
+            "{n} state(s), {states}, but {found} measured of the output(s) {outputs} at t = {} s",
+            exact(t)
+        ));
     }
     let entries = |x: Of<M::State, f64>| M::State::into_array(x);
     for iteration in 0..ITERATIONS {
@@ -45,8 +49,9 @@ pub(crate) fn state<M: Model>(
         let undefined = (0..M::Output::LEN).find(|&j| y.as_ref()[j].is_finite() && errors[j].is_nan());
         if let Some(j) = undefined {
             return Err(format!(
-                "the model's output `{}` is not a number on the way to it, at t = {t} s",
-                M::Output::NAMES[j]
+                "the model's output `{}` is not a number on the way to it, at t = {} s",
+                M::Output::NAMES[j],
+                exact(t)
             ));
         }
         let mut information = Information::new(n);

@@ -4,17 +4,16 @@
 //! letters by percentages in pixels of the screen and stretches only its curves; a *fixed* one, for files, is in pixels
 //! throughout. Colors are names in the style sheet: the page gives them by theme, a file by value.
 
-mod axes;
 mod curves;
 mod forest;
 mod heat;
+mod scale;
+mod timeline;
 
-pub(super) use axes::Axis;
-pub(super) use curves::{Curves, Layer};
-pub(super) use forest::{Forest, Row as ForestRow};
-pub(super) use heat::{Cell, Heat};
+pub(super) use timeline::{keys, time_axis};
 
 use super::markup::Markup;
+use crate::section::{Drawing, Plot, Style};
 
 /// How wide a drawing is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,7 +46,7 @@ const LETTER: f64 = 7.0;
 const FLUID: f64 = 1000.0;
 
 /// Names of colors with their values on light and on dark ground.
-pub(super) const PALETTE: [(&str, &str, &str); 14] = [
+pub(super) const PALETTE: [(&str, &str, &str); 16] = [
     ("paper", "#ffffff", "#0d1117"),
     ("card", "#f6f8fa", "#161b22"),
     ("ink", "#1b1f24", "#e6edf3"),
@@ -56,6 +55,8 @@ pub(super) const PALETTE: [(&str, &str, &str); 14] = [
     ("measured", "#6e86a8", "#7d96bd"),
     ("predicted", "#c2410c", "#ff9d57"),
     ("residual", "#4f46e5", "#a5b4fc"),
+    ("input", "#0f766e", "#4fd1c5"),
+    ("quiet", "#8c959f", "#768390"),
     ("bar", "#4f6db8", "#7c9cf0"),
     ("level", "#b42318", "#ff7b72"),
     ("good", "#1a7f37", "#3fb950"),
@@ -66,6 +67,32 @@ pub(super) const PALETTE: [(&str, &str, &str); 14] = [
 
 /// The style of all drawings, its colors by name.
 pub(super) const STYLE: &str = include_str!("chart/chart.css");
+
+/// Draws a plot; nothing, if its drawing was not kept.
+pub(super) fn draw(plot: &Plot, to: &mut Markup, size: Size) {
+    match &plot.drawing {
+        Some(Drawing::Curves(drawn)) => curves::draw(drawn, to, size, &plot.title),
+        Some(Drawing::Forest(drawn)) => forest::draw(drawn, to, size, &plot.title),
+        Some(Drawing::Heat(drawn)) => heat::draw(drawn, to, size, &plot.title),
+        Some(Drawing::Timeline(drawn)) => timeline::draw(drawn, to, size, &plot.title),
+        None => {}
+    }
+}
+
+/// The class of a style in the style sheet.
+pub(super) fn class(style: Style) -> &'static str {
+    match style {
+        Style::Measured => "measured",
+        Style::Predicted => "predicted",
+        Style::Residual => "residual",
+        Style::Confidence => "confidence",
+        Style::Prediction => "prediction",
+        Style::Input => "input",
+        Style::Main => "main",
+        Style::Reference => "reference",
+        Style::Quiet => "quiet",
+    }
+}
 
 impl Frame {
     /// Draws within the margins what `content` draws, under a name for those who cannot see it.

@@ -1,13 +1,14 @@
 //! What the findings mean and what would help, a sentence each.
 
 use super::together::together;
-use super::{Excitation, Identifiability};
-use crate::estimate::{Unknown, number};
+use super::{Collinear, Excitation, Identifiability};
+use crate::estimate::{Direction, Unknown};
 use crate::experiment::ExperimentOf;
 use crate::model::Model;
+use crate::numeral::{counted, exact, number, percent};
 use crate::signals::Signals;
 
-/// An output that holds so much of an unknown's information is its only witness.
+/// An output that holds so much of an unknown's information is the only one that tells it.
 const ONLY: f64 = 0.99;
 /// So much of an unknown's information from one tenth of a record leaves little to the others.
 const ONCE: f64 = 0.9;
@@ -18,6 +19,7 @@ const MENTIONED: usize = 3;
 pub(super) fn advice<M: Model>(
     found: &Identifiability,
     unknowns: &[Unknown],
+    directions: &[Direction],
     records: &[ExperimentOf<M>],
 ) -> Vec<String> {
     let mut advice = vec![];
@@ -36,12 +38,20 @@ pub(super) fn advice<M: Model>(
             found.rank
         ));
     }
-    for set in found.collinear.iter().take(MENTIONED) {
+    // What the estimate names as a direction is not said again.
+    let named = |set: &&Collinear| {
+        directions.iter().any(|Direction { moves }| {
+            moves.len() == set.moves.len()
+                && moves.iter().all(|(name, _)| set.moves.iter().any(|(other, _)| other == name))
+        })
+    };
+    for set in found.collinear.iter().filter(|set| !named(set)).take(MENTIONED) {
         let left = set.index.map_or(0.0, f64::recip);
         advice.extend(together(&set.moves, left, unknowns).map(|text| text + "; fix one, or excite them apart"));
     }
-    if let Some(more @ 1..) = found.collinear.len().checked_sub(MENTIONED) {
-        advice.push(format!("{more} more set(s) of unknowns are hardly known but together"));
+    let count = found.collinear.iter().filter(|set| !named(set)).count();
+    if let Some(more @ 1..) = count.checked_sub(MENTIONED) {
+        advice.push(format!("{} of unknowns are hardly known but together", counted(more as u64, "more set")));
     }
     let initial = |excited: &&Excitation| excited.name.contains("(0)");
     for excited in &found.excitation {
@@ -51,7 +61,7 @@ pub(super) fn advice<M: Model>(
     }
     // The beginning of a record is where initial states are seen, and nothing helps that.
     for excited in found.excitation.iter().filter(|excited| !initial(excited)) {
-        advice.extend(one_witness(excited));
+        advice.extend(one_output(excited));
         advice.extend(one_moment(excited));
     }
     for i in 0..M::Input::LEN {
@@ -60,23 +70,24 @@ pub(super) fn advice<M: Model>(
         let all = records.iter().enumerate();
         if all.flat_map(|(e, r)| (0..r.len()).map(move |k| (k, e))).all(|(k, e)| value(k, e) == first) {
             advice.push(format!(
-                "the input `{}` is {first} throughout: what it drives cannot be told from an offset; vary it",
-                M::Input::NAMES[i]
+                "the input `{}` is {} throughout: what it drives cannot be told from an offset; vary it",
+                M::Input::NAMES[i],
+                exact(first)
             ));
         }
     }
     advice
 }
 
-fn one_witness(excited: &Excitation) -> Option<String> {
+fn one_output(excited: &Excitation) -> Option<String> {
     let (output, share) = excited.outputs.iter().find(|(_, share)| *share > ONLY)?;
     let others = excited.outputs.iter().filter(|(name, _)| name != output);
     let others: Vec<String> = others.map(|(name, _)| format!("`{name}`")).collect();
     (!others.is_empty()).then(|| {
         format!(
-            "`{}` is seen only through `{output}` ({:.2} %): {} hardly answers to it; excite it there for a second witness",
+            "`{}` is seen only through `{output}` ({}): {} hardly depends on it, and cannot confirm it",
             excited.name,
-            100.0 * share,
+            percent(*share, 4),
             others.join(", ")
         )
     })
@@ -84,13 +95,14 @@ fn one_witness(excited: &Excitation) -> Option<String> {
 
 fn one_moment(excited: &Excitation) -> Option<String> {
     let segment = excited.segments.iter().find(|segment| segment.share > ONCE)?;
+    let begin = excited.segments.iter().find(|first| first.experiment == segment.experiment)?.from;
     (excited.segments.len() > 1).then(|| {
         format!(
-            "`{}` is known from one tenth of `{}` alone, from t = {} s on ({:.1} %)",
+            "`{}` is known from one tenth of `{}` alone, {} s after its start ({})",
             excited.name,
             segment.experiment,
-            number(segment.from, 5),
-            100.0 * segment.share
+            number(segment.from - begin, 3),
+            percent(segment.share, 3)
         )
     })
 }
