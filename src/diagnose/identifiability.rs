@@ -122,7 +122,7 @@ pub fn identifiability<M: Model, I: Integrator, P: Predictor<M>, O>(
         excitation,
         advice: vec![],
     };
-    result.advice = advice::advice::<M>(&result, &estimate.unknowns, &estimate.directions, problem.experiments());
+    result.advice = advice::advice::<M>(&result, &estimate.unknowns, problem.experiments());
     Ok(result)
 }
 

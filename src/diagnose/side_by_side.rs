@@ -27,7 +27,7 @@ pub enum DataUse {
 /// #     fitted: &ExperimentOf<Surface>, other: &ExperimentOf<Surface>,
 /// # ) -> Result<Report, greybox::Error> {
 /// let both = |record, part| {
-///     Compared::new(record, part).with("full", &full.predict(model, record)?)?.with("linear", &linear.predict(model, record)?)
+///     Compared::new(model, record, part).with("full", &full.predict(model, record)?)?.with("linear", &linear.predict(model, record)?)
 /// };
 /// let report = report.with(vec![both(fitted, DataUse::Estimation)?, both(other, DataUse::Validation)?]);
 /// # Ok(report)
@@ -61,8 +61,8 @@ pub struct ComparedOutput {
 }
 
 impl Compared {
-    /// A record that no model has predicted yet.
-    pub fn new<M: Model>(record: &ExperimentOf<M>, part: DataUse) -> Compared {
+    /// A record that no model has predicted yet; the model only says which signals are meant.
+    pub fn new<M: Model>(_model: &M, record: &ExperimentOf<M>, part: DataUse) -> Compared {
         let output = |j: usize| ComparedOutput {
             name: M::Output::NAMES[j].to_owned(),
             unit: M::Output::UNITS[j].to_owned(),

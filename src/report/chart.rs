@@ -10,7 +10,7 @@ mod heat;
 mod scale;
 mod timeline;
 
-pub(super) use timeline::{keys, time_axis};
+pub(super) use timeline::{COLUMNS, keys, time_axis};
 
 use super::markup::Markup;
 use crate::section::{Drawing, Plot, Style};
@@ -18,8 +18,8 @@ use crate::section::{Drawing, Plot, Style};
 /// How wide a drawing is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Size {
-    /// As wide as the page leaves it.
-    Fluid,
+    /// As wide as the page leaves it; signals over time in so many columns at most.
+    Fluid(usize),
     /// So many pixels, margins included.
     Fixed(f64),
 }
@@ -100,7 +100,7 @@ impl Frame {
         let Margins { left, right, top, bottom } = self.margins;
         let height = self.height + top + bottom;
         match self.size {
-            Size::Fluid => {
+            Size::Fluid(_) => {
                 let style = format!("height:{height}px;padding:{top}px {right}px {bottom}px {left}px");
                 let attributes: [(&str, &dyn core::fmt::Display); 4] =
                     [("class", &"chart"), ("role", &"img"), ("aria-label", &name), ("style", &style)];
@@ -135,7 +135,7 @@ impl Frame {
     /// The place of a fraction of the width, as an attribute.
     fn x(&self, fraction: f64) -> String {
         match self.size {
-            Size::Fluid => format!("{}%", Short(100.0 * fraction)),
+            Size::Fluid(_) => format!("{}%", Short(100.0 * fraction)),
             Size::Fixed(_) => Short(fraction * self.width()).to_string(),
         }
     }
@@ -143,7 +143,7 @@ impl Frame {
     /// Width of the surface in the coordinates of its curves.
     fn width(&self) -> f64 {
         match self.size {
-            Size::Fluid => FLUID,
+            Size::Fluid(_) => FLUID,
             Size::Fixed(width) => (width - self.margins.left - self.margins.right).max(1.0),
         }
     }

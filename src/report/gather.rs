@@ -18,8 +18,8 @@ use core::ops::Range;
 
 /// So many pairs of a record and an output are drawn; of more, those reproduced worst.
 const DRAWN: usize = 24;
-/// Numbers kept for the drawings of all records: with a third more for writing them in letters, 1.8 MB of a page.
-const NUMBERS: usize = 340_000;
+/// Numbers kept for the drawings of all records: four bytes each, a third more in letters, they are 1.4 MB of a page.
+const NUMBERS: usize = 260_000;
 /// Samples of a closeup.
 const CLOSE: usize = 400;
 /// The probability with which bands hold a measurement.

@@ -5,7 +5,7 @@ mod signals;
 mod table;
 mod terms;
 
-use super::chart::{self, PALETTE, STYLE, Size};
+use super::chart::{self, COLUMNS, PALETTE, STYLE, Size};
 use super::markup::{Attributes, Markup};
 use super::{Report, words};
 use crate::optimize::Severity;
@@ -40,7 +40,7 @@ pub(super) fn page(report: &Report) -> String {
             });
         });
         html.node("body", &[], |body| {
-            let mut prose = Prose::default();
+            let mut prose = Prose::new(size(report));
             verdict(body, report, &mut prose);
             contents(body, report);
             body.node("main", &[], |main| {
@@ -56,6 +56,18 @@ pub(super) fn page(report: &Report) -> String {
         });
     });
     page.finish()
+}
+
+/// How finely signals are drawn before anyone zooms: the more of them, the less so.
+fn size(report: &Report) -> Size {
+    /// Columns of all lines together, some 26 bytes each, and the fewest of one.
+    const ALL: usize = 20_000;
+    const FEWEST: usize = 60;
+    let lines = report.plots().into_iter().map(|plot| match &plot.drawing {
+        Some(Drawing::Timeline(timeline)) => timeline.lines().count(),
+        _ => 0,
+    });
+    Size::Fluid((ALL / lines.sum::<usize>().max(1)).clamp(FEWEST, COLUMNS))
 }
 
 /// The colors of both themes, as variables; paper is light.
@@ -202,8 +214,8 @@ fn figure(to: &mut Markup, plot: &Plot, prose: &mut Prose) {
             figure.node("figcaption", &[], |caption| prose.sentence(caption, &plot.caption));
         }
         match &plot.drawing {
-            Some(Drawing::Timeline(timeline)) => signals::draw(figure, plot, timeline),
-            _ => chart::draw(plot, figure, Size::Fluid),
+            Some(Drawing::Timeline(timeline)) => signals::draw(figure, plot, timeline, prose.size),
+            _ => chart::draw(plot, figure, prose.size),
         }
     });
 }

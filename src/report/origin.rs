@@ -76,7 +76,7 @@ impl Origin {
             let text = format!("{}, {size} bytes, SHA-256 {hash}", path.display());
             ["file".into(), text.into()]
         });
-        let date = self.at.and_then(|at| humantime_of(at)).map(|date| ("date", date));
+        let date = self.at.and_then(humantime_of).map(|date| ("date", date));
         let said =
             [self.command.clone().map(|text| ("command", text)), self.code.clone().map(|text| ("code", text)), date];
         table.rows(files).rows(said.into_iter().flatten().map(|(name, text)| [Cell::from(name), text.into()]))

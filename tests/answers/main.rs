@@ -1,7 +1,9 @@
 //! What is said of an estimate: identifiability, diagnostics, comparison, reports.
 
 mod compare;
+mod gallery;
 mod identifiability;
+mod pages;
 #[path = "../common/random.rs"]
 mod random;
 mod reports;

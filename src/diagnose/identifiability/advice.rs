@@ -1,8 +1,8 @@
 //! What the findings mean and what would help, a sentence each.
 
 use super::together::together;
-use super::{Collinear, Excitation, Identifiability};
-use crate::estimate::{Direction, Unknown};
+use super::{Excitation, Identifiability};
+use crate::estimate::Unknown;
 use crate::experiment::ExperimentOf;
 use crate::model::Model;
 use crate::numeral::{counted, exact, number, percent};
@@ -19,7 +19,6 @@ const MENTIONED: usize = 3;
 pub(super) fn advice<M: Model>(
     found: &Identifiability,
     unknowns: &[Unknown],
-    directions: &[Direction],
     records: &[ExperimentOf<M>],
 ) -> Vec<String> {
     let mut advice = vec![];
@@ -38,19 +37,11 @@ pub(super) fn advice<M: Model>(
             found.rank
         ));
     }
-    // What the estimate names as a direction is not said again.
-    let named = |set: &&Collinear| {
-        directions.iter().any(|Direction { moves }| {
-            moves.len() == set.moves.len()
-                && moves.iter().all(|(name, _)| set.moves.iter().any(|(other, _)| other == name))
-        })
-    };
-    for set in found.collinear.iter().filter(|set| !named(set)).take(MENTIONED) {
+    for set in found.collinear.iter().take(MENTIONED) {
         let left = set.index.map_or(0.0, f64::recip);
         advice.extend(together(&set.moves, left, unknowns).map(|text| text + "; fix one, or excite them apart"));
     }
-    let count = found.collinear.iter().filter(|set| !named(set)).count();
-    if let Some(more @ 1..) = count.checked_sub(MENTIONED) {
+    if let Some(more @ 1..) = found.collinear.len().checked_sub(MENTIONED) {
         advice.push(format!("{} of unknowns are hardly known but together", counted(more as u64, "more set")));
     }
     let initial = |excited: &&Excitation| excited.name.contains("(0)");

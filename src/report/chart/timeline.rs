@@ -9,7 +9,7 @@ use crate::section::{Axis, Line, Panel, PanelKind, Stretch, Style, Timeline, Tra
 use core::fmt::{Display, Write};
 
 /// Columns across the drawing of the whole record.
-const COLUMNS: usize = 500;
+pub(in crate::report) const COLUMNS: usize = 500;
 
 /// Height of a panel without its margins (px).
 fn height(kind: PanelKind) -> f64 {
@@ -32,7 +32,7 @@ fn along(timeline: &Timeline, panel: &Panel) -> Along {
 /// Draws the panels below each other under a name for those who cannot see them.
 pub(super) fn draw(timeline: &Timeline, to: &mut Markup, size: Size, name: &str) {
     match size {
-        Size::Fluid => panels(timeline, to, size, name),
+        Size::Fluid(_) => panels(timeline, to, size, name),
         Size::Fixed(width) => {
             let whole = |panel: &Panel| height(panel.kind) + 24.0 + along(timeline, panel).room();
             let heights: Vec<f64> = timeline.panels.iter().map(whole).collect();
@@ -84,8 +84,9 @@ fn panel(timeline: &Timeline, panel: &Panel, first: usize, to: &mut Markup, size
     let y = Scale::new(&Axis::new(&panel.name, &panel.unit), range).with_room();
     let center = traces().find(|(line, _)| line.style == Style::Predicted).map(|(_, trace)| trace);
     let height = height(panel.kind);
+    let columns = if let Size::Fluid(columns) = size { columns } else { COLUMNS };
     let stretched = |frame: &Frame, svg: &mut Markup| {
-        let surface = Surface { frame, x: &x, y: &y, whole };
+        let surface = Surface { frame, x: &x, y: &y, whole, columns };
         for (line, trace) in traces() {
             let d = match (is_band(line.style), center) {
                 (true, Some(center)) => surface.band(center, trace),
@@ -135,6 +136,8 @@ struct Surface<'a> {
     x: &'a Scale,
     y: &'a Scale,
     whole: &'a Stretch,
+    /// Columns that the whole is drawn in at most.
+    columns: usize,
 }
 
 impl Surface<'_> {
@@ -149,8 +152,8 @@ impl Surface<'_> {
         values: impl Iterator<Item = Option<T>>,
         merge: impl Fn(T, T) -> T,
     ) -> Vec<Option<Column<T>>> {
-        let few = self.whole.t.len() <= COLUMNS;
-        let width = if few { 0.0 } else { (self.x.to - self.x.from) / COLUMNS as f64 };
+        let few = self.whole.t.len() <= self.columns;
+        let width = if few { 0.0 } else { (self.x.to - self.x.from) / self.columns.max(1) as f64 };
         let mut columns: Vec<Option<Column<T>>> = vec![];
         // The last column's begin, the last value's time, and whether values are missing since.
         let (mut begin, mut last, mut missing) = (f64::NEG_INFINITY, f64::NEG_INFINITY, false);

@@ -1,6 +1,7 @@
 //! Sentences of a page: names as code, terms with their explanation.
 
 use super::terms::{self, TERMS};
+use crate::report::chart::Size;
 use crate::report::markup::Markup;
 use crate::report::words;
 use core::fmt::Display;
@@ -8,9 +9,9 @@ use core::fmt::Display;
 /// Letters after a term that stay with it: `),`.
 const CLOSE: usize = 2;
 
-/// Which terms have been met.
-#[derive(Default)]
+/// Which terms have been met, and how plots are drawn.
 pub(super) struct Prose {
+    pub size: Size,
     /// In this section, where a term is explained once.
     here: Vec<&'static str>,
     /// On the page.
@@ -18,6 +19,11 @@ pub(super) struct Prose {
 }
 
 impl Prose {
+    /// Nothing has been met.
+    pub fn new(size: Size) -> Prose {
+        Prose { size, here: vec![], met: vec![] }
+    }
+
     /// A new section begins.
     pub fn begin(&mut self) {
         self.here.clear();

@@ -37,7 +37,7 @@ struct PackedTrace {
 }
 
 /// Legend, drawing and numbers.
-pub(super) fn draw(to: &mut Markup, plot: &Plot, timeline: &Timeline) {
+pub(super) fn draw(to: &mut Markup, plot: &Plot, timeline: &Timeline, size: Size) {
     let attributes: [(&str, &dyn Display); 4] =
         [("class", &"timeline"), ("tabindex", &"0"), ("role", &"group"), ("aria-label", &plot.title)];
     to.node("div", &attributes, |node| {
@@ -46,7 +46,7 @@ pub(super) fn draw(to: &mut Markup, plot: &Plot, timeline: &Timeline) {
                 legend.words("span", &[("class", &format_args!("key {class}"))], name);
             }
         });
-        chart::draw(plot, node, Size::Fluid);
+        chart::draw(plot, node, size);
         node.node("script", &[("type", &"application/json")], |script| script.verbatim(&numbers(timeline)));
     });
 }

@@ -103,6 +103,9 @@ const zoomable = (root) => {
     point(middle(), timeline.panels[0]);
   });
   root.addEventListener("focusout", unpoint);
+  // What was closed was drawn coarsely.
+  const closed = root.closest("details");
+  closed?.addEventListener("toggle", () => closed.open && show(...timeline.shown));
   timeline.panels.forEach((panel) => pointing(panel, { timeline, show, scale, all, point, unpoint, timeAt, box }));
 };
 

@@ -9,12 +9,17 @@ use crate::section::{Drawing, Section};
 /// Gaps that are named.
 const NAMED: usize = 5;
 
+/// Plots of residuals against signals, in all and of one output.
+const AGAINST: usize = 120;
+
 /// A section for each record that is drawn; of several, the one reproduced worst is open.
 pub(super) fn sections(facts: &Facts) -> Vec<Section> {
     let drawn = || facts.records.iter().filter(|record| record.timeline.is_some());
+    let outputs = drawn().map(|record| record.fits.len()).sum::<usize>();
+    let against = (AGAINST / outputs.max(1)).clamp(4, 16);
     let worst = |record: &Record| record.fits.iter().filter_map(|fit| fit.fit_percent).fold(f64::INFINITY, f64::min);
     let least = drawn().map(worst).fold(f64::INFINITY, f64::min);
-    let mut sections: Vec<Section> = drawn().enumerate().map(|(i, record)| section(i + 1, record)).collect();
+    let mut sections: Vec<Section> = drawn().enumerate().map(|(i, record)| section(i + 1, record, against)).collect();
     let open = drawn().position(|record| worst(record) == least).unwrap_or(0);
     let closed = sections.iter_mut().enumerate().filter(|(i, _)| *i != open);
     closed.for_each(|(_, section)| section.folded = true);
@@ -27,15 +32,14 @@ pub(super) fn sections(facts: &Facts) -> Vec<Section> {
     sections
 }
 
-fn section(number: usize, record: &Record) -> Section {
+fn section(number: usize, record: &Record, against: usize) -> Section {
     let title = format!("Measured and predicted: {}", record.name);
     let section = Section::new(format!("record-{number}"), title).says(format!("{}.", extent(record)));
     let section = sentences(record).into_iter().fold(section, Section::says);
     let section = section.plot(record.timeline.clone());
-    record
-        .fits
-        .iter()
-        .fold(section, |section, fit| section.part(residuals::of_output(&format!("record-{number}"), record, fit)))
+    record.fits.iter().fold(section, |section, fit| {
+        section.part(residuals::of_output(&format!("record-{number}"), record, fit, against))
+    })
 }
 
 /// What the drawing of a record shows, and what it cannot.

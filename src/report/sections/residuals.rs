@@ -60,8 +60,9 @@ fn meanings(failed: &[(String, &Test)]) -> Vec<String> {
     said.chain((left > 0).then(|| format!("{left} more meanings stand with the records."))).collect()
 }
 
-/// The residuals of an output of a record; `id` tells the record from others.
-pub(super) fn of_output(id: &str, record: &Record, fit: &OutputFit) -> Section {
+/// The residuals of an output of a record; `id` tells the record from others. Of the plots against signals so many are
+/// shown, those with the least probable tests first.
+pub(super) fn of_output(id: &str, record: &Record, fit: &OutputFit, shown: usize) -> Section {
     let of = &fit.residuals;
     let fits = fit.fit_percent.map_or(String::new(), |fit| format!(", reproduced to {} %", numeral::fit(fit)));
     let section = Section::new(format!("{id}-{}", fit.name), format!("Residuals of {}{fits}", fit.name)).folded();
@@ -83,9 +84,7 @@ pub(super) fn of_output(id: &str, record: &Record, fit: &OutputFit) -> Section {
     };
     let title = format!("The residuals of {} against each signal", fit.name);
     let against = Section::new(format!("{id}-{}-signals", fit.name), title).folded();
-    let against =
-        of.correlations.iter().fold(against, |part, with| part.plot(cross_correlation(id, record, fit, with)));
-    let against = of.spreads.iter().fold(against, |part, over| part.plot(spread(id, record, fit, over)));
+    let against = against_signals(id, record, fit).into_iter().take(shown).fold(against, Section::plot);
     let mut section = section
         .plot(fit.closeup.clone())
         .plot(histogram(id, record, fit))
@@ -172,6 +171,24 @@ fn cross_correlation(id: &str, record: &Record, fit: &OutputFit, with: &Correlat
     );
     let drawing = lags("correlation", record.sample_time, *first_lag, *tested_from, values, *band)?;
     Some(Plot::new(format!("correlation-{id}-{}-{signal}-{role}", fit.name), caption, title, drawing))
+}
+
+/// The plots of the residual against each signal, those with the least probable tests first.
+fn against_signals(id: &str, record: &Record, fit: &OutputFit) -> Vec<Plot> {
+    let of = &fit.residuals;
+    let p = |begin: &str, role: &str, signal: &str| {
+        let test = of.tests.iter().find(|test| test.name == format!("{begin} {role} `{signal}`"));
+        test.map_or(1.0, |test| test.p_value)
+    };
+    let correlations = of.correlations.iter().filter_map(|with| {
+        Some((p("cross-correlation with", &with.role, &with.signal), cross_correlation(id, record, fit, with)?))
+    });
+    let spreads = of.spreads.iter();
+    let spreads =
+        spreads.map(|over| (p("Breusch-Pagan-Koenker,", &over.role, &over.signal), spread(id, record, fit, over)));
+    let mut plots: Vec<(f64, Plot)> = correlations.chain(spreads).collect();
+    plots.sort_by(|a, b| a.0.total_cmp(&b.0));
+    plots.into_iter().map(|(_, plot)| plot).collect()
 }
 
 /// Bars over lags in seconds; those before `tested_from` (samples) are not tested.
