@@ -42,9 +42,9 @@ pub(crate) fn rounded(value: f64, step: f64) -> String {
     trimmed(&resolved(value, step)).to_owned()
 }
 
-/// A fit (%), with the digits that tell it from 100 %.
+/// A fit (%): four digits, or as many more as tell it from 100 %.
 pub(crate) fn fit(percent: f64) -> String {
-    if (99.0..100.0).contains(&percent) { resolved(percent, 100.0 - percent) } else { number(percent, 4) }
+    if (99.0..100.0).contains(&percent) { resolved(percent, 100.0 - percent) } else { written(percent, 4) }
 }
 
 /// A standard error: two digits, zeros kept.

@@ -45,8 +45,8 @@ fn values_end_where_their_errors_do() {
 /// A fit that is not perfect is not written as 100 %.
 #[test]
 fn a_fit_is_told_from_perfect() {
-    let fits = [99.997_89, 99.2, 94.837, 100.0, -48_432.0].map(fit);
-    assert_eq!(fits, ["99.9979", "99.20", "94.84", "100", "-48432"]);
+    let fits = [99.997_89, 99.2, 95.5, 100.0, -48_432.0].map(fit);
+    assert_eq!(fits, ["99.9979", "99.20", "95.50", "100.0", "-48432"]);
     assert_eq!((rounded(0.015, 0.001), rounded(1.000_02e-3, 0.001)), ("0.015".to_owned(), "0.001".to_owned()));
 }
 

@@ -108,10 +108,10 @@ fn class(severity: Severity) -> &'static str {
     }
 }
 
-/// Links to the sections, but for more records than a reader goes through.
+/// Links to the sections that are open.
 fn contents(body: &mut Markup, report: &Report) {
     const LINKS: usize = 16;
-    let linked = report.sections.iter().filter(|section| !section.is_empty());
+    let linked = report.sections.iter().filter(|section| !section.is_empty() && !section.folded);
     body.node("nav", &[("aria-label", &"Sections")], |nav| {
         nav.node("ul", &[], |list| {
             for section in linked.take(LINKS) {
@@ -165,7 +165,6 @@ fn content(to: &mut Markup, section: &Section, level: usize, prose: &mut Prose) 
     let (timelines, small): (Vec<&Plot>, Vec<&Plot>) =
         section.plots.iter().filter(|plot| plot.drawing.is_some()).partition(wide);
     paragraphs(to, section, prose);
-    timelines.iter().for_each(|plot| figure(to, plot, prose));
     match (section.tables.as_slice(), small.as_slice()) {
         ([first, rest @ ..], [plot]) => {
             beside(to, first, plot, prose);
@@ -185,6 +184,7 @@ fn content(to: &mut Markup, section: &Section, level: usize, prose: &mut Prose) 
             }
         }
     }
+    timelines.iter().for_each(|plot| figure(to, plot, prose));
     section.parts.iter().for_each(|part| self::section(to, part, level + 1, prose));
 }
 

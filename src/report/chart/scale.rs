@@ -1,5 +1,6 @@
 //! [`Scale`]: an axis with its range, round numbers in it, and how they are written.
 
+use super::cut;
 use crate::numeral::exact;
 use crate::section::Axis;
 
@@ -22,6 +23,8 @@ pub(super) struct Tick {
     pub label: String,
 }
 
+/// So many letters of a name fit the narrowest screen beside a unit.
+const LETTERS: usize = 36;
 /// A range this much smaller than its distance from zero is written as what is above a round number.
 const NARROW: f64 = 1e-4;
 /// A logarithmic range of fewer decades is one value.
@@ -89,9 +92,10 @@ impl Scale {
             0.0 => String::new(),
             base => format!(", above {}", exact(base)),
         };
+        let name = cut(&self.name, LETTERS);
         match factor.len() + self.unit.len() {
-            0 => format!("{}{base}", self.name),
-            _ => format!("{}{base} ({})", self.name, format!("{factor}{}", self.unit).trim_end()),
+            0 => format!("{name}{base}"),
+            _ => format!("{name}{base} ({})", format!("{factor}{}", self.unit).trim_end()),
         }
     }
 

@@ -130,6 +130,14 @@ struct Column<T> {
     value: T,
 }
 
+/// The least and greatest of several values, and those of the first and the last of them.
+#[derive(Clone, Copy)]
+struct Span {
+    ends: (f64, f64),
+    first: (f64, f64),
+    last: (f64, f64),
+}
+
 /// Where the values of a stretch are drawn.
 struct Surface<'a> {
     frame: &'a Frame,
@@ -180,22 +188,31 @@ impl Surface<'_> {
         columns
     }
 
-    /// A line through all columns, up and down each.
+    /// A line through all columns: along one in which the values rise or fall all the way, else up and down.
     fn line(&self, line: &Line, trace: &Trace) -> String {
-        let wider = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
+        let spans = trace.extremes().map(|ends| ends.map(|ends| Span { ends, first: ends, last: ends }));
+        let wider = |a: Span, b: Span| {
+            let ends = (a.ends.0.min(b.ends.0), a.ends.1.max(b.ends.1));
+            Span { ends, first: a.first, last: b.last }
+        };
         let mut before: Option<f64> = None;
         let mut places = vec![];
-        for column in self.columns(trace.extremes(), wider) {
-            let Some(Column { begin, end, value: (low, high) }) = column else {
+        for column in self.columns(spans, wider) {
+            let Some(Column { begin, end, value }) = column else {
                 before = None;
                 places.push(None);
                 continue;
             };
+            let (low, high) = value.ends;
             if let Some(held) = before.filter(|_| line.held && low == high) {
                 places.push(Some(self.place(begin, held)));
             }
-            // From the end that is nearer to where the line stands.
-            let upwards = before.is_none_or(|before| (before - low).abs() <= (before - high).abs());
+            // Up and down, from the end that is nearer to where the line stands.
+            let nearer = before.is_none_or(|before| (before - low).abs() <= (before - high).abs());
+            let (rises, falls) =
+                (value.first.0 == low && value.last.1 == high, value.first.1 == high && value.last.0 == low);
+            let upwards = if rises == falls { nearer } else { rises };
+            let end = if rises == falls { begin } else { end };
             let (first, last) = if upwards { (low, high) } else { (high, low) };
             places.push(Some(self.place(begin, first)));
             if last != first {

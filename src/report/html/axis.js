@@ -25,7 +25,8 @@ const axisOf = (from, to) => {
   }
   const title = (name, unit) => {
     const scaled = `${exponent ? `1e${exponent} ` : ""}${unit}`.trim();
-    return `${name}${base ? `, above ${digitsOf(base, 15)}` : ""}${scaled ? ` (${scaled})` : ""}`;
+    const short = name.length > 36 ? `${name.slice(0, 35)}…` : name;
+    return `${short}${base ? `, above ${digitsOf(base, 15)}` : ""}${scaled ? ` (${scaled})` : ""}`;
   };
   return { ticks, title, at: (value) => (value - from) / span };
 };

@@ -5,8 +5,10 @@ use crate::report::markup::{Attributes, Markup};
 use crate::section::{Cell, Table};
 use core::fmt::Display;
 
-/// A table of more columns than this is scrolled on a narrow screen; its rows would be cards as long as the screen.
-const CARDS: usize = 9;
+/// A table of more cells than these, or of more columns, is scrolled on a narrow screen; its rows would be too many cards,
+/// or cards as long as the screen.
+const CELLS: usize = 48;
+const COLUMNS: usize = 9;
 /// Words of fewer letters stay on one line.
 const SHORT: usize = 20;
 /// What stands between the ends of an interval, which stay on one line.
@@ -18,7 +20,10 @@ pub(super) fn draw(to: &mut Markup, table: &Table, prose: &mut Prose) {
     let fitting: Attributes<'_> = &[("class", &kind)];
     let scroll: Attributes<'_> =
         &[("class", &"scroll"), ("tabindex", &"0"), ("role", &"group"), ("aria-label", &table.caption)];
-    to.node("div", if table.columns.len() <= CARDS { fitting } else { scroll }, |around| {
+    let prose_in_it = (0..table.columns.len()).any(|column| table.is_prose(column));
+    let small = table.rows.len() * table.columns.len() <= CELLS;
+    let fits = kind == "entries" || table.columns.len() <= COLUMNS && (small || prose_in_it);
+    to.node("div", if fits { fitting } else { scroll }, |around| {
         around.node("table", &[("role", &"table")], |node| {
             node.node("caption", &[], |caption| prose.sentence(caption, &table.caption));
             node.node("thead", &[("role", &"rowgroup")], |head| {

@@ -28,8 +28,8 @@ const columnAfter = (time, t) => {
   }
   return low;
 };
-// The columns of a line in a part of time, drawn at most so many: its first time, least
-// and greatest value and last time; null where the line is broken.
+// The columns of a line in a part of time, drawn at most so many: times of the first and last value, least and greatest,
+// and whether they rise or fall all the way; null where the line is broken.
 const columnsOf = ({ time }, low, high, [begin, end]) => {
   const [first, last] = [Math.max(0, columnAfter(time, begin) - 1), Math.min(time.length, columnAfter(time, end) + 1)];
   const width = last - first <= columnsDrawn ? 0 : (end - begin) / columnsDrawn;
@@ -42,13 +42,21 @@ const columnsOf = ({ time }, low, high, [begin, end]) => {
     }
     const [apart, column] = [missing && time[k] - before > width, columns.at(-1)];
     if (column && !apart && time[k] - started < width) {
-      [column[1], column[2], column[3]] = [Math.min(column[1], low[k]), Math.max(column[2], high[k]), time[k]];
+      column.least = Math.min(column.least, low[k]);
+      column.greatest = Math.max(column.greatest, high[k]);
+      [column.end, column.last] = [time[k], k];
     } else {
       if (apart && columns.length) columns.push(null);
-      columns.push([time[k], low[k], high[k], time[k]]);
+      columns.push({ begin: time[k], end: time[k], least: low[k], greatest: high[k], first: k, last: k });
       started = time[k];
     }
     [before, missing] = [time[k], false];
+  }
+  for (const column of columns) {
+    if (!column) continue;
+    const { least, greatest, first, last } = column;
+    column.rises = low[first] === least && high[last] === greatest;
+    column.falls = high[first] === greatest && low[last] === least;
   }
   return columns;
 };
@@ -59,12 +67,14 @@ const linePath = (columns, place, held) => {
       before = null;
       continue;
     }
-    const [t, low, high, last] = column;
-    const upwards = before === null || Math.abs(before - low) <= Math.abs(before - high);
-    const [start, stop] = upwards ? [low, high] : [high, low];
-    if (before === null) d += `M${place(t, start)}L${place(t, start)}`;
-    else d += `${held && low === high ? `L${place(t, before)}` : ""}L${place(t, start)}`;
-    if (start !== stop) d += `L${place(last, stop)}`;
+    const { begin, least, greatest, rises, falls } = column;
+    const nearer = before === null || Math.abs(before - least) <= Math.abs(before - greatest);
+    const upwards = rises === falls ? nearer : rises;
+    const end = rises === falls ? begin : column.end;
+    const [start, stop] = upwards ? [least, greatest] : [greatest, least];
+    if (before === null) d += `M${place(begin, start)}L${place(begin, start)}`;
+    else d += `${held && least === greatest ? `L${place(begin, before)}` : ""}L${place(begin, start)}`;
+    if (start !== stop) d += `L${place(end, stop)}`;
     before = stop;
   }
   return d;
@@ -78,7 +88,7 @@ const bandPath = (means, halves, place) => {
   };
   // Of several columns in one of the drawing the mean stands for the line, and the widest half width for the band.
   means.forEach((column, k) => {
-    if (column && halves[k]) piece.push([column[0], (column[1] + column[2]) / 2, halves[k][2]]);
+    if (column && halves[k]) piece.push([column.begin, (column.least + column.greatest) / 2, halves[k].greatest]);
     else close();
   });
   close();
@@ -132,7 +142,7 @@ class Timeline {
     lines.forEach((line, k) => {
       if (isBand(line)) return;
       for (const column of columns[k]) {
-        if (column) [least, greatest] = [Math.min(least, column[1]), Math.max(greatest, column[2])];
+        if (column) [least, greatest] = [Math.min(least, column.least), Math.max(greatest, column.greatest)];
       }
     });
     if (least > greatest) [least, greatest] = [0, 1];

@@ -19,6 +19,7 @@ pub(super) fn section(facts: &Facts) -> Section {
             section.part(part.says(format!("{}.", extent(record))).table(signals(record)).folded())
         }),
     };
+    let section = if facts.single() { section } else { section.folded() };
     match facts.records.len().saturating_sub(SHOWN) {
         0 => section,
         more => section.says(format!("The signals of {} are not listed.", counted(more as u64, "more record"))),

@@ -3,7 +3,7 @@
 use super::quoted;
 use crate::diagnose::residuals::{Correlation, Residuals, Spread};
 use crate::diagnose::{self, LEVEL, Test};
-use crate::numeral::{self, counted, number, rounded};
+use crate::numeral::{self, counted, number, resolved, rounded};
 use crate::optimize::Severity;
 use crate::report::facts::{Facts, OutputFit, Record};
 use crate::section::{Axis, Curves, Drawing, Layer, Plot, Section, Style};
@@ -70,7 +70,7 @@ pub(super) fn of_output(id: &str, record: &Record, fit: &OutputFit, shown: usize
     let unit = unit_after(&fit.unit);
     let section = section.says(format!(
         "Mean {}{unit}, standard deviation {}{unit}; the largest is {}{unit}, {at} s after the start.",
-        number(of.mean, 2),
+        resolved(of.mean, of.standard_deviation / of.effective_samples.max(1.0).sqrt()),
         number(of.standard_deviation, 3),
         number(fit.largest, 3),
     ));
