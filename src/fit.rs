@@ -330,10 +330,9 @@ impl<M: Model, I: Integrator, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
                 if !(weight >= 0.0 && weight.is_finite()) {
                     let name = record.name();
                     return Err(Error::Option(format!(
-                        "weighting: the weight of sample {k} (t = {} s) of experiment `{name}` is {}; weights must be \
+                        "weighting: the weight of sample {k} (t = {} s) of experiment `{name}` is {weight}; weights must be \
                          finite and not negative",
-                        exact(t),
-                        exact(weight)
+                        exact(t)
                     )));
                 }
                 counts |= weight > 0.0 && M::Output::into_array(y).as_ref().iter().any(|y| !y.is_nan());
