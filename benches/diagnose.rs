@@ -7,7 +7,7 @@ use cpu_time::ProcessTime;
 use divan::Bencher;
 use greybox::diagnose::{identifiability, residuals};
 use greybox::optimize::LeastSquares;
-use greybox::{Experiment, Fit, Model, Report, Scalar, Time, free, signals};
+use greybox::{Experiment, Fit, Model, Report, Scalar, Time, free, signals, simulate};
 
 const SAMPLES: usize = 200_000;
 
@@ -15,6 +15,7 @@ signals! { struct Currents { id: "A", iq: "A" } }
 signals! { struct Drive { ud: "V", uq: "V", w: "rad/s" } }
 signals! { struct Winding { rs: "ohm", ls: "H", ke: "V s/rad" } }
 
+#[derive(Clone)]
 struct Pmsm;
 
 impl Model for Pmsm {
@@ -23,7 +24,6 @@ impl Model for Pmsm {
     type Output = Currents;
     type Parameters = Winding;
 
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Currents<S>, u: &Drive<S>, p: &Winding<S>) -> Currents<S> {
         let we = u.w * 4.0;
         Currents {
@@ -32,7 +32,6 @@ impl Model for Pmsm {
         }
     }
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
         *x
     }
@@ -46,17 +45,12 @@ fn record() -> Experiment<Currents, Drive, Currents> {
         uq: 30.0 + wave(k, 700),
         w: 40.0 + 2.0 * wave(k, 9000) + noise(k),
     });
-    let zero = Currents { id: 0.0, iq: 0.0 };
-    let time = Time::Uniform { start: 0.0, step: 125e-6 };
-    let blank = Experiment::new(&Pmsm, time.clone(), inputs.collect(), vec![zero; SAMPLES]).unwrap();
+    let (time, inputs) = (Time::Uniform { start: 0.0, step: 125e-6 }, inputs.collect::<Vec<_>>());
     let truth = Winding { rs: 0.5, ls: 2e-3, ke: 0.7 };
-    let parameters =
-        Winding { rs: greybox::fixed(truth.rs), ls: greybox::fixed(truth.ls), ke: greybox::fixed(truth.ke) };
-    let blank = blank.initial(Currents { id: greybox::fixed(0.0), iq: greybox::fixed(0.0) });
-    let outputs = Fit::new(&Pmsm, &blank).parameters(parameters).simulate().unwrap().outputs;
+    let outputs = simulate(&Pmsm, &truth, &Currents { id: 0.0, iq: 0.0 }, time.clone(), &inputs).unwrap().outputs;
     let noisy =
         outputs.iter().enumerate().map(|(k, y)| Currents { id: y.id + noise(3 * k), iq: y.iq + noise(5 * k + 1) });
-    Experiment::new(&Pmsm, time, blank.inputs().to_vec(), noisy.collect()).unwrap()
+    Experiment::new(&Pmsm, time, inputs, noisy.collect()).unwrap()
 }
 
 const GUESS: Winding<f64> = Winding { rs: 0.6, ls: 2.2e-3, ke: 0.65 };
@@ -65,15 +59,16 @@ const GUESS: Winding<f64> = Winding { rs: 0.6, ls: 2.2e-3, ke: 0.65 };
 fn main() {
     let record = record();
     let parameters = Winding { rs: free(GUESS.rs), ls: free(GUESS.ls), ke: free(GUESS.ke) };
-    let mut problem = Fit::new(&Pmsm, &record).parameters(parameters).problem().unwrap();
+    let problem = Fit::new(&Pmsm, &record).parameters(parameters).problem().unwrap();
     let estimate = problem.run().unwrap();
-    let place = problem.objective().start();
+    let objective = problem.objective().unwrap();
+    let place = objective.start();
     let took = |work: &dyn Fn()| {
         let begin = ProcessTime::now();
         work();
         begin.elapsed().as_secs_f64()
     };
-    let passes = took(&|| (0..20).for_each(|_| drop(problem.objective().linearize(&place).unwrap())));
+    let passes = took(&|| (0..20).for_each(|_| drop(objective.linearize(&place).unwrap())));
     let report = took(&|| drop(Report::new(&problem, &estimate).unwrap()));
     println!(
         "process time: twenty passes {passes:.3} s, default diagnostics {report:.3} s, ratio {:.2}",
@@ -87,7 +82,7 @@ fn twenty_passes_with_slopes(bencher: Bencher) {
     let record = record();
     let parameters = Winding { rs: free(GUESS.rs), ls: free(GUESS.ls), ke: free(GUESS.ke) };
     let problem = Fit::new(&Pmsm, &record).parameters(parameters).problem().unwrap();
-    let objective = problem.objective();
+    let objective = problem.objective().unwrap();
     let place = objective.start();
     bencher.bench_local(|| (0..20).map(|_| objective.linearize(&place).unwrap().cost).sum::<f64>());
 }
@@ -96,7 +91,7 @@ fn twenty_passes_with_slopes(bencher: Bencher) {
 fn default_diagnostics(bencher: Bencher) {
     let record = record();
     let parameters = Winding { rs: free(GUESS.rs), ls: free(GUESS.ls), ke: free(GUESS.ke) };
-    let mut problem = Fit::new(&Pmsm, &record).parameters(parameters).problem().unwrap();
+    let problem = Fit::new(&Pmsm, &record).parameters(parameters).problem().unwrap();
     let estimate = problem.run().unwrap();
     bencher.bench_local(|| Report::new(&problem, &estimate).unwrap());
 }
@@ -107,14 +102,14 @@ fn examination_of_residuals(bencher: Bencher) {
     let parameters = Winding { rs: free(GUESS.rs), ls: free(GUESS.ls), ke: free(GUESS.ke) };
     let estimate = Fit::new(&Pmsm, &record).parameters(parameters).run().unwrap();
     let prediction = estimate.predict(&Pmsm, &record).unwrap();
-    bencher.bench_local(|| residuals::examine(&prediction, &record).unwrap());
+    bencher.bench_local(|| residuals::examine(&prediction.columns, record.record()).unwrap());
 }
 
 #[divan::bench(sample_count = 5, sample_size = 1)]
 fn identifiability_of_parameters(bencher: Bencher) {
     let record = record();
     let parameters = Winding { rs: free(GUESS.rs), ls: free(GUESS.ls), ke: free(GUESS.ke) };
-    let mut problem = Fit::new(&Pmsm, &record).parameters(parameters).problem().unwrap();
+    let problem = Fit::new(&Pmsm, &record).parameters(parameters).problem().unwrap();
     let estimate = problem.run().unwrap();
     bencher.bench_local(|| identifiability(&problem, &estimate).unwrap());
 }

@@ -43,7 +43,13 @@ models! {
     positioning_loop: PositioningLoop::EMPS, Reference { qg: 0.1 }, Axis { m: 95.0, fv: 200.0, fc: 20.0, offset: -3.0 };
 }
 
-fn run<M: Model>(bencher: Bencher, model: &M, amplitude: Of<M::Input, f64>, p: Of<M::Parameters, f64>, slopes: bool) {
+fn run<M: Model + Clone>(
+    bencher: Bencher,
+    model: &M,
+    amplitude: Of<M::Input, f64>,
+    p: Of<M::Parameters, f64>,
+    slopes: bool,
+) {
     let swing = |k: usize| (3.0 * k as f64 * STEP).sin();
     let inputs = (0..SAMPLES).map(|k| M::Input::map(amplitude, |a| a * swing(k))).collect();
     let outputs = (0..SAMPLES).map(|k| M::Output::splat(swing(7 * k))).collect();
@@ -51,7 +57,7 @@ fn run<M: Model>(bencher: Bencher, model: &M, amplitude: Of<M::Input, f64>, p: O
     let record = record.initial(M::State::splat(free(0.0)));
     let fit = Fit::new(model, &record).parameters(M::Parameters::map(p, free)).noise(M::Output::splat(1.0));
     let problem = fit.problem().unwrap();
-    let objective = problem.objective();
+    let objective = problem.objective().unwrap();
     let start = objective.start();
     let bencher = bencher.counter(ItemsCount::new(SAMPLES));
     if slopes {

@@ -51,8 +51,7 @@ fn run(arguments: &Arguments) -> Result<(), greybox::Error> {
     // is gtau times either, so that the ratio is that of the forces.
     let simulated = estimate.predict(&model, &record)?;
     let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
-    let error =
-        norm(&mut simulated.residuals.iter().map(|e| e.vir)) / norm(&mut record.outputs().iter().map(|y| y.vir));
+    let error = norm(&mut simulated.residuals.iter().map(|e| e.vir)) / norm(&mut record.outputs().map(|y| y.vir));
     println!("\nRelative force error of the closed-loop simulation: {:.2} %", 100.0 * error);
     Ok(())
 }

@@ -3,7 +3,7 @@
 //! The record is simulated here, with known parameters and noise, so that the truth can stand beside the estimate:
 //! `cargo run --release --example first_fit`. With `-- --save motor.csv` it is kept as a file.
 
-use greybox::{Experiment, ExperimentOf, Fit, Model, Scalar, Signals, Time, fixed, free, signals};
+use greybox::{Experiment, ExperimentOf, Fit, Model, Scalar, Time, free, signals, simulate};
 use rand_distr::{Distribution, Normal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use std::{error::Error, process::ExitCode};
@@ -28,7 +28,6 @@ impl Model for Pmsm {
     type Output = Currents;
     type Parameters = Winding;
 
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Currents<S>, u: &Drive<S>, p: &Winding<S>) -> Currents<S> {
         let we = u.w * self.pole_pairs;
         Currents {
@@ -37,7 +36,6 @@ impl Model for Pmsm {
         }
     }
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
         *x
     }
@@ -81,14 +79,12 @@ fn simulated(model: &Pmsm, truth: Winding) -> Result<ExperimentOf<Pmsm>, Box<dyn
         let step = if k / 100 % 2 == 0 { 8.0 } else { -8.0 };
         inputs.push(Drive { ud: digits(-0.4 * step)?, uq: digits(0.63 * step + 0.95 * SQRT_2_3 * w)?, w: digits(w)? });
     }
-    let unknown = vec![Currents { id: f64::NAN, iq: f64::NAN }; inputs.len()];
-    let record = Experiment::new(model, time.clone(), inputs, unknown)?.initial(Currents::splat(fixed(0.0)));
-    let currents = Fit::new(model, &record).parameters(Winding::map(truth, fixed)).simulate()?.outputs;
+    let currents = simulate(model, &truth, &Currents { id: 0.0, iq: 0.0 }, time.clone(), &inputs)?.outputs;
     let (mut random, noise) = (Xoshiro256PlusPlus::seed_from_u64(2011), Normal::new(0.0, 0.05)?);
     let mut measured = |current: f64| digits(current + noise.sample(&mut random));
     let outputs: Result<_, _> = currents
         .iter()
         .map(|i| Ok::<_, std::num::ParseFloatError>(Currents { id: measured(i.id)?, iq: measured(i.iq)? }))
         .collect();
-    Ok(Experiment::new(model, time, record.inputs().to_vec(), outputs?)?.named("simulated drive"))
+    Ok(Experiment::new(model, time, inputs, outputs?)?.named("simulated drive"))
 }

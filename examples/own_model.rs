@@ -3,10 +3,7 @@
 //! It shows a discrete model, a nonlinear output, two experiments with a start of their own each, a parameter that every
 //! experiment has for itself, a prior from a data sheet, bounds, and logarithms: `cargo run --release --example own_model`.
 
-use greybox::{Experiment, ExperimentOf, Fit, Kind, Model, Scalar, Signals, Time, fixed, free, signals};
-use rand_distr::{Distribution, Normal};
-use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
-use std::error::Error;
+use greybox::{Error, ExperimentOf, Fit, Kind, Model, Scalar, Time, free, signals, simulate};
 
 signals! {
     /// What the mug remembers.
@@ -24,6 +21,12 @@ struct Cooling {
     step: f64,
 }
 
+impl Cooling {
+    fn time(&self) -> Time {
+        Time::Uniform { start: 0.0, step: self.step }
+    }
+}
+
 impl Model for Cooling {
     type State = Heat;
     type Input = Surroundings;
@@ -31,20 +34,18 @@ impl Model for Cooling {
     type Parameters = Mug;
     const KIND: Kind = Kind::Discrete;
 
-    #[inline]
     fn next<S: Scalar>(&self, _t: S, x: &Heat<S>, u: &Surroundings<S>, p: &Mug<S>) -> Heat<S> {
         let rest = u.ambient + u.power / p.loss;
         let decay = (-p.loss * self.step / p.capacity).exp();
         Heat { temperature: rest + (x.temperature - rest) * decay }
     }
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Heat<S>, _u: &Surroundings<S>, p: &Mug<S>) -> Thermistor<S> {
         Thermistor { resistance: p.r25 * (p.beta * (x.temperature.recip() - 1.0 / 298.15)).exp() }
     }
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<(), Error> {
     let model = Cooling { step: 10.0 };
     let open = Mug { capacity: 1250.0, loss: 1.9, r25: 10.12, beta: 3965.0 };
     let records = [
@@ -61,12 +62,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         .run()?;
     println!("{estimate}\n\nTrue values: {open:?}, with its lid a loss of 0.8 W/K");
 
-    // An estimate predicts. How warm does the open mug stay at 30 W?
-    let inputs = vec![Surroundings { power: 30.0, ambient: 293.0 }; 1000];
-    let unknown = vec![Thermistor { resistance: f64::NAN }; inputs.len()];
-    let future = Experiment::new(&model, Time::Uniform { start: 0.0, step: model.step }, inputs, unknown)?
-        .initial(Heat { temperature: fixed(293.0) });
-    let last = estimate.predict(&model, &future)?.outputs[999].resistance;
+    // The estimate simulated. How warm does the open mug stay at 30 W?
+    let (time, inputs) = (model.time(), vec![Surroundings { power: 30.0, ambient: 293.0 }; 1000]);
+    let future = simulate(&model, &estimate.parameters, &Heat { temperature: 293.0 }, time, &inputs)?;
+    let last = future.outputs[999].resistance;
     println!("After three hours at 30 W the thermistor will show {last:.4} kohm.");
     Ok(())
 }
@@ -78,15 +77,9 @@ fn measured(
     truth: Mug,
     temperature: f64,
     seed: u64,
-) -> Result<ExperimentOf<Cooling>, Box<dyn Error>> {
-    let time = Time::Uniform { start: 0.0, step: model.step };
+) -> Result<ExperimentOf<Cooling>, Error> {
     let power = |k: usize| if (k / 60).is_multiple_of(2) { 0.0 } else { 90.0 };
     let inputs: Vec<_> = (0..180).map(|k| Surroundings { power: power(k), ambient: 293.0 }).collect();
-    let unknown = vec![Thermistor { resistance: f64::NAN }; inputs.len()];
-    let record = Experiment::new(model, time.clone(), inputs.clone(), unknown)?
-        .initial(Heat { temperature: fixed(temperature) });
-    let mut outputs = Fit::new(model, &record).parameters(Mug::map(truth, fixed)).simulate()?.outputs;
-    let (mut random, noise) = (Xoshiro256PlusPlus::seed_from_u64(seed), Normal::new(0.0, 0.02)?);
-    outputs.iter_mut().for_each(|y| y.resistance += noise.sample(&mut random));
-    Ok(Experiment::new(model, time, inputs, outputs)?.named(name))
+    let run = simulate(model, &truth, &Heat { temperature }, model.time(), &inputs)?;
+    Ok(run.with_noise(Thermistor { resistance: 0.02 }, seed).experiment(model)?.named(name))
 }

@@ -18,7 +18,6 @@ impl Model for Pmsm {
     type Output = Currents;
     type Parameters = Winding;
 
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Currents<S>, u: &Drive<S>, p: &Winding<S>) -> Currents<S> {
         let we = u.w * self.pole_pairs;
         Currents {
@@ -27,7 +26,6 @@ impl Model for Pmsm {
         }
     }
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
         *x
     }
@@ -78,9 +76,9 @@ fn read(model: &Pmsm, path: &str, samples: usize) -> Result<Vec<ExperimentOf<Pms
         bytes.chunks_exact(8).map(|b| f64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]])).collect();
     drop(bytes);
     let record = |rows: &[f64]| {
-        let inputs = rows.chunks_exact(5).map(|r| Drive { ud: r[0], uq: r[1], w: r[2] }).collect();
-        let outputs = rows.chunks_exact(5).map(|r| Currents { id: r[3], iq: r[4] }).collect();
-        Experiment::new(model, Time::Uniform { start: 0.0, step: SAMPLE_TIME }, inputs, outputs)
+        let column = |i: usize| rows.chunks_exact(5).map(|row| row[i]).collect::<Vec<f64>>();
+        let (inputs, outputs) = (vec![column(0), column(1), column(2)], vec![column(3), column(4)]);
+        Experiment::from_columns(model, Time::Uniform { start: 0.0, step: SAMPLE_TIME }, inputs, outputs)
     };
     Ok(numbers.chunks(samples.saturating_mul(5)).map(record).collect::<Result<_, _>>()?)
 }

@@ -1,55 +1,59 @@
-//! Signals of a generic type in serde's data model: a map from name to entry, as the structs of `signals!` have it.
-//!
-//! For fields of type `Of<X, T>`, where `X` is only known to be [`Signals`]:
-//! `#[serde(serialize_with = "by_name::serialize::<X, _, _>", deserialize_with = "by_name::deserialize::<X, _, _>")]`.
+//! Named vectors in serde's data model: a map from name to entry, as the structs of `signals!` have it, for names that
+//! are known at run time.
 
-use crate::signals::{Entry, Of, Signals};
 use core::fmt;
 use core::marker::PhantomData;
 use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Writes the entries under their names.
-pub(crate) fn serialize<X: Signals, T: Entry + Serialize, S: Serializer>(
-    signals: &Of<X, T>,
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
-    serializer.collect_map(X::NAMES.iter().zip(X::into_array(*signals)))
+/// Entries under names that are known at run time; a repeated name is an error.
+pub(crate) struct Entries<T>(pub Vec<(String, T)>);
+
+impl<T> Entries<T> {
+    /// The entries in the order of these names; an unknown or a missing name is an error that says it.
+    pub fn in_order<'n>(self, names: impl Iterator<Item = &'n str> + Clone) -> Result<Vec<T>, String> {
+        if let Some((unknown, _)) = self.0.iter().find(|(name, _)| !names.clone().any(|known| known == name)) {
+            let names: Vec<String> = names.map(|name| format!("`{name}`")).collect();
+            return Err(format!("unknown field `{unknown}`, expected one of {}", names.join(", ")));
+        }
+        let mut entries: Vec<Option<(String, T)>> = self.0.into_iter().map(Some).collect();
+        let mut take = |name: &str| {
+            let mut here = entries.iter_mut().filter(|entry| entry.as_ref().is_some_and(|(known, _)| known == name));
+            here.next().and_then(Option::take).map(|(_, entry)| entry).ok_or_else(|| format!("missing field `{name}`"))
+        };
+        names.map(&mut take).collect()
+    }
 }
 
-/// Reads the entries; a missing, unknown or repeated name is an error that says it.
-pub(crate) fn deserialize<'de, X: Signals, T: Entry + Deserialize<'de>, D: Deserializer<'de>>(
-    deserializer: D,
-) -> Result<Of<X, T>, D::Error> {
-    let entries: Vec<T> = in_order::<X, T, D>(deserializer)?;
-    Ok(X::from_fn(|i| entries[i]))
+impl<T: Serialize> Serialize for Entries<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(name, entry)| (name, entry)))
+    }
 }
 
-/// Reads one value for each name of `X`, in the order of declaration.
-pub(crate) fn in_order<'de, X: Signals, T: Deserialize<'de>, D: Deserializer<'de>>(
-    deserializer: D,
-) -> Result<Vec<T>, D::Error> {
-    deserializer.deserialize_map(ByName::<X, T>(PhantomData))
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Entries<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(ByName(PhantomData))
+    }
 }
 
-struct ByName<X, T>(PhantomData<(X, T)>);
+struct ByName<T>(PhantomData<T>);
 
-impl<'de, X: Signals, T: Deserialize<'de>> Visitor<'de> for ByName<X, T> {
-    type Value = Vec<T>;
+impl<'de, T: Deserialize<'de>> Visitor<'de> for ByName<T> {
+    type Value = Entries<T>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "one value for each of: {}", X::NAMES.join(", "))
+        f.write_str("a map of values by name")
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Vec<T>, A::Error> {
-        let mut values: Vec<Option<T>> = X::NAMES.iter().map(|_| None).collect();
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Entries<T>, A::Error> {
+        let mut entries: Vec<(String, T)> = vec![];
         while let Some(name) = map.next_key::<String>()? {
-            let Some(i) = X::position(&name) else { return Err(A::Error::unknown_field(&name, X::NAMES)) };
-            if values[i].replace(map.next_value()?).is_some() {
-                return Err(A::Error::duplicate_field(X::NAMES[i]));
+            if entries.iter().any(|(earlier, _)| *earlier == name) {
+                return Err(A::Error::custom(format_args!("duplicate field `{name}`")));
             }
+            entries.push((name, map.next_value()?));
         }
-        let named = values.into_iter().zip(X::NAMES);
-        named.map(|(value, name)| value.ok_or_else(|| A::Error::missing_field(name))).collect()
+        Ok(Entries(entries))
     }
 }

@@ -3,8 +3,9 @@
 use crate::dual::Dual;
 use crate::integrate::{Integrator, ModelSystem};
 use crate::interval::{Hold, Interval};
+use crate::layout::Kind;
 use crate::loss::Loss;
-use crate::model::{Kind, Model};
+use crate::model::Model;
 use crate::numeric::{central_jacobian, joined, taken};
 use crate::scalar::Scalar;
 use crate::signals;
@@ -234,7 +235,7 @@ pub fn order<I: Integrator>(integrator: &I) -> Option<Order> {
 fn errors<I: Integrator>(integrator: &I, intervals: u32) -> Option<[f64; 2]> {
     let start = Plane { x: Dual::<4>::variable(0.4, 0), y: Dual::variable(-0.3, 1) };
     let p = Rates { growth: Dual::variable(1.2, 2), turn: Dual::variable(1.5, 3) };
-    let (mut x, mut memory) = (start, I::Memory::default());
+    let (mut x, mut memory) = (start, 0.0);
     let time = |k: u32| f64::from(k) / f64::from(intervals);
     for k in 0..intervals {
         let interval = Interval { t0: time(k), t1: time(k + 1), u0: Nothing, u1: Nothing, hold: Hold::Zero };

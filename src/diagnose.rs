@@ -18,7 +18,7 @@ pub use bands::{Bands, bands};
 pub(crate) use bands::{Widths, widths};
 pub use bootstrap::{Bootstrap, Resampling, bootstrap};
 pub use compare::{
-    Comparison, NamedQualities, Summary, Validation, cross_validate, f_test, likelihood_ratio, validate,
+    Candidate, Comparison, NamedQualities, Validation, cross_validate, f_test, likelihood_ratio, validate,
 };
 pub use convergence::{Convergence, Iteration};
 pub use derived::{Derived, derived};

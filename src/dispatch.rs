@@ -3,15 +3,16 @@
 //! The default target of `x86_64` has 16 registers of two lanes; with AVX-512 there are 32, and no copies between them. A
 //! [`Kernel`] is compiled once portably and once for that, and everything that is inlined into it (models too: hence
 //! `#[inline]` on them) profits. Two lessons:
-//! - The compiler surely inlines a large function only where it has one caller. So the numbers of each unit are types of
-//!   their own ([`Dual`](crate::Dual) carries the unit), and each has its own copy of the model, with one caller.
+//! - The compiler surely inlines a large function only where it has one caller. So the numbers of the two loops are of
+//!   two types, and each has its own copy of the model, with one caller.
 //! - No wider lanes by explicit instructions: where inlining fails they become calls, twenty times slower, while this is
 //!   never slower than the portable loop.
 
-pub(crate) use crate::lanes::{PORTABLE, Unit, WIDE};
+use crate::lanes::Number;
 
-/// A loop to be compiled for several units. `run` and all it calls in its loop must be inlined.
+/// A loop to be compiled for one type of numbers. `run` and all it calls in its loop must be inlined.
 pub(crate) trait Kernel {
+    type Number: Number;
     type Output;
     fn run(self) -> Self::Output;
 }
@@ -27,11 +28,11 @@ pub(crate) fn has_wide() -> bool {
     return false;
 }
 
-/// Runs the kernel in the given unit, or portably where the machine lacks it.
+/// Runs the kernel: one of fused numbers in the wide unit, which the machine must have.
 #[inline]
-pub(crate) fn run<const UNIT: Unit, K: Kernel>(kernel: K) -> K::Output {
+pub(crate) fn run<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
-    if UNIT == WIDE && has_wide() {
+    if K::Number::FUSED && has_wide() {
         // SAFETY: the features were just found on this machine.
         return unsafe { wide(kernel) };
     }

@@ -1,16 +1,23 @@
 //! [`Dual`]: a value and its slopes, propagated exactly through arithmetic (forward-mode differentiation; Griewank and
 //! Walther, *Evaluating Derivatives*, 2008, ch. 3).
 //!
-//! Speed rests on two things. The slopes are a fixed array walked two at a time in vector registers. And a quotient multiplies by the reciprocal of its divisor, which is computed once where the divisor does not
-//! change (a parameter inside a time loop); its value may therefore differ from `a / b` in the last bit.
+//! Speed rests on two things. The slopes are a fixed array, of which two at a time stand in a vector register. And a
+//! quotient multiplies by the reciprocal of its divisor, which is computed once where the divisor does not change (a
+//! parameter inside a time loop); its value may therefore differ from `a / b` in the last bit.
 
-use crate::lanes::{Fused, lanes};
-use crate::scalar::Scalar;
+use crate::scalar::{Comparison, Grid, Scalar};
 use core::cmp::Ordering;
 use core::iter::Sum;
 use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
-/// A value and its slopes with respect to `N` quantities. `UNIT` is for the library's own loops: leave it out.
+/// A value and its slopes with respect to `N` quantities, in numbers of the type `T`.
+///
+/// With a dual for `T` the slopes have slopes, second derivatives:
+/// ```
+/// use greybox::{Dual, Scalar};
+/// let x = Dual::<1, Dual<1>>::variable(Dual::variable(3.0, 0), 0);
+/// assert_eq!((x * x * x).slopes[0].slopes[0], 18.0); // 6 x
+/// ```
 ///
 /// ```
 /// use greybox::{Dual, Scalar};
@@ -21,35 +28,33 @@ use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAss
 /// assert_eq!(f.slopes[1], 9.0 + 2f64.cos()); // x^2 + cos y
 /// ```
 #[derive(Clone, Copy, Debug)]
-pub struct Dual<const N: usize, const UNIT: u8 = 0> {
+pub struct Dual<const N: usize, T = f64> {
     /// The value.
-    pub value: f64,
+    pub value: T,
     /// d value / d quantity, one entry per quantity.
-    pub slopes: [f64; N],
+    pub slopes: [T; N],
 }
 
-impl<const N: usize> Dual<N> {
+impl<const N: usize, T: Scalar> Dual<N, T> {
     /// A number that depends on nothing: all slopes zero.
     #[inline(always)]
-    pub const fn constant(value: f64) -> Self {
-        Dual { value, slopes: [0.0; N] }
+    pub fn constant(value: T) -> Self {
+        Dual { value, slopes: [T::from(0.0); N] }
     }
 
     /// The quantity number `lane` itself: slope one there, zero elsewhere (everywhere, when `lane >= N`).
     #[inline(always)]
-    pub fn variable(value: f64, lane: usize) -> Self {
-        let mut slopes = [0.0; N];
+    pub fn variable(value: T, lane: usize) -> Self {
+        let mut slopes = [T::from(0.0); N];
         if let Some(slope) = slopes.get_mut(lane) {
-            *slope = 1.0;
+            *slope = T::from(1.0);
         }
         Dual { value, slopes }
     }
-}
 
-impl<const N: usize, const UNIT: u8> Dual<N, UNIT> {
     #[inline(always)]
-    fn with(value: f64, slope: impl Fn(usize) -> f64) -> Self {
-        let mut slopes = [0.0; N];
+    fn with(value: T, slope: impl Fn(usize) -> T) -> Self {
+        let mut slopes = [T::from(0.0); N];
         let mut i = 0;
         while i < N {
             slopes[i] = slope(i);
@@ -60,103 +65,110 @@ impl<const N: usize, const UNIT: u8> Dual<N, UNIT> {
 
     /// The chain rule where `df` may be infinite: what does not vary contributes nothing (no `0 * inf`).
     #[inline(always)]
-    fn chain_singular(self, f: f64, df: f64) -> Self {
-        Self::with(f, |i| if self.slopes[i] == 0.0 { 0.0 } else { self.slopes[i] * df })
+    fn chain_singular(self, f: T, df: T) -> Self {
+        let zero = T::from(0.0);
+        Self::with(f, |i| T::select(Comparison::Equal, self.slopes[i], zero, zero, self.slopes[i] * df))
+    }
+
+    /// `1 - value^2` without cancellation.
+    #[inline(always)]
+    fn one_less_square(self) -> T {
+        (T::from(1.0) - self.value) * (self.value + 1.0)
+    }
+
+    /// The chain rule.
+    #[inline(always)]
+    fn chained(self, f: T, df: T) -> Self {
+        Dual { value: f, slopes: T::slopes_times(&self.slopes, df) }
     }
 }
 
-impl<const N: usize, const UNIT: u8> Default for Dual<N, UNIT> {
+impl<const N: usize, T: Scalar> Default for Dual<N, T> {
     #[inline(always)]
     fn default() -> Self {
         Self::from(0.0)
     }
 }
 
-impl<const N: usize, const UNIT: u8> From<f64> for Dual<N, UNIT> {
+impl<const N: usize, T: Scalar> From<f64> for Dual<N, T> {
     #[inline(always)]
     fn from(value: f64) -> Self {
-        Dual { value, slopes: [0.0; N] }
+        Self::constant(T::from(value))
     }
 }
 
-impl<const N: usize, const UNIT: u8> PartialEq for Dual<N, UNIT> {
+impl<const N: usize, T: Scalar> PartialEq for Dual<N, T> {
     #[inline(always)]
     fn eq(&self, other: &Self) -> bool {
         self.value == other.value
     }
 }
 
-impl<const N: usize, const UNIT: u8> PartialOrd for Dual<N, UNIT> {
+impl<const N: usize, T: Scalar> PartialOrd for Dual<N, T> {
     #[inline(always)]
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         self.value.partial_cmp(&other.value)
     }
 }
 
-impl<const N: usize, const UNIT: u8> PartialEq<f64> for Dual<N, UNIT> {
+impl<const N: usize, T: Scalar> PartialEq<f64> for Dual<N, T> {
     #[inline(always)]
     fn eq(&self, other: &f64) -> bool {
         self.value == *other
     }
 }
 
-impl<const N: usize, const UNIT: u8> PartialOrd<f64> for Dual<N, UNIT> {
+impl<const N: usize, T: Scalar> PartialOrd<f64> for Dual<N, T> {
     #[inline(always)]
     fn partial_cmp(&self, other: &f64) -> Option<Ordering> {
         self.value.partial_cmp(other)
     }
 }
 
-impl<const N: usize, const UNIT: u8> Neg for Dual<N, UNIT> {
+impl<const N: usize, T: Scalar> Neg for Dual<N, T> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        let slopes = lanes!(N; x in self.slopes; sign = -1.0; x * sign);
-        Dual { value: -self.value, slopes }
+        Dual { value: -self.value, slopes: T::slopes_times(&self.slopes, T::from(-1.0)) }
     }
 }
 
-impl<const N: usize, const UNIT: u8> Add for Dual<N, UNIT> {
+impl<const N: usize, T: Scalar> Add for Dual<N, T> {
     type Output = Self;
     #[inline(always)]
     fn add(self, b: Self) -> Self {
-        let slopes = lanes!(N; x in self.slopes, y in b.slopes;; x + y);
-        Dual { value: self.value + b.value, slopes }
+        Dual { value: self.value + b.value, slopes: T::slopes_plus(&self.slopes, &b.slopes) }
     }
 }
 
-impl<const N: usize, const UNIT: u8> Sub for Dual<N, UNIT> {
+impl<const N: usize, T: Scalar> Sub for Dual<N, T> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, b: Self) -> Self {
-        let slopes = lanes!(N; x in self.slopes, y in b.slopes;; x - y);
-        Dual { value: self.value - b.value, slopes }
+        Dual { value: self.value - b.value, slopes: T::slopes_minus(&self.slopes, &b.slopes) }
     }
 }
 
-impl<const N: usize, const UNIT: u8> Mul for Dual<N, UNIT> {
+impl<const N: usize, T: Scalar> Mul for Dual<N, T> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, b: Self) -> Self {
-        let slopes =
-            lanes!(N; x in self.slopes, y in b.slopes; u = self.value, v = b.value; y.times_plus::<UNIT>(u, x * v));
+        let slopes = T::slopes_of_product(&self.slopes, b.value, &b.slopes, self.value);
         Dual { value: self.value * b.value, slopes }
     }
 }
 
-impl<const N: usize, const UNIT: u8> Div for Dual<N, UNIT> {
+impl<const N: usize, T: Scalar> Div for Dual<N, T> {
     type Output = Self;
     #[inline(always)]
     fn div(self, b: Self) -> Self {
-        let reciprocal = 1.0 / b.value;
+        let reciprocal = T::from(1.0) / b.value;
         let value = self.value * reciprocal;
-        let slopes =
-            lanes!(N; x in self.slopes, y in b.slopes; q = value, r = reciprocal; y.times_from::<UNIT>(q, x) * r);
-        Dual { value, slopes }
+        Dual { value, slopes: T::slopes_of_quotient(&self.slopes, &b.slopes, value, reciprocal) }
     }
 }
 
-impl<const N: usize, const UNIT: u8> Add<f64> for Dual<N, UNIT> {
+impl<const N: usize, T: Scalar> Add<f64> for Dual<N, T> {
     type Output = Self;
     #[inline(always)]
     fn add(self, b: f64) -> Self {
@@ -164,7 +176,7 @@ impl<const N: usize, const UNIT: u8> Add<f64> for Dual<N, UNIT> {
     }
 }
 
-impl<const N: usize, const UNIT: u8> Sub<f64> for Dual<N, UNIT> {
+impl<const N: usize, T: Scalar> Sub<f64> for Dual<N, T> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, b: f64) -> Self {
@@ -172,34 +184,31 @@ impl<const N: usize, const UNIT: u8> Sub<f64> for Dual<N, UNIT> {
     }
 }
 
-impl<const N: usize, const UNIT: u8> Mul<f64> for Dual<N, UNIT> {
+impl<const N: usize, T: Scalar> Mul<f64> for Dual<N, T> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, b: f64) -> Self {
-        let slopes = lanes!(N; x in self.slopes; v = b; x * v);
-        Dual { value: self.value * b, slopes }
+        Dual { value: self.value * b, slopes: T::slopes_times(&self.slopes, T::from(b)) }
     }
 }
 
-impl<const N: usize, const UNIT: u8> Div<f64> for Dual<N, UNIT> {
+impl<const N: usize, T: Scalar> Div<f64> for Dual<N, T> {
     type Output = Self;
     #[inline(always)]
     fn div(self, b: f64) -> Self {
-        let reciprocal = 1.0 / b;
-        let slopes = lanes!(N; x in self.slopes; r = reciprocal; x * r);
-        Dual { value: self.value * reciprocal, slopes }
+        self * (1.0 / b)
     }
 }
 
 macro_rules! assign {
     ($($trait:ident $method:ident $op:tt;)*) => {$(
-        impl<const N: usize, const UNIT: u8> $trait for Dual<N, UNIT> {
+        impl<const N: usize, T: Scalar> $trait for Dual<N, T> {
             #[inline(always)]
             fn $method(&mut self, b: Self) {
                 *self = *self $op b;
             }
         }
-        impl<const N: usize, const UNIT: u8> $trait<f64> for Dual<N, UNIT> {
+        impl<const N: usize, T: Scalar> $trait<f64> for Dual<N, T> {
             #[inline(always)]
             fn $method(&mut self, b: f64) {
                 *self = *self $op b;
@@ -209,164 +218,165 @@ macro_rules! assign {
 }
 assign! { AddAssign add_assign +; SubAssign sub_assign -; MulAssign mul_assign *; DivAssign div_assign /; }
 
-impl<const N: usize, const UNIT: u8> Sum for Dual<N, UNIT> {
+impl<const N: usize, T: Scalar> Sum for Dual<N, T> {
     fn sum<I: Iterator<Item = Self>>(terms: I) -> Self {
         terms.fold(Self::default(), |a, b| a + b)
     }
 }
 
-impl<const N: usize, const UNIT: u8> Scalar for Dual<N, UNIT> {
+impl<const N: usize, T: Scalar> Scalar for Dual<N, T> {
     #[inline(always)]
     fn value(&self) -> f64 {
-        self.value
+        self.value.value()
     }
     #[inline(always)]
     fn plus_times(self, k: Self, a: f64) -> Self {
-        let slopes = lanes!(N; x in self.slopes, y in k.slopes; v = a; y.times_plus::<UNIT>(v, x));
+        let slopes = T::slopes_plus_times(&self.slopes, &k.slopes, a);
         Dual { value: self.value + k.value * a, slopes }
     }
     #[inline(always)]
     fn chain(self, f: f64, df: f64) -> Self {
-        let slopes = lanes!(N; x in self.slopes; d = df; x * d);
-        Dual { value: f, slopes }
+        // Where the numbers have slopes, those of `df` are not known: not a number, rather than wrong.
+        self.chained(self.value.chain(f, df), self.value.chain(df, f64::NAN))
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
-        let f = Scalar::sqrt(self.value);
-        self.chain_singular(f, 0.5 / f)
+        let f = self.value.sqrt();
+        self.chain_singular(f, T::from(0.5) / f)
     }
     #[inline(always)]
     fn cbrt(self) -> Self {
-        let f = Scalar::cbrt(self.value);
-        self.chain_singular(f, 1.0 / (3.0 * f * f))
+        let f = self.value.cbrt();
+        self.chain_singular(f, T::from(1.0) / (f * f * 3.0))
     }
     #[inline(always)]
     fn powi(self, n: i32) -> Self {
-        let df = if n == 0 { 0.0 } else { n as f64 * Scalar::powi(self.value, n - 1) };
-        self.chain_singular(Scalar::powi(self.value, n), df)
+        let df = if n == 0 { T::from(0.0) } else { self.value.powi(n.saturating_sub(1)) * f64::from(n) };
+        self.chain_singular(self.value.powi(n), df)
     }
     #[inline(always)]
     fn powf(self, n: f64) -> Self {
-        let df = if n == 0.0 { 0.0 } else { n * Scalar::powf(self.value, n - 1.0) };
-        self.chain_singular(Scalar::powf(self.value, n), df)
+        let df = if n == 0.0 { T::from(0.0) } else { self.value.powf(n - 1.0) * n };
+        self.chain_singular(self.value.powf(n), df)
     }
     #[inline(always)]
     fn pow(self, n: Self) -> Self {
-        let f = Scalar::powf(self.value, n.value);
-        let base = self.powf(n.value);
+        let (f, zero) = (self.value.pow(n.value), T::from(0.0));
+        let df = self.value.pow(n.value - 1.0) * n.value;
+        let base = self.chain_singular(f, T::select(Comparison::Equal, n.value, zero, zero, df));
         // 0^n does not move with n (n > 0): the limit of f ln x, not its 0 * -inf.
-        let df = if f == 0.0 { 0.0 } else { f * Scalar::ln(self.value) };
-        let exponent = n.chain_singular(f, df);
+        let exponent = n.chain_singular(f, T::select(Comparison::Equal, f, zero, zero, f * self.value.ln()));
         Self::with(f, |i| base.slopes[i] + exponent.slopes[i])
     }
     #[inline(always)]
     fn exp(self) -> Self {
-        let f = Scalar::exp(self.value);
+        let f = self.value.exp();
         self.chain_singular(f, f)
     }
     #[inline(always)]
     fn exp2(self) -> Self {
-        let f = Scalar::exp2(self.value);
+        let f = self.value.exp2();
         self.chain_singular(f, f * core::f64::consts::LN_2)
     }
     #[inline(always)]
     fn exp_m1(self) -> Self {
-        let f = Scalar::exp_m1(self.value);
+        let f = self.value.exp_m1();
         self.chain_singular(f, f + 1.0)
     }
     #[inline(always)]
     fn ln(self) -> Self {
-        self.chain_singular(Scalar::ln(self.value), 1.0 / self.value)
+        self.chain_singular(self.value.ln(), T::from(1.0) / self.value)
     }
     #[inline(always)]
     fn ln_1p(self) -> Self {
-        self.chain_singular(Scalar::ln_1p(self.value), 1.0 / (1.0 + self.value))
+        self.chain_singular(self.value.ln_1p(), T::from(1.0) / (self.value + 1.0))
     }
     #[inline(always)]
     fn log2(self) -> Self {
-        self.chain_singular(Scalar::log2(self.value), core::f64::consts::LOG2_E / self.value)
+        self.chain_singular(self.value.log2(), T::from(core::f64::consts::LOG2_E) / self.value)
     }
     #[inline(always)]
     fn log10(self) -> Self {
-        self.chain_singular(Scalar::log10(self.value), core::f64::consts::LOG10_E / self.value)
+        self.chain_singular(self.value.log10(), T::from(core::f64::consts::LOG10_E) / self.value)
     }
     #[inline(always)]
     fn sin(self) -> Self {
-        let (sin, cos) = Scalar::sin_cos(self.value);
-        self.chain(sin, cos)
+        let (sin, cos) = self.value.sin_cos();
+        self.chained(sin, cos)
     }
     #[inline(always)]
     fn cos(self) -> Self {
-        let (sin, cos) = Scalar::sin_cos(self.value);
-        self.chain(cos, -sin)
+        let (sin, cos) = self.value.sin_cos();
+        self.chained(cos, -sin)
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        let (sin, cos) = Scalar::sin_cos(self.value);
-        (self.chain(sin, cos), self.chain(cos, -sin))
+        let (sin, cos) = self.value.sin_cos();
+        (self.chained(sin, cos), self.chained(cos, -sin))
     }
     #[inline(always)]
     fn tan(self) -> Self {
-        let f = Scalar::tan(self.value);
-        self.chain(f, 1.0 + f * f)
+        let f = self.value.tan();
+        self.chained(f, f * f + 1.0)
     }
     #[inline(always)]
     fn asin(self) -> Self {
-        self.chain_singular(Scalar::asin(self.value), 1.0 / Scalar::sqrt((1.0 - self.value) * (1.0 + self.value)))
+        self.chain_singular(self.value.asin(), T::from(1.0) / self.one_less_square().sqrt())
     }
     #[inline(always)]
     fn acos(self) -> Self {
-        self.chain_singular(Scalar::acos(self.value), -1.0 / Scalar::sqrt((1.0 - self.value) * (1.0 + self.value)))
+        self.chain_singular(self.value.acos(), T::from(-1.0) / self.one_less_square().sqrt())
     }
     #[inline(always)]
     fn atan(self) -> Self {
-        self.chain(Scalar::atan(self.value), 1.0 / (1.0 + self.value * self.value))
+        self.chained(self.value.atan(), T::from(1.0) / (self.value * self.value + 1.0))
     }
     #[inline(always)]
     fn atan2(self, x: Self) -> Self {
         // Divided by the radius twice rather than by its square once: no overflow, no 0 / 0 away from the origin.
-        let r = Scalar::hypot(self.value, x.value);
-        let (dy, dx) = if r > 0.0 { (x.value / r / r, -(self.value / r / r)) } else { (0.0, 0.0) };
-        Self::with(Scalar::atan2(self.value, x.value), |i| self.slopes[i] * dy + x.slopes[i] * dx)
+        let (r, zero) = (self.value.hypot(x.value), T::from(0.0));
+        let away = |slope: T| T::select(Comparison::Less, zero, r, slope, zero);
+        let (dy, dx) = (away(x.value / r / r), away(-(self.value / r / r)));
+        Self::with(self.value.atan2(x.value), |i| self.slopes[i] * dy + x.slopes[i] * dx)
     }
     #[inline(always)]
     fn sinh(self) -> Self {
-        self.chain_singular(Scalar::sinh(self.value), Scalar::cosh(self.value))
+        self.chain_singular(self.value.sinh(), self.value.cosh())
     }
     #[inline(always)]
     fn cosh(self) -> Self {
-        self.chain_singular(Scalar::cosh(self.value), Scalar::sinh(self.value))
+        self.chain_singular(self.value.cosh(), self.value.sinh())
     }
     #[inline(always)]
     fn tanh(self) -> Self {
-        let f = Scalar::tanh(self.value);
-        self.chain(f, (1.0 - f) * (1.0 + f))
+        let f = self.value.tanh();
+        self.chained(f, (T::from(1.0) - f) * (f + 1.0))
     }
     #[inline(always)]
     fn asinh(self) -> Self {
-        self.chain(Scalar::asinh(self.value), 1.0 / Scalar::hypot(self.value, 1.0))
+        self.chained(self.value.asinh(), T::from(1.0) / self.value.hypot(T::from(1.0)))
     }
     #[inline(always)]
     fn acosh(self) -> Self {
-        self.chain_singular(Scalar::acosh(self.value), 1.0 / Scalar::sqrt((self.value - 1.0) * (self.value + 1.0)))
+        self.chain_singular(self.value.acosh(), T::from(1.0) / ((self.value - 1.0) * (self.value + 1.0)).sqrt())
     }
     #[inline(always)]
     fn atanh(self) -> Self {
-        self.chain_singular(Scalar::atanh(self.value), 1.0 / ((1.0 - self.value) * (1.0 + self.value)))
+        self.chain_singular(self.value.atanh(), T::from(1.0) / self.one_less_square())
     }
     #[inline(always)]
     fn hypot(self, other: Self) -> Self {
-        let r = Scalar::hypot(self.value, other.value);
+        let r = self.value.hypot(other.value);
         // At the origin the slope along the direction of motion is its length.
         if r == 0.0 {
-            return Self::with(r, |i| Scalar::hypot(self.slopes[i], other.slopes[i]));
+            return Self::with(r, |i| self.slopes[i].hypot(other.slopes[i]));
         }
         let (a, b) = (self.value / r, other.value / r);
         Self::with(r, |i| self.slopes[i] * a + other.slopes[i] * b)
     }
     #[inline(always)]
     fn recip(self) -> Self {
-        let f = 1.0 / self.value;
+        let f = self.value.recip();
         self.chain_singular(f, -f * f)
     }
     #[inline(always)]
@@ -375,19 +385,22 @@ impl<const N: usize, const UNIT: u8> Scalar for Dual<N, UNIT> {
     }
     #[inline(always)]
     fn abs(self) -> Self {
-        self.chain(f64::abs(self.value), f64::signum(self.value))
+        self.chained(self.value.abs(), self.value.signum())
     }
     #[inline(always)]
     fn signum(self) -> Self {
-        Self::from(f64::signum(self.value))
+        Self::constant(self.value.signum())
     }
+    // Only what is not a number differs from itself.
     #[inline(always)]
+    #[allow(clippy::eq_op)]
     fn max(self, other: Self) -> Self {
-        if self.value >= other.value || other.value.is_nan() { self } else { other }
+        if self.value >= other.value || other.value != other.value { self } else { other }
     }
     #[inline(always)]
+    #[allow(clippy::eq_op)]
     fn min(self, other: Self) -> Self {
-        if self.value <= other.value || other.value.is_nan() { self } else { other }
+        if self.value <= other.value || other.value != other.value { self } else { other }
     }
     #[inline(always)]
     fn clamp(self, low: f64, high: f64) -> Self {
@@ -401,30 +414,39 @@ impl<const N: usize, const UNIT: u8> Scalar for Dual<N, UNIT> {
     }
     #[inline(always)]
     fn floor(self) -> Self {
-        Self::from(Scalar::floor(self.value))
+        Self::constant(self.value.floor())
     }
     #[inline(always)]
     fn ceil(self) -> Self {
-        Self::from(Scalar::ceil(self.value))
+        Self::constant(self.value.ceil())
     }
     #[inline(always)]
     fn round(self) -> Self {
-        Self::from(Scalar::round(self.value))
+        Self::constant(self.value.round())
     }
     #[inline(always)]
     fn trunc(self) -> Self {
-        Self::from(Scalar::trunc(self.value))
+        Self::constant(self.value.trunc())
     }
     #[inline(always)]
     fn fract(self) -> Self {
-        Dual { value: Scalar::fract(self.value), slopes: self.slopes }
+        Dual { value: self.value.fract(), slopes: self.slopes }
     }
     #[inline(always)]
     fn rem_euclid(self, period: f64) -> Self {
-        Dual { value: Scalar::rem_euclid(self.value, period), slopes: self.slopes }
+        Dual { value: self.value.rem_euclid(period), slopes: self.slopes }
     }
     #[inline(always)]
     fn copysign(self, sign: Self) -> Self {
-        if self.value.is_sign_negative() == sign.value.is_sign_negative() { self } else { -self }
+        self.chained(self.value.copysign(sign.value), self.value.signum() * sign.value.signum())
+    }
+    fn look_up(table: &Grid<'_>, [x, y]: [Self; 2], [i, j]: [u8; 2]) -> Self {
+        let at = [x.value, y.value];
+        let (value, dx) = (T::look_up(table, at, [i, j]), T::look_up(table, at, [i.saturating_add(1), j]));
+        if !table.is_surface() {
+            return x.chained(value, dx);
+        }
+        let dy = T::look_up(table, at, [i, j.saturating_add(1)]);
+        Dual { value, slopes: T::slopes_of_product(&x.slopes, dx, &y.slopes, dy) }
     }
 }

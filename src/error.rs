@@ -27,11 +27,11 @@ pub enum Error {
         /// Name of the experiment.
         experiment: String,
         /// The column.
-        what: &'static str,
+        what: String,
         /// Its length.
         found: usize,
         /// The column it was compared with.
-        reference: &'static str,
+        reference: String,
         /// That one's length.
         expected: usize,
     },

@@ -1,4 +1,4 @@
-//! [`Estimate`]: what a fit found, and how well it is known.
+//! [`Summary`]: what a fit found, and how well it is known; and [`Estimate`], the same by the model's names.
 
 mod display;
 mod prediction;
@@ -6,17 +6,18 @@ pub(crate) mod student;
 
 pub use prediction::Prediction;
 
-use crate::by_name;
-use crate::information::SquareMatrix;
-use crate::integrate::Automatic;
+use crate::information::{Covariance, SquareMatrix};
+use crate::layout::Layout;
 use crate::model::Model;
-use crate::numeral::{number, or_nan, pairs_or_nan};
+use crate::numeral::{counted, number, or_nan, pairs_or_nan};
 use crate::optimize::{Outcome, Severity};
 use crate::parameter::{Parameter, Transform, unbounded_above, unbounded_below};
-use crate::predict::FreeRun;
+use crate::problem::Role;
 use crate::signals::{Of, Signals};
 use core::fmt;
-use serde::{Deserialize, Serialize};
+use core::ops::Deref;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// What is known of one quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -58,10 +59,14 @@ impl Knowledge {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Unknown {
-    /// Name, with its experiment in brackets if it belongs to one; an initial state is `name(0)`.
+    /// Name, with its experiment in brackets if it belongs to one of several; an initial state is `name(0)`.
     pub name: String,
     /// Unit.
     pub unit: String,
+    /// What it is in the model.
+    pub role: Role,
+    /// Index of the experiment that it belongs to; `None` if all share it.
+    pub experiment: Option<usize>,
     /// Estimated value.
     #[serde(deserialize_with = "or_nan")]
     pub value: f64,
@@ -79,10 +84,27 @@ pub struct Unknown {
     pub transform: Transform,
 }
 
-/// How well one output is reproduced.
+/// A parameter of the model: what was declared of it, and what was found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ParameterEstimate {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Value; of a parameter that each experiment has for itself, the first experiment's.
+    #[serde(deserialize_with = "or_nan")]
+    pub value: f64,
+    /// What is known of it.
+    pub knowledge: Knowledge,
+    /// What was declared of it.
+    pub declared: Parameter,
+}
+
+/// How well an output is reproduced.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Quality {
+pub struct OutputFit {
     /// Samples measured.
     pub samples: u64,
     /// Root of the mean squared prediction error, in the output's unit, before any pre-filter.
@@ -93,6 +115,18 @@ pub struct Quality {
     /// Standard deviation of the noise: given, or estimated from the (filtered) errors with `N - p` in the denominator.
     #[serde(deserialize_with = "or_nan")]
     pub sigma: f64,
+}
+
+/// An output of the model, and how well it is reproduced over all experiments.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OutputEstimate {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// The numbers.
+    pub fit: OutputFit,
 }
 
 /// A set of parameters that the data cannot tell apart.
@@ -127,28 +161,76 @@ pub struct Warning {
 }
 
 /// What one experiment has for itself.
-#[derive(Debug, Serialize, Deserialize)]
-#[serde(bound = "", deny_unknown_fields)]
-pub struct Share<M: Model> {
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExperimentEstimate {
     /// Name of the experiment.
     pub name: String,
     /// Number of samples.
-    pub samples: usize,
-    /// Parameters of this experiment: the common ones and its own.
-    #[serde(
-        serialize_with = "by_name::serialize::<M::Parameters, _, _>",
-        deserialize_with = "by_name::deserialize::<M::Parameters, _, _>"
-    )]
-    pub parameters: Of<M::Parameters, f64>,
+    pub samples: u64,
+    /// Parameters of this experiment in the model's order: the common ones and its own.
+    pub parameters: Vec<f64>,
     /// State at the first sample.
-    #[serde(
-        serialize_with = "by_name::serialize::<M::State, _, _>",
-        deserialize_with = "by_name::deserialize::<M::State, _, _>"
-    )]
-    pub initial_state: Of<M::State, f64>,
+    pub initial_state: Vec<f64>,
 }
 
-/// How an estimate was made, in words; enough to make it again.
+/// Where the noise levels came from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum NoiseModel {
+    /// They were given.
+    Given,
+    /// Estimated per output.
+    #[default]
+    PerOutput,
+    /// Estimated as a full covariance.
+    Covariance,
+    /// The predictor predicted the variances.
+    Predicted,
+}
+
+impl fmt::Display for NoiseModel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            NoiseModel::Given => "given",
+            NoiseModel::PerOutput => "estimated per output",
+            NoiseModel::Covariance => "estimated as a full covariance",
+            NoiseModel::Predicted => "predicted",
+        })
+    }
+}
+
+/// How the covariance of the unknowns was made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum CovarianceMethod {
+    /// From the curvature of the cost, for white errors.
+    #[default]
+    Classical,
+    /// The sandwich, for errors that are independent from sample to sample.
+    Sandwich,
+    /// The sandwich, for errors that are white before the pre-filter.
+    FilteredSandwich,
+    /// Newey and West's, prewhitened, for autocorrelated errors.
+    Hac {
+        /// Lags over which correlation is allowed for.
+        lags: u64,
+    },
+}
+
+impl fmt::Display for CovarianceMethod {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            CovarianceMethod::Classical => f.write_str("classical (white errors)"),
+            CovarianceMethod::Sandwich => f.write_str("sandwich (errors independent from sample to sample)"),
+            CovarianceMethod::FilteredSandwich => f.write_str("sandwich (white errors before the pre-filter)"),
+            CovarianceMethod::Hac { lags } => {
+                let lags = counted(*lags, "lag");
+                write!(f, "HAC (Newey-West over {lags}, prewhitened, for colored errors)")
+            }
+        }
+    }
+}
+
+/// How an estimate was made; enough to make it again.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Method {
@@ -158,57 +240,39 @@ pub struct Method {
     pub integrator: String,
     /// Which prediction error.
     pub predictor: String,
+    /// How the equations were evaluated.
+    pub engine: String,
     /// The loss.
     pub loss: String,
     /// The weighting.
     pub weighting: String,
     /// The pre-filter.
     pub prefilter: String,
-    /// What was said of the noise.
-    pub noise: String,
+    /// Where the noise levels came from.
+    pub noise: NoiseModel,
     /// How the covariance was made.
-    pub covariance: String,
+    pub covariance: CovarianceMethod,
     /// Version of this library.
     pub version: String,
 }
 
-/// What a fit found, and how well it is known. It borrows nothing.
-#[derive(Serialize, Deserialize)]
-#[serde(
-    bound(serialize = "I: Serialize, P: Serialize", deserialize = "I: Deserialize<'de>, P: Deserialize<'de>"),
-    deny_unknown_fields
-)]
-pub struct Estimate<M: Model, I = Automatic, P = FreeRun> {
-    /// The parameters; of those that each experiment has for itself, the first experiment's.
-    #[serde(
-        serialize_with = "by_name::serialize::<M::Parameters, _, _>",
-        deserialize_with = "by_name::deserialize::<M::Parameters, _, _>"
-    )]
-    pub parameters: Of<M::Parameters, f64>,
-    /// What is known of each parameter.
-    #[serde(
-        serialize_with = "by_name::serialize::<M::Parameters, _, _>",
-        deserialize_with = "by_name::deserialize::<M::Parameters, _, _>"
-    )]
-    pub knowledge: Of<M::Parameters, Knowledge>,
-    /// What was declared of each parameter.
-    #[serde(
-        serialize_with = "by_name::serialize::<M::Parameters, _, _>",
-        deserialize_with = "by_name::deserialize::<M::Parameters, _, _>"
-    )]
-    pub declared: Of<M::Parameters, Parameter>,
+/// What a fit found, and how well it is known, quantities by name. It borrows nothing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Summary {
+    /// The model's quantities.
+    pub layout: Layout,
+    /// The parameters, in the model's order.
+    pub parameters: Vec<ParameterEstimate>,
     /// What each experiment has for itself.
-    pub experiments: Vec<Share<M>>,
-    /// How well each output is reproduced, over all experiments.
-    #[serde(
-        serialize_with = "by_name::serialize::<M::Output, _, _>",
-        deserialize_with = "by_name::deserialize::<M::Output, _, _>"
-    )]
-    pub quality: Of<M::Output, Quality>,
+    pub experiments: Vec<ExperimentEstimate>,
+    /// The outputs.
+    pub outputs: Vec<OutputEstimate>,
     /// All free quantities in the order of the covariance: common parameters, then experiment by experiment.
     pub unknowns: Vec<Unknown>,
-    /// Covariance of the unknowns, in products of their units; zero where there is no interval.
-    pub covariance: SquareMatrix,
+    /// Covariance of the unknowns, in products of their units and in their order; zero where there is no interval. Its
+    /// memory is linear in their number.
+    pub covariance: Covariance,
     /// Covariance of the noise between outputs, where it was estimated in full.
     pub noise_covariance: Option<SquareMatrix>,
     /// What the data cannot tell apart.
@@ -218,6 +282,7 @@ pub struct Estimate<M: Model, I = Automatic, P = FreeRun> {
     /// What the reader must know.
     pub warnings: Vec<Warning>,
     /// The minimized cost: the weighted sum of `rho` of the standardized errors, and half the squares of the priors.
+    #[serde(deserialize_with = "or_nan")]
     pub cost: f64,
     /// Measurements used (samples times outputs).
     pub measurements: u64,
@@ -228,16 +293,13 @@ pub struct Estimate<M: Model, I = Automatic, P = FreeRun> {
     /// Passes over the data with slopes.
     pub evaluations: u64,
     /// Time taken (s).
+    #[serde(deserialize_with = "or_nan")]
     pub seconds: f64,
     /// How it was made.
     pub method: Method,
-    /// The method that stepped the model.
-    pub integrator: I,
-    /// The prediction error that was minimized.
-    pub predictor: P,
 }
 
-impl<M: Model, I, P> Estimate<M, I, P> {
+impl Summary {
     /// Degrees of freedom: measurements less unknowns, but for those held at a bound and one for each direction along
     /// which nothing is known. Zero where there are no more measurements than unknowns.
     pub fn degrees_of_freedom(&self) -> f64 {
@@ -266,9 +328,9 @@ impl<M: Model, I, P> Estimate<M, I, P> {
         Some(student::interval(unknown.value, error, unknown.transform, probability, self.degrees_of_freedom()))
     }
 
-    /// Correlation of the unknowns; zero where there is no interval, one on the diagonal.
-    pub fn correlation(&self) -> SquareMatrix {
-        let c = &self.covariance;
+    /// Correlation of some unknowns, by their numbers; zero where there is no interval, one on the diagonal.
+    pub fn correlation(&self, unknowns: &[usize]) -> SquareMatrix {
+        let c = self.covariance.dense(unknowns);
         SquareMatrix::from_fn(c.size(), |i, j| {
             let scale = (c[(i, i)] * c[(j, j)]).sqrt();
             if i == j {
@@ -302,56 +364,136 @@ impl<M: Model, I, P> Estimate<M, I, P> {
     /// Akaike's final prediction error (Ljung 1999, eq. 16.56): the expected product over the outputs of the error
     /// variances on new data. `None` if there are not more samples than unknowns.
     pub fn fpe(&self) -> Option<f64> {
-        let outputs = M::Output::into_array(self.quality);
-        let samples = outputs.as_ref().iter().map(|q| q.samples).max().unwrap_or(0) as f64;
+        let samples = self.outputs.iter().map(|output| output.fit.samples).max().unwrap_or(0) as f64;
         let d = self.unknowns.len() as f64;
-        let determinant: f64 = outputs.as_ref().iter().map(|q| q.rmse * q.rmse).product();
+        let determinant: f64 = self.outputs.iter().map(|output| output.fit.rmse * output.fit.rmse).product();
         (samples > d).then(|| determinant * (1.0 + d / samples) / (1.0 - d / samples))
     }
 
-    fn likelihood_parameters(&self) -> f64 {
-        let outputs = M::Output::LEN;
-        let noise = match (self.method.noise.as_str(), &self.noise_covariance) {
-            (_, Some(_)) => outputs * (outputs + 1) / 2,
-            ("given", None) => 0,
-            _ => outputs,
+    /// Parameters of the likelihood: unknowns, and estimated standard deviations of the noise.
+    pub(crate) fn likelihood_parameters(&self) -> f64 {
+        let outputs = self.outputs.len();
+        let noise = match self.method.noise {
+            NoiseModel::Covariance if self.noise_covariance.is_some() => outputs * (outputs + 1) / 2,
+            NoiseModel::PerOutput | NoiseModel::Covariance => outputs,
+            NoiseModel::Given | NoiseModel::Predicted => 0,
         };
         (self.unknowns.len() + noise) as f64
     }
+
+    /// Standard deviation of the noise of each output.
+    pub(crate) fn sigma(&self) -> Vec<f64> {
+        self.outputs.iter().map(|output| output.fit.sigma).collect()
+    }
 }
 
-impl<M: Model, I: Clone, P: Clone> Clone for Estimate<M, I, P> {
-    fn clone(&self) -> Self {
-        Estimate {
-            experiments: self.experiments.clone(),
-            unknowns: self.unknowns.clone(),
-            covariance: self.covariance.clone(),
-            noise_covariance: self.noise_covariance.clone(),
-            directions: self.directions.clone(),
-            warnings: self.warnings.clone(),
-            method: self.method.clone(),
-            integrator: self.integrator.clone(),
-            predictor: self.predictor.clone(),
-            ..*self
+/// What a fit found, and how well it is known, by the names of its model; everything of the [`Summary`] can be read from
+/// it, too.
+pub struct Estimate<M: Model> {
+    /// The parameters; of those that each experiment has for itself, the first experiment's.
+    pub parameters: Of<M::Parameters, f64>,
+    /// What is known of each parameter.
+    pub knowledge: Of<M::Parameters, Knowledge>,
+    /// How well each output is reproduced, over all experiments.
+    pub quality: Of<M::Output, OutputFit>,
+    /// Parameters and initial state of each experiment.
+    pub experiments: Vec<Values<M>>,
+    summary: Summary,
+}
+
+/// Parameters and initial state of one experiment.
+pub struct Values<M: Model> {
+    /// Parameters: the common ones and its own.
+    pub parameters: Of<M::Parameters, f64>,
+    /// State at the first sample.
+    pub initial_state: Of<M::State, f64>,
+}
+
+impl<M: Model> Estimate<M> {
+    /// An estimate of a model from its summary.
+    ///
+    /// # Errors
+    /// A summary of other quantities than the model has.
+    pub fn of(summary: Summary) -> Result<Self, crate::error::Error> {
+        let layout = Layout::of::<M>();
+        if summary.layout != layout {
+            return Err(crate::error::Error::Option(format!(
+                "the estimate is of another model: it has the quantities {:?}, the model has {layout:?}",
+                summary.layout
+            )));
         }
+        let values = |one: &ExperimentEstimate| Values {
+            parameters: M::Parameters::from_fn(|j| one.parameters[j]),
+            initial_state: M::State::from_fn(|i| one.initial_state[i]),
+        };
+        Ok(Estimate {
+            parameters: M::Parameters::from_fn(|j| summary.parameters[j].value),
+            knowledge: M::Parameters::from_fn(|j| summary.parameters[j].knowledge),
+            quality: M::Output::from_fn(|j| summary.outputs[j].fit),
+            experiments: summary.experiments.iter().map(values).collect(),
+            summary,
+        })
+    }
+
+    /// All that was found, quantities by name.
+    pub fn summary(&self) -> &Summary {
+        &self.summary
+    }
+
+    /// The same, without the model's names.
+    pub fn into_summary(self) -> Summary {
+        self.summary
     }
 }
 
-// `derive` would ask for `M: Clone`.
-impl<M: Model> Clone for Share<M> {
+impl<M: Model> Deref for Estimate<M> {
+    type Target = Summary;
+
+    fn deref(&self) -> &Summary {
+        &self.summary
+    }
+}
+
+impl<M: Model> Serialize for Estimate<M> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.summary.serialize(serializer)
+    }
+}
+
+impl<'de, M: Model> Deserialize<'de> for Estimate<M> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Estimate::of(Summary::deserialize(deserializer)?).map_err(D::Error::custom)
+    }
+}
+
+// `derive` would ask for the same of `M`.
+impl<M: Model> Clone for Values<M> {
     fn clone(&self) -> Self {
-        Share { name: self.name.clone(), ..*self }
+        Values { ..*self }
     }
 }
 
-impl<M: Model, I: fmt::Debug, P: fmt::Debug> fmt::Debug for Estimate<M, I, P> {
+impl<M: Model> fmt::Debug for Values<M> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Estimate")
-            .field("unknowns", &self.unknowns)
-            .field("outcome", &self.outcome)
-            .field("warnings", &self.warnings)
-            .field("cost", &self.cost)
-            .field("method", &self.method)
-            .finish_non_exhaustive()
+        let Values { parameters, initial_state } = self;
+        f.debug_struct("Values").field("parameters", parameters).field("initial_state", initial_state).finish()
+    }
+}
+
+impl<M: Model> Clone for Estimate<M> {
+    fn clone(&self) -> Self {
+        Estimate { experiments: self.experiments.clone(), summary: self.summary.clone(), ..*self }
+    }
+}
+
+impl<M: Model> fmt::Debug for Estimate<M> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.summary.fmt(f)
+    }
+}
+
+impl<M: Model> fmt::Display for Estimate<M> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(&self.summary, f)
     }
 }

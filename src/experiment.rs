@@ -1,71 +1,38 @@
-//! [`Experiment`]: a measured record, valid by construction.
+//! [`Experiment`]: a record that knows its model's signals by their types.
 
 #[cfg(feature = "csv")]
 mod csv;
-mod cycles;
 mod edit;
-mod meta;
-mod time;
 
-#[cfg(feature = "csv")]
-pub use csv::CsvFile;
-pub use cycles::Gap;
-#[cfg(feature = "csv")]
-pub(crate) use time::Clock;
-pub use time::Time;
-
-use crate::by_name;
 use crate::error::Error;
-use crate::interval::{Hold, Interval};
+use crate::interval::Hold;
+use crate::layout::{Quantity, quantities};
 use crate::model::Model;
 use crate::parameter::Parameter;
+use crate::record::{Channel, Initial, Record, Stored, Time};
 use crate::signals::{Of, Signals};
-use serde::{Deserialize, Serialize};
-
-/// What is known of the state at the first sample.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-#[serde(bound = "")]
-pub enum Initial<X: Signals> {
-    /// It is estimated, starting from what the first sample says.
-    Estimated,
-    /// It is what the first sample says, taken as exact.
-    FirstSample,
-    /// Guess, bounds and prior of each state.
-    Given(
-        #[serde(
-            serialize_with = "by_name::serialize::<X, _, _>",
-            deserialize_with = "by_name::deserialize::<X, _, _>"
-        )]
-        Of<X, Parameter>,
-    ),
-}
+use core::marker::PhantomData;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// One measured record of inputs `U` and outputs `Y`, and what is known of the state `X` at its first sample.
 ///
-/// Time increases, inputs are finite, lengths agree; an output that was not measured is `NaN`. Without a further word the
+/// Time increases, inputs are finite, lengths agree; an output that was not measured is `NaN`. Unless told otherwise the
 /// input is held from sample to sample, and the initial state is estimated from a start that the first sample gives.
 ///
-/// It is made of vectors ([`new`](Experiment::new)) or of a CSV file (`from_csv`, `CsvFile`), and
-/// cut ([`slice`](Experiment::slice), [`between`](Experiment::between), [`split`](Experiment::split),
-/// [`cycles`](Experiment::cycles), [`without_gaps`](Experiment::without_gaps)), [joined](Experiment::join) and
-/// [thinned](Experiment::decimate) into others. As JSON it keeps everything; what is read back is checked again.
+/// It is made of vectors ([`new`](Experiment::new)), of columns ([`from_columns`](Experiment::from_columns)) or of a CSV
+/// file (`from_csv`, `CsvFile`), and cut ([`slice`](Experiment::slice), [`between`](Experiment::between),
+/// [`split`](Experiment::split), [`cycles`](Experiment::cycles), [`without_gaps`](Experiment::without_gaps)),
+/// [joined](Experiment::join) and [thinned](Experiment::decimate) into others; pieces share the columns of the whole. As
+/// JSON it keeps everything; what is read back is checked again.
 #[derive(Clone, Debug)]
 pub struct Experiment<X: Signals, U: Signals, Y: Signals> {
-    pub(crate) name: String,
-    pub(crate) time: Time,
-    pub(crate) inputs: Vec<Of<U, f64>>,
-    pub(crate) outputs: Vec<Of<Y, f64>>,
-    pub(crate) hold: Hold,
-    pub(crate) initial: Initial<X>,
+    record: Record,
+    signals: PhantomData<(X, U, Y)>,
 }
 
 /// The experiment that fits a model.
 pub type ExperimentOf<M> = Experiment<<M as Model>::State, <M as Model>::Input, <M as Model>::Output>;
-
-/// The fewest samples of a record: a state needs an interval to move in.
-pub(crate) fn least<X: Signals>() -> usize {
-    if X::LEN == 0 { 1 } else { 2 }
-}
 
 /// One row of a record.
 #[derive(Clone, Copy, Debug)]
@@ -79,7 +46,7 @@ pub struct Sample<M: Model> {
 }
 
 impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
-    /// A record from its columns; the model only says which signals are meant.
+    /// A record from its rows; the model only says which signals are meant.
     ///
     /// # Errors
     /// Fewer than two samples (one, for a model without state), lengths that differ, time that does not increase, a time
@@ -90,160 +57,188 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
         inputs: Vec<Of<U, f64>>,
         outputs: Vec<Of<Y, f64>>,
     ) -> Result<Self, Error> {
-        let experiment = Experiment {
-            name: "record".to_owned(),
-            time,
-            inputs,
-            outputs,
-            hold: Hold::default(),
-            initial: Initial::Estimated,
-        };
-        experiment.checked()
+        if outputs.len() != inputs.len() {
+            let (experiment, what, reference) = ("record".to_owned(), "the output".to_owned(), "the input".to_owned());
+            return Err(Error::Lengths { experiment, what, found: outputs.len(), reference, expected: inputs.len() });
+        }
+        let record = Record::new(quantities::<X>(), time, channels::<U>(&inputs), channels::<Y>(&outputs))?;
+        Ok(Experiment { record, signals: PhantomData })
     }
 
-    /// A record of inputs alone, to be simulated: every output is missing.
+    /// A record from its columns, one per input and one per output in the order of their declaration.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
-    pub fn of_inputs<M: Model<State = X, Input = U, Output = Y>>(
-        model: &M,
+    /// Another number of columns than signals, and as [`new`](Self::new).
+    pub fn from_columns<M: Model<State = X, Input = U, Output = Y>>(
+        _model: &M,
         time: Time,
-        inputs: Vec<Of<U, f64>>,
+        inputs: Vec<Vec<f64>>,
+        outputs: Vec<Vec<f64>>,
     ) -> Result<Self, Error> {
-        let outputs = vec![Y::splat(f64::NAN); inputs.len()];
-        Experiment::new(model, time, inputs, outputs)
+        let named = |columns: Vec<Vec<f64>>, signals: Vec<Quantity>, what: &str| {
+            if columns.len() != signals.len() {
+                let (found, expected) = (columns.len(), signals.len());
+                return Err(Error::Option(format!("{found} column(s) for the {expected} {what}(s) of the model")));
+            }
+            let channel = |(values, signal): (Vec<f64>, Quantity)| Channel::new(signal.name, signal.unit, values);
+            Ok(columns.into_iter().zip(signals).map(channel).collect())
+        };
+        let inputs = named(inputs, quantities::<U>(), "input")?;
+        let outputs = named(outputs, quantities::<Y>(), "output")?;
+        Ok(Experiment { record: Record::new(quantities::<X>(), time, inputs, outputs)?, signals: PhantomData })
+    }
+
+    /// The record of a model's signals, as they stand in it.
+    ///
+    /// # Errors
+    /// Other names of states, inputs or outputs than the model has.
+    pub fn from_record<M: Model<State = X, Input = U, Output = Y>>(_model: &M, record: Record) -> Result<Self, Error> {
+        let states: Vec<&str> = record.states.iter().map(|state| state.name.as_str()).collect();
+        let names = |channels: &'_ [Channel]| channels.iter().map(|channel| channel.name.clone()).collect::<Vec<_>>();
+        let (inputs, outputs) = (names(&record.inputs), names(&record.outputs));
+        if states == X::NAMES && inputs == U::NAMES && outputs == Y::NAMES {
+            return Ok(Experiment { record, signals: PhantomData });
+        }
+        Err(Error::Option(format!(
+            "experiment `{}` has the states {states:?}, inputs {inputs:?} and outputs {outputs:?}, but the model has {:?}, \
+             {:?} and {:?}",
+            record.name,
+            X::NAMES,
+            U::NAMES,
+            Y::NAMES
+        )))
     }
 
     /// Names the record in reports and errors.
     pub fn named(self, name: impl Into<String>) -> Self {
-        Experiment { name: name.into(), ..self }
+        self.map(|record| record.named(name))
     }
 
     /// Says how the input behaves between samples.
     pub fn hold(self, hold: Hold) -> Self {
-        Experiment { hold, ..self }
+        self.map(|record| record.hold(hold))
     }
 
     /// Says what is known of the state at the first sample: `fixed` where given, `free` (with bounds or prior) where
     /// estimated, in the units of the states.
     pub fn initial(self, state: Of<X, Parameter>) -> Self {
-        Experiment { initial: Initial::Given(state), ..self }
+        let initial = Initial::Given(X::into_array(state).as_ref().to_vec());
+        self.map(|record| Record { initial, ..record })
     }
 
     /// Takes the state at the first sample from its outputs, as exact. Noise of that one sample then enters the whole
     /// simulation; the default estimates the state instead.
     pub fn initial_from_first_sample(self) -> Self {
-        Experiment { initial: Initial::FirstSample, ..self }
+        self.map(|record| Record { initial: Initial::FirstSample, ..record })
+    }
+
+    /// The record by columns, its signals known by name.
+    pub fn record(&self) -> &Record {
+        &self.record
     }
 
     /// Name in reports and errors.
     pub fn name(&self) -> &str {
-        &self.name
+        self.record.name()
     }
 
     /// Number of samples.
     pub fn len(&self) -> usize {
-        self.inputs.len()
+        self.record.len()
     }
 
     /// Whether there is no sample; never so for an experiment that was made.
     pub fn is_empty(&self) -> bool {
-        self.inputs.is_empty()
+        self.record.is_empty()
     }
 
     /// Time of sample `k` (s).
     #[inline(always)]
     pub fn time(&self, k: usize) -> f64 {
-        self.time.at(k)
+        self.record.time(k)
     }
 
     /// When the samples were taken.
     pub fn times(&self) -> &Time {
-        &self.time
+        self.record.times()
     }
 
-    /// Inputs, one row per sample.
-    pub fn inputs(&self) -> &[Of<U, f64>] {
-        &self.inputs
+    /// Inputs of sample `k`.
+    #[inline(always)]
+    pub fn input(&self, k: usize) -> Of<U, f64> {
+        U::from_fn(|i| self.record.inputs[i].values[k])
     }
 
-    /// Measured outputs, one row per sample; NaN where missing.
-    pub fn outputs(&self) -> &[Of<Y, f64>] {
-        &self.outputs
+    /// Measured outputs of sample `k`; NaN where missing.
+    #[inline(always)]
+    pub fn output(&self, k: usize) -> Of<Y, f64> {
+        Y::from_fn(|j| self.record.outputs[j].values[k])
+    }
+
+    /// Inputs, sample by sample.
+    pub fn inputs(&self) -> impl ExactSizeIterator<Item = Of<U, f64>> {
+        let columns: Vec<&[f64]> = self.record.inputs.iter().map(|channel| &*channel.values).collect();
+        (0..self.len()).map(move |k| U::from_fn(|i| columns[i][k]))
+    }
+
+    /// Measured outputs, sample by sample; NaN where missing.
+    pub fn outputs(&self) -> impl ExactSizeIterator<Item = Of<Y, f64>> {
+        let columns: Vec<&[f64]> = self.record.outputs.iter().map(|channel| &*channel.values).collect();
+        (0..self.len()).map(move |k| Y::from_fn(|j| columns[j][k]))
+    }
+
+    /// The rows of the record.
+    pub fn samples<M: Model<State = X, Input = U, Output = Y>>(&self) -> impl ExactSizeIterator<Item = Sample<M>> {
+        (0..self.len()).map(|k| Sample { t: self.time(k), u: self.input(k), y: self.output(k) })
     }
 
     /// How the input behaves between samples.
     pub fn input_hold(&self) -> Hold {
-        self.hold
+        self.record.input_hold()
     }
 
     /// What is known of the state at the first sample.
-    pub fn initial_state(&self) -> &Initial<X> {
-        &self.initial
+    pub fn initial_state(&self) -> &Initial {
+        self.record.initial_state()
     }
 
     /// Median time from sample to sample (s); of a uniform record, its sample time.
     pub fn sample_time(&self) -> f64 {
-        match &self.time {
-            Time::Uniform { step, .. } => *step,
-            Time::Stamps(stamps) => {
-                let mut steps: Vec<f64> = stamps.windows(2).map(|w| w[1] - w[0]).collect();
-                if steps.is_empty() {
-                    return 0.0;
-                }
-                let middle = steps.len() / 2;
-                *steps.select_nth_unstable_by(middle, f64::total_cmp).1
-            }
-        }
+        self.record.sample_time()
     }
 
-    /// The record, if it keeps its promises.
-    pub(crate) fn checked(self) -> Result<Self, Error> {
-        let samples = self.inputs.len();
-        if self.outputs.len() != samples {
-            let (what, found, reference) = ("the output", self.outputs.len(), "the input");
-            let experiment = self.name;
-            return Err(Error::Lengths { experiment, what, found, reference, expected: samples });
-        }
-        self.time.check(&self.name, samples)?;
-        let needed = least::<X>();
-        if samples < needed {
-            return Err(Error::TooFewSamples { experiment: self.name, samples, needed, purpose: "for a fit" });
-        }
-        for sample in 0..samples {
-            let (u, y) = (U::into_array(self.inputs[sample]), Y::into_array(self.outputs[sample]));
-            let inputs = U::NAMES.iter().zip(u.as_ref()).find(|(_, value)| !value.is_finite());
-            let outputs = || Y::NAMES.iter().zip(y.as_ref()).find(|(_, value)| value.is_infinite());
-            if let Some((signal, &value)) = inputs.or_else(outputs) {
-                let (experiment, signal, time) = (self.name.clone(), (*signal).to_owned(), self.time(sample));
-                return Err(Error::NotFinite { experiment, signal, value, sample, time });
-            }
-        }
-        Ok(self)
+    fn map(self, f: impl FnOnce(Record) -> Record) -> Self {
+        Experiment { record: f(self.record), signals: PhantomData }
     }
 
-    /// The samples of a range that the record has, and that is long enough, under a name of their own.
-    pub(crate) fn piece(&self, samples: std::ops::Range<usize>, name: String) -> Self {
-        let time = match &self.time {
-            Time::Uniform { step, .. } => Time::Uniform { start: self.time(samples.start), step: *step },
-            Time::Stamps(stamps) => Time::Stamps(stamps[samples.clone()].to_vec()),
-        };
-        let initial = match self.initial {
-            Initial::Given(_) if samples.start > 0 => Initial::Estimated,
-            initial => initial,
-        };
-        let (inputs, outputs) = (self.inputs[samples.clone()].to_vec(), self.outputs[samples].to_vec());
-        Experiment { name, time, inputs, outputs, hold: self.hold, initial }
-    }
-
-    /// What happens from sample `k` to the next.
-    #[inline(always)]
-    pub(crate) fn interval(&self, k: usize, hold: Hold) -> Interval<U> {
-        let u1 = if hold == Hold::First { self.inputs[k + 1] } else { self.inputs[k] };
-        Interval { t0: self.time(k), t1: self.time(k + 1), u0: self.inputs[k], u1, hold }
+    /// A record of this model's signals.
+    pub(crate) fn of(record: Record) -> Self {
+        Experiment { record, signals: PhantomData }
     }
 }
 
+/// The columns of a vector of signals.
+fn channels<S: Signals>(rows: &[Of<S, f64>]) -> Vec<Channel> {
+    let column = |i: usize| rows.iter().map(|row| S::into_array(*row).as_ref()[i]).collect::<Vec<f64>>();
+    let signals = quantities::<S>().into_iter().enumerate();
+    signals.map(|(i, signal)| Channel::new(signal.name, signal.unit, column(i))).collect()
+}
+
+impl<X: Signals, U: Signals, Y: Signals> Serialize for Experiment<X, U, Y> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.record.serialize(serializer)
+    }
+}
+
+impl<'de, X: Signals, U: Signals, Y: Signals> Deserialize<'de> for Experiment<X, U, Y> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let stored = Stored::deserialize(deserializer)?;
+        let record = stored.into_record(quantities::<X>(), &quantities::<U>(), &quantities::<Y>());
+        record.map(Self::of).map_err(D::Error::custom)
+    }
+}
+
+/// What several records are made of: one, or a slice or vector of them.
 impl<X: Signals, U: Signals, Y: Signals> AsRef<[Experiment<X, U, Y>]> for Experiment<X, U, Y> {
     fn as_ref(&self) -> &[Experiment<X, U, Y>] {
         std::slice::from_ref(self)

@@ -1,111 +1,35 @@
 //! [`Fit`]: from a model and its records to an estimate.
 
-mod as_argmin;
-mod checkpoint;
-mod colored;
-mod conclude;
-mod covariance;
-mod noise;
-mod objective;
 mod predict;
-mod reproduce;
 mod run;
 mod search;
-mod source;
-mod unknowns;
-mod warnings;
 
-pub(crate) use conclude::held_or_unseen;
-pub(crate) use covariance::classical;
-pub use objective::Objective;
-pub(crate) use objective::{Rows, each};
-pub use run::FitProblem;
-
+use crate::equations::Equations;
 use crate::error::Error;
+use crate::estimate::Estimate;
 use crate::experiment::{ExperimentOf, Sample};
-use crate::integrate::{Automatic, Integrator};
+use crate::functions::Handle;
+use crate::integrate::{Automatic, Integrator, Method};
+use crate::layout::{Kind, Layout};
 use crate::loss::Loss;
-use crate::model::{Kind, Model};
-use crate::numeral::exact;
-use crate::optimize::{GaussNewton, LeastSquaresState, LevenbergMarquardt, Linearization, Outcome};
+use crate::model::Model;
+use crate::optimize::LeastSquaresState;
 use crate::parameter::Parameter;
-use crate::predict::{FreeRun, Predictor};
+use crate::predict::{FreeRun, Prediction, Predictor};
 use crate::prefilter::Butterworth;
-use crate::scaling::Scaling;
+use crate::problem::{Problem, Search, Settings, Weights};
+use crate::record::Record;
 use crate::signals::{Of, Signals};
+use crate::sweep::{DualSweep, Loops, ProgramSweep, Sweep};
 use crate::weighting::Weighting;
-use argmin::core::Solver;
 use argmin::core::observers::{Observe, ObserverMode};
-use noise::{Noise, Whitening};
-use objective::Control;
-use serde::Serialize;
-use serde::de::DeserializeOwned;
-use source::{Simulated, Source};
+use core::marker::PhantomData;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, Mutex};
 use std::time::Duration;
-use unknowns::Unknowns;
 
-/// A search that a fit can run: one of argmin's solvers that says how it ended.
-pub trait Search: Clone + Serialize + DeserializeOwned + for<'p> Solver<&'p Objective<'p>, LeastSquaresState> {
-    /// How the search ended, if it was its own decision.
-    fn outcome(&self) -> Option<Outcome>;
-
-    /// Cost and slopes where the search stands.
-    fn linearization(&self) -> Option<&Linearization>;
-
-    /// The same search for a cost that is soon to change: it may stop three digits into the minimum.
-    fn rough(&self) -> Self;
-
-    /// Whether its settings make sense.
-    ///
-    /// # Errors
-    /// The setting and its value.
-    fn check(&self) -> Result<(), Error> {
-        Ok(())
-    }
-}
-
-impl<S: Scaling + Serialize + DeserializeOwned> Search for LevenbergMarquardt<S> {
-    fn outcome(&self) -> Option<Outcome> {
-        LevenbergMarquardt::outcome(self)
-    }
-
-    fn linearization(&self) -> Option<&Linearization> {
-        LevenbergMarquardt::linearization(self)
-    }
-
-    fn rough(&self) -> Self {
-        LevenbergMarquardt::new(self.stop.rough(), self.scaling.clone())
-    }
-
-    fn check(&self) -> Result<(), Error> {
-        self.stop.check()
-    }
-}
-
-impl Search for GaussNewton {
-    fn outcome(&self) -> Option<Outcome> {
-        GaussNewton::outcome(self)
-    }
-
-    fn linearization(&self) -> Option<&Linearization> {
-        GaussNewton::linearization(self)
-    }
-
-    fn rough(&self) -> Self {
-        GaussNewton::new(self.stop.rough())
-    }
-
-    fn check(&self) -> Result<(), Error> {
-        self.stop.check()
-    }
-}
-
-type Observer = Arc<Mutex<Box<dyn Observe<LeastSquaresState> + Send>>>;
-
-/// A model and its records, still without a word on the parameters.
+/// A model and its records, nothing said yet of the parameters.
 #[derive(Debug)]
 pub struct Records<'a, M: Model> {
     model: &'a M,
@@ -119,47 +43,42 @@ impl<'a, M: Model> Records<'a, M> {
             model: self.model,
             experiments: self.experiments,
             parameters,
-            integrator: Automatic::default(),
-            predictor: FreeRun,
-            optimizer: LevenbergMarquardt::default(),
-            weighting: None,
-            terms: Terms {
-                noise: Noise::PerOutput,
-                loss: None,
-                prefilter: None,
-                control: Control::default(),
-                time_limit: None,
-                observers: vec![],
-                checkpoint: None,
-            },
+            stepping: Stepping::new(Automatic::default()),
+            predictor: Arc::new(FreeRun),
+            settings: Settings::default(),
         }
+    }
+}
+
+/// An integrator as a loop over a model's samples, and as an object.
+pub(crate) struct Stepping<M: Model> {
+    loops: Arc<dyn Loops<M>>,
+    method: Arc<dyn Method>,
+}
+
+impl<M: Model> Stepping<M> {
+    pub fn new(integrator: impl Integrator) -> Self {
+        Stepping { loops: Arc::new(integrator.clone()), method: Arc::new(integrator) }
+    }
+}
+
+impl<M: Model> Clone for Stepping<M> {
+    fn clone(&self) -> Self {
+        Stepping { loops: self.loops.clone(), method: self.method.clone() }
     }
 }
 
 /// A fit about to be run.
 ///
-/// Left unsaid: simulation error, squared loss, no weighting, noise estimated per output, [`LevenbergMarquardt`], and the
-/// step that the model's kind asks for.
-pub struct Fit<'a, M: Model, I = Automatic, P = FreeRun, O = LevenbergMarquardt> {
+/// Left out: simulation error, squared loss, no weighting, noise estimated per output,
+/// [`LevenbergMarquardt`](crate::optimize::LevenbergMarquardt), and the step that the model's kind asks for.
+pub struct Fit<'a, M: Model> {
     model: &'a M,
     experiments: &'a [ExperimentOf<M>],
     parameters: Of<M::Parameters, Parameter>,
-    integrator: I,
-    predictor: P,
-    optimizer: O,
-    weighting: Option<Box<dyn Weighting<M> + 'a>>,
-    terms: Terms<'a>,
-}
-
-/// What is said of a fit whatever its model.
-struct Terms<'a> {
-    noise: Noise,
-    loss: Option<Box<dyn Loss + 'a>>,
-    prefilter: Option<Butterworth>,
-    control: Control,
-    time_limit: Option<Duration>,
-    observers: Vec<(Observer, ObserverMode)>,
-    checkpoint: Option<(PathBuf, u64)>,
+    stepping: Stepping<M>,
+    predictor: Arc<dyn Prediction>,
+    settings: Settings<'a>,
 }
 
 impl<'a, M: Model> Fit<'a, M> {
@@ -168,205 +87,180 @@ impl<'a, M: Model> Fit<'a, M> {
     pub fn new<R: AsRef<[ExperimentOf<M>]> + ?Sized>(model: &'a M, records: &'a R) -> Records<'a, M> {
         Records { model, experiments: records.as_ref() }
     }
-}
 
-impl<'a, M: Model, I, P, O> Fit<'a, M, I, P, O> {
     /// Steps the model by another method.
-    pub fn integrator<J: Integrator>(self, integrator: J) -> Fit<'a, M, J, P, O> {
-        let Fit { model, experiments, parameters, predictor, optimizer, weighting, terms, .. } = self;
-        Fit { model, experiments, parameters, integrator, predictor, optimizer, weighting, terms }
+    pub fn integrator(self, integrator: impl Integrator) -> Self {
+        Fit { stepping: Stepping::new(integrator), ..self }
     }
 
     /// Minimizes another prediction error.
-    pub fn predictor<Q: Predictor<M>>(self, predictor: Q) -> Fit<'a, M, I, Q, O> {
-        let Fit { model, experiments, parameters, integrator, optimizer, weighting, terms, .. } = self;
-        Fit { model, experiments, parameters, integrator, predictor, optimizer, weighting, terms }
+    pub fn predictor(self, predictor: impl Predictor) -> Self {
+        Fit { predictor: Arc::new(predictor), ..self }
     }
 
     /// Searches by another method, or by the same with other settings.
-    pub fn optimizer<S: Search>(self, optimizer: S) -> Fit<'a, M, I, P, S> {
-        let Fit { model, experiments, parameters, integrator, predictor, weighting, terms, .. } = self;
-        Fit { model, experiments, parameters, integrator, predictor, optimizer, weighting, terms }
+    pub fn optimizer(self, optimizer: impl Search) -> Self {
+        self.set(|settings| settings.optimizer(optimizer))
     }
 
     /// The standard deviation of the noise of each output, in its unit (after the pre-filter, if there is one). Left out,
     /// it is estimated from the errors.
-    pub fn noise(mut self, sigma: Of<M::Output, f64>) -> Self {
-        self.terms.noise = Noise::Given(M::Output::into_array(sigma).as_ref().to_vec());
-        self
+    pub fn noise(self, sigma: Of<M::Output, f64>) -> Self {
+        self.set(|settings| settings.noise(M::Output::into_array(sigma).as_ref().to_vec()))
     }
 
     /// Estimates the noise with its correlations between outputs.
-    pub fn noise_covariance(mut self) -> Self {
-        self.terms.noise = Noise::Covariance;
-        self
+    pub fn noise_covariance(self) -> Self {
+        self.set(Settings::noise_covariance)
     }
 
     /// Multiplies the cost of each sample by a weight (at least zero), any function of the sample. It is not an inverse
     /// variance: the covariance is that of the weighted estimate, whatever the noise (a sandwich).
-    pub fn weighting(self, weighting: impl Weighting<M> + 'a) -> Self {
-        Fit { weighting: Some(Box::new(weighting)), ..self }
+    pub fn weighting(mut self, weighting: impl Weighting<M> + 'a) -> Self {
+        self.settings.weights = Some(Arc::new(ByModel { weighting, model: PhantomData::<fn(&M)> }));
+        self
     }
 
     /// Bends the cost of large standardized errors.
-    pub fn loss(mut self, loss: impl Loss + 'a) -> Self {
-        self.terms.loss = Some(Box::new(loss));
-        self
+    pub fn loss(self, loss: impl Loss + 'a) -> Self {
+        self.set(|settings| settings.loss(loss))
     }
 
     /// Filters the prediction errors (and their slopes) before they count. A missing sample enters the filter as a zero.
-    pub fn prefilter(mut self, filter: Butterworth) -> Self {
-        self.terms.prefilter = Some(filter);
-        self
+    pub fn prefilter(self, filter: Butterworth) -> Self {
+        self.set(|settings| settings.prefilter(filter))
     }
 
     /// Stops the search, with what it has found by then, when the flag is raised (from another thread, a signal handler).
-    pub fn cancel(mut self, flag: Arc<AtomicBool>) -> Self {
-        self.terms.control.cancel = Some(flag);
-        self
+    pub fn cancel(self, flag: Arc<AtomicBool>) -> Self {
+        self.set(|settings| settings.cancel(flag))
     }
 
     /// Stops the search after this time, with what it has found by then.
-    pub fn time_limit(mut self, limit: Duration) -> Self {
-        self.terms.time_limit = Some(limit);
-        self
+    pub fn time_limit(self, limit: Duration) -> Self {
+        self.set(|settings| settings.time_limit(limit))
     }
 
     /// Shows the progress to an observer of argmin.
-    pub fn observe(mut self, observer: impl Observe<LeastSquaresState> + Send + 'static, mode: ObserverMode) -> Self {
-        self.terms.observers.push((Arc::new(Mutex::new(Box::new(observer))), mode));
-        self
+    pub fn observe(self, observer: impl Observe<LeastSquaresState> + Send + 'static, mode: ObserverMode) -> Self {
+        self.set(|settings| settings.observe(observer, mode))
     }
 
     /// Saves the place of the search into a file, every so many iterations, and goes on from there if the file exists. A
     /// file of another problem is refused.
-    pub fn checkpoint(mut self, path: impl Into<PathBuf>, every: u64) -> Self {
-        self.terms.checkpoint = Some((path.into(), every));
-        self
+    pub fn checkpoint(self, path: impl Into<PathBuf>, every: u64) -> Self {
+        self.set(|settings| settings.checkpoint(path, every))
+    }
+
+    fn set(self, say: impl FnOnce(Settings<'a>) -> Settings<'a>) -> Self {
+        Fit { settings: say(self.settings), ..self }
+    }
+
+    /// Searches for the parameters, and says how well they are known.
+    ///
+    /// A search that does not converge is an outcome of the estimate, not an error.
+    ///
+    /// # Errors
+    /// What makes no sense ([`Error`] names it), a start that cannot be simulated, a checkpoint that cannot be read.
+    pub fn run(self) -> Result<Estimate<M>, Error> {
+        let begin = std::time::Instant::now();
+        let sweep = sweep(Handle::Borrowed(self.model), &self.stepping, &self.predictor)?;
+        let (records, parameters) = (records::<M>(self.experiments), declared::<M>(self.parameters));
+        let problem = Problem::new(sweep, records, &parameters, self.settings)?;
+        Estimate::of(problem.run_since(begin)?)
     }
 }
 
-/// What a fit needs to be evaluated, prepared once.
-struct Setting<R> {
-    unknowns: Unknowns,
-    /// What the predictor made of each record.
-    prepared: Vec<R>,
+impl<'a, M: Model + Clone + 'a> Fit<'a, M> {
+    /// The fit as a problem of its own: to be run, to be asked ([`diagnose`](crate::diagnose), [`Report`](crate::Report)), to
+    /// be given to argmin's solvers. It holds a copy of the model.
+    ///
+    /// # Errors
+    /// As [`run`](Fit::run).
+    pub fn problem(self) -> Result<Problem<'a>, Error> {
+        let model = Handle::Shared(Arc::new(self.model.clone()));
+        let sweep = sweep(model, &self.stepping, &self.predictor)?;
+        Problem::new(sweep, records::<M>(self.experiments), &declared::<M>(self.parameters), self.settings)
+    }
 }
 
-impl<M: Model, I: Integrator, P: Predictor<M>, O> Fit<'_, M, I, P, O> {
-    /// Checks all that was said, and looks at every record once.
-    fn prepare(&self) -> Result<Setting<P::Prepared>, Error> {
-        self.check()?;
-        let unknowns = Unknowns::new(self.model, self.experiments, self.parameters)?;
-        if unknowns.row.is_empty() {
-            return Err(Error::NothingFree);
-        }
-        self.check_measured()?;
-        self.prepared(unknowns)
-    }
+/// The records of experiments, which share their columns.
+fn records<M: Model>(experiments: &[ExperimentOf<M>]) -> Vec<Record> {
+    experiments.iter().map(|experiment| experiment.record().clone()).collect()
+}
 
-    fn prepared(&self, unknowns: Unknowns) -> Result<Setting<P::Prepared>, Error> {
-        let start = M::Parameters::map(self.parameters, |p| p.start);
-        let prepare = |experiment| self.predictor.prepare(self.model, experiment, &start);
-        let prepared = self.experiments.iter().map(prepare).collect::<Result<_, _>>()?;
-        Ok(Setting { unknowns, prepared })
+/// What was declared, in the model's order.
+fn declared<M: Model>(parameters: Of<M::Parameters, Parameter>) -> Vec<Parameter> {
+    M::Parameters::into_array(parameters).as_ref().to_vec()
+}
+
+/// The model on its way through records, by a method and a predictor.
+pub(crate) fn sweep<'a, M: Model>(
+    model: Handle<'a, M>,
+    stepping: &Stepping<M>,
+    predictor: &Arc<dyn Prediction>,
+) -> Result<Arc<dyn Sweep + 'a>, Error>
+where
+    M: 'a,
+{
+    let Stepping { loops, method } = stepping.clone();
+    if !method.serves(M::KIND) {
+        let word = |kind| match kind {
+            Kind::Continuous => "continuous",
+            Kind::Discrete => "discrete",
+            Kind::Static => "static",
+        };
+        let kinds = [Kind::Continuous, Kind::Discrete, Kind::Static];
+        let serves = kinds.into_iter().find(|&kind| method.serves(kind)).map_or("no", word);
+        let integrator = method.describe(M::KIND);
+        return Err(Error::WrongIntegrator { model: word(M::KIND), integrator, serves });
+    }
+    method.check()?;
+    let layout = Arc::new(Layout::of::<M>());
+    predictor.check(&layout)?;
+    let traced = Equations::trace(&*model);
+    if std::env::var("GREYBOX_ENGINE").is_ok_and(|e| e == "duals") {
+        return Ok(Arc::new(DualSweep {
+            layout,
+            model,
+            loops,
+            method,
+            predictor: predictor.clone(),
+            reason: "asked for".to_owned(),
+        }));
+    }
+    let reason = match &traced {
+        Ok(_) => String::new(),
+        Err(untraceable) => untraceable.reason.clone(),
+    };
+    let (method_, predictor_) = (method.clone(), predictor.clone());
+    let plain = Arc::new(DualSweep { layout, model, loops, method, predictor: predictor.clone(), reason });
+    let Ok(equations) = traced else { return Ok(plain) };
+    Ok(match ProgramSweep::new(Arc::new(equations), method_, predictor_, plain.clone()) {
+        Ok(sweep) => Arc::new(sweep),
+        Err(_) => plain,
+    })
+}
+
+/// A typed weighting by position.
+struct ByModel<W, M> {
+    weighting: W,
+    model: PhantomData<fn(&M)>,
+}
+
+impl<M: Model, W: Weighting<M>> Weights for ByModel<W, M> {
+    fn weight(&self, record: &Record, k: usize) -> f64 {
+        let (t, inputs, outputs) = (record.time(k), record.inputs(), record.outputs());
+        let u = M::Input::from_fn(|i| inputs[i].values[k]);
+        let y = M::Output::from_fn(|j| outputs[j].values[k]);
+        self.weighting.weight(&Sample { t, u, y })
     }
 
     fn check(&self) -> Result<(), Error> {
-        if self.experiments.is_empty() {
-            return Err(Error::NoExperiment);
-        }
-        if !self.integrator.serves(M::KIND) {
-            let word = |kind| match kind {
-                Kind::Continuous => "continuous",
-                Kind::Discrete => "discrete",
-                Kind::Static => "static",
-            };
-            let kinds = [Kind::Continuous, Kind::Discrete, Kind::Static];
-            let serves = kinds.into_iter().find(|&kind| self.integrator.serves(kind)).map_or("no", word);
-            return Err(Error::WrongIntegrator {
-                model: word(M::KIND),
-                integrator: self.integrator.describe(M::KIND),
-                serves,
-            });
-        }
-        if let Noise::Given(sigma) = &self.terms.noise
-            && let Some(j) = sigma.iter().position(|s| !(*s > 0.0 && s.is_finite()))
-        {
-            let what = format!("the noise of output `{}`", M::Output::NAMES[j]);
-            return Err(Error::NotPositive { what, value: sigma[j] });
-        }
-        self.integrator.check()?;
-        self.terms.loss.as_ref().map_or(Ok(()), |loss| loss.check())?;
-        if let Some(filter) = &self.terms.prefilter {
-            self.experiments.iter().try_for_each(|record| filter.check(record))?;
-        }
-        self.check_weights()
+        self.weighting.check()
     }
 
-    /// Every output must have been measured somewhere.
-    fn check_measured(&self) -> Result<(), Error> {
-        for j in 0..M::Output::LEN {
-            let measured =
-                |e: &ExperimentOf<M>| e.outputs().iter().any(|y| !M::Output::into_array(*y).as_ref()[j].is_nan());
-            if !self.experiments.iter().any(measured) {
-                let names: Vec<&str> = self.experiments.iter().map(|e| e.name()).collect();
-                let output = M::Output::NAMES[j].to_owned();
-                return Err(Error::OutputMissing { experiment: names.join("`, `"), output });
-            }
-        }
-        Ok(())
-    }
-
-    /// Weights must be finite, not negative, and not zero wherever something was measured.
-    fn check_weights(&self) -> Result<(), Error> {
-        let Some(weighting) = &self.weighting else { return Ok(()) };
-        weighting.check()?;
-        let mut counts = false;
-        for record in self.experiments {
-            for k in 0..record.len() {
-                let (t, u, y) = (record.time(k), record.inputs()[k], record.outputs()[k]);
-                let weight = weighting.weight(&Sample { t, u, y });
-                if !(weight >= 0.0 && weight.is_finite()) {
-                    let name = record.name();
-                    return Err(Error::Option(format!(
-                        "weighting: the weight of sample {k} (t = {} s) of experiment `{name}` is {weight}; weights must be \
-                         finite and not negative",
-                        exact(t)
-                    )));
-                }
-                counts |= weight > 0.0 && M::Output::into_array(y).as_ref().iter().any(|y| !y.is_nan());
-            }
-        }
-        if counts {
-            return Ok(());
-        }
-        Err(Error::Option(format!(
-            "weighting: `{}` is zero at every sample with a measured output; nothing is left to fit",
-            weighting.describe()
-        )))
-    }
-
-    fn source<'s>(&'s self, experiments: &'s [ExperimentOf<M>], prepared: &'s [P::Prepared]) -> Arc<dyn Source + 's> {
-        Arc::new(Simulated {
-            model: self.model,
-            experiments,
-            integrator: self.integrator.clone(),
-            predictor: &self.predictor,
-            prepared,
-            weighting: self.weighting.as_deref().map(|weighting| weighting as &dyn Weighting<M>),
-        })
-    }
-
-    /// The cost, with errors in the units of the outputs.
-    fn objective<'s>(&'s self, setting: &'s Setting<P::Prepared>) -> Objective<'s> {
-        Objective {
-            source: self.source(self.experiments, &setting.prepared),
-            unknowns: &setting.unknowns,
-            loss: self.terms.loss.as_deref().map(|loss| loss as &dyn Loss),
-            prefilter: self.terms.prefilter.as_ref(),
-            whitening: Whitening::Diagonal(vec![1.0; M::Output::LEN]),
-            control: &self.terms.control,
-        }
+    fn describe(&self) -> String {
+        self.weighting.describe()
     }
 }

@@ -11,16 +11,24 @@
 //! Triangles of different widths fit together: a column that a triangle or a row does not have is a column of zeros.
 
 mod block;
+mod chain;
 mod covariance;
+mod elimination;
+mod inverse;
 mod matrix;
 mod reflect;
 mod solve;
 mod spectrum;
+mod triangles;
 
 pub use block::Block;
+pub(crate) use chain::Chain;
+pub use covariance::Covariance;
+pub use elimination::{BadPiece, Elimination, Undetermined};
 pub use matrix::SquareMatrix;
 pub use solve::RankDeficient;
 pub use spectrum::{NoSpectrum, Spectrum};
+pub use triangles::Triangles;
 
 use serde::{Deserialize, Serialize};
 
@@ -104,6 +112,28 @@ impl Information {
         self.rows += 1;
     }
 
+    /// The same, said to be made of so many rows.
+    pub(crate) fn of_rows(self, rows: u64) -> Self {
+        Information { rows, ..self }
+    }
+
+    /// Whether all its numbers are finite.
+    pub(crate) fn is_finite(&self) -> bool {
+        self.triangle.iter().all(|entry| entry.is_finite())
+    }
+
+    /// Multiplies each column by a positive number, as if the slopes had been taken with respect to unknowns in other units.
+    pub(crate) fn scale_columns(&mut self, scales: &[f64]) {
+        let mut at = 0;
+        for i in 0..=self.columns {
+            for scale in scales.get(i..self.columns).unwrap_or_default() {
+                self.triangle[at] *= scale;
+                at += 1;
+            }
+            at += 1;
+        }
+    }
+
     /// Adds all that `other` knows: the result is as if its rows had been absorbed here.
     pub fn merge(&mut self, other: &Information) {
         self.widen(other.columns);
@@ -120,6 +150,18 @@ impl Information {
         let size = (columns + 1) * (columns + 2) / 2;
         let triangle = self.triangle[self.triangle.len() - size..].to_vec();
         Information { columns, rows: self.rows, triangle }
+    }
+
+    /// The first columns of `Phi` alone, as far as their rows reach; with `y` zero.
+    fn leading(&self, columns: usize) -> Information {
+        let mut leading = Information::new(columns);
+        leading.rows = self.rows;
+        let mut start = 0;
+        for i in 0..columns {
+            leading.triangle[start..start + columns - i].copy_from_slice(&self.row(i).1[..columns - i]);
+            start += columns + 1 - i;
+        }
+        leading
     }
 
     /// What is known of these columns, in this order, with all others held at a zero step.
@@ -173,13 +215,25 @@ impl Information {
 
     /// Euclidean norm of each column of `Phi`.
     pub fn column_norms(&self) -> Vec<f64> {
-        (0..self.columns).map(|j| norm((0..=j).map(|i| self.at(i, j)))).collect()
+        (0..self.columns).map(|j| self.column_norm(j)).collect()
+    }
+
+    fn column_norm(&self, j: usize) -> f64 {
+        norm((0..=j).map(|i| self.at(i, j)))
     }
 
     /// Entry of the triangle, `i <= j`, the column `columns` being `y`; zero below the diagonal.
     pub fn at(&self, i: usize, j: usize) -> f64 {
         let width = self.columns + 1;
         if i > j || j >= width { 0.0 } else { self.triangle[i * (2 * width + 1 - i) / 2 + j - i] }
+    }
+
+    // Row `i` of the triangle: its `y`, and its slopes from the diagonal on.
+    fn row(&self, i: usize) -> (f64, &[f64]) {
+        let width = self.columns + 1;
+        let start = i * (2 * width + 1 - i) / 2;
+        let (slopes, y) = self.triangle[start..].split_at(self.columns - i);
+        (y[0], slopes)
     }
 
     // The triangle's rows as a block, with these columns.
@@ -209,8 +263,9 @@ impl Information {
 }
 
 // Euclidean norm without overflow or underflow.
-fn norm(entries: impl Iterator<Item = f64>) -> f64 {
-    entries.fold(0.0, f64::hypot)
+fn norm(entries: impl Iterator<Item = f64> + Clone) -> f64 {
+    let squares: f64 = entries.clone().map(|entry| entry * entry).sum();
+    if (1e-200..1e200).contains(&squares) { squares.sqrt() } else { entries.fold(0.0, f64::hypot) }
 }
 
 #[derive(Deserialize)]

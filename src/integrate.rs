@@ -3,6 +3,8 @@
 mod automatic;
 mod discrete;
 mod esdirk;
+#[cfg(feature = "std")]
+mod method;
 mod rk4;
 mod rk45;
 mod system;
@@ -11,6 +13,8 @@ mod tolerance;
 pub use automatic::Automatic;
 pub use discrete::Discrete;
 pub use esdirk::Esdirk;
+#[cfg(feature = "std")]
+pub(crate) use method::{Duals, Field, Method, SymbolicField};
 pub use rk4::Rk4;
 pub use rk45::Rk45;
 pub use system::{ModelSystem, Square, System};
@@ -26,14 +30,12 @@ use core::fmt::Debug;
 /// Steps are chosen from values only, so that the slopes are exactly those of the numbers computed. It is written once for
 /// all number types, and for states whose length the compiler knows as for those whose length it does not.
 pub trait Integrator: Clone + Debug + Send + Sync + 'static {
-    /// What an adaptive method remembers from one interval to the next (its step).
-    type Memory: Copy + Default + Send + Sync;
-
     /// Whether the steps are the same whatever the values. The whole step of such a method is differentiated and compiled
     /// for each model; the others take their steps one by one.
     const FIXED: bool;
 
-    /// The state at the end of the interval.
+    /// The state at the end of the interval. `step` is what an adaptive method hands from one interval to the next: the
+    /// length of its step (s), zero before the first.
     ///
     /// # Errors
     /// `Stuck`, where the method cannot meet its tolerance.
@@ -41,7 +43,7 @@ pub trait Integrator: Clone + Debug + Send + Sync + 'static {
         &self,
         system: &Y,
         x: Y::Vector<Y::Scalar>,
-        memory: &mut Self::Memory,
+        step: &mut f64,
     ) -> Result<Y::Vector<Y::Scalar>, Stuck>;
 
     /// Whether the method serves models of this kind.

@@ -5,8 +5,8 @@
 //! run-time dispatch is needed and nothing hinges on inlining; wider units gained less than a fifth, because one
 //! trajectory is bound by latency.
 //!
-//! Numbers of the [`WIDE`] unit multiply and add in one instruction, which shortens that latency: a fit took 6 % less time.
-//! The instruction is written out, because the compiler makes a call of it in whatever it does not inline.
+//! The slopes of fused numbers are multiplied and added in one instruction, which shortens that latency: a fit took 6 % less
+//! time. The instruction is written out, because the compiler makes a call of it in whatever it does not inline.
 
 use core::ops::{Add, Mul, Sub};
 
@@ -21,47 +21,63 @@ pub(crate) struct Pair(__m128d);
 #[derive(Clone, Copy)]
 pub(crate) struct Pair([f64; 2]);
 
-/// Which registers a number is made for, as a const parameter.
-pub(crate) type Unit = u8;
-/// What every machine of the target has.
-#[cfg(feature = "std")]
-pub(crate) const PORTABLE: Unit = 0;
-/// AVX-512 and fused multiply-add. Numbers of this unit occur only in loops that found both on the machine at hand.
-pub(crate) const WIDE: Unit = 1;
+/// A number whose slopes stand in pairs.
+///
+/// # Safety
+/// The type must be laid out as an `f64`.
+pub(crate) unsafe trait Number:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+{
+    /// Whether slopes are multiplied and added in one instruction: only where the machine has FMA.
+    #[cfg(feature = "std")]
+    const FUSED: bool;
+}
+
+// SAFETY: the same type.
+unsafe impl Number for f64 {
+    #[cfg(feature = "std")]
+    const FUSED: bool = false;
+}
 
 impl Pair {
     /// Entries `at` and `at + 1`; nothing is read, and zeros come back, beyond the end.
     #[inline(always)]
-    pub fn load<const N: usize>(from: &[f64; N], at: usize) -> Self {
+    pub fn load<T: Number, const N: usize>(from: &[T; N], at: usize) -> Self {
         if at + 2 > N {
-            return Pair::splat(0.0);
+            return Pair::splat(0.0f64);
         }
-        // SAFETY: both entries lie within the array; SSE2 is part of x86_64.
+        let first = from.as_ptr().cast::<f64>();
+        // SAFETY: both entries lie within the array, and are laid out as `f64`; SSE2 is part of x86_64.
         #[cfg(target_arch = "x86_64")]
-        return Pair(unsafe { _mm_loadu_pd(from.as_ptr().add(at)) });
+        return Pair(unsafe { _mm_loadu_pd(first.add(at)) });
+        // SAFETY: as above.
         #[cfg(not(target_arch = "x86_64"))]
-        return Pair([from[at], from[at + 1]]);
+        return Pair(unsafe { [*first.add(at), *first.add(at + 1)] });
     }
 
     /// Writes entries `at` and `at + 1`; nothing beyond the end.
     #[inline(always)]
-    pub fn store<const N: usize>(self, to: &mut [f64; N], at: usize) {
+    pub fn store<T: Number, const N: usize>(self, to: &mut [T; N], at: usize) {
         if at + 2 <= N {
-            // SAFETY: both entries lie within the array; SSE2 is part of x86_64.
+            let first = to.as_mut_ptr().cast::<f64>();
+            // SAFETY: both entries lie within the array, and are laid out as `f64`; SSE2 is part of x86_64.
             #[cfg(target_arch = "x86_64")]
             unsafe {
-                _mm_storeu_pd(to.as_mut_ptr().add(at), self.0)
+                _mm_storeu_pd(first.add(at), self.0)
             }
+            // SAFETY: as above.
             #[cfg(not(target_arch = "x86_64"))]
-            {
-                [to[at], to[at + 1]] = self.0;
+            unsafe {
+                [*first.add(at), *first.add(at + 1)] = self.0;
             }
         }
     }
 
     /// The same number twice.
     #[inline(always)]
-    pub fn splat(value: f64) -> Self {
+    pub fn splat<T: Number>(value: T) -> Self {
+        // SAFETY: laid out as an `f64`.
+        let value = unsafe { *(&raw const value).cast::<f64>() };
         // SAFETY: SSE2 is part of x86_64.
         #[cfg(target_arch = "x86_64")]
         return Pair(unsafe { _mm_set1_pd(value) });
@@ -87,31 +103,11 @@ macro_rules! operator {
 }
 operator! { Add add + _mm_add_pd; Sub sub - _mm_sub_pd; Mul mul * _mm_mul_pd; }
 
-/// Products that are added to something.
-pub(crate) trait Fused: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
-    /// `self * by + to`.
-    #[inline(always)]
-    fn times_plus<const UNIT: Unit>(self, by: Self, to: Self) -> Self {
-        self * by + to
-    }
-
-    /// `to - self * by`.
-    #[inline(always)]
-    fn times_from<const UNIT: Unit>(self, by: Self, to: Self) -> Self {
-        to - self * by
-    }
-}
-
-impl Fused for f64 {}
-
-#[cfg(not(target_arch = "x86_64"))]
-impl Fused for Pair {}
-
 #[cfg(target_arch = "x86_64")]
 macro_rules! fused {
     ($instruction:literal, $by:expr, $with:expr, $to:expr) => {{
         let mut sum = $to.0;
-        // SAFETY: numbers of the unit WIDE occur only where the machine has FMA.
+        // SAFETY: fused numbers occur only where the machine has FMA.
         unsafe {
             core::arch::asm!(
                 concat!($instruction, " {0}, {1}, {2}"), inout(xmm_reg) sum, in(xmm_reg) $by.0, in(xmm_reg) $with.0,
@@ -122,16 +118,34 @@ macro_rules! fused {
     }};
 }
 
-#[cfg(target_arch = "x86_64")]
-impl Fused for Pair {
+/// Products that are added to something; single numbers are rounded twice in any case.
+pub(crate) trait Sums: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+    /// `self * by + to`.
     #[inline(always)]
-    fn times_plus<const UNIT: Unit>(self, by: Self, to: Self) -> Self {
-        if UNIT == WIDE { fused!("vfmadd231pd", self, by, to) } else { self * by + to }
+    fn times_plus<const FUSED: bool>(self, by: Self, to: Self) -> Self {
+        self * by + to
     }
 
+    /// `to - self * by`.
     #[inline(always)]
-    fn times_from<const UNIT: Unit>(self, by: Self, to: Self) -> Self {
-        if UNIT == WIDE { fused!("vfnmadd231pd", self, by, to) } else { to - self * by }
+    fn times_from<const FUSED: bool>(self, by: Self, to: Self) -> Self {
+        to - self * by
+    }
+}
+
+impl<T: Number> Sums for T {}
+
+impl Sums for Pair {
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    fn times_plus<const FUSED: bool>(self, by: Self, to: Self) -> Self {
+        if FUSED { fused!("vfmadd231pd", self, by, to) } else { self * by + to }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    fn times_from<const FUSED: bool>(self, by: Self, to: Self) -> Self {
+        if FUSED { fused!("vfnmadd231pd", self, by, to) } else { to - self * by }
     }
 }
 
@@ -139,12 +153,12 @@ impl Fused for Pair {
 /// the same for all.
 macro_rules! lanes {
     ($n:ident; $($x:ident in $a:expr),+; $($s:ident = $scalar:expr),*; $expression:expr) => {{
-        let mut slopes = [0.0; $n];
+        let mut slopes = [<Self as core::convert::From<f64>>::from(0.0); $n];
         {
             $(let $s = $crate::lanes::Pair::splat($scalar);)*
             let mut pair = 0;
             while pair + 2 <= $n {
-                $(let $x = $crate::lanes::Pair::load(&$a, pair);)+
+                $(let $x = $crate::lanes::Pair::load($a, pair);)+
                 $crate::lanes::Pair::store($expression, &mut slopes, pair);
                 pair += 2;
             }
@@ -158,3 +172,35 @@ macro_rules! lanes {
     }};
 }
 pub(crate) use lanes;
+
+/// The slope arithmetic of [`Scalar`](crate::Scalar), in pairs, for a [`Number`].
+macro_rules! slopes_in_pairs {
+    ($fused:literal) => {
+        #[inline(always)]
+        fn slopes_plus<const N: usize>(x: &[Self; N], y: &[Self; N]) -> [Self; N] {
+            $crate::lanes::lanes!(N; x in x, y in y;; x + y)
+        }
+        #[inline(always)]
+        fn slopes_minus<const N: usize>(x: &[Self; N], y: &[Self; N]) -> [Self; N] {
+            $crate::lanes::lanes!(N; x in x, y in y;; x - y)
+        }
+        #[inline(always)]
+        fn slopes_times<const N: usize>(x: &[Self; N], factor: Self) -> [Self; N] {
+            $crate::lanes::lanes!(N; x in x; v = factor; x * v)
+        }
+        #[inline(always)]
+        fn slopes_of_product<const N: usize>(x: &[Self; N], by: Self, y: &[Self; N], with: Self) -> [Self; N] {
+            $crate::lanes::lanes!(N; x in x, y in y; u = with, v = by; y.times_plus::<$fused>(u, x * v))
+        }
+        #[inline(always)]
+        fn slopes_of_quotient<const N: usize>(x: &[Self; N], y: &[Self; N], value: Self, over: Self) -> [Self; N] {
+            $crate::lanes::lanes!(N; x in x, y in y; q = value, r = over; y.times_from::<$fused>(q, x) * r)
+        }
+        #[inline(always)]
+        fn slopes_plus_times<const N: usize>(x: &[Self; N], y: &[Self; N], a: f64) -> [Self; N] {
+            $crate::lanes::lanes!(N; x in x, y in y; v = <Self as core::convert::From<f64>>::from(a);
+                y.times_plus::<$fused>(v, x))
+        }
+    };
+}
+pub(crate) use slopes_in_pairs;

@@ -59,7 +59,7 @@ impl Layout {
 
 /// The quantities of a vector of signals.
 #[cfg(feature = "std")]
-fn quantities<X: Signals>() -> Vec<Quantity> {
+pub(crate) fn quantities<X: Signals>() -> Vec<Quantity> {
     let named = X::NAMES.iter().zip(X::UNITS);
     named.map(|(name, unit)| Quantity { name: (*name).to_owned(), unit: (*unit).to_owned() }).collect()
 }

@@ -21,7 +21,7 @@
 //! # The result
 //!
 //! ```
-//! use greybox::{Experiment, Fit, Model, Scalar, Time, fixed, free, signals};
+//! use greybox::{Fit, Model, Scalar, Time, free, signals, simulate};
 //!
 //! signals! {
 //!     pub struct Level { h: "m" }
@@ -37,25 +37,20 @@
 //!     type Output = Level;
 //!     type Parameters = Tank;
 //!
-//!     #[inline]
 //!     fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Inflow<S>, p: &Tank<S>) -> Level<S> {
 //!         Level { h: (u.q - p.outlet * (x.h * 19.62).sqrt()) / p.area }
 //!     }
-//!     #[inline]
 //!     fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Inflow<S>, _p: &Tank<S>) -> Level<S> {
 //!         *x
 //!     }
 //! }
 //!
 //! # fn main() -> Result<(), greybox::Error> {
-//! // A record: here simulated, from a known tank.
+//! // A record: here simulated, from a known tank, with a millimeter of noise.
 //! let time = Time::Uniform { start: 0.0, step: 1.0 };
-//! let inflow = (0..300).map(|k| Inflow { q: if k < 150 { 1e-3 } else { 3e-3 } }).collect();
-//! let tank = Experiment::of_inputs(&Draining, time.clone(), inflow)?.initial(Level { h: fixed(1.0) });
-//! let truth = Fit::new(&Draining, &tank).parameters(Tank { area: fixed(0.5), outlet: fixed(4e-4) }).simulate()?;
-//! let ripple = |k: usize| 1e-3 * (k as f64 * 2.4).sin(); // stands for noise
-//! let measured = truth.outputs.iter().enumerate().map(|(k, y)| Level { h: y.h + ripple(k) }).collect();
-//! let record = Experiment::new(&Draining, time, tank.inputs().to_vec(), measured)?;
+//! let inflow: Vec<Inflow> = (0..300).map(|k| Inflow { q: if k < 150 { 1e-3 } else { 3e-3 } }).collect();
+//! let run = simulate(&Draining, &Tank { area: 0.5, outlet: 4e-4 }, &Level { h: 1.0 }, time, &inflow)?;
+//! let record = run.with_noise(Level { h: 1e-3 }, 1).experiment(&Draining)?;
 //!
 //! // The fit, from a start that is far off.
 //! let estimate =
@@ -79,30 +74,29 @@
 //! | floor | what | files |
 //! |---|---|---|
 //! | roof | read | [`report`], which reads [`diagnose`]; [`check`] |
-//! | 3 | learn | `loss`, `weighting`, `prefilter`, [`optimize`], [`regress`], [`numeric`], `fit`, `estimate`, [`online`] |
-//! | 2 | expect | `integrate`, `predict` |
-//! | 1 | say | `model`, `parameter`, `scaling`, `interval`, `experiment`, [`units`] |
-//! | ground | numbers | `lanes`, `scalar`, `dual`, `signals`, `information`, `covariance`, `whiteness`, `error` |
+//! | 3 | learn | `loss`, `weighting`, [`optimize`], [`regress`], [`numeric`], [`problem`], `estimate`, `judge`, `fit`, [`online`] |
+//! | 2 | expect | `integrate`, `prefilter`, `recurrence`, `predict`, `simulate`, [`sweep`] |
+//! | 1 | say | `model`, `parameter`, `scaling`, `interval`, [`record`], `functions`, `equations`, `experiment`, [`units`] |
+//! | ground | numbers | `lanes`, `scalar`, `dual`, `signals`, `layout`, [`graph`], `information`, `whiteness`, `error` |
 //! | wing | machines | [`pmsm`], [`models`] |
 //!
 //! **The way of a sample through a fit.** [`Experiment`] holds it. The integrator carries the state to it in
 //! [`Dual`] numbers, a value with up to eight slopes, and the predictor turns that into a prediction error and its slopes,
 //! column by column in a window of 128 samples. The fit filters the window, divides it by the noise, weights it. The
 //! [`Information`] triangle absorbs its rows by orthogonal reflections and forgets them. After the last window the optimizer
-//! reads its step off the triangle; initial states, and parameters that each experiment has for itself, are minimized out
-//! of their experiment's triangle before the triangles are merged. When the search has ended, covariance, rank and
-//! directions come from the same triangle. Nothing is kept of the samples, and nothing is allocated for them.
+//! reads its step off the triangles; initial states, and parameters that each experiment has for itself, are minimized out
+//! of their experiment's triangle first ([`Elimination`]), so that many experiments cost no more than their samples. When
+//! the search has ended, covariance, rank and directions come from the same triangles. Nothing is kept of the samples, and nothing is allocated for them.
 //!
-//! Only the loop over the samples is compiled for each model. `fit/source.rs` is the door to it: search, noise, covariance
-//! and diagnoses see windows of numbers through it, and are compiled once.
+//! Only the loop over the samples depends on the type of the model; [`sweep`] separates it from search, noise, covariance
+//! and diagnoses, which are given windows of numbers and are compiled once.
 //!
 //! # Features
 //!
-//! `std`, `csv` and `parallel` are on by default; without `std` the ground floor (but for the triangle), models,
+//! `std`, `csv`, `jit` (machine code for models that can be read as a graph) and `parallel` are on by default; without `std` the ground floor (but for the triangle), models,
 //! integrators and [`online`] observers build without `alloc` too.
 #![cfg_attr(not(feature = "std"), no_std)]
 
-mod covariance;
 #[cfg(feature = "std")]
 mod dispatch;
 mod dual;
@@ -126,6 +120,11 @@ pub mod check;
 #[cfg(feature = "std")]
 pub mod diagnose;
 #[cfg(feature = "std")]
+#[doc(hidden)]
+pub mod engine;
+#[cfg(feature = "std")]
+mod equations;
+#[cfg(feature = "std")]
 mod error;
 #[cfg(feature = "std")]
 mod estimate;
@@ -134,7 +133,15 @@ mod experiment;
 #[cfg(feature = "std")]
 mod fit;
 #[cfg(feature = "std")]
+mod functions;
+#[cfg(feature = "std")]
+mod fused;
+#[cfg(feature = "std")]
+pub mod graph;
+#[cfg(feature = "std")]
 mod information;
+#[cfg(feature = "std")]
+mod judge;
 #[cfg(feature = "std")]
 mod loss;
 #[cfg(feature = "std")]
@@ -150,7 +157,13 @@ mod predict;
 #[cfg(feature = "std")]
 mod prefilter;
 #[cfg(feature = "std")]
+pub mod problem;
+#[cfg(feature = "std")]
 mod random;
+#[cfg(feature = "std")]
+pub mod record;
+#[cfg(feature = "std")]
+mod recurrence;
 #[cfg(feature = "std")]
 pub mod regress;
 #[cfg(feature = "std")]
@@ -159,6 +172,10 @@ pub mod report;
 mod scaling;
 #[cfg(feature = "std")]
 mod section;
+#[cfg(feature = "std")]
+mod simulate;
+#[cfg(feature = "std")]
+pub mod sweep;
 #[cfg(feature = "std")]
 mod weighting;
 #[cfg(feature = "std")]
@@ -169,34 +186,45 @@ mod wide;
 #[doc(hidden)]
 pub use {approx, nalgebra, serde};
 
-pub use covariance::{Covariance, Gain};
 pub use dual::Dual;
 pub use integrate::{Automatic, Discrete, Esdirk, Integrator, ModelSystem, Rk4, Rk45, Square, Stuck, System};
 pub use interval::{Hold, Interval};
 pub use layout::Kind;
 pub use model::Model;
 pub use parameter::{Parameter, Prior, Transform, fixed, free};
-pub use scalar::Scalar;
+pub use scalar::{Comparison, Extrapolation, Grid, Interpolation, Scalar, TableError};
 pub use signals::{Entry, Nothing, Of, Signals};
 
 #[cfg(feature = "csv")]
-pub use experiment::CsvFile;
+pub use record::CsvFile;
 #[cfg(feature = "std")]
 pub use {
+    equations::{Dependence, Equations, InvalidEquations},
     error::{Error, Failure},
-    estimate::{Direction, Estimate, Knowledge, Method, Prediction, Quality, Share, Unknown, Warning},
-    experiment::{Experiment, ExperimentOf, Gap, Initial, Sample, Time},
-    fit::{Fit, FitProblem, Objective, Records, Search},
-    information::{Block, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix},
+    estimate::{
+        CovarianceMethod, Direction, Estimate, Knowledge, Method, NoiseModel, OutputFit, Prediction, Summary, Unknown,
+        Warning,
+    },
+    experiment::{Experiment, ExperimentOf, Sample},
+    fit::{Fit, Records},
+    information::{
+        BadPiece, Block, Covariance, Elimination, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix,
+        Triangles, Undetermined,
+    },
     layout::{Layout, Quantity},
     loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
     numeric::{Derivative, Next, Numeric, StateEquation},
     outliers::hampel,
-    predict::{FreeRun, Horizon, Predictor, Walk},
+    predict::{FreeRun, Horizon, Kalman, Plant, Predictor},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
+    problem::{Objective, Problem, Search},
+    record::{Gap, Initial, Time},
+    recurrence::{InvalidRecurrence, Recurrence},
     regress::{Assumption, LinearEstimate, Regression, RegressionError},
     report::Report,
+    scalar::Table,
     scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
+    simulate::{Simulation, Simulator, simulate},
     weighting::{BySignal, Law, Weighting},
 };
 

@@ -1,17 +1,18 @@
 //! [`Model`]: the equations, written once.
 
-pub use crate::layout::Kind;
+use crate::layout::Kind;
+#[cfg(feature = "std")]
+use crate::layout::Layout;
 use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
 
 /// A physical system, as arithmetic on named quantities.
 ///
-/// The functions are generic over [`Scalar`], so that one text serves simulation, exact slopes and observers. Put
-/// `#[inline]` on them: a fit runs them inside a loop compiled for the vector unit of the machine at hand, and can only
-/// do so with what is inlined there. Constants multiply from the right (`x * 2.0`).
+/// The functions are generic over [`Scalar`], so that one text serves simulation, exact slopes and observers. Constants
+/// multiply from the right (`x * 2.0`).
 ///
 /// The names and units of all quantities come from the four signal types.
-pub trait Model: Sync {
+pub trait Model: Send + Sync {
     /// The states `x`; [`Nothing`](crate::Nothing) for a static model.
     type State: Signals;
     /// The inputs `u`; [`Nothing`](crate::Nothing) if there are none.
@@ -52,6 +53,21 @@ pub trait Model: Sync {
         Self::State::splat(S::from(f64::NAN))
     }
 
+    /// Process noise: of a continuous model the standard deviation of each state's disturbance over one second of white
+    /// noise (unit of the state per square root of a second), of a discrete model that of what is added at each step. Zero
+    /// unless written. Predictors that filter use it ([`Kalman`](crate::Kalman)); a simulation does not.
+    #[inline]
+    fn diffusion<S: Scalar>(&self, _p: &Of<Self::Parameters, S>) -> Of<Self::State, S> {
+        Self::State::splat(S::from(0.0))
+    }
+
+    /// Standard deviation of the measurement noise of each output, in its unit, for predictors that filter. Left
+    /// unwritten, it is not a number, which such a predictor refuses.
+    #[inline]
+    fn noise<S: Scalar>(&self, _p: &Of<Self::Parameters, S>) -> Of<Self::Output, S> {
+        Self::Output::splat(S::from(f64::NAN))
+    }
+
     /// The outputs at time `t` (s).
     fn output<S: Scalar>(
         &self,
@@ -60,4 +76,12 @@ pub trait Model: Sync {
         u: &Of<Self::Input, S>,
         p: &Of<Self::Parameters, S>,
     ) -> Of<Self::Output, S>;
+}
+
+#[cfg(feature = "std")]
+impl Layout {
+    /// The layout of a model's signals.
+    pub fn of<M: Model>() -> Self {
+        Layout::new::<M::State, M::Input, M::Output, M::Parameters>(M::KIND)
+    }
 }

@@ -5,7 +5,8 @@
 //! parameter; equations written over [`Scalar`] are better where they can be had. `finitediff` steps by an absolute
 //! 6e-6, which is far too much for 1e-12 and lost in rounding at 1e12; so it is handed variables scaled to about one.
 
-use crate::model::{Kind, Model};
+use crate::layout::Kind;
+use crate::model::Model;
 use crate::scalar::Scalar;
 use crate::signals::{Nothing, Of, Signals};
 use core::any::TypeId;
@@ -43,7 +44,7 @@ pub struct Derivative<F>(pub F);
 pub struct Next<F>(pub F);
 
 /// What a [`Numeric`] model knows of its state: [`Derivative`], [`Next`], or [`Nothing`].
-pub trait StateEquation<X: Signals, U: Signals, P: Signals>: Sync {
+pub trait StateEquation<X: Signals, U: Signals, P: Signals>: Send + Sync {
     /// The kind of model it makes.
     const KIND: Kind;
 
@@ -53,7 +54,7 @@ pub trait StateEquation<X: Signals, U: Signals, P: Signals>: Sync {
 
 impl<X: Signals, U: Signals, P: Signals, F> StateEquation<X, U, P> for Derivative<F>
 where
-    F: Fn(f64, &Of<X, f64>, &Of<U, f64>, &Of<P, f64>) -> Of<X, f64> + Sync,
+    F: Fn(f64, &Of<X, f64>, &Of<U, f64>, &Of<P, f64>) -> Of<X, f64> + Send + Sync,
 {
     const KIND: Kind = Kind::Continuous;
     fn value(&self, t: f64, x: &Of<X, f64>, u: &Of<U, f64>, p: &Of<P, f64>) -> Of<X, f64> {
@@ -63,7 +64,7 @@ where
 
 impl<X: Signals, U: Signals, P: Signals, F> StateEquation<X, U, P> for Next<F>
 where
-    F: Fn(f64, &Of<X, f64>, &Of<U, f64>, &Of<P, f64>) -> Of<X, f64> + Sync,
+    F: Fn(f64, &Of<X, f64>, &Of<U, f64>, &Of<P, f64>) -> Of<X, f64> + Send + Sync,
 {
     const KIND: Kind = Kind::Discrete;
     fn value(&self, t: f64, x: &Of<X, f64>, u: &Of<U, f64>, p: &Of<P, f64>) -> Of<X, f64> {
@@ -82,8 +83,8 @@ impl<X: Signals, U: Signals, Y: Signals, P: Signals> Numeric<X, U, Y, P> {
     /// The model `dx/dt = derivative(t, x, u, p)`, `y = output(t, x, u, p)`.
     pub fn continuous<F, G>(derivative: F, output: G) -> Numeric<X, U, Y, P, Derivative<F>, G>
     where
-        F: Fn(f64, &Of<X, f64>, &Of<U, f64>, &Of<P, f64>) -> Of<X, f64> + Sync,
-        G: Fn(f64, &Of<X, f64>, &Of<U, f64>, &Of<P, f64>) -> Of<Y, f64> + Sync,
+        F: Fn(f64, &Of<X, f64>, &Of<U, f64>, &Of<P, f64>) -> Of<X, f64> + Send + Sync,
+        G: Fn(f64, &Of<X, f64>, &Of<U, f64>, &Of<P, f64>) -> Of<Y, f64> + Send + Sync,
     {
         Numeric::made_of(Derivative(derivative), output)
     }
@@ -91,8 +92,8 @@ impl<X: Signals, U: Signals, Y: Signals, P: Signals> Numeric<X, U, Y, P> {
     /// The model `x[k+1] = next(t, x[k], u[k], p)`, `y = output(t, x, u, p)`.
     pub fn discrete<F, G>(next: F, output: G) -> Numeric<X, U, Y, P, Next<F>, G>
     where
-        F: Fn(f64, &Of<X, f64>, &Of<U, f64>, &Of<P, f64>) -> Of<X, f64> + Sync,
-        G: Fn(f64, &Of<X, f64>, &Of<U, f64>, &Of<P, f64>) -> Of<Y, f64> + Sync,
+        F: Fn(f64, &Of<X, f64>, &Of<U, f64>, &Of<P, f64>) -> Of<X, f64> + Send + Sync,
+        G: Fn(f64, &Of<X, f64>, &Of<U, f64>, &Of<P, f64>) -> Of<Y, f64> + Send + Sync,
     {
         Numeric::made_of(Next(next), output)
     }
@@ -102,7 +103,7 @@ impl<U: Signals, Y: Signals, P: Signals> Numeric<Nothing, U, Y, P> {
     /// The model `y = output(t, Nothing, u, p)`.
     pub fn without_state<G>(output: G) -> Numeric<Nothing, U, Y, P, Nothing, G>
     where
-        G: Fn(f64, &Nothing, &Of<U, f64>, &Of<P, f64>) -> Of<Y, f64> + Sync,
+        G: Fn(f64, &Nothing, &Of<U, f64>, &Of<P, f64>) -> Of<Y, f64> + Send + Sync,
     {
         Numeric::made_of(Nothing, output)
     }
@@ -189,7 +190,7 @@ pub(crate) fn central_jacobian(f: &dyn Fn(&[f64]) -> Vec<f64>, at: &[f64], sizes
 impl<X: Signals, U: Signals, Y: Signals, P: Signals, F, G> Model for Numeric<X, U, Y, P, F, G>
 where
     F: StateEquation<X, U, P>,
-    G: Fn(f64, &Of<X, f64>, &Of<U, f64>, &Of<P, f64>) -> Of<Y, f64> + Sync,
+    G: Fn(f64, &Of<X, f64>, &Of<U, f64>, &Of<P, f64>) -> Of<Y, f64> + Send + Sync,
 {
     type State = X;
     type Input = U;

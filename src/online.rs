@@ -13,10 +13,12 @@
 mod ekf;
 mod mras;
 mod rls;
+mod ud_factors;
 
 pub use ekf::{Ekf, EkfStart};
 pub use mras::{Gradient, Law, Moment, Mras, MrasStart, Order, Rate, Stepping};
 pub use rls::{Forgetting, Rls};
+pub use ud_factors::{MeasurementGain, UdFactors};
 
 use crate::parameter::{Parameter, Transform};
 use crate::scalar::Scalar;

@@ -9,6 +9,7 @@
 
 mod zero_phase;
 
+pub(crate) use zero_phase::filtered;
 pub use zero_phase::zero_phase;
 
 use crate::dual::Dual;
@@ -242,6 +243,27 @@ impl Butterworth {
         for (column, state) in block.chunks_mut(stride).zip(states.chunks_mut(1)) {
             self.lanes::<1>(column, stride, rows, state);
         }
+    }
+
+    /// Filters rows of `width` numbers in place, sample by sample and each place in the row from its own state, which moves
+    /// on to the next rows. The state is at rest where `states` is empty.
+    pub(crate) fn filter_rows(&self, rows: &mut [f64], width: usize, states: &mut Vec<f64>) {
+        let (high, sections) = (self.design.pass == Pass::High, self.sections());
+        if width == 0 {
+            return;
+        }
+        states.resize(2 * width * sections.len(), 0.0);
+        for row in rows.chunks_exact_mut(width) {
+            for (section, states) in sections.iter().zip(states.chunks_exact_mut(2 * width)) {
+                let (first, second) = states.split_at_mut(width);
+                for ((x, s1), s2) in row.iter_mut().zip(first).zip(second) {
+                    let mut state = [*s1, *s2];
+                    *x = section.step(high, &mut state, *x);
+                    [*s1, *s2] = state;
+                }
+            }
+        }
+        states.iter_mut().for_each(|state| *state = state.flushed());
     }
 
     /// Filters `L` columns side by side: one alone would wait for its own last sample most of the time.

@@ -3,6 +3,7 @@
 //! ```
 //! # use greybox::{Experiment, Fit, Kind, Model, Nothing, Report, Scalar, Time, diagnose, free, signals};
 //! # signals! { pub struct Load { f: "N" } pub struct Length { y: "m" } pub struct Spring { k: "N/m", rest: "m" } }
+//! # #[derive(Clone)]
 //! # struct Hooke;
 //! # impl Model for Hooke {
 //! #     type State = Nothing; type Input = Load; type Output = Length; type Parameters = Spring;
@@ -17,7 +18,7 @@
 //! # let record = Experiment::new(&Hooke, Time::Uniform { start: 0.0, step: 1.0 }, loads, lengths)?;
 //! # let path = std::env::temp_dir().join(format!("greybox_spring_{}.html", std::process::id()));
 //! # let (model, parameters) = (Hooke, Spring { k: free(10.0), rest: free(0.0) });
-//! let mut problem = Fit::new(&model, &record).parameters(parameters).problem()?;
+//! let problem = Fit::new(&model, &record).parameters(parameters).problem()?;
 //! let estimate = problem.run()?;
 //! let report = Report::new(&problem, &estimate)? // with tests of the residuals, identifiability and bands
 //!     .titled("Spring of bench 3")
@@ -60,8 +61,8 @@ pub use crate::section::{
 pub use format::{Format, Version};
 pub use origin::Origin;
 
-use crate::diagnose::Summary;
 use crate::error::Error;
+use crate::estimate::Summary;
 use crate::optimize::Severity;
 use core::fmt;
 use facts::Facts;
@@ -99,8 +100,8 @@ impl Report {
         Report {
             format: Format,
             version: Version,
-            title: facts.estimate.title.clone(),
-            severity: said.fold(facts.estimate.severity, Severity::max),
+            title: "Parameter estimation".to_owned(),
+            severity: said.fold(facts.estimate.severity(), Severity::max),
             estimate: facts.estimate.clone(),
             sections,
         }
@@ -109,7 +110,6 @@ impl Report {
     /// Puts a title above it; without one it is "Parameter estimation".
     pub fn titled(mut self, title: impl Into<String>) -> Self {
         self.title = title.into();
-        self.estimate.title.clone_from(&self.title);
         self
     }
 

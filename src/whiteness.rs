@@ -7,6 +7,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 pub(crate) struct Autocorrelation {
     /// Sum of `e[t] e[t - k]` for `k = 0..=lags`.
     sums: Vec<f64>,
+    /// The first values.
+    first: Vec<f64>,
     /// The last values, then those of the run at hand.
     values: Vec<f64>,
     /// How many values were measured.
@@ -15,12 +17,14 @@ pub(crate) struct Autocorrelation {
 
 impl Autocorrelation {
     pub fn new(lags: usize) -> Self {
-        Autocorrelation { sums: vec![0.0; lags + 1], values: vec![0.0; lags], count: 0 }
+        Autocorrelation { sums: vec![0.0; lags + 1], first: vec![], values: vec![0.0; lags], count: 0 }
     }
 
     /// The next values in order of time, zero where missing; `count` of them were measured.
     pub fn add(&mut self, run: &[f64], count: u64) {
         let lags = self.sums.len() - 1;
+        let missing = (lags - self.first.len()).min(run.len());
+        self.first.extend_from_slice(&run[..missing]);
         self.values.extend_from_slice(run);
         for (k, sum) in self.sums.iter_mut().enumerate() {
             *sum += dot(run, &self.values[lags - k..]);
@@ -29,9 +33,23 @@ impl Autocorrelation {
         self.count += count;
     }
 
-    /// Forgets the past: what comes next belongs to another record.
-    pub fn restart(&mut self) {
-        self.values.fill(0.0);
+    /// As if the values of the other had followed.
+    pub fn follow(&mut self, next: &Autocorrelation) {
+        let lags = self.sums.len() - 1;
+        for k in 1..=lags {
+            self.sums[k] += dot(&next.first[..k.min(next.first.len())], &self.values[lags - k..]);
+        }
+        self.append(next);
+        let missing = (lags - self.first.len()).min(next.first.len());
+        self.first.extend_from_slice(&next.first[..missing]);
+        self.values.extend_from_slice(&next.values[lags - next.first.len()..]);
+        self.values.drain(..next.first.len());
+    }
+
+    /// Adds the sums of another record.
+    pub fn append(&mut self, other: &Autocorrelation) {
+        self.sums.iter_mut().zip(&other.sums).for_each(|(sum, other)| *sum += other);
+        self.count += other.count;
     }
 
     /// How many values were measured.
@@ -93,6 +111,21 @@ mod tests {
             assert!((found - expected).abs() < 1e-14, "lag {}: {found} {expected}", k + 1);
         }
         assert_eq!(runs.count(), 300);
+        // So do pieces of any length, each with its own runs.
+        for cuts in [[100, 200], [5, 8], [1, 299], [290, 295]] {
+            let piece = |e: &[f64]| {
+                let mut piece = Autocorrelation::new(12);
+                e.chunks(7).for_each(|run| piece.add(run, run.len() as u64));
+                piece
+            };
+            let [a, b] = cuts;
+            let mut joined = piece(&e[..a]);
+            joined.follow(&piece(&e[a..b]));
+            joined.follow(&piece(&e[b..]));
+            for (found, expected) in joined.coefficients().iter().zip(runs.coefficients()) {
+                assert!((found - expected).abs() < 1e-14, "{cuts:?}: {found} {expected}");
+            }
+        }
     }
 
     /// By hand: n = 10, rho = (0.5, -0.2) gives 10 * 12 * (0.25 / 9 + 0.04 / 8); two degrees of freedom have the tail

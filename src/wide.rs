@@ -7,8 +7,15 @@
 //! Lanes never mix, and every operation is one IEEE operation with one rounding, so that a lane's bits do not depend on the
 //! width. They do depend on whether the machine fuses a product with a sum: a processor without FMA rounds twice.
 
+mod array;
+mod one;
 #[cfg(target_arch = "x86_64")]
-use core::arch::x86_64::*;
+mod registers;
+
+use array::Array;
+use one::One;
+#[cfg(target_arch = "x86_64")]
+use registers::{Ymm, Zmm};
 
 /// Numbers side by side.
 pub(crate) trait Wide: Copy + Send + Sync + 'static {
@@ -21,6 +28,16 @@ pub(crate) trait Wide: Copy + Send + Sync + 'static {
     fn load(from: &[f64]) -> Self;
     /// Into the first `LANES` numbers of a slice, which must have as many.
     fn store(self, to: &mut [f64]);
+    /// `LANES` numbers from an address.
+    ///
+    /// # Safety
+    /// They must be readable.
+    unsafe fn read(from: *const f64) -> Self;
+    /// `LANES` numbers to an address.
+    ///
+    /// # Safety
+    /// They must be writable.
+    unsafe fn write(self, to: *mut f64);
 
     fn add(self, b: Self) -> Self;
     fn sub(self, b: Self) -> Self;
@@ -29,8 +46,14 @@ pub(crate) trait Wide: Copy + Send + Sync + 'static {
     fn sqrt(self) -> Self;
     /// The sign bit turned over.
     fn neg(self) -> Self;
+    /// The sign bit turned over where that of `sign`, a zero, is set.
+    fn xor(self, sign: Self) -> Self;
     /// The sign bit cleared.
     fn abs(self) -> Self;
+    /// With the sign bit of `sign`.
+    fn copysign(self, sign: Self) -> Self;
+    /// Times two to the power of `n`, a whole number between -2100 and 2100 (not checked), rounded once.
+    fn scale2(self, n: Self) -> Self;
     /// `self * a + b`, rounded once where the machine can.
     fn mul_add(self, a: Self, b: Self) -> Self;
     /// `b - self * a`, rounded once where the machine can.
@@ -42,6 +65,14 @@ pub(crate) trait Wide: Copy + Send + Sync + 'static {
     fn select_le(self, than: Self, then: Self, otherwise: Self) -> Self;
     /// The same with `==`.
     fn select_eq(self, to: Self, then: Self, otherwise: Self) -> Self;
+
+    /// Whether all lanes are below a limit.
+    #[inline(always)]
+    fn all_below(self, limit: f64) -> bool {
+        let mut lanes = [f64::NEG_INFINITY; 8];
+        self.store(&mut lanes);
+        lanes.iter().all(|lane| *lane < limit)
+    }
 
     /// Each lane through a function of one number.
     #[inline(always)]
@@ -87,6 +118,9 @@ enum Instructions {
     #[cfg(target_arch = "x86_64")]
     Fma,
     Portable,
+    #[cfg(target_arch = "x86_64")]
+    FmaSingle,
+    Single,
 }
 
 impl Width {
@@ -126,11 +160,23 @@ impl Width {
         Width(Instructions::Portable)
     }
 
+    /// One number at a time, with fused products where the processor has them.
+    pub fn single() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("fma") {
+            return Width(Instructions::FmaSingle);
+        }
+        Width(Instructions::Single)
+    }
+
     /// Lanes of a register.
     pub fn lanes(self) -> usize {
         match self.0 {
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx512 => 8,
+            #[cfg(target_arch = "x86_64")]
+            Instructions::FmaSingle => 1,
+            Instructions::Single => 1,
             _ => 4,
         }
     }
@@ -150,6 +196,10 @@ pub(crate) fn run<T: Task>(width: Width, task: T) -> T::Output {
         #[cfg(target_arch = "x86_64")]
         Instructions::Fma => unsafe { with_fma(task) },
         Instructions::Portable => task.run::<Array<{ cfg!(not(target_arch = "x86_64")) }>>(),
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        Instructions::FmaSingle => unsafe { one_with_fma(task) },
+        Instructions::Single => task.run::<One<{ cfg!(not(target_arch = "x86_64")) }>>(),
     }
 }
 
@@ -171,200 +221,10 @@ unsafe fn with_fma<T: Task>(task: T) -> T::Output {
     task.run::<Array<true>>()
 }
 
-/// Four numbers in an array.
-#[derive(Clone, Copy)]
-pub(crate) struct Array<const FUSED: bool>([f64; 4]);
-
-impl<const FUSED: bool> Array<FUSED> {
-    #[inline(always)]
-    fn each(self, b: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (self.0, b.0);
-        Array([f(a0, b0), f(a1, b1), f(a2, b2), f(a3, b3)])
-    }
-
-    #[inline(always)]
-    fn either(self, then: Self, otherwise: Self, b: Self, holds: impl Fn(f64, f64) -> bool) -> Self {
-        let mut chosen = otherwise.0;
-        let mut i = 0;
-        while i < 4 {
-            if holds(self.0[i], b.0[i]) {
-                chosen[i] = then.0[i];
-            }
-            i += 1;
-        }
-        Array(chosen)
-    }
-}
-
-impl<const FUSED: bool> Wide for Array<FUSED> {
-    const LANES: usize = 4;
-
-    #[inline(always)]
-    fn splat(x: f64) -> Self {
-        Array([x; 4])
-    }
-    #[inline(always)]
-    fn load(from: &[f64]) -> Self {
-        Array([from[0], from[1], from[2], from[3]])
-    }
-    #[inline(always)]
-    fn store(self, to: &mut [f64]) {
-        to[..4].copy_from_slice(&self.0);
-    }
-    #[inline(always)]
-    fn add(self, b: Self) -> Self {
-        self.each(b, |a, b| a + b)
-    }
-    #[inline(always)]
-    fn sub(self, b: Self) -> Self {
-        self.each(b, |a, b| a - b)
-    }
-    #[inline(always)]
-    fn mul(self, b: Self) -> Self {
-        self.each(b, |a, b| a * b)
-    }
-    #[inline(always)]
-    fn div(self, b: Self) -> Self {
-        self.each(b, |a, b| a / b)
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        self.each(self, |a, _| a.sqrt())
-    }
-    #[inline(always)]
-    fn neg(self) -> Self {
-        self.each(self, |a, _| -a)
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        self.each(self, |a, _| a.abs())
-    }
-    #[inline(always)]
-    fn mul_add(self, a: Self, b: Self) -> Self {
-        let product = |i: usize| if FUSED { self.0[i].mul_add(a.0[i], b.0[i]) } else { self.0[i] * a.0[i] + b.0[i] };
-        Array([product(0), product(1), product(2), product(3)])
-    }
-    #[inline(always)]
-    fn neg_mul_add(self, a: Self, b: Self) -> Self {
-        self.neg().mul_add(a, b)
-    }
-    #[inline(always)]
-    fn select_lt(self, than: Self, then: Self, otherwise: Self) -> Self {
-        self.either(then, otherwise, than, |a, b| a < b)
-    }
-    #[inline(always)]
-    fn select_le(self, than: Self, then: Self, otherwise: Self) -> Self {
-        self.either(then, otherwise, than, |a, b| a <= b)
-    }
-    #[inline(always)]
-    fn select_eq(self, to: Self, then: Self, otherwise: Self) -> Self {
-        self.either(then, otherwise, to, |a, b| a == b)
-    }
-}
-
 #[cfg(target_arch = "x86_64")]
-macro_rules! register {
-    ($(#[$doc:meta])* $name:ident($register:ty), $lanes:literal; $splat:ident, $load:ident, $store:ident,
-     $add:ident, $sub:ident, $mul:ident, $div:ident, $sqrt:ident, $fma:ident, $fnma:ident,
-     $xor:ident, $andnot:ident, |$a:ident, $b:ident, $then:ident, $otherwise:ident| $lt:expr, $le:expr, $eq:expr) => {
-        $(#[$doc])*
-        #[derive(Clone, Copy)]
-        pub(crate) struct $name($register);
-
-        // SAFETY of all blocks: values of this type live only inside tasks that `run` has started with the target features;
-        // loads and stores check the length of their slices.
-        impl Wide for $name {
-            const LANES: usize = $lanes;
-
-            #[inline(always)]
-            fn splat(x: f64) -> Self {
-                $name(unsafe { $splat(x) })
-            }
-            #[inline(always)]
-            fn load(from: &[f64]) -> Self {
-                assert!(from.len() >= $lanes);
-                $name(unsafe { $load(from.as_ptr()) })
-            }
-            #[inline(always)]
-            fn store(self, to: &mut [f64]) {
-                assert!(to.len() >= $lanes);
-                unsafe { $store(to.as_mut_ptr(), self.0) }
-            }
-            #[inline(always)]
-            fn add(self, b: Self) -> Self {
-                $name(unsafe { $add(self.0, b.0) })
-            }
-            #[inline(always)]
-            fn sub(self, b: Self) -> Self {
-                $name(unsafe { $sub(self.0, b.0) })
-            }
-            #[inline(always)]
-            fn mul(self, b: Self) -> Self {
-                $name(unsafe { $mul(self.0, b.0) })
-            }
-            #[inline(always)]
-            fn div(self, b: Self) -> Self {
-                $name(unsafe { $div(self.0, b.0) })
-            }
-            #[inline(always)]
-            fn sqrt(self) -> Self {
-                $name(unsafe { $sqrt(self.0) })
-            }
-            #[inline(always)]
-            fn neg(self) -> Self {
-                $name(unsafe { $xor(self.0, $splat(-0.0)) })
-            }
-            #[inline(always)]
-            fn abs(self) -> Self {
-                $name(unsafe { $andnot($splat(-0.0), self.0) })
-            }
-            #[inline(always)]
-            fn mul_add(self, a: Self, b: Self) -> Self {
-                $name(unsafe { $fma(self.0, a.0, b.0) })
-            }
-            #[inline(always)]
-            fn neg_mul_add(self, a: Self, b: Self) -> Self {
-                $name(unsafe { $fnma(self.0, a.0, b.0) })
-            }
-            #[inline(always)]
-            fn select_lt(self, than: Self, then: Self, otherwise: Self) -> Self {
-                let ($a, $b, $then, $otherwise) = (self.0, than.0, then.0, otherwise.0);
-                $name(unsafe { $lt })
-            }
-            #[inline(always)]
-            fn select_le(self, than: Self, then: Self, otherwise: Self) -> Self {
-                let ($a, $b, $then, $otherwise) = (self.0, than.0, then.0, otherwise.0);
-                $name(unsafe { $le })
-            }
-            #[inline(always)]
-            fn select_eq(self, to: Self, then: Self, otherwise: Self) -> Self {
-                let ($a, $b, $then, $otherwise) = (self.0, to.0, then.0, otherwise.0);
-                $name(unsafe { $eq })
-            }
-        }
-    };
-}
-
-#[cfg(target_arch = "x86_64")]
-register! {
-    /// Eight numbers in a register of AVX-512.
-    Zmm(__m512d), 8; _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd,
-    _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd, _mm512_sqrt_pd, _mm512_fmadd_pd, _mm512_fnmadd_pd,
-    _mm512_xor_pd, _mm512_andnot_pd, |a, b, then, otherwise|
-    _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(a, b), otherwise, then),
-    _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_LE_OQ>(a, b), otherwise, then),
-    _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_EQ_OQ>(a, b), otherwise, then)
-}
-
-#[cfg(target_arch = "x86_64")]
-register! {
-    /// Four numbers in a register of AVX2.
-    Ymm(__m256d), 4; _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd,
-    _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd, _mm256_sqrt_pd, _mm256_fmadd_pd, _mm256_fnmadd_pd,
-    _mm256_xor_pd, _mm256_andnot_pd, |a, b, then, otherwise|
-    _mm256_blendv_pd(otherwise, then, _mm256_cmp_pd::<_CMP_LT_OQ>(a, b)),
-    _mm256_blendv_pd(otherwise, then, _mm256_cmp_pd::<_CMP_LE_OQ>(a, b)),
-    _mm256_blendv_pd(otherwise, then, _mm256_cmp_pd::<_CMP_EQ_OQ>(a, b))
+#[target_feature(enable = "fma")]
+unsafe fn one_with_fma<T: Task>(task: T) -> T::Output {
+    task.run::<One<true>>()
 }
 
 #[cfg(test)]
@@ -392,6 +252,9 @@ mod tests {
                     a.abs().sqrt(),
                     a.neg(),
                     a.abs(),
+                    a.copysign(b),
+                    a.scale2(W::splat(5.0)),
+                    a.scale2(W::splat(-1070.0)),
                     a.mul_add(c, b),
                     a.neg_mul_add(c, b),
                     a.select_lt(b, c, a),
@@ -407,7 +270,7 @@ mod tests {
                     for (lane, x) in lanes[..W::LANES].iter().enumerate() {
                         // The bits of a NaN are the processor's business; the last row tells the width.
                         let x = if x.is_nan() { f64::NAN } else { *x };
-                        if number < 14 {
+                        if number < 17 {
                             bits.push((number * 8 + at + lane, x.to_bits()));
                         }
                     }
@@ -425,7 +288,7 @@ mod tests {
             assert_eq!(run(width, All), reference, "{width:?}");
         }
         assert_eq!(f64::from_bits(reference[0]), 3.0);
-        assert_eq!(f64::from_bits(reference[9 * 8]), 1.5, "equal is not less: a stays");
-        assert_eq!(f64::from_bits(reference[10 * 8]), 0.1, "equal is at most: c");
+        assert_eq!(f64::from_bits(reference[12 * 8]), 1.5, "equal is not less: a stays");
+        assert_eq!(f64::from_bits(reference[13 * 8]), 0.1, "equal is at most: c");
     }
 }

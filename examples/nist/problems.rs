@@ -48,7 +48,6 @@ macro_rules! problems {
                         type Parameters = $size;
                         const KIND: Kind = Kind::Static;
 
-                        #[inline]
                         fn output<S: Scalar>(
                             &self, _t: S, _x: &Nothing, u: &Predictors<S>, p: &$size<S>,
                         ) -> Response<S> {

@@ -1,24 +1,19 @@
 //! Predictions with bands: how far the truth, and how far a measurement, may be from what the model says.
 
 use crate::error::Error;
-use crate::estimate::{Estimate, Prediction, student};
-use crate::fit::{FitProblem, Objective, Rows};
-use crate::integrate::Integrator;
-use crate::model::Model;
-use crate::predict::{Predictor, WINDOW};
-use crate::signals::{Of, Signals};
+use crate::estimate::{Summary, student};
+use crate::problem::{Accumulate, Objective, Problem, Simulated};
+use crate::sweep::Window;
 
-/// A prediction of one record with the half widths of its bands.
-#[derive(Debug)]
-pub struct Bands<M: Model> {
-    /// Time of each sample (s).
-    pub t: Vec<f64>,
+/// A prediction of one record with the half widths of its bands, a column per output.
+#[derive(Clone, Debug)]
+pub struct Bands {
     /// Predicted outputs.
-    pub outputs: Vec<Of<M::Output, f64>>,
+    pub outputs: Vec<Vec<f64>>,
     /// Half width of the band that holds the noise-free output, from the uncertainty of the unknowns, in its unit.
-    pub confidence: Vec<Of<M::Output, f64>>,
+    pub confidence: Vec<Vec<f64>>,
     /// Half width of the band that holds a new measurement: that and the noise.
-    pub prediction: Vec<Of<M::Output, f64>>,
+    pub prediction: Vec<Vec<f64>>,
 }
 
 /// The bands, each point for itself, that hold with the given probability, to first order in the unknowns (Seber and Wild,
@@ -27,72 +22,79 @@ pub struct Bands<M: Model> {
 ///
 /// # Errors
 /// No such record, a probability not between 0 and 1, an estimate of another problem, a simulation that fails.
-pub fn bands<M: Model, I: Integrator, P: Predictor<M>, O>(
-    problem: &FitProblem<'_, M, I, P, O>,
-    estimate: &Estimate<M, I, P>,
-    experiment: usize,
-    probability: f64,
-) -> Result<Bands<M>, Error> {
+pub fn bands(problem: &Problem<'_>, estimate: &Summary, experiment: usize, probability: f64) -> Result<Bands, Error> {
     let (objective, best) = problem.at(estimate)?;
-    if experiment >= problem.experiments().len() {
-        let count = problem.experiments().len();
+    let count = problem.records().len();
+    if experiment >= count {
         return Err(Error::Option(format!("there is no record number {experiment}; the fit has {count}, from zero")));
     }
     if !(probability > 0.0 && probability < 1.0) {
         return Err(Error::Option(format!("the probability of a band is {probability}; it must be between 0 and 1")));
     }
-    let Prediction { t, outputs, .. } = problem.prediction(&objective, experiment, &best)?;
+    let Simulated { outputs, .. } = objective.predict(experiment, &best)?;
     let Widths { confidence, prediction } = widths(&objective, &best, estimate, experiment, probability)?;
-    Ok(Bands { t, outputs, confidence, prediction })
+    Ok(Bands { outputs, confidence, prediction })
 }
 
-/// Half widths of the bands about a prediction.
-pub(crate) struct Widths<M: Model> {
-    pub confidence: Vec<Of<M::Output, f64>>,
-    pub prediction: Vec<Of<M::Output, f64>>,
+/// Half widths of the bands about a prediction, a column per output.
+pub(crate) struct Widths {
+    pub confidence: Vec<Vec<f64>>,
+    pub prediction: Vec<Vec<f64>>,
 }
 
 /// The half widths at a place, of record number `experiment`, which must be there.
-pub(crate) fn widths<M: Model, I, P>(
+pub(crate) fn widths(
     objective: &Objective<'_>,
     best: &[f64],
-    estimate: &Estimate<M, I, P>,
+    estimate: &Summary,
     experiment: usize,
     probability: f64,
-) -> Result<Widths<M>, Error> {
-    let sigma = M::Output::into_array(M::Output::map(estimate.quality, |quality| quality.sigma));
+) -> Result<Widths, Error> {
     let quantile = student::quantile(0.5 + probability / 2.0, estimate.degrees_of_freedom());
     // Slopes in the outputs' own units, and the covariance in the optimizer's coordinates.
     let objective = objective.in_units();
-    let columns: Vec<usize> = objective.unknowns.columns(experiment).collect();
+    let columns: Vec<usize> = objective.problem.unknowns.columns(experiment).collect();
     let slope = |i: usize| estimate.unknowns[i].transform.slope(estimate.unknowns[i].value);
     let n = columns.len();
-    let covariance: Vec<f64> = (0..n * n)
-        .map(|ij| {
-            let (i, j) = (columns[ij / n], columns[ij % n]);
-            estimate.covariance[(i, j)] / (slope(i) * slope(j))
-        })
-        .collect();
-    let zero = vec![M::Output::splat(0.0); objective.source.samples(experiment)];
-    let mut found = Widths { confidence: zero.clone(), prediction: zero };
-    let rows = M::Output::LEN * WINDOW;
-    let mut g = vec![0.0; n];
-    let visit = &mut |Rows { begin, samples, window }: Rows<'_>| {
-        let slopes = window.data_mut();
-        for k in 0..samples {
-            let variance = M::Output::array_from_fn(|j| {
-                g.iter_mut().enumerate().for_each(|(c, g)| *g = slopes[c * rows + j * WINDOW + k]);
-                let row = |i: usize| g.iter().zip(&covariance[i * n..]).map(|(g, c)| g * c).sum::<f64>() * g[i];
-                (0..n).map(row).sum::<f64>().max(0.0)
-            });
-            let variance = variance.as_ref();
-            found.confidence[begin + k] = M::Output::from_fn(|j| quantile * variance[j].sqrt());
-            found.prediction[begin + k] =
-                M::Output::from_fn(|j| quantile * variance[j].sqrt().hypot(sigma.as_ref()[j]));
-        }
+    let dense = estimate.covariance.dense(&columns);
+    let covariance = (0..n * n).map(|ij| dense[(ij / n, ij % n)] / (slope(columns[ij / n]) * slope(columns[ij % n])));
+    let (covariance, sigma): (Vec<f64>, Vec<f64>) = (covariance.collect(), estimate.sigma());
+    let make = || {
+        let none = vec![vec![]; sigma.len()];
+        let found = Widths { confidence: none.clone(), prediction: none };
+        Gather { covariance: &covariance, quantile, sigma: &sigma, found }
     };
-    if objective.walk(experiment, best, true, visit).is_err() {
-        return Err(Error::Simulation(objective.locate(experiment, best, 0)));
+    let gathered = objective.gather_one(best, experiment, true, make);
+    gathered.map(|gather| gather.found).map_err(|_| Error::Simulation(objective.locate(experiment, best, 0)))
+}
+
+/// The half widths of the rows of each window.
+struct Gather<'g> {
+    covariance: &'g [f64],
+    quantile: f64,
+    sigma: &'g [f64],
+    found: Widths,
+}
+
+impl Accumulate for Gather<'_> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        let n = window.columns() - 1;
+        for k in 0..window.samples[lane] {
+            for (j, sigma) in self.sigma.iter().enumerate() {
+                let g = |c: usize| window.at(k, j, c, lane);
+                let row = |i: usize| (0..n).map(|c| g(c) * self.covariance[i * n + c]).sum::<f64>() * g(i);
+                let deviation = (0..n).map(row).sum::<f64>().max(0.0).sqrt();
+                self.found.confidence[j].push(self.quantile * deviation);
+                self.found.prediction[j].push(self.quantile * deviation.hypot(*sigma));
+            }
+        }
     }
-    Ok(found)
+
+    fn append(&mut self, later: Self) {
+        let extend = |all: &mut [Vec<f64>], later: Vec<Vec<f64>>| {
+            all.iter_mut().zip(later).for_each(|(all, later)| all.extend(later));
+        };
+        extend(&mut self.found.confidence, later.found.confidence);
+        extend(&mut self.found.prediction, later.found.prediction);
+    }
 }

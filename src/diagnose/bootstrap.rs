@@ -3,17 +3,13 @@
 
 use super::{Pinned, minimize};
 use crate::error::Error;
-use crate::estimate::Estimate;
-use crate::experiment::ExperimentOf;
-use crate::fit::{FitProblem, each};
-use crate::integrate::Integrator;
-use crate::model::Model;
+use crate::estimate::Summary;
 use crate::numeral::resolved;
 use crate::optimize::LeastSquares;
-use crate::predict::Predictor;
+use crate::problem::{Objective, Problem, Simulated, each};
 use crate::random::Random;
+use crate::record::Record;
 use crate::section::{Cell, Section, Table};
-use crate::signals::{Of, Signals};
 use serde::{Deserialize, Serialize};
 
 /// What is drawn.
@@ -52,31 +48,19 @@ pub struct Bootstrap {
 ///
 /// # Errors
 /// An estimate of another problem or one that cannot be simulated, and fewer than twenty refits that end.
-pub fn bootstrap<M: Model, I: Integrator, P: Predictor<M>, O: Sync>(
-    problem: &FitProblem<'_, M, I, P, O>,
-    estimate: &Estimate<M, I, P>,
+pub fn bootstrap(
+    problem: &Problem<'_>,
+    estimate: &Summary,
     resampling: Resampling,
     count: usize,
     seed: u64,
 ) -> Result<Bootstrap, Error> {
     let (objective, best) = problem.at(estimate)?;
-    let predictions = (0..objective.experiments()).map(|e| problem.prediction(&objective, e, &best));
+    let predictions = (0..objective.experiments()).map(|e| objective.predict(e, &best));
     let predictions = predictions.collect::<Result<Vec<_>, _>>()?;
-    // Centered: a mean that the model left would be counted as noise.
-    let residuals: Vec<Vec<Of<M::Output, f64>>> = predictions
-        .iter()
-        .map(|prediction| {
-            let columns: Vec<f64> = (0..M::Output::LEN).map(|j| mean::<M::Output>(&prediction.residuals, j)).collect();
-            let centered = |row: &Of<M::Output, f64>| {
-                let row = M::Output::into_array(*row);
-                M::Output::from_fn(|j| row.as_ref()[j] - columns[j])
-            };
-            let here = |row: &&Of<M::Output, f64>| M::Output::into_array(**row).as_ref().iter().all(|e| e.is_finite());
-            prediction.residuals.iter().filter(here).map(centered).collect()
-        })
-        .collect();
+    let residuals: Vec<Vec<Vec<f64>>> = predictions.iter().map(centered).collect();
     if let Some(e) = residuals.iter().position(Vec::is_empty) {
-        let experiment = problem.experiments()[e].name().to_owned();
+        let experiment = problem.records()[e].name().to_owned();
         return Err(Error::TooFewSamples {
             experiment,
             samples: 0,
@@ -86,28 +70,12 @@ pub fn bootstrap<M: Model, I: Integrator, P: Predictor<M>, O: Sync>(
     }
     let refit = |number: usize| -> Option<Vec<f64>> {
         let mut random = Random::stream(seed, number as u64);
-        let records: Vec<ExperimentOf<M>> = problem
-            .experiments()
-            .iter()
-            .zip(&predictions)
-            .zip(&residuals)
-            .map(|((record, prediction), residuals)| {
-                let drawn = draw(residuals, record.len(), resampling, &mut random);
-                let mut record = record.clone();
-                for ((y, predicted), e) in record.outputs.iter_mut().zip(&prediction.outputs).zip(drawn) {
-                    let (old, new, e) =
-                        (M::Output::into_array(*y), M::Output::into_array(*predicted), M::Output::into_array(e));
-                    *y = M::Output::from_fn(|j| match old.as_ref()[j].is_nan() {
-                        true => f64::NAN,
-                        false => new.as_ref()[j] + e.as_ref()[j],
-                    });
-                }
-                record
-            })
-            .collect();
-        let prepare = |record| problem.prepared(record, &estimate.parameters);
-        let prepared = records.iter().map(prepare).collect::<Result<Vec<_>, _>>().ok()?;
-        let again = problem.of_records(&objective, &records, &prepared);
+        let parts = problem.records().iter().zip(&predictions).zip(&residuals);
+        let records = parts.map(|((record, prediction), residuals)| {
+            resampled(record, prediction, draw(residuals, record.len(), resampling, &mut random))
+        });
+        let again = problem.with_records(records.collect()).ok()?;
+        let again = objective.of(&again, objective.sweep);
         let (place, _) = minimize(Pinned { problem: &again, bounds: again.bounds() }, best.clone())?;
         Some(estimate.unknowns.iter().zip(&place).map(|(u, &c)| u.transform.to_value(c)).collect())
     };
@@ -151,14 +119,35 @@ pub fn bootstrap<M: Model, I: Integrator, P: Predictor<M>, O: Sync>(
     Ok(result)
 }
 
-fn mean<Y: Signals>(rows: &[Of<Y, f64>], j: usize) -> f64 {
-    let values = rows.iter().map(|row| Y::into_array(*row).as_ref()[j]).filter(|value| value.is_finite());
+/// The residuals of the samples of which all outputs have one, sample by sample. Centered: a mean that the model left would
+/// be counted as noise.
+fn centered(prediction: &Simulated) -> Vec<Vec<f64>> {
+    let means: Vec<f64> = prediction.residuals.iter().map(|column| mean(column)).collect();
+    let samples = prediction.residuals.first().map_or(0, Vec::len);
+    let row = |k: usize| -> Vec<f64> {
+        prediction.residuals.iter().zip(&means).map(|(column, mean)| column[k] - mean).collect()
+    };
+    (0..samples).map(row).filter(|row| row.iter().all(|e| e.is_finite())).collect()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    let values = values.iter().filter(|value| value.is_finite());
     let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
     if count > 0.0 { sum / count } else { 0.0 }
 }
 
+/// The record that the prediction and these errors make; what was not measured stays so.
+fn resampled(record: &Record, prediction: &Simulated, errors: Vec<Vec<f64>>) -> Record {
+    let outputs = record.outputs.iter().enumerate().map(|(j, channel)| {
+        let rows = channel.values.iter().zip(&prediction.outputs[j]).zip(&errors);
+        let drawn = |((old, new), e): ((&f64, &f64), &Vec<f64>)| if old.is_nan() { f64::NAN } else { new + e[j] };
+        channel.with(rows.map(drawn).collect::<Vec<f64>>())
+    });
+    Record { outputs: outputs.collect(), ..record.clone() }
+}
+
 /// As many rows as asked for, all outputs of a sample together.
-fn draw<Y: Copy>(residuals: &[Y], count: usize, resampling: Resampling, random: &mut Random) -> Vec<Y> {
+fn draw<Y: Clone>(residuals: &[Y], count: usize, resampling: Resampling, random: &mut Random) -> Vec<Y> {
     let length = match resampling {
         Resampling::Residuals => 1,
         Resampling::Blocks(0) => (residuals.len() as f64).cbrt().round() as usize,

@@ -4,126 +4,47 @@ mod section;
 
 use super::Test;
 use crate::error::Error;
-use crate::estimate::{Direction, Estimate, Method, Quality, Unknown, Warning};
+use crate::estimate::{Estimate, OutputFit, Summary};
 use crate::experiment::ExperimentOf;
 use crate::fit::Fit;
-use crate::information::SquareMatrix;
-use crate::integrate::Integrator;
 use crate::model::Model;
-use crate::numeral::or_nan;
-use crate::optimize::Severity;
 use crate::parameter::fixed;
-use crate::predict::{FreeRun, Horizon, Predictor};
+use crate::predict::Horizon;
 use crate::signals::Signals;
 use crate::whiteness::chi_squared_tail;
 use core::fmt;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-/// An estimate of any model without its types, to be kept, compared and reported.
+/// An estimate under a title, to be compared with others of the same data.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Summary {
+pub struct Candidate {
     /// What the reader calls it.
     pub title: String,
-    /// All free quantities.
-    pub unknowns: Vec<Unknown>,
-    /// Names, units and quality of the outputs.
-    pub outputs: Vec<(String, String, Quality)>,
-    /// Names and samples of the experiments.
-    pub experiments: Vec<(String, u64)>,
-    /// Measurements used.
-    pub measurements: u64,
-    /// The minimized cost.
-    #[serde(deserialize_with = "or_nan")]
-    pub cost: f64,
-    /// `-2 ln` of the likelihood, where there is one.
-    pub deviance: Option<f64>,
-    /// Parameters of the likelihood: unknowns and estimated standard deviations of the noise.
-    pub likelihood_parameters: Option<f64>,
-    /// Akaike's criterion.
-    pub aic: Option<f64>,
-    /// The same, corrected for short records.
-    pub aicc: Option<f64>,
-    /// Bayes' criterion.
-    pub bic: Option<f64>,
-    /// Akaike's final prediction error.
-    pub fpe: Option<f64>,
-    /// Measurements less what was estimated from them.
-    #[serde(deserialize_with = "or_nan")]
-    pub degrees_of_freedom: f64,
-    /// Covariance of the unknowns, in products of their units; zero where there is no interval.
-    pub covariance: SquareMatrix,
-    /// What the data cannot tell apart.
-    pub directions: Vec<Direction>,
-    /// What the reader must know.
-    pub warnings: Vec<Warning>,
-    /// How the search ended, in words.
-    pub outcome: String,
-    /// Whether it ended in a minimum.
-    pub converged: bool,
-    /// What to do, if it did not.
-    pub advice: String,
-    /// The worst that is said of it.
-    pub severity: Severity,
-    /// Trial steps of the search.
-    pub iterations: u64,
-    /// Passes over the data with slopes.
-    pub evaluations: u64,
-    /// Time taken (s).
-    #[serde(deserialize_with = "or_nan")]
-    pub seconds: f64,
-    /// How it was made.
-    pub method: Method,
+    /// The estimate.
+    pub estimate: Summary,
 }
 
-impl Summary {
-    /// The summary of an estimate under a title.
-    pub fn of<M: Model, I, P>(title: impl Into<String>, estimate: &Estimate<M, I, P>) -> Self {
-        let quality = M::Output::into_array(estimate.quality);
-        let output = |j: usize| (M::Output::NAMES[j].to_owned(), M::Output::UNITS[j].to_owned(), quality.as_ref()[j]);
-        Summary {
-            title: title.into(),
-            unknowns: estimate.unknowns.clone(),
-            outputs: (0..M::Output::LEN).map(output).collect(),
-            experiments: estimate.experiments.iter().map(|e| (e.name.clone(), e.samples as u64)).collect(),
-            measurements: estimate.measurements,
-            cost: estimate.cost,
-            deviance: estimate.deviance,
-            likelihood_parameters: estimate.aic().zip(estimate.deviance).map(|(aic, deviance)| (aic - deviance) / 2.0),
-            aic: estimate.aic(),
-            aicc: estimate.aicc(),
-            bic: estimate.bic(),
-            fpe: estimate.fpe(),
-            degrees_of_freedom: estimate.degrees_of_freedom(),
-            covariance: estimate.covariance.clone(),
-            directions: estimate.directions.clone(),
-            warnings: estimate.warnings.clone(),
-            outcome: estimate.outcome.to_string(),
-            converged: estimate.outcome.converged(),
-            advice: estimate.outcome.advice().to_owned(),
-            severity: estimate.severity(),
-            iterations: estimate.iterations,
-            evaluations: estimate.evaluations,
-            seconds: estimate.seconds,
-            method: estimate.method.clone(),
-        }
+impl Candidate {
+    /// An estimate under a title.
+    pub fn new(title: impl Into<String>, estimate: &Summary) -> Self {
+        Candidate { title: title.into(), estimate: estimate.clone() }
     }
 
-    fn same_data(&self, other: &Summary) -> Result<(), Error> {
-        let data = |s: &Summary| (s.measurements, s.experiments.clone(), s.method.predictor.clone());
+    fn same_data(&self, other: &Candidate) -> Result<(), Error> {
+        let data = |c: &Candidate| {
+            let experiments = c.estimate.experiments.iter().map(|e| (e.name.clone(), e.samples));
+            (c.estimate.measurements, experiments.collect::<Vec<_>>(), c.estimate.method.predictor.clone())
+        };
         if data(self) == data(other) {
             return Ok(());
         }
+        let (mine, its) = (&self.estimate, &other.estimate);
         Err(Error::Option(format!(
             "`{}` and `{}` are not fits of the same data by the same prediction error ({} measurements by {}, {} by {}): \
              their likelihoods do not compare",
-            self.title,
-            other.title,
-            self.measurements,
-            self.method.predictor,
-            other.measurements,
-            other.method.predictor
+            self.title, other.title, mine.measurements, mine.method.predictor, its.measurements, its.method.predictor
         )))
     }
 }
@@ -133,9 +54,9 @@ impl Summary {
 ///
 /// # Errors
 /// Fits of other data, weighted or robust ones (which have no likelihood), and a `full` that has no more unknowns.
-pub fn likelihood_ratio(restricted: &Summary, full: &Summary) -> Result<Test, Error> {
+pub fn likelihood_ratio(restricted: &Candidate, full: &Candidate) -> Result<Test, Error> {
     let more = nested(restricted, full)?;
-    let (Some(one), Some(other)) = (restricted.deviance, full.deviance) else {
+    let (Some(one), Some(other)) = (restricted.estimate.deviance, full.estimate.deviance) else {
         return Err(Error::Option("weighted and robust fits have no likelihood to compare".to_owned()));
     };
     let statistic = one - other;
@@ -148,28 +69,28 @@ pub fn likelihood_ratio(restricted: &Summary, full: &Summary) -> Result<Test, Er
 ///
 /// # Errors
 /// As [`likelihood_ratio`], and fits of several outputs.
-pub fn f_test(restricted: &Summary, full: &Summary) -> Result<Test, Error> {
+pub fn f_test(restricted: &Candidate, full: &Candidate) -> Result<Test, Error> {
     let more = nested(restricted, full)?;
-    let ([(_, _, one)], [(_, _, other)], true) = (
-        restricted.outputs.as_slice(),
-        full.outputs.as_slice(),
-        restricted.deviance.is_some() && full.deviance.is_some(),
+    let ([one], [other], true) = (
+        restricted.estimate.outputs.as_slice(),
+        full.estimate.outputs.as_slice(),
+        restricted.estimate.deviance.is_some() && full.estimate.deviance.is_some(),
     ) else {
         return Err(Error::Option("the F test is for unweighted fits of one output; use likelihood_ratio".to_owned()));
     };
-    let n = other.samples as f64;
-    let degrees = n - full.unknowns.len() as f64;
-    let squares = |quality: &Quality| quality.rmse * quality.rmse * n;
-    let statistic = (squares(one) - squares(other)) / more / (squares(other) / degrees);
+    let n = other.fit.samples as f64;
+    let degrees = n - full.estimate.unknowns.len() as f64;
+    let squares = |fit: &OutputFit| fit.rmse * fit.rmse * n;
+    let statistic = (squares(&one.fit) - squares(&other.fit)) / more / (squares(&other.fit) / degrees);
     let p_value = FisherSnedecor::new(more, degrees)
         .map_err(|_| Error::Option(format!("{n} measurements leave the F test no degree of freedom")))?
         .sf(statistic.max(0.0));
     Ok(verdict(format!("F test, {more} and {degrees} degrees of freedom"), statistic, p_value, restricted, full))
 }
 
-fn nested(restricted: &Summary, full: &Summary) -> Result<f64, Error> {
+fn nested(restricted: &Candidate, full: &Candidate) -> Result<f64, Error> {
     restricted.same_data(full)?;
-    let (few, many) = (restricted.unknowns.len(), full.unknowns.len());
+    let (few, many) = (restricted.estimate.unknowns.len(), full.estimate.unknowns.len());
     if many <= few {
         return Err(Error::Option(format!(
             "`{}` has {many} unknowns and `{}` has {few}: the second must have more than the first it is nested in",
@@ -179,16 +100,16 @@ fn nested(restricted: &Summary, full: &Summary) -> Result<f64, Error> {
     Ok((many - few) as f64)
 }
 
-fn verdict(name: String, statistic: f64, p_value: f64, restricted: &Summary, full: &Summary) -> Test {
+fn verdict(name: String, statistic: f64, p_value: f64, restricted: &Candidate, full: &Candidate) -> Test {
     let passed = format!("`{}` says as much as `{}` with fewer unknowns: keep it", restricted.title, full.title);
     let failed =
         format!("`{}` says more than chance would let it: `{}` misses something", full.title, restricted.title);
     Test::new(name, statistic, p_value, &passed, &failed)
 }
 
-/// Summaries side by side; prints as a table, and is a section of a report.
+/// Candidates side by side; prints as a table, and is a section of a report.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Comparison(pub Vec<Summary>);
+pub struct Comparison(pub Vec<Candidate>);
 
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -207,37 +128,27 @@ pub struct Validation {
 }
 
 /// Name and quality of each output.
-pub type NamedQualities = Vec<(String, Quality)>;
+pub type NamedQualities = Vec<(String, OutputFit)>;
 
 /// Simulates a record with the estimate's parameters, and predicts it each number of samples of `steps` ahead. What the
 /// record leaves open of its initial state is estimated from it.
 ///
 /// # Errors
 /// As [`Estimate::predict`]; predicting ahead needs outputs that give the state.
-pub fn validate<M: Model, I: Integrator, P>(
-    estimate: &Estimate<M, I, P>,
+pub fn validate<M: Model>(
+    estimate: &Estimate<M>,
     model: &M,
     record: &ExperimentOf<M>,
     steps: &[usize],
 ) -> Result<Validation, Error> {
-    fn quality<M: Model, I: Integrator, P, Q: Predictor<M>>(
-        estimate: &Estimate<M, I, P>,
-        model: &M,
-        record: &ExperimentOf<M>,
-        predictor: Q,
-    ) -> Result<Vec<(String, Quality)>, Error> {
-        let prediction = Fit::new(model, record)
-            .parameters(M::Parameters::map(estimate.parameters, fixed))
-            .noise(M::Output::map(estimate.quality, |quality| quality.sigma))
-            .integrator(estimate.integrator.clone())
-            .predictor(predictor)
-            .simulate()?;
-        let quality = M::Output::into_array(prediction.quality);
-        Ok((0..M::Output::LEN).map(|j| (M::Output::NAMES[j].to_owned(), quality.as_ref()[j])).collect())
-    }
-    let mut qualities = vec![(None, quality(estimate, model, record, FreeRun)?)];
+    let fit = || Fit::new(model, record).parameters(M::Parameters::map(estimate.parameters, fixed));
+    let quality = |fit: Fit<'_, M>| -> Result<NamedQualities, Error> {
+        let found = M::Output::into_array(fit.predict(estimate, record)?.quality);
+        Ok(M::Output::NAMES.iter().map(|name| (*name).to_owned()).zip(found).collect())
+    };
+    let mut qualities = vec![(None, quality(fit())?)];
     for &steps in steps {
-        qualities.push((Some(steps as u64), quality(estimate, model, record, Horizon::new(steps))?));
+        qualities.push((Some(steps as u64), quality(fit().predictor(Horizon::new(steps)))?));
     }
     Ok(Validation { experiment: record.name().to_owned(), qualities })
 }
@@ -247,10 +158,10 @@ pub fn validate<M: Model, I: Integrator, P>(
 ///
 /// # Errors
 /// Fewer than two records, and those of the fits and simulations.
-pub fn cross_validate<M: Model, I: Integrator, P>(
+pub fn cross_validate<M: Model>(
     model: &M,
     records: &[ExperimentOf<M>],
-    fit: impl Fn(&[ExperimentOf<M>]) -> Result<Estimate<M, I, P>, Error>,
+    fit: impl Fn(&[ExperimentOf<M>]) -> Result<Estimate<M>, Error>,
 ) -> Result<Vec<Validation>, Error> {
     if records.len() < 2 {
         return Err(Error::Option(format!(

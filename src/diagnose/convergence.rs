@@ -24,6 +24,7 @@ pub struct Iteration {
 /// ```
 /// # use greybox::{Experiment, Fit, Kind, Model, Nothing, Scalar, Time, free, signals};
 /// # signals! { pub struct Load { f: "N" } pub struct Length { y: "m" } pub struct Spring { k: "N/m" } }
+/// # #[derive(Clone)]
 /// # struct Hooke;
 /// # impl Model for Hooke {
 /// #     type State = Nothing; type Input = Load; type Output = Length; type Parameters = Spring;

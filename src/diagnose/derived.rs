@@ -1,9 +1,10 @@
 //! Delta method: how well a function of the parameters is known, by its exact slopes.
 
 use crate::dual::Dual;
-use crate::estimate::{Estimate, student};
+use crate::estimate::{Estimate, Unknown, student};
 use crate::model::Model;
 use crate::parameter::Transform;
+use crate::problem::Role;
 use crate::signals::{Of, Signals};
 use serde::{Deserialize, Serialize};
 
@@ -27,17 +28,15 @@ pub struct Derived {
 
 /// A function of the parameters with its interval: `derived(&estimate, "kt", |p| p.ke * 1.5)`. Parameters that each
 /// experiment has for itself are those of the first; fixed ones count as exact.
-pub fn derived<M: Model, I, P>(
-    estimate: &Estimate<M, I, P>,
+pub fn derived<M: Model>(
+    estimate: &Estimate<M>,
     name: &str,
     f: impl Fn(&Of<M::Parameters, Dual<LANES>>) -> Dual<LANES>,
 ) -> Derived {
     let values = M::Parameters::into_array(estimate.parameters);
-    let own = estimate.experiments.first().map(|share| share.name.as_str()).unwrap_or_default();
     let unknown = |j: usize| {
-        let name = M::Parameters::NAMES[j];
-        let local = format!("{name} [{own}]");
-        estimate.unknowns.iter().position(|u| u.name == name || u.name == local)
+        let first = |u: &Unknown| u.role == Role::Parameter(j) && u.experiment.is_none_or(|e| e == 0);
+        estimate.unknowns.iter().position(first)
     };
     let mut gradient = vec![0.0; estimate.unknowns.len()];
     let (mut value, mut known) = (f64::NAN, true);
@@ -53,10 +52,10 @@ pub fn derived<M: Model, I, P>(
             }
         }
     }
-    let c = &estimate.covariance;
-    let n = gradient.len();
-    let variance: f64 =
-        (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).map(|(i, j)| gradient[i] * c[(i, j)] * gradient[j]).sum();
+    let moved: Vec<usize> = (0..gradient.len()).filter(|&i| gradient[i] != 0.0).collect();
+    let c = estimate.covariance.dense(&moved);
+    let pairs = (0..moved.len()).flat_map(|a| (0..moved.len()).map(move |b| (a, b)));
+    let variance: f64 = pairs.map(|(a, b)| gradient[moved[a]] * c[(a, b)] * gradient[moved[b]]).sum();
     let standard_error = Some(variance.max(0.0).sqrt()).filter(|error| known && error.is_finite() && value.is_finite());
     let degrees = estimate.degrees_of_freedom();
     let interval = standard_error.map(|error| student::interval(value, error, Transform::Identity, 0.95, degrees));

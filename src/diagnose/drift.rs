@@ -1,7 +1,7 @@
 //! Drift: how estimates of one model go from record to record.
 
-use super::{Summary, Test};
-use crate::estimate::Unknown;
+use super::Test;
+use crate::estimate::{Summary, Unknown};
 use crate::whiteness::chi_squared_tail;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Normal};

@@ -8,14 +8,11 @@ mod together;
 pub(crate) use together::reworded;
 
 use crate::error::Error;
-use crate::estimate::Estimate;
-use crate::fit::{FitProblem, Objective};
+use crate::estimate::Summary;
 use crate::information::Information;
-use crate::integrate::Integrator;
-use crate::model::Model;
 use crate::optimize::{LeastSquares, Linearization};
 use crate::parameter::Transform;
-use crate::predict::Predictor;
+use crate::problem::{Objective, Problem};
 use crate::random::Random;
 use serde::{Deserialize, Serialize};
 
@@ -90,10 +87,7 @@ const SEED: u64 = 1;
 ///
 /// # Errors
 /// An estimate of another problem, or one that cannot be simulated any more.
-pub fn identifiability<M: Model, I: Integrator, P: Predictor<M>, O>(
-    problem: &FitProblem<'_, M, I, P, O>,
-    estimate: &Estimate<M, I, P>,
-) -> Result<Identifiability, Error> {
+pub fn identifiability(problem: &Problem<'_>, estimate: &Summary) -> Result<Identifiability, Error> {
     let (objective, best) = problem.at(estimate)?;
     let linear = objective.linearize(&best).map_err(|error| Error::Optimizer(error.to_string()))?;
     let whole = assembled(&linear);
@@ -122,7 +116,7 @@ pub fn identifiability<M: Model, I: Integrator, P: Predictor<M>, O>(
         excitation,
         advice: vec![],
     };
-    result.advice = advice::advice::<M>(&result, &estimate.unknowns, problem.experiments());
+    result.advice = advice::advice(&result, &estimate.unknowns, problem.records());
     Ok(result)
 }
 

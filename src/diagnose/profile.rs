@@ -7,14 +7,12 @@ mod section;
 
 use super::{Pinned, minimize};
 use crate::error::Error;
-use crate::estimate::{Estimate, Knowledge, student};
-use crate::fit::{FitProblem, classical, held_or_unseen};
-use crate::integrate::Integrator;
-use crate::model::Model;
+use crate::estimate::{Knowledge, Summary, student};
+use crate::judge::undetermined;
 use crate::numeral::number;
 use crate::optimize::{LeastSquares, Severity};
 use crate::parameter::Transform;
-use crate::predict::Predictor;
+use crate::problem::Problem;
 use serde::{Deserialize, Serialize};
 
 /// The profile of one unknown.
@@ -111,12 +109,7 @@ const CLOSE: f64 = 1e-3;
 ///
 /// # Errors
 /// A name that no unknown has, a probability not between 0 and 1, an estimate of another problem.
-pub fn profile<M: Model, I: Integrator, P: Predictor<M>, O>(
-    problem: &FitProblem<'_, M, I, P, O>,
-    estimate: &Estimate<M, I, P>,
-    name: &str,
-    probability: f64,
-) -> Result<Profile, Error> {
+pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probability: f64) -> Result<Profile, Error> {
     let (objective, best) = problem.at(estimate)?;
     let Some(index) = estimate.unknowns.iter().position(|unknown| unknown.name == name) else {
         let available = estimate.unknowns.iter().map(|unknown| unknown.name.clone()).collect();
@@ -130,13 +123,13 @@ pub fn profile<M: Model, I: Integrator, P: Predictor<M>, O>(
     let unknown = &estimate.unknowns[index];
     let linear = objective.linearize(&best).map_err(|error| Error::Optimizer(error.to_string()))?;
     let at_bound = |i: usize| i != index && matches!(estimate.unknowns[i].knowledge, Knowledge::Held { .. });
-    let held = held_or_unseen(&linear, (0..best.len()).map(at_bound).collect());
-    let covariance = classical(&linear, &held);
+    let held = undetermined(&linear, &(0..best.len()).map(at_bound).collect::<Vec<bool>>()).held;
+    let covariance = linear.covariance(&held);
     // How far one standard error is, and how the others go along.
-    let error = covariance.as_ref().map(|c| c[(index, index)].sqrt()).filter(|e| e.is_finite() && *e > 0.0);
+    let error = covariance.as_ref().map(|c| c.standard_error(index)).filter(|e| e.is_finite() && *e > 0.0);
     let along: Vec<f64> = (0..best.len())
         .map(|j| match (&covariance, error) {
-            (Some(c), Some(error)) if !held[j] => c[(j, index)] / (error * error),
+            (Some(c), Some(error)) if !held[j] => c.get(j, index) / (error * error),
             _ => f64::from(u8::from(j == index)),
         })
         .collect();

@@ -16,10 +16,8 @@ pub use spread::Spread;
 
 use super::Test;
 use crate::error::Error;
-use crate::estimate::Prediction;
-use crate::experiment::ExperimentOf;
-use crate::model::Model;
-use crate::signals::{Of, Signals};
+use crate::problem::Simulated;
+use crate::record::{Channel, Record};
 use crate::whiteness::ljung_box;
 use core::cell::OnceCell;
 use serde::{Deserialize, Serialize};
@@ -79,47 +77,46 @@ pub struct Residuals {
 /// # Errors
 /// A prediction that is not of this record, or a prediction that is infinite. Too few residuals for a test (fewer than
 /// [`FEWEST`]), and residuals that do not vary, are not errors: the tests are left out.
-pub fn examine<M: Model>(prediction: &Prediction<M>, record: &ExperimentOf<M>) -> Result<Vec<Residuals>, Error> {
-    if prediction.residuals.len() != record.len() {
+pub fn examine(prediction: &Simulated, record: &Record) -> Result<Vec<Residuals>, Error> {
+    let found = prediction.residuals.first().map_or(0, Vec::len);
+    if found != record.len() {
         return Err(Error::Lengths {
             experiment: record.name().to_owned(),
-            what: "the prediction",
-            found: prediction.residuals.len(),
-            reference: "the record",
+            what: "the prediction".to_owned(),
+            found,
+            reference: "the record".to_owned(),
             expected: record.len(),
         });
     }
-    let inputs: Vec<Series> = (0..M::Input::LEN)
-        .map(|i| Series::new("input", M::Input::NAMES[i], M::Input::UNITS[i], &column::<M::Input>(record.inputs(), i)))
-        .collect();
-    let outputs: Vec<Series> = (0..M::Output::LEN)
-        .map(|j| {
-            let values = column::<M::Output>(record.outputs(), j);
-            Series::new("measured output", M::Output::NAMES[j], M::Output::UNITS[j], &values)
-        })
-        .collect();
-    let predicted: Vec<Series> = (0..M::Output::LEN)
-        .map(|j| {
-            let values = column::<M::Output>(&prediction.outputs, j);
-            Series::new("predicted output", M::Output::NAMES[j], M::Output::UNITS[j], &values)
-        })
+    let series =
+        |what: &'static str, channel: &Channel, values: &[f64]| Series::new(what, &channel.name, &channel.unit, values);
+    let inputs: Vec<Series> = record.inputs().iter().map(|channel| series("input", channel, &channel.values)).collect();
+    let outputs: Vec<Series> =
+        record.outputs().iter().map(|channel| series("measured output", channel, &channel.values)).collect();
+    let predicted: Vec<Series> = record
+        .outputs()
+        .iter()
+        .zip(&prediction.outputs)
+        .map(|(channel, values)| series("predicted output", channel, values))
         .collect();
     let times: Vec<f64> = (0..record.len()).map(|k| record.time(k)).collect();
     let time = Series::new("time", "t", "s", &times);
     let even = record.gaps().is_empty();
-    (0..M::Output::LEN)
-        .map(|j| {
-            let residuals = column::<M::Output>(&prediction.residuals, j);
+    record
+        .outputs()
+        .iter()
+        .zip(&prediction.residuals)
+        .map(|(channel, residuals)| {
             if let Some(k) = residuals.iter().position(|e| e.is_infinite()) {
                 return Err(Error::NotFinite {
                     experiment: record.name().to_owned(),
-                    signal: format!("residual of {}", M::Output::NAMES[j]),
+                    signal: format!("residual of {}", channel.name),
                     value: residuals[k],
                     sample: k,
                     time: record.time(k),
                 });
             }
-            let output = Series::new("residual", M::Output::NAMES[j], M::Output::UNITS[j], &residuals);
+            let output = series("residual", channel, residuals);
             let mut result = output.examine(record.name(), &inputs, &outputs, &predicted, &time);
             if result.samples >= FEWEST && output.deviation > 0.0 {
                 if even {
@@ -127,22 +124,18 @@ pub fn examine<M: Model>(prediction: &Prediction<M>, record: &ExperimentOf<M>) -
                     (result.spectrum, result.period) = (spectrum, period);
                     result.tests.push(test);
                 }
-                (result.outliers, result.outlier_count) = outliers::find(&residuals, &times);
+                (result.outliers, result.outlier_count) = outliers::find(residuals, &times);
             }
             Ok(result)
         })
         .collect()
 }
 
-fn column<S: Signals>(rows: &[Of<S, f64>], i: usize) -> Vec<f64> {
-    rows.iter().map(|row| S::into_array(*row).as_ref()[i]).collect()
-}
-
 /// A signal less its mean, zero where missing.
 struct Series {
     role: &'static str,
-    name: &'static str,
-    unit: &'static str,
+    name: String,
+    unit: String,
     values: Vec<f64>,
     /// Whether each value was there; empty if all were.
     missing: Vec<bool>,
@@ -155,7 +148,7 @@ struct Series {
 }
 
 impl Series {
-    fn new(role: &'static str, name: &'static str, unit: &'static str, raw: &[f64]) -> Self {
+    fn new(role: &'static str, name: &str, unit: &str, raw: &[f64]) -> Self {
         let count = raw.iter().filter(|v| v.is_finite()).count();
         let missing = if count < raw.len() { raw.iter().map(|v| !v.is_finite()).collect() } else { vec![] };
         let n = count.max(1) as f64;
@@ -170,8 +163,8 @@ impl Series {
         let deviation = if highest > lowest { (values.iter().map(|v| v * v).sum::<f64>() / n).sqrt() } else { 0.0 };
         Series {
             role,
-            name,
-            unit,
+            name: name.to_owned(),
+            unit: unit.to_owned(),
             values,
             missing,
             count: count as u64,

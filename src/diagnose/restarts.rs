@@ -2,14 +2,11 @@
 
 use super::{Pinned, minimize};
 use crate::error::Error;
-use crate::estimate::Estimate;
-use crate::fit::{FitProblem, each};
-use crate::integrate::Integrator;
-use crate::model::Model;
+use crate::estimate::Summary;
 use crate::numeral::number;
 use crate::optimize::{LeastSquares, Severity};
 use crate::parameter::Transform;
-use crate::predict::Predictor;
+use crate::problem::{Problem, each};
 use crate::random::Random;
 use crate::section::{Axis, Cell, Curves, Drawing, Layer, Plot, Section, Style, Table};
 use serde::{Deserialize, Serialize};
@@ -66,9 +63,9 @@ const SAME: f64 = 1e-6;
 ///
 /// # Errors
 /// A reach that is not above one, an estimate of another problem.
-pub fn restarts<M: Model, I: Integrator, P: Predictor<M>, O: Sync>(
-    problem: &FitProblem<'_, M, I, P, O>,
-    estimate: &Estimate<M, I, P>,
+pub fn restarts(
+    problem: &Problem<'_>,
+    estimate: &Summary,
     count: usize,
     reach: f64,
     seed: u64,

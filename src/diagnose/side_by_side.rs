@@ -2,11 +2,11 @@
 
 use crate::error::Error;
 use crate::estimate::Prediction;
-use crate::experiment::ExperimentOf;
 use crate::model::Model;
+use crate::record::{Channel, Record};
 use crate::section::{Cell, Keep, Line, Panel, PanelKind, Samples, Section, Style, Table, Timeline, identifier};
 use crate::section::{Drawing, Plot};
-use crate::signals::{Of, Signals};
+use crate::signals::Signals;
 use serde::{Deserialize, Serialize};
 
 /// What a record was used for.
@@ -27,7 +27,7 @@ pub enum DataUse {
 /// #     fitted: &ExperimentOf<Surface>, other: &ExperimentOf<Surface>,
 /// # ) -> Result<Report, greybox::Error> {
 /// let both = |record, part| {
-///     Compared::new(model, record, part).with("full", &full.predict(model, record)?)?.with("linear", &linear.predict(model, record)?)
+///     Compared::new(record.record(), part).with("full", &full.predict(model, record)?)?.with("linear", &linear.predict(model, record)?)
 /// };
 /// let report = report.with(vec![both(fitted, DataUse::Estimation)?, both(other, DataUse::Validation)?]);
 /// # Ok(report)
@@ -61,12 +61,12 @@ pub struct ComparedOutput {
 }
 
 impl Compared {
-    /// A record that no model has predicted yet; the model only says which signals are meant.
-    pub fn new<M: Model>(_model: &M, record: &ExperimentOf<M>, part: DataUse) -> Compared {
-        let output = |j: usize| ComparedOutput {
-            name: M::Output::NAMES[j].to_owned(),
-            unit: M::Output::UNITS[j].to_owned(),
-            measured: column::<M::Output>(record.outputs(), j),
+    /// A record that no model has predicted yet.
+    pub fn new(record: &Record, part: DataUse) -> Compared {
+        let output = |channel: &Channel| ComparedOutput {
+            name: channel.name.clone(),
+            unit: channel.unit.clone(),
+            measured: channel.values.to_vec(),
             predicted: vec![],
         };
         Compared {
@@ -74,7 +74,7 @@ impl Compared {
             part,
             t: (0..record.len()).map(|k| record.time(k)).collect(),
             gaps: record.gaps().iter().map(|gap| gap.sample).collect(),
-            outputs: (0..M::Output::LEN).map(output).collect(),
+            outputs: record.outputs().iter().map(output).collect(),
         }
     }
 
@@ -86,9 +86,9 @@ impl Compared {
         if prediction.t.len() != self.t.len() {
             return Err(Error::Lengths {
                 experiment: self.record,
-                what: "the prediction",
+                what: "the prediction".to_owned(),
                 found: prediction.t.len(),
-                reference: "the record",
+                reference: "the record".to_owned(),
                 expected: self.t.len(),
             });
         }
@@ -97,14 +97,10 @@ impl Compared {
                 let available = M::Output::NAMES.iter().map(|&name| name.to_owned()).collect();
                 return Err(Error::UnknownSignal { signal: output.name.clone(), available });
             };
-            output.predicted.push((model.to_owned(), column::<M::Output>(&prediction.outputs, j)));
+            output.predicted.push((model.to_owned(), prediction.columns.outputs[j].clone()));
         }
         Ok(self)
     }
-}
-
-fn column<S: Signals>(rows: &[Of<S, f64>], i: usize) -> Vec<f64> {
-    rows.iter().map(|row| S::into_array(*row).as_ref()[i]).collect()
 }
 
 impl ComparedOutput {

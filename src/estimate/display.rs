@@ -1,11 +1,9 @@
 //! An estimate as plain text, within the 80 columns of a terminal.
 
-use super::{Estimate, Knowledge, Unknown};
-use crate::model::Model;
+use super::{Knowledge, ParameterEstimate, Summary, Unknown};
 use crate::numeral::{error_size, exact, number, resolved};
 use crate::optimize::Severity;
 use crate::section::{Cell, Table, wrapped};
-use crate::signals::Signals;
 use core::fmt;
 
 impl fmt::Display for Severity {
@@ -18,7 +16,7 @@ impl fmt::Display for Severity {
     }
 }
 
-impl<M: Model, I, P> fmt::Display for Estimate<M, I, P> {
+impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let line = |f: &mut fmt::Formatter<'_>, text: &str, indent: usize| {
             writeln!(f, "{:indent$}{}", "", wrapped(text, indent, indent + 2))
@@ -31,20 +29,14 @@ impl<M: Model, I, P> fmt::Display for Estimate<M, I, P> {
             let kind = if warning.severity == Severity::Usable { "note" } else { "warning" };
             line(f, &format!("{kind}: {}", warning.text), 2)?;
         }
-        let unknowns = self.unknowns.iter().map(row);
-        let (values, knowledge) =
-            (M::Parameters::into_array(self.parameters), M::Parameters::into_array(self.knowledge));
-        let fixed = (0..M::Parameters::LEN).filter(|&i| knowledge.as_ref()[i] == Knowledge::Fixed).map(|i| {
-            let (name, unit) = (M::Parameters::NAMES[i], M::Parameters::UNITS[i]);
-            [name.into(), Cell::number(values.as_ref()[i], 7), unit.into(), Cell::Empty, "fixed".into()].into()
-        });
+        let fixed = self.parameters.iter().filter(|parameter| parameter.knowledge == Knowledge::Fixed);
+        let rows: Vec<Vec<Cell>> = self.unknowns.iter().map(row).chain(fixed.map(fixed_row)).collect();
         let columns = ["parameter", "value", "unit", "std. error", "95 % interval", "index"];
-        let rows: Vec<Vec<Cell>> = unknowns.chain(fixed).collect();
         writeln!(f, "\n{}\n", Table::new("", columns).rows(rows))?;
-        let outputs = M::Output::into_array(self.quality).into_iter().enumerate().map(|(j, quality)| {
-            let fit = Cell::fit(quality.fit_percent);
-            let (rmse, sigma) = (Cell::number(quality.rmse, 4), Cell::number(quality.sigma, 4));
-            [M::Output::NAMES[j].into(), rmse, M::Output::UNITS[j].into(), sigma, fit]
+        let outputs = self.outputs.iter().map(|output| {
+            let fit = Cell::fit(output.fit.fit_percent);
+            let (rmse, sigma) = (Cell::number(output.fit.rmse, 4), Cell::number(output.fit.sigma, 4));
+            [output.name.as_str().into(), rmse, output.unit.as_str().into(), sigma, fit]
         });
         writeln!(f, "{}\n", Table::new("", ["output", "rmse", "unit", "noise", "fit"]).rows(outputs))?;
         let mut figures = format!("{} measurements, {} unknowns", self.measurements, self.unknowns.len());
@@ -84,4 +76,9 @@ fn row(unknown: &Unknown) -> Vec<Cell> {
         Knowledge::Unidentified => said("not determined by the data".to_owned()),
         Knowledge::Fixed => said("fixed".to_owned()),
     }
+}
+
+fn fixed_row(parameter: &ParameterEstimate) -> Vec<Cell> {
+    let ParameterEstimate { name, unit, value, .. } = parameter;
+    [name.as_str().into(), Cell::number(*value, 7), unit.as_str().into(), Cell::Empty, "fixed".into()].into()
 }

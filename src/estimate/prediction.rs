@@ -1,7 +1,8 @@
 //! [`Prediction`]: what an estimate says of a record.
 
-use super::Quality;
+use super::OutputFit;
 use crate::model::Model;
+use crate::problem::Simulated;
 use crate::signals::Of;
 
 /// What an estimate says of a record: the outputs it predicts, beside those measured.
@@ -16,5 +17,7 @@ pub struct Prediction<M: Model> {
     /// State at the first sample: given, measured, or estimated with the parameters kept.
     pub initial_state: Of<M::State, f64>,
     /// How well each output is reproduced.
-    pub quality: Of<M::Output, Quality>,
+    pub quality: Of<M::Output, OutputFit>,
+    /// The same by columns.
+    pub columns: Simulated,
 }

@@ -1,183 +1,22 @@
-//! [`CsvFile`]: from a CSV file to a record, and back.
+//! Experiments from and to CSV files.
 
-mod read;
-mod table;
-mod write;
-
-use super::Experiment;
+use super::{Experiment, ExperimentOf};
 use crate::error::Error;
+use crate::layout::Layout;
 use crate::model::Model;
+use crate::record::CsvFile;
 use crate::signals::Signals;
 use std::path::{Path, PathBuf};
 
-/// A CSV file, and how it becomes a record.
-///
-/// A file whose columns have the names and units of the model's signals, and `t` in seconds, needs no word:
-/// `Experiment::from_csv(&model, "record.csv")`. Of any other file, what differs is said. From
-///
-/// ```text
-/// # bench 3, winding cold
-/// time (ms); speed; voltage; i;     remark
-/// 0;         1500;  24,1;    -0,52;
-/// 1;         1500;  24,1;    ;      out of range
-/// 2;         1498;  24,0;    -0,50;
-/// ```
-///
-/// a motor with the inputs `u` (V) and `w` (rad/s) and the output `i` (A) gets its record by
-///
-/// ```
-/// # use greybox::{Model, Of, Scalar, signals};
-/// # signals! { pub struct Current { i: "A" } pub struct Supply { u: "V", w: "rad/s" } pub struct Winding { r: "ohm" } }
-/// # struct Motor;
-/// # impl Model for Motor {
-/// #     type State = Current; type Input = Supply; type Output = Current; type Parameters = Winding;
-/// #     fn output<S: Scalar>(&self, _: S, x: &Current<S>, _: &Supply<S>, _: &Winding<S>) -> Current<S> { *x }
-/// # }
-/// # let (model, path) = (Motor, std::env::temp_dir().join(format!("greybox_csv_{}.csv", std::process::id())));
-/// # let text = "# bench 3, winding cold\ntime (ms); speed; voltage; i;     remark\n0;         1500;  24,1;    -0,52;\n\
-/// # 1;         1500;  24,1;    ;      out of range\n2;         1498;  24,0;    -0,50;\n";
-/// # std::fs::write(&path, text).unwrap();
-/// use greybox::{CsvFile, Hold, Time, units};
-///
-/// let record = CsvFile::new(&path)
-///     .decimal_comma()
-///     .column("t", "time (ms)").factor("t", 1e-3)
-///     .column("u", "voltage")
-///     .column("w", "speed").factor("w", units::RPM)
-///     .reversed("i")
-///     .read(&model)?
-///     .named("bench 3")
-///     .hold(Hold::First);
-///
-/// assert_eq!(record.times(), &Time::Uniform { start: 0.0, step: 1e-3 });
-/// assert_eq!(record.inputs()[0].w, 1500.0 * units::RPM);
-/// assert_eq!(record.outputs()[0].i, 0.52);
-/// assert!(record.outputs()[1].i.is_nan());
-/// # std::fs::remove_file(path).unwrap();
-/// # Ok::<(), greybox::Error>(())
-/// ```
-///
-/// **Columns** go by name. Each input and output of the model, and the time `t`, has a column of its own name unless
-/// [`column`](CsvFile::column) says another. States need none; further columns are ignored. A value is
-/// `factor * cell + offset`, in the unit of the signal.
-///
-/// **Cells** stand between commas, may be quoted, and may have white space around them. An output that was not measured
-/// is empty, `NaN`, `NA` or `null`; inputs and time are always there.
-///
-/// **Lines** that begin with `#` are comments, blank lines nothing. The names stand on the first line that is neither,
-/// or in the last comment if numbers follow it at once (as numpy writes them).
-///
-/// **Time** increases. If evenly, up to a millionth of a step (see [`Time::from_stamps`](crate::Time::from_stamps)), it is
-/// stored as [`Time::Uniform`](crate::Time::Uniform) and costs no memory. A static model needs no time: without a column
-/// for it the rows are numbered.
-///
-/// **The record** is named after the file, its input is held from sample to sample, and its initial state is estimated,
-/// unless the [`Experiment`] is told otherwise.
-///
-/// The file is read row by row and kept only as the record: ten million rows of five signals take 400 MB. Only where time
-/// turns out uneven, a regular file is read again up to there for its stamps.
-#[derive(Clone, Debug)]
-pub struct CsvFile {
-    path: PathBuf,
-    delimiter: u8,
-    comment: u8,
-    decimal_comma: bool,
-    preamble: usize,
-    units_row: bool,
-    sample_time: Option<f64>,
-    columns: Vec<Column>,
-}
-
-/// What was said of one signal.
-#[derive(Clone, Debug)]
-struct Column {
-    signal: String,
-    name: String,
-    factor: f64,
-    offset: f64,
-    reversed: bool,
-}
-
-impl Column {
-    fn new(signal: &str) -> Column {
-        // Adding minus zero changes no number, not even minus zero.
-        Column { signal: signal.to_owned(), name: signal.to_owned(), factor: 1.0, offset: -0.0, reversed: false }
-    }
-}
-
 impl CsvFile {
-    /// The file at `path`: comma-separated, columns named as the signals and in their units.
-    pub fn new(path: impl Into<PathBuf>) -> Self {
-        CsvFile {
-            path: path.into(),
-            delimiter: b',',
-            comment: b'#',
-            decimal_comma: false,
-            preamble: 0,
-            units_row: false,
-            sample_time: None,
-            columns: Vec::new(),
-        }
-    }
-
-    /// The column that holds `signal`: an input or output of the model, or the time `t`.
-    pub fn column(self, signal: &str, name: &str) -> Self {
-        self.with(signal, |column| column.name = name.to_owned())
-    }
-
-    /// What a cell of `signal` is multiplied by, such as [`units::RPM`](crate::units::RPM); positive.
-    pub fn factor(self, signal: &str, factor: f64) -> Self {
-        self.with(signal, |column| column.factor = factor)
-    }
-
-    /// What is added to `signal` after its factor, in the signal's unit.
-    pub fn offset(self, signal: &str, offset: f64) -> Self {
-        self.with(signal, |column| column.offset = offset)
-    }
-
-    /// Turns the sign of the cells of `signal`: for a sensor mounted the other way round.
-    pub fn reversed(self, signal: &str) -> Self {
-        self.with(signal, |column| column.reversed = true)
-    }
-
-    /// Time from a constant sample time (s) instead of a column; it starts at zero.
-    pub fn sample_time(self, step: f64) -> Self {
-        CsvFile { sample_time: Some(step), ..self }
-    }
-
-    /// The byte between cells, such as `b';'` or `b'\t'`.
-    pub fn delimiter(self, delimiter: u8) -> Self {
-        CsvFile { delimiter, ..self }
-    }
-
-    /// Numbers as `1,5`, and cells between semicolons (unless [`delimiter`](CsvFile::delimiter) says otherwise after this).
-    pub fn decimal_comma(self) -> Self {
-        CsvFile { decimal_comma: true, delimiter: b';', ..self }
-    }
-
-    /// The byte that a comment begins with, if not `b'#'`.
-    pub fn comment(self, comment: u8) -> Self {
-        CsvFile { comment, ..self }
-    }
-
-    /// How many lines to skip above the names.
-    pub fn preamble(self, lines: usize) -> Self {
-        CsvFile { preamble: lines, ..self }
-    }
-
-    /// Skips the line below the names, where some instruments write the units.
-    pub fn units_row(self) -> Self {
-        CsvFile { units_row: true, ..self }
-    }
-
-    fn with(mut self, signal: &str, say: impl FnOnce(&mut Column)) -> Self {
-        let known = self.columns.iter().position(|column| column.signal == signal);
-        let at = known.unwrap_or_else(|| {
-            self.columns.push(Column::new(signal));
-            self.columns.len() - 1
-        });
-        say(&mut self.columns[at]);
-        self
+    /// Reads the record of a model; it is named after the file.
+    ///
+    /// # Errors
+    /// A file that cannot be read; a missing or ambiguous column (the message lists those there); a cell that is no
+    /// number, a missing input, time that does not increase, a row of another length (each with its line); a factor that
+    /// is not positive; a signal that the model does not have; whatever [`Experiment::new`] refuses.
+    pub fn read<M: Model>(&self, _model: &M) -> Result<ExperimentOf<M>, Error> {
+        self.read_record(&Layout::of::<M>()).map(Experiment::of)
     }
 }
 
@@ -201,6 +40,6 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     /// # Errors
     /// A file that cannot be written (it is left as it was); an input and an output of one name.
     pub fn to_csv(&self, path: impl AsRef<Path>) -> Result<(), Error> {
-        write::write(self, path.as_ref())
+        self.record().to_csv(path)
     }
 }

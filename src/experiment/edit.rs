@@ -1,16 +1,12 @@
-//! Cutting, joining and thinning records.
-//!
-//! A piece keeps the hold. What was given of the initial state holds at the first sample of the whole record: a piece that
-//! begins later has its initial state estimated. Cuts copy what they keep.
+//! Cutting, joining and thinning experiments. A piece keeps the hold. What was given of the initial state holds at the first
+//! sample of the whole record: a piece that begins later has its initial state estimated.
 
-use super::{Experiment, Time, least};
+use super::{Experiment, Sample};
 use crate::error::Error;
-use crate::interval::Hold;
+use crate::model::Model;
+use crate::record::Gap;
 use crate::signals::{Of, Signals};
-use std::ops::{Bound, Range, RangeBounds};
-
-/// Two times closer than this fraction of an even step are the same: `3 * 0.1` is not `0.3` in binary.
-const SAME: f64 = 1e-6;
+use std::ops::RangeBounds;
 
 impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     /// The samples of a range, by index from zero: `record.slice(1000..)`.
@@ -18,23 +14,7 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     /// # Errors
     /// A range that the record does not have, or too few samples in it.
     pub fn slice(&self, samples: impl RangeBounds<usize>) -> Result<Self, Error> {
-        let begin = match samples.start_bound() {
-            Bound::Included(&k) => k,
-            Bound::Excluded(&k) => k.saturating_add(1),
-            Bound::Unbounded => 0,
-        };
-        let end = match samples.end_bound() {
-            Bound::Included(&k) => k.saturating_add(1),
-            Bound::Excluded(&k) => k,
-            Bound::Unbounded => self.len(),
-        };
-        if begin > end || end > self.len() {
-            let (name, len) = (&self.name, self.len());
-            return Err(Error::Option(format!(
-                "experiment `{name}` has {len} samples; {begin}..{end} is no range of them"
-            )));
-        }
-        self.cut(begin..end, format!("{}[{begin}..{end}]", self.name))
+        self.record.slice(samples).map(Self::of)
     }
 
     /// The samples of a range of time (s): `record.between(2.0..5.0)`. A sample at the begin belongs to it, one at the end
@@ -43,17 +23,7 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     /// # Errors
     /// A bound that is not a number, or too few samples between them.
     pub fn between(&self, seconds: impl RangeBounds<f64>) -> Result<Self, Error> {
-        let begin = match seconds.start_bound() {
-            Bound::Included(&t) => self.before(t)?,
-            Bound::Excluded(&t) => self.until(t)?,
-            Bound::Unbounded => 0,
-        };
-        let end = match seconds.end_bound() {
-            Bound::Included(&t) => self.until(t)?,
-            Bound::Excluded(&t) => self.before(t)?,
-            Bound::Unbounded => self.len(),
-        };
-        self.cut(begin..end.max(begin), format!("{}[{begin}..{}]", self.name, end.max(begin)))
+        self.record.between(seconds).map(Self::of)
     }
 
     /// Two pieces, the first with `fraction` (0 to 1) of the samples: to fit on and to validate on.
@@ -61,13 +31,7 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     /// # Errors
     /// A fraction outside 0 to 1, or one that leaves too few samples on a side.
     pub fn split(&self, fraction: f64) -> Result<(Self, Self), Error> {
-        if !(0.0..=1.0).contains(&fraction) {
-            let name = &self.name;
-            return Err(Error::Option(format!(
-                "experiment `{name}`: {fraction} is no fraction to split at; take one between 0 and 1"
-            )));
-        }
-        self.halves((fraction * self.len() as f64).round() as usize)
+        self.record.split(fraction).map(|(a, b)| (Self::of(a), Self::of(b)))
     }
 
     /// Two pieces, the second beginning with the first sample at or after `time` (s).
@@ -75,7 +39,7 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     /// # Errors
     /// A time that is not a number, or that leaves too few samples on a side.
     pub fn split_at(&self, time: f64) -> Result<(Self, Self), Error> {
-        self.halves(self.before(time)?)
+        self.record.split_at(time).map(|(a, b)| (Self::of(a), Self::of(b)))
     }
 
     /// This record and one that follows it, as one. Between them the input is held as between any two samples; name and
@@ -84,18 +48,7 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     /// # Errors
     /// A second record that begins before the first has ended, or with another hold.
     pub fn join(self, later: &Self) -> Result<Self, Error> {
-        if self.hold != later.hold {
-            return Err(Error::Option(format!(
-                "experiments `{}` and `{}` cannot be joined: their holds are {:?} and {:?}",
-                self.name, later.name, self.hold, later.hold
-            )));
-        }
-        let stamps = (0..self.len()).map(|k| self.time(k)).chain((0..later.len()).map(|k| later.time(k)));
-        let time = Time::from_stamps(stamps.collect());
-        let (mut inputs, mut outputs) = (self.inputs, self.outputs);
-        inputs.extend_from_slice(&later.inputs);
-        outputs.extend_from_slice(&later.outputs);
-        Experiment { time, inputs, outputs, ..self }.checked()
+        self.record.join(&later.record).map(Self::of)
     }
 
     /// Every `n`-th sample, from the first.
@@ -113,83 +66,55 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     /// # Errors
     /// `n` of zero, or too few samples left.
     pub fn decimate(&self, n: usize) -> Result<Self, Error> {
-        if n == 0 {
-            let name = &self.name;
-            return Err(Error::Option(format!(
-                "experiment `{name}`: every 0-th sample makes no sense; take 1 or more"
-            )));
-        }
-        let kept = || (0..self.len()).step_by(n);
-        let time = match &self.time {
-            Time::Uniform { start, step } => Time::Uniform { start: *start, step: step * n as f64 },
-            Time::Stamps(stamps) => Time::Stamps(stamps.iter().step_by(n).copied().collect()),
-        };
-        let inputs = match self.hold {
-            Hold::Zero => kept().map(|k| self.mean_input(k..self.len().min(k.saturating_add(n)))).collect(),
-            Hold::First => kept().map(|k| self.inputs[k]).collect(),
-        };
-        let outputs = kept().map(|k| self.outputs[k]).collect();
-        let (name, hold, initial) = (self.name.clone(), self.hold, self.initial);
-        Experiment { name, time, inputs, outputs, hold, initial }.checked()
+        self.record.decimate(n).map(Self::of)
     }
 
-    /// The mean of the input, held from sample to sample, over the intervals that begin with these samples. The last
-    /// sample of the record begins none.
-    fn mean_input(&self, samples: Range<usize>) -> Of<U, f64> {
-        let first = U::into_array(self.inputs[samples.start]);
-        let mut excess = U::array_from_fn(|_| 0.0);
-        let mut total = 0.0;
-        for k in samples.start..samples.end.min(self.len() - 1) {
-            let u = U::into_array(self.inputs[k]);
-            // Even steps all weigh the same, without the rounding of their times.
-            let span = if let Time::Stamps(stamps) = &self.time { stamps[k + 1] - stamps[k] } else { 1.0 };
-            for i in 0..U::LEN {
-                excess.as_mut()[i] += (u.as_ref()[i] - first.as_ref()[i]) * span;
-            }
-            total += span;
-        }
-        // The excess over the first sample, so that a constant input stays what it is to the last bit.
-        U::from_fn(|i| first.as_ref()[i] + if total > 0.0 { excess.as_ref()[i] / total } else { 0.0 })
+    /// The operating cycles: each run of samples for which `running` holds, if it is at least `shortest` samples long, as
+    /// a record of its own, numbered from one.
+    ///
+    /// ```
+    /// # use greybox::{Error, Experiment, Kind, Model, Nothing, Sample, Scalar, Time, signals};
+    /// # signals! { pub struct Speed { w: "rad/s" } pub struct Torque { m: "N m" } pub struct Friction { b: "N m s" } }
+    /// # struct Bearing;
+    /// # impl Model for Bearing {
+    /// #     type State = Nothing; type Input = Speed; type Output = Torque; type Parameters = Friction;
+    /// #     const KIND: Kind = Kind::Static;
+    /// #     fn output<S: Scalar>(&self, _: S, _: &Nothing, u: &Speed<S>, p: &Friction<S>) -> Torque<S> {
+    /// #         Torque { m: u.w * p.b }
+    /// #     }
+    /// # }
+    /// # let u = [0.0, 9.0, 8.0, 9.0, 0.0, 9.0, 0.0].map(|w| Speed { w }).to_vec();
+    /// # let y = vec![Torque { m: 1.0 }; 7];
+    /// # let record = Experiment::new(&Bearing, Time::Uniform { start: 0.0, step: 0.1 }, u, y)?;
+    /// let cycles = record.cycles(2, |s: &Sample<Bearing>| s.u.w.abs() > 5.0);
+    /// assert_eq!(cycles[0].name(), "record, cycle 1");
+    /// # assert_eq!((cycles.len(), cycles[0].len(), cycles[0].time(0)), (1, 3, 0.1));
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn cycles<M: Model<State = X, Input = U, Output = Y>>(
+        &self,
+        shortest: usize,
+        mut running: impl FnMut(&Sample<M>) -> bool,
+    ) -> Vec<Self> {
+        let at = |k| Sample { t: self.time(k), u: self.input(k), y: self.output(k) };
+        self.record.cycles(shortest, |k| running(&at(k))).into_iter().map(Self::of).collect()
     }
 
-    fn halves(&self, cut: usize) -> Result<(Self, Self), Error> {
-        let first = self.cut(0..cut, format!("{}, part 1", self.name))?;
-        Ok((first, self.cut(cut..self.len(), format!("{}, part 2", self.name))?))
+    /// The pieces between the [`gaps`](Experiment::gaps), each a record of its own, numbered from one; a single sample
+    /// between two gaps is dropped.
+    pub fn without_gaps(&self) -> Vec<Self> {
+        self.record.without_gaps().into_iter().map(Self::of).collect()
     }
 
-    fn cut(&self, samples: Range<usize>, name: String) -> Result<Self, Error> {
-        let (found, needed) = (samples.len(), least::<X>());
-        if found < needed {
-            return Err(Error::TooFewSamples { experiment: name, samples: found, needed, purpose: "in a piece" });
-        }
-        Ok(self.piece(samples, name))
+    /// Where time jumps: a step of more than 1.5 times the median one, so that a sample or more is lost. Over a gap the
+    /// input is held as between any two samples, which is seldom what happened.
+    pub fn gaps(&self) -> Vec<Gap> {
+        self.record.gaps()
     }
 
-    /// How many samples lie before `time`.
-    fn before(&self, time: f64) -> Result<usize, Error> {
-        let edge = time - self.slack();
-        self.count_while(time, |t| t < edge)
-    }
-
-    /// How many samples lie before or at `time`.
-    fn until(&self, time: f64) -> Result<usize, Error> {
-        let edge = time + self.slack();
-        self.count_while(time, |t| t <= edge)
-    }
-
-    fn slack(&self) -> f64 {
-        if let Time::Uniform { step, .. } = self.time { step * SAME } else { 0.0 }
-    }
-
-    fn count_while(&self, bound: f64, holds: impl Fn(f64) -> bool) -> Result<usize, Error> {
-        if bound.is_nan() {
-            return Err(Error::Option(format!("experiment `{}`: NaN s is no time to cut at", self.name)));
-        }
-        let (mut low, mut high) = (0, self.len());
-        while low < high {
-            let middle = low + (high - low) / 2;
-            if holds(self.time(middle)) { low = middle + 1 } else { high = middle }
-        }
-        Ok(low)
+    /// The share of the samples, from 0 to 1, in which each output was measured.
+    pub fn coverage(&self) -> Of<Y, f64> {
+        let coverage = self.record.coverage();
+        Y::from_fn(|j| coverage[j])
     }
 }

@@ -1,223 +1,142 @@
 //! The search: rounds of an optimizer, with the noise estimated between them.
 
-use super::checkpoint::CheckpointFile;
-use super::noise::{Noise, Whitening};
-use super::objective::Objective;
-use super::source::Halt;
-use super::{Observer, Search, Terms};
 use crate::error::Error;
-use crate::optimize::{Infeasible, LeastSquaresState, Linearization, Outcome};
-use argmin::core::observers::Observe;
-use argmin::core::{Executor, KV, Solver, State, TerminationReason, TerminationStatus};
+use crate::judge::{SearchEnd, noise};
+use crate::optimize::{Infeasible, Outcome};
+use crate::problem::{CheckpointFile, Control, Noise, Objective, Optimizer, Problem, RoundError};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
-
-/// Where a search ended.
-pub(super) struct Found {
-    pub coordinates: Vec<f64>,
-    pub whitening: Whitening,
-    /// The slopes there, if they are still those of this whitening.
-    pub linear: Option<Linearization>,
-    pub outcome: Outcome,
-    pub iterations: u64,
-    pub evaluations: u64,
-    pub name: String,
-    pub trouble: Option<String>,
-}
 
 /// The noise is known well enough when a round changes it by less than this part: no unknown then moves by more than that
 /// part of its standard error.
 const NOISE_TOLERANCE: f64 = 1e-6;
 const NOISE_ROUNDS: u32 = 100;
 
-impl Objective<'_> {
-    /// Searches from the start, or from where a checkpoint says. `self` leaves errors in the units of the outputs.
-    pub(super) fn search<O: Search>(&self, terms: &Terms<'_>, optimizer: &O) -> Result<Found, Error> {
-        let mut coordinates = self.unknowns.start();
-        let mut solver = optimizer.clone();
-        let mut file = None;
-        let mut before = 0;
-        if let Some((path, every)) = &terms.checkpoint {
-            let (path, every, fingerprint) = (path.clone(), *every, self.fingerprint(terms));
-            let settings = serde_json::to_string(&solver).map_err(|error| Error::Optimizer(error.to_string()))?;
-            let mut checkpoint = CheckpointFile { path, every, fingerprint, settings, before, trouble: Arc::default() };
-            match checkpoint.load::<O>()? {
-                Some((place, iterations, saved)) if place.len() == coordinates.len() => {
-                    (coordinates, before) = (place, iterations);
-                    // The settings are those of this run; only a search with the same that has not ended goes on as it was.
-                    solver = saved.filter(|saved| saved.outcome().is_none()).unwrap_or(solver);
-                }
-                // Written at once: a place that cannot be written to is better known now.
-                _ => checkpoint.write(&coordinates, 0, &solver)?,
+/// Searches from the start, or from where a checkpoint says. `plain` leaves errors in the units of the outputs.
+pub(super) fn search(plain: &Objective<'_>, optimizer: &Arc<dyn Optimizer>) -> Result<SearchEnd, Error> {
+    let problem = plain.problem;
+    let mut coordinates = problem.unknowns.start();
+    let mut next = optimizer.clone();
+    let mut file = None;
+    if let Some((path, every)) = &problem.settings.checkpoint {
+        let mut checkpoint = CheckpointFile::new(path.clone(), *every, fingerprint(problem), optimizer.settings()?);
+        match optimizer.resume(&checkpoint)? {
+            Some((place, iterations, saved)) if place.len() == coordinates.len() => {
+                (coordinates, checkpoint.before) = (place, iterations);
+                next = saved.unwrap_or(next);
             }
-            checkpoint.before = before;
-            file = Some(checkpoint);
+            // Written at once: a place that cannot be written to is better known now.
+            _ => optimizer.begin(&checkpoint, &coordinates)?,
         }
-        let mut whitening = self.first_whitening(terms, &coordinates)?;
-        let known = matches!(terms.noise, Noise::Given(_)) || self.noise_is_no_matter(&terms.noise);
-        let (mut iterations, mut evaluations) = (before, 0);
-        let mut name = String::new();
-        // Noise as the errors at the start show it is not worth an exact minimum.
-        if !known && file.is_none() {
-            solver = optimizer.rough();
-        }
-        let mut round = 0;
-        loop {
-            round += 1;
-            let objective = self.with(whitening.clone());
-            let result = objective.round(terms, coordinates, solver, &file)?;
-            name.clone_from(&result.name);
-            iterations += result.iterations;
-            evaluations += result.evaluations;
-            coordinates = result.coordinates;
-            let (mut outcome, mut linear) = (result.outcome, result.linear);
-            let lost = matches!(outcome, Outcome::Stalled { .. } | Outcome::LimitOfPrecision { .. });
-            if lost && objective.reproduces(&coordinates) {
-                outcome = Outcome::Exact;
-            }
-            let mut settled = known || !outcome.converged();
-            if !settled {
-                let next = objective.estimate_noise(&coordinates, &terms.noise).unwrap_or_else(|_| whitening.clone());
-                let changes = next.sigma().into_iter().zip(whitening.sigma()).map(|(a, b)| (a / b).ln().abs());
-                settled = round > 1 && changes.fold(0.0, f64::max) < NOISE_TOLERANCE;
-                if !settled {
-                    (whitening, linear) = (next, None);
-                }
-                // Rounding is another at every point.
-                settled |= outcome == Outcome::Exact;
-                if !settled && round == NOISE_ROUNDS {
-                    outcome = Outcome::IterationLimit { iterations };
-                    settled = true;
-                }
-            }
-            if settled {
-                let trouble = file.and_then(|file| file.trouble.lock().ok().and_then(|trouble| trouble.clone()));
-                return Ok(Found { coordinates, whitening, linear, outcome, iterations, evaluations, name, trouble });
-            }
-            solver = optimizer.clone();
-        }
+        file = Some(checkpoint);
     }
-
-    /// One search with the noise as it stands.
-    fn round<O: Search>(
-        &self,
-        terms: &Terms<'_>,
-        start: Vec<f64>,
-        solver: O,
-        file: &Option<CheckpointFile>,
-    ) -> Result<Round, Error> {
-        let counting = |state: LeastSquaresState| state.param(start.clone()).counting(true);
-        let mut executor = Executor::new(self, solver).configure(counting).ctrlc(false);
-        for (observer, mode) in &terms.observers {
-            executor = executor.add_observer(Shared(observer.clone()), *mode);
-        }
-        if let Some(file) = file {
-            executor = executor.checkpointing(file.clone());
-        }
-        let result = executor.run().map_err(|error| match error.downcast::<Infeasible>() {
-            Ok(Infeasible::Failed(_)) => self.start_failure(terms, &start),
-            Ok(Infeasible::Cancelled) => self.stopped(terms),
-            Err(other) => Error::Optimizer(other.to_string()),
+    let mut whitening =
+        noise::first_whitening(plain, &coordinates).map_err(|error| start_error(plain, &coordinates, error))?;
+    let known = !noise::is_estimated(plain);
+    let before = file.as_ref().map_or(0, |file| file.before);
+    let (mut iterations, mut evaluations) = (before, 0);
+    // Noise as the errors at the start show it is not worth an exact minimum.
+    if !known && file.is_none() {
+        next = optimizer.rough();
+    }
+    for round in 1.. {
+        let objective = plain.with(whitening.clone());
+        let result = next.round(&objective, coordinates.clone(), file.as_ref()).map_err(|error| match error {
+            RoundError::Start(error) => start_error(plain, &coordinates, error),
+            RoundError::Optimizer(text) => Error::Optimizer(text),
         })?;
-        let state = result.state();
-        let outcome = result.solver().outcome().unwrap_or(match state.get_termination_status() {
-            TerminationStatus::Terminated(TerminationReason::MaxItersReached) => {
-                Outcome::IterationLimit { iterations: state.get_iter() }
+        iterations += result.iterations;
+        evaluations += result.evaluations;
+        coordinates = result.coordinates;
+        let (mut outcome, mut linear) = (result.outcome, result.linear);
+        let lost = matches!(outcome, Outcome::Stalled { .. } | Outcome::LimitOfPrecision { .. });
+        if lost && noise::reproduces(&objective, &coordinates) {
+            outcome = Outcome::Exact;
+        }
+        let mut settled = known || !outcome.converged();
+        if !settled {
+            let found = noise::estimate(&objective, &coordinates).unwrap_or_else(|_| whitening.clone());
+            let changes = found.sigma().into_iter().zip(whitening.sigma()).map(|(a, b)| (a / b).ln().abs());
+            settled = round > 1 && changes.fold(0.0, f64::max) < NOISE_TOLERANCE;
+            if !settled {
+                (whitening, linear) = (found, None);
             }
-            _ => Outcome::Cancelled,
+            // Rounding is another at every point.
+            settled |= outcome == Outcome::Exact;
+            if !settled && round == NOISE_ROUNDS {
+                outcome = Outcome::IterationLimit { iterations };
+                settled = true;
+            }
+        }
+        if settled {
+            let trouble = file.and_then(|file| file.trouble());
+            let name = result.name;
+            return Ok(SearchEnd { coordinates, whitening, linear, outcome, iterations, evaluations, name, trouble });
+        }
+        next = optimizer.clone();
+    }
+    Err(Error::Optimizer("the search never began".to_owned()))
+}
+
+/// Why the start could not be evaluated.
+pub(super) fn start_error(objective: &Objective<'_>, coordinates: &[f64], error: Infeasible) -> Error {
+    if error == Infeasible::Cancelled {
+        return stopped(objective);
+    }
+    // Whatever stops the search does not stop the search for what failed; it ends where the evaluation did.
+    let objective = Objective { control: &Control::NEVER, ..objective.clone() };
+    for e in 0..objective.experiments() {
+        let mut last = 0;
+        let failed = objective.run_alone(e, coordinates, true, &mut |window| {
+            last = window.begin[0];
+            let errors = (0..window.samples[0]).flat_map(|k| (0..window.outputs()).map(move |j| (k, j)));
+            let mut bad = errors.clone().filter(|&(k, j)| !window.error(k, j, 0).is_finite());
+            match bad.next() {
+                Some((k, _)) => {
+                    last += k;
+                    false
+                }
+                None => true,
+            }
         });
-        let outcome = match outcome {
-            Outcome::Cancelled if self.control.expired() => Outcome::TimeLimit,
-            outcome => outcome,
-        };
-        let evaluations = state.get_func_counts().get("linearization_count").copied().unwrap_or(0);
-        if let Some(file) = file
-            && let Some(place) = state.get_param()
-            && let Err(error) = file.write(place, state.get_iter(), result.solver())
-            && let Ok(mut trouble) = file.trouble.lock()
-        {
-            *trouble = Some(error.to_string());
-        }
-        Ok(Round {
-            coordinates: state.get_param().cloned().unwrap_or(start),
-            linear: result.solver().linearization().cloned(),
-            outcome,
-            iterations: state.get_iter(),
-            evaluations,
-            name: Solver::<&Objective<'_>, LeastSquaresState>::name(result.solver()).to_owned(),
-        })
-    }
-
-    /// The noise as given, or as the errors at the start show it.
-    pub(super) fn first_whitening(&self, terms: &Terms<'_>, coordinates: &[f64]) -> Result<Whitening, Error> {
-        match &terms.noise {
-            Noise::Given(sigma) => Ok(Whitening::Diagonal(sigma.clone())),
-            noise if self.noise_is_no_matter(noise) => Ok(self.whitening.clone()),
-            noise => self.estimate_noise(coordinates, noise).map_err(|_| self.start_failure(terms, coordinates)),
+        if failed.is_err() {
+            return Error::Start(objective.locate(e, coordinates, last));
         }
     }
-
-    /// With one output, squared loss and no prior the noise scales the cost and nothing else.
-    pub(super) fn noise_is_no_matter(&self, noise: &Noise) -> bool {
-        let priors = self.unknowns.row.iter().any(|unknown| unknown.parameter.prior.is_some());
-        !matches!(noise, Noise::Given(_)) && self.outputs() == 1 && self.loss.is_none() && !priors
-    }
-
-    pub(super) fn start_failure(&self, terms: &Terms<'_>, coordinates: &[f64]) -> Error {
-        for e in 0..self.experiments() {
-            match self.experiment(e, coordinates) {
-                Err(Halt::Failed { sample }) => return Error::Start(self.locate(e, coordinates, sample)),
-                Err(Halt::Cancelled) => return self.stopped(terms),
-                Ok(_) => {}
-            }
-        }
-        Error::Start(self.locate(0, coordinates, 0))
-    }
-
-    fn stopped(&self, terms: &Terms<'_>) -> Error {
-        Error::Option(match terms.time_limit {
-            Some(limit) if self.control.expired() => format!(
-                "the time limit of {} s was over before the start had been evaluated; allow more time",
-                limit.as_secs_f64()
-            ),
-            _ => "the fit was cancelled before its start had been evaluated; lower the flag to run it".to_owned(),
-        })
-    }
-
-    /// What a checkpoint belongs to: the data, and everything that shapes the cost.
-    fn fingerprint(&self, terms: &Terms<'_>) -> String {
-        let mut hash = DefaultHasher::new();
-        env!("CARGO_PKG_VERSION").hash(&mut hash);
-        self.source.fingerprint(&mut hash);
-        format!("{:?}{:?}", self.unknowns.parameters, self.unknowns.row).hash(&mut hash);
-        self.loss.map(|loss| loss.describe()).hash(&mut hash);
-        format!("{:?}{:?}", self.prefilter, terms.noise).hash(&mut hash);
-        format!("{:016x}", hash.finish())
-    }
+    let failing = (0..objective.experiments()).find(|&e| {
+        let alone = objective.cost_of(e, coordinates);
+        !alone.is_ok_and(f64::is_finite)
+    });
+    Error::Start(objective.locate(failing.unwrap_or(0), coordinates, 0))
 }
 
-struct Round {
-    coordinates: Vec<f64>,
-    linear: Option<Linearization>,
-    outcome: Outcome,
-    iterations: u64,
-    evaluations: u64,
-    name: String,
+fn stopped(objective: &Objective<'_>) -> Error {
+    Error::Option(match objective.problem.settings.time_limit {
+        Some(limit) if objective.control.expired() => format!(
+            "the time limit of {} s was over before the start had been evaluated; allow more time",
+            limit.as_secs_f64()
+        ),
+        _ => "the fit was cancelled before its start had been evaluated; lower the flag to run it".to_owned(),
+    })
 }
 
-/// An observer that several rounds of one fit share.
-struct Shared(Observer);
-
-impl Observe<LeastSquaresState> for Shared {
-    fn observe_init(&mut self, name: &str, state: &LeastSquaresState, kv: &KV) -> Result<(), argmin::core::Error> {
-        self.0.lock().map_or(Ok(()), |mut observer| observer.observe_init(name, state, kv))
+/// What a checkpoint belongs to: the data, and everything that shapes the cost.
+fn fingerprint(problem: &Problem<'_>) -> String {
+    let mut hash = DefaultHasher::new();
+    env!("CARGO_PKG_VERSION").hash(&mut hash);
+    let (sweep, settings) = (&problem.sweep, &problem.settings);
+    (sweep.identity(), sweep.layout(), sweep.integrator(), sweep.predictor()).hash(&mut hash);
+    for record in &problem.records {
+        (record.name(), record.len(), format!("{:?}{:?}", record.input_hold(), record.initial_state())).hash(&mut hash);
+        (0..record.len()).for_each(|k| record.time(k).to_bits().hash(&mut hash));
+        for channel in record.inputs().iter().chain(record.outputs()) {
+            channel.values.iter().for_each(|value| value.to_bits().hash(&mut hash));
+        }
     }
-
-    fn observe_iter(&mut self, state: &LeastSquaresState, kv: &KV) -> Result<(), argmin::core::Error> {
-        self.0.lock().map_or(Ok(()), |mut observer| observer.observe_iter(state, kv))
-    }
-
-    fn observe_final(&mut self, state: &LeastSquaresState) -> Result<(), argmin::core::Error> {
-        self.0.lock().map_or(Ok(()), |mut observer| observer.observe_final(state))
-    }
+    format!("{:?}{:?}", problem.unknowns.parameters, problem.unknowns.row).hash(&mut hash);
+    settings.weights.as_ref().map(|weights| weights.describe()).hash(&mut hash);
+    settings.loss.as_ref().map(|loss| loss.describe()).hash(&mut hash);
+    let noise: &Noise = &settings.noise;
+    format!("{:?}{noise:?}", settings.prefilter).hash(&mut hash);
+    format!("{:016x}", hash.finish())
 }

@@ -13,7 +13,6 @@ pub struct Automatic {
 }
 
 impl Integrator for Automatic {
-    type Memory = ();
     const FIXED: bool = true;
 
     #[inline(always)]
@@ -21,11 +20,11 @@ impl Integrator for Automatic {
         &self,
         system: &Y,
         x: Y::Vector<Y::Scalar>,
-        memory: &mut (),
+        step: &mut f64,
     ) -> Result<Y::Vector<Y::Scalar>, Stuck> {
         match system.kind() {
-            Kind::Continuous => self.continuous.advance(system, x, memory),
-            Kind::Discrete => Discrete.advance(system, x, memory),
+            Kind::Continuous => self.continuous.advance(system, x, step),
+            Kind::Discrete => Discrete.advance(system, x, step),
             Kind::Static => Ok(x),
         }
     }

@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 pub struct Discrete;
 
 impl Integrator for Discrete {
-    type Memory = ();
     const FIXED: bool = true;
 
     #[inline(always)]
@@ -17,7 +16,7 @@ impl Integrator for Discrete {
         &self,
         system: &Y,
         x: Y::Vector<Y::Scalar>,
-        _memory: &mut (),
+        _step: &mut f64,
     ) -> Result<Y::Vector<Y::Scalar>, Stuck> {
         Ok(system.next(&x))
     }

@@ -78,7 +78,6 @@ struct Linearization<Y: System> {
 }
 
 impl Integrator for Esdirk {
-    type Memory = f64;
     const FIXED: bool = false;
 
     #[inline(always)]
@@ -86,14 +85,14 @@ impl Integrator for Esdirk {
         &self,
         system: &Y,
         x: Y::Vector<Y::Scalar>,
-        memory: &mut f64,
+        step: &mut f64,
     ) -> Result<Y::Vector<Y::Scalar>, Stuck> {
         let (_, length) = system.interval();
         let zero = system.vector(|_| 0.0);
         let mut k: [_; STAGES] = core::array::from_fn(|_| system.vector(|_| Y::Scalar::from(0.0)));
         let (mut start, mut end) = (f64::NAN, f64::NAN);
         let tolerance = Tolerance { relative: self.relative, absolute: self.absolute };
-        tolerance.cross(4.0, system, x, memory, |x, tau, h| {
+        tolerance.cross(4.0, system, x, step, |x, tau, h| {
             if tau == end {
                 k.swap(0, STAGES - 1);
                 start = tau;

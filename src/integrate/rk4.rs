@@ -25,7 +25,6 @@ impl Default for Rk4 {
 const STAGES: [(f64, f64); 4] = [(0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0)];
 
 impl Integrator for Rk4 {
-    type Memory = ();
     const FIXED: bool = true;
 
     // One call site of the derivative: it is inlined once, which the vector unit needs (3 times faster than four).
@@ -34,7 +33,7 @@ impl Integrator for Rk4 {
         &self,
         system: &Y,
         mut x: Y::Vector<Y::Scalar>,
-        _memory: &mut (),
+        _step: &mut f64,
     ) -> Result<Y::Vector<Y::Scalar>, Stuck> {
         let steps = self.substeps.max(1);
         let part = 1.0 / f64::from(steps);

@@ -43,7 +43,6 @@ const ERROR: [f64; STAGES] =
     [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
 
 impl Integrator for Rk45 {
-    type Memory = f64;
     const FIXED: bool = false;
 
     // One call site of the derivative, as in Rk4.
@@ -52,7 +51,7 @@ impl Integrator for Rk45 {
         &self,
         system: &Y,
         x: Y::Vector<Y::Scalar>,
-        memory: &mut f64,
+        step: &mut f64,
     ) -> Result<Y::Vector<Y::Scalar>, Stuck> {
         let (_, length) = system.interval();
         let zero = system.vector(|_| 0.0);
@@ -60,7 +59,7 @@ impl Integrator for Rk45 {
         // The times whose derivatives stand in the first and in the last stage.
         let (mut start, mut end) = (f64::NAN, f64::NAN);
         let tolerance = Tolerance { relative: self.relative, absolute: self.absolute };
-        tolerance.cross(5.0, system, x, memory, |x, tau, h| {
+        tolerance.cross(5.0, system, x, step, |x, tau, h| {
             if tau == end {
                 k.swap(0, STAGES - 1);
                 start = tau;

@@ -89,9 +89,9 @@ impl<M: Model, S: Scalar> ModelSystem<'_, M, S> {
         &self,
         integrator: &I,
         x: Of<M::State, S>,
-        memory: &mut I::Memory,
+        step: &mut f64,
     ) -> Result<Of<M::State, S>, Stuck> {
-        integrator.advance(self, M::State::into_array(x), memory).map(M::State::from_array)
+        integrator.advance(self, M::State::into_array(x), step).map(M::State::from_array)
     }
 }
 

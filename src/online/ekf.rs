@@ -2,9 +2,8 @@
 //! Jacobians are the exact slopes of the model's own text. States come first in the joint vector: `U D U^T` then keeps
 //! the parameters' covariance in a block of its own, which survives when the state must start anew.
 
-use super::{Beat, Clock, Divergence, Guard, ObserverError, Outcome, Update, Watch};
+use super::{Beat, Clock, Divergence, Guard, ObserverError, Outcome, UdFactors, Update, Watch};
 use super::{check_all_positive, check_starts, in_bounds, not_finite, prior_std};
-use crate::covariance::Covariance;
 use crate::dual::Dual;
 use crate::integrate::{Automatic, Integrator, ModelSystem};
 use crate::interval::{Hold, Interval};
@@ -40,7 +39,7 @@ pub struct EkfStart<M: Model> {
 pub struct Ekf<M: Model, const N: usize, I: Integrator = Automatic> {
     model: M,
     integrator: I,
-    memory: I::Memory,
+    step: f64,
     start: EkfStart<M>,
     lanes: <M::Parameters as Signals>::Array<usize>,
     drift: [f64; N],
@@ -48,7 +47,7 @@ pub struct Ekf<M: Model, const N: usize, I: Integrator = Automatic> {
     input: Option<Of<M::Input, f64>>,
     x: Of<M::State, f64>,
     p: Of<M::Parameters, f64>,
-    covariance: Covariance<N>,
+    covariance: UdFactors<N>,
     nis: f64,
     guard: Guard<M::Output>,
     stopped: Option<Divergence>,
@@ -101,14 +100,14 @@ impl<M: Model, const N: usize, I: Integrator> Ekf<M, N, I> {
         Ok(Ekf {
             model,
             integrator,
-            memory: I::Memory::default(),
+            step: 0.0,
             lanes,
             drift,
             clock: Clock::new(ts)?,
             input: None,
             x: M::State::map(start.state, |known| known.start),
             p: M::Parameters::map(start.parameters, |known| known.start),
-            covariance: Covariance::diagonal(variances),
+            covariance: UdFactors::diagonal(variances),
             nis: 0.0,
             guard: Guard::new(start.watch),
             stopped: None,
@@ -204,7 +203,7 @@ impl<M: Model, const N: usize, I: Integrator> Ekf<M, N, I> {
     fn predict(&mut self, interval: &Interval<M::Input>) -> Result<(), Divergence> {
         let (x, p) = (self.x_dual(), self.p_dual());
         let system = ModelSystem { model: &self.model, interval, p: &p };
-        let x = system.step(&self.integrator, x, &mut self.memory).map_err(|_| Divergence::Stuck)?;
+        let x = system.step(&self.integrator, x, &mut self.step).map_err(|_| Divergence::Stuck)?;
         self.x = M::State::map(x, |x| x.value);
         self.covariance.predict(M::State::into_array(M::State::map(x, |x| x.slopes)).as_ref(), &self.drift);
         Ok(())
@@ -274,7 +273,7 @@ impl<M: Model, const N: usize, I: Integrator> Ekf<M, N, I> {
     }
 
     /// Covariance of states, then free parameters in order of declaration (in logarithms where those are filtered).
-    pub fn covariance(&self) -> &Covariance<N> {
+    pub fn covariance(&self) -> &UdFactors<N> {
         &self.covariance
     }
 

@@ -14,7 +14,8 @@ use super::{Beat, Clock, Divergence, Guard, ObserverError, Outcome, Update, Watc
 use super::{check_identity, check_starts, in_bounds, not_finite};
 use crate::integrate::{Automatic, ModelSystem};
 use crate::interval::{Hold, Interval};
-use crate::model::{Kind, Model};
+use crate::layout::Kind;
+use crate::model::Model;
 use crate::parameter::Parameter;
 use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
@@ -220,7 +221,7 @@ impl<M: Model, L: Law<M>> Mras<M, L> {
         let interval = Interval { t0: t, t1: t + ts, u0: *u, u1: *u, hold: Hold::Zero };
         let advance = |x| {
             let system = ModelSystem { model: &self.model, interval: &interval, p };
-            system.step(&Automatic::default(), x, &mut ()).map_err(|_| Divergence::Stuck)
+            system.step(&Automatic::default(), x, &mut 0.0).map_err(|_| Divergence::Stuck)
         };
         match self.start.order {
             Order::UpdateThenPredict => advance(pulled(x)),

@@ -1,13 +1,14 @@
 //! Recursive least squares in factored form (Bierman 1977), with forgetting that cannot wind up.
 
-use super::{Divergence, ObserverError, Outcome, Update, check_identity, check_positive, check_starts, in_bounds};
-use crate::covariance::Covariance;
+use super::{
+    Divergence, ObserverError, Outcome, UdFactors, Update, check_identity, check_positive, check_starts, in_bounds,
+};
 use crate::parameter::Parameter;
 use crate::signals::{Of, Signals};
 
 /// Recursive least squares with forgetting: follows the `N` parameters `P` of equations `y = phi p + noise`.
 ///
-/// The covariance is kept factored ([`Covariance`]), so that it stays positive however long it runs. A parameter is
+/// The covariance is kept factored ([`UdFactors`]), so that it stays positive however long it runs. A parameter is
 /// known to its prior's mean and standard deviation at the start; one that is fixed stays.
 ///
 /// ```
@@ -28,7 +29,7 @@ use crate::signals::{Of, Signals};
 pub struct Rls<P: Signals, const N: usize> {
     known: Of<P, Parameter>,
     p: Of<P, f64>,
-    covariance: Covariance<N>,
+    covariance: UdFactors<N>,
     noise: f64,
     forgetting: Forgetting<N>,
     stopped: Option<Divergence>,
@@ -62,7 +63,7 @@ impl<const N: usize> Forgetting<N> {
     }
 
     #[inline]
-    fn growth(&self, covariance: &Covariance<N>) -> f64 {
+    fn growth(&self, covariance: &UdFactors<N>) -> f64 {
         if self.factor == 1.0 && self.floor == [0.0; N] {
             return 1.0;
         }
@@ -102,7 +103,7 @@ impl<P: Signals, const N: usize> Rls<P, N> {
         Ok(Rls {
             known: parameters,
             p: P::map(parameters, |known| known.start),
-            covariance: Covariance::diagonal(variances),
+            covariance: UdFactors::diagonal(variances),
             noise: noise * noise,
             forgetting,
             stopped: None,
@@ -156,7 +157,7 @@ impl<P: Signals, const N: usize> Rls<P, N> {
     }
 
     /// Their covariance.
-    pub fn covariance(&self) -> &Covariance<N> {
+    pub fn covariance(&self) -> &UdFactors<N> {
         &self.covariance
     }
 

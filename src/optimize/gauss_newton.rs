@@ -110,7 +110,7 @@ impl GaussNewton {
         point: &Point,
         bounds: &[(f64, f64)],
     ) -> Result<Option<Point>, Error> {
-        let cost = point.linear.cost;
+        let (cost, size) = (point.linear.cost, point.cost_size());
         let mut step = point.full.clone().unwrap_or_default();
         let mut failed = 0;
         let mut blind = 0;
@@ -137,8 +137,8 @@ impl GaussNewton {
                         false => decrease > 0.0 && decrease >= -SUFFICIENT * slope,
                     };
                     if enough && !point.loses_influence(&next) {
-                        if decrease <= self.stop.cost * cost && next.potential <= self.stop.cost * cost {
-                            self.outcome = Some(Outcome::CostUnchanged { decrease: decrease / cost });
+                        if decrease <= self.stop.cost * size && next.potential <= self.stop.cost * size {
+                            self.outcome = Some(Outcome::CostUnchanged { decrease: decrease / size });
                         }
                         return Ok(Some(next));
                     }

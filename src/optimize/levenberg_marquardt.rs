@@ -173,14 +173,14 @@ impl<S: Scaling> LevenbergMarquardt<S> {
                 return Ok(None);
             }
         };
-        let (cost, new_cost) = (point.linear.cost, linear.cost);
+        let (cost, new_cost, size) = (point.linear.cost, linear.cost, point.cost_size());
         let next = Point::new(x, linear, &self.scaling, &point.scales, bounds);
         // Where the cost decides nothing, the slope along the step does: in the metric of the damped step the gradient of
         // a convergent iteration shrinks steadily.
         let (accept, gain) = if unresolved {
             let again = next.linear.step_within(&damping, &next.held, &next.room);
             let part = again.map_or(f64::INFINITY, |again| next.slope(&again) / point.slope(&step));
-            (part < 1.0 && new_cost <= cost * (1.0 + COST_ROUNDING), if part < 0.25 { 1.0 } else { 0.9 })
+            (part < 1.0 && new_cost <= cost + COST_ROUNDING * size, if part < 0.25 { 1.0 } else { 0.9 })
         } else {
             let gain = (cost - new_cost) / promised;
             (gain > ACCEPT, gain)
@@ -190,9 +190,9 @@ impl<S: Scaling> LevenbergMarquardt<S> {
             return Ok(None);
         }
         self.longer(gain);
-        let decrease = (cost - new_cost) / cost;
+        let decrease = (cost - new_cost) / size;
         // A step that was short for its damping says nothing of the cost to come.
-        if decrease <= self.stop.cost && next.potential <= self.stop.cost * cost {
+        if decrease <= self.stop.cost && next.potential <= self.stop.cost * size {
             self.outcome = Some(Outcome::CostUnchanged { decrease });
         }
         Ok(Some(next))

@@ -79,7 +79,7 @@ impl Point {
 
     /// Largest part of itself, or of the standard error it has at least, by which the full step moves an unknown.
     fn relative_step(&self) -> f64 {
-        let rows: u64 = self.linear.blocks().iter().map(|block| block.rows()).sum();
+        let rows = self.linear.rows();
         let sigma = (self.linear.sum_of_squares() / rows.max(1) as f64).sqrt();
         let size = |step: &Vec<f64>| {
             let free = (0..self.x.len()).filter(|&i| !self.held[i] && step[i] != 0.0);
@@ -107,9 +107,15 @@ impl Point {
         (0..self.x.len()).map(along).collect()
     }
 
+    /// Size of the terms of the cost, by which its changes are measured. Where variances are predicted, their logarithms
+    /// may leave a sum that is negative or next to zero.
+    pub fn cost_size(&self) -> f64 {
+        self.linear.cost.abs().max(0.5 * self.linear.sum_of_squares())
+    }
+
     /// Whether a decrease of this size drowns in the rounding of the cost.
     pub fn cannot_resolve(&self, decrease: f64) -> bool {
-        decrease <= RESOLUTION * self.linear.cost
+        decrease <= RESOLUTION * self.cost_size()
     }
 
     /// Whether an unknown that had influence here has none there: a plateau that no slope leads back from.

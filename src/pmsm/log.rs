@@ -2,7 +2,8 @@
 
 use super::robot::TS;
 use super::{Currents, Drive, Motion, Surface};
-use crate::experiment::{Experiment, Time};
+use crate::experiment::Experiment;
+use crate::record::Time;
 use serde::{Deserialize, Serialize};
 
 /// What one sample of a drive's log holds, and the truth behind it.

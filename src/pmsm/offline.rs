@@ -95,7 +95,8 @@ impl Spans {
         mut theta: f64,
     ) -> Result<Spans, Error> {
         let ts = experiment.sample_time();
-        let (inputs, outputs) = (experiment.inputs(), experiment.outputs());
+        let inputs: Vec<Drive> = experiment.inputs().collect();
+        let outputs: Vec<Currents> = experiment.outputs().collect();
         if let Some(sample) = outputs.iter().position(|y| !(y.id.is_finite() && y.iq.is_finite())) {
             return Err(Error::NotFinite {
                 experiment: experiment.name().to_owned(),

@@ -1,13 +1,12 @@
 //! [`Horizon`]: prediction a fixed number of samples ahead.
 
-use super::{Predictor, Walk, measured};
+use super::{Predictor, measured};
 use crate::error::Error;
-use crate::experiment::ExperimentOf;
-use crate::integrate::{Integrator, Stuck};
-use crate::model::Model;
-use crate::prefilter::{Butterworth, zero_phase};
-use crate::scalar::Scalar;
-use crate::signals::{Of, Signals};
+use crate::functions::Functions;
+use crate::integrate::Duals;
+use crate::layout::Layout;
+use crate::prefilter::{Butterworth, filtered};
+use crate::record::Record;
 use serde::{Deserialize, Serialize};
 
 /// Prediction `steps` samples ahead: each output is simulated from the state measured that many samples earlier, so that
@@ -36,83 +35,58 @@ impl Horizon {
     pub fn filtered(self, filter: Butterworth) -> Self {
         Horizon { filter: Some(filter), ..self }
     }
-}
 
-impl<M: Model> Predictor<M> for Horizon {
-    const CARRIES: bool = false;
-    /// The measured state at each sample; NaN where there is none.
-    type Prepared = Vec<Of<M::State, f64>>;
-
-    fn prepare(
+    /// The state that was measured at each sample, sample by sample; NaN where there is none. With the parameters `p`, on
+    /// which the outputs must not depend.
+    ///
+    /// # Errors
+    /// Steps that the record does not have, outputs that do not give the state.
+    pub(crate) fn states(
         &self,
-        model: &M,
-        experiment: &ExperimentOf<M>,
-        p: &Of<M::Parameters, f64>,
-    ) -> Result<Self::Prepared, Error> {
-        let filtered = self.filter.as_ref().map(|filter| zero_phase(experiment, filter)).transpose()?;
-        let outputs = filtered.as_ref().map_or(experiment.outputs(), |filtered| filtered.outputs());
-        let (steps, samples) = (self.steps, experiment.len());
+        layout: &Layout,
+        functions: &dyn Functions<Duals>,
+        record: &Record,
+        p: &[f64],
+    ) -> Result<Vec<f64>, Error> {
+        let smooth = self.filter.as_ref().map(|filter| filtered(record, filter)).transpose()?;
+        let record = smooth.as_ref().unwrap_or(record);
+        let (steps, samples, n) = (self.steps, record.len(), layout.states.len());
         if steps == 0 || steps >= samples {
             return Err(Error::Option(format!(
                 "a prediction {steps} sample(s) ahead makes no sense for experiment `{}` of {samples} samples; take at least \
                  1 and fewer than {samples}, or FreeRun to simulate it whole",
-                experiment.name()
+                record.name()
             )));
         }
+        let not_measured = |reason| Error::StateNotMeasured { experiment: record.name().to_owned(), reason };
         let mut why = None;
-        let mut states = Vec::with_capacity(experiment.len());
+        let mut states = vec![f64::NAN; n * samples];
         let mut known = 0;
-        for (k, (u, y)) in experiment.inputs().iter().zip(outputs).enumerate() {
-            let t = experiment.time(k);
-            states.push(match measured::state(model, t, u, y, p) {
+        for k in 0..samples {
+            let (t, u, y) = (record.time(k), record.input(k), record.output(k));
+            match measured::state(layout, functions, t, &u, &y, p) {
                 Ok(x) => {
                     known += 1;
                     if known == 1
-                        && let Some(name) = measured::depends_on_parameter(model, t, &x, u, p)
+                        && let Some(name) = measured::depends_on_parameter(layout, functions, t, &x, &u, p)
                     {
-                        let reason = format!("the outputs depend on the parameter `{name}`, too");
-                        return Err(Error::StateNotMeasured { experiment: experiment.name().to_owned(), reason });
+                        return Err(not_measured(format!("the outputs depend on the parameter `{name}`, too")));
                     }
-                    x
+                    states[k * n..(k + 1) * n].copy_from_slice(&x);
                 }
-                Err(reason) => {
-                    why = why.or(Some(reason));
-                    M::State::splat(f64::NAN)
-                }
-            });
+                Err(reason) => why = why.or(Some(reason)),
+            }
         }
         match why {
-            Some(reason) if known == 0 => {
-                Err(Error::StateNotMeasured { experiment: experiment.name().to_owned(), reason })
-            }
+            Some(reason) if known == 0 => Err(not_measured(reason)),
             _ => Ok(states),
         }
     }
+}
 
-    #[inline(always)]
-    fn state<S: Scalar, I: Integrator>(
-        &self,
-        walk: &Walk<'_, M, I>,
-        prepared: &Self::Prepared,
-        k: usize,
-        start: Of<M::State, S>,
-        p: &Of<M::Parameters, S>,
-        memory: &mut I::Memory,
-    ) -> Result<Option<Of<M::State, S>>, Stuck> {
-        let steps = self.steps;
-        let (mut x, first) = if k < steps {
-            (start, 0)
-        } else {
-            let x = prepared[k - steps];
-            if M::State::into_array(x).as_ref().iter().any(|x| x.is_nan()) {
-                return Ok(None);
-            }
-            (M::State::map(x, S::from), k - steps)
-        };
-        for j in first..k {
-            x = walk.advance(j, x, p, memory)?;
-        }
-        Ok(Some(x))
+impl Predictor for Horizon {
+    fn restarts(&self) -> Option<Horizon> {
+        Some(*self)
     }
 
     fn describe(&self) -> String {

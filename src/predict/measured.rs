@@ -1,69 +1,67 @@
 //! The state that the outputs of one sample give, where they give it.
 
 use crate::dual::Dual;
+use crate::functions::Functions;
 use crate::information::Information;
-use crate::model::Model;
+use crate::integrate::Duals;
+use crate::layout::{Layout, Quantity};
 use crate::numeral::exact;
-use crate::signals::{Of, Signals};
 
 const LANES: usize = 8;
 const ITERATIONS: usize = 50;
 
 /// The state whose outputs are the measured ones, by Newton's method from zero; why not, where there is none.
-pub(crate) fn state<M: Model>(
-    model: &M,
+pub(crate) fn state(
+    layout: &Layout,
+    functions: &dyn Functions<Duals>,
     t: f64,
-    u: &Of<M::Input, f64>,
-    y: &Of<M::Output, f64>,
-    p: &Of<M::Parameters, f64>,
-) -> Result<Of<M::State, f64>, String> {
-    let n = M::State::LEN;
-    let mut x = M::State::splat(0.0);
+    u: &[f64],
+    y: &[f64],
+    p: &[f64],
+) -> Result<Vec<f64>, String> {
+    let n = layout.states.len();
+    let mut x = vec![0.0; n];
     if n == 0 {
         return Ok(x);
     }
-    let y = M::Output::into_array(*y);
-    let found = y.as_ref().iter().filter(|y| y.is_finite()).count();
+    let names = |quantities: &[Quantity]| quantities.iter().map(|q| q.name.as_str()).collect::<Vec<&str>>().join(", ");
+    let found = y.iter().filter(|y| y.is_finite()).count();
     if found < n {
-        let (states, outputs) = (M::State::NAMES.join(", "), M::Output::NAMES.join(", "));
-        return Err(format!(
-            "{n} state(s), {states}, but {found} measured of the output(s) {outputs} at t = {} s",
-            exact(t)
-        ));
+        let (states, outputs) = (names(&layout.states), names(&layout.outputs));
+        let t = exact(t);
+        return Err(format!("{n} state(s), {states}, but {found} measured of the output(s) {outputs} at t = {t} s"));
     }
-    let entries = |x: Of<M::State, f64>| M::State::into_array(x);
+    let (u, p) = (constants(u), constants(p));
     for iteration in 0..ITERATIONS {
-        let mut rows = vec![vec![0.0; n]; M::Output::LEN];
-        let mut errors = vec![0.0; M::Output::LEN];
+        let mut rows = vec![vec![0.0; n]; y.len()];
+        let mut errors = vec![0.0; y.len()];
+        let mut expected = vec![Dual::constant(0.0); y.len()];
         for first in (0..n).step_by(LANES) {
-            let seeded = M::State::from_fn(|i| Dual::<LANES>::variable(entries(x).as_ref()[i], i.wrapping_sub(first)));
-            let expected =
-                model.output(t.into(), &seeded, &M::Input::map(*u, Dual::from), &M::Parameters::map(*p, Dual::from));
-            for (j, output) in M::Output::into_array(expected).into_iter().enumerate() {
-                errors[j] = y.as_ref()[j] - output.value;
+            let seeded: Vec<Duals> =
+                x.iter().enumerate().map(|(i, x)| Dual::variable(*x, i.wrapping_sub(first))).collect();
+            functions.output(Dual::constant(t), &seeded, &u, &p, &mut expected);
+            for (j, output) in expected.iter().enumerate() {
+                errors[j] = y[j] - output.value;
                 for lane in 0..LANES.min(n - first) {
                     rows[j][first + lane] = output.slopes[lane];
                 }
             }
         }
-        let undefined = (0..M::Output::LEN).find(|&j| y.as_ref()[j].is_finite() && errors[j].is_nan());
-        if let Some(j) = undefined {
-            return Err(format!(
-                "the model's output `{}` is not a number on the way to it, at t = {} s",
-                M::Output::NAMES[j],
-                exact(t)
-            ));
+        if let Some(j) = (0..y.len()).find(|&j| y[j].is_finite() && errors[j].is_nan()) {
+            let (output, t) = (&layout.outputs[j].name, exact(t));
+            return Err(format!("the model's output `{output}` is not a number on the way to it, at t = {t} s"));
         }
         let mut information = Information::new(n);
         for (row, &error) in rows.iter().zip(&errors).filter(|(_, error)| error.is_finite()) {
             information.absorb_row(row, error);
         }
         let step = information.solve().map_err(|deficient| {
-            format!("the outputs do not depend on `{}`", M::State::NAMES.get(deficient.column).unwrap_or(&"a state"))
+            let state = layout.states.get(deficient.column).map_or("a state", |state| &state.name);
+            format!("the outputs do not depend on `{state}`")
         })?;
-        x = M::State::from_fn(|i| entries(x).as_ref()[i] + step[i]);
+        x.iter_mut().zip(&step).for_each(|(x, step)| *x += step);
         let size = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
-        if iteration > 0 && size(&step) <= 1e-12 * size(entries(x).as_ref()).max(f64::MIN_POSITIVE) {
+        if iteration > 0 && size(&step) <= 1e-12 * size(&x).max(f64::MIN_POSITIVE) {
             return Ok(x);
         }
     }
@@ -71,18 +69,27 @@ pub(crate) fn state<M: Model>(
 }
 
 /// The name of a parameter that the outputs depend on directly, if there is one: then they do not give the state alone.
-pub(crate) fn depends_on_parameter<M: Model>(
-    model: &M,
+pub(crate) fn depends_on_parameter(
+    layout: &Layout,
+    functions: &dyn Functions<Duals>,
     t: f64,
-    x: &Of<M::State, f64>,
-    u: &Of<M::Input, f64>,
-    p: &Of<M::Parameters, f64>,
-) -> Option<&'static str> {
-    let p = M::Parameters::into_array(*p);
-    (0..M::Parameters::LEN).find_map(|i| {
-        let seeded = M::Parameters::from_fn(|j| Dual::<1>::variable(p.as_ref()[j], usize::from(i != j)));
-        let y = model.output(t.into(), &M::State::map(*x, Dual::from), &M::Input::map(*u, Dual::from), &seeded);
-        let depends = M::Output::into_array(y).into_iter().any(|y| y.slopes[0] != 0.0);
-        depends.then_some(M::Parameters::NAMES[i])
-    })
+    x: &[f64],
+    u: &[f64],
+    p: &[f64],
+) -> Option<String> {
+    let (x, u) = (constants(x), constants(u));
+    let mut y = vec![Dual::constant(0.0); layout.outputs.len()];
+    for first in (0..p.len()).step_by(LANES) {
+        let seeded: Vec<Duals> = p.iter().enumerate().map(|(i, p)| Dual::variable(*p, i.wrapping_sub(first))).collect();
+        functions.output(Dual::constant(t), &x, &u, &seeded, &mut y);
+        let depends = |lane: &usize| y.iter().any(|y| y.slopes[*lane] != 0.0);
+        if let Some(lane) = (0..LANES.min(p.len() - first)).find(depends) {
+            return Some(layout.parameters[first + lane].name.clone());
+        }
+    }
+    None
+}
+
+fn constants(values: &[f64]) -> Vec<Duals> {
+    values.iter().map(|value| Dual::constant(*value)).collect()
 }

@@ -2,9 +2,10 @@
 
 use super::{Butterworth, Design, warped};
 use crate::error::Error;
-use crate::experiment::{Experiment, Time};
+use crate::experiment::Experiment;
 use crate::numeral::exact;
-use crate::signals::{Of, Signals};
+use crate::record::{Channel, Record, Time};
+use crate::signals::Signals;
 
 impl Butterworth {
     /// Filters a whole record in place, forward and then backward: no delay at any frequency, and the gain squared (-6 dB
@@ -34,7 +35,7 @@ impl Butterworth {
 
     /// Refuses a record whose samples are, in the median, not the filter's sample time apart (to 1 %): its cut-off would be
     /// another.
-    pub(crate) fn check<X: Signals, U: Signals, Y: Signals>(&self, record: &Experiment<X, U, Y>) -> Result<(), Error> {
+    pub(crate) fn check(&self, record: &Record) -> Result<(), Error> {
         let (step, found) = (self.design.sample_time, record.sample_time());
         if close(found, step) {
             return Ok(());
@@ -69,8 +70,13 @@ pub fn zero_phase<X: Signals, U: Signals, Y: Signals>(
     experiment: &Experiment<X, U, Y>,
     filter: &Butterworth,
 ) -> Result<Experiment<X, U, Y>, Error> {
+    filtered(experiment.record(), filter).map(Experiment::of)
+}
+
+/// The same of a record whose signals are known by name.
+pub(crate) fn filtered(record: &Record, filter: &Butterworth) -> Result<Record, Error> {
     let step = filter.design.sample_time;
-    let other = match &experiment.time {
+    let other = match record.times() {
         Time::Uniform { step, .. } => Some((0, *step)),
         Time::Stamps(stamps) => stamps.windows(2).map(|w| w[1] - w[0]).enumerate().find(|(_, s)| !close(*s, step)),
     };
@@ -79,30 +85,20 @@ pub fn zero_phase<X: Signals, U: Signals, Y: Signals>(
             "it is made for samples every {} s, but in experiment `{}` the sample after number {sample} comes {} s later; make it \
              for that sample time, or resample the record",
             exact(step),
-            experiment.name,
+            record.name(),
             exact(found)
         )));
     }
-    Experiment {
-        inputs: filtered::<U>(&experiment.inputs, filter),
-        outputs: filtered::<Y>(&experiment.outputs, filter),
-        ..experiment.clone()
-    }
-    .checked()
+    let smooth = |channel: &Channel| {
+        let mut values = channel.values.to_vec();
+        filter.zero_phase(&mut values);
+        channel.with(values)
+    };
+    let (inputs, outputs) =
+        (record.inputs().iter().map(smooth).collect(), record.outputs().iter().map(smooth).collect());
+    record.clone().with_channels(inputs, outputs)
 }
 
 fn close(found: f64, expected: f64) -> bool {
     (found - expected).abs() <= 0.01 * expected
-}
-
-fn filtered<S: Signals>(rows: &[Of<S, f64>], filter: &Butterworth) -> Vec<Of<S, f64>> {
-    let mut rows: Vec<_> = rows.iter().map(|&row| S::into_array(row)).collect();
-    for i in 0..S::LEN {
-        let mut column: Vec<f64> = rows.iter().map(|row| row.as_ref()[i]).collect();
-        filter.zero_phase(&mut column);
-        for (row, value) in rows.iter_mut().zip(column) {
-            row.as_mut()[i] = value;
-        }
-    }
-    rows.into_iter().map(S::from_array).collect()
 }

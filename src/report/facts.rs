@@ -1,19 +1,17 @@
 //! What a report is made of: plain values that know nothing of the model's types.
 
+use crate::diagnose::Identifiability;
 use crate::diagnose::residuals::Residuals;
-use crate::diagnose::{Identifiability, Summary};
-use crate::estimate::Unknown;
+use crate::estimate::{Summary, Unknown};
 use crate::information::SquareMatrix;
-use crate::parameter::Parameter;
+use crate::problem::Role;
 use crate::section::Plot;
 
 /// An estimate, its records, and what was examined of them.
 pub(super) struct Facts {
     pub estimate: Summary,
-    /// Name of the model's type.
+    /// Name of the equations.
     pub model: String,
-    /// Name, unit and declaration of each parameter, fixed ones included.
-    pub declared: Vec<(String, String, Parameter)>,
     /// Correlation of the unknowns, in their order.
     pub correlation: SquareMatrix,
     pub records: Vec<Record>,
@@ -104,14 +102,9 @@ impl Facts {
 
     /// The unknowns with their numbers, parameters or initial states.
     pub fn unknowns(&self, initial: bool) -> impl Iterator<Item = (usize, &Unknown)> {
-        let chosen = move |(_, unknown): &(usize, &Unknown)| is_initial(&unknown.name) == initial;
+        let chosen = move |(_, unknown): &(usize, &Unknown)| matches!(unknown.role, Role::InitialState(_)) == initial;
         self.estimate.unknowns.iter().enumerate().filter(chosen)
     }
-}
-
-/// Whether an unknown is an initial state: `name(0)`, perhaps with its record in brackets.
-pub(super) fn is_initial(name: &str) -> bool {
-    name.split(" [").next().is_some_and(|name| name.ends_with("(0)"))
 }
 
 #[cfg(test)]
@@ -128,11 +121,5 @@ mod tests {
         for nothing in [vec![], vec![f64::NAN; 5], vec![0.0; 5]] {
             assert_eq!(Histogram::new(&nothing), Histogram::default());
         }
-    }
-
-    #[test]
-    fn initial_states_are_told_by_their_names() {
-        assert!(is_initial("id(0)") && is_initial("id(0) [record 2]"));
-        assert!(!is_initial("rs") && !is_initial("rs [a(0)]"));
     }
 }

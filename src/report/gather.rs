@@ -3,17 +3,15 @@
 use super::Report;
 use super::facts::{Facts, Histogram, OutputFit, Record, Signal};
 use crate::diagnose::residuals;
-use crate::diagnose::{self, Summary, Widths};
+use crate::diagnose::{self, Widths};
 use crate::error::Error;
-use crate::estimate::{Estimate, Prediction};
-use crate::experiment::ExperimentOf;
-use crate::fit::FitProblem;
-use crate::integrate::Integrator;
+use crate::estimate::Summary;
 use crate::interval::Hold;
-use crate::model::{Kind, Model};
-use crate::predict::Predictor;
+use crate::judge::output_fit;
+use crate::layout::Kind;
+use crate::problem::{Problem, Simulated};
+use crate::record::{Channel, Record as Measured};
 use crate::section::{Drawing, Keep, Line, Panel, PanelKind, Plot, Samples, Style, Timeline, identifier};
-use crate::signals::{Of, Signals};
 use core::ops::Range;
 
 /// So many pairs of a record and an output are drawn; of more, those reproduced worst.
@@ -32,120 +30,163 @@ impl Report {
     ///
     /// # Errors
     /// An estimate of another problem; a prediction that fails or is not finite.
-    pub fn new<M: Model, I: Integrator, P: Predictor<M>, O>(
-        problem: &FitProblem<'_, M, I, P, O>,
-        estimate: &Estimate<M, I, P>,
-    ) -> Result<Report, Error> {
+    pub fn new(problem: &Problem<'_>, estimate: &Summary) -> Result<Report, Error> {
         let identifiability = diagnose::identifiability(problem, estimate)?;
         let (objective, best) = problem.at(estimate)?;
-        let numbers = NUMBERS / problem.experiments().len().min(DRAWN / M::Output::LEN.max(1)).max(1);
+        let outputs = estimate.outputs.len();
+        let numbers = NUMBERS / problem.records().len().min(DRAWN / outputs.max(1)).max(1);
         let mut records = vec![];
-        for (e, record) in problem.experiments().iter().enumerate() {
-            let prediction = problem.prediction(&objective, e, &best)?;
-            let widths = match objective.prefilter {
+        for (e, record) in problem.records().iter().enumerate() {
+            let prediction = objective.predict(e, &best)?;
+            let widths = match problem.settings.prefilter {
                 Some(_) => None,
                 None => Some(diagnose::widths(&objective, &best, estimate, e, BAND)?),
             };
-            records.push(gathered::<M>(&estimate.experiments[e].name, record, &prediction, widths.as_ref(), numbers)?);
+            let of = Columns::new(&estimate.experiments[e].name, record, &prediction, widths.as_ref());
+            records.push(of.gathered(problem.layout().kind, residuals::examine(&prediction, record)?, numbers));
         }
-        thin(&mut records, M::Output::LEN);
-        let mut summary = Summary::of("Parameter estimation", estimate);
+        thin(&mut records, outputs);
         let reworded = |warning| diagnose::reworded(warning, &estimate.directions, &estimate.unknowns);
-        summary.warnings = estimate.warnings.iter().map(reworded).collect();
-        let declared = M::Parameters::into_array(estimate.declared);
+        let warnings = estimate.warnings.iter().map(reworded).collect();
         Ok(Report::of(&Facts {
-            estimate: summary,
-            model: core::any::type_name::<M>().to_owned(),
-            declared: named::<M::Parameters>().zip(declared).map(|((name, unit), p)| (name, unit, p)).collect(),
-            correlation: estimate.correlation(),
+            model: problem.sweep.identity(),
+            correlation: estimate.correlation(&(0..estimate.unknowns.len()).collect::<Vec<usize>>()),
+            estimate: Summary { warnings, ..estimate.clone() },
             records,
             identifiability,
         }))
     }
 }
 
-fn named<S: Signals>() -> impl Iterator<Item = (String, String)> {
-    S::NAMES.iter().zip(S::UNITS).map(|(name, unit)| ((*name).to_owned(), (*unit).to_owned()))
-}
-
-/// The signals of all rows, one by one.
-fn columns<S: Signals>(rows: &[Of<S, f64>]) -> Vec<Vec<f64>> {
-    (0..S::LEN).map(|i| rows.iter().map(|row| S::into_array(*row).as_ref()[i]).collect()).collect()
-}
-
-/// A record as columns, with the predictions and half widths of the bands; these are empty if there are none.
-struct Columns {
+/// A record with what was predicted of it, and the half widths of the bands; these are empty if there are none.
+struct Columns<'a> {
+    name: &'a str,
+    record: &'a Measured,
     t: Vec<f64>,
     gaps: Vec<usize>,
-    inputs: Vec<Vec<f64>>,
-    measured: Vec<Vec<f64>>,
-    predicted: Vec<Vec<f64>>,
-    residuals: Vec<Vec<f64>>,
-    confidence: Vec<Vec<f64>>,
-    prediction: Vec<Vec<f64>>,
+    prediction: &'a Simulated,
+    bands: Option<&'a Widths>,
+    /// The sample with the largest residual of each output.
+    worst: Vec<Option<usize>>,
 }
 
-fn gathered<M: Model>(
-    name: &str,
-    record: &ExperimentOf<M>,
-    prediction: &Prediction<M>,
-    widths: Option<&Widths<M>>,
-    numbers: usize,
-) -> Result<Record, Error> {
-    let gaps = record.gaps();
-    let of = Columns {
-        t: prediction.t.clone(),
-        gaps: gaps.iter().map(|gap| gap.sample).collect(),
-        inputs: columns::<M::Input>(record.inputs()),
-        measured: columns::<M::Output>(record.outputs()),
-        predicted: columns::<M::Output>(&prediction.outputs),
-        residuals: columns::<M::Output>(&prediction.residuals),
-        confidence: widths.map_or(vec![], |widths| columns::<M::Output>(&widths.confidence)),
-        prediction: widths.map_or(vec![], |widths| columns::<M::Output>(&widths.prediction)),
-    };
-    let held = record.input_hold() == Hold::Zero;
-    let hold = match (M::KIND, held) {
-        (Kind::Static, _) => "none: the model has no state",
-        (_, true) => "inputs hold from sample to sample",
-        (_, false) => "inputs are straight lines from sample to sample",
-    };
-    let inputs = named::<M::Input>().zip(&of.inputs).map(|(name, values)| signal(name, "input", values));
-    let outputs = named::<M::Output>().zip(&of.measured).map(|(name, values)| signal(name, "output", values));
-    let worst: Vec<Option<usize>> = of.residuals.iter().map(|residuals| largest(residuals)).collect();
-    let timeline = timeline::<M>(&of, held, numbers, &worst);
-    let single = timeline.stretches.first().is_some_and(|whole| whole.samples_per_column == 1);
-    let quality = M::Output::into_array(prediction.quality);
-    let fits = residuals::examine(prediction, record)?.into_iter().enumerate().map(|(j, residuals)| {
-        let close = worst[j].filter(|_| !single || of.t.len() > 4 * CLOSE);
-        OutputFit {
-            name: M::Output::NAMES[j].to_owned(),
-            unit: M::Output::UNITS[j].to_owned(),
-            fit_percent: quality.as_ref()[j].fit_percent,
-            unpredicted: of.predicted[j].iter().filter(|value| !value.is_finite()).count() as u64,
-            residuals,
-            largest: worst[j].map_or(0.0, |k| of.residuals[j][k]),
-            largest_at: record.time(worst[j].unwrap_or(0)),
-            histogram: Histogram::new(&of.residuals[j]),
-            closeup: close.map(|worst| closeup::<M>(name, &of, j, worst)),
+impl<'a> Columns<'a> {
+    fn new(name: &'a str, record: &'a Measured, prediction: &'a Simulated, bands: Option<&'a Widths>) -> Self {
+        Columns {
+            name,
+            record,
+            t: (0..record.len()).map(|k| record.time(k)).collect(),
+            gaps: record.gaps().iter().map(|gap| gap.sample).collect(),
+            prediction,
+            bands,
+            worst: prediction.residuals.iter().map(|residuals| largest(residuals)).collect(),
         }
-    });
-    let title = format!("{name} over time");
-    let plot = Plot::new(format!("record-{name}"), "", title, Drawing::Timeline(timeline));
-    Ok(Record {
-        name: name.to_owned(),
-        samples: record.len() as u64,
-        begin: record.time(0),
-        end: record.time(record.len().saturating_sub(1)),
-        sample_time: record.sample_time(),
-        gaps: gaps.iter().map(|gap| (gap.from, gap.to)).collect(),
-        hold,
-        signals: inputs.chain(outputs).collect(),
-        fits: fits.collect(),
-        timeline: Some(plot),
-    })
+    }
+
+    fn gathered(&self, kind: Kind, examined: Vec<residuals::Residuals>, numbers: usize) -> Record {
+        let record = self.record;
+        let hold = match (kind, record.input_hold()) {
+            (Kind::Static, _) => "none: the model has no state",
+            (_, Hold::Zero) => "inputs hold from sample to sample",
+            _ => "inputs are straight lines from sample to sample",
+        };
+        let inputs = record.inputs().iter().map(|channel| signal(channel, "input"));
+        let outputs = record.outputs().iter().map(|channel| signal(channel, "output"));
+        let timeline = self.timeline(numbers);
+        let single = timeline.stretches.first().is_some_and(|whole| whole.samples_per_column == 1);
+        let fits = examined.into_iter().enumerate().map(|(j, residuals)| {
+            let (channel, errors) = (&record.outputs()[j], &self.prediction.residuals[j]);
+            let (worst, predicted) = (self.worst[j], &self.prediction.outputs[j]);
+            OutputFit {
+                name: channel.name.clone(),
+                unit: channel.unit.clone(),
+                fit_percent: output_fit(&channel.values, errors).fit_percent,
+                unpredicted: predicted.iter().filter(|value| !value.is_finite()).count() as u64,
+                residuals,
+                largest: worst.map_or(0.0, |k| errors[k]),
+                largest_at: record.time(worst.unwrap_or(0)),
+                histogram: Histogram::new(errors),
+                closeup: worst.filter(|_| !single || self.t.len() > 4 * CLOSE).map(|worst| self.closeup(j, worst)),
+            }
+        });
+        Record {
+            name: self.name.to_owned(),
+            samples: record.len() as u64,
+            begin: record.time(0),
+            end: record.time(record.len().saturating_sub(1)),
+            sample_time: record.sample_time(),
+            gaps: record.gaps().iter().map(|gap| (gap.from, gap.to)).collect(),
+            hold,
+            signals: inputs.chain(outputs).collect(),
+            fits: fits.collect(),
+            timeline: Some(Plot::new(
+                format!("record-{}", self.name),
+                "",
+                format!("{} over time", self.name),
+                Drawing::Timeline(timeline),
+            )),
+        }
+    }
+
+    /// The panels of an output: what was measured and predicted, and what is left.
+    fn panels(&self, j: usize) -> [Panel; 2] {
+        let Channel { name, unit, .. } = &self.record.outputs()[j];
+        let line = |style, name: &str| Line { style, name: name.to_owned(), held: false };
+        let (percent, mut lines) = (100.0 * BAND, vec![]);
+        if self.bands.is_some() {
+            lines.push(line(Style::Prediction, &format!("holds {percent} % of measurements")));
+            lines.push(line(Style::Confidence, &format!("{percent} % of the model alone")));
+        }
+        lines.extend([line(Style::Measured, "measured"), line(Style::Predicted, "predicted")]);
+        let residual = Panel {
+            name: format!("residual of {name}"),
+            unit: unit.clone(),
+            kind: PanelKind::Residual,
+            lines: vec![line(Style::Residual, "residual")],
+        };
+        [Panel { name: name.clone(), unit: unit.clone(), kind: PanelKind::Response, lines }, residual]
+    }
+
+    /// The lines of these panels.
+    fn lines(&self, j: usize) -> impl Iterator<Item = (Keep, &[f64])> {
+        let bands = self.bands.into_iter().flat_map(move |bands| [&bands.prediction[j], &bands.confidence[j]]);
+        let rest = [
+            (Keep::Extremes, &*self.record.outputs()[j].values),
+            (Keep::ExtremesAndMean, self.prediction.outputs[j].as_slice()),
+            (Keep::Extremes, self.prediction.residuals[j].as_slice()),
+        ];
+        bands.map(|widths| (Keep::Median, widths.as_slice())).chain(rest)
+    }
+
+    /// The outputs and, below them, the inputs.
+    fn timeline(&self, numbers: usize) -> Timeline {
+        let (inputs, outputs) = (self.record.inputs(), 0..self.record.outputs().len());
+        let held = self.record.input_hold() == Hold::Zero;
+        let input = |Channel { name, unit, .. }: &Channel| {
+            let lines = vec![Line { style: Style::Input, name: name.clone(), held }];
+            Panel { name: name.clone(), unit: unit.clone(), kind: PanelKind::Input, lines }
+        };
+        let panels = outputs.clone().flat_map(|j| self.panels(j)).chain(inputs.iter().map(input)).collect();
+        let lines = outputs.flat_map(|j| self.lines(j));
+        let lines = lines.chain(inputs.iter().map(|channel| (Keep::Extremes, &*channel.values)));
+        let pieces: Vec<Range<usize>> = self.worst.iter().flatten().map(|&k| about(k, self.t.len())).collect();
+        Timeline::new(panels, &Samples { t: &self.t, gaps: &self.gaps, lines: lines.collect() }, numbers, &pieces)
+    }
+
+    /// One output about its largest residual.
+    fn closeup(&self, j: usize, worst: usize) -> Plot {
+        let (record, output) = (self.name, &self.record.outputs()[j].name);
+        let samples = Samples { t: &self.t, gaps: &self.gaps, lines: self.lines(j).collect() };
+        let start = self.t.first().copied().unwrap_or(0.0);
+        let stretches = vec![samples.stretch(about(worst, self.t.len()), CLOSE, start)];
+        let drawing = Drawing::Timeline(Timeline { start, panels: self.panels(j).to_vec(), stretches });
+        let title = format!("Output {output} of {record} about its largest residual");
+        Plot::new(identifier(&format!("closeup-{record}-{output}")), "About the largest residual", title, drawing)
+    }
 }
 
-fn signal((name, unit): (String, String), role: &'static str, values: &[f64]) -> Signal {
+fn signal(channel: &Channel, role: &'static str) -> Signal {
+    let (name, unit, values) = (channel.name.clone(), channel.unit.clone(), &*channel.values);
     let measured = || values.iter().copied().filter(|value| !value.is_nan());
     let count = measured().count();
     let (low, high) = (measured().reduce(f64::min), measured().reduce(f64::max));
@@ -154,64 +195,10 @@ fn signal((name, unit): (String, String), role: &'static str, values: &[f64]) ->
     Signal { name, unit, role, missing: (values.len() - count) as u64, values: values_of }
 }
 
-/// The panels of an output: what was measured and predicted, and what is left.
-fn output_panels<M: Model>(j: usize, bands: bool) -> [Panel; 2] {
-    let (name, unit) = (M::Output::NAMES[j].to_owned(), M::Output::UNITS[j].to_owned());
-    let line = |style, name: &str| Line { style, name: name.to_owned(), held: false };
-    let (percent, mut lines) = (100.0 * BAND, vec![]);
-    if bands {
-        lines.push(line(Style::Prediction, &format!("holds {percent} % of measurements")));
-        lines.push(line(Style::Confidence, &format!("{percent} % of the model alone")));
-    }
-    lines.extend([line(Style::Measured, "measured"), line(Style::Predicted, "predicted")]);
-    let residual = Panel {
-        name: format!("residual of {name}"),
-        unit: unit.clone(),
-        kind: PanelKind::Residual,
-        lines: vec![line(Style::Residual, "residual")],
-    };
-    [Panel { name, unit, kind: PanelKind::Response, lines }, residual]
-}
-
-/// The lines of these panels.
-fn output_lines(of: &Columns, j: usize) -> impl Iterator<Item = (Keep, &[f64])> {
-    let bands = [of.prediction.get(j), of.confidence.get(j)].into_iter().flatten();
-    let rest = [(Keep::Extremes, &of.measured[j]), (Keep::ExtremesAndMean, &of.predicted[j])];
-    let rest = rest.into_iter().chain([(Keep::Extremes, &of.residuals[j])]);
-    bands.map(|widths| (Keep::Median, widths)).chain(rest).map(|(keep, values)| (keep, values.as_slice()))
-}
-
-/// The outputs and, below them, the inputs of a record.
-fn timeline<M: Model>(of: &Columns, held: bool, numbers: usize, worst: &[Option<usize>]) -> Timeline {
-    let bands = !of.confidence.is_empty();
-    let input = |(name, unit): (String, String)| {
-        let lines = vec![Line { style: Style::Input, name: name.clone(), held }];
-        Panel { name, unit, kind: PanelKind::Input, lines }
-    };
-    let outputs = (0..M::Output::LEN).flat_map(|j| output_panels::<M>(j, bands));
-    let panels = outputs.chain(named::<M::Input>().map(input)).collect();
-    let lines = (0..M::Output::LEN).flat_map(|j| output_lines(of, j));
-    let lines = lines.chain(of.inputs.iter().map(|values| (Keep::Extremes, values.as_slice())));
-    let pieces: Vec<Range<usize>> = worst.iter().flatten().map(|&k| about(k, of.t.len())).collect();
-    Timeline::new(panels, &Samples { t: &of.t, gaps: &of.gaps, lines: lines.collect() }, numbers, &pieces)
-}
-
 /// The samples about one.
 fn about(sample: usize, samples: usize) -> Range<usize> {
     let begin = sample.saturating_sub(CLOSE / 2).min(samples.saturating_sub(CLOSE));
     begin..(begin + CLOSE).min(samples)
-}
-
-/// One output about its largest residual.
-fn closeup<M: Model>(record: &str, of: &Columns, j: usize, worst: usize) -> Plot {
-    let output = M::Output::NAMES[j];
-    let samples = Samples { t: &of.t, gaps: &of.gaps, lines: output_lines(of, j).collect() };
-    let start = of.t.first().copied().unwrap_or(0.0);
-    let stretches = vec![samples.stretch(about(worst, of.t.len()), CLOSE, start)];
-    let panels = output_panels::<M>(j, !of.confidence.is_empty()).to_vec();
-    let drawing = Drawing::Timeline(Timeline { start, panels, stretches });
-    let title = format!("Output {output} of {record} about its largest residual");
-    Plot::new(identifier(&format!("closeup-{record}-{output}")), "About the largest residual", title, drawing)
 }
 
 /// Index of the largest residual in size.

@@ -34,8 +34,8 @@ pub(super) fn sign_of_reason(severity: Severity) -> &'static str {
 pub(super) fn search(report: &Report) -> String {
     let estimate = &report.estimate;
     let mut text = format!("Search: {}.", estimate.outcome);
-    if !estimate.converged {
-        text = format!("{text} {}", estimate.advice);
+    if !estimate.outcome.converged() {
+        text = format!("{text} {}", estimate.outcome.advice());
     }
     let unknown = estimate.unknowns.iter().filter(|unknown| unknown.knowledge == Knowledge::Unidentified).count();
     match unknown {

@@ -266,7 +266,8 @@ mod tests {
         let t: Vec<f64> = (0..5000).map(f64::from).collect();
         let whole = Timeline::new(vec![], &samples(&t, &[], Keep::Extremes, &t), 5000, std::slice::from_ref(&(0..9)));
         assert_eq!((whole.stretches.len(), whole.stretches[0].samples_per_column), (1, 1));
-        let thinned = Timeline::new(vec![], &samples(&t, &[], Keep::Extremes, &t), 1000, std::slice::from_ref(&(100..109)));
+        let thinned =
+            Timeline::new(vec![], &samples(&t, &[], Keep::Extremes, &t), 1000, std::slice::from_ref(&(100..109)));
         assert_eq!((thinned.stretches.len(), thinned.stretches[0].t.len()), (2, 500));
         assert_eq!(thinned.stretches[1].t, (100..109).map(f64::from).collect::<Vec<_>>());
     }

@@ -1,8 +1,10 @@
 //! Comparison, validation, drift and derived quantities against values known beforehand.
 
 use crate::random::Random;
-use greybox::diagnose::{Comparison, Summary, cross_validate, derived, drift, f_test, likelihood_ratio, validate};
-use greybox::{Error, Estimate, Experiment, Fit, Kind, Model, Nothing, Parameter, Scalar, Time, fixed, free, signals};
+use greybox::diagnose::{Candidate, Comparison, cross_validate, derived, drift, f_test, likelihood_ratio, validate};
+use greybox::{
+    Error, Estimate, Experiment, Fit, Kind, Model, Nothing, Parameter, Scalar, Summary, Time, fixed, free, signals,
+};
 
 signals! { struct Input { u: "V" } }
 signals! { struct Output { y: "A" } }
@@ -18,7 +20,6 @@ impl Model for Polynomial {
     type Parameters = Cubic;
     const KIND: Kind = Kind::Static;
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Input<S>, p: &Cubic<S>) -> Output<S> {
         Output { y: p.a + p.b * u.u + p.c * u.u * u.u }
     }
@@ -45,8 +46,8 @@ fn nested_models_are_told_apart() {
     let (mut by_ratio, mut by_f) = (0, 0);
     for seed in 0..1000 {
         let record = [record(seed, 2.0, 0.0)];
-        let line = Summary::of("line", &fit(&record, fixed(0.0)).unwrap());
-        let parabola = Summary::of("parabola", &fit(&record, free(0.1)).unwrap());
+        let line = Candidate::new("line", &fit(&record, fixed(0.0)).unwrap());
+        let parabola = Candidate::new("parabola", &fit(&record, free(0.1)).unwrap());
         by_ratio += u32::from(!likelihood_ratio(&line, &parabola).unwrap().passed);
         by_f += u32::from(!f_test(&line, &parabola).unwrap().passed);
         assert!(likelihood_ratio(&parabola, &line).is_err());
@@ -55,11 +56,12 @@ fn nested_models_are_told_apart() {
     assert!((2..=22).contains(&by_f) && (2..=26).contains(&by_ratio), "{by_f} {by_ratio}");
 
     let record = [record(1, 2.0, 0.3)];
-    let line = Summary::of("line", &fit(&record, fixed(0.0)).unwrap());
-    let parabola = Summary::of("parabola", &fit(&record, free(0.1)).unwrap());
+    let line = Candidate::new("line", &fit(&record, fixed(0.0)).unwrap());
+    let parabola = Candidate::new("parabola", &fit(&record, free(0.1)).unwrap());
     let test = f_test(&line, &parabola).unwrap();
     assert!(!test.passed && test.meaning.contains("`line` misses something"), "{test:?}");
-    assert!(parabola.aicc < line.aicc && parabola.bic < line.bic);
+    let (few, many) = (&line.estimate, &parabola.estimate);
+    assert!(many.aicc() < few.aicc() && many.bic() < few.bic());
     let table = Comparison(vec![line, parabola]).to_string();
     println!("{table}");
     assert!(table.lines().any(|line| line.starts_with("c ") && line.contains(" - ")), "{table}");
@@ -71,7 +73,7 @@ fn delta_method_by_hand() {
     let estimate = fit(&[record(3, 2.0, 0.4)], free(0.1)).unwrap();
     let (p, c) = (estimate.parameters, &estimate.covariance);
     let product = derived(&estimate, "a b", |p| p.a * p.b);
-    let expected = (p.b * p.b * c[(0, 0)] + p.a * p.a * c[(1, 1)] + 2.0 * p.a * p.b * c[(0, 1)]).sqrt();
+    let expected = (p.b * p.b * c.get(0, 0) + p.a * p.a * c.get(1, 1) + 2.0 * p.a * p.b * c.get(0, 1)).sqrt();
     assert!((product.value - p.a * p.b).abs() < 1e-15);
     assert!((product.standard_error.unwrap() / expected - 1.0).abs() < 1e-12);
     let (lower, upper) = product.interval.unwrap();
@@ -95,7 +97,7 @@ fn unseen_data_and_drift() {
 
     let each = |first: u64, b: &dyn Fn(u64) -> f64| -> Vec<Summary> {
         let estimates = (0..8).map(|day| fit(&[record(first + day, b(day), 0.3)], free(0.0)).unwrap());
-        estimates.map(|estimate| Summary::of("day", &estimate)).collect()
+        estimates.map(Estimate::into_summary).collect()
     };
     // Nothing drifts: each test refuses about once in a hundred times; 300 of each, three deviations above 1.4 % (the tail of
     // Student's t with 37 degrees of freedom where a normal one has 1 %).
@@ -121,12 +123,10 @@ impl Model for FirstOrder {
     type Output = Level;
     type Parameters = Lag;
 
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Input<S>, p: &Lag<S>) -> Level<S> {
         Level { x: (p.k * u.u - x.x) / p.tau }
     }
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Input<S>, _p: &Lag<S>) -> Level<S> {
         *x
     }

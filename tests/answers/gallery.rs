@@ -14,6 +14,7 @@ signals! { pub struct Voltages { ud: "V", uq: "V" } }
 signals! { pub struct Pair { a: "1", b: "A/V", the_resistance_of_the_second_phase: "ohm", d: "A", e: "A/V" } }
 
 /// Two outputs, in one of which `a` and `b` are known as their product only.
+#[derive(Clone)]
 struct Unclear;
 
 impl Model for Unclear {
@@ -23,7 +24,6 @@ impl Model for Unclear {
     type Parameters = Pair;
     const KIND: Kind = Kind::Static;
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltages<S>, p: &Pair<S>) -> Currents<S> {
         let second = u.uq / p.the_resistance_of_the_second_phase + p.d + p.e * u.ud * u.uq;
         Currents { id: p.a * p.b * u.ud, a_current_with_a_name_of_no_use_to_anyone: second }
@@ -55,7 +55,7 @@ fn pair() -> Pair<greybox::Parameter> {
 }
 
 fn of_unclear(records: &[ExperimentOf<Unclear>]) -> Result<Report, Error> {
-    let mut problem = Fit::new(&Unclear, records).parameters(pair()).problem()?;
+    let problem = Fit::new(&Unclear, records).parameters(pair()).problem()?;
     let estimate = problem.run()?;
     let report = Report::new(&problem, &estimate)?;
     let names = ["d", "e"].into_iter();
@@ -77,15 +77,15 @@ fn pages_are_written() {
         .run()
         .unwrap();
     let compared = |record: &ExperimentOf<Lag>, part| {
-        Compared::new(&Lag, record, part).with("the lag", &estimate.predict(&Lag, record).unwrap()).unwrap()
+        Compared::new(record.record(), part).with("the lag", &estimate.predict(&Lag, record).unwrap()).unwrap()
     };
     let both = vec![compared(&fitted, DataUse::Estimation), compared(&other, DataUse::Validation)];
     report(&[fitted]).unwrap().titled("A lag").with(both).save(folder.join("compared.html")).unwrap();
     if cfg!(not(debug_assertions)) {
-        let mut outputs = record(even(10_000_000), 0.01, 5).outputs().to_vec();
+        let mut outputs: Vec<_> = record(even(10_000_000), 0.01, 5).outputs().collect();
         outputs[7_654_321] = Response { y: 30.0 };
         let long = record(even(10_000_000), 0.01, 5);
-        let long = Experiment::new(&Lag, long.times().clone(), long.inputs().to_vec(), outputs).unwrap();
+        let long = Experiment::new(&Lag, long.times().clone(), long.inputs().collect(), outputs).unwrap();
         let page = report(&[long]).unwrap().to_html();
         assert!(page.len() < 3_000_000, "{} bytes", page.len());
         std::fs::write(folder.join("long.html"), page).unwrap();

@@ -5,13 +5,14 @@ use crate::shared::shared;
 use greybox::diagnose::{End, identifiability, profile, restarts};
 use greybox::optimize::Severity;
 use greybox::{Butterworth, Horizon, zero_phase};
-use greybox::{Experiment, Fit, Kind, Knowledge, Model, Nothing, Scalar, Time, fixed, free, signals};
+use greybox::{Estimate, Experiment, Fit, Kind, Knowledge, Model, Nothing, Scalar, Time, fixed, free, signals};
 
 signals! { struct Drive { u: "V", w: "V" } }
 signals! { struct Reading { y: "V", z: "V" } }
 signals! { struct Product { a: "1", b: "1", c: "V" } }
 
 /// `y = a b u + c`, `z = c w`.
+#[derive(Clone)]
 struct Amplifier;
 
 impl Model for Amplifier {
@@ -21,7 +22,6 @@ impl Model for Amplifier {
     type Parameters = Product;
     const KIND: Kind = Kind::Static;
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Drive<S>, p: &Product<S>) -> Reading<S> {
         Reading { y: p.a * p.b * u.u + p.c, z: p.c * u.w }
     }
@@ -40,8 +40,8 @@ fn a_product_is_named_and_so_is_a_constant_input() {
     let time = Time::Uniform { start: 0.0, step: 0.1 };
     let record = Experiment::new(&Amplifier, time, inputs.clone(), outputs.collect()).unwrap();
     let parameters = Product { a: free(1.5), b: free(2.5), c: free(0.5) };
-    let mut problem = Fit::new(&Amplifier, &record).parameters(parameters).problem().unwrap();
-    let estimate = problem.run().unwrap();
+    let problem = Fit::new(&Amplifier, &record).parameters(parameters).problem().unwrap();
+    let estimate = Estimate::<Amplifier>::of(problem.run().unwrap()).unwrap();
     assert_eq!(estimate.knowledge.a, Knowledge::Unidentified);
     let found = identifiability(&problem, &estimate).unwrap();
     assert_eq!((found.rank, found.generic_rank, found.condition), (2, 2, None));
@@ -66,6 +66,7 @@ signals! { struct Answer { y: "1" } }
 signals! { struct Saturation { top: "1", half: "1" } }
 
 /// `y = top u / (half + u)`: at large doses only the top is seen.
+#[derive(Clone)]
 struct Binding;
 
 impl Model for Binding {
@@ -75,7 +76,6 @@ impl Model for Binding {
     type Parameters = Saturation;
     const KIND: Kind = Kind::Static;
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Dose<S>, p: &Saturation<S>) -> Answer<S> {
         Answer { y: p.top * u.u / (p.half + u.u) }
     }
@@ -93,7 +93,7 @@ fn binding(seed: u64, half: f64) -> Experiment<Nothing, Dose, Answer> {
 fn a_profile_follows_the_bound() {
     let record = binding(1, 0.02);
     let parameters = Saturation { top: free(4.0), half: free(0.5).within(0.0, 100.0) };
-    let mut problem = Fit::new(&Binding, &record).parameters(parameters).problem().unwrap();
+    let problem = Fit::new(&Binding, &record).parameters(parameters).problem().unwrap();
     let estimate = problem.run().unwrap();
     let found = profile(&problem, &estimate, "half", 0.95).unwrap();
     println!("{:?} {:?} {:?}", found.value, found.lower, found.upper);
@@ -122,7 +122,7 @@ fn profiles_cover() {
         let covers = |seed: &u64| {
             let record = binding(*seed, half);
             let parameters = Saturation { top: free(4.0), half: free(0.5).within(0.0, 100.0) };
-            let mut problem = Fit::new(&Binding, &record).parameters(parameters).problem().unwrap();
+            let problem = Fit::new(&Binding, &record).parameters(parameters).problem().unwrap();
             let estimate = problem.run().unwrap();
             profile(&problem, &estimate, "half", 0.95).unwrap().covers(half)
         };
@@ -143,7 +143,7 @@ fn several_experiments_are_diagnosed_together() {
     let records = [binding(1, 1.0).named("cold"), binding(2, 3.0).named("warm")];
     let parameters = Saturation { top: fixed(5.0), half: free(0.5).within(0.0, 100.0).per_experiment() };
     let fit = |records| Fit::new(&Binding, records).parameters(parameters).noise(Answer { y: 0.2 });
-    let mut problem = fit(&records[..]).problem().unwrap();
+    let problem = fit(&records[..]).problem().unwrap();
     let estimate = problem.run().unwrap();
     let found = identifiability(&problem, &estimate).unwrap();
     assert_eq!((found.unknowns.as_slice(), found.rank), (&["half [cold]".to_owned(), "half [warm]".to_owned()][..], 2));
@@ -155,7 +155,7 @@ fn several_experiments_are_diagnosed_together() {
     // Singular values one: nothing of one record stands in the other.
     assert!((found.condition.unwrap() - 1.0).abs() < 1e-9);
     for (i, record) in records.iter().enumerate() {
-        let mut alone = fit(std::slice::from_ref(record)).problem().unwrap();
+        let alone = fit(std::slice::from_ref(record)).problem().unwrap();
         let own = alone.run().unwrap();
         let expected = profile(&alone, &own, &own.unknowns[0].name, 0.95).unwrap();
         let together = profile(&problem, &estimate, &found.unknowns[i], 0.95).unwrap();
@@ -171,6 +171,7 @@ signals! { struct Command { vir: "V" } }
 signals! { struct Slide { m: "kg", fv: "N s/m", fcp: "N", fcm: "N", offset: "N" } }
 
 /// The electro-mechanical positioning system with friction of its own in each direction.
+#[derive(Clone)]
 struct Emps;
 
 const GTAU: f64 = 35.150_651_88;
@@ -181,7 +182,6 @@ impl Model for Emps {
     type Output = Motion;
     type Parameters = Slide;
 
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Command<S>, p: &Slide<S>) -> Motion<S> {
         let sign = (x.v * 500.0).tanh();
         let forward = (sign + 1.0) * 0.5;
@@ -189,7 +189,6 @@ impl Model for Emps {
         Motion { q: x.v, v: (u.vir * GTAU - p.fv * x.v - friction - p.offset) / p.m }
     }
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, _u: &Command<S>, _p: &Slide<S>) -> Motion<S> {
         *x
     }
@@ -217,7 +216,7 @@ fn a_common_shift_of_frictions_and_offset_is_named() {
     let Some(record) = emps() else { return };
     let parameters = Slide { m: free(90.0), fv: free(200.0), fcp: free(20.0), fcm: free(20.0), offset: free(-3.0) };
     let fit = Fit::new(&Emps, &record).parameters(parameters).predictor(Horizon { steps: 50, filter: None });
-    let mut problem = fit.problem().unwrap();
+    let problem = fit.problem().unwrap();
     let estimate = problem.run().unwrap();
     println!("{estimate}");
     let found = identifiability(&problem, &estimate).unwrap();

@@ -16,6 +16,7 @@ signals! {
 }
 
 /// `y = gain scale (slope u + forwards [u > 0] - backwards [u <= 0] + offset)`
+#[derive(Clone)]
 struct Friction;
 
 impl Model for Friction {
@@ -25,7 +26,6 @@ impl Model for Friction {
     type Parameters = Line;
     const KIND: Kind = Kind::Static;
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Drive<S>, p: &Line<S>) -> Response<S> {
         let dry = if u.u.value() > 0.0 { p.forwards } else { -p.backwards };
         Response { y: p.gain * p.scale * (p.slope * u.u + dry + p.offset) }
@@ -54,14 +54,14 @@ fn line() -> Line<greybox::Parameter> {
 }
 
 fn report(record: &ExperimentOf<Friction>, line: Line<greybox::Parameter>) -> Report {
-    let mut problem = Fit::new(&Friction, record).parameters(line).problem().unwrap();
+    let problem = Fit::new(&Friction, record).parameters(line).problem().unwrap();
     let estimate = problem.run().unwrap();
     Report::new(&problem, &estimate).unwrap()
 }
 
 fn with_everything() -> Report {
     let record = record(500).named(HOSTILE);
-    let mut problem = Fit::new(&Friction, &record).parameters(line()).problem().unwrap();
+    let problem = Fit::new(&Friction, &record).parameters(line()).problem().unwrap();
     let mut estimate = problem.run().unwrap();
     // What differs from run to run is no part of an example.
     estimate.seconds = 0.25;
@@ -258,9 +258,9 @@ fn a_product_and_a_factor_are_named() {
 #[test]
 fn missing_outputs_are_gaps() {
     let whole = record(300);
-    let mut outputs = whole.outputs().to_vec();
+    let mut outputs: Vec<_> = whole.outputs().collect();
     outputs[100..200].fill(Response::splat(f64::NAN));
-    let record = Experiment::new(&Friction, whole.times().clone(), whole.inputs().to_vec(), outputs).unwrap();
+    let record = Experiment::new(&Friction, whole.times().clone(), whole.inputs().collect(), outputs).unwrap();
     let report = report(&record, line());
     let missing = report.sections.iter().find(|section| section.id == "data").unwrap();
     assert_eq!(missing.tables[0].rows[1][6].text(), "100");
@@ -342,9 +342,9 @@ fn every_form_is_saved_by_its_ending() {
 #[cfg_attr(debug_assertions, ignore = "ten million samples take an optimized build")]
 fn a_long_record_makes_a_small_page() {
     let long = record(10_000_000);
-    let mut outputs = long.outputs().to_vec();
+    let mut outputs: Vec<_> = long.outputs().collect();
     outputs[7_654_321].y += 100.0;
-    let record = Experiment::new(&Friction, long.times().clone(), long.inputs().to_vec(), outputs).unwrap();
+    let record = Experiment::new(&Friction, long.times().clone(), long.inputs().collect(), outputs).unwrap();
     let report = report(&record, line());
     let timeline = timeline(&report);
     let residual = &timeline.stretches[0].traces[4];

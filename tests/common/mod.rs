@@ -1,4 +1,4 @@
-//! Small models and reproducible noise for the trials of the fit.
+//! Small models and reproducible noise for the tests of the fit.
 #![allow(dead_code, reason = "each test uses some of it")]
 
 use greybox::*;
@@ -10,6 +10,7 @@ signals! { pub struct Affine { slope: "1", offset: "V" } }
 signals! { pub struct Branch { gain: "A/V", tau: "s" } }
 
 /// `y = slope u + offset`, `z = offset u - slope`: linear in its parameters, without state.
+#[derive(Clone)]
 pub struct Line;
 
 impl Model for Line {
@@ -18,13 +19,13 @@ impl Model for Line {
     type Output = Pair;
     type Parameters = Affine;
     const KIND: Kind = Kind::Static;
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Affine<S>) -> Pair<S> {
         Pair { y: p.slope * u.u + p.offset, z: p.offset * u.u - p.slope }
     }
 }
 
 /// `tau di/dt = gain u - i`, the current measured.
+#[derive(Clone)]
 pub struct Lag;
 
 impl Model for Lag {
@@ -32,11 +33,9 @@ impl Model for Lag {
     type Input = Voltage;
     type Output = Current;
     type Parameters = Branch;
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Current<S>, u: &Voltage<S>, p: &Branch<S>) -> Current<S> {
         Current { i: (p.gain * u.u - x.i) / p.tau }
     }
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, _p: &Branch<S>) -> Current<S> {
         *x
     }
@@ -70,7 +69,8 @@ pub fn levels(samples: usize, hold: usize, seed: u64) -> Vec<f64> {
         .collect()
 }
 
-/// What a model says of these inputs with these parameters, from this state: outputs without noise.
+/// The record that a model makes of these inputs with these parameters, from this state, without noise; the state at its
+/// first sample is given.
 pub fn simulated<M: Model>(
     model: &M,
     step: f64,
@@ -78,17 +78,17 @@ pub fn simulated<M: Model>(
     start: Of<M::State, f64>,
     truth: Of<M::Parameters, f64>,
 ) -> ExperimentOf<M> {
-    let outputs = vec![M::Output::splat(0.0); inputs.len()];
-    let record = Experiment::new(model, Time::Uniform { start: 0.0, step }, inputs.clone(), outputs)
-        .unwrap()
-        .initial(M::State::map(start, fixed));
-    with_truth(model, &record, truth)
+    let run = simulate(model, &truth, &start, Time::Uniform { start: 0.0, step }, &inputs).unwrap();
+    run.experiment(model).unwrap().initial(M::State::map(start, fixed))
 }
 
-/// The record with the model's own outputs in place of the measured ones.
+/// The record, whose initial state is given, with the model's own outputs in place of the measured ones.
 pub fn with_truth<M: Model>(model: &M, record: &ExperimentOf<M>, truth: Of<M::Parameters, f64>) -> ExperimentOf<M> {
-    let said = Fit::new(model, record).parameters(M::Parameters::map(truth, fixed)).simulate().unwrap();
-    with_outputs(model, record, said.outputs)
+    let Initial::Given(start) = record.initial_state() else { panic!("the initial state is not given") };
+    let (start, inputs) = (M::State::from_fn(|i| start[i].start), record.inputs().collect::<Vec<_>>());
+    let simulator = Simulator::new(model).hold(record.input_hold());
+    let run = simulator.run(&truth, &start, record.times().clone(), &inputs).unwrap();
+    with_outputs(model, record, run.outputs)
 }
 
 /// The record with other outputs.
@@ -97,10 +97,10 @@ pub fn with_outputs<M: Model>(
     record: &ExperimentOf<M>,
     outputs: Vec<Of<M::Output, f64>>,
 ) -> ExperimentOf<M> {
-    let made = Experiment::new(model, record.times().clone(), record.inputs().to_vec(), outputs).unwrap();
+    let made = Experiment::new(model, record.times().clone(), record.inputs().collect(), outputs).unwrap();
     let made = made.named(record.name()).hold(record.input_hold());
-    match *record.initial_state() {
-        Initial::Given(state) => made.initial(state),
+    match record.initial_state() {
+        Initial::Given(state) => made.initial(M::State::from_fn(|i| state[i])),
         Initial::FirstSample => made.initial_from_first_sample(),
         Initial::Estimated => made,
     }
@@ -114,10 +114,10 @@ pub fn noisy<M: Model>(
     noise: &mut Noise,
 ) -> ExperimentOf<M> {
     let sigma = M::Output::into_array(sigma);
-    let disturbed = |y: &Of<M::Output, f64>| {
-        let y = M::Output::into_array(*y);
+    let disturbed = |y: Of<M::Output, f64>| {
+        let y = M::Output::into_array(y);
         M::Output::from_fn(|j| y.as_ref()[j] + sigma.as_ref()[j] * noise.gauss())
     };
-    let outputs = record.outputs().iter().map(disturbed).collect();
+    let outputs = record.outputs().map(disturbed).collect();
     with_outputs(model, record, outputs)
 }

@@ -20,11 +20,9 @@ impl Model for Stiff {
     type Input = Source;
     type Output = Measured;
     type Parameters = Coil;
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Circuit<S>, u: &Source<S>, p: &Coil<S>) -> Circuit<S> {
         currents(x, u, p)
     }
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Circuit<S>, _u: &Source<S>, _p: &Coil<S>) -> Measured<S> {
         Measured { i: x.i }
     }

@@ -35,18 +35,19 @@ fn nelder_mead_and_lbfgs_find_the_minimum() {
     let fit = |record| fit(record).noise(Current { i: 10.0 });
     let best = fit(&record).run().unwrap();
     let problem = fit(&record).problem().unwrap();
-    let start = problem.objective().start();
+    let objective = problem.objective().unwrap();
+    let start = objective.start();
     let moved = |i: usize| {
         let mut corner = start.clone();
         corner[i] += 0.2;
         corner
     };
     let simplex = NelderMead::new(vec![start.clone(), moved(0), moved(1)]).with_sd_tolerance(1e-14).unwrap();
-    let found = Executor::new(problem.objective(), simplex).configure(|state| state.max_iters(500)).run().unwrap();
+    let found = Executor::new(objective.clone(), simplex).configure(|state| state.max_iters(500)).run().unwrap();
     let nelder_mead = found.state().get_best_param().unwrap().clone();
     let search = LBFGS::new(MoreThuenteLineSearch::new(), 7);
     let configure = |state: argmin::core::IterState<_, _, _, _, _, _>| state.param(start.clone()).max_iters(100);
-    let found = Executor::new(problem.objective(), search).configure(configure).run().unwrap();
+    let found = Executor::new(objective, search).configure(configure).run().unwrap();
     let lbfgs = found.state().get_best_param().unwrap().clone();
     for place in [nelder_mead, lbfgs] {
         let estimate = problem.estimate(&place).unwrap();
@@ -71,8 +72,8 @@ fn a_particle_swarm_finds_the_minimum_without_a_start() {
     // Coordinates: the gain, and the logarithm of the time constant, over four decades.
     let bounds = (vec![-10.0, f64::ln(1e-3)], vec![10.0, f64::ln(10.0)]);
     let swarm = ParticleSwarm::new(bounds, 40).with_rng_generator(rand::rngs::StdRng::seed_from_u64(1));
-    let found =
-        Executor::new(problem.objective(), swarm).configure(|state| state.max_iters(200)).ctrlc(false).run().unwrap();
+    let executor = Executor::new(problem.objective().unwrap(), swarm);
+    let found = executor.configure(|state| state.max_iters(200)).ctrlc(false).run().unwrap();
     let place = &found.state().get_best_param().unwrap().position;
     let estimate = problem.estimate(place).unwrap();
     for (found, best) in estimate.unknowns.iter().zip(&best.unknowns) {

@@ -11,6 +11,7 @@ signals! { pub struct Pair { a: "1/s", b: "1/s" } }
 signals! { pub struct Two { x: "m", z: "m" } }
 
 const H: f64 = 0.01;
+const EVEN: Time = Time::Uniform { start: 0.0, step: H };
 
 /// A model of one state with the parameters `a` and `b`, from its equations.
 macro_rules! model {
@@ -22,11 +23,9 @@ macro_rules! model {
             type Output = Position;
             type Parameters = Pair;
             const KIND: Kind = $kind;
-            #[inline]
             fn $step<S: Scalar>(&self, _t: S, $x: &Position<S>, $u: &Force<S>, $p: &Pair<S>) -> Position<S> {
                 Position { x: $dx }
             }
-            #[inline]
             fn output<S: Scalar>(&self, _t: S, $x: &Position<S>, _u: &Force<S>, _p: &Pair<S>) -> Position<S> {
                 Position { x: $y }
             }
@@ -96,7 +95,7 @@ fn says<T>(result: Result<T, Error>, parts: &[&str]) -> Error {
 
 /// The warnings in one text, which must hold every one of `parts`.
 #[track_caller]
-fn warns<M: Model, I, P>(estimate: &Estimate<M, I, P>, parts: &[&str]) {
+fn warns(estimate: &Summary, parts: &[&str]) {
     println!("{estimate}\n");
     let text: Vec<&str> = estimate.warnings.iter().map(|warning| warning.text.as_str()).collect();
     let text = text.join("\n");
@@ -154,7 +153,9 @@ fn the_wrong_method_for_a_model() {
     let held = || Fit::new(&Held, &discrete).parameters(free_pair(0.9, 0.1));
     says(held().integrator(Rk4::default()).run(), &["a discrete model", "Runge-Kutta 4", "serves continuous"]);
     says(held().integrator(Rk45::default()).run(), &["a discrete model", "Runge-Kutta 5(4)", "continuous"]);
-    says(held().integrator(Esdirk::default()).simulate(), &["a discrete model", "implicit Runge-Kutta"]);
+    let run = Simulator::new(&Held).integrator(Esdirk::default());
+    let run = run.run(&Pair { a: 0.9, b: 0.1 }, &Position { x: 0.0 }, EVEN, &[Force { u: 1.0 }; 3]);
+    says(run, &["a discrete model", "implicit Runge-Kutta"]);
     let lag = Fit::new(&Lag, &continuous).parameters(free_pair(2.0, 2.0)).integrator(Discrete).run();
     let error = says(lag, &["a continuous model", "discrete steps", "leave the integrator out"]);
     assert!(matches!(error, Error::WrongIntegrator { .. }));
@@ -171,7 +172,10 @@ fn equations_that_were_not_written() {
     assert!(matches!(says(mixed().run(), &parts), Error::Start(_)));
     says(mixed().integrator(Rk45::default()).run(), &parts);
     says(mixed().integrator(Esdirk::default()).run(), &parts);
-    says(mixed().simulate(), &parts);
+    // The estimate of a model with the same quantities.
+    let estimate = Fit::new(&Lag, &record(&Lag, H, &y)).parameters(free_pair(2.0, 2.0)).run().unwrap();
+    let estimate = Estimate::<Mixed>::of(estimate.into_summary()).unwrap();
+    says(mixed().predict(&estimate, &record(&Mixed, H, &y)), &parts);
     says(Fit::new(&Turned, &turned).parameters(free_pair(2.0, 2.0)).run(), &parts);
 }
 
@@ -235,7 +239,12 @@ fn an_unstable_simulation() {
     let parts = ["`bench`, sample", "`x`", "overflows", "horizon"];
     says(fit().integrator(Rk45::default()).run(), &parts);
     says(fit().integrator(Rk4 { substeps: 10 }).run(), &parts);
-    let error = says(fit().integrator(Rk4 { substeps: 10 }).simulate(), &parts);
+    // A stable estimate, made unstable.
+    let stable = Fit::new(&Lag, &record).parameters(free_pair(3.0, 1.0)).integrator(Rk4 { substeps: 10 });
+    let mut summary = stable.run().unwrap().into_summary();
+    summary.parameters[0].value = -3.0;
+    let estimate = Estimate::of(summary).unwrap();
+    let error = says(fit().integrator(Rk4 { substeps: 10 }).predict(&estimate, &record), &parts);
     assert!(matches!(error, Error::Simulation(_)));
     // A stable model, and a step too long for it.
     says(Fit::new(&Lag, &record).parameters(free_pair(9.0, 1.0)).run(), &["overflows", "shorter step"]);
@@ -256,14 +265,10 @@ fn a_step_too_coarse_for_the_dynamics_is_warned_of() {
         estimate.parameters.a
     );
     // With steps to match, and with an adaptive method, there is nothing to warn of, and the answer is right.
-    let fine = [
-        fit().integrator(Rk4 { substeps: 40 }).run().map(|e| (e.parameters.a, e.knowledge.a, e.warnings)),
-        fit().integrator(Rk45::default()).run().map(|e| (e.parameters.a, e.knowledge.a, e.warnings)),
-    ];
-    for fine in fine {
-        let (a, knowledge, warnings) = fine.unwrap();
-        assert!(warnings.is_empty(), "{warnings:?}");
-        assert!((a - 3.0).abs() < 5.0 * knowledge.standard_error().unwrap(), "{a}");
+    for fit in [fit().integrator(Rk4 { substeps: 40 }), fit().integrator(Rk45::default())] {
+        let fine = fit.run().unwrap();
+        assert!(fine.warnings.is_empty(), "{:?}", fine.warnings);
+        assert!((fine.parameters.a - 3.0).abs() < 5.0 * fine.knowledge.a.standard_error().unwrap(), "{fine}");
     }
     // The same with a loose tolerance.
     let loose = fit().integrator(Rk45 { relative: 0.1, absolute: 0.1 }).run().unwrap();
@@ -278,11 +283,9 @@ fn one_of_two_outputs() {
         type Input = Force;
         type Output = Two;
         type Parameters = Pair;
-        #[inline]
         fn derivative<S: Scalar>(&self, _t: S, x: &Position<S>, u: &Force<S>, p: &Pair<S>) -> Position<S> {
             Position { x: p.b * u.u - p.a * x.x }
         }
-        #[inline]
         fn output<S: Scalar>(&self, _t: S, x: &Position<S>, _u: &Force<S>, p: &Pair<S>) -> Two<S> {
             Two { x: x.x, z: x.x * 0.0 * p.a }
         }
@@ -345,7 +348,6 @@ fn a_fit_without_any_error() {
         type Output = Position;
         type Parameters = Pair;
         const KIND: Kind = Kind::Static;
-        #[inline]
         fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Force<S>, p: &Pair<S>) -> Position<S> {
             Position { x: p.a * u.u + p.b }
         }

@@ -101,10 +101,10 @@ fn a_numeric_model_simulates_like_the_exact_one() {
         let interval = Interval { t0: 0.02 * k as f64, t1: 0.02 * (k + 1) as f64, u0, u1: u0, hold: Hold::Zero };
         b = Some(
             ModelSystem { model: &Exact, interval: &interval, p: &p }
-                .step(&Rk4::default(), b.unwrap_or(a), &mut ())
+                .step(&Rk4::default(), b.unwrap_or(a), &mut 0.0)
                 .unwrap(),
         );
-        a = ModelSystem { model: &numeric(), interval: &interval, p: &p }.step(&Rk4::default(), a, &mut ()).unwrap();
+        a = ModelSystem { model: &numeric(), interval: &interval, p: &p }.step(&Rk4::default(), a, &mut 0.0).unwrap();
     }
     let b = b.unwrap();
     assert_relative_eq!(a.x.value, b.x.value, max_relative = 1e-13);

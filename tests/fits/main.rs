@@ -8,6 +8,7 @@ mod checks;
 mod closed_forms;
 #[path = "../common/mod.rs"]
 mod common;
+mod kalman;
 mod models;
 mod nist;
 mod optimizers;

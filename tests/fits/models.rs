@@ -61,11 +61,8 @@ fn a_dc_motor_is_recovered() {
             tau_l: if k / 400 % 2 == 0 { 0.0 } else { 0.05 },
         })
         .collect();
-    let unknown = vec![Rotation { i: f64::NAN, w: f64::NAN }; inputs.len()];
-    let at_rest = Rotation::splat(fixed(0.0));
-    let record = Experiment::new(&DcMotor, time.clone(), inputs.clone(), unknown).unwrap().initial(at_rest);
-    let simulated = Fit::new(&DcMotor, &record).parameters(Armature::map(truth, fixed)).simulate().unwrap().outputs;
-    let record = Experiment::new(&DcMotor, time, inputs, simulated).unwrap().initial(at_rest);
+    let run = simulate(&DcMotor, &truth, &Rotation::splat(0.0), time, &inputs).unwrap();
+    let record = run.experiment(&DcMotor).unwrap().initial(Rotation::splat(fixed(0.0)));
     let far = Armature { r: free(2.0), l: free(3e-3), k: free(0.1), j: free(3e-4), b: free(1e-5) };
     let estimate = Fit::new(&DcMotor, &record).parameters(far).noise(Rotation { i: 0.01, w: 1.0 }).run().unwrap();
     assert_relative_eq!(estimate.parameters, truth, max_relative = 1e-6);
@@ -89,7 +86,7 @@ fn the_emps_record_is_fitted_in_closed_loop() {
     assert_relative_eq!(p.offset, -3.1648, max_relative = 0.03);
     let simulated = estimate.predict(&model, &record).unwrap();
     let wrong: f64 = simulated.residuals.iter().map(|e| e.vir * e.vir).sum();
-    let whole: f64 = record.outputs().iter().map(|y| y.vir * y.vir).sum();
+    let whole: f64 = record.outputs().map(|y| y.vir * y.vir).sum();
     assert!((wrong / whole).sqrt() < 0.053, "relative force error {}", (wrong / whole).sqrt());
 }
 
@@ -100,9 +97,9 @@ fn an_independent_drive_is_fitted() {
         let Some(path) = shared(file) else { return };
         let log = CsvFile::new(path).column("w", "omega_m").read(&Surface::new(3).unwrap()).unwrap();
         let model = ExactSurface(ExactStep::new(3, log.sample_time(), HeldIn::Stationary).unwrap());
-        let next = log.inputs().iter().skip(1).chain(log.inputs().last());
-        let inputs = log.inputs().iter().zip(next).map(|(u, next)| Drive { w: (u.w + next.w) / 2.0, ..*u }).collect();
-        let record = Experiment::new(&model, log.times().clone(), inputs, log.outputs().to_vec()).unwrap();
+        let next = log.inputs().skip(1).chain(log.inputs().last());
+        let inputs = log.inputs().zip(next).map(|(u, next)| Drive { w: (u.w + next.w) / 2.0, ..u }).collect();
+        let record = Experiment::new(&model, log.times().clone(), inputs, log.outputs().collect()).unwrap();
         let start = Winding { rs: free(1.0).log(), ls: free(1e-2).log(), ke: free(1.0).log() };
         let p = Fit::new(&model, &record).parameters(start).run().unwrap().parameters;
         assert_relative_eq!(p.rs, 3.6, max_relative = rs);

@@ -18,11 +18,9 @@ impl Model for DcMotor {
     type Input = Voltage;
     type Output = Rotor;
     type Parameters = Brushed;
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Rotor<S>, u: &Voltage<S>, p: &Brushed<S>) -> Rotor<S> {
         Rotor { i: (u.u - p.r * x.i - p.k * x.w) / p.l, w: (p.k * x.i - p.b * x.w) / p.j }
     }
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Rotor<S>, _u: &Voltage<S>, _p: &Brushed<S>) -> Rotor<S> {
         *x
     }
@@ -37,11 +35,9 @@ impl Model for Recursion {
     type Output = Voltage;
     type Parameters = Poles;
     const KIND: Kind = Kind::Discrete;
-    #[inline]
     fn next<S: Scalar>(&self, _t: S, x: &Pair<S>, u: &Voltage<S>, p: &Poles<S>) -> Pair<S> {
         Pair { y: p.a1 * x.y + x.z, z: p.a2 * x.y + p.gain * u.u }
     }
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Pair<S>, _u: &Voltage<S>, _p: &Poles<S>) -> Voltage<S> {
         Voltage { u: x.y }
     }
@@ -138,17 +134,17 @@ fn records_of_every_kind() {
     finds(Fit::new(&Lag, &record).parameters(lag_free()));
     finds(Fit::new(&Lag, &record.clone().initial(Current { i: free(-1.0) })).parameters(lag_free()));
     finds(Fit::new(&Lag, &record.clone().initial_from_first_sample()).parameters(lag_free()));
-    let unsaid = Experiment::new(&Lag, record.times().clone(), record.inputs().to_vec(), record.outputs().to_vec());
+    let unsaid = Experiment::new(&Lag, record.times().clone(), record.inputs().collect(), record.outputs().collect());
     finds(Fit::new(&Lag, &unsaid.unwrap()).parameters(lag_free()));
     // Every third measurement missing.
-    let thin = |(k, y): (usize, &Current)| if k % 3 == 0 { Current { i: f64::NAN } } else { *y };
-    let outputs = record.outputs().iter().enumerate().map(thin).collect();
+    let thin = |(k, y): (usize, Current)| if k % 3 == 0 { Current { i: f64::NAN } } else { y };
+    let outputs = record.outputs().enumerate().map(thin).collect();
     finds(Fit::new(&Lag, &with_outputs(&Lag, &record, outputs)).parameters(lag_free()));
     // Inputs that run in straight lines, and time that does not.
     finds(Fit::new(&Lag, &with_truth(&Lag, &record.clone().hold(Hold::First), LAG)).parameters(lag_free()));
     let mut noise = Noise(3);
     let stamps = (0..200).map(|k| 5e-3 * (k as f64 + 0.8 * noise.uniform())).collect();
-    let uneven = Experiment::new(&Lag, Time::Stamps(stamps), record.inputs().to_vec(), record.outputs().to_vec());
+    let uneven = Experiment::new(&Lag, Time::Stamps(stamps), record.inputs().collect(), record.outputs().collect());
     let uneven = with_truth(&Lag, &uneven.unwrap().initial(Current { i: fixed(0.5) }), LAG);
     finds(Fit::new(&Lag, &uneven).parameters(lag_free()));
     // A pre-filter, and a noise covariance.
@@ -180,9 +176,9 @@ fn experiments_with_something_of_their_own() {
     let parameters = Branch { gain: free(1.0).per_experiment(), tau: free(0.08) };
     let estimate = Fit::new(&Lag, &records).parameters(parameters).run().unwrap();
     assert!((estimate.parameters.tau / LAG.tau - 1.0).abs() < 1e-6, "{estimate}");
-    for (e, share) in estimate.experiments.iter().enumerate() {
-        assert!((share.parameters.gain / gains[e] - 1.0).abs() < 1e-6, "{estimate}");
-        assert!((share.initial_state.i - e as f64).abs() < 1e-6, "{estimate}");
+    for (e, own) in estimate.experiments.iter().enumerate() {
+        assert!((own.parameters.gain / gains[e] - 1.0).abs() < 1e-6, "{estimate}");
+        assert!((own.initial_state.i - e as f64).abs() < 1e-6, "{estimate}");
     }
 }
 
@@ -219,7 +215,6 @@ fn priors_are_measurements() {
         type Output = Voltage;
         type Parameters = Unseen;
         const KIND: Kind = Kind::Static;
-        #[inline]
         fn output<S: Scalar>(&self, _t: S, _x: &Nothing, _u: &Voltage<S>, p: &Unseen<S>) -> Voltage<S> {
             Voltage { u: p.offset }
         }
@@ -233,7 +228,7 @@ fn priors_are_measurements() {
         assert!((estimate.knowledge.ghost.standard_error().unwrap() - 0.25).abs() < 1e-9, "{estimate}");
     }
     // A mean of 50 at 0.1 each, and a prior: weighted by their precision.
-    let mean = record.outputs().iter().map(|y| y.u).sum::<f64>() / 50.0;
+    let mean = record.outputs().map(|y| y.u).sum::<f64>() / 50.0;
     let (data, prior) = (50.0 / 0.01, 1.0 / 0.02f64.powi(2));
     let parameters = Unseen { offset: free(0.0).prior(0.5, 0.02), ghost: fixed(0.0) };
     let estimate = Fit::new(&Haunted, &record).parameters(parameters).noise(Voltage { u: 0.1 }).run().unwrap();

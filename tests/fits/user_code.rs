@@ -1,6 +1,6 @@
 //! The code that a user writes, as the design has it: it must compile and run as it stands.
 
-use greybox::{Experiment, Fit, Huber, Model, Sample, Scalar, fixed, free, signals};
+use greybox::{Experiment, Fit, Huber, Model, Sample, Scalar, free, signals};
 
 const SQRT_2_3: f64 = 0.816_496_580_927_726;
 
@@ -17,7 +17,6 @@ struct Pmsm {
 impl Model for Pmsm {
     type State = Currents;  type Input = Drive;  type Output = Currents;  type Parameters = Winding;
 
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Currents<S>, u: &Drive<S>, p: &Winding<S>) -> Currents<S> {
         let we = u.w * self.pole_pairs;
         Currents {
@@ -25,26 +24,23 @@ impl Model for Pmsm {
             iq: (u.uq - p.rs * x.iq - p.ke * u.w * SQRT_2_3) / p.ls - we * x.id,
         }
     }
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> { *x }
 }
 
 /// A record with nothing random in it: half a second of a motor that is turned up and down.
 fn record(model: &Pmsm, path: &std::path::Path) {
-    use greybox::Time;
+    use greybox::{Time, simulate};
     let samples = 4000;
     let time = Time::Uniform { start: 0.0, step: 0.126e-3 };
-    let inputs = (0..samples)
+    let inputs: Vec<Drive> = (0..samples)
         .map(|k| {
             let t = k as f64 * 0.126e-3;
             let w = 200.0 * (12.0 * t).sin();
             Drive { ud: 20.0 * (40.0 * t).cos() - 0.3 * w, uq: 0.8 * w + 15.0 * (25.0 * t).sin(), w }
         })
         .collect();
-    let still = Experiment::of_inputs(model, time.clone(), inputs).unwrap();
-    let still = still.initial(Currents { id: fixed(0.0), iq: fixed(0.0) });
-    let truth = Winding { rs: fixed(0.6), ls: fixed(3.5e-3), ke: fixed(0.9) };
-    let simulated = Fit::new(model, &still).parameters(truth).simulate().unwrap();
+    let truth = Winding { rs: 0.6, ls: 3.5e-3, ke: 0.9 };
+    let simulated = simulate(model, &truth, &Currents { id: 0.0, iq: 0.0 }, time.clone(), &inputs).unwrap();
     // A deterministic stand-in for noise, small against the currents.
     let outputs = simulated
         .outputs
@@ -55,7 +51,7 @@ fn record(model: &Pmsm, path: &std::path::Path) {
             iq: i.iq + 0.05 * (k as f64 * 1.618).cos(),
         })
         .collect();
-    Experiment::new(model, time, still.inputs().to_vec(), outputs).unwrap().to_csv(path).unwrap();
+    Experiment::new(model, time, inputs, outputs).unwrap().to_csv(path).unwrap();
 }
 
 #[test]

@@ -15,11 +15,9 @@ impl Model for Rl {
     type Input = Voltage;
     type Output = Current;
     type Parameters = Coil;
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Current<S>, u: &Voltage<S>, p: &Coil<S>) -> Current<S> {
         Current { i: (u.u - p.r * x.i) / p.l }
     }
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, _p: &Coil<S>) -> Current<S> {
         *x
     }

@@ -2,4 +2,5 @@
 
 mod allocator;
 mod long_record;
+mod many_records;
 mod no_alloc;

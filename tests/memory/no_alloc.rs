@@ -89,7 +89,7 @@ fn integrators_allocate_nothing() {
         allocations(|| {
             let start = Plane { x: Dual::constant(0.5), y: Dual::constant(0.0) };
             let system = ModelSystem { model: &Spiral, interval: &interval, p: &p };
-            system.step(integrator, start, &mut I::Memory::default()).unwrap();
+            system.step(integrator, start, &mut 0.0).unwrap();
         })
     }
     assert_eq!((run(&Rk4::default()), run(&Rk45::default()), run(&Esdirk::default())), (0, 0, 0));
@@ -127,7 +127,7 @@ fn evaluation(samples: usize) -> usize {
         .prefilter(Butterworth::low_pass(4, 100.0, TS).unwrap())
         .problem()
         .unwrap();
-    let objective = problem.objective();
+    let objective = problem.objective().unwrap();
     let start = objective.start();
     let count = allocations(|| {
         objective.linearize(&start).unwrap();

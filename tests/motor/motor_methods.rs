@@ -195,7 +195,7 @@ fn bad_records_are_told() {
     let error = Spans::from_experiment(&record, axis.pole_pairs, speed, 0.0).unwrap_err().to_string();
     assert!(error.contains("`iq`") && error.contains("77"), "{error}");
     // A sample time that jumps.
-    let (inputs, outputs) = (record.inputs().to_vec(), vec![Currents::default(); record.len()]);
+    let (inputs, outputs) = (record.inputs().collect(), vec![Currents::default(); record.len()]);
     let stamps = (0..record.len()).map(|k| k as f64 * TS + if k > 500 { 1e-3 } else { 0.0 }).collect();
     let gap = Experiment::new(&model, Time::Stamps(stamps), inputs, outputs).unwrap();
     let error = Spans::from_experiment(&gap, axis.pole_pairs, speed, 0.0).unwrap_err().to_string();

@@ -4,13 +4,13 @@ use approx::assert_relative_eq;
 use greybox::nalgebra::{SMatrix, SVector};
 use greybox::online::{
     Divergence, Ekf, EkfStart, Forgetting, Gradient, Law, Moment, Mras, MrasStart, ObserverError, Order, Outcome, Rate,
-    Rls, Stepping, Watch,
+    Rls, Stepping, UdFactors, Watch,
 };
 use greybox::pmsm::{
     AngledDrive, Currents, DirectCurrent, Drive, ExactFed, ExactStep, ExactSurface, FedWinding, HeldIn, Injection,
     KeLyapunov, MotorLaw, RsDirect, RsLyapunov, Surface, Winding,
 };
-use greybox::{Covariance, Hold, Kind, Model, Nothing, Parameter, Scalar, fixed, free, signals};
+use greybox::{Hold, Kind, Model, Nothing, Parameter, Scalar, fixed, free, signals};
 use proptest::prelude::*;
 
 const TS: f64 = 0.126e-3;
@@ -38,7 +38,7 @@ proptest! {
         d in prop::array::uniform4(0.01..10.0), f in prop::array::uniform8(-2.0..2.0), h in prop::array::uniform4(-2.0..2.0),
         q in prop::array::uniform4(0.0..1.0), r in 0.01..5.0,
     ) {
-        let mut factored = Covariance::diagonal(d);
+        let mut factored = UdFactors::diagonal(d);
         let mut p = SMatrix::<f64, 4, 4>::from_diagonal(&SVector::from(d));
         let rows = [[f[0], f[1], f[2], f[3]], [f[4], f[5], f[6], f[7]]];
         let mut big_f = SMatrix::<f64, 4, 4>::identity();
@@ -63,7 +63,7 @@ proptest! {
 
     #[test]
     fn renewed_quantities_leave_the_others_alone(d in prop::array::uniform4(0.01..10.0), h in prop::array::uniform4(-2.0..2.0)) {
-        let mut p = Covariance::diagonal(d);
+        let mut p = UdFactors::diagonal(d);
         p.absorb(&h, 0.1);
         let before = p.matrix();
         p.renew(&[7.0, 9.0]);
@@ -78,7 +78,7 @@ proptest! {
 // A million exact measurements of one direction: the dense form P - K h^T P turns indefinite here.
 #[test]
 fn covariance_never_turns_negative() {
-    let mut p = Covariance::diagonal([1e12, 1.0, 1e-12]);
+    let mut p = UdFactors::diagonal([1e12, 1.0, 1e-12]);
     for k in 0..1_000_000 {
         let x = (k % 10) as f64 * 1e-7;
         p.absorb(&[1.0, 1.0 + x, 1.0], 1e-10);
@@ -92,7 +92,7 @@ fn covariance_never_turns_negative() {
 
 #[test]
 fn what_is_known_exactly_stays() {
-    let mut p = Covariance::diagonal([4.0, 0.0]);
+    let mut p = UdFactors::diagonal([4.0, 0.0]);
     let gain = p.absorb(&[1.0, 1.0], 1.0);
     assert_eq!((gain.gain, gain.variance), ([0.8, 0.0], 5.0));
     p.predict(&[[1.0, 0.5]], &[0.0, 0.0]);
@@ -220,11 +220,9 @@ impl Model for Leak {
     type Output = Level;
     type Parameters = Tank;
 
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Nothing, p: &Tank<S>) -> Level<S> {
         Level { x: p.b - p.a * x.x }
     }
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Nothing, _p: &Tank<S>) -> Level<S> {
         *x
     }

@@ -262,13 +262,13 @@ fn a_record_is_filtered_on_both_sides() {
     ] {
         let experiment = record(time);
         let filtered = zero_phase(&experiment, &filter).unwrap();
-        let mut expected: Vec<f64> = experiment.inputs().iter().map(|u| u.u).collect();
+        let mut expected: Vec<f64> = experiment.inputs().map(|u| u.u).collect();
         filter.zero_phase(&mut expected);
         for (k, expected) in expected.iter().enumerate() {
-            assert_eq!((filtered.inputs()[k].u, filtered.outputs()[k].y), (*expected, *expected));
-            assert!(filtered.outputs()[k].z == 1.0 || k == 7);
+            assert_eq!((filtered.input(k).u, filtered.output(k).y), (*expected, *expected));
+            assert!(filtered.output(k).z == 1.0 || k == 7);
         }
-        assert!(filtered.outputs()[7].z.is_nan());
+        assert!(filtered.output(7).z.is_nan());
         assert_eq!((filtered.name(), filtered.input_hold(), filtered.len()), ("arm", Hold::First, 400));
     }
 }

@@ -39,11 +39,11 @@ fn simulate<M: Model, I: Integrator, S: Scalar>(
     x: Of<M::State, S>,
     p: &Of<M::Parameters, S>,
 ) -> Result<Of<M::State, S>, Stuck> {
-    let mut memory = I::Memory::default();
+    let mut step = 0.0;
     times.windows(2).try_fold(x, |x, t| {
         let u1 = if hold == Hold::First { input(t[1]) } else { input(t[0]) };
         let interval = Interval { t0: t[0], t1: t[1], u0: input(t[0]), u1, hold };
-        ModelSystem { model, interval: &interval, p }.step(integrator, x, &mut memory)
+        ModelSystem { model, interval: &interval, p }.step(integrator, x, &mut step)
     })
 }
 
@@ -62,11 +62,9 @@ impl Model for Lag {
     type Input = Source;
     type Output = Level;
     type Parameters = Time1;
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Source<S>, p: &Time1<S>) -> Level<S> {
         Level { x: (u.u - x.x) / p.tau }
     }
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Source<S>, _p: &Time1<S>) -> Level<S> {
         *x
     }
@@ -193,12 +191,10 @@ impl Model for Robertson {
     type Input = Nothing;
     type Output = Species;
     type Parameters = Speeds;
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Species<S>, _u: &Nothing, p: &Speeds<S>) -> Species<S> {
         let (forth, back, on) = (p.k1 * x.a, p.k2 * x.b * x.c, p.k3 * x.b * x.b);
         Species { a: back - forth, b: forth - back - on, c: on }
     }
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Species<S>, _u: &Nothing, _p: &Speeds<S>) -> Species<S> {
         *x
     }
@@ -237,11 +233,9 @@ impl Model for VanDerPol {
     type Input = Nothing;
     type Output = Relaxation;
     type Parameters = Stiffness;
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Relaxation<S>, _u: &Nothing, p: &Stiffness<S>) -> Relaxation<S> {
         Relaxation { x: x.v, v: p.mu * (x.x * x.x * -1.0 + 1.0) * x.v - x.x }
     }
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Relaxation<S>, _u: &Nothing, _p: &Stiffness<S>) -> Relaxation<S> {
         *x
     }
@@ -294,11 +288,9 @@ impl Model for Snubber {
     type Input = Source;
     type Output = Circuit;
     type Parameters = Parts;
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Circuit<S>, u: &Source<S>, p: &Parts<S>) -> Circuit<S> {
         Circuit { il: (u.u - p.r * x.il - x.uc) / p.l, uc: (x.il - x.id) / p.c, id: (x.uc - x.id * 100.0) / p.ls }
     }
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Circuit<S>, _u: &Source<S>, _p: &Parts<S>) -> Circuit<S> {
         *x
     }

@@ -1,4 +1,4 @@
-//! The arrow-shaped triangle of [`Linearization`] against the same rows in one dense triangle and against their definition.
+//! The triangles of [`Linearization`] against the same rows in one dense triangle and against their definition.
 
 use greybox::Information;
 use greybox::optimize::Linearization;
@@ -126,8 +126,9 @@ fn what_is_not_determined_has_no_step() {
 fn information_counted_from_another_point() {
     let (_, dense, rows) = problem();
     let origin = [0.3, -0.2, 0.5, 0.1, -0.4, 0.6];
-    let moved = dense.blocks()[0].about(&origin);
+    let (block, _) = dense.columns().next().expect("one block");
+    let moved = block.about(&origin);
     let rest: Vec<f64> = moved.solve().expect("it is determined").iter().zip(&origin).map(|(d, o)| d + o).collect();
-    close(&rest, &dense.blocks()[0].solve().expect("it is determined"));
+    close(&rest, &block.solve().expect("it is determined"));
     close(&[moved.residual_at_zero()], &[rows.iter().map(|row| error(row, &origin).powi(2)).sum()]);
 }

@@ -7,3 +7,4 @@ mod integrators;
 mod linearization;
 mod losses;
 mod regress;
+mod trees;

@@ -59,7 +59,7 @@ fn record() -> impl Strategy<Value = Record> {
 /// Equal to the last bit, missing outputs included.
 fn same_signals(a: &Record, b: &Record) -> bool {
     let bits = |r: &Record| {
-        let rows = r.inputs().iter().zip(r.outputs());
+        let rows = r.inputs().zip(r.outputs());
         rows.map(|(u, y)| [u.ud, u.w, y.id, y.iq].map(f64::to_bits)).collect::<Vec<_>>()
     };
     bits(a) == bits(b)
@@ -137,8 +137,8 @@ proptest! {
         match read {
             Ok(record) => {
                 prop_assert!(record.len() >= 2 && (1..record.len()).all(|k| record.time(k) > record.time(k - 1)));
-                prop_assert!(record.inputs().iter().all(|u| u.ud.is_finite() && u.w.is_finite()));
-                prop_assert!(record.outputs().iter().all(|y| !y.id.is_infinite() && !y.iq.is_infinite()));
+                prop_assert!(record.inputs().all(|u| u.ud.is_finite() && u.w.is_finite()));
+                prop_assert!(record.outputs().all(|y| !y.id.is_infinite() && !y.iq.is_infinite()));
             }
             Err(error) => prop_assert!(!error.to_string().is_empty()),
         }
@@ -174,7 +174,8 @@ proptest! {
             prop_assert!(cycle.len() >= 2 && cycle.samples().all(|s| running(&s)));
         }
         // No pair of running neighbors is lost, and none is counted twice.
-        let pairs = |r: &Record| r.inputs().windows(2).filter(|u| u[0].w > level && u[1].w > level).count();
+        let above = |u: Drive| u.w > level;
+        let pairs = |r: &Record| r.inputs().zip(r.inputs().skip(1)).filter(|&(a, b)| above(a) && above(b)).count();
         prop_assert_eq!(pairs(&record), cycles.iter().map(|cycle| cycle.len() - 1).sum::<usize>());
     }
 }

@@ -16,11 +16,7 @@ struct Study {
 
 impl Study {
     /// Fits as often as it takes; `fit` gives each unknown, the truth beside it is asked once.
-    fn of<M: Model, I, P>(
-        name: &'static str,
-        truth: Vec<f64>,
-        mut fit: impl FnMut(&mut Noise) -> Estimate<M, I, P>,
-    ) -> Study {
+    fn of<M: Model>(name: &'static str, truth: Vec<f64>, mut fit: impl FnMut(&mut Noise) -> Estimate<M>) -> Study {
         let n = truth.len();
         let mut study = Study { name, truth, covered: vec![0; n], sums: vec![[0.0; 2]; n] };
         for run in 0..RUNS {
@@ -140,11 +136,11 @@ fn weighting_by_speed() {
 fn huber_with_outliers() {
     let record = lag(200, fixed(0.5));
     Study::of("lag, Huber, 5 % outliers", vec![LAG.gain, LAG.tau], |noise| {
-        let disturbed = |y: &Current| {
+        let disturbed = |y: Current| {
             let sigma = LAG_NOISE.i * if noise.uniform() < 0.05 { 10.0 } else { 1.0 };
             Current { i: y.i + sigma * noise.gauss() }
         };
-        let outputs = record.outputs().iter().map(disturbed).collect();
+        let outputs = record.outputs().map(disturbed).collect();
         let parameters = lag_free();
         Fit::new(&Lag, &with_outputs(&Lag, &record, outputs)).parameters(parameters).loss(Huber(1.345)).run().unwrap()
     })
@@ -176,11 +172,11 @@ fn noise_covariance() {
     let bound = information.try_inverse().unwrap().diagonal();
     let factor = covariance.cholesky().unwrap().l();
     Study::of("line, full noise covariance", vec![truth.slope, truth.offset], |noise| {
-        let disturbed = |y: &Pair| {
+        let disturbed = |y: Pair| {
             let e = factor * nalgebra::Vector2::new(noise.gauss(), noise.gauss());
             Pair { y: y.y + e[0], z: y.z + e[1] }
         };
-        let outputs = record.outputs().iter().map(disturbed).collect();
+        let outputs = record.outputs().map(disturbed).collect();
         Fit::new(&Line, &with_outputs(&Line, &record, outputs))
             .parameters(Affine { slope: free(1.0), offset: free(0.0) })
             .noise_covariance()

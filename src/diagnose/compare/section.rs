@@ -1,24 +1,24 @@
 //! Comparisons and validations as sections of a report.
 
-use super::{Comparison, Summary, Validation};
-use crate::estimate::{Knowledge, Unknown};
+use super::{Comparison, Validation};
+use crate::estimate::{Knowledge, OutputFit, Summary, Unknown};
 use crate::numeral::{counted, error_size, number, resolved};
 use crate::section::{Cell, Section, Table};
 
 impl Comparison {
-    /// The unknowns and criteria, a column for each summary.
+    /// The unknowns and criteria, a column for each candidate.
     pub(super) fn table(&self) -> Table {
         let mut names: Vec<&str> = vec![];
-        for unknown in self.0.iter().flat_map(|summary| &summary.unknowns) {
+        for unknown in self.0.iter().flat_map(|candidate| &candidate.estimate.unknowns) {
             if !names.contains(&unknown.name.as_str()) {
                 names.push(&unknown.name);
             }
         }
-        let columns = [""].into_iter().chain(self.0.iter().map(|summary| summary.title.as_str()));
+        let columns = [""].into_iter().chain(self.0.iter().map(|candidate| candidate.title.as_str()));
         let columns = columns.map(str::to_owned).collect();
         let empty = Table { columns, ..Table::new("Estimates side by side", []) };
         let row = |label: &str, cell: &dyn Fn(&Summary) -> Cell| -> Vec<Cell> {
-            [label.into()].into_iter().chain(self.0.iter().map(cell)).collect()
+            [label.into()].into_iter().chain(self.0.iter().map(|candidate| cell(&candidate.estimate))).collect()
         };
         let unknowns = names
             .iter()
@@ -26,16 +26,16 @@ impl Comparison {
         let optional = |value: Option<f64>| value.map_or("-".into(), |value| Cell::number(value, 8));
         let fits = |s: &Summary| {
             let fit = |fit: Option<f64>| fit.map_or("-".to_owned(), crate::numeral::fit);
-            s.outputs.iter().map(|(_, _, q)| fit(q.fit_percent)).collect::<Vec<_>>().join(" / ").into()
+            s.outputs.iter().map(|output| fit(output.fit.fit_percent)).collect::<Vec<_>>().join(" / ").into()
         };
         empty.rows(unknowns).rows([
             row("fit %", &fits),
             row("measurements", &|s| s.measurements.into()),
             row("unknowns", &|s| (s.unknowns.len() as u64).into()),
-            row("AIC", &|s| optional(s.aic)),
-            row("AICc", &|s| optional(s.aicc)),
-            row("BIC", &|s| optional(s.bic)),
-            row("verdict", &|s| s.severity.to_string().into()),
+            row("AIC", &|s| optional(s.aic())),
+            row("AICc", &|s| optional(s.aicc())),
+            row("BIC", &|s| optional(s.bic())),
+            row("verdict", &|s| s.severity().to_string().into()),
         ])
     }
 }
@@ -75,7 +75,7 @@ impl From<&[Validation]> for Section {
         for Validation { experiment, qualities } in validations {
             for (steps, outputs) in qualities {
                 let ahead = steps.map_or("by simulation".to_owned(), |steps| counted(steps, "sample") + " ahead");
-                let row = |(name, quality): &(String, crate::estimate::Quality)| {
+                let row = |(name, quality): &(String, OutputFit)| {
                     let fit = Cell::fit(quality.fit_percent);
                     let record = experiment.as_str().into();
                     [record, ahead.as_str().into(), name.as_str().into(), fit, Cell::number(quality.rmse, 3)]

@@ -3,10 +3,9 @@
 use super::together::together;
 use super::{Excitation, Identifiability};
 use crate::estimate::Unknown;
-use crate::experiment::ExperimentOf;
-use crate::model::Model;
 use crate::numeral::{counted, exact, number, percent};
-use crate::signals::Signals;
+use crate::problem::Role;
+use crate::record::Record;
 
 /// An output that holds so much of an unknown's information is the only one that tells it.
 const ONLY: f64 = 0.99;
@@ -16,11 +15,7 @@ const ONCE: f64 = 0.9;
 /// Sets that are put into words; the strongest come first.
 const MENTIONED: usize = 3;
 
-pub(super) fn advice<M: Model>(
-    found: &Identifiability,
-    unknowns: &[Unknown],
-    records: &[ExperimentOf<M>],
-) -> Vec<String> {
+pub(super) fn advice(found: &Identifiability, unknowns: &[Unknown], records: &[Record]) -> Vec<String> {
     let mut advice = vec![];
     let n = unknowns.len() as u64;
     if found.generic_rank < n {
@@ -44,25 +39,25 @@ pub(super) fn advice<M: Model>(
     if let Some(more @ 1..) = found.collinear.len().checked_sub(MENTIONED) {
         advice.push(format!("{} of unknowns are hardly known but together", counted(more as u64, "more set")));
     }
-    let initial = |excited: &&Excitation| excited.name.contains("(0)");
     for excited in &found.excitation {
         if excited.outputs.iter().all(|(_, share)| *share == 0.0) {
             advice.push(format!("`{}` moves no output at all: fix it", excited.name));
         }
     }
     // The beginning of a record is where initial states are seen, and nothing helps that.
-    for excited in found.excitation.iter().filter(|excited| !initial(excited)) {
-        advice.extend(one_output(excited));
-        advice.extend(one_moment(excited));
+    for (excited, unknown) in found.excitation.iter().zip(unknowns) {
+        if matches!(unknown.role, Role::Parameter(_)) {
+            advice.extend(one_output(excited));
+            advice.extend(one_moment(excited));
+        }
     }
-    for i in 0..M::Input::LEN {
-        let value = |k: usize, e: usize| M::Input::into_array(records[e].inputs()[k]).as_ref()[i];
-        let first = value(0, 0);
-        let all = records.iter().enumerate();
-        if all.flat_map(|(e, r)| (0..r.len()).map(move |k| (k, e))).all(|(k, e)| value(k, e) == first) {
+    let inputs = records.first().map_or(&[][..], |record| record.inputs());
+    for (i, input) in inputs.iter().enumerate() {
+        let Some(&first) = input.values.first() else { continue };
+        if records.iter().all(|record| record.inputs()[i].values.iter().all(|value| *value == first)) {
             advice.push(format!(
                 "the input `{}` is {} throughout: what it drives cannot be told from an offset; vary it",
-                M::Input::NAMES[i],
+                input.name,
                 exact(first)
             ));
         }

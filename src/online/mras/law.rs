@@ -1,7 +1,8 @@
 //! Adaptation laws: what the error between measured and predicted states says of the parameters.
 
 use crate::dual::Dual;
-use crate::model::{Kind, Model};
+use crate::layout::Kind;
+use crate::model::Model;
 use crate::signals::{Of, Signals};
 
 /// What an adaptation law sees of one sample.

@@ -1,7 +1,8 @@
 use super::Spans;
 use crate::error::Error;
-use crate::experiment::{Experiment, Time};
+use crate::experiment::Experiment;
 use crate::pmsm::{CompensatedDrive, Currents, ExactCompensated, dead_time};
+use crate::record::Time;
 
 impl Spans {
     /// The record as [`ExactCompensated`] needs it, for a fit of simulated to measured currents (thesis 5.2.3): `i0` (A) is

@@ -234,7 +234,7 @@ impl Surface<'_> {
             let edge = |sign: f64| {
                 move |column: &Column<(f64, f64, f64)>| {
                     let (mean, half, count) = column.value;
-                    (column.begin, (mean + 2.0 * sign * half) / count)
+                    (column.begin, (mean + sign * half) / count)
                 }
             };
             let there = piece.iter().flatten().map(edge(1.0));

@@ -1,5 +1,6 @@
 //! How well the outputs are reproduced, over all records and record by record.
 
+use crate::estimate::OutputEstimate;
 use crate::numeral::{counted, exact, number, rounded};
 use crate::report::facts::{Facts, Record};
 use crate::section::{Axis, Cell, Curves, Drawing, Layer, Plot, Section, Style, Table};
@@ -10,7 +11,7 @@ const SHOWN: usize = 50;
 const OUTPUTS: usize = 4;
 
 pub(super) fn section(facts: &Facts) -> Section {
-    let rows = facts.estimate.outputs.iter().map(|(name, unit, q)| {
+    let rows = facts.estimate.outputs.iter().map(|OutputEstimate { name, unit, fit: q }| {
         let fit = Cell::fit(q.fit_percent);
         let (rmse, sigma) = (Cell::number(q.rmse, 3), Cell::number(q.sigma, 3));
         [name.as_str().into(), fit, rmse, sigma, unit.as_str().into(), q.samples.into()]

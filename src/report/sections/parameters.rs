@@ -1,6 +1,6 @@
 //! What is known of the parameters and initial states.
 
-use crate::estimate::{Knowledge, Unknown};
+use crate::estimate::{Knowledge, ParameterEstimate, Unknown};
 use crate::numeral::{exact, number, resolved};
 use crate::report::facts::Facts;
 use crate::section::{Cell, Drawing, Forest, Interval, Plot, Section, Table};
@@ -11,9 +11,18 @@ const COLUMNS: [&str; 6] = ["parameter", "value", "unit", "std. error", "95 % in
 
 pub(super) fn section(facts: &Facts) -> Section {
     let unknowns: Vec<&Unknown> = facts.unknowns(false).map(|(_, unknown)| unknown).collect();
-    let fixed = facts.declared.iter().filter(|(_, _, p)| !p.free).map(|(name, unit, p)| {
-        [name.as_str().into(), Cell::number(p.start, 7), unit.as_str().into(), Cell::Empty, "fixed".into(), Cell::Empty]
-    });
+    let fixed = facts.estimate.parameters.iter().filter(|p| !p.declared.free).map(
+        |ParameterEstimate { name, unit, value, .. }| {
+            [
+                name.as_str().into(),
+                Cell::number(*value, 7),
+                unit.as_str().into(),
+                Cell::Empty,
+                "fixed".into(),
+                Cell::Empty,
+            ]
+        },
+    );
     let table = Table::new("Estimates", COLUMNS).rows(unknowns.iter().map(|unknown| row(unknown))).rows(fixed);
     let section =
         Section::new("parameters", "Parameters").table(table.at_most(SHOWN)).plot(forest("parameters", &unknowns));

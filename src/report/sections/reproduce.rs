@@ -1,5 +1,6 @@
 //! All that is needed to make the estimate again.
 
+use crate::estimate::ParameterEstimate;
 use crate::numeral::{exact, number};
 use crate::parameter::{Parameter, Transform};
 use crate::report::facts::Facts;
@@ -11,7 +12,7 @@ pub(super) fn section(facts: &Facts) -> Section {
 
 /// What was declared of the parameters.
 fn declared(facts: &Facts) -> Table {
-    let rows = facts.declared.iter().map(|(name, unit, p)| {
+    let rows = facts.estimate.parameters.iter().map(|ParameterEstimate { name, unit, declared: p, .. }| {
         let bounds = match (p.lower.is_finite(), p.upper.is_finite()) {
             (false, false) => "none".to_owned(),
             (true, false) => format!("{} or more", exact(p.lower)),
@@ -52,17 +53,19 @@ fn settings(facts: &Facts) -> Table {
             .collect::<Vec<_>>()
             .join("; "),
     };
+    let (noise, covariance) = (m.noise.to_string(), m.covariance.to_string());
     let rows = [
         ("model", facts.model.as_str()),
         ("hold", &hold),
         ("optimizer", &m.optimizer),
         ("prediction", &m.predictor),
         ("integrator", &m.integrator),
+        ("equations", &m.engine),
         ("loss", &m.loss),
         ("weighting", &m.weighting),
         ("pre-filter", &m.prefilter),
-        ("noise", &m.noise),
-        ("covariance", &m.covariance),
+        ("noise", &noise),
+        ("covariance", &covariance),
         ("greybox version", &m.version),
     ];
     Table::new("Settings", ["setting", "value"]).rows(rows.map(|(name, value)| [name.into(), value.into()]))
@@ -72,8 +75,13 @@ fn settings(facts: &Facts) -> Table {
 fn figures(facts: &Facts) -> Table {
     let s = &facts.estimate;
     let counts = [("measurements", s.measurements), ("unknowns", s.unknowns.len() as u64)];
-    let criteria =
-        [("deviance", s.deviance), ("AIC", s.aic), ("AICc", s.aicc), ("BIC", s.bic), ("final prediction error", s.fpe)];
+    let criteria = [
+        ("deviance", s.deviance),
+        ("AIC", s.aic()),
+        ("AICc", s.aicc()),
+        ("BIC", s.bic()),
+        ("final prediction error", s.fpe()),
+    ];
     let criteria = criteria.into_iter().filter_map(|(name, value)| Some((name, Cell::number(value?, 7))));
     let work = [("iterations", s.iterations), ("passes with slopes", s.evaluations)];
     let seconds = Cell::Number { value: s.seconds, text: format!("{} s", number(s.seconds, 2)) };

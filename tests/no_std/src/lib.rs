@@ -26,11 +26,9 @@ impl Model for Warming {
     type Output = Rise;
     type Parameters = Heat;
 
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Rise<S>, _u: &Nothing, p: &Heat<S>) -> Rise<S> {
         Rise { dt: p.gain - p.loss * x.dt }
     }
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Rise<S>, _u: &Nothing, _p: &Heat<S>) -> Rise<S> {
         *x
     }

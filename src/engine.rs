@@ -1,0 +1,249 @@
+//! [`Program`]: a recurrence with its slopes, compiled, for many trajectories side by side.
+//!
+//! A [`Recurrence`] is differentiated as a whole, with respect to chosen seeds, scheduled to instructions, and run on *lanes*:
+//! each lane is a trajectory of its own, with its own parameters, start and record. A lane's bits depend on nothing but its
+//! own numbers: not on its neighbors, nor on the number of lanes, nor on what runs the instructions.
+//!
+//! The interpreter runs everywhere. Where the processor is an x86-64 with AVX2, and the feature `jit` is on, the instructions
+//! become machine code.
+
+mod choice;
+mod code;
+mod derive;
+mod functions;
+mod fusion;
+mod group;
+mod interpret;
+mod jets;
+#[cfg(all(feature = "jit", target_arch = "x86_64"))]
+mod machine;
+mod schedule;
+mod step;
+mod system;
+
+pub use code::Column;
+pub use group::Group;
+pub use schedule::TooLarge;
+pub use system::{Differentiated, DifferentiatedSystem};
+
+use crate::equations::Equations;
+use crate::graph::{Leaf, Node, Pattern, Seed};
+use crate::recurrence::Recurrence;
+use crate::wide::Width;
+use choice::Machine;
+use code::Sound;
+use derive::Derivation;
+use schedule::{Roots, schedule};
+use std::sync::Arc;
+use step::Step;
+
+/// How the samples of a pass follow each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sampling {
+    /// By the same step, which each lane is told.
+    Uniform,
+    /// By steps that are a column.
+    Irregular,
+}
+
+/// How many trajectories run at a time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Trajectories {
+    /// Several, side by side.
+    Many,
+    /// One: as fast as it can follow itself.
+    One,
+}
+
+/// A recurrence with its slopes, compiled. Clones share it.
+#[derive(Clone, Debug)]
+pub struct Program(Arc<Compiled>);
+
+#[derive(Debug)]
+struct Compiled {
+    code: Sound,
+    derivation: Derivation,
+    pattern: Pattern,
+    shape: Shape,
+    outputs: usize,
+    variances: usize,
+    width: Width,
+    trajectories: Trajectories,
+    machine: Option<Machine>,
+}
+
+/// What slopes there are.
+#[derive(Debug)]
+struct Shape {
+    seeds: Vec<Seed>,
+    /// Slopes of each output.
+    slopes: usize,
+    parameters: usize,
+    /// The first of the parameters that are a direction.
+    direction: Option<usize>,
+    /// Whether what depends on the record alone comes as columns.
+    derives: bool,
+}
+
+/// As many parameters as a recurrence depends on, and those before them.
+fn parameters(recurrence: &Recurrence) -> usize {
+    let parameter = |node: &Node| match node {
+        Node::Leaf(Leaf::Parameter(j)) => Some(*j as usize + 1),
+        _ => None,
+    };
+    recurrence.graph().nodes().iter().filter_map(parameter).max().unwrap_or(0)
+}
+
+impl Program {
+    /// Differentiates a recurrence with respect to the seeds (none: values only) and compiles it.
+    ///
+    /// # Errors
+    /// If it needs too many numbers at a time.
+    pub fn compile(
+        recurrence: &Recurrence,
+        seeds: &[Seed],
+        sampling: Sampling,
+        trajectories: Trajectories,
+    ) -> Result<Self, TooLarge> {
+        let step = Step::new(recurrence, seeds, sampling == Sampling::Uniform);
+        let shape = Shape {
+            seeds: seeds.to_vec(),
+            slopes: seeds.len(),
+            parameters: parameters(recurrence),
+            direction: None,
+            derives: true,
+        };
+        Program::of_step(step, recurrence, shape, trajectories)
+    }
+
+    /// What is carried and the outputs, with their first and second derivatives along a direction in the space of the
+    /// seeds that each lane is told ([`Group::set_direction`]): two slopes per output, the first derivative and the second.
+    ///
+    /// # Errors
+    /// If it needs too many numbers at a time.
+    pub fn compile_second(recurrence: &Recurrence, seeds: &[Seed], sampling: Sampling) -> Result<Self, TooLarge> {
+        let own = parameters(recurrence);
+        let step = jets::second_along(recurrence, seeds, own, sampling == Sampling::Uniform);
+        let shape = Shape {
+            seeds: seeds.to_vec(),
+            slopes: 2,
+            parameters: own + seeds.len(),
+            direction: Some(own),
+            derives: true,
+        };
+        Program::of_step(step, recurrence, shape, Trajectories::Many)
+    }
+
+    /// The right-hand side of equations with one tangent per lane.
+    fn right_hand_side(equations: &Equations) -> Result<Self, TooLarge> {
+        let recurrence = jets::right_hand_side(equations);
+        let parameters = 2 * equations.layout().parameters.len();
+        let shape = Shape { seeds: vec![], slopes: 0, parameters, direction: None, derives: false };
+        Program::of_step(Step::new(&recurrence, &[], true), &recurrence, shape, Trajectories::Many)
+    }
+
+    fn of_step(
+        step: Step,
+        recurrence: &Recurrence,
+        shape: Shape,
+        trajectories: Trajectories,
+    ) -> Result<Self, TooLarge> {
+        let roots: Vec<_> = step.rows.iter().flatten().chain(&step.next).copied().collect();
+        let derived = if shape.derives { derive::dear(&step.tape, &roots) } else { vec![] };
+        let (tape, parameters) = (&step.tape, shape.parameters);
+        let code = schedule(&Roots { tape, next: &step.next, rows: &step.rows, parameters, derived: &derived })?;
+        let (width, machine) = choice::engine(&code, trajectories);
+        Ok(Program(Arc::new(Compiled {
+            code,
+            derivation: Derivation::new(&step.tape, &derived)?,
+            pattern: step.pattern,
+            shape,
+            outputs: recurrence.mean().len(),
+            variances: recurrence.variance().len(),
+            width,
+            trajectories,
+            machine,
+        })))
+    }
+
+    /// Lanes of the largest group: what is best for many trajectories.
+    pub fn lanes(&self) -> usize {
+        self.0.width.lanes() * self.0.registers(usize::MAX)
+    }
+
+    /// A group of at least so many lanes, if it can be: the smallest such group, or the largest.
+    pub fn group(&self, lanes: usize) -> Group {
+        Group::new(Arc::clone(&self.0), self.0.registers(lanes))
+    }
+
+    /// What is read at each sample, in order.
+    pub fn columns(&self) -> &[Column] {
+        &self.0.code.columns
+    }
+
+    /// Whether the inputs at the next sample are read: then a run needs one row of columns more than it has samples.
+    pub fn reads_next(&self) -> bool {
+        self.0.code.reads_next()
+    }
+
+    /// What slopes are taken with respect to.
+    pub fn seeds(&self) -> &[Seed] {
+        &self.0.shape.seeds
+    }
+
+    /// Numbers that each sample's rows have: for each output the slopes and the mean, then for each variance the same.
+    pub fn row_length(&self) -> usize {
+        (self.0.outputs + self.0.variances) * (self.0.shape.slopes + 1)
+    }
+
+    /// Outputs.
+    pub fn outputs(&self) -> usize {
+        self.0.outputs
+    }
+
+    /// Variances: none, or as many as outputs.
+    pub fn variances(&self) -> usize {
+        self.0.variances
+    }
+
+    /// Entries of what is carried, without slopes.
+    pub fn carried(&self) -> usize {
+        self.0.pattern.rows.len()
+    }
+
+    /// Instructions at each sample, and once a pass.
+    pub fn instructions(&self) -> (usize, usize) {
+        (self.0.code.output.len() + self.0.code.advance.len(), self.0.code.once.len())
+    }
+
+    /// Bytes of machine code; zero, where instructions are interpreted.
+    pub fn machine_code(&self) -> usize {
+        self.0.machine.as_ref().map_or(0, Machine::len)
+    }
+
+    /// The columns that [`derive`](Self::derive) reads, in order; at the next sample, too, if the second says so.
+    pub fn derived_from(&self) -> (&[Column], bool) {
+        self.0.derivation.reads()
+    }
+
+    /// The derived columns of a record: `columns` are those of [`derived_from`](Self::derived_from), each with a number for
+    /// every sample, and one more at the end if the next sample is read. One vector per [`Column::Derived`].
+    ///
+    /// # Panics
+    /// If a column is too short.
+    pub fn derive(&self, columns: &[&[f64]], samples: usize) -> Vec<Vec<f64>> {
+        self.0.derivation.run(self.0.width, columns, samples)
+    }
+}
+
+impl Compiled {
+    /// Registers side by side for so many lanes.
+    fn registers(&self, lanes: usize) -> usize {
+        match lanes.div_ceil(self.width.lanes()) {
+            _ if self.trajectories == Trajectories::One || self.machine.is_some() => 1,
+            0 | 1 => 1,
+            2 => 2,
+            _ => 4,
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! What depends on a record alone and is dear: computed once a record, and read as a column.
+
+use super::code::{Column, Sound};
+use super::interpret::{Once, Run};
+use super::schedule::{Roots, TooLarge, schedule};
+use crate::graph::{Id, Node, Tape};
+use crate::wide::{Width, run};
+
+/// The dear nodes of a record that others read: functions and quotients, and what is made of them.
+pub(super) fn dear(tape: &Tape, roots: &[Id]) -> Vec<Id> {
+    let reached = tape.graph.reached(roots);
+    let mut dear = vec![false; tape.graph.len()];
+    let mut read = vec![false; tape.graph.len()];
+    roots.iter().for_each(|root| read[root.index()] = true);
+    for (i, node) in tape.graph.nodes().iter().enumerate().filter(|(i, _)| reached[*i]) {
+        if tape.depends[i].on_record_alone() {
+            let costly = matches!(node, Node::Function(..) | Node::Function2(..) | Node::Table { .. });
+            dear[i] = costly || node.operands().any(|operand| dear[operand.index()]);
+        } else {
+            node.operands().for_each(|operand| read[operand.index()] = true);
+        }
+    }
+    (0..dear.len()).filter(|i| dear[*i] && read[*i]).map(Id::new).collect()
+}
+
+/// The program of the derived columns: consecutive samples are its lanes.
+#[derive(Debug)]
+pub(super) struct Derivation(Sound);
+
+impl Derivation {
+    pub fn new(tape: &Tape, derived: &[Id]) -> Result<Self, TooLarge> {
+        let rows: Vec<_> = derived.iter().copied().map(Some).collect();
+        schedule(&Roots { tape, next: &[], rows: &rows, parameters: 0, derived: &[] }).map(Derivation)
+    }
+
+    pub fn reads(&self) -> (&[Column], bool) {
+        (&self.0.columns, self.0.reads_next())
+    }
+
+    pub fn run(&self, width: Width, columns: &[&[f64]], samples: usize) -> Vec<Vec<f64>> {
+        let (code, lanes) = (&self.0, width.lanes());
+        let mut derived = vec![Vec::with_capacity(samples); code.rows.len()];
+        if derived.is_empty() {
+            return derived;
+        }
+        let mut slots = vec![0.0; code.slots * lanes];
+        for (slot, value) in &code.constants {
+            slots[usize::from(*slot) * lanes..][..lanes].fill(*value);
+        }
+        run(width, Once::<1> { code, slots: &mut slots, width });
+        let mut inputs = vec![0.0; 2 * columns.len() * lanes];
+        let mut rows = vec![0.0; code.rows.len() * lanes];
+        for begin in (0..samples).step_by(lanes) {
+            let there = lanes.min(samples - begin);
+            for (next, half) in inputs.chunks_exact_mut((columns.len() * lanes).max(1)).enumerate() {
+                for (column, lanes) in columns.iter().zip(half.chunks_exact_mut(lanes)) {
+                    if next == 0 || code.reads_next() {
+                        lanes[..there].copy_from_slice(&column[begin + next..][..there]);
+                    }
+                }
+            }
+            run(width, Run::<1> { code, slots: &mut slots, inputs: &inputs, rows: &mut rows, samples: 1, width });
+            for (derived, row) in derived.iter_mut().zip(rows.chunks_exact(lanes)) {
+                derived.extend(&row[..there]);
+            }
+        }
+        derived
+    }
+}

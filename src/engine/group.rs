@@ -1,0 +1,182 @@
+//! [`Group`]: the lanes of a program.
+
+use super::interpret::{Once, Run};
+use super::{Compiled, Seed};
+use crate::wide::run;
+use std::sync::Arc;
+
+/// Slopes below this are set to zero between blocks: squared they are denormal, which slows processors down up to 60 times.
+const NEGLIGIBLE: f64 = 1e-150;
+
+/// Numbers in a cache line.
+const LINE: usize = 8;
+
+/// Trajectories side by side: their parameters, what they carry, and room to compute.
+///
+/// Set parameters and steps, [`prepare`](Self::prepare), [`start`](Self::start) each lane, [`run`](Self::run) block by block.
+///
+/// # Panics
+/// All methods, where there is no such lane, or where a slice is too short.
+#[derive(Debug)]
+pub struct Group {
+    program: Arc<Compiled>,
+    registers: usize,
+    /// Slot, lane; from `first` on, where a cache line begins.
+    numbers: Vec<f64>,
+    first: usize,
+}
+
+impl Clone for Group {
+    fn clone(&self) -> Self {
+        let mut group = Group::new(Arc::clone(&self.program), self.registers);
+        let length = self.program.code.slots * self.lanes();
+        group.numbers[group.first..][..length].copy_from_slice(&self.numbers[self.first..][..length]);
+        group
+    }
+}
+
+impl Group {
+    pub(super) fn new(program: Arc<Compiled>, registers: usize) -> Self {
+        let lanes = registers * program.width.lanes();
+        let numbers = vec![0.0; program.code.slots * lanes + LINE];
+        let first = numbers.as_ptr().align_offset(LINE * size_of::<f64>()).min(LINE);
+        let mut group = Group { program, registers, numbers, first };
+        for (slot, value) in group.program.clone().code.constants.iter() {
+            group.slot(usize::from(*slot)).fill(*value);
+        }
+        group
+    }
+
+    /// How many trajectories there are.
+    pub fn lanes(&self) -> usize {
+        self.registers * self.program.width.lanes()
+    }
+
+    fn slot(&mut self, slot: usize) -> &mut [f64] {
+        let lanes = self.lanes();
+        &mut self.numbers[self.first + slot * lanes..][..lanes]
+    }
+
+    fn number(&self, slot: usize, lane: usize) -> f64 {
+        let lanes = self.lanes();
+        self.numbers[self.first + slot * lanes..][..lanes][lane]
+    }
+
+    /// A lane's parameters; those that nothing depends on may be left out at the end.
+    pub fn set_parameters(&mut self, lane: usize, values: &[f64]) {
+        let shape = &self.program.shape;
+        let (carried, parameters) = (self.program.code.carried, shape.direction.unwrap_or(shape.parameters));
+        for (j, value) in values[..].iter().take(parameters).enumerate() {
+            self.slot(carried + j)[lane] = *value;
+        }
+    }
+
+    /// The time (s) from sample to sample of a lane, if it is the same for all samples.
+    pub fn set_step(&mut self, lane: usize, step: f64) {
+        if let Some(slot) = self.program.code.step {
+            self.slot(usize::from(slot))[lane] = step;
+        }
+    }
+
+    /// Computes what depends on parameters and steps alone: after they have been set, before anything runs.
+    pub fn prepare(&mut self) {
+        let program = Arc::clone(&self.program);
+        let (code, slots, width) = (&program.code, &mut self.numbers[self.first..], program.width);
+        match self.registers {
+            1 => run(width, Once::<1> { code, slots, width }),
+            2 => run(width, Once::<2> { code, slots, width }),
+            _ => run(width, Once::<4> { code, slots, width }),
+        }
+    }
+
+    /// The direction of a lane, one component for each seed, of a program of second derivatives; before
+    /// [`prepare`](Self::prepare) and [`start`](Self::start).
+    pub fn set_direction(&mut self, lane: usize, direction: &[f64]) {
+        if let Some(first) = self.program.shape.direction {
+            let first = self.program.code.carried + first;
+            for (s, component) in direction.iter().take(self.program.shape.seeds.len()).enumerate() {
+                self.slot(first + s)[lane] = *component;
+            }
+        }
+    }
+
+    /// Slope `number` of entry `i` at the start.
+    fn slope_at_start(&self, lane: usize, i: usize, number: usize) -> f64 {
+        let (seeds, own) = (&self.program.shape.seeds, Seed::Carry(i));
+        let component = |first: usize| {
+            let seeded = (0..seeds.len()).filter(|s| seeds[*s] == own);
+            seeded.map(|s| self.number(self.program.code.carried + first + s, lane)).sum()
+        };
+        match self.program.shape.direction {
+            None => f64::from(u8::from(seeds[number] == own)),
+            Some(first) if number == 0 => component(first),
+            Some(_) => 0.0,
+        }
+    }
+
+    /// A lane's start: what it carries, with a slope of one for each seed that is an entry of it.
+    pub fn start(&mut self, lane: usize, carry: &[f64]) {
+        let program = Arc::clone(&self.program);
+        for (i, row) in program.pattern.rows.iter().enumerate() {
+            self.slot(i)[lane] = carry[i];
+            for (number, at) in row.iter().enumerate() {
+                if let Some(at) = at {
+                    self.slot(*at)[lane] = self.slope_at_start(lane, i, number);
+                }
+            }
+        }
+    }
+
+    /// What a lane carries, without slopes.
+    pub fn carry(&self, lane: usize, carry: &mut [f64]) {
+        for (i, entry) in carry.iter_mut().enumerate().take(self.program.pattern.rows.len()) {
+            *entry = self.number(i, lane);
+        }
+    }
+
+    /// The slopes of what a lane carries: entry by entry, one for each seed.
+    pub fn carry_slopes(&self, lane: usize, slopes: &mut [f64]) {
+        for (to, at) in slopes.iter_mut().zip(self.program.pattern.rows.iter().flatten()) {
+            *to = at.map_or(0.0, |at| self.number(at, lane));
+        }
+    }
+
+    /// Puts back what was carried, as it was read; slopes that are always zero stay so.
+    pub fn resume(&mut self, lane: usize, carry: &[f64], slopes: &[f64]) {
+        let program = Arc::clone(&self.program);
+        for (i, _) in program.pattern.rows.iter().enumerate() {
+            self.slot(i)[lane] = carry[i];
+        }
+        for (from, at) in slopes.iter().zip(program.pattern.rows.iter().flatten()) {
+            if let Some(at) = at {
+                self.slot(*at)[lane] = *from;
+            }
+        }
+    }
+
+    /// Runs through a block of samples. `inputs`: sample, column, lane, with one sample more if the program
+    /// [reads the next](super::Program::reads_next). `rows`: sample, output, slopes and mean, lane; then variances likewise.
+    pub fn run(&mut self, inputs: &[f64], rows: &mut [f64], samples: usize) {
+        let program = Arc::clone(&self.program);
+        self.clear_negligible();
+        let lanes = self.lanes();
+        let (code, slots, width) = (&program.code, &mut self.numbers[self.first..], program.width);
+        if let Some(machine) = &program.machine {
+            return machine.run(code, lanes, slots, inputs, rows, samples);
+        }
+        match self.registers {
+            1 => run(width, Run::<1> { code, slots, inputs, rows, samples, width }),
+            2 => run(width, Run::<2> { code, slots, inputs, rows, samples, width }),
+            _ => run(width, Run::<4> { code, slots, inputs, rows, samples, width }),
+        }
+    }
+
+    fn clear_negligible(&mut self) {
+        let (values, carried, lanes) = (self.program.pattern.rows.len(), self.program.code.carried, self.lanes());
+        for slope in &mut self.numbers[self.first + values * lanes..self.first + carried * lanes] {
+            if slope.abs() < NEGLIGIBLE {
+                *slope = 0.0;
+            }
+        }
+    }
+}

@@ -1,0 +1,213 @@
+//! The interpreter: one instruction after the other, each on several registers side by side.
+//!
+//! An instruction costs a jump that is hard to foresee, so that it pays to do much in each: four registers of eight lanes.
+
+use super::code::{Instruction, Operation, Sound};
+use super::functions::apply;
+use crate::graph::Function;
+use crate::scalar::Table;
+use crate::wide::{Task, Wide, Width};
+use std::sync::Arc;
+
+/// Numbers per slot and register, sample by sample: what a run reads and writes.
+pub(super) struct Run<'a, const K: usize> {
+    pub code: &'a Sound,
+    /// Slots of `K` registers each.
+    pub slots: &'a mut [f64],
+    /// Sample, column, lane; one sample more if the next inputs are read.
+    pub inputs: &'a [f64],
+    /// Sample, row, lane.
+    pub rows: &'a mut [f64],
+    pub samples: usize,
+    /// The registers'.
+    pub width: Width,
+}
+
+impl<const K: usize> Task for Run<'_, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        let Run { code, slots, inputs, rows, samples, width } = self;
+        let lanes = K * W::LANES;
+        let (columns, height) = (code.columns.len() * lanes, code.rows.len() * lanes);
+        assert!(width.lanes() == W::LANES && slots.len() >= code.slots * lanes);
+        assert!(inputs.len() >= (samples + usize::from(code.reads_next())) * columns && rows.len() >= samples * height);
+        let (slots, inputs, rows) = (slots.as_mut_ptr(), inputs.as_ptr(), rows.as_mut_ptr());
+        for sample in 0..samples {
+            for read in &code.reads {
+                let from = (sample + usize::from(read.next)) * columns + read.column * lanes;
+                // SAFETY: the column lies within its sample's row of inputs, of which there are enough; the slot within
+                // the slots, since the code is sound. So it is for all that follows.
+                unsafe { copy::<W, K>(inputs.add(from), slots.add(usize::from(read.to) * lanes)) };
+            }
+            // SAFETY: as above.
+            unsafe { interpret::<W, K>(&code.output, &code.tables, slots, width) };
+            for (number, slot) in code.rows.iter().enumerate() {
+                // SAFETY: as above; the row lies within its sample's rows, of which there are enough.
+                unsafe {
+                    copy::<W, K>(slots.add(usize::from(*slot) * lanes), rows.add(sample * height + number * lanes))
+                };
+            }
+            // SAFETY: as above.
+            unsafe { interpret::<W, K>(&code.advance, &code.tables, slots, width) };
+        }
+    }
+}
+
+/// What is computed once a pass.
+pub(super) struct Once<'a, const K: usize> {
+    pub code: &'a Sound,
+    pub slots: &'a mut [f64],
+    /// The registers'.
+    pub width: Width,
+}
+
+impl<const K: usize> Task for Once<'_, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        assert!(self.width.lanes() == W::LANES && self.slots.len() >= self.code.slots * K * W::LANES);
+        // SAFETY: all slots of the instructions lie within the slots, since the code is sound and the slots are all there.
+        unsafe { interpret::<W, K>(&self.code.once, &self.code.tables, self.slots.as_mut_ptr(), self.width) };
+    }
+}
+
+/// # Safety
+/// Both must be `K` registers long.
+#[inline(always)]
+unsafe fn copy<W: Wide, const K: usize>(from: *const f64, to: *mut f64) {
+    let mut k = 0;
+    while k < K {
+        // SAFETY: as the caller says.
+        unsafe { W::read(from.add(k * W::LANES)).write(to.add(k * W::LANES)) };
+        k += 1;
+    }
+}
+
+/// # Safety
+/// All slots that the instructions name must be there, `K` registers each, and `width` must be that of `W`.
+#[inline(always)]
+unsafe fn interpret<W: Wide, const K: usize>(
+    code: &[Instruction],
+    tables: &[Arc<Table>],
+    slots: *mut f64,
+    width: Width,
+) {
+    for instruction in code {
+        // SAFETY: as the caller says.
+        let of = Operands::<W, K> { slots, instruction, lanes: core::marker::PhantomData };
+        // SAFETY: as the caller says.
+        unsafe {
+            match instruction.operation {
+                Operation::Copy => of.each(|[[a, _], ..]| a),
+                Operation::Add => of.each(|[[a, b], ..]| a.add(b)),
+                Operation::Sub => of.each(|[[a, b], ..]| a.sub(b)),
+                Operation::Mul => of.each(|[[a, b], ..]| a.mul(b)),
+                Operation::Neg => of.each(|[[a, _], ..]| a.neg()),
+                Operation::Abs => of.each(|[[a, _], ..]| a.abs()),
+                Operation::Signum => of.each(|[[a, _], ..]| signum(a)),
+                Operation::Copysign => of.each(|[[a, b], ..]| a.copysign(b)),
+                Operation::Recip => of.each(|[[a, _], ..]| W::splat(1.0).div(a)),
+                Operation::Sqrt => of.each(|[[a, _], ..]| a.sqrt()),
+                Operation::Less => of.each(|[[a, b], [c, d], ..]| a.select_lt(b, c, d)),
+                Operation::LessOrEqual => of.each(|[[a, b], [c, d], ..]| a.select_le(b, c, d)),
+                Operation::Equal => of.each(|[[a, b], [c, d], ..]| a.select_eq(b, c, d)),
+                Operation::Fused => of.sum::<true, false>(),
+                Operation::FusedProducts => of.sum::<false, false>(),
+                Operation::Rounded => of.sum::<true, true>(),
+                Operation::RoundedProducts => of.sum::<false, true>(),
+                Operation::Function(of_one) => of.function(width, of_one),
+                Operation::Table(order) => {
+                    let (table, order) = (tables[usize::from(instruction.init)].grid(), [order >> 4, order & 15]);
+                    of.each(|[[a, b], ..]| a.zip(b, |x, y| table.derivative([x, y], order)))
+                }
+                Operation::Function2(of_two) => of.each(|[[a, b], ..]| a.zip(b, |x, y| of_two.of(x, y, Some(y)))),
+            }
+        }
+    }
+}
+
+#[inline(always)]
+pub(super) fn signum<W: Wide>(a: W) -> W {
+    a.select_eq(a, W::splat(1.0).copysign(a), a)
+}
+
+/// An instruction and the slots that it works on.
+struct Operands<'a, W, const K: usize> {
+    slots: *mut f64,
+    instruction: &'a Instruction,
+    lanes: core::marker::PhantomData<W>,
+}
+
+impl<W: Wide, const K: usize> Operands<'_, W, K> {
+    /// Register `k` of a slot.
+    #[inline(always)]
+    unsafe fn at(&self, slot: u16, k: usize) -> W {
+        // SAFETY: the slot is there, as `interpret` demands.
+        unsafe { W::read(self.slots.add((usize::from(slot) * K + k) * W::LANES)) }
+    }
+
+    #[inline(always)]
+    unsafe fn put(&self, k: usize, value: W) {
+        // SAFETY: the slot is there, as `interpret` demands.
+        unsafe { value.write(self.slots.add((usize::from(self.instruction.to) * K + k) * W::LANES)) }
+    }
+
+    #[inline(always)]
+    unsafe fn each(&self, f: impl Fn([[W; 2]; 2]) -> W) {
+        let [[a, b], [c, d], ..] = self.instruction.pairs;
+        let mut k = 0;
+        while k < K {
+            // SAFETY: as above; unused operands are slot zero.
+            unsafe { self.put(k, f([[self.at(a, k), self.at(b, k)], [self.at(c, k), self.at(d, k)]])) };
+            k += 1;
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn function(&self, width: Width, of: Function) {
+        let at = |slot: u16| self.slots.wrapping_add(usize::from(slot) * K * W::LANES);
+        // SAFETY: the slots are there, as `interpret` demands, and the width is that of `W`.
+        unsafe { apply(width, of, at(self.instruction.pairs[0][0]), at(self.instruction.to), K) };
+    }
+
+    /// A sum of `N` pairs: from `init`, or from the first product; each operation rounded, or each product with its sum.
+    #[inline(always)]
+    unsafe fn sum_of<const N: usize, const INIT: bool, const ROUNDED: bool>(&self) {
+        let mut k = 0;
+        while k < K {
+            // SAFETY: as above.
+            let pair = |j: usize| unsafe { self.instruction.pairs[j].map(|slot| self.at(slot, k)) };
+            // SAFETY: as above.
+            let mut sum = if INIT { unsafe { self.at(self.instruction.init, k) } } else { pair(0)[0].mul(pair(0)[1]) };
+            let mut j = usize::from(!INIT);
+            while j < N {
+                let [a, b] = pair(j);
+                // Rounding is symmetric, so that a turned sign is as good as a subtraction.
+                let a = a.xor(W::splat(SIGNS[usize::from(self.instruction.signs >> j & 1)]));
+                sum = if ROUNDED { sum.add(a.mul(b)) } else { a.mul_add(b, sum) };
+                j += 1;
+            }
+            // SAFETY: as above.
+            unsafe { self.put(k, sum) };
+            k += 1;
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn sum<const INIT: bool, const ROUNDED: bool>(&self) {
+        // SAFETY: as above.
+        unsafe {
+            match self.instruction.count {
+                1 => self.sum_of::<1, INIT, ROUNDED>(),
+                2 => self.sum_of::<2, INIT, ROUNDED>(),
+                3 => self.sum_of::<3, INIT, ROUNDED>(),
+                _ => self.sum_of::<4, INIT, ROUNDED>(),
+            }
+        }
+    }
+}
+
+const SIGNS: [f64; 2] = [0.0, -0.0];

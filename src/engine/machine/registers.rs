@@ -1,0 +1,117 @@
+//! Which slots stand in registers.
+
+use super::super::code::Slot;
+
+/// Never read again.
+pub(super) const NEVER: usize = usize::MAX;
+
+/// What has to happen for a register to become free.
+pub(super) enum Freed {
+    /// Nothing.
+    Clean(u8),
+    /// Its number goes to its slot.
+    Spilled(u8, Slot),
+}
+
+/// The contents of the registers, and when each slot is read next.
+pub(super) struct Registers {
+    slot_in: Vec<Option<Slot>>,
+    register_of: Vec<Option<u8>>,
+    /// Slots whose register is newer than their memory.
+    dirty: Vec<bool>,
+    /// Registers that the instruction at hand uses.
+    held: Vec<bool>,
+    pub next: Vec<usize>,
+}
+
+impl Registers {
+    pub fn new(registers: u8, slots: usize) -> Self {
+        Registers {
+            slot_in: vec![None; registers.into()],
+            register_of: vec![None; slots],
+            dirty: vec![false; slots],
+            held: vec![false; registers.into()],
+            next: vec![NEVER; slots],
+        }
+    }
+
+    /// Where a slot's number stands, if in a register, which is then held.
+    pub fn find(&mut self, slot: Slot) -> Option<u8> {
+        let found = self.register_of[usize::from(slot)];
+        found.into_iter().for_each(|register| self.held[usize::from(register)] = true);
+        found
+    }
+
+    /// Whether a number read again at `next` is worth a register.
+    pub fn is_worth_loading(&self, next: usize) -> bool {
+        next != NEVER
+            && self
+                .slot_in
+                .iter()
+                .zip(&self.held)
+                .any(|(slot, held)| !held && slot.is_none_or(|slot| self.next[usize::from(slot)] > next))
+    }
+
+    /// A register for something new, held: a free one, or that of the number that is read last.
+    pub fn take(&mut self) -> Option<Freed> {
+        let last_read = |(_, slot): &(usize, &Option<Slot>)| match slot {
+            None => (NEVER, true, true),
+            Some(slot) => (self.next[usize::from(*slot)], false, !self.dirty[usize::from(*slot)]),
+        };
+        let open = self.slot_in.iter().enumerate().filter(|(register, _)| !self.held[*register]);
+        let (register, slot) = open.max_by_key(last_read)?;
+        let (number, slot) = (u8::try_from(register).ok()?, *slot);
+        self.held[register] = true;
+        let Some(slot) = slot else { return Some(Freed::Clean(number)) };
+        let spilled = self.dirty[usize::from(slot)] && self.next[usize::from(slot)] != NEVER;
+        self.forget(slot);
+        Some(if spilled { Freed::Spilled(number, slot) } else { Freed::Clean(number) })
+    }
+
+    /// A slot's number now stands in this register; `dirty`: and nowhere else.
+    pub fn bind(&mut self, slot: Slot, register: u8, dirty: bool) {
+        self.forget(slot);
+        if let Some(before) = self.slot_in[usize::from(register)] {
+            self.forget(before);
+        }
+        self.slot_in[usize::from(register)] = Some(slot);
+        self.register_of[usize::from(slot)] = Some(register);
+        self.dirty[usize::from(slot)] = dirty;
+    }
+
+    /// A slot's number is in no register any more.
+    pub fn forget(&mut self, slot: Slot) {
+        if let Some(register) = self.register_of[usize::from(slot)].take() {
+            self.slot_in[usize::from(register)] = None;
+            self.dirty[usize::from(slot)] = false;
+        }
+    }
+
+    /// A register that was taken for the instruction at hand alone.
+    pub fn free(&mut self, register: u8) {
+        self.held[usize::from(register)] = false;
+    }
+
+    /// The end of an instruction: its registers may be taken again.
+    pub fn release(&mut self) {
+        self.held.fill(false);
+    }
+
+    /// The numbers that must be written to their slots, for whoever reads these; all that is read again is then in both.
+    pub fn unwritten(&mut self) -> Vec<(u8, Slot)> {
+        let dirty: Vec<(u8, Slot)> = (0u8..)
+            .zip(&self.slot_in)
+            .filter_map(|(register, slot)| slot.map(|slot| (register, slot)))
+            .filter(|(_, slot)| self.dirty[usize::from(*slot)] && self.next[usize::from(*slot)] != NEVER)
+            .collect();
+        dirty.iter().for_each(|(_, slot)| self.dirty[usize::from(*slot)] = false);
+        dirty
+    }
+
+    /// Nothing is in a register any more.
+    pub fn clear(&mut self) {
+        self.slot_in.fill(None);
+        self.register_of.fill(None);
+        self.dirty.fill(false);
+    }
+}

@@ -1,0 +1,342 @@
+//! [`Equations`]: a model as data.
+
+use crate::functions::Functions;
+use crate::graph::{Graph, Id, Leaf, Node, Symbol, Untraceable};
+use crate::layout::{Kind, Layout};
+use crate::model::Model;
+use crate::scalar::Scalar;
+use crate::signals::Signals;
+use core::fmt::{self, Display};
+use serde::{Deserialize, Serialize};
+
+/// A model's quantities and its arithmetic, known at run time.
+///
+/// A Rust model is read once ([`Equations::trace`]); equations from elsewhere are made of a graph ([`Equations::new`]).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Parts", into = "Parts")]
+pub struct Equations {
+    layout: Layout,
+    graph: Graph,
+    state: Vec<Id>,
+    output: Vec<Id>,
+    /// Empty where not said.
+    diffusion: Vec<Id>,
+    noise: Vec<Id>,
+}
+
+/// What is written of equations.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Parts {
+    layout: Layout,
+    graph: Graph,
+    state: Vec<Id>,
+    output: Vec<Id>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    diffusion: Vec<Id>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    noise: Vec<Id>,
+}
+
+/// A graph that does not make up equations of its layout.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum InvalidEquations {
+    /// Not one root per quantity.
+    #[error("the layout has {expected} {role}, the equations {found}; give one node for each")]
+    Count {
+        /// States or outputs.
+        role: &'static str,
+        /// As many as the layout has.
+        expected: usize,
+        /// As many as were given.
+        found: usize,
+    },
+    /// A root that is no node of the graph.
+    #[error("the equations name node {node} of a graph of {nodes}")]
+    NoSuchNode {
+        /// The node's number.
+        node: usize,
+        /// How many there are.
+        nodes: usize,
+    },
+    /// A quantity that the layout does not have, or that a model's equations cannot depend on.
+    #[error("the equations depend on {leaf:?}, which is no quantity of the layout")]
+    NoSuchQuantity {
+        /// The quantity.
+        leaf: Leaf,
+    },
+}
+
+/// What a node depends on.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Dependence {
+    /// Whether on time.
+    pub time: bool,
+    /// On which states.
+    pub states: Vec<usize>,
+    /// On which inputs.
+    pub inputs: Vec<usize>,
+    /// On which parameters.
+    pub parameters: Vec<usize>,
+}
+
+impl Equations {
+    /// The equations `dx/dt`, or the next state, as `state`, and the outputs.
+    ///
+    /// # Errors
+    /// If they do not fit the layout.
+    pub fn new(layout: Layout, graph: &Graph, state: &[Id], output: &[Id]) -> Result<Self, InvalidEquations> {
+        Equations::with_noise(layout, graph, [state, output, &[], &[]])
+    }
+
+    /// The same with process noise and measurement noise, as [`Model::diffusion`] and [`Model::noise`] say them: roots of
+    /// the states, the outputs, the diffusion of each state and the noise of each output. Either may be left empty.
+    ///
+    /// # Errors
+    /// If they do not fit the layout, or noise depends on more than parameters.
+    pub fn with_noise(layout: Layout, graph: &Graph, roots: [&[Id]; 4]) -> Result<Self, InvalidEquations> {
+        let count = |role, expected: usize, found: usize| match expected == found {
+            true => Ok(()),
+            false => Err(InvalidEquations::Count { role, expected, found }),
+        };
+        let [state, output, diffusion, noise] = roots;
+        count("states", if layout.kind == Kind::Static { 0 } else { layout.states.len() }, state.len())?;
+        count("outputs", layout.outputs.len(), output.len())?;
+        if !diffusion.is_empty() {
+            count("diffusions of states", layout.states.len(), diffusion.len())?;
+        }
+        if !noise.is_empty() {
+            count("noises of outputs", layout.outputs.len(), noise.len())?;
+        }
+        let all = roots.concat();
+        if let Some(root) = all.iter().find(|root| root.index() >= graph.len()) {
+            return Err(InvalidEquations::NoSuchNode { node: root.index(), nodes: graph.len() });
+        }
+        let (graph, all) = graph.pruned(&all);
+        let (drift, levels) = all.split_at(state.len() + output.len());
+        let constant = graph.reached(levels);
+        for (node, constant) in graph.nodes().iter().zip(constant) {
+            let Node::Leaf(leaf) = *node else { continue };
+            let there = match leaf {
+                Leaf::Time => !constant,
+                Leaf::State(i) => (i as usize) < layout.states.len() && !constant,
+                Leaf::Input(i) => (i as usize) < layout.inputs.len() && !constant,
+                Leaf::Parameter(i) => (i as usize) < layout.parameters.len(),
+                Leaf::Step | Leaf::NextInput(_) | Leaf::Measured(_) => false,
+            };
+            if !there {
+                return Err(InvalidEquations::NoSuchQuantity { leaf });
+            }
+        }
+        let (state, output) = drift.split_at(state.len());
+        let (diffusion, noise) = levels.split_at(diffusion.len());
+        let [state, output, diffusion, noise] = [state, output, diffusion, noise].map(<[Id]>::to_vec);
+        Ok(Equations { layout, graph, state, output, diffusion, noise })
+    }
+
+    /// Reads a Rust model.
+    ///
+    /// # Errors
+    /// If it is more than arithmetic; then it runs on [`Dual`](crate::Dual)s.
+    pub fn trace<M: Model>(model: &M) -> Result<Self, Untraceable> {
+        let layout = Layout::new::<M::State, M::Input, M::Output, M::Parameters>(M::KIND);
+        let mut graph = Graph::default();
+        let number = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
+        let leaves = || {
+            let t = Symbol::leaf(Leaf::Time);
+            let x = M::State::from_fn(|i| Symbol::leaf(Leaf::State(number(i))));
+            let u = M::Input::from_fn(|i| Symbol::leaf(Leaf::Input(number(i))));
+            let p = M::Parameters::from_fn(|i| Symbol::leaf(Leaf::Parameter(number(i))));
+            (t, x, u, p)
+        };
+        let state = match M::KIND {
+            Kind::Static => vec![],
+            kind => graph.trace(|| {
+                let (t, x, u, p) = leaves();
+                let state = match kind {
+                    Kind::Discrete => model.next(t, &x, &u, &p),
+                    _ => model.derivative(t, &x, &u, &p),
+                };
+                M::State::into_array(state).as_ref().to_vec()
+            })?,
+        };
+        let output = graph.trace(|| {
+            let (t, x, u, p) = leaves();
+            M::Output::into_array(model.output(t, &x, &u, &p)).as_ref().to_vec()
+        })?;
+        let levels = graph.trace(|| {
+            let p = leaves().3;
+            let diffusion = M::State::into_array(model.diffusion(&p));
+            let noise = M::Output::into_array(model.noise(&p));
+            diffusion.as_ref().iter().chain(noise.as_ref()).copied().collect()
+        })?;
+        let (diffusion, noise) = levels.split_at(M::State::LEN);
+        // What was not written is no noise.
+        let said = |levels: &[Id], unsaid: fn(f64) -> bool| {
+            let unsaid = |id: &Id| graph.known(*id).is_some_and(unsaid);
+            if levels.iter().all(unsaid) { vec![] } else { levels.to_vec() }
+        };
+        let (diffusion, noise) = (said(diffusion, |level| level == 0.0), said(noise, f64::is_nan));
+        let roots: [&[Id]; 4] = [&state, &output, &diffusion, &noise];
+        Equations::with_noise(layout, &graph, roots).map_err(|wrong| Untraceable { reason: wrong.to_string() })
+    }
+
+    /// The quantities.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// The arithmetic.
+    pub fn graph(&self) -> &Graph {
+        &self.graph
+    }
+
+    /// The derivative of each state (continuous) or its next value (discrete); empty for a static model.
+    pub fn state(&self) -> &[Id] {
+        &self.state
+    }
+
+    /// Each output.
+    pub fn output(&self) -> &[Id] {
+        &self.output
+    }
+
+    /// Whether derivatives and outputs are affine in the states: then so is each step, and slopes do not depend on states.
+    pub fn is_affine(&self) -> bool {
+        let degrees = degrees(&self.graph);
+        self.state.iter().chain(&self.output).all(|root| degrees[root.index()] <= Degree::One)
+    }
+
+    /// What a state's equation or an output depends on.
+    pub fn dependence(&self, root: Id) -> Dependence {
+        let mut on = Dependence::default();
+        let reached = self.graph.reached(&[root]);
+        for (node, _) in self.graph.nodes().iter().zip(reached).filter(|(_, reached)| *reached) {
+            match *node {
+                Node::Leaf(Leaf::Time) => on.time = true,
+                Node::Leaf(Leaf::State(i)) => on.states.push(i as usize),
+                Node::Leaf(Leaf::Input(i)) => on.inputs.push(i as usize),
+                Node::Leaf(Leaf::Parameter(i)) => on.parameters.push(i as usize),
+                _ => {}
+            }
+        }
+        for list in [&mut on.states, &mut on.inputs, &mut on.parameters] {
+            list.sort_unstable();
+        }
+        on
+    }
+
+    /// The values of roots; without time, states and inputs for what depends on parameters alone.
+    fn values<S: Scalar>(&self, roots: &[Id], at: Option<(S, &[S], &[S])>, p: &[S], to: &mut [S]) {
+        let unknown = || S::from(f64::NAN);
+        let found = self.graph.evaluate(roots, |leaf| match (leaf, at) {
+            (Leaf::Parameter(i), _) => p[i as usize],
+            (Leaf::Time, Some((t, ..))) => t,
+            (Leaf::State(i), Some((_, x, _))) => x[i as usize],
+            (Leaf::Input(i), Some((_, _, u))) => u[i as usize],
+            _ => unknown(),
+        });
+        to.iter_mut().zip(found).for_each(|(to, found)| *to = found);
+    }
+
+    fn name(&self, leaf: Leaf) -> String {
+        let name = |of: &[crate::layout::Quantity], i: u32| {
+            of.get(i as usize).map_or_else(|| format!("{leaf:?}"), |quantity| quantity.name.clone())
+        };
+        match leaf {
+            Leaf::Time => "t".to_owned(),
+            Leaf::State(i) => name(&self.layout.states, i),
+            Leaf::Input(i) => name(&self.layout.inputs, i),
+            Leaf::Parameter(i) => name(&self.layout.parameters, i),
+            Leaf::Step | Leaf::NextInput(_) | Leaf::Measured(_) => format!("{leaf:?}"),
+        }
+    }
+}
+
+/// How a node depends on the states.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Degree {
+    Zero,
+    One,
+    Higher,
+}
+
+/// The degree of each node in the states.
+fn degrees(graph: &Graph) -> Vec<Degree> {
+    let mut degrees: Vec<Degree> = Vec::with_capacity(graph.len());
+    for node in graph.nodes() {
+        let of = |id: Id| degrees[id.index()];
+        let product = |a: Degree, b: Degree| match (a, b) {
+            (Degree::Zero, other) | (other, Degree::Zero) => other,
+            _ => Degree::Higher,
+        };
+        let constant = |needed: Degree, result: Degree| if needed == Degree::Zero { result } else { Degree::Higher };
+        let degree = match *node {
+            Node::Constant(_) => Degree::Zero,
+            Node::Leaf(Leaf::State(_)) => Degree::One,
+            Node::Leaf(_) => Degree::Zero,
+            Node::Neg(a) => of(a),
+            Node::Add(a, b) | Node::Sub(a, b) => of(a).max(of(b)),
+            Node::Mul(a, b) => product(of(a), of(b)),
+            Node::Div(a, b) => constant(of(b), of(a)),
+            Node::MulAdd([a, b, c]) => product(of(a), of(b)).max(of(c)),
+            Node::Select(_, [a, b, c, d]) => constant(of(a).max(of(b)), of(c).max(of(d))),
+            _ => constant(node.operands().map(of).max().unwrap_or(Degree::Zero), Degree::Zero),
+        };
+        degrees.push(degree);
+    }
+    degrees
+}
+
+impl<S: Scalar> Functions<S> for Equations {
+    fn state(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        match self.layout.kind {
+            Kind::Static => to.copy_from_slice(x),
+            _ => self.values(&self.state, Some((t, x, u)), p, to),
+        }
+    }
+
+    fn output(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        self.values(&self.output, Some((t, x, u)), p, to);
+    }
+
+    fn diffusion(&self, p: &[S], to: &mut [S]) {
+        to.fill(S::from(0.0));
+        self.values(&self.diffusion, None, p, to);
+    }
+
+    fn noise(&self, p: &[S], to: &mut [S]) {
+        to.fill(S::from(f64::NAN));
+        self.values(&self.noise, None, p, to);
+    }
+}
+
+impl From<Equations> for Parts {
+    fn from(Equations { layout, graph, state, output, diffusion, noise }: Equations) -> Self {
+        Parts { layout, graph, state, output, diffusion, noise }
+    }
+}
+
+impl TryFrom<Parts> for Equations {
+    type Error = InvalidEquations;
+
+    fn try_from(parts: Parts) -> Result<Self, InvalidEquations> {
+        let Parts { layout, graph, state, output, diffusion, noise } = parts;
+        Equations::with_noise(layout, &graph, [&state, &output, &diffusion, &noise])
+    }
+}
+
+impl Display for Equations {
+    /// One line per state and output, by the names of the layout, after what they share.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let left = |name: &str| match self.layout.kind {
+            Kind::Continuous => format!("d({name})/dt"),
+            _ => format!("next {name}"),
+        };
+        let state = self.layout.states.iter().zip(&self.state).map(|(quantity, root)| (left(&quantity.name), *root));
+        let outputs = self.layout.outputs.iter().zip(&self.output);
+        let output = outputs.map(|(quantity, root)| (format!("output {}", quantity.name), *root));
+        let roots: Vec<(String, Id)> = state.chain(output).collect();
+        self.graph.write(f, &|leaf| self.name(leaf), &roots)
+    }
+}

@@ -1,0 +1,149 @@
+//! Steps between bounds.
+
+use super::reduce::Terms;
+use super::{Elimination, entry};
+
+/// How often unknowns are released from the ends of their room; a few times suffice.
+const RELEASES: usize = 20;
+/// How often the way along the bounds is halved before only the part to the first end is gone.
+const HALVINGS: usize = 10;
+/// An unknown is kept on an end where the cosine between the residual and its column is below.
+const NEGLIGIBLE: f64 = 1e-12;
+
+impl Elimination {
+    /// As [`step`](Self::step), and within this room (at most zero, at least zero) for each unknown: the minimizer among
+    /// all steps that the room allows.
+    ///
+    /// The way to a minimizer is projected on the room: unknowns that would leave it stay on its end. As much of the way
+    /// is gone, all or a half or a quarter and so on, as lowers the damped sum of squares further than to go straight
+    /// and stop where the first unknown gets to its end. The unknowns on their ends are kept there and the others
+    /// minimized again, until all stay within their room; then those whose slopes fall inward are released
+    /// (Bertsekas, SIAM J. Control Optim. 20 (1982) 221). Many pieces do so in as few stages as one.
+    pub fn step_within(&self, damping: &[f64], held: &[bool], room: &[(f64, f64)]) -> Option<Vec<f64>> {
+        let n = self.unknowns();
+        let mut stage = Stage {
+            held: (0..n).map(|i| held.get(i).copied().unwrap_or(false)).collect(),
+            put: vec![0.0; n],
+            on_end: vec![None; n],
+            at: vec![0.0; n],
+            step: self.step(damping, held)?,
+        };
+        if stage.leaving(room).is_empty() {
+            return Some(stage.step);
+        }
+        let mut releases = 0;
+        loop {
+            let leaving = stage.leaving(room);
+            if let Some(first) = leaving.iter().map(|leaving| leaving.part).min_by(f64::total_cmp) {
+                let part = self.part(&stage, first, &leaving, damping);
+                stage.advance(part, &leaving);
+            } else {
+                std::mem::swap(&mut stage.at, &mut stage.step);
+                releases += 1;
+                if releases > RELEASES || !stage.release(&self.slopes(&stage.at, damping)) {
+                    return Some(stage.at);
+                }
+            }
+            stage.step = self.solve(Terms { damping, held: &stage.held, origin: &stage.put })?;
+            stage.step.iter_mut().zip(&stage.put).for_each(|(step, put)| *step += put);
+        }
+    }
+
+    /// How much of the way to go.
+    fn part(&self, stage: &Stage, first: f64, leaving: &[Leaving], damping: &[f64]) -> f64 {
+        let gain = |part: f64| {
+            let step = stage.along(part, leaving);
+            let damped: f64 = step.iter().enumerate().map(|(i, d)| (entry(damping, i) * d).powi(2)).sum();
+            self.predicted_reduction(&step) - 0.5 * damped
+        };
+        let straight = gain(first);
+        let parts = std::iter::successors(Some(1.0), |part| Some(part * 0.5)).take(HALVINGS);
+        parts.take_while(|part| *part > first).find(|part| gain(*part) > straight).unwrap_or(first)
+    }
+
+    /// Slopes of half the damped sum of squares after a step; zero where no more than rounding.
+    fn slopes(&self, step: &[f64], damping: &[f64]) -> Vec<f64> {
+        let mut slopes: Vec<f64> = step.iter().enumerate().map(|(i, d)| entry(damping, i).powi(2) * d).collect();
+        let mut squares = 0.0;
+        for (triangle, columns) in self.columns() {
+            for i in 0..columns.len() {
+                let (y, row) = triangle.row(i);
+                let change: f64 = row.iter().zip(&columns[i..]).map(|(r, &unknown)| r * step[unknown]).sum();
+                row.iter().zip(&columns[i..]).for_each(|(r, &unknown)| slopes[unknown] += r * (change - y));
+                squares += (change - y) * (change - y);
+            }
+            squares += triangle.residual();
+        }
+        let negligible = NEGLIGIBLE * squares.sqrt();
+        for ((slope, norm), i) in slopes.iter_mut().zip(&self.norms).zip(0..) {
+            if slope.abs() <= negligible * norm.hypot(entry(damping, i)) {
+                *slope = 0.0;
+            }
+        }
+        slopes
+    }
+}
+
+/// How far the search for a step within bounds has come.
+struct Stage {
+    held: Vec<bool>,
+    /// Where unknowns were put on an end.
+    put: Vec<f64>,
+    /// On which end: -1 for the lower one, 1 for the upper one.
+    on_end: Vec<Option<f64>>,
+    /// The point reached, and the minimizer that is to be reached from it.
+    at: Vec<f64>,
+    step: Vec<f64>,
+}
+
+/// A free unknown that leaves its room on the way.
+struct Leaving {
+    unknown: usize,
+    /// At what part of the way.
+    part: f64,
+    end: f64,
+    side: f64,
+}
+
+impl Stage {
+    fn leaving(&self, room: &[(f64, f64)]) -> Vec<Leaving> {
+        let leaving = |(unknown, &(down, up)): (usize, &(f64, f64))| {
+            let (at, step) = (*self.at.get(unknown)?, self.step[unknown]);
+            let (end, side) = match step {
+                _ if self.held[unknown] => return None,
+                step if step < down => (down, -1.0),
+                step if step > up => (up, 1.0),
+                _ => return None,
+            };
+            Some(Leaving { unknown, part: ((end - at) / (step - at)).clamp(0.0, 1.0), end, side })
+        };
+        room.iter().enumerate().filter_map(leaving).collect()
+    }
+
+    /// The point after this part of the way, those that have left their room by then on its end.
+    fn along(&self, part: f64, leaving: &[Leaving]) -> Vec<f64> {
+        let mut point: Vec<f64> = self.at.iter().zip(&self.step).map(|(at, step)| at + part * (step - at)).collect();
+        leaving.iter().filter(|leaving| leaving.part <= part).for_each(|leaving| point[leaving.unknown] = leaving.end);
+        point
+    }
+
+    /// Goes this part of the way.
+    fn advance(&mut self, part: f64, leaving: &[Leaving]) {
+        self.at = self.along(part, leaving);
+        for &Leaving { unknown, end, side, .. } in leaving.iter().filter(|leaving| leaving.part <= part) {
+            (self.put[unknown], self.held[unknown], self.on_end[unknown]) = (end, true, Some(side));
+        }
+    }
+
+    /// Releases the unknowns whose slopes fall inward; whether there were any.
+    fn release(&mut self, slopes: &[f64]) -> bool {
+        let mut any = false;
+        for (unknown, side) in self.on_end.iter_mut().enumerate() {
+            if side.is_some_and(|side| slopes[unknown] * side > 0.0) {
+                (self.put[unknown], self.held[unknown], *side) = (0.0, false, None);
+                any = true;
+            }
+        }
+        any
+    }
+}

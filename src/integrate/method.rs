@@ -1,0 +1,171 @@
+//! [`Method`]: an integrator whose type is not known, for systems whose number of states is known at run time only.
+
+use super::{Integrator, Square, Stuck, System};
+use crate::dual::Dual;
+use crate::error::Error;
+use crate::graph::{Leaf, Symbol};
+use crate::layout::Kind;
+use crate::scalar::Scalar;
+use crate::signals::Entry;
+use core::fmt::Debug;
+use std::sync::Arc;
+
+/// Eight slopes at a time.
+pub(crate) type Duals = Dual<8>;
+
+/// `f(position, x, to)`: writes a derivative, or the next state.
+pub(crate) type Rate<'a, S> = &'a dyn Fn(f64, &[S], &mut [S]);
+
+/// Value and Jacobian (by rows) of a derivative, at a position and values of the states.
+pub(crate) type Slopes<'a> = &'a dyn Fn(f64, &[f64]) -> (Vec<f64>, Vec<Vec<f64>>);
+
+/// An interval of a system that is given by functions.
+pub(crate) struct Field<'a, S> {
+    pub kind: Kind,
+    /// Begin and length (s).
+    pub interval: (f64, f64),
+    pub states: usize,
+    pub rate: Rate<'a, S>,
+    pub slopes: Slopes<'a>,
+}
+
+impl Square for Vec<Vec<f64>> {
+    fn row(&self, i: usize) -> &[f64] {
+        &self[i]
+    }
+    fn row_mut(&mut self, i: usize) -> &mut [f64] {
+        &mut self[i]
+    }
+}
+
+impl<S: Scalar> System for Field<'_, S> {
+    type Scalar = S;
+    type Vector<T: Entry> = Vec<T>;
+    type Matrix = Vec<Vec<f64>>;
+
+    fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    fn interval(&self) -> (f64, f64) {
+        self.interval
+    }
+
+    fn vector<T: Entry>(&self, f: impl FnMut(usize) -> T) -> Vec<T> {
+        (0..self.states).map(f).collect()
+    }
+
+    fn derivative(&self, position: f64, x: &Vec<S>) -> Vec<S> {
+        let mut to = vec![S::from(0.0); self.states];
+        (self.rate)(position, x, &mut to);
+        to
+    }
+
+    fn next(&self, x: &Vec<S>) -> Vec<S> {
+        self.derivative(0.0, x)
+    }
+
+    fn jacobian(&self, position: f64, x: &Vec<f64>) -> (Vec<f64>, Vec<Vec<f64>>) {
+        (self.slopes)(position, x)
+    }
+
+    fn along(&self, x: &Vec<S>, part: f64, k: &Vec<S>) -> Vec<S> {
+        let a = self.interval.1 * part;
+        x.iter().zip(k).map(|(x, k)| x.plus_times(*k, a)).collect()
+    }
+}
+
+/// An interval of a system in symbols: its begin is [`Leaf::Time`], its length [`Leaf::Step`].
+pub(crate) struct SymbolicField<'a> {
+    pub kind: Kind,
+    pub states: usize,
+    pub rate: Rate<'a, Symbol>,
+}
+
+impl System for SymbolicField<'_> {
+    type Scalar = Symbol;
+    type Vector<T: Entry> = Vec<T>;
+    type Matrix = Vec<Vec<f64>>;
+
+    fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    fn interval(&self) -> (f64, f64) {
+        Symbol::fail("its integrator asks for the interval in numbers");
+        (f64::NAN, f64::NAN)
+    }
+
+    fn vector<T: Entry>(&self, f: impl FnMut(usize) -> T) -> Vec<T> {
+        (0..self.states).map(f).collect()
+    }
+
+    fn derivative(&self, position: f64, x: &Vec<Symbol>) -> Vec<Symbol> {
+        let mut to = vec![Symbol::default(); self.states];
+        (self.rate)(position, x, &mut to);
+        to
+    }
+
+    fn next(&self, x: &Vec<Symbol>) -> Vec<Symbol> {
+        self.derivative(0.0, x)
+    }
+
+    fn jacobian(&self, _position: f64, x: &Vec<f64>) -> (Vec<f64>, Vec<Vec<f64>>) {
+        Symbol::fail("its integrator asks for a Jacobian in numbers");
+        (x.clone(), vec![x.clone(); x.len()])
+    }
+
+    fn along(&self, x: &Vec<Symbol>, part: f64, k: &Vec<Symbol>) -> Vec<Symbol> {
+        if part == 0.0 {
+            return x.clone();
+        }
+        let h = Symbol::leaf(Leaf::Step) * part;
+        x.iter().zip(k).map(|(x, k)| x.along(*k, h)).collect()
+    }
+}
+
+/// An [`Integrator`] as an object.
+pub(crate) trait Method: Debug + Send + Sync {
+    fn advance_values(&self, field: &Field<'_, f64>, x: Vec<f64>, step: &mut f64) -> Result<Vec<f64>, Stuck>;
+    fn advance_duals(&self, field: &Field<'_, Duals>, x: Vec<Duals>, step: &mut f64) -> Result<Vec<Duals>, Stuck>;
+    fn advance_symbols(&self, field: &SymbolicField<'_>, x: Vec<Symbol>) -> Result<Vec<Symbol>, Stuck>;
+    fn is_fixed(&self) -> bool;
+    fn serves(&self, kind: Kind) -> bool;
+    fn refined(&self, kind: Kind) -> Option<Arc<dyn Method>>;
+    fn check(&self) -> Result<(), Error>;
+    fn describe(&self, kind: Kind) -> String;
+}
+
+impl<I: Integrator> Method for I {
+    fn advance_values(&self, field: &Field<'_, f64>, x: Vec<f64>, step: &mut f64) -> Result<Vec<f64>, Stuck> {
+        self.advance(field, x, step)
+    }
+
+    fn advance_duals(&self, field: &Field<'_, Duals>, x: Vec<Duals>, step: &mut f64) -> Result<Vec<Duals>, Stuck> {
+        self.advance(field, x, step)
+    }
+
+    fn advance_symbols(&self, field: &SymbolicField<'_>, x: Vec<Symbol>) -> Result<Vec<Symbol>, Stuck> {
+        self.advance(field, x, &mut 0.0)
+    }
+
+    fn is_fixed(&self) -> bool {
+        I::FIXED
+    }
+
+    fn serves(&self, kind: Kind) -> bool {
+        Integrator::serves(self, kind)
+    }
+
+    fn refined(&self, kind: Kind) -> Option<Arc<dyn Method>> {
+        Integrator::refined(self, kind).map(|refined| Arc::new(refined) as Arc<dyn Method>)
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        Integrator::check(self)
+    }
+
+    fn describe(&self, kind: Kind) -> String {
+        Integrator::describe(self, kind)
+    }
+}

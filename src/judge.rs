@@ -1,0 +1,13 @@
+//! From where a search ended to what is known: noise, covariance, directions, warnings.
+
+mod conclude;
+mod directions;
+mod hac;
+pub(crate) mod noise;
+mod residual_pass;
+mod sandwich;
+mod warnings;
+
+pub(crate) use conclude::{SearchEnd, conclude};
+pub(crate) use directions::undetermined;
+pub(crate) use residual_pass::output_fit;

@@ -1,0 +1,338 @@
+//! From where a search ended to a [`Summary`].
+
+use super::directions;
+use super::hac::{Hac, hac};
+use super::residual_pass::{Residuals, reason, residual_pass};
+use super::{noise, sandwich};
+use crate::error::Error;
+use crate::estimate::{
+    CovarianceMethod, ExperimentEstimate, Knowledge, Method, NoiseModel, OutputEstimate, ParameterEstimate, Summary,
+    Unknown, student,
+};
+use crate::information::{Covariance, Undetermined};
+use crate::layout::{Kind, Quantity};
+use crate::optimize::{Linearization, Outcome};
+use crate::problem::{Noise, Objective, Role, Whitening};
+
+/// Below so many measurements a covariance that allows for autocorrelated errors is less sure than the classical one.
+const CORRELATED_SAMPLES: u64 = 100;
+/// Errors below this part of a given noise are no sample of it.
+const ROUNDING: f64 = 0.1;
+/// The probability below which errors count as autocorrelated.
+const WHITENESS_LEVEL: f64 = 0.01;
+
+/// Where a search ended.
+pub(crate) struct SearchEnd {
+    pub coordinates: Vec<f64>,
+    pub whitening: Whitening,
+    /// The slopes there, if they are still those of this whitening.
+    pub linear: Option<Linearization>,
+    pub outcome: Outcome,
+    pub iterations: u64,
+    pub evaluations: u64,
+    /// The search's name.
+    pub name: String,
+    /// What went wrong with a checkpoint.
+    pub trouble: Option<String>,
+}
+
+/// Where the search ended, and what follows from there; each step adds to it.
+pub(super) struct Judgement<'j> {
+    pub objective: &'j Objective<'j>,
+    pub end: &'j SearchEnd,
+    pub linear: &'j Linearization,
+    pub residuals: Residuals,
+    /// Values of the unknowns, and how fast each moves with its coordinate.
+    pub values: Vec<f64>,
+    pub slopes: Vec<f64>,
+    pub norms: Vec<f64>,
+    /// The bound that each unknown is held at.
+    pub held_at: Vec<Option<f64>>,
+    /// Directions of the scaled unknowns along which nothing is known; and the unknowns held for the covariance: at a
+    /// bound, or one for each such direction.
+    pub undetermined: Undetermined,
+    /// Measurements less estimated unknowns; zero where nothing is left.
+    pub degrees: f64,
+    /// By how much the noise is wider than what the errors were divided by.
+    pub widening: f64,
+    /// Whether the errors are so far below a given noise that they are rounding.
+    pub rounding: bool,
+}
+
+/// The covariance of the unknowns in their own units, how it was made, and that of unit noise in coordinates.
+pub(super) struct Covariances {
+    pub unknowns: Option<Covariance>,
+    pub method: CovarianceMethod,
+    pub unit: Option<Covariance>,
+}
+
+/// What is known at the end of a search; the objective has the whitening that it ended with.
+pub(crate) fn conclude(objective: &Objective<'_>, end: &SearchEnd, seconds: f64) -> Result<Summary, Error> {
+    let evaluated;
+    let linear = match &end.linear {
+        Some(linear) => linear,
+        None => {
+            evaluated = objective.evaluate(&end.coordinates).map_err(reason)?;
+            &evaluated
+        }
+    };
+    let judgement = Judgement::new(objective, end, linear)?;
+    let covariances = judgement.covariances();
+    let unknowns = judgement.unknowns(&covariances);
+    let directions = judgement.directions();
+    let warnings = judgement.warnings(&unknowns, &directions, &covariances);
+    let noise = judgement.noise()?;
+    let problem = objective.problem;
+    let measurements = judgement.residuals.measured;
+    Ok(Summary {
+        layout: problem.layout().clone(),
+        parameters: judgement.parameters(&unknowns),
+        experiments: judgement.experiments(),
+        outputs: judgement.outputs(&noise),
+        deviance: judgement.deviance(),
+        covariance: covariances.unknowns.unwrap_or_else(|| Covariance::zeros(unknowns.len())),
+        unknowns,
+        noise_covariance: match noise {
+            Whitening::Full { covariance, .. } => Some(covariance),
+            Whitening::Diagonal(_) => None,
+        },
+        directions,
+        outcome: end.outcome,
+        warnings,
+        cost: linear.cost,
+        measurements,
+        iterations: end.iterations,
+        evaluations: end.evaluations + u64::from(end.linear.is_none()),
+        seconds,
+        method: method(objective, end.name.clone(), covariances.method),
+    })
+}
+
+fn method(objective: &Objective<'_>, optimizer: String, covariance: CovarianceMethod) -> Method {
+    let (settings, sweep) = (&objective.problem.settings, objective.sweep);
+    let or = |said: Option<String>, other: &str| said.unwrap_or_else(|| other.to_owned());
+    Method {
+        optimizer,
+        integrator: sweep.integrator(),
+        predictor: sweep.predictor(),
+        engine: sweep.engine(),
+        loss: or(settings.loss.as_ref().map(|loss| loss.describe()), "squared"),
+        weighting: or(settings.weights.as_ref().map(|weights| weights.describe()), "none"),
+        prefilter: or(settings.prefilter.as_ref().map(|filter| filter.describe()), "none"),
+        noise: match settings.noise {
+            Noise::Given(_) => NoiseModel::Given,
+            Noise::PerOutput => NoiseModel::PerOutput,
+            Noise::Covariance => NoiseModel::Covariance,
+            Noise::Predicted => NoiseModel::Predicted,
+        },
+        covariance,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+    }
+}
+
+impl<'j> Judgement<'j> {
+    fn new(objective: &'j Objective<'j>, end: &'j SearchEnd, linear: &'j Linearization) -> Result<Self, Error> {
+        let (unknowns, coordinates) = (&objective.problem.unknowns, &end.coordinates);
+        let n = unknowns.row.len();
+        let residuals = residual_pass(objective, coordinates)?;
+        let (gradient, norms, bounds) = (linear.gradient(), linear.column_norms(), unknowns.bounds());
+        let at_bound = |i: usize| {
+            let ((lower, upper), x) = (bounds[i], coordinates[i]);
+            let parameter = unknowns.row[i].parameter;
+            let low = (x <= lower && gradient[i] >= 0.0).then_some(parameter.lower);
+            low.or((x >= upper && gradient[i] <= 0.0).then_some(parameter.upper))
+        };
+        let held_at: Vec<Option<f64>> = (0..n).map(at_bound).collect();
+        let at_bounds: Vec<bool> = held_at.iter().map(Option::is_some).collect();
+        let undetermined = directions::undetermined(linear, &at_bounds);
+        let values = unknowns.values(coordinates);
+        let slopes = (0..n).map(|i| unknowns.row[i].parameter.transform.slope(values[i])).collect();
+        let estimated = undetermined.held.iter().filter(|held| !**held).count() as f64;
+        let measured = residuals.measured;
+        // With no more measurements than unknowns nothing is left to tell the noise from.
+        let degrees = if measured <= n as u64 { 0.0 } else { measured as f64 - estimated };
+        let noise = &objective.problem.settings.noise;
+        let widening = match noise {
+            Noise::Given(_) | Noise::Predicted => 1.0,
+            _ if noise::only_scales(objective) => (linear.sum_of_squares() / degrees.max(1.0)).sqrt(),
+            _ => (measured as f64 / degrees.max(1.0)).sqrt(),
+        };
+        let sigma = objective.whitening.sigma();
+        let below = |(fit, sigma): (&crate::estimate::OutputFit, &f64)| fit.rmse < ROUNDING * sigma;
+        let rounding = matches!(noise, Noise::Given(_)) && residuals.outputs.iter().zip(&sigma).all(below);
+        Ok(Judgement {
+            objective,
+            end,
+            linear,
+            residuals,
+            values,
+            slopes,
+            norms,
+            held_at,
+            undetermined,
+            degrees,
+            widening,
+            rounding,
+        })
+    }
+
+    /// Whether an unknown is neither held at a bound nor part of a direction along which nothing is known.
+    fn seen(&self) -> Vec<bool> {
+        let mut seen: Vec<bool> = self.held_at.iter().map(Option::is_none).collect();
+        for direction in &self.undetermined.directions {
+            directions::taking_part(direction).for_each(|(i, _)| seen[i] = false);
+        }
+        seen
+    }
+
+    /// The errors' autocorrelation, where it matters: residuals far below a given noise are rounding.
+    pub(super) fn autocorrelated(&self) -> Option<(usize, super::residual_pass::Whiteness)> {
+        self.residuals.least_white().filter(|(_, white)| white.p_value < WHITENESS_LEVEL && !self.rounding)
+    }
+
+    fn covariances(&self) -> Covariances {
+        let (objective, x) = (self.objective, &self.end.coordinates);
+        let unit = self.linear.covariance(&self.undetermined.held);
+        let small_sample = self.residuals.measured as f64 / self.degrees.max(1.0);
+        let autocorrelated = self.autocorrelated().filter(|_| {
+            objective.problem.layout().kind != Kind::Static && self.residuals.measured >= CORRELATED_SAMPLES
+        });
+        let found = autocorrelated.and_then(|_| hac(objective, x, self.linear, &self.undetermined.held));
+        let found =
+            found.and_then(|Hac { sandwich, lags }| Some((sandwich.covariance(&self.undetermined.held)?, lags)));
+        let (found, method, factor) = match found {
+            Some((covariance, lags)) => (Some(covariance), CovarianceMethod::Hac { lags: lags as u64 }, small_sample),
+            None if sandwich::is_needed(objective) => {
+                let filtered = objective.problem.settings.prefilter.is_some();
+                let method = if filtered { CovarianceMethod::FilteredSandwich } else { CovarianceMethod::Sandwich };
+                (sandwich::sandwich(objective, x, &self.undetermined.held).ok().flatten(), method, 1.0)
+            }
+            // The noise is wider than the errors, the priors are not.
+            None if self.widening != 1.0 && objective.problem.unknowns.priors(x).next().is_some() => {
+                let widened = objective.with(objective.whitening.widened(self.widening));
+                let covariance = widened.evaluate(x).ok().and_then(|linear| linear.covariance(&self.undetermined.held));
+                (covariance, CovarianceMethod::Classical, 1.0)
+            }
+            None => (unit.clone(), CovarianceMethod::Classical, self.widening * self.widening),
+        };
+        let seen = self.seen().into_iter().zip(&self.slopes);
+        let in_units: Vec<f64> = seen.map(|(seen, slope)| if seen { *slope } else { 0.0 }).collect();
+        let unknowns = found.map(|covariance| covariance.times(factor).scaled(&in_units));
+        Covariances { unknowns, method, unit }
+    }
+
+    fn unknowns(&self, covariances: &Covariances) -> Vec<Unknown> {
+        let (free, seen) = (&self.objective.problem.unknowns.row, self.seen());
+        let root = self.linear.sum_of_squares().sqrt();
+        let one = |i: usize| {
+            let (unknown, value) = (&free[i], self.values[i]);
+            let transform = unknown.parameter.transform;
+            let covariance = covariances.unknowns.as_ref().filter(|_| seen[i] && self.degrees > 0.0);
+            let knowledge = match (self.held_at[i], covariance) {
+                (Some(bound), _) => Knowledge::Held { bound },
+                (None, None) => Knowledge::Unidentified,
+                (None, Some(covariance)) => {
+                    let standard_error = covariance.standard_error(i);
+                    let (lower, upper) = student::interval(value, standard_error, transform, 0.95, self.degrees);
+                    Knowledge::Known { standard_error, lower, upper }
+                }
+            };
+            let index = |change: f64| {
+                let percent = 100.0 * (root * change * self.slopes[i] / value).abs();
+                (covariance.is_some() && percent.is_finite()).then_some(percent)
+            };
+            Unknown {
+                name: unknown.name.clone(),
+                unit: unknown.unit.clone(),
+                role: unknown.role,
+                experiment: unknown.experiment,
+                value,
+                start: unknown.parameter.start,
+                knowledge,
+                error_index: covariances.unit.as_ref().and_then(|unit| index(unit.standard_error(i))),
+                error_index_held: index(1.0 / self.norms[i]),
+                transform,
+            }
+        };
+        (0..free.len()).map(one).collect()
+    }
+
+    fn directions(&self) -> Vec<crate::estimate::Direction> {
+        let unknowns = &self.objective.problem.unknowns;
+        let named = |d: &Vec<(usize, f64)>| directions::named(unknowns, d, &self.norms, &self.values, &self.slopes);
+        self.undetermined.directions.iter().map(named).collect()
+    }
+
+    fn parameters(&self, unknowns: &[Unknown]) -> Vec<ParameterEstimate> {
+        let (problem, x) = (self.objective.problem, &self.end.coordinates);
+        let first = problem.unknowns.of_experiment(0, x);
+        let one = |(j, Quantity { name, unit }): (usize, &Quantity)| ParameterEstimate {
+            name: name.clone(),
+            unit: unit.clone(),
+            value: first.p[j],
+            knowledge: unknowns
+                .iter()
+                .find(|unknown| unknown.role == Role::Parameter(j))
+                .map_or(Knowledge::Fixed, |unknown| unknown.knowledge),
+            declared: problem.parameters()[j],
+        };
+        problem.layout().parameters.iter().enumerate().map(one).collect()
+    }
+
+    fn experiments(&self) -> Vec<ExperimentEstimate> {
+        let problem = self.objective.problem;
+        let one = |e: usize| {
+            let values = problem.unknowns.of_experiment(e, &self.end.coordinates);
+            ExperimentEstimate {
+                name: problem.unknowns.labels[e].clone(),
+                samples: problem.records[e].len() as u64,
+                parameters: values.p,
+                initial_state: values.x,
+            }
+        };
+        (0..problem.records.len()).map(one).collect()
+    }
+
+    /// The noise with the degrees of freedom that the unknowns took.
+    fn noise(&self) -> Result<Whitening, Error> {
+        let objective = self.objective;
+        // Weights are in the sum of squares, but no part of the noise.
+        if objective.is_weighted() && noise::only_scales(objective) {
+            let found = noise::estimate(objective, &self.end.coordinates).map_err(reason)?;
+            return Ok(found.widened((self.residuals.measured as f64 / self.degrees.max(1.0)).sqrt()));
+        }
+        Ok(objective.whitening.widened(self.widening))
+    }
+
+    fn outputs(&self, noise: &Whitening) -> Vec<OutputEstimate> {
+        let predicted = self.objective.sweep.predicts_variance();
+        let outputs = self.objective.problem.layout().outputs.iter();
+        let one = |((quantity, fit), sigma): ((&Quantity, &crate::estimate::OutputFit), f64)| {
+            let sigma = if predicted { fit.rmse } else { sigma };
+            let fit = crate::estimate::OutputFit { sigma, ..*fit };
+            OutputEstimate { name: quantity.name.clone(), unit: quantity.unit.clone(), fit }
+        };
+        outputs.zip(&self.residuals.outputs).zip(noise.sigma()).map(one).collect()
+    }
+
+    /// `-2 ln` of the Gaussian likelihood, if weights and losses leave it one.
+    fn deviance(&self) -> Option<f64> {
+        let objective = self.objective;
+        if objective.loss().is_some() || objective.is_weighted() {
+            return None;
+        }
+        let (n, priors) = (self.residuals.measured as f64, objective.problem.unknowns.priors(&self.end.coordinates));
+        let priors: f64 = priors.map(|(_, _, error)| error * error).sum();
+        let log_determinant = self.residuals.log_determinant;
+        let squares = match objective.sweep.predicts_variance() {
+            true => 2.0 * self.linear.cost - log_determinant,
+            false => self.linear.sum_of_squares(),
+        };
+        // Where the noise only scales the cost, its most likely variance is still to be put in.
+        let variance = if noise::only_scales(objective) { squares / n } else { 1.0 };
+        let deviance =
+            n * (std::f64::consts::TAU.ln() + variance.ln()) + log_determinant + (squares - priors) / variance;
+        // Without any error the likelihood has no bound.
+        deviance.is_finite().then_some(deviance)
+    }
+}

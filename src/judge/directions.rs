@@ -1,0 +1,41 @@
+//! Directions in the space of the unknowns along which the data say nothing.
+
+use crate::estimate::Direction;
+use crate::information::Undetermined;
+use crate::optimize::Linearization;
+use crate::problem::Unknowns;
+
+/// Singular values below this part of the largest are rounding of a simulation: nothing is known along their directions.
+const RANK: f64 = 1e-11;
+/// What has less than this part in a direction that is not known is itself known.
+const PART: f64 = 1e-3;
+
+/// What the data do not determine, with these unknowns held.
+pub(crate) fn undetermined(linear: &Linearization, held: &[bool]) -> Undetermined {
+    linear.undetermined(held, RANK)
+}
+
+/// The entries of the unknowns that take part in a direction.
+pub(crate) fn taking_part(direction: &[(usize, f64)]) -> impl Iterator<Item = (usize, f64)> {
+    let largest = direction.iter().fold(0.0f64, |m, (_, d)| m.max(d.abs()));
+    direction.iter().copied().filter(move |(_, d)| d.abs() > PART * largest)
+}
+
+/// A direction of the scaled unknowns as relative changes by name.
+pub(crate) fn named(
+    unknowns: &Unknowns,
+    direction: &[(usize, f64)],
+    norms: &[f64],
+    values: &[f64],
+    slopes: &[f64],
+) -> Direction {
+    let change = |i: usize, d: f64| {
+        let step = d / if norms[i] > 0.0 { norms[i] } else { 1.0 } * slopes[i];
+        if values[i] == 0.0 { step } else { step / values[i].abs() }
+    };
+    let mut moves: Vec<(String, f64)> =
+        taking_part(direction).map(|(i, d)| (unknowns.row[i].name.clone(), change(i, d))).collect();
+    let unit = moves.iter().map(|(_, by)| *by).fold(0.0, |m: f64, by| if by.abs() > m.abs() { by } else { m });
+    moves.iter_mut().for_each(|(_, by)| *by /= unit);
+    Direction { moves }
+}

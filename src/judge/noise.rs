@@ -1,0 +1,154 @@
+//! How large the noise is, by the prediction errors.
+
+use crate::information::SquareMatrix;
+use crate::loss::{Huber, Loss};
+use crate::optimize::Infeasible;
+use crate::problem::{Accumulate, Noise, Objective, Whitening};
+use crate::sweep::Window;
+use statrs::distribution::{Continuous, ContinuousCDF, Normal};
+
+/// Noise below this part of the output's own size is rounding of the simulation.
+const ROUNDING: f64 = 1e-15;
+/// Errors below this part of the output's own size, in the mean, are all rounding: it adds up along a record.
+const REPRODUCED: f64 = 1e-12;
+
+/// `E[psi^2]` of Huber's loss under the standard normal.
+fn bent_variance(&Huber(c): &Huber) -> f64 {
+    let normal = Normal::standard();
+    2.0 * (normal.cdf(c) - 0.5 - c * normal.pdf(c) + c * c * normal.sf(c))
+}
+
+/// Sums of the products of two outputs' errors, and how many there were.
+struct Moments<'m> {
+    objective: &'m Objective<'m>,
+    experiment: usize,
+    sigma: &'m [f64],
+    bend: Option<&'m (dyn Fn(f64) -> f64 + Sync)>,
+    sums: SquareMatrix,
+    pairs: SquareMatrix,
+}
+
+impl Accumulate for Moments<'_> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        let outputs = window.outputs();
+        let mut errors = vec![0.0; outputs];
+        for k in 0..window.samples[lane] {
+            if self.objective.weight(self.experiment, window.begin[lane] + k) <= 0.0 {
+                continue;
+            }
+            for (j, error) in errors.iter_mut().enumerate() {
+                let value = window.error(k, j, lane);
+                *error = self.bend.map_or(value, |bend| bend(value / self.sigma[j]) * self.sigma[j]);
+            }
+            for i in 0..outputs {
+                for j in 0..outputs {
+                    if window.is_measured(k, i, lane) && window.is_measured(k, j, lane) {
+                        self.sums[(i, j)] += errors[i] * errors[j];
+                        self.pairs[(i, j)] += 1.0;
+                    }
+                }
+            }
+        }
+    }
+
+    fn append(&mut self, later: Self) {
+        let n = self.sums.size();
+        let added = |a: &SquareMatrix, b: &SquareMatrix| SquareMatrix::from_fn(n, |i, j| a[(i, j)] + b[(i, j)]);
+        self.sums = added(&self.sums, &later.sums);
+        self.pairs = added(&self.pairs, &later.pairs);
+    }
+}
+
+/// Second moments of the (filtered) errors in the units of the outputs; each error through `bend` in units of
+/// `sigma`, for robust estimates.
+fn moments(
+    objective: &Objective<'_>,
+    coordinates: &[f64],
+    sigma: &[f64],
+    bend: Option<&(dyn Fn(f64) -> f64 + Sync)>,
+) -> Result<SquareMatrix, Infeasible> {
+    let outputs = objective.outputs();
+    let plain = objective.in_units();
+    let empty = || SquareMatrix::zeros(outputs);
+    let make = |experiment| Moments { objective: &plain, experiment, sigma, bend, sums: empty(), pairs: empty() };
+    let all = plain.gather(coordinates, false, make)?;
+    let sum = |part: &dyn Fn(&Moments<'_>) -> f64| all.iter().map(part).sum::<f64>();
+    let covariance = SquareMatrix::from_fn(outputs, |i, j| {
+        sum(&|moments| moments.sums[(i, j)]) / sum(&|moments| moments.pairs[(i, j)]).max(1.0)
+    });
+    if let Some(variance) = covariance.diagonal().iter().find(|variance| !variance.is_finite()) {
+        return Err(Infeasible::Failed(format!("the variance of an output's errors is {variance}")));
+    }
+    Ok(covariance)
+}
+
+/// With one output, squared loss and no prior the noise scales the cost and nothing else.
+pub(crate) fn only_scales(objective: &Objective<'_>) -> bool {
+    let settings = &objective.problem.settings;
+    let priors = objective.problem.unknowns.row.iter().any(|unknown| unknown.parameter.prior.is_some());
+    let estimated = matches!(settings.noise, Noise::PerOutput | Noise::Covariance);
+    estimated && objective.outputs() == 1 && settings.loss.is_none() && !priors
+}
+
+/// Whether the search finds its noise by itself, in rounds.
+pub(crate) fn is_estimated(objective: &Objective<'_>) -> bool {
+    matches!(objective.problem.settings.noise, Noise::PerOutput | Noise::Covariance) && !only_scales(objective)
+}
+
+/// The noise as given, or as the errors at a point show it.
+pub(crate) fn first_whitening(objective: &Objective<'_>, coordinates: &[f64]) -> Result<Whitening, Infeasible> {
+    match &objective.problem.settings.noise {
+        Noise::Given(sigma) => Ok(Whitening::Diagonal(sigma.clone())),
+        _ if is_estimated(objective) => estimate(objective, coordinates),
+        _ => Ok(objective.whitening.clone()),
+    }
+}
+
+/// The noise that the errors at a point show: plainly, or robustly by Huber's proposal 2 (Huber, *Robust Statistics*,
+/// 1981, section 6.4) where a robust loss bends the large ones.
+pub(crate) fn estimate(objective: &Objective<'_>, coordinates: &[f64]) -> Result<Whitening, Infeasible> {
+    let outputs = objective.outputs();
+    let mut found = moments(objective, coordinates, &vec![1.0; outputs], None)?;
+    let size = |size: f64| if size > 0.0 { size } else { 1.0 };
+    let floor: Vec<f64> = magnitudes(objective).into_iter().map(|magnitude| ROUNDING * size(magnitude)).collect();
+    let sigma = |moments: &SquareMatrix| -> Vec<f64> {
+        moments.diagonal().iter().zip(&floor).map(|(v, floor)| v.sqrt().max(*floor)).collect()
+    };
+    if objective.is_robust() {
+        let huber = Huber::default();
+        let kappa = bent_variance(&huber);
+        for _ in 0..50 {
+            let before = sigma(&found);
+            found = moments(objective, coordinates, &before, Some(&|z| huber.psi(z)))?;
+            found = SquareMatrix::from_fn(outputs, |i, j| found[(i, j)] / kappa);
+            let change = |(a, b): (f64, &f64)| (a / b).ln().abs();
+            if sigma(&found).into_iter().zip(&before).map(change).fold(0.0, f64::max) < 1e-9 {
+                break;
+            }
+        }
+    }
+    let diagonal = Whitening::Diagonal(sigma(&found));
+    Ok(match objective.problem.settings.noise {
+        Noise::Covariance => Whitening::full(found).unwrap_or(diagonal),
+        _ => diagonal,
+    })
+}
+
+/// Whether the model reproduces the data but for rounding, whose errors lead no search anywhere.
+pub(crate) fn reproduces(objective: &Objective<'_>, coordinates: &[f64]) -> bool {
+    let reproduced = |moments: SquareMatrix| {
+        let mut variances = moments.diagonal().into_iter().zip(magnitudes(objective));
+        variances.all(|(variance, size)| variance.sqrt() <= REPRODUCED * size)
+    };
+    moments(objective, coordinates, &vec![1.0; objective.outputs()], None).is_ok_and(reproduced)
+}
+
+/// Largest measured magnitude of each output.
+fn magnitudes(objective: &Objective<'_>) -> Vec<f64> {
+    let largest = |values: &[f64]| values.iter().fold(0.0f64, |largest, y| largest.max(y.abs()));
+    let of = |j: usize| {
+        let records = objective.problem.records.iter();
+        records.map(|record| largest(&record.outputs()[j].values)).fold(0.0, f64::max)
+    };
+    (0..objective.outputs()).map(of).collect()
+}

@@ -1,0 +1,304 @@
+//! One pass over the data without slopes: what is left unexplained at the point that was found.
+
+use crate::error::Error;
+use crate::estimate::OutputFit;
+use crate::optimize::Infeasible;
+use crate::problem::{Accumulate, Objective, each};
+use crate::sweep::{Piece, Prepared, Sweep, Window};
+use crate::whiteness::{Autocorrelation, ljung_box};
+use std::sync::Arc;
+
+/// Lags of the whiteness test.
+const LAGS: usize = 20;
+/// One window in so many is simulated once more with a finer step, and so many of a record at most.
+const EVERY: usize = 8;
+const AGAIN: usize = 64;
+
+/// What a pass over the residuals found.
+pub(crate) struct Residuals {
+    pub outputs: Vec<OutputFit>,
+    /// How many measurements count.
+    pub measured: u64,
+    /// Logarithm of the determinant of the covariance of all measurements.
+    pub log_determinant: f64,
+    /// A bound on how far (in standard errors) a finer step could move the unknowns: the norm of the change of all
+    /// standardized predictions, extrapolated from the windows that were simulated again.
+    pub step_error: f64,
+    /// The whiteness of each output's errors.
+    pub whiteness: Vec<Whiteness>,
+}
+
+/// How white the errors of an output are.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Whiteness {
+    /// Probability that white errors look like this (Ljung and Box).
+    pub p_value: f64,
+    /// Correlation of an error with the one before.
+    pub first: f64,
+}
+
+/// Sums over one experiment.
+struct Sums<'s> {
+    objective: &'s Objective<'s>,
+    experiment: usize,
+    outputs: Vec<OutputSums>,
+    measured: u64,
+    log_determinant: f64,
+    autocorrelations: Vec<Autocorrelation>,
+    /// The windows to be simulated again.
+    again: Vec<Sampled>,
+    run: Vec<f64>,
+}
+
+/// A window that is to be compared with a finer simulation.
+struct Sampled {
+    begin: usize,
+    errors: Vec<f64>,
+    carry: Vec<f64>,
+}
+
+impl Accumulate for Sums<'_> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        let (outputs, samples) = (window.outputs(), window.samples[lane]);
+        let begin = window.begin[lane];
+        let whitening = &self.objective.whitening;
+        let all: Vec<usize> = (0..outputs).collect();
+        let whole = whitening.log_determinant(&all);
+        let mut here = Vec::with_capacity(outputs);
+        for k in 0..samples {
+            here.clear();
+            here.extend((0..outputs).filter(|&j| window.is_measured(k, j, lane)));
+            self.log_determinant += match here.len() == outputs {
+                _ if window.has_variances() => {
+                    let number = |j: usize| (k * outputs + j) * window.lanes() + lane;
+                    here.iter().map(|&j| window.log_variances[number(j)]).sum()
+                }
+                true => whole,
+                false => whitening.log_determinant(&here),
+            };
+            if !self.objective.is_weighted() || self.objective.weight(self.experiment, begin + k) > 0.0 {
+                self.measured += here.len() as u64;
+            }
+        }
+        let record = &self.objective.problem.records[self.experiment];
+        for j in 0..outputs {
+            self.run.clear();
+            self.run.extend((0..samples).map(|k| window.error(k, j, lane)));
+            let values = &record.outputs()[j].values[begin..begin + samples];
+            let mut count = 0;
+            for (k, (&y, &error)) in values.iter().zip(&self.run).enumerate() {
+                if window.is_measured(k, j, lane) {
+                    let unit = window.variance_root(k, j, lane);
+                    self.outputs[j].add(y, error * unit);
+                    count += 1;
+                }
+            }
+            self.autocorrelations[j].add(&self.run, count);
+        }
+        // Those in which a multiple of the distance lies.
+        let distance = (EVERY * window.capacity()).max(record.len() / AGAIN);
+        if begin.next_multiple_of(distance) < begin + samples && !window.carry.is_empty() {
+            let errors = (0..samples).flat_map(|k| (0..outputs).map(move |j| window.error(k, j, lane))).collect();
+            let carry = window.carry.iter().skip(lane).step_by(window.lanes()).copied().collect();
+            self.again.push(Sampled { begin, errors, carry });
+        }
+    }
+
+    fn append(&mut self, later: Self) {
+        self.measured += later.measured;
+        self.log_determinant += later.log_determinant;
+        self.outputs.iter_mut().zip(&later.outputs).for_each(|(sums, later)| sums.append(later));
+        self.autocorrelations.iter_mut().zip(&later.autocorrelations).for_each(|(sums, later)| sums.follow(later));
+        self.again.extend(later.again);
+    }
+}
+
+/// What is left unexplained at a point, in the units of the outputs.
+pub(crate) fn residual_pass(objective: &Objective<'_>, coordinates: &[f64]) -> Result<Residuals, Error> {
+    // Without a pre-filter: the errors as they are.
+    let mut plain = objective.in_units();
+    let unfiltered;
+    if objective.problem.settings.prefilter.is_some() {
+        let mut problem = objective.problem.clone();
+        problem.settings.prefilter = None;
+        unfiltered = problem;
+        plain = Objective { problem: &unfiltered, ..plain };
+    }
+    let outputs = objective.outputs();
+    let make = |experiment: usize| Sums {
+        objective,
+        experiment,
+        outputs: vec![OutputSums::default(); outputs],
+        measured: 0,
+        log_determinant: 0.0,
+        autocorrelations: vec![Autocorrelation::new(LAGS); outputs],
+        again: vec![],
+        run: vec![],
+    };
+    let all = plain.gather(coordinates, false, make).map_err(|_| failed(objective, coordinates))?;
+    let step_error = step_error(objective, coordinates, &all);
+    let mut sums = vec![OutputSums::default(); outputs];
+    let (mut measured, mut log_determinant) = (0, 0.0);
+    for one in &all {
+        measured += one.measured;
+        log_determinant += one.log_determinant;
+        sums.iter_mut().zip(&one.outputs).for_each(|(sum, one)| sum.append(one));
+    }
+    let whiteness = |j: usize| {
+        let mut total = all[0].autocorrelations[j].clone();
+        all[1..].iter().for_each(|one| total.append(&one.autocorrelations[j]));
+        let coefficients = total.coefficients();
+        let (_, p_value) = ljung_box(&coefficients, total.count());
+        Whiteness { p_value, first: coefficients.first().copied().unwrap_or(0.0) }
+    };
+    Ok(Residuals {
+        outputs: sums.iter().map(OutputSums::fit).collect(),
+        measured,
+        log_determinant,
+        step_error,
+        whiteness: (0..outputs).map(whiteness).collect(),
+    })
+}
+
+fn failed(objective: &Objective<'_>, coordinates: &[f64]) -> Error {
+    for e in 0..objective.experiments() {
+        let probe = objective.run_alone(e, coordinates, false, &mut |window| {
+            (0..window.samples[0]).all(|k| (0..window.outputs()).all(|j| window.error(k, j, 0).is_finite()))
+        });
+        if let Err(error) = probe {
+            let sample = if let crate::sweep::RunError::Failed { sample } = error { sample } else { 0 };
+            return Error::Simulation(objective.locate(e, coordinates, sample));
+        }
+    }
+    Error::Simulation(objective.locate(0, coordinates, 0))
+}
+
+/// The norm of the change of all standardized predictions with a finer step, extrapolated from some windows.
+fn step_error(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -> f64 {
+    let Some(finer) = objective.sweep.refined() else { return 0.0 };
+    if objective.sweep.predicts_variance() {
+        return 0.0;
+    }
+    let sigma = objective.whitening.sigma();
+    let change = |e: usize| changed(objective, coordinates, e, &finer, &sigma, &all[e].again);
+    each(all.len(), change).into_iter().sum::<f64>().sqrt()
+}
+
+/// Sum of the squared standardized changes in some windows, extrapolated to the whole experiment.
+fn changed(
+    objective: &Objective<'_>,
+    x: &[f64],
+    e: usize,
+    finer: &Arc<dyn Sweep + '_>,
+    sigma: &[f64],
+    again: &[Sampled],
+) -> f64 {
+    let record = &objective.problem.records[e];
+    let values = objective.problem.unknowns.of_experiment(e, x);
+    let prepared = Prepared { restarts: objective.problem.prepared[e].restarts.clone() };
+    let (mut change, mut seen) = (0.0, 0usize);
+    for sampled in again {
+        let samples = sampled.errors.len() / sigma.len();
+        let piece = Piece {
+            record,
+            prepared: &prepared,
+            samples: sampled.begin..sampled.begin + samples,
+            carry: sampled.carry.clone(),
+            slopes: vec![],
+            parameters: &values.p,
+        };
+        let mut found = 0.0;
+        let reached = finer.run(std::slice::from_ref(&piece), &[], &mut |window| {
+            for k in 0..window.samples[0] {
+                for (j, sigma) in sigma.iter().enumerate() {
+                    let before = sampled.errors[(window.begin[0] + k - sampled.begin) * window.outputs() + j];
+                    found += ((before - window.error(k, j, 0)) / sigma).powi(2);
+                }
+            }
+            true
+        });
+        if reached.iter().all(Result::is_ok) && found.is_finite() {
+            change += found;
+            seen += samples;
+        }
+    }
+    if seen > 0 { change * record.len() as f64 / seen as f64 } else { 0.0 }
+}
+impl Residuals {
+    /// The output whose errors are least white, and how white they are; the probability counts all outputs that were
+    /// tested.
+    pub fn least_white(&self) -> Option<(usize, Whiteness)> {
+        let count = self.whiteness.len() as f64;
+        let tested = self.whiteness.iter().enumerate();
+        let tested = tested.map(|(j, white)| (j, Whiteness { p_value: white.p_value * count, ..*white }));
+        let strongest =
+            |a: &Whiteness, b: &Whiteness| a.p_value.total_cmp(&b.p_value).then(b.first.total_cmp(&a.first));
+        tested.min_by(|a, b| strongest(&a.1, &b.1))
+    }
+}
+
+/// Running sums of an output and its error.
+#[derive(Clone, Copy, Debug, Default)]
+struct OutputSums {
+    count: u64,
+    first: f64,
+    sum: f64,
+    squares: f64,
+    errors: f64,
+}
+
+impl OutputSums {
+    fn add(&mut self, y: f64, error: f64) {
+        if self.count == 0 {
+            self.first = y;
+        }
+        // From the first value, so that a large mean costs no digits.
+        let y = y - self.first;
+        self.count += 1;
+        self.sum += y;
+        self.squares += y * y;
+        self.errors += error * error;
+    }
+
+    /// As if the other's values had been added after its own.
+    fn append(&mut self, other: &OutputSums) {
+        if other.count == 0 {
+            return;
+        }
+        if self.count == 0 {
+            *self = *other;
+            return;
+        }
+        let (shift, n) = (other.first - self.first, other.count as f64);
+        self.squares += other.squares + 2.0 * shift * other.sum + n * shift * shift;
+        self.sum += other.sum + n * shift;
+        self.errors += other.errors;
+        self.count += other.count;
+    }
+
+    fn fit(&self) -> OutputFit {
+        let n = self.count as f64;
+        let spread = self.squares - self.sum * self.sum / n;
+        let fit_percent = (spread > 0.0).then(|| 100.0 * (1.0 - (self.errors / spread).sqrt()));
+        OutputFit {
+            samples: self.count,
+            rmse: if self.count > 0 { (self.errors / n).sqrt() } else { 0.0 },
+            fit_percent,
+            sigma: 0.0,
+        }
+    }
+}
+
+/// The fit of an output from its measured values and their errors; NaN where missing.
+pub(crate) fn output_fit(measured: &[f64], residuals: &[f64]) -> OutputFit {
+    let mut sums = OutputSums::default();
+    for (&y, &error) in measured.iter().zip(residuals).filter(|(_, error)| !error.is_nan()) {
+        sums.add(y, error);
+    }
+    sums.fit()
+}
+
+/// Why an infeasible point failed, in words.
+pub(crate) fn reason(error: Infeasible) -> Error {
+    Error::Optimizer(error.to_string())
+}

@@ -1,0 +1,380 @@
+//! The sandwich covariance, where weights, a robust loss or a pre-filter call for it.
+//!
+//! It is `A^-1 B A^-1` (Huber 1967; White 1980). `A` is the curvature of the cost, `E[psi'] sum w g g'`. `B` is the
+//! covariance of the score: the sum of squares of the samples' own scores, `w psi(z) g` added up over the outputs. Errors
+//! of a fit are smaller than the noise by the part of it that the fit took over, so each is divided by one less its
+//! leverage (HC3: MacKinnon and White, J. Econometrics 29 (1985) 305).
+//!
+//! A pre-filter correlates the errors. Where those before it are white, with covariance `S` between the outputs, the score
+//! is theirs times the weighted slopes passed through the filter backward in time (its adjoint), from rest at the end of
+//! the record to its first sample. A forward pass instead counts what happens at the begin of a record wrongly: errors of
+//! initial states came out several times too large.
+
+use crate::information::{Block, Covariance, Information};
+use crate::optimize::{Infeasible, Linearization};
+use crate::prefilter::{Butterworth, FilterState};
+use crate::problem::{Accumulate, Objective};
+use crate::sweep::Window;
+use nalgebra::DMatrix;
+
+/// One less the leverage of a measurement that alone determines an unknown: its error is rounding.
+const ALONE: f64 = 1e-6;
+/// Rows that are absorbed together.
+const ROWS: usize = 256;
+
+/// Curvature of the cost and triangles of the scores, a pair per experiment.
+pub(crate) struct Sandwich {
+    bread: Linearization,
+    pub scores: Vec<Information>,
+    /// Mean of `psi'`, by which the curvature is to be multiplied.
+    curvature: f64,
+    /// By which the squares of the scores are to be multiplied.
+    pub scale: f64,
+}
+
+impl Sandwich {
+    /// The curvature of plain least squares, still without scores.
+    pub fn plain(linear: &Linearization) -> Self {
+        Sandwich { bread: linear.clone(), scores: vec![], curvature: 1.0, scale: 1.0 }
+    }
+
+    /// `A^-1 B A^-1` over all unknowns that are not held.
+    pub fn covariance(&self, held: &[bool]) -> Option<Covariance> {
+        let scale = self.scale / (self.curvature * self.curvature);
+        Some(self.bread.sandwich(held, &self.scores)?.times(scale))
+    }
+}
+
+/// What the first pass sums up over all measurements.
+pub(crate) struct Tally {
+    weights: f64,
+    curvature: f64,
+    /// Sums of the products of two outputs' influences.
+    influence: DMatrix<f64>,
+    /// Sums of the variance that white noise of variance one would have.
+    expected: Vec<f64>,
+}
+
+impl Tally {
+    fn add(&mut self, other: Tally) {
+        self.weights += other.weights;
+        self.curvature += other.curvature;
+        self.influence += other.influence;
+        self.expected.iter_mut().zip(other.expected).for_each(|(sum, other)| *sum += other);
+    }
+}
+
+/// Whether the classical covariance would be wrong whatever the data say.
+pub(crate) fn is_needed(objective: &Objective<'_>) -> bool {
+    objective.is_weighted() || objective.problem.settings.prefilter.is_some() || objective.is_robust()
+}
+
+/// The sandwich over all unknowns that are not held, in two more passes with slopes; `None` if it has no number.
+pub(crate) fn sandwich(
+    objective: &Objective<'_>,
+    coordinates: &[f64],
+    held: &[bool],
+) -> Result<Option<Covariance>, Infeasible> {
+    Passes { objective, coordinates }.sandwich(held)
+}
+
+/// The curvature for the weights and the loss of a fit, in one pass with slopes; its scores are still missing.
+pub(crate) fn curvature(objective: &Objective<'_>, coordinates: &[f64]) -> Result<Sandwich, Infeasible> {
+    Ok(Passes { objective, coordinates }.without_scores()?.0)
+}
+
+/// The row of a prior on unknown `i` among the columns of experiment `e`.
+pub(crate) fn prior_row(objective: &Objective<'_>, e: usize, i: usize, slope: f64) -> Vec<f64> {
+    objective.problem.unknowns.columns(e).map(|c| if c == i { slope } else { 0.0 }).collect()
+}
+
+/// Passes over the data at a point.
+struct Passes<'p> {
+    objective: &'p Objective<'p>,
+    coordinates: &'p [f64],
+}
+
+impl Passes<'_> {
+    fn sandwich(&self, held: &[bool]) -> Result<Option<Covariance>, Infeasible> {
+        let (sandwich, tally) = self.without_scores()?;
+        let Some(inverse) = sandwich.bread.covariance(held) else { return Ok(None) };
+        let (mut scores, scale) = match &self.objective.problem.settings.prefilter {
+            Some(filter) => self.filtered_scores(&inverse, filter, &tally)?,
+            None => (self.scores(&inverse)?, 1.0),
+        };
+        for (i, slope, _) in self.objective.problem.unknowns.priors(self.coordinates) {
+            let e = self.objective.problem.unknowns.row[i].experiment.unwrap_or(0);
+            scores[e].absorb_row(&prior_row(self.objective, e, i, slope / scale.sqrt()), 0.0);
+        }
+        Ok(Sandwich { scores, scale, ..sandwich }.covariance(held))
+    }
+
+    /// The curvature for the weights and the loss of this fit, in one pass with slopes; its scores are still missing.
+    fn without_scores(&self) -> Result<(Sandwich, Tally), Infeasible> {
+        let outputs = self.objective.outputs();
+        let make = |experiment: usize| {
+            let columns = self.objective.problem.unknowns.columns(experiment).count();
+            let tally = Tally {
+                weights: 0.0,
+                curvature: 0.0,
+                influence: DMatrix::zeros(outputs, outputs),
+                expected: vec![0.0; outputs],
+            };
+            let (bread, block) = (Information::new(columns), Block::new(columns, ROWS));
+            let impulse = self.objective.problem.settings.prefilter.as_ref().map(ImpulseResponse::new);
+            Curvature { objective: self.objective, experiment, tally, bread, block, impulse, row: vec![0.0; columns] }
+        };
+        let all = self.objective.gather(self.coordinates, true, make)?;
+        let mut tally = Tally {
+            weights: 0.0,
+            curvature: 0.0,
+            influence: DMatrix::zeros(outputs, outputs),
+            expected: vec![0.0; outputs],
+        };
+        let mut blocks = Vec::with_capacity(all.len());
+        for mut one in all {
+            one.bread.absorb(&mut one.block);
+            blocks.push(one.bread);
+            tally.add(one.tally);
+        }
+        let curvature = tally.curvature / tally.weights;
+        for (i, slope, _) in self.objective.problem.unknowns.priors(self.coordinates) {
+            let e = self.objective.problem.unknowns.row[i].experiment.unwrap_or(0);
+            // A prior is a measurement of unit variance; the bread is multiplied by the mean curvature later.
+            blocks[e]
+                .absorb_row(&prior_row(self.objective, e, i, slope / curvature.max(f64::MIN_POSITIVE).sqrt()), 0.0);
+        }
+        let bread = Linearization::new(0.0, self.objective.problem.unknowns.shared(), blocks);
+        Ok((Sandwich { bread, scores: vec![], curvature, scale: 1.0 }, tally))
+    }
+
+    /// The triangle of each experiment's scores, sample by sample.
+    fn scores(&self, inverse: &Covariance) -> Result<Vec<Information>, Infeasible> {
+        let make = |experiment: usize| {
+            let inverse = self.of_experiment(inverse, experiment);
+            let columns = inverse.nrows();
+            let (scores, block) = (Information::new(columns), Block::new(columns, ROWS));
+            Scores { objective: self.objective, experiment, inverse, scores, block, row: vec![0.0; columns] }
+        };
+        let all = self.objective.gather(self.coordinates, true, make)?;
+        let absorbed = |mut one: Scores<'_>| {
+            one.scores.absorb(&mut one.block);
+            one.scores
+        };
+        Ok(all.into_iter().map(absorbed).collect())
+    }
+
+    /// The triangle of each experiment's scores where a filter correlated white errors, and the factor for all of them by
+    /// which the noise is larger than the errors. Holds the slopes of one experiment at a time.
+    fn filtered_scores(
+        &self,
+        inverse: &Covariance,
+        filter: &Butterworth,
+        tally: &Tally,
+    ) -> Result<(Vec<Information>, f64), Infeasible> {
+        let expected = |i: usize| tally.expected[i].max(f64::MIN_POSITIVE);
+        let outputs = self.objective.outputs();
+        let noise =
+            DMatrix::from_fn(outputs, outputs, |i, j| tally.influence[(i, j)] / (expected(i) * expected(j)).sqrt());
+        let deviations = DMatrix::from_diagonal(&noise.diagonal().map(f64::sqrt));
+        let factor = noise.cholesky().map_or(deviations, |cholesky| cholesky.l());
+        let make = |experiment: usize| {
+            let columns = self.objective.problem.unknowns.columns(experiment).count();
+            let samples = self.objective.problem.records[experiment].len();
+            Backward {
+                objective: self.objective,
+                experiment,
+                columns,
+                samples,
+                slopes: vec![0.0; columns * outputs * samples],
+                measured: vec![false; outputs * samples],
+            }
+        };
+        let (mut scores, mut taken) = (vec![], 0.0);
+        for e in 0..self.objective.experiments() {
+            let mut gathered = self.objective.gather_one(self.coordinates, e, true, || make(e))?;
+            let (triangle, part) = gathered.scores(filter, &factor, &self.of_experiment(inverse, e), outputs);
+            scores.push(triangle);
+            taken += part;
+        }
+        let expected: f64 = tally.expected.iter().sum();
+        Ok((scores, expected / (expected - taken).max(f64::MIN_POSITIVE)))
+    }
+
+    /// The rows and columns of one experiment.
+    fn of_experiment(&self, covariance: &Covariance, e: usize) -> DMatrix<f64> {
+        let columns: Vec<usize> = self.objective.problem.unknowns.columns(e).collect();
+        DMatrix::from(&covariance.dense(&columns))
+    }
+}
+
+/// The triangle of `sqrt(w) g`, and what there is to know of the errors.
+struct Curvature<'c> {
+    objective: &'c Objective<'c>,
+    experiment: usize,
+    tally: Tally,
+    bread: Information,
+    block: Block,
+    impulse: Option<ImpulseResponse<'c>>,
+    row: Vec<f64>,
+}
+
+impl Accumulate for Curvature<'_> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        let (outputs, lanes) = (window.outputs(), window.lanes());
+        let loss = self.objective.loss();
+        let mut psi = vec![0.0; outputs];
+        for k in 0..window.samples[lane] {
+            let w = self.objective.weight(self.experiment, window.begin[lane] + k);
+            let expected = self.impulse.as_mut().map_or(1.0, ImpulseResponse::next);
+            psi.fill(0.0);
+            for j in (0..outputs).filter(|&j| w > 0.0 && window.is_measured(k, j, lane)) {
+                let z = window.error(k, j, lane);
+                psi[j] = loss.map_or(z, |loss| loss.psi(z));
+                self.tally.weights += w;
+                self.tally.curvature += w * loss.map_or(1.0, |loss| loss.slope(z));
+                self.tally.expected[j] += expected;
+                let values = window.row(k, j).iter().skip(lane).step_by(lanes);
+                self.row.iter_mut().zip(values).for_each(|(to, from)| *to = from * w.sqrt());
+                self.bread.gather(&mut self.block, &self.row, 0.0);
+            }
+            for (i, j) in (0..outputs).flat_map(|i| (0..outputs).map(move |j| (i, j))) {
+                self.tally.influence[(i, j)] += psi[i] * psi[j];
+            }
+        }
+    }
+
+    fn append(&mut self, mut later: Self) {
+        later.bread.absorb(&mut later.block);
+        self.bread.absorb(&mut self.block);
+        self.bread.merge(&later.bread);
+        self.tally.add(later.tally);
+    }
+}
+
+/// The triangle of the scores.
+struct Scores<'s> {
+    objective: &'s Objective<'s>,
+    experiment: usize,
+    inverse: DMatrix<f64>,
+    scores: Information,
+    block: Block,
+    row: Vec<f64>,
+}
+
+impl Accumulate for Scores<'_> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        let (lanes, loss) = (window.lanes(), self.objective.loss());
+        let mut slopes = vec![0.0; self.row.len()];
+        for k in 0..window.samples[lane] {
+            let weight = self.objective.weight(self.experiment, window.begin[lane] + k);
+            self.row.fill(0.0);
+            for j in (0..window.outputs()).filter(|&j| weight > 0.0 && window.is_measured(k, j, lane)) {
+                let values = window.row(k, j).iter().skip(lane).step_by(lanes);
+                slopes.iter_mut().zip(values).for_each(|(to, from)| *to = *from);
+                let z = window.error(k, j, lane);
+                let less = (1.0 - weight * form(&self.inverse, &slopes)).max(ALONE);
+                let influence = weight * loss.map_or(z, |loss| loss.psi(z)) / less;
+                self.row.iter_mut().zip(&slopes).for_each(|(row, slope)| *row += slope * influence);
+            }
+            self.scores.gather(&mut self.block, &self.row, 0.0);
+        }
+    }
+
+    fn append(&mut self, mut later: Self) {
+        later.scores.absorb(&mut later.block);
+        self.scores.absorb(&mut self.block);
+        self.scores.merge(&later.scores);
+    }
+}
+
+/// The weighted slopes of an experiment backward in time: column by column, output by output.
+struct Backward<'b> {
+    objective: &'b Objective<'b>,
+    experiment: usize,
+    columns: usize,
+    samples: usize,
+    slopes: Vec<f64>,
+    measured: Vec<bool>,
+}
+
+impl Accumulate for Backward<'_> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        let (outputs, samples) = (window.outputs(), self.samples);
+        for k in 0..window.samples[lane] {
+            let sample = window.begin[lane] + k;
+            let (weight, back) = (self.objective.weight(self.experiment, sample), samples - 1 - sample);
+            for j in 0..outputs {
+                self.measured[j * samples + back] = window.is_measured(k, j, lane);
+                for c in 0..self.columns {
+                    self.slopes[(c * outputs + j) * samples + back] = weight * window.at(k, j, c, lane);
+                }
+            }
+        }
+    }
+
+    fn append(&mut self, later: Self) {
+        self.slopes.iter_mut().zip(later.slopes).for_each(|(slope, later)| *slope += later);
+        self.measured.iter_mut().zip(later.measured).for_each(|(measured, later)| *measured |= later);
+    }
+}
+
+impl Backward<'_> {
+    /// The triangle of the scores, and the sum of the leverages.
+    fn scores(
+        &mut self,
+        filter: &Butterworth,
+        factor: &DMatrix<f64>,
+        inverse: &DMatrix<f64>,
+        outputs: usize,
+    ) -> (Information, f64) {
+        let Backward { columns, samples, slopes, measured, .. } = self;
+        let (columns, samples) = (*columns, *samples);
+        filter.filter(slopes, samples, samples, &mut vec![FilterState::default(); columns * outputs]);
+        let (mut scores, mut block) = (Information::new(columns), Block::new(columns, ROWS));
+        let (mut score, mut taken) = (vec![0.0; columns], 0.0);
+        for k in 0..samples {
+            let at = |c: usize, j: usize| {
+                if measured[j * samples + k] { slopes[(c * outputs + j) * samples + k] } else { 0.0 }
+            };
+            for j in 0..outputs {
+                score.iter_mut().enumerate().for_each(|(c, score)| *score = at(c, j));
+                taken += form(inverse, &score);
+                score.iter_mut().enumerate().for_each(|(c, score)| {
+                    *score = (j..outputs).map(|i| factor[(i, j)] * at(c, i)).sum();
+                });
+                scores.gather(&mut block, &score, 0.0);
+            }
+        }
+        scores.absorb(&mut block);
+        (scores, taken)
+    }
+}
+
+/// `v' m v`.
+fn form(m: &DMatrix<f64>, v: &[f64]) -> f64 {
+    let product =
+        |(column, b): (nalgebra::DVectorView<'_, f64>, &f64)| column.iter().zip(v).map(|(m, a)| m * a).sum::<f64>() * b;
+    m.column_iter().zip(v).map(product).sum()
+}
+
+/// Variance that white noise of variance one has after a filter that was at rest: the sum of the squared impulse response
+/// so far.
+struct ImpulseResponse<'f> {
+    filter: &'f Butterworth,
+    state: FilterState,
+    impulse: f64,
+    total: f64,
+}
+
+impl<'f> ImpulseResponse<'f> {
+    fn new(filter: &'f Butterworth) -> Self {
+        ImpulseResponse { filter, state: FilterState::default(), impulse: 1.0, total: 0.0 }
+    }
+
+    fn next(&mut self) -> f64 {
+        let response = self.filter.step(&mut self.state, std::mem::take(&mut self.impulse));
+        self.total += response * response;
+        self.total
+    }
+}

@@ -1,0 +1,145 @@
+//! What the reader of an estimate must know of its data and its method.
+
+use super::conclude::{Covariances, Judgement};
+use crate::estimate::{CovarianceMethod, Direction, Knowledge, Unknown, Warning};
+use crate::layout::Kind;
+use crate::numeral::{counted, exact, number, p_value, percent};
+use crate::optimize::Severity;
+use crate::problem::Objective;
+
+/// A finer step may move a parameter by this part of its standard error without a word.
+const STEP_SHIFT: f64 = 0.5;
+/// Autocorrelation that widens an interval by more than this factor calls for care.
+const CORRELATION_MATTERS: f64 = 2.0;
+
+fn care(text: String) -> Warning {
+    Warning { severity: Severity::UsableWithCare, text }
+}
+
+impl Judgement<'_> {
+    /// What must be said of what was found.
+    pub(super) fn warnings(
+        &self,
+        unknowns: &[Unknown],
+        directions: &[Direction],
+        covariances: &Covariances,
+    ) -> Vec<Warning> {
+        let mut warnings = vec![];
+        warnings.extend(self.of_the_data(unknowns));
+        warnings.extend(self.gaps());
+        for unknown in unknowns {
+            if let Knowledge::Held { bound } = unknown.knowledge {
+                let (Unknown { name, unit, .. }, bound) = (unknown, exact(bound));
+                warnings.push(care(format!("`{name}` is held at its bound {bound} {unit}: the data want it beyond")));
+            }
+        }
+        warnings.extend(
+            directions.iter().map(|d| care(format!("{d}; fix one, add a prior, or excite the system differently"))),
+        );
+        warnings.extend(self.step(unknowns));
+        if !self.end.outcome.converged() && unknowns.iter().any(|row| row.knowledge.standard_error().is_some()) {
+            let text =
+                "standard errors and intervals are those of a minimum, where the search did not arrive".to_owned();
+            warnings.push(Warning { severity: Severity::NotUsable, text });
+        }
+        if let Some(trouble) = &self.end.trouble {
+            let text = format!("the checkpoint could not be written ({trouble}); the search went on without it");
+            warnings.push(Warning { severity: Severity::Usable, text });
+        }
+        warnings.extend(self.autocorrelation(covariances));
+        warnings
+    }
+
+    /// Whether there are measurements enough to say anything.
+    fn of_the_data(&self, unknowns: &[Unknown]) -> Option<Warning> {
+        let (measured, severity) = (self.residuals.measured, Severity::NotUsable);
+        if measured <= unknowns.len() as u64 {
+            let text = format!(
+                "{measured} measurement(s) for {} unknown(s) leave nothing to tell the accuracy by; fix some, or record more",
+                unknowns.len()
+            );
+            return Some(Warning { severity, text });
+        }
+        let none = unknowns.iter().all(|row| row.knowledge == Knowledge::Unidentified);
+        none.then(|| Warning { severity, text: "the data determine none of the unknowns".to_owned() })
+    }
+
+    fn gaps(&self) -> Vec<Warning> {
+        let problem = self.objective.problem;
+        if problem.layout().kind == Kind::Static {
+            return vec![];
+        }
+        let records = problem.records.iter().zip(&problem.unknowns.labels);
+        let gaps = |(record, label): (&crate::record::Record, &String)| {
+            let gaps = record.gaps();
+            let (count, first) = (counted(gaps.len() as u64, "gap"), gaps.first()?);
+            Some(care(format!(
+                "time jumps in experiment `{label}` ({count}, the first: {first}): the input is taken as held meanwhile, \
+                 which is seldom what happened; fit the pieces between (Experiment::without_gaps)"
+            )))
+        };
+        records.filter_map(gaps).collect()
+    }
+
+    /// Whether a finer step would move an unknown. The bound first, which costs little; the shift itself only where the
+    /// bound is not enough.
+    fn step(&self, unknowns: &[Unknown]) -> Option<Warning> {
+        // The noise, where the errors were not divided by it.
+        if self.residuals.step_error / self.widening <= STEP_SHIFT {
+            return None;
+        }
+        let finer = self.objective.sweep.refined()?;
+        let objective = self.objective.of(self.objective.problem, &*finer);
+        let (name, shift, part) = shift(&objective, &self.end.coordinates, unknowns)?;
+        let finer = finer.integrator();
+        (shift > STEP_SHIFT).then(|| {
+            let (part, errors) = (percent(part, 2), number(shift, 2));
+            care(format!(
+                "the step is too coarse: with {finer} `{name}` would move by {part} of itself ({errors} standard errors); use \
+                 a finer step"
+            ))
+        })
+    }
+
+    /// Whether the errors are autocorrelated, and what of it the intervals allow for.
+    fn autocorrelation(&self, covariances: &Covariances) -> Option<Warning> {
+        let (output, white) = self.autocorrelated()?;
+        let output = &self.objective.problem.layout().outputs[output].name;
+        let (probability, first) = (p_value(white.p_value.min(1.0)), number(white.first, 2));
+        let mut text = format!(
+            "the errors of `{output}` are not white (Ljung-Box {probability}, correlation with the error before \
+             {first}): the model misses a part, or the noise is colored"
+        );
+        let CovarianceMethod::Hac { lags } = covariances.method else {
+            text += "; the intervals take them as white and are too narrow if the order of the samples matters";
+            return Some(care(text));
+        };
+        let white = |i: usize| {
+            let unit = covariances.unit.as_ref()?;
+            Some(unit.standard_error(i) * self.widening * self.slopes[i].abs()).filter(|error| *error > 0.0)
+        };
+        let widened = |i: usize| Some(covariances.unknowns.as_ref()?.standard_error(i) / white(i)?);
+        let widest = (0..self.slopes.len()).filter_map(widened).fold(0.0, f64::max);
+        text += &format!("; the intervals allow for it (HAC over {}, prewhitened)", counted(lags, "lag"));
+        if widest > 1.0 {
+            text += &format!(", which makes them up to {} times as wide as for white errors", number(widest, 3));
+        }
+        let severity = if widest > CORRELATION_MATTERS { Severity::UsableWithCare } else { Severity::Usable };
+        Some(Warning { severity, text })
+    }
+}
+
+/// By how many standard errors, and by which part of itself, an unknown would move at most towards the minimum of an
+/// objective.
+fn shift(objective: &Objective<'_>, coordinates: &[f64], unknowns: &[Unknown]) -> Option<(String, f64, f64)> {
+    let linear = objective.evaluate(coordinates).ok()?;
+    let held: Vec<bool> = unknowns.iter().map(|row| row.knowledge.standard_error().is_none()).collect();
+    let step = linear.step(&vec![0.0; unknowns.len()], &held)?;
+    let shift = |i: usize| {
+        let unknown = &unknowns[i];
+        let change = (step[i] * unknown.transform.slope(unknown.value)).abs();
+        let error = unknown.knowledge.standard_error().filter(|error| *error > 0.0)?;
+        Some((unknown.name.clone(), change / error, change / unknown.value.abs()))
+    };
+    (0..unknowns.len()).filter_map(shift).max_by(|a, b| a.1.total_cmp(&b.1))
+}

@@ -1,0 +1,139 @@
+//! [`UdFactors`]: a covariance of `N` quantities, kept as `P = U D U^T` with `U` unit upper triangular.
+//!
+//! In this form (G. J. Bierman, *Factorization Methods for Discrete Sequential Estimation*, 1977) variances cannot turn
+//! negative by rounding: a measurement multiplies each entry of `D` by a factor between 0 and 1, a prediction sums
+//! squares. Neither takes a square root or allocates.
+
+use nalgebra::SMatrix;
+
+/// The factors of the covariance of `N` quantities. A quantity whose variance is zero is known exactly and is left alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UdFactors<const N: usize> {
+    u: [[f64; N]; N],
+    d: [f64; N],
+}
+
+/// Gain of one scalar measurement: see [`UdFactors::absorb`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeasurementGain<const N: usize> {
+    /// Correction of each quantity per unit of innovation.
+    pub gain: [f64; N],
+    /// Variance of the innovation, `h P h^T + r`.
+    pub variance: f64,
+}
+
+#[expect(clippy::needless_range_loop, reason = "matrix algebra is written in indices")]
+impl<const N: usize> UdFactors<N> {
+    /// Independent quantities with these variances (negative ones count as zero).
+    pub fn diagonal(variances: [f64; N]) -> Self {
+        let mut u = [[0.0; N]; N];
+        for (i, row) in u.iter_mut().enumerate() {
+            row[i] = 1.0;
+        }
+        UdFactors { u, d: variances.map(|v| if v > 0.0 { v } else { 0.0 }) }
+    }
+
+    /// Variance of quantity `i`; zero for `i >= N`.
+    #[inline]
+    pub fn variance(&self, i: usize) -> f64 {
+        let Some(row) = self.u.get(i) else { return 0.0 };
+        let mut sum = 0.0;
+        for k in 0..N {
+            sum += row[k] * row[k] * self.d[k];
+        }
+        sum
+    }
+
+    /// The matrix itself.
+    pub fn matrix(&self) -> SMatrix<f64, N, N> {
+        SMatrix::from_fn(|i, j| (0..N).map(|k| self.u[i][k] * self.d[k] * self.u[j][k]).sum())
+    }
+
+    /// Absorbs one measurement `y = h z + noise` of variance `r > 0` (Bierman 1977, ch. V.3); the estimate is then
+    /// corrected by the gain times `y - h z`.
+    #[inline]
+    pub fn absorb(&mut self, h: &[f64; N], r: f64) -> MeasurementGain<N> {
+        let mut gain = [0.0; N];
+        let mut alpha = r;
+        for j in 0..N {
+            let mut f = h[j];
+            for i in 0..j {
+                f += self.u[i][j] * h[i];
+            }
+            let v = self.d[j] * f;
+            let before = alpha;
+            alpha += f * v;
+            self.d[j] *= before / alpha;
+            let lambda = -f / before;
+            for i in 0..j {
+                let u = self.u[i][j];
+                self.u[i][j] = u + lambda * gain[i];
+                gain[i] += u * v;
+            }
+            gain[j] = v;
+        }
+        let scale = 1.0 / alpha;
+        MeasurementGain { gain: gain.map(|g| g * scale), variance: alpha }
+    }
+
+    /// Predicts: `P <- F P F^T + diag(q)`, where `f` holds the first rows of `F` and the others are those of the
+    /// identity (weighted Gram-Schmidt; Thornton and Bierman 1977).
+    #[inline]
+    pub fn predict(&mut self, f: &[[f64; N]], q: &[f64; N]) {
+        // P = [F U | I] diag(D, q) [F U | I]^T; its rows are made orthogonal from the last to the first.
+        let mut w = self.u;
+        for (row, f) in w.iter_mut().zip(f) {
+            for j in 0..N {
+                let mut sum = f[j];
+                for k in 0..j {
+                    sum += f[k] * self.u[k][j];
+                }
+                row[j] = sum;
+            }
+        }
+        let mut v = Self::diagonal([0.0; N]).u;
+        let mut d = [0.0; N];
+        for j in (0..N).rev() {
+            let (wj, vj) = (w[j], v[j]);
+            let (mut dw, mut qv) = ([0.0; N], [0.0; N]);
+            for k in 0..N {
+                dw[k] = wj[k] * self.d[k];
+                qv[k] = vj[k] * q[k];
+                d[j] += wj[k] * dw[k] + vj[k] * qv[k];
+            }
+            let scale = if d[j] > 0.0 { 1.0 / d[j] } else { 0.0 };
+            for i in 0..j {
+                let mut sum = 0.0;
+                for k in 0..N {
+                    sum += w[i][k] * dw[k] + v[i][k] * qv[k];
+                }
+                let u = sum * scale;
+                for k in 0..N {
+                    w[i][k] -= u * wj[k];
+                    v[i][k] -= u * vj[k];
+                }
+                self.u[i][j] = u;
+            }
+        }
+        self.d = d;
+    }
+
+    /// Multiplies `P` by a factor above zero.
+    #[inline]
+    pub fn scale(&mut self, factor: f64) {
+        for d in &mut self.d {
+            *d *= factor;
+        }
+    }
+
+    /// Forgets what was known of the first quantities and of their correlation with all others; they get these
+    /// variances, and the others keep theirs.
+    pub fn renew(&mut self, variances: &[f64]) {
+        let fresh = Self::diagonal([0.0; N]).u;
+        for (i, variance) in variances.iter().enumerate().take(N) {
+            // The lower right block of U D U^T does not depend on the rows above it.
+            self.u[i] = fresh[i];
+            self.d[i] = *variance;
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! [`Kalman`]: one-step prediction of a linear plant with process noise.
+
+use super::{Plant, Predictor};
+use crate::error::Error;
+use crate::integrate::Stuck;
+use crate::layout::{Kind, Layout};
+use crate::scalar::Scalar;
+use serde::{Deserialize, Serialize};
+
+/// The Kalman filter of a model that is affine in its state (R. E. Kalman, Journal of Basic Engineering 82 (1960) 35-45;
+/// for the likelihood F. C. Schweppe, IEEE Transactions on Information Theory 11 (1965) 61-70): each output is predicted
+/// from all measurements before it, with its variance.
+///
+/// The noise comes from the model, [`Model::diffusion`](crate::Model::diffusion) and
+/// [`Model::noise`](crate::Model::noise), so that noise levels are parameters like others. The state at the first sample is
+/// what the fit takes it to be; its covariance is zero, because the fit estimates it or is given it.
+///
+/// The outputs of a sample are taken in one by one, which for independent measurement noises is the same as all at once.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Kalman;
+
+/// Where entry `(i, j)` of a symmetric matrix of `n` rows stands, its upper triangle row by row.
+fn entry(n: usize, i: usize, j: usize) -> usize {
+    let (i, j) = (i.min(j), i.max(j));
+    i * (2 * n - i + 1) / 2 + j - i
+}
+
+/// The columns of a function that is affine: what each unit vector adds to its value at zero.
+fn columns<S: Scalar, E>(n: usize, m: usize, f: impl Fn(&[S], &mut [S]) -> Result<(), E>) -> Result<Vec<Vec<S>>, E> {
+    let (zero, mut origin) = (vec![S::from(0.0); n], vec![S::from(0.0); m]);
+    f(&zero, &mut origin)?;
+    (0..n)
+        .map(|j| {
+            let (mut unit, mut to) = (zero.clone(), origin.clone());
+            unit[j] = S::from(1.0);
+            f(&unit, &mut to)?;
+            Ok(to.iter().zip(&origin).map(|(a, b)| *a - *b).collect())
+        })
+        .collect()
+}
+
+impl Kalman {
+    /// Covariance of the state times the row `c` of an output, and the variance of that output.
+    fn gain<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &[S], output: usize) -> (Vec<S>, S) {
+        let (n, outputs) = (plant.layout().states.len(), plant.layout().outputs.len());
+        let at = |x: &[S], y: &mut [S]| {
+            plant.output(x, y);
+            Ok::<(), Stuck>(())
+        };
+        let c: Vec<S> = columns(n, outputs, at).unwrap_or_default().iter().map(|column| column[output]).collect();
+        let covariance = &carry[n..];
+        let times = |i: usize| (0..n).map(|j| covariance[entry(n, i, j)] * c[j]).sum::<S>();
+        let gain: Vec<S> = (0..n).map(times).collect();
+        let mut noise = vec![S::from(0.0); outputs];
+        plant.noise(&mut noise);
+        let variance = gain.iter().zip(&c).map(|(g, c)| *g * *c).sum::<S>() + noise[output] * noise[output];
+        (gain, variance)
+    }
+}
+
+impl Predictor for Kalman {
+    fn carry(&self, layout: &Layout) -> usize {
+        let n = layout.states.len();
+        n + n * (n + 1) / 2
+    }
+
+    fn predicts_variance(&self) -> bool {
+        true
+    }
+
+    fn check(&self, layout: &Layout) -> Result<(), Error> {
+        if layout.kind == Kind::Static {
+            return Err(Error::Option("a static model has no state to filter; leave the predictor out".to_owned()));
+        }
+        Ok(())
+    }
+
+    fn start<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S]) {
+        carry[plant.layout().states.len()..].fill(S::from(0.0));
+    }
+
+    fn predict<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &[S], output: usize) -> (S, S) {
+        let mut y = vec![S::from(0.0); plant.layout().outputs.len()];
+        plant.output(&carry[..plant.layout().states.len()], &mut y);
+        (y[output], self.gain(plant, carry, output).1)
+    }
+
+    fn correct<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S], output: usize, error: S) {
+        let n = plant.layout().states.len();
+        let (gain, variance) = self.gain(plant, carry, output);
+        let (x, covariance) = carry.split_at_mut(n);
+        for i in 0..n {
+            let part = gain[i] / variance;
+            x[i] += part * error;
+            for j in i..n {
+                covariance[entry(n, i, j)] -= part * gain[j];
+            }
+        }
+    }
+
+    fn advance<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S]) -> Result<(), Stuck> {
+        let n = plant.layout().states.len();
+        let mut noise = vec![S::from(0.0); n];
+        plant.diffusion(&mut noise);
+        if plant.layout().kind == Kind::Discrete {
+            let a = columns(n, n, |x: &[S], to: &mut [S]| {
+                to.copy_from_slice(x);
+                plant.next(to)
+            })?;
+            let (x, covariance) = carry.split_at_mut(n);
+            plant.next(x)?;
+            let before = covariance.to_vec();
+            for i in 0..n {
+                for j in i..n {
+                    let pairs = (0..n).flat_map(|k| (0..n).map(move |l| (k, l)));
+                    let moved: S = pairs.map(|(k, l)| a[k][i] * before[entry(n, k, l)] * a[l][j]).sum();
+                    covariance[entry(n, i, j)] = if i == j { moved + noise[i] * noise[i] } else { moved };
+                }
+            }
+            return Ok(());
+        }
+        // dx/dt = f(x), dP/dt = A P + P A' + Q.
+        plant.integrate(carry, &|position, z, to| {
+            let (x, covariance) = z.split_at(n);
+            plant.derivative(position, x, &mut to[..n]);
+            let at = |x: &[S], to: &mut [S]| {
+                plant.derivative(position, x, to);
+                Ok::<(), Stuck>(())
+            };
+            let a = columns(n, n, at).unwrap_or_default();
+            let flow = |i: usize, j: usize| (0..n).map(|k| a[k][i] * covariance[entry(n, k, j)]).sum::<S>();
+            for i in 0..n {
+                for j in i..n {
+                    let moved = flow(i, j) + flow(j, i);
+                    to[n + entry(n, i, j)] = if i == j { moved + noise[i] * noise[i] } else { moved };
+                }
+            }
+        })
+    }
+
+    fn describe(&self) -> String {
+        "one-step prediction by a Kalman filter".to_owned()
+    }
+}

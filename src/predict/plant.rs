@@ -1,0 +1,207 @@
+//! [`Plant`]: the model between two samples, as a predictor sees it.
+
+use crate::dual::Dual;
+use crate::functions::Functions;
+use crate::integrate::{Duals, Field, Method, Stuck};
+use crate::interval::Hold;
+use crate::layout::{Kind, Layout};
+use crate::record::Record;
+use crate::scalar::Scalar;
+
+/// The model at one sample and on the way to the next, with parameters and inputs filled in.
+pub trait Plant<S> {
+    /// The model's quantities.
+    fn layout(&self) -> &Layout;
+
+    /// The parameters.
+    fn parameters(&self) -> &[S];
+
+    /// The outputs at the sample, from the state there.
+    fn output(&self, x: &[S], y: &mut [S]);
+
+    /// The state at the next sample, in the place of the state at this one; what a longer vector holds behind the state
+    /// is left alone.
+    ///
+    /// # Errors
+    /// Where the integrator is [`Stuck`].
+    fn next(&self, x: &mut [S]) -> Result<(), Stuck>;
+
+    /// Of a continuous model: `dx/dt` at the fraction `position` of the way to the next sample.
+    fn derivative(&self, position: f64, x: &[S], to: &mut [S]);
+
+    /// Carries any vector to the next sample by the integrator of the fit: `rate(position, z, to)` writes `dz/dt` (per
+    /// second) at a fraction of the way.
+    ///
+    /// # Errors
+    /// Where the integrator is [`Stuck`].
+    fn integrate(&self, z: &mut [S], rate: &dyn Fn(f64, &[S], &mut [S])) -> Result<(), Stuck>;
+
+    /// Process noise of each state, as [`Model::diffusion`](crate::Model::diffusion).
+    fn diffusion(&self, to: &mut [S]);
+
+    /// Measurement noise of each output, as [`Model::noise`](crate::Model::noise).
+    fn noise(&self, to: &mut [S]);
+}
+
+/// From one sample of a record to the next.
+pub(crate) struct Between {
+    /// Begin and length (s).
+    interval: (f64, f64),
+    u0: Vec<f64>,
+    /// The input at the end; `None` where it is held.
+    u1: Option<Vec<f64>>,
+}
+
+impl Between {
+    /// From sample `k` on; after the last one the input is held and no time passes.
+    pub fn new(record: &Record, k: usize) -> Self {
+        let (t0, u0) = (record.time(k), record.input(k));
+        let last = k + 1 >= record.len();
+        let length = if last { 0.0 } else { record.time(k + 1) - t0 };
+        let u1 = (record.input_hold() == Hold::First && !last).then(|| record.input(k + 1));
+        Between { interval: (t0, length), u0, u1 }
+    }
+
+    /// Time at a fraction of the way (s).
+    pub fn time(&self, position: f64) -> f64 {
+        self.interval.0 + position * self.interval.1
+    }
+
+    /// The input at a fraction of the way.
+    pub fn input<S: Scalar>(&self, position: f64) -> Vec<S> {
+        let Some(u1) = &self.u1 else { return self.u0.iter().map(|u| S::from(*u)).collect() };
+        self.u0.iter().zip(u1).map(|(u0, u1)| S::from(u0 + (u1 - u0) * position)).collect()
+    }
+}
+
+/// A plant whose functions and method are objects.
+pub(crate) struct SlicePlant<'a, S> {
+    pub layout: &'a Layout,
+    pub functions: &'a dyn Functions<S>,
+    /// The same in numbers with slopes, for Jacobians.
+    pub duals: &'a dyn Functions<Duals>,
+    pub method: &'a dyn Method,
+    pub between: Between,
+    pub p: &'a [S],
+    /// What an adaptive method hands on.
+    pub step: &'a core::cell::Cell<f64>,
+}
+
+/// What numbers an object-safe method can step.
+pub(crate) trait Stepped: Scalar {
+    fn advance(method: &dyn Method, field: &Field<'_, Self>, x: Vec<Self>, step: &mut f64) -> Result<Vec<Self>, Stuck>;
+}
+
+impl Stepped for f64 {
+    fn advance(method: &dyn Method, field: &Field<'_, f64>, x: Vec<f64>, step: &mut f64) -> Result<Vec<f64>, Stuck> {
+        method.advance_values(field, x, step)
+    }
+}
+
+impl Stepped for Duals {
+    fn advance(
+        method: &dyn Method,
+        field: &Field<'_, Duals>,
+        x: Vec<Duals>,
+        step: &mut f64,
+    ) -> Result<Vec<Duals>, Stuck> {
+        method.advance_duals(field, x, step)
+    }
+}
+
+impl<S: Stepped> SlicePlant<'_, S> {
+    fn cross(
+        &self,
+        kind: Kind,
+        z: &mut [S],
+        rate: &dyn Fn(f64, &[S], &mut [S]),
+        slopes: &dyn Fn(f64, &[f64]) -> (Vec<f64>, Vec<Vec<f64>>),
+    ) -> Result<(), Stuck> {
+        let field = Field { kind, interval: self.between.interval, states: z.len(), rate, slopes };
+        let mut step = self.step.get();
+        let end = S::advance(self.method, &field, z.to_vec(), &mut step)?;
+        self.step.set(step);
+        z.copy_from_slice(&end);
+        Ok(())
+    }
+}
+
+impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
+    fn layout(&self) -> &Layout {
+        self.layout
+    }
+
+    fn parameters(&self) -> &[S] {
+        self.p
+    }
+
+    fn output(&self, x: &[S], y: &mut [S]) {
+        self.functions.output(S::from(self.between.time(0.0)), x, &self.between.input(0.0), self.p, y);
+    }
+
+    fn next(&self, x: &mut [S]) -> Result<(), Stuck> {
+        let (state, _) = x.split_at_mut(self.layout.states.len());
+        let p: Vec<Duals> = self.p.iter().map(|p| Dual::constant(p.value())).collect();
+        let slopes = |position: f64, x: &[f64]| {
+            let (t, u) = (Dual::constant(self.between.time(position)), self.between.input(position));
+            jacobian(x, &|x, to| self.duals.state(t, x, &u, &p, to))
+        };
+        self.cross(self.layout.kind, state, &|position, x, to| self.derivative(position, x, to), &slopes)
+    }
+
+    fn derivative(&self, position: f64, x: &[S], to: &mut [S]) {
+        let (t, u) = (S::from(self.between.time(position)), self.between.input(position));
+        self.functions.state(t, x, &u, self.p, to);
+    }
+
+    fn integrate(&self, z: &mut [S], rate: &dyn Fn(f64, &[S], &mut [S])) -> Result<(), Stuck> {
+        // The rate is known in these numbers alone: the Jacobian that an implicit method asks for is by differences.
+        let values = |position: f64, z: &[f64]| {
+            let lifted: Vec<S> = z.iter().map(|z| S::from(*z)).collect();
+            let mut to = lifted.clone();
+            rate(position, &lifted, &mut to);
+            to.iter().map(Scalar::value).collect::<Vec<f64>>()
+        };
+        let slopes = |position: f64, z: &[f64]| {
+            let columns = (0..z.len()).map(|j| {
+                let h = 6e-6 * z[j].abs().max(1e-3);
+                let (mut above, mut below) = (z.to_vec(), z.to_vec());
+                (above[j], below[j]) = (z[j] + h, z[j] - h);
+                let (a, b) = (values(position, &above), values(position, &below));
+                a.iter().zip(&b).map(|(a, b)| (a - b) / (above[j] - below[j])).collect::<Vec<f64>>()
+            });
+            let columns: Vec<Vec<f64>> = columns.collect();
+            let rows = (0..z.len()).map(|i| columns.iter().map(|column| column[i]).collect()).collect();
+            (values(position, z), rows)
+        };
+        self.cross(Kind::Continuous, z, rate, &slopes)
+    }
+
+    fn diffusion(&self, to: &mut [S]) {
+        self.functions.diffusion(self.p, to);
+    }
+
+    fn noise(&self, to: &mut [S]) {
+        self.functions.noise(self.p, to);
+    }
+}
+
+/// Value of `f` and its Jacobian by rows, eight columns at a time.
+pub(crate) fn jacobian(x: &[f64], f: &dyn Fn(&[Duals], &mut [Duals])) -> (Vec<f64>, Vec<Vec<f64>>) {
+    const COLUMNS: usize = 8;
+    let n = x.len();
+    let (mut value, mut rows) = (vec![0.0; n], vec![vec![0.0; n]; n]);
+    for first in (0..n).step_by(COLUMNS) {
+        let lane = |i: usize| i.checked_sub(first).unwrap_or(COLUMNS);
+        let seeded: Vec<Duals> = x.iter().enumerate().map(|(i, x)| Dual::variable(*x, lane(i))).collect();
+        let mut to = seeded.clone();
+        f(&seeded, &mut to);
+        for (i, dual) in to.iter().enumerate() {
+            value[i] = dual.value;
+            for (entry, slope) in rows[i].iter_mut().skip(first).zip(dual.slopes) {
+                *entry = slope;
+            }
+        }
+    }
+    (value, rows)
+}

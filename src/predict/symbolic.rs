@@ -1,0 +1,98 @@
+//! A predictor with the equations that it predicts, read as one graph.
+
+use super::{Plant, Prediction};
+use crate::equations::Equations;
+use crate::functions::Functions;
+use crate::graph::{Graph, Leaf, Symbol, Untraceable};
+use crate::integrate::{Method, Stuck};
+use crate::interval::Hold;
+use crate::layout::{Kind, Layout};
+use crate::recurrence::{Recurrence, SymbolicInterval};
+use crate::scalar::{Comparison, Scalar};
+
+/// What happens at a sample and on the way to the next, as a predictor sees it.
+///
+/// # Errors
+/// A method or a predictor that looks at the numbers it works on.
+pub(crate) fn recurrence(
+    equations: &Equations,
+    method: &dyn Method,
+    predictor: &dyn Prediction,
+    hold: Hold,
+) -> Result<Recurrence, Untraceable> {
+    let layout = equations.layout();
+    let (carried, outputs) = (predictor.carry(layout), layout.outputs.len());
+    let number = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
+    let mut graph = Graph::default();
+    let roots = graph.trace(|| {
+        let plant = SymbolicPlant {
+            interval: SymbolicInterval { equations, method, hold },
+            p: (0..layout.parameters.len()).map(|j| Symbol::leaf(Leaf::Parameter(number(j)))).collect(),
+        };
+        let steps = predictor.symbols();
+        let mut carry: Vec<Symbol> = (0..carried).map(|i| Symbol::leaf(Leaf::State(number(i)))).collect();
+        let (mut means, mut variances) = (vec![], vec![]);
+        for j in 0..outputs {
+            let (mean, variance) = steps.predict(&plant, &carry, j);
+            let y = Symbol::leaf(Leaf::Measured(number(j)));
+            // What was not measured is not a number, and equals nothing.
+            let if_measured = |then: Symbol, or: Symbol| Symbol::select(Comparison::Equal, y, y, then, or);
+            let error = if_measured(y - mean, Symbol::from(0.0));
+            let mut corrected = carry.clone();
+            steps.correct(&plant, &mut corrected, j, error);
+            carry.iter_mut().zip(corrected).for_each(|(carry, corrected)| *carry = if_measured(corrected, *carry));
+            means.push(mean);
+            variances.push(variance);
+        }
+        if steps.advance(&plant, &mut carry).is_err() {
+            Symbol::fail("its predictor cannot go on to the next sample");
+        }
+        [carry, means, if predictor.predicts_variance() { variances } else { vec![] }].concat()
+    })?;
+    let (next, rest) = roots.split_at(carried.min(roots.len()));
+    let (mean, variance) = rest.split_at(outputs.min(rest.len()));
+    Recurrence::from_roots(&graph, next, mean, variance).map_err(|wrong| Untraceable { reason: wrong.to_string() })
+}
+
+/// A plant in symbols.
+struct SymbolicPlant<'a> {
+    interval: SymbolicInterval<'a>,
+    p: Vec<Symbol>,
+}
+
+impl Plant<Symbol> for SymbolicPlant<'_> {
+    fn layout(&self) -> &Layout {
+        self.interval.equations.layout()
+    }
+
+    fn parameters(&self) -> &[Symbol] {
+        &self.p
+    }
+
+    fn output(&self, x: &[Symbol], y: &mut [Symbol]) {
+        y.copy_from_slice(&self.interval.output(x));
+    }
+
+    fn next(&self, x: &mut [Symbol]) -> Result<(), Stuck> {
+        let (state, _) = x.split_at_mut(self.layout().states.len());
+        self.interval.next(state);
+        Ok(())
+    }
+
+    fn derivative(&self, position: f64, x: &[Symbol], to: &mut [Symbol]) {
+        self.interval.rate(position, x, to);
+    }
+
+    fn integrate(&self, z: &mut [Symbol], rate: &dyn Fn(f64, &[Symbol], &mut [Symbol])) -> Result<(), Stuck> {
+        self.interval.cross(Kind::Continuous, z, rate);
+        Ok(())
+    }
+
+    fn diffusion(&self, to: &mut [Symbol]) {
+        self.interval.equations.diffusion(&self.p, to);
+    }
+
+    fn noise(&self, to: &mut [Symbol]) {
+        self.interval.equations.noise(&self.p, to);
+    }
+}

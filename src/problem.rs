@@ -1,0 +1,150 @@
+//! [`Problem`]: what a fit minimizes, with its records, as a value that knows quantities by position and name.
+
+mod absorb;
+mod as_argmin;
+mod checkpoint;
+mod control;
+mod linearize;
+mod objective;
+mod pass;
+mod search;
+mod segments;
+mod settings;
+mod simulate;
+mod standardize;
+mod unknowns;
+mod weighing;
+mod whitening;
+
+pub(crate) use checkpoint::CheckpointFile;
+pub(crate) use control::Control;
+pub use objective::Objective;
+pub(crate) use pass::{Accumulate, each};
+pub use search::Search;
+pub(crate) use search::{Optimizer, RoundError};
+use segments::{Cuts, Memory};
+pub use settings::Settings;
+pub(crate) use settings::{Observer, Weights};
+pub use simulate::Simulated;
+pub use unknowns::Role;
+pub(crate) use unknowns::{Unknowns, Values};
+use weighing::Weighing;
+pub(crate) use whitening::{Noise, Whitening};
+
+use crate::error::Error;
+use crate::layout::Layout;
+use crate::loss::expectations;
+use crate::parameter::Parameter;
+use crate::record::Record;
+use crate::sweep::{Prepared, Sweep};
+use std::sync::Arc;
+
+/// A model, records and settings, ready to be fitted: the untyped problem that every kind of model ends up as.
+///
+/// It owns its records and settings. `'a` is the lifetime of what a sweep, a loss or a weighting borrows; that of a problem
+/// that a typed [`Fit`](crate::Fit) hands over is `'static`.
+#[derive(Clone)]
+pub struct Problem<'a> {
+    pub(crate) sweep: Arc<dyn Sweep + 'a>,
+    pub(crate) records: Vec<Record>,
+    pub(crate) prepared: Vec<Prepared>,
+    pub(crate) unknowns: Arc<Unknowns>,
+    pub(crate) settings: Settings<'a>,
+    /// Mean of `psi(z) z` for Gaussian `z`; needed where variances are predicted, one for least squares.
+    pub(crate) kappa: f64,
+    pub(crate) cuts: Cuts,
+}
+
+impl<'a> Problem<'a> {
+    /// Checks all that was said, and looks at every record once.
+    ///
+    /// # Errors
+    /// What makes no sense ([`Error`] names it): no record, parameters that do not fit the model, nothing free, an output
+    /// that was never measured, settings out of range.
+    pub fn new(
+        sweep: Arc<dyn Sweep + 'a>,
+        records: Vec<Record>,
+        parameters: &[Parameter],
+        settings: Settings<'a>,
+    ) -> Result<Self, Error> {
+        let problem = Problem::unchecked(sweep, records, parameters, settings)?;
+        if problem.unknowns.row.is_empty() {
+            return Err(Error::NothingFree);
+        }
+        problem.check_measured()?;
+        Ok(problem)
+    }
+
+    /// The same, where nothing need be free nor measured.
+    pub(crate) fn unchecked(
+        sweep: Arc<dyn Sweep + 'a>,
+        records: Vec<Record>,
+        parameters: &[Parameter],
+        settings: Settings<'a>,
+    ) -> Result<Self, Error> {
+        if records.is_empty() {
+            return Err(Error::NoExperiment);
+        }
+        unknowns::check_count(sweep.layout(), parameters)?;
+        settings.check(sweep.layout(), &records)?;
+        let unknowns = Arc::new(Unknowns::new(&*sweep, &records, parameters)?);
+        let prepared = Problem::prepared(&*sweep, &records, parameters)?;
+        let settings = settings.of(&*sweep);
+        let kappa = match &settings.loss {
+            Some(loss) if sweep.predicts_variance() => expectations(&**loss).slope,
+            _ => 1.0,
+        };
+        let cuts = Cuts::new(&*sweep, &records, settings.prefilter.is_some());
+        Ok(Problem { sweep, records, prepared, unknowns, settings, kappa, cuts })
+    }
+
+    fn prepared(sweep: &dyn Sweep, records: &[Record], parameters: &[Parameter]) -> Result<Vec<Prepared>, Error> {
+        let start: Vec<f64> = parameters.iter().map(|p| p.start).collect();
+        records.iter().map(|record| sweep.prepare(record, &start)).collect()
+    }
+
+    /// The same problem with other measurements of the same experiments.
+    pub(crate) fn with_records(&self, records: Vec<Record>) -> Result<Self, Error> {
+        let prepared = Problem::prepared(&*self.sweep, &records, &self.unknowns.parameters)?;
+        Ok(Problem { records, prepared, ..self.clone() })
+    }
+
+    /// Every output must have been measured somewhere.
+    pub(crate) fn check_measured(&self) -> Result<(), Error> {
+        for (j, output) in self.layout().outputs.iter().enumerate() {
+            let measured = |record: &Record| record.outputs()[j].values.iter().any(|y| !y.is_nan());
+            if !self.records.iter().any(measured) {
+                let names: Vec<&str> = self.records.iter().map(|record| record.name()).collect();
+                return Err(Error::OutputMissing { experiment: names.join("`, `"), output: output.name.clone() });
+            }
+        }
+        Ok(())
+    }
+
+    /// The model's quantities.
+    pub fn layout(&self) -> &Layout {
+        self.sweep.layout()
+    }
+
+    /// The records.
+    pub fn records(&self) -> &[Record] {
+        &self.records
+    }
+
+    /// What was declared of each parameter.
+    pub fn parameters(&self) -> &[Parameter] {
+        &self.unknowns.parameters
+    }
+
+    /// The names of the unknowns, in order.
+    pub fn unknowns(&self) -> Vec<String> {
+        self.unknowns.row.iter().map(|unknown| unknown.name.clone()).collect()
+    }
+
+    /// The cost to minimize, with errors in the units of the outputs.
+    pub(crate) fn in_units<'p>(&'p self, control: &'p Control) -> Objective<'p> {
+        let whitening = Whitening::none(self.layout().outputs.len());
+        let memory = Memory::default();
+        Objective { problem: self, sweep: &*self.sweep, whitening, control, memory }
+    }
+}

@@ -1,0 +1,126 @@
+//! [`Absorber`]: from windows of standardized errors to costs and triangles.
+
+use super::pass::Job;
+use super::{Objective, Weighing};
+use crate::information::{Block, Information, Triangles};
+use crate::sweep::Window;
+
+/// Rows that are absorbed together.
+const ROWS: usize = 256;
+
+/// What absorbs the rows of jobs that run side by side.
+pub(super) struct Absorber<'o> {
+    weighing: Vec<Weighing<'o>>,
+    /// Whether every error counts by its square.
+    plain: bool,
+    rows: Vec<u64>,
+    triangles: Triangles,
+    alone: Option<(Information, Block)>,
+}
+
+impl<'o> Absorber<'o> {
+    pub fn new(objective: &'o Objective<'o>, jobs: &[&Job<'_>]) -> Self {
+        let columns = jobs[0].seeds.len();
+        Absorber {
+            weighing: jobs.iter().map(|job| Weighing::new(objective, job.experiment)).collect(),
+            plain: objective.loss().is_none() && !objective.is_weighted() && !objective.sweep.predicts_variance(),
+            rows: vec![0; jobs.len()],
+            triangles: Triangles::new(columns, 0),
+            alone: None,
+        }
+    }
+
+    /// Takes in a window, which is used up.
+    pub fn absorb(&mut self, window: &mut Window) {
+        let (lanes, columns) = (window.lanes(), window.columns() - 1);
+        if lanes == 1 {
+            return self.absorb_alone(window);
+        }
+        if self.triangles.lanes() != lanes {
+            self.triangles = Triangles::new(columns, lanes);
+        }
+        let count = window.len() * window.outputs();
+        if self.plain {
+            self.square(window);
+        } else {
+            self.weigh(window);
+        }
+        if window.has_variances() {
+            self.triangles.absorb(window.variance_rows_mut(), count);
+        }
+        self.triangles.absorb(window.rows_mut(), count);
+    }
+
+    /// Sums of squares.
+    fn square(&mut self, window: &Window) {
+        let (lanes, last) = (window.lanes(), window.columns() - 1);
+        for k in 0..window.len() {
+            for j in 0..window.outputs() {
+                let errors = &window.row(k, j)[last * lanes..];
+                let measured = window.measured(k, j);
+                for (lane, weighing) in self.weighing.iter_mut().enumerate() {
+                    weighing.cost += 0.5 * errors[lane] * errors[lane];
+                    self.rows[lane] += u64::from(measured >> lane & 1);
+                }
+            }
+        }
+    }
+
+    /// Multiplies rows by the roots of their weights.
+    fn weigh(&mut self, window: &mut Window) {
+        let (lanes, last) = (window.lanes(), window.columns() - 1);
+        let outputs = window.outputs();
+        for (k, j) in (0..window.len()).flat_map(|k| (0..outputs).map(move |j| (k, j))) {
+            for (lane, weighing) in self.weighing.iter_mut().enumerate() {
+                if !window.is_measured(k, j, lane) {
+                    continue;
+                }
+                let [first, second] = weighing.rows(window, k, j, lane);
+                let weigh = |row: &mut [f64], (root, error): (f64, f64)| {
+                    row[lane..last * lanes].iter_mut().step_by(lanes).for_each(|slope| *slope *= root);
+                    row[last * lanes + lane] = error;
+                };
+                weigh(window.row_mut(k, j), first);
+                if window.has_variances() {
+                    weigh(window.variance_row_mut(k, j), second);
+                    self.rows[lane] += 1;
+                }
+                self.rows[lane] += 1;
+            }
+        }
+    }
+
+    fn absorb_alone(&mut self, window: &mut Window) {
+        let columns = window.columns() - 1;
+        let (information, block) =
+            self.alone.get_or_insert_with(|| (Information::new(columns), Block::new(columns, ROWS)));
+        let mut row = vec![0.0; columns];
+        for k in 0..window.samples[0] {
+            for j in 0..window.outputs() {
+                if !window.is_measured(k, j, 0) {
+                    continue;
+                }
+                let [(root, error), second] = self.weighing[0].rows(window, k, j, 0);
+                row.iter_mut().zip(window.row(k, j)).for_each(|(to, from)| *to = from * root);
+                information.gather(block, &row, error);
+                if window.has_variances() {
+                    let (root, error) = second;
+                    row.iter_mut().zip(window.variance_row(k, j)).for_each(|(to, from)| *to = from * root);
+                    information.gather(block, &row, error);
+                }
+            }
+        }
+    }
+
+    /// Cost and triangle of a job.
+    pub fn part(&mut self, lane: usize) -> (f64, Information) {
+        let cost = self.weighing[lane].cost;
+        match self.alone.take() {
+            Some((mut information, mut block)) => {
+                information.absorb(&mut block);
+                (cost, information)
+            }
+            None => (cost, self.triangles.triangle(lane).of_rows(self.rows[lane])),
+        }
+    }
+}

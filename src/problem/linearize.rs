@@ -1,0 +1,208 @@
+//! Cost and triangles of an objective.
+
+use super::absorb::Absorber;
+use super::pass::{Broken, Job};
+use super::segments::{Border, Borders};
+use super::{Objective, Values, Weighing};
+use crate::information::{Chain, Information};
+use crate::optimize::{Infeasible, Linearization};
+use crate::sweep::{Piece, Reached, RunError, Seed};
+use std::sync::Arc;
+
+/// Part of the squared errors that the correction of guessed borders may change before the slopes are computed anew.
+const MOVED: f64 = 1e-6;
+
+/// What one segment comes to.
+struct Part {
+    cost: f64,
+    triangle: Information,
+    reached: Reached,
+}
+
+impl Objective<'_> {
+    /// Cost and triangles of all experiments and the priors.
+    pub(crate) fn evaluate(&self, coordinates: &[f64]) -> Result<Linearization, Infeasible> {
+        let values = self.values(coordinates);
+        let cuts = &self.problem.cuts;
+        let chained = (0..self.experiments()).any(|e| cuts.is_chained(e));
+        let (guess, exact) = if chained { self.guess(coordinates, &values)? } else { (None, true) };
+        let mut found = self.triangles(coordinates, &values, guess.as_ref())?;
+        if !exact && found.moved > MOVED * 2.0 * found.cost {
+            found = self.triangles(coordinates, &values, found.borders.as_ref())?;
+        }
+        if std::env::var("DBG").is_ok() {
+            eprintln!("{coordinates:?} {:?} {:?}", found.cost, found.blocks[0]);
+        }
+        let Triangulation { mut cost, mut blocks, borders, .. } = found;
+        if let Some(borders) = borders {
+            self.memory.keep(Arc::new(borders));
+        }
+        for (i, slope, error) in self.problem.unknowns.priors(coordinates) {
+            let e = self.problem.unknowns.row[i].experiment.unwrap_or(0);
+            let row: Vec<f64> = self.problem.unknowns.columns(e).map(|c| if c == i { slope } else { 0.0 }).collect();
+            blocks[e].absorb_row(&row, error);
+            cost += 0.5 * error * error;
+        }
+        Ok(Linearization::new(cost, self.problem.unknowns.shared(), blocks))
+    }
+
+    /// Where the segments begin, and whether that is exact. A guess will do where it can be corrected: the cost is a sum of
+    /// squares, the model affine.
+    fn guess(&self, coordinates: &[f64], values: &[Values]) -> Result<(Option<Borders>, bool), Infeasible> {
+        if let Some(known) = self.memory.at(coordinates) {
+            return Ok((Some((*known).clone()), true));
+        }
+        let corrigible = self.problem.cuts.affine && self.loss().is_none();
+        let Some(best) = self.memory.best().filter(|_| corrigible) else {
+            return Ok((Some(self.simulated_borders(coordinates, values)?), true));
+        };
+        let mut guess = Borders { point: coordinates.to_vec(), values: values.to_vec(), ..(*best).clone() };
+        for (e, borders) in guess.of.iter_mut().enumerate() {
+            let quantity = |values: &Values, seed: &Seed| match *seed {
+                Seed::Carry(i) => values.x[i],
+                Seed::Parameter(j) => values.p[j],
+            };
+            let seeds = self.problem.unknowns.seeds(e);
+            let change = |seed| quantity(&values[e], seed) - quantity(&best.values[e], seed);
+            let change: Vec<f64> = seeds.iter().map(change).collect();
+            for (s, border) in borders.iter_mut().enumerate() {
+                *border = Border { carry: best.moved(e, s + 1, &change), slopes: vec![] };
+            }
+        }
+        Ok((Some(guess), false))
+    }
+
+    /// The triangles of all experiments, priors left out.
+    fn triangles(
+        &self,
+        coordinates: &[f64],
+        values: &[Values],
+        guess: Option<&Borders>,
+    ) -> Result<Triangulation, Infeasible> {
+        let jobs: Vec<Job<'_>> =
+            (0..self.experiments()).flat_map(|e| self.linear_jobs(e, &values[e], coordinates, guess)).collect();
+        let mut parts = self.in_batches(&jobs, coordinates, |jobs| self.parts(jobs))?.into_iter();
+        let mut found = Triangulation { cost: 0.0, moved: 0.0, blocks: vec![], borders: None };
+        let mut of = vec![];
+        for (e, segments) in self.problem.cuts.segments.iter().enumerate() {
+            let parts: Vec<Part> = parts.by_ref().take(segments.len()).collect();
+            if self.problem.cuts.is_chained(e) {
+                let guess = guess.map_or(&[][..], |guess| &guess.of[e]);
+                of.push(self.chain(e, &values[e], coordinates, parts, guess, &mut found));
+            } else {
+                let mut parts = parts.into_iter();
+                let Some(Part { cost, triangle: mut whole, .. }) = parts.next() else { continue };
+                found.cost += cost;
+                for part in parts {
+                    found.cost += part.cost;
+                    whole.merge(&part.triangle);
+                }
+                whole.scale_columns(&self.problem.unknowns.scales(e, coordinates));
+                found.blocks.push(whole);
+                of.push(vec![]);
+            }
+        }
+        if !found.cost.is_finite() || found.blocks.iter().any(|block| !block.is_finite()) {
+            return Err(self.infeasible(0, coordinates, RunError::Failed { sample: 0 }));
+        }
+        if guess.is_some() {
+            let (point, cost, values) = (coordinates.to_vec(), found.cost, values.to_vec());
+            found.borders = Some(Borders { point, cost, values, of });
+        }
+        Ok(found)
+    }
+
+    /// One triangle of the segments of an experiment, each of which began with a guess; the borders as they ought to be.
+    fn chain(
+        &self,
+        e: usize,
+        values: &Values,
+        coordinates: &[f64],
+        parts: Vec<Part>,
+        guess: &[Border],
+        found: &mut Triangulation,
+    ) -> Vec<Border> {
+        let whole = self.job(e, values, coordinates, true);
+        let is_parameter = |i: &usize| matches!(whole.seeds[*i], Seed::Parameter(_));
+        let parameters: Vec<usize> = (0..whole.seeds.len()).filter(is_parameter).collect();
+        let Piece { carry, slopes, .. } = whole.piece;
+        let mut chain = Chain::new(carry.len(), slopes, &parameters, &whole.scales);
+        let mut borders = Vec::with_capacity(guess.len());
+        let simulated = parts.iter().map(|part| part.cost).sum::<f64>();
+        for (s, part) in parts.iter().enumerate() {
+            chain.add(&part.triangle);
+            if let Some(Border { carry, .. }) = guess.get(s) {
+                chain.go_on(&part.reached.carry, &part.reached.slopes, carry);
+                if !self.problem.cuts.affine {
+                    chain.without_defect();
+                }
+                let (defect, slopes) = chain.begin();
+                let carry = carry.iter().zip(defect).map(|(carry, defect)| carry + defect).collect();
+                borders.push(Border { carry, slopes: slopes.to_vec() });
+            }
+        }
+        found.moved += chain.moved;
+        found.cost += if chain.moved > 0.0 { 0.5 * chain.squares } else { simulated };
+        found.blocks.push(chain.triangle());
+        borders
+    }
+
+    /// The segments of an experiment with slopes in the quantities themselves; chained ones with respect to all that they
+    /// begin with.
+    fn linear_jobs<'p>(
+        &'p self,
+        e: usize,
+        values: &'p Values,
+        coordinates: &[f64],
+        guess: Option<&Borders>,
+    ) -> Vec<Job<'p>> {
+        let mut jobs = self.segments(e, values, coordinates, true, guess);
+        let chained = self.problem.cuts.is_chained(e);
+        for job in &mut jobs {
+            job.scales.clear();
+            if chained {
+                let carried = job.piece.carry.len();
+                job.seeds.retain(|seed| matches!(seed, Seed::Parameter(_)));
+                job.seeds.splice(0..0, (0..carried).map(Seed::Carry));
+                let width = job.seeds.len();
+                job.piece.slopes =
+                    (0..carried * width).map(|at| f64::from(u8::from(at % width == at / width))).collect();
+            }
+        }
+        jobs
+    }
+
+    /// Costs and triangles of jobs that run side by side.
+    fn parts(&self, jobs: &[&Job<'_>]) -> Result<Vec<Part>, Broken> {
+        let mut absorbers: Absorber<'_> = Absorber::new(self, jobs);
+        let reached = self.run(jobs, &mut |window| absorbers.absorb(window))?;
+        let parts = reached.into_iter().enumerate();
+        parts
+            .map(|(lane, reached)| {
+                let (cost, triangle) = absorbers.part(lane);
+                Ok(Part { cost, triangle, reached })
+            })
+            .collect()
+    }
+
+    /// The cost of one experiment alone, priors left out.
+    pub(crate) fn cost_of(&self, e: usize, coordinates: &[f64]) -> Result<f64, Infeasible> {
+        self.gather_one(coordinates, e, true, || Weighing::new(self, e)).map(|weighing| weighing.cost)
+    }
+
+    /// The cost alone.
+    pub(crate) fn cost_at(&self, coordinates: &[f64]) -> Result<f64, Infeasible> {
+        let found = self.gather(coordinates, false, |experiment| Weighing::new(self, experiment))?;
+        let priors = self.problem.unknowns.priors(coordinates).map(|(_, _, error)| 0.5 * error * error);
+        Ok(found.iter().map(|weighing| weighing.cost).sum::<f64>() + priors.sum::<f64>())
+    }
+}
+
+/// Costs and triangles of all experiments at a point.
+struct Triangulation {
+    cost: f64,
+    /// Sum of squares of what the correction of guessed borders changed.
+    moved: f64,
+    blocks: Vec<Information>,
+    borders: Option<Borders>,
+}

@@ -1,0 +1,157 @@
+//! [`Objective`]: the cost of a fit as a function of its unknowns.
+
+use super::segments::Memory;
+use super::{Control, Problem, Whitening};
+use crate::error::Failure;
+use crate::loss::Loss;
+use crate::optimize::{Infeasible, LeastSquares, Linearization};
+use crate::sweep::{Located, OVERFLOW, RunError, Sweep, Window};
+
+/// What a fit minimizes, as a problem for its own and for argmin's solvers.
+///
+/// The unknowns are coordinates in a row: shared parameters, then each experiment's free initial states and own
+/// parameters; parameters declared with `.log()` by their logarithm. [`names`](Self::names) tells the order. The cost is
+/// the sum over samples and outputs of `weight * rho(error / sigma)`, plus half the squares of the priors; where the
+/// variance `v` is predicted, of `rho(error / sqrt(v)) + kappa / 2 * ln(v)`, with `kappa` the mean of `psi(z) z` for
+/// Gaussian `z` (one for least squares).
+#[derive(Clone)]
+pub struct Objective<'p> {
+    pub(crate) problem: &'p Problem<'p>,
+    pub(crate) sweep: &'p dyn Sweep,
+    pub(crate) whitening: Whitening,
+    pub(crate) control: &'p Control,
+    /// Where the segments of records begin at points that were evaluated.
+    pub(crate) memory: Memory,
+}
+
+impl<'p> Objective<'p> {
+    /// The names of the unknowns, in order.
+    pub fn names(&self) -> Vec<String> {
+        self.problem.unknowns()
+    }
+
+    /// The coordinates at which the fit starts.
+    pub fn start(&self) -> Vec<f64> {
+        self.problem.unknowns.start()
+    }
+
+    /// The same with errors and slopes in the units of the outputs.
+    pub(crate) fn in_units(&self) -> Self {
+        self.with(Whitening::none(self.outputs()))
+    }
+
+    /// The same with errors standardized otherwise.
+    pub(crate) fn with(&self, whitening: Whitening) -> Self {
+        Objective { whitening, ..self.clone() }
+    }
+
+    /// The same with another sweep, or records that differ in what was measured.
+    pub(crate) fn of<'q>(&'q self, problem: &'q Problem<'q>, sweep: &'q dyn Sweep) -> Objective<'q> {
+        let whitening = self.whitening.clone();
+        Objective { problem, sweep, whitening, control: self.control, memory: Memory::default() }
+    }
+
+    /// Number of experiments.
+    pub(crate) fn experiments(&self) -> usize {
+        self.problem.records.len()
+    }
+
+    /// Number of outputs.
+    pub(crate) fn outputs(&self) -> usize {
+        self.problem.layout().outputs.len()
+    }
+
+    pub(crate) fn loss(&self) -> Option<&dyn Loss> {
+        self.problem.settings.loss.as_deref().map(|loss| loss as &dyn Loss)
+    }
+
+    /// Whether the loss bends the cost of large errors.
+    pub(crate) fn is_robust(&self) -> bool {
+        self.loss().is_some_and(|loss| loss.weight(1e3) < 1.0)
+    }
+
+    pub(crate) fn is_weighted(&self) -> bool {
+        self.problem.settings.weights.is_some()
+    }
+
+    /// The weight of a sample.
+    pub(crate) fn weight(&self, experiment: usize, sample: usize) -> f64 {
+        let weights = self.problem.settings.weights.as_ref();
+        weights.map_or(1.0, |weights| weights.weight(&self.problem.records[experiment], sample))
+    }
+
+    pub(crate) fn infeasible(&self, experiment: usize, coordinates: &[f64], error: RunError) -> Infeasible {
+        match error {
+            RunError::Stopped => Infeasible::Cancelled,
+            RunError::Failed { sample } => Infeasible::Failed(self.locate(experiment, coordinates, sample).to_string()),
+        }
+    }
+
+    /// What exactly fails in an experiment that cannot be evaluated; `sample` is where it was noticed.
+    pub(crate) fn locate(&self, e: usize, coordinates: &[f64], sample: usize) -> Failure {
+        let (problem, sigma) = (self.problem, self.whitening.sigma());
+        let (label, record) = (&problem.unknowns.labels[e], &problem.records[e]);
+        let values = problem.unknowns.of_experiment(e, coordinates);
+        let found = self.sweep.locate(record, label, &values.x, &values.p, sample, &sigma);
+        let failure = |signal: String, value: f64, hint| Failure {
+            experiment: label.clone(),
+            sample,
+            time: record.time(sample),
+            signal,
+            value,
+            hint,
+        };
+        match found {
+            Some(Located::Broken(failure)) => failure,
+            Some(Located::Largest(largest)) => self.unsound_prediction(e, coordinates).unwrap_or(largest),
+            None => self
+                .unsound_prediction(e, coordinates)
+                .unwrap_or_else(|| failure("the prediction".to_owned(), f64::NAN, UNSOUND)),
+        }
+    }
+
+    /// The first predicted variance that is not positive, or slope that is not finite.
+    fn unsound_prediction(&self, e: usize, coordinates: &[f64]) -> Option<Failure> {
+        let outputs = &self.problem.layout().outputs;
+        let unknowns: Vec<&str> =
+            self.problem.unknowns.columns(e).map(|i| self.problem.unknowns.row[i].name.as_str()).collect();
+        let mut first: Option<(usize, String, f64, &'static str)> = None;
+        let visit = &mut |window: &mut Window| {
+            for (k, j) in (0..window.samples[0]).flat_map(|k| (0..outputs.len()).map(move |j| (k, j))) {
+                let (sample, output, variance) = (window.begin[0] + k, &outputs[j].name, window.variance(k, j, 0));
+                if window.is_measured(k, j, 0) && !(variance > 0.0 && variance.is_finite()) {
+                    let signal = format!("the predicted variance of output `{output}`");
+                    first.get_or_insert((sample, signal, variance, NO_NOISE));
+                }
+                let slopes = unknowns.iter().enumerate().map(|(column, name)| (name, window.at(k, j, column, 0)));
+                for (unknown, slope) in slopes.filter(|(_, slope)| !slope.is_finite()) {
+                    let signal = format!("the slope of output `{output}` with respect to `{unknown}`");
+                    first.get_or_insert((sample, signal, slope, if slope.is_nan() { STEEP } else { OVERFLOW }));
+                }
+            }
+            first.is_none()
+        };
+        // It fails, where it fails, after what is looked for.
+        let _ = self.run_alone(e, coordinates, true, visit);
+        let (sample, signal, value, hint) = first?;
+        let experiment = self.problem.unknowns.labels[e].clone();
+        let time = self.problem.records[e].time(sample);
+        Some(Failure { experiment, sample, time, signal, value, hint })
+    }
+}
+
+const STEEP: &str = "; the value is finite but has no slope there (a root or a power at zero): start elsewhere, or write \
+                     the model so that it is smooth there";
+const NO_NOISE: &str = "; it must be positive: write Model::noise, and keep the noise levels away \
+                        from zero (with .log())";
+const UNSOUND: &str = "; it is not a finite number: bound the parameters or start elsewhere";
+
+impl LeastSquares for Objective<'_> {
+    fn linearize(&self, x: &[f64]) -> Result<Linearization, Infeasible> {
+        self.evaluate(x)
+    }
+
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        self.problem.unknowns.bounds()
+    }
+}

@@ -1,0 +1,201 @@
+//! [`Search`]: what a fit can be searched with, and one round of it.
+
+use super::checkpoint::CheckpointFile;
+use super::{Objective, Observer};
+use crate::error::Error;
+use crate::optimize::{GaussNewton, Infeasible, LeastSquaresState, LevenbergMarquardt, Linearization, Outcome};
+use crate::scaling::Scaling;
+use argmin::core::observers::Observe;
+use argmin::core::{Executor, KV, Solver, State, TerminationReason, TerminationStatus};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::sync::Arc;
+
+/// A search that a fit can run: one of argmin's solvers that says how it ended.
+pub trait Search:
+    Clone + Send + Sync + Serialize + DeserializeOwned + for<'p> Solver<&'p Objective<'p>, LeastSquaresState> + 'static
+{
+    /// How the search ended, if it was its own decision.
+    fn outcome(&self) -> Option<Outcome>;
+
+    /// Cost and slopes where the search stands.
+    fn linearization(&self) -> Option<&Linearization>;
+
+    /// The same search for a cost that is soon to change: it may stop three digits into the minimum.
+    fn rough(&self) -> Self;
+
+    /// Whether its settings make sense.
+    ///
+    /// # Errors
+    /// The setting and its value.
+    fn check(&self) -> Result<(), Error> {
+        Ok(())
+    }
+}
+
+impl<S: Scaling + Serialize + DeserializeOwned + 'static> Search for LevenbergMarquardt<S> {
+    fn outcome(&self) -> Option<Outcome> {
+        LevenbergMarquardt::outcome(self)
+    }
+
+    fn linearization(&self) -> Option<&Linearization> {
+        LevenbergMarquardt::linearization(self)
+    }
+
+    fn rough(&self) -> Self {
+        LevenbergMarquardt::new(self.stop.rough(), self.scaling.clone())
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        self.stop.check()
+    }
+}
+
+impl Search for GaussNewton {
+    fn outcome(&self) -> Option<Outcome> {
+        GaussNewton::outcome(self)
+    }
+
+    fn linearization(&self) -> Option<&Linearization> {
+        GaussNewton::linearization(self)
+    }
+
+    fn rough(&self) -> Self {
+        GaussNewton::new(self.stop.rough())
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        self.stop.check()
+    }
+}
+
+/// How one round of a search ended.
+pub(crate) struct Round {
+    pub coordinates: Vec<f64>,
+    pub linear: Option<Linearization>,
+    pub outcome: Outcome,
+    pub iterations: u64,
+    pub evaluations: u64,
+    pub name: String,
+}
+
+/// Why a round did not begin.
+pub(crate) enum RoundError {
+    /// There is no cost at the start, or the search was stopped there.
+    Start(Infeasible),
+    /// The optimizer gave up.
+    Optimizer(String),
+}
+
+/// A [`Search`] as an object.
+pub(crate) trait Optimizer: Send + Sync {
+    fn check(&self) -> Result<(), Error>;
+
+    fn rough(&self) -> Arc<dyn Optimizer>;
+
+    /// Its settings, as text.
+    fn settings(&self) -> Result<String, Error>;
+
+    /// One search of an objective with its noise as it stands.
+    fn round(
+        &self,
+        objective: &Objective<'_>,
+        start: Vec<f64>,
+        file: Option<&CheckpointFile>,
+    ) -> Result<Round, RoundError>;
+
+    /// Where a checkpoint's search stood, how far it had come, and the search itself if it may go on.
+    fn resume(&self, file: &CheckpointFile) -> Result<Option<Resumed>, Error>;
+
+    /// Writes a checkpoint of a search that has not begun.
+    fn begin(&self, file: &CheckpointFile, coordinates: &[f64]) -> Result<(), Error>;
+}
+
+/// Place, iterations so far, and the search if it may go on.
+pub(crate) type Resumed = (Vec<f64>, u64, Option<Arc<dyn Optimizer>>);
+
+impl<S: Search> Optimizer for S {
+    fn check(&self) -> Result<(), Error> {
+        Search::check(self)
+    }
+
+    fn rough(&self) -> Arc<dyn Optimizer> {
+        Arc::new(Search::rough(self))
+    }
+
+    fn settings(&self) -> Result<String, Error> {
+        serde_json::to_string(self).map_err(|error| Error::Optimizer(error.to_string()))
+    }
+
+    fn round(
+        &self,
+        objective: &Objective<'_>,
+        start: Vec<f64>,
+        file: Option<&CheckpointFile>,
+    ) -> Result<Round, RoundError> {
+        let counting = |state: LeastSquaresState| state.param(start.clone()).counting(true);
+        let mut executor = Executor::new(objective, self.clone()).configure(counting).ctrlc(false);
+        for (observer, mode) in &objective.problem.settings.observers {
+            executor = executor.add_observer(Shared(observer.clone()), *mode);
+        }
+        if let Some(file) = file {
+            executor = executor.checkpointing(file.clone());
+        }
+        let result = executor.run().map_err(|error| match error.downcast::<Infeasible>() {
+            Ok(infeasible) => RoundError::Start(infeasible),
+            Err(other) => RoundError::Optimizer(other.to_string()),
+        })?;
+        let state = result.state();
+        let outcome = result.solver().outcome().unwrap_or(match state.get_termination_status() {
+            TerminationStatus::Terminated(TerminationReason::MaxItersReached) => {
+                Outcome::IterationLimit { iterations: state.get_iter() }
+            }
+            _ => Outcome::Cancelled,
+        });
+        let outcome = match outcome {
+            Outcome::Cancelled if objective.control.expired() => Outcome::TimeLimit,
+            outcome => outcome,
+        };
+        if let Some(file) = file
+            && let Some(place) = state.get_param()
+        {
+            file.note(file.write(place, state.get_iter(), result.solver()));
+        }
+        Ok(Round {
+            coordinates: state.get_param().cloned().unwrap_or(start),
+            linear: result.solver().linearization().cloned(),
+            outcome,
+            iterations: state.get_iter(),
+            evaluations: state.get_func_counts().get("linearization_count").copied().unwrap_or(0),
+            name: Solver::<&Objective<'_>, LeastSquaresState>::name(result.solver()).to_owned(),
+        })
+    }
+
+    fn resume(&self, file: &CheckpointFile) -> Result<Option<Resumed>, Error> {
+        let Some((place, iterations, saved)) = file.load::<S>()? else { return Ok(None) };
+        // Only a search with the settings of this run that has not ended goes on as it was.
+        let saved = saved.filter(|saved| saved.outcome().is_none());
+        Ok(Some((place, iterations, saved.map(|saved| Arc::new(saved) as Arc<dyn Optimizer>))))
+    }
+
+    fn begin(&self, file: &CheckpointFile, coordinates: &[f64]) -> Result<(), Error> {
+        file.write(coordinates, 0, self)
+    }
+}
+
+/// An observer that several rounds of one fit share.
+struct Shared(Observer);
+
+impl Observe<LeastSquaresState> for Shared {
+    fn observe_init(&mut self, name: &str, state: &LeastSquaresState, kv: &KV) -> Result<(), argmin::core::Error> {
+        self.0.lock().map_or(Ok(()), |mut observer| observer.observe_init(name, state, kv))
+    }
+
+    fn observe_iter(&mut self, state: &LeastSquaresState, kv: &KV) -> Result<(), argmin::core::Error> {
+        self.0.lock().map_or(Ok(()), |mut observer| observer.observe_iter(state, kv))
+    }
+
+    fn observe_final(&mut self, state: &LeastSquaresState) -> Result<(), argmin::core::Error> {
+        self.0.lock().map_or(Ok(()), |mut observer| observer.observe_final(state))
+    }
+}

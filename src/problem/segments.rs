@@ -1,0 +1,130 @@
+//! Records cut into segments that are run side by side, and what is remembered of where they begin.
+//!
+//! A record is cut by its length alone, so that no bit of a result depends on the machine. Where a segment begins follows
+//! from the segments before. For models that are affine in their carry a guess of it will do, because what it is off by
+//! can be taken out exactly afterwards ([`Chain`](crate::information::Chain)); the guess comes from a point evaluated
+//! before. For others the begins are simulated, in values alone, before the segments are run with their slopes.
+
+use super::Values;
+use crate::record::Record;
+use crate::sweep::{Joints, Sweep};
+use std::ops::Range;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// From this length on, into so many segments.
+const SEGMENTS: [(usize, usize); 6] =
+    [(512, 8), (4_096, 16), (16_384, 32), (131_072, 64), (1_048_576, 128), (8_388_608, 256)];
+/// Segments begin at multiples of it.
+const GRAIN: usize = 32;
+/// Records of a fit from which on they keep the lanes busy whole.
+const MANY: usize = 8;
+/// Longest carry whose slopes are worth the cut.
+const CARRY: usize = 16;
+
+/// The segments of each record.
+#[derive(Clone, Debug)]
+pub(crate) struct Cuts {
+    pub segments: Vec<Vec<Range<usize>>>,
+    /// Whether anything is carried from one to the next.
+    pub carried: bool,
+    /// Whether guesses of it can be corrected.
+    pub affine: bool,
+}
+
+impl Cuts {
+    /// Cuts records as this sweep allows; not at all, if something else hangs on their order.
+    pub fn new(sweep: &dyn Sweep, records: &[Record], ordered: bool) -> Self {
+        let joints = if std::env::var("NONLIN").is_ok() { Joints::Nonlinear } else { sweep.joints() };
+        let carried = matches!(joints, Joints::Affine | Joints::Nonlinear);
+        let whole = std::env::var("NOSEG").is_ok()
+            || ordered
+            || records.len() >= MANY
+            || joints == Joints::Uncut
+            || carried && sweep.carry() > CARRY;
+        let segments = records.iter().map(|record| cut(record.len(), whole)).collect();
+        Cuts { segments, carried, affine: joints == Joints::Affine }
+    }
+
+    /// Whether segments of this record begin with what others carried there.
+    pub fn is_chained(&self, experiment: usize) -> bool {
+        self.carried && self.segments[experiment].len() > 1
+    }
+}
+
+fn cut(samples: usize, whole: bool) -> Vec<Range<usize>> {
+    let segments = SEGMENTS.iter().rev().find(|(least, _)| samples >= *least).map_or(1, |(_, segments)| *segments);
+    if whole || segments == 1 {
+        return std::iter::once(0..samples).collect();
+    }
+    let grains = samples.div_ceil(GRAIN);
+    let begin = |s: usize| (s * grains / segments * GRAIN).min(samples);
+    (0..segments).map(|s| begin(s)..begin(s + 1)).collect()
+}
+
+/// What is carried into a segment, and its slopes with respect to the quantities of the record's unknowns, row by row;
+/// none, where only values were simulated.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Border {
+    pub carry: Vec<f64>,
+    pub slopes: Vec<f64>,
+}
+
+/// The borders between the segments of all records at a point: of each record one for each segment but the first.
+#[derive(Clone, Debug)]
+pub(crate) struct Borders {
+    pub point: Vec<f64>,
+    pub cost: f64,
+    pub values: Vec<Values>,
+    pub of: Vec<Vec<Border>>,
+}
+
+impl Borders {
+    pub fn has_slopes(&self) -> bool {
+        self.of.iter().flatten().all(|border| !border.slopes.is_empty())
+    }
+
+    /// The carry into a segment, as it would be after changes of the quantities of the record's unknowns.
+    pub fn moved(&self, experiment: usize, segment: usize, change: &[f64]) -> Vec<f64> {
+        let Border { carry, slopes } = &self.of[experiment][segment - 1];
+        let row = |i: usize| &slopes[i * change.len()..][..change.len()];
+        let moved = |i: usize| row(i).iter().zip(change).map(|(s, d)| s * d).sum::<f64>();
+        carry.iter().enumerate().map(|(i, x)| x + moved(i)).collect()
+    }
+}
+
+/// The borders at the last point that was evaluated, and at the best. A copy is independent of what it was copied from.
+#[derive(Debug, Default)]
+pub(crate) struct Memory(Mutex<[Option<Arc<Borders>>; 2]>);
+
+impl Memory {
+    fn points(&self) -> std::sync::MutexGuard<'_, [Option<Arc<Borders>>; 2]> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Keeps the borders of a point.
+    pub fn keep(&self, borders: Arc<Borders>) {
+        let [last, best] = &mut *self.points();
+        // A cost with another noise is another cost; but then the point is the one that was best.
+        if best.as_ref().is_none_or(|best| borders.cost <= best.cost || borders.point == best.point) {
+            *best = Some(borders.clone());
+        }
+        *last = Some(borders);
+    }
+
+    /// The borders at exactly this point.
+    pub fn at(&self, point: &[f64]) -> Option<Arc<Borders>> {
+        let same = |a: &[f64]| a.len() == point.len() && a.iter().zip(point).all(|(a, b)| a.to_bits() == b.to_bits());
+        self.points().iter().flatten().find(|borders| same(&borders.point)).cloned()
+    }
+
+    /// The borders with slopes at the best point.
+    pub fn best(&self) -> Option<Arc<Borders>> {
+        self.points()[1].clone().filter(|borders| borders.has_slopes())
+    }
+}
+
+impl Clone for Memory {
+    fn clone(&self) -> Self {
+        Memory(Mutex::new(self.points().clone()))
+    }
+}

@@ -1,0 +1,169 @@
+//! [`Settings`]: what is said of a fit besides model, records and parameters.
+
+use super::{Noise, Optimizer, Search};
+use crate::error::Error;
+use crate::layout::Layout;
+use crate::loss::Loss;
+use crate::optimize::{LeastSquaresState, LevenbergMarquardt};
+use crate::prefilter::Butterworth;
+use crate::record::Record;
+use crate::sweep::Sweep;
+use argmin::core::observers::{Observe, ObserverMode};
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+pub(crate) type Observer = Arc<Mutex<Box<dyn Observe<LeastSquaresState> + Send>>>;
+
+/// The weight of each sample of a record.
+pub(crate) trait Weights: Send + Sync {
+    /// The weight of sample `k`.
+    fn weight(&self, record: &Record, k: usize) -> f64;
+    /// Whether it fits the model.
+    fn check(&self) -> Result<(), Error>;
+    /// Name and constants, for reports.
+    fn describe(&self) -> String;
+}
+
+/// What is said of a fit besides model, records and parameters; each may be left out.
+#[derive(Clone)]
+pub struct Settings<'a> {
+    pub(crate) noise: Noise,
+    pub(crate) loss: Option<Arc<dyn Loss + 'a>>,
+    pub(crate) weights: Option<Arc<dyn Weights + 'a>>,
+    pub(crate) prefilter: Option<Butterworth>,
+    pub(crate) cancel: Option<Arc<AtomicBool>>,
+    pub(crate) time_limit: Option<Duration>,
+    pub(crate) observers: Vec<(Observer, ObserverMode)>,
+    pub(crate) checkpoint: Option<(PathBuf, u64)>,
+    pub(crate) optimizer: Arc<dyn Optimizer>,
+}
+
+impl Default for Settings<'_> {
+    fn default() -> Self {
+        Settings {
+            noise: Noise::PerOutput,
+            loss: None,
+            weights: None,
+            prefilter: None,
+            cancel: None,
+            time_limit: None,
+            observers: vec![],
+            checkpoint: None,
+            optimizer: Arc::new(<LevenbergMarquardt>::default()),
+        }
+    }
+}
+
+impl<'a> Settings<'a> {
+    /// The standard deviation of the noise of each output, in its unit (after the pre-filter, if there is one). Left out,
+    /// it is estimated from the errors.
+    pub fn noise(mut self, sigma: Vec<f64>) -> Self {
+        self.noise = Noise::Given(sigma);
+        self
+    }
+
+    /// Estimates the noise with its correlations between outputs.
+    pub fn noise_covariance(mut self) -> Self {
+        self.noise = Noise::Covariance;
+        self
+    }
+
+    /// Searches by another method, or by the same with other settings.
+    pub fn optimizer(mut self, optimizer: impl Search) -> Self {
+        self.optimizer = Arc::new(optimizer);
+        self
+    }
+
+    /// Bends the cost of large standardized errors.
+    pub fn loss(mut self, loss: impl Loss + 'a) -> Self {
+        self.loss = Some(Arc::new(loss));
+        self
+    }
+
+    /// Filters the prediction errors (and their slopes) before they count. A missing sample enters the filter as a zero.
+    pub fn prefilter(mut self, filter: Butterworth) -> Self {
+        self.prefilter = Some(filter);
+        self
+    }
+
+    /// Stops the search, with what it has found by then, when the flag is raised.
+    pub fn cancel(mut self, flag: Arc<AtomicBool>) -> Self {
+        self.cancel = Some(flag);
+        self
+    }
+
+    /// Stops the search after this time, with what it has found by then.
+    pub fn time_limit(mut self, limit: Duration) -> Self {
+        self.time_limit = Some(limit);
+        self
+    }
+
+    /// Shows the progress to an observer of argmin.
+    pub fn observe(mut self, observer: impl Observe<LeastSquaresState> + Send + 'static, mode: ObserverMode) -> Self {
+        self.observers.push((Arc::new(Mutex::new(Box::new(observer))), mode));
+        self
+    }
+
+    /// Saves the place of the search into a file, every so many iterations, and goes on from there if the file exists. A
+    /// file of another problem is refused.
+    pub fn checkpoint(mut self, path: impl Into<PathBuf>, every: u64) -> Self {
+        self.checkpoint = Some((path.into(), every));
+        self
+    }
+
+    /// As they are for what this sweep predicts.
+    pub(super) fn of(mut self, sweep: &dyn Sweep) -> Self {
+        if sweep.predicts_variance() {
+            self.noise = Noise::Predicted;
+        }
+        self
+    }
+
+    /// Refuses what makes no sense for these records.
+    pub(super) fn check(&self, layout: &Layout, records: &[Record]) -> Result<(), Error> {
+        if let Noise::Given(sigma) = &self.noise {
+            if sigma.len() != layout.outputs.len() {
+                let (found, expected) = (sigma.len(), layout.outputs.len());
+                return Err(Error::Option(format!("{found} noise level(s) are given for {expected} output(s)")));
+            }
+            if let Some(j) = sigma.iter().position(|s| !(*s > 0.0 && s.is_finite())) {
+                let what = format!("the noise of output `{}`", layout.outputs[j].name);
+                return Err(Error::NotPositive { what, value: sigma[j] });
+            }
+        }
+        self.loss.as_ref().map_or(Ok(()), |loss| loss.check())?;
+        if let Some(filter) = &self.prefilter {
+            records.iter().try_for_each(|record| filter.check(record))?;
+        }
+        self.check_weights(records)
+    }
+
+    /// Weights must be finite, not negative, and not zero wherever something was measured.
+    fn check_weights(&self, records: &[Record]) -> Result<(), Error> {
+        let Some(weights) = &self.weights else { return Ok(()) };
+        weights.check()?;
+        let mut counts = false;
+        for record in records {
+            for k in 0..record.len() {
+                let weight = weights.weight(record, k);
+                if !(weight >= 0.0 && weight.is_finite()) {
+                    let (name, t) = (record.name(), record.time(k));
+                    return Err(Error::Option(format!(
+                        "weighting: the weight of sample {k} (t = {t} s) of experiment `{name}` is {weight}; weights must \
+                         be finite and not negative"
+                    )));
+                }
+                counts |= weight > 0.0 && record.outputs().iter().any(|channel| !channel.values[k].is_nan());
+            }
+        }
+        if counts {
+            return Ok(());
+        }
+        Err(Error::Option(format!(
+            "weighting: `{}` is zero at every sample with a measured output; nothing is left to fit",
+            weights.describe()
+        )))
+    }
+}

@@ -1,0 +1,70 @@
+//! What the model says of a record at given values of its unknowns.
+
+use super::{Objective, Problem};
+use crate::error::Error;
+use crate::record::{Column, Record};
+use crate::sweep::RunError;
+
+/// The outputs of one record, predicted.
+#[derive(Clone, Debug)]
+pub struct Simulated {
+    /// Predicted outputs, a column each; NaN where there is no prediction.
+    pub outputs: Vec<Vec<f64>>,
+    /// Measured less predicted; NaN where there is nothing to compare.
+    pub residuals: Vec<Vec<f64>>,
+    /// The state at the first sample.
+    pub initial_state: Vec<f64>,
+}
+
+impl Objective<'_> {
+    /// Predicts the outputs of one record.
+    pub(crate) fn predict(&self, e: usize, coordinates: &[f64]) -> Result<Simulated, Error> {
+        let record = &self.problem.records[e];
+        let measured: Vec<&[f64]> = record.outputs().iter().map(|channel| &*channel.values).collect();
+        // A filter needs the measurements; else, predictions are wanted where nothing was measured, too.
+        let filters = self.sweep.predicts_variance();
+        let compared = if filters { self.problem.clone() } else { self.problem.against_zero() };
+        let objective = self.of(&compared, self.sweep);
+        let mut outputs = vec![vec![f64::NAN; record.len()]; measured.len()];
+        let mut failed = None;
+        let result = objective.run_alone(e, coordinates, false, &mut |window| {
+            for k in 0..window.samples[0] {
+                for (j, output) in outputs.iter_mut().enumerate() {
+                    if window.is_measured(k, j, 0) {
+                        let at = window.begin[0] + k;
+                        output[at] = if filters { measured[j][at] } else { 0.0 } - window.error(k, j, 0);
+                        if !output[at].is_finite() {
+                            failed = Some(at);
+                            return false;
+                        }
+                    }
+                }
+            }
+            true
+        });
+        let failed = match result {
+            Err(RunError::Failed { sample }) => Some(sample),
+            _ => failed,
+        };
+        if let Some(sample) = failed {
+            return Err(Error::Simulation(self.locate(e, coordinates, sample)));
+        }
+        let residual = |(measured, predicted): (&&[f64], &Vec<f64>)| {
+            measured.iter().zip(predicted).map(|(y, predicted)| y - predicted).collect()
+        };
+        let residuals = measured.iter().zip(&outputs).map(residual).collect();
+        Ok(Simulated { outputs, residuals, initial_state: self.problem.unknowns.of_experiment(e, coordinates).x })
+    }
+}
+
+impl Problem<'_> {
+    /// The same problem with outputs that were measured as zero throughout.
+    fn against_zero(&self) -> Self {
+        let zero = |record: &Record| {
+            let zeros = Column::from(vec![0.0; record.len()]);
+            let outputs = record.outputs.iter().map(|channel| channel.with(zeros.clone())).collect();
+            Record { outputs, ..record.clone() }
+        };
+        Problem { records: self.records.iter().map(zero).collect(), ..self.clone() }
+    }
+}

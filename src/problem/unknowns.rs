@@ -1,0 +1,240 @@
+//! [`Unknowns`]: the free quantities of a fit in a row, and how parameters and initial states follow from them.
+//!
+//! The row holds the parameters that all experiments share, then for each experiment its free initial states and its own
+//! parameters. The optimizer works on coordinates: values, or their logarithms.
+
+use crate::error::Error;
+use crate::layout::{Layout, Quantity};
+use crate::parameter::{Parameter, Transform, fixed, free};
+use crate::record::{Initial, Record};
+use crate::sweep::{Seed, Sweep};
+use serde::{Deserialize, Serialize};
+
+/// What an unknown is in the model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Role {
+    /// Parameter number.
+    Parameter(usize),
+    /// State number, at the first sample.
+    InitialState(usize),
+}
+
+/// One free quantity.
+#[derive(Clone, Debug)]
+pub(crate) struct Free {
+    /// Name with its experiment, if it belongs to one of several.
+    pub name: String,
+    pub unit: String,
+    pub role: Role,
+    /// Index of the experiment that it belongs to; `None` if all share it.
+    pub experiment: Option<usize>,
+    pub parameter: Parameter,
+}
+
+/// Initial state and parameters of one experiment.
+#[derive(Clone, Debug)]
+pub(crate) struct Values {
+    pub x: Vec<f64>,
+    pub p: Vec<f64>,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Unknowns {
+    /// What each experiment is called in reports and errors.
+    pub labels: Vec<String>,
+    pub parameters: Vec<Parameter>,
+    /// What is known of each experiment's initial state.
+    initial: Vec<Vec<Parameter>>,
+    pub row: Vec<Free>,
+    /// Where in the row each experiment's own unknowns begin, and the end of the row.
+    begins: Vec<usize>,
+}
+
+impl Unknowns {
+    pub fn new(sweep: &dyn Sweep, records: &[Record], parameters: &[Parameter]) -> Result<Self, Error> {
+        let layout = sweep.layout();
+        for (quantity, parameter) in layout.parameters.iter().zip(parameters) {
+            check(&quantity.name, parameter)?;
+        }
+        let labels = labels(records);
+        let labeled = |name: &str, e: usize| match records.len() {
+            1 => name.to_owned(),
+            _ => format!("{name} [{}]", labels[e]),
+        };
+        let free_of = |i: usize, experiment: Option<usize>| {
+            let Quantity { name, unit } = layout.parameters[i].clone();
+            let name = experiment.map_or(name.clone(), |e| format!("{name} [{}]", labels[e]));
+            Free { name, unit, role: Role::Parameter(i), experiment, parameter: parameters[i] }
+        };
+        let chosen = |own: bool| {
+            (0..parameters.len()).filter(move |&i| parameters[i].free && parameters[i].per_experiment == own)
+        };
+        let mut row: Vec<Free> = chosen(false).map(|i| free_of(i, None)).collect();
+        let (mut begins, mut initial) = (vec![], vec![]);
+        for (e, record) in records.iter().enumerate() {
+            begins.push(row.len());
+            let state = initial_state(sweep, record, parameters)?;
+            for (i, (&known, Quantity { name, unit })) in state.iter().zip(&layout.states).enumerate() {
+                let name = labeled(&format!("{name}(0)"), e);
+                check(&name, &known)?;
+                if known.free {
+                    let (unit, role, experiment) = (unit.clone(), Role::InitialState(i), Some(e));
+                    row.push(Free { name, unit, role, experiment, parameter: known });
+                }
+            }
+            row.extend(chosen(true).map(|i| free_of(i, Some(e))));
+            initial.push(state);
+        }
+        begins.push(row.len());
+        Ok(Unknowns { labels, parameters: parameters.to_vec(), initial, row, begins })
+    }
+
+    /// How many unknowns all experiments share; they come first.
+    pub fn shared(&self) -> usize {
+        self.begins[0]
+    }
+
+    /// The unknowns that one experiment depends on, in the order of its columns: its own, then the shared ones.
+    pub fn columns(&self, experiment: usize) -> impl Iterator<Item = usize> + Clone + use<> {
+        (self.begins[experiment]..self.begins[experiment + 1]).chain(0..self.begins[0])
+    }
+
+    /// The coordinates where the search starts.
+    pub fn start(&self) -> Vec<f64> {
+        self.row.iter().map(|u| u.parameter.transform.to_coordinate(u.parameter.start)).collect()
+    }
+
+    /// The bounds of each coordinate.
+    pub fn bounds(&self) -> Vec<(f64, f64)> {
+        let coordinate = |u: &Free, bound: f64| match u.parameter.transform {
+            Transform::Log if bound <= 0.0 => f64::NEG_INFINITY,
+            transform => transform.to_coordinate(bound),
+        };
+        self.row.iter().map(|u| (coordinate(u, u.parameter.lower), coordinate(u, u.parameter.upper))).collect()
+    }
+
+    /// The value of each unknown.
+    pub fn values(&self, coordinates: &[f64]) -> Vec<f64> {
+        self.row.iter().zip(coordinates).map(|(u, &c)| u.parameter.transform.to_value(c)).collect()
+    }
+
+    /// Initial state and parameters of one experiment.
+    pub fn of_experiment(&self, experiment: usize, coordinates: &[f64]) -> Values {
+        let start = |known: &[Parameter]| known.iter().map(|p| p.start).collect::<Vec<f64>>();
+        let mut values = Values { x: start(&self.initial[experiment]), p: start(&self.parameters) };
+        for i in self.columns(experiment) {
+            let value = self.row[i].parameter.transform.to_value(coordinates[i]);
+            match self.row[i].role {
+                Role::InitialState(s) => values.x[s] = value,
+                Role::Parameter(j) => values.p[j] = value,
+            }
+        }
+        values
+    }
+
+    /// What each column of one experiment's slopes is taken with respect to.
+    pub fn seeds(&self, experiment: usize) -> Vec<Seed> {
+        let seed = |i: usize| match self.row[i].role {
+            Role::InitialState(s) => Seed::Carry(s),
+            Role::Parameter(j) => Seed::Parameter(j),
+        };
+        self.columns(experiment).map(seed).collect()
+    }
+
+    /// How fast the quantity of each column moves with its coordinate.
+    pub fn scales(&self, experiment: usize, coordinates: &[f64]) -> Vec<f64> {
+        let scale = |i: usize| {
+            let transform = self.row[i].parameter.transform;
+            transform.slope(transform.to_value(coordinates[i]))
+        };
+        self.columns(experiment).map(scale).collect()
+    }
+
+    /// The prior of each unknown that has one: its index, the slope of its standardized error and the error itself.
+    pub fn priors(&self, coordinates: &[f64]) -> impl Iterator<Item = (usize, f64, f64)> {
+        self.row.iter().zip(coordinates).enumerate().filter_map(|(i, (unknown, &c))| {
+            let Parameter { prior, transform, .. } = unknown.parameter;
+            let value = transform.to_value(c);
+            prior.map(|prior| (i, transform.slope(value) / prior.std, (prior.mean - value) / prior.std))
+        })
+    }
+}
+
+/// The names of the experiments; those that share one are numbered from 1 in their order.
+fn labels(records: &[Record]) -> Vec<String> {
+    let mut twins = std::collections::HashMap::<&str, usize>::new();
+    for record in records {
+        *twins.entry(record.name()).or_default() += 1;
+    }
+    let mut numbers = std::collections::HashMap::<&str, usize>::new();
+    let label = |record| {
+        let name = Record::name(record);
+        if twins[name] == 1 {
+            return name.to_owned();
+        }
+        let number = numbers.entry(name).or_default();
+        *number += 1;
+        format!("{name} #{number}")
+    };
+    records.iter().map(label).collect()
+}
+
+/// What is known of the state at an experiment's first sample.
+fn initial_state(sweep: &dyn Sweep, record: &Record, parameters: &[Parameter]) -> Result<Vec<Parameter>, Error> {
+    let (how, alone): (fn(f64) -> Parameter, bool) = match record.initial_state() {
+        Initial::Given(state) => return Ok(state.clone()),
+        Initial::FirstSample => (fixed, true),
+        Initial::Estimated => (free, false),
+    };
+    let p: Vec<f64> = parameters.iter().map(|p| p.start).collect();
+    let unknown = |reason| Error::StateNotMeasured { experiment: record.name().to_owned(), reason };
+    let x = sweep.measured_state(record, 0, &p, alone).map_err(unknown)?;
+    Ok(x.into_iter().map(how).collect())
+}
+
+fn check(name: &str, parameter: &Parameter) -> Result<(), Error> {
+    let Parameter { start, free, lower, upper, prior, transform, .. } = *parameter;
+    let wrong = |problem: String| Err(Error::Parameter { parameter: name.to_owned(), problem });
+    if !start.is_finite() {
+        return wrong(format!("its value is {start}; give a finite start"));
+    }
+    if lower.is_nan() || upper.is_nan() || lower > upper || free && lower == upper {
+        return wrong(format!("its bounds are {lower} and {upper}; the lower must be below the upper (or use fixed)"));
+    }
+    if start < lower || start > upper {
+        return wrong(format!(
+            "its start {start} lies outside its bounds {lower} to {upper}; move the start, or the bounds"
+        ));
+    }
+    if !free {
+        return Ok(());
+    }
+    if transform == Transform::Log && start <= 0.0 {
+        return wrong(format!("its start {start} has no logarithm; start above zero or leave .log() out"));
+    }
+    match prior {
+        Some(p) if !(p.mean.is_finite() && p.std > 0.0 && p.std.is_finite()) => wrong(format!(
+            "its prior is {} +- {}; mean and standard deviation must be finite, the latter positive",
+            p.mean, p.std
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// The quantities by name.
+pub(crate) fn names(layout: &[Quantity]) -> Vec<String> {
+    layout.iter().map(|quantity| quantity.name.clone()).collect()
+}
+
+/// Whether as many parameters were declared as the layout has.
+pub(crate) fn check_count(layout: &Layout, parameters: &[Parameter]) -> Result<(), Error> {
+    if parameters.len() == layout.parameters.len() {
+        return Ok(());
+    }
+    Err(Error::Option(format!(
+        "{} parameter(s) are declared, but the model has {}: {}",
+        parameters.len(),
+        layout.parameters.len(),
+        names(&layout.parameters).join(", ")
+    )))
+}

@@ -1,0 +1,124 @@
+//! [`Whitening`]: from prediction errors to standardized ones.
+
+use crate::information::SquareMatrix;
+use crate::sweep::Window;
+
+/// What is said of the measurement noise.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Noise {
+    /// Its standard deviation per output.
+    Given(Vec<f64>),
+    /// Estimated per output.
+    PerOutput,
+    /// Estimated as a full covariance.
+    Covariance,
+    /// The predictor predicts its variance.
+    Predicted,
+}
+
+/// How errors are standardized: divided by their standard deviations, or multiplied by the inverse Cholesky factor of
+/// their covariance.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Whitening {
+    Diagonal(Vec<f64>),
+    Full { covariance: SquareMatrix, inverse: SquareMatrix },
+}
+
+impl Whitening {
+    /// Errors in the units of the outputs.
+    pub fn none(outputs: usize) -> Self {
+        Whitening::Diagonal(vec![1.0; outputs])
+    }
+
+    pub fn full(covariance: SquareMatrix) -> Option<Self> {
+        let inverse = inverse_factor(&covariance)?;
+        Some(Whitening::Full { covariance, inverse })
+    }
+
+    /// Standard deviation of each output.
+    pub fn sigma(&self) -> Vec<f64> {
+        match self {
+            Whitening::Diagonal(sigma) => sigma.clone(),
+            Whitening::Full { covariance, .. } => covariance.diagonal().iter().map(|v| v.sqrt()).collect(),
+        }
+    }
+
+    /// Logarithm of the determinant of the covariance of a sample of which these outputs were measured.
+    pub fn log_determinant(&self, here: &[usize]) -> f64 {
+        let of = |inverse: &SquareMatrix| -2.0 * inverse.diagonal().iter().map(|l| l.ln()).sum::<f64>();
+        match self {
+            Whitening::Diagonal(sigma) => 2.0 * here.iter().map(|&j| sigma[j].ln()).sum::<f64>(),
+            Whitening::Full { covariance, inverse } if here.len() == covariance.size() => of(inverse),
+            Whitening::Full { covariance, .. } => of(&factor_of_part(covariance, here)),
+        }
+    }
+
+    /// The same with all standard deviations longer by a factor.
+    pub fn widened(&self, factor: f64) -> Self {
+        match self {
+            Whitening::Diagonal(sigma) => Whitening::Diagonal(sigma.iter().map(|s| s * factor).collect()),
+            Whitening::Full { covariance, inverse } => {
+                let n = covariance.size();
+                Whitening::Full {
+                    covariance: SquareMatrix::from_fn(n, |i, j| covariance[(i, j)] * factor * factor),
+                    inverse: SquareMatrix::from_fn(n, |i, j| inverse[(i, j)] / factor),
+                }
+            }
+        }
+    }
+
+    /// Standardizes the rows of a window in place.
+    pub fn apply(&self, window: &mut Window) {
+        match self {
+            Whitening::Diagonal(sigma) => {
+                if sigma.iter().all(|sigma| *sigma == 1.0) {
+                    return;
+                }
+                for k in 0..window.len() {
+                    for (j, sigma) in sigma.iter().enumerate() {
+                        let scale = 1.0 / sigma;
+                        window.row_mut(k, j).iter_mut().for_each(|value| *value *= scale);
+                    }
+                }
+            }
+            Whitening::Full { covariance, inverse } => {
+                for lane in 0..window.lanes() {
+                    for k in 0..window.samples[lane] {
+                        mix(covariance, inverse, window, k, lane);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Multiplies the rows of one sample of a lane by the inverse factor of the covariance of what was measured.
+fn mix(covariance: &SquareMatrix, inverse: &SquareMatrix, window: &mut Window, k: usize, lane: usize) {
+    let outputs = covariance.size();
+    let here: Vec<usize> = (0..outputs).filter(|&j| window.is_measured(k, j, lane)).collect();
+    // Where outputs are missing, those left have a covariance of their own.
+    let part = (here.len() < outputs).then(|| factor_of_part(covariance, &here));
+    let factor = part.as_ref().unwrap_or(inverse);
+    let lanes = window.lanes();
+    for column in 0..window.columns() {
+        for a in (0..here.len()).rev() {
+            let value = (0..=a).map(|b| factor[(a, b)] * window.at(k, here[b], column, lane)).sum();
+            window.row_mut(k, here[a])[column * lanes + lane] = value;
+        }
+    }
+}
+
+/// Inverse of the lower Cholesky factor; `None` if the matrix is not positive definite.
+fn inverse_factor(covariance: &SquareMatrix) -> Option<SquareMatrix> {
+    let n = covariance.size();
+    let matrix = nalgebra::DMatrix::from_fn(n, n, |i, j| covariance[(i, j)]);
+    let inverse = matrix.cholesky()?.l().try_inverse()?;
+    Some(SquareMatrix::from_fn(n, |i, j| inverse[(i, j)]))
+}
+
+/// The same of the rows and columns of some outputs.
+fn factor_of_part(covariance: &SquareMatrix, here: &[usize]) -> SquareMatrix {
+    let part = SquareMatrix::from_fn(here.len(), |a, b| covariance[(here[a], here[b])]);
+    // A part of a positive definite matrix is one.
+    inverse_factor(&part).unwrap_or_else(|| SquareMatrix::zeros(here.len()))
+}

@@ -1,0 +1,191 @@
+//! [`Record`]: measured inputs and outputs over time, by columns, valid by construction.
+
+mod column;
+#[cfg(feature = "csv")]
+mod csv;
+mod cycles;
+mod edit;
+mod stored;
+mod time;
+
+pub use column::{Channel, Column};
+#[cfg(feature = "csv")]
+pub use csv::CsvFile;
+pub use cycles::Gap;
+pub(crate) use stored::Stored;
+#[cfg(feature = "csv")]
+pub(crate) use time::Clock;
+pub use time::Time;
+
+use crate::error::Error;
+use crate::interval::Hold;
+use crate::layout::Quantity;
+use crate::parameter::Parameter;
+
+/// What is known of the state at the first sample.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Initial {
+    /// It is estimated, starting from what the first sample says.
+    #[default]
+    Estimated,
+    /// It is what the first sample says, taken as exact.
+    FirstSample,
+    /// Guess, bounds and prior of each state.
+    Given(Vec<Parameter>),
+}
+
+/// One measured record, its signals in columns.
+///
+/// Time increases, inputs are finite, lengths agree; an output that was not measured is `NaN`. An
+/// [`Experiment`](crate::Experiment) is a record that knows its model's signals by their types; this one knows them by
+/// name. Copies and pieces share the columns.
+#[derive(Clone, Debug)]
+pub struct Record {
+    pub(crate) name: String,
+    pub(crate) states: Vec<Quantity>,
+    pub(crate) time: Time,
+    pub(crate) inputs: Vec<Channel>,
+    pub(crate) outputs: Vec<Channel>,
+    pub(crate) hold: Hold,
+    pub(crate) initial: Initial,
+}
+
+impl Record {
+    /// A record of these signals for a model with these states, held from sample to sample, its initial state estimated.
+    ///
+    /// # Errors
+    /// No signal at all, fewer than two samples (one, without state), lengths that differ, time that does not increase, a
+    /// time or input that is not finite, an infinite output.
+    pub fn new(states: Vec<Quantity>, time: Time, inputs: Vec<Channel>, outputs: Vec<Channel>) -> Result<Self, Error> {
+        let (name, hold, initial) = ("record".to_owned(), Hold::default(), Initial::default());
+        Record { name, states, time, inputs, outputs, hold, initial }.checked()
+    }
+
+    /// Names the record in reports and errors.
+    pub fn named(self, name: impl Into<String>) -> Self {
+        Record { name: name.into(), ..self }
+    }
+
+    /// Says how the input behaves between samples.
+    pub fn hold(self, hold: Hold) -> Self {
+        Record { hold, ..self }
+    }
+
+    /// Says what is known of the state at the first sample; of a given one, an entry per state.
+    ///
+    /// # Errors
+    /// Another number of entries than states.
+    pub fn initial(self, initial: Initial) -> Result<Self, Error> {
+        match &initial {
+            Initial::Given(given) if given.len() != self.states.len() => Err(Error::Option(format!(
+                "experiment `{}`: the initial state has {} entries, but the model has {} states",
+                self.name,
+                given.len(),
+                self.states.len()
+            ))),
+            _ => Ok(Record { initial, ..self }),
+        }
+    }
+
+    /// The same record with other signals.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub(crate) fn with_channels(self, inputs: Vec<Channel>, outputs: Vec<Channel>) -> Result<Self, Error> {
+        Record { inputs, outputs, ..self }.checked()
+    }
+
+    /// Name in reports and errors.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.inputs.iter().chain(&self.outputs).map(|channel| channel.values.len()).next().unwrap_or(0)
+    }
+
+    /// Whether there is no sample; never so for a record that was made.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// When the samples were taken.
+    pub fn times(&self) -> &Time {
+        &self.time
+    }
+
+    /// Time of sample `k` (s).
+    #[inline(always)]
+    pub fn time(&self, k: usize) -> f64 {
+        self.time.at(k)
+    }
+
+    /// The inputs.
+    pub fn inputs(&self) -> &[Channel] {
+        &self.inputs
+    }
+
+    /// The measured outputs; NaN where missing.
+    pub fn outputs(&self) -> &[Channel] {
+        &self.outputs
+    }
+
+    /// How the input behaves between samples.
+    pub fn input_hold(&self) -> Hold {
+        self.hold
+    }
+
+    /// What is known of the state at the first sample.
+    pub fn initial_state(&self) -> &Initial {
+        &self.initial
+    }
+
+    /// Median time from sample to sample (s); of a uniform record, its sample time.
+    pub fn sample_time(&self) -> f64 {
+        self.time.median_step()
+    }
+
+    /// Inputs of sample `k`.
+    pub(crate) fn input(&self, k: usize) -> Vec<f64> {
+        self.inputs.iter().map(|channel| channel.values[k]).collect()
+    }
+
+    /// Measured outputs of sample `k`.
+    pub(crate) fn output(&self, k: usize) -> Vec<f64> {
+        self.outputs.iter().map(|channel| channel.values[k]).collect()
+    }
+
+    /// The fewest samples of a record: a state needs an interval to move in.
+    pub(crate) fn least(&self) -> usize {
+        if self.states.is_empty() { 1 } else { 2 }
+    }
+
+    /// The record, if it keeps its promises.
+    pub(crate) fn checked(self) -> Result<Self, Error> {
+        let mut channels = self.inputs.iter().chain(&self.outputs);
+        let Some(first) = channels.next() else {
+            return Err(Error::Option(format!("experiment `{}` has neither an input nor an output", self.name)));
+        };
+        let samples = first.values.len();
+        if let Some(other) = channels.find(|channel| channel.values.len() != samples) {
+            let (what, found) = (format!("`{}`", other.name), other.values.len());
+            let (experiment, reference) = (self.name.clone(), format!("`{}`", first.name));
+            return Err(Error::Lengths { experiment, what, found, reference, expected: samples });
+        }
+        self.time.check(&self.name, samples, &first.name)?;
+        let needed = self.least();
+        if samples < needed {
+            return Err(Error::TooFewSamples { experiment: self.name, samples, needed, purpose: "for a fit" });
+        }
+        let bad_input = |channel: &Channel| channel.values.iter().position(|value| !value.is_finite());
+        let bad_output = |channel: &Channel| channel.values.iter().position(|value| value.is_infinite());
+        let inputs = self.inputs.iter().filter_map(|channel| Some((bad_input(channel)?, channel)));
+        let outputs = self.outputs.iter().filter_map(|channel| Some((bad_output(channel)?, channel)));
+        if let Some((sample, channel)) = inputs.chain(outputs).min_by_key(|(sample, _)| *sample) {
+            let (experiment, signal, time) = (self.name.clone(), channel.name.clone(), self.time(sample));
+            return Err(Error::NotFinite { experiment, signal, value: channel.values[sample], sample, time });
+        }
+        Ok(self)
+    }
+}

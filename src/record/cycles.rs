@@ -1,0 +1,76 @@
+//! What a record consists of: operating cycles, gaps, and how much of each output was measured.
+
+use super::{Record, Time};
+use crate::numeral::exact;
+use core::fmt;
+use std::ops::Range;
+
+/// A time without samples, inside a record.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gap {
+    /// Index of the first sample after it.
+    pub sample: usize,
+    /// Time of the last sample before it (s).
+    pub from: f64,
+    /// Time of the first sample after it (s).
+    pub to: f64,
+}
+
+impl fmt::Display for Gap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "no sample from {} s to {} s (before sample {})", exact(self.from), exact(self.to), self.sample)
+    }
+}
+
+/// A step this much longer than the median one is a gap: half way to one lost sample.
+const GAP: f64 = 1.5;
+
+impl Record {
+    /// Each run of samples for which `running` holds, if it is at least `shortest` samples long, as a record of its own,
+    /// numbered from one.
+    pub fn cycles(&self, shortest: usize, mut running: impl FnMut(usize) -> bool) -> Vec<Self> {
+        let mut runs = Vec::new();
+        let mut begin = None;
+        for k in 0..self.len() {
+            match (running(k), begin) {
+                (true, None) => begin = Some(k),
+                (false, Some(first)) => {
+                    runs.push(first..k);
+                    begin = None;
+                }
+                _ => {}
+            }
+        }
+        runs.extend(begin.map(|first| first..self.len()));
+        self.pieces(runs, shortest, "cycle")
+    }
+
+    /// The pieces between the [`gaps`](Record::gaps), each a record of its own, numbered from one; a single sample
+    /// between two gaps is dropped.
+    pub fn without_gaps(&self) -> Vec<Self> {
+        let begins: Vec<usize> = [0].into_iter().chain(self.gaps().iter().map(|gap| gap.sample)).collect();
+        let ends = begins.iter().skip(1).copied().chain([self.len()]);
+        let runs = begins.iter().zip(ends).map(|(&begin, end)| begin..end).collect();
+        self.pieces(runs, 0, "piece")
+    }
+
+    /// Where time jumps: a step of more than 1.5 times the median one, so that a sample or more is lost. Over a gap the
+    /// input is held as between any two samples, which is seldom what happened.
+    pub fn gaps(&self) -> Vec<Gap> {
+        let Time::Stamps(stamps) = &self.time else { return Vec::new() };
+        let longest = self.sample_time() * GAP;
+        let steps = stamps.windows(2).enumerate();
+        steps.filter(|(_, t)| t[1] - t[0] > longest).map(|(k, t)| Gap { sample: k + 1, from: t[0], to: t[1] }).collect()
+    }
+
+    /// The share of the samples, from 0 to 1, in which each output was measured.
+    pub fn coverage(&self) -> Vec<f64> {
+        let measured = |values: &[f64]| values.iter().filter(|value| !value.is_nan()).count();
+        self.outputs.iter().map(|channel| measured(&channel.values) as f64 / self.len() as f64).collect()
+    }
+
+    fn pieces(&self, runs: Vec<Range<usize>>, shortest: usize, what: &str) -> Vec<Self> {
+        let runs = runs.into_iter().filter(|run| run.len() >= shortest.max(self.least()));
+        runs.enumerate().map(|(i, run)| self.piece(run, format!("{}, {what} {}", self.name, i + 1))).collect()
+    }
+}

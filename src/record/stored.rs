@@ -1,0 +1,111 @@
+//! Records in serde's data model: everything that was said of one, its signals as columns by name, a missing output as
+//! null. What is read is checked like any other record.
+
+use super::{Channel, Initial, Record, Time};
+use crate::by_name::Entries;
+use crate::interval::Hold;
+use crate::layout::Quantity;
+use crate::parameter::Parameter;
+use serde::ser::SerializeStruct;
+use serde::{Deserialize, Serialize, Serializer};
+
+impl Serialize for Record {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut record = serializer.serialize_struct("Experiment", 6)?;
+        record.serialize_field("name", &self.name)?;
+        record.serialize_field("hold", &self.hold)?;
+        record.serialize_field("initial", &StoredInitial::of(&self.initial, &self.states))?;
+        record.serialize_field("time", &self.time)?;
+        record.serialize_field("inputs", &Columns(&self.inputs))?;
+        record.serialize_field("outputs", &Columns(&self.outputs))?;
+        record.end()
+    }
+}
+
+/// Signals, to be written as columns by name.
+struct Columns<'a>(&'a [Channel]);
+
+/// One of them.
+struct Values<'a>(&'a [f64]);
+
+impl Serialize for Columns<'_> {
+    fn serialize<Z: Serializer>(&self, serializer: Z) -> Result<Z::Ok, Z::Error> {
+        serializer.collect_map(self.0.iter().map(|channel| (&channel.name, Values(&channel.values))))
+    }
+}
+
+impl Serialize for Values<'_> {
+    fn serialize<Z: Serializer>(&self, serializer: Z) -> Result<Z::Ok, Z::Error> {
+        serializer.collect_seq(self.0.iter().map(|value| Some(*value).filter(|value| !value.is_nan())))
+    }
+}
+
+/// [`Initial`] with its states by name.
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "Initial")]
+enum StoredInitial {
+    Estimated,
+    FirstSample,
+    Given(Entries<Parameter>),
+}
+
+impl StoredInitial {
+    fn of(initial: &Initial, states: &[Quantity]) -> Self {
+        match initial {
+            Initial::Estimated => StoredInitial::Estimated,
+            Initial::FirstSample => StoredInitial::FirstSample,
+            Initial::Given(given) => {
+                let named = states.iter().map(|state| state.name.clone()).zip(given.iter().copied());
+                StoredInitial::Given(Entries(named.collect()))
+            }
+        }
+    }
+
+    fn into_initial(self, states: &[Quantity]) -> Result<Initial, String> {
+        let given = match self {
+            StoredInitial::Estimated => return Ok(Initial::Estimated),
+            StoredInitial::FirstSample => return Ok(Initial::FirstSample),
+            StoredInitial::Given(given) => given,
+        };
+        given.in_order(names(states)).map(Initial::Given)
+    }
+}
+
+fn names(quantities: &[Quantity]) -> impl Iterator<Item = &str> + Clone {
+    quantities.iter().map(|quantity| quantity.name.as_str())
+}
+
+/// What stands in a file, before it is checked against a model.
+#[derive(Deserialize)]
+#[serde(rename = "Experiment", deny_unknown_fields)]
+pub(crate) struct Stored {
+    name: String,
+    hold: Hold,
+    initial: StoredInitial,
+    time: Time,
+    inputs: Entries<Vec<Option<f64>>>,
+    outputs: Entries<Vec<Option<f64>>>,
+}
+
+impl Stored {
+    /// The record, if it has these signals and keeps its promises.
+    pub fn into_record(
+        self,
+        states: Vec<Quantity>,
+        inputs: &[Quantity],
+        outputs: &[Quantity],
+    ) -> Result<Record, String> {
+        let initial = self.initial.into_initial(&states)?;
+        let channels = |columns: Entries<Vec<Option<f64>>>, quantities: &[Quantity]| {
+            let columns = columns.in_order(names(quantities))?.into_iter().zip(quantities);
+            let channel = |(column, quantity): (Vec<Option<f64>>, &Quantity)| {
+                let values: Vec<f64> = column.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect();
+                Channel::new(&quantity.name, &quantity.unit, values)
+            };
+            Ok::<_, String>(columns.map(channel).collect::<Vec<Channel>>())
+        };
+        let (inputs, outputs) = (channels(self.inputs, inputs)?, channels(self.outputs, outputs)?);
+        let Stored { name, hold, time, .. } = self;
+        Record { name, states, time, inputs, outputs, hold, initial }.checked().map_err(|error| error.to_string())
+    }
+}

@@ -1,0 +1,200 @@
+//! [`simulate`]: what a model does with given parameters, and records made of it.
+
+use crate::error::{Error, Failure};
+use crate::experiment::{Experiment, ExperimentOf};
+use crate::integrate::{Automatic, Integrator, ModelSystem, Stuck};
+use crate::interval::{Hold, Interval};
+use crate::layout::Kind;
+use crate::model::Model;
+use crate::random::Random;
+use crate::record::Time;
+use crate::signals::{Of, Signals};
+
+/// Simulates a model from an initial state, its inputs held from sample to sample, by the step that its kind asks for;
+/// [`Simulator`] has the choice.
+///
+/// ```
+/// use greybox::{Model, Scalar, Time, signals, simulate};
+/// signals! { pub struct Speed { w: "rad/s" } pub struct Torque { m: "N m" } pub struct Shaft { j: "kg m^2", b: "N m s" } }
+/// struct Rotor;
+/// impl Model for Rotor {
+///     type State = Speed; type Input = Torque; type Output = Speed; type Parameters = Shaft;
+///     fn derivative<S: Scalar>(&self, _t: S, x: &Speed<S>, u: &Torque<S>, p: &Shaft<S>) -> Speed<S> {
+///         Speed { w: (u.m - p.b * x.w) / p.j }
+///     }
+///     fn output<S: Scalar>(&self, _t: S, x: &Speed<S>, _u: &Torque<S>, _p: &Shaft<S>) -> Speed<S> { *x }
+/// }
+/// let (shaft, time) = (Shaft { j: 0.1, b: 0.2 }, Time::Uniform { start: 0.0, step: 0.01 });
+/// let run = simulate(&Rotor, &shaft, &Speed { w: 0.0 }, time, &vec![Torque { m: 1.0 }; 500])?;
+/// assert!((run.outputs[499].w - 5.0).abs() < 1e-3); // m / b, after ten time constants
+/// let record = run.with_noise(Speed { w: 0.05 }, 7).experiment(&Rotor)?; // a record to try a fit on
+/// # assert_eq!(record.len(), 500);
+/// # Ok::<(), greybox::Error>(())
+/// ```
+///
+/// # Errors
+/// As [`Simulator::run`].
+pub fn simulate<M: Model>(
+    model: &M,
+    parameters: &Of<M::Parameters, f64>,
+    initial: &Of<M::State, f64>,
+    time: Time,
+    inputs: &[Of<M::Input, f64>],
+) -> Result<Simulation<M>, Error> {
+    Simulator::new(model).run(parameters, initial, time, inputs)
+}
+
+/// A simulation about to be run: the method and the hold of the inputs.
+#[derive(Clone, Debug)]
+pub struct Simulator<'a, M, I = Automatic> {
+    model: &'a M,
+    integrator: I,
+    hold: Hold,
+}
+
+impl<'a, M: Model> Simulator<'a, M> {
+    /// By the step that the model's kind asks for, inputs held from sample to sample.
+    pub fn new(model: &'a M) -> Self {
+        Simulator { model, integrator: Automatic::default(), hold: Hold::default() }
+    }
+}
+
+impl<'a, M: Model, I: Integrator> Simulator<'a, M, I> {
+    /// Steps the model by another method.
+    pub fn integrator<J: Integrator>(self, integrator: J) -> Simulator<'a, M, J> {
+        Simulator { model: self.model, integrator, hold: self.hold }
+    }
+
+    /// Says how the inputs behave between samples.
+    pub fn hold(self, hold: Hold) -> Self {
+        Simulator { hold, ..self }
+    }
+
+    /// Simulates from the initial state; one sample for each row of inputs.
+    ///
+    /// # Errors
+    /// No input row, time that does not increase or does not go with the inputs, an input that is not finite, a method that
+    /// does not serve the model; a state or an output that is not finite, an integrator that is stuck ([`Error::Simulation`]).
+    pub fn run(
+        &self,
+        parameters: &Of<M::Parameters, f64>,
+        initial: &Of<M::State, f64>,
+        time: Time,
+        inputs: &[Of<M::Input, f64>],
+    ) -> Result<Simulation<M>, Error> {
+        self.check(&time, inputs)?;
+        let mut x = *initial;
+        let mut step = 0.0;
+        let (mut states, mut outputs) = (Vec::with_capacity(inputs.len()), Vec::with_capacity(inputs.len()));
+        for (k, u) in inputs.iter().enumerate() {
+            finite::<M::State>("state", &x, k, &time)?;
+            let y = self.model.output(time.at(k), &x, u, parameters);
+            finite::<M::Output>("output", &y, k, &time)?;
+            states.push(x);
+            outputs.push(y);
+            let Some(&next) = inputs.get(k + 1) else { break };
+            let u1 = if self.hold == Hold::First { next } else { *u };
+            let interval = Interval { t0: time.at(k), t1: time.at(k + 1), u0: *u, u1, hold: self.hold };
+            let system = ModelSystem { model: self.model, interval: &interval, p: parameters };
+            x = system
+                .step(&self.integrator, x, &mut step)
+                .map_err(|Stuck| failure("the progress of the integrator".to_owned(), 0.0, k, &time))?;
+        }
+        Ok(Simulation { time, hold: self.hold, inputs: inputs.to_vec(), states, outputs })
+    }
+
+    fn check(&self, time: &Time, inputs: &[Of<M::Input, f64>]) -> Result<(), Error> {
+        if inputs.is_empty() {
+            let (experiment, purpose) = ("simulation".to_owned(), "of inputs, to simulate");
+            return Err(Error::TooFewSamples { experiment, samples: 0, needed: 1, purpose });
+        }
+        time.check("simulation", inputs.len(), "the inputs")?;
+        let bad = |u: &Of<M::Input, f64>| M::Input::into_array(*u).as_ref().iter().position(|u| !u.is_finite());
+        if let Some((sample, i)) = inputs.iter().enumerate().find_map(|(k, u)| Some((k, bad(u)?))) {
+            let (experiment, signal) = ("simulation".to_owned(), M::Input::NAMES[i].to_owned());
+            let value = M::Input::into_array(inputs[sample]).as_ref()[i];
+            return Err(Error::NotFinite { experiment, signal, value, sample, time: time.at(sample) });
+        }
+        if !self.integrator.serves(M::KIND) {
+            let word = |kind| match kind {
+                Kind::Continuous => "continuous",
+                Kind::Discrete => "discrete",
+                Kind::Static => "static",
+            };
+            let kinds = [Kind::Continuous, Kind::Discrete, Kind::Static];
+            let serves = kinds.into_iter().find(|&kind| self.integrator.serves(kind)).map_or("no", word);
+            let integrator = self.integrator.describe(M::KIND);
+            return Err(Error::WrongIntegrator { model: word(M::KIND), integrator, serves });
+        }
+        self.integrator.check()
+    }
+}
+
+fn failure(signal: String, value: f64, sample: usize, time: &Time) -> Error {
+    let hint = "; check the parameters and the initial state, or take a shorter step or a stiff method";
+    Error::Simulation(Failure {
+        experiment: "simulation".to_owned(),
+        sample,
+        time: time.at(sample),
+        signal,
+        value,
+        hint,
+    })
+}
+
+/// Refuses a vector with an entry that is not finite.
+fn finite<S: Signals>(what: &str, signals: &Of<S, f64>, k: usize, time: &Time) -> Result<(), Error> {
+    let entries = S::into_array(*signals);
+    match entries.as_ref().iter().position(|value| !value.is_finite()) {
+        Some(i) => Err(failure(format!("{what} `{}`", S::NAMES[i]), entries.as_ref()[i], k, time)),
+        None => Ok(()),
+    }
+}
+
+/// What a model did.
+#[derive(Debug)]
+pub struct Simulation<M: Model> {
+    /// When.
+    pub time: Time,
+    /// How the inputs behave between samples.
+    pub hold: Hold,
+    /// Inputs, one row per sample.
+    pub inputs: Vec<Of<M::Input, f64>>,
+    /// States, one row per sample.
+    pub states: Vec<Of<M::State, f64>>,
+    /// Outputs, one row per sample.
+    pub outputs: Vec<Of<M::Output, f64>>,
+}
+
+impl<M: Model> Simulation<M> {
+    /// The outputs with white Gaussian noise of these standard deviations added; the same seed adds the same noise.
+    pub fn with_noise(mut self, sigma: Of<M::Output, f64>, seed: u64) -> Self {
+        let sigma = M::Output::into_array(sigma);
+        for (j, sigma) in sigma.as_ref().iter().enumerate() {
+            let mut random = Random::stream(seed, j as u64);
+            for y in &mut self.outputs {
+                let mut entries = M::Output::into_array(*y);
+                entries.as_mut()[j] += sigma * random.normal();
+                *y = M::Output::from_array(entries);
+            }
+        }
+        self
+    }
+
+    /// The run as a record; its initial state is to be estimated.
+    ///
+    /// # Errors
+    /// As [`Experiment::new`].
+    pub fn experiment(&self, model: &M) -> Result<ExperimentOf<M>, Error> {
+        let record = Experiment::new(model, self.time.clone(), self.inputs.clone(), self.outputs.clone())?;
+        Ok(record.hold(self.hold))
+    }
+}
+
+// `derive` would ask for the same of `M`.
+impl<M: Model> Clone for Simulation<M> {
+    fn clone(&self) -> Self {
+        let (time, hold, inputs) = (self.time.clone(), self.hold, self.inputs.clone());
+        Simulation { time, hold, inputs, states: self.states.clone(), outputs: self.outputs.clone() }
+    }
+}

@@ -1,0 +1,216 @@
+//! [`DualSweep`]: models run in numbers with slopes, one piece at a time.
+
+use super::filtered::Filter;
+use super::{Located, Loops, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
+use crate::error::{Error, Failure};
+use crate::functions::{Functions, Handle};
+use crate::integrate::{Duals, Method, Stuck};
+use crate::layout::Layout;
+use crate::model::Model;
+use crate::predict::{Between, Plant, Prediction, SlicePlant, measured};
+use crate::record::Record;
+use core::cell::Cell;
+use std::sync::Arc;
+
+/// A model run as compiled, in dual numbers.
+pub(crate) struct DualSweep<'a, M: Model> {
+    pub layout: Arc<Layout>,
+    pub model: Handle<'a, M>,
+    pub loops: Arc<dyn Loops<M> + 'a>,
+    pub method: Arc<dyn Method>,
+    pub predictor: Arc<dyn Prediction>,
+    /// Why the model is not run as a graph.
+    pub reason: String,
+}
+
+impl<M: Model> DualSweep<'_, M> {
+    fn filter(&self) -> Filter<'_> {
+        Filter {
+            layout: &self.layout,
+            values: &self.model,
+            duals: &self.model,
+            method: &*self.method,
+            predictor: &*self.predictor,
+        }
+    }
+}
+
+impl<M: Model> Sweep for DualSweep<'_, M> {
+    fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    fn carry(&self) -> usize {
+        self.predictor.carry(&self.layout)
+    }
+
+    fn predicts_variance(&self) -> bool {
+        self.predictor.predicts_variance()
+    }
+
+    fn prepare(&self, record: &Record, parameters: &[f64]) -> Result<Prepared, Error> {
+        let restarts = match self.predictor.restarts() {
+            Some(horizon) => horizon.states(&self.layout, &self.model, record, parameters)?,
+            None => vec![],
+        };
+        Ok(Prepared { restarts })
+    }
+
+    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Reached {
+        self.filter().start(record, state, parameters)
+    }
+
+    fn run(&self, pieces: &[Piece<'_>], seeds: &[Seed], visit: Visit<'_>) -> Vec<Result<Reached, RunError>> {
+        let one = |piece: &Piece<'_>| {
+            if self.predictor.is_simulation() {
+                return self.loops.run(&self.model, piece, seeds, None, visit);
+            }
+            match self.predictor.restarts() {
+                Some(horizon) => self.loops.run(&self.model, piece, seeds, Some(horizon.steps), visit),
+                None => self.filter().run(piece, seeds, visit),
+            }
+        };
+        pieces.iter().map(one).collect()
+    }
+
+    fn measured_state(&self, record: &Record, sample: usize, p: &[f64], alone: bool) -> Result<Vec<f64>, String> {
+        measured_state(&self.layout, &self.model, record, sample, p, alone)
+    }
+
+    fn locate(
+        &self,
+        record: &Record,
+        label: &str,
+        state: &[f64],
+        parameters: &[f64],
+        sample: usize,
+        sigma: &[f64],
+    ) -> Option<Located> {
+        let layout = &*self.layout;
+        let search =
+            FailureSearch { layout, values: &self.model, duals: &self.model, method: &*self.method, record, label };
+        Some(search.locate(state, parameters, sample, sigma))
+    }
+
+    fn refined<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
+        let (loops, method) = self.loops.refined(M::KIND)?;
+        let (layout, model, predictor) = (self.layout.clone(), self.model.clone(), self.predictor.clone());
+        let reason = self.reason.clone();
+        Some(Arc::new(DualSweep { layout, model, loops, method, predictor, reason }))
+    }
+
+    fn integrator(&self) -> String {
+        self.method.describe(self.layout.kind)
+    }
+
+    fn predictor(&self) -> String {
+        self.predictor.describe()
+    }
+
+    fn engine(&self) -> String {
+        format!("dual numbers ({})", self.reason)
+    }
+
+    fn identity(&self) -> String {
+        std::any::type_name::<M>().to_owned()
+    }
+}
+
+/// The state that the outputs of a sample give; alone, if the outputs must not depend on the parameters besides.
+pub(crate) fn measured_state(
+    layout: &Layout,
+    functions: &dyn Functions<Duals>,
+    record: &Record,
+    sample: usize,
+    p: &[f64],
+    alone: bool,
+) -> Result<Vec<f64>, String> {
+    let (t, u, y) = (record.time(sample), record.input(sample), record.output(sample));
+    let x = measured::state(layout, functions, t, &u, &y, p)?;
+    match measured::depends_on_parameter(layout, functions, t, &x, &u, p).filter(|_| alone) {
+        Some(name) => Err(format!("the outputs depend on the parameter `{name}`, too")),
+        None => Ok(x),
+    }
+}
+
+/// A record run in plain numbers, to find what fails in it.
+pub(crate) struct FailureSearch<'w> {
+    pub layout: &'w Layout,
+    pub values: &'w dyn Functions<f64>,
+    pub duals: &'w dyn Functions<Duals>,
+    pub method: &'w dyn Method,
+    pub record: &'w Record,
+    pub label: &'w str,
+}
+
+impl FailureSearch<'_> {
+    fn failure(&self, k: usize, signal: String, value: f64, hint: &'static str) -> Failure {
+        Failure { experiment: self.label.to_owned(), sample: k, time: self.record.time(k), signal, value, hint }
+    }
+
+    /// What fails in a simulation from this state; where nothing does, the error that is largest against the noise.
+    pub fn locate(&self, state: &[f64], p: &[f64], sample: usize, sigma: &[f64]) -> Located {
+        let broken = |k, signal, value, hint| Located::Broken(self.failure(k, signal, value, hint));
+        let unsound = |values: &[f64]| {
+            let i = values.iter().position(|v| !v.is_finite())?;
+            Some((i, values[i], if values[i].is_nan() { UNDEFINED } else { OVERFLOW }))
+        };
+        let runaway = |x: &[f64]| x.iter().copied().enumerate().find(|(_, x)| x.abs() >= RUNAWAY);
+        let name = |i: usize| &self.layout.states[i].name;
+        let mut x = state.to_vec();
+        let step = Cell::new(0.0);
+        let mut y = vec![0.0; self.layout.outputs.len()];
+        let mut largest = (sample, 0, 0.0f64);
+        for k in 0..self.record.len() {
+            let between = Between::new(self.record, k);
+            let FailureSearch { layout, values, duals, method, .. } = *self;
+            let plant = SlicePlant { layout, functions: values, duals, method, between, p, step: &step };
+            plant.output(&x, &mut y);
+            for (j, (&y, channel)) in y.iter().zip(self.record.outputs()).enumerate() {
+                let found = channel.values[k];
+                // What was not measured need not be predicted in a fit; where a prediction was asked for, it stopped here.
+                if !y.is_finite() && (!found.is_nan() || k == sample) {
+                    let hint = if y.is_nan() { UNDEFINED } else { OVERFLOW };
+                    return broken(k, format!("output `{}`", self.layout.outputs[j].name), y, hint);
+                }
+                if ((found - y) / sigma[j]).abs() > (largest.2 / sigma[largest.1]).abs() {
+                    largest = (k, j, found - y);
+                }
+            }
+            if k + 1 == self.record.len() {
+                break;
+            }
+            let mut next = x.clone();
+            if plant.next(&mut next) == Err(Stuck) {
+                if let Some((i, value)) = runaway(&x) {
+                    return broken(k, format!("state `{}`", name(i)), value, OVERFLOW);
+                }
+                plant.derivative(0.0, &x, &mut next);
+                return match unsound(&next) {
+                    Some((i, value, hint)) => broken(k, format!("the derivative of state `{}`", name(i)), value, hint),
+                    None => broken(k, "the progress of the integrator".to_owned(), 0.0, STUCK),
+                };
+            }
+            if let Some((i, value, hint)) = unsound(&next) {
+                let hint = if runaway(&x).is_some() { OVERFLOW } else { hint };
+                return broken(k + 1, format!("state `{}`", name(i)), value, hint);
+            }
+            x = next;
+        }
+        let (k, j, error) = largest;
+        Located::Largest(self.failure(k, format!("the error of output `{}`", self.layout.outputs[j].name), error, HUGE))
+    }
+}
+
+/// A state as large as this is about to overflow; a method then gets stuck, or computes infinity less infinity.
+const RUNAWAY: f64 = 1e100;
+
+const STUCK: &str = "; no step is short enough, or 100,000 of them do not reach the next sample: the model is too stiff for \
+                     the method, jumps, or leaves its domain (take Esdirk, or smooth the model)";
+const UNDEFINED: &str = "; the equations are undefined there (a division by zero, a root or logarithm out of its domain, \
+                         or the `derivative` or `next` that Model::KIND asks for was not written): bound the parameters \
+                         or start elsewhere";
+pub(crate) const OVERFLOW: &str = "; the simulation overflows (an unstable model, or a step too long for its dynamics): \
+                                   bound the parameters, take a shorter step or a stiff method, or predict over a shorter \
+                                   horizon";
+const HUGE: &str = ", whose square overflows: check the units of the record, the noise levels and the start";

@@ -1,0 +1,214 @@
+//! A piece run by a [`Predictor`](crate::Predictor) of any kind, on vectors of run-time length.
+
+use super::{Piece, Reached, RunError, Seed, Visit, Window};
+use crate::dual::Dual;
+use crate::functions::Functions;
+use crate::integrate::{Duals, Method, Stuck};
+use crate::layout::Layout;
+use crate::predict::{Between, Prediction, SlicePlant, Stepped, Steps};
+use crate::scalar::Scalar;
+use core::cell::Cell;
+
+/// Samples per window.
+const WINDOW: usize = 128;
+/// Slopes of a pass.
+const SLOPES: usize = 8;
+/// Slopes below this are gone for good; squared they are denormal.
+const NEGLIGIBLE: f64 = 1e-150;
+
+/// What a run needs besides the piece.
+pub(crate) struct Filter<'f> {
+    pub layout: &'f Layout,
+    pub values: &'f dyn Functions<f64>,
+    pub duals: &'f dyn Functions<Duals>,
+    pub method: &'f dyn Method,
+    pub predictor: &'f dyn Prediction,
+}
+
+/// The state of one pass with up to eight slopes.
+struct Pass<S> {
+    carry: Vec<S>,
+    p: Vec<S>,
+    step: Cell<f64>,
+    first: usize,
+    used: usize,
+}
+
+/// A number, and how its slopes are read and cleaned.
+trait Number: Stepped {
+    fn with(value: f64, slope: &dyn Fn(usize) -> f64) -> Self;
+    fn slope(&self, i: usize) -> f64;
+    fn flushed(self) -> Self;
+}
+
+impl Number for f64 {
+    fn with(value: f64, _slope: &dyn Fn(usize) -> f64) -> Self {
+        value
+    }
+    fn slope(&self, _i: usize) -> f64 {
+        0.0
+    }
+    fn flushed(self) -> Self {
+        self
+    }
+}
+
+impl Number for Duals {
+    fn with(value: f64, slope: &dyn Fn(usize) -> f64) -> Self {
+        let mut dual = Dual::constant(value);
+        dual.slopes.iter_mut().enumerate().for_each(|(i, s)| *s = slope(i));
+        dual
+    }
+    fn slope(&self, i: usize) -> f64 {
+        self.slopes[i]
+    }
+    fn flushed(mut self) -> Self {
+        for slope in &mut self.slopes {
+            if slope.abs() < NEGLIGIBLE {
+                *slope = 0.0;
+            }
+        }
+        self
+    }
+}
+
+impl Filter<'_> {
+    /// The carry at the first sample, with slopes with respect to states, then parameters.
+    pub fn start(&self, record: &crate::record::Record, state: &[f64], parameters: &[f64]) -> Reached {
+        let (n, width) = (state.len(), state.len() + parameters.len());
+        let size = self.predictor.carry(self.layout);
+        let mut reached = Reached { carry: vec![0.0; size], slopes: vec![0.0; size * width] };
+        for first in (0..width.max(1)).step_by(SLOPES) {
+            let lane = |i: usize| i.wrapping_sub(first);
+            let mut carry = vec![Duals::constant(0.0); size];
+            for (i, x) in state.iter().enumerate() {
+                carry[i] = Dual::variable(*x, lane(i));
+            }
+            let p: Vec<Duals> = parameters.iter().enumerate().map(|(j, p)| Dual::variable(*p, lane(n + j))).collect();
+            let step = Cell::new(0.0);
+            let plant = self.plant(self.duals, Between::new(record, 0), &p, &step);
+            self.predictor.duals().start(&plant, &mut carry);
+            for (entry, x) in carry.iter().enumerate() {
+                reached.carry[entry] = x.value;
+                for i in 0..SLOPES.min(width - first.min(width)) {
+                    reached.slopes[entry * width + first + i] = x.slopes[i];
+                }
+            }
+        }
+        reached
+    }
+
+    /// Runs a piece.
+    pub fn run(&self, piece: &Piece<'_>, seeds: &[Seed], visit: Visit<'_>) -> Result<Reached, RunError> {
+        match seeds.is_empty() {
+            true => self.walk::<f64>(self.values, self.predictor.values(), piece, seeds, visit),
+            false => self.walk::<Duals>(self.duals, self.predictor.duals(), piece, seeds, visit),
+        }
+    }
+
+    fn plant<'p, S: Stepped>(
+        &'p self,
+        functions: &'p dyn Functions<S>,
+        between: Between,
+        p: &'p [S],
+        step: &'p Cell<f64>,
+    ) -> SlicePlant<'p, S> {
+        SlicePlant { layout: self.layout, functions, duals: self.duals, method: self.method, between, p, step }
+    }
+
+    fn walk<S: Number>(
+        &self,
+        functions: &dyn Functions<S>,
+        steps: &dyn Steps<S>,
+        piece: &Piece<'_>,
+        seeds: &[Seed],
+        visit: Visit<'_>,
+    ) -> Result<Reached, RunError> {
+        let count = seeds.len().div_ceil(SLOPES).max(1);
+        let mut passes: Vec<Pass<S>> = (0..count).map(|pass| Pass::new(piece, seeds, pass * SLOPES)).collect();
+        let outputs = self.layout.outputs.len();
+        let variances = self.predictor.predicts_variance();
+        let mut window = Window::new(1, outputs, seeds.len(), WINDOW, variances);
+        let mut begin = piece.samples.start;
+        while begin < piece.samples.end {
+            let samples = WINDOW.min(piece.samples.end - begin);
+            (window.begin[0], window.samples[0]) = (begin, samples);
+            window.carry = passes[0].carry.iter().map(Scalar::value).collect();
+            for pass in &mut passes {
+                for k in 0..samples {
+                    self.sample(functions, steps, piece, pass, begin + k, k, &mut window)
+                        .map_err(|Stuck| RunError::Failed { sample: begin + k + 1 })?;
+                }
+                pass.carry.iter_mut().for_each(|x| *x = x.flushed());
+            }
+            if !visit(&mut window) {
+                return Err(RunError::Stopped);
+            }
+            begin += samples;
+        }
+        let size = passes[0].carry.len();
+        let carry = passes[0].carry.iter().map(Scalar::value).collect();
+        let mut slopes = vec![0.0; size * seeds.len()];
+        for pass in &passes {
+            for (entry, x) in pass.carry.iter().enumerate() {
+                for i in 0..pass.used {
+                    slopes[entry * seeds.len() + pass.first + i] = x.slope(i);
+                }
+            }
+        }
+        Ok(Reached { carry, slopes })
+    }
+
+    /// Predicts and takes in the outputs of a sample, and goes on to the next.
+    #[expect(clippy::too_many_arguments, reason = "one place in two sequences")]
+    fn sample<S: Number>(
+        &self,
+        functions: &dyn Functions<S>,
+        steps: &dyn Steps<S>,
+        piece: &Piece<'_>,
+        pass: &mut Pass<S>,
+        sample: usize,
+        k: usize,
+        window: &mut Window,
+    ) -> Result<(), Stuck> {
+        let plant = self.plant(functions, Between::new(piece.record, sample), &pass.p, &pass.step);
+        let columns = window.columns();
+        for (j, channel) in piece.record.outputs().iter().enumerate() {
+            let y = channel.values[sample];
+            window.set_measured(k, j, u32::from(!y.is_nan()));
+            if y.is_nan() {
+                window.row_mut(k, j).fill(0.0);
+                continue;
+            }
+            let (mean, variance) = steps.predict(&plant, &pass.carry, j);
+            let error = S::from(y) - mean;
+            let write = |row: &mut [f64], value: &S, sign: f64| {
+                row[columns - 1] = value.value();
+                for i in 0..pass.used {
+                    row[pass.first + i] = sign * value.slope(i);
+                }
+            };
+            // The slopes of the prediction are those of the error turned over.
+            write(window.row_mut(k, j), &error, -1.0);
+            if window.has_variances() {
+                write(window.variance_row_mut(k, j), &variance, 1.0);
+            }
+            steps.correct(&plant, &mut pass.carry, j, error);
+        }
+        if sample + 1 < piece.record.len() { steps.advance(&plant, &mut pass.carry) } else { Ok(()) }
+    }
+}
+
+impl<S: Number> Pass<S> {
+    fn new(piece: &Piece<'_>, seeds: &[Seed], first: usize) -> Self {
+        let used = seeds.len().saturating_sub(first).min(SLOPES);
+        let slope = |entry: usize, i: usize| {
+            if i < used { piece.slopes[entry * seeds.len() + first + i] } else { 0.0 }
+        };
+        let moves = |j: usize, i: usize| i < used && seeds[first + i] == Seed::Parameter(j);
+        let carry = piece.carry.iter().enumerate().map(|(entry, x)| S::with(*x, &|i| slope(entry, i))).collect();
+        let parameters = piece.parameters.iter().enumerate();
+        let p = parameters.map(|(j, p)| S::with(*p, &|i| f64::from(u8::from(moves(j, i))))).collect();
+        Pass { carry, p, step: Cell::new(0.0), first, used }
+    }
+}

@@ -1,0 +1,343 @@
+//! [`Loops`]: the loop over the samples, compiled for a model and an integrator, in numbers with slopes.
+//!
+//! This is how models are run that cannot be read as a graph. Slopes with respect to the initial state die away like
+//! `exp(-t / T)`; after some ten thousand samples they are denormal numbers, on which processors are up to 60 times slower;
+//! so slopes below 1e-150 are set to zero between windows.
+
+use super::{Piece, Reached, RunError, Seed, Visit, Window};
+use crate::dispatch::{Kernel, has_wide, run};
+use crate::dual::Dual;
+use crate::fused::Fused;
+use crate::integrate::{Integrator, Method, ModelSystem, Stuck};
+use crate::interval::{Hold, Interval};
+use crate::lanes;
+use crate::layout::Kind;
+use crate::model::Model;
+use crate::record::Record;
+use crate::scalar::Scalar;
+use crate::signals::{Of, Signals};
+use std::sync::Arc;
+
+/// Samples per window: short enough for two outputs and eight slopes to stay in the nearest cache.
+const WINDOW: usize = 128;
+
+/// Slopes below this are gone for good; squared they are denormal.
+const NEGLIGIBLE: f64 = 1e-150;
+
+/// A number with a fixed count of slopes.
+trait Number: Scalar {
+    /// What the slopes are made of.
+    type Slope: lanes::Number;
+    const SLOPES: usize;
+    fn with(value: f64, slope: impl Fn(usize) -> f64) -> Self;
+    fn slope(&self, i: usize) -> f64;
+    fn flushed(self) -> Self;
+}
+
+impl Number for f64 {
+    type Slope = f64;
+    const SLOPES: usize = 0;
+    #[inline(always)]
+    fn with(value: f64, _slope: impl Fn(usize) -> f64) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn slope(&self, _i: usize) -> f64 {
+        0.0
+    }
+    #[inline(always)]
+    fn flushed(self) -> Self {
+        self
+    }
+}
+
+impl<const N: usize, T: Scalar + lanes::Number> Number for Dual<N, T> {
+    type Slope = T;
+    const SLOPES: usize = N;
+    #[inline(always)]
+    fn with(value: f64, slope: impl Fn(usize) -> f64) -> Self {
+        let mut dual = Self::from(value);
+        dual.slopes.iter_mut().enumerate().for_each(|(i, s)| *s = T::from(slope(i)));
+        dual
+    }
+    #[inline(always)]
+    fn slope(&self, i: usize) -> f64 {
+        self.slopes[i].value()
+    }
+    #[inline(always)]
+    fn flushed(mut self) -> Self {
+        for slope in &mut self.slopes {
+            if slope.value().abs() < NEGLIGIBLE {
+                *slope = T::from(0.0);
+            }
+        }
+        self
+    }
+}
+
+/// The rows of one window, with the sample after its last one; made once, and filled for each window.
+struct Rows<'p, M: Model> {
+    record: &'p Record,
+    input_columns: Vec<&'p [f64]>,
+    output_columns: Vec<&'p [f64]>,
+    times: Vec<f64>,
+    inputs: Vec<Of<M::Input, f64>>,
+    outputs: Vec<Of<M::Output, f64>>,
+}
+
+impl<'p, M: Model> Rows<'p, M> {
+    fn new(record: &'p Record) -> Self {
+        Rows {
+            record,
+            input_columns: record.inputs().iter().map(|channel| &*channel.values).collect(),
+            output_columns: record.outputs().iter().map(|channel| &*channel.values).collect(),
+            times: Vec::with_capacity(WINDOW + 1),
+            inputs: Vec::with_capacity(WINDOW + 1),
+            outputs: Vec::with_capacity(WINDOW),
+        }
+    }
+
+    fn read(&mut self, begin: usize, samples: usize) {
+        let (record, inputs, outputs) = (self.record, &self.input_columns, &self.output_columns);
+        let all = record.len().min(begin + samples + 1);
+        self.times.clear();
+        self.times.extend((begin..all).map(|k| record.time(k)));
+        self.inputs.clear();
+        self.inputs.extend((begin..all).map(|k| M::Input::from_fn(|i| inputs[i][k])));
+        self.outputs.clear();
+        self.outputs.extend((begin..begin + samples).map(|k| M::Output::from_fn(|j| outputs[j][k])));
+    }
+}
+
+/// States and parameters with a part of the slopes.
+struct Pass<M: Model, D: Number> {
+    x: Of<M::State, D>,
+    start: Of<M::State, D>,
+    p: Of<M::Parameters, D>,
+    step: f64,
+    first: usize,
+    used: usize,
+}
+
+impl<M: Model, D: Number> Pass<M, D> {
+    fn new(piece: &Piece<'_>, seeds: &[Seed], first: usize) -> Self {
+        let used = seeds.len().saturating_sub(first).min(D::SLOPES);
+        let slope = |entry: usize, i: usize| {
+            if i < used { piece.slopes[entry * seeds.len() + first + i] } else { 0.0 }
+        };
+        let moves = |j: usize, i: usize| i < used && seeds[first + i] == Seed::Parameter(j);
+        let x = M::State::from_fn(|entry| D::with(piece.carry[entry], |i| slope(entry, i)));
+        let p = M::Parameters::from_fn(|j| D::with(piece.parameters[j], |i| f64::from(u8::from(moves(j, i)))));
+        Pass { x, start: x, p, step: 0.0, first, used }
+    }
+}
+
+/// The loop over the samples for a model, whatever the integrator.
+pub(crate) trait Loops<M: Model>: Send + Sync {
+    /// Runs a piece, its samples predicted from measured states so many samples before if `restart` says so.
+    fn run(
+        &self,
+        model: &M,
+        piece: &Piece<'_>,
+        seeds: &[Seed],
+        restart: Option<usize>,
+        visit: Visit<'_>,
+    ) -> Result<Reached, RunError>;
+
+    /// The same with a finer step, if there is one.
+    fn refined(&self, kind: Kind) -> Option<Refined<M>>;
+}
+
+/// A loop with a finer step, and its method.
+pub(crate) type Refined<M> = (Arc<dyn Loops<M>>, Arc<dyn Method>);
+
+impl<M: Model, I: Integrator> Loops<M> for I {
+    fn run(
+        &self,
+        model: &M,
+        piece: &Piece<'_>,
+        seeds: &[Seed],
+        restart: Option<usize>,
+        visit: Visit<'_>,
+    ) -> Result<Reached, RunError> {
+        let task = Task { model, integrator: self, piece, seeds, restart };
+        // The wide loop is made for the hold that nearly all records have.
+        let wide = has_wide() && piece.record.input_hold() == Hold::Zero;
+        // A build that is not made for speed is soon compiled: same numbers, more passes.
+        #[cfg(debug_assertions)]
+        return match (seeds.len(), wide) {
+            (0, _) => task.walk::<f64>(visit),
+            (_, false) => task.walk::<Dual<4>>(visit),
+            (_, true) => task.walk::<Dual<4, Fused>>(visit),
+        };
+        #[cfg(not(debug_assertions))]
+        match (seeds.len(), wide) {
+            (0, _) => task.walk::<f64>(visit),
+            (1..=4, false) => task.walk::<Dual<4>>(visit),
+            (5 | 6 | 9..=12, false) => task.walk::<Dual<6>>(visit),
+            (_, false) => task.walk::<Dual<8>>(visit),
+            (1..=4, true) => task.walk::<Dual<4, Fused>>(visit),
+            (5 | 6 | 9..=12, true) => task.walk::<Dual<6, Fused>>(visit),
+            (_, true) => task.walk::<Dual<8, Fused>>(visit),
+        }
+    }
+
+    fn refined(&self, kind: Kind) -> Option<Refined<M>> {
+        let refined = Integrator::refined(self, kind)?;
+        Some((Arc::new(refined.clone()), Arc::new(refined)))
+    }
+}
+
+/// A piece and how it is to be run.
+struct Task<'t, M: Model, I> {
+    model: &'t M,
+    integrator: &'t I,
+    piece: &'t Piece<'t>,
+    seeds: &'t [Seed],
+    restart: Option<usize>,
+}
+
+impl<M: Model, I: Integrator> Task<'_, M, I> {
+    fn walk<D: Number>(&self, visit: Visit<'_>) -> Result<Reached, RunError> {
+        let (piece, seeds) = (self.piece, self.seeds);
+        let count = seeds.len().div_ceil(D::SLOPES.max(1)).max(1);
+        let mut passes: Vec<Pass<M, D>> = (0..count).map(|i| Pass::new(piece, seeds, i * D::SLOPES)).collect();
+        let mut window = Window::new(1, M::Output::LEN, seeds.len(), WINDOW, false);
+        window.carry = vec![0.0; M::State::LEN];
+        let mut rows = Rows::<M>::new(piece.record);
+        let mut begin = piece.samples.start;
+        while begin < piece.samples.end {
+            let samples = WINDOW.min(piece.samples.end - begin);
+            (window.begin[0], window.samples[0]) = (begin, samples);
+            rows.read(begin, samples);
+            for (entry, x) in window.carry.iter_mut().zip(M::State::into_array(passes[0].x)) {
+                *entry = x.value();
+            }
+            for pass in &mut passes {
+                run(Fill { task: self, pass, rows: &rows, window: &mut window })?;
+            }
+            if !visit(&mut window) {
+                return Err(RunError::Stopped);
+            }
+            begin += samples;
+        }
+        let values = M::State::into_array(passes[0].x);
+        let mut reached = Reached { carry: values.into_iter().map(|x| x.value()).collect(), slopes: vec![] };
+        reached.slopes = vec![0.0; M::State::LEN * seeds.len()];
+        for pass in &passes {
+            for (entry, x) in M::State::into_array(pass.x).into_iter().enumerate() {
+                for i in 0..pass.used {
+                    reached.slopes[entry * seeds.len() + pass.first + i] = x.slope(i);
+                }
+            }
+        }
+        Ok(reached)
+    }
+}
+
+/// One window of one pass.
+struct Fill<'f, 't, M: Model, I, D: Number> {
+    task: &'f Task<'t, M, I>,
+    pass: &'f mut Pass<M, D>,
+    rows: &'f Rows<'f, M>,
+    window: &'f mut Window,
+}
+
+impl<M: Model, I: Integrator, D: Number> Fill<'_, '_, M, I, D> {
+    /// The state at the sample after `k`, both counted from the window's begin.
+    #[inline(always)]
+    fn advance(
+        &self,
+        k: usize,
+        x: Of<M::State, D>,
+        p: &Of<M::Parameters, D>,
+        step: &mut f64,
+    ) -> Result<Of<M::State, D>, Stuck> {
+        // Known to the compiler in the wide loop, which then computes once per interval what depends on the input alone.
+        let hold = if <D::Slope as lanes::Number>::FUSED { Hold::Zero } else { self.task.piece.record.input_hold() };
+        let u0 = self.rows.inputs[k];
+        let u1 = if hold == Hold::First { self.rows.inputs[k + 1] } else { u0 };
+        let interval = Interval { t0: self.rows.times[k], t1: self.rows.times[k + 1], u0, u1, hold };
+        ModelSystem { model: self.task.model, interval: &interval, p }.step(self.task.integrator, x, step)
+    }
+
+    /// The state that sample `sample` is predicted from, `restart` samples after it was measured; `None` if it was not.
+    fn restarted(
+        &self,
+        sample: usize,
+        restart: usize,
+        p: &Of<M::Parameters, D>,
+    ) -> Result<Option<Of<M::State, D>>, Stuck> {
+        let (piece, n) = (self.task.piece, M::State::LEN);
+        let (mut x, first) = if sample < restart {
+            (self.pass.start, 0)
+        } else {
+            let x = &piece.prepared.restarts[(sample - restart) * n..][..n];
+            if x.iter().any(|x| x.is_nan()) {
+                return Ok(None);
+            }
+            (M::State::from_fn(|i| D::from(x[i])), sample - restart)
+        };
+        let record = piece.record;
+        let input = |k: usize| M::Input::from_fn(|i| record.inputs()[i].values[k]);
+        let mut step = 0.0;
+        for k in first..sample {
+            let hold = record.input_hold();
+            let u0 = input(k);
+            let u1 = if hold == Hold::First { input(k + 1) } else { u0 };
+            let interval = Interval { t0: record.time(k), t1: record.time(k + 1), u0, u1, hold };
+            x = ModelSystem { model: self.task.model, interval: &interval, p }.step(
+                self.task.integrator,
+                x,
+                &mut step,
+            )?;
+        }
+        Ok(Some(x))
+    }
+}
+
+impl<M: Model, I: Integrator, D: Number> Kernel for Fill<'_, '_, M, I, D> {
+    type Number = D::Slope;
+    type Output = Result<(), RunError>;
+
+    #[inline(always)]
+    fn run(self) -> Result<(), RunError> {
+        let (begin, samples) = (self.window.begin[0], self.window.samples[0]);
+        let (p, mut x, mut step) = (self.pass.p, self.pass.x, self.pass.step);
+        let (first, used, columns) = (self.pass.first, self.pass.used, self.window.columns());
+        for k in 0..samples {
+            let failed = |Stuck| RunError::Failed { sample: begin + k };
+            let state = match self.task.restart {
+                None => x,
+                Some(restart) => match self.restarted(begin + k, restart, &p).map_err(failed)? {
+                    Some(state) => state,
+                    None => {
+                        for j in 0..M::Output::LEN {
+                            self.window.set_measured(k, j, 0);
+                            self.window.row_mut(k, j).fill(0.0);
+                        }
+                        continue;
+                    }
+                },
+            };
+            let u = M::Input::map(self.rows.inputs[k], D::from);
+            let expected = self.task.model.output(D::from(self.rows.times[k]), &state, &u, &p);
+            let (expected, found) = (M::Output::into_array(expected), M::Output::into_array(self.rows.outputs[k]));
+            for (j, (expected, found)) in expected.into_iter().zip(found).enumerate() {
+                let here = !found.is_nan();
+                self.window.set_measured(k, j, u32::from(here));
+                let row = self.window.row_mut(k, j);
+                row[columns - 1] = if here { found - expected.value() } else { 0.0 };
+                for (i, slope) in row[first..first + used].iter_mut().enumerate() {
+                    *slope = if here { expected.slope(i) } else { 0.0 };
+                }
+            }
+            if self.task.restart.is_none() && k + 1 < self.rows.times.len() {
+                x = self.advance(k, x, &p, &mut step).map_err(|Stuck| RunError::Failed { sample: begin + k + 1 })?;
+            }
+        }
+        self.pass.x = M::State::map(x, Number::flushed);
+        self.pass.step = step;
+        Ok(())
+    }
+}

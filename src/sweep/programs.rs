@@ -1,0 +1,209 @@
+//! [`ProgramSweep`]: models that were read as graphs, run as programs, pieces side by side.
+
+mod horizon;
+mod run;
+
+use super::{Joints, Located, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
+use crate::engine::{Program, Sampling, Trajectories};
+use crate::equations::Equations;
+use crate::error::Error;
+use crate::graph::Untraceable;
+use crate::integrate::Method;
+use crate::interval::Hold;
+use crate::layout::{Kind, Layout};
+use crate::predict::{Prediction, recurrence};
+use crate::record::{Record, Time};
+use crate::recurrence::Recurrence;
+use run::Run;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+/// Equations run by compiled programs.
+pub(crate) struct ProgramSweep<'a> {
+    equations: Arc<Equations>,
+    method: Arc<dyn Method>,
+    predictor: Arc<dyn Prediction>,
+    /// The same equations in dual numbers: for what is not a pass over many samples.
+    plain: Arc<dyn Sweep + 'a>,
+    joints: Joints,
+    /// By hold: zero, first.
+    recurrences: [OnceLock<Arc<Recurrence>>; 2],
+    programs: Mutex<Vec<(Key, Program)>>,
+    refined: OnceLock<Option<Arc<ProgramSweep<'a>>>>,
+}
+
+/// What a program was compiled for.
+#[derive(Clone, Debug, PartialEq)]
+struct Key {
+    hold: Hold,
+    sampling: Sampling,
+    seeds: Vec<Seed>,
+    purpose: Purpose,
+}
+
+/// What is asked of a program.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Purpose {
+    /// Rows of many trajectories.
+    Rows,
+    /// The carry of one, without rows.
+    Carry,
+}
+
+impl<'a> ProgramSweep<'a> {
+    /// Compiles the equations, to values and to slopes with respect to all parameters.
+    ///
+    /// # Errors
+    /// Why they cannot be compiled.
+    pub fn new(
+        equations: Arc<Equations>,
+        method: Arc<dyn Method>,
+        predictor: Arc<dyn Prediction>,
+        plain: Arc<dyn Sweep + 'a>,
+    ) -> Result<Self, Untraceable> {
+        let joints = match predictor.restarts() {
+            Some(_) => Joints::Restarted,
+            None if equations.layout().kind == Kind::Static => Joints::Restarted,
+            None if predictor.is_simulation() && equations.is_affine() => Joints::Affine,
+            None => Joints::Nonlinear,
+        };
+        let sweep = ProgramSweep {
+            equations,
+            method,
+            predictor,
+            plain,
+            joints,
+            recurrences: [OnceLock::new(), OnceLock::new()],
+            programs: Mutex::new(vec![]),
+            refined: OnceLock::new(),
+        };
+        sweep.recurrence(Hold::Zero)?;
+        Ok(sweep)
+    }
+
+    fn recurrence(&self, hold: Hold) -> Result<Arc<Recurrence>, Untraceable> {
+        let known = &self.recurrences[usize::from(hold == Hold::First)];
+        if let Some(known) = known.get() {
+            return Ok(known.clone());
+        }
+        let made = recurrence(&self.equations, &*self.method, &*self.predictor, hold)?;
+        Ok(known.get_or_init(|| Arc::new(made)).clone())
+    }
+
+    /// The program for records like this one; `None` where there can be none.
+    fn program(&self, record: &Record, seeds: &[Seed], purpose: Purpose) -> Option<Program> {
+        let sampling = match record.times() {
+            Time::Uniform { .. } => Sampling::Uniform,
+            Time::Stamps(_) => Sampling::Irregular,
+        };
+        let key = Key { hold: record.input_hold(), sampling, seeds: seeds.to_vec(), purpose };
+        let mut programs = self.programs.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, program)) = programs.iter().find(|(known, _)| *known == key) {
+            return Some(program.clone());
+        }
+        let recurrence = self.recurrence(key.hold).ok()?;
+        let program = match purpose {
+            Purpose::Rows => Program::compile(&recurrence, seeds, sampling, Trajectories::Many),
+            Purpose::Carry => Program::compile(&recurrence.without_outputs(), &[], sampling, Trajectories::One),
+        };
+        let program = program.ok()?;
+        programs.push((key, program.clone()));
+        Some(program)
+    }
+}
+
+impl Sweep for ProgramSweep<'_> {
+    fn layout(&self) -> &Layout {
+        self.equations.layout()
+    }
+
+    fn carry(&self) -> usize {
+        self.plain.carry()
+    }
+
+    fn predicts_variance(&self) -> bool {
+        self.predictor.predicts_variance()
+    }
+
+    fn lanes(&self, record: &Record, seeds: &[Seed]) -> usize {
+        match self.predictor.restarts() {
+            Some(_) => 1,
+            None => self.program(record, seeds, Purpose::Rows).map_or(1, |program| program.lanes()),
+        }
+    }
+
+    fn joints(&self) -> Joints {
+        self.joints
+    }
+
+    fn prepare(&self, record: &Record, parameters: &[f64]) -> Result<Prepared, Error> {
+        self.plain.prepare(record, parameters)
+    }
+
+    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Reached {
+        self.plain.start(record, state, parameters)
+    }
+
+    fn run(&self, pieces: &[Piece<'_>], seeds: &[Seed], visit: Visit<'_>) -> Vec<Result<Reached, RunError>> {
+        let Some(first) = pieces.first() else { return vec![] };
+        let Some(program) = self.program(first.record, seeds, Purpose::Rows) else {
+            return self.plain.run(pieces, seeds, visit);
+        };
+        match self.predictor.restarts() {
+            Some(horizon) => {
+                let one = |piece| horizon::run(&program, piece, horizon.steps, visit);
+                pieces.iter().map(one).collect()
+            }
+            None => Run::new(&program, pieces.to_vec()).all(visit),
+        }
+    }
+
+    fn follow(&self, piece: &Piece<'_>, at: &[usize]) -> Result<Vec<Vec<f64>>, RunError> {
+        match self.program(piece.record, &[], Purpose::Carry) {
+            Some(program) => Run::new(&program, vec![piece.clone()]).follow(at),
+            None => self.plain.follow(piece, at),
+        }
+    }
+
+    fn measured_state(&self, record: &Record, sample: usize, p: &[f64], alone: bool) -> Result<Vec<f64>, String> {
+        self.plain.measured_state(record, sample, p, alone)
+    }
+
+    fn locate(
+        &self,
+        record: &Record,
+        label: &str,
+        state: &[f64],
+        parameters: &[f64],
+        sample: usize,
+        sigma: &[f64],
+    ) -> Option<Located> {
+        self.plain.locate(record, label, state, parameters, sample, sigma)
+    }
+
+    fn refined<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
+        self.plain.refined()
+    }
+
+    fn integrator(&self) -> String {
+        self.plain.integrator()
+    }
+
+    fn predictor(&self) -> String {
+        self.plain.predictor()
+    }
+
+    fn engine(&self) -> String {
+        let programs = self.programs.lock().unwrap_or_else(PoisonError::into_inner);
+        match programs.iter().any(|(_, program)| program.machine_code() > 0) {
+            true => "read as a graph, run as machine code".to_owned(),
+            false => "read as a graph, run by the interpreter".to_owned(),
+        }
+    }
+
+    fn identity(&self) -> String {
+        self.plain.identity()
+    }
+}
+
+#[cfg(test)]
+mod tests;

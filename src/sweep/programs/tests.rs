@@ -1,0 +1,150 @@
+use super::*;
+use crate::functions::Handle;
+use crate::integrate::Rk4;
+use crate::model::Model;
+use crate::predict::{FreeRun, Horizon, Kalman};
+use crate::record::{Channel, Column};
+use crate::scalar::Scalar;
+use crate::sweep::{DualSweep, Window};
+use crate::{Of, signals};
+
+signals! {
+    struct Angle { phi: "rad", w: "rad/s" }
+    struct Torque { m: "N m" }
+    struct Given { g: "1/s^2", d: "1/s", b: "1/kg", q: "1", r: "1" }
+}
+
+/// A pendulum, or its linear relative.
+struct Pendulum {
+    linear: bool,
+}
+
+impl Model for Pendulum {
+    type State = Angle;
+    type Input = Torque;
+    type Output = Angle;
+    type Parameters = Given;
+    fn derivative<S: Scalar>(&self, t: S, x: &Angle<S>, u: &Torque<S>, p: &Given<S>) -> Angle<S> {
+        let pull = if self.linear { x.phi } else { x.phi.sin() };
+        Angle { phi: x.w, w: u.m * p.b - pull * p.g - x.w * p.d + (t * 3.0).sin() * 0.1 }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Angle<S>, u: &Torque<S>, p: &Given<S>) -> Angle<S> {
+        Angle { phi: x.phi, w: x.w + u.m * 0.01 }
+    }
+    fn diffusion<S: Scalar>(&self, p: &Given<S>) -> Angle<S> {
+        Angle { phi: S::from(0.0), w: p.q }
+    }
+    fn noise<S: Scalar>(&self, p: &Given<S>) -> Angle<S> {
+        Angle { phi: p.r, w: p.r * 2.0 }
+    }
+}
+
+fn record(samples: usize, seed: f64, uniform: bool) -> Record {
+    let wave = |a: f64| Column::from((0..samples).map(|k| (a * k as f64 + seed).sin()).collect::<Vec<_>>());
+    let channel = |name: &str, values: Column| Channel { name: name.to_owned(), unit: "1".to_owned(), values };
+    let missing = |mut values: Vec<f64>, every: usize| {
+        values.iter_mut().skip(3).step_by(every).for_each(|y| *y = f64::NAN);
+        Column::from(values)
+    };
+    let time = match uniform {
+        true => Time::Uniform { start: 0.3, step: 0.02 },
+        false => Time::Stamps((0..samples).map(|k| 0.02 * k as f64 + 0.005 * (k as f64 * 1.7).sin()).collect()),
+    };
+    let outputs = vec![channel("phi", missing(wave(0.05).to_vec(), 7)), channel("w", missing(wave(0.07).to_vec(), 11))];
+    let states = Layout::of::<Pendulum>().states;
+    Record::new(states, time, vec![channel("m", wave(0.11))], outputs).unwrap()
+}
+
+/// Rows of all samples by lane: output by output, slopes, error and, if there is one, variance with its slopes.
+fn rows(sweep: &dyn Sweep, pieces: &[Piece<'_>], seeds: &[Seed]) -> (Vec<Vec<f64>>, Vec<Reached>) {
+    let mut all = vec![vec![]; pieces.len()];
+    let reached = sweep.run(pieces, seeds, &mut |window: &mut Window| {
+        for (lane, all) in all.iter_mut().enumerate().take(pieces.len()) {
+            for k in 0..window.samples[lane] {
+                for j in 0..window.outputs() {
+                    all.push(f64::from(u8::from(window.is_measured(k, j, lane))));
+                    all.extend((0..window.columns()).map(|c| window.at(k, j, c, lane)));
+                    if window.has_variances() && window.is_measured(k, j, lane) {
+                        let row = window.variance_row(k, j);
+                        all.extend((0..window.columns()).map(|c| row[c * window.lanes() + lane]));
+                    }
+                }
+            }
+        }
+        true
+    });
+    (all, reached.into_iter().map(Result::unwrap).collect())
+}
+
+fn sweeps(model: &Pendulum, predictor: impl crate::Predictor) -> (Arc<dyn Sweep + '_>, ProgramSweep<'_>) {
+    let (method, predictor): (Arc<dyn Method>, Arc<dyn Prediction>) = (Arc::new(Rk4::default()), Arc::new(predictor));
+    let plain: Arc<dyn Sweep> = Arc::new(DualSweep {
+        layout: Arc::new(Layout::of::<Pendulum>()),
+        model: Handle::Borrowed(model),
+        loops: Arc::new(Rk4::default()),
+        method: method.clone(),
+        predictor: predictor.clone(),
+        reason: String::new(),
+    });
+    let equations = Arc::new(Equations::trace(model).unwrap());
+    (plain.clone(), ProgramSweep::new(equations, method, predictor, plain).unwrap())
+}
+
+/// Pieces of several records with different parameters, with slopes and without.
+fn compare(model: &Pendulum, predictor: impl crate::Predictor, uniform: bool, hold: Hold) {
+    let (plain, programs) = sweeps(model, predictor);
+    let lengths = [100, 64, 2, 33, 97];
+    let parameters = |i: usize| [2.0 + 0.1 * i as f64, 0.3, 1.5, 0.2, 0.1];
+    let records: Vec<Record> = lengths.iter().map(|&n| record(n.max(40), n as f64, uniform).hold(hold)).collect();
+    let all_p: Vec<[f64; 5]> = (0..lengths.len()).map(parameters).collect();
+    let prepared: Vec<Prepared> = records.iter().zip(&all_p).map(|(r, p)| plain.prepare(r, p).unwrap()).collect();
+    for seeds in
+        [vec![], vec![Seed::Carry(1), Seed::Parameter(0), Seed::Parameter(2), Seed::Parameter(3), Seed::Parameter(4)]]
+    {
+        let piece = |i: usize| {
+            let Reached { carry, slopes: all } = plain.start(&records[i], &[0.3, -0.2], &all_p[i]);
+            let column = |seed: &Seed| match *seed {
+                Seed::Carry(i) => i,
+                Seed::Parameter(j) => 2 + j,
+            };
+            let row = |row: usize| seeds.iter().map(|seed| all[row * 7 + column(seed)]).collect::<Vec<f64>>();
+            let slopes = (0..carry.len()).flat_map(row).collect();
+            let (record, prepared, parameters) = (&records[i], &prepared[i], &all_p[i][..]);
+            Piece { record, prepared, samples: 0..lengths[i], carry, slopes, parameters }
+        };
+        let pieces: Vec<Piece<'_>> = (0..lengths.len()).map(piece).collect();
+        let lanes = programs.lanes(&records[0], &seeds);
+        let all = |sweep: &dyn Sweep, lanes: usize| {
+            let found: Vec<_> = pieces.chunks(lanes).map(|pieces| rows(sweep, pieces, &seeds)).collect();
+            let (rows, reached): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+            (rows.concat(), reached.concat())
+        };
+        let ((expected, ends), (found, reached)) = (all(&*plain, 1), all(&programs, lanes));
+        for lane in 0..pieces.len() {
+            assert_eq!(expected[lane].len(), found[lane].len());
+            for (at, (a, b)) in expected[lane].iter().zip(&found[lane]).enumerate() {
+                // A hundred steps, each of some dozens of roundings of numbers up to ten.
+                assert!((a - b).abs() < 1e-11, "{} seeds, lane {lane}, entry {at}: {a} {b}", seeds.len());
+            }
+            if pieces[lane].samples.end < pieces[lane].record.len() && programs.predictor.restarts().is_none() {
+                let (a, b) = (&ends[lane], &reached[lane]);
+                let pairs = a.carry.iter().zip(&b.carry).chain(a.slopes.iter().zip(&b.slopes));
+                for (a, b) in pairs {
+                    assert!((a - b).abs() < 1e-11, "{} seeds, end of lane {lane}: {a} {b}", seeds.len());
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn programs_predict_what_duals_predict() {
+    for hold in [Hold::Zero, Hold::First] {
+        for uniform in [true, false] {
+            compare(&Pendulum { linear: false }, FreeRun, uniform, hold);
+            compare(&Pendulum { linear: true }, Kalman, uniform, hold);
+        }
+        compare(&Pendulum { linear: false }, Horizon::new(1), true, hold);
+        compare(&Pendulum { linear: false }, Horizon::new(35), true, hold);
+    }
+}

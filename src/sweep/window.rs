@@ -1,0 +1,206 @@
+//! [`Window`]: prediction errors and slopes of a run of samples, of several pieces side by side.
+
+/// Prediction errors and slopes of a run of samples of several pieces side by side, in lanes.
+///
+/// A row is one output of one sample: its slopes with respect to the seeds, then the prediction error; each entry holds one
+/// number per lane. Rows without a measurement, or beyond the end of a lane's piece, are zero. Where variances are
+/// predicted they stand in rows of the same shape: slopes, then the variance.
+#[derive(Clone, Debug)]
+pub struct Window {
+    lanes: usize,
+    outputs: usize,
+    columns: usize,
+    capacity: usize,
+    /// First sample of each lane.
+    pub begin: Vec<usize>,
+    /// Number of samples of each lane; zero for a lane without a piece.
+    pub samples: Vec<usize>,
+    values: Vec<f64>,
+    variances: Vec<f64>,
+    /// Logarithm of each predicted variance, per row and lane, once the errors are standardized by them.
+    pub(crate) log_variances: Vec<f64>,
+    /// Per row, a bit for each lane that holds a measurement.
+    measured: Vec<u32>,
+    /// The carry at each lane's first sample, entry by entry.
+    pub carry: Vec<f64>,
+}
+
+impl Window {
+    /// An empty window of at most `capacity` samples.
+    pub fn new(lanes: usize, outputs: usize, seeds: usize, capacity: usize, variances: bool) -> Self {
+        let columns = seeds + 1;
+        let size = capacity * outputs * columns * lanes;
+        Window {
+            lanes,
+            outputs,
+            columns,
+            capacity,
+            begin: vec![0; lanes],
+            samples: vec![0; lanes],
+            values: vec![0.0; size],
+            variances: vec![0.0; if variances { size } else { 0 }],
+            log_variances: vec![0.0; if variances { capacity * outputs * lanes } else { 0 }],
+            measured: vec![0; capacity * outputs],
+            carry: vec![],
+        }
+    }
+
+    /// Numbers side by side in each entry.
+    pub fn lanes(&self) -> usize {
+        self.lanes
+    }
+
+    /// Outputs, which are the rows of a sample.
+    pub fn outputs(&self) -> usize {
+        self.outputs
+    }
+
+    /// Entries of a row: slopes and the error.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// The most samples it can hold.
+    pub fn capacity(&self) -> usize {
+        self.capacity
+    }
+
+    /// Samples of the longest lane.
+    pub fn len(&self) -> usize {
+        self.samples.iter().copied().max().unwrap_or(0)
+    }
+
+    /// Whether no lane holds a sample.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Sets all to zero.
+    pub fn clear(&mut self) {
+        self.values.fill(0.0);
+        self.variances.fill(0.0);
+        self.measured.fill(0);
+    }
+
+    /// All rows, one after the other, of the samples that the longest lane has.
+    pub fn rows_mut(&mut self) -> &mut [f64] {
+        let used = self.len() * self.outputs * self.columns * self.lanes;
+        &mut self.values[..used]
+    }
+
+    /// The same of the variances.
+    pub fn variance_rows_mut(&mut self) -> &mut [f64] {
+        let used = self.len() * self.outputs * self.columns * self.lanes;
+        &mut self.variances[..used]
+    }
+
+    /// All rows that there is room for.
+    pub fn all_rows_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
+
+    /// The row of an output of a sample: entry by entry, each with its lanes.
+    pub fn row(&self, sample: usize, output: usize) -> &[f64] {
+        let width = self.columns * self.lanes;
+        &self.values[(sample * self.outputs + output) * width..][..width]
+    }
+
+    /// The same to be written.
+    pub fn row_mut(&mut self, sample: usize, output: usize) -> &mut [f64] {
+        let width = self.columns * self.lanes;
+        &mut self.values[(sample * self.outputs + output) * width..][..width]
+    }
+
+    /// The row of an output's variance.
+    pub fn variance_row(&self, sample: usize, output: usize) -> &[f64] {
+        let width = self.columns * self.lanes;
+        &self.variances[(sample * self.outputs + output) * width..][..width]
+    }
+
+    /// The same to be written.
+    pub fn variance_row_mut(&mut self, sample: usize, output: usize) -> &mut [f64] {
+        let width = self.columns * self.lanes;
+        &mut self.variances[(sample * self.outputs + output) * width..][..width]
+    }
+
+    /// Whether variances are predicted.
+    pub fn has_variances(&self) -> bool {
+        !self.variances.is_empty()
+    }
+
+    /// One number of a row.
+    #[inline(always)]
+    pub fn at(&self, sample: usize, output: usize, column: usize, lane: usize) -> f64 {
+        self.values[((sample * self.outputs + output) * self.columns + column) * self.lanes + lane]
+    }
+
+    /// The prediction error.
+    #[inline(always)]
+    pub fn error(&self, sample: usize, output: usize, lane: usize) -> f64 {
+        self.at(sample, output, self.columns - 1, lane)
+    }
+
+    /// The predicted variance; one where none is predicted.
+    #[inline(always)]
+    pub fn variance(&self, sample: usize, output: usize, lane: usize) -> f64 {
+        let at = ((sample * self.outputs + output + 1) * self.columns - 1) * self.lanes + lane;
+        self.variances.get(at).copied().unwrap_or(1.0)
+    }
+
+    /// Standard deviation that the error was divided by, where variances are predicted and the window is standardized.
+    #[inline(always)]
+    pub(crate) fn variance_root(&self, sample: usize, output: usize, lane: usize) -> f64 {
+        let at = (sample * self.outputs + output) * self.lanes + lane;
+        self.log_variances.get(at).map_or(1.0, |log| (0.5 * log).exp())
+    }
+
+    /// Whether an output was measured at a sample of a lane.
+    #[inline(always)]
+    pub fn is_measured(&self, sample: usize, output: usize, lane: usize) -> bool {
+        self.measured[sample * self.outputs + output] >> lane & 1 == 1
+    }
+
+    /// Which lanes have measured an output at a sample, a bit each.
+    #[inline(always)]
+    pub fn measured(&self, sample: usize, output: usize) -> u32 {
+        self.measured[sample * self.outputs + output]
+    }
+
+    /// Says which lanes have measured an output at a sample.
+    #[inline(always)]
+    pub fn set_measured(&mut self, sample: usize, output: usize, lanes: u32) {
+        self.measured[sample * self.outputs + output] = lanes;
+    }
+
+    /// Sets a row to zero in the lanes without a measurement.
+    pub fn clear_unmeasured_row(&mut self, sample: usize, output: usize) {
+        let (lanes, measured) = (self.lanes, self.measured(sample, output));
+        let mut clear = |row: &mut [f64]| {
+            for (at, value) in row.iter_mut().enumerate() {
+                if measured >> (at % lanes) & 1 == 0 {
+                    *value = 0.0;
+                }
+            }
+        };
+        clear(self.row_mut(sample, output));
+        if self.has_variances() {
+            clear(self.variance_row_mut(sample, output));
+        }
+    }
+
+    /// Sets rows without a measurement to zero, after something has run over them.
+    pub fn clear_unmeasured(&mut self) {
+        let (lanes, width) = (self.lanes, self.columns * self.lanes);
+        let all = u32::MAX >> (32 - lanes);
+        for (row, measured) in self.values.chunks_exact_mut(width).zip(&self.measured) {
+            if measured & all == all {
+                continue;
+            }
+            for (at, value) in row.iter_mut().enumerate() {
+                if measured >> (at % lanes) & 1 == 0 {
+                    *value = 0.0;
+                }
+            }
+        }
+    }
+}

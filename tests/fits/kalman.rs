@@ -1,0 +1,369 @@
+//! [`Kalman`] against exact likelihoods: of an independent scalar filter, and of all measurements at once as one Gaussian
+//! vector. Noise levels are among the unknowns.
+
+use crate::common::Noise;
+use argmin::core::{CostFunction, Gradient};
+use core::f64::consts::TAU;
+use greybox::optimize::{LevenbergMarquardt, Stop};
+use greybox::*;
+use nalgebra::{DMatrix, DVector};
+
+signals! { pub struct Position { x: "m" } }
+signals! { pub struct Push { u: "m" } }
+signals! { pub struct Sensors { y: "m", z: "m" } }
+signals! { pub struct Levels { drift: "m", y: "m", z: "m" } }
+signals! { pub struct Dynamics { tau: "s", gain: "1", drift: "m", y: "m", z: "m" } }
+
+/// `x[k+1] = x[k] + w`, seen by two sensors of different noise.
+#[derive(Clone)]
+struct Walk;
+
+impl Model for Walk {
+    type State = Position;
+    type Input = Push;
+    type Output = Sensors;
+    type Parameters = Levels;
+    const KIND: Kind = Kind::Discrete;
+    fn next<S: Scalar>(&self, _t: S, x: &Position<S>, _u: &Push<S>, _p: &Levels<S>) -> Position<S> {
+        *x
+    }
+    fn diffusion<S: Scalar>(&self, p: &Levels<S>) -> Position<S> {
+        Position { x: p.drift }
+    }
+    fn noise<S: Scalar>(&self, p: &Levels<S>) -> Sensors<S> {
+        Sensors { y: p.y, z: p.z }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Position<S>, _u: &Push<S>, _p: &Levels<S>) -> Sensors<S> {
+        Sensors { y: x.x, z: x.x }
+    }
+}
+
+/// `x[k+1] = a x[k] + (1 - a) gain u[k] + w` with `a = exp(-1 / tau)`; the second sensor shows twice the state.
+#[derive(Clone)]
+struct Sampled;
+
+impl Model for Sampled {
+    type State = Position;
+    type Input = Push;
+    type Output = Sensors;
+    type Parameters = Dynamics;
+    const KIND: Kind = Kind::Discrete;
+    fn next<S: Scalar>(&self, _t: S, x: &Position<S>, u: &Push<S>, p: &Dynamics<S>) -> Position<S> {
+        let a = (-p.tau.recip()).exp();
+        Position { x: a * x.x + p.gain * u.u * (-a + 1.0) }
+    }
+    fn diffusion<S: Scalar>(&self, p: &Dynamics<S>) -> Position<S> {
+        Position { x: p.drift }
+    }
+    fn noise<S: Scalar>(&self, p: &Dynamics<S>) -> Sensors<S> {
+        Sensors { y: p.y, z: p.z }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Position<S>, _u: &Push<S>, _p: &Dynamics<S>) -> Sensors<S> {
+        Sensors { y: x.x, z: x.x * 2.0 }
+    }
+}
+
+/// `tau dx = (gain u - x) dt + tau drift dw`, seen as `Sampled` is.
+#[derive(Clone)]
+struct Lag;
+
+impl Model for Lag {
+    type State = Position;
+    type Input = Push;
+    type Output = Sensors;
+    type Parameters = Dynamics;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Position<S>, u: &Push<S>, p: &Dynamics<S>) -> Position<S> {
+        Position { x: (p.gain * u.u - x.x) / p.tau }
+    }
+    fn diffusion<S: Scalar>(&self, p: &Dynamics<S>) -> Position<S> {
+        Position { x: p.drift }
+    }
+    fn noise<S: Scalar>(&self, p: &Dynamics<S>) -> Sensors<S> {
+        Sensors { y: p.y, z: p.z }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Position<S>, _u: &Push<S>, _p: &Dynamics<S>) -> Sensors<S> {
+        Sensors { y: x.x, z: x.x * 2.0 }
+    }
+}
+
+/// Numbers with slopes with respect to all unknowns.
+type D = Dual<6>;
+
+/// A scalar state over a record: `x[k+1] = a x[k] + f + w`, the variance of `w` is `q`.
+struct Chain<S> {
+    start: S,
+    steps: Vec<[S; 3]>,
+    measurements: Vec<Measurement<S>>,
+}
+
+/// `y = c x + e` at a sample, the variance of `e` is `r`.
+struct Measurement<S> {
+    sample: usize,
+    y: f64,
+    c: f64,
+    r: S,
+}
+
+impl<S: Scalar> Chain<S> {
+    /// `-ln` of the likelihood by the recursion of a scalar filter.
+    fn by_filter(&self) -> S {
+        let (mut x, mut p, mut sum) = (self.start, S::from(0.0), S::from(0.0));
+        for k in 0..=self.steps.len() {
+            for m in self.measurements.iter().filter(|m| m.sample == k) {
+                let (error, variance) = (S::from(m.y) - x * m.c, p * (m.c * m.c) + m.r);
+                sum += (error * error / variance + (variance * TAU).ln()) * 0.5;
+                let gain = p * m.c / variance;
+                (x, p) = (x + gain * error, p * m.r / variance);
+            }
+            if let Some([a, f, q]) = self.steps.get(k) {
+                (x, p) = (*a * x + *f, *a * *a * p + *q);
+            }
+        }
+        sum
+    }
+
+    /// The same from mean and covariance of all measurements, by Cholesky's factorization.
+    fn by_covariance(&self) -> S {
+        // Mean and variance of the state at each sample; its covariance with an earlier one is that one's variance times
+        // the product of all a between them.
+        let mut moments = vec![(self.start, S::from(0.0))];
+        for [a, f, q] in &self.steps {
+            let (mean, variance) = moments[moments.len() - 1];
+            moments.push((*a * mean + *f, *a * *a * variance + *q));
+        }
+        let covariance = |earlier: usize, later: usize| {
+            self.steps[earlier..later].iter().fold(moments[earlier].1, |product, [a, ..]| product * *a)
+        };
+        let n = self.measurements.len();
+        let mut factor = vec![vec![S::from(0.0); n]; n];
+        let mut sum = S::from(0.5 * n as f64 * TAU.ln());
+        let mut whitened: Vec<S> = Vec::with_capacity(n);
+        for i in 0..n {
+            let m = &self.measurements[i];
+            for j in 0..=i {
+                let other = &self.measurements[j];
+                let mut entry = covariance(other.sample, m.sample) * (m.c * other.c);
+                if i == j {
+                    entry += m.r;
+                }
+                for k in 0..j {
+                    entry -= factor[i][k] * factor[j][k];
+                }
+                factor[i][j] = if i == j { entry.sqrt() } else { entry / factor[j][j] };
+            }
+            let mut error = S::from(m.y) - moments[m.sample].0 * m.c;
+            for k in 0..i {
+                error -= factor[i][k] * whitened[k];
+            }
+            whitened.push(error / factor[i][i]);
+            sum += factor[i][i].ln() + whitened[i] * whitened[i] * 0.5;
+        }
+        sum
+    }
+}
+
+/// The measurements of a record, in the order of time and of the outputs; `c` of each sensor, and their variances.
+fn measurements<S: Scalar>(
+    outputs: impl Iterator<Item = Sensors>,
+    c: [f64; 2],
+    deviations: [S; 2],
+) -> Vec<Measurement<S>> {
+    let r = deviations.map(|deviation| deviation * deviation);
+    let rows = outputs
+        .enumerate()
+        .flat_map(|(sample, row)| [(row.y, 0), (row.z, 1)].map(|(y, j)| Measurement { sample, y, c: c[j], r: r[j] }));
+    rows.filter(|m| !m.y.is_nan()).collect()
+}
+
+/// The gradient, by exact slopes.
+fn gradient(chain: &dyn Fn(&[D]) -> Chain<D>, at: &[f64]) -> Vec<f64> {
+    let seeded: Vec<D> = at.iter().enumerate().map(|(i, x)| Dual::variable(*x, i)).collect();
+    chain(&seeded).by_covariance().slopes[..at.len()].to_vec()
+}
+
+/// Where the gradient vanishes, by Newton's method with differences of it, from a place nearby.
+fn minimum(chain: &dyn Fn(&[D]) -> Chain<D>, from: &[f64]) -> Vec<f64> {
+    let n = from.len();
+    let moved = |x: &DVector<f64>, i: usize, by: f64| {
+        let mut to = x.clone();
+        to[i] += by;
+        DVector::from_vec(gradient(chain, to.as_slice()))
+    };
+    let mut x = DVector::from_column_slice(from);
+    for _ in 0..8 {
+        let hessian = DMatrix::from_columns(
+            &(0..n).map(|i| (moved(&x, i, 1e-5) - moved(&x, i, -1e-5)) / 2e-5).collect::<Vec<_>>(),
+        );
+        let step = hessian.lu().solve(&DVector::from_vec(gradient(chain, x.as_slice()))).unwrap();
+        x -= step;
+    }
+    x.as_slice().to_vec()
+}
+
+/// Likelihood and gradient of a fit at its start and at its end, and its end, against the two of the reference, whose
+/// unknowns are the coordinates of the fit.
+fn agrees<M: Model + Clone>(fit: Fit<'_, M>, chain: &dyn Fn(&[D]) -> Chain<D>) {
+    // The search converges linearly, by a half at each step: the last one has to be shorter than the tolerance below.
+    let stop = Stop { step: 1e-12, ..Stop::default() };
+    let problem = fit.optimizer(LevenbergMarquardt::new(stop, JacobianColumns)).problem().unwrap();
+    let estimate = problem.run().unwrap();
+    println!("{estimate}");
+    assert!(estimate.outcome.converged(), "{estimate}");
+    assert_eq!(estimate.method.noise, NoiseModel::Predicted);
+    let objective = problem.objective().unwrap();
+    let end: Vec<f64> = estimate.unknowns.iter().map(|u| u.transform.to_coordinate(u.value)).collect();
+    let constant = 0.5 * estimate.measurements as f64 * TAU.ln();
+    for at in [objective.start(), end.clone()] {
+        let constants: Vec<D> = at.iter().map(|x| Dual::constant(*x)).collect();
+        let (filtered, exact) = (chain(&constants).by_filter().value, chain(&constants).by_covariance().value);
+        // The two references agree with each other first.
+        assert!((filtered / exact - 1.0).abs() < 1e-12, "{filtered} {exact}");
+        let found = objective.cost(&at).unwrap() + constant;
+        assert!((found / exact - 1.0).abs() < 1e-10, "{found} {exact}");
+        let (found, exact) = (objective.gradient(&at).unwrap(), gradient(chain, &at));
+        // At the minimum the gradient is zero: it is measured by its terms, one per measurement.
+        let size = exact.iter().fold(constant, |size, g| size.max(g.abs()));
+        for (found, exact) in found.iter().zip(&exact) {
+            assert!((found - exact).abs() < 1e-10 * size, "{found} {exact}");
+        }
+    }
+    let best = minimum(chain, &end);
+    for ((unknown, found), exact) in estimate.unknowns.iter().zip(&end).zip(&best) {
+        let value = unknown.transform.to_value(*exact);
+        println!("{} {} {value} {:e}", unknown.name, unknown.value, unknown.value / value - 1.0);
+        assert!((unknown.value / value - 1.0).abs() < 1e-10, "{}: {found} {exact}", unknown.name);
+    }
+    let constants: Vec<D> = best.iter().map(|x| Dual::constant(*x)).collect();
+    let deviance = 2.0 * chain(&constants).by_covariance().value;
+    assert!((estimate.deviance.unwrap() / deviance - 1.0).abs() < 1e-10, "{:?} {deviance}", estimate.deviance);
+}
+
+/// A record of the plant: one sensor is read at every third sample only, and neither at some.
+fn record<M>(model: &M, time: Time, step: impl Fn(f64, f64, f64, f64) -> f64, c: [f64; 2]) -> ExperimentOf<M>
+where
+    M: Model<State = Position, Input = Push, Output = Sensors>,
+{
+    let mut noise = Noise(11);
+    let (mut x, mut inputs, mut outputs) = (1.5, vec![], vec![]);
+    for k in 0..60 {
+        let u = if k % 17 < 8 { 1.0 } else { -0.5 };
+        let (y, z) = (c[0] * x + 0.3 * noise.gauss(), c[1] * x + 0.5 * noise.gauss());
+        let y = if k % 7 == 5 { f64::NAN } else { y };
+        outputs.push(Sensors { y, z: if k % 3 == 0 { z } else { f64::NAN } });
+        inputs.push(Push { u });
+        x = step(time.at(k + 1) - time.at(k), x, u, noise.gauss());
+    }
+    Experiment::new(model, time, inputs, outputs).unwrap().initial(Position { x: free(1.0) })
+}
+
+#[test]
+fn a_random_walk() {
+    let record = record(&Walk, Time::Uniform { start: 0.0, step: 1.0 }, |_, x, _, w| x + 0.2 * w, [1.0, 1.0]);
+    let parameters = Levels { drift: free(0.5).log(), y: free(0.5).log(), z: free(0.4) };
+    let fit = Fit::new(&Walk, &record).parameters(parameters).predictor(Kalman);
+    agrees(fit, &|p| {
+        let q = (p[0] * 2.0).exp();
+        Chain {
+            start: p[3],
+            steps: vec![[D::from(1.0), D::from(0.0), q]; record.len() - 1],
+            measurements: measurements(record.outputs(), [1.0, 1.0], [p[1].exp(), p[2]]),
+        }
+    });
+}
+
+fn dynamics() -> Dynamics<Parameter> {
+    Dynamics { tau: free(5.0).log(), gain: free(1.0), drift: free(0.3).log(), y: free(0.5).log(), z: free(0.4) }
+}
+
+#[test]
+fn a_first_order_lag_in_discrete_time() {
+    let a = f64::exp(-0.25);
+    let step = |_: f64, x: f64, u: f64, w: f64| a * x + (1.0 - a) * 2.0 * u + 0.2 * w;
+    let record = record(&Sampled, Time::Uniform { start: 0.0, step: 1.0 }, step, [1.0, 2.0]);
+    let fit = Fit::new(&Sampled, &record).parameters(dynamics()).predictor(Kalman);
+    agrees(fit, &|p| {
+        let (a, gain, q) = ((-(-p[0]).exp()).exp(), p[1], (p[2] * 2.0).exp());
+        let inputs = record.inputs().take(record.len() - 1);
+        Chain {
+            start: p[5],
+            steps: inputs.map(|u| [a, gain * (-a + 1.0) * u.u, q]).collect(),
+            measurements: measurements(record.outputs(), [1.0, 2.0], [p[3].exp(), p[4]]),
+        }
+    });
+}
+
+/// Over an interval `h` under a held input, exactly: `a = exp(-h / tau)` and `q = drift^2 tau (1 - a^2) / 2`. Runge-Kutta's
+/// 200 steps per sample err by `200 (2 h / (200 tau))^5 / 120` in the variance, with `h / tau` up to 0.33 less than 1e-12.
+#[test]
+fn a_first_order_lag_in_continuous_time_sampled_unevenly() {
+    let (tau, drift) = (0.4, 0.5);
+    let step = |h: f64, x: f64, u: f64, w: f64| {
+        let a = f64::exp(-h / tau);
+        a * x + (1.0 - a) * 2.0 * u + drift * f64::sqrt(tau / 2.0 * (1.0 - a * a)) * w
+    };
+    let time = Time::Stamps((0..60).map(|k| 0.1 * k as f64 + if k % 2 == 0 { 0.0 } else { 0.03 }).collect());
+    let record = record(&Lag, time, step, [1.0, 2.0]);
+    let parameters = Dynamics { tau: free(0.5).log(), ..dynamics() };
+    let fit = Fit::new(&Lag, &record).parameters(parameters).predictor(Kalman).integrator(Rk4 { substeps: 200 });
+    agrees(fit, &|p| {
+        let (tau, gain, drift) = (p[0].exp(), p[1], p[2].exp());
+        let over = |(k, u): (usize, Push)| {
+            let a = (-tau.recip() * (record.time(k + 1) - record.time(k))).exp();
+            [a, gain * (-a + 1.0) * u.u, drift * drift * tau * (-(a * a) + 1.0) * 0.5]
+        };
+        Chain {
+            start: p[5],
+            steps: record.inputs().enumerate().take(record.len() - 1).map(over).collect(),
+            measurements: measurements(record.outputs(), [1.0, 2.0], [p[3].exp(), p[4]]),
+        }
+    });
+}
+
+/// A model that says nothing of its noise.
+macro_rules! without_noise {
+    ($name:ident, $kind:expr, $state:ident) => {
+        #[derive(Clone)]
+        struct $name;
+
+        impl Model for $name {
+            type State = $state;
+            type Input = Push;
+            type Output = Position;
+            type Parameters = Levels;
+            const KIND: Kind = $kind;
+            fn next<S: Scalar>(&self, _t: S, x: &Of<$state, S>, _u: &Push<S>, _p: &Levels<S>) -> Of<$state, S> {
+                *x
+            }
+            fn output<S: Scalar>(&self, _t: S, _x: &Of<$state, S>, u: &Push<S>, p: &Levels<S>) -> Position<S> {
+                Position { x: u.u * p.y }
+            }
+        }
+    };
+}
+
+without_noise!(Noiseless, Kind::Discrete, Position);
+without_noise!(Stateless, Kind::Static, Nothing);
+
+#[test]
+fn what_cannot_be_filtered_is_refused() {
+    fn refused<M>(model: &M, start: Of<M::State, Parameter>) -> String
+    where
+        M: Model<Input = Push, Output = Position, Parameters = Levels> + Clone,
+    {
+        let (inputs, outputs) = (vec![Push { u: 1.0 }; 9], vec![Position { x: 1.0 }; 9]);
+        let record = Experiment::new(model, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        let record = record.initial(start);
+        let parameters = Levels { drift: fixed(0.1), y: free(0.5), z: fixed(0.0) };
+        let Err(error) = Fit::new(model, &record).parameters(parameters).predictor(Kalman).run() else {
+            panic!("a fit without noise")
+        };
+        error.to_string()
+    }
+    let why = refused(&Noiseless, Position { x: fixed(0.0) });
+    assert!(
+        why.contains("the predicted variance of output `x` is NaN; it must be positive: write Model::noise"),
+        "{why}"
+    );
+    let why = refused(&Stateless, Nothing);
+    assert!(why.contains("no state to filter"), "{why}");
+}
