@@ -106,13 +106,13 @@ fn stepped(
     held_in: HeldIn,
 ) -> Result<(ExactSurface, ExperimentOf<ExactSurface>), Box<dyn Error>> {
     let model = ExactSurface(ExactStep::new(pole_pairs, log.sample_time(), held_in)?);
-    let next = log.inputs().iter().skip(1).chain(log.inputs().last());
-    let speed = |(u, next): (&Drive, &Drive)| match held_in {
-        HeldIn::Rotor => *u,
-        HeldIn::Stationary => Drive { w: (u.w + next.w) / 2.0, ..*u },
+    let next = log.inputs().skip(1).chain(log.inputs().last());
+    let speed = |(u, next): (Drive, Drive)| match held_in {
+        HeldIn::Rotor => u,
+        HeldIn::Stationary => Drive { w: (u.w + next.w) / 2.0, ..u },
     };
-    let inputs = log.inputs().iter().zip(next).map(speed).collect();
-    let record = Experiment::new(&model, log.times().clone(), inputs, log.outputs().to_vec())?;
+    let inputs = log.inputs().zip(next).map(speed).collect();
+    let record = Experiment::new(&model, log.times().clone(), inputs, log.outputs().collect())?;
     Ok((model, record.named(log.name().to_owned())))
 }
 

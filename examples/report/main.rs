@@ -69,7 +69,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     Ok(arguments.out.as_ref().map_or(Ok(()), |path| report.save(path))?)
 }
 
-fn reported<M: Model>(
+fn reported<M: Model + Clone>(
     model: &M,
     record: &ExperimentOf<M>,
     start: Of<M::Parameters, Parameter>,
@@ -78,7 +78,7 @@ fn reported<M: Model>(
     assumed: Option<Section>,
 ) -> Result<Report, greybox::Error> {
     let convergence = Convergence::default();
-    let mut problem = Fit::new(model, record)
+    let problem = Fit::new(model, record)
         .parameters(start)
         .cancel(stop.clone())
         .observe(terminal::Search(terminal::spinner("fit")), ObserverMode::Always)
