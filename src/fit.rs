@@ -220,14 +220,7 @@ where
     predictor.check(&layout)?;
     let traced = Equations::trace(&*model);
     if std::env::var("GREYBOX_ENGINE").is_ok_and(|e| e == "duals") {
-        return Ok(Arc::new(DualSweep {
-            layout,
-            model,
-            loops,
-            method,
-            predictor: predictor.clone(),
-            reason: "asked for".to_owned(),
-        }));
+        return Ok(Arc::new(DualSweep { layout, model, loops, method, predictor: predictor.clone(), reason: "asked for".to_owned() }));
     }
     let reason = match &traced {
         Ok(_) => String::new(),

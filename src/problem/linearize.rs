@@ -30,9 +30,7 @@ impl Objective<'_> {
         if !exact && found.moved > MOVED * 2.0 * found.cost {
             found = self.triangles(coordinates, &values, found.borders.as_ref())?;
         }
-        if std::env::var("DBG").is_ok() {
-            eprintln!("{coordinates:?} {:?} {:?}", found.cost, found.blocks[0]);
-        }
+        if std::env::var("DBG").is_ok() { eprintln!("{coordinates:?} {:?} {:?}", found.cost, found.blocks[0]); }
         let Triangulation { mut cost, mut blocks, borders, .. } = found;
         if let Some(borders) = borders {
             self.memory.keep(Arc::new(borders));
@@ -165,8 +163,7 @@ impl Objective<'_> {
                 job.seeds.retain(|seed| matches!(seed, Seed::Parameter(_)));
                 job.seeds.splice(0..0, (0..carried).map(Seed::Carry));
                 let width = job.seeds.len();
-                job.piece.slopes =
-                    (0..carried * width).map(|at| f64::from(u8::from(at % width == at / width))).collect();
+                job.piece.slopes = (0..carried * width).map(|at| f64::from(u8::from(at % width == at / width))).collect();
             }
         }
         jobs
@@ -177,12 +174,10 @@ impl Objective<'_> {
         let mut absorbers: Absorber<'_> = Absorber::new(self, jobs);
         let reached = self.run(jobs, &mut |window| absorbers.absorb(window))?;
         let parts = reached.into_iter().enumerate();
-        parts
-            .map(|(lane, reached)| {
-                let (cost, triangle) = absorbers.part(lane);
-                Ok(Part { cost, triangle, reached })
-            })
-            .collect()
+        parts.map(|(lane, reached)| {
+            let (cost, triangle) = absorbers.part(lane);
+            Ok(Part { cost, triangle, reached })
+        }).collect()
     }
 
     /// The cost of one experiment alone, priors left out.

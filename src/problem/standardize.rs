@@ -88,3 +88,4 @@ fn by_variance(window: &mut Window) -> Result<(), (usize, usize)> {
     }
     Ok(())
 }
+

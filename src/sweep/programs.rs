@@ -103,7 +103,9 @@ impl<'a> ProgramSweep<'a> {
         let recurrence = self.recurrence(key.hold).ok()?;
         let program = match purpose {
             Purpose::Rows => Program::compile(&recurrence, seeds, sampling, Trajectories::Many),
-            Purpose::Carry => Program::compile(&recurrence.without_outputs(), &[], sampling, Trajectories::One),
+            Purpose::Carry => {
+                Program::compile(&recurrence.without_outputs(), &[], sampling, Trajectories::One)
+            }
         };
         let program = program.ok()?;
         programs.push((key, program.clone()));

@@ -270,6 +270,7 @@ fn derived(program: &Program, record: &Record, begin: usize, samples: usize) -> 
         Column::Derived(_) => f64::NAN,
     };
     let rows = samples + usize::from(next);
-    let columns: Vec<Vec<f64>> = columns.iter().map(|column| (0..rows).map(|k| number(column, k)).collect()).collect();
+    let columns: Vec<Vec<f64>> =
+        columns.iter().map(|column| (0..rows).map(|k| number(column, k)).collect()).collect();
     program.derive(&columns.iter().map(Vec::as_slice).collect::<Vec<_>>(), samples)
 }

@@ -50,7 +50,10 @@ fn record(samples: usize, seed: f64, uniform: bool) -> Record {
         true => Time::Uniform { start: 0.3, step: 0.02 },
         false => Time::Stamps((0..samples).map(|k| 0.02 * k as f64 + 0.005 * (k as f64 * 1.7).sin()).collect()),
     };
-    let outputs = vec![channel("phi", missing(wave(0.05).to_vec(), 7)), channel("w", missing(wave(0.07).to_vec(), 11))];
+    let outputs = vec![
+        channel("phi", missing(wave(0.05).to_vec(), 7)),
+        channel("w", missing(wave(0.07).to_vec(), 11)),
+    ];
     let states = Layout::of::<Pendulum>().states;
     Record::new(states, time, vec![channel("m", wave(0.11))], outputs).unwrap()
 }
@@ -98,9 +101,7 @@ fn compare(model: &Pendulum, predictor: impl crate::Predictor, uniform: bool, ho
     let records: Vec<Record> = lengths.iter().map(|&n| record(n.max(40), n as f64, uniform).hold(hold)).collect();
     let all_p: Vec<[f64; 5]> = (0..lengths.len()).map(parameters).collect();
     let prepared: Vec<Prepared> = records.iter().zip(&all_p).map(|(r, p)| plain.prepare(r, p).unwrap()).collect();
-    for seeds in
-        [vec![], vec![Seed::Carry(1), Seed::Parameter(0), Seed::Parameter(2), Seed::Parameter(3), Seed::Parameter(4)]]
-    {
+    for seeds in [vec![], vec![Seed::Carry(1), Seed::Parameter(0), Seed::Parameter(2), Seed::Parameter(3), Seed::Parameter(4)]] {
         let piece = |i: usize| {
             let Reached { carry, slopes: all } = plain.start(&records[i], &[0.3, -0.2], &all_p[i]);
             let column = |seed: &Seed| match *seed {
