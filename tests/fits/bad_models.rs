@@ -256,7 +256,7 @@ fn a_step_too_coarse_for_the_dynamics_is_warned_of() {
     let coarse = record(&Lag, 0.4, &lag(3.0, 1.0, 0.4, 300, 1e-4));
     let fit = || Fit::new(&Lag, &coarse).parameters(free_pair(2.0, 1.5));
     let estimate = fit().run().unwrap();
-    warns(&estimate, &["step is too coarse", "Runge-Kutta 4, 2 step(s)", "standard errors", "finer step"]);
+    warns(&estimate, &["step is too coarse", "Runge-Kutta 4, 2 steps", "standard errors", "finer step"]);
     assert_eq!(estimate.severity(), Severity::UsableWithCare);
     let error = estimate.knowledge.a.standard_error().unwrap();
     assert!(

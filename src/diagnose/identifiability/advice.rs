@@ -45,12 +45,11 @@ pub(super) fn advice(found: &Identifiability, unknowns: &[Unknown], records: &[R
         }
     }
     // The beginning of a record is where initial states are seen, and nothing helps that.
-    for (excited, unknown) in found.excitation.iter().zip(unknowns) {
-        if matches!(unknown.role, Role::Parameter(_)) {
-            advice.extend(one_output(excited));
-            advice.extend(one_moment(excited));
-        }
-    }
+    let of_parameters = found.excitation.iter().zip(unknowns);
+    let of_parameters = of_parameters.filter(|(_, unknown)| matches!(unknown.role, Role::Parameter(_)));
+    let of_parameters: Vec<&Excitation> = of_parameters.map(|(excited, _)| excited).collect();
+    advice.extend(one_output(&of_parameters));
+    advice.extend(of_parameters.iter().filter_map(|excited| one_moment(excited)));
     let inputs = records.first().map_or(&[][..], |record| record.inputs());
     for (i, input) in inputs.iter().enumerate() {
         let Some(&first) = input.values.first() else { continue };
@@ -65,18 +64,30 @@ pub(super) fn advice(found: &Identifiability, unknowns: &[Unknown], records: &[R
     advice
 }
 
-fn one_output(excited: &Excitation) -> Option<String> {
-    let (output, share) = excited.outputs.iter().find(|(_, share)| *share > ONLY)?;
-    let others = excited.outputs.iter().filter(|(name, _)| name != output);
-    let others: Vec<String> = others.map(|(name, _)| format!("`{name}`")).collect();
-    (!others.is_empty()).then(|| {
-        format!(
-            "`{}` is seen only through `{output}` ({}): {} hardly depends on it, and cannot confirm it",
-            excited.name,
-            percent(*share, 4),
+/// Which parameters only one of several outputs tells, output by output.
+fn one_output(parameters: &[&Excitation]) -> Vec<String> {
+    let outputs = parameters.first().map_or(&[][..], |excited| &excited.outputs);
+    let sentence = |j: usize| {
+        let output = &outputs[j].0;
+        let only: Vec<&&Excitation> = parameters.iter().filter(|excited| excited.outputs[j].1 > ONLY).collect();
+        let least = only.iter().map(|excited| excited.outputs[j].1).reduce(f64::min)?;
+        let names: Vec<String> = only.iter().map(|excited| format!("`{}`", excited.name)).collect();
+        let others = outputs.iter().filter(|(name, _)| name != output);
+        let others: Vec<String> = others.map(|(name, _)| format!("`{name}`")).collect();
+        let (verb, them, at_least) = match names.len() {
+            1 => ("is", "it", ""),
+            _ => ("are", "them", "at least "),
+        };
+        let depend = if others.len() == 1 { "depends" } else { "depend" };
+        Some(format!(
+            "{} {verb} seen only through `{output}` ({at_least}{} of the information): {} hardly {depend} on {them}, and \
+             cannot confirm {them}",
+            names.join(", "),
+            percent(least, 4),
             others.join(", ")
-        )
-    })
+        ))
+    };
+    if outputs.len() < 2 { vec![] } else { (0..outputs.len()).filter_map(sentence).collect() }
 }
 
 fn one_moment(excited: &Excitation) -> Option<String> {

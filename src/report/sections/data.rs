@@ -1,7 +1,7 @@
 //! The records and their signals.
 
 use super::outputs::extent;
-use crate::numeral::counted;
+use crate::numeral::{counted, number};
 use crate::report::facts::{Facts, Record};
 use crate::section::{Cell, Section, Table};
 
@@ -26,10 +26,16 @@ pub(super) fn section(facts: &Facts) -> Section {
     }
 }
 
+/// A value with four digits, and none below a ten-thousandth of the range: the mean of an alternating signal is zero.
+fn size(value: f64, range: f64) -> Cell {
+    let rounding = value.abs() < 5e-5 * range;
+    Cell::Number { value, text: number(if rounding { 0.0 } else { value }, 4) }
+}
+
 /// The columns of a record.
 fn signals(record: &Record) -> Table {
     let rows = record.signals.iter().map(|signal| {
-        let value = |i: usize| signal.values.map_or("-".into(), |values| Cell::number(values[i], 4));
+        let value = |i: usize| signal.values.map_or("-".into(), |values| size(values[i], values[2] - values[0]));
         let (name, role, unit) = (signal.name.as_str().into(), signal.role.into(), signal.unit.as_str().into());
         [name, role, unit, value(0), value(1), value(2), signal.missing.into()]
     });
