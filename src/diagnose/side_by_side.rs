@@ -26,7 +26,7 @@ pub enum DataUse {
 /// #     report: Report, model: &Surface, linear: &Estimate<Surface>, full: &Estimate<Surface>,
 /// #     fitted: &ExperimentOf<Surface>, other: &ExperimentOf<Surface>,
 /// # ) -> Result<Report, greybox::Error> {
-/// let both = |record, part| {
+/// let both = |record: &ExperimentOf<Surface>, part| {
 ///     Compared::new(record.record(), part).with("full", &full.predict(model, record)?)?.with("linear", &linear.predict(model, record)?)
 /// };
 /// let report = report.with(vec![both(fitted, DataUse::Estimation)?, both(other, DataUse::Validation)?]);
