@@ -21,6 +21,7 @@ mod schedule;
 mod step;
 mod system;
 
+pub(crate) use choice::only_duals;
 pub use code::Column;
 pub use group::Group;
 pub use schedule::TooLarge;
@@ -164,6 +165,11 @@ impl Program {
             trajectories,
             machine,
         })))
+    }
+
+    /// Whether this is the same program.
+    pub(crate) fn is(&self, other: &Program) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
     }
 
     /// Lanes of the largest group: what is best for many trajectories.

@@ -4,6 +4,7 @@ mod predict;
 mod run;
 mod search;
 
+use crate::engine::only_duals;
 use crate::equations::Equations;
 use crate::error::Error;
 use crate::estimate::Estimate;
@@ -195,14 +196,11 @@ fn declared<M: Model>(parameters: Of<M::Parameters, Parameter>) -> Vec<Parameter
 }
 
 /// The model on its way through records, by a method and a predictor.
-pub(crate) fn sweep<'a, M: Model>(
+pub(crate) fn sweep<'a, M: Model + 'a>(
     model: Handle<'a, M>,
     stepping: &Stepping<M>,
     predictor: &Arc<dyn Prediction>,
-) -> Result<Arc<dyn Sweep + 'a>, Error>
-where
-    M: 'a,
-{
+) -> Result<Arc<dyn Sweep + 'a>, Error> {
     let Stepping { loops, method } = stepping.clone();
     if !method.serves(M::KIND) {
         let word = |kind| match kind {
@@ -218,20 +216,21 @@ where
     method.check()?;
     let layout = Arc::new(Layout::of::<M>());
     predictor.check(&layout)?;
-    let traced = Equations::trace(&*model);
-    if std::env::var("GREYBOX_ENGINE").is_ok_and(|e| e == "duals") {
-        return Ok(Arc::new(DualSweep { layout, model, loops, method, predictor: predictor.clone(), reason: "asked for".to_owned() }));
-    }
-    let reason = match &traced {
-        Ok(_) => String::new(),
-        Err(untraceable) => untraceable.reason.clone(),
+    let traced = match only_duals() {
+        true => Err("dual numbers are asked for".to_owned()),
+        false => Equations::trace(&*model).map_err(|untraceable| untraceable.reason),
     };
-    let (method_, predictor_) = (method.clone(), predictor.clone());
-    let plain = Arc::new(DualSweep { layout, model, loops, method, predictor: predictor.clone(), reason });
-    let Ok(equations) = traced else { return Ok(plain) };
-    Ok(match ProgramSweep::new(Arc::new(equations), method_, predictor_, plain.clone()) {
+    let plain = |reason: String| {
+        let (layout, model, loops) = (layout.clone(), model.clone(), loops.clone());
+        Arc::new(DualSweep { layout, model, loops, method: method.clone(), predictor: predictor.clone(), reason })
+    };
+    let equations = match traced {
+        Ok(equations) => Arc::new(equations),
+        Err(reason) => return Ok(plain(reason)),
+    };
+    Ok(match ProgramSweep::new(equations, method.clone(), predictor.clone(), plain(String::new())) {
         Ok(sweep) => Arc::new(sweep),
-        Err(_) => plain,
+        Err(untraceable) => plain(untraceable.reason),
     })
 }
 

@@ -40,7 +40,7 @@ pub(crate) use tape::Tape;
 pub use trace::Untraceable;
 
 use crate::scalar::Table;
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
 /// Arithmetic as a value: nodes, each after its operands.
@@ -49,7 +49,7 @@ use std::sync::Arc;
 pub struct Graph {
     nodes: Vec<Node>,
     tables: Vec<Arc<Table>>,
-    known: HashMap<Node, Id>,
+    known: FxHashMap<Node, Id>,
 }
 
 impl PartialEq for Graph {

@@ -14,7 +14,9 @@ pub use automatic::Automatic;
 pub use discrete::Discrete;
 pub use esdirk::Esdirk;
 #[cfg(feature = "std")]
-pub(crate) use method::{Duals, Field, Method, SymbolicField};
+pub use method::Rate;
+#[cfg(feature = "std")]
+pub(crate) use method::{Duals, Field, Method, Slopes, SymbolicField};
 pub use rk4::Rk4;
 pub use rk45::Rk45;
 pub use system::{ModelSystem, Square, System};

@@ -2,7 +2,7 @@
 
 use crate::equations::Equations;
 use crate::graph::{Graph, Id, Leaf, Node, Symbol, Untraceable};
-use crate::integrate::{Integrator, Method, SymbolicField};
+use crate::integrate::{Integrator, Method, Rate, SymbolicField};
 use crate::interval::Hold;
 use crate::layout::Kind;
 
@@ -158,7 +158,7 @@ impl SymbolicInterval<'_> {
     }
 
     /// Any vector at the next sample, by its rate.
-    pub fn cross(&self, kind: Kind, z: &mut [Symbol], rate: &dyn Fn(f64, &[Symbol], &mut [Symbol])) {
+    pub fn cross(&self, kind: Kind, z: &mut [Symbol], rate: Rate<'_, Symbol>) {
         if !self.method.is_fixed() {
             return Symbol::fail("the steps of its integrator depend on the state");
         }

@@ -11,7 +11,7 @@ mod window;
 
 pub(crate) use duals::{DualSweep, OVERFLOW};
 pub(crate) use loops::Loops;
-pub(crate) use programs::ProgramSweep;
+pub(crate) use programs::{Derived, ProgramSweep};
 pub use window::Window;
 
 pub use crate::graph::Seed;
@@ -27,6 +27,8 @@ use std::sync::Arc;
 pub struct Prepared {
     /// The measured state at each sample, sample by sample, where predictions restart from it; NaN where there is none.
     pub restarts: Vec<f64>,
+    /// What programs compute from the record alone.
+    pub(crate) derived: Derived,
 }
 
 /// A run of samples of a record and what it starts from.

@@ -1,5 +1,6 @@
 //! Whether errors are white: autocorrelations gathered run by run, and the portmanteau test of Ljung and Box.
 
+use crate::wide::{self, Task, Wide, Width};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Running sums of products of a sequence with its own past, which need no memory but that of the longest lag.
@@ -26,9 +27,7 @@ impl Autocorrelation {
         let missing = (lags - self.first.len()).min(run.len());
         self.first.extend_from_slice(&run[..missing]);
         self.values.extend_from_slice(run);
-        for (k, sum) in self.sums.iter_mut().enumerate() {
-            *sum += dot(run, &self.values[lags - k..]);
-        }
+        wide::run(Width::widest(), Products { run, values: &self.values, sums: &mut self.sums });
         self.values.drain(..run.len());
         self.count += count;
     }
@@ -64,6 +63,26 @@ impl Autocorrelation {
     }
 }
 
+/// Adds the products of a run with itself and with what came before to the sums of all lags.
+struct Products<'p> {
+    run: &'p [f64],
+    /// As many values as there are lags, then those of the run.
+    values: &'p [f64],
+    sums: &'p mut [f64],
+}
+
+impl Task for Products<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        let lags = self.sums.len() - 1;
+        for (k, sum) in self.sums.iter_mut().enumerate() {
+            *sum += dot(self.run, &self.values[lags - k..]);
+        }
+    }
+}
+
 /// Statistic and p-value of Ljung and Box (Biometrika 65 (1978) 297) for the autocorrelations at lags `1, 2, ...` of
 /// `count` values: the probability that white noise shows as much.
 pub(crate) fn ljung_box(coefficients: &[f64], count: u64) -> (f64, f64) {
@@ -80,6 +99,7 @@ pub(crate) fn chi_squared_tail(statistic: f64, degrees: f64) -> f64 {
 }
 
 /// Sum of products over the shorter, in accumulators that the compiler may keep in vector lanes.
+#[inline(always)]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let n = a.len().min(b.len());
     let (a, b) = (&a[..n], &b[..n]);

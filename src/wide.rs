@@ -66,6 +66,20 @@ pub(crate) trait Wide: Copy + Send + Sync + 'static {
     /// The same with `==`.
     fn select_eq(self, to: Self, then: Self, otherwise: Self) -> Self;
 
+    /// Rows and columns of the first `LANES` by `LANES` numbers changed over.
+    #[inline(always)]
+    fn transpose(square: [Self; 8]) -> [Self; 8] {
+        let mut numbers = [[0.0; 8]; 8];
+        for (row, numbers) in square.iter().zip(&mut numbers) {
+            row.store(numbers);
+        }
+        let mut rows = square;
+        for (at, row) in rows.iter_mut().enumerate().take(Self::LANES) {
+            *row = Self::load(&core::array::from_fn::<f64, 8, _>(|from| numbers[from][at]));
+        }
+        rows
+    }
+
     /// Whether all lanes are below a limit.
     #[inline(always)]
     fn all_below(self, limit: f64) -> bool {
@@ -278,6 +292,33 @@ mod tests {
             }
             bits.sort_unstable();
             bits.into_iter().map(|(_, bits)| bits).collect()
+        }
+    }
+
+    /// Changes rows and columns over.
+    struct Transpose;
+
+    impl Task for Transpose {
+        type Output = ();
+        #[inline(always)]
+        fn run<W: Wide>(self) {
+            let row = |from: usize| core::array::from_fn::<f64, 8, _>(|at| (8 * from + at) as f64);
+            let rows = W::transpose(core::array::from_fn(|from| W::load(&row(from))));
+            for (at, row) in rows.into_iter().enumerate().take(W::LANES) {
+                let mut numbers = [0.0; 8];
+                row.store(&mut numbers);
+                let expected: Vec<f64> = (0..W::LANES).map(|from| (8 * from + at) as f64).collect();
+                assert_eq!(numbers[..W::LANES], expected);
+            }
+        }
+    }
+
+    #[test]
+    fn rows_become_columns() {
+        for width in
+            [Width::avx512(), Width::avx2(), Some(Width::portable()), Some(Width::single())].into_iter().flatten()
+        {
+            run(width, Transpose);
         }
     }
 

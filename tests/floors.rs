@@ -9,12 +9,13 @@ use std::path::{Path, PathBuf};
 
 /// The rooms, floor by floor. Each may import from all the rows above its own, and from nothing else.
 const FLOORS: &[(&str, &[&str])] = &[
-    ("ground: hardware", &["lanes"]),
-    ("ground: beside numbers", &["scalar", "units", "dispatch", "random", "numeral", "whiteness", "wide"]),
+    ("ground: hardware", &["lanes", "wide"]),
+    ("ground: beside numbers", &["scalar", "units", "dispatch", "random", "numeral", "whiteness"]),
     ("ground: numbers", &["dual", "fused", "signals"]),
     ("ground: vectors of numbers", &["information", "error", "by_name", "layout", "graph"]),
     ("say: words", &["model", "parameter", "scaling", "interval"]),
-    ("say: records and equations by position", &["record", "functions", "equations"]),
+    ("say: records and functions by position", &["record", "functions"]),
+    ("say: equations as graphs", &["equations"]),
     ("say: records by type", &["experiment"]),
     // Filtering a record is editing it, and a horizon may start from filtered states.
     ("expect: one step", &["integrate", "prefilter"]),

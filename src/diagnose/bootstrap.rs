@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::estimate::Summary;
 use crate::numeral::resolved;
 use crate::optimize::LeastSquares;
-use crate::problem::{Objective, Problem, Simulated, each};
+use crate::problem::{Problem, Simulated, each};
 use crate::random::Random;
 use crate::record::Record;
 use crate::section::{Cell, Section, Table};

@@ -25,7 +25,7 @@ impl Machine {
     }
 }
 
-/// The variable that tests choose an engine by. It changes no bit of any result.
+/// The variable that tests choose an engine by. It changes no bit of any result, but for `duals`: no program at all.
 const VARIABLE: &str = "GREYBOX_ENGINE";
 
 /// The registers and, if it can be and pays, the machine code for a step.
@@ -40,4 +40,9 @@ pub(super) fn engine(code: &Sound, trajectories: Trajectories) -> (Width, Option
     };
     let interpreted = wanted.starts_with("interpreter") || wanted == "portable";
     (width, if interpreted { None } else { Machine::new(code, width) })
+}
+
+/// Whether models are to be evaluated with dual numbers, whatever can be compiled.
+pub(crate) fn only_duals() -> bool {
+    std::env::var(VARIABLE).is_ok_and(|wanted| wanted == "duals")
 }

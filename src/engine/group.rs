@@ -134,6 +134,12 @@ impl Group {
         }
     }
 
+    /// What all lanes carry, without slopes: entry, lane.
+    pub fn carries(&self, carries: &mut [f64]) {
+        let length = self.program.pattern.rows.len() * self.lanes();
+        carries[..length].copy_from_slice(&self.numbers[self.first..][..length]);
+    }
+
     /// The slopes of what a lane carries: entry by entry, one for each seed.
     pub fn carry_slopes(&self, lane: usize, slopes: &mut [f64]) {
         for (to, at) in slopes.iter_mut().zip(self.program.pattern.rows.iter().flatten()) {

@@ -8,8 +8,8 @@ mod slots;
 use super::code::{Code, Column, Instruction, Operation, Read, Slot, Sound};
 use super::fusion::{TERMS, Term, Work, works};
 use crate::graph::{Id, Leaf, Node, Tape};
+use rustc_hash::FxHashMap;
 use slots::Slots;
-use std::collections::HashMap;
 
 /// More numbers than a program's instructions can name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -52,10 +52,10 @@ struct Scheduler<'a> {
     works: Vec<Option<Work>>,
     visited: Vec<bool>,
     /// Where each node's value stands.
-    at: HashMap<Id, Slot>,
+    at: FxHashMap<Id, Slot>,
     slots: Slots,
     /// The slots of numbers, by their bits.
-    numbers: HashMap<u64, Slot>,
+    numbers: FxHashMap<u64, Slot>,
     code: Code,
 }
 
@@ -83,7 +83,7 @@ impl<'a> Scheduler<'a> {
             tables: roots.tape.graph.tables().to_vec(),
         };
         let slots = Slots::after(roots.next.len() + roots.parameters);
-        Scheduler { roots, works, visited, at: HashMap::new(), slots, numbers: HashMap::new(), code }
+        Scheduler { roots, works, visited, at: FxHashMap::default(), slots, numbers: FxHashMap::default(), code }
     }
 
     /// The nodes that are still to be computed, as they are needed.
@@ -196,11 +196,11 @@ impl<'a> Scheduler<'a> {
     /// The instructions of the samples: those up to `first` before the rows are read off.
     fn run(mut self, order: &[Id], first: usize) -> Result<Code, TooLarge> {
         let last = self.last_reads(order, first);
-        let mut targets: HashMap<Id, Vec<Slot>> = HashMap::new();
+        let mut targets: FxHashMap<Id, Vec<Slot>> = FxHashMap::default();
         for (entry, id) in self.roots.next.iter().enumerate() {
             targets.entry(*id).or_default().push(slots::narrow(entry)?);
         }
-        let leaves: HashMap<Slot, Id> = self.at.iter().map(|(id, slot)| (*slot, *id)).collect();
+        let leaves: FxHashMap<Slot, Id> = self.at.iter().map(|(id, slot)| (*slot, *id)).collect();
         for (position, id) in order.iter().enumerate() {
             let Some(work) = self.works[id.index()].clone() else { continue };
             if position == first {
@@ -242,7 +242,7 @@ impl<'a> Scheduler<'a> {
     }
 
     /// Gives back the slots of rows that nothing else reads; the rows have been read off.
-    fn release_rows(&mut self, work: &Work, last: &HashMap<Id, usize>, first: usize) {
+    fn release_rows(&mut self, work: &Work, last: &FxHashMap<Id, usize>, first: usize) {
         let operands = work.operands();
         let mut done: Vec<Slot> = vec![];
         for row in
@@ -256,8 +256,8 @@ impl<'a> Scheduler<'a> {
     }
 
     /// The position after which each node's value is not read any more.
-    fn last_reads(&self, order: &[Id], first: usize) -> HashMap<Id, usize> {
-        let mut last = HashMap::new();
+    fn last_reads(&self, order: &[Id], first: usize) -> FxHashMap<Id, usize> {
+        let mut last = FxHashMap::default();
         for row in self.roots.rows.iter().flatten() {
             last.insert(*row, first);
         }

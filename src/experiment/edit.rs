@@ -53,9 +53,9 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
 
     /// Every `n`-th sample, from the first.
     ///
-    /// A held input ([`Hold::Zero`]) becomes its mean, weighted by time, over what is thinned out: the integral of the
+    /// A held input ([`Hold::Zero`](crate::Hold::Zero)) becomes its mean, weighted by time, over what is thinned out: the integral of the
     /// input over each interval stays what it was, and the state follows it up to the second order in the interval. An
-    /// input between straight lines ([`Hold::First`]) and the outputs are instants, and stay those of the samples kept.
+    /// input between straight lines ([`Hold::First`](crate::Hold::First)) and the outputs are instants, and stay those of the samples kept.
     ///
     /// Nothing is filtered. White noise on an output stays as large as it was, so that thinning loses information and
     /// gains speed; it biases nothing. What varies faster than the new samples can follow is another matter: in an input

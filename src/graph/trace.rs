@@ -9,7 +9,7 @@ use super::{Graph, Id};
 use crate::scalar::Comparison;
 use core::any::Any;
 use core::cell::RefCell;
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 /// Runs of the code, one for each way through it.
@@ -60,7 +60,7 @@ pub(super) struct Arena {
     path: Vec<Decision>,
     asked: usize,
     /// What each two numbers may still be to each other in this run.
-    relations: HashMap<(Id, Id), u8>,
+    relations: FxHashMap<(Id, Id), u8>,
     operations: usize,
     failure: Option<String>,
 }
@@ -184,7 +184,7 @@ impl Graph {
                 number,
                 path: core::mem::take(&mut path),
                 asked: 0,
-                relations: HashMap::new(),
+                relations: FxHashMap::default(),
                 operations: 0,
                 failure: None,
             };

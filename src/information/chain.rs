@@ -245,7 +245,8 @@ mod tests {
         let mut chain = Chain::new(STATES, slopes, &[2, 0], &[2.0, 3.0, 5.0]);
         chain.add(&triangle);
         let found = chain.triangle();
-        let product = |t: &Information, i: usize, j: usize| (0..=i.min(j)).map(|r| t.at(r, i) * t.at(r, j)).sum::<f64>();
+        let product =
+            |t: &Information, i: usize, j: usize| (0..=i.min(j)).map(|r| t.at(r, i) * t.at(r, j)).sum::<f64>();
         let (from, scales) = ([4, 2, 3, 5], [2.0, 3.0, 5.0, 1.0]);
         for (i, j) in (0..4).flat_map(|i| (0..4).map(move |j| (i, j))) {
             let expected = product(&triangle, from[i], from[j]) * scales[i] * scales[j];

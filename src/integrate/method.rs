@@ -8,13 +8,12 @@ use crate::layout::Kind;
 use crate::scalar::Scalar;
 use crate::signals::Entry;
 use core::fmt::Debug;
-use std::sync::Arc;
 
 /// Eight slopes at a time.
 pub(crate) type Duals = Dual<8>;
 
 /// `f(position, x, to)`: writes a derivative, or the next state.
-pub(crate) type Rate<'a, S> = &'a dyn Fn(f64, &[S], &mut [S]);
+pub type Rate<'a, S> = &'a dyn Fn(f64, &[S], &mut [S]);
 
 /// Value and Jacobian (by rows) of a derivative, at a position and values of the states.
 pub(crate) type Slopes<'a> = &'a dyn Fn(f64, &[f64]) -> (Vec<f64>, Vec<Vec<f64>>);
@@ -131,7 +130,6 @@ pub(crate) trait Method: Debug + Send + Sync {
     fn advance_symbols(&self, field: &SymbolicField<'_>, x: Vec<Symbol>) -> Result<Vec<Symbol>, Stuck>;
     fn is_fixed(&self) -> bool;
     fn serves(&self, kind: Kind) -> bool;
-    fn refined(&self, kind: Kind) -> Option<Arc<dyn Method>>;
     fn check(&self) -> Result<(), Error>;
     fn describe(&self, kind: Kind) -> String;
 }
@@ -155,10 +153,6 @@ impl<I: Integrator> Method for I {
 
     fn serves(&self, kind: Kind) -> bool {
         Integrator::serves(self, kind)
-    }
-
-    fn refined(&self, kind: Kind) -> Option<Arc<dyn Method>> {
-        Integrator::refined(self, kind).map(|refined| Arc::new(refined) as Arc<dyn Method>)
     }
 
     fn check(&self) -> Result<(), Error> {

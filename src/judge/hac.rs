@@ -288,9 +288,8 @@ impl<'m> MovingSums<'m> {
     fn slide(&mut self, new: &[f64], counts: bool) {
         let part = (self.window as f64).sqrt().recip();
         let mut oldest = self.recent.pop_front().unwrap_or_default();
-        for i in 0..new.len() {
-            self.sums[i] += new[i] - oldest[i];
-            oldest[i] = new[i];
+        for ((sum, new), old) in self.sums.iter_mut().zip(new).zip(&mut oldest) {
+            *sum += new - std::mem::replace(old, *new);
         }
         self.recent.push_back(oldest);
         if counts {

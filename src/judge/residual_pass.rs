@@ -5,14 +5,14 @@ use crate::estimate::OutputFit;
 use crate::optimize::Infeasible;
 use crate::problem::{Accumulate, Objective, each};
 use crate::sweep::{Piece, Prepared, Sweep, Window};
-use crate::whiteness::{Autocorrelation, ljung_box};
+use crate::whiteness::{Autocorrelation, dot, ljung_box};
 use std::sync::Arc;
 
 /// Lags of the whiteness test.
 const LAGS: usize = 20;
 /// One window in so many is simulated once more with a finer step, and so many of a record at most.
 const EVERY: usize = 8;
-const AGAIN: usize = 64;
+const AGAIN: usize = 16;
 
 /// What a pass over the residuals found.
 pub(crate) struct Residuals {
@@ -57,13 +57,18 @@ struct Sampled {
     carry: Vec<f64>,
 }
 
-impl Accumulate for Sums<'_> {
-    fn add(&mut self, window: &Window, lane: usize) {
+impl Sums<'_> {
+    /// Counts the measurements of a window.
+    fn count(&mut self, window: &Window, lane: usize) {
         let (outputs, samples) = (window.outputs(), window.samples[lane]);
-        let begin = window.begin[lane];
         let whitening = &self.objective.whitening;
         let all: Vec<usize> = (0..outputs).collect();
         let whole = whitening.log_determinant(&all);
+        if window.whole && !window.has_variances() && !self.objective.is_weighted() {
+            self.log_determinant += samples as f64 * whole;
+            self.measured += (samples * outputs) as u64;
+            return;
+        }
         let mut here = Vec::with_capacity(outputs);
         for k in 0..samples {
             here.clear();
@@ -76,15 +81,27 @@ impl Accumulate for Sums<'_> {
                 true => whole,
                 false => whitening.log_determinant(&here),
             };
-            if !self.objective.is_weighted() || self.objective.weight(self.experiment, begin + k) > 0.0 {
+            if !self.objective.is_weighted() || self.objective.weight(self.experiment, window.begin[lane] + k) > 0.0 {
                 self.measured += here.len() as u64;
             }
         }
+    }
+}
+
+impl Accumulate for Sums<'_> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        let (outputs, samples, begin) = (window.outputs(), window.samples[lane], window.begin[lane]);
+        self.count(window, lane);
         let record = &self.objective.problem.records[self.experiment];
         for j in 0..outputs {
             self.run.clear();
             self.run.extend((0..samples).map(|k| window.error(k, j, lane)));
             let values = &record.outputs()[j].values[begin..begin + samples];
+            if window.whole && !window.has_variances() {
+                self.outputs[j].add_all(values, &self.run);
+                self.autocorrelations[j].add(&self.run, samples as u64);
+                continue;
+            }
             let mut count = 0;
             for (k, (&y, &error)) in values.iter().zip(&self.run).enumerate() {
                 if window.is_measured(k, j, lane) {
@@ -195,7 +212,7 @@ fn changed(
 ) -> f64 {
     let record = &objective.problem.records[e];
     let values = objective.problem.unknowns.of_experiment(e, x);
-    let prepared = Prepared { restarts: objective.problem.prepared[e].restarts.clone() };
+    let prepared = Prepared { restarts: objective.problem.prepared[e].restarts.clone(), ..Prepared::default() };
     let (mut change, mut seen) = (0.0, 0usize);
     for sampled in again {
         let samples = sampled.errors.len() / sigma.len();
@@ -260,6 +277,19 @@ impl OutputSums {
         self.errors += error * error;
     }
 
+    /// Adds values, all of which were measured.
+    fn add_all(&mut self, values: &[f64], errors: &[f64]) {
+        let Some(first) = values.first() else { return };
+        if self.count == 0 {
+            self.first = *first;
+        }
+        let first = self.first;
+        self.count += values.len() as u64;
+        self.sum += total(values.iter().map(|y| y - first));
+        self.squares += total(values.iter().map(|y| (y - first) * (y - first)));
+        self.errors += dot(errors, errors);
+    }
+
     /// As if the other's values had been added after its own.
     fn append(&mut self, other: &OutputSums) {
         if other.count == 0 {
@@ -287,6 +317,13 @@ impl OutputSums {
             sigma: 0.0,
         }
     }
+}
+
+/// A sum in accumulators that the compiler may keep in vector lanes.
+fn total(numbers: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let mut sums = [0.0; 4];
+    numbers.enumerate().for_each(|(k, number)| sums[k % 4] += number);
+    sums.iter().sum()
 }
 
 /// The fit of an output from its measured values and their errors; NaN where missing.

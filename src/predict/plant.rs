@@ -2,7 +2,7 @@
 
 use crate::dual::Dual;
 use crate::functions::Functions;
-use crate::integrate::{Duals, Field, Method, Stuck};
+use crate::integrate::{Duals, Field, Method, Rate, Slopes, Stuck};
 use crate::interval::Hold;
 use crate::layout::{Kind, Layout};
 use crate::record::Record;
@@ -34,7 +34,7 @@ pub trait Plant<S> {
     ///
     /// # Errors
     /// Where the integrator is [`Stuck`].
-    fn integrate(&self, z: &mut [S], rate: &dyn Fn(f64, &[S], &mut [S])) -> Result<(), Stuck>;
+    fn integrate(&self, z: &mut [S], rate: Rate<'_, S>) -> Result<(), Stuck>;
 
     /// Process noise of each state, as [`Model::diffusion`](crate::Model::diffusion).
     fn diffusion(&self, to: &mut [S]);
@@ -110,13 +110,7 @@ impl Stepped for Duals {
 }
 
 impl<S: Stepped> SlicePlant<'_, S> {
-    fn cross(
-        &self,
-        kind: Kind,
-        z: &mut [S],
-        rate: &dyn Fn(f64, &[S], &mut [S]),
-        slopes: &dyn Fn(f64, &[f64]) -> (Vec<f64>, Vec<Vec<f64>>),
-    ) -> Result<(), Stuck> {
+    fn cross(&self, kind: Kind, z: &mut [S], rate: Rate<'_, S>, slopes: Slopes<'_>) -> Result<(), Stuck> {
         let field = Field { kind, interval: self.between.interval, states: z.len(), rate, slopes };
         let mut step = self.step.get();
         let end = S::advance(self.method, &field, z.to_vec(), &mut step)?;
@@ -154,7 +148,7 @@ impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
         self.functions.state(t, x, &u, self.p, to);
     }
 
-    fn integrate(&self, z: &mut [S], rate: &dyn Fn(f64, &[S], &mut [S])) -> Result<(), Stuck> {
+    fn integrate(&self, z: &mut [S], rate: Rate<'_, S>) -> Result<(), Stuck> {
         // The rate is known in these numbers alone: the Jacobian that an implicit method asks for is by differences.
         let values = |position: f64, z: &[f64]| {
             let lifted: Vec<S> = z.iter().map(|z| S::from(*z)).collect();

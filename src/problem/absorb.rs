@@ -4,6 +4,7 @@ use super::pass::Job;
 use super::{Objective, Weighing};
 use crate::information::{Block, Information, Triangles};
 use crate::sweep::Window;
+use crate::wide::{self, Task, Wide, Width};
 
 /// Rows that are absorbed together.
 const ROWS: usize = 256;
@@ -14,8 +15,12 @@ pub(super) struct Absorber<'o> {
     /// Whether every error counts by its square.
     plain: bool,
     rows: Vec<u64>,
+    /// Sums of squares, where every error counts by its own, lane by lane.
+    squares: Vec<f64>,
     triangles: Triangles,
     alone: Option<(Information, Block)>,
+    /// Room for one row.
+    row: Vec<f64>,
 }
 
 impl<'o> Absorber<'o> {
@@ -25,8 +30,10 @@ impl<'o> Absorber<'o> {
             weighing: jobs.iter().map(|job| Weighing::new(objective, job.experiment)).collect(),
             plain: objective.loss().is_none() && !objective.is_weighted() && !objective.sweep.predicts_variance(),
             rows: vec![0; jobs.len()],
+            squares: vec![],
             triangles: Triangles::new(columns, 0),
             alone: None,
+            row: vec![0.0; columns],
         }
     }
 
@@ -52,17 +59,15 @@ impl<'o> Absorber<'o> {
     }
 
     /// Sums of squares.
-    fn square(&mut self, window: &Window) {
-        let (lanes, last) = (window.lanes(), window.columns() - 1);
-        for k in 0..window.len() {
-            for j in 0..window.outputs() {
-                let errors = &window.row(k, j)[last * lanes..];
-                let measured = window.measured(k, j);
-                for (lane, weighing) in self.weighing.iter_mut().enumerate() {
-                    weighing.cost += 0.5 * errors[lane] * errors[lane];
-                    self.rows[lane] += u64::from(measured >> lane & 1);
-                }
-            }
+    fn square(&mut self, window: &mut Window) {
+        let (lanes, columns, outputs) = (window.lanes(), window.columns(), window.outputs());
+        self.squares.resize(lanes, 0.0);
+        wide::run(Width::widest(), Square { rows: window.rows_mut(), columns, squares: &mut self.squares });
+        for (lane, rows) in self.rows.iter_mut().enumerate() {
+            *rows += match window.whole {
+                true => (window.samples[lane] * outputs) as u64,
+                false => window.measurements(lane),
+            };
         }
     }
 
@@ -94,7 +99,7 @@ impl<'o> Absorber<'o> {
         let columns = window.columns() - 1;
         let (information, block) =
             self.alone.get_or_insert_with(|| (Information::new(columns), Block::new(columns, ROWS)));
-        let mut row = vec![0.0; columns];
+        let row = &mut self.row;
         for k in 0..window.samples[0] {
             for j in 0..window.outputs() {
                 if !window.is_measured(k, j, 0) {
@@ -102,11 +107,11 @@ impl<'o> Absorber<'o> {
                 }
                 let [(root, error), second] = self.weighing[0].rows(window, k, j, 0);
                 row.iter_mut().zip(window.row(k, j)).for_each(|(to, from)| *to = from * root);
-                information.gather(block, &row, error);
+                information.gather(block, row, error);
                 if window.has_variances() {
                     let (root, error) = second;
                     row.iter_mut().zip(window.variance_row(k, j)).for_each(|(to, from)| *to = from * root);
-                    information.gather(block, &row, error);
+                    information.gather(block, row, error);
                 }
             }
         }
@@ -114,13 +119,42 @@ impl<'o> Absorber<'o> {
 
     /// Cost and triangle of a job.
     pub fn part(&mut self, lane: usize) -> (f64, Information) {
-        let cost = self.weighing[lane].cost;
+        let cost = self.weighing[lane].cost + 0.5 * self.squares.get(lane).unwrap_or(&0.0);
         match self.alone.take() {
             Some((mut information, mut block)) => {
                 information.absorb(&mut block);
                 (cost, information)
             }
             None => (cost, self.triangles.triangle(lane).of_rows(self.rows[lane])),
+        }
+    }
+}
+
+/// Adds the squares of the errors, the last column of each row, to each lane's sum.
+struct Square<'s> {
+    rows: &'s [f64],
+    columns: usize,
+    squares: &'s mut [f64],
+}
+
+impl Task for Square<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        let Square { rows, columns, squares } = self;
+        let lanes = squares.len();
+        let errors = rows.chunks_exact(columns * lanes).map(|row| &row[(columns - 1) * lanes..]);
+        for first in (0..lanes - lanes % W::LANES).step_by(W::LANES) {
+            let mut sum = W::load(&squares[first..]);
+            for errors in errors.clone() {
+                let error = W::load(&errors[first..]);
+                sum = sum.add(error.mul(error));
+            }
+            sum.store(&mut squares[first..]);
+        }
+        for lane in lanes - lanes % W::LANES..lanes {
+            errors.clone().for_each(|errors| squares[lane] += errors[lane] * errors[lane]);
         }
     }
 }

@@ -9,8 +9,9 @@ use crate::optimize::{Infeasible, Linearization};
 use crate::sweep::{Piece, Reached, RunError, Seed};
 use std::sync::Arc;
 
-/// Part of the squared errors that the correction of guessed borders may change before the slopes are computed anew.
-const MOVED: f64 = 1e-6;
+/// Part of the squared errors that the correction of guessed borders may change before the slopes are computed anew. The
+/// corrected errors are exact; slopes with respect to parameters are off by as much, relatively, as the guesses are.
+const MOVED: f64 = 0.1;
 
 /// What one segment comes to.
 struct Part {
@@ -30,7 +31,6 @@ impl Objective<'_> {
         if !exact && found.moved > MOVED * 2.0 * found.cost {
             found = self.triangles(coordinates, &values, found.borders.as_ref())?;
         }
-        if std::env::var("DBG").is_ok() { eprintln!("{coordinates:?} {:?} {:?}", found.cost, found.blocks[0]); }
         let Triangulation { mut cost, mut blocks, borders, .. } = found;
         if let Some(borders) = borders {
             self.memory.keep(Arc::new(borders));
@@ -50,9 +50,11 @@ impl Objective<'_> {
         if let Some(known) = self.memory.at(coordinates) {
             return Ok((Some((*known).clone()), true));
         }
-        let corrigible = self.problem.cuts.affine && self.loss().is_none();
-        let Some(best) = self.memory.best().filter(|_| corrigible) else {
+        if !self.problem.cuts.affine || self.loss().is_some() {
             return Ok((Some(self.simulated_borders(coordinates, values)?), true));
+        }
+        let Some(best) = self.memory.best() else {
+            return Ok((Some(self.initial_borders(coordinates, values)), false));
         };
         let mut guess = Borders { point: coordinates.to_vec(), values: values.to_vec(), ..(*best).clone() };
         for (e, borders) in guess.of.iter_mut().enumerate() {
@@ -68,6 +70,17 @@ impl Objective<'_> {
             }
         }
         Ok((Some(guess), false))
+    }
+
+    /// Every segment begins as the first does.
+    fn initial_borders(&self, coordinates: &[f64], values: &[Values]) -> Borders {
+        let of = |e: usize| {
+            let carry = self.job(e, &values[e], coordinates, false).piece.carry;
+            let borders = self.problem.cuts.segments[e].len() - 1;
+            vec![Border { carry, slopes: vec![] }; borders]
+        };
+        let of = (0..self.experiments()).map(of).collect();
+        Borders { point: coordinates.to_vec(), cost: f64::INFINITY, values: values.to_vec(), of }
     }
 
     /// The triangles of all experiments, priors left out.
@@ -163,7 +176,8 @@ impl Objective<'_> {
                 job.seeds.retain(|seed| matches!(seed, Seed::Parameter(_)));
                 job.seeds.splice(0..0, (0..carried).map(Seed::Carry));
                 let width = job.seeds.len();
-                job.piece.slopes = (0..carried * width).map(|at| f64::from(u8::from(at % width == at / width))).collect();
+                job.piece.slopes =
+                    (0..carried * width).map(|at| f64::from(u8::from(at % width == at / width))).collect();
             }
         }
         jobs
@@ -174,10 +188,12 @@ impl Objective<'_> {
         let mut absorbers: Absorber<'_> = Absorber::new(self, jobs);
         let reached = self.run(jobs, &mut |window| absorbers.absorb(window))?;
         let parts = reached.into_iter().enumerate();
-        parts.map(|(lane, reached)| {
-            let (cost, triangle) = absorbers.part(lane);
-            Ok(Part { cost, triangle, reached })
-        }).collect()
+        parts
+            .map(|(lane, reached)| {
+                let (cost, triangle) = absorbers.part(lane);
+                Ok(Part { cost, triangle, reached })
+            })
+            .collect()
     }
 
     /// The cost of one experiment alone, priors left out.

@@ -126,7 +126,8 @@ impl<'p> Objective<'p> {
                 let slopes = unknowns.iter().enumerate().map(|(column, name)| (name, window.at(k, j, column, 0)));
                 for (unknown, slope) in slopes.filter(|(_, slope)| !slope.is_finite()) {
                     let signal = format!("the slope of output `{output}` with respect to `{unknown}`");
-                    first.get_or_insert((sample, signal, slope, if slope.is_nan() { STEEP } else { OVERFLOW }));
+                    let error = window.error(k, j, 0).abs();
+                    first.get_or_insert((sample, signal, slope, if error < OVERFLOWING { STEEP } else { OVERFLOW }));
                 }
             }
             first.is_none()
@@ -140,6 +141,8 @@ impl<'p> Objective<'p> {
     }
 }
 
+/// Errors beyond this come with slopes that overflow.
+const OVERFLOWING: f64 = 1e100;
 const STEEP: &str = "; the value is finite but has no slope there (a root or a power at zero): start elsewhere, or write \
                      the model so that it is smooth there";
 const NO_NOISE: &str = "; it must be positive: write Model::noise, and keep the noise levels away \

@@ -77,7 +77,12 @@ impl Objective<'_> {
             let carry = from(&whole.piece.carry, border.map(|border| &border.carry));
             let slopes = from(&whole.piece.slopes, border.map(|border| &border.slopes).filter(|_| slopes));
             let (seeds, scales) = (whole.seeds.clone(), whole.scales.clone());
-            Job { experiment: e, seeds, scales, piece: Piece { samples: samples.clone(), carry, slopes, ..whole.piece.clone() } }
+            Job {
+                experiment: e,
+                seeds,
+                scales,
+                piece: Piece { samples: samples.clone(), carry, slopes, ..whole.piece.clone() },
+            }
         };
         segments.map(job).collect()
     }
@@ -103,7 +108,12 @@ impl Objective<'_> {
     }
 
     /// The borders of the segments at a point, with their slopes if they are asked for; `None` where nothing is chained.
-    fn borders(&self, coordinates: &[f64], values: &[Values], slopes: bool) -> Result<Option<Arc<Borders>>, Infeasible> {
+    fn borders(
+        &self,
+        coordinates: &[f64],
+        values: &[Values],
+        slopes: bool,
+    ) -> Result<Option<Arc<Borders>>, Infeasible> {
         let cuts = &self.problem.cuts;
         if !(0..self.experiments()).any(|e| cuts.is_chained(e)) {
             return Ok(None);
@@ -134,8 +144,10 @@ impl Objective<'_> {
             let at: Vec<usize> = segments[1..].iter().map(|samples| samples.start).collect();
             self.sweep.follow(&job.piece, &at).map_err(|error| self.infeasible(e, coordinates, error))
         };
-        let borders = |carries: Vec<Vec<f64>>| carries.into_iter().map(|carry| Border { carry, slopes: vec![] }).collect();
-        let of: Result<Vec<_>, Infeasible> = each(self.experiments(), one).into_iter().map(|e| e.map(borders)).collect();
+        let borders =
+            |carries: Vec<Vec<f64>>| carries.into_iter().map(|carry| Border { carry, slopes: vec![] }).collect();
+        let of: Result<Vec<_>, Infeasible> =
+            each(self.experiments(), one).into_iter().map(|e| e.map(borders)).collect();
         Ok(Borders { point: coordinates.to_vec(), cost: f64::INFINITY, values: values.to_vec(), of: of? })
     }
 
@@ -255,18 +267,15 @@ impl Objective<'_> {
     }
 
     /// Runs pieces side by side and shows their windows of standardized errors.
-    pub(super) fn run(
-        &self,
-        jobs: &[&Job<'_>],
-        show: &mut dyn FnMut(&mut Window),
-    ) -> Result<Vec<Reached>, Broken> {
+    pub(super) fn run(&self, jobs: &[&Job<'_>], show: &mut dyn FnMut(&mut Window)) -> Result<Vec<Reached>, Broken> {
         let pieces: Vec<Piece<'_>> = jobs.iter().map(|job| job.piece.clone()).collect();
-        let mut standardize = Standardize::new(self, jobs);
+        let mut standardize: Option<Standardize<'_>> = None;
         let mut failed = None;
         let visit = &mut |window: &mut Window| {
             if self.control.stops() {
                 return false;
             }
+            let standardize = standardize.get_or_insert_with(|| Standardize::new(self, jobs, window.lanes()));
             if let Err((lane, sample)) = standardize.apply(window) {
                 failed = Some(Broken { lane, error: RunError::Failed { sample } });
                 return false;

@@ -34,9 +34,9 @@ pub(crate) struct Cuts {
 impl Cuts {
     /// Cuts records as this sweep allows; not at all, if something else hangs on their order.
     pub fn new(sweep: &dyn Sweep, records: &[Record], ordered: bool) -> Self {
-        let joints = if std::env::var("NONLIN").is_ok() { Joints::Nonlinear } else { sweep.joints() };
+        let joints = sweep.joints();
         let carried = matches!(joints, Joints::Affine | Joints::Nonlinear);
-        let whole = std::env::var("NOSEG").is_ok() || ordered || records.len() >= MANY || joints == Joints::Uncut || carried && sweep.carry() > CARRY;
+        let whole = ordered || records.len() >= MANY || joints == Joints::Uncut || carried && sweep.carry() > CARRY;
         let segments = records.iter().map(|record| cut(record.len(), whole)).collect();
         Cuts { segments, carried, affine: joints == Joints::Affine }
     }

@@ -1,62 +1,104 @@
 //! [`Standardize`]: from errors and slopes in the units of the outputs to standardized ones.
 
-use super::Objective;
 use super::pass::Job;
+use super::{Objective, Whitening};
 use crate::prefilter::Butterworth;
 use crate::sweep::Window;
+use crate::wide::{self, Task, Wide, Width};
 
 /// From errors and slopes in the units of the outputs to standardized ones, with respect to the coordinates.
 pub(super) struct Standardize<'s> {
     objective: &'s Objective<'s>,
     prefilter: Option<(&'s Butterworth, Vec<f64>)>,
-    /// By lane, then by column; empty where all are one.
-    scales: Vec<Vec<f64>>,
+    /// What the entries of the rows of a sample are multiplied by, output by output, column by column, lane by lane; empty
+    /// where all are one. Of each job: how fast the quantities move with the coordinates; and one over the noise level.
+    factors: Vec<f64>,
+    width: Width,
 }
 
 impl<'s> Standardize<'s> {
-    pub fn new(objective: &'s Objective<'s>, jobs: &[&Job<'_>]) -> Self {
+    /// For windows of so many lanes.
+    pub fn new(objective: &'s Objective<'s>, jobs: &[&Job<'_>], lanes: usize) -> Self {
         let prefilter = objective.problem.settings.prefilter.as_ref().map(|filter| (filter, vec![]));
-        let plain = jobs.iter().all(|job| job.scales.iter().all(|scale| *scale == 1.0));
-        let scales = if plain { vec![] } else { jobs.iter().map(|job| job.scales.clone()).collect() };
-        Standardize { objective, prefilter, scales }
+        let predicted = objective.sweep.predicts_variance();
+        let columns = jobs[0].seeds.len() + 1;
+        let mut factors = vec![];
+        for j in 0..objective.outputs() {
+            let unit = match &objective.whitening {
+                Whitening::Diagonal(sigma) if !predicted => 1.0 / sigma[j],
+                _ => 1.0,
+            };
+            for column in 0..columns {
+                let scale = |job: &&Job<'_>| unit * job.scales.get(column).unwrap_or(&1.0);
+                factors.extend(jobs.iter().map(scale).chain(std::iter::repeat(1.0)).take(lanes));
+            }
+        }
+        if factors.iter().all(|factor| *factor == 1.0) {
+            factors.clear();
+        }
+        Standardize { objective, prefilter, factors, width: Width::widest() }
     }
 
     /// The lane and the sample whose error is not finite, where there is one.
     pub fn apply(&mut self, window: &mut Window) -> Result<(), (usize, usize)> {
-        let (len, outputs, lanes) = (window.len(), window.outputs(), window.lanes());
-        let last = window.columns() - 1;
-        for k in 0..len {
-            for j in 0..outputs {
-                let errors = &window.row(k, j)[last * lanes..];
-                if let Some(lane) = errors.iter().position(|error| !error.is_finite()) {
-                    return Err((lane, window.begin[lane] + k));
-                }
-            }
+        if !window.whole {
+            check(window)?;
         }
         if let Some((filter, states)) = &mut self.prefilter {
-            let width = outputs * window.columns() * lanes;
+            let width = window.outputs() * window.columns() * window.lanes();
             filter.filter_rows(window.rows_mut(), width, states);
             window.clear_unmeasured();
         }
         if window.has_variances() {
             by_variance(window)?;
         } else {
-            self.objective.whitening.apply(window);
+            self.objective.whitening.decorrelate(window);
         }
-        for (lane, scales) in self.scales.iter().enumerate() {
-            for (k, j) in (0..len).flat_map(|k| (0..outputs).map(move |j| (k, j))) {
-                scale(window.row_mut(k, j), scales, lane, lanes);
-                if window.has_variances() {
-                    scale(window.variance_row_mut(k, j), scales, lane, lanes);
-                }
+        if !self.factors.is_empty() {
+            wide::run(self.width, Multiply { rows: window.rows_mut(), factors: &self.factors });
+            if window.has_variances() {
+                wide::run(self.width, Multiply { rows: window.variance_rows_mut(), factors: &self.factors });
             }
         }
         Ok(())
     }
 }
 
-fn scale(row: &mut [f64], scales: &[f64], lane: usize, lanes: usize) {
-    row.iter_mut().skip(lane).step_by(lanes).zip(scales).for_each(|(value, scale)| *value *= scale);
+/// The first lane and sample whose error is not finite, if there is one.
+fn check(window: &Window) -> Result<(), (usize, usize)> {
+    let (lanes, last) = (window.lanes(), window.columns() - 1);
+    for k in 0..window.len() {
+        for j in 0..window.outputs() {
+            let errors = &window.row(k, j)[last * lanes..];
+            if let Some(lane) = errors.iter().position(|error| !error.is_finite()) {
+                return Err((lane, window.begin[lane] + k));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Multiplies the rows of each sample by the same factors.
+struct Multiply<'m> {
+    rows: &'m mut [f64],
+    factors: &'m [f64],
+}
+
+impl Task for Multiply<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        for rows in self.rows.chunks_exact_mut(self.factors.len()) {
+            let (mut rows, mut factors) = (rows.chunks_exact_mut(W::LANES), self.factors.chunks_exact(W::LANES));
+            for (row, factor) in (&mut rows).zip(&mut factors) {
+                W::load(row).mul(W::load(factor)).store(row);
+            }
+            for (entry, factor) in rows.into_remainder().iter_mut().zip(factors.remainder()) {
+                *entry *= factor;
+            }
+        }
+    }
 }
 
 /// Standardizes errors by their predicted variances `v`: rows `dy / sqrt(v), z = e / sqrt(v)`, and in the place of the
@@ -88,4 +130,3 @@ fn by_variance(window: &mut Window) -> Result<(), (usize, usize)> {
     }
     Ok(())
 }
-

@@ -67,26 +67,12 @@ impl Whitening {
         }
     }
 
-    /// Standardizes the rows of a window in place.
-    pub fn apply(&self, window: &mut Window) {
-        match self {
-            Whitening::Diagonal(sigma) => {
-                if sigma.iter().all(|sigma| *sigma == 1.0) {
-                    return;
-                }
-                for k in 0..window.len() {
-                    for (j, sigma) in sigma.iter().enumerate() {
-                        let scale = 1.0 / sigma;
-                        window.row_mut(k, j).iter_mut().for_each(|value| *value *= scale);
-                    }
-                }
-            }
-            Whitening::Full { covariance, inverse } => {
-                for lane in 0..window.lanes() {
-                    for k in 0..window.samples[lane] {
-                        mix(covariance, inverse, window, k, lane);
-                    }
-                }
+    /// Standardizes the rows of a window by a full covariance; does nothing where there is none.
+    pub fn decorrelate(&self, window: &mut Window) {
+        let Whitening::Full { covariance, inverse } = self else { return };
+        for lane in 0..window.lanes() {
+            for k in 0..window.samples[lane] {
+                mix(covariance, inverse, window, k, lane);
             }
         }
     }

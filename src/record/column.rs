@@ -21,6 +21,11 @@ impl Column {
         Column { storage: Arc::new(storage), range }
     }
 
+    /// Whether these are the same numbers at the same place.
+    pub(crate) fn is(&self, other: &Column) -> bool {
+        Arc::ptr_eq(&self.storage, &other.storage) && self.range == other.range
+    }
+
     /// A part of the column; what lies beyond its end is left out.
     pub fn part(&self, range: Range<usize>) -> Self {
         let end = self.range.end.min(self.range.start + range.end);

@@ -70,7 +70,7 @@ use std::path::{Path, PathBuf};
 /// for it the rows are numbered.
 ///
 /// **The record** is named after the file, its input is held from sample to sample, and its initial state is estimated,
-/// unless the [`Experiment`] is told otherwise.
+/// unless the [`Experiment`](crate::Experiment) is told otherwise.
 ///
 /// The file is read row by row and kept only as the record: ten million rows of five signals take 400 MB. Only where time
 /// turns out uneven, a regular file is read again up to there for its stamps.

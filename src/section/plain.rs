@@ -40,7 +40,8 @@ pub(crate) fn visible(text: &str) -> String {
     text.chars().map(|letter| if letter.is_control() { '\u{FFFD}' } else { letter }).collect()
 }
 
-/// A table: its first column to the left, numbers to the right; where it is too wide, a few lines for each row.
+/// A table: its first column to the left, numbers to the right; where it is too wide, one part of the columns below the
+/// other, or, if they are not all numbers, a few lines for each row.
 pub(super) fn table(table: &Table) -> String {
     let rows: Vec<Vec<String>> =
         table.rows.iter().map(|row| row.iter().map(|cell| visible(cell.text())).collect()).collect();
@@ -55,6 +56,9 @@ pub(super) fn table(table: &Table) -> String {
     let mut text = String::new();
     if !prose && whole <= WIDTH {
         [&columns].into_iter().chain(&rows).for_each(|row| line(&mut text, row, &widths));
+    } else if table.is_of_numbers() && widths.iter().skip(1).all(|width| widths[0] + BETWEEN + width <= WIDTH) {
+        let lines: Vec<&[String]> = [columns.as_slice()].into_iter().chain(rows.iter().map(Vec::as_slice)).collect();
+        parts(&mut text, &lines, &widths);
     } else if columns.len() == 2 {
         rows.iter().for_each(|row| entry(&mut text, row, widths[0]));
     } else {
@@ -65,6 +69,26 @@ pub(super) fn table(table: &Table) -> String {
         text.push('\n');
     }
     text
+}
+
+/// The columns part by part, each after the first column again.
+fn parts(text: &mut String, lines: &[&[String]], widths: &[usize]) {
+    let mut from = 1;
+    while from < widths.len() {
+        let mut width = widths[0];
+        let fits = |column: &&usize| {
+            width += BETWEEN + *column;
+            width <= WIDTH
+        };
+        let end = from + widths[from..].iter().take_while(fits).count();
+        if from > 1 {
+            text.push('\n');
+        }
+        let part = |of: &[String]| [&of[..1], &of[from.min(of.len())..end.min(of.len())]].concat();
+        let widths = [&widths[..1], &widths[from..end]].concat();
+        lines.iter().filter(|cells| !cells.is_empty()).for_each(|cells| line(text, &part(cells), &widths));
+        from = end;
+    }
 }
 
 fn line(text: &mut String, cells: &[String], widths: &[usize]) {
@@ -140,6 +164,12 @@ mod tests {
         let wide = Table::new("", columns).row([long.into(), 1u64.into(), 2u64.into(), long.into(), "m".into()]);
         let text = wide.at_most(1).to_string();
         assert!(widest(&text) <= WIDTH && text.contains("value: 1  standard error: 2\n"), "{text}");
+        let columns = ["cycle", "resistance (ohm)", "inductance (H)", "constant (V s/rad)", "temperature (K)", "load (N m)"];
+        let numbers = |k: u64| [Cell::from(k)].into_iter().chain((1..6).map(|i| Cell::number(0.1 * i as f64, 3)));
+        let text = Table::new("", columns).rows((0..3).map(numbers)).to_string();
+        let expected = "1                   0.1             0.2                 0.3              0.4\n";
+        assert!(widest(&text) <= WIDTH && text.contains(expected), "{text}");
+        assert!(text.ends_with("\n\ncycle  load (N m)\n0             0.5\n1             0.5\n2             0.5"), "{text}");
         let rows = (0..9u64).map(|k| ["k".into(), k.into()]);
         assert!(Table::new("", ["name", "k"]).rows(rows).at_most(4).to_string().ends_with("and 5 more"));
     }

@@ -69,6 +69,12 @@ impl Table {
         column > 0 && self.rows.iter().any(text)
     }
 
+    /// Whether all columns but the first hold numbers.
+    pub(crate) fn is_of_numbers(&self) -> bool {
+        let number = |cell: &Cell| !matches!(cell, Cell::Text(_));
+        self.rows.iter().all(|row| row.iter().skip(1).all(number))
+    }
+
     /// What is said of the rows left out.
     pub(crate) fn remainder(&self) -> Option<String> {
         (self.omitted > 0).then(|| format!("and {} more", self.omitted))

@@ -53,7 +53,7 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
             Some(horizon) => horizon.states(&self.layout, &self.model, record, parameters)?,
             None => vec![],
         };
-        Ok(Prepared { restarts })
+        Ok(Prepared { restarts, ..Prepared::default() })
     }
 
     fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Reached {

@@ -1,5 +1,7 @@
 //! [`ProgramSweep`]: models that were read as graphs, run as programs, pieces side by side.
 
+mod columns;
+mod derived;
 mod horizon;
 mod run;
 
@@ -14,6 +16,7 @@ use crate::layout::{Kind, Layout};
 use crate::predict::{Prediction, recurrence};
 use crate::record::{Record, Time};
 use crate::recurrence::Recurrence;
+pub(crate) use derived::Derived;
 use run::Run;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -28,7 +31,6 @@ pub(crate) struct ProgramSweep<'a> {
     /// By hold: zero, first.
     recurrences: [OnceLock<Arc<Recurrence>>; 2],
     programs: Mutex<Vec<(Key, Program)>>,
-    refined: OnceLock<Option<Arc<ProgramSweep<'a>>>>,
 }
 
 /// What a program was compiled for.
@@ -74,7 +76,6 @@ impl<'a> ProgramSweep<'a> {
             joints,
             recurrences: [OnceLock::new(), OnceLock::new()],
             programs: Mutex::new(vec![]),
-            refined: OnceLock::new(),
         };
         sweep.recurrence(Hold::Zero)?;
         Ok(sweep)
@@ -103,9 +104,7 @@ impl<'a> ProgramSweep<'a> {
         let recurrence = self.recurrence(key.hold).ok()?;
         let program = match purpose {
             Purpose::Rows => Program::compile(&recurrence, seeds, sampling, Trajectories::Many),
-            Purpose::Carry => {
-                Program::compile(&recurrence.without_outputs(), &[], sampling, Trajectories::One)
-            }
+            Purpose::Carry => Program::compile(&recurrence.without_outputs(), &[], sampling, Trajectories::One),
         };
         let program = program.ok()?;
         programs.push((key, program.clone()));

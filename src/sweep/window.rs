@@ -23,6 +23,8 @@ pub struct Window {
     measured: Vec<u32>,
     /// The carry at each lane's first sample, entry by entry.
     pub carry: Vec<f64>,
+    /// Whether it is known that every lane with a piece has as many samples, all measured, and all errors are finite.
+    pub(crate) whole: bool,
 }
 
 impl Window {
@@ -42,6 +44,7 @@ impl Window {
             log_variances: vec![0.0; if variances { capacity * outputs * lanes } else { 0 }],
             measured: vec![0; capacity * outputs],
             carry: vec![],
+            whole: false,
         }
     }
 
@@ -160,6 +163,12 @@ impl Window {
         self.measured[sample * self.outputs + output] >> lane & 1 == 1
     }
 
+    /// How many measurements a lane holds.
+    pub fn measurements(&self, lane: usize) -> u64 {
+        let rows = &self.measured[..self.len() * self.outputs];
+        rows.iter().map(|lanes| u64::from(lanes >> lane & 1)).sum()
+    }
+
     /// Which lanes have measured an output at a sample, a bit each.
     #[inline(always)]
     pub fn measured(&self, sample: usize, output: usize) -> u32 {
@@ -175,11 +184,9 @@ impl Window {
     /// Sets a row to zero in the lanes without a measurement.
     pub fn clear_unmeasured_row(&mut self, sample: usize, output: usize) {
         let (lanes, measured) = (self.lanes, self.measured(sample, output));
-        let mut clear = |row: &mut [f64]| {
-            for (at, value) in row.iter_mut().enumerate() {
-                if measured >> (at % lanes) & 1 == 0 {
-                    *value = 0.0;
-                }
+        let clear = |row: &mut [f64]| {
+            for lane in (0..lanes).filter(|lane| measured >> lane & 1 == 0) {
+                row.iter_mut().skip(lane).step_by(lanes).for_each(|value| *value = 0.0);
             }
         };
         clear(self.row_mut(sample, output));

@@ -6,7 +6,7 @@ use core::arch::x86_64::*;
 macro_rules! register {
     ($(#[$doc:meta])* $name:ident($register:ty), $lanes:literal; $splat:ident, $load:ident, $store:ident,
      $add:ident, $sub:ident, $mul:ident, $div:ident, $sqrt:ident, $fma:ident, $fnma:ident,
-     $xor:ident, $andnot:ident, $and:ident, $or:ident, |$x:ident, $n:ident| $scale:expr, |$a:ident, $b:ident, $then:ident, $otherwise:ident| $lt:expr, $le:expr, $eq:expr) => {
+     $xor:ident, $andnot:ident, $and:ident, $or:ident, |$x:ident, $n:ident| $scale:expr, |$a:ident, $b:ident, $then:ident, $otherwise:ident| $lt:expr, $le:expr, $eq:expr, $transpose:ident) => {
         $(#[$doc])*
         #[derive(Clone, Copy)]
         pub(crate) struct $name($register);
@@ -102,6 +102,10 @@ macro_rules! register {
                 let ($a, $b, $then, $otherwise) = (self.0, to.0, then.0, otherwise.0);
                 $name(unsafe { $eq })
             }
+            #[inline(always)]
+            fn transpose(square: [Self; 8]) -> [Self; 8] {
+                unsafe { $transpose(square.map(|row| row.0)) }.map($name)
+            }
         }
     };
 }
@@ -113,7 +117,7 @@ register! {
     _mm512_xor_pd, _mm512_andnot_pd, _mm512_and_pd, _mm512_or_pd, |x, n| _mm512_scalef_pd(x, n), |a, b, then, otherwise|
     _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(a, b), otherwise, then),
     _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_LE_OQ>(a, b), otherwise, then),
-    _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_EQ_OQ>(a, b), otherwise, then)
+    _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_EQ_OQ>(a, b), otherwise, then), eight
 }
 
 register! {
@@ -129,5 +133,55 @@ register! {
     }, |a, b, then, otherwise|
     _mm256_blendv_pd(otherwise, then, _mm256_cmp_pd::<_CMP_LT_OQ>(a, b)),
     _mm256_blendv_pd(otherwise, then, _mm256_cmp_pd::<_CMP_LE_OQ>(a, b)),
-    _mm256_blendv_pd(otherwise, then, _mm256_cmp_pd::<_CMP_EQ_OQ>(a, b))
+    _mm256_blendv_pd(otherwise, then, _mm256_cmp_pd::<_CMP_EQ_OQ>(a, b)), four
+}
+
+/// Rows and columns of eight by eight changed over: pairs of numbers, then pairs of pairs, then halves.
+///
+/// # Safety
+/// AVX-512 must be there.
+#[inline(always)]
+unsafe fn eight([a, b, c, d, e, f, g, h]: [__m512d; 8]) -> [__m512d; 8] {
+    // SAFETY: as the caller says.
+    unsafe {
+        let quarter = |a, b, c, d| {
+            let (even, odd) = (_mm512_shuffle_f64x2::<0x88>(a, b), _mm512_shuffle_f64x2::<0xdd>(a, b));
+            let (even_, odd_) = (_mm512_shuffle_f64x2::<0x88>(c, d), _mm512_shuffle_f64x2::<0xdd>(c, d));
+            [
+                _mm512_shuffle_f64x2::<0x88>(even, even_),
+                _mm512_shuffle_f64x2::<0x88>(odd, odd_),
+                _mm512_shuffle_f64x2::<0xdd>(even, even_),
+                _mm512_shuffle_f64x2::<0xdd>(odd, odd_),
+            ]
+        };
+        let low = |a, b| _mm512_unpacklo_pd(a, b);
+        let high = |a, b| _mm512_unpackhi_pd(a, b);
+        let [r0, r2, r4, r6] = quarter(low(a, b), low(c, d), low(e, f), low(g, h));
+        let [r1, r3, r5, r7] = quarter(high(a, b), high(c, d), high(e, f), high(g, h));
+        [r0, r1, r2, r3, r4, r5, r6, r7]
+    }
+}
+
+/// The same of four by four, the first of each.
+///
+/// # Safety
+/// AVX2 must be there.
+#[inline(always)]
+unsafe fn four([a, b, c, d, rest @ ..]: [__m256d; 8]) -> [__m256d; 8] {
+    // SAFETY: as the caller says.
+    unsafe {
+        let (low, high) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b));
+        let (low_, high_) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d));
+        let [e, f, g, h] = rest;
+        [
+            _mm256_permute2f128_pd::<0x20>(low, low_),
+            _mm256_permute2f128_pd::<0x20>(high, high_),
+            _mm256_permute2f128_pd::<0x31>(low, low_),
+            _mm256_permute2f128_pd::<0x31>(high, high_),
+            e,
+            f,
+            g,
+            h,
+        ]
+    }
 }

@@ -146,14 +146,14 @@ impl<S: Scalar> Chain<S> {
                 if i == j {
                     entry += m.r;
                 }
-                for k in 0..j {
-                    entry -= factor[i][k] * factor[j][k];
+                for (a, b) in factor[i][..j].iter().zip(&factor[j]) {
+                    entry -= *a * *b;
                 }
                 factor[i][j] = if i == j { entry.sqrt() } else { entry / factor[j][j] };
             }
             let mut error = S::from(m.y) - moments[m.sample].0 * m.c;
-            for k in 0..i {
-                error -= factor[i][k] * whitened[k];
+            for (entry, white) in factor[i].iter().zip(&whitened) {
+                error -= *entry * *white;
             }
             whitened.push(error / factor[i][i]);
             sum += factor[i][i].ln() + whitened[i] * whitened[i] * 0.5;

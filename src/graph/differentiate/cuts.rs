@@ -49,7 +49,7 @@ impl Cuts {
                 Rule::Length(_, a, b) => vec![*a, *b],
                 Rule::Flat | Rule::Linear(_) => vec![],
             };
-            let mut of_operands = Tangents::new();
+            let mut of_operands = Tangents::default();
             for (operand, gradient) in operands.iter().zip(gradients(tape, &operands, &leaves)) {
                 of_operands.insert(*operand, chained(tape, &gradient, &leaves, &known, variables.seeds));
             }

@@ -5,10 +5,10 @@ use crate::graph::partials::{Partial, Rule};
 use crate::graph::tape::Tape;
 use crate::graph::{Function, Function2, Id, Node};
 use crate::scalar::Comparison;
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 /// Tangents of the nodes that have any.
-pub(super) type Tangents = HashMap<Id, Tangent>;
+pub(super) type Tangents = FxHashMap<Id, Tangent>;
 
 /// Which roots vary with which leaves; rows as the roots.
 pub(super) fn influence(tape: &Tape, leaves: &[Id], roots: &[Id]) -> Vec<Vec<bool>> {

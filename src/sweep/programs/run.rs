@@ -1,71 +1,55 @@
 //! Pieces side by side through a program.
 
-use crate::engine::{Column, Group, Program};
-use crate::record::{Record, Time};
+use super::columns::Columns;
+use crate::engine::{Group, Program};
+use crate::record::Time;
 use crate::sweep::{Piece, Reached, RunError, Visit, Window};
-use std::ops::Range;
+use crate::wide::{self, Task, Wide, Width};
 
 /// Samples per window. Lanes of any length see the same windows, counted from their begin, so that their bits do not
 /// depend on each other.
-pub(super) const WINDOW: usize = 32;
+pub(super) const WINDOW: usize = 64;
 
 /// Pieces on their way through their records.
 pub(super) struct Run<'r> {
     program: &'r Program,
     group: Group,
     pieces: Vec<Piece<'r>>,
-    columns: Vec<Source<'r>>,
+    columns: Columns<'r>,
     /// Sample, column, lane.
     inputs: Vec<f64>,
     /// Sample, output, lane: as measured.
     measured: Vec<f64>,
     /// Where variances are predicted, all rows of each sample.
     rows: Vec<f64>,
-    /// Room for what one lane carries.
-    carry: Vec<f64>,
-}
-
-/// Where the numbers of a column of a lane come from; lane by lane, column by column.
-enum Source<'r> {
-    Values(&'r [f64]),
-    Time(&'r Record),
-    Step(&'r Record),
-    /// Number of the derived column.
-    Derived(usize),
+    /// First sample of each lane.
+    begins: Vec<usize>,
 }
 
 impl<'r> Run<'r> {
     pub fn new(program: &'r Program, pieces: Vec<Piece<'r>>) -> Self {
         let mut group = program.group(pieces.len());
         let lanes = group.lanes();
+        // Lanes without a piece do what the first does.
+        let piece = |lane: usize| pieces.get(lane).unwrap_or(&pieces[0]);
         for lane in 0..lanes {
-            // Lanes without a piece do what the first does.
-            let piece = pieces.get(lane).unwrap_or(&pieces[0]);
-            group.set_parameters(lane, piece.parameters);
-            if let Time::Uniform { step, .. } = piece.record.times() {
+            group.set_parameters(lane, piece(lane).parameters);
+            if let Time::Uniform { step, .. } = piece(lane).record.times() {
                 group.set_step(lane, *step);
             }
         }
         group.prepare();
-        let source = |piece: &Piece<'r>, column: &Column| match *column {
-            Column::Time => Source::Time(piece.record),
-            Column::Step => Source::Step(piece.record),
-            Column::Input(i) => Source::Values(&piece.record.inputs()[i].values),
-            Column::Measured(j) => Source::Values(&piece.record.outputs()[j].values),
-            Column::Derived(n) => Source::Derived(n),
-        };
-        let columns = pieces.iter().flat_map(|piece| program.columns().iter().map(move |column| source(piece, column)));
-        let columns = columns.collect();
+        let columns = Columns::new(program, (0..lanes).map(piece));
         let rows = WINDOW * program.row_length() * lanes;
         let mut run = Run {
             program,
             group,
             pieces,
+            inputs: vec![0.0; columns.rows(WINDOW) * program.columns().len() * lanes],
             columns,
-            inputs: vec![0.0; (WINDOW + 1) * program.columns().len() * lanes],
             measured: vec![0.0; WINDOW * program.outputs() * lanes],
             rows: if program.variances() > 0 { vec![0.0; rows] } else { vec![] },
-            carry: vec![0.0; program.carried()],
+            begins: vec![0; lanes],
         };
         run.start();
         run
@@ -98,27 +82,31 @@ impl<'r> Run<'r> {
         self.pieces.iter().map(|piece| piece.samples.len()).max().unwrap_or(0)
     }
 
-    /// Runs a window of all pieces, which begins so many samples after they do, and says where each has come to by its end.
+    /// Runs a window of all pieces, which begins so many samples after they do, and says where those have come to that end
+    /// with it.
     pub fn next(&mut self, begin: usize, window: &mut Window, reached: &mut [Reached]) {
-        let (lanes, carried) = (self.group.lanes(), self.program.carried());
         let samples = WINDOW.min(self.longest() - begin);
-        for lane in 0..self.pieces.len() {
-            let Range { start, end } = self.pieces[lane].samples;
-            window.begin[lane] = start + begin;
-            window.samples[lane] = (end - start).saturating_sub(begin).min(WINDOW);
-            self.read(lane, start + begin, samples);
+        self.read(begin, samples);
+        for (lane, Piece { samples: all, .. }) in self.pieces.iter().enumerate() {
+            window.begin[lane] = all.start + begin;
+            window.samples[lane] = all.len().saturating_sub(begin).min(WINDOW);
         }
-        for lane in 0..lanes {
-            self.group.carry(lane, &mut self.carry);
-            (0..carried).for_each(|i| window.carry[i * lanes + lane] = self.carry[i]);
-        }
+        self.group.carries(&mut window.carry);
         self.end_within(window, samples, reached);
         self.fill(window, samples);
         for (lane, reached) in reached.iter_mut().enumerate() {
-            if window.samples[lane] == samples {
+            if begin + samples == self.pieces[lane].samples.len() {
                 *reached = self.reached(&self.group, lane);
             }
         }
+    }
+
+    /// Reads inputs and measurements of samples that begin so many after the pieces do.
+    fn read(&mut self, begin: usize, samples: usize) {
+        for (lane, to) in self.begins.iter_mut().enumerate() {
+            *to = self.pieces.get(lane).unwrap_or(&self.pieces[0]).samples.start + begin;
+        }
+        self.columns.read(self.program, &self.begins, samples, &mut self.inputs);
     }
 
     /// Runs all pieces to their ends.
@@ -141,7 +129,7 @@ impl<'r> Run<'r> {
         for &next in at {
             while sample < next {
                 let samples = WINDOW.min(next - sample);
-                self.read(0, sample, samples);
+                self.read(sample - self.pieces[0].samples.start, samples);
                 self.group.run(&self.inputs, &mut [], samples);
                 sample += samples;
             }
@@ -176,45 +164,6 @@ impl<'r> Run<'r> {
         }
     }
 
-    /// Reads the inputs of a lane, from a sample of its record on; beyond the last, that is repeated.
-    fn read(&mut self, lane: usize, begin: usize, samples: usize) {
-        let (lanes, count) = (self.group.lanes(), self.program.columns().len());
-        let piece = &self.pieces[lane];
-        let (record, last) = (piece.record, piece.record.len() - 1);
-        let rows = samples + usize::from(self.program.reads_next());
-        let there = rows.min((last + 1).saturating_sub(begin));
-        let derived = match self.columns.iter().any(|source| matches!(source, Source::Derived(_))) {
-            true => derived(self.program, record, begin.min(last), there.max(1)),
-            false => vec![],
-        };
-        let copies = if lane == 0 { self.pieces.len()..lanes } else { 0..0 };
-        for (c, source) in self.columns[lane * count..][..count].iter().enumerate() {
-            let to = &mut self.inputs[c * lanes..];
-            let mut put = |k: usize, value: f64| {
-                let row = &mut to[k * count * lanes..][..lanes];
-                row[lane] = value;
-                row[copies.clone()].fill(value);
-            };
-            match source {
-                Source::Values(values) => {
-                    values[begin.min(last)..][..there].iter().enumerate().for_each(|(k, value)| put(k, *value));
-                    (there..rows).for_each(|k| put(k, values[last]));
-                }
-                Source::Time(record) => (0..rows).for_each(|k| put(k, record.time((begin + k).min(last)))),
-                Source::Step(record) => (0..rows).for_each(|k| put(k, step(record, begin + k))),
-                Source::Derived(n) => {
-                    (0..rows).for_each(|k| put(k, derived[*n].get(k).or(derived[*n].last()).copied().unwrap_or(0.0)));
-                }
-            }
-        }
-        let outputs = self.program.outputs();
-        for (j, channel) in record.outputs().iter().enumerate().take(outputs) {
-            let to = &mut self.measured[j * lanes + lane..];
-            let values = &channel.values[begin.min(last)..];
-            to.iter_mut().step_by(outputs * lanes).zip(values).take(samples).for_each(|(to, y)| *to = *y);
-        }
-    }
-
     /// Runs a window and makes prediction errors of the outputs.
     fn fill(&mut self, window: &mut Window, samples: usize) {
         let (lanes, outputs, columns) = (self.group.lanes(), window.outputs(), window.columns());
@@ -232,19 +181,25 @@ impl<'r> Run<'r> {
         } else {
             self.group.run(&self.inputs, window.all_rows_mut(), samples);
         }
+        self.columns.read_measured(&self.begins, samples, &mut self.measured);
+        let rows = window.all_rows_mut();
+        let errors = Errors { rows, measured: &self.measured, samples: samples * outputs, columns, lanes };
+        let finite = wide::run(Width::widest(), errors);
+        let all_lanes = u32::MAX >> (32 - lanes);
+        let pieces = u32::MAX >> (32 - self.pieces.len());
+        window.whole = finite && self.pieces.iter().enumerate().all(|(lane, _)| window.samples[lane] == samples);
+        if window.whole {
+            (0..samples * outputs).for_each(|row| window.set_measured(row / outputs, row % outputs, pieces));
+            return;
+        }
         for k in 0..samples {
             let active = (0..self.pieces.len()).filter(|&lane| k < window.samples[lane]);
             let active = active.fold(0u32, |bits, lane| bits | 1 << lane);
             for j in 0..outputs {
-                let measured = &self.measured[(k * outputs + j) * lanes..][..lanes];
-                let row = window.row_mut(k, j);
-                let mut there = 0u32;
-                for (lane, (mean, y)) in row[width - lanes..].iter_mut().zip(measured).enumerate() {
-                    *mean = y - *mean;
-                    there |= u32::from(!y.is_nan()) << lane;
-                }
+                let measured = self.measured[(k * outputs + j) * lanes..][..lanes].iter().enumerate();
+                let there = measured.fold(0u32, |bits, (lane, y)| bits | u32::from(!y.is_nan()) << lane);
                 window.set_measured(k, j, there & active);
-                if there & active != u32::MAX >> (32 - lanes) {
+                if there & active != all_lanes {
                     window.clear_unmeasured_row(k, j);
                 }
             }
@@ -252,25 +207,40 @@ impl<'r> Run<'r> {
     }
 }
 
-/// Time to the next sample (s); after the last none passes.
-fn step(record: &Record, sample: usize) -> f64 {
-    if sample + 1 < record.len() { record.time(sample + 1) - record.time(sample) } else { 0.0 }
+/// Makes errors of means, in the last column of each row; whether all are finite.
+struct Errors<'e> {
+    rows: &'e mut [f64],
+    measured: &'e [f64],
+    samples: usize,
+    columns: usize,
+    lanes: usize,
 }
 
-/// The derived columns of some samples.
-fn derived(program: &Program, record: &Record, begin: usize, samples: usize) -> Vec<Vec<f64>> {
-    let (columns, next) = program.derived_from();
-    let last = record.len() - 1;
-    let sample = |k: usize| (begin + k).min(last);
-    let number = |column: &Column, k: usize| match *column {
-        Column::Time => record.time(sample(k)),
-        Column::Step => step(record, begin + k),
-        Column::Input(i) => record.inputs()[i].values[sample(k)],
-        Column::Measured(j) => record.outputs()[j].values[sample(k)],
-        Column::Derived(_) => f64::NAN,
-    };
-    let rows = samples + usize::from(next);
-    let columns: Vec<Vec<f64>> =
-        columns.iter().map(|column| (0..rows).map(|k| number(column, k)).collect()).collect();
-    program.derive(&columns.iter().map(Vec::as_slice).collect::<Vec<_>>(), samples)
+impl Task for Errors<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<W: Wide>(self) -> bool {
+        let Errors { rows, measured, samples, columns, lanes } = self;
+        let width = columns * lanes;
+        // A difference of what is not finite is not a number.
+        let mut differences = W::splat(0.0);
+        let mut finite = true;
+        for (row, measured) in rows.chunks_exact_mut(width).zip(measured.chunks_exact(lanes)).take(samples) {
+            let means = &mut row[width - lanes..];
+            if lanes % W::LANES == 0 {
+                for (mean, y) in means.chunks_exact_mut(W::LANES).zip(measured.chunks_exact(W::LANES)) {
+                    let error = W::load(y).sub(W::load(mean));
+                    differences = differences.add(error.sub(error));
+                    error.store(mean);
+                }
+            } else {
+                for (mean, y) in means.iter_mut().zip(measured) {
+                    *mean = y - *mean;
+                    finite &= mean.is_finite();
+                }
+            }
+        }
+        finite && differences.all_below(1.0)
+    }
 }

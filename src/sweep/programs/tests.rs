@@ -2,11 +2,11 @@ use super::*;
 use crate::functions::Handle;
 use crate::integrate::Rk4;
 use crate::model::Model;
-use crate::predict::{FreeRun, Horizon, Kalman};
+use crate::predict::{FreeRun, Horizon, Kalman, Predictor};
 use crate::record::{Channel, Column};
 use crate::scalar::Scalar;
+use crate::signals;
 use crate::sweep::{DualSweep, Window};
-use crate::{Of, signals};
 
 signals! {
     struct Angle { phi: "rad", w: "rad/s" }
@@ -28,7 +28,7 @@ impl Model for Pendulum {
         let pull = if self.linear { x.phi } else { x.phi.sin() };
         Angle { phi: x.w, w: u.m * p.b - pull * p.g - x.w * p.d + (t * 3.0).sin() * 0.1 }
     }
-    fn output<S: Scalar>(&self, _t: S, x: &Angle<S>, u: &Torque<S>, p: &Given<S>) -> Angle<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Angle<S>, u: &Torque<S>, _p: &Given<S>) -> Angle<S> {
         Angle { phi: x.phi, w: x.w + u.m * 0.01 }
     }
     fn diffusion<S: Scalar>(&self, p: &Given<S>) -> Angle<S> {
@@ -50,10 +50,7 @@ fn record(samples: usize, seed: f64, uniform: bool) -> Record {
         true => Time::Uniform { start: 0.3, step: 0.02 },
         false => Time::Stamps((0..samples).map(|k| 0.02 * k as f64 + 0.005 * (k as f64 * 1.7).sin()).collect()),
     };
-    let outputs = vec![
-        channel("phi", missing(wave(0.05).to_vec(), 7)),
-        channel("w", missing(wave(0.07).to_vec(), 11)),
-    ];
+    let outputs = vec![channel("phi", missing(wave(0.05).to_vec(), 7)), channel("w", missing(wave(0.07).to_vec(), 11))];
     let states = Layout::of::<Pendulum>().states;
     Record::new(states, time, vec![channel("m", wave(0.11))], outputs).unwrap()
 }
@@ -79,7 +76,7 @@ fn rows(sweep: &dyn Sweep, pieces: &[Piece<'_>], seeds: &[Seed]) -> (Vec<Vec<f64
     (all, reached.into_iter().map(Result::unwrap).collect())
 }
 
-fn sweeps(model: &Pendulum, predictor: impl crate::Predictor) -> (Arc<dyn Sweep + '_>, ProgramSweep<'_>) {
+fn sweeps(model: &Pendulum, predictor: impl Predictor) -> (Arc<dyn Sweep + '_>, ProgramSweep<'_>) {
     let (method, predictor): (Arc<dyn Method>, Arc<dyn Prediction>) = (Arc::new(Rk4::default()), Arc::new(predictor));
     let plain: Arc<dyn Sweep> = Arc::new(DualSweep {
         layout: Arc::new(Layout::of::<Pendulum>()),
@@ -94,14 +91,16 @@ fn sweeps(model: &Pendulum, predictor: impl crate::Predictor) -> (Arc<dyn Sweep 
 }
 
 /// Pieces of several records with different parameters, with slopes and without.
-fn compare(model: &Pendulum, predictor: impl crate::Predictor, uniform: bool, hold: Hold) {
+fn compare(model: &Pendulum, predictor: impl Predictor, uniform: bool, hold: Hold) {
     let (plain, programs) = sweeps(model, predictor);
     let lengths = [100, 64, 2, 33, 97];
     let parameters = |i: usize| [2.0 + 0.1 * i as f64, 0.3, 1.5, 0.2, 0.1];
     let records: Vec<Record> = lengths.iter().map(|&n| record(n.max(40), n as f64, uniform).hold(hold)).collect();
     let all_p: Vec<[f64; 5]> = (0..lengths.len()).map(parameters).collect();
     let prepared: Vec<Prepared> = records.iter().zip(&all_p).map(|(r, p)| plain.prepare(r, p).unwrap()).collect();
-    for seeds in [vec![], vec![Seed::Carry(1), Seed::Parameter(0), Seed::Parameter(2), Seed::Parameter(3), Seed::Parameter(4)]] {
+    for seeds in
+        [vec![], vec![Seed::Carry(1), Seed::Parameter(0), Seed::Parameter(2), Seed::Parameter(3), Seed::Parameter(4)]]
+    {
         let piece = |i: usize| {
             let Reached { carry, slopes: all } = plain.start(&records[i], &[0.3, -0.2], &all_p[i]);
             let column = |seed: &Seed| match *seed {

@@ -1,0 +1,195 @@
+//! [`Columns`]: what a program reads, gathered from the records of its lanes.
+
+use super::derived::{derived, step};
+use crate::engine::{Column, Program};
+use crate::record::Record;
+use crate::sweep::Piece;
+use crate::wide::{self, Task, Wide, Width};
+use std::sync::Arc;
+
+/// Numbers of several pieces' records, sample by sample, column by column, with the lanes side by side.
+pub(super) struct Columns<'r> {
+    records: Vec<&'r Record>,
+    /// The derived columns of each lane's record, where they are kept.
+    derived: Vec<Option<Arc<Vec<Vec<f64>>>>>,
+    lanes: usize,
+    width: Width,
+    /// By column, then by lane.
+    inputs: Vec<Vec<Source<'r>>>,
+    /// By output, then by lane.
+    outputs: Vec<Vec<&'r [f64]>>,
+    next: usize,
+}
+
+/// Where the numbers of a column come from.
+enum Source<'r> {
+    Values(&'r [f64]),
+    Time,
+    Step,
+    /// Number of the derived column.
+    Derived(usize),
+}
+
+impl<'r> Columns<'r> {
+    /// Of the pieces of all lanes.
+    pub fn new<'p>(program: &Program, pieces: impl Iterator<Item = &'p Piece<'r>>) -> Self
+    where
+        'r: 'p,
+    {
+        let of = |piece: &Piece<'r>| (piece.record, piece.prepared.derived.of(program, piece.record));
+        let (records, derived): (Vec<&'r Record>, Vec<_>) = pieces.map(of).unzip();
+        let source = |record: &'r Record, column: &Column| match *column {
+            Column::Time => Source::Time,
+            Column::Step => Source::Step,
+            Column::Input(i) => Source::Values(&record.inputs()[i].values),
+            Column::Measured(j) => Source::Values(&record.outputs()[j].values),
+            Column::Derived(n) => Source::Derived(n),
+        };
+        let inputs = program.columns().iter().map(|column| records.iter().map(|r| source(r, column)).collect());
+        let outputs = (0..program.outputs()).map(|j| records.iter().map(|r| &r.outputs()[j].values[..]).collect());
+        let (inputs, outputs) = (inputs.collect(), outputs.collect());
+        let next = usize::from(program.reads_next());
+        Columns { lanes: records.len(), width: Width::widest(), inputs, outputs, records, derived, next }
+    }
+
+    /// Rows of inputs that so many samples need.
+    pub fn rows(&self, samples: usize) -> usize {
+        samples + self.next
+    }
+
+    /// Reads the inputs of some samples of each lane, from its own first one on; beyond a record's last sample, that is
+    /// repeated.
+    pub fn read(&self, program: &Program, begin: &[usize], samples: usize, to: &mut [f64]) {
+        let (rows, stride) = (self.rows(samples), self.inputs.len() * self.lanes);
+        let derives = self.inputs.iter().any(|sources| matches!(sources[..], [Source::Derived(_), ..]));
+        let here = |lane: usize| match &self.derived[lane] {
+            None if derives => derived(program, self.records[lane], begin[lane], rows),
+            _ => vec![],
+        };
+        let here: Vec<_> = if derives { (0..self.lanes).map(here).collect() } else { vec![] };
+        for (c, sources) in self.inputs.iter().enumerate() {
+            let to = &mut to[c * self.lanes..];
+            match sources.first() {
+                Some(Source::Values(_)) => {
+                    let values = |lane: usize| match sources[lane] {
+                        Source::Values(values) => values,
+                        _ => &[],
+                    };
+                    self.transpose(values, Some(begin), rows, stride, to);
+                }
+                Some(Source::Derived(n)) => {
+                    let values = |lane: usize| match &self.derived[lane] {
+                        Some(kept) => kept[*n].get(begin[lane]..).unwrap_or_default(),
+                        None => &here[lane][*n],
+                    };
+                    self.transpose(values, None, rows, stride, to);
+                }
+                Some(Source::Time) => {
+                    self.each(begin, rows, stride, to, |record, sample| record.time(sample.min(record.len() - 1)))
+                }
+                Some(Source::Step) => self.each(begin, rows, stride, to, step),
+                None => {}
+            }
+        }
+    }
+
+    /// Reads what was measured at some samples of each lane.
+    pub fn read_measured(&self, begin: &[usize], samples: usize, to: &mut [f64]) {
+        let stride = self.outputs.len() * self.lanes;
+        for (j, lanes) in self.outputs.iter().enumerate() {
+            self.transpose(|lane| lanes[lane], Some(begin), samples, stride, &mut to[j * self.lanes..]);
+        }
+    }
+
+    fn each(
+        &self,
+        begin: &[usize],
+        rows: usize,
+        stride: usize,
+        to: &mut [f64],
+        number: impl Fn(&Record, usize) -> f64,
+    ) {
+        for (k, row) in to.chunks_mut(stride).take(rows).enumerate() {
+            for ((to, record), begin) in row.iter_mut().zip(&self.records).zip(begin) {
+                *to = number(record, begin + k);
+            }
+        }
+    }
+
+    /// Columns of values, one for each lane, from where each begins on, or as they are.
+    fn transpose<'v>(
+        &self,
+        values: impl Fn(usize) -> &'v [f64],
+        begin: Option<&[usize]>,
+        rows: usize,
+        stride: usize,
+        to: &mut [f64],
+    ) {
+        let mut lane = 0;
+        while lane < self.lanes {
+            let eight = self.lanes - lane >= LANES;
+            let from: [&[f64]; LANES] = std::array::from_fn(|l| {
+                let lane = if eight { lane + l } else { lane };
+                let values = values(lane);
+                &values[begin.map_or(0, |begin| begin[lane]).min(values.len())..]
+            });
+            if eight && from.iter().all(|values| values.len() >= rows) {
+                let from = from.map(|values| &values[..rows]);
+                wide::run(self.width, Transpose { from, stride, to: &mut to[lane..] });
+                lane += LANES;
+                continue;
+            }
+            let last = values(lane).last().copied().unwrap_or(0.0);
+            for k in 0..rows {
+                to[k * stride + lane] = from[0].get(k).copied().unwrap_or(last);
+            }
+            lane += 1;
+        }
+    }
+}
+
+/// Lanes that are transposed together.
+const LANES: usize = 8;
+
+/// Turns eight columns of the same length into rows of eight.
+struct Transpose<'t> {
+    from: [&'t [f64]; LANES],
+    stride: usize,
+    to: &'t mut [f64],
+}
+
+impl Task for Transpose<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        let Transpose { from, stride, to } = self;
+        let rows = from[0].len();
+        let whole = rows - rows % W::LANES;
+        let mut first = 0;
+        while first < LANES {
+            let mut k = 0;
+            while k < whole {
+                let row = |lane: usize| W::load(&from[first + lane % W::LANES][k..]);
+                let square = W::transpose(std::array::from_fn(row));
+                let mut row = 0;
+                while row < W::LANES {
+                    square[row].store(&mut to[(k + row) * stride + first..]);
+                    row += 1;
+                }
+                k += W::LANES;
+            }
+            first += W::LANES;
+        }
+        let mut k = whole;
+        while k < rows {
+            let to = &mut to[k * stride..][..LANES];
+            let mut lane = 0;
+            while lane < LANES {
+                to[lane] = from[lane][k];
+                lane += 1;
+            }
+            k += 1;
+        }
+    }
+}
