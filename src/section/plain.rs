@@ -164,12 +164,16 @@ mod tests {
         let wide = Table::new("", columns).row([long.into(), 1u64.into(), 2u64.into(), long.into(), "m".into()]);
         let text = wide.at_most(1).to_string();
         assert!(widest(&text) <= WIDTH && text.contains("value: 1  standard error: 2\n"), "{text}");
-        let columns = ["cycle", "resistance (ohm)", "inductance (H)", "constant (V s/rad)", "temperature (K)", "load (N m)"];
+        let columns =
+            ["cycle", "resistance (ohm)", "inductance (H)", "constant (V s/rad)", "temperature (K)", "load (N m)"];
         let numbers = |k: u64| [Cell::from(k)].into_iter().chain((1..6).map(|i| Cell::number(0.1 * i as f64, 3)));
         let text = Table::new("", columns).rows((0..3).map(numbers)).to_string();
         let expected = "1                   0.1             0.2                 0.3              0.4\n";
         assert!(widest(&text) <= WIDTH && text.contains(expected), "{text}");
-        assert!(text.ends_with("\n\ncycle  load (N m)\n0             0.5\n1             0.5\n2             0.5"), "{text}");
+        assert!(
+            text.ends_with("\n\ncycle  load (N m)\n0             0.5\n1             0.5\n2             0.5"),
+            "{text}"
+        );
         let rows = (0..9u64).map(|k| ["k".into(), k.into()]);
         assert!(Table::new("", ["name", "k"]).rows(rows).at_most(4).to_string().ends_with("and 5 more"));
     }
