@@ -3,9 +3,9 @@
 
 use argmin::core::CostFunction;
 use divan::{Bencher, counter::ItemsCount};
-use greybox::models::{Armature, Axis, Command, DcMotor, Feed, Guided, Positioning, PositioningLoop, Reference};
+use greybox::models::{Armature, Axis, Command, DcMotor, Feed, ControlledAxisOutput, Positioning, PositioningLoop, Reference};
 use greybox::optimize::{LeastSquares, LevenbergMarquardt, Linearization};
-use greybox::pmsm::{Acting, Drive, Machine, Rotor, Salient, SalientWinding, Surface, Winding};
+use greybox::pmsm::{Drive, Machine, MachineParameters, Salient, SalientWinding, Surface, VoltageAndLoad, Winding};
 use greybox::{Experiment, Fit, Information, Model, Of, Signals, Time, free};
 
 const SAMPLES: usize = 20_000;
@@ -36,8 +36,8 @@ models! {
     surface: Surface::new(4).unwrap(), Drive { ud: 5.0, uq: 40.0, w: 50.0 }, Winding { rs: 0.63, ls: 4e-3, ke: 0.95 };
     salient: Salient::new(4).unwrap(), Drive { ud: 5.0, uq: 40.0, w: 50.0 },
         SalientWinding { rs: 0.63, ld: 4e-3, lq: 5e-3, ke: 0.95 };
-    machine: Machine::new(4, 100.0).unwrap(), Acting { ud: 5.0, uq: 40.0, tau_l: 0.1 },
-        Rotor { rs: 0.63, ld: 4e-3, lq: 5e-3, ke: 0.95, j: 0.012, bv: 4e-3, tc: 1.2, tg: 1.0 };
+    machine: Machine::new(4, 100.0).unwrap(), VoltageAndLoad { ud: 5.0, uq: 40.0, tau_l: 0.1 },
+        MachineParameters { rs: 0.63, ld: 4e-3, lq: 5e-3, ke: 0.95, j: 0.012, bv: 4e-3, tc: 1.2, tg: 1.0 };
     dc_motor: DcMotor, Feed { u: 24.0, tau_l: 0.1 }, Armature { r: 1.0, l: 1e-3, k: 0.05, j: 1e-4, b: 1e-5 };
     positioning: Positioning::EMPS, Command { vir: 2.0 }, Axis { m: 95.0, fv: 200.0, fc: 20.0, offset: -3.0 };
     positioning_loop: PositioningLoop::EMPS, Reference { qg: 0.1 }, Axis { m: 95.0, fv: 200.0, fc: 20.0, offset: -3.0 };
@@ -93,7 +93,7 @@ fn read_csv(bencher: Bencher) {
     let path = std::env::temp_dir().join(format!("greybox_bench_{}.csv", std::process::id()));
     let value = |k: usize| (k as f64 * 0.377).sin();
     let inputs = (0..SAMPLES).map(|k| Reference { qg: value(k) }).collect();
-    let outputs = (0..SAMPLES).map(|k| Guided { qm: value(k + 1), vir: value(k + 2) }).collect();
+    let outputs = (0..SAMPLES).map(|k| ControlledAxisOutput { qm: value(k + 1), vir: value(k + 2) }).collect();
     let record = Experiment::new(&model, Time::Uniform { start: 0.0, step: STEP }, inputs, outputs).unwrap();
     record.to_csv(&path).unwrap();
     bencher.counter(ItemsCount::new(SAMPLES)).bench_local(|| Experiment::from_csv(&model, &path).unwrap());

@@ -7,8 +7,8 @@ use greybox::pmsm::inverter::Carrier;
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::{Axis, V_DC};
 use greybox::pmsm::{
-    AngledDrive, Currents, Drive, ExactFed, ExactStep, ExactSurface, FedWinding, HeldIn, KeLyapunov, MotorLaw,
-    RsLyapunov, SQRT_2_3, Winding,
+    AngledDrive, Currents, Drive, ExactStep, ExactSurface, HeldIn, InverterFed, InverterFedWinding, KeLyapunov,
+    MotorLaw, RsLyapunov, SQRT_2_3, Winding,
 };
 use greybox::{Hold, Model, fixed, free};
 
@@ -25,8 +25,8 @@ fn step() -> ExactStep {
 
 /// Time, input and currents of a motor under a simple current controller.
 fn record() -> Vec<(f64, AngledDrive, Currents)> {
-    let model = ExactFed::new(step(), 0.15).unwrap();
-    let truth = FedWinding { rs: 0.63, ls: 4e-3, ke: 0.95, vdt: 2.0 };
+    let model = InverterFed::<_, InverterFedWinding>::new(ExactSurface(step()));
+    let truth = InverterFedWinding { rs: 0.63, ls: 4e-3, ke: 0.95, vdt: 2.0, i0: 0.15 };
     let (mut i, mut theta) = (Currents::default(), 0.0);
     (0..SAMPLES)
         .map(|k| {
@@ -109,19 +109,20 @@ fn ekf_five_states(bencher: Bencher) {
     let record = record();
     let start = EkfStart {
         state: Currents { id: free(0.0).prior(0.0, 1.0), iq: free(0.0).prior(0.0, 1.0) },
-        parameters: FedWinding {
+        parameters: InverterFedWinding {
             rs: free(0.4).prior(0.4, 0.32).within(0.01, 10.0),
             ls: fixed(4e-3),
             ke: free(0.855).prior(0.855, 0.14).within(0.1, 10.0),
             vdt: free(0.0).prior(0.0, 2.0),
+            i0: fixed(0.15),
         },
         state_drift: Currents { id: 0.1, iq: 0.1 },
-        parameter_drift: FedWinding { rs: 1e-5, ls: 0.0, ke: 3e-6, vdt: 3e-5 },
+        parameter_drift: InverterFedWinding { rs: 1e-5, ls: 0.0, ke: 3e-6, vdt: 3e-5, i0: 0.0 },
         noise: Currents { id: 0.06, iq: 0.06 },
         hold: Hold::Zero,
         watch: Watch { limit: Currents { id: 8.0, iq: 8.0 }, patience: 1000 },
     };
-    let ekf = ExactFed::new(step(), 0.15).unwrap().ekf::<5>(start).unwrap();
+    let ekf = InverterFed::<_, InverterFedWinding>::new(ExactSurface(step())).ekf::<5>(start).unwrap();
     bencher.counter(ItemsCount::new(SAMPLES)).bench_local(|| {
         let mut ekf = ekf;
         for (t, u, i) in divan::black_box(&record) {

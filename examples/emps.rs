@@ -6,7 +6,7 @@
 //! reference, as on the bench, and position and command are compared.
 
 use clap::Parser;
-use greybox::models::{Axis, GuidedMotion, PositioningLoop};
+use greybox::models::{Axis, ControlledAxisMotion, PositioningLoop};
 use greybox::{Experiment, Fit, Hold, Signals, fixed, free};
 use std::{path::PathBuf, process::ExitCode};
 
@@ -35,7 +35,7 @@ fn run(arguments: &Arguments) -> Result<(), greybox::Error> {
     let record = Experiment::from_csv(&model, &arguments.file)?
         .named("EMPS")
         .hold(Hold::First) // the reference is a smooth curve, sampled
-        .initial(GuidedMotion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) }); // it starts at rest
+        .initial(ControlledAxisMotion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) }); // it starts at rest
     let estimate = Fit::new(&model, &record)
         .parameters(Axis { m: free(80.0), fv: free(150.0), fc: free(15.0), offset: free(0.0) })
         .run()?;

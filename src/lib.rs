@@ -220,10 +220,10 @@ pub use {
     problem::{Objective, Problem, Search},
     record::{Gap, Initial, Time},
     recurrence::{InvalidRecurrence, Recurrence},
-    regress::{Assumption, LinearEstimate, Regression, RegressionError},
+    regress::{Assumption, LinearEstimate, PooledRegression, Regression, RegressionError},
     report::Report,
     scalar::Table,
-    scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
+    scaling::{JacobianColumns, Nominal, OwnSize, Scaling, Seen, Unscaled},
     simulate::{Simulation, Simulator, simulate},
     weighting::{BySignal, Law, Weighting},
 };

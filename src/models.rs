@@ -12,4 +12,4 @@ mod dc_motor;
 mod positioning;
 
 pub use dc_motor::{Armature, DcMotor, Feed, Rotation};
-pub use positioning::{Axis, Command, Guided, GuidedMotion, Motion, Position, Positioning, PositioningLoop, Reference};
+pub use positioning::{Axis, Command, ControlledAxisOutput, ControlledAxisMotion, AxisMotion, Position, Positioning, PositioningLoop, Reference};

@@ -20,18 +20,19 @@
 //! | [`units`] | line-line and phase, rms and peak, terminals, Ke, Kt, flux, rpm, cable | |
 //! | [`motor`] | constants from geometry | units |
 //! | [`temperature`] | winding and magnet laws, temperatures read back from estimates | |
-//! | [`Surface`], [`Salient`], [`Saturated`], [`Fed`], [`Shaft`] | the equations, each a [`Model`](crate::Model) | frames |
-//! | [`ExactSurface`], [`ExactFed`], [`ExactCompensated`] | the currents' equation in exact steps | `Fed` |
+//! | [`Surface`], [`Salient`], [`Saturated`], [`Shaft`] | the equations, each a [`Model`](crate::Model) | frames |
+//! | [`ExactSurface`], [`ExactSalient`] | the currents' equation in exact steps | |
+//! | [`InverterFed`], [`Compensated`], [`Cabled`], [`Misaligned`], [`EmfHarmonic`], [`FluxLinkage`] | what stands around a motor, each around any [`MotorModel`] | |
 //! | [`MotorLaw`] and its parts | adaptation laws for the motor's [`Mras`](crate::online::Mras) | |
 //! | [`Injection`] | d current that makes the resistance visible | |
 //! | [`control`], [`inverter`], [`sensors`] | the parts of a drive | frames |
 //! | [`robot`] | the axes of the reference robot | temperature |
 //! | [`Plant`] | a motor and its load as they really are | inverter, robot |
-//! | [`Bridge`] | an inverter that switches, with the plant behind it | plant |
+//! | [`SwitchingInverter`] | an inverter that switches, with the plant behind it | plant |
 //! | `program`, `drive` | motion programs; the whole drive in simulation, and its log (with `std`) | all of these |
 //! | `adaptive` | a drive that uses its observer (with `std`) | control, `Machine` |
 //! | `offline` | least squares on a record (with `std`) | drive |
-//! | [`Machine`] | currents, speed and angle together | `Salient`, `Shaft` |
+//! | [`Machine`] | currents, speed and angle together | any `MotorModel`, `Shaft` |
 //!
 //! Source of the formulas: M. Tenerz, *Parameter Estimation in a Permanent Magnet Synchronous Motor*,
 //! LiTH-ISY-EX--11/4495--SE, Linkoping 2011, called "the thesis"; corrected where it errs, which is said in place.
@@ -54,35 +55,45 @@ pub mod temperature;
 pub mod units;
 
 mod adaptation;
-mod bridge;
+mod cabled;
 mod compensated;
+mod emf_harmonic;
 mod exact;
-mod fed;
+mod flux_linkage;
 mod injection;
+mod inverter_fed;
 #[cfg(feature = "std")]
 mod log;
 mod machine;
+mod misaligned;
+mod motor_model;
 mod plant;
 mod salient;
 mod saturated;
 mod shaft;
 mod surface;
+mod switching;
 
 pub use adaptation::{
-    Adaptation, DeadZone, DirectCurrent, KeConstantGain, KeLyapunov, MotorLaw, Normalized, Resting, RsDirect,
-    RsLyapunov, Seen, lyapunov_margin, lyapunov_rate,
+    Adaptation, AdaptationInput, DeadZone, DirectCurrent, KeConstantGain, KeLyapunov, MotorLaw, Normalized, NotAdapted,
+    RsDirect, RsLyapunov, lyapunov_margin, lyapunov_rate,
 };
-pub use bridge::Bridge;
-pub use compensated::{CompensatedDrive, CompensatedWinding, ExactCompensated};
-pub use exact::{ExactFed, ExactStep, ExactSurface, FedWinding, HeldIn};
-pub use fed::{AngledDrive, Fed, Line, dead_time};
+pub use cabled::{CableResistance, Cabled};
+pub use compensated::{Compensated, CompensatedDrive, CompensatedSalientWinding, CompensatedWinding, DeadTimeSize};
+pub use emf_harmonic::{EmfHarmonic, SixthHarmonic};
+pub use exact::{ExactSalient, ExactStep, ExactSurface, HeldIn};
+pub use flux_linkage::{FluxLinkage, FluxWinding};
 pub use injection::{Injection, Stair};
-pub use machine::{Acting, Machine, Motion, Rotor};
+pub use inverter_fed::{AngledDrive, DeadTimeLoss, InverterFed, InverterFedWinding, dead_time};
+pub use machine::{Machine, MachineParameters, MachineState, VoltageAndLoad};
+pub use misaligned::{Misaligned, Misalignment};
+pub use motor_model::MotorModel;
 pub use plant::Plant;
 pub use salient::{Salient, SalientWinding};
 pub use saturated::{Saturated, SaturatedWinding};
-pub use shaft::{COULOMB_WIDTH, Mechanics, Shaft, Torque, Turning};
+pub use shaft::{COULOMB_WIDTH, Load, Mechanics, Shaft, ShaftMotion, Torque};
 pub use surface::Surface;
+pub use switching::SwitchingInverter;
 
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
@@ -112,9 +123,9 @@ crate::signals! {
     }
     /// Parameters of a motor with surface magnets.
     pub struct Winding {
-        /// Phase resistance.
+        /// Phase resistance; must be positive.
         rs: "ohm",
-        /// Synchronous inductance.
+        /// Synchronous inductance; must be positive.
         ls: "H",
         /// Line-to-line rms back-EMF per mechanical speed.
         ke: "V s/rad",

@@ -6,9 +6,11 @@
 
 mod error;
 mod estimate;
+mod pooled;
 
 pub use error::{Direction, RegressionError};
 pub use estimate::{Assumption, LinearEstimate};
+pub use pooled::PooledRegression;
 
 use crate::information::{Block, Information, SquareMatrix};
 use crate::signals::{Of, Signals};
@@ -119,7 +121,7 @@ impl<P: Signals> Regression<P> {
     /// rows do not determine, by name.
     pub fn solve(&self) -> Result<LinearEstimate<P>, RegressionError> {
         self.check()?;
-        let (n, used) = (P::LEN, self.rows.iter().filter(|row| row.weight > 0.0).count());
+        let (n, used) = (P::LEN, self.used());
         if used <= n {
             return Err(RegressionError::TooFewRows { rows: used, parameters: n });
         }
@@ -135,8 +137,6 @@ impl<P: Signals> Regression<P> {
             Assumption::OwnVariance => self.sandwich(&information, &solution, 0)?,
             Assumption::Correlated { lags } => self.sandwich(&information, &solution, lags)?,
         };
-        let squares: f64 =
-            self.rows.iter().filter(|row| row.weight > 0.0).map(|row| row.residual(&solution).powi(2)).sum();
         let estimate = LinearEstimate {
             parameters: P::from_fn(|i| solution[i]),
             standard_errors: P::from_fn(|i| covariance[(i, i)].sqrt()),
@@ -145,7 +145,7 @@ impl<P: Signals> Regression<P> {
                 let norms = information.column_norms();
                 P::from_fn(|i| percent(information.residual().sqrt() / norms[i], solution[i]))
             },
-            rms: (squares / used as f64).sqrt(),
+            rms: self.rms(&solution),
             covariance,
             rows: used as u64,
             condition,
@@ -153,6 +153,17 @@ impl<P: Signals> Regression<P> {
         };
         let known = |i: usize| solution[i].is_finite() && estimate.covariance[(i, i)].is_finite();
         if (0..n).all(known) { Ok(estimate) } else { Err(RegressionError::OutOfRange) }
+    }
+
+    // How many rows have a weight.
+    fn used(&self) -> usize {
+        self.rows.iter().filter(|row| row.weight > 0.0).count()
+    }
+
+    fn rms(&self, solution: &[f64]) -> f64 {
+        let used = self.rows.iter().filter(|row| row.weight > 0.0);
+        let squares: f64 = used.map(|row| row.residual(solution).powi(2)).sum();
+        (squares / self.used() as f64).sqrt()
     }
 
     fn assumption(&self) -> Assumption {
@@ -164,34 +175,36 @@ impl<P: Signals> Regression<P> {
         }
     }
 
-    // Newey and West's sum over lags with Bartlett's falling weights is the sum of squares of moving sums of `lags + 1`
-    // scores, which a triangle absorbs like any other rows; without lags it is White's.
     fn sandwich(
         &self,
         information: &Information,
         solution: &[f64],
         lags: usize,
     ) -> Result<SquareMatrix, RegressionError> {
+        let scores = self.scores(solution, lags, |phi| information.leverage(phi).ok());
+        scores.and_then(|scores| information.sandwich(&scores).ok()).ok_or(RegressionError::OutOfRange)
+    }
+
+    // The triangle of the scores. Newey and West's sum over lags with Bartlett's falling weights is the sum of squares of
+    // moving sums of `lags + 1` scores, which a triangle absorbs like any other rows; without lags it is White's. `leverage`
+    // is that of a row of weight one.
+    fn scores(&self, solution: &[f64], lags: usize, leverage: impl Fn(&[f64]) -> Option<f64>) -> Option<Information> {
         let mut scores: Vec<P::Array<f64>> = Vec::with_capacity(self.rows.len());
         for row in self.rows.iter().filter(|row| row.weight > 0.0) {
-            let leverage = row.weight
-                * information
-                    .leverage(P::into_array(row.regressor).as_ref())
-                    .map_err(|_| RegressionError::OutOfRange)?;
+            let leverage = row.weight * leverage(P::into_array(row.regressor).as_ref())?;
             let score = row.weight * row.residual(solution) / (1.0 - leverage).max(ALONE);
             scores.push(P::into_array(P::map(row.regressor, |phi| phi * score)));
         }
         let (rows, window) = (scores.len(), lags.min(scores.len()) + 1);
         let share = (window as f64).sqrt().recip();
         let mut sums = P::array_from_fn(|_| 0.0);
-        let meat = triangle::<P>((0..rows + window - 1).map(|t| {
+        Some(triangle::<P>((0..rows + window - 1).map(|t| {
             for (i, sum) in sums.as_mut().iter_mut().enumerate() {
                 *sum += if t < rows { scores[t].as_ref()[i] } else { 0.0 };
                 *sum -= if t >= window { scores[t - window].as_ref()[i] } else { 0.0 };
             }
             (P::array_from_fn(|i| sums.as_ref()[i] * share), 0.0)
-        }));
-        information.sandwich(&meat).map_err(|_| RegressionError::OutOfRange)
+        })))
     }
 
     fn check(&self) -> Result<(), RegressionError> {

@@ -53,6 +53,78 @@ pub trait Signals: Copy + Debug + Default + PartialEq + Send + Sync + 'static {
     fn position(name: &str) -> Option<usize> {
         Self::NAMES.iter().position(|known| *known == name)
     }
+    /// The signals of `P` by their names out of these, which may hold others besides: how the parameters of a composed model
+    /// become those of its parts. A name that is missing, or that has another unit, does not compile.
+    ///
+    /// ```
+    /// use greybox::{Signals, signals};
+    /// signals! {
+    ///     pub struct Coil { r: "ohm", l: "H" }
+    ///     pub struct Motor { l: "H", r: "ohm", ke: "V s/rad" }
+    /// }
+    /// let motor = Motor { l: 2e-3, r: 0.4, ke: 0.95 };
+    /// assert_eq!(Motor::<f64>::part::<Coil, f64>(motor), Coil { r: 0.4, l: 2e-3 });
+    /// ```
+    #[inline(always)]
+    fn part<P: Signals, T: Entry>(signals: Self::Of<T>) -> P::Of<T> {
+        let entries = Self::into_array(signals);
+        P::from_fn(|i| entries.as_ref()[Places::<Self, P>::AT[i]])
+    }
+}
+
+/// Where the signals of `P` stand among those of `W`.
+struct Places<W, P>(core::marker::PhantomData<(W, P)>);
+
+/// Most signals of a part.
+const MOST: usize = 64;
+
+impl<W: Signals, P: Signals> Places<W, P> {
+    const AT: [usize; MOST] = {
+        assert!(P::LEN <= MOST, "a part has at most 64 signals");
+        let (mut at, mut i) = ([0; MOST], 0);
+        while i < P::LEN {
+            at[i] = place_of(W::NAMES, P::NAMES[i]);
+            assert!(same(W::UNITS[at[i]], P::UNITS[i]), "a signal has another unit in the part than in the whole");
+            i += 1;
+        }
+        at
+    };
+}
+
+/// The position of a name that must be there.
+pub(crate) const fn place_of(names: &[&str], name: &str) -> usize {
+    let place = search(names, name);
+    assert!(place < names.len(), "a signal of the part is missing in the whole: the two names must be the same");
+    place
+}
+
+/// Whether a name is there.
+pub(crate) const fn holds(names: &[&str], name: &str) -> bool {
+    search(names, name) < names.len()
+}
+
+/// The position of a name; the number of names, if it is not there.
+const fn search(names: &[&str], name: &str) -> usize {
+    let mut i = 0;
+    while i < names.len() && !same(names[i], name) {
+        i += 1;
+    }
+    i
+}
+
+const fn same(a: &str, b: &str) -> bool {
+    let (a, b) = (a.as_bytes(), b.as_bytes());
+    if a.len() != b.len() {
+        return false;
+    }
+    let mut i = 0;
+    while i < a.len() {
+        if a[i] != b[i] {
+            return false;
+        }
+        i += 1;
+    }
+    true
 }
 
 /// Declares a named vector: a struct generic over its entries (`f64` unless said otherwise), each field with its unit.

@@ -153,7 +153,7 @@ fn an_import_from_above_is_seen() {
     assert_eq!(seen(&["loss"], "use super::fit::Fit;"), 1);
     assert_eq!(seen(&["fit", "run"], "use super::objective::Halt; use super::super::report::text;"), 1);
     assert_eq!(seen(&["loss"], "use crate::Model;"), 1, "the public list");
-    assert_eq!(seen(&["pmsm", "fed"], "use crate::{Model, Kind}; use super::Drive;"), 0);
+    assert_eq!(seen(&["pmsm", "surface"], "use crate::{Model, Kind}; use super::Drive;"), 0);
     assert_eq!(seen(&["cellar"], ""), 1);
     assert_eq!(seen(&["loss"], "#[cfg(test)]\nmod tests { use crate::fit::Fit; }"), 0);
 }

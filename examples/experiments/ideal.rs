@@ -5,8 +5,8 @@ use greybox::online::{Law, Mras, MrasStart, Order, Outcome, Stepping, Watch};
 use greybox::pmsm::adaptive::{Adaptive, Instant};
 use greybox::pmsm::control::{CurrentControl, PositionControl, SpeedControl};
 use greybox::pmsm::{
-    Currents, ExactStep, ExactSurface, HeldIn, KeLyapunov, Machine, MotorLaw, PolePairs, Resting, Rotor, RsDirect,
-    RsLyapunov, Winding,
+    Currents, ExactStep, ExactSurface, HeldIn, KeLyapunov, Machine, MachineParameters, MotorLaw, NotAdapted, PolePairs,
+    RsDirect, RsLyapunov, Winding,
 };
 use greybox::{fixed, free};
 
@@ -30,10 +30,10 @@ fn observer<L: Law<ExactSurface>>(start: Winding, law: L, ts: f64, order: Order)
 }
 
 /// The motor of experiment 1: Ke falls by 10 % from 5 s to 7 s, R rises by 30 % from 9 s to 11 s.
-fn drifting(t: f64) -> Rotor {
+fn drifting(t: f64) -> MachineParameters {
     let ramp = |begin: f64| ((t - begin) / 2.0).clamp(0.0, 1.0);
     let (rs, ke) = (0.5 * (1.0 + 0.3 * ramp(9.0)), 1.6 * (1.0 - 0.1 * ramp(5.0)));
-    Rotor { rs, ld: 4e-3, lq: 4e-3, ke, j: 0.3, bv: 1.0, tc: 0.0, tg: 0.0 }
+    MachineParameters { rs, ld: 4e-3, lq: 4e-3, ke, j: 0.3, bv: 1.0, tc: 0.0, tg: 0.0 }
 }
 
 fn errors(now: &Instant) -> (f64, f64) {
@@ -63,7 +63,7 @@ pub fn torque_step() -> Result<Report> {
     let ke = KeLyapunov { gain: 1e-3 };
     let direct = step_of_torque(MotorLaw { rs: RsDirect { gain: -10.0 }, ke }, 100.0, 0.2)?;
     let lyapunov = step_of_torque(MotorLaw { rs: RsLyapunov { gain: 5e-3 }, ke }, 100.0, 0.2)?;
-    let without = step_of_torque(MotorLaw { rs: Resting, ke }, 100.0, 0.0)?;
+    let without = step_of_torque(MotorLaw { rs: NotAdapted, ke }, 100.0, 0.0)?;
     let reversed = step_of_torque(MotorLaw { rs: RsDirect { gain: -10.0 }, ke }, -100.0, 0.2)?;
 
     let runs = [("R law (5.4)", &direct), ("R law by Lyapunov", &lyapunov), ("id = 0, R held", &without)];
@@ -95,8 +95,9 @@ pub fn torque_step() -> Result<Report> {
     report.claim("Law (5.4) is stable only while g id < 0 (here: -100 N m)", found, stopped.is_some());
 
     let trace = |of: fn(&Instant) -> f64, seen: &[Instant]| thin(seen.iter().map(|now| (now.t, of(now))).collect());
-    let truth = |of: fn(Rotor) -> f64| thin(direct.iter().map(|now| (now.t, of(drifting(now.t)))).collect());
-    let series = |of: fn(&Instant) -> f64, true_value: fn(Rotor) -> f64| {
+    let truth =
+        |of: fn(MachineParameters) -> f64| thin(direct.iter().map(|now| (now.t, of(drifting(now.t)))).collect());
+    let series = |of: fn(&Instant) -> f64, true_value: fn(MachineParameters) -> f64| {
         vec![
             ("true".to_owned(), truth(true_value)),
             ("law (5.4)".to_owned(), trace(of, &direct)),
@@ -132,7 +133,7 @@ struct Followed {
 }
 
 fn step_of_position<L: Law<ExactSurface>>(law: L, start: f64, ts: f64, order: Order) -> Result<Followed> {
-    let rotor = Rotor { rs: 0.4, ld: 4e-3, lq: 4e-3, ke: 0.95, j: 0.2, bv: 0.02, tc: 0.0, tg: 0.0 };
+    let rotor = MachineParameters { rs: 0.4, ld: 4e-3, lq: 4e-3, ke: 0.95, j: 0.2, bv: 0.02, tc: 0.0, tg: 0.0 };
     let drive = Adaptive {
         machine: Machine::new(4, 1.0)?,
         control: CurrentControl::lambda_tuned(0.4, 4e-3, 0.0, PolePairs::new(4)?, 1e-3)?,
@@ -142,7 +143,7 @@ fn step_of_position<L: Law<ExactSurface>>(law: L, start: f64, ts: f64, order: Or
     let mut position = PositionControl::new(5.0, 300.0, 60.0)?;
     let mut speed = SpeedControl::tuned(0.2, 3.0, 1.0)?;
     let (mut integral, mut speed_error, mut kt) = (0.0, Vec::new(), Vec::new());
-    let reference = |t: f64, x: &greybox::pmsm::Motion, kt: f64| {
+    let reference = |t: f64, x: &greybox::pmsm::MachineState, kt: f64| {
         let target = position.step(2400.0 - x.theta, ts);
         integral += (target.w - x.w).abs() * ts;
         speed_error.push((t, target.w - x.w));
@@ -163,8 +164,8 @@ fn step_of_position<L: Law<ExactSurface>>(law: L, start: f64, ts: f64, order: Or
 
 pub fn position_step() -> Result<Report> {
     let mut report = Report::new("Experiment 2: position step of 2400 rad, Kt believed 20 % high");
-    let adapt = MotorLaw { rs: Resting, ke: KeLyapunov { gain: 1e-3 } };
-    let rest = MotorLaw { rs: Resting, ke: Resting };
+    let adapt = MotorLaw { rs: NotAdapted, ke: KeLyapunov { gain: 1e-3 } };
+    let rest = MotorLaw { rs: NotAdapted, ke: NotAdapted };
     let runs = [
         ("true Kt", step_of_position(rest, 1.0, TS / 10.0, Order::Thesis)?),
         ("adapted, Ts/10, order of the thesis", step_of_position(adapt, 1.2, TS / 10.0, Order::Thesis)?),

@@ -8,7 +8,8 @@ use greybox::pmsm::program::{Cycle, Program};
 use greybox::pmsm::robot::{Axis, TS};
 use greybox::pmsm::temperature::{Celsius, Estimated, magnet_rise, winding_rise};
 use greybox::pmsm::{
-    Currents, DeadZone, Drive, ExactStep, ExactSurface, HeldIn, KeConstantGain, KeLyapunov, MotorLaw, Resting, Winding,
+    Currents, DeadZone, Drive, ExactStep, ExactSurface, HeldIn, KeConstantGain, KeLyapunov, MotorLaw, NotAdapted,
+    Winding,
 };
 use greybox::{Butterworth, LinearEstimate, fixed, free};
 
@@ -82,8 +83,8 @@ fn rms_of_second_half(trace: &[(f64, f64)]) -> f64 {
     (half.iter().map(|(_, e)| e * e).sum::<f64>() / half.len() as f64).sqrt()
 }
 
-fn only_ke<K>(ke: K) -> MotorLaw<Resting, K> {
-    MotorLaw { rs: Resting, ke }
+fn only_ke<K>(ke: K) -> MotorLaw<NotAdapted, K> {
+    MotorLaw { rs: NotAdapted, ke }
 }
 
 pub fn speeds() -> Result<Report> {
@@ -204,7 +205,7 @@ fn first_axis(report: &mut Report, run: &Run, both: &[(f64, LinearEstimate<Windi
 /// Extended least squares on a whole record: motor and cable resistance, Ke.
 fn whole(run: &Run) -> Result<(Estimated, Estimated)> {
     let filter = low_pass()?;
-    let i0 = search_i0(0.03, 1.0, |i0| extended(&run.spans, i0).prefiltered(&filter))?;
+    let i0 = search_i0(0.03, 1.0, |i0| extended(&run.spans, i0).prefiltered(&filter).least_squares())?;
     let found = extended(&run.spans, i0).prefiltered(&filter).solve()?;
     let (p, s) = (found.parameters, found.standard_errors);
     Ok((Estimated { value: p.r, std: s.r }, Estimated { value: p.ke, std: s.ke }))

@@ -13,8 +13,8 @@ use greybox::pmsm::offline::{Axes, Extended, Form, Spans, extended, plain, searc
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::{Axis, TS, V_DC};
 use greybox::pmsm::{
-    AngledDrive, Currents, DeadZone, ExactFed, ExactStep, ExactSurface, FedWinding, HeldIn, Injection, KeLyapunov,
-    MotorLaw, Normalized, Resting, Winding,
+    AngledDrive, Currents, DeadZone, ExactStep, ExactSurface, HeldIn, Injection, InverterFed, InverterFedWinding,
+    KeLyapunov, MotorLaw, Normalized, NotAdapted, Winding,
 };
 use greybox::{Butterworth, Hold, LinearEstimate, fixed, free, hampel};
 use report::Report;
@@ -32,7 +32,7 @@ fn solve_plain(spans: &Spans) -> Result<Winding> {
 
 fn solve_extended(spans: &Spans) -> Result<LinearEstimate<Extended>> {
     let filter = Butterworth::low_pass(4, 100.0, TS)?;
-    let i0 = search_i0(0.03, 1.0, |i0| extended(spans, i0).prefiltered(&filter))?;
+    let i0 = search_i0(0.03, 1.0, |i0| extended(spans, i0).prefiltered(&filter).least_squares())?;
     Ok(extended(spans, i0).prefiltered(&filter).solve()?)
 }
 
@@ -69,19 +69,24 @@ fn joint_filter(axis: &Axis, spans: &Spans) -> Result<f64> {
     let current = free(0.0).prior(0.0, 1.0);
     let start = EkfStart {
         state: Currents { id: current, iq: current },
-        parameters: FedWinding {
+        parameters: InverterFedWinding {
             rs: free(axis.rs).prior(axis.rs, 0.1f64.sqrt()),
             ls: fixed(axis.ls),
             ke: free(0.9 * axis.ke).prior(0.9 * axis.ke, 0.02f64.sqrt()),
             vdt: free(0.0).prior(0.0, 2.0),
+            i0: fixed(0.15),
         },
         state_drift: Currents { id: 0.1, iq: 0.1 },
-        parameter_drift: FedWinding { rs: 1e-5, ls: 0.0, ke: 1e-11f64.sqrt(), vdt: 1e-9f64.sqrt() },
+        parameter_drift: InverterFedWinding { rs: 1e-5, ls: 0.0, ke: 1e-11f64.sqrt(), vdt: 1e-9f64.sqrt(), i0: 0.0 },
         noise: Currents { id: 4e-3f64.sqrt(), iq: 4e-3f64.sqrt() },
         hold: Hold::Zero,
         watch: Watch { limit: Currents { id: 1e3, iq: 1e3 }, patience: 1000 },
     };
-    let mut filter = Ekf::<_, 5>::new(ExactFed::new(ExactStep::new(4, TS, HeldIn::Stationary)?, 0.15)?, TS, start)?;
+    let mut filter = Ekf::<_, 5>::new(
+        InverterFed::<_, InverterFedWinding>::new(ExactSurface(ExactStep::new(4, TS, HeldIn::Stationary)?)),
+        TS,
+        start,
+    )?;
     Ok(rms(
         axis,
         spans.spans.iter().enumerate().map(|(k, span)| {
@@ -114,9 +119,9 @@ fn main() -> Result<()> {
         }
         offline.push((name.clone(), worst.to_vec()));
 
-        let law = |gain| MotorLaw { rs: Resting, ke: KeLyapunov { gain } };
-        let normalized = |gain| MotorLaw { rs: Resting, ke: Normalized { law: KeLyapunov { gain }, speed: 100.0 } };
-        let zone = MotorLaw { rs: Resting, ke: DeadZone { law: normalized(1e-5).ke, speed: 20.0 } };
+        let law = |gain| MotorLaw { rs: NotAdapted, ke: KeLyapunov { gain } };
+        let normalized = |gain| MotorLaw { rs: NotAdapted, ke: Normalized { law: KeLyapunov { gain }, speed: 100.0 } };
+        let zone = MotorLaw { rs: NotAdapted, ke: DeadZone { law: normalized(1e-5).ke, speed: 20.0 } };
         let (nominal, whole) = ((total, axis.ls), solve_extended(&spans)?.parameters);
         let row = vec![
             mras(&axis, &spans, (axis.rs, axis.ls), 0.0, law(1e-5))?,

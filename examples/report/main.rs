@@ -7,7 +7,7 @@
 use argmin::core::observers::ObserverMode;
 use clap::Parser;
 use greybox::diagnose::{Convergence, Resampling, bootstrap, profile, restarts};
-use greybox::models::{Axis, GuidedMotion, PositioningLoop};
+use greybox::models::{Axis, ControlledAxisMotion, PositioningLoop};
 use greybox::report::{Origin, Section};
 use greybox::{CsvFile, ExperimentOf, Fit, Hold, Model, Of, Parameter, Report, fixed, free};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -55,7 +55,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let columns: Vec<&str> = header.split(',').map(str::trim).collect();
     let report = if ["qg", "vir"].iter().all(|name| columns.contains(name)) {
         let model = PositioningLoop::EMPS;
-        let rest = GuidedMotion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) };
+        let rest = ControlledAxisMotion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) };
         let record = CsvFile::new(&arguments.file).read(&model)?.hold(Hold::First).initial(rest);
         let axis = Axis { m: free(80.0), fv: free(150.0), fc: free(15.0), offset: free(0.0) };
         reported(&model, &record, axis, arguments, &stop, None)?
@@ -88,21 +88,26 @@ fn reported<M: Model + Clone>(
     let report = Report::new(&problem, &estimate)?.titled(format!("Estimate from {}", record.name()));
     let mut report = assumed.into_iter().fold(report, Report::with).with(convergence);
     let going = || !stop.load(Ordering::Relaxed);
+    // What Ctrl-C ended is left out.
+    let with = |report: Report, section: Result<Section, greybox::Error>| match section {
+        Err(_) if !going() => Ok(report),
+        section => section.map(|section| report.with(section)),
+    };
     let wanted: Vec<_> = estimate.unknowns.iter().filter(|_| arguments.profiles).collect();
     let bar = terminal::steps(wanted.len(), "profiles");
     for unknown in wanted.iter().take_while(|_| going()) {
-        report = report.with(profile(&problem, &estimate, &unknown.name, 0.95)?);
+        report = with(report, profile(&problem, &estimate, &unknown.name, 0.95).map(Section::from))?;
         bar.inc(1);
     }
     bar.finish_and_clear();
     if let Some(searches) = arguments.starts.filter(|_| going()) {
         let bar = terminal::spinner("searches from other starts");
-        report = report.with(restarts(&problem, &estimate, searches, 10.0, 1)?);
+        report = with(report, restarts(&problem, &estimate, searches, 10.0, 1).map(Section::from))?;
         bar.finish_and_clear();
     }
     if let Some(refits) = arguments.bootstrap.filter(|_| going()) {
         let bar = terminal::spinner("refits of resampled records");
-        report = report.with(bootstrap(&problem, &estimate, Resampling::Blocks(0), refits, 1)?);
+        report = with(report, bootstrap(&problem, &estimate, Resampling::Blocks(0), refits, 1).map(Section::from))?;
         bar.finish_and_clear();
     }
     Ok(report)

@@ -18,15 +18,15 @@ crate::signals! {
     }
     /// Parameters of a direct-current motor with its rotor.
     pub struct Armature {
-        /// Armature resistance.
+        /// Armature resistance; must be positive.
         r: "ohm",
-        /// Armature inductance.
+        /// Armature inductance; must be positive.
         l: "H",
         /// Motor constant: EMF per speed (V s/rad), and torque per current (N m/A), which are the same number.
         k: "V s/rad",
-        /// Inertia.
+        /// Inertia; must be positive.
         j: "kg m^2",
-        /// Viscous friction.
+        /// Viscous friction; negative is not physical.
         b: "N m s",
     }
 }

@@ -3,14 +3,14 @@ use serde::{Deserialize, Serialize};
 
 crate::signals! {
     /// Motion of a linear axis.
-    pub struct Motion {
+    pub struct AxisMotion {
         /// Position.
         q: "m",
         /// Speed.
         v: "m/s",
     }
     /// Motion of a linear axis, and the speed as its controller sees it.
-    pub struct GuidedMotion {
+    pub struct ControlledAxisMotion {
         /// Position.
         q: "m",
         /// Speed.
@@ -34,7 +34,7 @@ crate::signals! {
         qm: "m",
     }
     /// What is measured of the axis under its controller.
-    pub struct Guided {
+    pub struct ControlledAxisOutput {
         /// Position.
         qm: "m",
         /// Command to the drive, as the controller gives it.
@@ -42,11 +42,11 @@ crate::signals! {
     }
     /// Parameters of a linear axis, as the load feels them.
     pub struct Axis {
-        /// Mass, with the inertia of all that turns.
+        /// Mass, with the inertia of all that turns; must be positive.
         m: "kg",
-        /// Viscous friction.
+        /// Viscous friction; negative is not physical.
         fv: "N s/m",
-        /// Dry friction.
+        /// Dry friction; negative is not physical.
         fc: "N",
         /// Constant force: the drive's offset, and what friction differs between the directions.
         offset: "N",
@@ -62,6 +62,9 @@ crate::signals! {
 /// After A. Janot, M. Gautier, M. Brunot, *Data set and reference models of EMPS*, Workshop on Nonlinear System
 /// Identification Benchmarks, Eindhoven 2019, whose dry friction is `fc sign(v)`. That has no slope and no answer at rest;
 /// the smooth one approaches it where `|v|` is a few times `width`.
+///
+/// The hold of the record must be [`Hold::Zero`](crate::Hold::Zero): a drive holds its command from sample to sample, which
+/// is what a record takes unless told otherwise.
 ///
 /// Position is the second integral of the command: in an open loop, small errors of the force grow without bound, and a
 /// long simulation from poor parameters ends in wrong minima. Where the controller is known, [`PositioningLoop`] is the
@@ -85,18 +88,18 @@ impl Positioning {
 }
 
 impl Model for Positioning {
-    type State = Motion;
+    type State = AxisMotion;
     type Input = Command;
     type Output = Position;
     type Parameters = Axis;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Command<S>, p: &Axis<S>) -> Motion<S> {
-        Motion { q: x.v, v: self.acceleration(x.v, u.vir, p) }
+    fn derivative<S: Scalar>(&self, _t: S, x: &AxisMotion<S>, u: &Command<S>, p: &Axis<S>) -> AxisMotion<S> {
+        AxisMotion { q: x.v, v: self.acceleration(x.v, u.vir, p) }
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, _u: &Command<S>, _p: &Axis<S>) -> Position<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &AxisMotion<S>, _u: &Command<S>, _p: &Axis<S>) -> Position<S> {
         Position { qm: x.q }
     }
 }
@@ -111,6 +114,10 @@ impl Model for Positioning {
 /// The lag stands for how a digital controller comes by a speed. In the record of the benchmark it can be read off: the
 /// speed that `kp kv (qg - q) - vir` stands for is, to 0.2 %, the mean of the last two differences of the position, which
 /// is one sample old (1 ms).
+///
+/// The hold of the record must be [`Hold::First`](crate::Hold::First): the reference is a smooth curve of which the record
+/// has samples. Held from sample to sample instead it acts half a sample late, which the fit takes for friction of the wrong
+/// sign (`fv` -477 N s/m on the benchmark's record, with a better fit); an `fv` or `fc` below zero says so.
 ///
 /// The controller keeps the simulated axis near the reference whatever the parameters, so that a fit finds its way from
 /// far off; and the command that the model needs to do so, compared with the recorded one, tells the parameters.
@@ -134,25 +141,25 @@ impl PositioningLoop {
         PositioningLoop { axis: Positioning::EMPS, kp: 160.18, kv: 243.45, limit: 10.0, lag: 1e-3 };
 
     #[inline]
-    fn command<S: Scalar>(&self, x: &GuidedMotion<S>, u: &Reference<S>) -> S {
+    fn command<S: Scalar>(&self, x: &ControlledAxisMotion<S>, u: &Reference<S>) -> S {
         (((u.qg - x.q) * self.kp - x.vm) * self.kv).clamp(-self.limit, self.limit)
     }
 }
 
 impl Model for PositioningLoop {
-    type State = GuidedMotion;
+    type State = ControlledAxisMotion;
     type Input = Reference;
-    type Output = Guided;
+    type Output = ControlledAxisOutput;
     type Parameters = Axis;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: S, x: &GuidedMotion<S>, u: &Reference<S>, p: &Axis<S>) -> GuidedMotion<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &ControlledAxisMotion<S>, u: &Reference<S>, p: &Axis<S>) -> ControlledAxisMotion<S> {
         let v = self.axis.acceleration(x.v, self.command(x, u), p);
-        GuidedMotion { q: x.v, v, vm: (x.v - x.vm) / self.lag }
+        ControlledAxisMotion { q: x.v, v, vm: (x.v - x.vm) / self.lag }
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: S, x: &GuidedMotion<S>, u: &Reference<S>, _p: &Axis<S>) -> Guided<S> {
-        Guided { qm: x.q, vir: self.command(x, u) }
+    fn output<S: Scalar>(&self, _t: S, x: &ControlledAxisMotion<S>, u: &Reference<S>, _p: &Axis<S>) -> ControlledAxisOutput<S> {
+        ControlledAxisOutput { qm: x.q, vir: self.command(x, u) }
     }
 }

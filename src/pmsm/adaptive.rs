@@ -3,7 +3,7 @@
 
 use super::control::{Command, CurrentControl};
 use super::machine::runge_kutta;
-use super::{Acting, Currents, Drive, Machine, Motion, Rotor, SQRT_3_2, Winding};
+use super::{Currents, Drive, Machine, MachineParameters, MachineState, SQRT_3_2, VoltageAndLoad, Winding};
 use crate::model::Model;
 use crate::online::{Law, Mras, Outcome};
 
@@ -26,7 +26,7 @@ pub struct Instant {
     /// Time (s).
     pub t: f64,
     /// The plant's motion.
-    pub x: Motion,
+    pub x: MachineState,
     /// Electromagnetic torque (N m).
     pub torque: f64,
     /// What the observer believes before this sample corrects it.
@@ -49,12 +49,12 @@ where
     pub fn run(
         mut self,
         duration: f64,
-        rotor: impl Fn(f64) -> Rotor,
+        rotor: impl Fn(f64) -> MachineParameters,
         load: impl Fn(f64) -> f64,
-        mut reference: impl FnMut(f64, &Motion, f64) -> Currents,
+        mut reference: impl FnMut(f64, &MachineState, f64) -> Currents,
         mut see: impl FnMut(&Instant),
     ) {
-        let mut x = Motion::default();
+        let mut x = MachineState::default();
         let samples = (duration / self.ts).round() as usize;
         for k in 0..=samples {
             let t = k as f64 * self.ts;
@@ -66,9 +66,9 @@ where
             let u = Drive { ud: command.ud, uq: command.uq, w: x.w };
             let outcome = self.observer.update(t, &u, &measured).outcome;
             let p = rotor(t);
-            let torque = SQRT_3_2 * p.ke * x.iq;
+            let torque = self.machine.torque(&x, &p);
             see(&Instant { t, x, torque, estimate, command, outcome });
-            let acting = Acting { ud: command.ud, uq: command.uq, tau_l: load(x.w) };
+            let acting = VoltageAndLoad { ud: command.ud, uq: command.uq, tau_l: load(x.w) };
             x = runge_kutta(x, self.ts, |x| self.machine.derivative(t, x, &acting, &p));
         }
     }

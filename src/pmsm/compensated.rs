@@ -1,9 +1,9 @@
-use super::{Currents, Drive, ExactStep, Winding};
-use crate::{Kind, Model, Scalar};
-use serde::{Deserialize, Serialize};
+use super::motor_model::{MotorModel, passes_on, wraps_motor};
+use super::{Currents, PolePairs};
+use crate::{Of, Scalar, Signals};
 
 crate::signals! {
-    /// Commanded voltages, speed, and where the inverter's dead time points.
+    /// Commanded voltages, speed and angle, and where the inverter's dead time points.
     pub struct CompensatedDrive {
         /// Commanded voltage along the magnet flux.
         ud: "V",
@@ -11,62 +11,73 @@ crate::signals! {
         uq: "V",
         /// Mechanical speed.
         w: "rad/s",
+        /// Mechanical angle in the middle of the sample interval.
+        theta: "rad",
         /// Dead time's voltage per volt of `vdt`, along the flux: [`dead_time`](super::dead_time) of *measured* currents.
         lost_d: "1",
         /// The same, 90 electrical degrees ahead.
         lost_q: "1",
     }
-    /// Parameters of a motor, its cable and the size of its inverter's dead time.
+    /// Size of a dead time whose shape is known.
+    pub struct DeadTimeSize {
+        /// Voltage that dead time takes from each phase.
+        vdt: "V",
+    }
+    /// Parameters of a surface-magnet motor, its cable and the size of its inverter's dead time.
     pub struct CompensatedWinding {
-        /// Phase resistance, cable included.
+        /// Phase resistance, cable included; must be positive.
         rs: "ohm",
-        /// Inductance, the same in both axes.
+        /// Inductance, the same in both axes; must be positive.
         ls: "H",
         /// Line-to-line rms back-EMF per mechanical speed.
         ke: "V s/rad",
         /// Voltage that dead time takes from each phase.
         vdt: "V",
     }
+    /// Parameters of a salient motor with a harmonic in its EMF, its cable and the size of its inverter's dead time.
+    pub struct CompensatedSalientWinding {
+        /// Phase resistance, cable included; must be positive.
+        rs: "ohm",
+        /// Inductance along the magnet flux; must be positive.
+        ld: "H",
+        /// Inductance 90 electrical degrees ahead of it; must be positive.
+        lq: "H",
+        /// Line-to-line rms back-EMF per mechanical speed.
+        ke: "V s/rad",
+        /// Amplitude of its sixth harmonic.
+        ke6: "V s/rad",
+        /// Voltage that dead time takes from each phase.
+        vdt: "V",
+    }
 }
 
-/// The offline grey box: exact steps, and a dead time whose shape comes from the measured currents, mean of the interval,
-/// at the angle of its middle. Only its size is a parameter, in which the model is then linear.
-///
-/// [`ExactFed`](super::ExactFed) takes the simulated current instead: near zero current, where the sign decides, what the
-/// motor's harmonics do to the measured current then goes into the parameters (0.3 % of Ke at 15 rad/s on a small axis).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ExactCompensated(
-    /// How the step is made.
-    pub ExactStep,
-);
+wraps_motor! {
+    /// A motor behind an inverter, for offline fits: the shape of the dead time's voltage comes from the measured currents,
+    /// mean of the interval, at the angle of its middle. Only its size is a parameter, in which the model is then linear.
+    /// The parameters `P` hold those of the motor `M` and of [`DeadTimeSize`], by name.
+    ///
+    /// [`InverterFed`](super::InverterFed) takes the simulated current instead: near zero current, where the sign decides,
+    /// what the motor's harmonics do to the measured current then goes into the parameters (0.3 % of Ke at 15 rad/s on a
+    /// small axis).
+    Compensated, CompensatedDrive
+}
 
-impl Model for ExactCompensated {
-    type State = Currents;
-    type Input = CompensatedDrive;
-    type Output = Currents;
-    type Parameters = CompensatedWinding;
-    const KIND: Kind = Kind::Discrete;
-
-    #[inline]
-    fn next<S: Scalar>(
+impl<M: MotorModel, P: Signals> Compensated<M, P> {
+    #[inline(always)]
+    fn through<S: Scalar>(
         &self,
-        _t: S,
         x: &Currents<S>,
         u: &CompensatedDrive<S>,
-        p: &CompensatedWinding<S>,
+        p: &Of<P, S>,
+        motor: impl FnOnce(&Currents<S>, &Of<M::Input, S>, &Of<M::Parameters, S>) -> Currents<S>,
     ) -> Currents<S> {
-        let drive = Drive { ud: u.ud - p.vdt * u.lost_d, uq: u.uq - p.vdt * u.lost_q, w: u.w };
-        self.0.advance(x, &drive, &Winding { rs: p.rs, ls: p.ls, ke: p.ke })
+        let vdt = P::part::<DeadTimeSize, S>(*p).vdt;
+        let u = CompensatedDrive { ud: u.ud - vdt * u.lost_d, uq: u.uq - vdt * u.lost_q, ..*u };
+        motor(x, &CompensatedDrive::part::<M::Input, S>(u), &P::part::<M::Parameters, S>(*p))
     }
+}
 
-    #[inline]
-    fn output<S: Scalar>(
-        &self,
-        _t: S,
-        x: &Currents<S>,
-        _u: &CompensatedDrive<S>,
-        _p: &CompensatedWinding<S>,
-    ) -> Currents<S> {
-        *x
-    }
+impl<M: MotorModel, P: Signals> MotorModel for Compensated<M, P> {
+    passes_on!(pole_pairs);
+    passes_on!(torque);
 }

@@ -10,10 +10,10 @@ use super::inverter::{Carrier, DeadTime, Inverter, aim};
 pub use super::log::{Log, Row, Warning};
 use super::plant::Plant;
 use super::program::Program;
-use super::robot::{Axis, TS, V_MAX};
+use super::robot::{Axis, V_MAX};
 use super::sensors::{CurrentSensors, Resolver};
 use super::temperature::Celsius;
-use super::{Bridge, Currents, Error, Injection, Motion, SQRT_3_2};
+use super::{Currents, Error, Injection, MachineState, SQRT_3_2, SwitchingInverter};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
@@ -187,22 +187,23 @@ impl Simulation {
         Simulation { seed, ..self }
     }
 
-    /// Runs a program from rest.
+    /// Runs a program from rest, at the program's sample time.
     pub fn run(&self, program: &Program) -> Log {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(self.seed);
         let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
         let (mut current_control, mut speed_control) = (self.current_control, self.speed_control);
-        let np = self.nominal.pole_pairs;
+        let (np, ts) = (self.nominal.pole_pairs, program.ts);
         let (kt, i_max) = (SQRT_3_2 * self.nominal.ke, self.nominal.i_max);
-        let blend = 1.0 - (-2.0 * core::f64::consts::PI * SPEED_FILTER * TS).exp();
+        let blend = 1.0 - (-2.0 * core::f64::consts::PI * SPEED_FILTER * ts).exp();
 
-        let mut log = Log { rows: Vec::with_capacity(program.targets.len()), voltage_limited: 0, current_limited: 0 };
-        let mut x = Motion::default();
+        let mut log =
+            Log { ts, rows: Vec::with_capacity(program.targets.len()), voltage_limited: 0, current_limited: 0 };
+        let mut x = MachineState::default();
         let mut last_theta = None;
         let mut wf = 0.0;
-        let mut bridge = match self.inverter {
+        let mut switching = match self.inverter {
             Inverter::Averaged => None,
-            Inverter::Switching { vdc, carrier } => Some(Bridge::new(&self.plant, vdc, carrier)),
+            Inverter::Switching { vdc, carrier } => Some(SwitchingInverter::new(&self.plant, vdc, carrier)),
         };
         let (mut acting, mut held) = (Command::default(), Stator::default());
         for (k, target) in program.targets.iter().enumerate() {
@@ -210,24 +211,24 @@ impl Simulation {
             let (alpha, beta) = rotate_out_of((x.id, x.iq), self.plant.axis.pole_pairs.electrical(x.theta));
             let read = self.currents.read(Stator { alpha, beta }, [draw(), draw()]);
             let (id, iq) = rotate_into((read.alpha, read.beta), np.electrical(theta));
-            let w = (theta - last_theta.unwrap_or(theta)) / TS;
+            let w = (theta - last_theta.unwrap_or(theta)) / ts;
             last_theta = Some(theta);
             wf += blend * (w - wf);
 
-            let (torque, current_limited) = speed_control.step(*target, theta, wf, TS);
+            let (torque, current_limited) = speed_control.step(*target, theta, wf, ts);
             let iq_ref = (torque / kt).clamp(-i_max, i_max);
-            let id_ref = self.injection.map_or(0.0, |injection| injection.at(k as f64 * TS).id);
+            let id_ref = self.injection.map_or(0.0, |injection| injection.at(k as f64 * ts).id);
             let reference = Currents { id: id_ref, iq: iq_ref };
-            let command = current_control.step(reference, Currents { id, iq }, wf, TS);
+            let command = current_control.step(reference, Currents { id, iq }, wf, ts);
             log.voltage_limited += usize::from(command.limited);
             log.current_limited += usize::from(current_limited);
             log.rows.push(Row { ud: acting.ud, uq: acting.uq, w, id, iq, theta, iq_ref, w_ref: target.w, truth: x });
 
-            x = match &mut bridge {
-                None => self.plant.advance(x, held, TS, self.substeps),
-                Some(bridge) => bridge.advance(x, held, TS, self.substeps, |_, _| {}),
+            x = match &mut switching {
+                None => self.plant.advance(x, held, ts, self.substeps),
+                Some(switching) => switching.advance(x, held, ts, self.substeps, |_, _| {}),
             };
-            held = aim((command.ud, command.uq), np.electrical(theta), wf, np, TS);
+            held = aim((command.ud, command.uq), np.electrical(theta), wf, np, ts);
             acting = command;
         }
         log

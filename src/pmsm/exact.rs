@@ -5,8 +5,12 @@
 //! turns backwards seen from the rotor; an ideal simulation may hold it in the rotor frame. To mistake one for the other
 //! biases the resistance.
 
-use super::{AngledDrive, Currents, Drive, Error, PolePairs, SQRT_2_3, Winding, dead_time};
-use crate::online::{Ekf, EkfStart, Law, Mras, MrasStart, ObserverError};
+mod salient;
+
+pub use salient::ExactSalient;
+
+use super::{AngledDrive, Currents, Drive, Error, MotorModel, PolePairs, SQRT_2_3, Winding, dead_time, units};
+use crate::online::{Law, Mras, MrasStart, ObserverError};
 use crate::{Kind, Model, Parameter, Scalar};
 use serde::{Deserialize, Serialize};
 
@@ -35,6 +39,11 @@ impl ExactStep {
     pub fn new(pole_pairs: u32, ts: f64, held_in: HeldIn) -> Result<Self, Error> {
         let ts = Error::positive("sample time", ts, "s")?;
         Ok(ExactStep { pole_pairs: PolePairs::new(pole_pairs)?, ts, held_in })
+    }
+
+    /// Sample time (s).
+    pub const fn sample_time(&self) -> f64 {
+        self.ts
     }
 
     /// The input that reaches the motor: the command less `vdt tanh(i/i0)` (V, A) per phase, at the interval's middle angle.
@@ -106,6 +115,18 @@ impl ExactSurface {
     }
 }
 
+impl MotorModel for ExactSurface {
+    fn pole_pairs(&self) -> PolePairs {
+        self.0.pole_pairs
+    }
+
+    /// `kt iq` (N m).
+    #[inline]
+    fn torque<S: Scalar>(&self, x: &Currents<S>, _theta: S, p: &Winding<S>) -> S {
+        units::kt_from_ke(p.ke) * x.iq
+    }
+}
+
 impl Model for ExactSurface {
     type State = Currents;
     type Input = Drive;
@@ -124,71 +145,8 @@ impl Model for ExactSurface {
     }
 }
 
-crate::signals! {
-    /// Parameters of a motor with surface magnets behind an inverter with dead time.
-    pub struct FedWinding {
-        /// Phase resistance, cable included.
-        rs: "ohm",
-        /// Synchronous inductance.
-        ls: "H",
-        /// Line-to-line rms back-EMF per mechanical speed.
-        ke: "V s/rad",
-        /// Voltage that the inverter's dead time takes from each phase.
-        vdt: "V",
-    }
-}
-
-/// The motor with surface magnets behind an inverter that loses `vdt tanh(i/i0)` per phase, in exact steps: the model of
-/// the joint filter over (id, iq, rs, ke, vdt).
-///
-/// The lost voltage is that of the currents at the begin of the interval, at its middle angle, and is held as the
-/// command is.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ExactFed {
-    step: ExactStep,
-    i0: f64,
-}
-
-impl ExactFed {
-    /// A motor stepped so, with the turnover current `i0` (A) of its inverter's dead time.
-    ///
-    /// # Errors
-    /// A turnover current that is not positive and finite.
-    pub fn new(step: ExactStep, i0: f64) -> Result<Self, Error> {
-        Ok(ExactFed { step, i0: Error::positive("turnover current i0", i0, "A")? })
-    }
-
-    /// The motor's joint [`Ekf`], with this step's sample time; five states where rs, ke and vdt are free.
-    ///
-    /// # Errors
-    /// A resistance, inductance or back-EMF that does not start above zero; else as [`Ekf::new`].
-    pub fn ekf<const N: usize>(self, start: EkfStart<Self>) -> Result<Ekf<Self, N>, ObserverError> {
-        let FedWinding { rs, ls, ke, .. } = start.parameters;
-        all_positive([("rs", rs), ("ls", ls), ("ke", ke)])?;
-        Ekf::new(self, self.step.ts, start)
-    }
-}
-
-impl Model for ExactFed {
-    type State = Currents;
-    type Input = AngledDrive;
-    type Output = Currents;
-    type Parameters = FedWinding;
-    const KIND: Kind = Kind::Discrete;
-
-    #[inline]
-    fn next<S: Scalar>(&self, _t: S, x: &Currents<S>, u: &AngledDrive<S>, p: &FedWinding<S>) -> Currents<S> {
-        let u = self.step.less_dead_time(x, u, p.vdt, self.i0);
-        self.step.advance(x, &u, &Winding { rs: p.rs, ls: p.ls, ke: p.ke })
-    }
-
-    #[inline]
-    fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &AngledDrive<S>, _p: &FedWinding<S>) -> Currents<S> {
-        *x
-    }
-}
-
-fn all_positive(starts: [(&'static str, Parameter); 3]) -> Result<(), ObserverError> {
+/// Refuses a start that is not positive.
+pub(super) fn all_positive<const N: usize>(starts: [(&'static str, Parameter); N]) -> Result<(), ObserverError> {
     starts.iter().try_for_each(|&(signal, Parameter { start: value, .. })| {
         let positive = value > 0.0 && value.is_finite();
         if positive { Ok(()) } else { Err(ObserverError::NotPositive { what: "the start", signal, value }) }
@@ -196,18 +154,18 @@ fn all_positive(starts: [(&'static str, Parameter); 3]) -> Result<(), ObserverEr
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::{Surface, frames::rotate_into};
+pub(super) mod tests {
+    use super::super::{Salient, SalientWinding, frames::rotate_into};
     use super::*;
     use approx::assert_relative_eq;
     use proptest::prelude::*;
 
-    const TS: f64 = 0.126e-3;
+    pub const TS: f64 = 0.126e-3;
     const P: Winding = Winding { rs: 0.4, ls: 4e-3, ke: 0.95 };
 
     /// The continuous equation in 2000 Runge-Kutta steps of one sample; global error below 1e-12 A.
-    fn fine(i: Currents, u: Drive, p: &Winding, held_in: HeldIn) -> Currents {
-        let (motor, n) = (Surface::new(4).unwrap(), 2000);
+    pub fn fine(i: Currents, u: Drive, p: &SalientWinding, held_in: HeldIn) -> Currents {
+        let (motor, n) = (Salient::new(4).unwrap(), 2000);
         let h = TS / n as f64;
         let f = |t: f64, i: Currents| {
             let turned = match held_in {
@@ -235,7 +193,8 @@ mod tests {
             let (i, u, p) = (Currents { id, iq }, Drive { ud, uq, w }, Winding { rs, ..P });
             for held_in in [HeldIn::Stationary, HeldIn::Rotor] {
                 let exact = ExactStep::new(4, TS, held_in).unwrap().advance(&i, &u, &p);
-                assert_relative_eq!(exact, fine(i, u, &p, held_in), epsilon = 1e-9);
+                let salient = SalientWinding { rs, ld: P.ls, lq: P.ls, ke: P.ke };
+                assert_relative_eq!(exact, fine(i, u, &salient, held_in), epsilon = 1e-9);
             }
         }
     }
@@ -250,23 +209,9 @@ mod tests {
     }
 
     #[test]
-    fn dead_time_is_a_voltage_lost() {
-        let step = ExactStep::new(4, TS, HeldIn::Stationary).unwrap();
-        let (i, theta) = (Currents { id: 3.0, iq: -8.0 }, 0.3);
-        let lost = dead_time(&i, 0.15, 4.0 * theta);
-        let p = FedWinding { rs: 0.4, ls: 4e-3, ke: 0.95, vdt: 2.0 };
-        let a =
-            ExactFed::new(step, 0.15).unwrap().next(0.0, &i, &AngledDrive { ud: 9.0, uq: 40.0, w: 60.0, theta }, &p);
-        let u = Drive { ud: 9.0 - 2.0 * lost.0, uq: 40.0 - 2.0 * lost.1, w: 60.0 };
-        assert_relative_eq!(a, step.advance(&i, &u, &P), max_relative = 1e-14);
-    }
-
-    #[test]
     fn what_makes_no_sense_is_refused() {
         assert_eq!(ExactStep::new(0, TS, HeldIn::Rotor).unwrap_err(), Error::NoPolePairs);
         let error = ExactStep::new(4, -1.0, HeldIn::Rotor).unwrap_err();
         assert_eq!(error.to_string(), "sample time is -1 s; it must be positive and finite");
-        let step = ExactStep::new(4, TS, HeldIn::Rotor).unwrap();
-        assert!(ExactFed::new(step, 0.0).is_err());
     }
 }

@@ -32,7 +32,7 @@ pub enum Inverter {
     /// As its mean over the sample: no ripple, and dead time as a voltage.
     #[default]
     Averaged,
-    /// By pulses of the direct voltage `vdc` (V, positive); see [`Bridge`](super::Bridge).
+    /// By pulses of the direct voltage `vdc` (V, positive); see [`SwitchingInverter`](super::SwitchingInverter).
     Switching {
         /// Direct voltage (V).
         vdc: f64,

@@ -1,7 +1,6 @@
 //! What a run of a drive leaves behind.
 
-use super::robot::TS;
-use super::{Currents, Drive, Motion, Surface};
+use super::{Currents, Drive, MachineState, Surface};
 use crate::experiment::Experiment;
 use crate::record::Time;
 use serde::{Deserialize, Serialize};
@@ -26,13 +25,15 @@ pub struct Row {
     /// Reference of the speed (rad/s).
     pub w_ref: f64,
     /// The plant's true motion.
-    pub truth: Motion,
+    pub truth: MachineState,
 }
 
 /// What a run of a drive left behind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Log {
-    /// One row per sample of [`TS`].
+    /// Sample time (s).
+    pub ts: f64,
+    /// One row per sample.
     pub rows: Vec<Row>,
     /// Samples in which the voltage was at its limit.
     pub voltage_limited: usize,
@@ -52,7 +53,7 @@ impl Log {
                 (Drive { ud: pair[0].ud, uq: pair[0].uq, w: pair[1].w }, Currents { id: pair[0].id, iq: pair[0].iq })
             })
             .unzip();
-        Experiment::new(model, Time::Uniform { start: 0.0, step: TS }, inputs, outputs)
+        Experiment::new(model, Time::Uniform { start: 0.0, step: self.ts }, inputs, outputs)
     }
 
     /// What kept the drive from doing as it was asked.

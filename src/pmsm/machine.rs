@@ -1,11 +1,12 @@
-use super::{Currents, Drive, Error, Mechanics, PolePairs, Salient, SalientWinding, Shaft, Turning};
+use super::{AngledDrive, Currents, Error, Load, MotorModel, PolePairs, Salient, Shaft, ShaftMotion};
 use crate::integrate::{axpy, combined};
-use crate::{Model, Scalar};
+use crate::{Kind, Model, Of, Scalar, Signals};
+use core::marker::PhantomData;
 use serde::{Deserialize, Serialize};
 
 crate::signals! {
     /// Everything that moves in a motor.
-    pub struct Motion {
+    pub struct MachineState {
         /// Current along the magnet flux, phase peak.
         id: "A",
         /// Current 90 electrical degrees ahead of it.
@@ -16,7 +17,7 @@ crate::signals! {
         theta: "rad",
     }
     /// What acts on a motor from outside.
-    pub struct Acting {
+    pub struct VoltageAndLoad {
         /// Voltage along the magnet flux, phase peak.
         ud: "V",
         /// Voltage 90 electrical degrees ahead of it.
@@ -24,17 +25,17 @@ crate::signals! {
         /// Load torque besides friction and gravity.
         tau_l: "N m",
     }
-    /// Parameters of a motor with its mechanics.
-    pub struct Rotor {
-        /// Phase resistance.
+    /// Parameters of a salient motor with its mechanics.
+    pub struct MachineParameters {
+        /// Phase resistance; must be positive.
         rs: "ohm",
-        /// Inductance along the magnet flux.
+        /// Inductance along the magnet flux; must be positive.
         ld: "H",
-        /// Inductance 90 electrical degrees ahead of it.
+        /// Inductance 90 electrical degrees ahead of it; must be positive.
         lq: "H",
         /// Line-to-line rms back-EMF per mechanical speed.
         ke: "V s/rad",
-        /// Inertia.
+        /// Inertia; must be positive.
         j: "kg m^2",
         /// Viscous friction.
         bv: "N m s",
@@ -45,59 +46,77 @@ crate::signals! {
     }
 }
 
-/// A motor that turns: the currents of [`Salient`] and the motion of [`Shaft`], coupled by EMF and torque.
+/// A motor that turns: the currents of a motor `M` and the motion of [`Shaft`], coupled by EMF and torque.
+///
+/// The parameters `P` hold those of `M` and of [`Load`], by name; unless said otherwise it is the [`Salient`] motor with
+/// [`MachineParameters`]. Any motor that is not in exact steps will do, one behind an inverter included.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Machine {
-    /// The electrical half.
-    pub winding: Salient,
-    /// The mechanical half.
-    pub shaft: Shaft,
+pub struct Machine<M = Salient, P = MachineParameters> {
+    motor: M,
+    shaft: Shaft,
+    #[serde(skip)]
+    parameters: PhantomData<fn() -> P>,
 }
 
 impl Machine {
-    /// A motor with this many pole pairs behind a gear; zero pole pairs or a gear that is not positive are errors.
+    /// A salient motor with this many pole pairs behind a gear; zero pole pairs or a gear that is not positive are errors.
     pub fn new(pole_pairs: u32, gear: f64) -> Result<Self, Error> {
-        Ok(Machine { winding: Salient::new(pole_pairs)?, shaft: Shaft::new(gear)? })
-    }
-
-    /// Its pole pairs.
-    pub const fn pole_pairs(&self) -> PolePairs {
-        self.winding.pole_pairs()
+        Ok(Machine::of(Salient::new(pole_pairs)?, Shaft::new(gear)?))
     }
 }
 
-impl Model for Machine {
-    type State = Motion;
-    type Input = Acting;
-    type Output = Motion;
-    type Parameters = Rotor;
+impl<M: MotorModel, P: Signals> Machine<M, P> {
+    /// This motor on this shaft.
+    pub const fn of(motor: M, shaft: Shaft) -> Self {
+        const { assert!(matches!(M::KIND, Kind::Continuous), "a motor in exact steps has its speed as an input") };
+        Machine { motor, shaft, parameters: PhantomData }
+    }
+
+    /// Its pole pairs.
+    pub fn pole_pairs(&self) -> PolePairs {
+        self.motor.pole_pairs()
+    }
+
+    /// Electromagnetic torque (N m).
+    #[inline]
+    pub fn torque<S: Scalar>(&self, x: &MachineState<S>, p: &Of<P, S>) -> S {
+        let currents = MachineState::part::<Currents, S>(*x);
+        self.motor.torque(&currents, x.theta, &P::part::<M::Parameters, S>(*p))
+    }
+}
+
+impl<M: MotorModel, P: Signals> Model for Machine<M, P> {
+    type State = MachineState;
+    type Input = VoltageAndLoad;
+    type Output = MachineState;
+    type Parameters = P;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, t: S, x: &Motion<S>, u: &Acting<S>, p: &Rotor<S>) -> Motion<S> {
-        let currents = Currents { id: x.id, iq: x.iq };
-        let winding = SalientWinding { rs: p.rs, ld: p.ld, lq: p.lq, ke: p.ke };
-        let di = self.winding.derivative(t, &currents, &Drive { ud: u.ud, uq: u.uq, w: x.w }, &winding);
-        let turning = Turning { w: x.w, theta: x.theta };
-        let mechanics = Mechanics { j: p.j, bv: p.bv, tc: p.tc, tg: p.tg, ke: p.ke };
-        let torque = self.winding.torque(&currents, &winding) - self.shaft.load(&turning, &mechanics) - u.tau_l;
-        Motion { id: di.id, iq: di.iq, w: torque / p.j, theta: x.w }
+    fn derivative<S: Scalar>(&self, t: S, x: &MachineState<S>, u: &VoltageAndLoad<S>, p: &Of<P, S>) -> MachineState<S> {
+        let currents = MachineState::part::<Currents, S>(*x);
+        let drive = AngledDrive { ud: u.ud, uq: u.uq, w: x.w, theta: x.theta };
+        let (drive, winding) = (AngledDrive::part::<M::Input, S>(drive), P::part::<M::Parameters, S>(*p));
+        let di = self.motor.derivative(t, &currents, &drive, &winding);
+        let (motion, load) = (MachineState::part::<ShaftMotion, S>(*x), P::part::<Load, S>(*p));
+        let turned = self.shaft.accelerated(self.torque(x, p) - u.tau_l, &motion, &load);
+        MachineState { id: di.id, iq: di.iq, w: turned.w, theta: turned.theta }
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, _u: &Acting<S>, _p: &Rotor<S>) -> Motion<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &MachineState<S>, _u: &VoltageAndLoad<S>, _p: &Of<P, S>) -> MachineState<S> {
         *x
     }
 }
 
 /// One step of the classical Runge-Kutta method (Kutta 1901) over `h` (s), for a slope that does not depend on time.
 #[inline]
-pub(super) fn runge_kutta(x: Motion, h: f64, f: impl Fn(&Motion) -> Motion) -> Motion {
-    let ahead = |h: f64, k: Motion| axpy::<Motion, f64>(x, h, k);
+pub(super) fn runge_kutta(x: MachineState, h: f64, f: impl Fn(&MachineState) -> MachineState) -> MachineState {
+    let ahead = |h: f64, k: MachineState| axpy::<MachineState, f64>(x, h, k);
     let k1 = f(&x);
     let k2 = f(&ahead(0.5 * h, k1));
     let k3 = f(&ahead(0.5 * h, k2));
     let k4 = f(&ahead(h, k3));
-    combined::<Motion, f64>(&x, h / 6.0, &[1.0, 2.0, 2.0, 1.0], &[k1, k2, k3, k4])
+    combined::<MachineState, f64>(&x, h / 6.0, &[1.0, 2.0, 2.0, 1.0], &[k1, k2, k3, k4])
 }
 
 #[cfg(test)]
@@ -112,8 +131,8 @@ mod tests {
         fn power_balances(id in -60.0..60.0, iq in -60.0..60.0, ud in -300.0..300.0, uq in -300.0..300.0,
                           w in -400.0..400.0, tau_l in -50.0..50.0) {
             let machine = Machine::new(4, 120.0).unwrap();
-            let p = Rotor { rs: 0.4, ld: 3.84e-3, lq: 4.16e-3, ke: 0.95, j: 0.012, bv: 4e-3, tc: 1.2, tg: 6.0 };
-            let (x, u) = (Motion { id, iq, w, theta: 1.0 }, Acting { ud, uq, tau_l });
+            let p = MachineParameters { rs: 0.4, ld: 3.84e-3, lq: 4.16e-3, ke: 0.95, j: 0.012, bv: 4e-3, tc: 1.2, tg: 6.0 };
+            let (x, u) = (MachineState { id, iq, w, theta: 1.0 }, VoltageAndLoad { ud, uq, tau_l });
             let dx = machine.derivative(0.0, &x, &u, &p);
             let field = 1.5 * (p.ld * id * dx.id + p.lq * iq * dx.iq);
             let copper = 1.5 * p.rs * (id * id + iq * iq);

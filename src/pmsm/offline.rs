@@ -13,12 +13,11 @@ mod validate;
 
 pub use equations::{Equations, WEAK, hardly_seen};
 pub use extended::{Extended, extended, search_i0};
-pub use mechanics::{Inertia, mechanics};
+pub use mechanics::mechanics;
 pub use plain::{Axes, Form, plain};
 pub use validate::{Validation, voltages};
 
 use super::drive::Log;
-use super::robot::TS;
 use super::{Currents, Drive, PolePairs};
 use crate::error::Error;
 use crate::experiment::Experiment;
@@ -83,7 +82,7 @@ impl Spans {
                 theta: 0.5 * (a.theta + b.theta),
             }
         });
-        Spans { ts: TS, pole_pairs, spans: spans.collect() }
+        Spans { ts: log.ts, pole_pairs, spans: spans.collect() }
     }
 
     /// The intervals of a record without angle, which is added up from the speed and starts at `theta` (rad, mechanical;

@@ -1,8 +1,9 @@
 use super::frames::{Stator, rotate_into, rotate_out_of};
 use super::inverter::DeadTime;
 use super::robot::Axis;
-use super::{COULOMB_WIDTH, Motion, SQRT_2_3, SQRT_3_2};
+use super::{COULOMB_WIDTH, Currents, Drive, MachineState, MotorModel, Salient, SalientWinding};
 use crate::integrate::axpy;
+use crate::model::Model;
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
@@ -28,44 +29,42 @@ pub struct Plant {
 impl Plant {
     /// Slope of the motion under a stationary voltage (V).
     #[inline]
-    pub fn derivative(&self, x: &Motion, u: Stator) -> Motion {
+    pub fn derivative(&self, x: &MachineState, u: Stator) -> MachineState {
         let a = &self.axis;
         let theta_e = a.pole_pairs.electrical(x.theta);
-        let we = a.pole_pairs.electrical(x.w);
         let (alpha, beta) = rotate_out_of((x.id, x.iq), theta_e);
         let lost = self.dead_time.lost(Stator { alpha, beta });
         let (ud, uq) = rotate_into((u.alpha - lost.alpha, u.beta - lost.beta), theta_e);
-        let ke = a.ke * (1.0 + self.emf_harmonic * Scalar::cos(6.0 * theta_e));
         let half = x.iq / (0.5 * a.i_max);
-        let ld = a.ls * (1.0 - self.saliency);
-        let lq = a.ls * (1.0 + self.saliency) * (1.0 - self.saturation * Scalar::min(half * half, 2.0));
-        let r = a.rs + a.r_cable;
-        let torque = SQRT_3_2 * ke * x.iq + 1.5 * a.pole_pairs.get() * (ld - lq) * x.id * x.iq;
+        let winding = SalientWinding {
+            rs: a.rs + a.r_cable,
+            ld: a.ls * (1.0 - self.saliency),
+            lq: a.ls * (1.0 + self.saliency) * (1.0 - self.saturation * Scalar::min(half * half, 2.0)),
+            ke: a.ke * (1.0 + self.emf_harmonic * Scalar::cos(6.0 * theta_e)),
+        };
+        let (motor, i) = (Salient::with(a.pole_pairs), Currents { id: x.id, iq: x.iq });
+        let slope = motor.derivative(0.0, &i, &Drive { ud, uq, w: x.w }, &winding);
+        let torque = motor.torque(&i, x.theta, &winding);
         let load = a.tc * Scalar::tanh(x.w / COULOMB_WIDTH)
             + a.bv * x.w
             + a.tg * Scalar::cos(x.theta / a.gear)
             + a.cogging * Scalar::sin(24.0 * x.theta);
-        Motion {
-            id: (ud - r * x.id + we * lq * x.iq) / ld,
-            iq: (uq - r * x.iq - we * ld * x.id - SQRT_2_3 * ke * x.w) / lq,
-            w: (torque - load) / a.j,
-            theta: x.w,
-        }
+        MachineState { id: slope.id, iq: slope.iq, w: (torque - load) / a.j, theta: x.w }
     }
 
     /// Electromagnetic torque (N m).
-    pub fn torque(&self, x: &Motion) -> f64 {
+    pub fn torque(&self, x: &MachineState) -> f64 {
         let free = Plant { axis: Axis { tc: 0.0, bv: 0.0, tg: 0.0, cogging: 0.0, ..self.axis }, ..*self };
         self.axis.j * free.derivative(x, Stator::default()).w
     }
 
     /// The motion after `ts` (s) under a stationary voltage, by midpoint steps (second-order Runge-Kutta).
     #[inline]
-    pub fn advance(&self, mut x: Motion, u: Stator, ts: f64, substeps: u32) -> Motion {
+    pub fn advance(&self, mut x: MachineState, u: Stator, ts: f64, substeps: u32) -> MachineState {
         let h = ts / substeps as f64;
         for _ in 0..substeps {
-            let middle = axpy::<Motion, f64>(x, 0.5 * h, self.derivative(&x, u));
-            x = axpy::<Motion, f64>(x, h, self.derivative(&middle, u));
+            let middle = axpy::<MachineState, f64>(x, 0.5 * h, self.derivative(&x, u));
+            x = axpy::<MachineState, f64>(x, h, self.derivative(&middle, u));
         }
         x
     }

@@ -2,17 +2,19 @@
 
 use super::Error;
 use super::control::Target;
-use super::robot::{Axis, TS};
+use super::robot::Axis;
 use core::f64::consts::PI;
 use core::ops::Range;
 
-/// Samples over which a reference is smoothed: 20 ms.
-const SMOOTHING: usize = 158;
+/// Time (s) over which a reference is smoothed, to a whole number of samples.
+const SMOOTHING: f64 = 0.02;
 
 /// A speed reference with its operating cycles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Program {
-    /// Speed and acceleration asked for, one per sample of [`TS`].
+    /// Sample time (s).
+    pub ts: f64,
+    /// Speed and acceleration asked for, one per sample.
     pub targets: Vec<Target>,
     /// The operating cycles that the record is to be cut into.
     pub cycles: Vec<Cycle>,
@@ -28,23 +30,29 @@ pub struct Cycle {
 }
 
 /// Puts speeds together, then smooths them.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 struct Composer {
+    ts: f64,
     speeds: Vec<f64>,
     cycles: Vec<Cycle>,
 }
 
 impl Composer {
+    fn new(axis: &Axis) -> Result<Self, Error> {
+        let ts = Error::positive("sample time", axis.ts, "s")?;
+        Ok(Composer { ts, speeds: Vec::new(), cycles: Vec::new() })
+    }
+
     fn rest(&mut self, seconds: f64) -> &mut Self {
-        self.speeds.resize(self.speeds.len() + (seconds / TS) as usize, 0.0);
+        self.speeds.resize(self.speeds.len() + (seconds / self.ts) as usize, 0.0);
         self
     }
 
     /// Up to `v` (rad/s) at `a` (rad/s^2), `cruise` seconds there, and down again.
     fn trap(&mut self, v: f64, a: f64, cruise: f64) -> &mut Self {
-        let ramp = ((v.abs() / a / TS) as usize).max(4);
+        let ramp = ((v.abs() / a / self.ts) as usize).max(4);
         self.speeds.extend((0..ramp).map(|k| v * k as f64 / ramp as f64));
-        self.speeds.resize(self.speeds.len() + (cruise / TS) as usize, v);
+        self.speeds.resize(self.speeds.len() + (cruise / self.ts) as usize, v);
         self.speeds.extend((0..ramp).map(|k| v * (1.0 - k as f64 / ramp as f64)));
         self
     }
@@ -56,15 +64,15 @@ impl Composer {
     }
 
     fn finish(self) -> Program {
-        let speeds = moving_average(&self.speeds, SMOOTHING);
+        let speeds = moving_average(&self.speeds, (SMOOTHING / self.ts) as usize);
         let at = |k: usize| speeds.get(k).copied().unwrap_or(0.0);
         let targets = (0..speeds.len())
             .map(|k| {
                 let before = if k == 0 { at(0) } else { at(k - 1) };
-                Target { w: at(k), a: (at(k + 1) - before) / (2.0 * TS) }
+                Target { w: at(k), a: (at(k + 1) - before) / (2.0 * self.ts) }
             })
             .collect();
-        Program { targets, cycles: self.cycles }
+        Program { ts: self.ts, targets, cycles: self.cycles }
     }
 }
 
@@ -86,7 +94,7 @@ impl Program {
     /// at `share` of its largest acceleration.
     pub fn speed_cycles(axis: &Axis, count: usize, share: f64) -> Result<Program, Error> {
         let a = Error::positive("acceleration", share * axis.a_max, "rad/s^2")?;
-        let mut composer = Composer::default();
+        let mut composer = Composer::new(axis)?;
         for k in 0..count {
             let v = 15.0 + (axis.w_max - 15.0) * k as f64 / (count.max(2) - 1) as f64;
             composer.cycle(v, |c| {
@@ -100,7 +108,7 @@ impl Program {
     pub fn material_handling(axis: &Axis, repeats: usize) -> Result<Program, Error> {
         let a = Error::positive("acceleration", axis.a_max, "rad/s^2")?;
         let v = 0.85 * axis.w_max;
-        let mut composer = Composer::default();
+        let mut composer = Composer::new(axis)?;
         for _ in 0..repeats {
             composer.cycle(v, |c| {
                 for s in [1.0, -1.0] {
@@ -115,12 +123,13 @@ impl Program {
     /// Experiment 6, water cutting: slow contours, then short moves; the same speeds on every axis.
     pub fn water_cutting(axis: &Axis, repeats: usize) -> Result<Program, Error> {
         let a = Error::positive("acceleration", axis.a_max, "rad/s^2")?;
-        let mut composer = Composer::default();
+        let mut composer = Composer::new(axis)?;
         for _ in 0..repeats {
             composer.cycle(85.0, |c| {
+                let ts = c.ts;
                 c.rest(0.3);
-                c.speeds.extend((0..(4.0 / TS) as usize).map(|k| {
-                    let t = k as f64 * TS;
+                c.speeds.extend((0..(4.0 / ts) as usize).map(|k| {
+                    let t = k as f64 * ts;
                     let contour = 22.0 * (2.0 * PI * 0.5 * t).sin() * (2.0 * t).min(1.0);
                     contour + 8.0 * (2.0 * PI * 1.5 * t).sin()
                 }));
@@ -133,7 +142,7 @@ impl Program {
 
     /// Its length (s).
     pub fn duration(&self) -> f64 {
-        self.targets.len() as f64 * TS
+        self.targets.len() as f64 * self.ts
     }
 }
 
@@ -152,7 +161,7 @@ mod tests {
             assert!((top - cycle.speed).abs() < 1e-9, "{top} {}", cycle.speed);
         }
         // What is asked for comes back to where it began: forth and back are equal.
-        let sum: f64 = program.targets.iter().map(|t| t.w * TS).sum();
+        let sum: f64 = program.targets.iter().map(|t| t.w * program.ts).sum();
         assert!(sum.abs() < 1e-9, "{sum}");
         // The acceleration is within the limit, but for ramps rounded down to whole samples: the shortest has 132.
         let most = program.targets.iter().map(|t| t.a.abs()).fold(0.0, f64::max);
@@ -163,8 +172,8 @@ mod tests {
     fn smoothing_keeps_the_sum() {
         let mut values = vec![0.0; 400];
         values[200] = 1.0;
-        let smooth = moving_average(&values, SMOOTHING);
+        let smooth = moving_average(&values, 158);
         assert!((smooth.iter().sum::<f64>() - 1.0).abs() < 1e-12);
-        assert_eq!(smooth.iter().filter(|v| **v > 0.0).count(), SMOOTHING);
+        assert_eq!(smooth.iter().filter(|v| **v > 0.0).count(), 158);
     }
 }

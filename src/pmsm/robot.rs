@@ -37,6 +37,8 @@ pub struct Axis {
     pub gear: f64,
     /// Cogging torque, 24 periods per revolution (N m, peak).
     pub cogging: f64,
+    /// Sample time of the drive (s).
+    pub ts: f64,
 }
 
 /// Sample time of the reference drive (s).
@@ -74,7 +76,7 @@ impl Axis {
         };
         let [rs, l_mh, ke, j, w_max, a_max, tg, r_cable, i_max, tc, bv, gear, cogging] = row;
         let ls = l_mh / 1000.0;
-        Ok(Axis { number, pole_pairs, rs, ls, ke, j, w_max, a_max, tg, r_cable, i_max, tc, bv, gear, cogging })
+        Ok(Axis { number, pole_pairs, rs, ls, ke, j, w_max, a_max, tg, r_cable, i_max, tc, bv, gear, cogging, ts: TS })
     }
 
     /// Torque per ampere of peak iq (N m/A).
@@ -96,6 +98,7 @@ impl Axis {
             ("inertia", self.j, "kg m^2"),
             ("current limit", self.i_max, "A"),
             ("gear ratio", self.gear, "turns"),
+            ("sample time", self.ts, "s"),
         ] {
             Error::positive(quantity, value, unit)?;
         }

@@ -1,15 +1,15 @@
-use super::{Currents, Drive, Error, PolePairs, SQRT_2_3, SQRT_3_2};
+use super::{Currents, Drive, Error, MotorModel, PolePairs, SQRT_2_3, SQRT_3_2};
 use crate::{Model, Scalar};
 use serde::{Deserialize, Serialize};
 
 crate::signals! {
     /// Parameters of a motor whose inductance differs between the axes.
     pub struct SalientWinding {
-        /// Phase resistance.
+        /// Phase resistance; must be positive.
         rs: "ohm",
-        /// Inductance along the magnet flux.
+        /// Inductance along the magnet flux; must be positive.
         ld: "H",
-        /// Inductance 90 electrical degrees ahead of it.
+        /// Inductance 90 electrical degrees ahead of it; must be positive.
         lq: "H",
         /// Line-to-line rms back-EMF per mechanical speed.
         ke: "V s/rad",
@@ -36,14 +36,20 @@ impl Salient {
         }
     }
 
-    /// Its pole pairs.
-    pub const fn pole_pairs(&self) -> PolePairs {
+    /// A motor with these pole pairs.
+    pub const fn with(pole_pairs: PolePairs) -> Self {
+        Salient { pole_pairs }
+    }
+}
+
+impl MotorModel for Salient {
+    fn pole_pairs(&self) -> PolePairs {
         self.pole_pairs
     }
 
-    /// Electromagnetic torque (N m): `kt iq + 3/2 np (ld - lq) id iq`.
+    /// `kt iq + 3/2 np (ld - lq) id iq` (N m).
     #[inline]
-    pub fn torque<S: Scalar>(&self, x: &Currents<S>, p: &SalientWinding<S>) -> S {
+    fn torque<S: Scalar>(&self, x: &Currents<S>, _theta: S, p: &SalientWinding<S>) -> S {
         (p.ke * SQRT_3_2 + (p.ld - p.lq) * x.id * (1.5 * self.pole_pairs.get())) * x.iq
     }
 }

@@ -1,21 +1,21 @@
-use super::{Currents, Drive, Error, PolePairs, SQRT_2_3};
+use super::{Currents, Drive, Error, MotorModel, PolePairs, units};
 use crate::{Model, Scalar};
 use serde::{Deserialize, Serialize};
 
 crate::signals! {
     /// Parameters of a motor whose q axis saturates.
     pub struct SaturatedWinding {
-        /// Phase resistance.
+        /// Phase resistance; must be positive.
         rs: "ohm",
-        /// Inductance along the magnet flux.
+        /// Inductance along the magnet flux; must be positive.
         ld: "H",
-        /// Inductance of the q axis at small currents.
+        /// Inductance of the q axis at small currents; must be positive.
         lq: "H",
-        /// Incremental inductance of the q axis at large currents.
+        /// Incremental inductance of the q axis at large currents; must be positive.
         lq_saturated: "H",
         /// What one ampere of id takes from or adds to the part of lq that saturates.
         lq_cross: "H/A",
-        /// Current around which the q axis saturates, positive.
+        /// Current around which the q axis saturates; must be positive.
         i_saturation: "A",
         /// Line-to-line rms back-EMF per mechanical speed.
         ke: "V s/rad",
@@ -53,7 +53,7 @@ impl Saturated {
     pub fn flux<S: Scalar>(&self, x: &Currents<S>, p: &SaturatedWinding<S>) -> (S, S) {
         let z = x.iq / p.i_saturation;
         let r = (z * z + 1.0).sqrt();
-        let psi_m = p.ke * SQRT_2_3 / self.pole_pairs.get();
+        let psi_m = units::psi_m_from_ke(p.ke, self.pole_pairs);
         let saturating = p.lq - p.lq_saturated + p.lq_cross * x.id;
         (
             psi_m + p.ld * x.id + p.lq_cross * p.i_saturation * p.i_saturation * (r - 1.0),
@@ -69,10 +69,16 @@ impl Saturated {
         let saturating = p.lq - p.lq_saturated + p.lq_cross * x.id;
         (p.ld, p.lq_cross * x.iq / r, p.lq_saturated + saturating / (r * r * r))
     }
+}
 
-    /// Electromagnetic torque (N m): `3/2 np (psi_d iq - psi_q id)`.
+impl MotorModel for Saturated {
+    fn pole_pairs(&self) -> PolePairs {
+        self.pole_pairs
+    }
+
+    /// `3/2 np (psi_d iq - psi_q id)` (N m).
     #[inline]
-    pub fn torque<S: Scalar>(&self, x: &Currents<S>, p: &SaturatedWinding<S>) -> S {
+    fn torque<S: Scalar>(&self, x: &Currents<S>, _theta: S, p: &SaturatedWinding<S>) -> S {
         let (psi_d, psi_q) = self.flux(x, p);
         (psi_d * x.iq - psi_q * x.id) * (1.5 * self.pole_pairs.get())
     }
@@ -144,7 +150,7 @@ mod tests {
             let (dpsi_d, dpsi_q) = (ldd * dx.id + ldq * dx.iq, ldq * dx.id + lqq * dx.iq);
             let field = 1.5 * (id * dpsi_d + iq * dpsi_q);
             let copper = 1.5 * P.rs * (id * id + iq * iq);
-            let mechanical = model.torque(&x, &P) * w;
+            let mechanical = model.torque(&x, 0.0, &P) * w;
             let electrical = 1.5 * (ud * id + uq * iq);
             prop_assert!((electrical - copper - mechanical - field).abs() < 1e-9 * (1.0 + electrical.abs() + field.abs()));
         }
@@ -159,7 +165,7 @@ mod tests {
             let salient = Salient::new(4).unwrap();
             let b = salient.derivative(0.0, &x, &u, &q);
             approx::assert_relative_eq!(a, b, epsilon = 1e-7, max_relative = 1e-11);
-            let torque = (Saturated::new(4).unwrap().torque(&x, &p), salient.torque(&x, &q));
+            let torque = (Saturated::new(4).unwrap().torque(&x, 0.0, &p), salient.torque(&x, 0.0, &q));
             approx::assert_relative_eq!(torque.0, torque.1, epsilon = 1e-11, max_relative = 1e-11);
         }
     }

@@ -1,10 +1,10 @@
-use super::{Error, SQRT_3_2};
-use crate::{Model, Scalar};
+use super::{Error, units};
+use crate::{Model, Scalar, Signals};
 use serde::{Deserialize, Serialize};
 
 crate::signals! {
     /// Motion of the rotor.
-    pub struct Turning {
+    pub struct ShaftMotion {
         /// Mechanical speed.
         w: "rad/s",
         /// Mechanical angle, not wrapped.
@@ -15,9 +15,20 @@ crate::signals! {
         /// Current that makes torque, phase peak.
         iq: "A",
     }
+    /// What the load of a rotor is made of, seen from the motor's side of the gear.
+    pub struct Load {
+        /// Inertia; must be positive.
+        j: "kg m^2",
+        /// Viscous friction.
+        bv: "N m s",
+        /// Coulomb friction.
+        tc: "N m",
+        /// Gravity's torque where the arm is level.
+        tg: "N m",
+    }
     /// Parameters of the mechanics, seen from the motor's side of the gear.
     pub struct Mechanics {
-        /// Inertia.
+        /// Inertia; must be positive.
         j: "kg m^2",
         /// Viscous friction.
         bv: "N m s",
@@ -59,24 +70,30 @@ impl Shaft {
 
     /// Torque (N m) that the load takes at this motion.
     #[inline]
-    pub fn load<S: Scalar>(&self, x: &Turning<S>, p: &Mechanics<S>) -> S {
+    pub fn load<S: Scalar>(&self, x: &ShaftMotion<S>, p: &Load<S>) -> S {
         p.tc * (x.w / COULOMB_WIDTH).tanh() + p.bv * x.w + p.tg * (x.theta / self.gear).cos()
+    }
+
+    /// Slope of the motion under a torque (N m) of the motor.
+    #[inline]
+    pub fn accelerated<S: Scalar>(&self, torque: S, x: &ShaftMotion<S>, p: &Load<S>) -> ShaftMotion<S> {
+        ShaftMotion { w: (torque - self.load(x, p)) / p.j, theta: x.w }
     }
 }
 
 impl Model for Shaft {
-    type State = Turning;
+    type State = ShaftMotion;
     type Input = Torque;
-    type Output = Turning;
+    type Output = ShaftMotion;
     type Parameters = Mechanics;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: S, x: &Turning<S>, u: &Torque<S>, p: &Mechanics<S>) -> Turning<S> {
-        Turning { w: (p.ke * u.iq * SQRT_3_2 - self.load(x, p)) / p.j, theta: x.w }
+    fn derivative<S: Scalar>(&self, _t: S, x: &ShaftMotion<S>, u: &Torque<S>, p: &Mechanics<S>) -> ShaftMotion<S> {
+        self.accelerated(units::kt_from_ke(p.ke) * u.iq, x, &Mechanics::part::<Load, S>(*p))
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: S, x: &Turning<S>, _u: &Torque<S>, _p: &Mechanics<S>) -> Turning<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &ShaftMotion<S>, _u: &Torque<S>, _p: &Mechanics<S>) -> ShaftMotion<S> {
         *x
     }
 }

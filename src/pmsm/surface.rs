@@ -1,4 +1,4 @@
-use super::{Currents, Drive, Error, PolePairs, SQRT_2_3, Winding};
+use super::{Currents, Drive, Error, MotorModel, PolePairs, SQRT_2_3, Winding, units};
 use crate::{Model, Scalar};
 use serde::{Deserialize, Serialize};
 
@@ -22,10 +22,17 @@ impl Surface {
             Err(error) => Err(error),
         }
     }
+}
 
-    /// Its pole pairs.
-    pub const fn pole_pairs(&self) -> PolePairs {
+impl MotorModel for Surface {
+    fn pole_pairs(&self) -> PolePairs {
         self.pole_pairs
+    }
+
+    /// `kt iq` (N m).
+    #[inline]
+    fn torque<S: Scalar>(&self, x: &Currents<S>, _theta: S, p: &Winding<S>) -> S {
+        units::kt_from_ke(p.ke) * x.iq
     }
 }
 

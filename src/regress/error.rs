@@ -98,12 +98,18 @@ pub(super) fn identifiable<P: Signals>(information: &Information) -> Result<f64,
     if null.is_empty() {
         return Ok(spectrum.condition());
     }
-    let directions = echelon(null.to_vec()).into_iter().map(|(pivot, vector)| {
+    let names = |i: usize| P::NAMES[i];
+    Err(RegressionError::NotIdentifiable { directions: directions(null.to_vec(), &scales, names) })
+}
+
+/// Directions from vectors of unknowns that are scaled by `scales`.
+pub(super) fn directions(null: Vec<Vec<f64>>, scales: &[f64], name: impl Fn(usize) -> &'static str) -> Vec<Direction> {
+    let direction = |(pivot, vector): (usize, Vec<f64>)| {
         let change = |i: usize| vector[i] * scales[i] / scales[pivot];
         let others = (0..vector.len()).filter(|&i| i != pivot && vector[i].abs() > PART);
-        Direction { changes: [pivot].into_iter().chain(others).map(|i| (P::NAMES[i], change(i))).collect() }
-    });
-    Err(RegressionError::NotIdentifiable { directions: directions.collect() })
+        Direction { changes: [pivot].into_iter().chain(others).map(|i| (name(i), change(i))).collect() }
+    };
+    echelon(null).into_iter().map(direction).collect()
 }
 
 /// The same space spanned by vectors that each have a pivot entry of one, where all others are zero: it separates what

@@ -2,7 +2,7 @@
 
 use crate::tables::{Coil, Flux, Mapped, Volts};
 use greybox::engine::Differentiated;
-use greybox::pmsm::{Acting, Machine, Motion, Rotor};
+use greybox::pmsm::{Machine, MachineParameters, MachineState, VoltageAndLoad};
 use greybox::{
     Dual, Equations, Esdirk, Extrapolation, Hold, Integrator, Interpolation, Interval, Model, ModelSystem, Of, Rk4,
     Rk45, Scalar, Signals, signals,
@@ -79,9 +79,9 @@ fn adaptive_methods_run_on_compiled_right_hand_sides() {
     agrees(&Stiff, &Esdirk::default(), x, p, u, 0.05);
     agrees(&Stiff, &Rk45::default(), x, p, u, 0.05);
     agrees(&Stiff, &Rk4 { substeps: 30 }, x, p, u, 0.05);
-    let rotor = Rotor { rs: 0.63, ld: 4e-3, lq: 5e-3, ke: 0.95, j: 0.012, bv: 4e-3, tc: 1.2, tg: 1.0 };
-    let (machine, acting) = (Machine::new(4, 100.0).unwrap(), Acting { ud: 5.0, uq: 40.0, tau_l: 0.1 });
-    agrees(&machine, &Rk45::default(), Motion::from([1.0, -2.0, 3.0, 0.1]), rotor, acting, 1e-3);
+    let rotor = MachineParameters { rs: 0.63, ld: 4e-3, lq: 5e-3, ke: 0.95, j: 0.012, bv: 4e-3, tc: 1.2, tg: 1.0 };
+    let (machine, acting) = (Machine::new(4, 100.0).unwrap(), VoltageAndLoad { ud: 5.0, uq: 40.0, tau_l: 0.1 });
+    agrees(&machine, &Rk45::default(), MachineState::from([1.0, -2.0, 3.0, 0.1]), rotor, acting, 1e-3);
     let mapped = Mapped::new(Interpolation::Smooth, Extrapolation::Linear);
     agrees(&mapped, &Esdirk::default(), Flux { d: 0.3, q: 0.6 }, Coil { r: 1.0, scale: 0.9 }, Volts { u: 2.0 }, 0.02);
 }

@@ -5,10 +5,18 @@ use crate::tables::Mapped;
 use greybox::engine::{Column, Program, Sampling};
 use greybox::graph::Seed;
 use greybox::models::{Armature, DcMotor, Feed, Rotation};
-use greybox::pmsm::{AngledDrive, Currents, Fed, Line, Saturated, SaturatedWinding};
+use greybox::pmsm::{AngledDrive, Cabled, Currents, InverterFed, Misaligned, Salient, Saturated, SaturatedWinding};
 use greybox::{
     Dual, Equations, Extrapolation, Hold, Interpolation, Interval, Model, ModelSystem, Of, Recurrence, Rk4, Signals,
+    signals,
 };
+
+signals! {
+    /// A salient motor behind cable and inverter, and how its record is aligned.
+    pub struct Line {
+        rs: "ohm", r_cable: "ohm", ld: "H", lq: "H", ke: "V s/rad", vdt: "V", i0: "A", tau: "s", delta: "rad",
+    }
+}
 
 type Second = Dual<1, Dual<1>>;
 
@@ -93,7 +101,15 @@ fn second_derivatives_are_those_of_duals_of_duals() {
     agrees(&Saturated::new(4).unwrap(), i, saturated, greybox::pmsm::Drive { ud: 20.0, uq: 40.0, w: 100.0 }, 1e-4);
     let line =
         Line { rs: 0.4, r_cable: 0.23, ld: 3.8e-3, lq: 4.2e-3, ke: 0.95, vdt: 2.0, i0: 5.0, tau: 1e-5, delta: 0.01 };
-    agrees(&Fed::new(4).unwrap(), i, line, AngledDrive { ud: 20.0, uq: 40.0, w: 100.0, theta: 2.0 }, 1e-4);
+    agrees(
+        &Misaligned::<InverterFed<Cabled<Salient, Line>, Line>, Line>::new(InverterFed::new(Cabled::new(
+            Salient::new(4).unwrap(),
+        ))),
+        i,
+        line,
+        AngledDrive { ud: 20.0, uq: 40.0, w: 100.0, theta: 2.0 },
+        1e-4,
+    );
     let armature = Armature { r: 1.0, l: 1e-3, k: 0.05, j: 1e-4, b: 1e-5 };
     agrees(&DcMotor, Rotation::from([0.5, 10.0]), armature, Feed { u: 24.0, tau_l: 0.1 }, 1e-4);
     let mapped = Mapped::new(Interpolation::Smooth, Extrapolation::Linear);

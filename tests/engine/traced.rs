@@ -3,12 +3,13 @@
 use crate::steps::agrees;
 use greybox::graph::{Function, Graph, Leaf, Symbol};
 use greybox::models::{
-    Armature, Axis, Command, DcMotor, Feed, GuidedMotion, Motion, Positioning, PositioningLoop, Reference, Rotation,
+    Armature, Axis, Command, DcMotor, Feed, ControlledAxisMotion, AxisMotion, Positioning, PositioningLoop, Reference, Rotation,
 };
 use greybox::pmsm::{
-    Acting, AngledDrive, CompensatedDrive, CompensatedWinding, Currents, Drive, ExactCompensated, ExactFed, ExactStep,
-    ExactSurface, Fed, FedWinding, HeldIn, Line, Machine, Mechanics, Rotor, Salient, SalientWinding, Saturated,
-    SaturatedWinding, Shaft, Surface, Torque, Turning, Winding,
+    AngledDrive, Cabled, Compensated, CompensatedDrive, CompensatedSalientWinding, CompensatedWinding, Currents, Drive,
+    EmfHarmonic, ExactSalient, ExactStep, ExactSurface, FluxLinkage, FluxWinding, HeldIn, InverterFed,
+    InverterFedWinding, Machine, MachineParameters, MachineState, Mechanics, Misaligned, Salient, SalientWinding,
+    Saturated, SaturatedWinding, Shaft, ShaftMotion, Surface, Torque, VoltageAndLoad, Winding,
 };
 use greybox::{Automatic, Equations, Hold, Kind, Model, Nothing, Rk4, Scalar, Signals, signals};
 
@@ -16,6 +17,13 @@ signals! {
     pub struct Pair { a: "1", b: "1" }
     pub struct Push { u: "1" }
     pub struct Gains { k: "1", d: "1" }
+}
+
+signals! {
+    /// A salient motor behind cable and inverter, and how its record is aligned.
+    pub struct Line {
+        rs: "ohm", r_cable: "ohm", ld: "H", lq: "H", ke: "V s/rad", vdt: "V", i0: "A", tau: "s", delta: "rad",
+    }
 }
 
 fn swing<U: Signals>(amplitudes: U::Of<f64>, n: usize) -> Vec<U::Of<f64>> {
@@ -98,7 +106,6 @@ fn shipped_models_run_on_lanes() {
     let rk4 = Rk4::default();
     let drive = swing::<Drive>(Drive { ud: 20.0, uq: 40.0, w: 100.0 }, 60);
     let i = Currents { id: 1.0, iq: -2.0 };
-    let pole_pairs = 4;
     let winding = Winding { rs: 0.63, ls: 4e-3, ke: 0.95 };
     agrees::<_, _, 5>(&Surface::new(4).unwrap(), &rk4, Hold::Zero, i, winding, &drive, 1e-4);
     let salient = SalientWinding { rs: 0.63, ld: 4e-3, lq: 5e-3, ke: 0.95 };
@@ -113,22 +120,32 @@ fn shipped_models_run_on_lanes() {
         ke: 0.95,
     };
     agrees::<_, _, 9>(&Saturated::new(4).unwrap(), &rk4, Hold::Zero, i, saturated, &drive, 1e-4);
-    let rotor = Rotor { rs: 0.63, ld: 4e-3, lq: 5e-3, ke: 0.95, j: 0.012, bv: 4e-3, tc: 1.2, tg: 1.0 };
-    let acting = swing::<Acting>(Acting { ud: 5.0, uq: 40.0, tau_l: 0.1 }, 60);
+    let rotor = MachineParameters { rs: 0.63, ld: 4e-3, lq: 5e-3, ke: 0.95, j: 0.012, bv: 4e-3, tc: 1.2, tg: 1.0 };
+    let acting = swing::<VoltageAndLoad>(VoltageAndLoad { ud: 5.0, uq: 40.0, tau_l: 0.1 }, 60);
     let machine = Machine::new(4, 100.0).unwrap();
-    let motion = greybox::pmsm::Motion::from([1.0, -2.0, 3.0, 0.1]);
+    let motion = MachineState::from([1.0, -2.0, 3.0, 0.1]);
     agrees::<_, _, 12>(&machine, &rk4, Hold::Zero, motion, rotor, &acting, 1e-4);
     let line =
         Line { rs: 0.4, r_cable: 0.23, ld: 3.8e-3, lq: 4.2e-3, ke: 0.95, vdt: 2.0, i0: 0.15, tau: 1e-5, delta: 0.01 };
     let angled = swing::<AngledDrive>(AngledDrive { ud: 20.0, uq: 40.0, w: 100.0, theta: 2.0 }, 60);
-    agrees::<_, _, 11>(&Fed::new(pole_pairs).unwrap(), &rk4, Hold::Zero, i, line, &angled, 1e-4);
+    agrees::<_, _, 11>(
+        &Misaligned::<InverterFed<Cabled<Salient, Line>, Line>, Line>::new(InverterFed::new(Cabled::new(
+            Salient::new(4).unwrap(),
+        ))),
+        &rk4,
+        Hold::Zero,
+        i,
+        line,
+        &angled,
+        1e-4,
+    );
     let shaft = Shaft::new(100.0).unwrap();
     let torque = swing::<Torque>(Torque::from([3.0]), 60);
     agrees::<_, _, 7>(
         &shaft,
         &rk4,
         Hold::Zero,
-        Turning::from([0.1, 2.0]),
+        ShaftMotion::from([0.1, 2.0]),
         Mechanics::from([0.01, 4e-3, 1.2, 1.0, 0.5]),
         &torque,
         1e-3,
@@ -137,20 +154,45 @@ fn shipped_models_run_on_lanes() {
         let step = ExactStep::new(4, 1e-4, held).unwrap();
         let exact = ExactSurface(step);
         agrees::<_, _, 5>(&exact, &Automatic::default(), Hold::Zero, i, winding, &drive, 1e-4);
-        let lost = swing::<CompensatedDrive>(CompensatedDrive::from([20.0, 40.0, 100.0, 0.9, -0.4]), 60);
+        let lost = swing::<CompensatedDrive>(CompensatedDrive::from([20.0, 40.0, 100.0, 2.0, 0.9, -0.4]), 60);
         let p = CompensatedWinding::from([0.63, 4e-3, 0.95, 2.0]);
-        agrees::<_, _, 6>(&ExactCompensated(step), &Automatic::default(), Hold::Zero, i, p, &lost, 1e-4);
-        let p = FedWinding::from([0.63, 4e-3, 0.95, 2.0]);
-        agrees::<_, _, 6>(&ExactFed::new(step, 0.15).unwrap(), &Automatic::default(), Hold::Zero, i, p, &angled, 1e-4);
+        agrees::<_, _, 6>(
+            &Compensated::<_, CompensatedWinding>::new(ExactSurface(step)),
+            &Automatic::default(),
+            Hold::Zero,
+            i,
+            p,
+            &lost,
+            1e-4,
+        );
+        let p = InverterFedWinding::from([0.63, 4e-3, 0.95, 2.0, 0.15]);
+        agrees::<_, _, 7>(
+            &InverterFed::<_, InverterFedWinding>::new(ExactSurface(step)),
+            &Automatic::default(),
+            Hold::Zero,
+            i,
+            p,
+            &angled,
+            1e-4,
+        );
     }
+    let flux = FluxLinkage::<_, FluxWinding>::new(Surface::new(4).unwrap());
+    agrees::<_, _, 5>(&flux, &rk4, Hold::Zero, i, FluxWinding { rs: 0.63, ls: 4e-3, psi_m: 0.19 }, &drive, 1e-4);
+    let motor = ExactSalient(ExactStep::new(4, 1e-4, HeldIn::Stationary).unwrap());
+    agrees::<_, _, 6>(&motor, &Automatic::default(), Hold::Zero, i, salient, &drive, 1e-4);
+    let harmonic = EmfHarmonic::<_, CompensatedSalientWinding>::new(motor);
+    let compensated = Compensated::<_, CompensatedSalientWinding>::new(harmonic);
+    let lost = swing::<CompensatedDrive>(CompensatedDrive::from([20.0, 40.0, 100.0, 2.0, 0.9, -0.4]), 60);
+    let p = CompensatedSalientWinding::from([0.63, 4e-3, 5e-3, 0.95, 0.01, 2.0]);
+    agrees::<_, _, 8>(&compensated, &Automatic::default(), Hold::Zero, i, p, &lost, 1e-4);
     let feed = swing::<Feed>(Feed { u: 24.0, tau_l: 0.1 }, 60);
     let armature = Armature { r: 1.0, l: 1e-3, k: 0.05, j: 1e-4, b: 1e-5 };
     agrees::<_, _, 7>(&DcMotor, &rk4, Hold::Zero, Rotation::from([0.5, 10.0]), armature, &feed, 1e-4);
     let axis = Axis { m: 95.0, fv: 200.0, fc: 20.0, offset: -3.0 };
     let command = swing::<Command>(Command { vir: 2.0 }, 60);
-    agrees::<_, _, 6>(&Positioning::EMPS, &rk4, Hold::Zero, Motion { q: 0.1, v: 0.0 }, axis, &command, 1e-3);
+    agrees::<_, _, 6>(&Positioning::EMPS, &rk4, Hold::Zero, AxisMotion { q: 0.1, v: 0.0 }, axis, &command, 1e-3);
     let reference = swing::<Reference>(Reference { qg: 0.1 }, 60);
-    let start = GuidedMotion { q: 0.1, v: 0.0, vm: 0.0 };
+    let start = ControlledAxisMotion { q: 0.1, v: 0.0, vm: 0.0 };
     agrees::<_, _, 7>(&PositioningLoop::EMPS, &rk4, Hold::First, start, axis, &reference, 1e-3);
 }
 

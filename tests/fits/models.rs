@@ -18,9 +18,9 @@ proptest! {
 
     #[test]
     fn slopes_of_the_axis(q in -0.2..0.2, v in -0.3..0.3, vm in -0.02..0.02, vir in -5.0..5.0, e in -1e-4..1e-4) {
-        let open = check::derivatives(&Positioning::EMPS, 0.0, &Motion { q, v }, &Command { vir }, &AXIS);
+        let open = check::derivatives(&Positioning::EMPS, 0.0, &AxisMotion { q, v }, &Command { vir }, &AXIS);
         prop_assert_eq!(open, Ok(()));
-        let x = GuidedMotion { q, v, vm };
+        let x = ControlledAxisMotion { q, v, vm };
         prop_assert_eq!(check::derivatives(&PositioningLoop::EMPS, 0.0, &x, &Reference { qg: q + e }, &AXIS), Ok(()));
     }
 
@@ -39,12 +39,12 @@ proptest! {
     #[test]
     fn the_loop_is_the_axis_under_its_command(q in -0.2..0.2, v in -0.3..0.3, qg in -0.2..0.2) {
         let (closed, u) = (PositioningLoop::EMPS, Reference { qg });
-        let x = GuidedMotion { q, v, vm: v };
+        let x = ControlledAxisMotion { q, v, vm: v };
         let vir = closed.output(0.0, &x, &u, &AXIS).vir;
         prop_assert_eq!(vir, (closed.kv * (closed.kp * (qg - q) - v)).clamp(-10.0, 10.0));
         let (dx, open) = (
             closed.derivative(0.0, &x, &u, &AXIS),
-            closed.axis.derivative(0.0, &Motion { q, v }, &Command { vir }, &AXIS),
+            closed.axis.derivative(0.0, &AxisMotion { q, v }, &Command { vir }, &AXIS),
         );
         prop_assert_eq!((dx.q, dx.v, dx.vm), (open.q, open.v, 0.0));
     }
@@ -75,7 +75,7 @@ fn the_emps_record_is_fitted_in_closed_loop() {
     let Some(path) = shared("emps/emps.csv") else { return };
     let model = PositioningLoop::EMPS;
     let record = Experiment::from_csv(&model, path).unwrap().hold(Hold::First);
-    let record = record.initial(GuidedMotion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) });
+    let record = record.initial(ControlledAxisMotion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) });
     let start = Axis { m: free(80.0), fv: free(150.0), fc: free(15.0), offset: free(0.0) };
     let estimate = Fit::new(&model, &record).parameters(start).run().unwrap();
     let p = estimate.parameters;

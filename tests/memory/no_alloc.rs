@@ -4,8 +4,8 @@ use crate::allocator::allocations;
 use greybox::check::{Plane, Rates, Spiral};
 use greybox::online::{Ekf, EkfStart, Forgetting, Mras, MrasStart, Order, Rls, Stepping, Watch};
 use greybox::pmsm::{
-    AngledDrive, Currents, Drive, ExactFed, ExactStep, ExactSurface, FedWinding, HeldIn, KeLyapunov, MotorLaw,
-    RsLyapunov, Winding,
+    AngledDrive, Currents, Drive, ExactStep, ExactSurface, HeldIn, InverterFed, InverterFedWinding, KeLyapunov,
+    MotorLaw, RsLyapunov, Winding,
 };
 use greybox::{
     Butterworth, Dual, Esdirk, Experiment, FilterState, Fit, Hold, Huber, Integrator, Interval, ModelSystem, Nothing,
@@ -43,17 +43,19 @@ fn mras_allocates_nothing() {
 #[test]
 fn ekf_allocates_nothing() {
     let count = allocations(|| {
-        let model = ExactFed::new(ExactStep::new(4, TS, HeldIn::Stationary).unwrap(), 0.15).unwrap();
+        let model =
+            InverterFed::<_, InverterFedWinding>::new(ExactSurface(ExactStep::new(4, TS, HeldIn::Stationary).unwrap()));
         let start = EkfStart {
             state: Currents { id: free(0.0).prior(0.0, 1.0), iq: free(0.0).prior(0.0, 1.0) },
-            parameters: FedWinding {
+            parameters: InverterFedWinding {
                 rs: free(0.4).prior(0.4, 0.3).log(),
                 ls: fixed(4e-3),
                 ke: free(0.9).prior(0.9, 0.1),
                 vdt: free(0.0).prior(0.0, 2.0),
+                i0: fixed(0.15),
             },
             state_drift: Currents { id: 0.1, iq: 0.1 },
-            parameter_drift: FedWinding { rs: 1e-5, ls: 0.0, ke: 3e-6, vdt: 3e-5 },
+            parameter_drift: InverterFedWinding { rs: 1e-5, ls: 0.0, ke: 3e-6, vdt: 3e-5, i0: 0.0 },
             noise: Currents { id: 0.06, iq: 0.06 },
             hold: Hold::Zero,
             watch: Watch { limit: Currents { id: 8.0, iq: 8.0 }, patience: 100 },

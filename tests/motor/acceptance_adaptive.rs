@@ -4,8 +4,8 @@ use greybox::online::{Law, Mras, MrasStart, Order, Outcome, Stepping, Watch};
 use greybox::pmsm::adaptive::{Adaptive, Instant};
 use greybox::pmsm::control::{CurrentControl, PositionControl, SpeedControl};
 use greybox::pmsm::{
-    Currents, ExactStep, ExactSurface, HeldIn, KeLyapunov, Machine, MotorLaw, PolePairs, Resting, Rotor, RsDirect,
-    RsLyapunov, Winding,
+    Currents, ExactStep, ExactSurface, HeldIn, KeLyapunov, Machine, MachineParameters, MotorLaw, NotAdapted, PolePairs,
+    RsDirect, RsLyapunov, Winding,
 };
 use greybox::{fixed, free};
 
@@ -31,10 +31,10 @@ fn observer<L: Law<ExactSurface>>(start: Winding, lowest: f64, law: L, ts: f64, 
 }
 
 /// Ramps of experiment 1: Ke -10 % from 5 s to 7 s, R +30 % from 9 s to 11 s.
-fn truth(t: f64) -> Rotor {
+fn truth(t: f64) -> MachineParameters {
     let ramp = |begin: f64| ((t - begin) / 2.0).clamp(0.0, 1.0);
     let (rs, ke) = (RS * (1.0 + 0.3 * ramp(9.0)), KE * (1.0 - 0.1 * ramp(5.0)));
-    Rotor { rs, ld: LS, lq: LS, ke, j: 0.3, bv: 1.0, tc: 0.0, tg: 0.0 }
+    MachineParameters { rs, ld: LS, lq: LS, ke, j: 0.3, bv: 1.0, tc: 0.0, tg: 0.0 }
 }
 
 /// Experiment 1: every sample of 14 s. `id` is the share of iq that id is given.
@@ -109,7 +109,7 @@ fn experiment_1_with_the_lyapunov_law_for_the_resistance() {
 // Without id and with the resistance held, what is missing in R i is taken for EMF: dR b / Ke^2 of it.
 #[test]
 fn experiment_1_without_d_current_the_resistance_goes_into_ke() {
-    let law = MotorLaw { rs: Resting, ke: KeLyapunov { gain: 1e-3 } };
+    let law = MotorLaw { rs: NotAdapted, ke: KeLyapunov { gain: 1e-3 } };
     let seen = experiment_1(law, 100.0, 0.0);
     for (t, expected) in [(4.9, 3.906), (14.0, 12.056)] {
         let ke = errors(&at(&seen, t)).1;
@@ -142,7 +142,7 @@ fn experiment_1_the_direct_law_diverges_with_d_current_of_the_wrong_sign_and_say
 /// Experiment 2: the integral of the absolute speed error (rad) over 5 s, and the torque constant's error (%) over time.
 fn experiment_2<L: Law<ExactSurface>>(law: L, start: f64, ts: f64, order: Order) -> (f64, Vec<(f64, f64)>) {
     const KE: f64 = 0.95;
-    let rotor = Rotor { rs: 0.4, ld: LS, lq: LS, ke: KE, j: 0.2, bv: 0.02, tc: 0.0, tg: 0.0 };
+    let rotor = MachineParameters { rs: 0.4, ld: LS, lq: LS, ke: KE, j: 0.2, bv: 0.02, tc: 0.0, tg: 0.0 };
     let np = PolePairs::new(4).unwrap();
     let drive = Adaptive {
         machine: Machine::new(4, 1.0).unwrap(),
@@ -154,7 +154,7 @@ fn experiment_2<L: Law<ExactSurface>>(law: L, start: f64, ts: f64, order: Order)
     let mut speed = SpeedControl::tuned(0.2, 3.0, 1.0).unwrap();
     let (mut integral, mut kt) = (0.0, Vec::new());
     let mut error = 0.0;
-    let reference = |_: f64, x: &greybox::pmsm::Motion, kt: f64| {
+    let reference = |_: f64, x: &greybox::pmsm::MachineState, kt: f64| {
         let target = position.step(2400.0 - x.theta, ts);
         error = target.w - x.w;
         integral += error.abs() * ts;
@@ -168,8 +168,8 @@ fn experiment_2<L: Law<ExactSurface>>(law: L, start: f64, ts: f64, order: Order)
 
 #[test]
 fn experiment_2_the_adapted_drive_follows_as_well_as_one_that_knows() {
-    let adapt = MotorLaw { rs: Resting, ke: KeLyapunov { gain: 1e-3 } };
-    let rest = MotorLaw { rs: Resting, ke: Resting };
+    let adapt = MotorLaw { rs: NotAdapted, ke: KeLyapunov { gain: 1e-3 } };
+    let rest = MotorLaw { rs: NotAdapted, ke: NotAdapted };
     let (ts, order) = (TS / 10.0, Order::Thesis);
     let within = |value: f64, expected: f64| assert!((value / expected - 1.0).abs() < 0.01, "{value} for {expected}");
     within(experiment_2(rest, 1.0, ts, order).0, 3.44);
@@ -184,7 +184,7 @@ fn experiment_2_the_adapted_drive_follows_as_well_as_one_that_knows() {
 // At the drive's own sample time the thesis' order is unstable; with the update before the prediction it works.
 #[test]
 fn experiment_2_at_the_drives_sample_time() {
-    let adapt = MotorLaw { rs: Resting, ke: KeLyapunov { gain: 1e-3 } };
+    let adapt = MotorLaw { rs: NotAdapted, ke: KeLyapunov { gain: 1e-3 } };
     let (integral, kt) = experiment_2(adapt, 1.2, TS, Order::UpdateThenPredict);
     assert!((integral / 3.44 - 1.0).abs() < 0.01, "{integral}");
     assert!(kt.iter().filter(|(t, _)| *t >= 0.3).all(|(_, error)| error.abs() < 1.0));

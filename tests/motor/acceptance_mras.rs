@@ -1,9 +1,9 @@
 //! The back-EMF's observer on the speed cycles of the robot, root mean square errors over the second half, mean of six axes.
 //!
-//! With the nominal inductance the best that dead time, total resistance, normalized gain and dead zone reach is 0.17 and
-//! 0.14 %. What is left is the inductance: the motors' differ by 4 % between the axes, and friction's iq makes a voltage
-//! `we (Lq - L) iq` that is taken for EMF. An observer with the voltage held in the rotor's frame has an error of the other
-//! sign, and reads 0.13 and 0.10 % (0.08 % on axis 1); that is no merit of its own.
+//! With the nominal inductance dead time, total resistance and normalized gain reach 0.166 %, with a dead zone 0.136 %. What
+//! is left is the saliency: `Ld` and `Lq` differ by 4 % from the observer's inductance, and the current that friction needs
+//! makes a voltage `we (Lq - L) iq` that is taken for EMF. Without saliency axis 1 reaches 0.042 and 0.029 %. An observer with
+//! the voltage held in the rotor's frame makes an error of the other sign that hides a part of it, and reads 0.13 %.
 
 use crate::acceptance_records::{Record, cycles, percent, record};
 use greybox::online::{Law, MrasStart, Order, Stepping, Watch};
@@ -12,7 +12,7 @@ use greybox::pmsm::offline::extended;
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::{Axis, TS};
 use greybox::pmsm::{
-    AngledDrive, Currents, DeadZone, ExactStep, ExactSurface, HeldIn, KeLyapunov, MotorLaw, Normalized, Resting,
+    AngledDrive, Currents, DeadZone, ExactStep, ExactSurface, HeldIn, KeLyapunov, MotorLaw, Normalized, NotAdapted,
     Winding,
 };
 use greybox::{Butterworth, fixed, free};
@@ -47,8 +47,8 @@ fn normalized(gain: f64) -> Normalized<KeLyapunov> {
     Normalized { law: lyapunov(gain), speed: 100.0 }
 }
 
-fn only<K>(ke: K) -> MotorLaw<Resting, K> {
-    MotorLaw { rs: Resting, ke }
+fn only<K>(ke: K) -> MotorLaw<NotAdapted, K> {
+    MotorLaw { rs: NotAdapted, ke }
 }
 
 const STILL: HeldIn = HeldIn::Stationary;
@@ -80,14 +80,16 @@ fn each_improvement_of_the_observer_counts() {
     }
     println!("mean: {mean:.3?}");
     let [plain, compensated, normalized, zone, found_lq, rotor] = mean;
+    // The published digits; the seeds' noise moves the last one.
     assert!((plain - 2.4).abs() < 0.05 && (compensated - 0.25).abs() < 0.005, "{mean:?}");
-    assert!(normalized < 0.17 && zone < 0.14 && found_lq < 0.09, "{mean:?}");
+    assert!((normalized - 0.166).abs() < 0.002 && (zone - 0.136).abs() < 0.002, "{mean:?}");
+    assert!(found_lq < 0.09, "{mean:?}");
     assert!((rotor - 0.13).abs() < 0.005, "{mean:?}");
 }
 
-// The two figures without the difference between the axes' inductances: a third and less.
+// The two figures without saliency: on axis 1 0.042 and 0.029 % in the place of 0.153 and 0.105 %.
 #[test]
-fn what_is_left_is_the_inductance() {
+fn what_is_left_is_the_saliency() {
     for number in (1..=6).step_by(if cfg!(debug_assertions) { 6 } else { 5 }) {
         let axis = Axis::reference(number).unwrap();
         let simulation = Simulation::new(axis).unwrap().without(Disturbance::Saliency);
@@ -96,6 +98,9 @@ fn what_is_left_is_the_inductance() {
         let plain = rms(&record, total, 2.0, STILL, only(normalized(2e-5)));
         let zone = rms(&record, total, 2.0, STILL, only(DeadZone { law: normalized(1e-5), speed: 20.0 }));
         println!("axis {number}: {plain:.3} %, with the dead zone {zone:.3} %");
+        if number == 1 {
+            assert!((plain - 0.042).abs() < 0.002 && (zone - 0.029).abs() < 0.002, "axis 1: {plain} {zone}");
+        }
         assert!(plain < 0.05 && zone < 0.03, "axis {number}: {plain} {zone}");
     }
 }

@@ -8,7 +8,8 @@ use greybox::pmsm::offline::{Axes, Form, Spans, extended, hardly_seen, plain, se
 use greybox::pmsm::program::{Cycle, Program};
 use greybox::pmsm::robot::{Axis, TS};
 use greybox::pmsm::{
-    AngledDrive, CompensatedWinding, Currents, ExactCompensated, ExactFed, ExactStep, FedWinding, HeldIn, Winding,
+    AngledDrive, Compensated, CompensatedWinding, Currents, ExactStep, ExactSurface, HeldIn, InverterFed,
+    InverterFedWinding, Winding,
 };
 use greybox::{Butterworth, Fit, Hold, LinearEstimate, fixed, free};
 use std::sync::OnceLock;
@@ -17,7 +18,7 @@ pub struct Record {
     pub axis: Axis,
     log: Log,
     pub spans: Spans,
-    cycles: Vec<Cycle>,
+    pub cycles: Vec<Cycle>,
 }
 
 pub fn record(simulation: Simulation, program: Program) -> Record {
@@ -36,7 +37,7 @@ pub fn cycles(number: u8) -> &'static Record {
     })
 }
 
-fn filter() -> Butterworth {
+pub fn filter() -> Butterworth {
     Butterworth::low_pass(4, 100.0, TS).unwrap()
 }
 
@@ -45,7 +46,7 @@ fn ls(spans: &Spans, form: Form) -> LinearEstimate<Winding> {
 }
 
 /// Step through what a test is to look at: one in release, `n` in a debug build.
-fn every(n: usize) -> usize {
+pub fn every(n: usize) -> usize {
     if cfg!(debug_assertions) {
         println!("one in {n}, this being a debug build; `cargo test --release --test motor` looks at all");
         n
@@ -55,10 +56,10 @@ fn every(n: usize) -> usize {
 }
 
 /// The largest magnitude of each column (%), for those who run the tests with `--nocapture`.
-struct Worst<const N: usize>([f64; N]);
+pub struct Worst<const N: usize>(pub [f64; N]);
 
 impl<const N: usize> Worst<N> {
-    fn see(&mut self, errors: [f64; N]) {
+    pub fn see(&mut self, errors: [f64; N]) {
         self.0.iter_mut().zip(errors).for_each(|(worst, error)| *worst = worst.max(error.abs()));
     }
 }
@@ -133,6 +134,7 @@ fn water_cutting_least_squares_and_weighted() {
     assert!((by_speed - 1.33).abs() < 0.3, "{by_speed}");
 }
 
+// The goal, cycle by cycle. Measured: Ke at most 0.017 to 0.055 % off, R 0.165 to 0.456 %.
 #[test]
 fn extended_least_squares_at_every_speed() {
     for number in 1..=6 {
@@ -141,15 +143,16 @@ fn extended_least_squares_at_every_speed() {
         for cycle in cycles.iter().step_by(every(6)) {
             let spans = spans.cut(cycle.samples.clone());
             let equations = |i0| extended(&spans, i0).prefiltered(&filter());
-            let i0 = search_i0(0.03, 1.0, equations).unwrap();
+            let i0 = search_i0(0.03, 1.0, |i0| equations(i0).least_squares()).unwrap();
             let found = equations(i0).solve().unwrap();
             let p = found.parameters;
             let (ke, r) = (percent(p.ke, axis.ke), percent(p.r, axis.rs + axis.r_cable));
-            let most = if number <= 3 { 0.3 } else { 0.5 };
-            assert!(ke.abs() < most && r.abs() < 2.0, "axis {number}, {}: Ke {ke} %, R {r} %", cycle.speed);
-            // Without d current to speak of, Ld is hardly seen, and that is said; Ke always is.
-            let weak = hardly_seen(&found);
-            assert!(weak.contains(&"ld") && !weak.contains(&"ke"), "axis {number}, {}: {weak:?}", cycle.speed);
+            assert!(ke.abs() < 0.1 && r.abs() < 1.0, "axis {number}, {}: Ke {ke} %, R {r} %", cycle.speed);
+            // Without d current to speak of, Ld is hardly seen, and that is said; where it is seen after all (the slowest
+            // cycles of the axes with gravity) it is right. Ke is seen everywhere.
+            let (weak, ld) = (hardly_seen(&found), percent(p.ld, 0.96 * axis.ls));
+            assert!(weak.contains(&"ld") || ld.abs() < 5.0, "axis {number}, {}: Ld {ld} %", cycle.speed);
+            assert!(!weak.contains(&"ke"), "axis {number}, {}: {weak:?}", cycle.speed);
             worst.see([ke, r]);
         }
         println!("axis {number}, extended: Ke, R off by at most {:.3?} %", worst.0);
@@ -169,7 +172,8 @@ fn without_d_current_ld_is_not_identifiable() {
 
 fn grey_box(number: u8, every: usize) {
     let Record { axis, spans, cycles, .. } = cycles(number);
-    let model = ExactCompensated(ExactStep::new(4, TS, HeldIn::Stationary).unwrap());
+    let model =
+        Compensated::<_, CompensatedWinding>::new(ExactSurface(ExactStep::new(4, TS, HeldIn::Stationary).unwrap()));
     let mut worst = Worst([0.0; 2]);
     for cycle in cycles.iter().step_by(every) {
         let experiment = spans.cut(cycle.samples.clone()).grey_box(&model, 0.15).unwrap();
@@ -202,18 +206,20 @@ fn grey_box_with_dead_time_on_the_other_axes() {
 /// Relative rms error of Ke (%) over the second half of a run of the joint filter on (id, iq, R, Ke, Vdt).
 fn joint_filter(record: &Record) -> f64 {
     let axis = &record.axis;
-    let model = ExactFed::new(ExactStep::new(4, TS, HeldIn::Stationary).unwrap(), 0.15).unwrap();
+    let model =
+        InverterFed::<_, InverterFedWinding>::new(ExactSurface(ExactStep::new(4, TS, HeldIn::Stationary).unwrap()));
     let current = free(0.0).prior(0.0, 1.0);
     let start = EkfStart {
         state: Currents { id: current, iq: current },
-        parameters: FedWinding {
+        parameters: InverterFedWinding {
             rs: free(axis.rs).prior(axis.rs, 0.1f64.sqrt()),
             ls: fixed(axis.ls),
             ke: free(0.9 * axis.ke).prior(0.9 * axis.ke, 0.02f64.sqrt()),
             vdt: free(0.0).prior(0.0, 2.0),
+            i0: fixed(0.15),
         },
         state_drift: Currents { id: 0.1, iq: 0.1 },
-        parameter_drift: FedWinding { rs: 1e-5, ls: 0.0, ke: 1e-11f64.sqrt(), vdt: 1e-9f64.sqrt() },
+        parameter_drift: InverterFedWinding { rs: 1e-5, ls: 0.0, ke: 1e-11f64.sqrt(), vdt: 1e-9f64.sqrt(), i0: 0.0 },
         noise: Currents { id: 4e-3f64.sqrt(), iq: 4e-3f64.sqrt() },
         hold: Hold::Zero,
         watch: Watch { limit: Currents { id: 1e3, iq: 1e3 }, patience: 1000 },

@@ -3,7 +3,7 @@
 
 use crate::shared::shared;
 use greybox::pmsm::offline::{Axes, Form, Spans, Speed, extended, plain, search_i0};
-use greybox::pmsm::{CompensatedWinding, ExactCompensated, ExactStep, HeldIn, PolePairs, Surface, Winding};
+use greybox::pmsm::{Compensated, CompensatedWinding, ExactStep, ExactSurface, HeldIn, PolePairs, Surface, Winding};
 use greybox::{CsvFile, Fit, fixed, free};
 
 const TRUTH: Winding = Winding { rs: 3.6, ls: 42e-3, ke: 2.002_46 };
@@ -41,7 +41,7 @@ fn plain_least_squares_within_two_hundredths_of_a_percent() {
 #[test]
 fn extended_least_squares_within_a_tenth_of_a_percent() {
     for (name, spans) in records() {
-        let i0 = search_i0(0.03, 1.0, |i0| extended(&spans, i0)).unwrap();
+        let i0 = search_i0(0.03, 1.0, |i0| extended(&spans, i0).least_squares()).unwrap();
         let p = extended(&spans, i0).solve().unwrap().parameters;
         for ls in [p.ld, p.lq] {
             assert_within(name, Winding { rs: p.r, ls, ke: p.ke }, 0.1);
@@ -53,7 +53,9 @@ fn extended_least_squares_within_a_tenth_of_a_percent() {
 #[test]
 fn grey_box_within_a_tenth_of_a_percent() {
     for (name, spans) in records() {
-        let model = ExactCompensated(ExactStep::new(3, spans.ts, HeldIn::Stationary).unwrap());
+        let model = Compensated::<_, CompensatedWinding>::new(ExactSurface(
+            ExactStep::new(3, spans.ts, HeldIn::Stationary).unwrap(),
+        ));
         let record = spans.grey_box(&model, 0.15).unwrap();
         let start = CompensatedWinding {
             rs: free(1.5 * TRUTH.rs),

@@ -3,6 +3,7 @@
 mod acceptance_adaptive;
 mod acceptance_mras;
 mod acceptance_records;
+mod goal;
 mod independent_drive;
 mod motor_methods;
 mod motor_models;

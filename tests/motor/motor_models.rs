@@ -6,7 +6,14 @@ use greybox::pmsm::offline::{Axes, Form, Spans, Validation, plain, voltages};
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::{Axis, TS};
 use greybox::pmsm::*;
-use greybox::{Fit, fixed};
+use greybox::{Fit, fixed, signals};
+
+signals! {
+    /// A salient motor behind cable and inverter, and how its record is aligned.
+    pub struct Line {
+        rs: "ohm", r_cable: "ohm", ld: "H", lq: "H", ke: "V s/rad", vdt: "V", i0: "A", tau: "s", delta: "rad",
+    }
+}
 
 const T: f64 = 0.3;
 const I: Currents = Currents { id: -3.0, iq: 11.0 };
@@ -33,30 +40,39 @@ fn slopes_are_those_of_the_values() {
     let (small, angled) = (Currents { id: 0.1, iq: 0.2 }, AngledDrive { ud: -20.0, uq: 90.0, w: 120.0, theta: 0.4 });
     let line =
         Line { rs: 0.4, r_cable: 0.23, ld: 3.8e-3, lq: 4.2e-3, ke: 0.95, vdt: 2.0, i0: 0.15, tau: 20e-6, delta: 0.01 };
-    derivatives(&Fed::new(4).unwrap(), T, &small, &angled, &line).unwrap();
+    derivatives(
+        &Misaligned::<InverterFed<Cabled<Salient, Line>, Line>, Line>::new(InverterFed::new(Cabled::new(
+            Salient::new(4).unwrap(),
+        ))),
+        T,
+        &small,
+        &angled,
+        &line,
+    )
+    .unwrap();
     for held_in in [HeldIn::Stationary, HeldIn::Rotor] {
         let step = ExactStep::new(4, TS, held_in).unwrap();
         derivatives(&ExactSurface(step), T, &I, &U, &winding).unwrap();
-        let p = FedWinding { rs: 0.4, ls: 4e-3, ke: 0.95, vdt: 2.0 };
-        derivatives(&ExactFed::new(step, 0.15).unwrap(), T, &small, &angled, &p).unwrap();
+        let p = InverterFedWinding { rs: 0.4, ls: 4e-3, ke: 0.95, vdt: 2.0, i0: 0.15 };
+        derivatives(&InverterFed::<_, InverterFedWinding>::new(ExactSurface(step)), T, &small, &angled, &p).unwrap();
         let p = CompensatedWinding { rs: 0.4, ls: 4e-3, ke: 0.95, vdt: 2.0 };
-        let u = CompensatedDrive { ud: -20.0, uq: 90.0, w: 120.0, lost_d: 0.3, lost_q: -0.9 };
-        derivatives(&ExactCompensated(step), T, &I, &u, &p).unwrap();
+        let u = CompensatedDrive { ud: -20.0, uq: 90.0, w: 120.0, theta: 0.4, lost_d: 0.3, lost_q: -0.9 };
+        derivatives(&Compensated::<_, CompensatedWinding>::new(ExactSurface(step)), T, &I, &u, &p).unwrap();
     }
 
     let mechanics = Mechanics { j: 0.015, bv: 5e-3, tc: 1.5, tg: 6.0, ke: 0.95 };
-    let turning = Turning { w: 0.4, theta: 70.0 };
+    let turning = ShaftMotion { w: 0.4, theta: 70.0 };
     derivatives(&Shaft::new(110.0).unwrap(), T, &turning, &Torque { iq: 7.0 }, &mechanics).unwrap();
-    let rotor = Rotor { rs: 0.4, ld: 3.8e-3, lq: 4.2e-3, ke: 0.95, j: 0.015, bv: 5e-3, tc: 1.5, tg: 6.0 };
-    let motion = Motion { id: -3.0, iq: 11.0, w: 0.4, theta: 70.0 };
-    let acting = Acting { ud: -20.0, uq: 90.0, tau_l: 2.0 };
+    let rotor = MachineParameters { rs: 0.4, ld: 3.8e-3, lq: 4.2e-3, ke: 0.95, j: 0.015, bv: 5e-3, tc: 1.5, tg: 6.0 };
+    let motion = MachineState { id: -3.0, iq: 11.0, w: 0.4, theta: 70.0 };
+    let acting = VoltageAndLoad { ud: -20.0, uq: 90.0, tau_l: 2.0 };
     derivatives(&Machine::new(4, 110.0).unwrap(), T, &motion, &acting, &rotor).unwrap();
 }
 
 #[test]
 fn a_motor_without_pole_pairs_is_refused() {
     assert_eq!(Surface::new(0), Err(Error::NoPolePairs));
-    assert!(Machine::new(4, 0.0).is_err() && Fed::new(0).is_err() && Shaft::new(f64::NAN).is_err());
+    assert!(Machine::new(4, 0.0).is_err() && Shaft::new(f64::NAN).is_err());
     assert!(serde_json::from_str::<Surface>(r#"{"pole_pairs":0}"#).unwrap_err().to_string().contains("pole pair"));
 }
 
@@ -74,7 +90,8 @@ fn validation_both_ways() {
     assert!(fit(found).iter().all(|percent| *percent > 99.5), "{:?}", fit(found));
     assert!(fit(wrong)[1] < 97.0, "{:?}", fit(wrong));
 
-    let model = ExactCompensated(ExactStep::new(4, TS, HeldIn::Stationary).unwrap());
+    let model =
+        Compensated::<_, CompensatedWinding>::new(ExactSurface(ExactStep::new(4, TS, HeldIn::Stationary).unwrap()));
     let record = spans.grey_box(&model, 0.15).unwrap();
     let simulated = |p: Winding| {
         let held = CompensatedWinding { rs: fixed(p.rs), ls: fixed(p.ls), ke: fixed(p.ke), vdt: fixed(0.0) };

@@ -7,8 +7,8 @@ use greybox::online::{
     Rls, Stepping, UdFactors, Watch,
 };
 use greybox::pmsm::{
-    AngledDrive, Currents, DirectCurrent, Drive, ExactFed, ExactStep, ExactSurface, FedWinding, HeldIn, Injection,
-    KeLyapunov, MotorLaw, RsDirect, RsLyapunov, Surface, Winding,
+    AngledDrive, Currents, DirectCurrent, Drive, ExactStep, ExactSurface, HeldIn, Injection, InverterFed,
+    InverterFedWinding, KeLyapunov, MotorLaw, RsDirect, RsLyapunov, Surface, Winding,
 };
 use greybox::{Hold, Kind, Model, Nothing, Parameter, Scalar, fixed, free, signals};
 use proptest::prelude::*;
@@ -294,8 +294,9 @@ fn ekf_finds_parameters_and_knows_how_well() {
 
 /// A drive's record: speed that swings, d current in steps, an inverter that loses 2 V.
 fn fed_motor(n: usize, mut each: impl FnMut(f64, AngledDrive, Currents)) {
-    let model = ExactFed::new(ExactStep::new(4, TS, HeldIn::Stationary).unwrap(), 0.15).unwrap();
-    let truth = FedWinding { rs: 0.63, ls: 4e-3, ke: 0.95, vdt: 2.0 };
+    let model =
+        InverterFed::<_, InverterFedWinding>::new(ExactSurface(ExactStep::new(4, TS, HeldIn::Stationary).unwrap()));
+    let truth = InverterFedWinding { rs: 0.63, ls: 4e-3, ke: 0.95, vdt: 2.0, i0: 0.15 };
     let (mut i, mut theta, mut noise) = (Currents::default(), 0.0, Noise(4));
     for k in 0..n {
         let t = k as f64 * TS;
@@ -315,18 +316,20 @@ fn fed_motor(n: usize, mut each: impl FnMut(f64, AngledDrive, Currents)) {
     }
 }
 
-fn motor_ekf() -> Ekf<ExactFed, 5> {
-    let model = ExactFed::new(ExactStep::new(4, TS, HeldIn::Stationary).unwrap(), 0.15).unwrap();
+fn motor_ekf() -> Ekf<InverterFed<ExactSurface, InverterFedWinding>, 5> {
+    let model =
+        InverterFed::<_, InverterFedWinding>::new(ExactSurface(ExactStep::new(4, TS, HeldIn::Stationary).unwrap()));
     let start = EkfStart {
         state: Currents { id: free(0.0).prior(0.0, 1.0), iq: free(0.0).prior(0.0, 1.0) },
-        parameters: FedWinding {
+        parameters: InverterFedWinding {
             rs: free(0.4).prior(0.4, 0.32).within(0.01, 10.0),
             ls: fixed(4e-3),
             ke: free(0.855).prior(0.855, 0.14).within(0.1, 10.0),
             vdt: free(0.0).prior(0.0, 2.0),
+            i0: fixed(0.15),
         },
         state_drift: Currents { id: 1e-3, iq: 1e-3 },
-        parameter_drift: FedWinding { rs: 1e-6, ls: 0.0, ke: 1e-7, vdt: 1e-6 },
+        parameter_drift: InverterFedWinding { rs: 1e-6, ls: 0.0, ke: 1e-7, vdt: 1e-6, i0: 0.0 },
         noise: Currents { id: 0.06, iq: 0.06 },
         hold: Hold::Zero,
         watch: Watch { limit: Currents { id: 8.0, iq: 8.0 }, patience: 50 },
@@ -578,8 +581,8 @@ fn an_observer_fed_with_what_the_dead_time_leaves_has_no_innovation() {
     let law = MotorLaw { rs: RsLyapunov { gain: 5e-3 }, ke: KeLyapunov { gain: 1e-3 } };
     let motor = Winding { rs: fixed(0.63), ls: fixed(4e-3), ke: free(0.95) };
     let mut mras = surface_mras(law, motor);
-    let model = ExactFed::new(step, 0.15).unwrap();
-    let p = FedWinding { rs: 0.63, ls: 4e-3, ke: 0.95, vdt: 2.0 };
+    let model = InverterFed::<_, InverterFedWinding>::new(ExactSurface(step));
+    let p = InverterFedWinding { rs: 0.63, ls: 4e-3, ke: 0.95, vdt: 2.0, i0: 0.15 };
     let mut i = Currents { id: -3.0, iq: 8.0 };
     for k in 0..1000 {
         let u = AngledDrive { ud: -10.0, uq: 60.0, w: 70.0, theta: 70.0 * TS * k as f64 };

@@ -2,8 +2,8 @@
 
 use greybox::online::{Divergence, Mras, MrasStart, Order, Outcome, Stepping, Watch};
 use greybox::pmsm::{
-    Adaptation, Currents, Drive, ExactStep, ExactSurface, HeldIn, KeLyapunov, MotorLaw, Resting, RsDirect, RsLyapunov,
-    SQRT_2_3, SQRT_3_2, Surface, Winding,
+    Adaptation, Currents, Drive, ExactStep, ExactSurface, HeldIn, KeLyapunov, MotorLaw, NotAdapted, RsDirect,
+    RsLyapunov, SQRT_2_3, SQRT_3_2, Surface, Winding,
 };
 use greybox::{Model, Parameter, fixed, free};
 
@@ -151,7 +151,7 @@ fn experiment_1_both_laws_follow_the_motor() {
 // the friction b.
 #[test]
 fn experiment_1_without_the_resistance_leaves_its_share_in_ke() {
-    let rows = torque_step(100.0, 0.0, Resting, fixed(0.8 * 0.5));
+    let rows = torque_step(100.0, 0.0, NotAdapted, fixed(0.8 * 0.5));
     println!(
         "Ke off by {:.3} % at 4.9 s, {:.3} % at 14 s",
         100.0 * at(&rows, 4.9).ke_error,
@@ -181,7 +181,7 @@ fn position_step(ke_start: Parameter, order: Order, ts: f64) -> (f64, f64) {
     let truth = Winding { rs: 0.4, ls: 4e-3, ke: 0.95 };
     let (j, b, acceleration, top, target) = (0.2, 0.02, 60.0, 300.0, 2400.0);
     let known = Winding { rs: fixed(truth.rs), ls: fixed(truth.ls), ke: ke_start };
-    let law = MotorLaw { rs: Resting, ke: KeLyapunov { gain: 1e-3 } };
+    let law = MotorLaw { rs: NotAdapted, ke: KeLyapunov { gain: 1e-3 } };
     let model = ExactSurface(ExactStep::new(4, ts, HeldIn::Rotor).unwrap());
     let mut mras = Mras::new(model, law, ts, start(known, order, Stepping::Split)).unwrap();
     let mut pi = Pi { kp: truth.ls / LAMBDA, ki: truth.rs / LAMBDA, integral: (0.0, 0.0) };
@@ -233,7 +233,7 @@ where
     M: Model<State = Currents, Input = Drive, Output = Currents, Parameters = Winding>,
 {
     let known = Winding { rs: fixed(0.4), ls: fixed(4e-3), ke: free(0.95) };
-    let law = MotorLaw { rs: Resting, ke: KeLyapunov { gain: 1e-3 } };
+    let law = MotorLaw { rs: NotAdapted, ke: KeLyapunov { gain: 1e-3 } };
     let mras = Mras::new(model, law, TS, start(known, order, stepping)).unwrap();
     let point = |w: f64| (Currents::default(), Drive { ud: 0.0, uq: SQRT_2_3 * 0.95 * w, w });
     let unstable = |w: f64| mras.check::<5>([point(w)]).is_err();

@@ -1,6 +1,6 @@
 #![cfg(feature = "std")]
 //! Linear least squares against certified numbers, identities, and the scatter of repeated experiments.
-use greybox::{Assumption, LinearEstimate, Regression, RegressionError, Signals, signals};
+use greybox::{Assumption, LinearEstimate, PooledRegression, Regression, RegressionError, Signals, signals};
 
 signals! {
     /// Parameters of the tests.
@@ -323,4 +323,82 @@ fn an_estimate_prints_and_comes_back() {
         assert!(correlation[(i, j)].abs() <= 1.0 && correlation[(i, j)] == correlation[(j, i)]);
     }
     assert_eq!(estimate.intervals(1.0).a, [f64::NEG_INFINITY, f64::INFINITY]);
+}
+
+signals! {
+    /// A line of its own offset for each of two sets, all in one vector.
+    struct TwoLines { slope: "V/s", first: "V", second: "V" }
+}
+signals! {
+    /// The same line, seen by one set.
+    struct OneLine { slope: "V/s", offset: "V" }
+}
+
+/// Two sets of a noisy line as one regression with an offset column for each, and as two sets.
+fn two_lines(weight: impl Fn(f64) -> f64) -> (Regression<TwoLines>, [Regression<OneLine>; 2]) {
+    let (mut noise, mut whole, mut sets) = (Noise(7), Regression::new(), [Regression::new(), Regression::new()]);
+    for k in 0..240 {
+        let (t, second) = (f64::from(k) / 50.0, k % 3 == 0);
+        let y = 2.0 * t + if second { -1.0 } else { 0.5 } + 0.1 * noise.gauss();
+        let (first_column, second_column) = if second { (0.0, 1.0) } else { (1.0, 0.0) };
+        whole.weighted_row([t, first_column, second_column].into(), y, weight(t));
+        sets[usize::from(second)].weighted_row(OneLine { slope: t, offset: 1.0 }, y, weight(t));
+    }
+    (whole, sets)
+}
+
+// The pooled solution is that of one regression in which each set has its own column; without lags every number agrees
+// to rounding.
+#[test]
+fn pooled_sets_are_one_regression_with_own_columns() {
+    for weight in [|_: f64| 1.0, |t: f64| 0.5 + t] {
+        let (whole, sets) = two_lines(weight);
+        let pooled = PooledRegression::new(sets, OneLine { slope: true, offset: false });
+        let (whole_found, found) = (whole.solve().unwrap(), pooled.solve().unwrap());
+        assert_close(pooled.least_squares(), whole.information().residual(), 1e-12);
+        let (p, s) = (whole_found.parameters, whole_found.standard_errors);
+        let (x, h) = (whole_found.index, whole_found.index_others_held);
+        for (set, of) in
+            found.iter().zip([[(p.first, s.first, x.first, h.first)], [(p.second, s.second, x.second, h.second)]])
+        {
+            let own =
+                (set.parameters.offset, set.standard_errors.offset, set.index.offset, set.index_others_held.offset);
+            let shared =
+                (set.parameters.slope, set.standard_errors.slope, set.index.slope, set.index_others_held.slope);
+            for (a, b) in [(own, of[0]), (shared, (p.slope, s.slope, x.slope, h.slope))] {
+                assert_close(a.0, b.0, 1e-11);
+                assert_close(a.1, b.1, 1e-11);
+                assert_close(a.2, b.2, 1e-10);
+                assert_close(a.3, b.3, 1e-10);
+            }
+            assert_eq!(set.assumption, whole_found.assumption);
+        }
+    }
+}
+
+// With nothing in common each set is solved by itself, correlation over lags included; only the noise of equal variance is
+// that of all sets.
+#[test]
+fn sets_with_nothing_in_common_are_solved_one_by_one() {
+    let (_, sets) = two_lines(|_| 1.0);
+    let sets = sets.map(|set| set.correlated(4));
+    let found = PooledRegression::new(sets.clone(), OneLine { slope: false, offset: false }).solve().unwrap();
+    for (set, found) in sets.iter().zip(found) {
+        let alone = set.solve().unwrap();
+        assert_close(found.parameters.slope, alone.parameters.slope, 1e-12);
+        assert_close(found.standard_errors.slope, alone.standard_errors.slope, 1e-10);
+        assert_close(found.standard_errors.offset, alone.standard_errors.offset, 1e-10);
+        assert_close(found.rms, alone.rms, 1e-12);
+    }
+}
+
+#[test]
+fn pooled_sets_that_do_not_determine_a_parameter_name_it() {
+    let mut still = Regression::<OneLine>::new();
+    (0..5).for_each(|_| still.row(OneLine { slope: 0.0, offset: 1.0 }, 1.0));
+    let shared = OneLine { slope: true, offset: false };
+    let error = PooledRegression::new([still.clone(), still], shared).solve().unwrap_err().to_string();
+    assert!(error.contains("`slope` is not identifiable"), "{error}");
+    let none = PooledRegression::<OneLine>::new([], shared).solve().unwrap_err().to_string();
+    assert!(none.contains("0 row(s)"), "{none}");
 }

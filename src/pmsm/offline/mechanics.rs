@@ -1,32 +1,18 @@
 use super::{Equations, Spans};
-use crate::pmsm::{COULOMB_WIDTH, SQRT_3_2, Shaft};
+use crate::pmsm::{COULOMB_WIDTH, Load, SQRT_3_2, Shaft};
 use crate::scalar::Scalar;
-
-crate::signals! {
-    /// What the torque of a rotor goes into, seen from the motor's side of the gear.
-    pub struct Inertia {
-        /// Inertia.
-        j: "kg m^2",
-        /// Viscous friction.
-        bv: "N m s",
-        /// Coulomb friction.
-        tc: "N m",
-        /// Gravity's torque where the arm is level.
-        tg: "N m",
-    }
-}
 
 /// The balance of torque `sqrt(3/2) ke iq = j dw/dt + bv w + tc tanh(w/0.5) + tg cos(theta/gear)` at each sample between
 /// two intervals, linear in inertia, friction and gravity; all of them scale with `ke` (V s/rad).
 ///
 /// The acceleration is the second difference of a measured angle and very noisy: filter the equations (a low-pass of some
 /// 10 Hz). Simulating [`Shaft`] in a fit instead needs no acceleration.
-pub fn mechanics(spans: &Spans, shaft: &Shaft, ke: f64) -> Equations<Inertia> {
+pub fn mechanics(spans: &Spans, shaft: &Shaft, ke: f64) -> Equations<Load> {
     let rows = spans.spans.windows(2).map(|pair| {
         let (a, b) = (&pair[0], &pair[1]);
         let w = 0.5 * (a.w + b.w);
         let theta = 0.5 * (a.theta + b.theta);
-        let terms = Inertia {
+        let terms = Load {
             j: (b.w - a.w) / spans.ts,
             bv: w,
             tc: Scalar::tanh(w / COULOMB_WIDTH),

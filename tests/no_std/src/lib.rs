@@ -5,8 +5,8 @@ use greybox::online::{
     Ekf, EkfStart, Forgetting, Mras, MrasStart, ObserverError, Order, Outcome, Rls, Stepping, Watch,
 };
 use greybox::pmsm::{
-    AngledDrive, Currents, Drive, ExactFed, ExactStep, ExactSurface, FedWinding, HeldIn, KeLyapunov, MotorLaw,
-    RsLyapunov, Winding,
+    AngledDrive, Currents, Drive, ExactStep, ExactSurface, HeldIn, InverterFed, InverterFedWinding, KeLyapunov,
+    MotorLaw, RsLyapunov, Winding,
 };
 use greybox::{Dual, Hold, Model, Nothing, Of, Scalar, fixed, free, signals};
 
@@ -70,17 +70,18 @@ pub fn motor(ts: f64, i: Currents) -> Result<[Outcome; 3], ObserverError> {
     let mut mras: Mras<_, _> = ExactSurface(step).mras(law, start)?;
     let a = mras.update(0.0, &Drive { ud: 0.0, uq: 70.0, w: 90.0 }, &i).outcome;
 
-    let Ok(model) = ExactFed::new(step, 0.15) else { return Ok([a; 3]) };
+    let model = InverterFed::<_, InverterFedWinding>::new(ExactSurface(step));
     let start = EkfStart {
         state: Currents { id: free(0.0).prior(0.0, 1.0), iq: free(0.0).prior(0.0, 1.0) },
-        parameters: FedWinding {
+        parameters: InverterFedWinding {
             rs: free(0.4).prior(0.4, 0.3),
             ls: fixed(4e-3),
             ke: free(0.9).prior(0.9, 0.1),
             vdt: free(0.0).prior(0.0, 2.0),
+            i0: fixed(0.15),
         },
         state_drift: Currents { id: 0.1, iq: 0.1 },
-        parameter_drift: FedWinding { rs: 1e-5, ls: 0.0, ke: 3e-6, vdt: 3e-5 },
+        parameter_drift: InverterFedWinding { rs: 1e-5, ls: 0.0, ke: 3e-6, vdt: 3e-5, i0: 0.0 },
         noise: Currents { id: 0.06, iq: 0.06 },
         hold: Hold::Zero,
         watch: Watch { limit: Currents { id: 8.0, iq: 8.0 }, patience: 100 },

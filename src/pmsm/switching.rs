@@ -2,7 +2,7 @@ use super::frames::{Phases, Stator, clarke, inverse_clarke, rotate_out_of};
 use super::inverter::{Carrier, DeadTime, duties};
 use super::machine::runge_kutta;
 use super::plant::Plant;
-use super::{Motion, PolePairs};
+use super::{MachineState, PolePairs};
 use crate::scalar::Scalar;
 
 /// A two-level inverter that switches, with the motor that it feeds.
@@ -17,7 +17,7 @@ use crate::scalar::Scalar;
 /// `1/2 (1 +- tanh(i/i0))`, so that the mean voltage lost in a carrier period is the `vdt tanh(i/i0)` of [`DeadTime`].
 /// Pulses shorter than the delay are swallowed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bridge {
+pub struct SwitchingInverter {
     plant: Plant,
     vdc: f64,
     carrier: Carrier,
@@ -38,11 +38,11 @@ struct Edge {
     up: bool,
 }
 
-impl Bridge {
+impl SwitchingInverter {
     /// An inverter on `vdc` (V) before the motor of `plant`, whose dead time it takes over; all legs down.
     pub fn new(plant: &Plant, vdc: f64, carrier: Carrier) -> Self {
         let none = DeadTime { vdt: 0.0, ..plant.dead_time };
-        Bridge {
+        SwitchingInverter {
             plant: Plant { dead_time: none, ..*plant },
             vdc,
             carrier,
@@ -57,12 +57,12 @@ impl Bridge {
     /// most `ts / substeps`. `see` is shown time (s) after the begin of the sample and motion, step by step.
     pub fn advance(
         &mut self,
-        mut x: Motion,
+        mut x: MachineState,
         u: Stator,
         ts: f64,
         substeps: u32,
-        mut see: impl FnMut(f64, &Motion),
-    ) -> Motion {
+        mut see: impl FnMut(f64, &MachineState),
+    ) -> MachineState {
         let longest = ts / substeps.max(1) as f64;
         let mut now = 0.0;
         let (edges, count) = self.edges(u, ts);
@@ -98,7 +98,7 @@ impl Bridge {
     }
 
     /// By how much (s) dead time delays an edge at this motion.
-    fn delay(&self, edge: &Edge, x: &Motion, ts: f64) -> f64 {
+    fn delay(&self, edge: &Edge, x: &MachineState, ts: f64) -> f64 {
         let DeadTime { vdt, i0 } = self.dead_time;
         if vdt == 0.0 {
             return 0.0;
@@ -111,12 +111,12 @@ impl Bridge {
     /// Goes on until `to`, with the edges that become due on the way.
     fn run(
         &mut self,
-        mut x: Motion,
+        mut x: MachineState,
         now: &mut f64,
         to: f64,
         longest: f64,
-        see: &mut impl FnMut(f64, &Motion),
-    ) -> Motion {
+        see: &mut impl FnMut(f64, &MachineState),
+    ) -> MachineState {
         loop {
             let due =
                 self.pending.iter().flatten().min_by(|a, b| a.at.total_cmp(&b.at)).filter(|e| e.at <= to).copied();
@@ -140,7 +140,7 @@ impl Bridge {
     }
 }
 
-fn phase_currents(x: &Motion, pole_pairs: PolePairs) -> Phases {
+fn phase_currents(x: &MachineState, pole_pairs: PolePairs) -> Phases {
     let (alpha, beta) = rotate_out_of((x.id, x.iq), pole_pairs.electrical(x.theta));
     inverse_clarke(Stator { alpha, beta })
 }
@@ -173,8 +173,8 @@ mod tests {
         let (plant, w) = (round(), 350.0);
         let winding = Winding { rs: 0.4, ls: 4e-3, ke: 0.95 };
         for carrier in CARRIERS {
-            let mut bridge = Bridge::new(&plant, V_DC, carrier);
-            let mut x = Motion { id: 2.0, iq: 10.0, w, theta: 0.3 };
+            let mut inverter = SwitchingInverter::new(&plant, V_DC, carrier);
+            let mut x = MachineState { id: 2.0, iq: 10.0, w, theta: 0.3 };
             let mut i = Currents { id: x.id, iq: x.iq };
             for k in 0..100 {
                 let begin = 4.0 * (0.3 + w * TS * k as f64);
@@ -205,7 +205,7 @@ mod tests {
                         *upper = !*upper;
                     }
                 }
-                x = bridge.advance(x, u, TS, 6, |_, _| {});
+                x = inverter.advance(x, u, TS, 6, |_, _| {});
                 let error = (x.id - i.id).hypot(x.iq - i.iq);
                 assert!(error < 1e-6, "{carrier:?}, sample {k}: {error}");
             }
@@ -218,8 +218,8 @@ mod tests {
     fn the_ripple_vanishes_at_the_samples() {
         let (plant, w) = (round(), 150.0);
         for carrier in CARRIERS {
-            let mut bridge = Bridge::new(&plant, V_DC, carrier);
-            let start = Motion { id: 0.0, iq: 10.0, w, theta: 0.0 };
+            let mut inverter = SwitchingInverter::new(&plant, V_DC, carrier);
+            let start = MachineState { id: 0.0, iq: 10.0, w, theta: 0.0 };
             let (mut x, mut mean) = (start, start);
             let (mut at_samples, mut between) = (0f64, 0f64);
             for k in 0..2000 {
@@ -231,7 +231,7 @@ mod tests {
                 let begin = mean;
                 let fine = |t: f64| plant.advance(begin, u, t, 12);
                 let mut swing = 0f64;
-                x = bridge.advance(x, u, TS, 6, |t, x| {
+                x = inverter.advance(x, u, TS, 6, |t, x| {
                     let mean = fine(t);
                     swing = swing.max((x.id - mean.id).hypot(x.iq - mean.iq));
                 });
@@ -255,12 +255,12 @@ mod tests {
         let lossy = Plant { axis, dead_time: DeadTime { vdt: 2.0, i0: 0.15 }, ..round() };
         for carrier in CARRIERS {
             for (id, iq) in [(8.0, 3.0), (-8.0, 3.0), (0.05, 0.02), (0.2, -0.1)] {
-                let start = Motion { id, iq, w: 0.0, theta: 0.2 };
+                let start = MachineState { id, iq, w: 0.0, theta: 0.2 };
                 let u = Stator { alpha: 40.0, beta: -25.0 };
-                let mut bridge = Bridge::new(&lossy, V_DC, carrier);
+                let mut inverter = SwitchingInverter::new(&lossy, V_DC, carrier);
                 let (mut x, mut mean) = (start, start);
                 for _ in 0..2 {
-                    x = bridge.advance(x, u, TS, 1, |_, _| {});
+                    x = inverter.advance(x, u, TS, 1, |_, _| {});
                     mean = lossy.advance(mean, u, TS, 6);
                 }
                 // In volts; the current's own change by 1e-4 A moves the loss by 1e-3 of it.
@@ -276,17 +276,17 @@ mod tests {
         // A dead time of 20 % of the period: at 5 A out of leg a and into the others, a's short pulse is lost.
         let axis = Axis { ls: 100.0, rs: 1e-9, ..round().axis };
         let lossy = Plant { axis, dead_time: DeadTime { vdt: 120.0, i0: 0.15 }, ..round() };
-        let start = Motion { id: 5.0, iq: 0.0, w: 0.0, theta: 0.0 };
-        let mut bridge = Bridge::new(&lossy, V_DC, Carrier::PerSample);
+        let start = MachineState { id: 5.0, iq: 0.0, w: 0.0, theta: 0.0 };
+        let mut inverter = SwitchingInverter::new(&lossy, V_DC, Carrier::PerSample);
         // Duties 0.1 (a) and 0.9: below the dead time, and so long that the edges down come late.
         let u = Stator { alpha: -320.0, beta: 0.0 };
         let mut up = 0;
         for _ in 0..5 {
-            bridge.advance(start, u, TS, 6, |_, _| {});
-            up += usize::from(bridge.upper[0]);
+            inverter.advance(start, u, TS, 6, |_, _| {});
+            up += usize::from(inverter.upper[0]);
         }
         assert_eq!(up, 0);
-        assert_eq!(bridge.upper, [false, true, true], "the other legs wait for the end of their dead time");
-        assert!(bridge.pending[1].is_some_and(|edge| edge.at > 0.0 && !edge.up), "{:?}", bridge.pending);
+        assert_eq!(inverter.upper, [false, true, true], "the other legs wait for the end of their dead time");
+        assert!(inverter.pending[1].is_some_and(|edge| edge.at > 0.0 && !edge.up), "{:?}", inverter.pending);
     }
 }

@@ -1,0 +1,76 @@
+use super::motor_model::{MotorModel, passes_on, wraps_motor};
+use super::{Currents, PolePairs, units};
+use crate::signals::place_of;
+use crate::{Of, Scalar, Signals};
+
+crate::signals! {
+    /// Parameters of a motor with surface magnets, its magnet by flux linkage.
+    pub struct FluxWinding {
+        /// Phase resistance; must be positive.
+        rs: "ohm",
+        /// Synchronous inductance; must be positive.
+        ls: "H",
+        /// Magnet flux linkage, peak.
+        psi_m: "Wb",
+    }
+}
+
+wraps_motor! {
+    /// A motor whose magnet is given, and found, by its flux linkage `psi_m` (Wb, peak) in place of `ke`: the parameters
+    /// `P` hold `psi_m` and those of the motor `M` but for `ke`, by name.
+    ///
+    /// Bounds, priors and intervals are then of `psi_m` itself. `ke = sqrt(3/2) np psi_m`
+    /// ([`ke_from_psi_m`](units::ke_from_psi_m)).
+    ///
+    /// ```
+    /// use greybox::pmsm::{FluxLinkage, FluxWinding, Surface};
+    /// let model = FluxLinkage::<_, FluxWinding>::new(Surface::new(4)?);
+    /// # Ok::<(), greybox::pmsm::Error>(())
+    /// ```
+    FluxLinkage, M::Input
+}
+
+impl<M: MotorModel, P: Signals> FluxLinkage<M, P> {
+    const PSI_M: usize = place_of(P::NAMES, "psi_m");
+    const KE: usize = place_of(M::Parameters::NAMES, "ke");
+    /// Where each parameter of the motor stands in `P`; `psi_m` in the place of `ke`.
+    const PLACES: [usize; 64] = {
+        let (mut places, mut i) = ([Self::PSI_M; 64], 0);
+        while i < M::Parameters::LEN {
+            if i != Self::KE {
+                places[i] = place_of(P::NAMES, M::Parameters::NAMES[i]);
+            }
+            i += 1;
+        }
+        places
+    };
+
+    #[inline(always)]
+    fn winding<S: Scalar>(&self, p: &Of<P, S>) -> Of<M::Parameters, S> {
+        let (entries, np) = (P::into_array(*p), self.motor.pole_pairs());
+        M::Parameters::from_fn(|i| {
+            let value = entries.as_ref()[Self::PLACES[i]];
+            if i == Self::KE { units::ke_from_psi_m(value, np) } else { value }
+        })
+    }
+
+    #[inline(always)]
+    fn through<S: Scalar>(
+        &self,
+        x: &Currents<S>,
+        u: &Of<M::Input, S>,
+        p: &Of<P, S>,
+        motor: impl FnOnce(&Currents<S>, &Of<M::Input, S>, &Of<M::Parameters, S>) -> Currents<S>,
+    ) -> Currents<S> {
+        motor(x, u, &self.winding(p))
+    }
+}
+
+impl<M: MotorModel, P: Signals> MotorModel for FluxLinkage<M, P> {
+    passes_on!(pole_pairs);
+
+    #[inline(always)]
+    fn torque<S: Scalar>(&self, x: &Currents<S>, theta: S, p: &Of<P, S>) -> S {
+        self.motor.torque(x, theta, &self.winding(p))
+    }
+}

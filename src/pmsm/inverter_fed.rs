@@ -1,0 +1,172 @@
+use super::frames::{Dq0, Park};
+use super::motor_model::{MotorModel, passes_on, wraps_motor};
+use super::{Currents, ExactSurface, PolePairs};
+use crate::online::{Ekf, EkfStart, ObserverError};
+use crate::{Of, Scalar, Signals};
+
+crate::signals! {
+    /// What an inverter is told, in the rotor frame, with the angle at which it happens.
+    pub struct AngledDrive {
+        /// Commanded voltage along the magnet flux.
+        ud: "V",
+        /// Commanded voltage 90 electrical degrees ahead of it.
+        uq: "V",
+        /// Mechanical speed.
+        w: "rad/s",
+        /// Mechanical angle; where it is held over a sample interval, that of the middle of the interval.
+        theta: "rad",
+    }
+    /// What an inverter's dead time takes from the voltage.
+    pub struct DeadTimeLoss {
+        /// Voltage that it takes from each phase.
+        vdt: "V",
+        /// Current at which that error turns over; must be positive.
+        i0: "A",
+    }
+    /// Parameters of a surface-magnet motor behind an inverter.
+    pub struct InverterFedWinding {
+        /// Phase resistance, cable included; must be positive.
+        rs: "ohm",
+        /// Synchronous inductance; must be positive.
+        ls: "H",
+        /// Line-to-line rms back-EMF per mechanical speed.
+        ke: "V s/rad",
+        /// Voltage that the inverter's dead time takes from each phase.
+        vdt: "V",
+        /// Current at which that error turns over; must be positive.
+        i0: "A",
+    }
+}
+
+wraps_motor! {
+    /// A motor behind an inverter that loses `vdt tanh(i/i0)` per phase to dead time.
+    ///
+    /// The parameters `P` hold those of the motor `M` and of [`DeadTimeLoss`], by name. The voltage lost is that of the
+    /// model's own current at the input's angle; for motors in exact steps, that of the current at the begin of the
+    /// interval, held as the command is. For offline fits [`Compensated`](super::Compensated) is more exact.
+    ///
+    /// ```
+    /// use greybox::pmsm::{InverterFed, Saturated};
+    /// greybox::signals! {
+    ///     /// A saturated motor and the dead time of its inverter.
+    ///     pub struct Mine {
+    ///         rs: "ohm", ld: "H", lq: "H", lq_saturated: "H", lq_cross: "H/A", i_saturation: "A", ke: "V s/rad",
+    ///         vdt: "V", i0: "A",
+    ///     }
+    /// }
+    /// let model = InverterFed::<_, Mine>::new(Saturated::new(4)?);
+    /// # Ok::<(), greybox::pmsm::Error>(())
+    /// ```
+    InverterFed, AngledDrive
+}
+
+impl<M: MotorModel, P: Signals> InverterFed<M, P> {
+    #[inline(always)]
+    fn through<S: Scalar>(
+        &self,
+        x: &Currents<S>,
+        u: &AngledDrive<S>,
+        p: &Of<P, S>,
+        motor: impl FnOnce(&Currents<S>, &Of<M::Input, S>, &Of<M::Parameters, S>) -> Currents<S>,
+    ) -> Currents<S> {
+        let loss = P::part::<DeadTimeLoss, S>(*p);
+        let lost = dead_time(x, loss.i0, self.motor.pole_pairs().electrical(u.theta));
+        let u = AngledDrive { ud: u.ud - loss.vdt * lost.0, uq: u.uq - loss.vdt * lost.1, ..*u };
+        motor(x, &AngledDrive::part::<M::Input, S>(u), &P::part::<M::Parameters, S>(*p))
+    }
+}
+
+impl<M: MotorModel, P: Signals> MotorModel for InverterFed<M, P> {
+    passes_on!(pole_pairs);
+    passes_on!(torque);
+}
+
+impl InverterFed<ExactSurface, InverterFedWinding> {
+    /// The motor's joint [`Ekf`], with this step's sample time; five states where rs, ke and vdt are free.
+    ///
+    /// # Errors
+    /// A resistance, inductance, back-EMF or turnover current that does not start above zero; else as [`Ekf::new`].
+    pub fn ekf<const N: usize>(self, start: EkfStart<Self>) -> Result<Ekf<Self, N>, ObserverError> {
+        let InverterFedWinding { rs, ls, ke, i0, .. } = start.parameters;
+        super::exact::all_positive([("rs", rs), ("ls", ls), ("ke", ke), ("i0", i0)])?;
+        Ekf::new(self, self.motor.0.sample_time(), start)
+    }
+}
+
+/// The dead time's voltage (V), `1 V * tanh(i/i0)` in each phase, seen from the rotor at electrical angle `theta_e`.
+#[inline]
+pub fn dead_time<S: Scalar>(x: &Currents<S>, i0: S, theta_e: S) -> (S, S) {
+    let park = Park::amplitude_invariant();
+    let mut phases = park.inverse(Dq0 { d: x.id, q: x.iq, zero: S::from(0.0) }, theta_e);
+    for i in [&mut phases.a, &mut phases.b, &mut phases.c] {
+        *i = (*i / i0).tanh();
+    }
+    let lost = park.forward(phases, theta_e);
+    (lost.d, lost.q)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Drive, ExactStep, HeldIn, Salient, SalientWinding, Saturated, SaturatedWinding, Winding};
+    use super::*;
+    use crate::Model;
+    use proptest::prelude::*;
+
+    crate::signals! {
+        /// A salient motor and its inverter.
+        struct Line { rs: "ohm", ld: "H", lq: "H", ke: "V s/rad", vdt: "V", i0: "A" }
+        /// A saturated motor and its inverter, in another order.
+        struct SaturatedLine {
+            vdt: "V", i0: "A", ke: "V s/rad", rs: "ohm", ld: "H", lq: "H", lq_saturated: "H", lq_cross: "H/A", i_saturation: "A",
+        }
+    }
+
+    const Q: SalientWinding = SalientWinding { rs: 0.63, ld: 3.84e-3, lq: 4.16e-3, ke: 0.95 };
+
+    proptest! {
+        // Behind an inverter, any motor gets the commanded voltage less the dead time's: to the bit, for it is the same code.
+        #[test]
+        fn any_motor_gets_what_dead_time_leaves(id in -60.0..60.0, iq in -60.0..60.0, ud in -300.0..300.0,
+                                                w in -400.0..400.0, theta in -9.0..9.0) {
+            let (x, u) = (Currents { id, iq }, AngledDrive { ud, uq: 50.0, w, theta });
+            let lost = dead_time(&x, 0.15, 4.0 * theta);
+            let left = Drive { ud: ud - 2.0 * lost.0, uq: 50.0 - 2.0 * lost.1, w };
+            let fed = InverterFed::<_, Line>::new(Salient::new(4).unwrap());
+            let p = Line { rs: Q.rs, ld: Q.ld, lq: Q.lq, ke: Q.ke, vdt: 2.0, i0: 0.15 };
+            prop_assert_eq!(fed.derivative(0.0, &x, &u, &p), Salient::new(4).unwrap().derivative(0.0, &x, &left, &Q));
+            let s = SaturatedWinding { rs: 0.63, ld: 3.84e-3, lq: 4.16e-3, lq_saturated: 2e-3, lq_cross: -8e-6,
+                                       i_saturation: 40.0, ke: 0.95 };
+            let p = SaturatedLine { vdt: 2.0, i0: 0.15, ke: s.ke, rs: s.rs, ld: s.ld, lq: s.lq,
+                                    lq_saturated: s.lq_saturated, lq_cross: s.lq_cross, i_saturation: s.i_saturation };
+            let fed = InverterFed::<_, SaturatedLine>::new(Saturated::new(4).unwrap());
+            prop_assert_eq!(fed.derivative(0.0, &x, &u, &p), Saturated::new(4).unwrap().derivative(0.0, &x, &left, &s));
+        }
+
+        // Dead time takes power from the motor whatever the angle.
+        #[test]
+        fn dead_time_is_a_loss(id in -60.0..60.0, iq in -60.0..60.0, theta_e in -9.0..9.0) {
+            let (d, q) = dead_time(&Currents { id, iq }, 0.15, theta_e);
+            prop_assert!(d * id + q * iq >= 0.0);
+        }
+    }
+
+    #[test]
+    fn an_exact_step_gets_it_too() {
+        let step = ExactStep::new(4, 0.126e-3, HeldIn::Stationary).unwrap();
+        let (i, theta) = (Currents { id: 3.0, iq: -8.0 }, 0.3);
+        let lost = dead_time(&i, 0.15, 4.0 * theta);
+        let p = InverterFedWinding { rs: 0.4, ls: 4e-3, ke: 0.95, vdt: 2.0, i0: 0.15 };
+        let fed = InverterFed::<_, InverterFedWinding>::new(ExactSurface(step));
+        let a = fed.next(0.0, &i, &AngledDrive { ud: 9.0, uq: 40.0, w: 60.0, theta }, &p);
+        let u = Drive { ud: 9.0 - 2.0 * lost.0, uq: 40.0 - 2.0 * lost.1, w: 60.0 };
+        assert_eq!(a, step.advance(&i, &u, &Winding { rs: 0.4, ls: 4e-3, ke: 0.95 }));
+    }
+
+    // Far from zero crossings a phase set of signs (+, -, -) is a vector of length 4/3 along phase a.
+    #[test]
+    fn dead_time_of_a_large_current() {
+        let (d, q) = dead_time(&Currents { id: 30.0, iq: 0.0 }, 0.15, 0.0);
+        approx::assert_relative_eq!(d, 4.0 / 3.0, max_relative = 1e-12);
+        assert!(q.abs() < 1e-12);
+    }
+}
