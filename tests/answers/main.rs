@@ -1,6 +1,7 @@
 //! What is said of an estimate: identifiability, diagnostics, comparison, reports.
 
 mod compare;
+mod filters;
 mod gallery;
 mod identifiability;
 mod pages;

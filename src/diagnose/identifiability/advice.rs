@@ -40,7 +40,7 @@ pub(super) fn advice(found: &Identifiability, unknowns: &[Unknown], records: &[R
         advice.push(format!("{} of unknowns are hardly known but together", counted(more as u64, "more set")));
     }
     for excited in &found.excitation {
-        if excited.outputs.iter().all(|(_, share)| *share == 0.0) {
+        if excited.segments.iter().all(|segment| segment.share == 0.0) {
             advice.push(format!("`{}` moves no output at all: fix it", excited.name));
         }
     }
