@@ -72,6 +72,9 @@ pub fn bootstrap(
         });
     }
     let refit = |number: usize| -> Option<Vec<f64>> {
+        if control.stops() {
+            return None;
+        }
         let mut random = Random::stream(seed, number as u64);
         let parts = problem.records().iter().zip(&predictions).zip(&residuals);
         let records = parts.map(|((record, prediction), residuals)| {
