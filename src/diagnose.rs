@@ -31,7 +31,9 @@ pub use side_by_side::{Compared, ComparedOutput, DataUse};
 
 use crate::error::Error;
 use crate::numeral::p_value;
-use crate::optimize::{Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization, Machine, Severity};
+use crate::optimize::{
+    Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization, Machine, Severity,
+};
 use crate::problem::{Control, Problem};
 use crate::section::{Cell, Section, Table};
 use argmin::core::{Executor, State};

@@ -226,7 +226,11 @@ fn spectrum(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
             label: format!("{} Hz", number(period.frequency, 4)),
         }),
     );
-    let unit = if fit.unit.is_empty() || fit.unit == "1" { "1/Hz".to_owned() } else { format!("({})²/Hz", fit.unit) };
+    let unit = match fit.unit.as_str() {
+        "" | "1" => "1/Hz".to_owned(),
+        single if single.chars().all(char::is_alphabetic) => format!("{single}²/Hz"),
+        several => format!("({several})²/Hz"),
+    };
     let drawing =
         Curves { x: Axis::new("frequency", "Hz").from(0.0), y: Axis::new("power density", unit).logarithmic(), layers };
     let caption = "Spectrum: mean power density, thin the greatest; that of white residuals is flat";
