@@ -92,7 +92,7 @@ fn trimmed(text: &str) -> &str {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
 }
 
-/// Reads a number that is null where it was not finite, because JSON has no other word for it: null is not a number.
+/// Reads a number that is null where it was not finite, because JSON has no value for it: null is not a number.
 pub(crate) fn or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }

@@ -36,7 +36,7 @@
 //! # JSON
 //!
 //! `schema/report.schema.json` describes it. A number that is not finite (a standard error without a degree of freedom) is
-//! null, because JSON has no other word for it; read back, it is not a number (for a bound: none). Drawings are left out
+//! null, because JSON has no value for it; read back, it is not a number (for a bound: none). Drawings are left out
 //! unless asked for.
 
 mod chart;

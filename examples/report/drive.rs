@@ -99,7 +99,7 @@ pub fn found(path: &Path, columns: &[&str], said: &Arguments, stop: &Arc<AtomicB
     Ok(Found { model, record, assumed: assumed(&tried) })
 }
 
-/// The model in exact steps, and the record with the speed of the interval that goes with it.
+/// The model in exact steps, and the record with the speed of the interval that it expects.
 fn stepped(
     log: &ExperimentOf<Surface>,
     pole_pairs: u32,

@@ -58,7 +58,7 @@ pub struct Residuals {
     pub correlations: Vec<Correlation>,
     /// Inputs that do not change in this record: what they drive cannot be told.
     pub constant_inputs: Vec<String>,
-    /// How the spread goes with each input, predicted output and time.
+    /// How the spread depends on each input, predicted output and time.
     pub spreads: Vec<Spread>,
     /// The residuals furthest out, beyond what a normal distribution allows; furthest first, twenty at most.
     pub outliers: Vec<Outlier>,

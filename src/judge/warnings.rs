@@ -7,7 +7,7 @@ use crate::numeral::{counted, exact, number, p_value, percent};
 use crate::optimize::Severity;
 use crate::problem::Objective;
 
-/// A finer step may move a parameter by this part of its standard error without a word.
+/// A finer step may move a parameter by this part of its standard error without a warning.
 const STEP_SHIFT: f64 = 0.5;
 /// Autocorrelation that widens an interval by more than this factor calls for care.
 const CORRELATION_MATTERS: f64 = 2.0;

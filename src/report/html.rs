@@ -146,7 +146,7 @@ fn section(to: &mut Markup, section: &Section, level: usize, prose: &mut Prose) 
     });
 }
 
-/// The title, and a sign where the section speaks against the estimate.
+/// The title, and a sign where the section is a reason not to use the estimate as it is.
 fn title(to: &mut Markup, section: &Section) {
     to.text(&section.title);
     if section.severity > Severity::Usable {

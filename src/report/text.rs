@@ -84,7 +84,7 @@ impl Page {
         self.left_out(&section.parts);
     }
 
-    /// What a terminal is spared: details that other forms of the report have.
+    /// Names the details that only the other forms of the report show.
     fn left_out(&mut self, parts: &[Section]) {
         const NAMED: usize = 3;
         let folded: Vec<&str> = parts.iter().filter(|part| part.folded).map(|part| part.title.as_str()).collect();

@@ -203,7 +203,7 @@ fn reports_keep_to_the_schema() {
     assert_eq!(Report::from_json(&drawn).unwrap(), everything);
 }
 
-/// A report with numbers that JSON has no word for.
+/// A report with numbers that JSON has no value for.
 fn not_finite() -> Report {
     let mut report = with_everything();
     report.estimate.cost = f64::NAN;

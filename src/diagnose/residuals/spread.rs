@@ -1,4 +1,4 @@
-//! Whether the residuals' spread goes with a signal (heteroscedasticity).
+//! Whether the residuals' spread depends on a signal (heteroscedasticity).
 
 use super::Series;
 use crate::diagnose::Test;
@@ -21,7 +21,7 @@ pub struct Spread {
     pub deviation: Vec<f64>,
     /// How many residuals there are.
     pub count: Vec<u64>,
-    /// Part of the variance of the squared residuals that goes with the signal.
+    /// Part of the variance of the squared residuals that the signal explains.
     pub share: f64,
 }
 
