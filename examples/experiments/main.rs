@@ -3,6 +3,8 @@
 mod ideal;
 mod report;
 mod robot;
+#[path = "../common/terminal.rs"]
+mod terminal;
 
 use clap::Parser;
 use std::path::PathBuf;
@@ -24,10 +26,13 @@ struct Arguments {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments = Arguments::parse();
     let mut reports = Vec::new();
-    for number in 1..=6u8 {
+    let stop = terminal::interrupted()?;
+    let bar = terminal::spinner("experiments");
+    for number in (1..=6u8).take_while(|_| !stop.load(std::sync::atomic::Ordering::Relaxed)) {
         if arguments.experiment != "all" && arguments.experiment != number.to_string() {
             continue;
         }
+        bar.set_message(format!("experiment {number}"));
         let report = match number {
             1 => ideal::torque_step()?,
             2 => ideal::position_step()?,
@@ -37,7 +42,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             _ => robot::applications()?,
         };
         if !arguments.json {
-            println!("{report}");
+            bar.suspend(|| println!("{report}"));
         }
         if let Some(folder) = &arguments.plots {
             std::fs::create_dir_all(folder)?;
@@ -47,6 +52,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         reports.push(report);
     }
+    bar.finish_and_clear();
     if arguments.json {
         println!("{}", serde_json::to_string_pretty(&reports)?);
     }

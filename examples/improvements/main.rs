@@ -3,6 +3,8 @@
 #[path = "../experiments/report.rs"]
 #[allow(dead_code, reason = "shared with the experiments, which also draw")]
 mod report;
+#[path = "../common/terminal.rs"]
+mod terminal;
 
 use greybox::online::{Ekf, EkfStart, Law, MrasStart, Order, Stepping, Watch};
 use greybox::pmsm::drive::Simulation;
@@ -98,7 +100,9 @@ fn joint_filter(axis: &Axis, spans: &Spans) -> Result<f64> {
 fn main() -> Result<()> {
     let mut report = Report::new("Beyond the thesis: the same records, before and after");
     let (mut offline, mut online, mut water_rows) = (Vec::new(), Vec::new(), Vec::new());
-    for number in 1..=6 {
+    let stop = terminal::interrupted()?;
+    let bar = terminal::steps(7, "axes");
+    for number in (1..=6).take_while(|_| !stop.load(std::sync::atomic::Ordering::Relaxed)) {
         let axis = Axis::reference(number)?;
         let (name, total) = (format!("axis {number}"), axis.rs + axis.r_cable);
         let simulation = Simulation::new(axis)?;
@@ -133,6 +137,7 @@ fn main() -> Result<()> {
         let (before, after) = (solve_plain(&water)?, solve_extended(&water)?.parameters);
         let row = vec![percent(before.ke, axis.ke), percent(after.ke, axis.ke), joint_filter(&axis, &water)?];
         water_rows.push((name, row));
+        bar.inc(1);
     }
     let columns = ["Ke LS", "Ke extended", "R LS", "R extended"];
     report.table("Speed cycles, offline: largest error over the speeds (%; R with cable)", &columns, offline);
@@ -141,6 +146,7 @@ fn main() -> Result<()> {
     let columns = ["Ke LS", "Ke extended", "EKF rms"];
     report.table("Water cutting: error of Ke (%)", &columns, water_rows);
 
+    bar.set_message("axis 1, variants");
     let axis = Axis::reference(1)?;
     let program = Program::speed_cycles(&axis, 4, 1.0)?;
     let simulation = Simulation::new(axis)?;
@@ -180,6 +186,7 @@ fn main() -> Result<()> {
     let rows = [("clean", clean), ("spikes of 40 A, 1 in 50", spiked), ("Hampel before the filter", ls(&log)?)];
     let rows = rows.map(|(name, cells)| (name.to_owned(), cells)).to_vec();
     report.table("Axis 1, outliers", &["R ohm", "L mH", "Ke V s/rad"], rows);
+    bar.finish_and_clear();
     println!("{report}");
     Ok(())
 }
