@@ -1,8 +1,9 @@
 //! Experiment 6: material handling and water cutting.
 
-use crate::figure::{Figure, Panel, curve, level, thin};
+use crate::figure::{Figure, Panel, curve, dots, level, thin};
 use crate::methods::*;
 use crate::report::Report;
+use crate::speeds::by_speed;
 use greybox::pmsm::drive::Simulation;
 use greybox::pmsm::offline::{Form, Validation, voltages};
 use greybox::pmsm::program::Program;
@@ -95,7 +96,7 @@ fn compare(errors: &mut Errors, run: &Run, trace: &[(f64, f64)]) -> Result<()> {
 
 fn by_axis(title: &str, errors: &Errors) -> Panel {
     let labels = ["least squares", "weighted by w^2", "nonlinear grey box", "extended least squares"];
-    let mut series: Vec<_> = labels.into_iter().zip(&errors.ke).map(|(label, ke)| curve(label, ke.clone())).collect();
+    let mut series: Vec<_> = labels.into_iter().zip(&errors.ke).map(|(label, ke)| dots(label, ke.clone())).collect();
     series.push(level("reference", 0.0, (1.0, 6.0)));
     Panel { title: title.to_owned(), series }
 }

@@ -31,18 +31,32 @@ pub struct Panel {
 pub struct Series {
     pub label: String,
     pub points: Vec<(f64, f64)>,
-    /// A value to compare with: dashed, gray, without markers.
-    pub reference: bool,
+    pub kind: Kind,
 }
 
-/// A curve.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// A line, with markers where a panel has several.
+    Curve,
+    /// Markers only: what the horizontal axis counts has no order.
+    Points,
+    /// A value to compare with: dashed, gray, without markers.
+    Reference,
+}
+
+/// A curve; it is broken where a point is not a number.
 pub fn curve(label: impl Into<String>, points: Vec<(f64, f64)>) -> Series {
-    Series { label: label.into(), points, reference: false }
+    Series { label: label.into(), points, kind: Kind::Curve }
+}
+
+/// Markers without a line.
+pub fn dots(label: impl Into<String>, points: Vec<(f64, f64)>) -> Series {
+    Series { label: label.into(), points, kind: Kind::Points }
 }
 
 /// What it is to be compared with.
 pub fn reference(label: impl Into<String>, points: Vec<(f64, f64)>) -> Series {
-    Series { label: label.into(), points, reference: true }
+    Series { label: label.into(), points, kind: Kind::Reference }
 }
 
 /// A constant to compare with, from `x.0` to `x.1`.
@@ -86,7 +100,7 @@ impl Figure {
     pub fn draw(&self, folder: &Path) -> Result {
         let columns = match self.panels.len() {
             1 => 1,
-            2..=4 => 2,
+            2 | 4 => 2,
             _ => 3,
         };
         let rows = self.panels.len().div_ceil(columns);
@@ -106,21 +120,22 @@ impl Figure {
     }
 
     /// The labels of all panels, each once.
-    fn legend(&self) -> Vec<(String, bool)> {
-        let mut legend: Vec<(String, bool)> = Vec::new();
+    fn legend(&self) -> Vec<(String, Kind)> {
+        let mut legend: Vec<(String, Kind)> = Vec::new();
         for series in self.panels.iter().flat_map(|panel| &panel.series) {
             if !legend.iter().any(|(label, _)| *label == series.label) {
-                legend.push((series.label.clone(), series.reference));
+                legend.push((series.label.clone(), series.kind));
             }
         }
         legend
     }
 
-    fn draw_panel(&self, panel: &Panel, area: &Area, legend: &[(String, bool)]) -> Result {
-        let scaled = |series: &Series| series.points.iter().filter_map(|p| self.scaled(*p)).collect::<Vec<_>>();
+    fn draw_panel(&self, panel: &Panel, area: &Area, legend: &[(String, Kind)]) -> Result {
+        let scaled = |series: &Series| series.points.iter().map(|p| self.scaled(*p)).collect::<Vec<_>>();
         let curves: Vec<(&Series, Vec<(f64, f64)>)> = panel.series.iter().map(|s| (s, scaled(s))).collect();
+        let several = panel.series.iter().filter(|series| series.kind == Kind::Curve).count() > 1;
         let range = |of: fn(&(f64, f64)) -> f64| {
-            let values = curves.iter().flat_map(|(_, points)| points).map(of);
+            let values = curves.iter().flat_map(|(_, points)| points).map(of).filter(|v| v.is_finite());
             let (low, high) = values.fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
             let pad = 0.05 * (high - low).max(1e-9);
             low - pad..high + pad
@@ -138,15 +153,14 @@ impl Figure {
         mesh.x_label_formatter(&|x| short(*x)).y_label_formatter(&y_label);
         mesh.label_style(letters.clone()).axis_desc_style(letters).light_line_style(WHITE).draw()?;
         for (series, points) in &curves {
-            draw_series(&mut chart, series, points, style(legend, &series.label))?;
+            draw_series(&mut chart, series.kind, points, several, style(legend, &series.label))?;
         }
         Ok(())
     }
 
-    /// A point as it is drawn; `None` where it cannot be.
-    fn scaled(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
-        let y = if self.logarithmic { y.abs().max(1e-4).log10() } else { y };
-        (x.is_finite() && y.is_finite()).then_some((x, y))
+    /// A point as it is drawn.
+    fn scaled(&self, (x, y): (f64, f64)) -> (f64, f64) {
+        (x, if self.logarithmic { y.abs().max(1e-4).log10() } else { y })
     }
 }
 
@@ -167,38 +181,49 @@ macro_rules! mark {
 
 fn draw_series(
     chart: &mut Chart<'_, '_>,
-    series: &Series,
+    kind: Kind,
     points: &[(f64, f64)],
+    several: bool,
     (number, style): (usize, ShapeStyle),
 ) -> Result {
-    if series.reference {
-        chart.draw_series(DashedLineSeries::new(points.iter().copied(), 8, 5, style))?;
+    let finite = |p: &(f64, f64)| p.0.is_finite() && p.1.is_finite();
+    for piece in points.split(|p| !finite(p)) {
+        match kind {
+            Kind::Curve => drop(chart.draw_series(LineSeries::new(piece.iter().copied(), style))?),
+            Kind::Reference => drop(chart.draw_series(DashedLineSeries::new(piece.iter().copied(), 8, 5, style))?),
+            Kind::Points => {}
+        }
+    }
+    if kind == Kind::Reference || kind == Kind::Curve && !several {
         return Ok(());
     }
-    chart.draw_series(LineSeries::new(points.iter().copied(), style))?;
     // All points of a short curve; some of a long one, at different places for each curve.
     let every = if points.len() <= 40 { 1 } else { points.len().div_ceil(MARKERS) };
     let first = if every == 1 { 0 } else { every * (1 + number) / 7 };
-    for point in points.iter().skip(first).step_by(every) {
+    for point in points.iter().skip(first).step_by(every).filter(|p| finite(p)) {
         mark!(chart.plotting_area(), number, *point, style)?;
     }
     Ok(())
 }
 
 /// The labels in rows; gives back where they end.
-fn draw_legend(root: &Area, legend: &[(String, bool)]) -> core::result::Result<u32, Box<dyn std::error::Error>> {
+fn draw_legend(root: &Area, legend: &[(String, Kind)]) -> core::result::Result<u32, Box<dyn std::error::Error>> {
     let (mut x, mut y) = (16, 46);
-    for (label, is_reference) in legend {
+    for (label, kind) in legend {
         let (number, style) = style(legend, label);
         let width = 44 + label.chars().count() as i32 * 9 + 22;
         if x + width > WIDTH as i32 && x > 16 {
             (x, y) = (16, y + 24);
         }
-        let ends = if *is_reference { vec![(x, x + 13), (x + 20, x + 33)] } else { vec![(x, x + 33)] };
-        for (from, to) in ends {
+        let lines = match kind {
+            Kind::Reference => vec![(x, x + 13), (x + 20, x + 33)],
+            Kind::Curve => vec![(x, x + 33)],
+            Kind::Points => vec![],
+        };
+        for (from, to) in lines {
             root.draw(&PathElement::new([(from, y + 8), (to, y + 8)], style))?;
         }
-        if !is_reference {
+        if *kind != Kind::Reference && legend.len() > 2 {
             mark!(root, number, (x + 16, y + 8), style)?;
         }
         root.draw(&Text::new(label.as_str(), (x + 42, y), ("sans-serif", LETTERS)))?;
@@ -208,10 +233,11 @@ fn draw_legend(root: &Area, legend: &[(String, bool)]) -> core::result::Result<u
 }
 
 /// Number and stroke of a label.
-fn style(legend: &[(String, bool)], label: &str) -> (usize, ShapeStyle) {
-    let is_reference = legend.iter().any(|(known, reference)| known == label && *reference);
-    let kind = legend.iter().filter(|(_, reference)| *reference == is_reference);
-    let number = kind.into_iter().position(|(known, _)| known == label).unwrap_or(0);
-    let color = if is_reference { REFERENCES[number % 2] } else { COLORS[number % COLORS.len()] };
+fn style(legend: &[(String, Kind)], label: &str) -> (usize, ShapeStyle) {
+    let is_reference = |kind: &Kind| *kind == Kind::Reference;
+    let mine = legend.iter().any(|(known, kind)| known == label && is_reference(kind));
+    let alike = legend.iter().filter(|(_, kind)| is_reference(kind) == mine);
+    let number = alike.into_iter().position(|(known, _)| known == label).unwrap_or(0);
+    let color = if mine { REFERENCES[number % 2] } else { COLORS[number % COLORS.len()] };
     (number, color.stroke_width(2))
 }

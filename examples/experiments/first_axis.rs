@@ -3,7 +3,7 @@
 use crate::figure::{Figure, Panel, Series, curve, level, thin};
 use crate::methods::*;
 use crate::report::Report;
-use crate::speeds::Found;
+use crate::speeds::{Found, by_speed};
 use greybox::LinearEstimate;
 use greybox::pmsm::{DeadZone, KeConstantGain, KeLyapunov, Winding};
 

@@ -1,6 +1,6 @@
 //! Experiment 4: cold and warm, and both temperatures read back.
 
-use crate::figure::{Figure, Panel, curve, level};
+use crate::figure::{Figure, Panel, curve, dots, level};
 use crate::methods::*;
 use crate::report::Report;
 use crate::speeds::CYCLE_SPEED;
@@ -94,8 +94,8 @@ pub fn temperature() -> Result<Report> {
             vec![Panel {
                 title: String::new(),
                 series: vec![
-                    curve("winding", winding_read),
-                    curve("magnet", magnet_read),
+                    dots("winding", winding_read),
+                    dots("magnet", magnet_read),
                     level("reference", 35.0, (1.0, 6.0)),
                 ],
             }],

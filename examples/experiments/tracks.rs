@@ -22,8 +22,8 @@ pub fn tracks(report: &mut Report, run: &Run) -> Result<()> {
         let chosen = run.cycles.iter().skip(odd).step_by(2);
         let points = chosen.flat_map(|cycle| {
             let mut points = trace(cycle.samples.clone(), &speed);
-            // A gap between one chosen cycle and the next: there the curve rests at zero.
-            points.insert(0, (cycle.samples.start as f64 * ts, 0.0));
+            // A gap between one chosen cycle and the next.
+            points.push((f64::NAN, f64::NAN));
             points
         });
         points.collect::<Vec<_>>()
