@@ -5,7 +5,7 @@
 
 use greybox::optimize::{LevenbergMarquardt, Stop};
 use greybox::pmsm::{Currents, Drive, SQRT_2_3, Winding};
-use greybox::{Estimate, Experiment, ExperimentOf, Fit, JacobianColumns, Model, Scalar, Time, free};
+use greybox::{Estimate, Experiment, ExperimentOf, Fit, Model, OwnSize, Scalar, Time, free};
 use std::error::Error;
 
 struct Pmsm {
@@ -66,7 +66,7 @@ fn fit(model: &Pmsm, record: &ExperimentOf<Pmsm>) -> Result<Estimate<Pmsm>, grey
     Fit::new(model, record)
         .parameters(Winding { rs: free(1.2), ls: free(1.75e-3), ke: free(0.63) })
         .noise(Currents { id: 1.0, iq: 1.0 })
-        .optimizer(LevenbergMarquardt::new(stop, JacobianColumns))
+        .optimizer(LevenbergMarquardt::new(stop, OwnSize))
         .run()
 }
 

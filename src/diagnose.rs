@@ -25,8 +25,10 @@ pub use identifiability::{COLLINEAR, Collinear, Excitation, Identifiability, Seg
 pub use profile::{End, Profile, ProfilePoint, profile};
 pub use restarts::{Better, Restarts, restarts};
 
+use crate::error::Error;
 use crate::estimate::p_value;
-use crate::optimize::{Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization};
+use crate::optimize::{Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization, Machine};
+use crate::problem::{Control, Problem};
 use argmin::core::{Executor, State};
 use serde::{Deserialize, Serialize};
 
@@ -74,9 +76,31 @@ impl<L: LeastSquares> LeastSquares for Pinned<'_, L> {
         self.problem.linearize(x)
     }
 
+    fn curvature(&self, x: &[f64], along: &[f64]) -> Option<Result<Linearization, Infeasible>> {
+        self.problem.curvature(x, along)
+    }
+
     fn bounds(&self) -> Vec<(f64, f64)> {
         self.bounds.clone()
     }
+
+    fn sizes(&self) -> Vec<Option<f64>> {
+        self.problem.sizes()
+    }
+}
+
+/// Refuses a result that was not computed to its end.
+fn check_complete(problem: &Problem<'_>, control: &Control, what: &str) -> Result<(), Error> {
+    if !control.stops() {
+        return Ok(());
+    }
+    Err(Error::Option(match problem.settings.time_limit {
+        Some(limit) if control.expired() => format!(
+            "the time limit of {} s, which holds for each diagnosis anew, was over before {what} was complete; allow more time",
+            limit.as_secs_f64()
+        ),
+        _ => format!("{what} was cancelled; lower the flag to run it"),
+    }))
 }
 
 /// Place and cost of the minimum that a search from `start` ends in; `None` where it cannot begin or does not end.

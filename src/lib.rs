@@ -219,7 +219,7 @@ pub use {
     regress::{Assumption, LinearEstimate, PooledRegression, Regression, RegressionError},
     report::Report,
     scalar::Table,
-    scaling::{JacobianColumns, Nominal, Scaling, Unscaled},
+    scaling::{JacobianColumns, Nominal, OwnSize, Scaling, Seen, Unscaled},
     simulate::{Simulation, Simulator, simulate},
     weighting::{BySignal, Law, Weighting},
 };

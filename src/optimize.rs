@@ -1,17 +1,21 @@
-//! Nonlinear least squares: [`LevenbergMarquardt`] and [`GaussNewton`], as solvers of argmin on the information triangle.
+//! Nonlinear least squares: [`LevenbergMarquardt`] and [`GaussNewton`], on the information triangle.
 //!
-//! A problem hands over one [`Linearization`] per point: cost and triangle from a single pass over the data. The solvers
-//! never see a residual vector and never form normal equations.
+//! A problem hands over one [`Linearization`] per point: cost and triangle from a single pass over the data. The searches
+//! never see a residual vector and never form normal equations. Each is a [`Machine`], which says what it wants to know next
+//! and is told; as a solver of argmin it evaluates its problem itself.
 
+mod descent;
 mod gauss_newton;
 mod levenberg_marquardt;
 mod linearization;
+mod machine;
 mod outcome;
-mod search;
+mod point;
 
 pub use gauss_newton::GaussNewton;
 pub use levenberg_marquardt::LevenbergMarquardt;
 pub use linearization::Linearization;
+pub use machine::{Domain, Machine, Request};
 pub use outcome::{Outcome, Severity};
 
 use crate::error::Error;
@@ -21,18 +25,34 @@ use serde::{Deserialize, Serialize};
 pub type LeastSquaresState = argmin::core::IterState<Vec<f64>, Vec<f64>, (), (), (), f64>;
 
 /// Where no step lowers the cost, a cosine up to this is rounding too.
-const PRECISION_GRADIENT: f64 = 1e-6;
+const PRECISION: f64 = 1e-6;
 
 /// A sum of squares to be minimized.
 pub trait LeastSquares {
     /// Cost, slopes and residuals at `x`, in one pass.
     ///
+    /// A slope may be infinite at a bound (the root of an initial level of zero). An unknown on its bound whose column is
+    /// given as zeros is left there, and tried inside before the search ends.
+    ///
     /// # Errors
-    /// [`Infeasible`], where there is no cost at `x`: the solver then tries a shorter step.
+    /// [`Infeasible`], where there is no cost at `x`: the search then tries a shorter step.
     fn linearize(&self, x: &[f64]) -> Result<Linearization, Infeasible>;
+
+    /// As [`linearize`](Self::linearize), with the second derivatives of the errors (measured less predicted) at `x + t along`,
+    /// `t = 0`, in the place of the errors: the rows whose damped solution is the geodesic acceleration. The cost does not
+    /// matter. `None` for a problem that has no second derivatives; its steps are then not bent.
+    fn curvature(&self, _x: &[f64], _along: &[f64]) -> Option<Result<Linearization, Infeasible>> {
+        None
+    }
 
     /// Lower and upper bound of each unknown; infinite where there is none. None at all unless said otherwise.
     fn bounds(&self) -> Vec<(f64, f64)> {
+        Vec::new()
+    }
+
+    /// The size of those unknowns whose magnitude does not tell it: one for a logarithm. Their magnitudes, unless said
+    /// otherwise.
+    fn sizes(&self) -> Vec<Option<f64>> {
         Vec::new()
     }
 }
@@ -42,8 +62,16 @@ impl<T: LeastSquares + ?Sized> LeastSquares for &T {
         (**self).linearize(x)
     }
 
+    fn curvature(&self, x: &[f64], along: &[f64]) -> Option<Result<Linearization, Infeasible>> {
+        (**self).curvature(x, along)
+    }
+
     fn bounds(&self) -> Vec<(f64, f64)> {
         (**self).bounds()
+    }
+
+    fn sizes(&self) -> Vec<Option<f64>> {
+        (**self).sizes()
     }
 }
 
@@ -66,7 +94,7 @@ pub struct Stop {
     pub step: f64,
     /// Converged, if the residual is orthogonal to every column of the Jacobian to this cosine.
     pub gradient: f64,
-    /// Converged, if a step lowered the cost by less than this part; zero switches the test off. A convenience of other
+    /// Converged, if a step lowered the cost by less than this part, and the next would; zero switches the test off. A convenience of other
     /// tools: on hard problems it stops with few right digits.
     pub cost: f64,
     /// Most trial steps.

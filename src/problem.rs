@@ -4,6 +4,7 @@ mod absorb;
 mod as_argmin;
 mod checkpoint;
 mod control;
+mod curvature;
 mod linearize;
 mod objective;
 mod pass;
@@ -22,7 +23,8 @@ pub use objective::Objective;
 pub(crate) use pass::{Accumulate, each};
 pub use search::Search;
 pub(crate) use search::{Optimizer, RoundError};
-use segments::{Cuts, Memory};
+use segments::Cuts;
+pub(crate) use segments::Memory;
 pub use settings::Settings;
 pub(crate) use settings::{Observer, Weights};
 pub use simulate::Simulated;
@@ -144,7 +146,6 @@ impl<'a> Problem<'a> {
     /// The cost to minimize, with errors in the units of the outputs.
     pub(crate) fn in_units<'p>(&'p self, control: &'p Control) -> Objective<'p> {
         let whitening = Whitening::none(self.layout().outputs.len());
-        let memory = Memory::default();
-        Objective { problem: self, sweep: &*self.sweep, whitening, control, memory }
+        Objective::new(self, &*self.sweep, whitening, control)
     }
 }

@@ -177,17 +177,17 @@ pub trait Sweep: Send + Sync {
     }
 
     /// What exactly fails in a record that cannot be run; `sample` is where it was noticed. The noise levels tell which
-    /// error is largest, where nothing fails.
+    /// error is largest, where nothing fails. It is given up where `stops` says so.
     fn locate(
         &self,
         record: &Record,
-        label: &str,
         state: &[f64],
         parameters: &[f64],
         sample: usize,
         sigma: &[f64],
+        stops: &dyn Fn() -> bool,
     ) -> Option<Located> {
-        let _ = (record, label, state, parameters, sample, sigma);
+        let _ = (record, state, parameters, sample, sigma, stops);
         None
     }
 

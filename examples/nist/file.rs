@@ -55,6 +55,21 @@ impl File {
         results.map_err(|error| format!("{}: {error}", self.name))
     }
 
+    /// Its data as a record of this model.
+    ///
+    /// # Errors
+    /// Data that are no record.
+    pub fn record<M: Model<State = Nothing, Input = Predictors, Output = Response>>(
+        &self,
+        model: &M,
+    ) -> Result<ExperimentOf<M>, Error> {
+        let input = |row: &Vec<f64>| Predictors { x: row[1], x2: row.get(2).copied().unwrap_or(0.0) };
+        let output = |row: &Vec<f64>| Response { y: if self.name == "Nelson" { row[0].ln() } else { row[0] } };
+        let (inputs, outputs) = (self.data.iter().map(input).collect(), self.data.iter().map(output).collect());
+        let time = Time::Uniform { start: 0.0, step: 1.0 };
+        Ok(Experiment::new(model, time, inputs, outputs)?.named(&self.name))
+    }
+
     fn found<M: Model>(&self, start: usize, estimate: &Estimate<M>) -> Found {
         let parameters = M::Parameters::into_array(estimate.parameters);
         let errors = M::Parameters::into_array(estimate.knowledge);
@@ -84,12 +99,8 @@ fn digits(found: f64, certified: f64) -> f64 {
 impl Task for &File {
     type Answer = Result<Vec<Found>, Error>;
 
-    fn run<M: Model<State = Nothing, Input = Predictors, Output = Response>>(self, model: &M) -> Self::Answer {
-        let input = |row: &Vec<f64>| Predictors { x: row[1], x2: row.get(2).copied().unwrap_or(0.0) };
-        let output = |row: &Vec<f64>| Response { y: if self.name == "Nelson" { row[0].ln() } else { row[0] } };
-        let (inputs, outputs) = (self.data.iter().map(input).collect(), self.data.iter().map(output).collect());
-        let time = Time::Uniform { start: 0.0, step: 1.0 };
-        let record: ExperimentOf<M> = Experiment::new(model, time, inputs, outputs)?.named(&self.name);
+    fn run<M: Model<State = Nothing, Input = Predictors, Output = Response> + Clone>(self, model: &M) -> Self::Answer {
+        let record = self.record(model)?;
         let fit = |start: usize| {
             let parameters = M::Parameters::from_fn(|i| free(self.parameters.get(i).map_or(f64::NAN, |p| p[start])));
             let estimate = Fit::new(model, &record).parameters(parameters).run()?;

@@ -31,7 +31,7 @@ pub trait Task {
     /// What it gives.
     type Answer;
     /// Does it.
-    fn run<M: Model<State = Nothing, Input = Predictors, Output = Response>>(self, model: &M) -> Self::Answer;
+    fn run<M: Model<State = Nothing, Input = Predictors, Output = Response> + Clone>(self, model: &M) -> Self::Answer;
 }
 
 macro_rules! problems {
@@ -40,6 +40,7 @@ macro_rules! problems {
         pub fn by_name<T: Task>(name: &str, task: T) -> Option<T::Answer> {
             match name {
                 $($(stringify!($name))|+ => {
+                    #[derive(Clone)]
                     struct Problem;
                     impl Model for Problem {
                         type State = Nothing;

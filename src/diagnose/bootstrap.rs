@@ -1,7 +1,7 @@
 //! Bootstrap: refits of what the model could as well have measured. It asks for no normal distribution, and in blocks for
 //! no white residuals.
 
-use super::{Pinned, minimize};
+use super::{Pinned, check_complete, minimize};
 use crate::error::Error;
 use crate::estimate::Summary;
 use crate::optimize::LeastSquares;
@@ -9,6 +9,7 @@ use crate::problem::{Problem, Simulated, each};
 use crate::random::Random;
 use crate::record::Record;
 use serde::{Deserialize, Serialize};
+use std::time::Instant;
 
 /// What is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -45,7 +46,8 @@ pub struct Bootstrap {
 /// Refits `count` records made of the prediction and resampled residuals, from the estimate on.
 ///
 /// # Errors
-/// An estimate of another problem or one that cannot be simulated, and fewer than twenty refits that end.
+/// An estimate of another problem or one that cannot be simulated, and fewer than twenty refits that end; a time limit or a
+/// flag that stops it.
 pub fn bootstrap(
     problem: &Problem<'_>,
     estimate: &Summary,
@@ -53,7 +55,8 @@ pub fn bootstrap(
     count: usize,
     seed: u64,
 ) -> Result<Bootstrap, Error> {
-    let (objective, best) = problem.at(estimate)?;
+    let control = problem.control(Instant::now());
+    let (objective, best) = problem.at_within(estimate, &control)?;
     let predictions = (0..objective.experiments()).map(|e| objective.predict(e, &best));
     let predictions = predictions.collect::<Result<Vec<_>, _>>()?;
     let residuals: Vec<Vec<Vec<f64>>> = predictions.iter().map(centered).collect();
@@ -78,6 +81,7 @@ pub fn bootstrap(
         Some(estimate.unknowns.iter().zip(&place).map(|(u, &c)| u.transform.to_value(c)).collect())
     };
     let found: Vec<Vec<f64>> = each(count, refit).into_iter().flatten().collect();
+    check_complete(problem, &control, "the bootstrap")?;
     if found.len() < 20 {
         return Err(Error::Option(format!(
             "only {} of {count} refits ended; twenty are the least, some thousand are wanted for percentiles",

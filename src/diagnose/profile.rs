@@ -3,13 +3,14 @@
 //! Watts, *Nonlinear Regression Analysis and Its Applications*, 1988, section 6.1; Raue et al., Bioinformatics 25 (2009)
 //! 1923).
 
-use super::{Pinned, minimize};
+use super::{Pinned, check_complete, minimize};
 use crate::error::Error;
 use crate::estimate::{Knowledge, Summary, student};
 use crate::judge::undetermined;
 use crate::optimize::{LeastSquares, Severity};
 use crate::problem::Problem;
 use serde::{Deserialize, Serialize};
+use std::time::Instant;
 
 /// The profile of one unknown.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -97,9 +98,11 @@ const CLOSE: f64 = 1e-3;
 /// The profile of an unknown of this name.
 ///
 /// # Errors
-/// A name that no unknown has, a probability not between 0 and 1, an estimate of another problem.
+/// A name that no unknown has, a probability not between 0 and 1, an estimate of another problem; a time limit or a flag that
+/// stops it.
 pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probability: f64) -> Result<Profile, Error> {
-    let (objective, best) = problem.at(estimate)?;
+    let control = problem.control(Instant::now());
+    let (objective, best) = problem.at_within(estimate, &control)?;
     let Some(index) = estimate.unknowns.iter().position(|unknown| unknown.name == name) else {
         let available = estimate.unknowns.iter().map(|unknown| unknown.name.clone()).collect();
         return Err(Error::UnknownSignal { signal: name.to_owned(), available });
@@ -207,6 +210,7 @@ pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probabilit
     };
     let lower = side(-1.0, bounds[index].0);
     let upper = side(1.0, bounds[index].1);
+    check_complete(problem, &control, "the profile")?;
     points.sort_by(|a, b| a.value.total_cmp(&b.value));
 
     let (mut severity, mut remark) = (Severity::Usable, String::new());

@@ -1,6 +1,6 @@
 //! Restarts: whether a search from elsewhere ends in a better minimum.
 
-use super::{Pinned, minimize};
+use super::{Pinned, check_complete, minimize};
 use crate::error::Error;
 use crate::estimate::Summary;
 use crate::optimize::{LeastSquares, Severity};
@@ -8,6 +8,7 @@ use crate::parameter::Transform;
 use crate::problem::{Problem, each};
 use crate::random::Random;
 use serde::{Deserialize, Serialize};
+use std::time::Instant;
 
 /// What searches from other starts found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -46,7 +47,7 @@ const SAME: f64 = 1e-6;
 /// (above one) of the estimate, either sign kept; zero is moved by ten standard errors.
 ///
 /// # Errors
-/// A reach that is not above one, an estimate of another problem.
+/// A reach that is not above one, an estimate of another problem; a time limit or a flag that stops it.
 pub fn restarts(
     problem: &Problem<'_>,
     estimate: &Summary,
@@ -57,7 +58,8 @@ pub fn restarts(
     if !(reach > 1.0 && reach.is_finite()) {
         return Err(Error::Option(format!("the reach of restarts is {reach}; it is a factor above one")));
     }
-    let (objective, best) = problem.at(estimate)?;
+    let control = problem.control(Instant::now());
+    let (objective, best) = problem.at_within(estimate, &control)?;
     let cost = objective.linearize(&best).map_err(|error| Error::Optimizer(error.to_string()))?.cost;
     let bounds = objective.bounds();
     let start = |attempt: usize| -> Vec<f64> {
@@ -84,6 +86,7 @@ pub fn restarts(
             .collect()
     };
     let found = each(count, |attempt| minimize(Pinned { problem: &objective, bounds: bounds.clone() }, start(attempt)));
+    check_complete(problem, &control, "the search from other starts")?;
     let mut result = Restarts {
         tried: count as u64,
         failed: 0,

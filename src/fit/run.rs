@@ -25,12 +25,18 @@ impl Problem<'_> {
     pub(super) fn run_since(&self, begin: Instant) -> Result<Summary, Error> {
         let settings = &self.settings;
         settings.optimizer.check()?;
-        let deadline = settings.time_limit.map(|limit| begin + limit);
-        let control = Control { cancel: settings.cancel.clone(), deadline };
+        let control = self.control(begin);
         let end = search(&self.in_units(&control), &settings.optimizer)?;
         // What was found is concluded even if the time is over.
         let objective = self.in_units(&NEVER).with(end.whitening.clone());
+        let objective = Objective { memory: end.memory.clone(), ..objective };
         conclude(&objective, &end, begin.elapsed().as_secs_f64())
+    }
+
+    /// What may stop what began then: the flag, and the time limit.
+    pub(crate) fn control(&self, begin: Instant) -> Control {
+        let deadline = self.settings.time_limit.and_then(|limit| begin.checked_add(limit));
+        Control { cancel: self.settings.cancel.clone(), deadline }
     }
 
     /// The cost to minimize, for argmin's solvers. Noise that was not given is what the errors at the start show.
@@ -72,6 +78,7 @@ impl Problem<'_> {
             evaluations: 1,
             name: "search by argmin".to_owned(),
             trouble: None,
+            memory: objective.memory.clone(),
         };
         conclude(&objective.with(whitening), &end, begin.elapsed().as_secs_f64())
     }
@@ -81,6 +88,19 @@ impl Problem<'_> {
     /// # Errors
     /// An estimate of another problem.
     pub(crate) fn at(&self, estimate: &Summary) -> Result<(Objective<'_>, Vec<f64>), Error> {
+        // What stopped the search does not stop a look at its result.
+        self.at_within(estimate, &NEVER)
+    }
+
+    /// The same for further searches, until this stops them.
+    ///
+    /// # Errors
+    /// An estimate of another problem.
+    pub(crate) fn at_within<'p>(
+        &'p self,
+        estimate: &Summary,
+        control: &'p Control,
+    ) -> Result<(Objective<'p>, Vec<f64>), Error> {
         self.check_estimate(estimate)?;
         let sigma = estimate.sigma();
         let full = estimate.noise_covariance.clone().and_then(Whitening::full);
@@ -92,8 +112,7 @@ impl Problem<'_> {
             _ => self.objective()?.whitening,
         };
         let coordinates = estimate.unknowns.iter().map(|u| u.transform.to_coordinate(u.value)).collect();
-        // What stopped the search does not stop what is asked of its result.
-        Ok((self.in_units(&NEVER).with(whitening), coordinates))
+        Ok((self.in_units(control).with(whitening), coordinates))
     }
 
     fn check_estimate(&self, estimate: &Summary) -> Result<(), Error> {

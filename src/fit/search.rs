@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::judge::{SearchEnd, noise};
 use crate::optimize::{Infeasible, Outcome};
-use crate::problem::{CheckpointFile, Control, Noise, Objective, Optimizer, Problem, RoundError};
+use crate::problem::{CheckpointFile, Noise, Objective, Optimizer, Problem, RoundError};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
@@ -39,8 +39,9 @@ pub(super) fn search(plain: &Objective<'_>, optimizer: &Arc<dyn Optimizer>) -> R
     if !known && file.is_none() {
         next = optimizer.rough();
     }
+    let mut memory = plain.memory.clone();
     for round in 1.. {
-        let objective = plain.with(whitening.clone());
+        let objective = Objective { memory, ..plain.with(whitening.clone()) };
         let result = next.round(&objective, coordinates.clone(), file.as_ref()).map_err(|error| match error {
             RoundError::Start(error) => start_error(plain, &coordinates, error),
             RoundError::Optimizer(text) => Error::Optimizer(text),
@@ -71,9 +72,21 @@ pub(super) fn search(plain: &Objective<'_>, optimizer: &Arc<dyn Optimizer>) -> R
         if settled {
             let trouble = file.and_then(|file| file.trouble());
             let name = result.name;
-            return Ok(SearchEnd { coordinates, whitening, linear, outcome, iterations, evaluations, name, trouble });
+            let memory = objective.memory;
+            return Ok(SearchEnd {
+                coordinates,
+                whitening,
+                linear,
+                outcome,
+                iterations,
+                evaluations,
+                name,
+                trouble,
+                memory,
+            });
         }
         next = optimizer.clone();
+        memory = objective.memory;
     }
     Err(Error::Optimizer("the search never began".to_owned()))
 }
@@ -83,8 +96,10 @@ pub(super) fn start_error(objective: &Objective<'_>, coordinates: &[f64], error:
     if error == Infeasible::Cancelled {
         return stopped(objective);
     }
-    // Whatever stops the search does not stop the search for what failed; it ends where the evaluation did.
-    let objective = Objective { control: &Control::NEVER, ..objective.clone() };
+    let locate = |e: usize, sample: usize| {
+        let failure = objective.locate(e, coordinates, sample);
+        if objective.control.stops() { stopped(objective) } else { Error::Start(failure) }
+    };
     for e in 0..objective.experiments() {
         let mut last = 0;
         let failed = objective.run_alone(e, coordinates, true, &mut |window| {
@@ -100,14 +115,14 @@ pub(super) fn start_error(objective: &Objective<'_>, coordinates: &[f64], error:
             }
         });
         if failed.is_err() {
-            return Error::Start(objective.locate(e, coordinates, last));
+            return locate(e, last);
         }
     }
     let failing = (0..objective.experiments()).find(|&e| {
         let alone = objective.cost_of(e, coordinates);
         !alone.is_ok_and(f64::is_finite)
     });
-    Error::Start(objective.locate(failing.unwrap_or(0), coordinates, 0))
+    locate(failing.unwrap_or(0), 0)
 }
 
 fn stopped(objective: &Objective<'_>) -> Error {

@@ -12,7 +12,7 @@ use crate::estimate::{
 use crate::information::{Covariance, Undetermined};
 use crate::layout::{Kind, Quantity};
 use crate::optimize::{Linearization, Outcome};
-use crate::problem::{Noise, Objective, Role, Whitening};
+use crate::problem::{Memory, Noise, Objective, Role, Whitening};
 
 /// Below so many measurements a covariance that allows for autocorrelated errors is less sure than the classical one.
 const CORRELATED_SAMPLES: u64 = 100;
@@ -34,6 +34,8 @@ pub(crate) struct SearchEnd {
     pub name: String,
     /// What went wrong with a checkpoint.
     pub trouble: Option<String>,
+    /// Where the segments of the records begin there.
+    pub memory: Memory,
 }
 
 /// Where the search ended, and what follows from there; each step adds to it.

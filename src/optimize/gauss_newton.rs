@@ -1,52 +1,179 @@
 //! [`GaussNewton`]: full steps, shortened by a line search.
 
-use super::search::{Point, linearize};
+use super::machine::{self, Domain, Machine, Request};
+use super::point::Point;
 use super::{Infeasible, LeastSquares, LeastSquaresState, Linearization, Outcome, Stop};
-use crate::scaling::JacobianColumns;
-use argmin::core::{Error, KV, Problem, Solver, State, TerminationReason, TerminationStatus};
+use argmin::core::{Error, KV, Problem, Solver, TerminationStatus};
 use serde::{Deserialize, Serialize};
 
 /// The method of Gauss and Newton with a backtracking line search (Nocedal and Wright, *Numerical Optimization*, 2006,
 /// sections 3.1 and 10.3), in bounds.
 ///
-/// Each iteration takes the minimizer of the linearized sum of squares and halves it until the cost falls by a part of
-/// what was promised (Armijo). Fast near a well-determined minimum; [`LevenbergMarquardt`](super::LevenbergMarquardt) is
-/// the safer choice elsewhere. Directions that the data do not determine are damped by 1e-8. Bounds are part of the
-/// linearized minimization.
+/// Each step is the minimizer of the linearized sum of squares, halved until the cost falls by a part of what was promised
+/// (Armijo). Fast near a well-determined minimum; [`LevenbergMarquardt`](super::LevenbergMarquardt) is the safer choice
+/// elsewhere. Directions that the data do not determine are damped by 1e-8. Bounds are part of the linearized minimization.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct GaussNewton {
     /// When to stop.
     pub stop: Stop,
+    x: Vec<f64>,
+    trials: u64,
     outcome: Option<Outcome>,
     #[serde(skip)]
+    domain: Domain,
+    #[serde(skip)]
     point: Option<Point>,
+    #[serde(skip)]
+    line: Line,
+}
+
+/// Where a line search stands.
+#[derive(Clone, Debug, Default)]
+struct Line {
+    step: Vec<f64>,
+    trial: Vec<f64>,
+    halvings: u32,
+    /// Trials that the cost could not resolve.
+    blind: u32,
+    failed: u64,
+    /// How far, as a part of the cost, the trials were off what the slopes promised.
+    noise: f64,
 }
 
 const SUFFICIENT: f64 = 1e-4;
 const HALVINGS: u32 = 60;
 /// Fewer are enough where the cost has no digits left.
-const LAST_HALVINGS: u32 = 10;
+const BLIND: u32 = 10;
+/// A step that shrinks a column of the Jacobian to less than this part went too far.
+const LOST: f64 = 1e-10;
 
 impl GaussNewton {
     /// A search with this rule to stop.
     pub fn new(stop: Stop) -> Self {
-        GaussNewton { stop, outcome: None, point: None }
+        GaussNewton {
+            stop,
+            x: vec![],
+            trials: 0,
+            outcome: None,
+            domain: Domain::default(),
+            point: None,
+            line: Line::default(),
+        }
     }
 
-    /// How the search ended; `None` while it runs, or if argmin stopped it (iterations, time, target cost).
-    pub fn outcome(&self) -> Option<Outcome> {
-        self.outcome
+    /// Begins a line search, or ends.
+    fn go_on(&mut self, point: Point) {
+        let limit = Outcome::IterationLimit { iterations: self.trials };
+        let ended = point.ended(&self.stop).or((self.trials >= self.stop.iterations).then_some(limit));
+        self.x.clone_from(&point.x);
+        if let Some(outcome) = ended {
+            return self.end(point, outcome);
+        }
+        self.line = Line { step: point.full.clone().unwrap_or_default(), ..Line::default() };
+        self.shorten(point);
     }
 
-    /// Cost and slopes where the search stands; `None` before it began.
-    pub fn linearization(&self) -> Option<&Linearization> {
-        self.point.as_ref().map(|point| &point.linear)
+    /// The next trial of the line search, if there is one.
+    fn shorten(&mut self, point: Point) {
+        let line = &mut self.line;
+        line.trial = point.towards(&line.step);
+        line.blind += u32::from(-point.slope(&line.step) <= point.resolution());
+        if line.trial == point.x || line.blind > BLIND || line.halvings > HALVINGS {
+            let outcome = point.stuck(line.failed, line.noise);
+            return self.end(point, outcome);
+        }
+        self.point = Some(point);
+    }
+
+    fn end(&mut self, point: Point, outcome: Outcome) {
+        (self.outcome, self.point) = (Some(outcome), Some(point));
+    }
+
+    /// Whether a trial lowers the cost enough.
+    fn accepts(&mut self, point: &Point, next: &Point) -> bool {
+        let slope = point.slope(&self.line.step);
+        let decrease = point.cost() - next.cost();
+        // Where the cost decides nothing, what the full step would still gain does.
+        let enough = match -slope <= point.resolution() {
+            true => next.potential < point.potential,
+            false => decrease > 0.0 && decrease >= -SUFFICIENT * slope,
+        };
+        self.line.noise = ((decrease + slope).abs() / point.cost_size()).max(0.125 * self.line.noise);
+        // A plateau, that no slope leads back from.
+        let lost = point.norms.iter().zip(&next.norms).any(|(before, after)| *after < LOST * before);
+        enough && !lost
     }
 }
 
 impl Default for GaussNewton {
     fn default() -> Self {
         GaussNewton::new(Stop::default())
+    }
+}
+
+impl Machine for GaussNewton {
+    fn begin(&mut self, start: Vec<f64>, domain: Domain) {
+        *self = GaussNewton { x: start, domain, ..GaussNewton::new(self.stop) };
+    }
+
+    fn resume(&mut self, domain: Domain) {
+        (self.domain, self.point) = (domain, None);
+    }
+
+    fn request(&self) -> Request<'_> {
+        match (self.outcome, &self.point) {
+            (Some(outcome), _) => Request::Ended(outcome),
+            (None, Some(_)) => Request::Linearize(&self.line.trial),
+            (None, None) => Request::Linearize(&self.x),
+        }
+    }
+
+    fn tell(&mut self, answer: Result<Linearization, Infeasible>) {
+        let told = match answer {
+            Err(Infeasible::Cancelled) => return self.outcome = Some(Outcome::Cancelled),
+            Err(Infeasible::Failed(_)) => None,
+            Ok(linear) => Some(linear),
+        };
+        let Some(point) = self.point.take() else {
+            match told.and_then(|linear| Point::new(self.x.clone(), linear, &self.domain)) {
+                None => self.outcome = Some(Outcome::Stalled { gradient: 0.0, step: 0.0, failed: 1 }),
+                Some(point) => self.go_on(point),
+            }
+            return;
+        };
+        self.trials += 1;
+        match told.and_then(|linear| Point::new(self.line.trial.clone(), linear, &self.domain)) {
+            Some(next) if self.accepts(&point, &next) => {
+                let decrease = (point.cost() - next.cost()) / point.cost_size();
+                match next.gains_too_little(decrease, point.cost_size(), &self.stop) {
+                    true => {
+                        self.x.clone_from(&next.x);
+                        self.end(next, Outcome::CostUnchanged { decrease });
+                    }
+                    false => self.go_on(next),
+                }
+            }
+            next => {
+                self.line.failed += u64::from(next.is_none());
+                self.line.step.iter_mut().for_each(|step| *step *= 0.5);
+                self.line.halvings += 1;
+                self.shorten(point);
+            }
+        }
+    }
+
+    fn tell_curvature(&mut self, _answer: Option<Result<Linearization, Infeasible>>) {}
+
+    fn place(&self) -> &[f64] {
+        &self.x
+    }
+
+    fn linearization(&self) -> Option<&Linearization> {
+        self.point.as_ref().map(|point| &point.linear)
+    }
+
+    fn outcome(&self) -> Option<Outcome> {
+        self.outcome
     }
 }
 
@@ -58,15 +185,9 @@ impl<O: LeastSquares> Solver<O, LeastSquaresState> for GaussNewton {
     fn init(
         &mut self,
         problem: &mut Problem<O>,
-        mut state: LeastSquaresState,
+        state: LeastSquaresState,
     ) -> Result<(LeastSquaresState, Option<KV>), Error> {
-        let x = state.take_param().ok_or_else(|| Error::msg("Gauss-Newton needs an initial parameter vector"))?;
-        let linear = linearize(problem, &x)??;
-        let bounds = problem.problem("bounds_count", |problem| Ok(problem.bounds()))?;
-        let point = Point::new(x.clone(), linear, &JacobianColumns, &[], &bounds);
-        let state = state.param(x).cost(point.linear.cost).gradient(point.gradient.clone());
-        self.point = Some(point);
-        Ok((state.max_iters(self.stop.iterations), None))
+        machine::init(self, problem, state)
     }
 
     fn next_iter(
@@ -74,79 +195,12 @@ impl<O: LeastSquares> Solver<O, LeastSquaresState> for GaussNewton {
         problem: &mut Problem<O>,
         state: LeastSquaresState,
     ) -> Result<(LeastSquaresState, Option<KV>), Error> {
-        let bounds = problem.problem("bounds_count", |problem| Ok(problem.bounds()))?;
-        let point = match self.point.take() {
-            Some(point) => point,
-            None => {
-                let x = state.get_param().cloned().unwrap_or_default();
-                let linear = linearize(problem, &x)??;
-                Point::new(x, linear, &JacobianColumns, &[], &bounds)
-            }
-        };
-        self.outcome = point.exact().or_else(|| point.converged(&self.stop));
-        let next = if self.outcome.is_none() { self.search(problem, &point, &bounds)? } else { None };
-        let point = next.unwrap_or(point);
-        let log = argmin::kv!("gradient" => point.cosine(););
-        let state = state.param(point.x.clone()).cost(point.linear.cost).gradient(point.gradient.clone());
-        self.point = Some(point);
-        Ok((state, Some(log)))
+        let state = machine::next_iter(self, problem, state)?;
+        let cosine = self.point.as_ref().map_or(0.0, Point::cosine);
+        Ok((state, Some(argmin::kv!("gradient" => cosine;))))
     }
 
     fn terminate(&mut self, _state: &LeastSquaresState) -> TerminationStatus {
-        match self.outcome {
-            None => TerminationStatus::NotTerminated,
-            Some(Outcome::Cancelled) => TerminationStatus::Terminated(TerminationReason::Interrupt),
-            Some(outcome) if outcome.converged() => TerminationStatus::Terminated(TerminationReason::SolverConverged),
-            Some(outcome) => TerminationStatus::Terminated(TerminationReason::SolverExit(outcome.to_string())),
-        }
-    }
-}
-
-impl GaussNewton {
-    /// The first point along the step that lowers the cost enough; `None` once the search has ended.
-    fn search<O: LeastSquares>(
-        &mut self,
-        problem: &mut Problem<O>,
-        point: &Point,
-        bounds: &[(f64, f64)],
-    ) -> Result<Option<Point>, Error> {
-        let (cost, size) = (point.linear.cost, point.cost_size());
-        let mut step = point.full.clone().unwrap_or_default();
-        let mut failed = 0;
-        let mut blind = 0;
-        for _ in 0..HALVINGS {
-            let x = point.towards(&step);
-            let slope = point.slope(&step);
-            let unresolved = point.cannot_resolve(-slope);
-            blind += u32::from(unresolved);
-            if x == point.x || blind > LAST_HALVINGS {
-                break;
-            }
-            match linearize(problem, &x)? {
-                Err(Infeasible::Cancelled) => {
-                    self.outcome = Some(Outcome::Cancelled);
-                    return Ok(None);
-                }
-                Err(Infeasible::Failed(_)) => failed += 1,
-                Ok(linear) => {
-                    let decrease = cost - linear.cost;
-                    let next = Point::new(x, linear, &JacobianColumns, &[], bounds);
-                    // Where the cost decides nothing, what the full step would still gain does.
-                    let enough = match unresolved {
-                        true => next.potential < point.potential,
-                        false => decrease > 0.0 && decrease >= -SUFFICIENT * slope,
-                    };
-                    if enough && !point.loses_influence(&next) {
-                        if decrease <= self.stop.cost * size && next.potential <= self.stop.cost * size {
-                            self.outcome = Some(Outcome::CostUnchanged { decrease: decrease / size });
-                        }
-                        return Ok(Some(next));
-                    }
-                }
-            }
-            step.iter_mut().for_each(|d| *d *= 0.5);
-        }
-        self.outcome = Some(point.stuck(&self.stop, failed));
-        Ok(None)
+        machine::termination(self)
     }
 }

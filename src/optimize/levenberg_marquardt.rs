@@ -1,84 +1,413 @@
 //! [`LevenbergMarquardt`]: damped Gauss-Newton steps.
 
-use super::search::{Point, linearize};
+use super::descent::{Descent, Reach, Trial, length};
+use super::machine::{self, Domain, Machine, Request};
+use super::point::Point;
 use super::{Infeasible, LeastSquares, LeastSquaresState, Linearization, Outcome, Stop};
-use crate::scaling::{JacobianColumns, Scaling};
-use argmin::core::{Error, KV, Problem, Solver, State, TerminationReason, TerminationStatus};
+use crate::scaling::{OwnSize, Scaling, Seen};
+use argmin::core::{Error, KV, Problem, Solver, TerminationStatus};
 use serde::{Deserialize, Serialize};
 
-/// The method of Levenberg (1944) and Marquardt (1963) with the column scaling of More (1978), in bounds.
+/// The method of Levenberg (1944) and Marquardt (1963), in bounds, with steps measured by the unknowns' own sizes.
 ///
-/// Each iteration tries one step, the minimizer of the linearized sum of squares plus `lambda |D step|^2`, computed from
-/// the triangle; the trial brings its slopes along. Bounds are part of that minimization: an unknown that would cross one
-/// is put on it, and the others are minimized again. `lambda` falls by up to 10 after a step that kept its promise and
-/// grows, ever faster, after one that did not. Where the cost can no longer resolve a step, the slope along the step
-/// decides instead. The undamped step decides when to stop, so that heavy damping never looks like a minimum.
+/// Each trial is the minimizer of the linearized sum of squares plus `lambda |D step|^2`, computed from the triangle; the
+/// trial brings its slopes along. `D` is the [`Scaling`]. `lambda` is the least, not below the last one, with which the step
+/// is no longer than allowed: a tenth of the unknowns' sizes at first, their sizes later, a quarter of the last step after
+/// one that gained nothing (found as by More 1978). After a step that kept its promise `lambda` falls, ever faster; after one
+/// that half did it stays (Nielsen 1999). Bounds are part of the minimization: an unknown that would cross one is put on it,
+/// and the others are minimized again. Where the cost can no longer resolve a step, the slope along the step decides
+/// instead. The undamped step decides when to stop, so that heavy damping never looks like a minimum.
+///
+/// In a curved valley, where steps are good and short, a step is bent by half the geodesic acceleration (Transtrum and
+/// Sethna 2012) if the problem gives second derivatives; that costs an evaluation.
+///
+/// A search that ends without a minimum, or where unknowns have lost their influence, is tried once more from the start, with
+/// steps that may be ten times the unknowns' sizes; the better end counts.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct LevenbergMarquardt<S = JacobianColumns> {
+pub struct LevenbergMarquardt<S = OwnSize> {
     /// When to stop.
     pub stop: Stop,
     /// What a unit step of each unknown counts.
     pub scaling: S,
-    lambda: f64,
-    growth: f64,
-    failed: u64,
+    x: Vec<f64>,
+    seen: Seen,
+    descent: Descent,
+    /// The fewest directions without influence that were met.
+    unseen: usize,
+    /// Steps taken.
+    steps: u64,
+    /// Steps taken where slopes show no way.
+    leaps: u64,
+    first: Option<Try>,
     outcome: Option<Outcome>,
+    /// Whether the problem may have second derivatives.
+    curved: bool,
+    #[serde(skip)]
+    domain: Domain,
+    #[serde(skip)]
+    stage: Stage,
     #[serde(skip)]
     point: Option<Point>,
 }
 
-const FIRST_LAMBDA: f64 = 1e-4;
-const LEAST_LAMBDA: f64 = 1e-20;
-const LARGEST_LAMBDA: f64 = 1e20;
-const FIRST_GROWTH: f64 = 4.0;
-const ACCEPT: f64 = 1e-4;
-/// Five trials in a row are enough where the cost has no digits left.
-const LAST_GROWTH: f64 = 16.0 * FIRST_GROWTH;
-const COST_ROUNDING: f64 = 1e-10;
+/// A try that has ended.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Try {
+    x: Vec<f64>,
+    cost: f64,
+    outcome: Outcome,
+    trials: u64,
+    #[serde(skip)]
+    point: Option<Point>,
+}
+
+/// What was asked for last.
+#[derive(Clone, Debug, Default)]
+enum Stage {
+    /// The slopes where a search stands that was read back.
+    #[default]
+    Resume,
+    /// Those at the start of a try.
+    Start,
+    /// Those at a trial point.
+    Step(Trial),
+    /// The second derivative along a step.
+    Bend(Trial),
+    /// Those at points around the start or the end, where slopes show nothing.
+    Look(Look),
+    /// Those where the first try ended, which was the better one.
+    Return,
+}
+
+/// A search that is to end like this, or to go on if it has just begun, unless the cost is lower at one of these points.
+#[derive(Clone, Debug)]
+struct Look {
+    outcome: Option<Outcome>,
+    /// The last one next.
+    points: Vec<Vec<f64>>,
+    /// How many of these points lie along directions that have lost their influence, and how many such directions.
+    beside: usize,
+    lost: usize,
+    /// At how many of them the cost is the same.
+    flat: usize,
+}
+
+const FIRST: Reach = Reach { first: 0.1, later: 1.0 };
+const SECOND: Reach = Reach { first: 30.0, later: 30.0 };
+/// A first try that has not ended after so many trials is given up.
+const FIRST_TRIALS: u64 = 2500;
+/// So often a search goes on that found a lower cost beside its end.
+const LEAPS: u64 = 5;
+/// Where the cost changes by less than this part over a hundredth of the unknowns' sizes, there is nothing to see.
+const FLAT: f64 = 1e-9;
+/// A step is bent where twice the bend is no longer than this part of it (Transtrum and Sethna 2012).
+const BEND: f64 = 0.75;
 
 impl<S: Scaling> LevenbergMarquardt<S> {
     /// A search with this rule to stop and this scaling.
     pub fn new(stop: Stop, scaling: S) -> Self {
-        let (lambda, growth) = (FIRST_LAMBDA, FIRST_GROWTH);
-        LevenbergMarquardt { stop, scaling, lambda, growth, failed: 0, outcome: None, point: None }
-    }
-
-    /// How the search ended; `None` while it runs, or if argmin stopped it (iterations, time, target cost).
-    pub fn outcome(&self) -> Option<Outcome> {
-        self.outcome
-    }
-
-    /// Cost and slopes where the search stands; `None` before it began.
-    pub fn linearization(&self) -> Option<&Linearization> {
-        self.point.as_ref().map(|point| &point.linear)
+        LevenbergMarquardt {
+            stop,
+            scaling,
+            x: vec![],
+            seen: Seen::default(),
+            descent: Descent::new(FIRST),
+            unseen: usize::MAX,
+            steps: 0,
+            leaps: 0,
+            first: None,
+            outcome: None,
+            curved: true,
+            domain: Domain::default(),
+            stage: Stage::Resume,
+            point: None,
+        }
     }
 
     /// Whether a point that another search has found is a minimum, by this search's tests with a tolerance of 1e-4: what
     /// methods without slopes can reach.
     pub(crate) fn judge(&self, x: &[f64], linear: &Linearization, bounds: &[(f64, f64)]) -> Outcome {
         const TOLERANCE: f64 = 1e-4;
-        let point = Point::new(x.to_vec(), linear.clone(), &self.scaling, &[], bounds);
+        let domain = Domain { bounds: bounds.to_vec(), ..Domain::default() };
         let stop = Stop { step: TOLERANCE, gradient: TOLERANCE, ..self.stop };
-        let ended = point.exact().or_else(|| point.converged(&stop));
-        ended.unwrap_or(Outcome::Stalled { gradient: point.cosine(), failed: 0 })
+        let stalled = |gradient, step| Outcome::Stalled { gradient, step, failed: 0 };
+        let point = Point::new(x.to_vec(), linear.clone(), &domain);
+        point.map_or(stalled(0.0, 0.0), |point| {
+            point.ended(&stop).unwrap_or(stalled(point.cosine(), point.relative_step()))
+        })
     }
 
-    fn longer(&mut self, gain: f64) {
-        // Nielsen (1999): smooth between no change at half the promised gain and a tenth at the full one.
-        self.lambda = (self.lambda * (1.0 - (2.0 * gain - 1.0).powi(3)).clamp(0.1, 2.0)).max(LEAST_LAMBDA);
-        self.growth = FIRST_GROWTH;
-        self.failed = 0;
+    /// What to do at the point where the search stands: end, or ask for the next evaluation.
+    fn go_on(&mut self, point: Point) {
+        let ended = point.ended(&self.stop).or_else(|| self.given_up(&point));
+        let trial = match ended {
+            Some(_) => None,
+            None => self.descent.propose(&point, &self.scales(), &self.seen),
+        };
+        match trial {
+            Some(trial) if self.curved && self.descent.is_slow(&trial) => self.stage = Stage::Bend(trial),
+            Some(trial) => self.stage = Stage::Step(trial),
+            None => {
+                let outcome = ended.unwrap_or_else(|| point.stuck(self.descent.failed, self.descent.noise));
+                return self.end(point, outcome);
+            }
+        }
+        self.point = Some(point);
     }
 
-    fn shorter(&mut self) {
-        self.lambda *= self.growth;
-        self.growth *= 2.0;
+    fn given_up(&mut self, point: &Point) -> Option<Outcome> {
+        let (trials, all) = (self.descent.trials, self.trials());
+        if all >= self.stop.iterations || self.first.is_none() && trials >= FIRST_TRIALS {
+            return Some(Outcome::IterationLimit { iterations: all });
+        }
+        if !self.descent.creeps(point) {
+            return None;
+        }
+        let (promised, stuck) = (point.potential / point.cost_size(), point.stuck(0, self.descent.noise));
+        Some(if stuck.converged() { stuck } else { Outcome::Creeping { trials, promised } })
+    }
+
+    fn scales(&self) -> Vec<f64> {
+        let mut scales = self.scaling.scales(&self.seen);
+        scales.resize(self.x.len(), 1.0);
+        for scale in &mut scales {
+            if !(*scale > 0.0 && scale.is_finite()) {
+                *scale = 1.0;
+            }
+        }
+        scales
+    }
+
+    /// Ends here like this, unless there is something that slopes do not show.
+    fn end(&mut self, point: Point, outcome: Outcome) {
+        let look = self.look(&point, outcome);
+        self.go_look(point, look);
+    }
+
+    fn go_look(&mut self, point: Point, look: Look) {
+        match look.points.is_empty() {
+            true => self.end_look(point, &look),
+            false => (self.stage, self.point) = (Stage::Look(look), Some(point)),
+        }
+    }
+
+    /// Where to look before the search ends: inside bounds where an unknown has no slopes, and along directions that have
+    /// lost their influence on the way.
+    fn look(&self, point: &Point, outcome: Outcome) -> Look {
+        let mut look = Look { outcome: Some(outcome), points: vec![], beside: 0, lost: 0, flat: 0 };
+        let blind = point.blind();
+        if blind.len() > self.unseen && matches!(outcome, Outcome::Converged { .. } | Outcome::LimitOfPrecision { .. })
+        {
+            look.lost = blind.len() - self.unseen;
+            look.points = blind.iter().flat_map(|direction| point.beside(direction, &self.seen)).collect();
+            look.beside = look.points.len();
+        }
+        look.points.extend(point.inside(&self.seen));
+        if self.leaps >= LEAPS {
+            look.points.clear();
+        }
+        look
+    }
+
+    /// The end of a try: of the search, unless another try may do better or the one before did.
+    fn end_try(&mut self, point: Point, outcome: Outcome) {
+        let trials = self.trials();
+        match self.first.take() {
+            None if !outcome.converged() && trials < self.stop.iterations => {
+                let (x, cost) = (point.x.clone(), point.cost());
+                self.first = Some(Try { x, cost, outcome, trials, point: Some(point) });
+                self.begin_try(self.seen.start.clone(), SECOND);
+            }
+            Some(first) if first.cost < point.cost() => self.return_to(first),
+            _ => (self.outcome, self.point) = (Some(outcome), Some(point)),
+        }
+    }
+
+    /// Ends where the first try did.
+    fn return_to(&mut self, mut first: Try) {
+        self.x.clone_from(&first.x);
+        self.point = first.point.take();
+        match self.point {
+            Some(_) => self.outcome = Some(first.outcome),
+            None => (self.stage, self.first) = (Stage::Return, Some(first)),
+        }
+    }
+
+    fn trials(&self) -> u64 {
+        self.descent.trials + self.first.as_ref().map_or(0, |first| first.trials)
+    }
+
+    fn begin_try(&mut self, start: Vec<f64>, reach: Reach) {
+        self.seen = Seen::new(&start, &self.domain.sizes);
+        self.descent = Descent::new(reach);
+        (self.leaps, self.x) = (0, start);
+        self.point = None;
+        self.stage = Stage::Start;
+    }
+
+    /// Goes on at a point that is not a trial's: `None` if it cannot be evaluated.
+    fn arrive(&mut self, stage: Stage, point: Option<Point>, first: Option<Try>) {
+        match (stage, point, first) {
+            (Stage::Return, point, Some(first)) => (self.outcome, self.point) = (Some(first.outcome), point),
+            (_, None, Some(first)) => self.return_to(first),
+            (_, None, None) => self.outcome = Some(Outcome::Stalled { gradient: 0.0, step: 0.0, failed: 1 }),
+            (stage, Some(point), first) => {
+                self.first = first;
+                if !matches!(stage, Stage::Start) {
+                    return self.go_on(point);
+                }
+                (self.steps, self.unseen) = (0, usize::MAX);
+                self.take(&point);
+                let points = point.inside(&self.seen);
+                self.go_look(point, Look { outcome: None, points, beside: 0, lost: 0, flat: 0 });
+            }
+        }
+    }
+
+    fn judge_trial(&mut self, point: Point, trial: &Trial, next: Option<Point>) {
+        let (cost, size) = (point.cost(), point.cost_size());
+        let accepted = self.descent.judge(&point, trial, next.as_ref());
+        let Some(next) = next.filter(|_| accepted) else { return self.go_on(point) };
+        self.take(&next);
+        let decrease = (cost - next.cost()) / size;
+        match next.gains_too_little(decrease, size, &self.stop) {
+            true => self.end(next, Outcome::CostUnchanged { decrease }),
+            false => self.go_on(next),
+        }
+    }
+
+    /// Goes to a point beside the end if the cost is lower there.
+    fn judge_look(&mut self, point: Point, mut look: Look, next: Option<Point>) {
+        let resolution = point.resolution();
+        match next {
+            Some(next) if next.cost() < point.cost() - resolution => {
+                self.leaps += 1;
+                self.take(&next);
+                return self.go_on(next);
+            }
+            Some(next) if look.points.len() < look.beside && next.cost() <= point.cost() + FLAT * point.cost_size() => {
+                look.flat += 1
+            }
+            _ => {}
+        }
+        self.go_look(point, look);
+    }
+
+    /// Ends a try after a look around, or goes on with it.
+    fn end_look(&mut self, point: Point, look: &Look) {
+        let Some(outcome) = look.outcome else { return self.go_on(point) };
+        // Of several lost directions the flat one may lie between those looked along; and a saddle that the search comes back
+        // to is no minimum either.
+        let outcome = match look.flat > 0 || look.lost > 1 || look.lost > 0 && self.leaps >= LEAPS {
+            true => Outcome::Plateau { lost: look.lost, gradient: point.cosine() },
+            false => outcome,
+        };
+        self.end_try(point, outcome);
+    }
+
+    /// Bends a step by half the geodesic acceleration, unless that is too long to be trusted.
+    fn bend(&self, trial: &mut Trial, second: &Linearization) {
+        let Some(point) = &self.point else { return };
+        let Some(bend) = second.step(&trial.damping, &point.held) else { return };
+        if length(&self.scales(), &bend) <= BEND * trial.length {
+            let step: Vec<f64> = trial.step.iter().zip(&bend).map(|(step, bend)| step + 0.5 * bend).collect();
+            trial.x = point.towards(&step);
+        }
+    }
+
+    /// Stops at the best point so far.
+    fn cancel(&mut self) {
+        let cost = self.point.as_ref().map_or(f64::INFINITY, Point::cost);
+        if let Some(first) = self.first.take().filter(|first| first.cost < cost) {
+            (self.x, self.point) = (first.x, first.point);
+        }
+        self.outcome = Some(Outcome::Cancelled);
+    }
+
+    /// Moves to a point.
+    fn take(&mut self, point: &Point) {
+        self.seen.add(&point.x, &point.norms);
+        self.x.clone_from(&point.x);
+        // Rank is looked at ever more seldom: a decomposition at each step would be dear with many unknowns.
+        if self.steps == 0 || self.steps.is_power_of_two() {
+            self.unseen = self.unseen.min(point.blind().len());
+        }
+        self.steps += 1;
+    }
+}
+
+impl<S: Scaling> Machine for LevenbergMarquardt<S> {
+    fn begin(&mut self, start: Vec<f64>, domain: Domain) {
+        (self.domain, self.first, self.outcome, self.curved) = (domain, None, None, true);
+        self.begin_try(start, FIRST);
+    }
+
+    fn resume(&mut self, domain: Domain) {
+        (self.domain, self.stage, self.point) = (domain, Stage::Resume, None);
+    }
+
+    fn request(&self) -> Request<'_> {
+        match (&self.stage, self.outcome) {
+            (_, Some(outcome)) => Request::Ended(outcome),
+            (Stage::Resume | Stage::Start | Stage::Return, None) => Request::Linearize(&self.x),
+            (Stage::Step(trial), None) => Request::Linearize(&trial.x),
+            (Stage::Look(look), None) => Request::Linearize(look.points.last().unwrap_or(&self.x)),
+            (Stage::Bend(trial), None) => Request::Curvature { x: &self.x, along: &trial.step },
+        }
+    }
+
+    fn tell(&mut self, answer: Result<Linearization, Infeasible>) {
+        let told = match answer {
+            Err(Infeasible::Cancelled) => return self.cancel(),
+            Err(Infeasible::Failed(_)) => None,
+            Ok(linear) => Some(linear),
+        };
+        match (std::mem::take(&mut self.stage), self.point.take(), self.first.take()) {
+            (Stage::Step(trial), Some(point), first) => {
+                self.first = first;
+                let next = told.and_then(|linear| Point::new(trial.x.clone(), linear, &self.domain));
+                self.judge_trial(point, &trial, next);
+            }
+            (Stage::Look(mut look), Some(point), first) => {
+                self.first = first;
+                let x = look.points.pop().unwrap_or_default();
+                let next = told.and_then(|linear| Point::new(x, linear, &self.domain));
+                self.judge_look(point, look, next);
+            }
+            (stage, _, first) => {
+                let point = told.and_then(|linear| Point::new(self.x.clone(), linear, &self.domain));
+                self.arrive(stage, point, first);
+            }
+        }
+    }
+
+    fn tell_curvature(&mut self, answer: Option<Result<Linearization, Infeasible>>) {
+        let Stage::Bend(mut trial) = std::mem::take(&mut self.stage) else { return };
+        match answer {
+            None => self.curved = false,
+            Some(Err(Infeasible::Cancelled)) => return self.cancel(),
+            Some(Err(Infeasible::Failed(_))) => {}
+            Some(Ok(second)) => self.bend(&mut trial, &second),
+        }
+        self.stage = Stage::Step(trial);
+    }
+
+    fn place(&self) -> &[f64] {
+        &self.x
+    }
+
+    fn linearization(&self) -> Option<&Linearization> {
+        self.point.as_ref().map(|point| &point.linear)
+    }
+
+    fn outcome(&self) -> Option<Outcome> {
+        self.outcome
     }
 }
 
 impl Default for LevenbergMarquardt {
     fn default() -> Self {
-        LevenbergMarquardt::new(Stop::default(), JacobianColumns)
+        LevenbergMarquardt::new(Stop::default(), OwnSize)
     }
 }
 
@@ -90,16 +419,9 @@ impl<O: LeastSquares, S: Scaling> Solver<O, LeastSquaresState> for LevenbergMarq
     fn init(
         &mut self,
         problem: &mut Problem<O>,
-        mut state: LeastSquaresState,
+        state: LeastSquaresState,
     ) -> Result<(LeastSquaresState, Option<KV>), Error> {
-        let x =
-            state.take_param().ok_or_else(|| Error::msg("Levenberg-Marquardt needs an initial parameter vector"))?;
-        let linear = linearize(problem, &x)??;
-        let bounds = problem.problem("bounds_count", |problem| Ok(problem.bounds()))?;
-        let point = Point::new(x.clone(), linear, &self.scaling, &[], &bounds);
-        let state = state.param(x).cost(point.linear.cost).gradient(point.gradient.clone());
-        self.point = Some(point);
-        Ok((state.max_iters(self.stop.iterations), None))
+        machine::init(self, problem, state)
     }
 
     fn next_iter(
@@ -107,94 +429,12 @@ impl<O: LeastSquares, S: Scaling> Solver<O, LeastSquaresState> for LevenbergMarq
         problem: &mut Problem<O>,
         state: LeastSquaresState,
     ) -> Result<(LeastSquaresState, Option<KV>), Error> {
-        let bounds = problem.problem("bounds_count", |problem| Ok(problem.bounds()))?;
-        let point = match self.point.take() {
-            Some(point) => point,
-            // Resumed from a checkpoint, which keeps the place but not the slopes.
-            None => {
-                let x = state.get_param().cloned().unwrap_or_default();
-                let linear = linearize(problem, &x)??;
-                Point::new(x, linear, &self.scaling, &[], &bounds)
-            }
-        };
-        let cost = point.linear.cost;
-        self.outcome = point.exact().or_else(|| point.converged(&self.stop));
-        let next = if self.outcome.is_none() { self.attempt(problem, &point, &bounds)? } else { None };
-        if self.outcome.is_none() && self.lambda > LARGEST_LAMBDA {
-            self.outcome = Some(point.stuck(&self.stop, self.failed));
-        }
-        let point = next.unwrap_or(point);
-        let log =
-            argmin::kv!("lambda" => self.lambda; "gradient" => point.cosine(); "decrease" => cost - point.linear.cost;);
-        let state = state.param(point.x.clone()).cost(point.linear.cost).gradient(point.gradient.clone());
-        self.point = Some(point);
-        Ok((state, Some(log)))
+        let state = machine::next_iter(self, problem, state)?;
+        let cosine = self.point.as_ref().map_or(0.0, Point::cosine);
+        Ok((state, Some(argmin::kv!("lambda" => self.descent.lambda(); "gradient" => cosine;))))
     }
 
     fn terminate(&mut self, _state: &LeastSquaresState) -> TerminationStatus {
-        match self.outcome {
-            None => TerminationStatus::NotTerminated,
-            Some(Outcome::Cancelled) => TerminationStatus::Terminated(TerminationReason::Interrupt),
-            Some(outcome) if outcome.converged() => TerminationStatus::Terminated(TerminationReason::SolverConverged),
-            Some(outcome) => TerminationStatus::Terminated(TerminationReason::SolverExit(outcome.to_string())),
-        }
-    }
-}
-
-impl<S: Scaling> LevenbergMarquardt<S> {
-    /// Tries one step; the new point, if it is taken.
-    fn attempt<O: LeastSquares>(
-        &mut self,
-        problem: &mut Problem<O>,
-        point: &Point,
-        bounds: &[(f64, f64)],
-    ) -> Result<Option<Point>, Error> {
-        let damping: Vec<f64> = point.scales.iter().map(|scale| self.lambda.sqrt() * scale).collect();
-        let Some(step) = point.linear.step_within(&damping, &point.held, &point.room) else {
-            self.shorter();
-            return Ok(None);
-        };
-        let x = point.towards(&step);
-        let promised = point.linear.predicted_reduction(&step);
-        let unresolved = point.cannot_resolve(promised);
-        if x == point.x || unresolved && self.growth > LAST_GROWTH {
-            self.outcome = Some(point.stuck(&self.stop, self.failed));
-            return Ok(None);
-        }
-        let linear = match linearize(problem, &x)? {
-            Ok(linear) => linear,
-            Err(Infeasible::Cancelled) => {
-                self.outcome = Some(Outcome::Cancelled);
-                return Ok(None);
-            }
-            Err(Infeasible::Failed(_)) => {
-                self.failed += 1;
-                self.shorter();
-                return Ok(None);
-            }
-        };
-        let (cost, new_cost, size) = (point.linear.cost, linear.cost, point.cost_size());
-        let next = Point::new(x, linear, &self.scaling, &point.scales, bounds);
-        // Where the cost decides nothing, the slope along the step does: in the metric of the damped step the gradient of
-        // a convergent iteration shrinks steadily.
-        let (accept, gain) = if unresolved {
-            let again = next.linear.step_within(&damping, &next.held, &next.room);
-            let part = again.map_or(f64::INFINITY, |again| next.slope(&again) / point.slope(&step));
-            (part < 1.0 && new_cost <= cost + COST_ROUNDING * size, if part < 0.25 { 1.0 } else { 0.9 })
-        } else {
-            let gain = (cost - new_cost) / promised;
-            (gain > ACCEPT, gain)
-        };
-        if !accept || point.loses_influence(&next) {
-            self.shorter();
-            return Ok(None);
-        }
-        self.longer(gain);
-        let decrease = (cost - new_cost) / size;
-        // A step that was short for its damping says nothing of the cost to come.
-        if decrease <= self.stop.cost && next.potential <= self.stop.cost * size {
-            self.outcome = Some(Outcome::CostUnchanged { decrease });
-        }
-        Ok(Some(next))
+        machine::termination(self)
     }
 }

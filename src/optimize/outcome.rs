@@ -1,13 +1,13 @@
 //! [`Outcome`]: how a search ended.
 
-use super::PRECISION_GRADIENT;
+use super::PRECISION;
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
 /// How a search ended, with the numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Outcome {
-    /// The next step is negligible and the residual orthogonal to the Jacobian (or next to rounding).
+    /// The next step is negligible and the residual orthogonal to the Jacobian.
     Converged {
         /// Largest relative size of the next step.
         step: f64,
@@ -23,15 +23,41 @@ pub enum Outcome {
     LimitOfPrecision {
         /// Largest cosine between the residual and a column of the Jacobian.
         gradient: f64,
+        /// Largest relative size of the next step; where it is large, this is a plateau.
+        step: f64,
     },
-    /// Nothing was left to explain: the model reproduces the data to the rounding of the unknowns.
+    /// Nothing was left to explain: the model reproduces the data to their rounding.
     Exact,
+    /// No step lowers the cost, which is rough: what the next step would gain is below what the cost jumps from point to
+    /// point.
+    Rough {
+        /// By how much the cost jumps, as a part of it.
+        noise: f64,
+        /// How long the next step would be, in standard errors of the unknowns.
+        errors: f64,
+    },
     /// However short, no step lowers the cost, and yet the gradient is not zero.
     Stalled {
         /// Largest cosine between the residual and a column of the Jacobian.
         gradient: f64,
+        /// Largest relative size of the next step.
+        step: f64,
         /// How many of the last trial steps could not be simulated.
         failed: u64,
+    },
+    /// Unknowns, or combinations of them, that had influence at the start have none at the end.
+    Plateau {
+        /// How many have lost it.
+        lost: usize,
+        /// Largest cosine between the residual and a column of the Jacobian.
+        gradient: f64,
+    },
+    /// Many steps in a row lowered the cost by next to nothing, where slopes promise more.
+    Creeping {
+        /// How many.
+        trials: u64,
+        /// By which part of the cost the next full step would lower it, if the slopes held.
+        promised: f64,
     },
     /// The limit of iterations was met first.
     IterationLimit {
@@ -55,12 +81,18 @@ pub enum Severity {
     NotUsable,
 }
 
+/// Where the cost resolves no more, three digits of each unknown make a minimum.
+const DIGITS: f64 = 1e-3;
+/// Where the cost is rough, a tenth of a standard error does.
+const NEAR: f64 = 0.1;
+
 impl Outcome {
     /// Whether a minimum was reached. It may still be a local one.
     pub fn converged(&self) -> bool {
         match self {
             Outcome::Converged { .. } | Outcome::CostUnchanged { .. } | Outcome::Exact => true,
-            Outcome::LimitOfPrecision { gradient } => *gradient <= PRECISION_GRADIENT,
+            Outcome::LimitOfPrecision { gradient, step } => *gradient <= PRECISION && *step <= DIGITS,
+            Outcome::Rough { errors, .. } => *errors <= NEAR,
             _ => false,
         }
     }
@@ -76,14 +108,24 @@ impl Outcome {
                 "Nothing to do: the cost has no more digits to give."
             }
             Outcome::LimitOfPrecision { .. } => {
-                "The cost is too rough to follow: tighten the integrator's tolerance, or scale the data."
+                "The cost is flat here: start elsewhere, or fix an unknown that only appears together with others."
             }
+            Outcome::Rough { .. } if self.converged() => {
+                "Tighten the integrator's tolerance if more digits than the noise allows matter."
+            }
+            Outcome::Rough { .. } => "Tighten the integrator's tolerance: the cost is too rough to follow.",
             Outcome::Stalled { failed: 0, .. } => {
                 "The cost is not smooth here (dry friction, a switch, a coarse tolerance): smooth the model, use a shorter \
                  horizon, or start elsewhere."
             }
             Outcome::Stalled { .. } => {
                 "The simulation fails all around this point: bound the parameters, use a shorter horizon or start elsewhere."
+            }
+            Outcome::Plateau { .. } => {
+                "Start elsewhere or give bounds: the search has run to where the unknowns no longer matter."
+            }
+            Outcome::Creeping { .. } => {
+                "Look for parameters that only appear together, and fix one of them or give it a prior; or start closer."
             }
             Outcome::IterationLimit { .. } => {
                 "Allow more iterations, or start closer; if it creeps, look for parameters that only appear together."
@@ -101,20 +143,39 @@ impl fmt::Display for Outcome {
                 write!(f, "converged (relative step {step:.1e}, gradient cosine {gradient:.1e})")
             }
             Outcome::CostUnchanged { decrease } => write!(f, "converged (cost fell by a part of {decrease:.1e} only)"),
-            Outcome::LimitOfPrecision { gradient } if self.converged() => {
-                write!(f, "converged to the precision of the cost (gradient cosine {gradient:.1e})")
-            }
-            Outcome::LimitOfPrecision { gradient } => {
-                write!(f, "not converged: the cost resolves no further step, but the gradient cosine is {gradient:.1e}")
+            Outcome::LimitOfPrecision { gradient, step } => {
+                let not = if self.converged() { "converged to" } else { "not converged: this is" };
+                write!(f, "{not} the precision of the cost (relative step {step:.1e}, gradient cosine {gradient:.1e})")
             }
             Outcome::Exact => write!(f, "converged (the model reproduces the data)"),
-            Outcome::Stalled { gradient, failed } => {
-                write!(f, "not converged: no step lowers the cost (gradient cosine {gradient:.1e}")?;
+            Outcome::Rough { noise, errors } => {
+                let not = if self.converged() { "converged" } else { "not converged" };
+                write!(
+                    f,
+                    "{not} within the roughness of the cost (it jumps by {noise:.1e} of itself; next step {errors:.1e} \
+                     standard errors)"
+                )
+            }
+            Outcome::Stalled { gradient, step, failed } => {
+                write!(
+                    f,
+                    "not converged: no step lowers the cost (relative step {step:.1e}, gradient cosine {gradient:.1e}"
+                )?;
                 if *failed > 0 {
                     write!(f, "; {failed} trial step(s) could not be simulated")?;
                 }
                 write!(f, ")")
             }
+            Outcome::Plateau { lost, gradient } => write!(
+                f,
+                "not converged: {lost} unknown(s) or combination(s) lost their influence on the way (gradient cosine \
+                 {gradient:.1e})"
+            ),
+            Outcome::Creeping { trials, promised } => write!(
+                f,
+                "not converged: {trials} steps hardly lowered the cost, of which the slopes promise {:.1} %",
+                100.0 * promised
+            ),
             Outcome::IterationLimit { iterations } => write!(f, "not converged after {iterations} iterations"),
             Outcome::TimeLimit => write!(f, "not converged within the time limit"),
             Outcome::Cancelled => write!(f, "cancelled"),

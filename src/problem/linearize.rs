@@ -23,6 +23,14 @@ struct Part {
 impl Objective<'_> {
     /// Cost and triangles of all experiments and the priors.
     pub(crate) fn evaluate(&self, coordinates: &[f64]) -> Result<Linearization, Infeasible> {
+        let found = self.evaluate_all(coordinates);
+        match (&found, self.inside_bounds(coordinates)) {
+            (Err(Infeasible::Failed(_)), Some(inside)) => inside.evaluate_all(coordinates).or(found),
+            _ => found,
+        }
+    }
+
+    fn evaluate_all(&self, coordinates: &[f64]) -> Result<Linearization, Infeasible> {
         let values = self.values(coordinates);
         let cuts = &self.problem.cuts;
         let chained = (0..self.experiments()).any(|e| cuts.is_chained(e));
@@ -41,7 +49,11 @@ impl Objective<'_> {
             blocks[e].absorb_row(&row, error);
             cost += 0.5 * error * error;
         }
-        Ok(Linearization::new(cost, self.problem.unknowns.shared(), blocks))
+        let linear = Linearization::new(cost, self.problem.unknowns.shared(), blocks);
+        Ok(match self.data_norm {
+            Some(norm) => linear.with_data_norm(norm),
+            None => linear,
+        })
     }
 
     /// Where the segments begin, and whether that is exact. A guess will do where it can be corrected: the cost is a sum of
@@ -92,7 +104,7 @@ impl Objective<'_> {
     ) -> Result<Triangulation, Infeasible> {
         let jobs: Vec<Job<'_>> =
             (0..self.experiments()).flat_map(|e| self.linear_jobs(e, &values[e], coordinates, guess)).collect();
-        let mut parts = self.in_batches(&jobs, coordinates, |jobs| self.parts(jobs))?.into_iter();
+        let mut parts = self.in_batches(&jobs, |jobs| self.parts(jobs))?.into_iter();
         let mut found = Triangulation { cost: 0.0, moved: 0.0, blocks: vec![], borders: None };
         let mut of = vec![];
         for (e, segments) in self.problem.cuts.segments.iter().enumerate() {
@@ -114,7 +126,7 @@ impl Objective<'_> {
             }
         }
         if !found.cost.is_finite() || found.blocks.iter().any(|block| !block.is_finite()) {
-            return Err(self.infeasible(0, coordinates, RunError::Failed { sample: 0 }));
+            return Err(self.infeasible(0, RunError::Failed { sample: 0 }));
         }
         if guess.is_some() {
             let (point, cost, values) = (coordinates.to_vec(), found.cost, values.to_vec());
@@ -170,17 +182,28 @@ impl Objective<'_> {
         let mut jobs = self.segments(e, values, coordinates, true, guess);
         let chained = self.problem.cuts.is_chained(e);
         for job in &mut jobs {
-            job.scales.clear();
+            // What is left out stays so.
+            job.scales.iter_mut().filter(|scale| **scale != 0.0).for_each(|scale| *scale = 1.0);
             if chained {
+                let moves = self.carry_moves(job);
+                job.scales.clear();
                 let carried = job.piece.carry.len();
                 job.seeds.retain(|seed| matches!(seed, Seed::Parameter(_)));
                 job.seeds.splice(0..0, (0..carried).map(Seed::Carry));
                 let width = job.seeds.len();
-                job.piece.slopes =
-                    (0..carried * width).map(|at| f64::from(u8::from(at % width == at / width))).collect();
+                let slope = |at| f64::from(u8::from(at % width == at / width && moves[at / width]));
+                job.piece.slopes = (0..carried * width).map(slope).collect();
             }
         }
         jobs
+    }
+
+    /// Which entries of the carry that a segment begins with depend on the unknowns: at the begin of a record those that are
+    /// given do not, and slopes with respect to them may be infinite.
+    fn carry_moves(&self, job: &Job<'_>) -> Vec<bool> {
+        let Piece { carry, slopes, samples, .. } = &job.piece;
+        let row = |i: usize| &slopes[i * job.seeds.len()..][..job.seeds.len()];
+        (0..carry.len()).map(|i| samples.start > 0 || row(i).iter().any(|slope| *slope != 0.0)).collect()
     }
 
     /// Costs and triangles of jobs that run side by side.

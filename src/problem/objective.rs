@@ -5,6 +5,7 @@ use super::{Control, Problem, Whitening};
 use crate::error::Failure;
 use crate::loss::Loss;
 use crate::optimize::{Infeasible, LeastSquares, Linearization};
+use crate::parameter::Transform;
 use crate::sweep::{Located, OVERFLOW, RunError, Sweep, Window};
 
 /// What a fit minimizes, as a problem for its own and for argmin's solvers.
@@ -20,6 +21,10 @@ pub struct Objective<'p> {
     pub(crate) sweep: &'p dyn Sweep,
     pub(crate) whitening: Whitening,
     pub(crate) control: &'p Control,
+    /// Norm of the measurements, standardized and weighted as the errors; unknown where variances are predicted.
+    pub(crate) data_norm: Option<f64>,
+    /// Unknowns whose slopes count as zero; empty for none.
+    pub(crate) left_out: Vec<bool>,
     /// Where the segments of records begin at points that were evaluated.
     pub(crate) memory: Memory,
 }
@@ -35,6 +40,25 @@ impl<'p> Objective<'p> {
         self.problem.unknowns.start()
     }
 
+    pub(super) fn new(
+        problem: &'p Problem<'p>,
+        sweep: &'p dyn Sweep,
+        whitening: Whitening,
+        control: &'p Control,
+    ) -> Objective<'p> {
+        let (data_norm, left_out, memory) = (None, vec![], Memory::default());
+        Objective { problem, sweep, whitening, control, data_norm, left_out, memory }.with_data_norm()
+    }
+
+    /// The same without the slopes of the unknowns on their bounds, which may be infinite there (the root of an initial level
+    /// of zero); `None` where none is, or where they have been left out already.
+    pub(super) fn inside_bounds(&self, coordinates: &[f64]) -> Option<Self> {
+        let bounds = self.problem.unknowns.bounds();
+        let left_out: Vec<bool> = bounds.iter().zip(coordinates).map(|((low, high), x)| x <= low || x >= high).collect();
+        let some = self.left_out.is_empty() && left_out.contains(&true);
+        some.then(|| Objective { left_out, ..self.clone() })
+    }
+
     /// The same with errors and slopes in the units of the outputs.
     pub(crate) fn in_units(&self) -> Self {
         self.with(Whitening::none(self.outputs()))
@@ -42,13 +66,31 @@ impl<'p> Objective<'p> {
 
     /// The same with errors standardized otherwise.
     pub(crate) fn with(&self, whitening: Whitening) -> Self {
-        Objective { whitening, ..self.clone() }
+        Objective { whitening, ..self.clone() }.with_data_norm()
+    }
+
+    fn with_data_norm(mut self) -> Self {
+        self.data_norm = (!self.sweep.predicts_variance()).then(|| self.norm_of_data());
+        self
+    }
+
+    fn norm_of_data(&self) -> f64 {
+        let sigma = self.whitening.sigma();
+        let mut squares = 0.0;
+        for (e, record) in self.problem.records.iter().enumerate() {
+            for (channel, sigma) in record.outputs().iter().zip(&sigma) {
+                for (k, y) in channel.values.iter().enumerate().filter(|(_, y)| !y.is_nan()) {
+                    squares += self.weight(e, k) * (y / sigma).powi(2);
+                }
+            }
+        }
+        squares.sqrt()
     }
 
     /// The same with another sweep, or records that differ in what was measured.
     pub(crate) fn of<'q>(&'q self, problem: &'q Problem<'q>, sweep: &'q dyn Sweep) -> Objective<'q> {
         let whitening = self.whitening.clone();
-        Objective { problem, sweep, whitening, control: self.control, memory: Memory::default() }
+        Objective::new(problem, sweep, whitening, self.control)
     }
 
     /// Number of experiments.
@@ -80,10 +122,14 @@ impl<'p> Objective<'p> {
         weights.map_or(1.0, |weights| weights.weight(&self.problem.records[experiment], sample))
     }
 
-    pub(crate) fn infeasible(&self, experiment: usize, coordinates: &[f64], error: RunError) -> Infeasible {
+    pub(crate) fn infeasible(&self, experiment: usize, error: RunError) -> Infeasible {
         match error {
             RunError::Stopped => Infeasible::Cancelled,
-            RunError::Failed { sample } => Infeasible::Failed(self.locate(experiment, coordinates, sample).to_string()),
+            // A search only wants to know that it failed: what exactly would cost it another simulation.
+            RunError::Failed { sample } => {
+                let label = &self.problem.unknowns.labels[experiment];
+                Infeasible::Failed(format!("experiment `{label}` cannot be evaluated (noticed at sample {sample})"))
+            }
         }
     }
 
@@ -92,7 +138,8 @@ impl<'p> Objective<'p> {
         let (problem, sigma) = (self.problem, self.whitening.sigma());
         let (label, record) = (&problem.unknowns.labels[e], &problem.records[e]);
         let values = problem.unknowns.of_experiment(e, coordinates);
-        let found = self.sweep.locate(record, label, &values.x, &values.p, sample, &sigma);
+        let stops = || self.control.stops();
+        let found = self.sweep.locate(record, &values.x, &values.p, sample, &sigma, &stops);
         let failure = |signal: String, value: f64, hint| Failure {
             experiment: label.clone(),
             sample,
@@ -102,8 +149,11 @@ impl<'p> Objective<'p> {
             hint,
         };
         match found {
-            Some(Located::Broken(failure)) => failure,
-            Some(Located::Largest(largest)) => self.unsound_prediction(e, coordinates).unwrap_or(largest),
+            Some(Located::Broken(failure)) => Failure { experiment: label.clone(), ..failure },
+            Some(Located::Largest(largest)) => {
+                let largest = Failure { experiment: label.clone(), ..largest };
+                self.unsound_prediction(e, coordinates).unwrap_or(largest)
+            }
             None => self
                 .unsound_prediction(e, coordinates)
                 .unwrap_or_else(|| failure("the prediction".to_owned(), f64::NAN, UNSOUND)),
@@ -152,6 +202,15 @@ const UNSOUND: &str = "; it is not a finite number: bound the parameters or star
 impl LeastSquares for Objective<'_> {
     fn linearize(&self, x: &[f64]) -> Result<Linearization, Infeasible> {
         self.evaluate(x)
+    }
+
+    fn curvature(&self, x: &[f64], along: &[f64]) -> Option<Result<Linearization, Infeasible>> {
+        (!self.sweep.predicts_variance()).then(|| self.second_along(x, along))
+    }
+
+    fn sizes(&self) -> Vec<Option<f64>> {
+        let size = |transform| (transform == Transform::Log).then_some(1.0);
+        self.problem.unknowns.row.iter().map(|unknown| size(unknown.parameter.transform)).collect()
     }
 
     fn bounds(&self) -> Vec<(f64, f64)> {

@@ -22,7 +22,7 @@ pub(crate) trait Accumulate: Send + Sized {
 pub(crate) struct Job<'p> {
     pub experiment: usize,
     pub seeds: Vec<Seed>,
-    /// How fast the quantity of each seed moves with its coordinate.
+    /// How fast the quantity of each seed moves with its coordinate; zero where its slopes are left out.
     pub scales: Vec<f64>,
     pub piece: Piece<'p>,
 }
@@ -42,15 +42,22 @@ impl Objective<'_> {
         let (problem, unknowns) = (self.problem, &self.problem.unknowns);
         let record = &problem.records[e];
         let seeds = if slopes { unknowns.seeds(e) } else { vec![] };
-        let scales = if slopes { unknowns.scales(e, coordinates) } else { vec![] };
+        let mut scales = if slopes { unknowns.scales(e, coordinates) } else { vec![] };
+        for (scale, i) in scales.iter_mut().zip(unknowns.columns(e)) {
+            if self.left_out.get(i) == Some(&true) {
+                *scale = 0.0;
+            }
+        }
         let Reached { carry, slopes: all } = self.sweep.start(record, &values.x, &values.p);
         let (states, width) = (values.x.len(), values.x.len() + values.p.len());
         let column = |seed: &Seed| match *seed {
             Seed::Carry(i) => i,
             Seed::Parameter(j) => states + j,
         };
-        let slopes = (0..carry.len()).flat_map(|row| seeds.iter().map(move |seed| (row, column(seed))));
-        let slopes = slopes.map(|(row, column)| all[row * width + column]).collect();
+        let known = seeds.iter().zip(&scales);
+        let slopes = (0..carry.len()).flat_map(|row| known.clone().map(move |(seed, scale)| (row, column(seed), *scale)));
+        let slope = |(row, column, scale): (usize, usize, f64)| if scale == 0.0 { 0.0 } else { all[row * width + column] };
+        let slopes = slopes.map(slope).collect();
         let (prepared, samples) = (&problem.prepared[e], 0..record.len());
         Job {
             experiment: e,
@@ -142,7 +149,7 @@ impl Objective<'_> {
             }
             let job = self.job(e, &values[e], coordinates, false);
             let at: Vec<usize> = segments[1..].iter().map(|samples| samples.start).collect();
-            self.sweep.follow(&job.piece, &at).map_err(|error| self.infeasible(e, coordinates, error))
+            self.sweep.follow(&job.piece, &at).map_err(|error| self.infeasible(e, error))
         };
         let borders =
             |carries: Vec<Vec<f64>>| carries.into_iter().map(|carry| Border { carry, slopes: vec![] }).collect();
@@ -158,12 +165,25 @@ impl Objective<'_> {
         slopes: bool,
         make: impl Fn(usize) -> A + Sync,
     ) -> Result<Vec<A>, Infeasible> {
+        let found = self.gather_all(coordinates, slopes, &make);
+        match (&found, self.inside_bounds(coordinates)) {
+            (Err(Infeasible::Failed(_)), Some(inside)) if slopes => inside.gather_all(coordinates, slopes, &make).or(found),
+            _ => found,
+        }
+    }
+
+    fn gather_all<A: Accumulate>(
+        &self,
+        coordinates: &[f64],
+        slopes: bool,
+        make: &(impl Fn(usize) -> A + Sync),
+    ) -> Result<Vec<A>, Infeasible> {
         let values = self.values(coordinates);
         let borders = self.borders(coordinates, &values, slopes)?;
         let jobs = (0..self.experiments())
             .flat_map(|e| self.segments(e, &values[e], coordinates, slopes, borders.as_deref()))
             .collect();
-        let found = self.run_jobs(jobs, coordinates, &make)?;
+        let found = self.run_jobs(jobs, make)?;
         let mut all: Vec<A> = Vec::with_capacity(self.experiments());
         let mut found = found.into_iter();
         for segments in &self.problem.cuts.segments {
@@ -186,7 +206,7 @@ impl Objective<'_> {
         let values = self.values(coordinates);
         let borders = self.borders(coordinates, &values, slopes)?;
         let jobs = self.segments(e, &values[e], coordinates, slopes, borders.as_deref());
-        let mut found = self.run_jobs(jobs, coordinates, &|_| make())?.into_iter();
+        let mut found = self.run_jobs(jobs, &|_| make())?.into_iter();
         let mut whole = found.next().unwrap_or_else(make);
         found.for_each(|part| whole.append(part));
         Ok(whole)
@@ -196,7 +216,6 @@ impl Objective<'_> {
     fn run_jobs<A: Accumulate>(
         &self,
         jobs: Vec<Job<'_>>,
-        coordinates: &[f64],
         make: &(impl Fn(usize) -> A + Sync),
     ) -> Result<Vec<A>, Infeasible> {
         let batch = |jobs: &[&Job<'_>]| {
@@ -208,14 +227,13 @@ impl Objective<'_> {
             })
             .map(|_| gatherers)
         };
-        self.in_batches(&jobs, coordinates, batch)
+        self.in_batches(&jobs, batch)
     }
 
     /// Runs jobs in batches of those that can go side by side; the results in the order of the jobs.
     pub(super) fn in_batches<T: Send>(
         &self,
         jobs: &[Job<'_>],
-        coordinates: &[f64],
         batch: impl Fn(&[&Job<'_>]) -> Result<Vec<T>, Broken> + Sync,
     ) -> Result<Vec<T>, Infeasible> {
         let batches = self.batches(jobs);
@@ -231,7 +249,7 @@ impl Objective<'_> {
         let mut found: Vec<Option<T>> = (0..jobs.len()).map(|_| None).collect();
         for (members, result) in batches.iter().zip(results) {
             let result = result.map_err(|Broken { lane, error }| {
-                self.infeasible(jobs[members[lane]].experiment, coordinates, error)
+                self.infeasible(jobs[members[lane]].experiment, error)
             })?;
             members.iter().zip(result).for_each(|(&i, value)| found[i] = Some(value));
         }

@@ -3,7 +3,9 @@
 use super::checkpoint::CheckpointFile;
 use super::{Objective, Observer};
 use crate::error::Error;
-use crate::optimize::{GaussNewton, Infeasible, LeastSquaresState, LevenbergMarquardt, Linearization, Outcome};
+use crate::optimize::{
+    GaussNewton, Infeasible, LeastSquaresState, LevenbergMarquardt, Linearization, Machine, Outcome,
+};
 use crate::scaling::Scaling;
 use argmin::core::observers::Observe;
 use argmin::core::{Executor, KV, Solver, State, TerminationReason, TerminationStatus};
@@ -11,16 +13,17 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::sync::Arc;
 
-/// A search that a fit can run: one of argmin's solvers that says how it ended.
+/// A search that a fit can run.
 pub trait Search:
-    Clone + Send + Sync + Serialize + DeserializeOwned + for<'p> Solver<&'p Objective<'p>, LeastSquaresState> + 'static
+    Machine
+    + Clone
+    + Send
+    + Sync
+    + Serialize
+    + DeserializeOwned
+    + for<'p> Solver<&'p Objective<'p>, LeastSquaresState>
+    + 'static
 {
-    /// How the search ended, if it was its own decision.
-    fn outcome(&self) -> Option<Outcome>;
-
-    /// Cost and slopes where the search stands.
-    fn linearization(&self) -> Option<&Linearization>;
-
     /// The same search for a cost that is soon to change: it may stop three digits into the minimum.
     fn rough(&self) -> Self;
 
@@ -34,14 +37,6 @@ pub trait Search:
 }
 
 impl<S: Scaling + Serialize + DeserializeOwned + 'static> Search for LevenbergMarquardt<S> {
-    fn outcome(&self) -> Option<Outcome> {
-        LevenbergMarquardt::outcome(self)
-    }
-
-    fn linearization(&self) -> Option<&Linearization> {
-        LevenbergMarquardt::linearization(self)
-    }
-
     fn rough(&self) -> Self {
         LevenbergMarquardt::new(self.stop.rough(), self.scaling.clone())
     }
@@ -52,14 +47,6 @@ impl<S: Scaling + Serialize + DeserializeOwned + 'static> Search for LevenbergMa
 }
 
 impl Search for GaussNewton {
-    fn outcome(&self) -> Option<Outcome> {
-        GaussNewton::outcome(self)
-    }
-
-    fn linearization(&self) -> Option<&Linearization> {
-        GaussNewton::linearization(self)
-    }
-
     fn rough(&self) -> Self {
         GaussNewton::new(self.stop.rough())
     }

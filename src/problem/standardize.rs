@@ -60,7 +60,20 @@ impl<'s> Standardize<'s> {
                 wide::run(self.width, Multiply { rows: window.variance_rows_mut(), factors: &self.factors });
             }
         }
+        if self.factors.contains(&0.0) {
+            leave_out(window.rows_mut(), &self.factors);
+            if window.has_variances() {
+                leave_out(window.variance_rows_mut(), &self.factors);
+            }
+        }
         Ok(())
+    }
+}
+
+/// Sets slopes to zero that are left out, infinite or not.
+fn leave_out(rows: &mut [f64], factors: &[f64]) {
+    for rows in rows.chunks_exact_mut(factors.len()) {
+        rows.iter_mut().zip(factors).filter(|(_, factor)| **factor == 0.0).for_each(|(entry, _)| *entry = 0.0);
     }
 }
 

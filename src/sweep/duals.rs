@@ -80,16 +80,16 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
     fn locate(
         &self,
         record: &Record,
-        label: &str,
         state: &[f64],
         parameters: &[f64],
         sample: usize,
         sigma: &[f64],
+        stops: &dyn Fn() -> bool,
     ) -> Option<Located> {
         let layout = &*self.layout;
         let search =
-            FailureSearch { layout, values: &self.model, duals: &self.model, method: &*self.method, record, label };
-        Some(search.locate(state, parameters, sample, sigma))
+            FailureSearch { layout, values: &self.model, duals: &self.model, method: &*self.method, record };
+        Some(search.locate(state, parameters, sample, sigma, stops))
     }
 
     fn refined<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
@@ -140,16 +140,22 @@ pub(crate) struct FailureSearch<'w> {
     pub duals: &'w dyn Functions<Duals>,
     pub method: &'w dyn Method,
     pub record: &'w Record,
-    pub label: &'w str,
 }
 
 impl FailureSearch<'_> {
     fn failure(&self, k: usize, signal: String, value: f64, hint: &'static str) -> Failure {
-        Failure { experiment: self.label.to_owned(), sample: k, time: self.record.time(k), signal, value, hint }
+        Failure { experiment: self.record.name().to_owned(), sample: k, time: self.record.time(k), signal, value, hint }
     }
 
     /// What fails in a simulation from this state; where nothing does, the error that is largest against the noise.
-    pub fn locate(&self, state: &[f64], p: &[f64], sample: usize, sigma: &[f64]) -> Located {
+    pub fn locate(
+        &self,
+        state: &[f64],
+        p: &[f64],
+        sample: usize,
+        sigma: &[f64],
+        stops: &dyn Fn() -> bool,
+    ) -> Located {
         let broken = |k, signal, value, hint| Located::Broken(self.failure(k, signal, value, hint));
         let unsound = |values: &[f64]| {
             let i = values.iter().position(|v| !v.is_finite())?;
@@ -177,7 +183,7 @@ impl FailureSearch<'_> {
                     largest = (k, j, found - y);
                 }
             }
-            if k + 1 == self.record.len() {
+            if k + 1 == self.record.len() || stops() {
                 break;
             }
             let mut next = x.clone();

@@ -172,13 +172,13 @@ impl Sweep for ProgramSweep<'_> {
     fn locate(
         &self,
         record: &Record,
-        label: &str,
         state: &[f64],
         parameters: &[f64],
         sample: usize,
         sigma: &[f64],
+        stops: &dyn Fn() -> bool,
     ) -> Option<Located> {
-        self.plain.locate(record, label, state, parameters, sample, sigma)
+        self.plain.locate(record, state, parameters, sample, sigma, stops)
     }
 
     fn refined<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {

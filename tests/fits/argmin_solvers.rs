@@ -123,7 +123,7 @@ fn a_checkpoint_goes_on() {
     assert!((resumed.parameters.gain - whole.parameters.gain).abs() < 1e-6 * error);
     // A finished search looks again before it says so.
     let again = fit(&record).checkpoint(&path, 1).run().unwrap();
-    assert!(again.outcome.converged() && again.evaluations > 0 && again.iterations > resumed.iterations, "{again}");
+    assert!(again.outcome.converged() && again.evaluations > 0 && again.iterations >= resumed.iterations, "{again}");
     assert!((again.parameters.gain - whole.parameters.gain).abs() < 1e-6 * error);
     let refused = fit(&other).checkpoint(&path, 1).run().unwrap_err().to_string();
     assert!(refused.contains("another problem"), "{refused}");
@@ -179,5 +179,5 @@ fn settings_of_optimizers_come_back_from_json() {
     same(LevenbergMarquardt::new(stop, Unscaled));
     same(LevenbergMarquardt::new(stop, Nominal(vec![1.0, 0.1])));
     same(GaussNewton::default());
-    same(Outcome::Stalled { gradient: 0.1, failed: 3 });
+    same(Outcome::Stalled { gradient: 0.1, step: 0.2, failed: 3 });
 }

@@ -388,7 +388,7 @@ fn scalings_that_return_rubbish() {
     #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
     struct Rubbish(f64, usize);
     impl Scaling for Rubbish {
-        fn scales(&self, _before: &[f64], _x: &[f64], _norms: &[f64]) -> Vec<f64> {
+        fn scales(&self, _seen: &Seen) -> Vec<f64> {
             vec![self.0; self.1]
         }
     }

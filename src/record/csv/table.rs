@@ -32,7 +32,9 @@ impl Table {
         let mut line = Vec::new();
         for _ in 0..file.preamble {
             line.clear();
-            bytes.read_until(b'\n', &mut line).map_err(failed)?;
+            if bytes.read_until(b'\n', &mut line).map_err(failed)? == 0 {
+                break;
+            }
         }
         let mut above = file.preamble as u64;
         let mut remark = None;

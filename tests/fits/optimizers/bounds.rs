@@ -3,14 +3,14 @@
 use super::problems::{D, PROBLEMS, Problem};
 use super::{gauss_newton, levenberg_marquardt};
 use argmin::core::{Executor, State};
-use greybox::JacobianColumns;
+use greybox::OwnSize;
 use greybox::optimize::LevenbergMarquardt;
 
 const FREE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 
 /// Both solvers end converged at this point, inside the bounds.
 fn both_reach(problem: &Problem, expected: &[f64], tolerance: f64) {
-    let ends = [levenberg_marquardt(problem, problem.start, JacobianColumns), gauss_newton(problem, problem.start)];
+    let ends = [levenberg_marquardt(problem, problem.start, OwnSize), gauss_newton(problem, problem.start)];
     for ended in ends {
         let outcome = ended.outcome.expect("an outcome");
         println!("{}: {:?} after {} evaluations, {outcome}", problem.name, ended.x, ended.evaluations);

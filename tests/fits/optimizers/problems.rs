@@ -40,6 +40,22 @@ impl LeastSquares for Problem {
         Ok(Linearization::new(cost, x.len(), vec![information]))
     }
 
+    /// By a difference with the residuals a hundredth of the direction away.
+    fn curvature(&self, x: &[f64], along: &[f64]) -> Option<Result<Linearization, Infeasible>> {
+        const FAR: f64 = 0.01;
+        let far: Vec<f64> = x.iter().zip(along).map(|(x, along)| x + FAR * along).collect();
+        let mut information = Information::new(x.len());
+        for (here, far) in self.evaluate(x).into_iter().zip(self.evaluate(&far)) {
+            let slope: f64 = here.slopes.iter().zip(along).map(|(slope, along)| slope * along).sum();
+            let second = 2.0 / (FAR * FAR) * (far.value - here.value - FAR * slope);
+            if !(second.is_finite() && here.slopes.iter().all(|slope| slope.is_finite())) {
+                return Some(Err(Infeasible::Failed("a residual is not finite".to_owned())));
+            }
+            information.absorb_row(&here.slopes[..x.len()], -second);
+        }
+        Some(Ok(Linearization::new(0.0, x.len(), vec![information])))
+    }
+
     fn bounds(&self) -> Vec<(f64, f64)> {
         self.bounds.to_vec()
     }

@@ -1,0 +1,95 @@
+//! Problems of NIST's Statistical Reference Datasets from bad starts: how many searches end right, which of the others say so,
+//! and what they cost. The starts, and what SciPy makes of them, come from `starts.py` beside this file:
+//!
+//! `nist_starts FOLDER_OF_DAT FOLDER_OF_STARTS [PROBLEM...]`
+
+#[path = "../nist/file.rs"]
+#[allow(dead_code, reason = "this example reads the files and fits them its own way")]
+mod file;
+#[path = "../nist/problems.rs"]
+mod problems;
+
+use file::File;
+use greybox::optimize::{Domain, LeastSquares, LevenbergMarquardt, Machine, Outcome, Request};
+use greybox::{Error, Fit, Model, Nothing, Objective, Signals, free};
+use problems::{Predictors, Response, Task};
+use std::path::Path;
+use std::time::Instant;
+
+/// Searches from many starts.
+struct Starts<'a> {
+    file: &'a File,
+    starts: &'a [Vec<f64>],
+}
+
+/// Sum of squares, how the search ended, evaluations.
+struct Ended {
+    squares: f64,
+    outcome: Outcome,
+    evaluations: u64,
+}
+
+/// A second derivative counts as one evaluation more.
+fn search(objective: &Objective<'_>, start: &[f64]) -> Ended {
+    let mut search: LevenbergMarquardt = LevenbergMarquardt::default();
+    let mut evaluations = 0;
+    search.begin(start.to_vec(), Domain::of(objective));
+    loop {
+        evaluations += 1;
+        match search.request() {
+            Request::Linearize(x) => search.tell(objective.linearize(x)),
+            Request::Curvature { x, along } => search.tell_curvature(objective.curvature(x, along)),
+            Request::Ended(outcome) => {
+                let squares = search.linearization().map_or(f64::INFINITY, |linear| 2.0 * linear.cost);
+                return Ended { squares, outcome, evaluations: evaluations - 1 };
+            }
+        }
+    }
+}
+
+impl Task for Starts<'_> {
+    /// The certified sum of squares, and the searches.
+    type Answer = Result<(f64, Vec<Ended>), Error>;
+
+    fn run<M: Model<State = Nothing, Input = Predictors, Output = Response> + Clone>(self, model: &M) -> Self::Answer {
+        let record = self.file.record(model)?;
+        let parameter = |i: usize| self.file.parameters.get(i).map_or(f64::NAN, |parameter| parameter[2]);
+        let problem = Fit::new(model, &record).parameters(M::Parameters::from_fn(|i| free(parameter(i)))).problem()?;
+        let objective = problem.objective()?;
+        let certified = 2.0 * objective.linearize(&objective.start()).map_err(|e| Error::Optimizer(e.to_string()))?.cost;
+        Ok((certified, self.starts.iter().map(|start| search(&objective, start)).collect()))
+    }
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [folder, starts, wanted @ ..] = &arguments[..] else {
+        return Err("usage: nist_starts FOLDER_OF_DAT FOLDER_OF_STARTS [PROBLEM...]".into());
+    };
+    println!("starts           of  right  wrong without a word  evaluations of right ones, median, and all   ms/search");
+    let mut paths: Vec<_> = std::fs::read_dir(starts)?.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>()?;
+    paths.sort();
+    for path in paths.iter().filter(|path| path.extension().is_some_and(|extension| extension == "txt")) {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let name = stem.split('_').next().unwrap_or_default();
+        if !wanted.is_empty() && !wanted.iter().any(|wanted| wanted == name) {
+            continue;
+        }
+        let numbers = |line: &str| line.split_whitespace().map(str::parse).collect::<Result<Vec<f64>, _>>();
+        let starts = std::fs::read_to_string(path)?.lines().map(numbers).collect::<Result<Vec<_>, _>>()?;
+        let file = File::read(&Path::new(folder).join(format!("{name}.dat")))?;
+        let begin = Instant::now();
+        let task = Starts { file: &file, starts: &starts };
+        let (certified, all) = problems::by_name(name, task).ok_or("not a known problem")??;
+        let time = begin.elapsed().as_secs_f64() * 1e3 / all.len() as f64;
+        let is_right = |ended: &&Ended| ended.squares <= certified * (1.0 + 1e-4) + 1e-22;
+        let mut right: Vec<u64> = all.iter().filter(is_right).map(|ended| ended.evaluations).collect();
+        right.sort_unstable();
+        let silent = all.iter().filter(|ended| !is_right(ended) && ended.outcome.converged()).count();
+        let median = right.get(right.len() / 2).copied().unwrap_or(0);
+        let sum: u64 = all.iter().map(|ended| ended.evaluations).sum();
+        let count = all.len();
+        println!("{stem:15} {count:4} {:6} {silent:21} {median:31} {sum:12} {time:11.2}", right.len());
+    }
+    Ok(())
+}

@@ -1,0 +1,239 @@
+//! [`Descent`]: one way down from a start, by damped steps of limited length.
+
+use super::point::Point;
+use crate::scaling::Seen;
+use serde::{Deserialize, Serialize};
+
+/// How long steps may be, in sizes of the unknowns.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Reach {
+    pub first: f64,
+    pub later: f64,
+}
+
+/// The longest step of the next trial.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+enum Longest {
+    First,
+    Later,
+    /// In the metric of the damping.
+    Length(f64),
+}
+
+/// The memory of a descent: damping, length of the next step, and what the last trials were like.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Descent {
+    reach: Reach,
+    lambda: f64,
+    /// The part to which `lambda` falls after the next good step.
+    fall: f64,
+    longest: Longest,
+    /// Trials in a row that were rejected where the cost resolves nothing.
+    blind: u32,
+    /// Trials since the cost last resolved one.
+    unresolved: u32,
+    /// Trials in a row that could not be evaluated.
+    pub failed: u64,
+    /// How far, as a part of the cost, the last rejected trials were off what the slopes promised.
+    pub noise: f64,
+    /// Trials so far.
+    pub trials: u64,
+    /// The last trial that was worth a mark, and cost and potential then.
+    mark: (u64, f64, f64),
+    /// Accepted steps in a row that lowered the cost by less than a tenth.
+    slow: u32,
+}
+
+/// A step to be tried.
+#[derive(Clone, Debug)]
+pub(super) struct Trial {
+    pub x: Vec<f64>,
+    pub step: Vec<f64>,
+    /// The diagonal by which it was damped, and its length in the metric of the scales.
+    pub damping: Vec<f64>,
+    pub length: f64,
+    promised: f64,
+    resolved: bool,
+}
+
+const FALL: f64 = 0.1;
+/// A step that gains so much of what was promised is a good one.
+const GOOD: f64 = 0.9;
+const ACCEPT: f64 = 1e-4;
+/// The next step after one that was rejected.
+const SHORTER: f64 = 0.25;
+/// Five trials are enough where the cost has no digits left.
+const BLIND: u32 = 5;
+/// And so many where the slopes still lead on: enough to win ten digits at half the distance a step.
+const UNRESOLVED: u32 = 60;
+const COST_ROUNDING: f64 = 1e-10;
+/// So many trials creep that together neither lower the cost by this part
+const CREEPING: u64 = 300;
+const CREEPING_FALL: f64 = 0.01;
+/// nor leave the next full step no more than this part of what it would have gained before.
+const CREEPING_GAIN: f64 = 0.1;
+/// Second derivatives are worth their evaluation after so many steps that each lower the cost by less than this part.
+const SLOW: (u32, f64) = (20, 0.1);
+
+impl Descent {
+    pub fn new(reach: Reach) -> Self {
+        Descent {
+            reach,
+            lambda: 0.0,
+            fall: FALL,
+            longest: Longest::First,
+            blind: 0,
+            unresolved: 0,
+            failed: 0,
+            noise: 0.0,
+            trials: 0,
+            mark: (0, f64::MAX, f64::MAX),
+            slow: 0,
+        }
+    }
+
+    pub fn lambda(&self) -> f64 {
+        self.lambda
+    }
+
+    /// The next step to try; `None` if no step leads away from here.
+    pub fn propose(&mut self, point: &Point, scales: &[f64], seen: &Seen) -> Option<Trial> {
+        let sizes: Vec<f64> = (0..point.x.len()).map(|i| seen.size(i)).collect();
+        let size = length(scales, &sizes);
+        let longest = match self.longest {
+            Longest::Length(longest) => longest,
+            _ if size == 0.0 => f64::INFINITY,
+            Longest::First => self.reach.first * size,
+            Longest::Later => self.reach.later * size,
+        };
+        let (lambda, step) = limited(point, scales, self.lambda, longest)?;
+        self.lambda = lambda;
+        let (x, promised) = (point.towards(&step), point.linear.predicted_reduction(&step));
+        let resolved = promised > point.resolution();
+        let damping = damping(scales, lambda);
+        let length = length(scales, &step);
+        let spent = self.blind >= BLIND || self.unresolved >= UNRESOLVED && !resolved;
+        (x != point.x && !spent).then_some(Trial { x, step, damping, length, promised, resolved })
+    }
+
+    /// Whether the second derivative along a step is worth an evaluation: in a curved valley, where steps are good and short.
+    pub fn is_slow(&self, trial: &Trial) -> bool {
+        self.slow >= SLOW.0 && trial.resolved
+    }
+
+    /// Whether the trials get nowhere.
+    pub fn creeps(&mut self, point: &Point) -> bool {
+        let (_, cost, potential) = self.mark;
+        if point.cost() < cost - CREEPING_FALL * point.cost_size() || point.potential < CREEPING_GAIN * potential {
+            self.mark = (self.trials, point.cost(), point.potential);
+        }
+        self.trials - self.mark.0 > CREEPING
+    }
+
+    /// Whether to go to the point that a trial led to (`None` if it has no cost); adapts damping and length of the next step.
+    pub fn judge(&mut self, point: &Point, trial: &Trial, next: Option<&Point>) -> bool {
+        self.trials += 1;
+        self.unresolved = if trial.resolved { 0 } else { self.unresolved + 1 };
+        let cost = point.cost();
+        let gain = match next {
+            None => f64::NEG_INFINITY,
+            Some(next) if trial.resolved => (cost - next.cost()) / trial.promised,
+            Some(next) => self.blind_gain(point, trial, next),
+        };
+        if gain <= ACCEPT {
+            self.reject(trial, gain, point.cost_size(), next.is_none());
+            return false;
+        }
+        let next_cost = next.map_or(cost, Point::cost);
+        self.slow = if trial.resolved && cost - next_cost < SLOW.1 * point.cost_size() { self.slow + 1 } else { 0 };
+        (self.blind, self.failed, self.noise, self.longest) = (0, 0, 0.0, Longest::Later);
+        if gain > GOOD {
+            // Ten times faster with each good step, so that a good start is not held up by the damping.
+            self.lambda *= self.fall;
+            self.fall *= FALL;
+        } else {
+            // Nielsen (1999): smooth between no change at half the promised gain and a tenth at the full one.
+            self.lambda *= (1.0 - (2.0 * gain - 1.0).powi(3)).clamp(FALL, 2.0);
+            self.fall = FALL;
+        }
+        true
+    }
+
+    fn reject(&mut self, trial: &Trial, gain: f64, cost: f64, failed: bool) {
+        self.blind += u32::from(!trial.resolved);
+        self.failed = if failed { self.failed + 1 } else { 0 };
+        if trial.resolved && !failed {
+            // Of a smooth cost this falls with the length of the step; what stays is noise.
+            self.noise = ((1.0 - gain).abs() * trial.promised / cost).max(0.125 * self.noise);
+        }
+        self.longest = Longest::Length(SHORTER * trial.length);
+        self.fall = FALL;
+    }
+
+    /// Where the cost decides nothing, the slope along the step does: in the metric of the damped step the gradient of a
+    /// convergent iteration shrinks steadily.
+    fn blind_gain(&self, point: &Point, trial: &Trial, next: &Point) -> f64 {
+        let again = next.linear.step_within(&trial.damping, &next.held, &next.room);
+        let part = again.map_or(f64::INFINITY, |again| next.slope(&again) / point.slope(&trial.step));
+        let rounding = COST_ROUNDING.max(point.linear.roughness());
+        match part {
+            _ if next.cost() > point.cost() + rounding * point.cost_size() => 0.0,
+            part if part < 0.25 => 1.0,
+            part if part < 1.0 => GOOD,
+            _ => 0.0,
+        }
+    }
+}
+
+/// `|diag(scales) step|`.
+pub(super) fn length(scales: &[f64], step: &[f64]) -> f64 {
+    scales.iter().zip(step).map(|(scale, step)| scale * step).fold(0.0, f64::hypot)
+}
+
+fn damping(scales: &[f64], lambda: f64) -> Vec<f64> {
+    scales.iter().map(|scale| lambda.sqrt() * scale).collect()
+}
+
+/// The step with the least damping, `lambda` at least, that is no longer than this (to a tenth), and that damping.
+fn limited(point: &Point, scales: &[f64], lambda: f64, longest: f64) -> Option<(f64, Vec<f64>)> {
+    const NEAR: f64 = 0.1;
+    const TRIALS: u32 = 20;
+    let at = |lambda: f64| {
+        let step = point.linear.step_within(&damping(scales, lambda), &point.held, &point.room)?;
+        Some((length(scales, &step), step))
+    };
+    let first = at(lambda);
+    if let Some((length, step)) = first.as_ref().filter(|(length, _)| *length <= (1.0 + NEAR) * longest) {
+        return length.is_finite().then(|| (lambda, step.clone()));
+    }
+    // The length falls with the damping, and is at most |gradient / scales| / lambda.
+    let free = (0..scales.len()).filter(|&i| !point.held[i]);
+    let steepest = free.map(|i| point.gradient[i] / scales[i]).fold(0.0, f64::hypot);
+    let (mut low, mut high) = (lambda, steepest / longest);
+    // Its inverse is nearly linear in the damping (Hebden 1973; More 1978): the secant of the last two.
+    let mut last = first.map(|(length, _)| (lambda, 1.0 / length));
+    let (mut lambda, mut best) = ((low * high).sqrt().max(1e-3 * high), None);
+    for _ in 0..TRIALS {
+        let Some((length, step)) = at(lambda) else {
+            (low, lambda) = (lambda, (10.0 * lambda).min(high));
+            continue;
+        };
+        best = Some((lambda, step));
+        if (length - longest).abs() <= NEAR * longest || high <= low {
+            break;
+        }
+        if length > longest {
+            low = low.max(lambda)
+        } else {
+            high = high.min(lambda)
+        }
+        let inverse = 1.0 / length;
+        let secant = last
+            .filter(|(_, other)| *other != inverse)
+            .map(|(other, its)| lambda + (1.0 / longest - inverse) * (lambda - other) / (inverse - its));
+        last = Some((lambda, inverse));
+        let middle = if low > 0.0 { (low * high).sqrt() } else { 0.01 * high };
+        lambda = secant.filter(|secant| low < *secant && *secant < high).unwrap_or(middle);
+    }
+    best
+}

@@ -1,0 +1,200 @@
+//! [`Point`]: where a search stands, and the tests that both searches share.
+//!
+//! Near a minimum the cost has half the digits of the unknowns: it cannot tell points apart that differ by 1e-8 of what
+//! the data resolve. There the length of the residual's projection on the Jacobian's columns decides, which is what Bates
+//! and Watts (Technometrics 23 (1981) 179) call the relative offset; unlike the gradient it weighs all directions alike.
+
+use super::{Domain, Linearization, Outcome, PRECISION, Stop};
+use crate::scaling::Seen;
+
+/// Where a search stands.
+#[derive(Clone, Debug)]
+pub(super) struct Point {
+    pub x: Vec<f64>,
+    pub linear: Linearization,
+    pub gradient: Vec<f64>,
+    pub norms: Vec<f64>,
+    pub held: Vec<bool>,
+    /// How far each unknown may move, down and up.
+    pub room: Vec<(f64, f64)>,
+    bounds: Vec<(f64, f64)>,
+    /// The step without damping, but for directions that the data do not determine.
+    pub full: Option<Vec<f64>>,
+    /// By how much the full step would lower the cost, if the slopes held.
+    pub potential: f64,
+}
+
+/// A cost cannot tell apart points that differ by less than this part of it.
+const RESOLUTION: f64 = 1e-13;
+/// A residual below this part of the data's norm is rounding.
+const ROUNDING: f64 = 1e-10;
+/// A residual within so many roundings of the unknowns is rounding, too.
+const ROUNDINGS: f64 = 10.0;
+/// Directions with a singular value below this part of the largest (columns scaled to unit norm) have no influence, and
+/// are damped.
+const RANK: f64 = 1e-10;
+
+/// How far away it is looked along a direction without influence, as a part of the unknowns' sizes.
+const BESIDE: f64 = 1e-2;
+/// How far inside its bound an unknown without slopes is tried, as a part of its size.
+const INSIDE: f64 = 1e-3;
+
+impl Point {
+    /// `None` where cost or slopes are no finite numbers.
+    pub fn new(x: Vec<f64>, linear: Linearization, domain: &Domain) -> Option<Self> {
+        let (gradient, norms) = (linear.gradient(), linear.column_norms());
+        if !linear.cost.is_finite() || gradient.iter().chain(&norms).any(|entry| !entry.is_finite()) {
+            return None;
+        }
+        let mut bounds = domain.bounds.clone();
+        bounds.resize(x.len(), (f64::NEG_INFINITY, f64::INFINITY));
+        let room: Vec<(f64, f64)> = bounds.iter().zip(&x).map(|(bound, x)| (bound.0 - x, bound.1 - x)).collect();
+        // Held: what has no influence, and what sits on a bound that it would cross.
+        let on_bound = |i: usize| room[i].0 >= 0.0 && gradient[i] >= 0.0 || room[i].1 <= 0.0 && gradient[i] <= 0.0;
+        let held: Vec<bool> = (0..x.len()).map(|i| norms[i] == 0.0 || on_bound(i)).collect();
+        let damping: Vec<f64> = norms.iter().map(|norm| RANK * norm).collect();
+        let full = linear.step_within(&damping, &held, &room);
+        let potential = full.as_ref().map_or(f64::INFINITY, |step| linear.predicted_reduction(step));
+        Some(Point { x, linear, gradient, norms, held, room, bounds, full, potential })
+    }
+
+    pub fn cost(&self) -> f64 {
+        self.linear.cost
+    }
+
+    /// Size of the terms of the cost, by which its changes are measured. Where variances are predicted, their logarithms
+    /// may leave a sum that is negative or next to zero.
+    pub fn cost_size(&self) -> f64 {
+        self.cost().abs().max(0.5 * self.linear.sum_of_squares())
+    }
+
+    fn free(&self) -> impl Iterator<Item = usize> {
+        (0..self.x.len()).filter(|&i| !self.held[i])
+    }
+
+    /// Largest cosine between the residual and a free column of the Jacobian.
+    pub fn cosine(&self) -> f64 {
+        let residual = self.linear.sum_of_squares().sqrt();
+        self.free().map(|i| self.gradient[i].abs() / (self.norms[i] * residual)).fold(0.0, f64::max)
+    }
+
+    /// Largest part of itself, or of the standard error it has at least, by which the full step moves an unknown.
+    pub fn relative_step(&self) -> f64 {
+        let sigma = (self.linear.sum_of_squares() / self.linear.rows().max(1) as f64).sqrt();
+        let size = |step: &Vec<f64>| {
+            let moved = self.free().filter(|&i| step[i] != 0.0);
+            moved.map(|i| step[i].abs() / (self.x[i].abs() + sigma / self.norms[i])).fold(0.0, f64::max)
+        };
+        self.full.as_ref().map_or(f64::MAX, size).min(f64::MAX)
+    }
+
+    /// Slope of the cost along a step; negative downhill.
+    pub fn slope(&self, step: &[f64]) -> f64 {
+        self.gradient.iter().zip(step).map(|(g, d)| g * d).sum()
+    }
+
+    /// `x + step`, exactly on the bound where the step uses up the room.
+    pub fn towards(&self, step: &[f64]) -> Vec<f64> {
+        let along = |i: usize| {
+            let ((down, up), (lower, upper)) = (self.room[i], self.bounds[i]);
+            match step[i] {
+                step if step <= down => lower,
+                step if step >= up => upper,
+                // Not `clamp`, which panics where the bounds are out of order.
+                step => (self.x[i] + step).max(lower).min(upper),
+            }
+        };
+        (0..self.x.len()).map(along).collect()
+    }
+
+    /// The smallest difference that the cost resolves, in its own unit.
+    pub fn resolution(&self) -> f64 {
+        RESOLUTION.max(self.linear.roughness()) * self.cost_size()
+    }
+
+    /// The directions, of unknowns that are not on a bound, that have no influence.
+    pub fn blind(&self) -> Vec<Vec<f64>> {
+        let on_bound: Vec<bool> = self.room.iter().map(|(down, up)| *down >= 0.0 || *up <= 0.0).collect();
+        let direction = |entries: Vec<(usize, f64)>| {
+            let mut direction = vec![0.0; self.x.len()];
+            for (i, entry) in entries {
+                direction[i] = if self.norms[i] > 0.0 { entry / self.norms[i] } else { entry };
+            }
+            direction
+        };
+        self.linear.undetermined(&on_bound, RANK).directions.into_iter().map(direction).collect()
+    }
+
+    /// Points to either side along a direction, a hundredth of the unknowns' sizes away.
+    pub fn beside(&self, direction: &[f64], seen: &Seen) -> Vec<Vec<f64>> {
+        let sizes = (0..self.x.len()).filter(|&i| seen.size(i) > 0.0).map(|i| direction[i].abs() / seen.size(i));
+        let length = BESIDE / sizes.fold(0.0, f64::max);
+        let side = |sign: f64| self.towards(&direction.iter().map(|d| sign * length * d).collect::<Vec<f64>>());
+        if length.is_finite() { vec![side(1.0), side(-1.0)] } else { vec![] }
+    }
+
+    /// Points with an unknown inside that sits on its bound without slopes, one for each such unknown: slopes that are infinite
+    /// at a bound are given as zeros.
+    pub fn inside(&self, seen: &Seen) -> Vec<Vec<f64>> {
+        let free = |i: &usize| self.norms[*i] == 0.0 && (self.room[*i].0 < 0.0) != (self.room[*i].1 > 0.0);
+        let moved = |unknown: usize| {
+            let (down, up) = self.room[unknown];
+            let width = up.max(-down).min(1.0);
+            let size = if seen.size(unknown) > 0.0 { seen.size(unknown).min(width) } else { width };
+            let mut x = self.x.clone();
+            x[unknown] += if up > 0.0 { INSIDE * size } else { -INSIDE * size };
+            x
+        };
+        (0..self.x.len()).filter(free).map(moved).collect()
+    }
+
+    /// Whether the residual is the rounding of the data and of the unknowns.
+    fn is_rounding(&self) -> bool {
+        let left = self.linear.sum_of_squares();
+        let unknowns: f64 = self.x.iter().zip(&self.norms).map(|(x, norm)| (f64::EPSILON * x * norm).powi(2)).sum();
+        let small = self.linear.data_norm().is_none_or(|norm| left <= (ROUNDING * norm).powi(2));
+        left == 0.0 || left > 0.0 && small && left <= ROUNDINGS.powi(2) * unknowns
+    }
+
+    /// Whether the residual is far below the data.
+    fn is_next_to_data(&self) -> bool {
+        self.linear.data_norm().is_some_and(|norm| self.linear.sum_of_squares() <= (ROUNDING * norm).powi(2))
+    }
+
+    /// Whether the search is over here by itself: nothing left to do, or the full step negligible. (A damped one may be short
+    /// for its damping alone.)
+    pub fn ended(&self, stop: &Stop) -> Option<Outcome> {
+        if self.is_rounding() {
+            return Some(Outcome::Exact);
+        }
+        if self.norms.iter().all(|&norm| norm == 0.0) {
+            return Some(Outcome::Stalled { gradient: 0.0, step: 0.0, failed: 0 });
+        }
+        let (step, gradient) = (self.relative_step(), self.cosine());
+        (step <= stop.step && gradient <= stop.gradient).then_some(Outcome::Converged { step, gradient })
+    }
+
+    /// Whether the step to here, which lowered the cost by this part, and the full step from here fall short of what a stop by
+    /// the cost asks for. (A step that was short for its damping says nothing of the cost to come.)
+    pub fn gains_too_little(&self, decrease: f64, before: f64, stop: &Stop) -> bool {
+        stop.cost > 0.0 && decrease <= stop.cost && self.potential <= stop.cost * before
+    }
+
+    /// How a search ends here that no step leads away from. `noise` is how far, as a part of the cost, the last trials were
+    /// off what the slopes promised.
+    pub fn stuck(&self, failed: u64, noise: f64) -> Outcome {
+        let (step, gradient) = (self.relative_step(), self.cosine());
+        let noise = noise.max(self.linear.roughness());
+        let left = self.potential / self.cost_size();
+        if self.is_next_to_data() {
+            Outcome::Exact
+        } else if gradient <= PRECISION {
+            Outcome::LimitOfPrecision { gradient, step }
+        } else if left <= noise {
+            // A step of `d` standard errors gains `d^2 / (2 rows)` of the sum of squares.
+            Outcome::Rough { noise, errors: (left * self.linear.rows() as f64).sqrt() }
+        } else {
+            Outcome::Stalled { gradient, step, failed }
+        }
+    }
+}
