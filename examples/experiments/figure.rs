@@ -85,12 +85,12 @@ const LETTERS: u32 = 17;
 /// Markers on a curve of many points.
 const MARKERS: usize = 11;
 
-/// A number without zeros behind the point, to four digits.
-fn short(value: f64) -> String {
+/// A number to so many digits, without zeros behind the point.
+fn short(value: f64, digits: i32) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
-    let digits = (3 - value.abs().log10().floor() as i32).clamp(0, 6) as usize;
+    let digits = (digits - 1 - value.abs().log10().floor() as i32).clamp(0, 6) as usize;
     let text = format!("{value:.digits$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
@@ -147,10 +147,10 @@ impl Figure {
         }
         let mut chart = builder.build_cartesian_2d(range(|p| p.0), range(|p| p.1))?;
         let letters = ("sans-serif", LETTERS).into_font();
-        let y_label = |y: &f64| if self.logarithmic { short(10f64.powf(*y)) } else { short(*y) };
+        let y_label = |y: &f64| if self.logarithmic { short(10f64.powf(*y), 2) } else { short(*y, 4) };
         let mut mesh = chart.configure_mesh();
         mesh.x_desc(self.x).y_desc(self.y).x_labels(6).y_labels(6);
-        mesh.x_label_formatter(&|x| short(*x)).y_label_formatter(&y_label);
+        mesh.x_label_formatter(&|x| short(*x, 4)).y_label_formatter(&y_label);
         mesh.label_style(letters.clone()).axis_desc_style(letters).light_line_style(WHITE).draw()?;
         for (series, points) in &curves {
             draw_series(&mut chart, series.kind, points, several, style(legend, &series.label))?;
@@ -209,6 +209,7 @@ fn draw_series(
 /// The labels in rows; gives back where they end.
 fn draw_legend(root: &Area, legend: &[(String, Kind)]) -> core::result::Result<u32, Box<dyn std::error::Error>> {
     let (mut x, mut y) = (16, 46);
+    let several = legend.iter().filter(|(_, kind)| *kind != Kind::Reference).count() > 1;
     for (label, kind) in legend {
         let (number, style) = style(legend, label);
         let width = 44 + label.chars().count() as i32 * 9 + 22;
@@ -223,7 +224,7 @@ fn draw_legend(root: &Area, legend: &[(String, Kind)]) -> core::result::Result<u
         for (from, to) in lines {
             root.draw(&PathElement::new([(from, y + 8), (to, y + 8)], style))?;
         }
-        if *kind != Kind::Reference && legend.len() > 2 {
+        if *kind != Kind::Reference && several {
             mark!(root, number, (x + 16, y + 8), style)?;
         }
         root.draw(&Text::new(label.as_str(), (x + 42, y), ("sans-serif", LETTERS)))?;

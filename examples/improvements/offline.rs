@@ -112,7 +112,7 @@ impl Offline {
             title: format!("{title} against speed, before and after"),
             caption:
                 "Logarithmic: the two methods of the thesis are above, those that know dead time, cable, saliency and \
-                      the EMF's harmonic two decades below, under the goal at every speed."
+                      the EMF's harmonic two decades below, under the goal at every speed. A dip is an error that changes its sign."
                     .to_owned(),
             x: "largest speed of the cycle (rad/s)",
             y,
