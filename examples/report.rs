@@ -5,7 +5,7 @@
 
 use clap::Parser;
 use greybox::diagnose::profile;
-use greybox::models::{ControlledAxisOutput, ControlledAxisMotion as Motion, Reference};
+use greybox::models::{ControlledAxisMotion as Motion, ControlledAxisOutput, Reference};
 use greybox::pmsm::{Surface, Winding};
 use greybox::{CsvFile, ExperimentOf, Fit, Hold, Model, Of, Parameter, Report, Scalar, fixed, free, signals};
 use std::{error::Error, fs::File, io::BufRead, io::BufReader, io::IsTerminal, path::PathBuf};
