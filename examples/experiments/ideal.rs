@@ -1,6 +1,8 @@
 //! Experiments 1 and 2: an observer inside the loop of an ideal drive.
 
-use crate::report::{Report, thin};
+use crate::figure::{Figure, Panel, Series, curve, reference, thin};
+use crate::methods::Result;
+use crate::report::Report;
 use greybox::online::{Law, Mras, MrasStart, Order, Outcome, Stepping, Watch};
 use greybox::pmsm::adaptive::{Adaptive, Instant};
 use greybox::pmsm::control::{CurrentControl, PositionControl, SpeedControl};
@@ -9,8 +11,6 @@ use greybox::pmsm::{
     RsDirect, RsLyapunov, Winding,
 };
 use greybox::{fixed, free};
-
-type Result<T> = core::result::Result<T, Box<dyn std::error::Error>>;
 
 const TS: f64 = 0.126e-3;
 
@@ -78,50 +78,60 @@ pub fn torque_step() -> Result<Report> {
     let torque = direct.iter().filter(|now| now.t >= 2.0).map(|now| (now.torque - 100.0).abs()).fold(0.0, f64::max);
     report.claim(
         "With both parameters estimated, torque stays at its reference while the motor drifts",
+        "within 0.12 N m from 2 s on",
         format!("within {torque:.3} N m of 100 N m from 2 s on"),
         torque < 0.12,
     );
     let bias = errors(&without[(4.9 / TS) as usize]).1;
     report.claim(
         "Without d current the resistance cannot be estimated, and its error goes into Ke",
-        format!("R held 20 % low makes Ke {bias:.2} % high"),
-        bias > 3.0,
+        "Ke off by dR b/Ke^2 = 3.906 %, within 0.05 %",
+        format!("R held 20 % low makes Ke {bias:.3} % high"),
+        (bias - 3.906).abs() < 0.05,
     );
     let stopped = reversed.iter().find_map(|now| match now.outcome {
         Outcome::Diverged(why) => Some((now.t, why)),
         _ => None,
     });
     let found = stopped.map_or("it did not stop".to_owned(), |(t, why)| format!("stopped at {t:.3} s: {why}"));
-    report.claim("Law (5.4) is stable only while g id < 0 (here: -100 N m)", found, stopped.is_some());
+    let statement = "Law (5.4) is stable only while g id < 0 (here: -100 N m)";
+    report.claim(statement, "the observer says that it diverged", found, stopped.is_some());
 
     let trace = |of: fn(&Instant) -> f64, seen: &[Instant]| thin(seen.iter().map(|now| (now.t, of(now))).collect());
     let truth =
         |of: fn(MachineParameters) -> f64| thin(direct.iter().map(|now| (now.t, of(drifting(now.t)))).collect());
     let series = |of: fn(&Instant) -> f64, true_value: fn(MachineParameters) -> f64| {
         vec![
-            ("true".to_owned(), truth(true_value)),
-            ("law (5.4)".to_owned(), trace(of, &direct)),
-            ("Lyapunov".to_owned(), trace(of, &lyapunov)),
-            ("id = 0".to_owned(), trace(of, &without)),
+            curve("law (5.4)", trace(of, &direct)),
+            curve("Lyapunov's law", trace(of, &lyapunov)),
+            curve("id = 0, R held", trace(of, &without)),
+            reference("true", truth(true_value)),
         ]
     };
-    report.figure(
+    let caption =
+        "Both laws find Ke from 80 % within a third of a second and follow it; with R held, R's error goes into Ke.";
+    report.figure(figure(
         "exp1-ke",
         "Back-EMF of a drifting motor",
-        ["time (s)", "Ke (V s/rad)"],
+        caption,
+        "Ke (V s/rad)",
         series(|now| now.estimate.ke, |p| p.ke),
-    );
-    report.figure(
+    ));
+    let caption = "Both laws find R and follow it; Ke's own drift (5 to 7 s) shows in Lyapunov's law for a moment.";
+    report.figure(figure(
         "exp1-rs",
         "Resistance of a drifting motor",
-        ["time (s)", "R (ohm)"],
+        caption,
+        "R (ohm)",
         series(|now| now.estimate.rs, |p| p.rs),
-    );
+    ));
     let torque = vec![
-        ("adapted".to_owned(), trace(|now| now.torque, &direct)),
-        ("id = 0, R held".to_owned(), trace(|now| now.torque, &without)),
+        curve("adapted", trace(|now| now.torque, &direct)),
+        curve("id = 0, R held", trace(|now| now.torque, &without)),
+        reference("reference", vec![(0.0, 0.0), (1.0, 0.0), (1.0, 100.0), (14.0, 100.0)]),
     ];
-    report.figure("exp1-torque", "Torque, 100 N m asked for from 1 s on", ["time (s)", "torque (N m)"], torque);
+    let caption = "Adapted, the torque is 100 N m whatever the motor does; a wrong Ke is a wrong torque.";
+    report.figure(figure("exp1-torque", "Torque, 100 N m asked for from 1 s on", caption, "torque (N m)", torque));
     Ok(report)
 }
 
@@ -185,23 +195,30 @@ pub fn position_step() -> Result<Report> {
     let (knows, adapted, not) = (runs[0].1.integral, runs[1].1.integral, runs[3].1.integral);
     report.claim(
         "An adapted Kt makes the speed follow as with the true one",
+        "integral within 1 % of that with the true Kt, and half as much again without adaptation",
         format!("{adapted:.2} rad adapted, {knows:.2} rad with the true Kt, {not:.2} rad not adapted"),
         adapted < 1.01 * knows && not > 1.5 * knows,
     );
     let series = |of: fn(&Followed) -> &Vec<(f64, f64)>| {
-        runs.iter().map(|(name, run)| (name.to_string(), of(run).clone())).collect::<Vec<_>>()
+        runs.iter().map(|(name, run)| curve(*name, of(run).clone())).collect::<Vec<_>>()
     };
-    report.figure(
-        "exp2-speed-error",
-        "Speed error in a position step",
-        ["time (s)", "speed error (rad/s)"],
-        series(|run| &run.speed_error),
-    );
-    report.figure(
-        "exp2-kt",
-        "Torque constant, believed 20 % high at first",
-        ["time (s)", "error of Kt (%)"],
-        series(|run| &run.kt),
-    );
+    let caption = "The adapted drive follows as one that knows Kt; not adapted, it lags by half as much again.";
+    let title = "Speed error in a position step";
+    report.figure(figure("exp2-speed-error", title, caption, "speed error (rad/s)", series(|run| &run.speed_error)));
+    let caption = "Kt is within 1 % after 0.3 s, at the drive's sample time as at a tenth of it.";
+    let title = "Torque constant, believed 20 % high at first";
+    report.figure(figure("exp2-kt", title, caption, "error of Kt (%)", series(|run| &run.kt)));
     Ok(report)
+}
+
+fn figure(name: &str, title: &str, caption: &str, y: &'static str, series: Vec<Series>) -> Figure {
+    Figure {
+        name: name.to_owned(),
+        title: title.to_owned(),
+        caption: caption.to_owned(),
+        x: "time (s)",
+        y,
+        panels: vec![Panel { title: String::new(), series }],
+        logarithmic: false,
+    }
 }

@@ -1,8 +1,19 @@
 //! The six experiments of the thesis on a simulated robot: `cargo run --release --example experiments -- all`.
 
+mod acceleration;
+mod applications;
+mod cable;
+mod figure;
+mod first_axis;
 mod ideal;
+mod methods;
 mod report;
-mod robot;
+mod sheet;
+mod speeds;
+mod temperature;
+#[path = "../common/terminal.rs"]
+mod terminal;
+mod tracks;
 
 use clap::Parser;
 use std::path::PathBuf;
@@ -13,7 +24,7 @@ struct Arguments {
     /// Which: 1 to 6, or all.
     #[arg(value_parser = ["1", "2", "3", "4", "5", "6", "all"])]
     experiment: String,
-    /// Draw the figures as SVG files into this folder.
+    /// Draw the figures as SVG files into this folder, with a page `index.html` that shows them all.
     #[arg(long)]
     plots: Option<PathBuf>,
     /// Print JSON instead of tables.
@@ -24,28 +35,30 @@ struct Arguments {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments = Arguments::parse();
     let mut reports = Vec::new();
-    for number in 1..=6u8 {
+    let stop = terminal::interrupted()?;
+    let bar = terminal::spinner("experiments");
+    for number in (1..=6u8).take_while(|_| !stop.load(std::sync::atomic::Ordering::Relaxed)) {
         if arguments.experiment != "all" && arguments.experiment != number.to_string() {
             continue;
         }
+        bar.set_message(format!("experiment {number}"));
         let report = match number {
             1 => ideal::torque_step()?,
             2 => ideal::position_step()?,
-            3 => robot::speeds()?,
-            4 => robot::temperature()?,
-            5 => robot::acceleration()?,
-            _ => robot::applications()?,
+            3 => speeds::speeds()?,
+            4 => temperature::temperature()?,
+            5 => acceleration::acceleration()?,
+            _ => applications::applications()?,
         };
         if !arguments.json {
-            println!("{report}");
-        }
-        if let Some(folder) = &arguments.plots {
-            std::fs::create_dir_all(folder)?;
-            for figure in &report.figures {
-                figure.draw(folder)?;
-            }
+            bar.suspend(|| println!("{report}"));
         }
         reports.push(report);
+    }
+    bar.finish_and_clear();
+    if let Some(folder) = &arguments.plots {
+        let figures: Vec<_> = reports.iter_mut().flat_map(|report| std::mem::take(&mut report.figures)).collect();
+        sheet::write(folder, "The six experiments: figures", &figures)?;
     }
     if arguments.json {
         println!("{}", serde_json::to_string_pretty(&reports)?);

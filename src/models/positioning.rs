@@ -9,7 +9,7 @@ crate::signals! {
         /// Speed.
         v: "m/s",
     }
-    /// Motion of a linear axis, and the speed as its controller sees it.
+    /// Motion of a linear axis, and the speed that its controller measures.
     pub struct ControlledAxisMotion {
         /// Position.
         q: "m",
@@ -60,11 +60,11 @@ crate::signals! {
 /// ```
 ///
 /// After A. Janot, M. Gautier, M. Brunot, *Data set and reference models of EMPS*, Workshop on Nonlinear System
-/// Identification Benchmarks, Eindhoven 2019, whose dry friction is `fc sign(v)`. That has no slope and no answer at rest;
+/// Identification Benchmarks, Eindhoven 2019, whose dry friction is `fc sign(v)`. That has no slope at rest;
 /// the smooth one approaches it where `|v|` is a few times `width`.
 ///
 /// The hold of the record must be [`Hold::Zero`](crate::Hold::Zero): a drive holds its command from sample to sample, which
-/// is what a record takes unless told otherwise.
+/// is the default of a record.
 ///
 /// Position is the second integral of the command: in an open loop, small errors of the force grow without bound, and a
 /// long simulation from poor parameters ends in wrong minima. Where the controller is known, [`PositioningLoop`] is the
@@ -111,16 +111,16 @@ impl Model for Positioning {
 /// lag dvm/dt = v - vm
 /// ```
 ///
-/// The lag stands for how a digital controller comes by a speed. In the record of the benchmark it can be read off: the
-/// speed that `kp kv (qg - q) - vir` stands for is, to 0.2 %, the mean of the last two differences of the position, which
+/// The lag models how a digital controller computes the speed. In the record of the benchmark it can be read off: the
+/// speed in `kp kv (qg - q) - vir` is, to 0.2 %, the mean of the last two differences of the position, which
 /// is one sample old (1 ms).
 ///
 /// The hold of the record must be [`Hold::First`](crate::Hold::First): the reference is a smooth curve of which the record
-/// has samples. Held from sample to sample instead it acts half a sample late, which the fit takes for friction of the wrong
-/// sign (`fv` -477 N s/m on the benchmark's record, with a better fit); an `fv` or `fc` below zero says so.
+/// has samples. Held from sample to sample instead it acts half a sample late, which biases the friction down to the wrong
+/// sign (`fv` -477 N s/m on the benchmark's record, with a better fit); an `fv` or `fc` below zero is a sign of it.
 ///
 /// The controller keeps the simulated axis near the reference whatever the parameters, so that a fit finds its way from
-/// far off; and the command that the model needs to do so, compared with the recorded one, tells the parameters.
+/// far off; and the command that the model needs to do so, compared with the recorded one, determines the parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PositioningLoop {
     /// The axis.
@@ -131,7 +131,7 @@ pub struct PositioningLoop {
     pub kv: f64,
     /// Largest command (V).
     pub limit: f64,
-    /// Lag of the speed that the controller sees (s), by difference, filter and hold; positive.
+    /// Lag of the speed that the controller measures (s), by difference, filter and hold; positive.
     pub lag: f64,
 }
 
@@ -153,13 +153,25 @@ impl Model for PositioningLoop {
     type Parameters = Axis;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: S, x: &ControlledAxisMotion<S>, u: &Reference<S>, p: &Axis<S>) -> ControlledAxisMotion<S> {
+    fn derivative<S: Scalar>(
+        &self,
+        _t: S,
+        x: &ControlledAxisMotion<S>,
+        u: &Reference<S>,
+        p: &Axis<S>,
+    ) -> ControlledAxisMotion<S> {
         let v = self.axis.acceleration(x.v, self.command(x, u), p);
         ControlledAxisMotion { q: x.v, v, vm: (x.v - x.vm) / self.lag }
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: S, x: &ControlledAxisMotion<S>, u: &Reference<S>, _p: &Axis<S>) -> ControlledAxisOutput<S> {
+    fn output<S: Scalar>(
+        &self,
+        _t: S,
+        x: &ControlledAxisMotion<S>,
+        u: &Reference<S>,
+        _p: &Axis<S>,
+    ) -> ControlledAxisOutput<S> {
         ControlledAxisOutput { qm: x.q, vir: self.command(x, u) }
     }
 }

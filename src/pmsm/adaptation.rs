@@ -6,7 +6,7 @@
 //! excited: `ke` by speed, `rs` by current. The proof is of continuous time, and covers neither [`KeConstantGain`] nor
 //! gains that vary; [`Mras::check`](crate::online::Mras::check) looks at the sampled loop.
 //!
-//! What the observer is not told goes into `ke`. On the reference robot's speed cycles (rms, mean of six axes): 2.4 %; told
+//! What the observer does not model biases `ke`. On the reference robot's speed cycles (rms, mean of six axes): 2.4 %; with
 //! dead time and cable 0.25 %; with normalized gain 0.166 %, and a dead zone 0.136 %. Most of what is left is saliency: without
 //! it axis 1 reaches 0.042 and 0.029 %.
 
@@ -16,7 +16,7 @@ use crate::online::{Law, Moment, Rate};
 use crate::signals::{Of, Signals, holds, place_of};
 use nalgebra::{Matrix2, Vector2};
 
-/// What a motor's adaptation law sees of one sample.
+/// The input of a motor's adaptation law at one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AdaptationInput {
     /// Measured less predicted currents (A).
@@ -72,7 +72,7 @@ impl Adaptation for KeConstantGain {
     }
 }
 
-/// `R' = g e_d` (5.4): the resistance from the d axis. Stable only while `g id < 0`; without id it tells nothing. Put it
+/// `R' = g e_d` (5.4): the resistance from the d axis. Stable only while `g id < 0`; without id it has no information. Put it
 /// behind a [`DirectCurrent`], and bound the parameter: with id of the wrong sign it diverges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RsDirect {
@@ -134,7 +134,7 @@ impl<A: Adaptation> Adaptation for DeadZone<A> {
     }
 }
 
-/// Holds the parameter while there is little d current: without it the d axis tells nothing of the resistance.
+/// Holds the parameter while there is little d current: without it the d axis has no information on the resistance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DirectCurrent<A> {
     /// The law above.
@@ -155,7 +155,7 @@ impl<A: Adaptation> Adaptation for DirectCurrent<A> {
     }
 }
 
-/// Divides the gain by `1 + (w/speed)^2`: with [`KeLyapunov`] the loop keeps its pace at high speed.
+/// Divides the gain by `1 + (w/speed)^2`: with [`KeLyapunov`] the loop's bandwidth does not grow with the square of the speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Normalized<A> {
     /// The law.
@@ -221,14 +221,14 @@ where
 }
 
 /// `dV/dt = -e^T (2 rs/ls I + F + F^T) e` (A^2/s) of the motor's observer under the Lyapunov laws (thesis, appendix A,
-/// derived anew): `f` is the pull (1/s).
+/// derived anew): `f` is the observer's feedback matrix (1/s).
 pub fn lyapunov_rate(rs: f64, ls: f64, f: &Matrix2<f64>, e: &Currents) -> f64 {
     let e = Vector2::from(*e);
     -(2.0 * rs / ls * e.norm_squared() + 2.0 * e.dot(&(f * e)))
 }
 
 /// How fast `V` falls at least, per second and per `e^T e`: `2 rs/ls + lambda_min(F + F^T)`. The continuous observer is
-/// stable where this is positive; no pull at all is enough.
+/// stable where this is positive; no feedback at all is enough.
 pub fn lyapunov_margin(rs: f64, ls: f64, f: &Matrix2<f64>) -> f64 {
     let s = f + f.transpose();
     let (mean, half) = (0.5 * (s.m11 + s.m22), 0.5 * (s.m11 - s.m22));

@@ -1,4 +1,4 @@
-//! A drive that controls its torque with what an observer says of the motor, in an otherwise ideal world: no noise, no
+//! A drive that controls its torque with the parameters that an observer estimates, otherwise ideal: no noise, no
 //! delay, no dead time, and the voltage held in the rotor's frame (thesis, simulations of chapter 6).
 
 use super::control::{Command, CurrentControl};
@@ -29,7 +29,7 @@ pub struct Instant {
     pub x: MachineState,
     /// Electromagnetic torque (N m).
     pub torque: f64,
-    /// What the observer believes before this sample corrects it.
+    /// The observer's parameters before this sample corrects them.
     pub estimate: Winding,
     /// The voltage from this sample to the next.
     pub command: Command,
@@ -45,7 +45,7 @@ where
     /// Runs for `duration` (s) from rest and shows each sample to `see`.
     ///
     /// `rotor` gives the plant's parameters at a time, `load` the torque (N m) besides viscous friction at a speed, and
-    /// `reference` the current references at a time and motion, for the torque constant (N m/A) that is believed.
+    /// `reference` the current references at a time and motion, for the estimated torque constant (N m/A).
     pub fn run(
         mut self,
         duration: f64,

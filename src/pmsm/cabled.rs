@@ -15,7 +15,7 @@ wraps_motor! {
     /// A motor at the end of a cable: its resistance `rs` and the cable's `r_cable` in series. The parameters `P` hold
     /// those of the motor `M` and of [`CableResistance`], by name.
     ///
-    /// Only the sum of both resistances is seen by the data: one of them is to be fixed, or known beforehand.
+    /// The data determine only the sum of both resistances: one of them is to be fixed, or known beforehand.
     Cabled, M::Input
 }
 

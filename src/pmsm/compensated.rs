@@ -3,7 +3,7 @@ use super::{Currents, PolePairs};
 use crate::{Of, Scalar, Signals};
 
 crate::signals! {
-    /// Commanded voltages, speed and angle, and where the inverter's dead time points.
+    /// Commanded voltages, speed, angle and direction of the dead time's voltage.
     pub struct CompensatedDrive {
         /// Commanded voltage along the magnet flux.
         ud: "V",

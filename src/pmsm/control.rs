@@ -110,7 +110,7 @@ pub struct Target {
     pub a: f64,
 }
 
-/// Proportional-integral control of the speed with acceleration feed-forward, and a proportional pull to the angle that
+/// Proportional-integral control of the speed with acceleration feed-forward, and a proportional feedback of the angle that
 /// the references add up to:
 ///
 /// ```text
@@ -126,7 +126,7 @@ pub struct SpeedControl {
     pub ki: f64,
     /// Inertia fed forward (kg m^2).
     pub j: f64,
-    /// Pull to the angle (1/s); zero for a pure speed controller.
+    /// Feedback of the angle error (1/s); zero for a pure speed controller.
     pub kv: f64,
     /// Largest torque (N m); infinite for no limit.
     pub torque_max: f64,

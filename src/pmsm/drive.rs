@@ -81,7 +81,7 @@ impl Disturbance {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Simulation {
-    /// What the controllers believe of the axis: data sheet, 20 C.
+    /// The axis that the controllers are designed for: data sheet, 20 C.
     pub nominal: Axis,
     /// What the axis is.
     pub plant: Plant,

@@ -14,8 +14,8 @@ wraps_motor! {
     /// A motor whose back-EMF has a sixth harmonic, in phase with the magnet: `ke + ke6 cos(6 theta_e)` in place of `ke`,
     /// in EMF and torque. The parameters `P` hold those of the motor `M` and of [`SixthHarmonic`], by name.
     ///
-    /// It is the fifth and seventh harmonic of the phases. At low speed, where a controller follows it, it is taken for
-    /// friction and dead time by a model without it: 0.2 % of `ke` on the small axes of the reference robot. For a motor in
+    /// It is the fifth and seventh harmonic of the phases. At low speed, where a controller follows it, a
+    /// model without it attributes it to `ke`: 0.2 % on the small axes of the reference robot. For a motor in
     /// exact steps it is taken at the input's angle, that of mid-interval, and held as the voltage is.
     EmfHarmonic, AngledDrive
 }

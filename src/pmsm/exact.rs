@@ -47,7 +47,7 @@ impl ExactStep {
     }
 
     /// The input that reaches the motor: the command less `vdt tanh(i/i0)` (V, A) per phase, at the interval's middle angle.
-    /// An observer of the motor alone is fed with this, and with measured currents for `i`.
+    /// It is the input for an observer of the motor alone, with measured currents for `i`.
     #[inline(always)]
     pub fn less_dead_time<S: Scalar>(&self, i: &Currents<S>, u: &AngledDrive<S>, vdt: S, i0: f64) -> Drive<S> {
         let lost = dead_time(i, S::from(i0), self.pole_pairs.electrical(u.theta));

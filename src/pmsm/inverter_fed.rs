@@ -5,7 +5,7 @@ use crate::online::{Ekf, EkfStart, ObserverError};
 use crate::{Of, Scalar, Signals};
 
 crate::signals! {
-    /// What an inverter is told, in the rotor frame, with the angle at which it happens.
+    /// Voltage command of an inverter in the rotor frame, with speed and angle.
     pub struct AngledDrive {
         /// Commanded voltage along the magnet flux.
         ud: "V",
@@ -16,9 +16,9 @@ crate::signals! {
         /// Mechanical angle; where it is held over a sample interval, that of the middle of the interval.
         theta: "rad",
     }
-    /// What an inverter's dead time takes from the voltage.
+    /// Voltage loss of an inverter by dead time.
     pub struct DeadTimeLoss {
-        /// Voltage that it takes from each phase.
+        /// Voltage lost in each phase.
         vdt: "V",
         /// Current at which that error turns over; must be positive.
         i0: "A",

@@ -1,11 +1,11 @@
-//! What a run of a drive leaves behind.
+//! The record of a run of a drive.
 
 use super::{Currents, Drive, MachineState, Surface};
 use crate::experiment::Experiment;
 use crate::record::Time;
 use serde::{Deserialize, Serialize};
 
-/// What one sample of a drive's log holds, and the truth behind it.
+/// One sample of a drive's log, with the plant's true state.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Commanded voltage along the flux that acts from this sample to the next (V).
@@ -28,7 +28,7 @@ pub struct Row {
     pub truth: MachineState,
 }
 
-/// What a run of a drive left behind.
+/// The record of a run of a drive.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Log {
     /// Sample time (s).
@@ -42,7 +42,7 @@ pub struct Log {
 }
 
 impl Log {
-    /// The record that an identification sees: voltages held from sample to sample, the *mean* speed of the same interval
+    /// The record for identification: voltages held from sample to sample, the *mean* speed of the same interval
     /// (the difference of the angles at its two ends), currents at its begin. The last row, which has no interval, is left
     /// out.
     pub fn experiment(&self, model: &Surface) -> Result<Experiment<Currents, Drive, Currents>, crate::Error> {

@@ -49,7 +49,7 @@ crate::signals! {
 /// A motor that turns: the currents of a motor `M` and the motion of [`Shaft`], coupled by EMF and torque.
 ///
 /// The parameters `P` hold those of `M` and of [`Load`], by name; unless said otherwise it is the [`Salient`] motor with
-/// [`MachineParameters`]. Any motor that is not in exact steps will do, one behind an inverter included.
+/// [`MachineParameters`]. Any continuous motor model can be used, an [`InverterFed`](super::InverterFed) one included.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Machine<M = Salient, P = MachineParameters> {
     motor: M,

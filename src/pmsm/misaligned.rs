@@ -4,9 +4,9 @@ use super::{AngledDrive, Currents, PolePairs};
 use crate::{Of, Scalar, Signals};
 
 crate::signals! {
-    /// By how much a record is out of step with the motor.
+    /// Delay and angle offset between a record and the motor.
     pub struct Misalignment {
-        /// By how much later the voltage acts than the record says.
+        /// By how much later the voltage acts than recorded.
         tau: "s",
         /// By how much the recorded electrical angle is ahead of the magnet.
         delta: "rad",
@@ -18,7 +18,7 @@ wraps_motor! {
     /// motor `M` and of [`Misalignment`], by name.
     ///
     /// A voltage that acts `tau` late has turned back by `we tau` seen from the rotor, while a resolver that is `delta`
-    /// ahead turns voltages, currents and EMF alike: at one speed the two look similar, over several they are told apart.
+    /// ahead turns voltages, currents and EMF alike: at one speed the two are hardly distinguishable, over several they are.
     /// The motor inside is computed in the magnet's true frame.
     Misaligned, AngledDrive
 }

@@ -1,4 +1,4 @@
-//! What a motor is to the parts around it, and what these parts have in common.
+//! The interface of a motor to inverter, cable and shaft, and the code that these wrappers share.
 
 use super::{Currents, PolePairs};
 use crate::{Model, Of, Scalar};

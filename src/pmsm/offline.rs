@@ -18,7 +18,7 @@ pub use plain::{Axes, Form, plain};
 pub use validate::{Validation, voltages};
 
 use super::drive::Log;
-use super::{Currents, Drive, PolePairs};
+use super::{AngledDrive, Currents, Drive, PolePairs};
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::signals::Signals;
@@ -45,6 +45,11 @@ impl Span {
     /// Mean of the currents at both ends.
     pub fn mean(&self) -> Currents {
         Currents { id: 0.5 * (self.i0.id + self.i1.id), iq: 0.5 * (self.i0.iq + self.i1.iq) }
+    }
+
+    /// The input of a motor behind an inverter in this interval.
+    pub fn angled(&self) -> AngledDrive {
+        AngledDrive { ud: self.ud, uq: self.uq, w: self.w, theta: self.theta }
     }
 }
 

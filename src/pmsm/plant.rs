@@ -7,7 +7,7 @@ use crate::model::Model;
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
-/// The motor and its load as they really are: what no estimator is told.
+/// The simulated motor and its load, with everything that the estimators do not know.
 ///
 /// Winding and magnet at their temperatures, cable, unequal inductances of which the q axis's falls with the current, a
 /// sixth harmonic in EMF and torque, cogging, friction and gravity. It is driven by a voltage that stands still in the

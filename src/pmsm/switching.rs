@@ -39,7 +39,7 @@ struct Edge {
 }
 
 impl SwitchingInverter {
-    /// An inverter on `vdc` (V) before the motor of `plant`, whose dead time it takes over; all legs down.
+    /// An inverter on `vdc` (V) before the motor of `plant`, with the dead time of `plant`; all legs down.
     pub fn new(plant: &Plant, vdc: f64, carrier: Carrier) -> Self {
         let none = DeadTime { vdt: 0.0, ..plant.dead_time };
         SwitchingInverter {

@@ -117,7 +117,7 @@ impl Magnet {
         }
     }
 
-    /// Takes the magnet to temperature `t`; says what happened to it.
+    /// Sets the magnet to temperature `t`; gives the kind of change.
     pub fn reach(&mut self, t: Celsius) -> Heating {
         let before = self.lost();
         if t > self.peak {
@@ -132,7 +132,7 @@ impl Magnet {
         }
     }
 
-    /// Share of the flux that heat has taken for good: `0.8e-5 max(peak - 150, 0)^2`.
+    /// Share of the flux that is lost irreversibly to heat: `0.8e-5 max(peak - 150, 0)^2`.
     pub fn lost(&self) -> f64 {
         0.5 * MAGNET_GROWTH * self.peak.above_knee() * self.peak.above_knee()
     }

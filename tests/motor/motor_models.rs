@@ -1,12 +1,16 @@
 //! Every motor model that ships: its slopes against finite differences, and validation both ways on a record.
 
+use approx::assert_relative_eq;
+use greybox::Model;
 use greybox::check::derivatives;
-use greybox::pmsm::drive::Simulation;
+use greybox::online::{MrasStart, Order, Stepping, Watch};
+use greybox::pmsm::drive::{Disturbance, Simulation};
+use greybox::pmsm::frames::{Stator, rotate_out_of};
 use greybox::pmsm::offline::{Axes, Form, Spans, Validation, plain, voltages};
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::{Axis, TS};
 use greybox::pmsm::*;
-use greybox::{Fit, fixed, signals};
+use greybox::{Fit, fixed, free, signals};
 
 signals! {
     /// A salient motor behind cable and inverter, and how its record is aligned.
@@ -67,6 +71,111 @@ fn slopes_are_those_of_the_values() {
     let motion = MachineState { id: -3.0, iq: 11.0, w: 0.4, theta: 70.0 };
     let acting = VoltageAndLoad { ud: -20.0, uq: 90.0, tau_l: 2.0 };
     derivatives(&Machine::new(4, 110.0).unwrap(), T, &motion, &acting, &rotor).unwrap();
+}
+
+signals! {
+    /// Everything from the inverter to the load.
+    struct Whole {
+        rs: "ohm", r_cable: "ohm", ld: "H", lq: "H", ke: "V s/rad", ke6: "V s/rad", vdt: "V", i0: "A",
+        j: "kg m^2", bv: "N m s", tc: "N m", tg: "N m",
+    }
+}
+
+// Composed of cable, harmonic, inverter and shaft around the salient motor, a model is the simulated axis with everything
+// but saturation and cogging: same slopes for the same voltage, at any angle.
+#[test]
+fn a_composed_model_is_the_simulated_axis() {
+    let axis = Axis::reference(2).unwrap();
+    let plant = Simulation::new(axis).unwrap().without(Disturbance::Saturation).without(Disturbance::Cogging).plant;
+    type Motor = InverterFed<EmfHarmonic<Cabled<Salient, Whole>, Whole>, Whole>;
+    let motor: Motor = InverterFed::new(EmfHarmonic::new(Cabled::new(Salient::new(4).unwrap())));
+    let machine = Machine::<Motor, Whole>::of(motor, Shaft::new(axis.gear).unwrap());
+    let p = Whole {
+        rs: axis.rs,
+        r_cable: axis.r_cable,
+        ld: 0.96 * axis.ls,
+        lq: 1.04 * axis.ls,
+        ke: axis.ke,
+        ke6: 0.01 * axis.ke,
+        vdt: 2.0,
+        i0: 0.15,
+        j: axis.j,
+        bv: axis.bv,
+        tc: axis.tc,
+        tg: axis.tg,
+    };
+    for k in 0..200 {
+        let k = f64::from(k);
+        let x = MachineState {
+            id: 3.0 * (1.7 * k).sin(),
+            iq: 12.0 * (0.9 * k).cos(),
+            w: 300.0 * (0.3 * k).sin(),
+            theta: 0.37 * k,
+        };
+        let (ud, uq) = (20.0 * k.cos(), 250.0 * (0.3 * k).sin());
+        let (alpha, beta) = rotate_out_of((ud, uq), 4.0 * x.theta);
+        let truth = plant.derivative(&x, Stator { alpha, beta });
+        let found = machine.derivative(0.0, &x, &VoltageAndLoad { ud, uq, tau_l: 0.0 }, &p);
+        // Slopes of up to 1e5 A/s; the angle of 300 rad electrical costs two digits.
+        assert_relative_eq!(found, truth, epsilon = 1e-8, max_relative = 1e-10);
+        assert_relative_eq!(machine.torque(&x, &p), plant.torque(&x), epsilon = 1e-9, max_relative = 1e-9);
+    }
+    let small = MachineState { id: 0.1, iq: 0.2, w: 0.4, theta: 7.0 };
+    derivatives(&machine, T, &small, &VoltageAndLoad { ud: 5.0, uq: 9.0, tau_l: 1.0 }, &p).unwrap();
+}
+
+// Flux linkage in the place of Ke: the same fit in another unit, estimate and interval alike.
+#[test]
+fn flux_linkage_may_be_given_and_found() {
+    let axis = Axis::reference(1).unwrap();
+    let surface = Surface::new(4).unwrap();
+    let log = Simulation::new(axis).unwrap().undisturbed().run(&Program::speed_cycles(&axis, 2, 1.0).unwrap());
+    let record = log.experiment(&surface).unwrap();
+    let start = Winding { rs: free(0.5), ls: free(5e-3), ke: free(0.8) };
+    let by_ke = Fit::new(&surface, &record).parameters(start).run().unwrap();
+    let np = surface.pole_pairs();
+    let start = FluxWinding { rs: free(0.5), ls: free(5e-3), psi_m: free(units::psi_m_from_ke(0.8, np)) };
+    let model = FluxLinkage::<_, FluxWinding>::new(surface);
+    let by_flux = Fit::new(&model, &record).parameters(start).run().unwrap();
+    // Both searches stop within a thousandth of a standard error.
+    let (psi_m, ke) = (by_flux.parameters.psi_m, by_ke.parameters.ke);
+    assert_relative_eq!(units::ke_from_psi_m(psi_m, np), ke, max_relative = 1e-7);
+    let error = |known: &greybox::Knowledge| known.standard_error().unwrap();
+    let (of_psi, of_ke) = (error(&by_flux.knowledge.psi_m), error(&by_ke.knowledge.ke));
+    assert_relative_eq!(units::ke_from_psi_m(of_psi, np), of_ke, max_relative = 1e-3);
+}
+
+// An observer that knows Ld and Lq has nothing left to adapt to on a salient motor, and finds Ke from 10 % below; one with a
+// single inductance, the mean of both, takes the difference for EMF.
+#[test]
+fn an_observer_of_a_salient_motor_has_no_error_of_inductance() {
+    let step = ExactStep::new(4, TS, HeldIn::Stationary).unwrap();
+    let truth = SalientWinding { rs: 0.4, ld: 3.6e-3, lq: 4.4e-3, ke: 0.95 };
+    let law = MotorLaw { rs: NotAdapted, ke: KeLyapunov { gain: 1e-5 } };
+    let (pull, watch) = (Currents { id: 1e3, iq: 1e3 }, Watch { limit: Currents { id: 1e3, iq: 1e3 }, patience: 1000 });
+    let (order, stepping, ke) = (Order::UpdateThenPredict, Stepping::Split, free(0.9 * truth.ke));
+    let parameters = SalientWinding { rs: fixed(truth.rs), ld: fixed(truth.ld), lq: fixed(truth.lq), ke };
+    let mut salient = ExactSalient(step).mras(law, MrasStart { parameters, pull, order, stepping, watch }).unwrap();
+    let parameters = Winding { rs: fixed(truth.rs), ls: fixed(4e-3), ke };
+    let mut round = ExactSurface(step).mras(law, MrasStart { parameters, pull, order, stepping, watch }).unwrap();
+    let mut i = Currents::default();
+    for k in 0..40_000 {
+        let t = f64::from(k) * TS;
+        let w = 200.0 + 100.0 * (3.0 * t).sin();
+        // A controller of 20 A in q and -10 A in d.
+        let u = Drive {
+            ud: 3.0 * (-10.0 - i.id) - 4.0 * w * truth.lq * i.iq,
+            uq: 3.0 * (20.0 - i.iq) + 4.0 * w * truth.ld * i.id + SQRT_2_3 * truth.ke * w,
+            w,
+        };
+        salient.update(t, &u, &i);
+        round.update(t, &u, &i);
+        i = step.advance_salient(&i, &u, &truth);
+    }
+    let off = |ke: f64| 100.0 * (ke / truth.ke - 1.0).abs();
+    let (right, wrong) = (off(salient.parameters().ke), off(round.parameters().ke));
+    assert!(right < 1e-6, "{right} %");
+    assert!(wrong > 0.5, "{wrong} %");
 }
 
 #[test]

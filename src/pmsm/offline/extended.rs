@@ -6,7 +6,7 @@ use argmin::core::{CostFunction, Executor};
 use argmin::solver::brent::BrentOpt;
 
 crate::signals! {
-    /// What the extended least squares tells apart.
+    /// Parameters of the extended least squares.
     pub struct Extended {
         /// Phase resistance, motor and cable.
         r: "ohm",
@@ -33,7 +33,7 @@ crate::signals! {
 /// `sinc(3 we Ts)`, its mean; the angle must be that of the magnet.
 ///
 /// The resistance and the harmonic are the same in all cycles of a motor: solved together by [`PooledRegression`], with
-/// the other parameters for each cycle, they are known from the fast cycles where the slow ones do not tell them.
+/// the other parameters for each cycle, they are determined by the fast cycles, and known in the slow ones, which do not determine them.
 ///
 /// [`PooledRegression`]: crate::PooledRegression
 pub fn extended(spans: &Spans, i0: f64) -> Equations<Extended> {

@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 /// Which voltage equations are used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Axes {
-    /// Only the q axis. With id = 0 it hardly tells the inductance: `diq/dt` is short.
+    /// Only the q axis. With id = 0 it hardly determines the inductance: `diq/dt` is short.
     Q,
-    /// Both; the d axis holds `we ls iq`, which tells the inductance.
+    /// Both; the d axis contains `we ls iq`, which determines the inductance.
     Both,
 }
 
