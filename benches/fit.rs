@@ -3,7 +3,9 @@
 
 use argmin::core::CostFunction;
 use divan::{Bencher, counter::ItemsCount};
-use greybox::models::{Armature, Axis, Command, DcMotor, Feed, ControlledAxisOutput, Positioning, PositioningLoop, Reference};
+use greybox::models::{
+    Armature, Axis, Command, ControlledAxisOutput, DcMotor, Feed, Positioning, PositioningLoop, Reference,
+};
 use greybox::optimize::{LeastSquares, LevenbergMarquardt, Linearization};
 use greybox::pmsm::{Drive, Machine, MachineParameters, Salient, SalientWinding, Surface, VoltageAndLoad, Winding};
 use greybox::{Experiment, Fit, Information, Model, Of, Signals, Time, free};

@@ -5,7 +5,7 @@
 
 use greybox::optimize::{LevenbergMarquardt, Stop};
 use greybox::pmsm::{Currents, Drive, SQRT_2_3, Winding};
-use greybox::{Estimate, Experiment, ExperimentOf, Fit, Model, OwnSize, Scalar, Time, free};
+use greybox::{Estimate, Experiment, ExperimentOf, Fit, Fleet, Model, OwnSize, Records, Scalar, Time, free};
 use std::error::Error;
 
 struct Pmsm {
@@ -45,7 +45,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (mut cost, mut passes) = (0.0, 0);
     for _ in 0..repetitions.parse()? {
         let begin = cpu_time();
-        let fits: Vec<Estimate<Pmsm>> = records.iter().map(|record| fit(&model, record)).collect::<Result<_, _>>()?;
+        let fits: Vec<Estimate<Pmsm>> = match records.as_slice() {
+            [record] => vec![fit(Fit::new(&model, record)).run()?],
+            _ => fit(Fleet::new(&model)).fleet()?.run(records.iter().cloned()).collect::<Result<_, _>>()?,
+        };
         times.push(cpu_time() - begin);
         cost = fits.iter().map(|fit| fit.cost).sum();
         passes = fits.iter().map(|fit| fit.evaluations).sum::<u64>() / fits.len() as u64;
@@ -61,13 +64,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn fit(model: &Pmsm, record: &ExperimentOf<Pmsm>) -> Result<Estimate<Pmsm>, greybox::Error> {
+fn fit<'a>(records: Records<'a, Pmsm>) -> Fit<'a, Pmsm> {
     let stop = Stop { cost: 1e-10, ..Stop::default() };
-    Fit::new(model, record)
+    records
         .parameters(Winding { rs: free(1.2), ls: free(1.75e-3), ke: free(0.63) })
         .noise(Currents { id: 1.0, iq: 1.0 })
         .optimizer(LevenbergMarquardt::new(stop, OwnSize))
-        .run()
 }
 
 fn read(model: &Pmsm, path: &str, samples: usize) -> Result<Vec<ExperimentOf<Pmsm>>, Box<dyn Error>> {

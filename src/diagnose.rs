@@ -34,7 +34,7 @@ use crate::numeral::p_value;
 use crate::optimize::{
     Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization, Machine, Severity,
 };
-use crate::problem::{Control, Problem};
+use crate::problem::{Control, Objective, Problem};
 use crate::section::{Cell, Section, Table};
 use argmin::core::{Executor, State};
 use serde::{Deserialize, Serialize};
@@ -132,6 +132,14 @@ fn check_complete(problem: &Problem<'_>, control: &Control, what: &str) -> Resul
         ),
         _ => format!("{what} was cancelled; lower the flag to run it"),
     }))
+}
+
+/// Cost and slopes at an estimate.
+fn linearize(objective: &Objective<'_>, best: &[f64], what: &str) -> Result<Linearization, Error> {
+    objective.linearize(best).map_err(|error| {
+        let stopped = check_complete(objective.problem, objective.control, what).err();
+        stopped.unwrap_or(Error::Optimizer(error.to_string()))
+    })
 }
 
 /// Place and cost of the minimum that a search from `start` ends in; `None` where it cannot begin or does not end.

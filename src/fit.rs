@@ -1,8 +1,12 @@
 //! [`Fit`]: from a model and its records to an estimate.
 
+mod fleet;
+mod lockstep;
 mod predict;
 mod run;
 mod search;
+
+pub use fleet::{Answers, Fleet};
 
 use crate::engine::only_duals;
 use crate::equations::Equations;

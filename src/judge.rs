@@ -8,6 +8,6 @@ mod residual_pass;
 mod sandwich;
 mod warnings;
 
-pub(crate) use conclude::{SearchEnd, conclude};
+pub(crate) use conclude::{SearchEnd, conclude, conclude_from};
 pub(crate) use directions::undetermined;
-pub(crate) use residual_pass::output_fit;
+pub(crate) use residual_pass::{output_fit, residuals_together};

@@ -206,7 +206,7 @@ pub use {
         Warning,
     },
     experiment::{Experiment, ExperimentOf, Sample},
-    fit::{Fit, Records},
+    fit::{Answers, Fit, Fleet, Records},
     information::{
         BadPiece, Block, Covariance, Elimination, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix,
         Triangles, Undetermined,

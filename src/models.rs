@@ -12,4 +12,7 @@ mod dc_motor;
 mod positioning;
 
 pub use dc_motor::{Armature, DcMotor, Feed, Rotation};
-pub use positioning::{Axis, Command, ControlledAxisOutput, ControlledAxisMotion, AxisMotion, Position, Positioning, PositioningLoop, Reference};
+pub use positioning::{
+    Axis, AxisMotion, Command, ControlledAxisMotion, ControlledAxisOutput, Position, Positioning, PositioningLoop,
+    Reference,
+};

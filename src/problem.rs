@@ -2,6 +2,7 @@
 
 mod absorb;
 mod as_argmin;
+mod batches;
 mod checkpoint;
 mod control;
 mod curvature;
@@ -13,21 +14,24 @@ mod segments;
 mod settings;
 mod simulate;
 mod standardize;
+mod together;
 mod unknowns;
 mod weighing;
 mod whitening;
 
+pub(crate) use batches::each;
 pub(crate) use checkpoint::CheckpointFile;
 pub(crate) use control::Control;
 pub use objective::Objective;
-pub(crate) use pass::{Accumulate, each};
+pub(crate) use pass::Accumulate;
 pub use search::Search;
-pub(crate) use search::{Optimizer, RoundError};
+pub(crate) use search::{Optimizer, Round, RoundError};
 use segments::Cuts;
 pub(crate) use segments::Memory;
 pub use settings::Settings;
 pub(crate) use settings::{Observer, Weights};
 pub use simulate::Simulated;
+pub(crate) use together::{At, gather_together, linearize_together};
 pub use unknowns::Role;
 pub(crate) use unknowns::{Unknowns, Values};
 use weighing::Weighing;

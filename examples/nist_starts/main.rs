@@ -56,7 +56,8 @@ impl Task for Starts<'_> {
         let parameter = |i: usize| self.file.parameters.get(i).map_or(f64::NAN, |parameter| parameter[2]);
         let problem = Fit::new(model, &record).parameters(M::Parameters::from_fn(|i| free(parameter(i)))).problem()?;
         let objective = problem.objective()?;
-        let certified = 2.0 * objective.linearize(&objective.start()).map_err(|e| Error::Optimizer(e.to_string()))?.cost;
+        let certified =
+            2.0 * objective.linearize(&objective.start()).map_err(|e| Error::Optimizer(e.to_string()))?.cost;
         Ok((certified, self.starts.iter().map(|start| search(&objective, start)).collect()))
     }
 }
@@ -66,8 +67,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let [folder, starts, wanted @ ..] = &arguments[..] else {
         return Err("usage: nist_starts FOLDER_OF_DAT FOLDER_OF_STARTS [PROBLEM...]".into());
     };
-    println!("starts           of  right  wrong without a word  evaluations of right ones, median, and all   ms/search");
-    let mut paths: Vec<_> = std::fs::read_dir(starts)?.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>()?;
+    println!(
+        "starts           of  right  wrong without a word  evaluations of right ones, median, and all   ms/search"
+    );
+    let mut paths: Vec<_> =
+        std::fs::read_dir(starts)?.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>()?;
     paths.sort();
     for path in paths.iter().filter(|path| path.extension().is_some_and(|extension| extension == "txt")) {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();

@@ -61,6 +61,7 @@ pub fn bootstrap(
     let (objective, best) = problem.at_within(estimate, &control)?;
     let predictions = (0..objective.experiments()).map(|e| objective.predict(e, &best));
     let predictions = predictions.collect::<Result<Vec<_>, _>>()?;
+    check_complete(problem, &control, "the bootstrap")?;
     let residuals: Vec<Vec<Vec<f64>>> = predictions.iter().map(centered).collect();
     if let Some(e) = residuals.iter().position(Vec::is_empty) {
         let experiment = problem.records()[e].name().to_owned();

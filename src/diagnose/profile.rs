@@ -5,7 +5,7 @@
 
 mod section;
 
-use super::{Pinned, check_complete, minimize};
+use super::{Pinned, check_complete, linearize, minimize};
 use crate::error::Error;
 use crate::estimate::{Knowledge, Summary, student};
 use crate::judge::undetermined;
@@ -124,7 +124,7 @@ pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probabilit
         )));
     }
     let unknown = &estimate.unknowns[index];
-    let linear = objective.linearize(&best).map_err(|error| Error::Optimizer(error.to_string()))?;
+    let linear = linearize(&objective, &best, "the profile")?;
     let at_bound = |i: usize| i != index && matches!(estimate.unknowns[i].knowledge, Knowledge::Held { .. });
     let held = undetermined(&linear, &(0..best.len()).map(at_bound).collect::<Vec<bool>>()).held;
     let covariance = linear.covariance(&held);

@@ -1,6 +1,6 @@
 //! Restarts: whether a search from elsewhere ends in a better minimum.
 
-use super::{Pinned, check_complete, minimize};
+use super::{Pinned, check_complete, linearize, minimize};
 use crate::error::Error;
 use crate::estimate::Summary;
 use crate::numeral::number;
@@ -76,7 +76,7 @@ pub fn restarts(
     }
     let control = problem.control(Instant::now());
     let (objective, best) = problem.at_within(estimate, &control)?;
-    let cost = objective.linearize(&best).map_err(|error| Error::Optimizer(error.to_string()))?.cost;
+    let cost = linearize(&objective, &best, "the search from other starts")?.cost;
     let bounds = objective.bounds();
     let start = |attempt: usize| -> Vec<f64> {
         let mut random = Random::stream(seed, attempt as u64);

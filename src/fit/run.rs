@@ -26,10 +26,11 @@ impl Problem<'_> {
         let settings = &self.settings;
         settings.optimizer.check()?;
         let control = self.control(begin);
-        let end = search(&self.in_units(&control), &settings.optimizer)?;
+        let plain = self.in_units(&control);
+        let end = search(&plain, &settings.optimizer)?;
         // What was found is concluded even if the time is over.
-        let objective = self.in_units(&NEVER).with(end.whitening.clone());
-        let objective = Objective { memory: end.memory.clone(), ..objective };
+        let objective = plain.with(end.whitening.clone());
+        let objective = Objective { memory: end.memory.clone(), control: &NEVER, ..objective };
         conclude(&objective, &end, begin.elapsed().as_secs_f64())
     }
 

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::judge::{SearchEnd, noise};
 use crate::optimize::{Infeasible, Outcome};
-use crate::problem::{CheckpointFile, Noise, Objective, Optimizer, Problem, RoundError};
+use crate::problem::{CheckpointFile, Memory, Noise, Objective, Optimizer, Problem, Round, RoundError, Whitening};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
@@ -15,80 +15,132 @@ const NOISE_ROUNDS: u32 = 100;
 /// Searches from the start, or from where a checkpoint says. `plain` leaves errors in the units of the outputs.
 pub(super) fn search(plain: &Objective<'_>, optimizer: &Arc<dyn Optimizer>) -> Result<SearchEnd, Error> {
     let problem = plain.problem;
-    let mut coordinates = problem.unknowns.start();
-    let mut next = optimizer.clone();
-    let mut file = None;
-    if let Some((path, every)) = &problem.settings.checkpoint {
-        let mut checkpoint = CheckpointFile::new(path.clone(), *every, fingerprint(problem), optimizer.settings()?);
-        match optimizer.resume(&checkpoint)? {
-            Some((place, iterations, saved)) if place.len() == coordinates.len() => {
-                (coordinates, checkpoint.before) = (place, iterations);
-                next = saved.unwrap_or(next);
-            }
-            // Written at once: a place that cannot be written to is better known now.
-            _ => optimizer.begin(&checkpoint, &coordinates)?,
+    let Some((path, every)) = &problem.settings.checkpoint else {
+        return Rounds::new(plain, optimizer)?.run(None);
+    };
+    let mut checkpoint = CheckpointFile::new(path.clone(), *every, fingerprint(problem), optimizer.settings()?);
+    let mut rounds = match optimizer.resume(&checkpoint)? {
+        Some((place, iterations, saved)) if place.len() == problem.unknowns.start().len() => {
+            checkpoint.before = iterations;
+            Rounds::from(plain, optimizer, place, saved)?
         }
-        file = Some(checkpoint);
+        // Written at once: a place that cannot be written to is better known now.
+        _ => {
+            let start = problem.unknowns.start();
+            optimizer.begin(&checkpoint, &start)?;
+            Rounds::from(plain, optimizer, start, None)?
+        }
+    };
+    rounds.iterations = checkpoint.before;
+    rounds.run(Some(checkpoint))
+}
+
+/// Searches with the noise as it stands, one after the other, and the noise estimated between them.
+pub(super) struct Rounds<'r> {
+    plain: &'r Objective<'r>,
+    optimizer: Arc<dyn Optimizer>,
+    /// What the next round searches with.
+    pub next: Arc<dyn Optimizer>,
+    /// Where the next round begins.
+    pub coordinates: Vec<f64>,
+    whitening: Whitening,
+    memory: Memory,
+    known: bool,
+    round: u32,
+    iterations: u64,
+    evaluations: u64,
+}
+
+impl<'r> Rounds<'r> {
+    /// From the start. Noise as the errors at the start show it is not worth an exact minimum.
+    pub fn new(plain: &'r Objective<'r>, optimizer: &Arc<dyn Optimizer>) -> Result<Self, Error> {
+        let first = noise::is_estimated(plain).then(|| optimizer.rough());
+        Rounds::from(plain, optimizer, plain.problem.unknowns.start(), first)
     }
-    let mut whitening =
-        noise::first_whitening(plain, &coordinates).map_err(|error| start_error(plain, &coordinates, error))?;
-    let known = !noise::is_estimated(plain);
-    let before = file.as_ref().map_or(0, |file| file.before);
-    let (mut iterations, mut evaluations) = (before, 0);
-    // Noise as the errors at the start show it is not worth an exact minimum.
-    if !known && file.is_none() {
-        next = optimizer.rough();
+
+    /// From a place, the first round with another search if there is one.
+    fn from(
+        plain: &'r Objective<'r>,
+        optimizer: &Arc<dyn Optimizer>,
+        coordinates: Vec<f64>,
+        first: Option<Arc<dyn Optimizer>>,
+    ) -> Result<Self, Error> {
+        let whitening =
+            noise::first_whitening(plain, &coordinates).map_err(|error| start_error(plain, &coordinates, error))?;
+        Ok(Rounds {
+            plain,
+            optimizer: optimizer.clone(),
+            next: first.unwrap_or_else(|| optimizer.clone()),
+            coordinates,
+            whitening,
+            memory: plain.memory.clone(),
+            known: !noise::is_estimated(plain),
+            round: 0,
+            iterations: 0,
+            evaluations: 0,
+        })
     }
-    let mut memory = plain.memory.clone();
-    for round in 1.. {
-        let objective = Objective { memory, ..plain.with(whitening.clone()) };
-        let result = next.round(&objective, coordinates.clone(), file.as_ref()).map_err(|error| match error {
-            RoundError::Start(error) => start_error(plain, &coordinates, error),
-            RoundError::Optimizer(text) => Error::Optimizer(text),
-        })?;
-        iterations += result.iterations;
-        evaluations += result.evaluations;
-        coordinates = result.coordinates;
+
+    fn run(mut self, file: Option<CheckpointFile>) -> Result<SearchEnd, Error> {
+        loop {
+            let objective = self.objective();
+            let result = self.next.round(&objective, self.coordinates.clone(), file.as_ref());
+            let result = result.map_err(|error| match error {
+                RoundError::Start(error) => start_error(self.plain, &self.coordinates, error),
+                RoundError::Optimizer(text) => Error::Optimizer(text),
+            })?;
+            if let Some(mut end) = self.take(objective, result) {
+                end.trouble = file.and_then(|file| file.trouble());
+                return Ok(end);
+            }
+        }
+    }
+
+    /// The objective of the next round.
+    pub fn objective(&self) -> Objective<'r> {
+        Objective { memory: self.memory.clone(), ..self.plain.with(self.whitening.clone()) }
+    }
+
+    /// Takes in how a round with this objective ended; the end of the search, if no other round is needed.
+    pub fn take(&mut self, objective: Objective<'r>, result: Round) -> Option<SearchEnd> {
+        self.round += 1;
+        self.iterations += result.iterations;
+        self.evaluations += result.evaluations;
+        self.coordinates = result.coordinates;
         let (mut outcome, mut linear) = (result.outcome, result.linear);
         let lost = matches!(outcome, Outcome::Stalled { .. } | Outcome::LimitOfPrecision { .. });
-        if lost && noise::reproduces(&objective, &coordinates) {
+        if lost && noise::reproduces(&objective, &self.coordinates) {
             outcome = Outcome::Exact;
         }
-        let mut settled = known || !outcome.converged();
+        let mut settled = self.known || !outcome.converged();
         if !settled {
-            let found = noise::estimate(&objective, &coordinates).unwrap_or_else(|_| whitening.clone());
-            let changes = found.sigma().into_iter().zip(whitening.sigma()).map(|(a, b)| (a / b).ln().abs());
-            settled = round > 1 && changes.fold(0.0, f64::max) < NOISE_TOLERANCE;
+            let found = noise::estimate(&objective, &self.coordinates).unwrap_or_else(|_| self.whitening.clone());
+            let changes = found.sigma().into_iter().zip(self.whitening.sigma()).map(|(a, b)| (a / b).ln().abs());
+            settled = self.round > 1 && changes.fold(0.0, f64::max) < NOISE_TOLERANCE;
             if !settled {
-                (whitening, linear) = (found, None);
+                (self.whitening, linear) = (found, None);
             }
             // Rounding is another at every point.
             settled |= outcome == Outcome::Exact;
-            if !settled && round == NOISE_ROUNDS {
-                outcome = Outcome::IterationLimit { iterations };
+            if !settled && self.round == NOISE_ROUNDS {
+                outcome = Outcome::IterationLimit { iterations: self.iterations };
                 settled = true;
             }
         }
-        if settled {
-            let trouble = file.and_then(|file| file.trouble());
-            let name = result.name;
-            let memory = objective.memory;
-            return Ok(SearchEnd {
-                coordinates,
-                whitening,
-                linear,
-                outcome,
-                iterations,
-                evaluations,
-                name,
-                trouble,
-                memory,
-            });
-        }
-        next = optimizer.clone();
-        memory = objective.memory;
+        self.next = self.optimizer.clone();
+        self.memory = objective.memory;
+        settled.then(|| SearchEnd {
+            coordinates: self.coordinates.clone(),
+            whitening: self.whitening.clone(),
+            linear,
+            outcome,
+            iterations: self.iterations,
+            evaluations: self.evaluations,
+            name: result.name,
+            trouble: None,
+            memory: self.memory.clone(),
+        })
     }
-    Err(Error::Optimizer("the search never began".to_owned()))
 }
 
 /// Why the start could not be evaluated.

@@ -70,6 +70,17 @@ pub(super) struct Covariances {
 
 /// What is known at the end of a search; the objective has the whitening that it ended with.
 pub(crate) fn conclude(objective: &Objective<'_>, end: &SearchEnd, seconds: f64) -> Result<Summary, Error> {
+    let residuals = residual_pass(objective, &end.coordinates)?;
+    conclude_from(objective, end, residuals, seconds)
+}
+
+/// The same from what was left unexplained there.
+pub(crate) fn conclude_from(
+    objective: &Objective<'_>,
+    end: &SearchEnd,
+    residuals: Residuals,
+    seconds: f64,
+) -> Result<Summary, Error> {
     let evaluated;
     let linear = match &end.linear {
         Some(linear) => linear,
@@ -78,7 +89,7 @@ pub(crate) fn conclude(objective: &Objective<'_>, end: &SearchEnd, seconds: f64)
             &evaluated
         }
     };
-    let judgement = Judgement::new(objective, end, linear)?;
+    let judgement = Judgement::new(objective, end, linear, residuals)?;
     let covariances = judgement.covariances();
     let unknowns = judgement.unknowns(&covariances);
     let directions = judgement.directions();
@@ -133,10 +144,14 @@ fn method(objective: &Objective<'_>, optimizer: String, covariance: CovarianceMe
 }
 
 impl<'j> Judgement<'j> {
-    fn new(objective: &'j Objective<'j>, end: &'j SearchEnd, linear: &'j Linearization) -> Result<Self, Error> {
+    fn new(
+        objective: &'j Objective<'j>,
+        end: &'j SearchEnd,
+        linear: &'j Linearization,
+        residuals: Residuals,
+    ) -> Result<Self, Error> {
         let (unknowns, coordinates) = (&objective.problem.unknowns, &end.coordinates);
         let n = unknowns.row.len();
-        let residuals = residual_pass(objective, coordinates)?;
         let (gradient, norms, bounds) = (linear.gradient(), linear.column_norms(), unknowns.bounds());
         let at_bound = |i: usize| {
             let ((lower, upper), x) = (bounds[i], coordinates[i]);

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::estimate::OutputFit;
 use crate::optimize::Infeasible;
-use crate::problem::{Accumulate, Objective, each};
+use crate::problem::{Accumulate, At, Objective, each, gather_together};
 use crate::sweep::{Piece, Prepared, Sweep, Window};
 use crate::whiteness::{Autocorrelation, dot, ljung_box};
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// Lags of the whiteness test.
 const LAGS: usize = 20;
 /// One window in so many is simulated once more with a finer step, and so many of a record at most.
-const EVERY: usize = 8;
+const EVERY: usize = 16;
 const AGAIN: usize = 16;
 
 /// What a pass over the residuals found.
@@ -60,7 +60,22 @@ struct Sampled {
     carry: Vec<f64>,
 }
 
-impl Sums<'_> {
+impl<'s> Sums<'s> {
+    fn new(objective: &'s Objective<'s>, experiment: usize) -> Self {
+        let outputs = objective.outputs();
+        Sums {
+            objective,
+            experiment,
+            outputs: vec![OutputSums::default(); outputs],
+            measured: 0,
+            log_determinant: 0.0,
+            autocorrelations: vec![Autocorrelation::new(LAGS); outputs],
+            surest: vec![f64::INFINITY; outputs],
+            again: vec![],
+            run: vec![],
+        }
+    }
+
     /// Counts the measurements of a window.
     fn count(&mut self, window: &Window, lane: usize) {
         let (outputs, samples) = (window.outputs(), window.samples[lane]);
@@ -148,23 +163,27 @@ pub(crate) fn residual_pass(objective: &Objective<'_>, coordinates: &[f64]) -> R
         unfiltered = problem;
         plain = Objective { problem: &unfiltered, ..plain };
     }
-    let outputs = objective.outputs();
-    let make = |experiment: usize| Sums {
-        objective,
-        experiment,
-        outputs: vec![OutputSums::default(); outputs],
-        measured: 0,
-        log_determinant: 0.0,
-        autocorrelations: vec![Autocorrelation::new(LAGS); outputs],
-        surest: vec![f64::INFINITY; outputs],
-        again: vec![],
-        run: vec![],
-    };
+    let make = |experiment: usize| Sums::new(objective, experiment);
     let all = plain.gather(coordinates, false, make).map_err(|_| failed(objective, coordinates))?;
-    let step_error = step_error(objective, coordinates, &all);
+    Ok(residuals(objective, coordinates, &all))
+}
+
+/// The same of several objectives of one record each, at points of their own; `None` for one that fails.
+pub(crate) fn residuals_together(points: &[At<'_>]) -> Vec<Option<Residuals>> {
+    let plain: Vec<Objective<'_>> = points.iter().map(|(objective, _)| objective.in_units()).collect();
+    let in_units: Vec<At<'_>> = plain.iter().zip(points).map(|(plain, (_, x))| (plain, *x)).collect();
+    let all = gather_together(&in_units, |i| Sums::new(points[i].0, 0));
+    let finish = |(sums, (objective, x)): (Option<Sums<'_>>, &At<'_>)| Some(residuals(objective, x, &[sums?]));
+    all.into_iter().zip(points).map(finish).collect()
+}
+
+/// What the sums of all experiments tell.
+fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -> Residuals {
+    let outputs = objective.outputs();
+    let step_error = step_error(objective, coordinates, all);
     let mut sums = vec![OutputSums::default(); outputs];
     let (mut measured, mut log_determinant) = (0, 0.0);
-    for one in &all {
+    for one in all {
         measured += one.measured;
         log_determinant += one.log_determinant;
         sums.iter_mut().zip(&one.outputs).for_each(|(sum, one)| sum.append(one));
@@ -176,14 +195,14 @@ pub(crate) fn residual_pass(objective: &Objective<'_>, coordinates: &[f64]) -> R
         let (_, p_value) = ljung_box(&coefficients, total.count());
         Whiteness { p_value, first: coefficients.first().copied().unwrap_or(0.0) }
     };
-    Ok(Residuals {
+    Residuals {
         outputs: sums.iter().map(OutputSums::fit).collect(),
         measured,
         log_determinant,
         step_error,
         whiteness: (0..outputs).map(whiteness).collect(),
         surest: (0..outputs).map(|j| all.iter().map(|one| one.surest[j]).fold(f64::INFINITY, f64::min)).collect(),
-    })
+    }
 }
 
 fn failed(objective: &Objective<'_>, coordinates: &[f64]) -> Error {

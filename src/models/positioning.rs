@@ -153,13 +153,25 @@ impl Model for PositioningLoop {
     type Parameters = Axis;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: S, x: &ControlledAxisMotion<S>, u: &Reference<S>, p: &Axis<S>) -> ControlledAxisMotion<S> {
+    fn derivative<S: Scalar>(
+        &self,
+        _t: S,
+        x: &ControlledAxisMotion<S>,
+        u: &Reference<S>,
+        p: &Axis<S>,
+    ) -> ControlledAxisMotion<S> {
         let v = self.axis.acceleration(x.v, self.command(x, u), p);
         ControlledAxisMotion { q: x.v, v, vm: (x.v - x.vm) / self.lag }
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: S, x: &ControlledAxisMotion<S>, u: &Reference<S>, _p: &Axis<S>) -> ControlledAxisOutput<S> {
+    fn output<S: Scalar>(
+        &self,
+        _t: S,
+        x: &ControlledAxisMotion<S>,
+        u: &Reference<S>,
+        _p: &Axis<S>,
+    ) -> ControlledAxisOutput<S> {
         ControlledAxisOutput { qm: x.q, vir: self.command(x, u) }
     }
 }

@@ -1,7 +1,7 @@
 //! [`Absorber`]: from windows of standardized errors to costs and triangles.
 
+use super::Weighing;
 use super::pass::Job;
-use super::{Objective, Weighing};
 use crate::information::{Block, Information, Triangles};
 use crate::sweep::Window;
 use crate::wide::{self, Task, Wide, Width};
@@ -18,33 +18,27 @@ pub(super) struct Absorber<'o> {
     /// Sums of squares, where every error counts by its own, lane by lane.
     squares: Vec<f64>,
     triangles: Triangles,
-    alone: Option<(Information, Block)>,
-    /// Room for one row.
-    row: Vec<f64>,
+    alone: Option<Alone>,
 }
 
 impl<'o> Absorber<'o> {
-    pub fn new(objective: &'o Objective<'o>, jobs: &[&Job<'_>]) -> Self {
+    pub fn new(jobs: &[&Job<'o>]) -> Self {
+        let objective = jobs[0].objective;
         let columns = jobs[0].seeds.len();
         Absorber {
-            weighing: jobs.iter().map(|job| Weighing::new(objective, job.experiment)).collect(),
+            weighing: jobs.iter().map(|job| Weighing::new(job.objective, job.experiment)).collect(),
             plain: objective.loss().is_none() && !objective.is_weighted() && !objective.sweep.predicts_variance(),
             rows: vec![0; jobs.len()],
             squares: vec![],
             triangles: Triangles::new(columns, 0),
             alone: None,
-            row: vec![0.0; columns],
         }
     }
 
     /// Takes in a window, which is used up.
     pub fn absorb(&mut self, window: &mut Window) {
-        let (lanes, columns) = (window.lanes(), window.columns() - 1);
-        if lanes == 1 {
-            return self.absorb_alone(window);
-        }
-        if self.triangles.lanes() != lanes {
-            self.triangles = Triangles::new(columns, lanes);
+        if self.triangles.lanes() != window.lanes() && window.lanes() > 1 {
+            self.triangles = Triangles::new(window.columns() - 1, window.lanes());
         }
         let count = window.len() * window.outputs();
         if self.plain {
@@ -53,9 +47,16 @@ impl<'o> Absorber<'o> {
             self.weigh(window);
         }
         if window.has_variances() {
-            self.triangles.absorb(window.variance_rows_mut(), count);
+            self.absorb_rows(window.lanes(), window.variance_rows_mut(), count);
         }
-        self.triangles.absorb(window.rows_mut(), count);
+        self.absorb_rows(window.lanes(), window.rows_mut(), count);
+    }
+
+    fn absorb_rows(&mut self, lanes: usize, rows: &mut [f64], count: usize) {
+        match lanes {
+            1 => self.alone.get_or_insert_with(|| Alone::new(self.triangles.columns())).absorb(rows),
+            _ => self.triangles.absorb(rows, count),
+        }
     }
 
     /// Sums of squares.
@@ -95,38 +96,49 @@ impl<'o> Absorber<'o> {
         }
     }
 
-    fn absorb_alone(&mut self, window: &mut Window) {
-        let columns = window.columns() - 1;
-        let (information, block) =
-            self.alone.get_or_insert_with(|| (Information::new(columns), Block::new(columns, ROWS)));
-        let row = &mut self.row;
-        for k in 0..window.samples[0] {
-            for j in 0..window.outputs() {
-                if !window.is_measured(k, j, 0) {
-                    continue;
-                }
-                let [(root, error), second] = self.weighing[0].rows(window, k, j, 0);
-                row.iter_mut().zip(window.row(k, j)).for_each(|(to, from)| *to = from * root);
-                information.gather(block, row, error);
-                if window.has_variances() {
-                    let (root, error) = second;
-                    row.iter_mut().zip(window.variance_row(k, j)).for_each(|(to, from)| *to = from * root);
-                    information.gather(block, row, error);
-                }
-            }
-        }
-    }
-
     /// Cost and triangle of a job.
     pub fn part(&mut self, lane: usize) -> (f64, Information) {
         let cost = self.weighing[lane].cost + 0.5 * self.squares.get(lane).unwrap_or(&0.0);
-        match self.alone.take() {
-            Some((mut information, mut block)) => {
-                information.absorb(&mut block);
-                (cost, information)
+        let triangle = match &mut self.alone {
+            Some(alone) => alone.triangle(),
+            None => self.triangles.triangle(lane),
+        };
+        (cost, triangle.of_rows(self.rows[lane]))
+    }
+}
+
+/// What absorbs the rows of a job that runs alone.
+struct Alone {
+    information: Information,
+    block: Block,
+}
+
+impl Alone {
+    fn new(columns: usize) -> Self {
+        Alone { information: Information::new(columns), block: Block::new(columns, ROWS) }
+    }
+
+    fn absorb(&mut self, mut rows: &[f64]) {
+        let (width, capacity) = (self.block.columns() + 1, self.block.capacity());
+        while !rows.is_empty() {
+            let len = self.block.len();
+            let count = (capacity - len).min(rows.len() / width);
+            let (now, later) = rows.split_at(count * width);
+            for column in 0..width {
+                let to = &mut self.block.column_mut(column)[len..len + count];
+                to.iter_mut().zip(now.iter().skip(column).step_by(width)).for_each(|(to, from)| *to = *from);
             }
-            None => (cost, self.triangles.triangle(lane).of_rows(self.rows[lane])),
+            self.block.set_len(len + count);
+            if self.block.is_full() {
+                self.information.absorb(&mut self.block);
+            }
+            rows = later;
         }
+    }
+
+    fn triangle(&mut self) -> Information {
+        self.information.absorb(&mut self.block);
+        self.information.clone()
     }
 }
 

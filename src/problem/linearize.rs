@@ -1,7 +1,8 @@
 //! Cost and triangles of an objective.
 
 use super::absorb::Absorber;
-use super::pass::{Broken, Job};
+use super::batches::{Broken, in_batches, run};
+use super::pass::Job;
 use super::segments::{Border, Borders};
 use super::{Objective, Values, Weighing};
 use crate::information::{Chain, Information};
@@ -14,7 +15,7 @@ use std::sync::Arc;
 const MOVED: f64 = 0.1;
 
 /// What one segment comes to.
-struct Part {
+pub(super) struct Part {
     cost: f64,
     triangle: Information,
     reached: Reached,
@@ -39,10 +40,24 @@ impl Objective<'_> {
         if !exact && found.moved > MOVED * 2.0 * found.cost {
             found = self.triangles(coordinates, &values, found.borders.as_ref())?;
         }
-        let Triangulation { mut cost, mut blocks, borders, .. } = found;
+        let Triangulation { cost, blocks, borders, .. } = found;
         if let Some(borders) = borders {
             self.memory.keep(Arc::new(borders));
         }
+        Ok(self.with_priors(coordinates, cost, blocks))
+    }
+
+    /// What one record that was run as a whole comes to.
+    pub(super) fn linear_of(&self, coordinates: &[f64], part: Part) -> Result<Linearization, Infeasible> {
+        let Part { cost, mut triangle, .. } = part;
+        triangle.scale_columns(&self.problem.unknowns.scales(0, coordinates));
+        if !cost.is_finite() || !triangle.is_finite() {
+            return Err(self.infeasible(0, RunError::Failed { sample: 0 }));
+        }
+        Ok(self.with_priors(coordinates, cost, vec![triangle]))
+    }
+
+    fn with_priors(&self, coordinates: &[f64], mut cost: f64, mut blocks: Vec<Information>) -> Linearization {
         for (i, slope, error) in self.problem.unknowns.priors(coordinates) {
             let e = self.problem.unknowns.row[i].experiment.unwrap_or(0);
             let row: Vec<f64> = self.problem.unknowns.columns(e).map(|c| if c == i { slope } else { 0.0 }).collect();
@@ -50,10 +65,10 @@ impl Objective<'_> {
             cost += 0.5 * error * error;
         }
         let linear = Linearization::new(cost, self.problem.unknowns.shared(), blocks);
-        Ok(match self.data_norm {
+        match self.data_norm() {
             Some(norm) => linear.with_data_norm(norm),
             None => linear,
-        })
+        }
     }
 
     /// Where the segments begin, and whether that is exact. A guess will do where it can be corrected: the cost is a sum of
@@ -104,7 +119,9 @@ impl Objective<'_> {
     ) -> Result<Triangulation, Infeasible> {
         let jobs: Vec<Job<'_>> =
             (0..self.experiments()).flat_map(|e| self.linear_jobs(e, &values[e], coordinates, guess)).collect();
-        let mut parts = self.in_batches(&jobs, |jobs| self.parts(jobs))?.into_iter();
+        let parts = in_batches(&jobs, |_, jobs| parts(jobs))
+            .map_err(|(job, error)| self.infeasible(jobs[job].experiment, error))?;
+        let mut parts = parts.into_iter();
         let mut found = Triangulation { cost: 0.0, moved: 0.0, blocks: vec![], borders: None };
         let mut of = vec![];
         for (e, segments) in self.problem.cuts.segments.iter().enumerate() {
@@ -206,19 +223,6 @@ impl Objective<'_> {
         (0..carry.len()).map(|i| samples.start > 0 || row(i).iter().any(|slope| *slope != 0.0)).collect()
     }
 
-    /// Costs and triangles of jobs that run side by side.
-    fn parts(&self, jobs: &[&Job<'_>]) -> Result<Vec<Part>, Broken> {
-        let mut absorbers: Absorber<'_> = Absorber::new(self, jobs);
-        let reached = self.run(jobs, &mut |window| absorbers.absorb(window))?;
-        let parts = reached.into_iter().enumerate();
-        parts
-            .map(|(lane, reached)| {
-                let (cost, triangle) = absorbers.part(lane);
-                Ok(Part { cost, triangle, reached })
-            })
-            .collect()
-    }
-
     /// The cost of one experiment alone, priors left out.
     pub(crate) fn cost_of(&self, e: usize, coordinates: &[f64]) -> Result<f64, Infeasible> {
         self.gather_one(coordinates, e, true, || Weighing::new(self, e)).map(|weighing| weighing.cost)
@@ -230,6 +234,19 @@ impl Objective<'_> {
         let priors = self.problem.unknowns.priors(coordinates).map(|(_, _, error)| 0.5 * error * error);
         Ok(found.iter().map(|weighing| weighing.cost).sum::<f64>() + priors.sum::<f64>())
     }
+}
+
+/// Costs and triangles of jobs that run side by side.
+pub(super) fn parts(jobs: &[&Job<'_>]) -> Result<Vec<Part>, Broken> {
+    let mut absorbers: Absorber<'_> = Absorber::new(jobs);
+    let reached = run(jobs, &mut |window| absorbers.absorb(window))?;
+    let parts = reached.into_iter().enumerate();
+    parts
+        .map(|(lane, reached)| {
+            let (cost, triangle) = absorbers.part(lane);
+            Ok(Part { cost, triangle, reached })
+        })
+        .collect()
 }
 
 /// Costs and triangles of all experiments at a point.

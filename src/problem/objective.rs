@@ -6,7 +6,9 @@ use crate::error::Failure;
 use crate::loss::Loss;
 use crate::optimize::{Infeasible, LeastSquares, Linearization};
 use crate::parameter::Transform;
+use crate::record::Record;
 use crate::sweep::{Located, OVERFLOW, RunError, Sweep, Window};
+use std::sync::Arc;
 
 /// What a fit minimizes, as a problem for its own and for argmin's solvers.
 ///
@@ -21,8 +23,8 @@ pub struct Objective<'p> {
     pub(crate) sweep: &'p dyn Sweep,
     pub(crate) whitening: Whitening,
     pub(crate) control: &'p Control,
-    /// Norm of the measurements, standardized and weighted as the errors; unknown where variances are predicted.
-    pub(crate) data_norm: Option<f64>,
+    /// Weighted sum of the squares of each output's measurements.
+    pub(crate) squares: Arc<[f64]>,
     /// Unknowns whose slopes count as zero; empty for none.
     pub(crate) left_out: Vec<bool>,
     /// Where the segments of records begin at points that were evaluated.
@@ -46,15 +48,17 @@ impl<'p> Objective<'p> {
         whitening: Whitening,
         control: &'p Control,
     ) -> Objective<'p> {
-        let (data_norm, left_out, memory) = (None, vec![], Memory::default());
-        Objective { problem, sweep, whitening, control, data_norm, left_out, memory }.with_data_norm()
+        let (left_out, memory) = (vec![], Memory::default());
+        let squares: Vec<f64> = (0..problem.layout().outputs.len()).map(|j| squares(problem, j)).collect();
+        Objective { problem, sweep, whitening, control, squares: squares.into(), left_out, memory }
     }
 
     /// The same without the slopes of the unknowns on their bounds, which may be infinite there (the root of an initial level
     /// of zero); `None` where none is, or where they have been left out already.
     pub(super) fn inside_bounds(&self, coordinates: &[f64]) -> Option<Self> {
         let bounds = self.problem.unknowns.bounds();
-        let left_out: Vec<bool> = bounds.iter().zip(coordinates).map(|((low, high), x)| x <= low || x >= high).collect();
+        let left_out: Vec<bool> =
+            bounds.iter().zip(coordinates).map(|((low, high), x)| x <= low || x >= high).collect();
         let some = self.left_out.is_empty() && left_out.contains(&true);
         some.then(|| Objective { left_out, ..self.clone() })
     }
@@ -66,25 +70,13 @@ impl<'p> Objective<'p> {
 
     /// The same with errors standardized otherwise.
     pub(crate) fn with(&self, whitening: Whitening) -> Self {
-        Objective { whitening, ..self.clone() }.with_data_norm()
+        Objective { whitening, ..self.clone() }
     }
 
-    fn with_data_norm(mut self) -> Self {
-        self.data_norm = (!self.sweep.predicts_variance()).then(|| self.norm_of_data());
-        self
-    }
-
-    fn norm_of_data(&self) -> f64 {
-        let sigma = self.whitening.sigma();
-        let mut squares = 0.0;
-        for (e, record) in self.problem.records.iter().enumerate() {
-            for (channel, sigma) in record.outputs().iter().zip(&sigma) {
-                for (k, y) in channel.values.iter().enumerate().filter(|(_, y)| !y.is_nan()) {
-                    squares += self.weight(e, k) * (y / sigma).powi(2);
-                }
-            }
-        }
-        squares.sqrt()
+    /// Norm of the standardized measurements; `None` where variances are predicted.
+    pub(super) fn data_norm(&self) -> Option<f64> {
+        let squares = self.squares.iter().zip(self.whitening.sigma()).map(|(squares, sigma)| squares / (sigma * sigma));
+        (!self.sweep.predicts_variance()).then(|| squares.sum::<f64>().sqrt())
     }
 
     /// The same with another sweep, or records that differ in what was measured.
@@ -189,6 +181,22 @@ impl<'p> Objective<'p> {
         let time = self.problem.records[e].time(sample);
         Some(Failure { experiment, sample, time, signal, value, hint })
     }
+}
+
+/// The weighted sum of the squares of an output's measurements.
+fn squares(problem: &Problem<'_>, output: usize) -> f64 {
+    let weights = problem.settings.weights.as_ref();
+    let of = |record: &Record| {
+        let weight = |k: usize| weights.map_or(1.0, |weights| weights.weight(record, k));
+        let mut sums = [0.0; 4];
+        for (c, chunk) in record.outputs()[output].values.chunks(4).enumerate() {
+            for (k, (sum, y)) in sums.iter_mut().zip(chunk).enumerate() {
+                *sum += if y.is_nan() { 0.0 } else { weight(4 * c + k) * y * y };
+            }
+        }
+        sums.iter().sum::<f64>()
+    };
+    problem.records.iter().map(of).sum()
 }
 
 /// Errors beyond this come with slopes that overflow.

@@ -1,11 +1,10 @@
 //! Passes over the data: the segments of all records, run side by side and in parallel, and what is gathered from their
 //! windows.
 
+use super::batches::{Broken, each, in_batches, run};
 use super::segments::{Border, Borders};
-use super::standardize::Standardize;
 use super::{Objective, Values};
 use crate::optimize::Infeasible;
-use crate::record::Time;
 use crate::sweep::{Piece, Reached, RunError, Seed, Visit, Window};
 use std::sync::Arc;
 
@@ -20,21 +19,13 @@ pub(crate) trait Accumulate: Send + Sized {
 
 /// A segment of an experiment, and what its windows need.
 pub(crate) struct Job<'p> {
+    pub objective: &'p Objective<'p>,
     pub experiment: usize,
     pub seeds: Vec<Seed>,
     /// How fast the quantity of each seed moves with its coordinate; zero where its slopes are left out.
     pub scales: Vec<f64>,
     pub piece: Piece<'p>,
 }
-
-/// Which of the pieces that ran side by side was not run to its end, and why.
-pub(super) struct Broken {
-    pub lane: usize,
-    pub error: RunError,
-}
-
-/// Samples times columns that are worth another thread.
-const WORTH_A_THREAD: usize = 50_000;
 
 impl Objective<'_> {
     /// An experiment as one piece.
@@ -55,11 +46,14 @@ impl Objective<'_> {
             Seed::Parameter(j) => states + j,
         };
         let known = seeds.iter().zip(&scales);
-        let slopes = (0..carry.len()).flat_map(|row| known.clone().map(move |(seed, scale)| (row, column(seed), *scale)));
-        let slope = |(row, column, scale): (usize, usize, f64)| if scale == 0.0 { 0.0 } else { all[row * width + column] };
+        let slopes =
+            (0..carry.len()).flat_map(|row| known.clone().map(move |(seed, scale)| (row, column(seed), *scale)));
+        let slope =
+            |(row, column, scale): (usize, usize, f64)| if scale == 0.0 { 0.0 } else { all[row * width + column] };
         let slopes = slopes.map(slope).collect();
         let (prepared, samples) = (&problem.prepared[e], 0..record.len());
         Job {
+            objective: self,
             experiment: e,
             seeds,
             scales,
@@ -85,6 +79,7 @@ impl Objective<'_> {
             let slopes = from(&whole.piece.slopes, border.map(|border| &border.slopes).filter(|_| slopes));
             let (seeds, scales) = (whole.seeds.clone(), whole.scales.clone());
             Job {
+                objective: self,
                 experiment: e,
                 seeds,
                 scales,
@@ -167,7 +162,9 @@ impl Objective<'_> {
     ) -> Result<Vec<A>, Infeasible> {
         let found = self.gather_all(coordinates, slopes, &make);
         match (&found, self.inside_bounds(coordinates)) {
-            (Err(Infeasible::Failed(_)), Some(inside)) if slopes => inside.gather_all(coordinates, slopes, &make).or(found),
+            (Err(Infeasible::Failed(_)), Some(inside)) if slopes => {
+                inside.gather_all(coordinates, slopes, &make).or(found)
+            }
             _ => found,
         }
     }
@@ -218,106 +215,18 @@ impl Objective<'_> {
         jobs: Vec<Job<'_>>,
         make: &(impl Fn(usize) -> A + Sync),
     ) -> Result<Vec<A>, Infeasible> {
-        let batch = |jobs: &[&Job<'_>]| {
-            let mut gatherers: Vec<A> = jobs.iter().map(|job| make(job.experiment)).collect();
-            self.run(jobs, &mut |window| {
-                for (lane, gatherer) in gatherers.iter_mut().enumerate().filter(|(lane, _)| window.samples[*lane] > 0) {
-                    gatherer.add(window, lane);
-                }
-            })
-            .map(|_| gatherers)
-        };
-        self.in_batches(&jobs, batch)
-    }
-
-    /// Runs jobs in batches of those that can go side by side; the results in the order of the jobs.
-    pub(super) fn in_batches<T: Send>(
-        &self,
-        jobs: &[Job<'_>],
-        batch: impl Fn(&[&Job<'_>]) -> Result<Vec<T>, Broken> + Sync,
-    ) -> Result<Vec<T>, Infeasible> {
-        let batches = self.batches(jobs);
-        let one = |b: usize| {
-            let members: Vec<&Job<'_>> = batches[b].iter().map(|&i| &jobs[i]).collect();
-            batch(&members)
-        };
-        let work = jobs.iter().map(|job| job.piece.samples.len() * (job.seeds.len() + 1)).sum::<usize>();
-        let results = match work / batches.len().max(1) > WORTH_A_THREAD || work > 8 * WORTH_A_THREAD {
-            true => each(batches.len(), one),
-            false => (0..batches.len()).map(one).collect(),
-        };
-        let mut found: Vec<Option<T>> = (0..jobs.len()).map(|_| None).collect();
-        for (members, result) in batches.iter().zip(results) {
-            let result = result.map_err(|Broken { lane, error }| {
-                self.infeasible(jobs[members[lane]].experiment, error)
-            })?;
-            members.iter().zip(result).for_each(|(&i, value)| found[i] = Some(value));
-        }
-        Ok(found.into_iter().flatten().collect())
-    }
-
-    /// The numbers of the jobs that go side by side: of records alike, the long ones first.
-    fn batches(&self, jobs: &[Job<'_>]) -> Vec<Vec<usize>> {
-        let alike = |a: &Job<'_>, b: &Job<'_>| {
-            let (one, other) = (a.piece.record, b.piece.record);
-            let uniform = |time: &Time| matches!(time, Time::Uniform { .. });
-            one.input_hold() == other.input_hold()
-                && uniform(one.times()) == uniform(other.times())
-                && a.seeds == b.seeds
-        };
-        let mut kinds: Vec<Vec<usize>> = vec![];
-        for (i, job) in jobs.iter().enumerate() {
-            match kinds.iter_mut().find(|kind| alike(&jobs[kind[0]], job)) {
-                Some(kind) => kind.push(i),
-                None => kinds.push(vec![i]),
-            }
-        }
-        let mut batches = vec![];
-        for mut kind in kinds {
-            let first = &jobs[kind[0]];
-            let lanes = self.sweep.lanes(first.piece.record, &first.seeds).max(1);
-            if lanes > 1 {
-                kind.sort_by_key(|&i| std::cmp::Reverse(jobs[i].piece.samples.len()));
-            }
-            batches.extend(kind.chunks(lanes).map(<[usize]>::to_vec));
-        }
-        batches
-    }
-
-    /// Runs pieces side by side and shows their windows of standardized errors.
-    pub(super) fn run(&self, jobs: &[&Job<'_>], show: &mut dyn FnMut(&mut Window)) -> Result<Vec<Reached>, Broken> {
-        let pieces: Vec<Piece<'_>> = jobs.iter().map(|job| job.piece.clone()).collect();
-        let mut standardize: Option<Standardize<'_>> = None;
-        let mut failed = None;
-        let visit = &mut |window: &mut Window| {
-            if self.control.stops() {
-                return false;
-            }
-            let standardize = standardize.get_or_insert_with(|| Standardize::new(self, jobs, window.lanes()));
-            if let Err((lane, sample)) = standardize.apply(window) {
-                failed = Some(Broken { lane, error: RunError::Failed { sample } });
-                return false;
-            }
-            show(window);
-            true
-        };
-        let reached = self.sweep.run(&pieces, &jobs[0].seeds, visit);
-        match failed {
-            Some(failed) => Err(failed),
-            None => {
-                let lanes = reached.into_iter().enumerate();
-                lanes.map(|(lane, reached)| reached.map_err(|error| Broken { lane, error })).collect()
-            }
-        }
+        let batch =
+            |_: &[usize], jobs: &[&Job<'_>]| gather(jobs, jobs.iter().map(|job| make(job.experiment)).collect());
+        in_batches(&jobs, batch).map_err(|(job, error)| self.infeasible(jobs[job].experiment, error))
     }
 }
 
-/// `f(0), f(1), ...`, in parallel where the feature `parallel` is on; in order.
-pub(crate) fn each<T: Send>(n: usize, f: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
-    #[cfg(feature = "parallel")]
-    if n > 1 {
-        use rayon::prelude::*;
-        return (0..n).into_par_iter().map(f).collect();
-    }
-    (0..n).map(f).collect()
+/// Runs jobs side by side and gathers from each.
+pub(super) fn gather<A: Accumulate>(jobs: &[&Job<'_>], mut gatherers: Vec<A>) -> Result<Vec<A>, Broken> {
+    run(jobs, &mut |window| {
+        for (lane, gatherer) in gatherers.iter_mut().enumerate().filter(|(lane, _)| window.samples[*lane] > 0) {
+            gatherer.add(window, lane);
+        }
+    })
+    .map(|_| gatherers)
 }

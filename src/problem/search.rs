@@ -83,6 +83,12 @@ pub(crate) trait Optimizer: Send + Sync {
     /// Its settings, as text.
     fn settings(&self) -> Result<String, Error>;
 
+    /// A copy that asks for its evaluations.
+    fn machine(&self) -> Box<dyn Machine + Send>;
+
+    /// Its name.
+    fn name(&self) -> String;
+
     /// One search of an objective with its noise as it stands.
     fn round(
         &self,
@@ -112,6 +118,14 @@ impl<S: Search> Optimizer for S {
 
     fn settings(&self) -> Result<String, Error> {
         serde_json::to_string(self).map_err(|error| Error::Optimizer(error.to_string()))
+    }
+
+    fn machine(&self) -> Box<dyn Machine + Send> {
+        Box::new(self.clone())
+    }
+
+    fn name(&self) -> String {
+        Solver::<&Objective<'_>, LeastSquaresState>::name(self).to_owned()
     }
 
     fn round(
@@ -154,7 +168,7 @@ impl<S: Search> Optimizer for S {
             outcome,
             iterations: state.get_iter(),
             evaluations: state.get_func_counts().get("linearization_count").copied().unwrap_or(0),
-            name: Solver::<&Objective<'_>, LeastSquaresState>::name(result.solver()).to_owned(),
+            name: Optimizer::name(self),
         })
     }
 

@@ -1,14 +1,15 @@
 //! [`Standardize`]: from errors and slopes in the units of the outputs to standardized ones.
 
+use super::Whitening;
 use super::pass::Job;
-use super::{Objective, Whitening};
 use crate::prefilter::Butterworth;
 use crate::sweep::Window;
 use crate::wide::{self, Task, Wide, Width};
 
 /// From errors and slopes in the units of the outputs to standardized ones, with respect to the coordinates.
 pub(super) struct Standardize<'s> {
-    objective: &'s Objective<'s>,
+    /// The whitening of each lane.
+    whitening: Vec<&'s Whitening>,
     prefilter: Option<(&'s Butterworth, Vec<f64>)>,
     /// What the entries of the rows of a sample are multiplied by, output by output, column by column, lane by lane; empty
     /// where all are one. Of each job: how fast the quantities move with the coordinates; and one over the noise level.
@@ -18,25 +19,27 @@ pub(super) struct Standardize<'s> {
 
 impl<'s> Standardize<'s> {
     /// For windows of so many lanes.
-    pub fn new(objective: &'s Objective<'s>, jobs: &[&Job<'_>], lanes: usize) -> Self {
+    pub fn new(jobs: &[&'s Job<'s>], lanes: usize) -> Self {
+        let objective = jobs[0].objective;
         let prefilter = objective.problem.settings.prefilter.as_ref().map(|filter| (filter, vec![]));
         let predicted = objective.sweep.predicts_variance();
         let columns = jobs[0].seeds.len() + 1;
         let mut factors = vec![];
         for j in 0..objective.outputs() {
-            let unit = match &objective.whitening {
+            let unit = |job: &Job<'_>| match &job.objective.whitening {
                 Whitening::Diagonal(sigma) if !predicted => 1.0 / sigma[j],
                 _ => 1.0,
             };
             for column in 0..columns {
-                let scale = |job: &&Job<'_>| unit * job.scales.get(column).unwrap_or(&1.0);
+                let scale = |job: &&Job<'_>| unit(job) * job.scales.get(column).unwrap_or(&1.0);
                 factors.extend(jobs.iter().map(scale).chain(std::iter::repeat(1.0)).take(lanes));
             }
         }
         if factors.iter().all(|factor| *factor == 1.0) {
             factors.clear();
         }
-        Standardize { objective, prefilter, factors, width: Width::widest() }
+        let whitening = jobs.iter().map(|job| &job.objective.whitening).collect();
+        Standardize { whitening, prefilter, factors, width: Width::widest() }
     }
 
     /// The lane and the sample whose error is not finite, where there is one.
@@ -52,7 +55,7 @@ impl<'s> Standardize<'s> {
         if window.has_variances() {
             by_variance(window)?;
         } else {
-            self.objective.whitening.decorrelate(window);
+            self.whitening.iter().enumerate().for_each(|(lane, whitening)| whitening.decorrelate(window, lane));
         }
         if !self.factors.is_empty() {
             wide::run(self.width, Multiply { rows: window.rows_mut(), factors: &self.factors });

@@ -67,13 +67,11 @@ impl Whitening {
         }
     }
 
-    /// Standardizes the rows of a window by a full covariance; does nothing where there is none.
-    pub fn decorrelate(&self, window: &mut Window) {
+    /// Standardizes the rows of a lane by a full covariance; does nothing where there is none.
+    pub fn decorrelate(&self, window: &mut Window, lane: usize) {
         let Whitening::Full { covariance, inverse } = self else { return };
-        for lane in 0..window.lanes() {
-            for k in 0..window.samples[lane] {
-                mix(covariance, inverse, window, k, lane);
-            }
+        for k in 0..window.samples[lane] {
+            mix(covariance, inverse, window, k, lane);
         }
     }
 }

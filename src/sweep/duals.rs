@@ -87,8 +87,7 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
         stops: &dyn Fn() -> bool,
     ) -> Option<Located> {
         let layout = &*self.layout;
-        let search =
-            FailureSearch { layout, values: &self.model, duals: &self.model, method: &*self.method, record };
+        let search = FailureSearch { layout, values: &self.model, duals: &self.model, method: &*self.method, record };
         Some(search.locate(state, parameters, sample, sigma, stops))
     }
 
@@ -148,14 +147,7 @@ impl FailureSearch<'_> {
     }
 
     /// What fails in a simulation from this state; where nothing does, the error that is largest against the noise.
-    pub fn locate(
-        &self,
-        state: &[f64],
-        p: &[f64],
-        sample: usize,
-        sigma: &[f64],
-        stops: &dyn Fn() -> bool,
-    ) -> Located {
+    pub fn locate(&self, state: &[f64], p: &[f64], sample: usize, sigma: &[f64], stops: &dyn Fn() -> bool) -> Located {
         let broken = |k, signal, value, hint| Located::Broken(self.failure(k, signal, value, hint));
         let unsound = |values: &[f64]| {
             let i = values.iter().position(|v| !v.is_finite())?;

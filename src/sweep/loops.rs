@@ -75,11 +75,14 @@ impl<const N: usize, T: Scalar + lanes::Number> Number for Dual<N, T> {
     }
 }
 
-/// The rows of one window, with the sample after its last one; made once, and filled for each window.
+/// The rows of one window, with the sample after its last one, and the samples before from which it is predicted; made
+/// once, and filled for each window.
 struct Rows<'p, M: Model> {
     record: &'p Record,
     input_columns: Vec<&'p [f64]>,
     output_columns: Vec<&'p [f64]>,
+    /// How many samples there are before the window's first.
+    before: usize,
     times: Vec<f64>,
     inputs: Vec<Of<M::Input, f64>>,
     outputs: Vec<Of<M::Output, f64>>,
@@ -91,19 +94,21 @@ impl<'p, M: Model> Rows<'p, M> {
             record,
             input_columns: record.inputs().iter().map(|channel| &*channel.values).collect(),
             output_columns: record.outputs().iter().map(|channel| &*channel.values).collect(),
+            before: 0,
             times: Vec::with_capacity(WINDOW + 1),
             inputs: Vec::with_capacity(WINDOW + 1),
             outputs: Vec::with_capacity(WINDOW),
         }
     }
 
-    fn read(&mut self, begin: usize, samples: usize) {
+    fn read(&mut self, begin: usize, samples: usize, before: usize) {
         let (record, inputs, outputs) = (self.record, &self.input_columns, &self.output_columns);
-        let all = record.len().min(begin + samples + 1);
+        self.before = before.min(begin);
+        let all = begin - self.before..record.len().min(begin + samples + 1);
         self.times.clear();
-        self.times.extend((begin..all).map(|k| record.time(k)));
+        self.times.extend(all.clone().map(|k| record.time(k)));
         self.inputs.clear();
-        self.inputs.extend((begin..all).map(|k| M::Input::from_fn(|i| inputs[i][k])));
+        self.inputs.extend(all.map(|k| M::Input::from_fn(|i| inputs[i][k])));
         self.outputs.clear();
         self.outputs.extend((begin..begin + samples).map(|k| M::Output::from_fn(|j| outputs[j][k])));
     }
@@ -209,7 +214,7 @@ impl<M: Model, I: Integrator> Task<'_, M, I> {
         while begin < piece.samples.end {
             let samples = WINDOW.min(piece.samples.end - begin);
             (window.begin[0], window.samples[0]) = (begin, samples);
-            rows.read(begin, samples);
+            rows.read(begin, samples, self.restart.unwrap_or(0));
             for (entry, x) in window.carry.iter_mut().zip(M::State::into_array(passes[0].x)) {
                 *entry = x.value();
             }
@@ -244,7 +249,7 @@ struct Fill<'f, 't, M: Model, I, D: Number> {
 }
 
 impl<M: Model, I: Integrator, D: Number> Fill<'_, '_, M, I, D> {
-    /// The state at the sample after `k`, both counted from the window's begin.
+    /// The state at the row after `k`.
     #[inline(always)]
     fn advance(
         &self,
@@ -261,38 +266,15 @@ impl<M: Model, I: Integrator, D: Number> Fill<'_, '_, M, I, D> {
         ModelSystem { model: self.task.model, interval: &interval, p }.step(self.task.integrator, x, step)
     }
 
-    /// The state that sample `sample` is predicted from, `restart` samples after it was measured; `None` if it was not.
-    fn restarted(
-        &self,
-        sample: usize,
-        restart: usize,
-        p: &Of<M::Parameters, D>,
-    ) -> Result<Option<Of<M::State, D>>, Stuck> {
-        let (piece, n) = (self.task.piece, M::State::LEN);
-        let (mut x, first) = if sample < restart {
-            (self.pass.start, 0)
-        } else {
-            let x = &piece.prepared.restarts[(sample - restart) * n..][..n];
-            if x.iter().any(|x| x.is_nan()) {
-                return Ok(None);
-            }
-            (M::State::from_fn(|i| D::from(x[i])), sample - restart)
-        };
-        let record = piece.record;
-        let input = |k: usize| M::Input::from_fn(|i| record.inputs()[i].values[k]);
-        let mut step = 0.0;
-        for k in first..sample {
-            let hold = record.input_hold();
-            let u0 = input(k);
-            let u1 = if hold == Hold::First { input(k + 1) } else { u0 };
-            let interval = Interval { t0: record.time(k), t1: record.time(k + 1), u0, u1, hold };
-            x = ModelSystem { model: self.task.model, interval: &interval, p }.step(
-                self.task.integrator,
-                x,
-                &mut step,
-            )?;
+    /// The measured state from which a sample is predicted, so many samples before; `None` if it was not measured.
+    fn restarted(&self, sample: usize, restart: usize) -> Option<(Of<M::State, D>, usize)> {
+        let n = M::State::LEN;
+        if sample < restart {
+            return Some((self.pass.start, sample));
         }
-        Ok(Some(x))
+        let x = &self.task.piece.prepared.restarts[(sample - restart) * n..][..n];
+        let measured = x.iter().all(|x| !x.is_nan());
+        measured.then(|| (M::State::from_fn(|i| D::from(x[i])), restart))
     }
 }
 
@@ -305,37 +287,49 @@ impl<M: Model, I: Integrator, D: Number> Kernel for Fill<'_, '_, M, I, D> {
         let (begin, samples) = (self.window.begin[0], self.window.samples[0]);
         let (p, mut x, mut step) = (self.pass.p, self.pass.x, self.pass.step);
         let (first, used, columns) = (self.pass.first, self.pass.used, self.window.columns());
-        for k in 0..samples {
-            let failed = |Stuck| RunError::Failed { sample: begin + k };
-            let state = match self.task.restart {
-                None => x,
-                Some(restart) => match self.restarted(begin + k, restart, &p).map_err(failed)? {
-                    Some(state) => state,
-                    None => {
-                        for j in 0..M::Output::LEN {
-                            self.window.set_measured(k, j, 0);
-                            self.window.row_mut(k, j).fill(0.0);
-                        }
-                        continue;
+        let before = self.rows.before;
+        let mut whole = true;
+        for k in 0..=samples {
+            let row = before + k;
+            // Where the way to this sample begins, and how many intervals it has.
+            let mut intervals = usize::from(k > 0 && row < self.rows.times.len());
+            if let Some(restart) = self.task.restart {
+                if k == samples {
+                    break;
+                }
+                let Some((from, count)) = self.restarted(begin + k, restart) else {
+                    for j in 0..M::Output::LEN {
+                        self.window.set_measured(k, j, 0);
+                        self.window.row_mut(k, j).fill(0.0);
                     }
-                },
-            };
-            let u = M::Input::map(self.rows.inputs[k], D::from);
-            let expected = self.task.model.output(D::from(self.rows.times[k]), &state, &u, &p);
+                    whole = false;
+                    continue;
+                };
+                (x, intervals, step) = (from, count, 0.0);
+            }
+            // The only place from which the model's step is called: with two of them compilers inline neither.
+            for from in row - intervals..row {
+                x = self.advance(from, x, &p, &mut step).map_err(|Stuck| RunError::Failed { sample: begin + k })?;
+            }
+            if k == samples {
+                break;
+            }
+            let u = M::Input::map(self.rows.inputs[row], D::from);
+            let expected = self.task.model.output(D::from(self.rows.times[row]), &x, &u, &p);
             let (expected, found) = (M::Output::into_array(expected), M::Output::into_array(self.rows.outputs[k]));
             for (j, (expected, found)) in expected.into_iter().zip(found).enumerate() {
                 let here = !found.is_nan();
                 self.window.set_measured(k, j, u32::from(here));
                 let row = self.window.row_mut(k, j);
-                row[columns - 1] = if here { found - expected.value() } else { 0.0 };
+                let error = found - expected.value();
+                whole &= error.is_finite();
+                row[columns - 1] = if here { error } else { 0.0 };
                 for (i, slope) in row[first..first + used].iter_mut().enumerate() {
                     *slope = if here { expected.slope(i) } else { 0.0 };
                 }
             }
-            if self.task.restart.is_none() && k + 1 < self.rows.times.len() {
-                x = self.advance(k, x, &p, &mut step).map_err(|Stuck| RunError::Failed { sample: begin + k + 1 })?;
-            }
         }
+        self.window.whole = whole;
         self.pass.x = M::State::map(x, Number::flushed);
         self.pass.step = step;
         Ok(())

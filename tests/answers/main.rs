@@ -12,3 +12,4 @@ mod residuals;
 #[path = "../common/shared.rs"]
 mod shared;
 mod silent_failures;
+mod stops;

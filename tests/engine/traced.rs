@@ -3,7 +3,8 @@
 use crate::steps::agrees;
 use greybox::graph::{Function, Graph, Leaf, Symbol};
 use greybox::models::{
-    Armature, Axis, Command, DcMotor, Feed, ControlledAxisMotion, AxisMotion, Positioning, PositioningLoop, Reference, Rotation,
+    Armature, Axis, AxisMotion, Command, ControlledAxisMotion, DcMotor, Feed, Positioning, PositioningLoop, Reference,
+    Rotation,
 };
 use greybox::pmsm::{
     AngledDrive, Cabled, Compensated, CompensatedDrive, CompensatedSalientWinding, CompensatedWinding, Currents, Drive,

@@ -8,6 +8,7 @@ mod checks;
 mod closed_forms;
 #[path = "../common/mod.rs"]
 mod common;
+mod far_starts;
 mod kalman;
 mod models;
 mod nist;

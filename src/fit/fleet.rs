@@ -1,0 +1,151 @@
+//! [`Fleet`]: the same fit of many records, each by itself.
+
+use super::lockstep::fit_together;
+use super::{Fit, Records, declared, sweep};
+use crate::error::Error;
+use crate::estimate::{Estimate, Summary};
+use crate::experiment::ExperimentOf;
+use crate::functions::Handle;
+use crate::model::Model;
+use crate::parameter::Parameter;
+use crate::problem::{Problem, Settings, each};
+use crate::record::Record;
+use crate::sweep::Sweep;
+use core::marker::PhantomData;
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// Records whose fits go step by step together: enough to keep the lanes busy when some have ended.
+const GROUP: usize = 32;
+/// Groups that are read ahead for each thread; what they find is kept until it is asked for.
+const AHEAD: usize = 4;
+
+/// The same fit of many records, each by itself: motors on a test bench, drives in the field.
+///
+/// The model is compiled once. Records of one hold, with even or uneven time, are run side by side in vector lanes, groups of
+/// them over threads. Every answer is that of [`Fit::run`] of the record, but for rounding; what fails, fails alone.
+pub struct Fleet<'a, M: Model> {
+    sweep: Arc<dyn Sweep + 'a>,
+    parameters: Vec<Parameter>,
+    settings: Settings<'a>,
+    model: PhantomData<fn() -> M>,
+}
+
+impl<'a, M: Model> Fit<'a, M> {
+    /// The same fit for records to come, each by itself. Those given so far are left out.
+    ///
+    /// # Errors
+    /// An integrator or a predictor that does not serve the model; settings that only a single fit can have (a checkpoint,
+    /// observers).
+    pub fn fleet(self) -> Result<Fleet<'a, M>, Error> {
+        if self.settings.checkpoint.is_some() || !self.settings.observers.is_empty() {
+            let text = "a fleet writes no checkpoint and shows no progress; ask its answers, which come in order";
+            return Err(Error::Option(text.to_owned()));
+        }
+        self.settings.optimizer.check()?;
+        let sweep = sweep(Handle::Borrowed(self.model), &self.stepping, &self.predictor)?;
+        let (parameters, settings) = (declared::<M>(self.parameters), self.settings);
+        Ok(Fleet { sweep, parameters, settings, model: PhantomData })
+    }
+}
+
+impl<'a, M: Model> Fleet<'a, M> {
+    /// The fit of records to come.
+    ///
+    /// ```
+    /// # use greybox::*;
+    /// # use greybox::pmsm::{Currents, Drive, Surface, Winding};
+    /// # fn example(records: Vec<ExperimentOf<Surface>>) -> Result<(), Error> {
+    /// # let model = Surface::new(4)?;
+    /// let parameters = Winding { rs: free(1.0), ls: free(1e-3), ke: free(0.5) };
+    /// let fleet = Fleet::new(&model).parameters(parameters).fleet()?;
+    /// for motor in fleet.run(records) {
+    ///     match motor {
+    ///         Ok(motor) => println!("{}", motor.parameters.rs),
+    ///         Err(error) => eprintln!("{error}"),
+    ///     }
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[expect(clippy::new_ret_no_self, reason = "a fleet without parameters is not a fleet yet")]
+    pub fn new(model: &'a M) -> Records<'a, M> {
+        Records { model, experiments: &[] }
+    }
+
+    /// Fits the records, and gives the answers in their order, as they are asked for. Some hundred records for each thread
+    /// are read ahead, whatever their number.
+    pub fn run<R>(&self, records: R) -> Answers<'_, 'a, M, R::IntoIter>
+    where
+        R: IntoIterator<Item = ExperimentOf<M>>,
+    {
+        Answers { fleet: self, records: records.into_iter(), ready: VecDeque::new() }
+    }
+
+    /// Fits one record.
+    ///
+    /// # Errors
+    /// As [`Fit::run`].
+    pub fn fit(&self, record: &ExperimentOf<M>) -> Result<Estimate<M>, Error> {
+        Estimate::of(self.problem(record.record().clone())?.run()?)
+    }
+
+    fn problem(&self, record: Record) -> Result<Problem<'a>, Error> {
+        Problem::new(self.sweep.clone(), vec![record], &self.parameters, self.settings.clone())
+    }
+
+    fn group(&self, records: &[Record]) -> Vec<Result<Summary, Error>> {
+        let problems: Vec<_> = records.iter().map(|record| self.problem(record.clone())).collect();
+        let mut answers: Vec<Option<Result<Summary, Error>>> = Vec::with_capacity(problems.len());
+        let mut sound = vec![];
+        for problem in problems {
+            match problem {
+                Ok(problem) => {
+                    sound.push(problem);
+                    answers.push(None);
+                }
+                Err(error) => answers.push(Some(Err(error))),
+            }
+        }
+        let mut found = match self.settings.prefilter.is_none() && self.is_wide(&sound) {
+            true => fit_together(&sound),
+            false => sound.iter().map(Problem::run).collect(),
+        }
+        .into_iter();
+        answers.into_iter().filter_map(|answer| answer.or_else(|| found.next())).collect()
+    }
+
+    /// Whether records like these are run side by side.
+    fn is_wide(&self, problems: &[Problem<'_>]) -> bool {
+        problems.first().is_some_and(|problem| self.sweep.lanes(&problem.records[0], &problem.unknowns.seeds(0)) > 1)
+    }
+}
+
+/// The answers of a fleet, in the order of its records.
+pub struct Answers<'f, 'a, M: Model, R> {
+    fleet: &'f Fleet<'a, M>,
+    records: R,
+    ready: VecDeque<Result<Summary, Error>>,
+}
+
+impl<M: Model, R: Iterator<Item = ExperimentOf<M>>> Iterator for Answers<'_, '_, M, R> {
+    type Item = Result<Estimate<M>, Error>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.ready.is_empty() {
+            let ahead = GROUP * AHEAD * threads();
+            let records: Vec<Record> =
+                self.records.by_ref().take(ahead).map(|experiment| experiment.record().clone()).collect();
+            let groups: Vec<&[Record]> = records.chunks(GROUP).collect();
+            self.ready.extend(each(groups.len(), |g| self.fleet.group(groups[g])).into_iter().flatten());
+        }
+        self.ready.pop_front().map(|answer| Estimate::of(answer?))
+    }
+}
+
+fn threads() -> usize {
+    #[cfg(feature = "parallel")]
+    return rayon::current_num_threads();
+    #[cfg(not(feature = "parallel"))]
+    1
+}

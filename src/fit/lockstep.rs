@@ -1,0 +1,150 @@
+//! Fits of single records that go step by step together: each evaluation of all of them is one pass over lanes.
+
+use super::search::Rounds;
+use crate::error::Error;
+use crate::estimate::Summary;
+use crate::judge::{SearchEnd, conclude, conclude_from, residuals_together};
+use crate::optimize::{Domain, Infeasible, LeastSquares, Linearization, Machine, Outcome, Request};
+use crate::problem::{At, Control, Objective, Problem, Round, linearize_together};
+use std::time::Instant;
+
+static NEVER: Control = Control::NEVER;
+
+/// A search on its way.
+struct Search<'p> {
+    rounds: Rounds<'p>,
+    objective: Objective<'p>,
+    machine: Box<dyn Machine + Send>,
+    name: String,
+    iterations: u64,
+    evaluations: u64,
+}
+
+/// Where a search stands.
+enum Stage<'p> {
+    Searching(Box<Search<'p>>),
+    Ended(Box<SearchEnd>),
+    /// It is fitted alone: its start cannot be evaluated, which is then told in more detail.
+    Alone,
+}
+
+impl<'p> Search<'p> {
+    fn new(rounds: Rounds<'p>) -> Self {
+        let objective = rounds.objective();
+        let mut machine = rounds.next.machine();
+        machine.begin(rounds.coordinates.clone(), Domain::of(&objective));
+        let name = rounds.next.name();
+        Search { rounds, objective, machine, name, iterations: 0, evaluations: 0 }
+    }
+
+    /// Where it asks for cost and slopes.
+    fn asks(&self) -> Option<At<'_>> {
+        match self.machine.request() {
+            Request::Linearize(x) => Some((&self.objective, x)),
+            _ => None,
+        }
+    }
+
+    /// Tells it what it asked for, and goes on until it asks again.
+    fn tell(mut self: Box<Self>, answer: Result<Linearization, Infeasible>) -> Stage<'p> {
+        self.evaluations += 1;
+        match (self.machine.linearization().is_some(), &answer) {
+            (false, Err(_)) => return Stage::Alone,
+            (begun, _) => self.iterations += u64::from(begun),
+        }
+        self.machine.tell(answer);
+        loop {
+            match self.machine.request() {
+                Request::Linearize(_) => return Stage::Searching(self),
+                Request::Curvature { x, along } => {
+                    let answer = self.objective.curvature(x, along);
+                    self.machine.tell_curvature(answer);
+                    self.evaluations += 1;
+                }
+                Request::Ended(outcome) => return self.end(outcome),
+            }
+        }
+    }
+
+    fn end(self: Box<Self>, outcome: Outcome) -> Stage<'p> {
+        let Search { mut rounds, objective, machine, name, iterations, evaluations } = *self;
+        let outcome = match outcome {
+            Outcome::Cancelled if objective.control.expired() => Outcome::TimeLimit,
+            outcome => outcome,
+        };
+        let round = Round {
+            coordinates: machine.place().to_vec(),
+            linear: machine.linearization().cloned(),
+            outcome,
+            iterations,
+            evaluations,
+            name,
+        };
+        match rounds.take(objective, round) {
+            Some(end) => Stage::Ended(Box::new(end)),
+            None => Stage::Searching(Box::new(Search::new(rounds))),
+        }
+    }
+}
+
+/// The estimate of each problem, all of the same sweep and of one record each.
+pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Error>> {
+    let begin = Instant::now();
+    let controls: Vec<Control> = problems.iter().map(|problem| problem.control(begin)).collect();
+    let plain: Vec<Objective<'_>> = problems.iter().zip(&controls).map(|(p, control)| p.in_units(control)).collect();
+    let first = |plain| match Rounds::new(plain, &plain.problem.settings.optimizer) {
+        Ok(rounds) => Stage::Searching(Box::new(Search::new(rounds))),
+        Err(_) => Stage::Alone,
+    };
+    let mut stages: Vec<Stage<'_>> = plain.iter().map(first).collect();
+    loop {
+        let asking = stages.iter().enumerate().filter_map(|(i, stage)| match stage {
+            Stage::Searching(search) => Some((i, search.asks()?)),
+            _ => None,
+        });
+        let (asking, points): (Vec<usize>, Vec<At<'_>>) = asking.unzip();
+        if asking.is_empty() {
+            break;
+        }
+        for (i, answer) in asking.into_iter().zip(linearize_together(&points)) {
+            if let Stage::Searching(search) = std::mem::replace(&mut stages[i], Stage::Alone) {
+                stages[i] = search.tell(answer);
+            }
+        }
+    }
+    conclude_together(problems, &plain, stages, begin)
+}
+
+fn conclude_together(
+    problems: &[Problem<'_>],
+    plain: &[Objective<'_>],
+    stages: Vec<Stage<'_>>,
+    begin: Instant,
+) -> Vec<Result<Summary, Error>> {
+    let ended = |(stage, plain): (&Stage<'_>, _)| match stage {
+        Stage::Ended(end) => Some(at_end(plain, end)),
+        _ => None,
+    };
+    let objectives: Vec<Option<Objective<'_>>> = stages.iter().zip(plain).map(ended).collect();
+    let points = stages.iter().zip(&objectives).filter_map(|(stage, objective)| match (stage, objective) {
+        (Stage::Ended(end), Some(objective)) => Some((objective, &end.coordinates[..])),
+        _ => None,
+    });
+    let mut residuals = residuals_together(&points.collect::<Vec<_>>()).into_iter();
+    let seconds = begin.elapsed().as_secs_f64() / problems.len() as f64;
+    let finish = |((stage, objective), problem): ((&Stage<'_>, &Option<Objective<'_>>), &Problem<'_>)| match (
+        stage, objective,
+    ) {
+        (Stage::Ended(end), Some(objective)) => match residuals.next().flatten() {
+            Some(residuals) => conclude_from(objective, end, residuals, seconds),
+            None => conclude(objective, end, seconds),
+        },
+        _ => problem.run(),
+    };
+    stages.iter().zip(&objectives).zip(problems).map(finish).collect()
+}
+
+/// The objective that a search ended with. What was found is concluded even if the time is over.
+fn at_end<'p>(plain: &Objective<'p>, end: &SearchEnd) -> Objective<'p> {
+    Objective { memory: end.memory.clone(), control: &NEVER, ..plain.with(end.whitening.clone()) }
+}
