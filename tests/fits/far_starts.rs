@@ -181,5 +181,10 @@ fn the_emps_record_is_fitted_in_open_loop_from_far() {
     let fit = Fit::new(&model, &record).parameters(start).run().unwrap();
     // One of the two best minima, 2.451 and 2.474 mm rms.
     let rms = (2.0 * fit.cost / 24_841.0).sqrt();
-    assert!(fit.outcome.converged() && fit.iterations < 300 && rms < 2.5e-3, "{rms}: {} {}", fit.iterations, fit.outcome);
+    assert!(
+        fit.outcome.converged() && fit.iterations < 300 && rms < 2.5e-3,
+        "{rms}: {} {}",
+        fit.iterations,
+        fit.outcome
+    );
 }
