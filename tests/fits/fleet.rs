@@ -79,7 +79,7 @@ fn each_answer_is_that_of_the_single_fit() {
     let stamps: Vec<f64> = (0..600).map(|k| TS * (k as f64 + 0.2 * (k as f64).sin())).collect();
     records[27] = Experiment::new(
         &model,
-        Time::Stamps(stamps.into()),
+        Time::Stamps(stamps),
         records[0].inputs().collect(),
         records[0].outputs().collect(),
     )
