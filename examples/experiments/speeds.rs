@@ -128,7 +128,8 @@ fn claims(report: &mut Report, all: &[Compared]) {
 /// R, L and Ke of every method against speed, an axis in each panel.
 fn against_speed(report: &mut Report, all: &[Compared]) {
     type Of = fn(&Winding) -> f64;
-    let quantities: [(&str, &str, &str, Of, fn(&Axis) -> f64); 3] = [
+    type Truth = fn(&Axis) -> f64;
+    let quantities: [(&str, &str, &str, Of, Truth); 3] = [
         ("exp3-rs", "Resistance", "R (ohm)", |p| p.rs, |a| a.rs),
         ("exp3-ls", "Inductance", "L (mH)", |p| 1e3 * p.ls, |a| 1e3 * a.ls),
         ("exp3-ke", "Back-EMF", "Ke (V s/rad)", |p| p.ke, |a| a.ke),

@@ -9,6 +9,8 @@ use crate::problem::Objective;
 
 /// A finer step may move a parameter by this part of its standard error without a warning.
 const STEP_SHIFT: f64 = 0.5;
+/// A predicted standard deviation that is smaller than this part of the errors is none of noise.
+const SURE: f64 = 1e-6;
 /// Autocorrelation that widens an interval by more than this factor calls for care.
 const CORRELATION_MATTERS: f64 = 2.0;
 
@@ -26,6 +28,7 @@ impl Judgement<'_> {
     ) -> Vec<Warning> {
         let mut warnings = vec![];
         warnings.extend(self.of_the_data(unknowns));
+        warnings.extend(self.unbounded());
         warnings.extend(self.gaps());
         for unknown in unknowns {
             if let Knowledge::Held { bound } = unknown.knowledge {
@@ -62,6 +65,23 @@ impl Judgement<'_> {
         }
         let none = unknowns.iter().all(|row| row.knowledge == Knowledge::Unidentified);
         none.then(|| Warning { severity, text: "the data determine none of the unknowns".to_owned() })
+    }
+
+    /// Whether a predicted variance goes to zero: there the likelihood has no maximum.
+    fn unbounded(&self) -> Option<Warning> {
+        let of = |j: usize| (self.residuals.surest[j], self.residuals.outputs[j].rmse);
+        let j = (0..self.residuals.surest.len()).find(|&j| of(j).0 < SURE * of(j).1)?;
+        let (output, (surest, rmse)) = (&self.objective.problem.layout().outputs[j], of(j));
+        let text = format!(
+            "a measurement of `{}` is predicted with a standard deviation of {} {unit}, beside errors of {} {unit}: the \
+             likelihood grows without bound (a free initial state fits the first measurement exactly); give the noise a \
+             lower bound, or fix the initial state",
+            output.name,
+            number(surest, 2),
+            number(rmse, 2),
+            unit = output.unit
+        );
+        Some(Warning { severity: Severity::NotUsable, text })
     }
 
     fn gaps(&self) -> Vec<Warning> {

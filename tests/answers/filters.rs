@@ -3,7 +3,10 @@
 use crate::pages::{Branch, Lag, Response, record};
 use crate::random::Random;
 use greybox::diagnose::bands;
-use greybox::{Experiment, Fit, Kalman, Kind, Model, Parameter, Report, Scalar, Time, fixed, free, signals};
+use greybox::optimize::Severity;
+use greybox::{
+    Experiment, ExperimentOf, Fit, Kalman, Kind, Model, Parameter, Report, Scalar, Time, fixed, free, signals,
+};
 
 signals! { pub struct Level { x: "V" } }
 signals! { pub struct Drive { u: "V" } }
@@ -35,14 +38,14 @@ impl Model for Drifting {
     }
 }
 
-/// The noise in the band of a filter is what a scalar filter by hand predicts, sample by sample, and parameters that are
-/// seen in the spread of the errors only are not called without influence.
-#[test]
-fn the_band_of_a_filter_is_its_own() {
+/// Three of four samples are not measured in the second half.
+fn is_measured(k: usize) -> bool {
+    k < 1000 || k.is_multiple_of(4)
+}
+
+fn drifting() -> ExperimentOf<Drifting> {
     let mut random = Random(77);
     let (mut x, mut inputs, mut outputs) = (0.0, vec![], vec![]);
-    // Three of four samples are not measured in the second half.
-    let is_measured = |k: usize| k < 1000 || k.is_multiple_of(4);
     for k in 0..2000 {
         let u = if k / 50 % 2 == 0 { 1.0 } else { -1.0 };
         let y = x + 0.2 * random.normal();
@@ -50,10 +53,32 @@ fn the_band_of_a_filter_is_its_own() {
         outputs.push(Sensor { y: if is_measured(k) { y } else { f64::NAN } });
         x = 0.9 * x + u + 0.3 * random.normal();
     }
-    let record = Experiment::new(&Drifting, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
-    let record = record.initial(Level { x: fixed(0.0) });
-    let start: Unsteady<Parameter> = Unsteady { decay: free(0.8), drift: free(1.0).log(), noise: free(1.0).log() };
-    let problem = Fit::new(&Drifting, &record).parameters(start).predictor(Kalman).problem().unwrap();
+    Experiment::new(&Drifting, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap()
+}
+
+fn start() -> Unsteady<Parameter> {
+    Unsteady { decay: free(0.8), drift: free(1.0).log(), noise: free(1.0).log() }
+}
+
+/// A free initial state may fit the first measurement exactly; then the likelihood has no maximum, and the verdict says so.
+#[test]
+fn a_likelihood_without_a_maximum_is_not_usable() {
+    let record = drifting();
+    // From here the search goes to a noise of nothing; from elsewhere it may end in the true maximum.
+    let nothing = Unsteady { noise: free(1e-3).log(), ..start() };
+    let estimate = Fit::new(&Drifting, &record).parameters(nothing).predictor(Kalman).run().unwrap();
+    let given = record.clone().initial(Level { x: fixed(0.0) });
+    let usable = Fit::new(&Drifting, &given).parameters(start()).predictor(Kalman).run().unwrap();
+    assert_eq!((estimate.severity(), usable.severity()), (Severity::NotUsable, Severity::Usable), "{estimate}");
+    assert!(estimate.warnings.iter().any(|w| w.text.contains("the likelihood grows without bound")), "{estimate}");
+}
+
+/// The noise in the band of a filter is what a scalar filter by hand predicts, sample by sample, and parameters that are
+/// seen in the spread of the errors only are not called without influence.
+#[test]
+fn the_band_of_a_filter_is_its_own() {
+    let record = drifting().initial(Level { x: fixed(0.0) });
+    let problem = Fit::new(&Drifting, &record).parameters(start()).predictor(Kalman).problem().unwrap();
     let estimate = problem.run().unwrap();
     let found = bands(&problem, &estimate, 0, 0.95).unwrap();
     let [decay, drift, noise] = [0, 1, 2].map(|i| estimate.parameters[i].value);

@@ -9,6 +9,7 @@ mod closed_forms;
 #[path = "../common/mod.rs"]
 mod common;
 mod far_starts;
+mod fleet;
 mod kalman;
 mod models;
 mod nist;
