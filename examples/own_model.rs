@@ -60,7 +60,7 @@ fn main() -> Result<(), Error> {
             beta: free(3950.0).prior(3950.0, 40.0),
         })
         .run()?;
-    println!("{estimate}\n\nTrue values: {open:?}, with its lid a loss of 0.8 W/K");
+    println!("{estimate}\n\nTrue values, with the lid a loss of 0.8 W/K:\n{open:?}");
 
     // The estimate simulated. How warm does the open mug stay at 30 W?
     let (time, inputs) = (model.time(), vec![Surroundings { power: 30.0, ambient: 293.0 }; 1000]);

@@ -5,12 +5,14 @@
 mod bands;
 mod bootstrap;
 mod compare;
+mod convergence;
 mod derived;
 mod drift;
 mod identifiability;
 mod profile;
 pub mod residuals;
 mod restarts;
+mod side_by_side;
 
 pub use bands::{Bands, bands};
 pub(crate) use bands::{Widths, widths};
@@ -18,17 +20,22 @@ pub use bootstrap::{Bootstrap, Resampling, bootstrap};
 pub use compare::{
     Candidate, Comparison, NamedQualities, Validation, cross_validate, f_test, likelihood_ratio, validate,
 };
+pub use convergence::{Convergence, Iteration};
 pub use derived::{Derived, derived};
 pub use drift::{Drift, drift};
 pub(crate) use identifiability::reworded;
 pub use identifiability::{COLLINEAR, Collinear, Excitation, Identifiability, Segment, identifiability};
 pub use profile::{End, Profile, ProfilePoint, profile};
-pub use restarts::{Better, Restarts, restarts};
+pub use restarts::{Better, Minimum, Restarts, restarts};
+pub use side_by_side::{Compared, ComparedOutput, DataUse};
 
 use crate::error::Error;
-use crate::estimate::p_value;
-use crate::optimize::{Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization, Machine};
-use crate::problem::{Control, Problem};
+use crate::numeral::p_value;
+use crate::optimize::{
+    Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization, Machine, Severity,
+};
+use crate::problem::{Control, Objective, Problem};
+use crate::section::{Cell, Section, Table};
 use argmin::core::{Executor, State};
 use serde::{Deserialize, Serialize};
 
@@ -63,6 +70,30 @@ impl Test {
         let meaning = if holds { passed } else { failed }.to_owned();
         Test { name: name.into(), statistic, p_value, passed: holds, meaning }
     }
+}
+
+/// Tests of something (nested models, drift) as a section of a report; where one fails, the estimate is to be used with
+/// care.
+pub fn tested<'a>(about: &str, tests: impl IntoIterator<Item = &'a Test>) -> Section {
+    let tests: Vec<&Test> = tests.into_iter().collect();
+    let part = Section::new(format!("tests-{about}"), about).table(results(about, tests.iter().copied()));
+    let failed = tests.iter().filter(|test| !test.passed);
+    let about = about.replace('`', "'");
+    let part = failed.fold(part, |part, test| {
+        part.because(Severity::UsableWithCare, format!("`{about}`, {}: {}", test.name, test.meaning))
+    });
+    Section::new("tests", "Further tests").part(part)
+}
+
+/// Tests and their results; what each means stands where it failed.
+pub(crate) fn results<'a>(caption: &str, tests: impl IntoIterator<Item = &'a Test>) -> Table {
+    let row = |test: &Test| {
+        let result = if test.passed { "✓ passes" } else { "! fails" };
+        let meaning = if test.passed { "" } else { &test.meaning };
+        let probability = Cell::Number { value: test.p_value, text: test.probability() };
+        [test.name.replace('`', "").into(), probability, result.into(), meaning.replace('`', "").into()]
+    };
+    Table::new(caption, ["test", "probability", "result", "meaning"]).rows(tests.into_iter().map(row))
 }
 
 /// A problem with other bounds; equal bounds pin an unknown.
@@ -101,6 +132,14 @@ fn check_complete(problem: &Problem<'_>, control: &Control, what: &str) -> Resul
         ),
         _ => format!("{what} was cancelled; lower the flag to run it"),
     }))
+}
+
+/// Cost and slopes at an estimate.
+fn linearize(objective: &Objective<'_>, best: &[f64], what: &str) -> Result<Linearization, Error> {
+    objective.linearize(best).map_err(|error| {
+        let stopped = check_complete(objective.problem, objective.control, what).err();
+        stopped.unwrap_or(Error::Optimizer(error.to_string()))
+    })
 }
 
 /// Place and cost of the minimum that a search from `start` ends in; `None` where it cannot begin or does not end.

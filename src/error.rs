@@ -1,5 +1,6 @@
 //! [`Error`]: why there is nothing to hand back. What a fit found but did not like is an outcome, not an error.
 
+use crate::numeral::exact;
 use std::path::PathBuf;
 
 /// A call that could not be served, with the thing, the number and the remedy.
@@ -36,7 +37,7 @@ pub enum Error {
     },
     /// A time or input that is not a finite number.
     #[error(
-        "experiment `{experiment}`: `{signal}` is {value} at sample {sample} (t = {time} s); only outputs may be missing (NaN)"
+        "experiment `{experiment}`: `{signal}` is {value} at sample {sample} (t = {} s); only outputs may be missing (NaN)", exact(*time)
     )]
     NotFinite {
         /// Name of the experiment.
@@ -52,7 +53,7 @@ pub enum Error {
     },
     /// Time that stands still or runs backwards.
     #[error(
-        "experiment `{experiment}`: time does not increase at sample {sample}: {before} s is followed by {time} s; sort the record or drop repeated stamps"
+        "experiment `{experiment}`: time does not increase at sample {sample}: {} s is followed by {} s; sort the record or drop repeated stamps", exact(*before), exact(*time)
     )]
     TimeOrder {
         /// Name of the experiment.
@@ -226,7 +227,7 @@ impl core::fmt::Debug for Error {
 
 /// Where and how a simulation failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("experiment `{experiment}`, sample {sample} (t = {time} s): {signal} is {}{hint}", short(*value))]
+#[error("experiment `{experiment}`, sample {sample} (t = {} s): {signal} is {}{hint}", exact(*time), short(*value))]
 pub struct Failure {
     /// Name of the experiment.
     pub experiment: String,

@@ -4,12 +4,12 @@ mod display;
 mod prediction;
 pub(crate) mod student;
 
-pub(crate) use display::{number, p_value};
 pub use prediction::Prediction;
 
 use crate::information::{Covariance, SquareMatrix};
 use crate::layout::Layout;
 use crate::model::Model;
+use crate::numeral::{counted, number, or_nan, pairs_or_nan};
 use crate::optimize::{Outcome, Severity};
 use crate::parameter::{Parameter, Transform, unbounded_above, unbounded_below};
 use crate::problem::Role;
@@ -25,6 +25,7 @@ pub enum Knowledge {
     /// It was estimated; the interval covers it with 95 % probability (asymmetric, if its logarithm was estimated).
     Known {
         /// Standard error, in its own unit.
+        #[serde(deserialize_with = "or_nan")]
         standard_error: f64,
         /// Lower end of the 95 % interval; `null` in JSON stands for none.
         #[serde(with = "unbounded_below")]
@@ -67,8 +68,10 @@ pub struct Unknown {
     /// Index of the experiment that it belongs to; `None` if all share it.
     pub experiment: Option<usize>,
     /// Estimated value.
+    #[serde(deserialize_with = "or_nan")]
     pub value: f64,
     /// Where the search started.
+    #[serde(deserialize_with = "or_nan")]
     pub start: f64,
     /// What is known of it.
     pub knowledge: Knowledge,
@@ -90,6 +93,7 @@ pub struct ParameterEstimate {
     /// Unit.
     pub unit: String,
     /// Value; of a parameter that each experiment has for itself, the first experiment's.
+    #[serde(deserialize_with = "or_nan")]
     pub value: f64,
     /// What is known of it.
     pub knowledge: Knowledge,
@@ -104,10 +108,12 @@ pub struct OutputFit {
     /// Samples measured.
     pub samples: u64,
     /// Root of the mean squared prediction error, in the output's unit, before any pre-filter.
+    #[serde(deserialize_with = "or_nan")]
     pub rmse: f64,
     /// Fit (%): `100 (1 - |y - y_hat| / |y - mean y|)`; `None` if the measurement is constant.
     pub fit_percent: Option<f64>,
     /// Standard deviation of the noise: given, or estimated from the (filtered) errors with `N - p` in the denominator.
+    #[serde(deserialize_with = "or_nan")]
     pub sigma: f64,
 }
 
@@ -128,6 +134,7 @@ pub struct OutputEstimate {
 pub struct Direction {
     /// Name and relative change (to the largest among them) of each; moving them together so changes no prediction.
     /// Absolute, where the value is zero.
+    #[serde(deserialize_with = "pairs_or_nan")]
     pub moves: Vec<(String, f64)>,
 }
 
@@ -137,7 +144,9 @@ impl fmt::Display for Direction {
             return write!(f, "`{name}` has no influence on the outputs");
         }
         let names: Vec<String> = self.moves.iter().map(|(name, _)| format!("`{name}`")).collect();
-        let moves: Vec<String> = self.moves.iter().map(|(name, by)| format!("{name} {:+.3} %", by)).collect();
+        let sign = |by: f64| if by < 0.0 { '-' } else { '+' };
+        let step = |(name, by): &(String, f64)| format!("{name} {}{} %", sign(*by), number(by.abs(), 3));
+        let moves: Vec<String> = self.moves.iter().map(step).collect();
         write!(f, "{} are known only together: {} changes nothing", names.join(", "), moves.join(" with "))
     }
 }
@@ -214,7 +223,8 @@ impl fmt::Display for CovarianceMethod {
             CovarianceMethod::Sandwich => f.write_str("sandwich (errors independent from sample to sample)"),
             CovarianceMethod::FilteredSandwich => f.write_str("sandwich (white errors before the pre-filter)"),
             CovarianceMethod::Hac { lags } => {
-                write!(f, "HAC (Newey-West over {lags} lag(s), prewhitened, for colored errors)")
+                let lags = counted(*lags, "lag");
+                write!(f, "HAC (Newey-West over {lags}, prewhitened, for colored errors)")
             }
         }
     }
@@ -272,6 +282,7 @@ pub struct Summary {
     /// What the reader must know.
     pub warnings: Vec<Warning>,
     /// The minimized cost: the weighted sum of `rho` of the standardized errors, and half the squares of the priors.
+    #[serde(deserialize_with = "or_nan")]
     pub cost: f64,
     /// Measurements used (samples times outputs).
     pub measurements: u64,
@@ -282,6 +293,7 @@ pub struct Summary {
     /// Passes over the data with slopes.
     pub evaluations: u64,
     /// Time taken (s).
+    #[serde(deserialize_with = "or_nan")]
     pub seconds: f64,
     /// How it was made.
     pub method: Method,

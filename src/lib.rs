@@ -145,6 +145,8 @@ mod judge;
 #[cfg(feature = "std")]
 mod loss;
 #[cfg(feature = "std")]
+mod numeral;
+#[cfg(feature = "std")]
 pub mod numeric;
 #[cfg(feature = "std")]
 pub mod optimize;
@@ -168,6 +170,8 @@ pub mod regress;
 pub mod report;
 #[cfg(feature = "std")]
 mod scaling;
+#[cfg(feature = "std")]
+mod section;
 #[cfg(feature = "std")]
 mod simulate;
 #[cfg(feature = "std")]

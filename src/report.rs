@@ -22,243 +22,129 @@
 //! let estimate = problem.run()?;
 //! let report = Report::new(&problem, &estimate)? // with tests of the residuals, identifiability and bands
 //!     .titled("Spring of bench 3")
-//!     .with_profile(diagnose::profile(&problem, &estimate, "k", 0.95)?); // what costs many fits is asked for
+//!     .with(diagnose::profile(&problem, &estimate, "k", 0.95)?); // what costs many fits is asked for
 //! report.save(&path)?; // .html, .md, .json or .txt
 //! println!("{report}");
 //! # std::fs::remove_file(path).unwrap();
 //! # Ok::<(), greybox::Error>(())
 //! ```
 //!
-//! A report knows nothing of the model's types any more: it is a value that can be stored, compared and drawn long after the
-//! program that fitted is gone. Records enter it as drawings of a few thousand columns and a few numbers each, so its size
-//! does not grow with theirs.
+//! A report knows nothing of the model's types: it is a value that can be stored, compared and drawn long after the program
+//! that fitted is gone. It consists of the estimate's numbers and of [`Section`]s, which text, Markdown, HTML and JSON show
+//! alike. Records enter it as drawings of bounded size, so its own does not grow with theirs.
+//!
+//! # JSON
+//!
+//! `schema/report.schema.json` describes it. A number that is not finite (a standard error without a degree of freedom) is
+//! null, because JSON has no value for it; read back, it is not a number (for a bound: none). Drawings are left out
+//! unless asked for.
 
 mod chart;
+mod facts;
 mod file;
 mod format;
 mod gather;
-mod histogram;
 mod html;
+mod json;
 mod markdown;
 mod markup;
-mod plots;
+mod origin;
+mod picture;
 mod sections;
-mod tables;
 mod text;
-mod trace;
 mod words;
 
-pub use format::Format;
-pub use histogram::Histogram;
-pub use plots::Plot;
-pub use sections::Finding;
-pub use trace::{Band, Trace};
+pub use crate::section::{
+    Axis, Cell, Curves, Drawing, Forest, Heat, Interval, Layer, Line, Panel, PanelKind, Plot, Reason, Section, Stretch,
+    Style, Table, Timeline, Trace,
+};
+pub use format::{Format, Version};
+pub use origin::Origin;
 
-use crate::diagnose::{Bootstrap, Identifiability, Profile, Restarts, residuals::Residuals};
 use crate::error::Error;
-use crate::estimate::{Direction, Method, OutputFit as Fitted, Unknown, Warning};
-use crate::information::SquareMatrix;
-use crate::optimize::{Outcome, Severity};
-use crate::parameter::Parameter;
+use crate::estimate::Summary;
+use crate::optimize::Severity;
 use core::fmt;
+use facts::Facts;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// What an estimate is worth, for a reader.
 ///
 /// It leads with the [`severity`](Report::severity), and holds all that is needed to judge the fit and to repeat it. It is
-/// made by [`Report::new`], which makes the diagnoses that cost little; others are added. It is kept as JSON ([`to_json`](Report::to_json), [`from_json`](Report::from_json)) and shown as text,
-/// Markdown or one self-contained HTML page; [`save`](Report::save) writes any of them.
+/// made by [`Report::new`], which makes the diagnoses that cost little; others are added by [`with`](Report::with). It is
+/// kept as JSON ([`to_json`](Report::to_json), [`from_json`](Report::from_json)) and shown as text, Markdown or one
+/// self-contained HTML page; [`save`](Report::save) writes any of them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Report {
-    /// The schema, so that a file says what it is.
+    /// What kind of file its JSON is.
     pub format: Format,
+    /// Which version of it.
+    pub version: Version,
     /// What stands above it.
     pub title: String,
     /// The worst that is said of the estimate.
     pub severity: Severity,
-    /// How the search ended.
-    pub outcome: Outcome,
-    /// What the reader must know.
-    pub warnings: Vec<Warning>,
-    /// Every free quantity of the fit.
-    pub unknowns: Vec<Unknown>,
-    /// What was declared of each parameter, fixed ones included.
-    pub declared: Vec<Declared>,
-    /// Correlation of the unknowns, in their order.
-    pub correlation: SquareMatrix,
-    /// What the data cannot tell apart.
-    pub directions: Vec<Direction>,
-    /// How well each output is reproduced over all records.
-    pub outputs: Vec<Output>,
-    /// The records of the fit.
-    pub records: Vec<Record>,
-    /// What the records can tell of the unknowns.
-    pub identifiability: Identifiability,
-    /// Likelihood profiles, if any were made.
-    pub profiles: Vec<Profile>,
-    /// Refits of resampled records, if any were made.
-    pub bootstrap: Option<Bootstrap>,
-    /// Searches from elsewhere, if any were made.
-    pub restarts: Option<Restarts>,
-    /// Further tests that someone made; those of the residuals stand with their output.
-    pub findings: Vec<Finding>,
-    /// Sums and criteria of the fit.
-    pub figures: Figures,
-    /// How it was made.
-    pub method: Method,
-}
-
-/// A parameter as it was declared.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Declared {
-    /// Name.
-    pub name: String,
-    /// Unit.
-    pub unit: String,
-    /// Start, bounds, prior, transform.
-    pub parameter: Parameter,
-}
-
-/// How well an output is reproduced.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Output {
-    /// Name.
-    pub name: String,
-    /// Unit.
-    pub unit: String,
-    /// The numbers.
-    pub quality: Fitted,
-}
-
-/// One record of the fit.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Record {
-    /// Name.
-    pub name: String,
-    /// Number of samples.
-    pub samples: u64,
-    /// Time of the first sample (s).
-    pub begin: f64,
-    /// Time of the last sample (s).
-    pub end: f64,
-    /// Median time from sample to sample (s).
-    pub sample_time: f64,
-    /// Places where samples are lost.
-    pub gaps: u64,
-    /// The inputs and the measured outputs.
-    pub signals: Vec<Signal>,
-    /// What the model made of each output.
-    pub fits: Vec<OutputFit>,
-}
-
-/// A column of a record.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Signal {
-    /// Name.
-    pub name: String,
-    /// Unit.
-    pub unit: String,
-    /// Whether it drives the model or is to be reproduced.
-    pub role: Role,
-    /// Samples that were not measured.
-    pub missing: u64,
-    /// Least value; `None` if nothing was measured.
-    pub min: Option<f64>,
-    /// Mean of the values.
-    pub mean: Option<f64>,
-    /// Greatest value.
-    pub max: Option<f64>,
-}
-
-/// What a column is to the model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Role {
-    /// It drives the model.
-    Input,
-    /// The model is to reproduce it.
-    Output,
-}
-
-/// One output of one record beside what the model predicted.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct OutputFit {
-    /// Name.
-    pub name: String,
-    /// Unit.
-    pub unit: String,
-    /// Fit (%) as in [`OutputFit`](crate::OutputFit).
-    pub fit_percent: Option<f64>,
-    /// Samples for which the method has no prediction; they are drawn as gaps.
-    pub unpredicted: u64,
-    /// What is left unexplained, and what it was tested for.
-    pub residuals: Residuals,
-    /// The largest residual in size, with its sign.
-    pub largest: f64,
-    /// Its time (s).
-    pub largest_at: f64,
-    /// How often which residual occurs.
-    pub histogram: Histogram,
-    /// Measured, predicted and residual, as a drawing of the whole record; `None` where too many records are to be drawn.
-    pub overview: Option<Trace>,
-    /// The samples about the largest residual, one by one, where the overview cannot show them.
-    pub closeup: Option<Trace>,
-}
-
-/// Sums and criteria of a fit.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Figures {
-    /// The minimized cost.
-    pub cost: f64,
-    /// Measurements used.
-    pub measurements: u64,
-    /// Measurements less unknowns.
-    pub degrees_of_freedom: f64,
-    /// `-2 ln` of the likelihood, where it is defined.
-    pub deviance: Option<f64>,
-    /// Akaike's information criterion.
-    pub aic: Option<f64>,
-    /// The same, corrected for short records.
-    pub aicc: Option<f64>,
-    /// Bayes' information criterion.
-    pub bic: Option<f64>,
-    /// Akaike's final prediction error.
-    pub fpe: Option<f64>,
-    /// Trial steps of the search.
-    pub iterations: u64,
-    /// Passes over the data with slopes.
-    pub evaluations: u64,
-    /// Time taken (s).
-    pub seconds: f64,
+    /// The estimate, for programs.
+    pub estimate: Summary,
+    /// What is said of it, for readers.
+    pub sections: Vec<Section>,
 }
 
 impl Report {
+    /// The report that these values make.
+    fn of(facts: &Facts) -> Report {
+        let sections = sections::all(facts);
+        let said = sections.iter().map(|section| section.severity);
+        Report {
+            format: Format,
+            version: Version,
+            title: "Parameter estimation".to_owned(),
+            severity: said.fold(facts.estimate.severity(), Severity::max),
+            estimate: facts.estimate.clone(),
+            sections,
+        }
+    }
+
     /// Puts a title above it; without one it is "Parameter estimation".
-    pub fn titled(self, title: impl Into<String>) -> Self {
-        Report { title: title.into(), ..self }
+    pub fn titled(mut self, title: impl Into<String>) -> Self {
+        self.title = title.into();
+        self
     }
 
-    /// The report as JSON, numbers to the last bit.
-    ///
-    /// # Errors
-    /// None for a report that this library made.
-    pub fn to_json(&self) -> Result<String, Error> {
-        serde_json::to_string_pretty(self).map_err(|error| Error::Option(format!("the report as JSON: {error}")))
+    /// Adds a section: a diagnosis ([`Profile`](crate::diagnose::Profile), [`Bootstrap`](crate::diagnose::Bootstrap),
+    /// [`Restarts`](crate::diagnose::Restarts), [`Compared`](crate::diagnose::Compared) records, ...) or one's own. The
+    /// report is then at least as severe. What a section of the same `id` says is added to the one that is there.
+    pub fn with(mut self, section: impl Into<Section>) -> Self {
+        let section = section.into();
+        self.severity = self.severity.max(section.severity);
+        if let Some(there) = self.sections.iter_mut().find(|there| there.id == section.id) {
+            there.extend(section);
+            return self;
+        }
+        let last = self.sections.iter().position(|there| sections::LAST.contains(&there.id.as_str()));
+        self.sections.insert(last.unwrap_or(self.sections.len()), section);
+        self
     }
 
-    /// A report from its JSON.
-    ///
-    /// # Errors
-    /// A text that is no report, or one of another schema; with its line and column.
-    pub fn from_json(text: &str) -> Result<Self, Error> {
-        serde_json::from_str(text).map_err(|error| Error::Option(format!("no report: {error}")))
+    /// Why the estimate is not simply usable, the worst first.
+    pub fn reasons(&self) -> Vec<&Reason> {
+        let mut reasons: Vec<&Reason> = vec![];
+        for reason in self.sections.iter().flat_map(Section::all_reasons) {
+            // What two sections say is said once.
+            if !reasons.iter().any(|other| other.text == reason.text) {
+                reasons.push(reason);
+            }
+        }
+        reasons.sort_by_key(|reason| core::cmp::Reverse(reason.severity));
+        reasons
+    }
+
+    /// The plots of all sections that have their drawing.
+    pub fn plots(&self) -> Vec<&Plot> {
+        let plots = self.sections.iter().flat_map(Section::all_plots);
+        plots.filter(|plot| plot.drawing.is_some()).collect()
     }
 
     /// The report as Markdown with tables (GitHub's flavor).
@@ -267,23 +153,19 @@ impl Report {
     }
 
     /// The report as one HTML page, with nothing in it that is fetched from elsewhere. It adapts to narrow and wide screens,
-    /// to light and dark, and to paper; a few lines of script in it let a reader zoom, and it reads as well without.
+    /// to light and dark, and to paper; a script in it lets a reader zoom, and it reads as well without.
     pub fn to_html(&self) -> String {
         html::page(self)
     }
 
-    /// The report as text for a terminal, in color. Its `Display` is the same without.
+    /// The report as text for a terminal of 80 columns, in color. Its `Display` is the same without. Whether a terminal
+    /// wants color is for the caller to ask (`NO_COLOR`, `std::io::IsTerminal`).
     pub fn to_colored_text(&self) -> String {
         text::page(self, true)
     }
 
-    /// The pictures of the report.
-    pub fn plots(&self) -> Vec<Plot<'_>> {
-        plots::all(self)
-    }
-
-    /// Writes the report to a file: a page, Markdown, JSON or text, as the path ends in `.html`, `.md`, `.json` or `.txt`.
-    /// It is written beside first and then renamed, so that there is never half a file.
+    /// Writes the report to a file: a page, Markdown, JSON without drawings or text, as the path ends in `.html`, `.md`,
+    /// `.json` or `.txt`. It is written beside first and then renamed, so that there is never half a file.
     ///
     /// # Errors
     /// Another ending, or a path that cannot be written to; nothing is left behind.

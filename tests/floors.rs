@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// The rooms, floor by floor. Each may import from all the rows above its own, and from nothing else.
 const FLOORS: &[(&str, &[&str])] = &[
     ("ground: hardware", &["lanes", "wide"]),
-    ("ground: beside numbers", &["scalar", "units", "dispatch", "random", "whiteness"]),
+    ("ground: beside numbers", &["scalar", "units", "dispatch", "random", "numeral", "whiteness"]),
     ("ground: numbers", &["dual", "fused", "signals"]),
     ("ground: vectors of numbers", &["information", "error", "by_name", "layout", "graph"]),
     ("say: words", &["model", "parameter", "scaling", "interval"]),
@@ -25,6 +25,7 @@ const FLOORS: &[(&str, &[&str])] = &[
     ("expect: pieces of records", &["sweep"]),
     ("learn: parts", &["loss", "weighting", "outliers", "optimize", "regress", "numeric", "online"]),
     ("learn: the problem", &["problem"]),
+    ("learn: words and figures for a reader", &["section"]),
     ("learn: the answer", &["estimate"]),
     ("learn: the judgement", &["judge"]),
     ("learn: the fit", &["fit"]),

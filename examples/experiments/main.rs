@@ -11,6 +11,8 @@ mod report;
 mod sheet;
 mod speeds;
 mod temperature;
+#[path = "../common/terminal.rs"]
+mod terminal;
 mod tracks;
 
 use clap::Parser;
@@ -33,10 +35,13 @@ struct Arguments {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments = Arguments::parse();
     let mut reports = Vec::new();
-    for number in 1..=6u8 {
+    let stop = terminal::interrupted()?;
+    let bar = terminal::spinner("experiments");
+    for number in (1..=6u8).take_while(|_| !stop.load(std::sync::atomic::Ordering::Relaxed)) {
         if arguments.experiment != "all" && arguments.experiment != number.to_string() {
             continue;
         }
+        bar.set_message(format!("experiment {number}"));
         let report = match number {
             1 => ideal::torque_step()?,
             2 => ideal::position_step()?,
@@ -46,10 +51,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             _ => applications::applications()?,
         };
         if !arguments.json {
-            println!("{report}");
+            bar.suspend(|| println!("{report}"));
         }
         reports.push(report);
     }
+    bar.finish_and_clear();
     if let Some(folder) = &arguments.plots {
         let figures: Vec<_> = reports.iter_mut().flat_map(|report| std::mem::take(&mut report.figures)).collect();
         sheet::write(folder, "The six experiments: figures", &figures)?;

@@ -1,6 +1,7 @@
 //! The results of an experiment: tables, claims beside what came out, and figures.
 
 use crate::figure::Figure;
+use greybox::report::{Cell, Table as TextTable};
 use serde::Serialize;
 use std::fmt;
 
@@ -48,32 +49,35 @@ impl Report {
     }
 }
 
+/// Text of 80 columns.
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "\n{}\n{}", self.title, "=".repeat(self.title.chars().count()))?;
         for table in &self.tables {
-            let first = table.rows.iter().map(|(label, _)| label.chars().count()).max().unwrap_or(0);
-            write!(f, "\n{}\n{:first$}", table.title, "")?;
-            for column in &table.columns {
-                write!(f, " {column:>11}")?;
-            }
-            writeln!(f)?;
-            for (label, cells) in &table.rows {
-                write!(f, "{label:first$}")?;
-                for cell in cells {
-                    // No minus before a zero.
-                    let cell = if cell.abs() < 5e-4 { 0.0 } else { *cell };
-                    write!(f, " {cell:>11.3}")?;
-                }
-                writeln!(f)?;
-            }
+            let number = |value: &f64| {
+                // No minus before a zero.
+                let value = if value.abs() < 5e-4 { 0.0 } else { *value };
+                Cell::Number { value, text: format!("{value:.3}") }
+            };
+            let rows = table.rows.iter().map(|(label, cells)| {
+                [label.as_str().into()].into_iter().chain(cells.iter().map(number)).collect::<Vec<Cell>>()
+            });
+            let columns = [""].iter().chain(&table.columns).map(|name| (*name).to_owned()).collect();
+            writeln!(f, "\n{}\n{}", table.title, TextTable { columns, ..TextTable::new("", []) }.rows(rows))?;
         }
-        writeln!(f)?;
-        for claim in &self.claims {
-            let verdict = if claim.holds { "holds" } else { "does not hold" };
-            writeln!(f, "[{verdict}] {}", claim.statement)?;
-            writeln!(f, "        threshold: {}\n        here: {}", claim.threshold, claim.found)?;
-        }
-        Ok(())
+        let verdict = |claim: &Claim| if claim.holds { "holds" } else { "does not hold" };
+        let rows = self.claims.iter().flat_map(|claim| {
+            [
+                [verdict(claim).into(), claim.statement.into()],
+                ["  threshold".into(), claim.threshold.into()],
+                ["  here".into(), claim.found.as_str().into()],
+            ]
+        });
+        writeln!(
+            f,
+            "
+{}",
+            TextTable::new("", ["claim", "is"]).rows(rows)
+        )
     }
 }

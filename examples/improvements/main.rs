@@ -12,6 +12,8 @@ mod pooled;
 mod report;
 #[path = "../experiments/sheet.rs"]
 mod sheet;
+#[path = "../common/terminal.rs"]
+mod terminal;
 
 use clap::Parser;
 use greybox::pmsm::drive::Simulation;
@@ -33,19 +35,24 @@ fn main() -> Result<()> {
     let arguments = Arguments::parse();
     let mut report = Report::new("Beyond the thesis: the same records, before and after");
     let (mut offline, mut online) = (offline::Offline::default(), online::Online::default());
-    for number in 1..=6 {
+    let stop = terminal::interrupted()?;
+    let bar = terminal::steps(7, "axes");
+    for number in (1..=6).take_while(|_| !stop.load(std::sync::atomic::Ordering::Relaxed)) {
         let axis = Axis::reference(number)?;
         let simulation = Simulation::new(axis)?;
         let cycles = run(simulation, Program::speed_cycles(&axis, 20, 1.0)?);
         let water = run(simulation, Program::water_cutting(&axis, 6)?);
         offline.compare(&cycles)?;
         online.compare(&cycles, &water)?;
+        bar.inc(1);
     }
+    bar.set_message("axis 1, variants");
     offline.report(&mut report);
     online.report(&mut report);
     others::injection(&mut report)?;
     others::switching(&mut report)?;
     others::outliers(&mut report)?;
+    bar.finish_and_clear();
     if let Some(folder) = &arguments.plots {
         sheet::write(folder, "Beyond the thesis: figures", &report.figures)?;
     }

@@ -36,7 +36,7 @@ pub fn bands(problem: &Problem<'_>, estimate: &Summary, experiment: usize, proba
     Ok(Bands { outputs, confidence, prediction })
 }
 
-/// Half widths of the bands about a prediction, a column per output.
+/// Half widths of the bands about a prediction, a column per output; NaN where there is no prediction.
 pub(crate) struct Widths {
     pub confidence: Vec<Vec<f64>>,
     pub prediction: Vec<Vec<f64>>,
@@ -53,6 +53,10 @@ pub(crate) fn widths(
     let quantile = student::quantile(0.5 + probability / 2.0, estimate.degrees_of_freedom());
     // Slopes in the outputs' own units, and the covariance in the optimizer's coordinates.
     let objective = objective.in_units();
+    // A filter needs the measurements; else, bands are wanted where nothing was measured, too.
+    let filters = objective.sweep.predicts_variance();
+    let compared = if filters { objective.problem.clone() } else { objective.problem.against_zero() };
+    let objective = objective.of(&compared, objective.sweep);
     let columns: Vec<usize> = objective.problem.unknowns.columns(experiment).collect();
     let slope = |i: usize| estimate.unknowns[i].transform.slope(estimate.unknowns[i].value);
     let n = columns.len();
@@ -84,8 +88,12 @@ impl Accumulate for Gather<'_> {
                 let g = |c: usize| window.at(k, j, c, lane);
                 let row = |i: usize| (0..n).map(|c| g(c) * self.covariance[i * n + c]).sum::<f64>() * g(i);
                 let deviation = (0..n).map(row).sum::<f64>().max(0.0).sqrt();
-                self.found.confidence[j].push(self.quantile * deviation);
-                self.found.prediction[j].push(self.quantile * deviation.hypot(*sigma));
+                // Slopes were divided by the predicted standard deviation, which takes the place of the common one.
+                let root = window.variance_root(k, j, lane);
+                let noise = if window.has_variances() { root } else { *sigma };
+                let quantile = if window.is_measured(k, j, lane) { self.quantile } else { f64::NAN };
+                self.found.confidence[j].push(quantile * deviation * root);
+                self.found.prediction[j].push(quantile * (deviation * root).hypot(noise));
             }
         }
     }

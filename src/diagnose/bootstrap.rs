@@ -4,10 +4,12 @@
 use super::{Pinned, check_complete, minimize};
 use crate::error::Error;
 use crate::estimate::Summary;
+use crate::numeral::resolved;
 use crate::optimize::LeastSquares;
 use crate::problem::{Problem, Simulated, each};
 use crate::random::Random;
 use crate::record::Record;
+use crate::section::{Cell, Section, Table};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -59,6 +61,7 @@ pub fn bootstrap(
     let (objective, best) = problem.at_within(estimate, &control)?;
     let predictions = (0..objective.experiments()).map(|e| objective.predict(e, &best));
     let predictions = predictions.collect::<Result<Vec<_>, _>>()?;
+    check_complete(problem, &control, "the bootstrap")?;
     let residuals: Vec<Vec<Vec<f64>>> = predictions.iter().map(centered).collect();
     if let Some(e) = residuals.iter().position(Vec::is_empty) {
         let experiment = problem.records()[e].name().to_owned();
@@ -70,6 +73,9 @@ pub fn bootstrap(
         });
     }
     let refit = |number: usize| -> Option<Vec<f64>> {
+        if control.stops() {
+            return None;
+        }
         let mut random = Random::stream(seed, number as u64);
         let parts = problem.records().iter().zip(&predictions).zip(&residuals);
         let records = parts.map(|((record, prediction), residuals)| {
@@ -163,4 +169,27 @@ fn draw<Y: Clone>(residuals: &[Y], count: usize, resampling: Resampling, random:
     }
     drawn.truncate(count);
     drawn
+}
+
+/// Standard errors, bias and intervals as a table.
+impl From<&Bootstrap> for Section {
+    fn from(found: &Bootstrap) -> Section {
+        let Bootstrap { unknowns, converged, tried, standard_errors, bias, intervals, seed } = found;
+        let row = |i: usize| {
+            let (error, (lower, upper)) = (standard_errors[i], intervals[i]);
+            let interval = format!("{} … {}", resolved(lower, error), resolved(upper, error));
+            [unknowns[i].as_str().into(), Cell::error(error), Cell::number(bias[i], 2), interval.into()]
+        };
+        let rows = unknowns.len().min(standard_errors.len()).min(bias.len()).min(intervals.len());
+        let columns = ["unknown", "std. error", "bias", "95 % interval"];
+        let table = Table::new("Refits of resampled records", columns).rows((0..rows).map(row));
+        let text = format!("{converged} of {tried} refits ended; the seed {seed} makes the same again.");
+        Section::new("bootstrap", "Bootstrap").says(text).table(table.at_most(40))
+    }
+}
+
+impl From<Bootstrap> for Section {
+    fn from(found: Bootstrap) -> Section {
+        Section::from(&found)
+    }
 }

@@ -1,8 +1,10 @@
 //! Estimates side by side, tests between nested ones, and data not used for the fit.
 
+mod section;
+
 use super::Test;
 use crate::error::Error;
-use crate::estimate::{Estimate, Knowledge, OutputFit, Summary};
+use crate::estimate::{Estimate, OutputFit, Summary};
 use crate::experiment::ExperimentOf;
 use crate::fit::Fit;
 use crate::model::Model;
@@ -105,60 +107,13 @@ fn verdict(name: String, statistic: f64, p_value: f64, restricted: &Candidate, f
     Test::new(name, statistic, p_value, &passed, &failed)
 }
 
-/// Candidates side by side; prints as a table.
+/// Candidates side by side; prints as a table, and is a section of a report.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Comparison(pub Vec<Candidate>);
 
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut names: Vec<&str> = vec![];
-        for unknown in self.0.iter().flat_map(|candidate| &candidate.estimate.unknowns) {
-            if !names.contains(&unknown.name.as_str()) {
-                names.push(&unknown.name);
-            }
-        }
-        let width = names.iter().map(|name| name.len()).max().unwrap_or(0).max(12);
-        write!(f, "{:<width$}", "")?;
-        self.0.iter().try_for_each(|candidate| write!(f, " {:>24}", candidate.title))?;
-        writeln!(f)?;
-        for name in names {
-            write!(f, "{name:<width$}")?;
-            for Candidate { estimate, .. } in &self.0 {
-                let cell = estimate.unknowns.iter().find(|u| u.name == name).map_or("-".to_owned(), |unknown| {
-                    match unknown.knowledge {
-                        Knowledge::Known { standard_error, .. } => {
-                            format!("{:.5e} +- {standard_error:.1e}", unknown.value)
-                        }
-                        Knowledge::Held { .. } => format!("{:.5e} (bound)", unknown.value),
-                        Knowledge::Unidentified => "not determined".to_owned(),
-                        Knowledge::Fixed => format!("{:.5e} (fixed)", unknown.value),
-                    }
-                });
-                write!(f, " {cell:>24}")?;
-            }
-            writeln!(f)?;
-        }
-        let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.3}"));
-        let fit = |s: &Summary| {
-            let fits: Vec<String> = s.outputs.iter().map(|output| number(output.fit.fit_percent)).collect();
-            fits.join(" / ")
-        };
-        type Row<'a> = (&'a str, &'a dyn Fn(&Summary) -> String);
-        let rows: [Row<'_>; 7] = [
-            ("fit %", &fit),
-            ("measurements", &|s| s.measurements.to_string()),
-            ("unknowns", &|s| s.unknowns.len().to_string()),
-            ("AIC", &|s| number(s.aic())),
-            ("AICc", &|s| number(s.aicc())),
-            ("BIC", &|s| number(s.bic())),
-            ("verdict", &|s| s.severity().to_string()),
-        ];
-        for (label, cell) in rows {
-            write!(f, "{label:<width$}")?;
-            self.0.iter().try_for_each(|candidate| write!(f, " {:>24}", cell(&candidate.estimate)))?;
-            writeln!(f)?;
-        }
-        Ok(())
+        fmt::Display::fmt(&self.table(), f)
     }
 }
 

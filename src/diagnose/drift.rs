@@ -6,7 +6,7 @@ use crate::whiteness::chi_squared_tail;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Normal};
 
-/// How a parameter goes from record to record.
+/// How a parameter changes from record to record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Drift {

@@ -3,11 +3,15 @@
 //! Watts, *Nonlinear Regression Analysis and Its Applications*, 1988, section 6.1; Raue et al., Bioinformatics 25 (2009)
 //! 1923).
 
-use super::{Pinned, check_complete, minimize};
+mod section;
+
+use super::{Pinned, check_complete, linearize, minimize};
 use crate::error::Error;
 use crate::estimate::{Knowledge, Summary, student};
 use crate::judge::undetermined;
+use crate::numeral::number;
 use crate::optimize::{LeastSquares, Severity};
+use crate::parameter::Transform;
 use crate::problem::Problem;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -28,6 +32,11 @@ pub struct Profile {
     pub lower: End,
     /// Upper end of the interval.
     pub upper: End,
+    /// Its standard error by the slopes at the estimate, where it has one: the curve's quadratic approximation is
+    /// `((z - z0) / s)^2` with the coordinate `z` that the optimizer worked in.
+    pub standard_error: Option<f64>,
+    /// That coordinate.
+    pub transform: Transform,
     /// The curve, by rising value.
     pub points: Vec<ProfilePoint>,
     /// The interval ends where the rise reaches this.
@@ -92,6 +101,8 @@ impl Profile {
 const POINTS: usize = 40;
 /// After so many points that a root of the rise below this part of the threshold's shows no end.
 const FLAT: (usize, f64) = (8, 1e-3);
+/// The curve goes on to this many times the threshold.
+const HEIGHT: f64 = 1.5;
 /// The ends are found to this part of the root of the threshold.
 const CLOSE: f64 = 1e-3;
 
@@ -113,7 +124,7 @@ pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probabilit
         )));
     }
     let unknown = &estimate.unknowns[index];
-    let linear = objective.linearize(&best).map_err(|error| Error::Optimizer(error.to_string()))?;
+    let linear = linearize(&objective, &best, "the profile")?;
     let at_bound = |i: usize| i != index && matches!(estimate.unknowns[i].knowledge, Knowledge::Held { .. });
     let held = undetermined(&linear, &(0..best.len()).map(at_bound).collect::<Vec<bool>>()).held;
     let covariance = linear.covariance(&held);
@@ -188,7 +199,7 @@ pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probabilit
                 continue;
             }
             // Between what is inside and what is outside.
-            let mut outside = (next, reached);
+            let (mut outside, mut end, highest) = ((next, reached), None, reached);
             for _ in 0..30 {
                 let part = ((quantile - inside.1) / (outside.1 - inside.1)).clamp(0.05, 0.95);
                 let middle = inside.0 + part * (outside.0 - inside.0);
@@ -197,14 +208,21 @@ pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probabilit
                     break;
                 };
                 if (reached - quantile).abs() <= CLOSE * quantile {
-                    return End::At(value(middle));
+                    end = Some(middle);
+                    break;
                 }
                 match reached < quantile {
                     true => (inside, place) = ((middle, reached), there),
                     false => outside = (middle, reached),
                 }
             }
-            return End::At(value(inside.0 + (outside.0 - inside.0) / 2.0));
+            let end = end.unwrap_or(inside.0 + (outside.0 - inside.0) / 2.0);
+            // Both sides are drawn to one height; a failure there costs a part of the drawing only.
+            let beyond = end + (HEIGHT.sqrt() - 1.0) * (end - best[index]);
+            if highest < HEIGHT.sqrt() * quantile && sign * (beyond - bound) < 0.0 {
+                let _ = root(beyond, &place);
+            }
+            return End::At(value(end));
         }
         End::Open(value(inside.0))
     };
@@ -223,8 +241,8 @@ pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probabilit
     if -lowest > 1e-3 {
         severity = Severity::NotUsable;
         remark = format!(
-            "a better minimum than the estimate was met on the profile of `{name}` (deviance lower by {:.3}): start there",
-            -lowest
+            "a better minimum than the estimate was met on the profile of `{name}` (deviance lower by {}): start there",
+            number(-lowest, 3)
         );
     }
     Ok(Profile {
@@ -234,6 +252,8 @@ pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probabilit
         probability,
         lower,
         upper,
+        standard_error: error.map(|error| error * inflation.sqrt() * unknown.transform.slope(unknown.value).abs()),
+        transform: unknown.transform,
         points,
         threshold: quantile * quantile,
         inflation,

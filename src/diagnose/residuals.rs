@@ -1,4 +1,4 @@
-//! Residuals: what is left of the measurement when the model has said its part. If the model is complete, it is noise.
+//! Residuals: measured less predicted outputs. If the model is complete, they are noise.
 //!
 //! Tests take correlated residuals into account by their effective number: `n / (1 + 2 sum rho(k))`, the sum over the lags
 //! up to the first that is not positive (Bayley and Hammersley, J. Royal Statistical Society suppl. 8 (1946) 184).
@@ -11,7 +11,7 @@ mod spread;
 
 pub use correlation::Correlation;
 pub use outliers::Outlier;
-pub use period::Period;
+pub use period::{Period, Spectrum};
 pub use spread::Spread;
 
 use super::Test;
@@ -51,18 +51,21 @@ pub struct Residuals {
     pub excess_kurtosis: f64,
     /// Correlation with the residuals 1, 2, ... samples before.
     pub autocorrelation: Vec<f64>,
-    /// White residuals stay within plus and minus this at 99 of 100 lags.
+    /// White residuals stay within plus and minus this at 99 of 100 lags, each lag for itself; the test of Ljung and Box
+    /// judges all lags together.
     pub autocorrelation_band: f64,
     /// Correlation with each input and measured output that is not constant.
     pub correlations: Vec<Correlation>,
     /// Inputs that do not change in this record: what they drive cannot be told.
     pub constant_inputs: Vec<String>,
-    /// How the spread goes with each input, predicted output and time.
+    /// How the spread depends on each input, predicted output and time.
     pub spreads: Vec<Spread>,
     /// The residuals furthest out, beyond what a normal distribution allows; furthest first, twenty at most.
     pub outliers: Vec<Outlier>,
     /// How many outliers there are.
     pub outlier_count: u64,
+    /// Where their power lies; empty where samples are not evenly spaced.
+    pub spectrum: Spectrum,
     /// The strongest line of the spectrum, if it stands out.
     pub period: Option<Period>,
     /// What the residuals were tested for.
@@ -117,8 +120,8 @@ pub fn examine(prediction: &Simulated, record: &Record) -> Result<Vec<Residuals>
             let mut result = output.examine(record.name(), &inputs, &outputs, &predicted, &time);
             if result.samples >= FEWEST && output.deviation > 0.0 {
                 if even {
-                    let (period, test) = period::find(&output, record.sample_time());
-                    result.period = period;
+                    let (spectrum, period, test) = period::find(&output, record.sample_time());
+                    (result.spectrum, result.period) = (spectrum, period);
                     result.tests.push(test);
                 }
                 (result.outliers, result.outlier_count) = outliers::find(residuals, &times);
@@ -188,7 +191,7 @@ impl Series {
         })
     }
 
-    /// What the residuals show by themselves, and beside other signals.
+    /// The numbers of these residuals, and their tests but that for a period.
     fn examine(
         &self,
         experiment: &str,
@@ -218,6 +221,7 @@ impl Series {
             spreads: vec![],
             outliers: vec![],
             outlier_count: 0,
+            spectrum: Spectrum::default(),
             period: None,
             tests: vec![],
         };
@@ -230,7 +234,7 @@ impl Series {
             format!("Ljung-Box, {lags} lags"),
             q,
             p,
-            "the residuals are white: each is news",
+            "the residuals are white: none can be predicted from those before",
             "the residuals follow from those before: the model misses dynamics, or the noise enters before the states \
              (predict over a shorter horizon); classical intervals are too narrow",
         ));

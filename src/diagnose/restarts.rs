@@ -1,12 +1,14 @@
 //! Restarts: whether a search from elsewhere ends in a better minimum.
 
-use super::{Pinned, check_complete, minimize};
+use super::{Pinned, check_complete, linearize, minimize};
 use crate::error::Error;
 use crate::estimate::Summary;
+use crate::numeral::number;
 use crate::optimize::{LeastSquares, Severity};
 use crate::parameter::Transform;
 use crate::problem::{Problem, each};
 use crate::random::Random;
+use crate::section::{Axis, Cell, Curves, Drawing, Layer, Plot, Section, Style, Table};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -24,6 +26,8 @@ pub struct Restarts {
     pub worse: u64,
     /// The best of those that ended in a better one.
     pub better: Option<Better>,
+    /// Where the searches ended, by rising cost.
+    pub minima: Vec<Minimum>,
     /// How bad it is.
     pub severity: Severity,
     /// What it means.
@@ -36,6 +40,18 @@ pub struct Restarts {
 pub struct Better {
     /// Its sum of squares as a part of the estimate's.
     pub cost_ratio: f64,
+    /// Names and values of the unknowns there.
+    pub unknowns: Vec<(String, f64)>,
+}
+
+/// A minimum that searches ended in.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Minimum {
+    /// Its cost as a part of the estimate's, which is one.
+    pub cost_ratio: f64,
+    /// Searches that ended in it.
+    pub searches: u64,
     /// Names and values of the unknowns there.
     pub unknowns: Vec<(String, f64)>,
 }
@@ -60,7 +76,7 @@ pub fn restarts(
     }
     let control = problem.control(Instant::now());
     let (objective, best) = problem.at_within(estimate, &control)?;
-    let cost = objective.linearize(&best).map_err(|error| Error::Optimizer(error.to_string()))?.cost;
+    let cost = linearize(&objective, &best, "the search from other starts")?.cost;
     let bounds = objective.bounds();
     let start = |attempt: usize| -> Vec<f64> {
         let mut random = Random::stream(seed, attempt as u64);
@@ -93,31 +109,42 @@ pub fn restarts(
         same: 0,
         worse: 0,
         better: None,
+        minima: vec![],
         severity: Severity::Usable,
         meaning: String::new(),
     };
-    let mut lowest = cost * (1.0 - SAME);
-    for end in found {
-        match end {
-            None => result.failed += 1,
-            Some((place, found)) if found < lowest => {
-                lowest = found;
-                let named = |(u, &c): (&crate::estimate::Unknown, &f64)| (u.name.clone(), u.transform.to_value(c));
+    let mut ends: Vec<(Vec<f64>, f64)> = found.into_iter().flatten().collect();
+    result.failed = (count - ends.len()) as u64;
+    ends.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let named = |(u, &c): (&crate::estimate::Unknown, &f64)| (u.name.clone(), u.transform.to_value(c));
+    for (place, found) in ends {
+        // Without any error there is no cost to compare with.
+        let cost_ratio = if cost > 0.0 { found / cost } else { f64::from(u8::from(found == 0.0)) };
+        match result.minima.last_mut().filter(|minimum| cost_ratio <= minimum.cost_ratio * (1.0 + SAME)) {
+            Some(minimum) => minimum.searches += 1,
+            None => {
                 let unknowns = estimate.unknowns.iter().zip(&place).map(named).collect();
-                result.better = Some(Better { cost_ratio: found / cost, unknowns });
+                result.minima.push(Minimum { cost_ratio, searches: 1, unknowns });
             }
-            Some((_, found)) if found > cost * (1.0 + SAME) => result.worse += 1,
-            Some(_) => result.same += 1,
         }
     }
+    for minimum in &result.minima {
+        match minimum.cost_ratio {
+            ratio if ratio < 1.0 - SAME => {}
+            ratio if ratio > 1.0 + SAME => result.worse += minimum.searches,
+            _ => result.same += minimum.searches,
+        }
+    }
+    let best = result.minima.first().filter(|minimum| minimum.cost_ratio < 1.0 - SAME);
+    result.better = best.map(|best| Better { cost_ratio: best.cost_ratio, unknowns: best.unknowns.clone() });
     result.meaning = match &result.better {
         Some(better) => {
             result.severity = Severity::NotUsable;
             let places: Vec<String> =
-                better.unknowns.iter().map(|(name, value)| format!("{name} = {value:.6}")).collect();
+                better.unknowns.iter().map(|(name, value)| format!("`{name}` = {}", number(*value, 6))).collect();
             format!(
-                "the estimate is a wrong minimum: from another start the cost is {:.4} times as large, at {}; start there",
-                better.cost_ratio,
+                "the estimate is a wrong minimum: from another start the cost is {} times as large, at {}; start there",
+                number(better.cost_ratio, 3),
                 places.join(", ")
             )
         }
@@ -132,4 +159,55 @@ pub fn restarts(
         }
     };
     Ok(result)
+}
+
+/// The minima as a table, and the searches by rising cost as a stair (a waterfall plot).
+impl From<&Restarts> for Section {
+    fn from(found: &Restarts) -> Section {
+        const LISTED: usize = 10;
+        let Restarts { tried, failed, minima, severity, meaning, .. } = found;
+        let section = Section::new("starts", "Searches from other starts");
+        let section = match severity {
+            Severity::Usable => section.says(format!("{meaning}.")),
+            _ => section.because(*severity, meaning.clone()),
+        };
+        let section = match failed {
+            0 => section,
+            failed => section.says(format!("{failed} of {tried} searches could not begin or did not end.")),
+        };
+        let row = |minimum: &Minimum| {
+            let places = minimum.unknowns.iter().map(|(name, value)| format!("{name} = {}", number(*value, 4)));
+            let places: Vec<String> = places.collect();
+            [Cell::number(minimum.cost_ratio, 5), minimum.searches.into(), places.join(", ").into()]
+        };
+        let columns = ["cost / estimate's", "searches", "at"];
+        let table = Table::new("Minima found", columns).rows(minima.iter().map(row)).at_most(LISTED);
+        section.table(table).plot(waterfall(minima))
+    }
+}
+
+fn waterfall(minima: &[Minimum]) -> Option<Plot> {
+    let mut points = vec![];
+    let mut before = 0.0;
+    for minimum in minima {
+        let after = before + minimum.searches as f64;
+        points.extend([(before, minimum.cost_ratio), (after, minimum.cost_ratio)]);
+        before = after;
+    }
+    let layers =
+        vec![Layer::Line { style: Style::Main, points }, Layer::Level { value: 1.0, label: "the estimate".to_owned() }];
+    let drawing = Curves {
+        x: Axis::new("searches, the best first", "").from(0.0),
+        y: Axis::new("cost / estimate's", "").logarithmic(),
+        layers,
+    };
+    let title = "Cost at the end of each search from another start, by rising cost, relative to the estimate's";
+    let caption = "Cost where each search ended; a step is a minimum";
+    (!minima.is_empty()).then(|| Plot::new("starts", caption, title, Drawing::Curves(drawing)))
+}
+
+impl From<Restarts> for Section {
+    fn from(found: Restarts) -> Section {
+        Section::from(&found)
+    }
 }

@@ -55,7 +55,7 @@ impl<'a, M: Model> Fleet<'a, M> {
     /// ```
     /// # use greybox::*;
     /// # use greybox::pmsm::{Currents, Drive, Surface, Winding};
-    /// # fn example(records: Vec<ExperimentOf<Surface>>) -> Result<(), Error> {
+    /// # fn example(records: Vec<ExperimentOf<Surface>>) -> Result<(), Box<dyn std::error::Error>> {
     /// # let model = Surface::new(4)?;
     /// let parameters = Winding { rs: free(1.0), ls: free(1e-3), ke: free(0.5) };
     /// let fleet = Fleet::new(&model).parameters(parameters).fleet()?;

@@ -60,6 +60,7 @@ impl Integrator for Rk4 {
 
     #[cfg(feature = "std")]
     fn describe(&self, _kind: Kind) -> String {
-        format!("Runge-Kutta 4, {} step(s) per sample", self.substeps.max(1))
+        let steps = self.substeps.max(1);
+        format!("Runge-Kutta 4, {steps} step{} per sample", if steps == 1 { "" } else { "s" })
     }
 }

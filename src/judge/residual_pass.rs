@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// Lags of the whiteness test.
 const LAGS: usize = 20;
 /// One window in so many is simulated once more with a finer step, and so many of a record at most.
-const EVERY: usize = 8;
+const EVERY: usize = 16;
 const AGAIN: usize = 16;
 
 /// What a pass over the residuals found.
@@ -26,6 +26,8 @@ pub(crate) struct Residuals {
     pub step_error: f64,
     /// The whiteness of each output's errors.
     pub whiteness: Vec<Whiteness>,
+    /// The smallest standard deviation that was predicted for a measurement of each output; infinite without predictions.
+    pub surest: Vec<f64>,
 }
 
 /// How white the errors of an output are.
@@ -45,6 +47,7 @@ struct Sums<'s> {
     measured: u64,
     log_determinant: f64,
     autocorrelations: Vec<Autocorrelation>,
+    surest: Vec<f64>,
     /// The windows to be simulated again.
     again: Vec<Sampled>,
     run: Vec<f64>,
@@ -67,6 +70,7 @@ impl<'s> Sums<'s> {
             measured: 0,
             log_determinant: 0.0,
             autocorrelations: vec![Autocorrelation::new(LAGS); outputs],
+            surest: vec![f64::INFINITY; outputs],
             again: vec![],
             run: vec![],
         }
@@ -121,6 +125,9 @@ impl Accumulate for Sums<'_> {
                 if window.is_measured(k, j, lane) {
                     let unit = window.variance_root(k, j, lane);
                     self.outputs[j].add(y, error * unit);
+                    if window.has_variances() {
+                        self.surest[j] = self.surest[j].min(unit);
+                    }
                     count += 1;
                 }
             }
@@ -140,6 +147,7 @@ impl Accumulate for Sums<'_> {
         self.log_determinant += later.log_determinant;
         self.outputs.iter_mut().zip(&later.outputs).for_each(|(sums, later)| sums.append(later));
         self.autocorrelations.iter_mut().zip(&later.autocorrelations).for_each(|(sums, later)| sums.follow(later));
+        self.surest.iter_mut().zip(&later.surest).for_each(|(surest, later)| *surest = surest.min(*later));
         self.again.extend(later.again);
     }
 }
@@ -193,6 +201,7 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
         log_determinant,
         step_error,
         whiteness: (0..outputs).map(whiteness).collect(),
+        surest: (0..outputs).map(|j| all.iter().map(|one| one.surest[j]).fold(f64::INFINITY, f64::min)).collect(),
     }
 }
 

@@ -1,13 +1,16 @@
 //! What the reader of an estimate must know of its data and its method.
 
 use super::conclude::{Covariances, Judgement};
-use crate::estimate::{CovarianceMethod, Direction, Knowledge, Unknown, Warning, p_value};
+use crate::estimate::{CovarianceMethod, Direction, Knowledge, Unknown, Warning};
 use crate::layout::Kind;
+use crate::numeral::{counted, exact, number, p_value, percent};
 use crate::optimize::Severity;
 use crate::problem::Objective;
 
-/// A finer step may move a parameter by this part of its standard error without a word.
+/// A finer step may move a parameter by this part of its standard error without a warning.
 const STEP_SHIFT: f64 = 0.5;
+/// A predicted standard deviation that is smaller than this part of the errors is none of noise.
+const SURE: f64 = 1e-6;
 /// Autocorrelation that widens an interval by more than this factor calls for care.
 const CORRELATION_MATTERS: f64 = 2.0;
 
@@ -25,10 +28,11 @@ impl Judgement<'_> {
     ) -> Vec<Warning> {
         let mut warnings = vec![];
         warnings.extend(self.of_the_data(unknowns));
+        warnings.extend(self.unbounded());
         warnings.extend(self.gaps());
         for unknown in unknowns {
             if let Knowledge::Held { bound } = unknown.knowledge {
-                let Unknown { name, unit, .. } = unknown;
+                let (Unknown { name, unit, .. }, bound) = (unknown, exact(bound));
                 warnings.push(care(format!("`{name}` is held at its bound {bound} {unit}: the data want it beyond")));
             }
         }
@@ -63,6 +67,23 @@ impl Judgement<'_> {
         none.then(|| Warning { severity, text: "the data determine none of the unknowns".to_owned() })
     }
 
+    /// Whether a predicted variance goes to zero: there the likelihood has no maximum.
+    fn unbounded(&self) -> Option<Warning> {
+        let of = |j: usize| (self.residuals.surest[j], self.residuals.outputs[j].rmse);
+        let j = (0..self.residuals.surest.len()).find(|&j| of(j).0 < SURE * of(j).1)?;
+        let (output, (surest, rmse)) = (&self.objective.problem.layout().outputs[j], of(j));
+        let text = format!(
+            "a measurement of `{}` is predicted with a standard deviation of {} {unit}, beside errors of {} {unit}: the \
+             likelihood grows without bound (a free initial state fits the first measurement exactly); give the noise a \
+             lower bound, or fix the initial state",
+            output.name,
+            number(surest, 2),
+            number(rmse, 2),
+            unit = output.unit
+        );
+        Some(Warning { severity: Severity::NotUsable, text })
+    }
+
     fn gaps(&self) -> Vec<Warning> {
         let problem = self.objective.problem;
         if problem.layout().kind == Kind::Static {
@@ -71,10 +92,10 @@ impl Judgement<'_> {
         let records = problem.records.iter().zip(&problem.unknowns.labels);
         let gaps = |(record, label): (&crate::record::Record, &String)| {
             let gaps = record.gaps();
-            let (count, first) = (gaps.len(), gaps.first()?);
+            let (count, first) = (counted(gaps.len() as u64, "gap"), gaps.first()?);
             Some(care(format!(
-                "time jumps in experiment `{label}` ({count} gap(s), the first: {first}): the input is taken as held \
-                 meanwhile, which is seldom what happened; fit the pieces between (Experiment::without_gaps)"
+                "time jumps in experiment `{label}` ({count}, the first: {first}): the input is taken as held meanwhile, \
+                 which is seldom what happened; fit the pieces between (Experiment::without_gaps)"
             )))
         };
         records.filter_map(gaps).collect()
@@ -92,9 +113,10 @@ impl Judgement<'_> {
         let (name, shift, part) = shift(&objective, &self.end.coordinates, unknowns)?;
         let finer = finer.integrator();
         (shift > STEP_SHIFT).then(|| {
+            let (part, errors) = (percent(part, 2), number(shift, 2));
             care(format!(
-                "the step is too coarse: with {finer} `{name}` would move by {part:.1e} of itself ({shift:.1} standard \
-                 errors); use a finer step"
+                "the step is too coarse: with {finer} `{name}` would move by {part} of itself ({errors} standard errors); use \
+                 a finer step"
             ))
         })
     }
@@ -103,10 +125,10 @@ impl Judgement<'_> {
     fn autocorrelation(&self, covariances: &Covariances) -> Option<Warning> {
         let (output, white) = self.autocorrelated()?;
         let output = &self.objective.problem.layout().outputs[output].name;
-        let (probability, first) = (p_value(white.p_value.min(1.0)), white.first);
+        let (probability, first) = (p_value(white.p_value.min(1.0)), number(white.first, 2));
         let mut text = format!(
             "the errors of `{output}` are not white (Ljung-Box {probability}, correlation with the error before \
-             {first:.3}): the model misses a part, or the noise is colored"
+             {first}): the model misses a part, or the noise is colored"
         );
         let CovarianceMethod::Hac { lags } = covariances.method else {
             text += "; the intervals take them as white and are too narrow if the order of the samples matters";
@@ -118,9 +140,10 @@ impl Judgement<'_> {
         };
         let widened = |i: usize| Some(covariances.unknowns.as_ref()?.standard_error(i) / white(i)?);
         let widest = (0..self.slopes.len()).filter_map(widened).fold(0.0, f64::max);
-        text += &format!(
-            "; the intervals allow for it (HAC over {lags} lag(s), prewhitened), up to {widest:.2} times those for white errors"
-        );
+        text += &format!("; the intervals allow for it (HAC over {}, prewhitened)", counted(lags, "lag"));
+        if widest > 1.0 {
+            text += &format!(", which makes them up to {} times as wide as for white errors", number(widest, 3));
+        }
         let severity = if widest > CORRELATION_MATTERS { Severity::UsableWithCare } else { Severity::Usable };
         Some(Warning { severity, text })
     }

@@ -5,6 +5,7 @@ use crate::functions::Functions;
 use crate::information::Information;
 use crate::integrate::Duals;
 use crate::layout::{Layout, Quantity};
+use crate::numeral::exact;
 
 const LANES: usize = 8;
 const ITERATIONS: usize = 50;
@@ -27,6 +28,7 @@ pub(crate) fn state(
     let found = y.iter().filter(|y| y.is_finite()).count();
     if found < n {
         let (states, outputs) = (names(&layout.states), names(&layout.outputs));
+        let t = exact(t);
         return Err(format!("{n} state(s), {states}, but {found} measured of the output(s) {outputs} at t = {t} s"));
     }
     let (u, p) = (constants(u), constants(p));
@@ -46,7 +48,7 @@ pub(crate) fn state(
             }
         }
         if let Some(j) = (0..y.len()).find(|&j| y[j].is_finite() && errors[j].is_nan()) {
-            let output = &layout.outputs[j].name;
+            let (output, t) = (&layout.outputs[j].name, exact(t));
             return Err(format!("the model's output `{output}` is not a number on the way to it, at t = {t} s"));
         }
         let mut information = Information::new(n);

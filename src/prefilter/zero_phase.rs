@@ -3,6 +3,7 @@
 use super::{Butterworth, Design, warped};
 use crate::error::Error;
 use crate::experiment::Experiment;
+use crate::numeral::exact;
 use crate::record::{Channel, Record, Time};
 use crate::signals::Signals;
 
@@ -40,9 +41,11 @@ impl Butterworth {
             return Ok(());
         }
         Err(Error::Filter(format!(
-            "it is made for samples every {step} s, but those of experiment `{}` are {found} s apart; make it for that \
-             sample time, or resample the record",
-            record.name()
+            "it is made for samples every {} s, but those of experiment `{}` are {} s apart; make it for that sample time, or \
+             resample the record",
+            exact(step),
+            record.name(),
+            exact(found)
         )))
     }
 
@@ -79,9 +82,11 @@ pub(crate) fn filtered(record: &Record, filter: &Butterworth) -> Result<Record, 
     };
     if let Some((sample, found)) = other.filter(|(_, found)| !close(*found, step)) {
         return Err(Error::Filter(format!(
-            "it is made for samples every {step} s, but in experiment `{}` the sample after number {sample} comes {found} s \
-             later; make it for that sample time, or resample the record",
-            record.name()
+            "it is made for samples every {} s, but in experiment `{}` the sample after number {sample} comes {} s later; make it \
+             for that sample time, or resample the record",
+            exact(step),
+            record.name(),
+            exact(found)
         )));
     }
     let smooth = |channel: &Channel| {

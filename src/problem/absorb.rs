@@ -18,7 +18,7 @@ pub(super) struct Absorber<'o> {
     /// Sums of squares, where every error counts by its own, lane by lane.
     squares: Vec<f64>,
     triangles: Triangles,
-    alone: Alone,
+    alone: Option<Alone>,
 }
 
 impl<'o> Absorber<'o> {
@@ -31,7 +31,7 @@ impl<'o> Absorber<'o> {
             rows: vec![0; jobs.len()],
             squares: vec![],
             triangles: Triangles::new(columns, 0),
-            alone: Alone { information: Information::new(columns), block: Block::new(columns, ROWS) },
+            alone: None,
         }
     }
 
@@ -54,7 +54,7 @@ impl<'o> Absorber<'o> {
 
     fn absorb_rows(&mut self, lanes: usize, rows: &mut [f64], count: usize) {
         match lanes {
-            1 => self.alone.absorb(rows),
+            1 => self.alone.get_or_insert_with(|| Alone::new(self.triangles.columns())).absorb(rows),
             _ => self.triangles.absorb(rows, count),
         }
     }
@@ -99,7 +99,10 @@ impl<'o> Absorber<'o> {
     /// Cost and triangle of a job.
     pub fn part(&mut self, lane: usize) -> (f64, Information) {
         let cost = self.weighing[lane].cost + 0.5 * self.squares.get(lane).unwrap_or(&0.0);
-        let triangle = if self.triangles.lanes() > 0 { self.triangles.triangle(lane) } else { self.alone.triangle() };
+        let triangle = match &mut self.alone {
+            Some(alone) => alone.triangle(),
+            None => self.triangles.triangle(lane),
+        };
         (cost, triangle.of_rows(self.rows[lane]))
     }
 }
@@ -111,6 +114,10 @@ struct Alone {
 }
 
 impl Alone {
+    fn new(columns: usize) -> Self {
+        Alone { information: Information::new(columns), block: Block::new(columns, ROWS) }
+    }
+
     fn absorb(&mut self, mut rows: &[f64]) {
         let (width, capacity) = (self.block.columns() + 1, self.block.capacity());
         while !rows.is_empty() {

@@ -4,6 +4,7 @@ use super::{Noise, Optimizer, Search};
 use crate::error::Error;
 use crate::layout::Layout;
 use crate::loss::Loss;
+use crate::numeral::exact;
 use crate::optimize::{LeastSquaresState, LevenbergMarquardt};
 use crate::prefilter::Butterworth;
 use crate::record::Record;
@@ -149,7 +150,7 @@ impl<'a> Settings<'a> {
             for k in 0..record.len() {
                 let weight = weights.weight(record, k);
                 if !(weight >= 0.0 && weight.is_finite()) {
-                    let (name, t) = (record.name(), record.time(k));
+                    let (name, t) = (record.name(), exact(record.time(k)));
                     return Err(Error::Option(format!(
                         "weighting: the weight of sample {k} (t = {t} s) of experiment `{name}` is {weight}; weights must \
                          be finite and not negative"

@@ -59,7 +59,7 @@ impl Objective<'_> {
 
 impl Problem<'_> {
     /// The same problem with outputs that were measured as zero throughout.
-    fn against_zero(&self) -> Self {
+    pub(crate) fn against_zero(&self) -> Self {
         let zero = |record: &Record| {
             let zeros = Column::from(vec![0.0; record.len()]);
             let outputs = record.outputs.iter().map(|channel| channel.with(zeros.clone())).collect();

@@ -1,6 +1,7 @@
 //! What a record consists of: operating cycles, gaps, and how much of each output was measured.
 
 use super::{Record, Time};
+use crate::numeral::exact;
 use core::fmt;
 use std::ops::Range;
 
@@ -17,7 +18,7 @@ pub struct Gap {
 
 impl fmt::Display for Gap {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "no sample from {} s to {} s (before sample {})", self.from, self.to, self.sample)
+        write!(f, "no sample from {} s to {} s (before sample {})", exact(self.from), exact(self.to), self.sample)
     }
 }
 

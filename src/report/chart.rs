@@ -4,23 +4,22 @@
 //! letters by percentages in pixels of the screen and stretches only its curves; a *fixed* one, for files, is in pixels
 //! throughout. Colors are names in the style sheet: the page gives them by theme, a file by value.
 
-mod axes;
 mod curves;
 mod forest;
 mod heat;
+mod scale;
+mod timeline;
 
-pub(super) use axes::Axis;
-pub(super) use curves::{Curves, Layer};
-pub(super) use forest::{Forest, Row as ForestRow};
-pub(super) use heat::{Cell, Heat};
+pub(super) use timeline::{COLUMNS, keys, time_axis};
 
 use super::markup::Markup;
+use crate::section::{Drawing, Plot, Style};
 
 /// How wide a drawing is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Size {
-    /// As wide as the page leaves it.
-    Fluid,
+    /// As wide as the page leaves it; signals over time in so many columns at most.
+    Fluid(usize),
     /// So many pixels, margins included.
     Fixed(f64),
 }
@@ -47,7 +46,7 @@ const LETTER: f64 = 7.0;
 const FLUID: f64 = 1000.0;
 
 /// Names of colors with their values on light and on dark ground.
-pub(super) const PALETTE: [(&str, &str, &str); 14] = [
+pub(super) const PALETTE: [(&str, &str, &str); 16] = [
     ("paper", "#ffffff", "#0d1117"),
     ("card", "#f6f8fa", "#161b22"),
     ("ink", "#1b1f24", "#e6edf3"),
@@ -56,6 +55,8 @@ pub(super) const PALETTE: [(&str, &str, &str); 14] = [
     ("measured", "#6e86a8", "#7d96bd"),
     ("predicted", "#c2410c", "#ff9d57"),
     ("residual", "#4f46e5", "#a5b4fc"),
+    ("input", "#0f766e", "#4fd1c5"),
+    ("quiet", "#8c959f", "#768390"),
     ("bar", "#4f6db8", "#7c9cf0"),
     ("level", "#b42318", "#ff7b72"),
     ("good", "#1a7f37", "#3fb950"),
@@ -67,13 +68,39 @@ pub(super) const PALETTE: [(&str, &str, &str); 14] = [
 /// The style of all drawings, its colors by name.
 pub(super) const STYLE: &str = include_str!("chart/chart.css");
 
+/// Draws a plot; nothing, if its drawing was not kept.
+pub(super) fn draw(plot: &Plot, to: &mut Markup, size: Size) {
+    match &plot.drawing {
+        Some(Drawing::Curves(drawn)) => curves::draw(drawn, to, size, &plot.title),
+        Some(Drawing::Forest(drawn)) => forest::draw(drawn, to, size, &plot.title),
+        Some(Drawing::Heat(drawn)) => heat::draw(drawn, to, size, &plot.title),
+        Some(Drawing::Timeline(drawn)) => timeline::draw(drawn, to, size, &plot.title),
+        None => {}
+    }
+}
+
+/// The class of a style in the style sheet.
+pub(super) fn class(style: Style) -> &'static str {
+    match style {
+        Style::Measured => "measured",
+        Style::Predicted => "predicted",
+        Style::Residual => "residual",
+        Style::Confidence => "confidence",
+        Style::Prediction => "prediction",
+        Style::Input => "input",
+        Style::Main => "main",
+        Style::Reference => "reference",
+        Style::Quiet => "quiet",
+    }
+}
+
 impl Frame {
     /// Draws within the margins what `content` draws, under a name for those who cannot see it.
     fn draw(&self, to: &mut Markup, name: &str, content: impl FnOnce(&Frame, &mut Markup)) {
         let Margins { left, right, top, bottom } = self.margins;
         let height = self.height + top + bottom;
         match self.size {
-            Size::Fluid => {
+            Size::Fluid(_) => {
                 let style = format!("height:{height}px;padding:{top}px {right}px {bottom}px {left}px");
                 let attributes: [(&str, &dyn core::fmt::Display); 4] =
                     [("class", &"chart"), ("role", &"img"), ("aria-label", &name), ("style", &style)];
@@ -108,7 +135,7 @@ impl Frame {
     /// The place of a fraction of the width, as an attribute.
     fn x(&self, fraction: f64) -> String {
         match self.size {
-            Size::Fluid => format!("{}%", Short(100.0 * fraction)),
+            Size::Fluid(_) => format!("{}%", Short(100.0 * fraction)),
             Size::Fixed(_) => Short(fraction * self.width()).to_string(),
         }
     }
@@ -116,7 +143,7 @@ impl Frame {
     /// Width of the surface in the coordinates of its curves.
     fn width(&self) -> f64 {
         match self.size {
-            Size::Fluid => FLUID,
+            Size::Fluid(_) => FLUID,
             Size::Fixed(width) => (width - self.margins.left - self.margins.right).max(1.0),
         }
     }

@@ -1,17 +1,23 @@
-//! From an estimate and its problem to a [`Report`].
+//! From an estimate and its problem to the plain values of a report. Nothing else of the report knows their types.
 
-use super::trace::{COLUMNS, Rows};
-use super::{Declared, Figures, Format, Histogram, Output, OutputFit, Record, Report, Role, Signal, Trace, words};
-use crate::diagnose::residuals::{self, Residuals};
+use super::Report;
+use super::facts::{Facts, Histogram, OutputFit, Record, Signal};
+use crate::diagnose::residuals;
 use crate::diagnose::{self, Widths};
 use crate::error::Error;
-use crate::estimate::{ParameterEstimate, Summary};
-use crate::judge::output_fit as output_fit_of;
+use crate::estimate::Summary;
+use crate::interval::Hold;
+use crate::judge::output_fit;
+use crate::layout::Kind;
 use crate::problem::{Problem, Simulated};
 use crate::record::{Channel, Record as Measured};
+use crate::section::{Drawing, Keep, Line, Panel, PanelKind, Plot, Samples, Style, Timeline, identifier};
+use core::ops::Range;
 
-/// So many pictures of records a reader will look at; of more, the worst are drawn.
-const DRAWN: usize = 12;
+/// So many pairs of a record and an output are drawn; of more, those reproduced worst.
+const DRAWN: usize = 24;
+/// Numbers kept for the drawings of all records: four bytes each, a third more in letters, they are 1.4 MB of a page.
+const NUMBERS: usize = 260_000;
 /// Samples of a closeup.
 const CLOSE: usize = 400;
 /// The probability with which bands hold a measurement.
@@ -27,6 +33,8 @@ impl Report {
     pub fn new(problem: &Problem<'_>, estimate: &Summary) -> Result<Report, Error> {
         let identifiability = diagnose::identifiability(problem, estimate)?;
         let (objective, best) = problem.at(estimate)?;
+        let outputs = estimate.outputs.len();
+        let numbers = NUMBERS / problem.records().len().min(DRAWN / outputs.max(1)).max(1);
         let mut records = vec![];
         for (e, record) in problem.records().iter().enumerate() {
             let prediction = objective.predict(e, &best)?;
@@ -34,119 +42,163 @@ impl Report {
                 Some(_) => None,
                 None => Some(diagnose::widths(&objective, &best, estimate, e, BAND)?),
             };
-            let name = &estimate.experiments[e].name;
-            records.push(summary(name, record, &prediction, widths.as_ref())?);
+            let of = Columns::new(&estimate.experiments[e].name, record, &prediction, widths.as_ref());
+            records.push(of.gathered(problem.layout().kind, residuals::examine(&prediction, record)?, numbers));
         }
-        thin(&mut records, estimate.outputs.len());
+        thin(&mut records, outputs);
         let reworded = |warning| diagnose::reworded(warning, &estimate.directions, &estimate.unknowns);
-        let report = Report {
-            format: Format,
-            title: "Parameter estimation".to_owned(),
-            severity: estimate.severity(),
-            outcome: estimate.outcome,
-            warnings: estimate.warnings.iter().map(reworded).collect(),
-            unknowns: estimate.unknowns.clone(),
-            declared: estimate.parameters.iter().map(declared).collect(),
+        let warnings = estimate.warnings.iter().map(reworded).collect();
+        Ok(Report::of(&Facts {
+            model: problem.sweep.identity(),
             correlation: estimate.correlation(&(0..estimate.unknowns.len()).collect::<Vec<usize>>()),
-            directions: estimate.directions.clone(),
-            outputs: estimate
-                .outputs
-                .iter()
-                .map(|output| Output { name: output.name.clone(), unit: output.unit.clone(), quality: output.fit })
-                .collect(),
+            estimate: Summary { warnings, ..estimate.clone() },
             records,
             identifiability,
-            profiles: vec![],
-            bootstrap: None,
-            restarts: None,
-            findings: vec![],
-            figures: Figures {
-                cost: estimate.cost,
-                measurements: estimate.measurements,
-                degrees_of_freedom: estimate.degrees_of_freedom(),
-                deviance: estimate.deviance,
-                aic: estimate.aic(),
-                aicc: estimate.aicc(),
-                bic: estimate.bic(),
-                fpe: estimate.fpe(),
-                iterations: estimate.iterations,
-                evaluations: estimate.evaluations,
-                seconds: estimate.seconds,
-            },
-            method: estimate.method.clone(),
-        };
-        let tested = words::failed(&report).map_or(report.severity, |(severity, _)| severity);
-        Ok(Report { severity: report.severity.max(tested), ..report })
+        }))
     }
 }
 
-fn declared(parameter: &ParameterEstimate) -> Declared {
-    let ParameterEstimate { name, unit, declared, .. } = parameter.clone();
-    Declared { name, unit, parameter: declared }
+/// A record with what was predicted of it, and the half widths of the bands; these are empty if there are none.
+struct Columns<'a> {
+    name: &'a str,
+    record: &'a Measured,
+    t: Vec<f64>,
+    gaps: Vec<usize>,
+    prediction: &'a Simulated,
+    bands: Option<&'a Widths>,
+    /// The sample with the largest residual of each output.
+    worst: Vec<Option<usize>>,
 }
 
-fn summary(name: &str, record: &Measured, prediction: &Simulated, widths: Option<&Widths>) -> Result<Record, Error> {
-    let inputs = record.inputs().iter().map(|channel| signal(channel, Role::Input));
-    let outputs = record.outputs().iter().map(|channel| signal(channel, Role::Output));
-    let examined = residuals::examine(prediction, record)?.into_iter().enumerate();
-    Ok(Record {
-        name: name.to_owned(),
-        samples: record.len() as u64,
-        begin: record.time(0),
-        end: record.time(record.len().saturating_sub(1)),
-        sample_time: record.sample_time(),
-        gaps: record.gaps().len() as u64,
-        signals: inputs.chain(outputs).collect(),
-        fits: examined.map(|(j, residuals)| output_fit(record, prediction, widths, residuals, j)).collect(),
-    })
+impl<'a> Columns<'a> {
+    fn new(name: &'a str, record: &'a Measured, prediction: &'a Simulated, bands: Option<&'a Widths>) -> Self {
+        Columns {
+            name,
+            record,
+            t: (0..record.len()).map(|k| record.time(k)).collect(),
+            gaps: record.gaps().iter().map(|gap| gap.sample).collect(),
+            prediction,
+            bands,
+            worst: prediction.residuals.iter().map(|residuals| largest(residuals)).collect(),
+        }
+    }
+
+    fn gathered(&self, kind: Kind, examined: Vec<residuals::Residuals>, numbers: usize) -> Record {
+        let record = self.record;
+        let hold = match (kind, record.input_hold()) {
+            (Kind::Static, _) => "none: the model has no state",
+            (_, Hold::Zero) => "inputs hold from sample to sample",
+            _ => "inputs are straight lines from sample to sample",
+        };
+        let inputs = record.inputs().iter().map(|channel| signal(channel, "input"));
+        let outputs = record.outputs().iter().map(|channel| signal(channel, "output"));
+        let timeline = self.timeline(numbers);
+        let single = timeline.stretches.first().is_some_and(|whole| whole.samples_per_column == 1);
+        let fits = examined.into_iter().enumerate().map(|(j, residuals)| {
+            let (channel, errors) = (&record.outputs()[j], &self.prediction.residuals[j]);
+            let (worst, predicted) = (self.worst[j], &self.prediction.outputs[j]);
+            OutputFit {
+                name: channel.name.clone(),
+                unit: channel.unit.clone(),
+                fit_percent: output_fit(&channel.values, errors).fit_percent,
+                unpredicted: predicted.iter().filter(|value| !value.is_finite()).count() as u64,
+                residuals,
+                largest: worst.map_or(0.0, |k| errors[k]),
+                largest_at: record.time(worst.unwrap_or(0)),
+                histogram: Histogram::new(errors),
+                closeup: worst.filter(|_| !single || self.t.len() > 4 * CLOSE).map(|worst| self.closeup(j, worst)),
+            }
+        });
+        Record {
+            name: self.name.to_owned(),
+            samples: record.len() as u64,
+            begin: record.time(0),
+            end: record.time(record.len().saturating_sub(1)),
+            sample_time: record.sample_time(),
+            gaps: record.gaps().iter().map(|gap| (gap.from, gap.to)).collect(),
+            hold,
+            signals: inputs.chain(outputs).collect(),
+            fits: fits.collect(),
+            timeline: Some(Plot::new(
+                format!("record-{}", self.name),
+                "",
+                format!("{} over time", self.name),
+                Drawing::Timeline(timeline),
+            )),
+        }
+    }
+
+    /// The panels of an output: what was measured and predicted, and what is left.
+    fn panels(&self, j: usize) -> [Panel; 2] {
+        let Channel { name, unit, .. } = &self.record.outputs()[j];
+        let line = |style, name: &str| Line { style, name: name.to_owned(), held: false };
+        let (percent, mut lines) = (100.0 * BAND, vec![]);
+        if self.bands.is_some() {
+            lines.push(line(Style::Prediction, &format!("holds {percent} % of measurements")));
+            lines.push(line(Style::Confidence, &format!("{percent} % of the model alone")));
+        }
+        lines.extend([line(Style::Measured, "measured"), line(Style::Predicted, "predicted")]);
+        let residual = Panel {
+            name: format!("residual of {name}"),
+            unit: unit.clone(),
+            kind: PanelKind::Residual,
+            lines: vec![line(Style::Residual, "residual")],
+        };
+        [Panel { name: name.clone(), unit: unit.clone(), kind: PanelKind::Response, lines }, residual]
+    }
+
+    /// The lines of these panels.
+    fn lines(&self, j: usize) -> impl Iterator<Item = (Keep, &[f64])> {
+        let bands = self.bands.into_iter().flat_map(move |bands| [&bands.prediction[j], &bands.confidence[j]]);
+        let rest = [
+            (Keep::Extremes, &*self.record.outputs()[j].values),
+            (Keep::ExtremesAndMean, self.prediction.outputs[j].as_slice()),
+            (Keep::Extremes, self.prediction.residuals[j].as_slice()),
+        ];
+        bands.map(|widths| (Keep::Median, widths.as_slice())).chain(rest)
+    }
+
+    /// The outputs and, below them, the inputs.
+    fn timeline(&self, numbers: usize) -> Timeline {
+        let (inputs, outputs) = (self.record.inputs(), 0..self.record.outputs().len());
+        let held = self.record.input_hold() == Hold::Zero;
+        let input = |Channel { name, unit, .. }: &Channel| {
+            let lines = vec![Line { style: Style::Input, name: name.clone(), held }];
+            Panel { name: name.clone(), unit: unit.clone(), kind: PanelKind::Input, lines }
+        };
+        let panels = outputs.clone().flat_map(|j| self.panels(j)).chain(inputs.iter().map(input)).collect();
+        let lines = outputs.flat_map(|j| self.lines(j));
+        let lines = lines.chain(inputs.iter().map(|channel| (Keep::Extremes, &*channel.values)));
+        let pieces: Vec<Range<usize>> = self.worst.iter().flatten().map(|&k| about(k, self.t.len())).collect();
+        Timeline::new(panels, &Samples { t: &self.t, gaps: &self.gaps, lines: lines.collect() }, numbers, &pieces)
+    }
+
+    /// One output about its largest residual.
+    fn closeup(&self, j: usize, worst: usize) -> Plot {
+        let (record, output) = (self.name, &self.record.outputs()[j].name);
+        let samples = Samples { t: &self.t, gaps: &self.gaps, lines: self.lines(j).collect() };
+        let start = self.t.first().copied().unwrap_or(0.0);
+        let stretches = vec![samples.stretch(about(worst, self.t.len()), CLOSE, start)];
+        let drawing = Drawing::Timeline(Timeline { start, panels: self.panels(j).to_vec(), stretches });
+        let title = format!("Output {output} of {record} about its largest residual");
+        Plot::new(identifier(&format!("closeup-{record}-{output}")), "About the largest residual", title, drawing)
+    }
 }
 
-fn signal(channel: &Channel, role: Role) -> Signal {
+fn signal(channel: &Channel, role: &'static str) -> Signal {
     let (name, unit, values) = (channel.name.clone(), channel.unit.clone(), &*channel.values);
     let measured = || values.iter().copied().filter(|value| !value.is_nan());
     let count = measured().count();
-    Signal {
-        name,
-        unit,
-        role,
-        missing: (values.len() - count) as u64,
-        min: measured().reduce(f64::min),
-        mean: (count > 0).then(|| measured().sum::<f64>() / count as f64),
-        max: measured().reduce(f64::max),
-    }
+    let (low, high) = (measured().reduce(f64::min), measured().reduce(f64::max));
+    let mean = measured().sum::<f64>() / count.max(1) as f64;
+    let values_of = low.zip(high).map(|(low, high)| [low, mean, high]);
+    Signal { name, unit, role, missing: (values.len() - count) as u64, values: values_of }
 }
 
-fn output_fit(
-    record: &Measured,
-    prediction: &Simulated,
-    widths: Option<&Widths>,
-    examined: Residuals,
-    j: usize,
-) -> OutputFit {
-    let channel = &record.outputs()[j];
-    let (measured, predicted, residuals) = (&*channel.values, &prediction.outputs[j], &prediction.residuals[j]);
-    let width = |column: fn(&Widths) -> &Vec<Vec<f64>>| widths.map_or(&[][..], |widths| &column(widths)[j]);
-    let (confidence, prediction) = (width(|widths| &widths.confidence), width(|widths| &widths.prediction));
-    let t: Vec<f64> = (0..record.len()).map(|k| record.time(k)).collect();
-    let rows = Rows { t: &t, measured, predicted, confidence, prediction };
-    let overview = Trace::new(&rows, 0..measured.len(), COLUMNS);
-    let largest = largest(residuals);
-    let closeup = largest.filter(|_| overview.samples_per_column > 1).map(|worst| {
-        let begin = worst.saturating_sub(CLOSE / 2).min(measured.len().saturating_sub(CLOSE));
-        Trace::new(&rows, begin..(begin + CLOSE).min(measured.len()), CLOSE)
-    });
-    OutputFit {
-        name: channel.name.clone(),
-        unit: channel.unit.clone(),
-        fit_percent: output_fit_of(measured, residuals).fit_percent,
-        unpredicted: predicted.iter().filter(|value| !value.is_finite()).count() as u64,
-        residuals: examined,
-        largest: largest.map_or(0.0, |k| residuals[k]),
-        largest_at: record.time(largest.unwrap_or(0)),
-        histogram: Histogram::new(residuals),
-        overview: Some(overview),
-        closeup,
-    }
+/// The samples about one.
+fn about(sample: usize, samples: usize) -> Range<usize> {
+    let begin = sample.saturating_sub(CLOSE / 2).min(samples.saturating_sub(CLOSE));
+    begin..(begin + CLOSE).min(samples)
 }
 
 /// Index of the largest residual in size.
@@ -162,8 +214,7 @@ fn thin(records: &mut [Record], outputs: usize) {
     let mut order: Vec<usize> = (0..records.len()).collect();
     order.sort_by(|&a, &b| worst(&records[a]).total_cmp(&worst(&records[b])));
     for &record in order.iter().skip(keep) {
-        for fit in &mut records[record].fits {
-            (fit.overview, fit.closeup) = (None, None);
-        }
+        records[record].timeline = None;
+        records[record].fits.iter_mut().for_each(|fit| fit.closeup = None);
     }
 }

@@ -1,20 +1,28 @@
 //! A report as one HTML page: verdict first, then what it rests on.
 
-mod records;
-mod unknowns;
+mod prose;
+mod signals;
+mod table;
+mod terms;
 
-use super::Report;
-use super::chart::{PALETTE, STYLE, Size};
+use super::chart::{self, COLUMNS, PALETTE, STYLE, Size};
 use super::markup::{Attributes, Markup};
-use super::plots::Plot;
-use super::tables::{self, Table};
-use super::words;
+use super::{Report, words};
 use crate::optimize::Severity;
+use crate::section::{Drawing, Plot, Section, Table};
 use core::fmt::Display;
+use prose::Prose;
 
 /// Nothing is fetched, and nothing runs but what stands in the page.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; base-uri 'none'; \
                       form-action 'none'";
+/// The scripts of the page, each in a scope of its own.
+const SCRIPTS: [&str; 4] = [
+    include_str!("html/axis.js"),
+    include_str!("html/timeline.js"),
+    include_str!("html/zoom.js"),
+    include_str!("html/terms.js"),
+];
 
 pub(super) fn page(report: &Report) -> String {
     let mut page = Markup::default();
@@ -32,22 +40,34 @@ pub(super) fn page(report: &Report) -> String {
             });
         });
         html.node("body", &[], |body| {
-            verdict(body, report);
+            let mut prose = Prose::new(size(report));
+            verdict(body, report, &mut prose);
+            contents(body, report);
             body.node("main", &[], |main| {
-                unknowns::parameters(main, report);
-                records::fits(main, report);
-                unknowns::identifiability(main, report);
-                unknowns::profiles(main, report);
-                unknowns::refits(main, report);
-                findings(main, report);
-                records::data(main, report);
-                reproduce(main, report);
+                report.sections.iter().for_each(|part| section(main, part, 2, &mut prose));
             });
-            body.words("footer", &[], format_args!("Made by greybox {}", report.method.version));
-            body.node("script", &[], |script| script.verbatim(include_str!("html/zoom.js")));
+            body.words("footer", &[], format_args!("Made by greybox {}", report.estimate.method.version));
+            prose.explanations(body);
+            body.node("script", &[], |script| {
+                script.verbatim("\"use strict\";\n{\n");
+                SCRIPTS.iter().for_each(|text| script.verbatim(text));
+                script.verbatim("}\n");
+            });
         });
     });
     page.finish()
+}
+
+/// How finely signals are drawn before anyone zooms: the more of them, the less so.
+fn size(report: &Report) -> Size {
+    /// Columns of all lines together, some 26 bytes each, and the fewest of one.
+    const ALL: usize = 20_000;
+    const FEWEST: usize = 60;
+    let lines = report.plots().into_iter().map(|plot| match &plot.drawing {
+        Some(Drawing::Timeline(timeline)) => timeline.lines().count(),
+        _ => 0,
+    });
+    Size::Fluid((ALL / lines.sum::<usize>().max(1)).clamp(FEWEST, COLUMNS))
 }
 
 /// The colors of both themes, as variables; paper is light.
@@ -61,19 +81,19 @@ fn theme() -> String {
     )
 }
 
-fn verdict(body: &mut Markup, report: &Report) {
+fn verdict(body: &mut Markup, report: &Report, prose: &mut Prose) {
     body.node("header", &[("class", &class(report.severity))], |header| {
         header.words("h1", &[], &report.title);
         header.node("p", &[("class", &"verdict")], |p| {
             p.words("span", &[("class", &"sign"), ("aria-hidden", &"true")], words::sign(report.severity));
             p.text(words::verdict(report.severity));
         });
-        header.node("p", &[], |p| sentence(p, &words::search(report)));
-        let reasons = words::reasons(report);
+        header.node("p", &[], |p| prose.sentence(p, &words::search(report)));
+        let reasons = report.reasons();
         if !reasons.is_empty() {
-            header.node("ul", &[], |list| {
-                for (severity, text) in &reasons {
-                    list.node("li", &[("class", &class(*severity))], |item| sentence(item, text));
+            header.node("ul", &[("class", &"reasons")], |list| {
+                for reason in &reasons {
+                    list.node("li", &[("class", &class(reason.severity))], |item| prose.sentence(item, &reason.text));
                 }
             });
         }
@@ -88,102 +108,114 @@ fn class(severity: Severity) -> &'static str {
     }
 }
 
-fn findings(main: &mut Markup, report: &Report) {
-    if !report.findings.is_empty() {
-        section(main, "Further tests", |section| {
-            for (about, of_it) in words::by_subject(report) {
-                table(section, about, "cards", &tables::tests(of_it));
+/// Links to the sections that are open.
+fn contents(body: &mut Markup, report: &Report) {
+    const LINKS: usize = 16;
+    let linked = report.sections.iter().filter(|section| !section.is_empty() && !section.folded);
+    body.node("nav", &[("aria-label", &"Sections")], |nav| {
+        nav.node("ul", &[], |list| {
+            for section in linked.take(LINKS) {
+                list.node("li", &[], |item| {
+                    item.words("a", &[("href", &format_args!("#{}", section.id))], &section.title);
+                });
             }
         });
+    });
+}
+
+/// A section, its heading of this level; those within are articles, and details are closed.
+fn section(to: &mut Markup, section: &Section, level: usize, prose: &mut Prose) {
+    if section.is_empty() {
+        return;
+    }
+    prose.begin();
+    let tag = if level == 2 { "section" } else { "article" };
+    let heading = format!("h{}", level.min(6));
+    to.node(tag, &[("id", &section.id)], |to| {
+        if section.folded {
+            to.node("details", &[], |details| {
+                details.node("summary", &[], |summary| {
+                    summary.node(&heading, &[], |node| title(node, section));
+                });
+                content(details, section, level, prose);
+            });
+        } else {
+            to.node(&heading, &[], |node| title(node, section));
+            content(to, section, level, prose);
+        }
+    });
+}
+
+/// The title, and a sign where the section is a reason not to use the estimate as it is.
+fn title(to: &mut Markup, section: &Section) {
+    to.text(&section.title);
+    if section.severity > Severity::Usable {
+        let attributes: [(&str, &dyn Display); 4] = [
+            ("class", &format_args!("mark {}", class(section.severity))),
+            ("role", &"img"),
+            ("aria-label", &"named in the verdict"),
+            ("title", &"named in the verdict"),
+        ];
+        to.words("span", &attributes, words::sign(section.severity));
     }
 }
 
-fn reproduce(main: &mut Markup, report: &Report) {
-    section(main, "To reproduce", |section| {
-        table(section, "What was declared of the parameters", "", &tables::declared(report));
-        section.node("div", &[("class", &"pair")], |pair| {
-            table(pair, "Settings", "", &tables::settings(report));
-            table(pair, "Figures", "", &tables::figures(report));
-        });
-    });
-}
-
-fn section(main: &mut Markup, title: &str, content: impl FnOnce(&mut Markup)) {
-    main.node("section", &[], |section| {
-        section.words("h2", &[], title);
-        content(section);
-    });
-}
-
-fn figure(to: &mut Markup, plot: &Plot<'_>, caption: &str) {
-    to.node("figure", &[], |figure| {
-        figure.words("figcaption", &[], typeset(caption));
-        plot.draw(figure, Size::Fluid);
-    });
-}
-
-/// A table that scrolls where the screen is too narrow, or whose rows become cards there.
-fn table(to: &mut Markup, caption: &str, kind: &str, table: &Table) {
-    let cards: Attributes<'_> = &[("class", &"cards")];
-    let scroll: Attributes<'_> =
-        &[("class", &"scroll"), ("tabindex", &"0"), ("role", &"group"), ("aria-label", &caption)];
-    to.node("div", if kind == "cards" { cards } else { scroll }, |around| {
-        around.node("table", &[("role", &"table")], |node| {
-            node.words("caption", &[], caption);
-            node.node("thead", &[("role", &"rowgroup")], |head| {
-                head.node("tr", &[("role", &"row")], |row| {
-                    for name in table.columns {
-                        let attributes: Attributes<'_> =
-                            &[("scope", &"col"), ("role", &"columnheader"), ("data-name", name)];
-                        row.words("th", attributes, name);
-                    }
-                });
-            });
-            node.node("tbody", &[("role", &"rowgroup")], |body| {
-                for cells in &table.rows {
-                    body.node("tr", &[("role", &"row")], |row| cells_of(row, table.columns, cells));
-                }
-            });
-        });
-    });
-}
-
-/// Roles are said, for a table that is laid out as cards is none to a browser any more.
-fn cells_of(row: &mut Markup, columns: &[&str], cells: &[String]) {
-    for (i, (name, cell)) in columns.iter().zip(cells).enumerate() {
-        match i {
-            0 => row.words("th", &[("scope", &"row"), ("role", &"rowheader")], cell),
-            _ => {
-                let mut attributes: Vec<(&str, &dyn Display)> = vec![("role", &"cell"), ("data-name", name)];
-                if cell.is_empty() {
-                    attributes.push(("class", &"empty"));
-                }
-                row.words("td", &attributes, cell);
+fn content(to: &mut Markup, section: &Section, level: usize, prose: &mut Prose) {
+    let wide = |plot: &&Plot| matches!(plot.drawing, Some(Drawing::Timeline(_)));
+    let (timelines, small): (Vec<&Plot>, Vec<&Plot>) =
+        section.plots.iter().filter(|plot| plot.drawing.is_some()).partition(wide);
+    paragraphs(to, section, prose);
+    match (section.tables.as_slice(), small.as_slice()) {
+        ([first, rest @ ..], [plot]) => {
+            beside(to, first, plot, prose);
+            rest.iter().for_each(|other| table::draw(to, other, prose));
+        }
+        // Tables and plots of one number stand beside each other.
+        (tables, plots) if tables.len() == plots.len() && tables.len() < 4 => {
+            for (one, plot) in tables.iter().zip(plots) {
+                beside(to, one, plot, prose);
             }
+        }
+        (tables, plots) => {
+            tables.iter().for_each(|one| table::draw(to, one, prose));
+            if !plots.is_empty() {
+                let panels: Attributes<'_> = &[("class", &"panels")];
+                to.node("div", panels, |panels| plots.iter().for_each(|plot| figure(panels, plot, prose)));
+            }
+        }
+    }
+    timelines.iter().for_each(|plot| figure(to, plot, prose));
+    section.parts.iter().for_each(|part| self::section(to, part, level + 1, prose));
+}
+
+/// A table and a plot that show the same.
+fn beside(to: &mut Markup, table: &Table, plot: &Plot, prose: &mut Prose) {
+    to.node("div", &[("class", &"pair table-first")], |pair| {
+        table::draw(pair, table, prose);
+        figure(pair, plot, prose);
+    });
+}
+
+/// One sentence is a paragraph, several are a list after the first.
+fn paragraphs(to: &mut Markup, section: &Section, prose: &mut Prose) {
+    if let [first, rest @ ..] = section.sentences.as_slice() {
+        to.node("p", &[], |p| prose.sentence(p, first));
+        if !rest.is_empty() {
+            to.node("ul", &[], |list| {
+                rest.iter().for_each(|text| list.node("li", &[], |item| prose.sentence(item, text)));
+            });
         }
     }
 }
 
-fn list(to: &mut Markup, items: &[String]) {
-    to.node("ul", &[], |list| {
-        items.iter().for_each(|item| list.node("li", &[], |node| sentence(node, item)));
+fn figure(to: &mut Markup, plot: &Plot, prose: &mut Prose) {
+    to.node("figure", &[], |figure| {
+        if !plot.caption.is_empty() {
+            figure.node("figcaption", &[], |caption| prose.sentence(caption, &plot.caption));
+        }
+        match &plot.drawing {
+            Some(Drawing::Timeline(timeline)) => signals::draw(figure, plot, timeline, prose.size),
+            _ => chart::draw(plot, figure, prose.size),
+        }
     });
-}
-
-/// A sentence with names as code.
-fn sentence(to: &mut Markup, text: &str) {
-    for (name, piece) in words::pieces(text) {
-        if name { to.words("code", &[], piece) } else { to.text(typeset(piece)) }
-    }
-}
-
-/// A minus that does not part from its number at the end of a line. Tables keep the plain one, for those who copy numbers.
-fn typeset(text: &str) -> String {
-    let mut typeset = String::with_capacity(text.len());
-    let mut letters = text.chars().peekable();
-    while let Some(letter) = letters.next() {
-        let before_digit = letters.peek().is_some_and(char::is_ascii_digit);
-        typeset.push(if letter == '-' && before_digit { '−' } else { letter });
-    }
-    typeset
 }

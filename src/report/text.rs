@@ -1,11 +1,8 @@
-//! A report for a terminal.
+//! A report for a terminal of 80 columns.
 
-use super::Report;
-use super::tables::{self, Table};
-use super::trace::Trace;
-use super::words;
-use crate::estimate::number;
+use super::{Report, words};
 use crate::optimize::Severity;
+use crate::section::{Drawing, PanelKind, Section, Timeline, Trace, visible, wrapped};
 use core::fmt::Write;
 
 /// Cells of a sparkline.
@@ -14,56 +11,15 @@ const CELLS: usize = 60;
 /// The report as text; with color by ANSI escapes (ECMA-48, 8.3.117) if wanted.
 pub(super) fn page(report: &Report, color: bool) -> String {
     let mut page = Page { text: String::new(), color };
-    page.line(&format!("{}\n", report.title));
-    page.painted(report.severity, &format!("{} {}", words::sign(report.severity), words::verdict(report.severity)));
-    page.line(&format!(". {}", words::search(report)));
-    for (severity, text) in words::reasons(report) {
-        page.painted(severity, &format!("  {} ", words::sign(severity)));
-        page.line(&text);
+    page.paragraph(&report.title, 0);
+    page.text.push('\n');
+    let verdict = format!("{} {}.", words::sign(report.severity), words::verdict(report.severity));
+    page.painted(report.severity, &verdict, &words::search(report), 0);
+    for reason in report.reasons() {
+        page.painted(reason.severity, words::sign_of_reason(reason.severity), &reason.text, 2);
     }
-    page.line("");
-    page.table(&tables::parameters(report));
-    page.table(&tables::outputs(report));
-    for record in &report.records {
-        page.line(&format!("{}: {}", record.name, words::extent(record)));
-        words::unpredicted(record).iter().for_each(|text| page.line(&format!("  {text}")));
-        for fit in &record.fits {
-            if let Some(trace) = &fit.overview {
-                let largest = format!("{} {}", number(fit.largest, 3), fit.unit);
-                let at = number(fit.largest_at, 6);
-                page.line(&format!("  |residual of {}|, largest {largest} at {at} s", fit.name));
-                page.line(&format!("  {}", sparkline(trace)));
-            }
-        }
-    }
-    page.section("\nwhat the data tell apart", [words::rank(report)]);
-    page.items(report.identifiability.advice.iter());
-    page.items(words::correlated(report).iter().map(|pair| format!("strongly correlated: {pair}")));
-    page.line("");
-    page.table(&tables::excitation(report));
-    let failures = words::failures(report);
-    if !failures.is_empty() {
-        page.section("tests of the residuals that failed", []);
-        page.items(failures.iter());
-        page.line("");
-    }
-    if !report.profiles.is_empty() {
-        page.table(&tables::profiles(report));
-    }
-    if let Some(found) = &report.bootstrap {
-        page.section(&words::refits(found), []);
-        page.table(&tables::bootstrap(found));
-    }
-    if let Some(found) = &report.restarts {
-        page.section("restarts", [found.meaning.clone()]);
-        page.line("");
-    }
-    for (about, of_it) in words::by_subject(report) {
-        page.section(about, []);
-        page.table(&tables::tests(of_it));
-    }
-    page.table(&tables::figures(report));
-    page.table(&tables::settings(report));
+    report.sections.iter().filter(|section| !section.folded).for_each(|section| page.section(section, 0));
+    page.left_out(&report.sections);
     page.text.truncate(page.text.trim_end().len());
     page.text
 }
@@ -74,57 +30,90 @@ struct Page {
 }
 
 impl Page {
-    fn line(&mut self, text: &str) {
-        // A name must not move the cursor.
-        let visible = |letter: char| if letter.is_control() && letter != '\n' { '\u{FFFD}' } else { letter };
-        self.text.extend(text.trim_end_matches(' ').chars().map(visible).chain(['\n']));
+    /// A paragraph, all of it indented.
+    fn paragraph(&mut self, text: &str, indent: usize) {
+        self.text.extend(core::iter::repeat_n(' ', indent));
+        self.text += &wrapped(&visible(text), indent, indent);
+        self.text.push('\n');
     }
 
-    fn section<const N: usize>(&mut self, title: &str, lines: [String; N]) {
-        self.line(title);
-        self.items(lines.iter());
-    }
-
-    fn items(&mut self, items: impl Iterator<Item = impl AsRef<str>>) {
-        items.for_each(|item| self.line(&format!("  {}", item.as_ref())));
-    }
-
-    fn painted(&mut self, severity: Severity, text: &str) {
-        let code = match severity {
+    /// A sentence after a colored sign.
+    fn painted(&mut self, severity: Severity, sign: &str, text: &str, indent: usize) {
+        let begin = indent + sign.chars().count() + 1;
+        let color = match severity {
             Severity::Usable => 32,
             Severity::UsableWithCare => 33,
             Severity::NotUsable => 31,
         };
+        let text = wrapped(&visible(text), begin, indent + 2);
         // Writing to a string does not fail.
         let _ = match self.color {
-            true => write!(self.text, "\x1b[1;{code}m{text}\x1b[0m"),
-            false => write!(self.text, "{text}"),
+            true => writeln!(self.text, "{:indent$}\x1b[1;{color}m{sign}\x1b[0m {text}", ""),
+            false => writeln!(self.text, "{:indent$}{sign} {text}", ""),
         };
     }
 
-    /// The first column to the left, the others to the right.
-    fn table(&mut self, table: &Table) {
-        let header: Vec<String> = table.columns.iter().map(|name| (*name).to_owned()).collect();
-        let rows = || [&header].into_iter().chain(&table.rows);
-        let width = |column: usize| rows().map(|row| row[column].chars().count()).max().unwrap_or(0);
-        let widths: Vec<usize> = (0..header.len()).map(width).collect();
-        for row in rows() {
-            let mut line = format!("{:<1$}", row[0], widths[0]);
-            for (cell, width) in row.iter().zip(&widths).skip(1) {
-                // Writing to a string does not fail.
-                let _ = write!(line, "  {cell:>width$}");
+    fn section(&mut self, section: &Section, depth: usize) {
+        let mut lines = vec![];
+        for plot in &section.plots {
+            if let Some(Drawing::Timeline(timeline)) = plot.drawing.as_ref().filter(|_| depth == 0) {
+                lines.extend(sparklines(timeline));
             }
-            self.line(&line);
         }
-        self.line("");
+        if section.sentences.is_empty() && section.tables.is_empty() && section.parts.is_empty() && lines.is_empty() {
+            return;
+        }
+        self.text.push('\n');
+        let title = visible(&section.title);
+        let rule = if depth == 0 { "=" } else { "-" }.repeat(title.chars().count().min(crate::section::WIDTH));
+        self.paragraph(&title, 0);
+        self.paragraph(&rule, 0);
+        section.sentences.iter().for_each(|text| self.paragraph(text, 0));
+        lines.iter().for_each(|line| self.text += line);
+        for (i, table) in section.tables.iter().enumerate() {
+            if i > 0 || !section.sentences.is_empty() || !lines.is_empty() {
+                self.text.push('\n');
+            }
+            if section.tables.len() > 1 {
+                self.paragraph(&table.caption, 0);
+            }
+            // Writing to a string does not fail.
+            let _ = writeln!(self.text, "{table}");
+        }
+        section.parts.iter().filter(|part| !part.folded).for_each(|part| self.section(part, depth + 1));
+        self.left_out(&section.parts);
+    }
+
+    /// Names the details that only the other forms of the report show.
+    fn left_out(&mut self, parts: &[Section]) {
+        const NAMED: usize = 3;
+        let folded: Vec<&str> = parts.iter().filter(|part| part.folded).map(|part| part.title.as_str()).collect();
+        let more = match folded.len().saturating_sub(NAMED) {
+            0 => String::new(),
+            more => format!("; {more} more"),
+        };
+        if !folded.is_empty() {
+            let named = folded[..folded.len().min(NAMED)].join("; ");
+            self.paragraph(&format!("(not shown here: {named}{more})"), 0);
+        }
     }
 }
 
-/// The largest residual in each cell, from none to the largest of all.
+/// The size of each residual over time.
+fn sparklines(timeline: &Timeline) -> Vec<String> {
+    let Some(whole) = timeline.stretches.first() else { return vec![] };
+    let residuals = timeline.lines().zip(&whole.traces).filter(|((panel, _), _)| panel.kind == PanelKind::Residual);
+    let line = |((panel, _), trace): ((&crate::section::Panel, _), &Trace)| {
+        format!("size of the {}\n  {}\n", visible(&panel.name), sparkline(trace))
+    };
+    residuals.map(line).collect()
+}
+
+/// The largest value in each cell, from none to the largest of all.
 fn sparkline(trace: &Trace) -> String {
     const LEVELS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
-    let ends = trace.residual.low.iter().zip(&trace.residual.high);
-    let sizes: Vec<Option<f64>> = ends.map(|(low, high)| Some(low.as_ref()?.abs().max(high.as_ref()?.abs()))).collect();
+    let size = |column: Option<(f64, f64)>| column.map(|(low, high)| low.abs().max(high.abs()));
+    let sizes: Vec<Option<f64>> = trace.extremes().map(size).collect();
     let largest = sizes.iter().flatten().copied().fold(0.0, f64::max);
     let cell = |sizes: &[Option<f64>]| match sizes.iter().flatten().copied().reduce(f64::max) {
         Some(size) if largest > 0.0 => LEVELS[((size / largest * 8.0) as usize).min(7)],

@@ -58,7 +58,7 @@ fn a_product_is_named_and_so_is_a_constant_input() {
     let says = |what: &str| found.advice.iter().any(|advice| advice.contains(what));
     assert!(says("`a` and `b` are known only as their product") || says("`b` and `a` are known only as their product"));
     assert!(says("the input `w` is 1.5 throughout"));
-    assert!(says("`a` is seen only through `y`"));
+    assert!(says("`a`, `b` are seen only through `y`"));
 }
 
 signals! { struct Dose { u: "1" } }

@@ -1,7 +1,10 @@
 //! What is said of an estimate: identifiability, diagnostics, comparison, reports.
 
 mod compare;
+mod filters;
+mod gallery;
 mod identifiability;
+mod pages;
 #[path = "../common/random.rs"]
 mod random;
 mod reports;
@@ -9,3 +12,4 @@ mod residuals;
 #[path = "../common/shared.rs"]
 mod shared;
 mod silent_failures;
+mod stops;

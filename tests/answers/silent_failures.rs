@@ -1,4 +1,4 @@
-//! Ways in which fits fail without a word elsewhere: here each is named.
+//! Failures that other programs do not report: each is named here.
 
 use greybox::diagnose::restarts;
 use greybox::optimize::Severity;

@@ -126,7 +126,7 @@ fn parameters_known_only_as_a_ratio_are_named_with_the_direction() {
     let record = record(&Ratio, H, &lag(3.0, 1.0, H, 300, 1e-3));
     for start in [free_pair(2.0, 1.0), free_pair(2e9, 1e9), Pair { a: free(2.0).log(), b: free(1.0).log() }] {
         let estimate = Fit::new(&Ratio, &record).parameters(start).run().unwrap();
-        warns(&estimate, &["`a`, `b` are known only together", "a +1.000 %", "b +1.000 %", "fix one, add a prior"]);
+        warns(&estimate, &["`a`, `b` are known only together", "a +1 %", "b +1 %", "fix one, add a prior"]);
         assert_eq!([estimate.knowledge.a, estimate.knowledge.b], [Knowledge::Unidentified; 2]);
         assert_eq!(estimate.severity(), Severity::NotUsable);
         // The ratio itself is right to five of its standard errors.
@@ -256,7 +256,7 @@ fn a_step_too_coarse_for_the_dynamics_is_warned_of() {
     let coarse = record(&Lag, 0.4, &lag(3.0, 1.0, 0.4, 300, 1e-4));
     let fit = || Fit::new(&Lag, &coarse).parameters(free_pair(2.0, 1.5));
     let estimate = fit().run().unwrap();
-    warns(&estimate, &["step is too coarse", "Runge-Kutta 4, 2 step(s)", "standard errors", "finer step"]);
+    warns(&estimate, &["step is too coarse", "Runge-Kutta 4, 2 steps", "standard errors", "finer step"]);
     assert_eq!(estimate.severity(), Severity::UsableWithCare);
     let error = estimate.knowledge.a.standard_error().unwrap();
     assert!(

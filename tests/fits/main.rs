@@ -8,6 +8,8 @@ mod checks;
 mod closed_forms;
 #[path = "../common/mod.rs"]
 mod common;
+mod far_starts;
+mod fleet;
 mod kalman;
 mod models;
 mod nist;

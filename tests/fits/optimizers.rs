@@ -4,6 +4,7 @@ mod bounds;
 mod far;
 mod others;
 mod problems;
+mod stationary;
 
 use argmin::core::{Executor, Solver, State};
 use greybox::optimize::{GaussNewton, LeastSquares, LeastSquaresState, LevenbergMarquardt, Machine, Outcome, Stop};
@@ -18,9 +19,9 @@ struct Ended {
     evaluations: u64,
 }
 
-fn run<O>(problem: &Problem, start: &[f64], solver: O, outcome: fn(&O) -> Option<Outcome>) -> Ended
+fn run<P, O>(problem: &P, start: &[f64], solver: O, outcome: fn(&O) -> Option<Outcome>) -> Ended
 where
-    O: for<'p> Solver<&'p Problem, LeastSquaresState>,
+    O: for<'p> Solver<&'p P, LeastSquaresState>,
 {
     let configure = |state: LeastSquaresState| state.param(start.to_vec()).counting(true);
     let result =

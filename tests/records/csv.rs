@@ -100,6 +100,13 @@ fn reads_what_instruments_write() {
     }
 }
 
+#[test]
+fn a_preamble_longer_than_the_file_ends_with_it() {
+    let path = file("preamble_only.csv", "t,ud,w,id,iq\n0,1.5,2,3,4\n");
+    let error = CsvFile::new(path).preamble(usize::MAX).read(&Pmsm).unwrap_err().to_string();
+    assert!(error.contains("the file ends before a line with the names of its columns"), "{error}");
+}
+
 /// Even stamps become a start and a step; a gap, a jitter or an uneven end keeps every stamp as written.
 #[test]
 fn time_is_uniform_only_where_it_is() {

@@ -2,11 +2,12 @@
 
 use super::together::together;
 use super::{Excitation, Identifiability};
-use crate::estimate::{Unknown, number};
+use crate::estimate::Unknown;
+use crate::numeral::{counted, exact, number, percent};
 use crate::problem::Role;
 use crate::record::Record;
 
-/// An output that holds so much of an unknown's information is its only witness.
+/// An output that holds so much of an unknown's information is the only one that tells it.
 const ONLY: f64 = 0.99;
 /// So much of an unknown's information from one tenth of a record leaves little to the others.
 const ONCE: f64 = 0.9;
@@ -36,56 +37,69 @@ pub(super) fn advice(found: &Identifiability, unknowns: &[Unknown], records: &[R
         advice.extend(together(&set.moves, left, unknowns).map(|text| text + "; fix one, or excite them apart"));
     }
     if let Some(more @ 1..) = found.collinear.len().checked_sub(MENTIONED) {
-        advice.push(format!("{more} more set(s) of unknowns are hardly known but together"));
+        advice.push(format!("{} of unknowns are hardly known but together", counted(more as u64, "more set")));
     }
     for excited in &found.excitation {
-        if excited.outputs.iter().all(|(_, share)| *share == 0.0) {
+        if excited.segments.iter().all(|segment| segment.share == 0.0) {
             advice.push(format!("`{}` moves no output at all: fix it", excited.name));
         }
     }
     // The beginning of a record is where initial states are seen, and nothing helps that.
-    for (excited, unknown) in found.excitation.iter().zip(unknowns) {
-        if matches!(unknown.role, Role::Parameter(_)) {
-            advice.extend(one_output(excited));
-            advice.extend(one_moment(excited));
-        }
-    }
+    let of_parameters = found.excitation.iter().zip(unknowns);
+    let of_parameters = of_parameters.filter(|(_, unknown)| matches!(unknown.role, Role::Parameter(_)));
+    let of_parameters: Vec<&Excitation> = of_parameters.map(|(excited, _)| excited).collect();
+    advice.extend(one_output(&of_parameters));
+    advice.extend(of_parameters.iter().filter_map(|excited| one_moment(excited)));
     let inputs = records.first().map_or(&[][..], |record| record.inputs());
     for (i, input) in inputs.iter().enumerate() {
         let Some(&first) = input.values.first() else { continue };
         if records.iter().all(|record| record.inputs()[i].values.iter().all(|value| *value == first)) {
             advice.push(format!(
-                "the input `{}` is {first} throughout: what it drives cannot be told from an offset; vary it",
-                input.name
+                "the input `{}` is {} throughout: what it drives cannot be told from an offset; vary it",
+                input.name,
+                exact(first)
             ));
         }
     }
     advice
 }
 
-fn one_output(excited: &Excitation) -> Option<String> {
-    let (output, share) = excited.outputs.iter().find(|(_, share)| *share > ONLY)?;
-    let others = excited.outputs.iter().filter(|(name, _)| name != output);
-    let others: Vec<String> = others.map(|(name, _)| format!("`{name}`")).collect();
-    (!others.is_empty()).then(|| {
-        format!(
-            "`{}` is seen only through `{output}` ({:.2} %): {} hardly answers to it; excite it there for a second witness",
-            excited.name,
-            100.0 * share,
+/// Which parameters only one of several outputs tells, output by output.
+fn one_output(parameters: &[&Excitation]) -> Vec<String> {
+    let outputs = parameters.first().map_or(&[][..], |excited| &excited.outputs);
+    let sentence = |j: usize| {
+        let output = &outputs[j].0;
+        let only: Vec<&&Excitation> = parameters.iter().filter(|excited| excited.outputs[j].1 > ONLY).collect();
+        let least = only.iter().map(|excited| excited.outputs[j].1).reduce(f64::min)?;
+        let names: Vec<String> = only.iter().map(|excited| format!("`{}`", excited.name)).collect();
+        let others = outputs.iter().filter(|(name, _)| name != output);
+        let others: Vec<String> = others.map(|(name, _)| format!("`{name}`")).collect();
+        let (verb, them, at_least) = match names.len() {
+            1 => ("is", "it", ""),
+            _ => ("are", "them", "at least "),
+        };
+        let depend = if others.len() == 1 { "depends" } else { "depend" };
+        Some(format!(
+            "{} {verb} seen only through `{output}` ({at_least}{} of the information): {} hardly {depend} on {them}, and \
+             cannot confirm {them}",
+            names.join(", "),
+            percent(least, 4),
             others.join(", ")
-        )
-    })
+        ))
+    };
+    if outputs.len() < 2 { vec![] } else { (0..outputs.len()).filter_map(sentence).collect() }
 }
 
 fn one_moment(excited: &Excitation) -> Option<String> {
     let segment = excited.segments.iter().find(|segment| segment.share > ONCE)?;
+    let begin = excited.segments.iter().find(|first| first.experiment == segment.experiment)?.from;
     (excited.segments.len() > 1).then(|| {
         format!(
-            "`{}` is known from one tenth of `{}` alone, from t = {} s on ({:.1} %)",
+            "`{}` is known from one tenth of `{}` alone, {} s after its start ({})",
             excited.name,
             segment.experiment,
-            number(segment.from, 5),
-            100.0 * segment.share
+            number(segment.from - begin, 3),
+            percent(segment.share, 3)
         )
     })
 }

@@ -22,9 +22,13 @@ impl Accumulate for Squares {
             let segment = (window.begin[lane] + k) / self.length;
             for j in 0..window.outputs() {
                 for (c, &unknown) in self.unknowns.iter().enumerate() {
-                    let slope = window.at(k, j, c, lane);
-                    self.by_output[unknown][j] += slope * slope;
-                    self.by_segment[unknown][segment] += slope * slope;
+                    let mut square = window.at(k, j, c, lane).powi(2);
+                    // Through the predicted variance of the output, too.
+                    if window.has_variances() && window.is_measured(k, j, lane) {
+                        square += window.variance_row(k, j)[c * window.lanes() + lane].powi(2);
+                    }
+                    self.by_output[unknown][j] += square;
+                    self.by_segment[unknown][segment] += square;
                 }
             }
         }

@@ -1,6 +1,7 @@
 //! Words for unknowns that are known only together: a common shift, a common factor, a ratio, a product.
 
-use crate::estimate::{Direction, Unknown, Warning, number};
+use crate::estimate::{Direction, Unknown, Warning};
+use crate::numeral::{number, percent};
 
 /// Moves are the same if they differ by less than this part.
 const SAME: f64 = 0.02;
@@ -33,7 +34,6 @@ pub(super) fn together(moves: &[(String, f64)], left: f64, unknowns: &[Unknown])
     let part = |((unknown, _), by): (&(&Unknown, f64), &f64)| {
         let sign = if *by < 0.0 { '−' } else { '+' };
         let size = number(by.abs() / largest, 3);
-        let size = size.trim_end_matches('0').trim_end_matches('.');
         let unit = if in_units { unknown.unit.as_str() } else { "%" };
         format!("`{}` {sign}{size} {unit}", unknown.name).trim_end().to_owned()
     };
@@ -41,9 +41,9 @@ pub(super) fn together(moves: &[(String, f64)], left: f64, unknowns: &[Unknown])
     Some(match left > 0.0 {
         false => format!("{names} are known only {how}: {steps} together change no prediction"),
         true => format!(
-            "{names} are hardly known but {how}: {steps} together change the predictions by {:.2} % of what one of them alone \
+            "{names} are hardly known but {how}: {steps} together change the predictions by {} of what one of them alone \
              would",
-            100.0 * left
+            percent(left, 2)
         ),
     })
 }

@@ -1,7 +1,7 @@
 //! Correlation of residuals with what went in and what was measured before.
 
 use super::Series;
-use crate::diagnose::Test;
+use crate::diagnose::{LEVEL, Test};
 use crate::whiteness::dot;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -18,8 +18,11 @@ pub struct Correlation {
     pub first_lag: i64,
     /// Correlation at that lag and the following ones.
     pub values: Vec<f64>,
-    /// Without correlation they stay within plus and minus this at 99 of 100 lags; it allows for the two signals' own
-    /// autocorrelations (Bartlett; Ljung, *System Identification*, 1999, eq. 16.65).
+    /// The first lag that the test looks at; it looks at all lags from there on.
+    pub tested_from: i64,
+    /// Without correlation all tested lags stay within plus and minus this with 99 % probability: the test fails where one
+    /// does not. It allows for the two signals' own autocorrelations (Bartlett; Ljung, *System Identification*, 1999, eq.
+    /// 16.65).
     pub band: f64,
 }
 
@@ -54,15 +57,20 @@ pub(super) fn between(residuals: &Series, own: &[f64], signal: &Series) -> (Corr
 
     // Residuals go with their own output of the same sample by construction: only its past is tested.
     let is_output = signal.role == "measured output";
+    let tested_from = i64::from(is_output);
     let tested = &values[lags + usize::from(is_output)..];
     let largest = tested.iter().fold(0.0f64, |m, r| m.max(r.abs())) / deviation;
     // The largest of many, as if they were independent: on the safe side where they are not.
+    let count = tested.len() as f64;
     let single = 2.0 * Normal::standard().sf(largest);
-    let p_value = -(tested.len() as f64 * (-single).ln_1p()).exp_m1();
+    let p_value = -(count * (-single).ln_1p()).exp_m1();
+    // Where the largest of so many has the probability of the level.
+    let one_lag = -((-LEVEL).ln_1p() / count.max(1.0)).exp_m1();
+    let band = -Normal::standard().inverse_cdf(one_lag / 2.0) * deviation;
     let failed = match is_output {
         false => format!(
-            "the residuals follow from the input `{0}`: the way from `{0}` to `{1}` is missing or wrong in the model (a \
-             term, a delay, a nonlinearity)",
+            "the residuals follow from the input `{0}`: what it does to `{1}` is missing or wrong in the model (a term, a \
+             delay, a nonlinearity)",
             signal.name, residuals.name
         ),
         true => format!(
@@ -82,7 +90,8 @@ pub(super) fn between(residuals: &Series, own: &[f64], signal: &Series) -> (Corr
         role: signal.role.to_owned(),
         first_lag: -(lags as i64),
         values,
-        band: 2.576 * deviation,
+        tested_from,
+        band,
     };
     (correlation, test)
 }

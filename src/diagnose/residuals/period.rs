@@ -6,6 +6,7 @@
 
 use super::Series;
 use crate::diagnose::Test;
+use crate::numeral::resolved;
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -31,7 +32,37 @@ const FEWEST: usize = 4;
 /// Half of the neighborhood: at most, at least.
 const REACH: (usize, usize) = (60, 6);
 
-pub(super) fn find(residuals: &Series, step: f64) -> (Option<Period>, Test) {
+/// Where the power of the residuals lies.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spectrum {
+    /// Middle of each part of the frequencies up to half the sampling frequency (Hz).
+    pub frequency: Vec<f64>,
+    /// Mean power density in it, one-sided, in the square of the output's unit per Hz.
+    pub density: Vec<f64>,
+    /// The greatest power density in it.
+    pub greatest: Vec<f64>,
+}
+
+/// Parts of the frequencies in a spectrum.
+const BANDS: usize = 128;
+
+/// The lines of a periodogram on a grid of this length, gathered.
+fn gathered(power: &[f64], grid: usize, samples: usize, step: f64) -> Spectrum {
+    let density = |power: f64| 2.0 * step * power / samples as f64;
+    let width = (power.len() - 1).div_ceil(BANDS).max(1);
+    let mut spectrum = Spectrum::default();
+    // Without the mean.
+    for (i, lines) in power[1..].chunks(width).enumerate() {
+        let middle = 1.0 + (i * width) as f64 + (lines.len() - 1) as f64 / 2.0;
+        spectrum.frequency.push(middle / (grid as f64 * step));
+        spectrum.density.push(density(lines.iter().sum::<f64>() / lines.len() as f64));
+        spectrum.greatest.push(density(lines.iter().copied().fold(0.0, f64::max)));
+    }
+    spectrum
+}
+
+pub(super) fn find(residuals: &Series, step: f64) -> (Spectrum, Option<Period>, Test) {
     let n = residuals.values.len();
     let mut spectrum: Vec<Complex<f64>> = residuals.values.iter().map(|&e| Complex::new(e, 0.0)).collect();
     let grid = n.next_power_of_two();
@@ -73,13 +104,16 @@ pub(super) fn find(residuals: &Series, step: f64) -> (Option<Period>, Test) {
         amplitude: 2.0 * power[k].sqrt() / residuals.count as f64,
         share: (2.0 * power[k] / (energy * residuals.count as f64)).min(1.0),
     };
+    // The place of a line is known to the distance between lines, at least.
+    let lines = (n as f64 * step).recip();
     let failed = format!(
-        "the residuals repeat every {:.4} s ({:.4} Hz): look for what turns or switches at that rate (cogging, \
-         eccentricity, sampling, mains) and model it or filter it out",
-        period.seconds, period.frequency
+        "the residuals repeat every {} s ({} Hz): look for what turns or switches at that rate (cogging, eccentricity, \
+         sampling, mains) and model it, or leave it out with a pre-filter",
+        resolved(period.seconds, lines * period.seconds.powi(2)),
+        resolved(period.frequency, lines)
     );
     let test = Test::new("periodogram", excess, p_value, "no period stands out", &failed);
-    ((!test.passed && k > 0).then_some(period), test)
+    (gathered(&power, grid, n, step), (!test.passed && k > 0).then_some(period), test)
 }
 
 /// Where between the lines of the grid the strongest is: the top of the parabola through the logarithms.
@@ -120,6 +154,27 @@ fn transform(values: &mut [Complex<f64>]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The densities times the widths of the bands make the variance (Parseval), of white noise alike in all bands.
+    #[test]
+    fn spectrum_holds_the_variance() {
+        let mut state = 1u64;
+        let mut noise = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        };
+        let raw: Vec<f64> = (0..4096).map(|_| noise()).collect();
+        let series = Series::new("residual", "y", "V", &raw);
+        let (spectrum, period, _) = find(&series, 0.01);
+        let width = 50.0 / BANDS as f64;
+        let power: f64 = spectrum.density.iter().map(|density| density * width).sum();
+        // The lines at zero and at 50 Hz are left out: two of 2048.
+        assert!((power / series.deviation.powi(2) - 1.0).abs() < 2e-3, "{power}");
+        assert!(period.is_none() && spectrum.density.len() == BANDS);
+        // Means of 16 exponential numbers, each within a factor of 3 of the whole's mean but with probability 1e-4.
+        let mean = power / 50.0;
+        assert!(spectrum.density.iter().all(|density| (0.25..3.0).contains(&(density / mean))));
+    }
 
     /// The definition, sum by sum.
     #[test]

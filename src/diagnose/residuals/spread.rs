@@ -1,4 +1,4 @@
-//! Whether the residuals' spread goes with a signal (heteroscedasticity).
+//! Whether the residuals' spread depends on a signal (heteroscedasticity).
 
 use super::Series;
 use crate::diagnose::Test;
@@ -21,11 +21,22 @@ pub struct Spread {
     pub deviation: Vec<f64>,
     /// How many residuals there are.
     pub count: Vec<u64>,
-    /// Part of the variance of the squared residuals that goes with the signal.
+    /// Part of the variance of the squared residuals that the signal explains.
     pub share: f64,
 }
 
 const PARTS: usize = 12;
+
+/// What can be done: a weighting sees time and inputs, but not the outputs.
+fn remedy(signal: &Series) -> String {
+    match signal.role {
+        "input" | "time" => format!("a weighting by `{}` makes the quieter part count for more", signal.name),
+        _ => {
+            "fit a part of the record in which they are of one size (`Experiment::between`), and compare the estimates"
+                .to_owned()
+        }
+    }
+}
 
 /// Koenker's form (J. Econometrics 17 (1981) 107) of Breusch and Pagan's test with the signal and its square, which does
 /// not ask for normal residuals.
@@ -90,9 +101,10 @@ pub(super) fn over(residuals: &Series, effective: f64, signal: &Series) -> Optio
         share,
     };
     let failed = format!(
-        "the size of the residuals goes with {} `{}`: the noise grows with it, or the model is wrong in part of its range; a \
-         weighting by `{}` gives the quiet part its due",
-        signal.role, signal.name, signal.name
+        "the size of the residuals changes with {} `{}`: the noise does, or the model is wrong in part of its range; {}",
+        signal.role,
+        signal.name,
+        remedy(signal)
     );
     let name = format!("Breusch-Pagan-Koenker, {} `{}`", signal.role, signal.name);
     Some((spread, Test::new(name, statistic, p_value, "the residuals are of one size over its range", &failed)))

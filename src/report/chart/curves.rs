@@ -1,166 +1,251 @@
 //! [`Curves`]: curves, bars and levels over one pair of axes.
 
-use super::axes::Axis;
-use super::{Frame, LETTER, Margins, Short, Size};
+use super::scale::Scale;
+use super::{Frame, LETTER, Margins, Short, Size, class};
 use crate::report::markup::Markup;
-use crate::report::trace::Band;
+use crate::section::{Axis, Curves, Layer, Style};
 use core::fmt::{Display, Write};
 
 /// Room for so many letters is left beside every drawing, so that those below each other are in line.
-const LETTERS: usize = 6;
+pub(super) const LETTERS: usize = 6;
+/// Height of the drawing without its margins (px).
+const HEIGHT: f64 = 160.0;
 
-/// A drawing over axes.
-#[derive(Clone, Debug)]
-pub(in crate::report) struct Curves<'a> {
-    pub x: Axis,
-    pub y: Axis,
-    /// From the lowest to the topmost.
-    pub layers: Vec<Layer<'a>>,
-    /// Height without margins (px).
-    pub height: f64,
+/// Draws them under a name for those who cannot see it.
+pub(super) fn draw(curves: &Curves, to: &mut Markup, size: Size, name: &str) {
+    let (x, y) = (across(curves), upwards(curves));
+    surface(
+        to,
+        size,
+        name,
+        (HEIGHT, Along::Titled),
+        (&x, &y),
+        |frame, svg| {
+            for layer in &curves.layers {
+                layers(layer, frame, svg, &x, &y);
+            }
+        },
+        |frame, svg| {
+            for layer in &curves.layers {
+                labels(layer, frame, svg, &x, &y);
+            }
+        },
+    );
 }
 
-/// One of the things drawn.
-#[derive(Clone, Debug)]
-pub(in crate::report) enum Layer<'a> {
-    /// A curve that spans a range in each column.
-    Band { class: &'static str, x: &'a [f64], y: &'a Band },
-    /// The surface between the least and the greatest of each column.
-    Area { class: &'static str, x: &'a [f64], y: &'a Band },
-    /// A curve through points.
-    Curve { class: &'static str, points: Vec<(f64, f64)> },
-    /// Bars of equal width, standing on zero.
-    Bars { first: f64, width: f64, heights: Vec<f64> },
-    /// A value of `y` to compare with.
-    Level(f64),
+/// What is written along the axis to the right.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Along {
+    /// Numbers and a title.
+    Titled,
+    /// Numbers.
+    Numbered,
+    /// Nothing: a drawing below has the same axis.
+    Bare,
 }
 
-impl Curves<'_> {
-    /// Draws it under a name for those who cannot see it.
-    pub(in crate::report) fn draw(&self, to: &mut Markup, size: Size, name: &str) {
-        let ticks = self.y.ticks();
-        let letters = ticks.iter().map(|tick| tick.label.chars().count()).fold(LETTERS, usize::max);
-        let margins = Margins { left: letters as f64 * LETTER + 12.0, right: 14.0, top: 24.0, bottom: 40.0 };
-        Frame { size, margins, height: self.height }.draw(to, name, |frame, svg| {
-            let (h, left) = (frame.height, -frame.margins.left);
-            svg.words("text", &[("class", &"name"), ("x", &left), ("y", &-10)], self.y.title());
+impl Along {
+    /// Room below the drawing (px).
+    pub fn room(self) -> f64 {
+        match self {
+            Along::Titled => 40.0,
+            Along::Numbered => 24.0,
+            Along::Bare => 10.0,
+        }
+    }
+}
+
+/// Axes with grid and ticks; on them what is stretched with the surface, and what is not.
+pub(super) fn surface(
+    to: &mut Markup,
+    size: Size,
+    name: &str,
+    (height, along): (f64, Along),
+    (x, y): (&Scale, &Scale),
+    stretched: impl FnOnce(&Frame, &mut Markup),
+    upright: impl FnOnce(&Frame, &mut Markup),
+) {
+    let ticks = y.ticks();
+    let letters = ticks.iter().map(|tick| tick.label.chars().count()).fold(LETTERS, usize::max);
+    let margins = Margins { left: letters as f64 * LETTER + 12.0, right: 14.0, top: 24.0, bottom: along.room() };
+    Frame { size, margins, height }.draw(to, name, |frame, svg| {
+        let (h, left) = (frame.height, -frame.margins.left);
+        svg.words("text", &[("class", &"name"), ("x", &left), ("y", &-10)], y.title());
+        svg.node("g", &[("class", &"up")], |group| {
             for tick in ticks {
                 let y = Short(h * (1.0 - tick.at));
                 let ends: [(&str, &dyn Display); 4] =
                     [("class", &"grid"), ("x2", &frame.x(1.0)), ("y1", &y), ("y2", &y)];
-                svg.leaf("line", &ends);
-                svg.words("text", &[("class", &"tick end"), ("x", &-6), ("y", &y), ("dy", &4)], tick.label);
+                group.leaf("line", &ends);
+                group.words("text", &[("class", &"tick end"), ("x", &-6), ("y", &y), ("dy", &4)], tick.label);
             }
-            svg.node("g", &[("class", &"along")], |group| {
-                for tick in self.x.ticks() {
-                    let place: [(&str, &dyn Display); 3] =
-                        [("class", &"tick middle"), ("x", &frame.x(tick.at)), ("y", &(h + 16.0))];
+        });
+        svg.node("g", &[("class", &"along")], |group| {
+            for tick in x.ticks() {
+                let x = frame.x(tick.at);
+                group.leaf("line", &[("class", &"grid"), ("x1", &x), ("x2", &x), ("y2", &h)]);
+                if along != Along::Bare {
+                    let place: [(&str, &dyn Display); 3] = [("class", &"tick middle"), ("x", &x), ("y", &(h + 16.0))];
                     group.words("text", &place, tick.label);
                 }
-            });
-            let place: [(&str, &dyn Display); 3] = [("class", &"name end"), ("x", &frame.x(1.0)), ("y", &(h + 34.0))];
-            svg.words("text", &place, self.x.title());
-            self.draw_layers(frame, svg);
+            }
         });
-    }
-
-    /// The layers, clipped to the surface, and stretched to it where it is fluid.
-    fn draw_layers(&self, frame: &Frame, svg: &mut Markup) {
-        let (w, h) = (frame.width(), frame.height);
-        let view = format!("0 0 {} {}", Short(w), Short(h));
-        let factor = self.x.factor();
-        let (from, to) = (self.x.from / factor, self.x.to / factor);
-        let attributes: [(&str, &dyn Display); 7] = [
+        if along == Along::Titled {
+            let place: [(&str, &dyn Display); 3] = [("class", &"name end"), ("x", &frame.x(1.0)), ("y", &(h + 34.0))];
+            svg.words("text", &place, x.title());
+        }
+        let view = format!("0 0 {} {}", Short(frame.width()), Short(h));
+        let attributes: [(&str, &dyn Display); 5] = [
             ("class", &"layers"),
             ("width", &frame.x(1.0)),
             ("height", &h),
             ("viewBox", &view),
             ("preserveAspectRatio", &"none"),
-            ("data-from", &from),
-            ("data-to", &to),
         ];
-        svg.node("svg", &attributes, |svg| {
-            let (x, y) = (|v: f64| Short(w * self.x.at(v)), |v: f64| Short(h * (1.0 - self.y.at(v))));
-            for layer in &self.layers {
-                match layer {
-                    Layer::Band { class, x: places, y: band } => {
-                        svg.leaf("path", &[("class", class), ("d", &path(places, &band.low, &band.high, x, y))]);
-                    }
-                    Layer::Area { class, x: places, y: band } => {
-                        svg.leaf("path", &[("class", class), ("d", &area(places, band, x, y))]);
-                    }
-                    Layer::Curve { class, points } => {
-                        let mut d = String::new();
-                        for (i, (place, value)) in points.iter().enumerate() {
-                            // Writing to a string does not fail.
-                            let _ = write!(d, "{}{} {}", if i == 0 { 'M' } else { 'L' }, x(*place), y(*value));
-                        }
-                        svg.leaf("path", &[("class", class), ("d", &d)]);
-                    }
-                    Layer::Bars { first, width, heights } => {
-                        let mut d = String::new();
-                        for (i, height) in heights.iter().enumerate().filter(|(_, height)| **height != 0.0) {
-                            let (begin, end) = (first + width * (i as f64 + 0.1), first + width * (i as f64 + 0.9));
-                            // Writing to a string does not fail.
-                            let _ = write!(d, "M{} {}V{}H{}V{}Z", x(begin), y(0.0), y(*height), x(end), y(0.0));
-                        }
-                        svg.leaf("path", &[("class", &"bar"), ("d", &d)]);
-                    }
-                    Layer::Level(value) => {
-                        let d = format!("M0 {0}H{1}", y(*value), Short(w));
-                        svg.leaf("path", &[("class", &"level"), ("d", &d)]);
-                    }
-                }
+        svg.node("svg", &attributes, |svg| stretched(frame, svg));
+        upright(frame, svg);
+    });
+}
+
+/// What the layers span, of places that both axes can show.
+fn span(curves: &Curves, of: impl Fn((f64, f64)) -> f64) -> Option<(f64, f64)> {
+    let shown = |axis: &Axis, value: f64| value.is_finite() && (!axis.logarithmic || value > 0.0);
+    let points = curves.layers.iter().flat_map(|layer| -> Vec<(f64, f64)> {
+        match layer {
+            Layer::Line { points, .. } | Layer::Dots { points, .. } => points.clone(),
+            Layer::Bars { first, width, heights, .. } => {
+                let end = first + width * heights.len() as f64;
+                let ends = [(*first, 0.0), (end, 0.0)];
+                let tops = heights.iter().enumerate().map(|(i, height)| (first + width * (i as f64 + 0.5), *height));
+                ends.into_iter().chain(tops).collect()
             }
-        });
-    }
-}
-
-/// A line through all columns, up and down each, broken where there is nothing.
-fn path(
-    places: &[f64],
-    low: &[Option<f64>],
-    high: &[Option<f64>],
-    x: impl Fn(f64) -> Short,
-    y: impl Fn(f64) -> Short,
-) -> String {
-    let mut d = String::new();
-    let mut before = None;
-    for ((place, low), high) in places.iter().zip(low).zip(high) {
-        let (Some(low), Some(high)) = (*low, *high) else {
-            before = None;
-            continue;
-        };
-        // From the end that is nearer to where the line stands.
-        let upwards = before.is_none_or(|before: f64| (before - low).abs() <= (before - high).abs());
-        let (first, last) = if upwards { (low, high) } else { (high, low) };
-        let step = if before.is_none() { 'M' } else { 'L' };
-        // Writing to a string does not fail. A lone point is drawn, too, by a line of no length.
-        let _ = write!(d, "{step}{} {}", x(*place), y(first));
-        if last != first || before.is_none() {
-            let _ = write!(d, "V{}", y(last));
+            Layer::Level { .. } | Layer::Mark { .. } => vec![],
         }
-        before = Some(last);
-    }
-    d
+    });
+    let values = points.filter(|(x, y)| shown(&curves.x, *x) && shown(&curves.y, *y)).map(of);
+    values.fold(None, |range, value| match range {
+        None => Some((value, value)),
+        Some((low, high)) => Some((f64::min(low, value), f64::max(high, value))),
+    })
 }
 
-/// There along the greatest and back along the least, in pieces where there is nothing between.
-fn area(places: &[f64], band: &Band, x: impl Fn(f64) -> Short, y: impl Fn(f64) -> Short) -> String {
-    let columns: Vec<Option<(f64, f64, f64)>> = places
-        .iter()
-        .zip(band.low.iter().zip(&band.high))
-        .map(|(place, (low, high))| Some((*place, (*low)?, (*high)?)))
-        .collect();
+fn across(curves: &Curves) -> Scale {
+    let marks = curves.layers.iter().filter_map(|layer| match layer {
+        Layer::Mark { value, .. } => Some(*value),
+        _ => None,
+    });
+    let bars = curves.layers.iter().any(|layer| matches!(layer, Layer::Bars { .. }));
+    ranged(&curves.x, span(curves, |(x, _)| x), marks, !bars)
+}
+
+fn upwards(curves: &Curves) -> Scale {
+    let levels = curves.layers.iter().filter_map(|layer| match layer {
+        Layer::Level { value, .. } => Some(*value),
+        _ => None,
+    });
+    ranged(&curves.y, span(curves, |(_, y)| y), levels, true)
+}
+
+/// An axis over a range and some values; with room at the ends that are not given.
+fn ranged(axis: &Axis, range: Option<(f64, f64)>, also: impl Iterator<Item = f64>, room: bool) -> Scale {
+    let wider = |(low, high): (f64, f64), value: f64| (low.min(value), high.max(value));
+    let also = also.chain(axis.from).filter(|value| !axis.logarithmic || *value > 0.0);
+    let range = also.fold(range, |range, value| Some(range.map_or((value, value), |range| wider(range, value))));
+    let range = range.map(|(low, high)| (low, axis.to.unwrap_or(high)));
+    let tight = Scale::new(axis, range);
+    let wide = if room { tight.clone().with_room() } else { tight.clone() };
+    let given = |end: Option<f64>, value: f64| end.is_some_and(|end| range.is_some() && end == value);
+    let (low, high) = range.unwrap_or((0.0, 1.0));
+    let from = if given(axis.from, low) { tight.from } else { wide.from };
+    let to = if given(axis.to, high) { tight.to } else { wide.to };
+    Scale { from, to, ..wide }
+}
+
+/// Draws what is stretched with the surface.
+fn layers(layer: &Layer, frame: &Frame, svg: &mut Markup, x: &Scale, y: &Scale) {
+    let (w, h) = (frame.width(), frame.height);
+    let (x, y) = (|v: f64| w * x.at(v), |v: f64| h * (1.0 - y.at(v)));
     let mut d = String::new();
-    for piece in columns.split(Option::is_none) {
-        let there = piece.iter().flatten().map(|(place, _, high)| (place, high));
-        let back = piece.iter().rev().flatten().map(|(place, low, _)| (place, low));
-        for (i, (place, value)) in there.chain(back).enumerate() {
+    // Writing to a string does not fail.
+    match layer {
+        Layer::Line { points, .. } => {
+            let places = points.iter().map(|(a, b)| Some((x(*a), y(*b))).filter(|(x, y)| (x + y).is_finite()));
+            d = path(places);
+        }
+        Layer::Bars { first, width, heights, .. } => {
+            for (i, height) in heights.iter().enumerate().filter(|(_, height)| **height != 0.0) {
+                let (begin, end) = (first + width * (i as f64 + 0.1), first + width * (i as f64 + 0.9));
+                let (zero, top) = (Short(y(0.0)), Short(y(*height)));
+                let _ = write!(d, "M{} {zero}V{top}H{}V{zero}Z", Short(x(begin)), Short(x(end)));
+            }
+        }
+        Layer::Level { value, .. } => {
+            let _ = write!(d, "M0 {}H{}", Short(y(*value)), Short(w));
+        }
+        Layer::Mark { value, .. } => {
+            let _ = write!(d, "M{} 0V{}", Short(x(*value)), Short(h));
+        }
+        Layer::Dots { .. } => return,
+    }
+    let (shape, style) = match layer {
+        Layer::Bars { style, .. } => ("bar ", class(*style)),
+        Layer::Line { style, .. } | Layer::Dots { style, .. } => ("line ", class(*style)),
+        Layer::Level { .. } => ("level", ""),
+        Layer::Mark { .. } => ("mark", ""),
+    };
+    svg.leaf("path", &[("class", &format_args!("{shape}{style}")), ("d", &d)]);
+}
+
+/// Draws what keeps its shape: points and labels.
+fn labels(layer: &Layer, frame: &Frame, svg: &mut Markup, x: &Scale, y: &Scale) {
+    /// Where letters stand above or below their line (px).
+    const ABOVE: f64 = -5.0;
+    const BELOW: f64 = 14.0;
+    let h = frame.height;
+    let inside = |at: f64| (-1e-9..=1.0 + 1e-9).contains(&at);
+    match layer {
+        Layer::Dots { style, points } => {
+            for (a, b) in points.iter().map(|(a, b)| (x.at(*a), y.at(*b))).filter(|(a, b)| inside(*a) && inside(*b)) {
+                let (cx, cy) = (frame.x(a), Short(h * (1.0 - b)));
+                let dot: [(&str, &dyn Display); 4] =
+                    [("class", &format_args!("point {}", class(*style))), ("cx", &cx), ("cy", &cy), ("r", &3)];
+                svg.leaf("circle", &dot);
+            }
+        }
+        Layer::Level { value, label } if !label.is_empty() && inside(y.at(*value)) => {
+            let at = h * (1.0 - y.at(*value));
+            let at = at + if at < 16.0 { BELOW } else { ABOVE };
+            let place: [(&str, &dyn Display); 3] = [("class", &"note end"), ("x", &frame.x(1.0)), ("y", &Short(at))];
+            svg.words("text", &place, label);
+        }
+        Layer::Mark { value, label } if !label.is_empty() && inside(x.at(*value)) => {
+            let at = x.at(*value);
+            let (side, shift) = if at > 0.7 { ("note end", -4) } else { ("note", 4) };
+            let place: [(&str, &dyn Display); 4] = [("class", &side), ("x", &frame.x(at)), ("y", &12), ("dx", &shift)];
+            svg.words("text", &place, label);
+        }
+        _ => {}
+    }
+}
+
+/// A line through places, broken where there is none; a lone place is a line of no length, whose round ends are seen.
+pub(super) fn path(places: impl Iterator<Item = Option<(f64, f64)>>) -> String {
+    let mut d = String::new();
+    let mut drawing = false;
+    for place in places {
+        if let Some((x, y)) = place {
             // Writing to a string does not fail.
-            let _ = write!(d, "{}{} {}", if i == 0 { 'M' } else { 'L' }, x(*place), y(*value));
+            let _ = match drawing {
+                true => write!(d, "L{} {}", Short(x), Short(y)),
+                false => write!(d, "M{0} {1}L{0} {1}", Short(x), Short(y)),
+            };
         }
-        d.push_str(if piece.is_empty() { "" } else { "Z" });
+        drawing = place.is_some();
     }
     d
+}
+
+/// The styles that are drawn as filled surfaces.
+pub(super) fn is_band(style: Style) -> bool {
+    matches!(style, Style::Confidence | Style::Prediction)
 }

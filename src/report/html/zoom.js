@@ -1,86 +1,175 @@
-"use strict";
-// Buttons that narrow and move the part of time that the drawings of one output show.
-for (const zoom of document.querySelectorAll(".zoom")) {
-  const charts = [...zoom.querySelectorAll(".layers")].map((layers) => ({
-    layers,
-    ticks: layers.parentNode.querySelector(".along"),
-    width: layers.viewBox.baseVal.width,
-    height: layers.viewBox.baseVal.height,
-    from: Number(layers.dataset.from),
-    to: Number(layers.dataset.to),
-  }));
-  let [begin, end] = [0, 1];
-  const deepest = 1 / 256;
+// Zooming into time: by a rubber band, the wheel with ctrl, two fingers, keys and buttons.
+const zoomable = (root) => {
+  const timeline = new Timeline(root);
+  const [first, last] = timeline.whole;
+  if (!(last > first)) return;
+  const status = Object.assign(document.createElement("p"), { className: "note" });
+  status.setAttribute("role", "status");
+  const readout = Object.assign(document.createElement("div"), { className: "readout", hidden: true });
+  readout.setAttribute("aria-hidden", "true");
 
-  const round = (step) => {
-    const power = 10 ** Math.floor(Math.log10(step));
-    return [1, 2, 5, 10].find((part) => step <= part * power * (1 + 1e-9)) * power;
+  const show = (begin, end) => {
+    timeline.show(begin, end);
+    const [from, to] = timeline.shown;
+    const { per } = timeline.stretch();
+    const detail = per > 1 ? `each column ${per} samples` : "sample by sample";
+    const range = to - from < last - first ? `${digitsOf(from, 7)} s to ${digitsOf(to, 7)} s` : "all";
+    status.textContent = `Shown: ${range}, ${detail}`;
+    buttons.forEach(([button, , possible]) => button.setAttribute("aria-disabled", String(!possible())));
   };
-  const mark = ({ layers, ticks, width, height, from, to }) => {
-    layers.setAttribute("viewBox", `${begin * width} 0 ${(end - begin) * width} ${height}`);
-    const [first, last] = [from + begin * (to - from), from + end * (to - from)];
-    const step = round((last - first) / 5);
-    const digits = Math.min(20, Math.max(0, -Math.floor(Math.log10(step))));
-    const y = ticks.firstChild.getAttribute("y");
-    ticks.textContent = "";
-    for (let i = Math.ceil(first / step); i * step <= last; i++) {
-      const text = document.createElementNS(layers.namespaceURI, "text");
-      text.setAttribute("class", "tick middle");
-      text.setAttribute("x", `${(100 * (i * step - first)) / (last - first)}%`);
-      text.setAttribute("y", y);
-      text.textContent = i ? (i * step).toFixed(digits).replace("-", "−") : "0";
-      ticks.append(text);
-    }
+  // About a time that stays where it is on the screen.
+  const scale = (by, about) => {
+    const [begin, end] = timeline.shown;
+    const width = Math.min(last - first, Math.max(timeline.deepest, by * (end - begin)));
+    const from = about - ((about - begin) / (end - begin)) * width;
+    show(from, from + width);
   };
-  const show = (from, to) => {
-    const width = Math.min(1, Math.max(deepest, to - from));
-    begin = Math.min(1 - width, Math.max(0, (from + to - width) / 2));
-    end = begin + width;
-    charts.forEach(mark);
-    buttons.forEach(([button, , possible]) => (button.disabled = !possible()));
+  const move = (by) => {
+    const [begin, end] = timeline.shown;
+    show(begin + by * (end - begin), end + by * (end - begin));
   };
-  const scaled = (by) => () => {
-    const [middle, half] = [(begin + end) / 2, (by * (end - begin)) / 2];
-    show(middle - half, middle + half);
-  };
-  const moved = (by) => () => show(begin + by * (end - begin), end + by * (end - begin));
+  const middle = () => (timeline.shown[0] + timeline.shown[1]) / 2;
+  const all = () => show(first, last);
+  const width = () => timeline.shown[1] - timeline.shown[0];
 
-  const controls = document.createElement("span");
-  controls.className = "controls";
+  const controls = Object.assign(document.createElement("span"), { className: "controls" });
   const buttons = [
-    ["+", "Zoom in", scaled(0.5), () => end - begin > deepest],
-    ["−", "Zoom out", scaled(2), () => end - begin < 1],
-    ["◂", "Earlier", moved(-0.5), () => begin > 0],
-    ["▸", "Later", moved(0.5), () => end < 1],
-    ["all", "Show all", () => show(0, 1), () => end - begin < 1],
+    ["+", "Zoom in", () => scale(0.5, middle()), () => width() > timeline.deepest * (1 + 1e-9)],
+    ["−", "Zoom out", () => scale(2, middle()), () => width() < last - first],
+    ["◂", "Earlier", () => move(-0.5), () => timeline.shown[0] > first],
+    ["▸", "Later", () => move(0.5), () => timeline.shown[1] < last],
+    ["all", "Show all", all, () => width() < last - first],
   ].map(([sign, name, act, possible]) => {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.textContent = sign;
-    button.title = name;
+    const button = Object.assign(document.createElement("button"), { type: "button", textContent: sign, title: name });
     button.setAttribute("aria-label", sign === "all" ? "all: show all" : name);
-    button.addEventListener("click", act);
+    // A button that can do nothing keeps the focus, and does nothing.
+    button.addEventListener("click", () => possible() && act());
+    button.setAttribute("aria-disabled", String(!possible()));
     controls.append(button);
     return [button, act, possible];
   });
-  zoom.querySelector(".legend").append(controls);
-  buttons.forEach(([button, , possible]) => (button.disabled = !possible()));
+  root.querySelector(".legend").append(controls);
+  root.querySelector(".legend").after(status);
+  root.append(readout);
 
-  // A dragged span is shown.
-  for (const { layers } of charts) {
-    const place = (event) => {
-      const box = layers.getBoundingClientRect();
-      return begin + ((event.clientX - box.left) / box.width) * (end - begin);
+  const box = ({ layers }) => layers.getBoundingClientRect();
+  const timeAt = (panel, x) => {
+    const { left, width: across } = box(panel);
+    const part = Math.min(1, Math.max(0, (x - left) / across));
+    return timeline.shown[0] + part * width();
+  };
+  const cursors = timeline.panels.map(({ node }) => {
+    const cursor = Object.assign(document.createElement("div"), { className: "cursor", hidden: true });
+    node.append(cursor);
+    return cursor;
+  });
+  // A line through all panels at a time, and the values there beside it.
+  const point = (t, panel) => {
+    const found = timeline.at(panel, t);
+    timeline.panels.forEach((other, k) => {
+      const [inner, outer] = [box(other), other.node.getBoundingClientRect()];
+      const x = inner.left - outer.left + ((found.t - timeline.shown[0]) / width()) * inner.width;
+      cursors[k].hidden = found.t < timeline.shown[0] || found.t > timeline.shown[1];
+      cursors[k].style.cssText = `left:${x}px;top:${inner.top - outer.top}px;height:${inner.height}px`;
+    });
+    readout.replaceChildren();
+    const row = (tag, text) => readout.append(Object.assign(document.createElement(tag), { textContent: text }));
+    row("b", `${digitsOf(found.t, 8)} s`);
+    found.values.forEach(([name, value]) => row("span", `${name} ${value}`));
+    readout.hidden = false;
+    const [inner, outer] = [box(panel), root.getBoundingClientRect()];
+    const right = found.t - timeline.shown[0] > width() / 2;
+    const at = inner.left - outer.left + ((found.t - timeline.shown[0]) / width()) * inner.width;
+    const beside = right ? `right:${outer.width - at + 10}px` : `left:${at + 10}px`;
+    readout.style.cssText = `${beside};top:${inner.top - outer.top + 4}px`;
+  };
+  const unpoint = () => [readout, ...cursors].forEach((node) => (node.hidden = true));
+
+  root.addEventListener("keydown", (event) => {
+    const keys = {
+      ArrowLeft: () => move(-0.25),
+      ArrowRight: () => move(0.25),
+      "+": () => scale(0.5, middle()),
+      "=": () => scale(0.5, middle()),
+      "-": () => scale(2, middle()),
+      Home: all,
+      0: all,
+      Escape: all,
     };
-    let start = null;
-    layers.parentNode.addEventListener("pointerdown", (event) => {
-      start = event.pointerType === "mouse" ? place(event) : null;
-    });
-    layers.parentNode.addEventListener("pointerup", (event) => {
-      const stop = place(event);
-      if (start !== null && Math.abs(stop - start) > 0.02 * (end - begin)) show(Math.min(start, stop), Math.max(start, stop));
-      start = null;
-    });
-    layers.parentNode.addEventListener("dblclick", () => show(0, 1));
-  }
-}
+    const act = keys[event.key];
+    if (!act || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    act();
+    point(middle(), timeline.panels[0]);
+  });
+  root.addEventListener("focusout", unpoint);
+  // What was closed was drawn coarsely.
+  const closed = root.closest("details");
+  closed?.addEventListener("toggle", () => closed.open && show(...timeline.shown));
+  timeline.panels.forEach((panel) => pointing(panel, { timeline, show, scale, all, point, unpoint, timeAt, box }));
+};
+
+// What a mouse or fingers do on one panel.
+const pointing = (panel, { timeline, show, scale, all, point, unpoint, timeAt, box }) => {
+  const { node } = panel;
+  const band = Object.assign(document.createElement("div"), { className: "band", hidden: true });
+  node.append(band);
+  const fingers = new Map();
+  let start = null;
+  const stretchBand = (x) => {
+    const [inner, outer] = [box(panel), node.getBoundingClientRect()];
+    const [left, right] = [Math.max(inner.left, Math.min(start, x)), Math.min(inner.right, Math.max(start, x))];
+    band.style.cssText = `left:${left - outer.left}px;width:${Math.max(0, right - left)}px;top:${inner.top - outer.top}px;height:${inner.height}px`;
+    band.hidden = Math.abs(x - start) < 4;
+  };
+  const release = () => {
+    [start, band.hidden] = [null, true];
+    fingers.clear();
+  };
+  node.addEventListener("pointerdown", (event) => {
+    if (event.button !== 0) return;
+    node.setPointerCapture(event.pointerId);
+    if (event.pointerType === "mouse") start = event.clientX;
+    else fingers.set(event.pointerId, event.clientX);
+    point(timeAt(panel, event.clientX), panel);
+  });
+  node.addEventListener("pointermove", (event) => {
+    if (start !== null) stretchBand(event.clientX);
+    if (fingers.has(event.pointerId)) slide(event);
+    else if (event.pointerType === "mouse") point(timeAt(panel, event.clientX), panel);
+  });
+  // One finger moves the time, two keep the times below them.
+  const slide = (event) => {
+    const before = [...fingers.values()];
+    const held = before.map((x) => timeAt(panel, x));
+    fingers.set(event.pointerId, event.clientX);
+    const now = [...fingers.values()];
+    const [begin, end] = timeline.shown;
+    if (now.length === 1) {
+      const by = timeAt(panel, now[0]) - held[0];
+      if (end - begin < timeline.whole[1] - timeline.whole[0]) show(begin - by, end - by);
+    } else if (now.length === 2 && Math.abs(now[1] - now[0]) > 8) {
+      const by = Math.abs((before[1] - before[0]) / (now[1] - now[0]));
+      scale(by, (held[0] + held[1]) / 2);
+    }
+  };
+  node.addEventListener("pointerup", (event) => {
+    if (start !== null && Math.abs(event.clientX - start) >= 4) {
+      const [a, b] = [timeAt(panel, start), timeAt(panel, event.clientX)];
+      unpoint();
+      show(Math.min(a, b), Math.max(a, b));
+    }
+    fingers.delete(event.pointerId);
+    [start, band.hidden] = [null, true];
+  });
+  node.addEventListener("pointercancel", release);
+  node.addEventListener("pointerleave", (event) => event.pointerType === "mouse" && unpoint());
+  node.addEventListener("dblclick", all);
+  const wheel = (event) => {
+    if (!event.ctrlKey) return;
+    event.preventDefault();
+    scale(Math.exp(Math.max(-1, Math.min(1, event.deltaY * 0.005))), timeAt(panel, event.clientX));
+  };
+  node.addEventListener("wheel", wheel, { passive: false });
+};
+document.querySelectorAll(".timeline").forEach(zoomable);

@@ -40,9 +40,9 @@ impl LeastSquares for Problem {
         Ok(Linearization::new(cost, x.len(), vec![information]))
     }
 
-    /// By a difference with the residuals a hundredth of the direction away.
+    /// By a difference with the residuals a tenth of the direction away.
     fn curvature(&self, x: &[f64], along: &[f64]) -> Option<Result<Linearization, Infeasible>> {
-        const FAR: f64 = 0.01;
+        const FAR: f64 = 0.1;
         let far: Vec<f64> = x.iter().zip(along).map(|(x, along)| x + FAR * along).collect();
         let mut information = Information::new(x.len());
         for (here, far) in self.evaluate(x).into_iter().zip(self.evaluate(&far)) {

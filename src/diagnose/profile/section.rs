@@ -1,0 +1,100 @@
+//! Profiles as a section of a report.
+
+use super::{End, HEIGHT, Profile, ProfilePoint};
+use crate::numeral::{number, percent, resolved};
+use crate::section::{Axis, Cell, Curves, Drawing, Layer, Plot, Section, Style, Table};
+
+impl From<Vec<Profile>> for Section {
+    fn from(profiles: Vec<Profile>) -> Section {
+        Section::from(profiles.as_slice())
+    }
+}
+
+impl From<Profile> for Section {
+    fn from(profile: Profile) -> Section {
+        Section::from(core::slice::from_ref(&profile))
+    }
+}
+
+/// The intervals as a table, and the curves beside their quadratic approximations.
+impl From<&[Profile]> for Section {
+    fn from(profiles: &[Profile]) -> Section {
+        let text = "Each curve tells how much worse the fit gets as one unknown is moved and the others are estimated anew. \
+                    Where it crosses the dashed line the interval ends; where it never does, the data set no end. The thin \
+                    curve is the parabola that a standard error stands for: where the two differ, trust the profile.";
+        let columns = ["profile of", "estimate", "unit", "probability", "interval"];
+        let row = |profile: &Profile| {
+            let Profile { name, unit, value, probability, .. } = profile;
+            let value = Cell::resolved(*value, profile.standard_error.unwrap_or(0.0));
+            [name.clone().into(), value, unit.as_str().into(), percent(*probability, 4).into(), profile.ends().into()]
+        };
+        let table = Table::new("Intervals by profile", columns).rows(profiles.iter().map(row));
+        let section = Section::new("profiles", "Profiles").says(text).table(table);
+        profiles.iter().fold(section, |section, profile| match profile.remark.is_empty() {
+            true => section.plot(profile.plot()),
+            false => section.plot(profile.plot()).because(profile.severity, profile.remark.clone()),
+        })
+    }
+}
+
+/// A profile is drawn in so many parts between two points.
+const PARTS: u32 = 8;
+
+impl Profile {
+    /// The interval, and how it ends.
+    fn ends(&self) -> String {
+        let error = self.standard_error.unwrap_or(0.0);
+        let end = |end: End| match end {
+            End::At(value) => resolved(value, error),
+            End::Bound(value) => format!("{} (bound)", number(value, 6)),
+            End::Open(value) => format!("open beyond {}", number(value, 3)),
+        };
+        format!("{} … {}", end(self.lower), end(self.upper))
+    }
+
+    fn plot(&self) -> Plot {
+        // Between points the signed root of the rise is next to straight.
+        let root = |point: &ProfilePoint| (point.value, point.rise.sqrt().copysign(point.value - self.value));
+        let roots: Vec<(f64, f64)> = self.points.iter().map(root).collect();
+        let between = |pair: &[(f64, f64)]| {
+            let ((a, low), (b, high)) = (pair[0], pair[1]);
+            (0..=PARTS).map(f64::from).map(move |i| i / f64::from(PARTS)).map(move |part| {
+                let root = low + part * (high - low);
+                (a + part * (b - a), root * root)
+            })
+        };
+        let height = HEIGHT * self.threshold;
+        let curve: Vec<(f64, f64)> = roots.windows(2).flat_map(between).filter(|(_, rise)| *rise <= height).collect();
+        let label = format!("{} threshold", percent(self.probability, 4));
+        let mut layers = vec![Layer::Level { value: self.threshold, label }];
+        layers.extend(self.quadratic(&curve).map(|points| Layer::Line { style: Style::Quiet, points }));
+        layers.push(Layer::Line { style: Style::Main, points: curve });
+        layers.push(Layer::Mark { value: self.value, label: "estimate".to_owned() });
+        let drawing = Curves {
+            x: Axis::new(&self.name, &self.unit),
+            y: Axis::new("rise of -2 ln L", "").from(0.0).to(height),
+            layers,
+        };
+        let title = format!(
+            "Profile of {}: rise of the deviance as it is moved, the others refitted; beside it the parabola of its standard \
+             error",
+            self.name
+        );
+        let caption = format!("`{}`: {} {}", self.name, self.ends(), self.unit);
+        Plot::new(format!("profile-{}", self.name), caption.trim_end(), title, Drawing::Curves(drawing))
+    }
+
+    /// The quadratic approximation over what the curve spans.
+    fn quadratic(&self, curve: &[(f64, f64)]) -> Option<Vec<(f64, f64)>> {
+        const POINTS: u32 = 64;
+        let error = self.standard_error? / self.transform.slope(self.value).abs();
+        let ((first, _), (last, _)) = (*curve.first()?, *curve.last()?);
+        let coordinate = |value: f64| self.transform.to_coordinate(value);
+        let point = |i: u32| {
+            let value = first + (last - first) * f64::from(i) / f64::from(POINTS);
+            (value, ((coordinate(value) - coordinate(self.value)) / error).powi(2))
+        };
+        let height = HEIGHT * self.threshold;
+        Some((0..=POINTS).map(point).filter(|(_, rise)| *rise <= height).collect())
+    }
+}

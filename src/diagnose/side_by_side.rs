@@ -1,0 +1,188 @@
+//! A record beside what several models make of it: data of the fit and data for validation, fit by fit.
+
+use crate::error::Error;
+use crate::estimate::Prediction;
+use crate::model::Model;
+use crate::record::{Channel, Record};
+use crate::section::{Cell, Keep, Line, Panel, PanelKind, Samples, Section, Style, Table, Timeline, identifier};
+use crate::section::{Drawing, Plot};
+use crate::signals::Signals;
+use serde::{Deserialize, Serialize};
+
+/// What a record was used for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum DataUse {
+    /// The parameters were estimated from it.
+    Estimation,
+    /// They were not.
+    Validation,
+}
+
+/// One record, and what each of several models predicts of it.
+///
+/// ```no_run
+/// # use greybox::{Estimate, ExperimentOf, Report, diagnose::{Compared, DataUse}, pmsm::Surface};
+/// # fn show(
+/// #     report: Report, model: &Surface, linear: &Estimate<Surface>, full: &Estimate<Surface>,
+/// #     fitted: &ExperimentOf<Surface>, other: &ExperimentOf<Surface>,
+/// # ) -> Result<Report, greybox::Error> {
+/// let both = |record: &ExperimentOf<Surface>, part| {
+///     Compared::new(record.record(), part).with("full", &full.predict(model, record)?)?.with("linear", &linear.predict(model, record)?)
+/// };
+/// let report = report.with(vec![both(fitted, DataUse::Estimation)?, both(other, DataUse::Validation)?]);
+/// # Ok(report)
+/// # }
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Compared {
+    /// Name of the record.
+    pub record: String,
+    /// What it was used for.
+    pub part: DataUse,
+    /// Time of each sample (s).
+    pub t: Vec<f64>,
+    /// Samples before which time jumps.
+    pub gaps: Vec<usize>,
+    /// The outputs.
+    pub outputs: Vec<ComparedOutput>,
+}
+
+/// One output of a record, measured and predicted; not a number where missing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ComparedOutput {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Measured values.
+    pub measured: Vec<f64>,
+    /// Name of each model, and what it predicts.
+    pub predicted: Vec<(String, Vec<f64>)>,
+}
+
+impl Compared {
+    /// A record that no model has predicted yet.
+    pub fn new(record: &Record, part: DataUse) -> Compared {
+        let output = |channel: &Channel| ComparedOutput {
+            name: channel.name.clone(),
+            unit: channel.unit.clone(),
+            measured: channel.values.to_vec(),
+            predicted: vec![],
+        };
+        Compared {
+            record: record.name().to_owned(),
+            part,
+            t: (0..record.len()).map(|k| record.time(k)).collect(),
+            gaps: record.gaps().iter().map(|gap| gap.sample).collect(),
+            outputs: record.outputs().iter().map(output).collect(),
+        }
+    }
+
+    /// Adds what a model predicts, which may be another one with outputs of the same names.
+    ///
+    /// # Errors
+    /// A prediction of another number of samples, or without one of the outputs.
+    pub fn with<M: Model>(mut self, model: &str, prediction: &Prediction<M>) -> Result<Self, Error> {
+        if prediction.t.len() != self.t.len() {
+            return Err(Error::Lengths {
+                experiment: self.record,
+                what: "the prediction".to_owned(),
+                found: prediction.t.len(),
+                reference: "the record".to_owned(),
+                expected: self.t.len(),
+            });
+        }
+        for output in &mut self.outputs {
+            let Some(j) = M::Output::position(&output.name) else {
+                let available = M::Output::NAMES.iter().map(|&name| name.to_owned()).collect();
+                return Err(Error::UnknownSignal { signal: output.name.clone(), available });
+            };
+            output.predicted.push((model.to_owned(), prediction.columns.outputs[j].clone()));
+        }
+        Ok(self)
+    }
+}
+
+impl ComparedOutput {
+    /// Fit (%) of each model: `100 (1 - |y - y_hat| / |y - mean y|)` over the samples that are measured and predicted;
+    /// `None` if the measurement is constant there.
+    pub fn fit_percent(&self) -> Vec<Option<f64>> {
+        let fit = |predicted: &Vec<f64>| {
+            let pairs = || self.measured.iter().zip(predicted).filter(|(y, p)| y.is_finite() && p.is_finite());
+            let count = pairs().count() as f64;
+            let mean = pairs().map(|(y, _)| y).sum::<f64>() / count;
+            let (errors, spread) =
+                pairs().fold((0.0, 0.0), |(e, s), (y, p)| (e + (y - p).powi(2), s + (y - mean).powi(2)));
+            (spread > 0.0).then(|| 100.0 * (1.0 - (errors / spread).sqrt()))
+        };
+        self.predicted.iter().map(|(_, predicted)| fit(predicted)).collect()
+    }
+}
+
+/// Numbers kept for the drawing of one record.
+const NUMBERS: usize = 40_000;
+/// Records drawn.
+const DRAWN: usize = 6;
+
+impl From<&[Compared]> for Section {
+    fn from(records: &[Compared]) -> Section {
+        let mut models: Vec<&str> = vec![];
+        for (model, _) in records.iter().flat_map(|record| &record.outputs).flat_map(|output| &output.predicted) {
+            if !models.contains(&model.as_str()) {
+                models.push(model);
+            }
+        }
+        let columns = ["record", "data", "output"].into_iter().chain(models.iter().copied()).map(str::to_owned);
+        let mut table = Table { columns: columns.collect(), ..Table::new("Fit of each model", []) };
+        for record in records {
+            let data = match record.part {
+                DataUse::Estimation => "estimation",
+                DataUse::Validation => "validation",
+            };
+            for output in &record.outputs {
+                let fits = output.fit_percent();
+                let of = |model: &&str| {
+                    let at = output.predicted.iter().position(|(name, _)| name == model);
+                    at.and_then(|at| fits[at]).map_or("-".into(), |fit| Cell::fit(Some(fit)))
+                };
+                let head: [Cell; 3] = [record.record.as_str().into(), data.into(), output.name.as_str().into()];
+                table = table.row(head.into_iter().chain(models.iter().map(of)));
+            }
+        }
+        let section = Section::new("compare", "Measured, and what each model predicts").table(table.at_most(60));
+        records.iter().take(DRAWN).fold(section, |section, record| section.plot(record.plot()))
+    }
+}
+
+impl From<Vec<Compared>> for Section {
+    fn from(records: Vec<Compared>) -> Section {
+        Section::from(records.as_slice())
+    }
+}
+
+impl From<Compared> for Section {
+    fn from(record: Compared) -> Section {
+        Section::from(core::slice::from_ref(&record))
+    }
+}
+
+impl Compared {
+    fn plot(&self) -> Plot {
+        let styles = [Style::Predicted, Style::Reference].into_iter().chain(core::iter::repeat(Style::Quiet));
+        let panel = |output: &ComparedOutput| {
+            let models = output.predicted.iter().map(|(model, _)| model.clone()).zip(styles.clone());
+            let lines = [("measured".to_owned(), Style::Measured)].into_iter().chain(models);
+            let lines = lines.map(|(name, style)| Line { style, name, held: false }).collect();
+            Panel { name: output.name.clone(), unit: output.unit.clone(), kind: PanelKind::Response, lines }
+        };
+        let lines = self.outputs.iter().flat_map(|output| {
+            let predicted = output.predicted.iter().map(|(_, values)| values.as_slice());
+            [output.measured.as_slice()].into_iter().chain(predicted).map(|values| (Keep::Extremes, values))
+        });
+        let samples = Samples { t: &self.t, gaps: &self.gaps, lines: lines.collect() };
+        let timeline = Timeline::new(self.outputs.iter().map(panel).collect(), &samples, NUMBERS, &[]);
+        let title = format!("Measured and predicted outputs of {} over time, model by model", self.record);
+        let name = identifier(&format!("compare-{}", self.record));
+        Plot::new(name, self.record.clone(), title, Drawing::Timeline(timeline))
+    }
+}

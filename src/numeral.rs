@@ -1,0 +1,104 @@
+//! How numbers are written: rounded for readers, and as null in JSON where they are not finite.
+
+#[cfg(test)]
+mod tests;
+
+use serde::{Deserialize, Deserializer};
+
+/// Digits that every `f64` can be trusted with; one more would show the rounding to binary (`1.1500000000000001`).
+const EXACT: usize = 15;
+
+/// A number that is exact, such as a time stamp or a bound, with the digits that it has.
+pub(crate) fn exact(value: f64) -> String {
+    number(value, EXACT)
+}
+
+/// A number with at most so many significant digits, without zeros at its end: `0.3`, `1.15`, `2.5e-5`.
+///
+/// Numbers from a ten-thousandth to ten million are written out, with all digits before the point. What is not finite is
+/// said in words.
+pub(crate) fn number(value: f64, digits: usize) -> String {
+    let written = written(value, digits);
+    let Some((mantissa, exponent)) = written.split_once('e') else { return trimmed(&written).to_owned() };
+    format!("{}e{exponent}", trimmed(mantissa))
+}
+
+/// A number rounded where its error has the second digit; zeros are kept, because they are known: `0.630` for an error of
+/// 0.0021. Without a usable error it has six digits.
+pub(crate) fn resolved(value: f64, error: f64) -> String {
+    if !(error > 0.0 && error.is_finite() && value.is_finite()) {
+        return number(value, 6);
+    }
+    let last = error.log10().floor() as i32 - 1;
+    let first = if value == 0.0 { last } else { value.abs().log10().floor() as i32 };
+    let digits = (first - last + 1).clamp(1, EXACT as i32) as usize;
+    let text = written(value, digits.max(2));
+    // What rounds to nothing at the error's place is a zero of that place.
+    if first < last && last < 0 { format!("{:.*}", -last as usize, value) } else { text }
+}
+
+/// The same without zeros at its end: a number that is not known better than to `step`.
+pub(crate) fn rounded(value: f64, step: f64) -> String {
+    trimmed(&resolved(value, step)).to_owned()
+}
+
+/// A fit (%): four digits, or as many more as tell it from 100 %.
+pub(crate) fn fit(percent: f64) -> String {
+    if (99.0..100.0).contains(&percent) { resolved(percent, 100.0 - percent) } else { written(percent, 4) }
+}
+
+/// A standard error: two digits, zeros kept.
+pub(crate) fn error_size(error: f64) -> String {
+    written(error, 2)
+}
+
+/// A part as a percentage, with so many significant digits.
+pub(crate) fn percent(part: f64, digits: usize) -> String {
+    format!("{} %", number(100.0 * part, digits))
+}
+
+/// A probability in words; below what the tails of distributions are computed to, only that it is.
+pub(crate) fn p_value(p: f64) -> String {
+    if p < 1e-15 { "p < 1e-15".to_owned() } else { format!("p = {}", number(p, 2)) }
+}
+
+/// A number of things: `1 gap`, `3 gaps`.
+pub(crate) fn counted(count: u64, thing: &str) -> String {
+    format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
+}
+
+fn written(value: f64, digits: usize) -> String {
+    if value.is_nan() {
+        return "not a number".to_owned();
+    }
+    if value.is_infinite() {
+        return if value > 0.0 { "infinite" } else { "-infinite" }.to_owned();
+    }
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let digits = digits.max(1);
+    let scientific = format!("{value:.*e}", digits - 1);
+    // The exponent after rounding: 9.99 may have become 10.0.
+    let exponent = scientific.split_once('e').and_then(|(_, exponent)| exponent.parse::<i32>().ok()).unwrap_or(0);
+    if exponent < -4 || exponent >= 7.max(digits as i32) {
+        return scientific;
+    }
+    format!("{value:.*}", (digits as i32 - 1 - exponent).max(0) as usize)
+}
+
+/// Without the zeros that a fraction ends in.
+fn trimmed(text: &str) -> &str {
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
+}
+
+/// Reads a number that is null where it was not finite, because JSON has no value for it: null is not a number.
+pub(crate) fn or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
+}
+
+/// The same of numbers with names.
+pub(crate) fn pairs_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<(String, f64)>, D::Error> {
+    let pairs = Vec::<(String, Option<f64>)>::deserialize(deserializer)?;
+    Ok(pairs.into_iter().map(|(name, value)| (name, value.unwrap_or(f64::NAN))).collect())
+}

@@ -1,0 +1,72 @@
+//! The records: measured and predicted over time, and what is left of each output.
+
+use super::outputs::extent;
+use super::{quoted, residuals};
+use crate::numeral::{counted, rounded};
+use crate::report::facts::{Facts, Record};
+use crate::section::{Drawing, Section};
+
+/// Gaps that are named.
+const NAMED: usize = 5;
+
+/// Plots of residuals against signals, in all and of one output.
+const AGAINST: usize = 120;
+
+/// A section for each record that is drawn; of several, the one reproduced worst is open.
+pub(super) fn sections(facts: &Facts) -> Vec<Section> {
+    let drawn = || facts.records.iter().filter(|record| record.timeline.is_some());
+    let outputs = drawn().map(|record| record.fits.len()).sum::<usize>();
+    let against = (AGAINST / outputs.max(1)).clamp(4, 16);
+    let worst = |record: &Record| record.fits.iter().filter_map(|fit| fit.fit_percent).fold(f64::INFINITY, f64::min);
+    let least = drawn().map(worst).fold(f64::INFINITY, f64::min);
+    let mut sections: Vec<Section> = drawn().enumerate().map(|(i, record)| section(i + 1, record, against)).collect();
+    let open = drawn().position(|record| worst(record) == least).unwrap_or(0);
+    let closed = sections.iter_mut().enumerate().filter(|(i, _)| *i != open);
+    closed.for_each(|(_, section)| section.folded = true);
+    let left = facts.records.len() - drawn().count();
+    if let Some(last) = sections.last_mut().filter(|_| left > 0) {
+        let text =
+            format!("{}, reproduced better than those drawn, are not drawn.", counted(left as u64, "more record"));
+        last.sentences.push(text);
+    }
+    sections
+}
+
+fn section(number: usize, record: &Record, against: usize) -> Section {
+    let title = format!("Measured and predicted: {}", record.name);
+    let section = Section::new(format!("record-{number}"), title).says(format!("{}.", extent(record)));
+    let section = sentences(record).into_iter().fold(section, Section::says);
+    let section = section.plot(record.timeline.clone());
+    record.fits.iter().fold(section, |section, fit| {
+        section.part(residuals::of_output(&format!("record-{number}"), record, fit, against))
+    })
+}
+
+/// What the drawing of a record shows, and what it cannot.
+fn sentences(record: &Record) -> Vec<String> {
+    let mut said = vec![];
+    let Some(Drawing::Timeline(timeline)) = record.timeline.as_ref().and_then(|plot| plot.drawing.as_ref()) else {
+        return said;
+    };
+    if let Some(per_column) = timeline.stretches.first().map(|whole| whole.samples_per_column).filter(|n| *n > 1) {
+        said.push(format!(
+            "Each column of the drawing spans the least to the greatest of {per_column} samples. About the largest residual \
+             of each output, samples are shown one by one as one zooms in."
+        ));
+    }
+    for fit in record.fits.iter().filter(|fit| fit.unpredicted > 0) {
+        said.push(format!("{} has no prediction in {} samples; they are gaps.", quoted(&fit.name), fit.unpredicted));
+    }
+    if !record.gaps.is_empty() {
+        let after = |t: f64| rounded(t - record.begin, record.sample_time);
+        let named =
+            record.gaps.iter().take(NAMED).map(|(from, to)| format!("from {} s to {} s", after(*from), after(*to)));
+        let named: Vec<String> = named.collect();
+        let more = match record.gaps.len().saturating_sub(NAMED) {
+            0 => String::new(),
+            more => format!("; {more} more"),
+        };
+        said.push(format!("Without samples, from the start: {}{more}.", named.join("; ")));
+    }
+    said
+}

@@ -1,0 +1,194 @@
+//! [`Plot`]: what is drawn, as plain numbers.
+
+use super::{Timeline, identifier};
+use serde::{Deserialize, Serialize};
+
+/// A picture of a section.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plot {
+    /// A name made of letters, digits and `-`, fit for a file; one plot of a report has it.
+    pub name: String,
+    /// What it shows, in a sentence for those who do not see it.
+    pub title: String,
+    /// What stands above it.
+    pub caption: String,
+    /// What is drawn; `None` in a report read from JSON without drawings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drawing: Option<Drawing>,
+}
+
+/// What is drawn.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Drawing {
+    /// Curves, bars and levels over a pair of axes.
+    Curves(Curves),
+    /// Estimates with their intervals, on one scale.
+    Forest(Forest),
+    /// A table of colored cells.
+    Heat(Heat),
+    /// Signals over time.
+    Timeline(Timeline),
+}
+
+/// Layers over one pair of axes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Curves {
+    /// To the right.
+    pub x: Axis,
+    /// Upwards.
+    pub y: Axis,
+    /// From the lowest to the topmost.
+    pub layers: Vec<Layer>,
+}
+
+/// An axis; it shows what its layers span.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Axis {
+    /// What it shows.
+    pub name: String,
+    /// Its unit; may be empty.
+    pub unit: String,
+    /// Whether it is logarithmic; what is not above zero is not drawn then.
+    pub logarithmic: bool,
+    /// What is shown besides the layers.
+    pub from: Option<f64>,
+    /// Nothing beyond this is shown.
+    pub to: Option<f64>,
+}
+
+/// What a line or bar stands for; it chooses the color.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Style {
+    /// What was measured.
+    Measured,
+    /// What the model predicts; in a comparison, the first model.
+    Predicted,
+    /// Measured less predicted.
+    Residual,
+    /// Where the noise-free output is.
+    Confidence,
+    /// Where a new measurement is.
+    Prediction,
+    /// What drives the model.
+    Input,
+    /// What the plot is about.
+    Main,
+    /// What it is compared with; in a comparison, the second model.
+    Reference,
+    /// What is there but not judged; in a comparison, further models.
+    Quiet,
+}
+
+/// One of the things drawn.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Layer {
+    /// A curve through points.
+    Line {
+        /// What it stands for.
+        style: Style,
+        /// `x` and `y`.
+        points: Vec<(f64, f64)>,
+    },
+    /// Points.
+    Dots {
+        /// What they stand for.
+        style: Style,
+        /// `x` and `y`.
+        points: Vec<(f64, f64)>,
+    },
+    /// Bars of equal width, standing on zero.
+    Bars {
+        /// What they stand for.
+        style: Style,
+        /// Left edge of the first.
+        first: f64,
+        /// Width of each.
+        width: f64,
+        /// Heights.
+        heights: Vec<f64>,
+    },
+    /// A value of `y` to compare with.
+    Level {
+        /// The value.
+        value: f64,
+        /// What it is; may be empty.
+        label: String,
+    },
+    /// A value of `x` to look at.
+    Mark {
+        /// The value.
+        value: f64,
+        /// What it is; may be empty.
+        label: String,
+    },
+}
+
+/// Intervals relative to their estimates.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Forest {
+    /// What the scale shows, in percent.
+    pub scale: String,
+    /// One estimate each.
+    pub rows: Vec<Interval>,
+}
+
+/// One estimate.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Interval {
+    /// Its name.
+    pub name: String,
+    /// Ends of its interval relative to its size (%).
+    pub ends: Option<(f64, f64)>,
+    /// Why there is no interval; else empty.
+    pub why: String,
+}
+
+/// Cells in rows, all of one width.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Heat {
+    /// Names of the rows.
+    pub rows: Vec<String>,
+    /// What stands above the columns.
+    pub columns: Vec<String>,
+    /// Row by row, from -1 to 1; `None` where nothing is known.
+    pub cells: Vec<Vec<Option<f64>>>,
+    /// Whether the numbers are parts that are read in percent, and colored by their part of the row's largest.
+    pub percent: bool,
+}
+
+impl Plot {
+    /// A plot; in the name, what is no letter or digit becomes `-`.
+    pub fn new(name: impl AsRef<str>, caption: impl Into<String>, title: impl Into<String>, drawing: Drawing) -> Plot {
+        let name = identifier(name.as_ref());
+        Plot { name, title: title.into(), caption: caption.into(), drawing: Some(drawing) }
+    }
+}
+
+impl Axis {
+    /// A linear axis.
+    pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Axis {
+        Axis { name: name.into(), unit: unit.into(), logarithmic: false, from: None, to: None }
+    }
+
+    /// A logarithmic axis.
+    pub fn logarithmic(self) -> Axis {
+        Axis { logarithmic: true, ..self }
+    }
+
+    /// Shows this value too.
+    pub fn from(self, value: f64) -> Axis {
+        Axis { from: Some(value), ..self }
+    }
+
+    /// Shows nothing beyond this value.
+    pub fn to(self, value: f64) -> Axis {
+        Axis { to: Some(value), ..self }
+    }
+}
