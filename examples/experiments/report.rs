@@ -73,11 +73,6 @@ impl fmt::Display for Report {
                 ["  here".into(), claim.found.as_str().into()],
             ]
         });
-        writeln!(
-            f,
-            "
-{}",
-            TextTable::new("", ["claim", "is"]).rows(rows)
-        )
+        writeln!(f, "\n{}", TextTable::new("", ["claim", "is"]).rows(rows))
     }
 }

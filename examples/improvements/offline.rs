@@ -3,7 +3,7 @@
 
 use crate::figure::{Figure, Panel, curve, level};
 use crate::methods::*;
-use crate::pooled::{compensated_grey_box, pooled};
+use crate::pooled::{compensated_grey_box, cycles, one_by_one, pooled};
 use crate::report::Report;
 use greybox::pmsm::offline::Axes;
 use greybox::pmsm::robot::Axis;
@@ -20,7 +20,7 @@ const METHODS: [&str; 5] = [
     "least squares (thesis 5.2.1)",
     "nonlinear grey box (thesis 5.2.3)",
     "extended least squares, cycle by cycle",
-    "the same, R and harmonic in common",
+    "the same, R, L and harmonic in common",
     "grey box with dead time and harmonic, R in common",
 ];
 
@@ -47,20 +47,18 @@ impl Offline {
         for (speed, found) in grey_box_per_cycle(run)? {
             add(1, speed, found.ke, found.rs);
         }
-        for cycle in &run.cycles {
-            let found = solve_extended(&run.spans.cut(cycle.samples.clone()))?.parameters;
-            add(2, cycle.speed, found.ke, found.r);
+        let cycles = cycles(run)?;
+        for (method, found) in [(2, one_by_one(&cycles)?), (3, pooled(&cycles)?)] {
+            found.iter().for_each(|(speed, found)| add(method, *speed, found.ke, found.r));
         }
-        let (i0, found) = pooled(run)?;
-        found.iter().for_each(|(speed, found)| add(3, *speed, found.ke, found.r));
-        let (r, found) = compensated_grey_box(run, i0)?;
+        let (r, found) = compensated_grey_box(&axis, &cycles)?;
         found.iter().for_each(|(speed, ke)| add(4, *speed, *ke, r));
         self.axes.push((axis, all));
         Ok(())
     }
 
     pub fn report(&self, report: &mut Report) {
-        let columns = ["LS", "grey box", "extended", "R in common", "grey, compens."];
+        let columns = ["LS", "grey box", "extended", "pooled", "grey, compens."];
         type Of = fn(&Errors) -> &Vec<(f64, f64)>;
         let quantities: [(&str, Of, f64); 2] = [("Ke", |e| &e.ke, GOAL.0), ("R (motor and cable)", |e| &e.r, GOAL.1)];
         for (quantity, of, goal) in quantities {

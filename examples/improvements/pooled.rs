@@ -2,37 +2,61 @@
 
 use crate::methods::*;
 use greybox::pmsm::offline::{Extended, Spans, extended, search_i0};
+use greybox::pmsm::program::Cycle;
+use greybox::pmsm::robot::Axis;
 use greybox::pmsm::{Compensated, CompensatedSalientWinding, EmfHarmonic, ExactSalient, ExactStep, HeldIn};
-use greybox::{Fit, PooledRegression, free};
+use greybox::{Fit, PooledRegression, Regression, free};
 
-/// What all cycles of a motor have in common.
-const SHARED: Extended<bool> = Extended { r: true, ld: false, lq: false, lq2: false, ke: false, ke6: true, vdt: false };
+/// What all cycles of a motor have in common: what belongs to the motor. How dead time acts on the mean voltage depends on how
+/// fast the currents pass through zero.
+const SHARED: Extended<bool> = Extended { r: true, ld: true, lq: true, lq2: true, ke: false, ke6: true, vdt: false };
 
-/// Extended least squares on all cycles together, and the turnover current of the dead time (A).
-pub fn pooled(run: &Run) -> Result<(f64, Vec<(f64, Extended)>)> {
-    let (filter, cuts) = (low_pass(run.spans.ts)?, cuts(run));
-    let together = |i0| {
-        let sets = cuts.iter().map(|spans| extended(spans, i0).prefiltered(&filter).regression());
-        PooledRegression::new(sets, SHARED)
-    };
-    let i0 = search_i0(0.03, 1.0, |i0| together(i0).least_squares())?;
-    let found = together(i0).solve()?;
-    Ok((i0, run.cycles.iter().zip(found).map(|(cycle, found)| (cycle.speed, found.parameters)).collect()))
+/// A cycle, and the current (A) at which its dead time turns over.
+pub struct CycleSpans {
+    speed: f64,
+    spans: Spans,
+    i0: f64,
 }
 
-fn cuts(run: &Run) -> Vec<Spans> {
-    run.cycles.iter().map(|cycle| run.spans.cut(cycle.samples.clone())).collect()
+/// The cycles of a record.
+pub fn cycles(run: &Run) -> Result<Vec<CycleSpans>> {
+    let filter = low_pass(run.spans.ts)?;
+    let cycle = |cycle: &Cycle| {
+        let spans = run.spans.cut(cycle.samples.clone());
+        let i0 = search_i0(0.03, 1.0, |i0| extended(&spans, i0).prefiltered(&filter).least_squares())?;
+        Ok(CycleSpans { speed: cycle.speed, spans, i0 })
+    };
+    run.cycles.iter().map(cycle).collect()
+}
+
+/// Extended least squares on each cycle alone.
+pub fn one_by_one(cycles: &[CycleSpans]) -> Result<Vec<(f64, Extended)>> {
+    let solve = |cycle: &CycleSpans| Ok((cycle.speed, cycle.regression()?.solve()?.parameters));
+    cycles.iter().map(solve).collect()
+}
+
+/// Extended least squares on all cycles together.
+pub fn pooled(cycles: &[CycleSpans]) -> Result<Vec<(f64, Extended)>> {
+    let sets = cycles.iter().map(CycleSpans::regression).collect::<Result<Vec<_>>>()?;
+    let found = PooledRegression::new(sets, SHARED).solve()?;
+    Ok(cycles.iter().zip(found).map(|(cycle, found)| (cycle.speed, found.parameters)).collect())
+}
+
+impl CycleSpans {
+    fn regression(&self) -> Result<Regression<Extended>> {
+        Ok(extended(&self.spans, self.i0).prefiltered(&low_pass(self.spans.ts)?).regression())
+    }
 }
 
 /// The grey box with dead time, saliency and the EMF's harmonic, all cycles together: the resistance in common, and Ke of
 /// each cycle.
-pub fn compensated_grey_box(run: &Run, i0: f64) -> Result<(f64, Vec<(f64, f64)>)> {
-    let axis = &run.axis;
-    let step = ExactStep::new(axis.pole_pairs.into(), run.spans.ts, HeldIn::Stationary)?;
+pub fn compensated_grey_box(axis: &Axis, cycles: &[CycleSpans]) -> Result<(f64, Vec<(f64, f64)>)> {
+    let ts = cycles.first().map_or(axis.ts, |cycle| cycle.spans.ts);
+    let step = ExactStep::new(axis.pole_pairs.into(), ts, HeldIn::Stationary)?;
     let motor = EmfHarmonic::<_, CompensatedSalientWinding>::new(ExactSalient(step));
     let model = Compensated::<_, CompensatedSalientWinding>::new(motor);
-    let records =
-        cuts(run).iter().map(|spans| spans.grey_box(&model, i0)).collect::<core::result::Result<Vec<_>, _>>()?;
+    let record = |cycle: &CycleSpans| cycle.spans.grey_box(&model, cycle.i0);
+    let records = cycles.iter().map(record).collect::<core::result::Result<Vec<_>, _>>()?;
     let start = CompensatedSalientWinding {
         rs: free(1.5 * axis.rs),
         ld: free(1.2 * axis.ls),
@@ -43,5 +67,5 @@ pub fn compensated_grey_box(run: &Run, i0: f64) -> Result<(f64, Vec<(f64, f64)>)
     };
     let estimate = Fit::new(&model, &records).parameters(start).run()?;
     let ke = estimate.unknowns.iter().filter(|unknown| unknown.name.starts_with("ke [")).map(|unknown| unknown.value);
-    Ok((estimate.parameters.rs, run.cycles.iter().map(|cycle| cycle.speed).zip(ke).collect()))
+    Ok((estimate.parameters.rs, cycles.iter().map(|cycle| cycle.speed).zip(ke).collect()))
 }

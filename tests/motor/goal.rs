@@ -2,55 +2,65 @@
 //! at every third cycle, release at each.
 //!
 //! The estimators are told what a user knows: that dead time and the EMF's sixth harmonic exist, of what shape, and that
-//! resistance and harmonic do not change from cycle to cycle.
+//! resistance, inductances and harmonic do not change from cycle to cycle.
 
 use crate::acceptance_records::{Worst, cycles, every, filter, percent};
-use greybox::pmsm::offline::{Extended, Spans, extended, search_i0};
+use greybox::pmsm::offline::{Equations, Extended, Spans, extended, search_i0};
+use greybox::pmsm::program::Cycle;
 use greybox::pmsm::robot::TS;
 use greybox::pmsm::{Compensated, CompensatedSalientWinding, EmfHarmonic, ExactSalient, ExactStep, HeldIn};
 use greybox::{Fit, PooledRegression, free};
 use std::sync::OnceLock;
 
-/// What all cycles of an axis share.
-const SHARED: Extended<bool> = Extended { r: true, ld: false, lq: false, lq2: false, ke: false, ke6: true, vdt: false };
+/// What all cycles of an axis share: what belongs to the motor. How dead time acts on the mean voltage depends on how fast the
+/// currents pass through zero, and with it on the speed.
+const SHARED: Extended<bool> = Extended { r: true, ld: true, lq: true, lq2: true, ke: false, ke6: true, vdt: false };
 
-fn each_cycle(number: u8) -> Vec<Spans> {
-    let record = cycles(number);
-    record.cycles.iter().step_by(every(3)).map(|cycle| record.spans.cut(cycle.samples.clone())).collect()
+/// A cycle, and the current (A) at which its dead time turns over.
+struct CycleSpans {
+    spans: Spans,
+    i0: f64,
 }
 
-fn pooled(spans: &[Spans], i0: f64) -> PooledRegression<Extended> {
-    let sets = spans.iter().map(|spans| extended(spans, i0).prefiltered(&filter()).regression());
-    PooledRegression::new(sets, SHARED)
+impl CycleSpans {
+    fn equations(&self, i0: f64) -> Equations<Extended> {
+        extended(&self.spans, i0).prefiltered(&filter())
+    }
 }
 
-/// The current (A) at which the dead time of an axis turns over, found from all its cycles.
-fn turnover(number: u8, spans: &[Spans]) -> f64 {
-    static FOUND: [OnceLock<f64>; 6] = [const { OnceLock::new() }; 6];
-    let search = || search_i0(0.03, 1.0, |i0| pooled(spans, i0).least_squares()).unwrap();
-    *FOUND[number as usize - 1].get_or_init(search)
-}
-
-// Measured on all cycles: Ke at most 0.017 to 0.059 % off, R 0.018 to 0.068 % (the simulated plant's own step leaves 0.03 %
-// of Ke at the highest speed).
-#[test]
-fn extended_regression_with_pooled_resistance() {
-    for number in 1..=6 {
+/// The cycles of an axis that are looked at.
+fn each_cycle(number: u8) -> &'static [CycleSpans] {
+    static FOUND: [OnceLock<Vec<CycleSpans>>; 6] = [const { OnceLock::new() }; 6];
+    FOUND[number as usize - 1].get_or_init(|| {
         let record = cycles(number);
-        let spans = each_cycle(number);
-        let i0 = turnover(number, &spans);
+        let cycle = |cycle: &Cycle| {
+            let mut found = CycleSpans { spans: record.spans.cut(cycle.samples.clone()), i0: 0.0 };
+            found.i0 = search_i0(0.03, 1.0, |i0| found.equations(i0).least_squares()).unwrap();
+            found
+        };
+        record.cycles.iter().step_by(every(3)).map(cycle).collect()
+    })
+}
+
+// Measured on all cycles: Ke at most 0.017 to 0.050 % off, R 0.027 to 0.077 %. With other seeds of the sensors' noise the
+// slowest cycle comes to 0.1 % (one of 36 records at 0.105 %).
+#[test]
+fn extended_regression_with_what_is_the_motors_in_common() {
+    for number in 1..=6 {
+        let axis = cycles(number).axis;
+        let sets = each_cycle(number).iter().map(|cycle| cycle.equations(cycle.i0).regression());
         let mut worst = Worst([0.0; 2]);
-        for found in pooled(&spans, i0).solve().unwrap() {
+        for found in PooledRegression::new(sets, SHARED).solve().unwrap() {
             let p = found.parameters;
-            worst.see([percent(p.ke, record.axis.ke), percent(p.r, record.axis.rs + record.axis.r_cable)]);
+            worst.see([percent(p.ke, axis.ke), percent(p.r, axis.rs + axis.r_cable)]);
         }
-        println!("axis {number}: i0 {i0:.4} A, Ke, R off by at most {:.4?} %", worst.0);
+        println!("axis {number}: Ke, R off by at most {:.4?} %", worst.0);
         assert!(worst.0[0] < 0.1 && worst.0[1] < 1.0, "axis {number}: Ke, R {:?} %", worst.0);
     }
 }
 
 // The thesis' method (5.2.3): currents simulated in exact steps and compared with the measured ones. Measured on all cycles:
-// Ke at most 0.016 to 0.057 % off, R 0.064 to 0.34 %.
+// Ke at most 0.016 to 0.076 % off, R 0.077 to 0.34 %.
 #[test]
 fn grey_box_with_harmonic_and_common_resistance() {
     let step = ExactStep::new(4, TS, HeldIn::Stationary).unwrap();
@@ -58,9 +68,8 @@ fn grey_box_with_harmonic_and_common_resistance() {
     let model = Compensated::<_, CompensatedSalientWinding>::new(motor);
     for number in 1..=6 {
         let axis = cycles(number).axis;
-        let spans = each_cycle(number);
-        let i0 = turnover(number, &spans);
-        let records: Vec<_> = spans.iter().map(|spans| spans.grey_box(&model, i0).unwrap()).collect();
+        let record = |cycle: &CycleSpans| cycle.spans.grey_box(&model, cycle.i0).unwrap();
+        let records: Vec<_> = each_cycle(number).iter().map(record).collect();
         let start = CompensatedSalientWinding {
             rs: free(1.5 * axis.rs),
             ld: free(1.2 * axis.ls),
@@ -77,7 +86,7 @@ fn grey_box_with_harmonic_and_common_resistance() {
             worst.see([percent(ke.value, axis.ke), 0.0]);
             found += 1;
         }
-        println!("axis {number}: i0 {i0:.4} A, Ke, R off by at most {:.4?} %", worst.0);
+        println!("axis {number}: Ke, R off by at most {:.4?} %", worst.0);
         assert_eq!(found, records.len());
         assert!(worst.0[0] < 0.1 && worst.0[1] < 1.0, "axis {number}: Ke, R {:?} %", worst.0);
     }
