@@ -36,9 +36,6 @@ fn saw(x: D, steepness: f64) -> Vec<D> {
     vec![(x - x.value()) * steepness + (2.0 + part)]
 }
 
-/// The errors of a problem at a point.
-type Residuals = fn(&[D]) -> Vec<D>;
-
 /// At the foot of a tooth each step leads up. The full step is 2e-13 of the unknown, and the slope is not zero.
 #[test]
 fn a_small_step_alone_is_no_minimum() {
@@ -85,11 +82,7 @@ fn a_plateau_is_left_or_not_called_a_minimum() {
     let (oxygen, onions) = (oxygen as Residuals, onions as Residuals);
     // The certified sums of squares.
     let (least, smallest) = (1_168.008_876_555_5, 8_786.404_907_963_1);
-<<<<<<< HEAD
-    let starts: [(Residuals, f64, &'static [f64]); 7] = [
-=======
     let starts: [(Residuals, f64, Start); 7] = [
->>>>>>> search
         (oxygen, least, &[1.0, 10.0]),
         (oxygen, least, &[1e4, 5.0]),
         (oxygen, least, &[50.0, 20.0]),
@@ -115,11 +108,7 @@ fn a_plateau_is_left_or_not_called_a_minimum() {
 /// away from the minimum at zero where the factor is below minus one.
 #[test]
 fn a_minimum_that_full_steps_lead_away_from_is_found_in_tens_of_trials() {
-<<<<<<< HEAD
-    let starts: [(&'static [f64], Residuals); 3] = [
-=======
     let starts: [(Start, Residuals); 3] = [
->>>>>>> search
         (&[1.0], |x| vec![x[0] + 1.0, x[0] * x[0] * -5.0 + x[0] - 1.0]),
         (&[1.0], |x| vec![x[0] + 1.0, x[0] * x[0] * -30.0 + x[0] - 1.0]),
         (&[0.3], |x| vec![x[0] + 1.0, x[0] * x[0] * -300.0 + x[0] - 1.0]),
