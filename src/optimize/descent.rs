@@ -36,6 +36,8 @@ pub(super) struct Descent {
     pub failed: u64,
     /// How far, as a part of the cost, the last rejected trials were off what the slopes promised.
     pub noise: f64,
+    /// Rejected trials in a row that kept their promise no better than the longer ones before, and the last one's mismatch.
+    rough: (u32, f64),
     /// Trials so far.
     pub trials: u64,
     /// The last trial that was worth a mark, and cost and potential then.
@@ -66,6 +68,10 @@ const SHORTER: f64 = 0.25;
 const BLIND: u32 = 5;
 /// And so many where the slopes still lead on: enough to win ten digits at half the distance a step.
 const UNRESOLVED: u32 = 60;
+/// A step of a quarter of the length keeps its promise four times as well where the cost is smooth; if less than this part
+/// better, so many times in a row, it is not.
+const SMOOTH: f64 = 0.7;
+const ROUGH: u32 = 8;
 const COST_ROUNDING: f64 = 1e-10;
 /// So many trials creep that together neither lower the cost by this part
 const CREEPING: u64 = 300;
@@ -86,6 +92,7 @@ impl Descent {
             unresolved: 0,
             failed: 0,
             noise: 0.0,
+            rough: (0, f64::MAX),
             trials: 0,
             mark: (0, f64::MAX, f64::MAX),
             slow: 0,
@@ -112,8 +119,13 @@ impl Descent {
         let resolved = promised > point.resolution();
         let damping = damping(scales, lambda);
         let length = length(scales, &step);
-        let spent = self.blind >= BLIND || self.unresolved >= UNRESOLVED && !resolved;
+        let spent = self.is_rough() || self.blind >= BLIND || self.unresolved >= UNRESOLVED && !resolved;
         (x != point.x && !spent).then_some(Trial { x, step, damping, length, promised, resolved })
+    }
+
+    /// Whether slopes are not those of the cost: however short the steps, they do not keep what slopes promise.
+    pub fn is_rough(&self) -> bool {
+        self.rough.0 >= ROUGH
     }
 
     /// Whether the second derivative along a step is worth an evaluation: in a curved valley, where steps are good and short.
@@ -147,6 +159,9 @@ impl Descent {
         let next_cost = next.map_or(cost, Point::cost);
         self.slow = if trial.resolved && cost - next_cost < SLOW.1 * point.cost_size() { self.slow + 1 } else { 0 };
         (self.blind, self.failed, self.noise, self.longest) = (0, 0, 0.0, Longest::Later);
+        if trial.resolved {
+            self.rough = (0, f64::MAX);
+        }
         if gain > GOOD {
             // Ten times faster with each good step, so that a good start is not held up by the damping.
             self.lambda *= self.fall;
@@ -165,6 +180,8 @@ impl Descent {
         if trial.resolved && !failed {
             // Of a smooth cost this falls with the length of the step; what stays is noise.
             self.noise = ((1.0 - gain).abs() * trial.promised / cost).max(0.125 * self.noise);
+            let falls = 1.0 - gain < SMOOTH * self.rough.1;
+            self.rough = (if falls { 0 } else { self.rough.0 + 1 }, 1.0 - gain);
         }
         self.longest = Longest::Length(SHORTER * trial.length);
         self.fall = FALL;

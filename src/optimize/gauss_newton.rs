@@ -79,7 +79,7 @@ impl GaussNewton {
         line.trial = point.towards(&line.step);
         line.blind += u32::from(-point.slope(&line.step) <= point.resolution());
         if line.trial == point.x || line.blind > BLIND || line.halvings > HALVINGS {
-            let outcome = point.stuck(line.failed, line.noise);
+            let outcome = point.stuck(line.failed, line.noise, false);
             return self.end(point, outcome);
         }
         self.point = Some(point);

@@ -1,11 +1,14 @@
 //! [`LevenbergMarquardt`]: damped Gauss-Newton steps.
 
+mod look;
+mod solver;
+
 use super::descent::{Descent, Reach, Trial, length};
-use super::machine::{self, Domain, Machine, Request};
+use super::machine::{Domain, Machine, Request};
 use super::point::Point;
-use super::{Infeasible, LeastSquares, LeastSquaresState, Linearization, Outcome, Stop};
+use super::{Infeasible, Linearization, Outcome, Stop};
 use crate::scaling::{OwnSize, Scaling, Seen};
-use argmin::core::{Error, KV, Problem, Solver, TerminationStatus};
+use look::Look;
 use serde::{Deserialize, Serialize};
 
 /// The method of Levenberg (1944) and Marquardt (1963), in bounds, with steps measured by the unknowns' own sizes.
@@ -79,27 +82,12 @@ enum Stage {
     Return,
 }
 
-/// A search that is to end like this, or to go on if it has just begun, unless the cost is lower at one of these points.
-#[derive(Clone, Debug)]
-struct Look {
-    outcome: Option<Outcome>,
-    /// The last one next.
-    points: Vec<Vec<f64>>,
-    /// How many of these points lie along directions that have lost their influence, and how many such directions.
-    beside: usize,
-    lost: usize,
-    /// At how many of them the cost is the same.
-    flat: usize,
-}
-
 const FIRST: Reach = Reach { first: 0.1, later: 1.0 };
 const SECOND: Reach = Reach { first: 30.0, later: 30.0 };
 /// A first try that has not ended after so many trials is given up.
 const FIRST_TRIALS: u64 = 2500;
 /// So often a search goes on that found a lower cost beside its end.
 const LEAPS: u64 = 5;
-/// Where the cost changes by less than this part over a hundredth of the unknowns' sizes, there is nothing to see.
-const FLAT: f64 = 1e-9;
 /// A step is bent where twice the bend is no longer than this part of it (Transtrum and Sethna 2012).
 const BEND: f64 = 0.75;
 
@@ -148,7 +136,8 @@ impl<S: Scaling> LevenbergMarquardt<S> {
             Some(trial) if self.curved && self.descent.is_slow(&trial) => self.stage = Stage::Bend(trial),
             Some(trial) => self.stage = Stage::Step(trial),
             None => {
-                let outcome = ended.unwrap_or_else(|| point.stuck(self.descent.failed, self.descent.noise));
+                let outcome = ended
+                    .unwrap_or_else(|| point.stuck(self.descent.failed, self.descent.noise, self.descent.is_rough()));
                 return self.end(point, outcome);
             }
         }
@@ -163,7 +152,7 @@ impl<S: Scaling> LevenbergMarquardt<S> {
         if !self.descent.creeps(point) {
             return None;
         }
-        let (promised, stuck) = (point.potential / point.cost_size(), point.stuck(0, self.descent.noise));
+        let (promised, stuck) = (point.potential / point.cost_size(), point.stuck(0, self.descent.noise, false));
         Some(if stuck.converged() { stuck } else { Outcome::Creeping { trials, promised } })
     }
 
@@ -180,33 +169,18 @@ impl<S: Scaling> LevenbergMarquardt<S> {
 
     /// Ends here like this, unless there is something that slopes do not show.
     fn end(&mut self, point: Point, outcome: Outcome) {
-        let look = self.look(&point, outcome);
+        let mut look = Look::before_end(&point, outcome, &self.seen, self.unseen);
+        if self.leaps >= LEAPS {
+            look.stop();
+        }
         self.go_look(point, look);
     }
 
     fn go_look(&mut self, point: Point, look: Look) {
-        match look.points.is_empty() {
-            true => self.end_look(point, &look),
-            false => (self.stage, self.point) = (Stage::Look(look), Some(point)),
+        match look.next() {
+            None => self.end_look(point, &look),
+            Some(_) => (self.stage, self.point) = (Stage::Look(look), Some(point)),
         }
-    }
-
-    /// Where to look before the search ends: inside bounds where an unknown has no slopes, and along directions that have
-    /// lost their influence on the way.
-    fn look(&self, point: &Point, outcome: Outcome) -> Look {
-        let mut look = Look { outcome: Some(outcome), points: vec![], beside: 0, lost: 0, flat: 0 };
-        let blind = point.blind();
-        if blind.len() > self.unseen && matches!(outcome, Outcome::Converged { .. } | Outcome::LimitOfPrecision { .. })
-        {
-            look.lost = blind.len() - self.unseen;
-            look.points = blind.iter().flat_map(|direction| point.beside(direction, &self.seen)).collect();
-            look.beside = look.points.len();
-        }
-        look.points.extend(point.inside(&self.seen));
-        if self.leaps >= LEAPS {
-            look.points.clear();
-        }
-        look
     }
 
     /// The end of a try: of the search, unless another try may do better or the one before did.
@@ -258,8 +232,8 @@ impl<S: Scaling> LevenbergMarquardt<S> {
                 }
                 (self.steps, self.unseen) = (0, usize::MAX);
                 self.take(&point);
-                let points = point.inside(&self.seen);
-                self.go_look(point, Look { outcome: None, points, beside: 0, lost: 0, flat: 0 });
+                let look = Look::at_start(&point, &self.seen);
+                self.go_look(point, look);
             }
         }
     }
@@ -276,33 +250,24 @@ impl<S: Scaling> LevenbergMarquardt<S> {
         }
     }
 
-    /// Goes to a point beside the end if the cost is lower there.
+    /// Goes to a point that was looked at if the cost is lower there.
     fn judge_look(&mut self, point: Point, mut look: Look, next: Option<Point>) {
-        let resolution = point.resolution();
-        match next {
-            Some(next) if next.cost() < point.cost() - resolution => {
+        match next.filter(|next| look.is_lower(&point, next)) {
+            Some(next) => {
                 self.leaps += 1;
                 self.take(&next);
-                return self.go_on(next);
+                self.go_on(next);
             }
-            Some(next) if look.points.len() < look.beside && next.cost() <= point.cost() + FLAT * point.cost_size() => {
-                look.flat += 1
-            }
-            _ => {}
+            None => self.go_look(point, look),
         }
-        self.go_look(point, look);
     }
 
     /// Ends a try after a look around, or goes on with it.
     fn end_look(&mut self, point: Point, look: &Look) {
-        let Some(outcome) = look.outcome else { return self.go_on(point) };
-        // Of several lost directions the flat one may lie between those looked along; and a saddle that the search comes back
-        // to is no minimum either.
-        let outcome = match look.flat > 0 || look.lost > 1 || look.lost > 0 && self.leaps >= LEAPS {
-            true => Outcome::Plateau { lost: look.lost, gradient: point.cosine() },
-            false => outcome,
-        };
-        self.end_try(point, outcome);
+        match look.outcome(&point, self.leaps >= LEAPS) {
+            None => self.go_on(point),
+            Some(outcome) => self.end_try(point, outcome),
+        }
     }
 
     /// Bends a step by half the geodesic acceleration, unless that is too long to be trusted.
@@ -351,7 +316,7 @@ impl<S: Scaling> Machine for LevenbergMarquardt<S> {
             (_, Some(outcome)) => Request::Ended(outcome),
             (Stage::Resume | Stage::Start | Stage::Return, None) => Request::Linearize(&self.x),
             (Stage::Step(trial), None) => Request::Linearize(&trial.x),
-            (Stage::Look(look), None) => Request::Linearize(look.points.last().unwrap_or(&self.x)),
+            (Stage::Look(look), None) => Request::Linearize(look.next().unwrap_or(&self.x)),
             (Stage::Bend(trial), None) => Request::Curvature { x: &self.x, along: &trial.step },
         }
     }
@@ -370,7 +335,7 @@ impl<S: Scaling> Machine for LevenbergMarquardt<S> {
             }
             (Stage::Look(mut look), Some(point), first) => {
                 self.first = first;
-                let x = look.points.pop().unwrap_or_default();
+                let x = look.take();
                 let next = told.and_then(|linear| Point::new(x, linear, &self.domain));
                 self.judge_look(point, look, next);
             }
@@ -408,33 +373,5 @@ impl<S: Scaling> Machine for LevenbergMarquardt<S> {
 impl Default for LevenbergMarquardt {
     fn default() -> Self {
         LevenbergMarquardt::new(Stop::default(), OwnSize)
-    }
-}
-
-impl<O: LeastSquares, S: Scaling> Solver<O, LeastSquaresState> for LevenbergMarquardt<S> {
-    fn name(&self) -> &str {
-        "Levenberg-Marquardt"
-    }
-
-    fn init(
-        &mut self,
-        problem: &mut Problem<O>,
-        state: LeastSquaresState,
-    ) -> Result<(LeastSquaresState, Option<KV>), Error> {
-        machine::init(self, problem, state)
-    }
-
-    fn next_iter(
-        &mut self,
-        problem: &mut Problem<O>,
-        state: LeastSquaresState,
-    ) -> Result<(LeastSquaresState, Option<KV>), Error> {
-        let state = machine::next_iter(self, problem, state)?;
-        let cosine = self.point.as_ref().map_or(0.0, Point::cosine);
-        Ok((state, Some(argmin::kv!("lambda" => self.descent.lambda(); "gradient" => cosine;))))
-    }
-
-    fn terminate(&mut self, _state: &LeastSquaresState) -> TerminationStatus {
-        machine::termination(self)
     }
 }

@@ -29,7 +29,7 @@ pub enum Outcome {
     /// Nothing was left to explain: the model reproduces the data to their rounding.
     Exact,
     /// No step lowers the cost, which is rough: what the next step would gain is below what the cost jumps from point to
-    /// point.
+    /// point, or steps do not keep what slopes promise, however short.
     Rough {
         /// By how much the cost jumps, as a part of it.
         noise: f64,
@@ -113,7 +113,10 @@ impl Outcome {
             Outcome::Rough { .. } if self.converged() => {
                 "Tighten the integrator's tolerance if more digits than the noise allows matter."
             }
-            Outcome::Rough { .. } => "Tighten the integrator's tolerance: the cost is too rough to follow.",
+            Outcome::Rough { .. } => {
+                "The cost is too rough to follow: tighten the integrator's tolerance, or smooth the model (dry friction, a \
+                 switch)."
+            }
             Outcome::Stalled { failed: 0, .. } => {
                 "The cost is not smooth here (dry friction, a switch, a coarse tolerance): smooth the model, use a shorter \
                  horizon, or start elsewhere."

@@ -181,8 +181,8 @@ impl Point {
     }
 
     /// How a search ends here that no step leads away from. `noise` is how far, as a part of the cost, the last trials were
-    /// off what the slopes promised.
-    pub fn stuck(&self, failed: u64, noise: f64) -> Outcome {
+    /// off what the slopes promised; `rough` says that they were off however short.
+    pub fn stuck(&self, failed: u64, noise: f64, rough: bool) -> Outcome {
         let (step, gradient) = (self.relative_step(), self.cosine());
         let noise = noise.max(self.linear.roughness());
         let left = self.potential / self.cost_size();
@@ -190,7 +190,8 @@ impl Point {
             Outcome::Exact
         } else if gradient <= PRECISION {
             Outcome::LimitOfPrecision { gradient, step }
-        } else if left <= noise {
+        } else if rough || left <= noise {
+            let noise = noise.max(left);
             // A step of `d` standard errors gains `d^2 / (2 rows)` of the sum of squares.
             Outcome::Rough { noise, errors: (left * self.linear.rows() as f64).sqrt() }
         } else {

@@ -5,6 +5,9 @@ use super::{Ended, levenberg_marquardt, run};
 use greybox::optimize::{Infeasible, LeastSquares, LevenbergMarquardt, Linearization, Machine, Outcome};
 use greybox::{OwnSize, Scalar};
 
+type Residuals = fn(&[D]) -> Vec<D>;
+type Start = &'static [f64];
+
 /// A problem whose data have this norm.
 struct Said<'p> {
     problem: &'p Problem,
@@ -23,7 +26,7 @@ fn search(problem: &Problem, norm: f64) -> Outcome {
         .expect("an outcome")
 }
 
-const fn problem(start: &'static [f64], residuals: fn(&[D]) -> Vec<D>) -> Problem {
+const fn problem(start: Start, residuals: Residuals) -> Problem {
     Problem { name: "", start, residuals, minima: &[], minimizer: None, bounds: &[] }
 }
 
@@ -32,9 +35,6 @@ fn saw(x: D, steepness: f64) -> Vec<D> {
     let part = ((x.value() - 1.0) * steepness).rem_euclid(1.0);
     vec![(x - x.value()) * steepness + (2.0 + part)]
 }
-
-/// The errors of a problem at a point.
-type Residuals = fn(&[D]) -> Vec<D>;
 
 /// At the foot of a tooth each step leads up. The full step is 2e-13 of the unknown, and the slope is not zero.
 #[test]
@@ -79,10 +79,10 @@ fn onions(x: &[D]) -> Vec<D> {
 /// From these starts the first edition converged on plateaus, with a standard deviation of 130 for 26.
 #[test]
 fn a_plateau_is_left_or_not_called_a_minimum() {
-    let (oxygen, onions) = (oxygen as fn(&[D]) -> Vec<D>, onions as fn(&[D]) -> Vec<D>);
+    let (oxygen, onions) = (oxygen as Residuals, onions as Residuals);
     // The certified sums of squares.
     let (least, smallest) = (1_168.008_876_555_5, 8_786.404_907_963_1);
-    let starts: [(Residuals, f64, &'static [f64]); 7] = [
+    let starts: [(Residuals, f64, Start); 7] = [
         (oxygen, least, &[1.0, 10.0]),
         (oxygen, least, &[1e4, 5.0]),
         (oxygen, least, &[50.0, 20.0]),
@@ -108,7 +108,7 @@ fn a_plateau_is_left_or_not_called_a_minimum() {
 /// away from the minimum at zero where the factor is below minus one.
 #[test]
 fn a_minimum_that_full_steps_lead_away_from_is_found_in_tens_of_trials() {
-    let starts: [(&'static [f64], Residuals); 3] = [
+    let starts: [(Start, Residuals); 3] = [
         (&[1.0], |x| vec![x[0] + 1.0, x[0] * x[0] * -5.0 + x[0] - 1.0]),
         (&[1.0], |x| vec![x[0] + 1.0, x[0] * x[0] * -30.0 + x[0] - 1.0]),
         (&[0.3], |x| vec![x[0] + 1.0, x[0] * x[0] * -300.0 + x[0] - 1.0]),
