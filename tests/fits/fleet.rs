@@ -77,13 +77,9 @@ fn each_answer_is_that_of_the_single_fit() {
     records[19] = rows(Drive { ud: 1e308, uq: 1e308, w: 1e308 }, Currents { id: 0.0, iq: 0.0 }, 400);
     records[23] = records[1].clone().hold(Hold::First);
     let stamps: Vec<f64> = (0..600).map(|k| TS * (k as f64 + 0.2 * (k as f64).sin())).collect();
-    records[27] = Experiment::new(
-        &model,
-        Time::Stamps(stamps),
-        records[0].inputs().collect(),
-        records[0].outputs().collect(),
-    )
-    .unwrap();
+    records[27] =
+        Experiment::new(&model, Time::Stamps(stamps), records[0].inputs().collect(), records[0].outputs().collect())
+            .unwrap();
     for (what, fit) in [
         ("noise given", &(|fit: Fit<'static, Surface>| fit.noise(Currents { id: 0.05, iq: 0.05 })) as &dyn Fn(_) -> _),
         ("noise estimated", &|fit| fit),
