@@ -3,6 +3,8 @@
 #[cfg(feature = "csv")]
 mod csv;
 mod edit;
+#[cfg(feature = "npy")]
+mod npy;
 
 use crate::error::Error;
 use crate::interval::Hold;

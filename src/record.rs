@@ -5,6 +5,8 @@ mod column;
 mod csv;
 mod cycles;
 mod edit;
+#[cfg(feature = "npy")]
+mod npy;
 mod stored;
 mod time;
 

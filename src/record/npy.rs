@@ -1,0 +1,80 @@
+//! Records from NumPy files, mapped into memory.
+
+use super::{Channel, Column, Record, Time};
+use crate::error::Error;
+use crate::layout::{Layout, Quantity};
+use memmap2::Mmap;
+use npyz::{NpyHeader, Order, TypeChar};
+use std::fs::File;
+use std::path::Path;
+
+/// Numbers of a mapped file.
+struct Mapped {
+    map: Mmap,
+    /// Where they begin (bytes).
+    begin: usize,
+}
+
+impl AsRef<[f64]> for Mapped {
+    fn as_ref(&self) -> &[f64] {
+        // Checked when it was made.
+        bytemuck::try_cast_slice(&self.map[self.begin..]).unwrap_or_default()
+    }
+}
+
+impl Record {
+    /// A record in a folder of NumPy files, one per signal, named after it (`id.npy`): one-dimensional, `float64`. The files
+    /// are mapped into memory, not read: a record may be larger than the memory. They must not change while it is in use.
+    ///
+    /// Time is even with a `step` (s) from zero, or else that of `t.npy` (s).
+    ///
+    /// # Errors
+    /// A file that cannot be opened, or is something else; whatever [`new`](Record::new) refuses.
+    pub fn from_npy(layout: &Layout, folder: impl AsRef<Path>, step: Option<f64>) -> Result<Self, Error> {
+        let folder = folder.as_ref();
+        let column = |name: &str| column(&folder.join(format!("{name}.npy")));
+        let channels = |signals: &[Quantity]| -> Result<Vec<Channel>, Error> {
+            let channel = |signal: &Quantity| Ok(Channel::new(&signal.name, &signal.unit, column(&signal.name)?));
+            signals.iter().map(channel).collect()
+        };
+        let time = match step {
+            Some(step) => Time::Uniform { start: 0.0, step },
+            None => Time::Stamps(column("t")?.to_vec()),
+        };
+        let (inputs, outputs) = (channels(&layout.inputs)?, channels(&layout.outputs)?);
+        let name = folder.file_name().map_or("record".into(), |name| name.to_string_lossy().into_owned());
+        Ok(Record::new(layout.states.clone(), time, inputs, outputs)?.named(name))
+    }
+}
+
+fn column(path: &Path) -> Result<Column, Error> {
+    let failed = |source: Box<dyn std::error::Error + Send + Sync>| Error::File { path: path.to_owned(), source };
+    let mut file = File::open(path).map_err(|error| failed(error.into()))?;
+    let header = NpyHeader::from_reader(&mut file).map_err(|error| failed(error.into()))?;
+    let begin = std::io::Seek::stream_position(&mut file).map_err(|error| failed(error.into()))?;
+    let begin = usize::try_from(begin).map_err(|error| failed(error.into()))?;
+    // SAFETY: nothing but numbers is read from the map, any bytes are numbers, and it is never written. That the file does
+    // not change meanwhile is for its owner to see to, as the documentation says.
+    let map = unsafe { Mmap::map(&file) }.map_err(|error| failed(error.into()))?;
+    let numbers: Option<&[f64]> = map.get(begin..).and_then(|bytes| bytemuck::try_cast_slice(bytes).ok());
+    let is_float = match header.dtype() {
+        npyz::DType::Plain(kind) => {
+            let native = if cfg!(target_endian = "little") { '<' } else { '>' };
+            kind.type_char() == TypeChar::Float && kind.size_field() == 8 && kind.to_string().contains(native)
+        }
+        _ => false,
+    };
+    let shape = header.shape();
+    match numbers {
+        Some(numbers) if is_float && shape == [numbers.len() as u64] => Ok(Column::new(Mapped { map, begin })),
+        _ => Err(failed(
+            format!(
+                "{} of shape {shape:?}{}: save one column of float64 in this machine's byte order, \
+                 numpy.save(\"NAME.npy\", numpy.ascontiguousarray(x, float))",
+                header.dtype().descr(),
+                if header.order() == Order::Fortran && shape.len() > 1 { " by columns" } else { "" }
+            )
+            .into(),
+        )),
+    }
+}
