@@ -1,5 +1,5 @@
-//! Nonlinear grey-box parameter estimation: from the equations of a physical system and a record of it to its parameters,
-//! and to what is known of them.
+//! Nonlinear grey-box parameter estimation: from the equations of a physical system and a record of it to its
+//! parameters, and to what is known of them.
 //!
 //! # The problem
 //!
@@ -7,16 +7,16 @@
 //! dx/dt = f(t, x, u; p)      y = g(t, x, u; p) + noise      find p, and say how well it is known
 //! ```
 //!
-//! The states `x` are not all measured, the inputs `u` are, the outputs `y` with noise; `f` and `g` are known from physics,
-//! their parameters `p` are not. The estimate is the `p` whose predictions miss the record by least:
+//! The states `x` are not all measured, the inputs `u` are, the outputs `y` with noise; `f` and `g` are known from
+//! physics, their parameters `p` are not. The estimate is the `p` whose predictions miss the record by least:
 //!
 //! ```text
 //! V(p) = sum over samples and outputs of  weight * rho((y - y_hat(p)) / sigma)
 //! ```
 //!
-//! with `rho(z) = z^2 / 2`, or a loss that forgives outliers. `y_hat` is what the model says: simulated from the initial
-//! state ([`FreeRun`]), or predicted a few samples ahead of a measured state ([`Horizon`]). See L. Ljung, *System
-//! Identification: Theory for the User*, 2nd ed., 1999, chapters 7, 9 and 10.
+//! with `rho(z) = z^2 / 2`, or a loss that forgives outliers. `y_hat` is what the model says: simulated from the
+//! initial state ([`FreeRun`]), or predicted a few samples ahead of a measured state ([`Horizon`]). See L. Ljung,
+//! *System Identification: Theory for the User*, 2nd ed., 1999, chapters 7, 9 and 10.
 //!
 //! # The result
 //!
@@ -63,9 +63,10 @@
 //! ```
 //!
 //! The report leads with a verdict. Each quantity is *known* (with an interval), *fixed*, *held* at a bound, or
-//! *unidentified* ([`Knowledge`]): nothing is reported as known that the data do not say, and parameters that the record
-//! cannot tell apart are named with the direction in which they may move together. A search that did not converge is an
-//! [`Outcome`](optimize::Outcome) with advice, not an error; an [`Error`] names the thing, the number and the remedy.
+//! *unidentified* ([`Knowledge`]): nothing is reported as known that the data do not say, and parameters that the
+//! record cannot tell apart are named with the direction in which they may move together. A search that did not
+//! converge is an [`Outcome`](optimize::Outcome) with advice, not an error; an [`Error`] names the thing, the number
+//! and the remedy.
 //!
 //! # Where to find what
 //!
@@ -91,8 +92,8 @@
 //!
 //! # Features
 //!
-//! `std`, `csv`, `jit` (machine code for models that can be traced) and `parallel` are on by default. Without `std` there
-//! are numbers, signals, models, integrators and [`online`] observers, without `alloc` too.
+//! `std`, `csv`, `jit` (machine code for models that can be traced) and `parallel` are on by default. Without `std`
+//! there are numbers, signals, models, integrators and [`online`] observers, without `alloc` too.
 #![cfg_attr(not(feature = "std"), no_std)]
 
 #[cfg(feature = "std")]
