@@ -1,4 +1,4 @@
-//! How large the noise is, by the prediction errors.
+//! Noise levels from the prediction errors.
 
 use crate::information::SquareMatrix;
 use crate::loss::{Huber, Loss};
@@ -7,9 +7,9 @@ use crate::problem::{Accumulate, Noise, Objective, Whitening};
 use crate::sweep::Window;
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
-/// Noise below this part of the output's own size is rounding of the simulation.
+/// Noise below this fraction of the output's magnitude is round-off of the simulation.
 const ROUNDING: f64 = 1e-15;
-/// Errors below this part of the output's own size, in the mean, are all rounding: it adds up along a record.
+/// Mean errors below this fraction of the output's magnitude are round-off, which accumulates along a record.
 const REPRODUCED: f64 = 1e-12;
 
 /// `E[psi^2]` of Huber's loss under the standard normal.
@@ -82,7 +82,7 @@ fn moments(
     Ok(covariance)
 }
 
-/// With one output, squared loss and no prior the noise scales the cost and nothing else.
+/// Whether the noise is a mere factor of the cost: one output, squared loss, no prior.
 pub(crate) fn only_scales(objective: &Objective<'_>) -> bool {
     let settings = &objective.problem.settings;
     let priors = objective.problem.unknowns.row.iter().any(|unknown| unknown.parameter.prior.is_some());
@@ -90,12 +90,12 @@ pub(crate) fn only_scales(objective: &Objective<'_>) -> bool {
     estimated && objective.outputs() == 1 && settings.loss.is_none() && !priors
 }
 
-/// Whether the search finds its noise by itself, in rounds.
+/// Whether the noise is estimated between rounds of the search.
 pub(crate) fn is_estimated(objective: &Objective<'_>) -> bool {
     matches!(objective.problem.settings.noise, Noise::PerOutput | Noise::Covariance) && !only_scales(objective)
 }
 
-/// The noise as given, or as the errors at a point show it.
+/// The noise as given, or estimated from the errors at a point.
 pub(crate) fn first_whitening(objective: &Objective<'_>, coordinates: &[f64]) -> Result<Whitening, Infeasible> {
     match &objective.problem.settings.noise {
         Noise::Given(sigma) => Ok(Whitening::Diagonal(sigma.clone())),
@@ -104,8 +104,9 @@ pub(crate) fn first_whitening(objective: &Objective<'_>, coordinates: &[f64]) ->
     }
 }
 
-/// The noise that the errors at a point show: plainly, or robustly by Huber's proposal 2 (Huber, *Robust Statistics*,
-/// 1981, section 6.4) where a robust loss bends the large ones.
+/// The noise estimated from the errors at a point: by their variance, or with a robust loss by Huber's proposal 2
+/// (Huber,
+/// *Robust Statistics*, 1981, section 6.4).
 pub(crate) fn estimate(objective: &Objective<'_>, coordinates: &[f64]) -> Result<Whitening, Infeasible> {
     let outputs = objective.outputs();
     let mut found = moments(objective, coordinates, &vec![1.0; outputs], None)?;
@@ -134,7 +135,7 @@ pub(crate) fn estimate(objective: &Objective<'_>, coordinates: &[f64]) -> Result
     })
 }
 
-/// Whether the model reproduces the data but for rounding, whose errors lead no search anywhere.
+/// Whether the model reproduces the data up to round-off, from which no search direction follows.
 pub(crate) fn reproduces(objective: &Objective<'_>, coordinates: &[f64]) -> bool {
     let reproduced = |moments: SquareMatrix| {
         let mut variances = moments.diagonal().into_iter().zip(magnitudes(objective));

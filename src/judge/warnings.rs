@@ -1,4 +1,4 @@
-//! What the reader of an estimate must know of its data and its method.
+//! Warnings about the data and the method of an estimate.
 
 use super::conclude::{Covariances, Judgement};
 use crate::estimate::{CovarianceMethod, Direction, Knowledge, Unknown, Warning};
@@ -7,11 +7,11 @@ use crate::numeral::{counted, exact, number, p_value, percent};
 use crate::optimize::Severity;
 use crate::problem::Objective;
 
-/// A finer step may move a parameter by this part of its standard error without a warning.
+/// Largest change of a parameter with a finer step, in standard errors, without a warning.
 const STEP_SHIFT: f64 = 0.5;
-/// A predicted standard deviation that is smaller than this part of the errors is none of noise.
+/// A predicted standard deviation below this fraction of the errors counts as zero.
 const SURE: f64 = 1e-6;
-/// Autocorrelation that widens an interval by more than this factor calls for care.
+/// Factor by which autocorrelation may widen an interval before the severity is raised.
 const CORRELATION_MATTERS: f64 = 2.0;
 
 fn care(text: String) -> Warning {
@@ -19,7 +19,7 @@ fn care(text: String) -> Warning {
 }
 
 impl Judgement<'_> {
-    /// What must be said of what was found.
+    /// All warnings, in the order in which they are shown.
     pub(super) fn warnings(
         &self,
         unknowns: &[Unknown],
@@ -53,7 +53,7 @@ impl Judgement<'_> {
         warnings
     }
 
-    /// Whether there are measurements enough to say anything.
+    /// Whether there are too few measurements, or none that determine an unknown.
     fn of_the_data(&self, unknowns: &[Unknown]) -> Option<Warning> {
         let (measured, severity) = (self.residuals.measured, Severity::NotUsable);
         if measured <= unknowns.len() as u64 {

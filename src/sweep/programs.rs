@@ -1,4 +1,4 @@
-//! [`ProgramSweep`]: models that were read as graphs, run as programs, pieces side by side.
+//! [`ProgramSweep`]: traced models, run as compiled programs, pieces in parallel lanes.
 
 mod columns;
 mod derived;
@@ -25,7 +25,7 @@ pub(crate) struct ProgramSweep<'a> {
     equations: Arc<Equations>,
     method: Arc<dyn Method>,
     predictor: Arc<dyn Prediction>,
-    /// The same equations in dual numbers: for what is not a pass over many samples.
+    /// The same equations in dual numbers, for all that is not a pass over many samples.
     plain: Arc<dyn Sweep + 'a>,
     joints: Joints,
     /// By hold: zero, first.
@@ -33,7 +33,7 @@ pub(crate) struct ProgramSweep<'a> {
     programs: Mutex<Vec<(Key, Program)>>,
 }
 
-/// What a program was compiled for.
+/// What a program depends on besides the recurrence.
 #[derive(Clone, Debug, PartialEq)]
 struct Key {
     hold: Hold,
@@ -42,7 +42,7 @@ struct Key {
     purpose: Purpose,
 }
 
-/// What is asked of a program.
+/// What a program computes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Purpose {
     /// Rows of many trajectories.
