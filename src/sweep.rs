@@ -71,7 +71,7 @@ pub enum RunError {
 
 /// How a piece depends on the piece before it in the same record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Joints {
+pub enum Coupling {
     /// The record must be run as a whole.
     Uncut,
     /// Each sample is predicted from measurements: nothing is carried from piece to piece.
@@ -116,8 +116,8 @@ pub trait Sweep: Send + Sync {
     }
 
     /// How pieces of a record depend on each other.
-    fn joints(&self) -> Joints {
-        Joints::Uncut
+    fn coupling(&self) -> Coupling {
+        Coupling::Uncut
     }
 
     /// Prepares a record, once, with the parameters at their start values.

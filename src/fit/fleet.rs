@@ -99,19 +99,19 @@ impl<'a, M: Model> Fleet<'a, M> {
     fn group(&self, records: &[Record]) -> Vec<Result<Summary, Error>> {
         let problems: Vec<_> = records.iter().map(|record| self.problem(record.clone())).collect();
         let mut answers: Vec<Option<Result<Summary, Error>>> = Vec::with_capacity(problems.len());
-        let mut sound = vec![];
+        let mut valid = vec![];
         for problem in problems {
             match problem {
                 Ok(problem) => {
-                    sound.push(problem);
+                    valid.push(problem);
                     answers.push(None);
                 }
                 Err(error) => answers.push(Some(Err(error))),
             }
         }
-        let mut found = match self.settings.prefilter.is_none() && self.is_wide(&sound) {
-            true => fit_together(&sound),
-            false => sound.iter().map(Problem::run).collect(),
+        let mut found = match self.settings.prefilter.is_none() && self.is_wide(&valid) {
+            true => fit_together(&valid),
+            false => valid.iter().map(Problem::run).collect(),
         }
         .into_iter();
         answers.into_iter().filter_map(|answer| answer.or_else(|| found.next())).collect()

@@ -38,7 +38,7 @@ impl<'p> Search<'p> {
     }
 
     /// The point at which it requests cost and slopes.
-    fn asks(&self) -> Option<At<'_>> {
+    fn requested(&self) -> Option<At<'_>> {
         match self.machine.request() {
             Request::Linearize(x) => Some((&self.objective, x)),
             _ => None,
@@ -98,15 +98,15 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
     };
     let mut stages: Vec<Stage<'_>> = plain.iter().map(first).collect();
     loop {
-        let asking = stages.iter().enumerate().filter_map(|(i, stage)| match stage {
-            Stage::Searching(search) => Some((i, search.asks()?)),
+        let requesting = stages.iter().enumerate().filter_map(|(i, stage)| match stage {
+            Stage::Searching(search) => Some((i, search.requested()?)),
             _ => None,
         });
-        let (asking, points): (Vec<usize>, Vec<At<'_>>) = asking.unzip();
-        if asking.is_empty() {
+        let (requesting, points): (Vec<usize>, Vec<At<'_>>) = requesting.unzip();
+        if requesting.is_empty() {
             break;
         }
-        for (i, answer) in asking.into_iter().zip(linearize_together(&points)) {
+        for (i, answer) in requesting.into_iter().zip(linearize_together(&points)) {
             if let Stage::Searching(search) = std::mem::replace(&mut stages[i], Stage::Alone) {
                 stages[i] = search.tell(answer);
             }

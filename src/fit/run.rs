@@ -79,7 +79,7 @@ impl Problem<'_> {
             iterations: 0,
             evaluations: 1,
             name: "search by argmin".to_owned(),
-            trouble: None,
+            write_error: None,
             memory: objective.memory.clone(),
         };
         conclude(&objective.with(whitening), &end, begin.elapsed().as_secs_f64())

@@ -90,7 +90,7 @@ impl<'r> Rounds<'r> {
                 RoundError::Optimizer(text) => Error::Optimizer(text),
             })?;
             if let Some(mut end) = self.take(objective, result) {
-                end.trouble = file.and_then(|file| file.trouble());
+                end.write_error = file.and_then(|file| file.write_error());
                 return Ok(end);
             }
         }
@@ -137,7 +137,7 @@ impl<'r> Rounds<'r> {
             iterations: self.iterations,
             evaluations: self.evaluations,
             name: result.name,
-            trouble: None,
+            write_error: None,
             memory: self.memory.clone(),
         })
     }

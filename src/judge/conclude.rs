@@ -33,7 +33,7 @@ pub(crate) struct SearchEnd {
     /// The search's name.
     pub name: String,
     /// The last error in writing a checkpoint.
-    pub trouble: Option<String>,
+    pub write_error: Option<String>,
     /// Carries at the begins of the segments there.
     pub memory: Memory,
 }

@@ -116,12 +116,12 @@ fn bandwidth(one: &DMatrix<f64>, two: &DMatrix<f64>, a: &DMatrix<f64>, count: us
     let andrews = if below > 0.0 { 1.1447 * (above / below * length).cbrt() } else { 0.0 };
     // Andrews' rule uses the correlation at lag one only; the longer of Schwert's rules (J. Business and Economic
     // Statistics 7 (1989) 147) allows for what the autoregression leaves at longer lags.
-    let room = 12.0 * (length / 100.0).powf(0.25);
-    (andrews.max(room).ceil() as usize + 1).clamp(1, (count / 2).max(1))
+    let schwert = 12.0 * (length / 100.0).powf(0.25);
+    (andrews.max(schwert).ceil() as usize + 1).clamp(1, (count / 2).max(1))
 }
 
 /// An accumulator of scores in order of time.
-trait TakeScore: Send {
+trait AccumulateScores: Send {
     fn take(&mut self, score: &[f64]);
     /// Adds the accumulator of the scores that follow.
     fn append(&mut self, later: Self);
@@ -142,7 +142,7 @@ impl<'s, T> EachScore<'s, T> {
     }
 }
 
-impl<T: TakeScore> Accumulate for EachScore<'_, T> {
+impl<T: AccumulateScores> Accumulate for EachScore<'_, T> {
     fn add(&mut self, window: &Window, lane: usize) {
         let loss = self.objective.loss();
         for k in 0..window.samples[lane] {
@@ -210,7 +210,7 @@ impl Lagged {
     }
 }
 
-impl TakeScore for Lagged {
+impl AccumulateScores for Lagged {
     fn take(&mut self, score: &[f64]) {
         if self.first.len() < 2 {
             self.first.push(score.to_vec());
@@ -312,7 +312,7 @@ impl<'m> MovingSums<'m> {
     }
 }
 
-impl TakeScore for MovingSums<'_> {
+impl AccumulateScores for MovingSums<'_> {
     fn take(&mut self, score: &[f64]) {
         let counts = self.first.len() == self.window;
         if !counts {

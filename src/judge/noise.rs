@@ -13,7 +13,7 @@ const ROUNDING: f64 = 1e-15;
 const REPRODUCED: f64 = 1e-12;
 
 /// `E[psi^2]` of Huber's loss under the standard normal.
-fn bent_variance(&Huber(c): &Huber) -> f64 {
+fn clipped_variance(&Huber(c): &Huber) -> f64 {
     let normal = Normal::standard();
     2.0 * (normal.cdf(c) - 0.5 - c * normal.pdf(c) + c * c * normal.sf(c))
 }
@@ -117,7 +117,7 @@ pub(crate) fn estimate(objective: &Objective<'_>, coordinates: &[f64]) -> Result
     };
     if objective.is_robust() {
         let huber = Huber::default();
-        let kappa = bent_variance(&huber);
+        let kappa = clipped_variance(&huber);
         for _ in 0..50 {
             let before = sigma(&found);
             found = moments(objective, coordinates, &before, Some(&|z| huber.psi(z)))?;

@@ -28,7 +28,7 @@ pub(crate) struct Residuals {
     pub whiteness: Vec<Whiteness>,
     /// The smallest standard deviation that was predicted for a measurement of each output; infinite without
     /// predictions.
-    pub surest: Vec<f64>,
+    pub least_sigma: Vec<f64>,
 }
 
 /// Whiteness test of the errors of an output.
@@ -48,7 +48,7 @@ struct Sums<'s> {
     measured: u64,
     log_determinant: f64,
     autocorrelations: Vec<Autocorrelation>,
-    surest: Vec<f64>,
+    least_sigma: Vec<f64>,
     /// The windows to be simulated again.
     again: Vec<Sampled>,
     run: Vec<f64>,
@@ -71,7 +71,7 @@ impl<'s> Sums<'s> {
             measured: 0,
             log_determinant: 0.0,
             autocorrelations: vec![Autocorrelation::new(LAGS); outputs],
-            surest: vec![f64::INFINITY; outputs],
+            least_sigma: vec![f64::INFINITY; outputs],
             again: vec![],
             run: vec![],
         }
@@ -127,7 +127,7 @@ impl Accumulate for Sums<'_> {
                     let unit = window.variance_root(k, j, lane);
                     self.outputs[j].add(y, error * unit);
                     if window.has_variances() {
-                        self.surest[j] = self.surest[j].min(unit);
+                        self.least_sigma[j] = self.least_sigma[j].min(unit);
                     }
                     count += 1;
                 }
@@ -148,7 +148,7 @@ impl Accumulate for Sums<'_> {
         self.log_determinant += later.log_determinant;
         self.outputs.iter_mut().zip(&later.outputs).for_each(|(sums, later)| sums.append(later));
         self.autocorrelations.iter_mut().zip(&later.autocorrelations).for_each(|(sums, later)| sums.follow(later));
-        self.surest.iter_mut().zip(&later.surest).for_each(|(surest, later)| *surest = surest.min(*later));
+        self.least_sigma.iter_mut().zip(&later.least_sigma).for_each(|(least, later)| *least = least.min(*later));
         self.again.extend(later.again);
     }
 }
@@ -202,7 +202,9 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
         log_determinant,
         step_error,
         whiteness: (0..outputs).map(whiteness).collect(),
-        surest: (0..outputs).map(|j| all.iter().map(|one| one.surest[j]).fold(f64::INFINITY, f64::min)).collect(),
+        least_sigma: (0..outputs)
+            .map(|j| all.iter().map(|one| one.least_sigma[j]).fold(f64::INFINITY, f64::min))
+            .collect(),
     }
 }
 

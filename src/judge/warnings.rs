@@ -10,7 +10,7 @@ use crate::problem::Objective;
 /// Largest change of a parameter with a finer step, in standard errors, without a warning.
 const STEP_SHIFT: f64 = 0.5;
 /// A predicted standard deviation below this fraction of the errors counts as zero.
-const SURE: f64 = 1e-6;
+const ZERO_DEVIATION: f64 = 1e-6;
 /// Factor by which autocorrelation may widen an interval before the severity is raised.
 const CORRELATION_MATTERS: f64 = 2.0;
 
@@ -45,8 +45,8 @@ impl Judgement<'_> {
                 "standard errors and intervals are those of a minimum, where the search did not arrive".to_owned();
             warnings.push(Warning { severity: Severity::NotUsable, text });
         }
-        if let Some(trouble) = &self.end.trouble {
-            let text = format!("the checkpoint could not be written ({trouble}); the search went on without it");
+        if let Some(write_error) = &self.end.write_error {
+            let text = format!("the checkpoint could not be written ({write_error}); the search went on without it");
             warnings.push(Warning { severity: Severity::Usable, text });
         }
         warnings.extend(self.autocorrelation(covariances));
@@ -69,15 +69,15 @@ impl Judgement<'_> {
 
     /// Whether a predicted variance goes to zero: there the likelihood has no maximum.
     fn unbounded(&self) -> Option<Warning> {
-        let of = |j: usize| (self.residuals.surest[j], self.residuals.outputs[j].rmse);
-        let j = (0..self.residuals.surest.len()).find(|&j| of(j).0 < SURE * of(j).1)?;
-        let (output, (surest, rmse)) = (&self.objective.problem.layout().outputs[j], of(j));
+        let of = |j: usize| (self.residuals.least_sigma[j], self.residuals.outputs[j].rmse);
+        let j = (0..self.residuals.least_sigma.len()).find(|&j| of(j).0 < ZERO_DEVIATION * of(j).1)?;
+        let (output, (least_sigma, rmse)) = (&self.objective.problem.layout().outputs[j], of(j));
         let text = format!(
             "a measurement of `{}` is predicted with a standard deviation of {} {unit}, beside errors of {} {unit}: the \
              likelihood grows without bound (a free initial state fits the first measurement exactly); give the noise a \
              lower bound, or fix the initial state",
             output.name,
-            number(surest, 2),
+            number(least_sigma, 2),
             number(rmse, 2),
             unit = output.unit
         );

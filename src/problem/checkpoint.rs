@@ -24,7 +24,7 @@ pub(crate) struct CheckpointFile {
     /// Iterations of earlier runs.
     pub before: u64,
     /// The last error in writing; it does not stop the search.
-    trouble: Arc<Mutex<Option<String>>>,
+    write_error: Arc<Mutex<Option<String>>>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -47,20 +47,20 @@ type Resumed<S> = (Vec<f64>, u64, Option<S>);
 impl CheckpointFile {
     /// A file for the search of one problem.
     pub fn new(path: PathBuf, every: u64, fingerprint: String, settings: String) -> Self {
-        CheckpointFile { path, every, fingerprint, settings, before: 0, trouble: Arc::default() }
+        CheckpointFile { path, every, fingerprint, settings, before: 0, write_error: Arc::default() }
     }
 
     /// The last error in writing.
-    pub fn trouble(&self) -> Option<String> {
-        self.trouble.lock().ok().and_then(|trouble| trouble.clone())
+    pub fn write_error(&self) -> Option<String> {
+        self.write_error.lock().ok().and_then(|write_error| write_error.clone())
     }
 
     /// Keeps the last error in writing.
     pub fn note(&self, written: Result<(), Error>) {
         if let Err(error) = written
-            && let Ok(mut trouble) = self.trouble.lock()
+            && let Ok(mut write_error) = self.write_error.lock()
         {
-            *trouble = Some(error.to_string());
+            *write_error = Some(error.to_string());
         }
     }
 

@@ -8,7 +8,7 @@
 
 use super::Values;
 use crate::record::Record;
-use crate::sweep::{Joints, Sweep};
+use crate::sweep::{Coupling, Sweep};
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -35,11 +35,11 @@ pub(crate) struct Cuts {
 impl Cuts {
     /// Cuts records as this sweep allows; not at all if samples must be processed in order (`ordered`).
     pub fn new(sweep: &dyn Sweep, records: &[Record], ordered: bool) -> Self {
-        let joints = sweep.joints();
-        let carried = matches!(joints, Joints::Affine | Joints::Nonlinear);
-        let whole = ordered || records.len() >= MANY || joints == Joints::Uncut || carried && sweep.carry() > CARRY;
+        let coupling = sweep.coupling();
+        let carried = matches!(coupling, Coupling::Affine | Coupling::Nonlinear);
+        let whole = ordered || records.len() >= MANY || coupling == Coupling::Uncut || carried && sweep.carry() > CARRY;
         let segments = records.iter().map(|record| cut(record.len(), whole)).collect();
-        Cuts { segments, carried, affine: joints == Joints::Affine }
+        Cuts { segments, carried, affine: coupling == Coupling::Affine }
     }
 
     /// Whether segments of this record begin with the carry at the end of the segment before.

@@ -101,8 +101,8 @@ impl Filter<'_> {
     /// Runs a piece.
     pub fn run(&self, piece: &Piece<'_>, seeds: &[Seed], visit: Visit<'_>) -> Result<Reached, RunError> {
         match seeds.is_empty() {
-            true => self.walk::<f64>(self.values, self.predictor.values(), piece, seeds, visit),
-            false => self.walk::<Duals>(self.duals, self.predictor.duals(), piece, seeds, visit),
+            true => self.run_windows::<f64>(self.values, self.predictor.values(), piece, seeds, visit),
+            false => self.run_windows::<Duals>(self.duals, self.predictor.duals(), piece, seeds, visit),
         }
     }
 
@@ -116,7 +116,7 @@ impl Filter<'_> {
         SlicePlant { layout: self.layout, functions, duals: self.duals, method: self.method, between, p, step }
     }
 
-    fn walk<S: Number>(
+    fn run_windows<S: Number>(
         &self,
         functions: &dyn Functions<S>,
         steps: &dyn Steps<S>,

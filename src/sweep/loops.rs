@@ -171,19 +171,19 @@ impl<M: Model, I: Integrator> Loops<M> for I {
         // Debug builds compile fewer variants, to save compile time: same numbers, more passes.
         #[cfg(debug_assertions)]
         return match (seeds.len(), wide) {
-            (0, _) => task.walk::<f64>(visit),
-            (_, false) => task.walk::<Dual<4>>(visit),
-            (_, true) => task.walk::<Dual<4, Fused>>(visit),
+            (0, _) => task.run_windows::<f64>(visit),
+            (_, false) => task.run_windows::<Dual<4>>(visit),
+            (_, true) => task.run_windows::<Dual<4, Fused>>(visit),
         };
         #[cfg(not(debug_assertions))]
         match (seeds.len(), wide) {
-            (0, _) => task.walk::<f64>(visit),
-            (1..=4, false) => task.walk::<Dual<4>>(visit),
-            (5 | 6 | 9..=12, false) => task.walk::<Dual<6>>(visit),
-            (_, false) => task.walk::<Dual<8>>(visit),
-            (1..=4, true) => task.walk::<Dual<4, Fused>>(visit),
-            (5 | 6 | 9..=12, true) => task.walk::<Dual<6, Fused>>(visit),
-            (_, true) => task.walk::<Dual<8, Fused>>(visit),
+            (0, _) => task.run_windows::<f64>(visit),
+            (1..=4, false) => task.run_windows::<Dual<4>>(visit),
+            (5 | 6 | 9..=12, false) => task.run_windows::<Dual<6>>(visit),
+            (_, false) => task.run_windows::<Dual<8>>(visit),
+            (1..=4, true) => task.run_windows::<Dual<4, Fused>>(visit),
+            (5 | 6 | 9..=12, true) => task.run_windows::<Dual<6, Fused>>(visit),
+            (_, true) => task.run_windows::<Dual<8, Fused>>(visit),
         }
     }
 
@@ -203,7 +203,7 @@ struct Task<'t, M: Model, I> {
 }
 
 impl<M: Model, I: Integrator> Task<'_, M, I> {
-    fn walk<D: Number>(&self, visit: Visit<'_>) -> Result<Reached, RunError> {
+    fn run_windows<D: Number>(&self, visit: Visit<'_>) -> Result<Reached, RunError> {
         let (piece, seeds) = (self.piece, self.seeds);
         let count = seeds.len().div_ceil(D::SLOPES.max(1)).max(1);
         let mut passes: Vec<Pass<M, D>> = (0..count).map(|i| Pass::new(piece, seeds, i * D::SLOPES)).collect();
