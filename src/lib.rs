@@ -14,7 +14,7 @@
 //! V(p) = sum over samples and outputs of  weight * rho((y - y_hat(p)) / sigma)
 //! ```
 //!
-//! with `rho(z) = z^2 / 2`, or a loss that forgives outliers. `y_hat` is what the model says: simulated from the
+//! with `rho(z) = z^2 / 2`, or a loss that limits the influence of outliers. `y_hat` is what the model predicts: simulated from the
 //! initial state ([`FreeRun`]), or predicted a few samples ahead of a measured state ([`Horizon`]). See L. Ljung,
 //! *System Identification: Theory for the User*, 2nd ed., 1999, chapters 7, 9 and 10.
 //!
@@ -80,7 +80,7 @@
 //! | fit many records, each by itself | [`Fleet`] |
 //! | choose an integrator | [`Automatic`], [`Rk4`], [`Rk45`], [`Esdirk`], [`Discrete`] |
 //! | choose what is predicted | [`FreeRun`], [`Horizon`], [`Kalman`] |
-//! | weigh, bend or filter errors | [`Weighting`], [`Loss`], [`Butterworth`] |
+//! | weigh or filter errors, limit outliers | [`Weighting`], [`Loss`], [`Butterworth`] |
 //! | choose a search | [`optimize`]; argmin's solvers by [`Problem::objective`] |
 //! | read the result | [`Estimate`], [`Knowledge`], [`Warning`], [`Summary`] |
 //! | judge it | [`diagnose`], [`Report`] |
