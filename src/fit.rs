@@ -76,7 +76,7 @@ impl<M: Model> Clone for Stepping<M> {
 /// A fit with its settings, before it is run.
 ///
 /// Defaults: simulation error, squared loss, no weighting, noise estimated per output,
-/// [`LevenbergMarquardt`](crate::optimize::LevenbergMarquardt), and the step that the model's kind asks for.
+/// [`LevenbergMarquardt`](crate::optimize::LevenbergMarquardt), and the default integrator of the model's kind.
 pub struct Fit<'a, M: Model> {
     model: &'a M,
     experiments: &'a [ExperimentOf<M>],

@@ -237,7 +237,7 @@ impl Objective<'_> {
     }
 }
 
-/// Costs and triangles of jobs that run side by side.
+/// Costs and triangles of jobs that run in parallel lanes.
 pub(super) fn parts(jobs: &[&Job<'_>]) -> Result<Vec<Part>, Broken> {
     let mut absorbers: Absorber<'_> = Absorber::new(jobs);
     let reached = run(jobs, &mut |window| absorbers.absorb(window))?;

@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// The cost of a fit, for its own and for argmin's solvers.
 ///
 /// The unknowns are coordinates in a row: shared parameters, then each experiment's free initial states and own
-/// parameters; parameters declared with `.log()` by their logarithm. [`names`](Self::names) tells the order. The cost
+/// parameters; parameters declared with `.log()` by their logarithm. [`names`](Self::names) gives the order. The cost
 /// is the sum over samples and outputs of `weight * rho(error / sigma)`, plus half the squares of the priors; where the
 /// variance `v` is predicted, of `rho(error / sqrt(v)) + kappa / 2 * ln(v)`, with `kappa` the mean of `psi(z) z` for
 /// Gaussian `z` (one for least squares).

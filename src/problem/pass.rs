@@ -109,7 +109,7 @@ impl Objective<'_> {
         reached.into_iter().next().map_or(Ok(()), |reached| reached.map(|_| ()))
     }
 
-    /// The borders of the segments at a point, with their slopes if they are asked for; `None` where nothing is
+    /// The borders of the segments at a point, with their slopes if `slopes` is set; `None` where nothing is
     /// chained.
     fn borders(
         &self,
