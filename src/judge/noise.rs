@@ -23,7 +23,7 @@ struct Moments<'m> {
     objective: &'m Objective<'m>,
     experiment: usize,
     sigma: &'m [f64],
-    bend: Option<&'m (dyn Fn(f64) -> f64 + Sync)>,
+    clip: Option<&'m (dyn Fn(f64) -> f64 + Sync)>,
     sums: SquareMatrix,
     pairs: SquareMatrix,
 }
@@ -38,7 +38,7 @@ impl Accumulate for Moments<'_> {
             }
             for (j, error) in errors.iter_mut().enumerate() {
                 let value = window.error(k, j, lane);
-                *error = self.bend.map_or(value, |bend| bend(value / self.sigma[j]) * self.sigma[j]);
+                *error = self.clip.map_or(value, |clip| clip(value / self.sigma[j]) * self.sigma[j]);
             }
             for i in 0..outputs {
                 for j in 0..outputs {
@@ -59,18 +59,18 @@ impl Accumulate for Moments<'_> {
     }
 }
 
-/// Second moments of the (filtered) errors in the units of the outputs; each error through `bend` in units of
+/// Second moments of the (filtered) errors in the units of the outputs; each error through `clip` in units of
 /// `sigma`, for robust estimates.
 fn moments(
     objective: &Objective<'_>,
     coordinates: &[f64],
     sigma: &[f64],
-    bend: Option<&(dyn Fn(f64) -> f64 + Sync)>,
+    clip: Option<&(dyn Fn(f64) -> f64 + Sync)>,
 ) -> Result<SquareMatrix, Infeasible> {
     let outputs = objective.outputs();
     let plain = objective.in_units();
     let empty = || SquareMatrix::zeros(outputs);
-    let make = |experiment| Moments { objective: &plain, experiment, sigma, bend, sums: empty(), pairs: empty() };
+    let make = |experiment| Moments { objective: &plain, experiment, sigma, clip, sums: empty(), pairs: empty() };
     let all = plain.gather(coordinates, false, make)?;
     let sum = |part: &dyn Fn(&Moments<'_>) -> f64| all.iter().map(part).sum::<f64>();
     let covariance = SquareMatrix::from_fn(outputs, |i, j| {
