@@ -34,7 +34,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-/// A model and its records, nothing said yet of the parameters.
+/// A model and its records, before the parameters are declared.
 #[derive(Debug)]
 pub struct Records<'a, M: Model> {
     model: &'a M,
@@ -42,7 +42,7 @@ pub struct Records<'a, M: Model> {
 }
 
 impl<'a, M: Model> Records<'a, M> {
-    /// Says of each parameter whether it is `free` (from where, within which bounds, with what prior) or `fixed`.
+    /// Declares each parameter `free` (with its start, bounds and prior) or `fixed`.
     pub fn parameters(self, parameters: Of<M::Parameters, Parameter>) -> Fit<'a, M> {
         Fit {
             model: self.model,
@@ -55,7 +55,7 @@ impl<'a, M: Model> Records<'a, M> {
     }
 }
 
-/// An integrator as a loop over a model's samples, and as an object.
+/// An integrator: compiled into the loop over a model's samples, and as a trait object.
 pub(crate) struct Stepping<M: Model> {
     loops: Arc<dyn Loops<M>>,
     method: Arc<dyn Method>,
@@ -73,10 +73,10 @@ impl<M: Model> Clone for Stepping<M> {
     }
 }
 
-/// A fit about to be run.
+/// A fit with its settings, before it is run.
 ///
-/// Left out: simulation error, squared loss, no weighting, noise estimated per output,
-/// [`LevenbergMarquardt`](crate::optimize::LevenbergMarquardt), and the step that the model's kind asks for.
+/// Defaults: simulation error, squared loss, no weighting, noise estimated per output,
+/// [`LevenbergMarquardt`](crate::optimize::LevenbergMarquardt), and the default integrator of the model's kind.
 pub struct Fit<'a, M: Model> {
     model: &'a M,
     experiments: &'a [ExperimentOf<M>],
@@ -93,28 +93,28 @@ impl<'a, M: Model> Fit<'a, M> {
         Records { model, experiments: records.as_ref() }
     }
 
-    /// Steps the model by another method.
+    /// Sets the integrator.
     pub fn integrator(self, integrator: impl Integrator) -> Self {
         Fit { stepping: Stepping::new(integrator), ..self }
     }
 
-    /// Minimizes another prediction error.
+    /// Sets the predictor, whose prediction error is minimized.
     pub fn predictor(self, predictor: impl Predictor) -> Self {
         Fit { predictor: Arc::new(predictor), ..self }
     }
 
-    /// Searches by another method, or by the same with other settings.
+    /// Sets the search and its settings.
     pub fn optimizer(self, optimizer: impl Search) -> Self {
         self.set(|settings| settings.optimizer(optimizer))
     }
 
-    /// The standard deviation of the noise of each output, in its unit (after the pre-filter, if there is one). Left out,
-    /// it is estimated from the errors.
+    /// Sets the standard deviation of the noise of each output, in its unit (after the pre-filter, if there is one).
+    /// Without it, the noise is estimated from the errors.
     pub fn noise(self, sigma: Of<M::Output, f64>) -> Self {
         self.set(|settings| settings.noise(M::Output::into_array(sigma).as_ref().to_vec()))
     }
 
-    /// Estimates the noise with its correlations between outputs.
+    /// Estimates the covariance of the noise of all outputs, instead of a standard deviation per output.
     pub fn noise_covariance(self) -> Self {
         self.set(Settings::noise_covariance)
     }
@@ -126,32 +126,33 @@ impl<'a, M: Model> Fit<'a, M> {
         self
     }
 
-    /// Bends the cost of large standardized errors.
+    /// Sets the loss, a function of the standardized errors.
     pub fn loss(self, loss: impl Loss + 'a) -> Self {
         self.set(|settings| settings.loss(loss))
     }
 
-    /// Filters the prediction errors (and their slopes) before they count. A missing sample enters the filter as a zero.
+    /// Filters the prediction errors and their slopes before the cost is computed. A missing sample enters the filter
+    /// as zero.
     pub fn prefilter(self, filter: Butterworth) -> Self {
         self.set(|settings| settings.prefilter(filter))
     }
 
-    /// Stops the search, with what it has found by then, when the flag is raised (from another thread, a signal handler).
+    /// Stops the search at its best point so far when the flag is set (by another thread, a signal handler).
     pub fn cancel(self, flag: Arc<AtomicBool>) -> Self {
         self.set(|settings| settings.cancel(flag))
     }
 
-    /// Stops the search after this time, with what it has found by then.
+    /// Stops the search at its best point so far after this time.
     pub fn time_limit(self, limit: Duration) -> Self {
         self.set(|settings| settings.time_limit(limit))
     }
 
-    /// Shows the progress to an observer of argmin.
+    /// Calls an observer of argmin with the state of the search.
     pub fn observe(self, observer: impl Observe<LeastSquaresState> + Send + 'static, mode: ObserverMode) -> Self {
         self.set(|settings| settings.observe(observer, mode))
     }
 
-    /// Saves the place of the search into a file, every so many iterations, and goes on from there if the file exists. A
+    /// Saves the state of the search into a file every `every` iterations, and resumes from the file if it exists. A
     /// file of another problem is refused.
     pub fn checkpoint(self, path: impl Into<PathBuf>, every: u64) -> Self {
         self.set(|settings| settings.checkpoint(path, every))
@@ -161,12 +162,13 @@ impl<'a, M: Model> Fit<'a, M> {
         Fit { settings: say(self.settings), ..self }
     }
 
-    /// Searches for the parameters, and says how well they are known.
+    /// Estimates the parameters and their uncertainty.
     ///
     /// A search that does not converge is an outcome of the estimate, not an error.
     ///
     /// # Errors
-    /// What makes no sense ([`Error`] names it), a start that cannot be simulated, a checkpoint that cannot be read.
+    /// Invalid settings or records ([`Error`] names them), a start that cannot be simulated, a checkpoint that cannot
+    /// be read.
     pub fn run(self) -> Result<Estimate<M>, Error> {
         let begin = std::time::Instant::now();
         let sweep = sweep(Handle::Borrowed(self.model), &self.stepping, &self.predictor)?;
@@ -177,8 +179,8 @@ impl<'a, M: Model> Fit<'a, M> {
 }
 
 impl<'a, M: Model + Clone + 'a> Fit<'a, M> {
-    /// The fit as a problem of its own: to be run, to be asked ([`diagnose`](crate::diagnose), [`Report`](crate::Report)), to
-    /// be given to argmin's solvers. It holds a copy of the model.
+    /// The fit as an untyped [`Problem`]: for [`diagnose`](crate::diagnose), for [`Report`](crate::Report), for
+    /// argmin's solvers, or to be run. It holds a copy of the model.
     ///
     /// # Errors
     /// As [`run`](Fit::run).
@@ -189,17 +191,17 @@ impl<'a, M: Model + Clone + 'a> Fit<'a, M> {
     }
 }
 
-/// The records of experiments, which share their columns.
+/// The untyped records of experiments; columns are shared, not copied.
 fn records<M: Model>(experiments: &[ExperimentOf<M>]) -> Vec<Record> {
     experiments.iter().map(|experiment| experiment.record().clone()).collect()
 }
 
-/// What was declared, in the model's order.
+/// The declared parameters, in the model's order.
 fn declared<M: Model>(parameters: Of<M::Parameters, Parameter>) -> Vec<Parameter> {
     M::Parameters::into_array(parameters).as_ref().to_vec()
 }
 
-/// The model on its way through records, by a method and a predictor.
+/// The sweep of a model: a compiled program if the model can be traced, else dual numbers.
 pub(crate) fn sweep<'a, M: Model + 'a>(
     model: Handle<'a, M>,
     stepping: &Stepping<M>,
@@ -238,7 +240,7 @@ pub(crate) fn sweep<'a, M: Model + 'a>(
     })
 }
 
-/// A typed weighting by position.
+/// A typed weighting as untyped [`Weights`].
 struct ByModel<W, M> {
     weighting: W,
     model: PhantomData<fn(&M)>,

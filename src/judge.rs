@@ -1,4 +1,4 @@
-//! From where a search ended to what is known: noise, covariance, directions, warnings.
+//! Evaluation of the result of a search: noise, covariance, null directions, warnings.
 
 mod conclude;
 mod directions;

@@ -1,5 +1,5 @@
-//! Nonlinear grey-box parameter estimation: from the equations of a physical system and a record of it to its parameters,
-//! and to what is known of them.
+//! Nonlinear grey-box parameter estimation: from the equations of a physical system and a record of it to its
+//! parameters, and to what is known of them.
 //!
 //! # The problem
 //!
@@ -7,16 +7,16 @@
 //! dx/dt = f(t, x, u; p)      y = g(t, x, u; p) + noise      find p, and say how well it is known
 //! ```
 //!
-//! The states `x` are not all measured, the inputs `u` are, the outputs `y` with noise; `f` and `g` are known from physics,
-//! their parameters `p` are not. The estimate is the `p` whose predictions miss the record by least:
+//! The states `x` are not all measured, the inputs `u` are, the outputs `y` with noise; `f` and `g` are known from
+//! physics, their parameters `p` are not. The estimate is the `p` whose predictions miss the record by least:
 //!
 //! ```text
 //! V(p) = sum over samples and outputs of  weight * rho((y - y_hat(p)) / sigma)
 //! ```
 //!
-//! with `rho(z) = z^2 / 2`, or a loss that forgives outliers. `y_hat` is what the model says: simulated from the initial
-//! state ([`FreeRun`]), or predicted a few samples ahead of a measured state ([`Horizon`]). See L. Ljung, *System
-//! Identification: Theory for the User*, 2nd ed., 1999, chapters 7, 9 and 10.
+//! with `rho(z) = z^2 / 2`, or a loss that limits the influence of outliers. `y_hat` is what the model predicts: simulated from the
+//! initial state ([`FreeRun`]), or predicted a few samples ahead of a measured state ([`Horizon`]). See L. Ljung,
+//! *System Identification: Theory for the User*, 2nd ed., 1999, chapters 7, 9 and 10.
 //!
 //! # The result
 //!
@@ -63,38 +63,37 @@
 //! ```
 //!
 //! The report leads with a verdict. Each quantity is *known* (with an interval), *fixed*, *held* at a bound, or
-//! *unidentified* ([`Knowledge`]): nothing is reported as known that the data do not say, and parameters that the record
-//! cannot tell apart are named with the direction in which they may move together. A search that did not converge is an
-//! [`Outcome`](optimize::Outcome) with advice, not an error; an [`Error`] names the thing, the number and the remedy.
+//! *unidentified* ([`Knowledge`]): nothing is reported as known that the data do not say, and parameters that the
+//! record cannot tell apart are named with the direction in which they may move together. A search that did not
+//! converge is an [`Outcome`](optimize::Outcome) with advice, not an error; an [`Error`] names the thing, the number
+//! and the remedy.
 //!
-//! # The house
+//! # Where to find what
 //!
-//! A file imports only from floors below its own; a test enforces it.
+//! | to | see |
+//! |---|---|
+//! | write a model | [`Model`], [`signals!`], [`Scalar`]; [`Numeric`] for functions over `f64`; [`models`] and [`pmsm`] for those that ship |
+//! | read a record | [`Experiment`], [`CsvFile`], [`Time`], [`Hold`], [`units`] |
+//! | simulate | [`simulate()`], [`Simulator`] |
+//! | declare parameters | [`free`], [`fixed`], [`Parameter`], [`Prior`] |
+//! | fit one record or several together | [`Fit`] |
+//! | fit many records, each by itself | [`Fleet`] |
+//! | choose an integrator | [`Automatic`], [`Rk4`], [`Rk45`], [`Esdirk`], [`Discrete`] |
+//! | choose what is predicted | [`FreeRun`], [`Horizon`], [`Kalman`] |
+//! | weigh or filter errors, limit outliers | [`Weighting`], [`Loss`], [`Butterworth`] |
+//! | choose a search | [`optimize`]; argmin's solvers by [`Problem::objective`] |
+//! | read the result | [`Estimate`], [`Knowledge`], [`Warning`], [`Summary`] |
+//! | judge it | [`diagnose`], [`Report`] |
+//! | test a model | [`check`] |
+//! | estimate online | [`online`] |
+//! | fit what is linear in its parameters | [`regress`] |
 //!
-//! | floor | what | files |
-//! |---|---|---|
-//! | roof | read | [`report`], which reads [`diagnose`]; [`check`] |
-//! | 3 | learn | `loss`, `weighting`, [`optimize`], [`regress`], [`numeric`], [`problem`], `estimate`, `judge`, `fit`, [`online`] |
-//! | 2 | expect | `integrate`, `prefilter`, `recurrence`, `predict`, `simulate`, [`sweep`] |
-//! | 1 | say | `model`, `parameter`, `scaling`, `interval`, [`record`], `functions`, `equations`, `experiment`, [`units`] |
-//! | ground | numbers | `lanes`, `scalar`, `dual`, `signals`, `layout`, [`graph`], `information`, `whiteness`, `error` |
-//! | wing | machines | [`pmsm`], [`models`] |
-//!
-//! **The way of a sample through a fit.** [`Experiment`] holds it. The integrator carries the state to it in
-//! [`Dual`] numbers, a value with up to eight slopes, and the predictor turns that into a prediction error and its slopes,
-//! column by column in a window of 128 samples. The fit filters the window, divides it by the noise, weights it. The
-//! [`Information`] triangle absorbs its rows by orthogonal reflections and forgets them. After the last window the optimizer
-//! reads its step off the triangles; initial states, and parameters that each experiment has for itself, are minimized out
-//! of their experiment's triangle first ([`Elimination`]), so that many experiments cost no more than their samples. When
-//! the search has ended, covariance, rank and directions come from the same triangles. Nothing is kept of the samples, and nothing is allocated for them.
-//!
-//! Only the loop over the samples depends on the type of the model; [`sweep`] separates it from search, noise, covariance
-//! and diagnoses, which are given windows of numbers and are compiled once.
+//! How the library is built is described in `ARCHITECTURE.md`, beside its `README.md`.
 //!
 //! # Features
 //!
-//! `std`, `csv`, `jit` (machine code for models that can be read as a graph) and `parallel` are on by default; without `std` the ground floor (but for the triangle), models,
-//! integrators and [`online`] observers build without `alloc` too.
+//! `std`, `csv`, `jit` (machine code for models that can be traced) and `parallel` are on by default. Without `std`
+//! there are numbers, signals, models, integrators and [`online`] observers, without `alloc` too.
 #![cfg_attr(not(feature = "std"), no_std)]
 
 #[cfg(feature = "std")]

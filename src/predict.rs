@@ -1,4 +1,4 @@
-//! [`Predictor`]: what the model expects of each output, mean and variance, and where the state behind it comes from.
+//! [`Predictor`]: mean and variance of each output, and the state from which they are computed.
 
 mod free_run;
 mod horizon;
@@ -21,59 +21,59 @@ use crate::layout::Layout;
 use crate::scalar::Scalar;
 use core::fmt::Debug;
 
-/// How a prediction comes about, sample by sample. What it hands from one sample to the next, the carry, begins with the
-/// state; a filter adds its uncertainty.
+/// Predicts the outputs sample by sample. The numbers that it passes from one sample to the next, the carry, begin with
+/// the state; a filter adds the state's covariance.
 ///
-/// At each sample the outputs are taken one after the other: [`predict`](Predictor::predict) says what is expected of it,
-/// and where it was measured [`correct`](Predictor::correct) takes the prediction error into the carry. Then
-/// [`advance`](Predictor::advance) goes on to the next sample. Written over [`Scalar`], the text gives exact slopes, and is
-/// compiled together with the model's equations where these can be read as a graph.
+/// At each sample the outputs are processed one after the other: [`predict`](Predictor::predict) returns mean and
+/// variance, and where the output was measured [`correct`](Predictor::correct) updates the carry with the prediction
+/// error. Then [`advance`](Predictor::advance) moves the carry to the next sample. The functions are generic over
+/// [`Scalar`]: slopes are exact, and they are compiled together with the model's equations where these can be traced.
 pub trait Predictor: Debug + Clone + Send + Sync + 'static {
-    /// How many numbers the carry has, for a model of this layout: its states at least, which come first.
+    /// Length of the carry for a model of this layout: at least its states, which come first.
     fn carry(&self, layout: &Layout) -> usize {
         layout.states.len()
     }
 
-    /// Whether it predicts a variance. Then the likelihood of the prediction errors is what a fit maximizes, and the noise
-    /// is the predictor's business.
+    /// Whether it predicts a variance. A fit then maximizes the likelihood of the prediction errors, and takes the
+    /// noise from the predictor.
     fn predicts_variance(&self) -> bool {
         false
     }
 
-    /// Whether each output is predicted from a state that was measured so many samples before, and by which settings;
-    /// nothing is carried on then.
+    /// The horizon, if each output is predicted from a state measured a fixed number of samples before; nothing is
+    /// carried from sample to sample then.
     fn restarts(&self) -> Option<Horizon> {
         None
     }
 
-    /// Whether it serves a model of this layout.
+    /// Checks that it can predict a model of this layout.
     ///
     /// # Errors
-    /// Why it does not, and what to do.
+    /// Why it cannot, and the remedy.
     fn check(&self, layout: &Layout) -> Result<(), Error> {
         let _ = layout;
         Ok(())
     }
 
-    /// Fills in what the carry holds at the first sample beyond the state.
+    /// Sets the entries of the carry after the state, at the first sample.
     fn start<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S]) {
         let _ = (plant, carry);
     }
 
-    /// Mean and variance of an output, from a carry that has taken in the outputs before it. The variance does not matter
-    /// to a predictor that predicts none.
+    /// Mean and variance of an output, from a carry that was corrected with the outputs before it. The variance is
+    /// ignored unless [`predicts_variance`](Predictor::predicts_variance).
     fn predict<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &[S], output: usize) -> (S, S) {
         let mut y = vec![S::from(0.0); plant.layout().outputs.len()];
         plant.output(&carry[..plant.layout().states.len()], &mut y);
         (y[output], S::from(1.0))
     }
 
-    /// Takes in the prediction error of an output that was measured.
+    /// Corrects the carry with the prediction error of an output that was measured.
     fn correct<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S], output: usize, error: S) {
         let _ = (plant, carry, output, error);
     }
 
-    /// On to the next sample.
+    /// Moves the carry to the next sample.
     ///
     /// # Errors
     /// Where the integrator is [`Stuck`].
@@ -81,11 +81,11 @@ pub trait Predictor: Debug + Clone + Send + Sync + 'static {
         plant.next(carry)
     }
 
-    /// Name and settings in a few words, for reports.
+    /// Name and settings in a short text, for reports.
     fn describe(&self) -> String;
 }
 
-/// A [`Predictor`] as an object.
+/// A [`Predictor`] as a trait object.
 pub(crate) trait Prediction: Debug + Send + Sync {
     fn carry(&self, layout: &Layout) -> usize;
     fn predicts_variance(&self) -> bool;

@@ -1,4 +1,4 @@
-//! [`Problem`]: what a fit minimizes, with its records, as a value that knows quantities by position and name.
+//! [`Problem`]: model, records and settings of a fit, with quantities by position and name instead of by type.
 
 mod absorb;
 mod as_argmin;
@@ -45,10 +45,10 @@ use crate::record::Record;
 use crate::sweep::{Prepared, Sweep};
 use std::sync::Arc;
 
-/// A model, records and settings, ready to be fitted: the untyped problem that every kind of model ends up as.
+/// A model, records and settings, ready to be fitted, without the types of the model.
 ///
-/// It owns its records and settings. `'a` is the lifetime of what a sweep, a loss or a weighting borrows; that of a problem
-/// that a typed [`Fit`](crate::Fit) hands over is `'static`.
+/// It owns its records and settings. `'a` is the lifetime of what a sweep, a loss or a weighting borrows; that of a
+/// problem that a typed [`Fit`](crate::Fit) hands over is `'static`.
 #[derive(Clone)]
 pub struct Problem<'a> {
     pub(crate) sweep: Arc<dyn Sweep + 'a>,
@@ -62,11 +62,11 @@ pub struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
-    /// Checks all that was said, and looks at every record once.
+    /// Checks parameters and settings, and prepares every record.
     ///
     /// # Errors
-    /// What makes no sense ([`Error`] names it): no record, parameters that do not fit the model, nothing free, an output
-    /// that was never measured, settings out of range.
+    /// No record, parameters that do not fit the model, nothing free, an output that was never measured, settings out
+    /// of range ([`Error`] names which).
     pub fn new(
         sweep: Arc<dyn Sweep + 'a>,
         records: Vec<Record>,
@@ -81,7 +81,7 @@ impl<'a> Problem<'a> {
         Ok(problem)
     }
 
-    /// The same, where nothing need be free nor measured.
+    /// The same without the check that something is free and that all outputs were measured.
     pub(crate) fn unchecked(
         sweep: Arc<dyn Sweep + 'a>,
         records: Vec<Record>,
@@ -115,7 +115,7 @@ impl<'a> Problem<'a> {
         Ok(Problem { records, prepared, ..self.clone() })
     }
 
-    /// Every output must have been measured somewhere.
+    /// Every output must have been measured at least once.
     pub(crate) fn check_measured(&self) -> Result<(), Error> {
         for (j, output) in self.layout().outputs.iter().enumerate() {
             let measured = |record: &Record| record.outputs()[j].values.iter().any(|y| !y.is_nan());

@@ -1,7 +1,7 @@
-//! [`Sweep`]: runs pieces of records through a model, with slopes, and shows the prediction errors window by window.
+//! [`Sweep`]: runs pieces of records through a model, with slopes, and returns prediction errors window by window.
 //!
-//! Everything that depends on the model's type, or on how its equations are evaluated, is behind this trait. What asks for
-//! passes over the data (search, noise, covariance, diagnoses) is compiled once and sees quantities by position.
+//! The implementers of this trait depend on the model's type and on how its equations are evaluated. Its callers
+//! (search, noise, covariance, diagnoses) are not generic: they know quantities by position.
 
 mod duals;
 mod filtered;
@@ -22,21 +22,21 @@ use crate::record::Record;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// What a sweep made of a record before the search.
+/// What a sweep computes from a record before the search.
 #[derive(Clone, Debug, Default)]
 pub struct Prepared {
     /// The measured state at each sample, sample by sample, where predictions restart from it; NaN where there is none.
     pub restarts: Vec<f64>,
-    /// What programs compute from the record alone.
+    /// Columns that programs compute from the record alone.
     pub(crate) derived: Derived,
 }
 
-/// A run of samples of a record and what it starts from.
+/// Consecutive samples of a record, with the carry at the first of them.
 #[derive(Clone, Debug)]
 pub struct Piece<'a> {
     /// The record.
     pub record: &'a Record,
-    /// What was made of it.
+    /// What [`Sweep::prepare`] has computed from it.
     pub prepared: &'a Prepared,
     /// Its samples.
     pub samples: Range<usize>,
@@ -48,7 +48,7 @@ pub struct Piece<'a> {
     pub parameters: &'a [f64],
 }
 
-/// Where a piece ended: the carry at the sample after its last one, where there is one.
+/// The carry at the end of a piece: at the sample after its last one, where there is one.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reached {
     /// The carry.
@@ -65,13 +65,13 @@ pub enum RunError {
         /// Its number.
         sample: usize,
     },
-    /// What was shown a window said to stop.
+    /// The function that is called with each window asked to stop.
     Stopped,
 }
 
-/// How the pieces of one record hang together.
+/// How a piece depends on the piece before it in the same record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Joints {
+pub enum Coupling {
     /// The record must be run as a whole.
     Uncut,
     /// Each sample is predicted from measurements: nothing is carried from piece to piece.
@@ -82,23 +82,23 @@ pub enum Joints {
     Nonlinear,
 }
 
-/// Shown each window; false to stop.
+/// Called with each window; returns false to stop.
 pub type Visit<'v> = &'v mut dyn FnMut(&mut Window) -> bool;
 
-/// What went wrong in an experiment.
+/// The cause of a failure in an experiment.
 pub enum Located {
-    /// The simulation broke there.
+    /// The simulation cannot go beyond this point.
     Broken(Failure),
-    /// It did not break; there its error is largest.
+    /// The simulation reaches the end; this is its largest error.
     Largest(Failure),
 }
 
-/// A model on its way through records.
+/// Evaluates a model along records.
 pub trait Sweep: Send + Sync {
     /// The model's quantities.
     fn layout(&self) -> &Layout;
 
-    /// How many numbers are carried from sample to sample; the states come first.
+    /// Length of the carry: the numbers that are passed from sample to sample, states first.
     fn carry(&self) -> usize {
         self.layout().states.len()
     }
@@ -108,29 +108,29 @@ pub trait Sweep: Send + Sync {
         false
     }
 
-    /// How many pieces of records like this one it runs side by side; [`run`](Sweep::run) is never given more, nor pieces
-    /// of records with different holds or with even and uneven time.
+    /// How many pieces of records like this one run in parallel lanes. [`run`](Sweep::run) is never given more, nor
+    /// pieces of records that differ in their holds or in their kind of time.
     fn lanes(&self, record: &Record, seeds: &[Seed]) -> usize {
         let _ = (record, seeds);
         1
     }
 
-    /// How the pieces of a record hang together.
-    fn joints(&self) -> Joints {
-        Joints::Uncut
+    /// How pieces of a record depend on each other.
+    fn coupling(&self) -> Coupling {
+        Coupling::Uncut
     }
 
-    /// Looks at a record once, with the parameters at their start.
+    /// Prepares a record, once, with the parameters at their start values.
     ///
     /// # Errors
-    /// A record that the predictor cannot serve.
+    /// A record that the predictor cannot predict.
     fn prepare(&self, record: &Record, parameters: &[f64]) -> Result<Prepared, Error> {
         let _ = (record, parameters);
         Ok(Prepared::default())
     }
 
-    /// The carry at the first sample from the initial state, and its slopes with respect to states, then parameters, row by
-    /// row.
+    /// The carry at the first sample from the initial state, and its slopes with respect to states, then parameters,
+    /// row by row.
     fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Reached {
         let _ = record;
         let (n, width) = (state.len(), state.len() + parameters.len());
@@ -138,13 +138,13 @@ pub trait Sweep: Send + Sync {
         Reached { carry: state.to_vec(), slopes }
     }
 
-    /// Runs pieces side by side and shows each window of them.
+    /// Runs pieces in parallel lanes and calls `visit` with each window.
     fn run(&self, pieces: &[Piece<'_>], seeds: &[Seed], visit: Visit<'_>) -> Vec<Result<Reached, RunError>>;
 
-    /// The carry at some samples, which rise, of a record that is run from its begin.
+    /// The carry at the samples `at`, in ascending order, of a record that is run from its begin.
     ///
     /// # Errors
-    /// Where it could not be run.
+    /// The sample that could not be reached.
     fn follow(&self, piece: &Piece<'_>, at: &[usize]) -> Result<Vec<Vec<f64>>, RunError> {
         let mut from = Piece { slopes: vec![], ..piece.clone() };
         let mut found = Vec::with_capacity(at.len());
@@ -160,11 +160,10 @@ pub trait Sweep: Send + Sync {
         Ok(found)
     }
 
-    /// The state that the outputs of a sample give; why not, where there is none. With `alone`, they must not depend on
-    /// the parameters besides.
+    /// The state that follows from the outputs of a sample. With `alone`, the outputs must not depend on parameters.
     ///
     /// # Errors
-    /// Why the outputs do not give it.
+    /// Why the outputs do not determine the state.
     fn measured_state(
         &self,
         record: &Record,
@@ -176,8 +175,8 @@ pub trait Sweep: Send + Sync {
         Err("the sweep does not solve outputs for states".to_owned())
     }
 
-    /// What exactly fails in a record that cannot be run; `sample` is where it was noticed. The noise levels tell which
-    /// error is largest, where nothing fails. It is given up where `stops` says so.
+    /// The exact cause of a failure that was noticed at `sample`. Where nothing fails, the error that is largest
+    /// relative to the noise levels. `None` if `stops` returns true.
     fn locate(
         &self,
         record: &Record,
@@ -196,15 +195,15 @@ pub trait Sweep: Send + Sync {
         None
     }
 
-    /// The integrator and its settings, in words.
+    /// Description of the integrator and its settings.
     fn integrator(&self) -> String;
 
-    /// The predictor and its settings, in words.
+    /// Description of the predictor and its settings.
     fn predictor(&self) -> String;
 
-    /// How the equations are evaluated, and why, in words.
+    /// Description of how the equations are evaluated, with the reason.
     fn engine(&self) -> String;
 
-    /// Words that tell these equations from others: part of what a checkpoint belongs to.
+    /// Text that identifies the equations; part of a checkpoint's fingerprint.
     fn identity(&self) -> String;
 }

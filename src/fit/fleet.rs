@@ -15,15 +15,17 @@ use core::marker::PhantomData;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// Records whose fits go step by step together: enough to keep the lanes busy when some have ended.
+/// Records whose fits are advanced together: more than there are lanes, so that few lanes are idle when some have
+/// ended.
 const GROUP: usize = 32;
-/// Groups that are read ahead for each thread; what they find is kept until it is asked for.
+/// Groups that are read ahead for each thread; their answers are buffered.
 const AHEAD: usize = 4;
 
 /// The same fit of many records, each by itself: motors on a test bench, drives in the field.
 ///
-/// The model is compiled once. Records of one hold, with even or uneven time, are run side by side in vector lanes, groups of
-/// them over threads. Every answer is that of [`Fit::run`] of the record, but for rounding; what fails, fails alone.
+/// The model is compiled once. Records with the same hold and the same kind of time (uniform or not) run in parallel
+/// vector lanes, groups of them on threads. Every answer is that of [`Fit::run`] of the record, up to rounding; a
+/// record that fails does not affect the others.
 pub struct Fleet<'a, M: Model> {
     sweep: Arc<dyn Sweep + 'a>,
     parameters: Vec<Parameter>,
@@ -32,11 +34,11 @@ pub struct Fleet<'a, M: Model> {
 }
 
 impl<'a, M: Model> Fit<'a, M> {
-    /// The same fit for records to come, each by itself. Those given so far are left out.
+    /// A fleet with this fit's model and settings. The records of the fit are not used.
     ///
     /// # Errors
-    /// An integrator or a predictor that does not serve the model; settings that only a single fit can have (a checkpoint,
-    /// observers).
+    /// An integrator or a predictor that does not support the model; settings that only a single fit can have (a
+    /// checkpoint, observers).
     pub fn fleet(self) -> Result<Fleet<'a, M>, Error> {
         if self.settings.checkpoint.is_some() || !self.settings.observers.is_empty() {
             let text = "a fleet writes no checkpoint and shows no progress; ask its answers, which come in order";
@@ -50,7 +52,7 @@ impl<'a, M: Model> Fit<'a, M> {
 }
 
 impl<'a, M: Model> Fleet<'a, M> {
-    /// The fit of records to come.
+    /// Begins the declaration of a fleet; parameters and settings follow.
     ///
     /// ```
     /// # use greybox::*;
@@ -73,8 +75,8 @@ impl<'a, M: Model> Fleet<'a, M> {
         Records { model, experiments: &[] }
     }
 
-    /// Fits the records, and gives the answers in their order, as they are asked for. Some hundred records for each thread
-    /// are read ahead, whatever their number.
+    /// Fits the records and returns an iterator of the answers in their order. It is lazy: some hundred records per
+    /// thread are read ahead, whatever their number.
     pub fn run<R>(&self, records: R) -> Answers<'_, 'a, M, R::IntoIter>
     where
         R: IntoIterator<Item = ExperimentOf<M>>,
@@ -97,31 +99,31 @@ impl<'a, M: Model> Fleet<'a, M> {
     fn group(&self, records: &[Record]) -> Vec<Result<Summary, Error>> {
         let problems: Vec<_> = records.iter().map(|record| self.problem(record.clone())).collect();
         let mut answers: Vec<Option<Result<Summary, Error>>> = Vec::with_capacity(problems.len());
-        let mut sound = vec![];
+        let mut valid = vec![];
         for problem in problems {
             match problem {
                 Ok(problem) => {
-                    sound.push(problem);
+                    valid.push(problem);
                     answers.push(None);
                 }
                 Err(error) => answers.push(Some(Err(error))),
             }
         }
-        let mut found = match self.settings.prefilter.is_none() && self.is_wide(&sound) {
-            true => fit_together(&sound),
-            false => sound.iter().map(Problem::run).collect(),
+        let mut found = match self.settings.prefilter.is_none() && self.is_wide(&valid) {
+            true => fit_together(&valid),
+            false => valid.iter().map(Problem::run).collect(),
         }
         .into_iter();
         answers.into_iter().filter_map(|answer| answer.or_else(|| found.next())).collect()
     }
 
-    /// Whether records like these are run side by side.
+    /// Whether such records run in more than one lane.
     fn is_wide(&self, problems: &[Problem<'_>]) -> bool {
         problems.first().is_some_and(|problem| self.sweep.lanes(&problem.records[0], &problem.unknowns.seeds(0)) > 1)
     }
 }
 
-/// The answers of a fleet, in the order of its records.
+/// Iterator of the answers of a fleet, in the order of its records.
 pub struct Answers<'f, 'a, M: Model, R> {
     fleet: &'f Fleet<'a, M>,
     records: R,

@@ -1,4 +1,4 @@
-//! Fits of single records that go step by step together: each evaluation of all of them is one pass over lanes.
+//! Fits of single records in lockstep: one evaluation of all of them is one pass over lanes.
 
 use super::search::Rounds;
 use crate::error::Error;
@@ -10,7 +10,7 @@ use std::time::Instant;
 
 static NEVER: Control = Control::NEVER;
 
-/// A search on its way.
+/// A search that has not ended.
 struct Search<'p> {
     rounds: Rounds<'p>,
     objective: Objective<'p>,
@@ -20,11 +20,11 @@ struct Search<'p> {
     evaluations: u64,
 }
 
-/// Where a search stands.
+/// The state of one record's fit.
 enum Stage<'p> {
     Searching(Box<Search<'p>>),
     Ended(Box<SearchEnd>),
-    /// It is fitted alone: its start cannot be evaluated, which is then told in more detail.
+    /// To be fitted by itself: its start cannot be evaluated, and the single fit gives the detailed error.
     Alone,
 }
 
@@ -37,15 +37,15 @@ impl<'p> Search<'p> {
         Search { rounds, objective, machine, name, iterations: 0, evaluations: 0 }
     }
 
-    /// Where it asks for cost and slopes.
-    fn asks(&self) -> Option<At<'_>> {
+    /// The point at which it requests cost and slopes.
+    fn requested(&self) -> Option<At<'_>> {
         match self.machine.request() {
             Request::Linearize(x) => Some((&self.objective, x)),
             _ => None,
         }
     }
 
-    /// Tells it what it asked for, and goes on until it asks again.
+    /// Passes on the evaluation and advances the search to its next request.
     fn tell(mut self: Box<Self>, answer: Result<Linearization, Infeasible>) -> Stage<'p> {
         self.evaluations += 1;
         match (self.machine.linearization().is_some(), &answer) {
@@ -98,15 +98,15 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
     };
     let mut stages: Vec<Stage<'_>> = plain.iter().map(first).collect();
     loop {
-        let asking = stages.iter().enumerate().filter_map(|(i, stage)| match stage {
-            Stage::Searching(search) => Some((i, search.asks()?)),
+        let requesting = stages.iter().enumerate().filter_map(|(i, stage)| match stage {
+            Stage::Searching(search) => Some((i, search.requested()?)),
             _ => None,
         });
-        let (asking, points): (Vec<usize>, Vec<At<'_>>) = asking.unzip();
-        if asking.is_empty() {
+        let (requesting, points): (Vec<usize>, Vec<At<'_>>) = requesting.unzip();
+        if requesting.is_empty() {
             break;
         }
-        for (i, answer) in asking.into_iter().zip(linearize_together(&points)) {
+        for (i, answer) in requesting.into_iter().zip(linearize_together(&points)) {
             if let Stage::Searching(search) = std::mem::replace(&mut stages[i], Stage::Alone) {
                 stages[i] = search.tell(answer);
             }
@@ -144,7 +144,7 @@ fn conclude_together(
     stages.iter().zip(&objectives).zip(problems).map(finish).collect()
 }
 
-/// The objective that a search ended with. What was found is concluded even if the time is over.
+/// The objective that a search ended with. The time limit does not apply to the conclusion.
 fn at_end<'p>(plain: &Objective<'p>, end: &SearchEnd) -> Objective<'p> {
     Objective { memory: end.memory.clone(), control: &NEVER, ..plain.with(end.whitening.clone()) }
 }

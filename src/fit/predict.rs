@@ -1,4 +1,4 @@
-//! From an estimate to what it says of a record: a fit of nothing but the initial state.
+//! Prediction of a record by an estimate: a fit of the initial state alone.
 
 use super::Fit;
 use super::search::search;
@@ -17,7 +17,7 @@ use std::sync::Arc;
 /// Predicts the outputs of a record with the parameters of an estimate.
 pub(super) fn predict<'a>(sweep: Arc<dyn Sweep + 'a>, record: &Record, estimate: &Summary) -> Result<Simulated, Error> {
     let parameters: Vec<_> = estimate.parameters.iter().map(|parameter| fixed(parameter.value)).collect();
-    // An output without any error tells no noise; that of this record does then.
+    // An output without any error gives no noise level; it is then estimated from this record.
     let sigma = estimate.sigma();
     let noisy = sigma.iter().all(|sigma| *sigma > 0.0);
     let settings = if noisy { Settings::default().noise(sigma) } else { Settings::default() };
@@ -34,8 +34,8 @@ pub(super) fn predict<'a>(sweep: Arc<dyn Sweep + 'a>, record: &Record, estimate:
 }
 
 impl<M: Model> Fit<'_, M> {
-    /// What an estimate says of a record, predicted by the method and the predictor of this fit; its own records,
-    /// parameters and settings do not matter. What the record leaves open of its initial state is estimated from it.
+    /// Predicts a record by an estimate, with the integrator and the predictor of this fit; the fit's own records,
+    /// parameters and other settings are not used. Free initial states are estimated from the record.
     ///
     /// # Errors
     /// As [`run`](Fit::run), and a simulation that fails.
@@ -47,8 +47,8 @@ impl<M: Model> Fit<'_, M> {
 }
 
 impl<M: Model> Estimate<M> {
-    /// Simulates the outputs of a record, of the fit or a new one, with these parameters and the default step. What the
-    /// record leaves open of its initial state is estimated from it, the parameters kept.
+    /// Simulates the outputs of a record, of the fit or a new one, with these parameters and the default step. Free
+    /// initial states are estimated from the record; the parameters stay fixed.
     ///
     /// # Errors
     /// As [`Fit::run`](crate::Fit::run), and a simulation that fails.
@@ -57,8 +57,8 @@ impl<M: Model> Estimate<M> {
         Fit::new(model, record).parameters(parameters).predict(self, record)
     }
 
-    /// The same with the parameters that an experiment of the fit has for itself, and its estimated initial state; `None`
-    /// if the fit had no experiment of this index.
+    /// The same with the local parameters of an experiment of the fit and its estimated initial state; `None` if the
+    /// fit had no experiment of this index.
     ///
     /// # Errors
     /// As [`predict`](Self::predict).
@@ -77,7 +77,7 @@ impl<M: Model> Estimate<M> {
     }
 }
 
-/// A prediction by the model's names.
+/// A prediction with the model's types.
 fn typed<M: Model>(found: Simulated, record: &ExperimentOf<M>) -> Prediction<M> {
     let Simulated { outputs, residuals, initial_state } = &found;
     let channels = record.record().outputs();

@@ -1,4 +1,4 @@
-//! What a problem can be asked for.
+//! Running a problem: search, estimate at a given point, objective, prediction.
 
 use super::search::{search, start_error};
 use crate::error::Error;
@@ -11,7 +11,7 @@ use std::time::Instant;
 static NEVER: Control = Control::NEVER;
 
 impl Problem<'_> {
-    /// Searches for the unknowns, and says how well they are known.
+    /// Estimates the unknowns and their uncertainty.
     ///
     /// A search that does not converge is an outcome of the estimate, not an error.
     ///
@@ -21,26 +21,27 @@ impl Problem<'_> {
         self.run_since(Instant::now())
     }
 
-    /// The same for a run that began earlier.
+    /// The same; the time limit counts from `begin`.
     pub(super) fn run_since(&self, begin: Instant) -> Result<Summary, Error> {
         let settings = &self.settings;
         settings.optimizer.check()?;
         let control = self.control(begin);
         let plain = self.in_units(&control);
         let end = search(&plain, &settings.optimizer)?;
-        // What was found is concluded even if the time is over.
+        // The time limit does not apply to the conclusion.
         let objective = plain.with(end.whitening.clone());
         let objective = Objective { memory: end.memory.clone(), control: &NEVER, ..objective };
         conclude(&objective, &end, begin.elapsed().as_secs_f64())
     }
 
-    /// What may stop what began then: the flag, and the time limit.
+    /// The stop conditions of a run that began then: flag and time limit.
     pub(crate) fn control(&self, begin: Instant) -> Control {
         let deadline = self.settings.time_limit.and_then(|limit| begin.checked_add(limit));
         Control { cancel: self.settings.cancel.clone(), deadline }
     }
 
-    /// The cost to minimize, for argmin's solvers. Noise that was not given is what the errors at the start show.
+    /// The cost to minimize, for argmin's solvers. Noise levels that were not given are estimated from the errors at
+    /// the start.
     ///
     /// # Errors
     /// A start that cannot be simulated.
@@ -50,7 +51,7 @@ impl Problem<'_> {
         Ok(plain.with(whitening))
     }
 
-    /// The estimate at a point that some search has found; it says for itself whether that is a minimum.
+    /// The estimate at a point that another solver has found; its outcome states whether the point is a minimum.
     ///
     /// # Errors
     /// A point of another length, or one that cannot be simulated.
@@ -78,22 +79,22 @@ impl Problem<'_> {
             iterations: 0,
             evaluations: 1,
             name: "search by argmin".to_owned(),
-            trouble: None,
+            write_error: None,
             memory: objective.memory.clone(),
         };
         conclude(&objective.with(whitening), &end, begin.elapsed().as_secs_f64())
     }
 
-    /// The cost with the noise that an estimate of this problem has found, and the coordinates of that estimate.
+    /// The cost with the estimated noise of an estimate of this problem, and the coordinates of that estimate.
     ///
     /// # Errors
     /// An estimate of another problem.
     pub(crate) fn at(&self, estimate: &Summary) -> Result<(Objective<'_>, Vec<f64>), Error> {
-        // What stopped the search does not stop a look at its result.
+        // The search's stop conditions do not apply to the evaluation of its result.
         self.at_within(estimate, &NEVER)
     }
 
-    /// The same for further searches, until this stops them.
+    /// The same for further searches, with their own stop conditions.
     ///
     /// # Errors
     /// An estimate of another problem.
@@ -105,7 +106,7 @@ impl Problem<'_> {
         self.check_estimate(estimate)?;
         let sigma = estimate.sigma();
         let full = estimate.noise_covariance.clone().and_then(Whitening::full);
-        // An output without any error tells no noise.
+        // An output without any error gives no noise level.
         let noisy = sigma.iter().all(|sigma| *sigma > 0.0);
         let whitening = match estimate.method.noise {
             NoiseModel::Predicted => Whitening::none(sigma.len()),
@@ -139,8 +140,8 @@ impl Problem<'_> {
         )))
     }
 
-    /// Predicts the outputs of a record with the parameters of an estimate, as they were fitted. What the record leaves open
-    /// of its initial state is estimated from it, the parameters kept.
+    /// Predicts the outputs of a record with the parameters of an estimate, by the integrator and predictor of this
+    /// problem. Free initial states are estimated from the record; the parameters stay fixed.
     ///
     /// # Errors
     /// As [`run`](Self::run), and a simulation that fails.

@@ -7,12 +7,12 @@ use crate::problem::{CheckpointFile, Memory, Noise, Objective, Optimizer, Proble
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
-/// The noise is known well enough when a round changes it by less than this part: no unknown then moves by more than that
-/// part of its standard error.
+/// Rounds end when the noise levels change by less than this, relatively: no unknown then moves by more than that
+/// fraction of its standard error.
 const NOISE_TOLERANCE: f64 = 1e-6;
 const NOISE_ROUNDS: u32 = 100;
 
-/// Searches from the start, or from where a checkpoint says. `plain` leaves errors in the units of the outputs.
+/// Searches from the start, or from a checkpoint. `plain` leaves errors in the units of the outputs.
 pub(super) fn search(plain: &Objective<'_>, optimizer: &Arc<dyn Optimizer>) -> Result<SearchEnd, Error> {
     let problem = plain.problem;
     let Some((path, every)) = &problem.settings.checkpoint else {
@@ -24,7 +24,7 @@ pub(super) fn search(plain: &Objective<'_>, optimizer: &Arc<dyn Optimizer>) -> R
             checkpoint.before = iterations;
             Rounds::from(plain, optimizer, place, saved)?
         }
-        // Written at once: a place that cannot be written to is better known now.
+        // Written at once, so that a path that cannot be written is reported before the search.
         _ => {
             let start = problem.unknowns.start();
             optimizer.begin(&checkpoint, &start)?;
@@ -35,13 +35,13 @@ pub(super) fn search(plain: &Objective<'_>, optimizer: &Arc<dyn Optimizer>) -> R
     rounds.run(Some(checkpoint))
 }
 
-/// Searches with the noise as it stands, one after the other, and the noise estimated between them.
+/// Searches with fixed noise, one after the other, with the noise estimated between them.
 pub(super) struct Rounds<'r> {
     plain: &'r Objective<'r>,
     optimizer: Arc<dyn Optimizer>,
-    /// What the next round searches with.
+    /// The search of the next round.
     pub next: Arc<dyn Optimizer>,
-    /// Where the next round begins.
+    /// The start of the next round.
     pub coordinates: Vec<f64>,
     whitening: Whitening,
     memory: Memory,
@@ -52,13 +52,13 @@ pub(super) struct Rounds<'r> {
 }
 
 impl<'r> Rounds<'r> {
-    /// From the start. Noise as the errors at the start show it is not worth an exact minimum.
+    /// From the start. With noise estimated at the start, the first round need not find an exact minimum.
     pub fn new(plain: &'r Objective<'r>, optimizer: &Arc<dyn Optimizer>) -> Result<Self, Error> {
         let first = noise::is_estimated(plain).then(|| optimizer.rough());
         Rounds::from(plain, optimizer, plain.problem.unknowns.start(), first)
     }
 
-    /// From a place, the first round with another search if there is one.
+    /// From a point; `first` is the search of the first round, if it differs.
     fn from(
         plain: &'r Objective<'r>,
         optimizer: &Arc<dyn Optimizer>,
@@ -90,7 +90,7 @@ impl<'r> Rounds<'r> {
                 RoundError::Optimizer(text) => Error::Optimizer(text),
             })?;
             if let Some(mut end) = self.take(objective, result) {
-                end.trouble = file.and_then(|file| file.trouble());
+                end.write_error = file.and_then(|file| file.write_error());
                 return Ok(end);
             }
         }
@@ -101,7 +101,7 @@ impl<'r> Rounds<'r> {
         Objective { memory: self.memory.clone(), ..self.plain.with(self.whitening.clone()) }
     }
 
-    /// Takes in how a round with this objective ended; the end of the search, if no other round is needed.
+    /// Records the result of a round with this objective; returns the end of the search if no further round is needed.
     pub fn take(&mut self, objective: Objective<'r>, result: Round) -> Option<SearchEnd> {
         self.round += 1;
         self.iterations += result.iterations;
@@ -120,7 +120,7 @@ impl<'r> Rounds<'r> {
             if !settled {
                 (self.whitening, linear) = (found, None);
             }
-            // Rounding is another at every point.
+            // Rounding errors differ from point to point: the noise would never settle.
             settled |= outcome == Outcome::Exact;
             if !settled && self.round == NOISE_ROUNDS {
                 outcome = Outcome::IterationLimit { iterations: self.iterations };
@@ -137,7 +137,7 @@ impl<'r> Rounds<'r> {
             iterations: self.iterations,
             evaluations: self.evaluations,
             name: result.name,
-            trouble: None,
+            write_error: None,
             memory: self.memory.clone(),
         })
     }
@@ -187,7 +187,7 @@ fn stopped(objective: &Objective<'_>) -> Error {
     })
 }
 
-/// What a checkpoint belongs to: the data, and everything that shapes the cost.
+/// A hash of the data and of all settings that the cost depends on.
 fn fingerprint(problem: &Problem<'_>) -> String {
     let mut hash = DefaultHasher::new();
     env!("CARGO_PKG_VERSION").hash(&mut hash);

@@ -1,4 +1,4 @@
-//! From where a search ended to a [`Summary`].
+//! From the end of a search to a [`Summary`].
 
 use super::directions;
 use super::hac::{Hac, hac};
@@ -14,14 +14,14 @@ use crate::layout::{Kind, Quantity};
 use crate::optimize::{Linearization, Outcome};
 use crate::problem::{Memory, Noise, Objective, Role, Whitening};
 
-/// Below so many measurements a covariance that allows for autocorrelated errors is less sure than the classical one.
+/// Below this number of measurements a HAC covariance is less accurate than the classical one.
 const CORRELATED_SAMPLES: u64 = 100;
-/// Errors below this part of a given noise are no sample of it.
+/// Residuals below this fraction of a given sigma are round-off: no whiteness test, no HAC.
 const ROUNDING: f64 = 0.1;
-/// The probability below which errors count as autocorrelated.
+/// Significance level of the whiteness test.
 const WHITENESS_LEVEL: f64 = 0.01;
 
-/// Where a search ended.
+/// The end of a search.
 pub(crate) struct SearchEnd {
     pub coordinates: Vec<f64>,
     pub whitening: Whitening,
@@ -32,32 +32,32 @@ pub(crate) struct SearchEnd {
     pub evaluations: u64,
     /// The search's name.
     pub name: String,
-    /// What went wrong with a checkpoint.
-    pub trouble: Option<String>,
-    /// Where the segments of the records begin there.
+    /// The last error in writing a checkpoint.
+    pub write_error: Option<String>,
+    /// Carries at the begins of the segments there.
     pub memory: Memory,
 }
 
-/// Where the search ended, and what follows from there; each step adds to it.
+/// The end of a search, and the quantities derived from it.
 pub(super) struct Judgement<'j> {
     pub objective: &'j Objective<'j>,
     pub end: &'j SearchEnd,
     pub linear: &'j Linearization,
     pub residuals: Residuals,
-    /// Values of the unknowns, and how fast each moves with its coordinate.
+    /// Values of the unknowns, and the derivative of each with respect to its coordinate.
     pub values: Vec<f64>,
     pub slopes: Vec<f64>,
     pub norms: Vec<f64>,
     /// The bound that each unknown is held at.
     pub held_at: Vec<Option<f64>>,
-    /// Directions of the scaled unknowns along which nothing is known; and the unknowns held for the covariance: at a
-    /// bound, or one for each such direction.
+    /// Null directions of the scaled unknowns; and the unknowns held for the covariance: at a bound, or one for each
+    /// null direction.
     pub undetermined: Undetermined,
-    /// Measurements less estimated unknowns; zero where nothing is left.
+    /// Degrees of freedom: measurements minus estimated unknowns, at least zero.
     pub degrees: f64,
-    /// By how much the noise is wider than what the errors were divided by.
+    /// Estimated noise level relative to that by which the errors were divided.
     pub widening: f64,
-    /// Whether the errors are so far below a given noise that they are rounding.
+    /// Whether the errors are far enough below a given noise to be round-off.
     pub rounding: bool,
 }
 
@@ -68,13 +68,13 @@ pub(super) struct Covariances {
     pub unit: Option<Covariance>,
 }
 
-/// What is known at the end of a search; the objective has the whitening that it ended with.
+/// The summary at the end of a search; the objective has the whitening that it ended with.
 pub(crate) fn conclude(objective: &Objective<'_>, end: &SearchEnd, seconds: f64) -> Result<Summary, Error> {
     let residuals = residual_pass(objective, &end.coordinates)?;
     conclude_from(objective, end, residuals, seconds)
 }
 
-/// The same from what was left unexplained there.
+/// The same from the residuals there.
 pub(crate) fn conclude_from(
     objective: &Objective<'_>,
     end: &SearchEnd,
@@ -166,7 +166,7 @@ impl<'j> Judgement<'j> {
         let slopes = (0..n).map(|i| unknowns.row[i].parameter.transform.slope(values[i])).collect();
         let estimated = undetermined.held.iter().filter(|held| !**held).count() as f64;
         let measured = residuals.measured;
-        // With no more measurements than unknowns nothing is left to tell the noise from.
+        // With no more measurements than unknowns there are no degrees of freedom to estimate the noise from.
         let degrees = if measured <= n as u64 { 0.0 } else { measured as f64 - estimated };
         let noise = &objective.problem.settings.noise;
         let widening = match noise {
@@ -193,7 +193,7 @@ impl<'j> Judgement<'j> {
         })
     }
 
-    /// Whether an unknown is neither held at a bound nor part of a direction along which nothing is known.
+    /// Whether an unknown is neither held at a bound nor part of a null direction.
     fn seen(&self) -> Vec<bool> {
         let mut seen: Vec<bool> = self.held_at.iter().map(Option::is_none).collect();
         for direction in &self.undetermined.directions {
@@ -202,7 +202,7 @@ impl<'j> Judgement<'j> {
         seen
     }
 
-    /// The errors' autocorrelation, where it matters: residuals far below a given noise are rounding.
+    /// The errors' autocorrelation; not computed where residuals are round-off.
     pub(super) fn autocorrelated(&self) -> Option<(usize, super::residual_pass::Whiteness)> {
         self.residuals.least_white().filter(|(_, white)| white.p_value < WHITENESS_LEVEL && !self.rounding)
     }
@@ -224,7 +224,7 @@ impl<'j> Judgement<'j> {
                 let method = if filtered { CovarianceMethod::FilteredSandwich } else { CovarianceMethod::Sandwich };
                 (sandwich::sandwich(objective, x, &self.undetermined.held).ok().flatten(), method, 1.0)
             }
-            // The noise is wider than the errors, the priors are not.
+            // The widening applies to the errors, not to the priors.
             None if self.widening != 1.0 && objective.problem.unknowns.priors(x).next().is_some() => {
                 let widened = objective.with(objective.whitening.widened(self.widening));
                 let covariance = widened.evaluate(x).ok().and_then(|linear| linear.covariance(&self.undetermined.held));
@@ -310,10 +310,10 @@ impl<'j> Judgement<'j> {
         (0..problem.records.len()).map(one).collect()
     }
 
-    /// The noise with the degrees of freedom that the unknowns took.
+    /// The noise, corrected for the degrees of freedom of the unknowns.
     fn noise(&self) -> Result<Whitening, Error> {
         let objective = self.objective;
-        // Weights are in the sum of squares, but no part of the noise.
+        // Weights enter the sum of squares, but are not part of the noise.
         if objective.is_weighted() && noise::only_scales(objective) {
             let found = noise::estimate(objective, &self.end.coordinates).map_err(reason)?;
             return Ok(found.widened((self.residuals.measured as f64 / self.degrees.max(1.0)).sqrt()));
@@ -332,7 +332,7 @@ impl<'j> Judgement<'j> {
         outputs.zip(&self.residuals.outputs).zip(noise.sigma()).map(one).collect()
     }
 
-    /// `-2 ln` of the Gaussian likelihood, if weights and losses leave it one.
+    /// `-2 ln` of the Gaussian likelihood; `None` with a weighting or a loss.
     fn deviance(&self) -> Option<f64> {
         let objective = self.objective;
         if objective.loss().is_some() || objective.is_weighted() {
@@ -345,11 +345,11 @@ impl<'j> Judgement<'j> {
             true => 2.0 * self.linear.cost - log_determinant,
             false => self.linear.sum_of_squares(),
         };
-        // Where the noise only scales the cost, its most likely variance is still to be put in.
+        // Where the noise only scales the cost, the cost does not include its maximum-likelihood variance yet.
         let variance = if noise::only_scales(objective) { squares / n } else { 1.0 };
         let deviance =
             n * (std::f64::consts::TAU.ln() + variance.ln()) + log_determinant + (squares - priors) / variance;
-        // Without any error the likelihood has no bound.
+        // Without any error the likelihood is unbounded.
         deviance.is_finite().then_some(deviance)
     }
 }

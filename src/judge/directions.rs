@@ -1,13 +1,14 @@
-//! Directions in the space of the unknowns along which the data say nothing.
+//! Null directions: directions of the unknowns that the data do not determine.
 
 use crate::estimate::Direction;
 use crate::information::Undetermined;
 use crate::optimize::Linearization;
 use crate::problem::Unknowns;
 
-/// Singular values below this part of the largest are rounding of a simulation: nothing is known along their directions.
+/// Singular values below this fraction of the largest are round-off of a simulation: their directions are null
+/// directions.
 const RANK: f64 = 1e-11;
-/// What has less than this part in a direction that is not known is itself known.
+/// Unknowns with a smaller entry than this in a null direction are not part of it.
 const PART: f64 = 1e-3;
 
 /// What the data do not determine, with these unknowns held.

@@ -3,9 +3,9 @@
 //!
 //! The scores of each experiment are prewhitened by a vector autoregression of order one, summed over lags with
 //! Bartlett's weights (Newey and West, Econometrica 55 (1987) 703) at Andrews' bandwidth (Econometrica 59 (1991) 817,
-//! eqs. 6.2 and 6.4), and recolored (Andrews and Monahan, Econometrica 60 (1992) 953). Newey and West's sum is the sum of
-//! squares of moving sums, which a triangle absorbs like any other rows; so two passes over the data serve, and no score
-//! is kept longer than the bandwidth.
+//! eqs. 6.2 and 6.4), and recolored (Andrews and Monahan, Econometrica 60 (1992) 953). Newey and West's sum is the sum
+//! of squares of moving sums, which a triangle absorbs like any other rows; so two passes over the data serve, and no
+//! score is kept longer than the bandwidth.
 //!
 //! The autoregression works on scores of unit covariance: so its singular values are below one, and the result does not
 //! depend on the choice of units or parameters.
@@ -97,11 +97,11 @@ fn long_run(objective: &Objective<'_>, e: usize, coordinates: &[f64], kept: &[us
     result.iter().all(|value| value.is_finite()).then_some((result, window - 1))
 }
 
-/// How many prewhitened scores a moving sum takes, from the correlations of the standardized scores at lags one and two,
-/// the autoregression `a` and the number of scores.
+/// How many prewhitened scores a moving sum takes, from the correlations of the standardized scores at lags one and
+/// two, the autoregression `a` and the number of scores.
 fn bandwidth(one: &DMatrix<f64>, two: &DMatrix<f64>, a: &DMatrix<f64>, count: usize) -> usize {
     let (n, length) = (a.nrows(), count as f64);
-    // What the prewhitened scores will show of themselves.
+    // Covariances of the prewhitened scores at lags zero and one.
     let zero = DMatrix::identity(n, n) - a * one.transpose() - one * a.transpose() + a * a.transpose();
     let next = one - two * a.transpose() - a + a * one * a.transpose();
     let (mut above, mut below) = (0.0, 0.0);
@@ -114,16 +114,16 @@ fn bandwidth(one: &DMatrix<f64>, two: &DMatrix<f64>, a: &DMatrix<f64>, count: us
         }
     }
     let andrews = if below > 0.0 { 1.1447 * (above / below * length).cbrt() } else { 0.0 };
-    // Andrews' rule sees the correlation with the score before only; what the autoregression leaves at longer lags is
-    // given the room of the longer of Schwert's rules (J. Business and Economic Statistics 7 (1989) 147).
-    let room = 12.0 * (length / 100.0).powf(0.25);
-    (andrews.max(room).ceil() as usize + 1).clamp(1, (count / 2).max(1))
+    // Andrews' rule uses the correlation at lag one only; the longer of Schwert's rules (J. Business and Economic
+    // Statistics 7 (1989) 147) allows for what the autoregression leaves at longer lags.
+    let schwert = 12.0 * (length / 100.0).powf(0.25);
+    (andrews.max(schwert).ceil() as usize + 1).clamp(1, (count / 2).max(1))
 }
 
-/// Takes scores in order of time.
-trait TakeScore: Send {
+/// An accumulator of scores in order of time.
+trait AccumulateScores: Send {
     fn take(&mut self, score: &[f64]);
-    /// Takes what the scores that follow have come to.
+    /// Adds the accumulator of the scores that follow.
     fn append(&mut self, later: Self);
 }
 
@@ -142,7 +142,7 @@ impl<'s, T> EachScore<'s, T> {
     }
 }
 
-impl<T: TakeScore> Accumulate for EachScore<'_, T> {
+impl<T: AccumulateScores> Accumulate for EachScore<'_, T> {
     fn add(&mut self, window: &Window, lane: usize) {
         let loss = self.objective.loss();
         for k in 0..window.samples[lane] {
@@ -210,7 +210,7 @@ impl Lagged {
     }
 }
 
-impl TakeScore for Lagged {
+impl AccumulateScores for Lagged {
     fn take(&mut self, score: &[f64]) {
         if self.first.len() < 2 {
             self.first.push(score.to_vec());
@@ -249,8 +249,8 @@ struct MovingSums<'m> {
     w: &'m DMatrix<f64>,
     a: &'m DMatrix<f64>,
     window: usize,
-    /// The first `window` scores, with which a sum reaches back to those before; they are prewhitened and summed when these are
-    /// known.
+    /// The first `window` scores, with which a sum reaches back to those before; they are prewhitened and summed when
+    /// these are known.
     first: Vec<Vec<f64>>,
     recent: VecDeque<Vec<f64>>,
     sums: Vec<f64>,
@@ -298,7 +298,7 @@ impl<'m> MovingSums<'m> {
         }
     }
 
-    /// The triangle, once the first scores have been summed from rest, and the last ones have left the window.
+    /// The triangle, after the first scores were summed from zero and the last ones were shifted out of the window.
     fn triangle(self) -> Information {
         let n = self.sums.len();
         let mut whole = MovingSums { first: vec![vec![]; self.window], ..MovingSums::new(self.w, self.a, self.window) };
@@ -312,7 +312,7 @@ impl<'m> MovingSums<'m> {
     }
 }
 
-impl TakeScore for MovingSums<'_> {
+impl AccumulateScores for MovingSums<'_> {
     fn take(&mut self, score: &[f64]) {
         let counts = self.first.len() == self.window;
         if !counts {
@@ -326,7 +326,7 @@ impl TakeScore for MovingSums<'_> {
         for score in &later.first {
             self.take(score);
         }
-        // With so many scores of its own it has forgotten those before.
+        // With a full window of its own scores, it no longer depends on those before.
         if later.first.len() == later.window {
             (self.recent, self.sums, self.before) = (later.recent, later.sums, later.before);
         }

@@ -1,4 +1,4 @@
-//! How large the noise is, by the prediction errors.
+//! Noise levels from the prediction errors.
 
 use crate::information::SquareMatrix;
 use crate::loss::{Huber, Loss};
@@ -7,13 +7,13 @@ use crate::problem::{Accumulate, Noise, Objective, Whitening};
 use crate::sweep::Window;
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
-/// Noise below this part of the output's own size is rounding of the simulation.
+/// Noise below this fraction of the output's magnitude is round-off of the simulation.
 const ROUNDING: f64 = 1e-15;
-/// Errors below this part of the output's own size, in the mean, are all rounding: it adds up along a record.
+/// Mean errors below this fraction of the output's magnitude are round-off, which accumulates along a record.
 const REPRODUCED: f64 = 1e-12;
 
 /// `E[psi^2]` of Huber's loss under the standard normal.
-fn bent_variance(&Huber(c): &Huber) -> f64 {
+fn clipped_variance(&Huber(c): &Huber) -> f64 {
     let normal = Normal::standard();
     2.0 * (normal.cdf(c) - 0.5 - c * normal.pdf(c) + c * c * normal.sf(c))
 }
@@ -23,7 +23,7 @@ struct Moments<'m> {
     objective: &'m Objective<'m>,
     experiment: usize,
     sigma: &'m [f64],
-    bend: Option<&'m (dyn Fn(f64) -> f64 + Sync)>,
+    clip: Option<&'m (dyn Fn(f64) -> f64 + Sync)>,
     sums: SquareMatrix,
     pairs: SquareMatrix,
 }
@@ -38,7 +38,7 @@ impl Accumulate for Moments<'_> {
             }
             for (j, error) in errors.iter_mut().enumerate() {
                 let value = window.error(k, j, lane);
-                *error = self.bend.map_or(value, |bend| bend(value / self.sigma[j]) * self.sigma[j]);
+                *error = self.clip.map_or(value, |clip| clip(value / self.sigma[j]) * self.sigma[j]);
             }
             for i in 0..outputs {
                 for j in 0..outputs {
@@ -59,18 +59,18 @@ impl Accumulate for Moments<'_> {
     }
 }
 
-/// Second moments of the (filtered) errors in the units of the outputs; each error through `bend` in units of
+/// Second moments of the (filtered) errors in the units of the outputs; each error through `clip` in units of
 /// `sigma`, for robust estimates.
 fn moments(
     objective: &Objective<'_>,
     coordinates: &[f64],
     sigma: &[f64],
-    bend: Option<&(dyn Fn(f64) -> f64 + Sync)>,
+    clip: Option<&(dyn Fn(f64) -> f64 + Sync)>,
 ) -> Result<SquareMatrix, Infeasible> {
     let outputs = objective.outputs();
     let plain = objective.in_units();
     let empty = || SquareMatrix::zeros(outputs);
-    let make = |experiment| Moments { objective: &plain, experiment, sigma, bend, sums: empty(), pairs: empty() };
+    let make = |experiment| Moments { objective: &plain, experiment, sigma, clip, sums: empty(), pairs: empty() };
     let all = plain.gather(coordinates, false, make)?;
     let sum = |part: &dyn Fn(&Moments<'_>) -> f64| all.iter().map(part).sum::<f64>();
     let covariance = SquareMatrix::from_fn(outputs, |i, j| {
@@ -82,7 +82,7 @@ fn moments(
     Ok(covariance)
 }
 
-/// With one output, squared loss and no prior the noise scales the cost and nothing else.
+/// Whether the noise is a mere factor of the cost: one output, squared loss, no prior.
 pub(crate) fn only_scales(objective: &Objective<'_>) -> bool {
     let settings = &objective.problem.settings;
     let priors = objective.problem.unknowns.row.iter().any(|unknown| unknown.parameter.prior.is_some());
@@ -90,12 +90,12 @@ pub(crate) fn only_scales(objective: &Objective<'_>) -> bool {
     estimated && objective.outputs() == 1 && settings.loss.is_none() && !priors
 }
 
-/// Whether the search finds its noise by itself, in rounds.
+/// Whether the noise is estimated between rounds of the search.
 pub(crate) fn is_estimated(objective: &Objective<'_>) -> bool {
     matches!(objective.problem.settings.noise, Noise::PerOutput | Noise::Covariance) && !only_scales(objective)
 }
 
-/// The noise as given, or as the errors at a point show it.
+/// The noise as given, or estimated from the errors at a point.
 pub(crate) fn first_whitening(objective: &Objective<'_>, coordinates: &[f64]) -> Result<Whitening, Infeasible> {
     match &objective.problem.settings.noise {
         Noise::Given(sigma) => Ok(Whitening::Diagonal(sigma.clone())),
@@ -104,8 +104,9 @@ pub(crate) fn first_whitening(objective: &Objective<'_>, coordinates: &[f64]) ->
     }
 }
 
-/// The noise that the errors at a point show: plainly, or robustly by Huber's proposal 2 (Huber, *Robust Statistics*,
-/// 1981, section 6.4) where a robust loss bends the large ones.
+/// The noise estimated from the errors at a point: by their variance, or with a robust loss by Huber's proposal 2
+/// (Huber,
+/// *Robust Statistics*, 1981, section 6.4).
 pub(crate) fn estimate(objective: &Objective<'_>, coordinates: &[f64]) -> Result<Whitening, Infeasible> {
     let outputs = objective.outputs();
     let mut found = moments(objective, coordinates, &vec![1.0; outputs], None)?;
@@ -116,7 +117,7 @@ pub(crate) fn estimate(objective: &Objective<'_>, coordinates: &[f64]) -> Result
     };
     if objective.is_robust() {
         let huber = Huber::default();
-        let kappa = bent_variance(&huber);
+        let kappa = clipped_variance(&huber);
         for _ in 0..50 {
             let before = sigma(&found);
             found = moments(objective, coordinates, &before, Some(&|z| huber.psi(z)))?;
@@ -134,7 +135,7 @@ pub(crate) fn estimate(objective: &Objective<'_>, coordinates: &[f64]) -> Result
     })
 }
 
-/// Whether the model reproduces the data but for rounding, whose errors lead no search anywhere.
+/// Whether the model reproduces the data up to round-off, from which no search direction follows.
 pub(crate) fn reproduces(objective: &Objective<'_>, coordinates: &[f64]) -> bool {
     let reproduced = |moments: SquareMatrix| {
         let mut variances = moments.diagonal().into_iter().zip(magnitudes(objective));

@@ -1,4 +1,4 @@
-//! One pass over the data without slopes: what is left unexplained at the point that was found.
+//! One pass over the data without slopes: the residuals at the estimate.
 
 use crate::error::Error;
 use crate::estimate::OutputFit;
@@ -10,14 +10,14 @@ use std::sync::Arc;
 
 /// Lags of the whiteness test.
 const LAGS: usize = 20;
-/// One window in so many is simulated once more with a finer step, and so many of a record at most.
+/// Every how many windows one is simulated again with a finer step, and the most of them per record.
 const EVERY: usize = 16;
 const AGAIN: usize = 16;
 
-/// What a pass over the residuals found.
+/// Results of a pass over the residuals.
 pub(crate) struct Residuals {
     pub outputs: Vec<OutputFit>,
-    /// How many measurements count.
+    /// Number of measurements with a weight above zero.
     pub measured: u64,
     /// Logarithm of the determinant of the covariance of all measurements.
     pub log_determinant: f64,
@@ -26,16 +26,17 @@ pub(crate) struct Residuals {
     pub step_error: f64,
     /// The whiteness of each output's errors.
     pub whiteness: Vec<Whiteness>,
-    /// The smallest standard deviation that was predicted for a measurement of each output; infinite without predictions.
-    pub surest: Vec<f64>,
+    /// The smallest standard deviation that was predicted for a measurement of each output; infinite without
+    /// predictions.
+    pub least_sigma: Vec<f64>,
 }
 
-/// How white the errors of an output are.
+/// Whiteness test of the errors of an output.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Whiteness {
-    /// Probability that white errors look like this (Ljung and Box).
+    /// p-value of the Ljung-Box test.
     pub p_value: f64,
-    /// Correlation of an error with the one before.
+    /// Autocorrelation at lag one.
     pub first: f64,
 }
 
@@ -47,7 +48,7 @@ struct Sums<'s> {
     measured: u64,
     log_determinant: f64,
     autocorrelations: Vec<Autocorrelation>,
-    surest: Vec<f64>,
+    least_sigma: Vec<f64>,
     /// The windows to be simulated again.
     again: Vec<Sampled>,
     run: Vec<f64>,
@@ -70,7 +71,7 @@ impl<'s> Sums<'s> {
             measured: 0,
             log_determinant: 0.0,
             autocorrelations: vec![Autocorrelation::new(LAGS); outputs],
-            surest: vec![f64::INFINITY; outputs],
+            least_sigma: vec![f64::INFINITY; outputs],
             again: vec![],
             run: vec![],
         }
@@ -126,7 +127,7 @@ impl Accumulate for Sums<'_> {
                     let unit = window.variance_root(k, j, lane);
                     self.outputs[j].add(y, error * unit);
                     if window.has_variances() {
-                        self.surest[j] = self.surest[j].min(unit);
+                        self.least_sigma[j] = self.least_sigma[j].min(unit);
                     }
                     count += 1;
                 }
@@ -147,12 +148,12 @@ impl Accumulate for Sums<'_> {
         self.log_determinant += later.log_determinant;
         self.outputs.iter_mut().zip(&later.outputs).for_each(|(sums, later)| sums.append(later));
         self.autocorrelations.iter_mut().zip(&later.autocorrelations).for_each(|(sums, later)| sums.follow(later));
-        self.surest.iter_mut().zip(&later.surest).for_each(|(surest, later)| *surest = surest.min(*later));
+        self.least_sigma.iter_mut().zip(&later.least_sigma).for_each(|(least, later)| *least = least.min(*later));
         self.again.extend(later.again);
     }
 }
 
-/// What is left unexplained at a point, in the units of the outputs.
+/// The residuals at a point, in the units of the outputs.
 pub(crate) fn residual_pass(objective: &Objective<'_>, coordinates: &[f64]) -> Result<Residuals, Error> {
     // Without a pre-filter: the errors as they are.
     let mut plain = objective.in_units();
@@ -177,7 +178,7 @@ pub(crate) fn residuals_together(points: &[At<'_>]) -> Vec<Option<Residuals>> {
     all.into_iter().zip(points).map(finish).collect()
 }
 
-/// What the sums of all experiments tell.
+/// Results from the sums of all experiments.
 fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -> Residuals {
     let outputs = objective.outputs();
     let step_error = step_error(objective, coordinates, all);
@@ -201,7 +202,9 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
         log_determinant,
         step_error,
         whiteness: (0..outputs).map(whiteness).collect(),
-        surest: (0..outputs).map(|j| all.iter().map(|one| one.surest[j]).fold(f64::INFINITY, f64::min)).collect(),
+        least_sigma: (0..outputs)
+            .map(|j| all.iter().map(|one| one.least_sigma[j]).fold(f64::INFINITY, f64::min))
+            .collect(),
     }
 }
 
@@ -297,7 +300,7 @@ impl OutputSums {
         if self.count == 0 {
             self.first = y;
         }
-        // From the first value, so that a large mean costs no digits.
+        // Relative to the first value, so that a large mean loses no digits.
         let y = y - self.first;
         self.count += 1;
         self.sum += y;
@@ -363,7 +366,7 @@ pub(crate) fn output_fit(measured: &[f64], residuals: &[f64]) -> OutputFit {
     sums.fit()
 }
 
-/// Why an infeasible point failed, in words.
+/// The error of an infeasible point.
 pub(crate) fn reason(error: Infeasible) -> Error {
     Error::Optimizer(error.to_string())
 }

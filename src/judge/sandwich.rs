@@ -1,14 +1,14 @@
-//! The sandwich covariance, where weights, a robust loss or a pre-filter call for it.
+//! The sandwich covariance, for fits with weights, a robust loss or a pre-filter.
 //!
 //! It is `A^-1 B A^-1` (Huber 1967; White 1980). `A` is the curvature of the cost, `E[psi'] sum w g g'`. `B` is the
-//! covariance of the score: the sum of squares of the samples' own scores, `w psi(z) g` added up over the outputs. Errors
-//! of a fit are smaller than the noise by the part of it that the fit took over, so each is divided by one less its
-//! leverage (HC3: MacKinnon and White, J. Econometrics 29 (1985) 305).
+//! covariance of the score: the sum of squares of the samples' own scores, `w psi(z) g` added up over the outputs.
+//! Errors of a fit are smaller than the noise by the part of it that the fit took over, so each is divided by one less
+//! its leverage (HC3: MacKinnon and White, J. Econometrics 29 (1985) 305).
 //!
-//! A pre-filter correlates the errors. Where those before it are white, with covariance `S` between the outputs, the score
-//! is theirs times the weighted slopes passed through the filter backward in time (its adjoint), from rest at the end of
-//! the record to its first sample. A forward pass instead counts what happens at the begin of a record wrongly: errors of
-//! initial states came out several times too large.
+//! A pre-filter correlates the errors. Where those before it are white, with covariance `S` between the outputs, the
+//! score is theirs times the weighted slopes passed through the filter backward in time (its adjoint), from rest at the
+//! end of the record to its first sample. A forward pass instead counts what happens at the begin of a record wrongly:
+//! errors of initial states came out several times too large.
 
 use crate::information::{Block, Covariance, Information};
 use crate::optimize::{Infeasible, Linearization};
@@ -64,7 +64,7 @@ impl Tally {
     }
 }
 
-/// Whether the classical covariance would be wrong whatever the data say.
+/// Whether the settings make the classical covariance wrong, independent of the data.
 pub(crate) fn is_needed(objective: &Objective<'_>) -> bool {
     objective.is_weighted() || objective.problem.settings.prefilter.is_some() || objective.is_robust()
 }
@@ -164,8 +164,8 @@ impl Passes<'_> {
         Ok(all.into_iter().map(absorbed).collect())
     }
 
-    /// The triangle of each experiment's scores where a filter correlated white errors, and the factor for all of them by
-    /// which the noise is larger than the errors. Holds the slopes of one experiment at a time.
+    /// The triangle of each experiment's scores where a filter correlated white errors, and the factor for all of them
+    /// by which the noise is larger than the errors. Holds the slopes of one experiment at a time.
     fn filtered_scores(
         &self,
         inverse: &Covariance,
@@ -208,7 +208,7 @@ impl Passes<'_> {
     }
 }
 
-/// The triangle of `sqrt(w) g`, and what there is to know of the errors.
+/// The triangle of `sqrt(w) g`, and sums of the errors.
 struct Curvature<'c> {
     objective: &'c Objective<'c>,
     experiment: usize,
@@ -358,8 +358,8 @@ fn form(m: &DMatrix<f64>, v: &[f64]) -> f64 {
     m.column_iter().zip(v).map(product).sum()
 }
 
-/// Variance that white noise of variance one has after a filter that was at rest: the sum of the squared impulse response
-/// so far.
+/// Variance that white noise of variance one has after a filter that was at rest: the sum of the squared impulse
+/// response so far.
 struct ImpulseResponse<'f> {
     filter: &'f Butterworth,
     state: FilterState,

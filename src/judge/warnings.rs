@@ -1,4 +1,4 @@
-//! What the reader of an estimate must know of its data and its method.
+//! Warnings about the data and the method of an estimate.
 
 use super::conclude::{Covariances, Judgement};
 use crate::estimate::{CovarianceMethod, Direction, Knowledge, Unknown, Warning};
@@ -7,11 +7,11 @@ use crate::numeral::{counted, exact, number, p_value, percent};
 use crate::optimize::Severity;
 use crate::problem::Objective;
 
-/// A finer step may move a parameter by this part of its standard error without a warning.
+/// Largest change of a parameter with a finer step, in standard errors, without a warning.
 const STEP_SHIFT: f64 = 0.5;
-/// A predicted standard deviation that is smaller than this part of the errors is none of noise.
-const SURE: f64 = 1e-6;
-/// Autocorrelation that widens an interval by more than this factor calls for care.
+/// A predicted standard deviation below this fraction of the errors counts as zero.
+const ZERO_DEVIATION: f64 = 1e-6;
+/// Factor by which autocorrelation may widen an interval before the severity is raised.
 const CORRELATION_MATTERS: f64 = 2.0;
 
 fn care(text: String) -> Warning {
@@ -19,7 +19,7 @@ fn care(text: String) -> Warning {
 }
 
 impl Judgement<'_> {
-    /// What must be said of what was found.
+    /// All warnings, in the order in which they are shown.
     pub(super) fn warnings(
         &self,
         unknowns: &[Unknown],
@@ -45,15 +45,15 @@ impl Judgement<'_> {
                 "standard errors and intervals are those of a minimum, where the search did not arrive".to_owned();
             warnings.push(Warning { severity: Severity::NotUsable, text });
         }
-        if let Some(trouble) = &self.end.trouble {
-            let text = format!("the checkpoint could not be written ({trouble}); the search went on without it");
+        if let Some(write_error) = &self.end.write_error {
+            let text = format!("the checkpoint could not be written ({write_error}); the search went on without it");
             warnings.push(Warning { severity: Severity::Usable, text });
         }
         warnings.extend(self.autocorrelation(covariances));
         warnings
     }
 
-    /// Whether there are measurements enough to say anything.
+    /// Whether there are too few measurements, or none that determine an unknown.
     fn of_the_data(&self, unknowns: &[Unknown]) -> Option<Warning> {
         let (measured, severity) = (self.residuals.measured, Severity::NotUsable);
         if measured <= unknowns.len() as u64 {
@@ -69,15 +69,15 @@ impl Judgement<'_> {
 
     /// Whether a predicted variance goes to zero: there the likelihood has no maximum.
     fn unbounded(&self) -> Option<Warning> {
-        let of = |j: usize| (self.residuals.surest[j], self.residuals.outputs[j].rmse);
-        let j = (0..self.residuals.surest.len()).find(|&j| of(j).0 < SURE * of(j).1)?;
-        let (output, (surest, rmse)) = (&self.objective.problem.layout().outputs[j], of(j));
+        let of = |j: usize| (self.residuals.least_sigma[j], self.residuals.outputs[j].rmse);
+        let j = (0..self.residuals.least_sigma.len()).find(|&j| of(j).0 < ZERO_DEVIATION * of(j).1)?;
+        let (output, (least_sigma, rmse)) = (&self.objective.problem.layout().outputs[j], of(j));
         let text = format!(
             "a measurement of `{}` is predicted with a standard deviation of {} {unit}, beside errors of {} {unit}: the \
              likelihood grows without bound (a free initial state fits the first measurement exactly); give the noise a \
              lower bound, or fix the initial state",
             output.name,
-            number(surest, 2),
+            number(least_sigma, 2),
             number(rmse, 2),
             unit = output.unit
         );

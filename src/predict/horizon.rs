@@ -9,9 +9,10 @@ use crate::prefilter::{Butterworth, filtered};
 use crate::record::Record;
 use serde::{Deserialize, Serialize};
 
-/// Prediction `steps` samples ahead: each output is simulated from the state measured that many samples earlier, so that
-/// model error and disturbances are forgotten after the horizon (Ljung, *System Identification*, 1999, section 3.2, for a
-/// measured state). Needs outputs that give the state, and takes them as exact: noise biases short horizons.
+/// Prediction `steps` samples ahead: each output is simulated from the state measured that many samples earlier, so
+/// that model error and disturbances act no longer than the horizon (Ljung, *System Identification*, 1999, section 3.2,
+/// for a measured state). Needs outputs that determine the state, and treats them as exact: noise biases short
+/// horizons.
 ///
 /// The first samples are predicted from the initial state. Where the state was not measured, the output `steps` samples
 /// later is not predicted.
@@ -30,14 +31,14 @@ impl Horizon {
         Horizon { steps, filter: None }
     }
 
-    /// Restarts from the states that the outputs give after zero-phase filtering, so that less of their noise enters; the
-    /// predictions are compared with the outputs as measured.
+    /// Restarts from the states that the outputs give after zero-phase filtering, so that less of their noise enters;
+    /// the predictions are compared with the outputs as measured.
     pub fn filtered(self, filter: Butterworth) -> Self {
         Horizon { filter: Some(filter), ..self }
     }
 
-    /// The state that was measured at each sample, sample by sample; NaN where there is none. With the parameters `p`, on
-    /// which the outputs must not depend.
+    /// The state that was measured at each sample, sample by sample; NaN where there is none. With the parameters `p`,
+    /// on which the outputs must not depend.
     ///
     /// # Errors
     /// Steps that the record does not have, outputs that do not give the state.

@@ -7,15 +7,16 @@ use crate::layout::{Kind, Layout};
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
-/// The Kalman filter of a model that is affine in its state (R. E. Kalman, Journal of Basic Engineering 82 (1960) 35-45;
-/// for the likelihood F. C. Schweppe, IEEE Transactions on Information Theory 11 (1965) 61-70): each output is predicted
-/// from all measurements before it, with its variance.
+/// The Kalman filter of a model that is affine in its state (R. E. Kalman, Journal of Basic Engineering 82 (1960)
+/// 35-45; for the likelihood F. C. Schweppe, IEEE Transactions on Information Theory 11 (1965) 61-70): each output is
+/// predicted from all measurements before it, with its variance.
 ///
-/// The noise comes from the model, [`Model::diffusion`](crate::Model::diffusion) and
-/// [`Model::noise`](crate::Model::noise), so that noise levels are parameters like others. The state at the first sample is
-/// what the fit takes it to be; its covariance is zero, because the fit estimates it or is given it.
+/// The noise is part of the model, [`Model::diffusion`](crate::Model::diffusion) and
+/// [`Model::noise`](crate::Model::noise), so that noise levels are parameters like others. The state at the first
+/// sample is what the fit takes it to be; its covariance is zero, because the fit estimates it or is given it.
 ///
-/// The outputs of a sample are taken in one by one, which for independent measurement noises is the same as all at once.
+/// The outputs of a sample are taken in one by one, which for independent measurement noises is the same as all at
+/// once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Kalman;
 

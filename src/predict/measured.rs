@@ -1,4 +1,4 @@
-//! The state that the outputs of one sample give, where they give it.
+//! The state that follows from the outputs of one sample, where they determine it.
 
 use crate::dual::Dual;
 use crate::functions::Functions;
@@ -10,7 +10,7 @@ use crate::numeral::exact;
 const LANES: usize = 8;
 const ITERATIONS: usize = 50;
 
-/// The state whose outputs are the measured ones, by Newton's method from zero; why not, where there is none.
+/// The state whose outputs are the measured ones, by Newton's method from zero; an error text where there is none.
 pub(crate) fn state(
     layout: &Layout,
     functions: &dyn Functions<Duals>,

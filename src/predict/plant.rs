@@ -1,4 +1,4 @@
-//! [`Plant`]: the model between two samples, as a predictor sees it.
+//! [`Plant`]: the interface of a predictor to the model between two samples.
 
 use crate::dual::Dual;
 use crate::functions::Functions;
@@ -8,7 +8,7 @@ use crate::layout::{Kind, Layout};
 use crate::record::Record;
 use crate::scalar::Scalar;
 
-/// The model at one sample and on the way to the next, with parameters and inputs filled in.
+/// The model at one sample and in the interval to the next, with given parameters and inputs.
 pub trait Plant<S> {
     /// The model's quantities.
     fn layout(&self) -> &Layout;
@@ -19,18 +19,18 @@ pub trait Plant<S> {
     /// The outputs at the sample, from the state there.
     fn output(&self, x: &[S], y: &mut [S]);
 
-    /// The state at the next sample, in the place of the state at this one; what a longer vector holds behind the state
-    /// is left alone.
+    /// Replaces the state at this sample by that at the next; entries of a longer vector after the state are not
+    /// changed.
     ///
     /// # Errors
     /// Where the integrator is [`Stuck`].
     fn next(&self, x: &mut [S]) -> Result<(), Stuck>;
 
-    /// Of a continuous model: `dx/dt` at the fraction `position` of the way to the next sample.
+    /// Of a continuous model: `dx/dt` at the fraction `position` of the interval.
     fn derivative(&self, position: f64, x: &[S], to: &mut [S]);
 
-    /// Carries any vector to the next sample by the integrator of the fit: `rate(position, z, to)` writes `dz/dt` (per
-    /// second) at a fraction of the way.
+    /// Integrates any vector to the next sample by the integrator of the fit: `rate(position, z, to)` writes `dz/dt`
+    /// (per second) at a fraction of the interval.
     ///
     /// # Errors
     /// Where the integrator is [`Stuck`].
@@ -62,19 +62,19 @@ impl Between {
         Between { interval: (t0, length), u0, u1 }
     }
 
-    /// Time at a fraction of the way (s).
+    /// Time at a fraction of the interval (s).
     pub fn time(&self, position: f64) -> f64 {
         self.interval.0 + position * self.interval.1
     }
 
-    /// The input at a fraction of the way.
+    /// The input at a fraction of the interval.
     pub fn input<S: Scalar>(&self, position: f64) -> Vec<S> {
         let Some(u1) = &self.u1 else { return self.u0.iter().map(|u| S::from(*u)).collect() };
         self.u0.iter().zip(u1).map(|(u0, u1)| S::from(u0 + (u1 - u0) * position)).collect()
     }
 }
 
-/// A plant whose functions and method are objects.
+/// A plant whose functions and integrator are trait objects.
 pub(crate) struct SlicePlant<'a, S> {
     pub layout: &'a Layout,
     pub functions: &'a dyn Functions<S>,
@@ -83,11 +83,11 @@ pub(crate) struct SlicePlant<'a, S> {
     pub method: &'a dyn Method,
     pub between: Between,
     pub p: &'a [S],
-    /// What an adaptive method hands on.
+    /// The step that an adaptive integrator passes from interval to interval.
     pub step: &'a core::cell::Cell<f64>,
 }
 
-/// What numbers an object-safe method can step.
+/// Numbers that a [`Method`] can integrate.
 pub(crate) trait Stepped: Scalar {
     fn advance(method: &dyn Method, field: &Field<'_, Self>, x: Vec<Self>, step: &mut f64) -> Result<Vec<Self>, Stuck>;
 }

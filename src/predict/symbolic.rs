@@ -1,4 +1,4 @@
-//! A predictor with the equations that it predicts, read as one graph.
+//! A predictor and the equations that it predicts, traced as one graph.
 
 use super::{Plant, Prediction};
 use crate::equations::Equations;
@@ -10,10 +10,10 @@ use crate::layout::{Kind, Layout};
 use crate::recurrence::{Recurrence, SymbolicInterval};
 use crate::scalar::{Comparison, Scalar};
 
-/// What happens at a sample and on the way to the next, as a predictor sees it.
+/// The recurrence of a predictor: one sample and the interval to the next.
 ///
 /// # Errors
-/// A method or a predictor that looks at the numbers it works on.
+/// An integrator or a predictor that cannot be traced.
 pub(crate) fn recurrence(
     equations: &Equations,
     method: &dyn Method,

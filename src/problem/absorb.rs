@@ -9,13 +9,13 @@ use crate::wide::{self, Task, Wide, Width};
 /// Rows that are absorbed together.
 const ROWS: usize = 256;
 
-/// What absorbs the rows of jobs that run side by side.
+/// Absorbs the rows of jobs that run in parallel lanes.
 pub(super) struct Absorber<'o> {
     weighing: Vec<Weighing<'o>>,
-    /// Whether every error counts by its square.
+    /// Whether the cost is the plain sum of squares: no loss, no weights, no predicted variances.
     plain: bool,
     rows: Vec<u64>,
-    /// Sums of squares, where every error counts by its own, lane by lane.
+    /// Plain sums of squares, lane by lane.
     squares: Vec<f64>,
     triangles: Triangles,
     alone: Option<Alone>,
@@ -35,7 +35,7 @@ impl<'o> Absorber<'o> {
         }
     }
 
-    /// Takes in a window, which is used up.
+    /// Absorbs a window; its contents are overwritten.
     pub fn absorb(&mut self, window: &mut Window) {
         if self.triangles.lanes() != window.lanes() && window.lanes() > 1 {
             self.triangles = Triangles::new(window.columns() - 1, window.lanes());
@@ -107,7 +107,7 @@ impl<'o> Absorber<'o> {
     }
 }
 
-/// What absorbs the rows of a job that runs alone.
+/// Absorbs the rows of a job that runs in a single lane.
 struct Alone {
     information: Information,
     block: Block,

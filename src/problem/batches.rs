@@ -1,20 +1,20 @@
-//! Jobs run side by side in lanes, and batches of them in parallel.
+//! Jobs run in parallel lanes, and batches of them on threads.
 
 use super::pass::Job;
 use super::standardize::Standardize;
 use crate::record::Time;
 use crate::sweep::{Piece, Reached, RunError, Window};
 
-/// Which of the pieces that ran side by side was not run to its end, and why.
+/// The lane whose piece was not run to its end, and why.
 pub(super) struct Broken {
     pub lane: usize,
     pub error: RunError,
 }
 
-/// Samples times columns that are worth another thread.
+/// Samples times columns from which on a batch is large enough for a thread of its own.
 const WORTH_A_THREAD: usize = 50_000;
 
-/// Runs jobs in batches of those that can go side by side; the results in the order of the jobs. All are of the same sweep.
+/// Runs jobs of one sweep in batches of compatible ones; the results are in the order of the jobs.
 ///
 /// # Errors
 /// The first job that was not run to its end, and why.
@@ -40,7 +40,7 @@ pub(super) fn in_batches<T: Send>(
     Ok(found.into_iter().flatten().collect())
 }
 
-/// The numbers of the jobs that go side by side: of records alike, the long ones first.
+/// The indices of the jobs of each batch: same hold, same kind of time, same seeds, longest first.
 fn batches(jobs: &[Job<'_>]) -> Vec<Vec<usize>> {
     let alike = |a: &Job<'_>, b: &Job<'_>| {
         let (one, other) = (a.piece.record, b.piece.record);
@@ -66,7 +66,7 @@ fn batches(jobs: &[Job<'_>]) -> Vec<Vec<usize>> {
     batches
 }
 
-/// Runs pieces side by side and shows their windows of standardized errors.
+/// Runs the jobs of a batch and calls `show` with their windows of standardized errors.
 pub(super) fn run(jobs: &[&Job<'_>], show: &mut dyn FnMut(&mut Window)) -> Result<Vec<Reached>, Broken> {
     let pieces: Vec<Piece<'_>> = jobs.iter().map(|job| job.piece.clone()).collect();
     let mut standardize: Option<Standardize<'_>> = None;

@@ -1,8 +1,8 @@
-//! [`CheckpointFile`]: a search that survives its process.
+//! [`CheckpointFile`]: the state of a search in a file, from which another process can resume.
 //!
-//! argmin resumes from whatever it finds, and a checkpoint of a finished or of another run then ends the new one after 0
-//! iterations without a word. So the file names its problem by a fingerprint of data and settings, and only the place
-//! and the solver's memory are taken over: the search goes on, however the old one ended.
+//! argmin resumes from any file that it finds, and a checkpoint of a finished run or of another problem then ends the
+//! new run after 0 iterations, unreported. So the file holds a fingerprint of data and settings, and only the point and
+//! the solver's internal state are taken over: the search continues, however the old one ended.
 
 use crate::error::Error;
 use crate::optimize::LeastSquaresState;
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-/// Where a search is saved, how often, and for which problem.
+/// Path of a checkpoint, interval between writes, and the fingerprint of its problem.
 #[derive(Clone, Debug)]
 pub(crate) struct CheckpointFile {
     pub path: PathBuf,
@@ -23,8 +23,8 @@ pub(crate) struct CheckpointFile {
     pub settings: String,
     /// Iterations of earlier runs.
     pub before: u64,
-    /// What went wrong while saving; the search goes on all the same.
-    trouble: Arc<Mutex<Option<String>>>,
+    /// The last error in writing; it does not stop the search.
+    write_error: Arc<Mutex<Option<String>>>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -41,33 +41,33 @@ struct Saved<S> {
 
 const FORMAT: &str = "greybox checkpoint 1";
 
-/// Place, iterations so far, and the solver if it may go on.
+/// Point, iterations so far, and the solver if it can be resumed.
 type Resumed<S> = (Vec<f64>, u64, Option<S>);
 
 impl CheckpointFile {
     /// A file for the search of one problem.
     pub fn new(path: PathBuf, every: u64, fingerprint: String, settings: String) -> Self {
-        CheckpointFile { path, every, fingerprint, settings, before: 0, trouble: Arc::default() }
+        CheckpointFile { path, every, fingerprint, settings, before: 0, write_error: Arc::default() }
     }
 
-    /// What went wrong while saving.
-    pub fn trouble(&self) -> Option<String> {
-        self.trouble.lock().ok().and_then(|trouble| trouble.clone())
+    /// The last error in writing.
+    pub fn write_error(&self) -> Option<String> {
+        self.write_error.lock().ok().and_then(|write_error| write_error.clone())
     }
 
-    /// Remembers what went wrong.
+    /// Keeps the last error in writing.
     pub fn note(&self, written: Result<(), Error>) {
         if let Err(error) = written
-            && let Ok(mut trouble) = self.trouble.lock()
+            && let Ok(mut write_error) = self.write_error.lock()
         {
-            *trouble = Some(error.to_string());
+            *write_error = Some(error.to_string());
         }
     }
 
-    /// The place, the iterations so far and, if it was set as it is now, the solver of an earlier run; `None` if there is
-    /// no file yet.
+    /// The point, the iterations so far and, if its settings are those of this run, the solver of an earlier run;
+    /// `None` if there is no file yet.
     pub fn load<S: DeserializeOwned>(&self) -> Result<Option<Resumed<S>>, Error> {
-        // A device may have no end, and must not be replaced by a file.
+        // Reading a device may never end, and a device must not be replaced by a file.
         if std::fs::metadata(&self.path).is_ok_and(|meta| !meta.is_file()) {
             let problem = "it is no regular file; name one that can be written".to_owned();
             return Err(Error::Checkpoint { path: self.path.clone(), problem });
@@ -93,7 +93,7 @@ impl CheckpointFile {
         Ok(Some((saved.coordinates, saved.iterations, solver)))
     }
 
-    /// Writes the file beside its place, then moves it there.
+    /// Writes a temporary file in the same folder and renames it.
     pub fn write<S: Serialize>(&self, coordinates: &[f64], iterations: u64, solver: &S) -> Result<(), Error> {
         let saved = Saved {
             format: FORMAT.to_owned(),
@@ -126,7 +126,7 @@ impl<S: Serialize> Checkpoint<S, LeastSquaresState> for CheckpointFile {
     }
 }
 
-/// Writes a file beside its place and renames it: whoever reads finds the old or the new one whole.
+/// Writes a temporary file in the same folder and renames it: a reader finds either the old or the new file, complete.
 fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut beside = path.as_os_str().to_owned();
     beside.push(format!(".{}.part", std::process::id()));

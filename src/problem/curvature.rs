@@ -5,7 +5,7 @@ use crate::information::{Block, Information};
 use crate::optimize::{Infeasible, Linearization};
 use crate::sweep::Window;
 
-/// How far the errors are looked at along the direction, as a part of it (Transtrum and Sethna 2012, section 4).
+/// Step of the finite difference, as a fraction of the direction (Transtrum and Sethna 2012, section 4).
 const FAR: f64 = 0.1;
 /// Rows that are absorbed together.
 const ROWS: usize = 256;
@@ -64,8 +64,8 @@ fn second(here: f64, beyond: f64, slopes: &[f64], along: &[f64]) -> f64 {
 }
 
 impl Objective<'_> {
-    /// Slopes at a point, and in the place of the errors their second derivatives along a direction: by the errors a tenth of
-    /// the direction away, with the slopes. Not for predicted variances.
+    /// Slopes at a point, and in the place of the errors their second derivatives along a direction: by the errors a
+    /// tenth of the direction away, with the slopes. Not for predicted variances.
     pub(super) fn second_along(&self, x: &[f64], along: &[f64]) -> Result<Linearization, Infeasible> {
         let unknowns = &self.problem.unknowns;
         let far: Vec<f64> = x.iter().zip(along).map(|(x, along)| x + FAR * along).collect();

@@ -10,11 +10,12 @@ use crate::optimize::{Infeasible, Linearization};
 use crate::sweep::{Piece, Reached, RunError, Seed};
 use std::sync::Arc;
 
-/// Part of the squared errors that the correction of guessed borders may change before the slopes are computed anew. The
-/// corrected errors are exact; slopes with respect to parameters are off by as much, relatively, as the guesses are.
+/// Part of the squared errors that the correction of guessed borders may change before the slopes are computed anew.
+/// The corrected errors are exact; slopes with respect to parameters are off by as much, relatively, as the guesses
+/// are.
 const MOVED: f64 = 0.1;
 
-/// What one segment comes to.
+/// Cost, triangle and final carry of one segment.
 pub(super) struct Part {
     cost: f64,
     triangle: Information,
@@ -47,7 +48,7 @@ impl Objective<'_> {
         Ok(self.with_priors(coordinates, cost, blocks))
     }
 
-    /// What one record that was run as a whole comes to.
+    /// The linearization of one record that was run uncut.
     pub(super) fn linear_of(&self, coordinates: &[f64], part: Part) -> Result<Linearization, Infeasible> {
         let Part { cost, mut triangle, .. } = part;
         triangle.scale_columns(&self.problem.unknowns.scales(0, coordinates));
@@ -71,8 +72,8 @@ impl Objective<'_> {
         }
     }
 
-    /// Where the segments begin, and whether that is exact. A guess will do where it can be corrected: the cost is a sum of
-    /// squares, the model affine.
+    /// The carry at the begin of each segment, and whether it is exact. A guess is enough where it can be corrected:
+    /// with an affine model and a cost that is a sum of squares.
     fn guess(&self, coordinates: &[f64], values: &[Values]) -> Result<(Option<Borders>, bool), Infeasible> {
         if let Some(known) = self.memory.at(coordinates) {
             return Ok((Some((*known).clone()), true));
@@ -99,7 +100,7 @@ impl Objective<'_> {
         Ok((Some(guess), false))
     }
 
-    /// Every segment begins as the first does.
+    /// Every segment begins with the carry of the first.
     fn initial_borders(&self, coordinates: &[f64], values: &[Values]) -> Borders {
         let of = |e: usize| {
             let carry = self.job(e, &values[e], coordinates, false).piece.carry;
@@ -152,7 +153,7 @@ impl Objective<'_> {
         Ok(found)
     }
 
-    /// One triangle of the segments of an experiment, each of which began with a guess; the borders as they ought to be.
+    /// Joins the triangles of an experiment's segments into `found`, and returns the corrected borders.
     fn chain(
         &self,
         e: usize,
@@ -187,8 +188,8 @@ impl Objective<'_> {
         borders
     }
 
-    /// The segments of an experiment with slopes in the quantities themselves; chained ones with respect to all that they
-    /// begin with.
+    /// The segments of an experiment with slopes in the quantities themselves; chained ones with respect to all that
+    /// they begin with.
     fn linear_jobs<'p>(
         &'p self,
         e: usize,
@@ -199,7 +200,7 @@ impl Objective<'_> {
         let mut jobs = self.segments(e, values, coordinates, true, guess);
         let chained = self.problem.cuts.is_chained(e);
         for job in &mut jobs {
-            // What is left out stays so.
+            // A scale of zero marks a column that is left out; it stays zero.
             job.scales.iter_mut().filter(|scale| **scale != 0.0).for_each(|scale| *scale = 1.0);
             if chained {
                 let moves = self.carry_moves(job);
@@ -215,8 +216,8 @@ impl Objective<'_> {
         jobs
     }
 
-    /// Which entries of the carry that a segment begins with depend on the unknowns: at the begin of a record those that are
-    /// given do not, and slopes with respect to them may be infinite.
+    /// Which entries of the carry that a segment begins with depend on the unknowns: at the begin of a record those
+    /// that are given do not, and slopes with respect to them may be infinite.
     fn carry_moves(&self, job: &Job<'_>) -> Vec<bool> {
         let Piece { carry, slopes, samples, .. } = &job.piece;
         let row = |i: usize| &slopes[i * job.seeds.len()..][..job.seeds.len()];
@@ -236,7 +237,7 @@ impl Objective<'_> {
     }
 }
 
-/// Costs and triangles of jobs that run side by side.
+/// Costs and triangles of jobs that run in parallel lanes.
 pub(super) fn parts(jobs: &[&Job<'_>]) -> Result<Vec<Part>, Broken> {
     let mut absorbers: Absorber<'_> = Absorber::new(jobs);
     let reached = run(jobs, &mut |window| absorbers.absorb(window))?;

@@ -10,11 +10,11 @@ use crate::record::Record;
 use crate::sweep::{Located, OVERFLOW, RunError, Sweep, Window};
 use std::sync::Arc;
 
-/// What a fit minimizes, as a problem for its own and for argmin's solvers.
+/// The cost of a fit, for its own and for argmin's solvers.
 ///
 /// The unknowns are coordinates in a row: shared parameters, then each experiment's free initial states and own
-/// parameters; parameters declared with `.log()` by their logarithm. [`names`](Self::names) tells the order. The cost is
-/// the sum over samples and outputs of `weight * rho(error / sigma)`, plus half the squares of the priors; where the
+/// parameters; parameters declared with `.log()` by their logarithm. [`names`](Self::names) gives the order. The cost
+/// is the sum over samples and outputs of `weight * rho(error / sigma)`, plus half the squares of the priors; where the
 /// variance `v` is predicted, of `rho(error / sqrt(v)) + kappa / 2 * ln(v)`, with `kappa` the mean of `psi(z) z` for
 /// Gaussian `z` (one for least squares).
 #[derive(Clone)]
@@ -25,9 +25,9 @@ pub struct Objective<'p> {
     pub(crate) control: &'p Control,
     /// Weighted sum of the squares of each output's measurements.
     pub(crate) squares: Arc<[f64]>,
-    /// Unknowns whose slopes count as zero; empty for none.
+    /// Unknowns whose slopes are set to zero; empty for none.
     pub(crate) left_out: Vec<bool>,
-    /// Where the segments of records begin at points that were evaluated.
+    /// Carries at the begins of segments, at points that were evaluated.
     pub(crate) memory: Memory,
 }
 
@@ -53,8 +53,8 @@ impl<'p> Objective<'p> {
         Objective { problem, sweep, whitening, control, squares: squares.into(), left_out, memory }
     }
 
-    /// The same without the slopes of the unknowns on their bounds, which may be infinite there (the root of an initial level
-    /// of zero); `None` where none is, or where they have been left out already.
+    /// The same without the slopes of the unknowns on their bounds, which may be infinite there (the root of an initial
+    /// level of zero); `None` where none is, or where they have been left out already.
     pub(super) fn inside_bounds(&self, coordinates: &[f64]) -> Option<Self> {
         let bounds = self.problem.unknowns.bounds();
         let left_out: Vec<bool> =
@@ -99,7 +99,7 @@ impl<'p> Objective<'p> {
         self.problem.settings.loss.as_deref().map(|loss| loss as &dyn Loss)
     }
 
-    /// Whether the loss bends the cost of large errors.
+    /// Whether the loss reduces the weight of large errors.
     pub(crate) fn is_robust(&self) -> bool {
         self.loss().is_some_and(|loss| loss.weight(1e3) < 1.0)
     }
@@ -117,7 +117,7 @@ impl<'p> Objective<'p> {
     pub(crate) fn infeasible(&self, experiment: usize, error: RunError) -> Infeasible {
         match error {
             RunError::Stopped => Infeasible::Cancelled,
-            // A search only wants to know that it failed: what exactly would cost it another simulation.
+            // A search needs no more than the fact: the exact cause would cost another simulation.
             RunError::Failed { sample } => {
                 let label = &self.problem.unknowns.labels[experiment];
                 Infeasible::Failed(format!("experiment `{label}` cannot be evaluated (noticed at sample {sample})"))

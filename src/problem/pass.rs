@@ -1,4 +1,4 @@
-//! Passes over the data: the segments of all records, run side by side and in parallel, and what is gathered from their
+//! Passes over the data: the segments of all records, run in lanes and on threads, and the accumulators of their
 //! windows.
 
 use super::batches::{Broken, each, in_batches, run};
@@ -8,21 +8,21 @@ use crate::optimize::Infeasible;
 use crate::sweep::{Piece, Reached, RunError, Seed, Visit, Window};
 use std::sync::Arc;
 
-/// What a pass gathers from the windows of a segment of an experiment.
+/// An accumulator of the windows of a segment of an experiment.
 pub(crate) trait Accumulate: Send + Sized {
-    /// Takes in one lane of a window of standardized errors.
+    /// Adds one lane of a window of standardized errors.
     fn add(&mut self, window: &Window, lane: usize);
 
-    /// Takes in what was gathered from the segment that follows.
+    /// Adds the accumulator of the segment that follows.
     fn append(&mut self, later: Self);
 }
 
-/// A segment of an experiment, and what its windows need.
+/// A segment of an experiment, with the objective that standardizes and weighs its windows.
 pub(crate) struct Job<'p> {
     pub objective: &'p Objective<'p>,
     pub experiment: usize,
     pub seeds: Vec<Seed>,
-    /// How fast the quantity of each seed moves with its coordinate; zero where its slopes are left out.
+    /// Derivative of the quantity of each seed with respect to its coordinate; zero where its slopes are left out.
     pub scales: Vec<f64>,
     pub piece: Piece<'p>,
 }
@@ -61,7 +61,7 @@ impl Objective<'_> {
         }
     }
 
-    /// The segments of an experiment, the begins of which are known.
+    /// The segments of an experiment, from the carries in `borders`.
     pub(super) fn segments<'p>(
         &'p self,
         e: usize,
@@ -94,7 +94,7 @@ impl Objective<'_> {
         (0..self.experiments()).map(|e| self.problem.unknowns.of_experiment(e, coordinates)).collect()
     }
 
-    /// Runs one experiment alone and shows its windows as they come, in the units of the outputs.
+    /// Runs one experiment alone and calls `visit` with its windows, in the units of the outputs.
     pub(crate) fn run_alone(
         &self,
         e: usize,
@@ -109,7 +109,8 @@ impl Objective<'_> {
         reached.into_iter().next().map_or(Ok(()), |reached| reached.map(|_| ()))
     }
 
-    /// The borders of the segments at a point, with their slopes if they are asked for; `None` where nothing is chained.
+    /// The borders of the segments at a point, with their slopes if `slopes` is set; `None` where nothing is
+    /// chained.
     fn borders(
         &self,
         coordinates: &[f64],
@@ -153,7 +154,7 @@ impl Objective<'_> {
         Ok(Borders { point: coordinates.to_vec(), cost: f64::INFINITY, values: values.to_vec(), of: of? })
     }
 
-    /// One pass over all data: a gatherer per experiment, fed with the experiment's windows in order of time.
+    /// One pass over all data: an accumulator per experiment, with the experiment's windows added in order of time.
     pub(crate) fn gather<A: Accumulate>(
         &self,
         coordinates: &[f64],
@@ -209,7 +210,7 @@ impl Objective<'_> {
         Ok(whole)
     }
 
-    /// Runs jobs side by side and gathers from each.
+    /// Runs jobs and accumulates the windows of each.
     fn run_jobs<A: Accumulate>(
         &self,
         jobs: Vec<Job<'_>>,
@@ -221,7 +222,7 @@ impl Objective<'_> {
     }
 }
 
-/// Runs jobs side by side and gathers from each.
+/// Runs jobs and accumulates the windows of each.
 pub(super) fn gather<A: Accumulate>(jobs: &[&Job<'_>], mut gatherers: Vec<A>) -> Result<Vec<A>, Broken> {
     run(jobs, &mut |window| {
         for (lane, gatherer) in gatherers.iter_mut().enumerate().filter(|(lane, _)| window.samples[*lane] > 0) {

@@ -1,4 +1,4 @@
-//! [`Search`]: what a fit can be searched with, and one round of it.
+//! [`Search`]: the optimizers that a fit accepts, and one round of a search.
 
 use super::checkpoint::CheckpointFile;
 use super::{Objective, Observer};
@@ -24,10 +24,10 @@ pub trait Search:
     + for<'p> Solver<&'p Objective<'p>, LeastSquaresState>
     + 'static
 {
-    /// The same search for a cost that is soon to change: it may stop three digits into the minimum.
+    /// The same search with loose tolerances (three digits), for a cost that changes in the next round.
     fn rough(&self) -> Self;
 
-    /// Whether its settings make sense.
+    /// Checks the settings.
     ///
     /// # Errors
     /// The setting and its value.
@@ -70,7 +70,7 @@ pub(crate) struct Round {
 pub(crate) enum RoundError {
     /// There is no cost at the start, or the search was stopped there.
     Start(Infeasible),
-    /// The optimizer gave up.
+    /// The optimizer returned an error.
     Optimizer(String),
 }
 
@@ -83,13 +83,13 @@ pub(crate) trait Optimizer: Send + Sync {
     /// Its settings, as text.
     fn settings(&self) -> Result<String, Error>;
 
-    /// A copy that asks for its evaluations.
+    /// A copy, used as a [`Machine`].
     fn machine(&self) -> Box<dyn Machine + Send>;
 
     /// Its name.
     fn name(&self) -> String;
 
-    /// One search of an objective with its noise as it stands.
+    /// One search of an objective with fixed noise.
     fn round(
         &self,
         objective: &Objective<'_>,
@@ -97,14 +97,14 @@ pub(crate) trait Optimizer: Send + Sync {
         file: Option<&CheckpointFile>,
     ) -> Result<Round, RoundError>;
 
-    /// Where a checkpoint's search stood, how far it had come, and the search itself if it may go on.
+    /// The point and the iterations of a checkpoint, and the search itself if it can be resumed.
     fn resume(&self, file: &CheckpointFile) -> Result<Option<Resumed>, Error>;
 
     /// Writes a checkpoint of a search that has not begun.
     fn begin(&self, file: &CheckpointFile, coordinates: &[f64]) -> Result<(), Error>;
 }
 
-/// Place, iterations so far, and the search if it may go on.
+/// Point, iterations so far, and the search if it can be resumed.
 pub(crate) type Resumed = (Vec<f64>, u64, Option<Arc<dyn Optimizer>>);
 
 impl<S: Search> Optimizer for S {
@@ -174,7 +174,7 @@ impl<S: Search> Optimizer for S {
 
     fn resume(&self, file: &CheckpointFile) -> Result<Option<Resumed>, Error> {
         let Some((place, iterations, saved)) = file.load::<S>()? else { return Ok(None) };
-        // Only a search with the settings of this run that has not ended goes on as it was.
+        // Only a search that has not ended, with the settings of this run, is resumed with its internal state.
         let saved = saved.filter(|saved| saved.outcome().is_none());
         Ok(Some((place, iterations, saved.map(|saved| Arc::new(saved) as Arc<dyn Optimizer>))))
     }

@@ -1,24 +1,25 @@
-//! Records cut into segments that are run side by side, and what is remembered of where they begin.
+//! Records cut into segments that run in parallel lanes, and the carries at their begins.
 //!
-//! A record is cut by its length alone, so that no bit of a result depends on the machine. Where a segment begins follows
-//! from the segments before. For models that are affine in their carry a guess of it will do, because what it is off by
-//! can be taken out exactly afterwards ([`Chain`](crate::information::Chain)); the guess comes from a point evaluated
-//! before. For others the begins are simulated, in values alone, before the segments are run with their slopes.
+//! A record is cut by its length alone, so that no bit of a result depends on the machine. The carry at the begin of a
+//! segment follows from the segments before. For models that are affine in their carry a guess is enough, because its
+//! error is corrected exactly afterwards ([`Chain`](crate::information::Chain)); the guess is extrapolated from a point
+//! evaluated before. For others the carries are simulated, in values alone, before the segments are run with their
+//! slopes.
 
 use super::Values;
 use crate::record::Record;
-use crate::sweep::{Joints, Sweep};
+use crate::sweep::{Coupling, Sweep};
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// From this length on, into so many segments.
+/// Least number of samples, number of segments.
 const SEGMENTS: [(usize, usize); 6] =
     [(512, 8), (4_096, 16), (16_384, 32), (131_072, 64), (1_048_576, 128), (8_388_608, 256)];
-/// Segments begin at multiples of it.
+/// Segments begin at multiples of this number of samples.
 const GRAIN: usize = 32;
-/// Records of a fit from which on they keep the lanes busy whole.
+/// From this number of records on, uncut records fill the lanes.
 const MANY: usize = 8;
-/// Longest carry whose slopes are worth the cut.
+/// Longest carry for which cutting saves time: a segment has a slope for each of its entries.
 const CARRY: usize = 16;
 
 /// The segments of each record.
@@ -27,21 +28,21 @@ pub(crate) struct Cuts {
     pub segments: Vec<Vec<Range<usize>>>,
     /// Whether anything is carried from one to the next.
     pub carried: bool,
-    /// Whether guesses of it can be corrected.
+    /// Whether guesses of the carry can be corrected exactly.
     pub affine: bool,
 }
 
 impl Cuts {
-    /// Cuts records as this sweep allows; not at all, if something else hangs on their order.
+    /// Cuts records as this sweep allows; not at all if samples must be processed in order (`ordered`).
     pub fn new(sweep: &dyn Sweep, records: &[Record], ordered: bool) -> Self {
-        let joints = sweep.joints();
-        let carried = matches!(joints, Joints::Affine | Joints::Nonlinear);
-        let whole = ordered || records.len() >= MANY || joints == Joints::Uncut || carried && sweep.carry() > CARRY;
+        let coupling = sweep.coupling();
+        let carried = matches!(coupling, Coupling::Affine | Coupling::Nonlinear);
+        let whole = ordered || records.len() >= MANY || coupling == Coupling::Uncut || carried && sweep.carry() > CARRY;
         let segments = records.iter().map(|record| cut(record.len(), whole)).collect();
-        Cuts { segments, carried, affine: joints == Joints::Affine }
+        Cuts { segments, carried, affine: coupling == Coupling::Affine }
     }
 
-    /// Whether segments of this record begin with what others carried there.
+    /// Whether segments of this record begin with the carry at the end of the segment before.
     pub fn is_chained(&self, experiment: usize) -> bool {
         self.carried && self.segments[experiment].len() > 1
     }
@@ -100,7 +101,7 @@ impl Memory {
     /// Keeps the borders of a point.
     pub fn keep(&self, borders: Arc<Borders>) {
         let [last, best] = &mut *self.points();
-        // A cost with another noise is another cost; but then the point is the one that was best.
+        // Costs with different noise levels cannot be compared; the point is then the same as the best one.
         if best.as_ref().is_none_or(|best| borders.cost <= best.cost || borders.point == best.point) {
             *best = Some(borders.clone());
         }

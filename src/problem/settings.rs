@@ -1,4 +1,4 @@
-//! [`Settings`]: what is said of a fit besides model, records and parameters.
+//! [`Settings`]: the settings of a fit besides model, records and parameters.
 
 use super::{Noise, Optimizer, Search};
 use crate::error::Error;
@@ -21,13 +21,13 @@ pub(crate) type Observer = Arc<Mutex<Box<dyn Observe<LeastSquaresState> + Send>>
 pub(crate) trait Weights: Send + Sync {
     /// The weight of sample `k`.
     fn weight(&self, record: &Record, k: usize) -> f64;
-    /// Whether it fits the model.
+    /// Checks the weighting against the model.
     fn check(&self) -> Result<(), Error>;
     /// Name and constants, for reports.
     fn describe(&self) -> String;
 }
 
-/// What is said of a fit besides model, records and parameters; each may be left out.
+/// The settings of a fit besides model, records and parameters; all have defaults.
 #[derive(Clone)]
 pub struct Settings<'a> {
     pub(crate) noise: Noise,
@@ -58,63 +58,64 @@ impl Default for Settings<'_> {
 }
 
 impl<'a> Settings<'a> {
-    /// The standard deviation of the noise of each output, in its unit (after the pre-filter, if there is one). Left out,
-    /// it is estimated from the errors.
+    /// Sets the standard deviation of the noise of each output, in its unit (after the pre-filter, if there is one).
+    /// Without it, the noise is estimated from the errors.
     pub fn noise(mut self, sigma: Vec<f64>) -> Self {
         self.noise = Noise::Given(sigma);
         self
     }
 
-    /// Estimates the noise with its correlations between outputs.
+    /// Estimates the covariance of the noise of all outputs, instead of a standard deviation per output.
     pub fn noise_covariance(mut self) -> Self {
         self.noise = Noise::Covariance;
         self
     }
 
-    /// Searches by another method, or by the same with other settings.
+    /// Sets the search and its settings.
     pub fn optimizer(mut self, optimizer: impl Search) -> Self {
         self.optimizer = Arc::new(optimizer);
         self
     }
 
-    /// Bends the cost of large standardized errors.
+    /// Sets the loss, a function of the standardized errors.
     pub fn loss(mut self, loss: impl Loss + 'a) -> Self {
         self.loss = Some(Arc::new(loss));
         self
     }
 
-    /// Filters the prediction errors (and their slopes) before they count. A missing sample enters the filter as a zero.
+    /// Filters the prediction errors and their slopes before the cost is computed. A missing sample enters the filter
+    /// as zero.
     pub fn prefilter(mut self, filter: Butterworth) -> Self {
         self.prefilter = Some(filter);
         self
     }
 
-    /// Stops the search, with what it has found by then, when the flag is raised.
+    /// Stops the search at its best point so far when the flag is set.
     pub fn cancel(mut self, flag: Arc<AtomicBool>) -> Self {
         self.cancel = Some(flag);
         self
     }
 
-    /// Stops the search after this time, with what it has found by then.
+    /// Stops the search at its best point so far after this time.
     pub fn time_limit(mut self, limit: Duration) -> Self {
         self.time_limit = Some(limit);
         self
     }
 
-    /// Shows the progress to an observer of argmin.
+    /// Calls an observer of argmin with the state of the search.
     pub fn observe(mut self, observer: impl Observe<LeastSquaresState> + Send + 'static, mode: ObserverMode) -> Self {
         self.observers.push((Arc::new(Mutex::new(Box::new(observer))), mode));
         self
     }
 
-    /// Saves the place of the search into a file, every so many iterations, and goes on from there if the file exists. A
+    /// Saves the state of the search into a file every `every` iterations, and resumes from the file if it exists. A
     /// file of another problem is refused.
     pub fn checkpoint(mut self, path: impl Into<PathBuf>, every: u64) -> Self {
         self.checkpoint = Some((path.into(), every));
         self
     }
 
-    /// As they are for what this sweep predicts.
+    /// These settings, with the noise set to `Predicted` where the sweep predicts variances.
     pub(super) fn of(mut self, sweep: &dyn Sweep) -> Self {
         if sweep.predicts_variance() {
             self.noise = Noise::Predicted;
@@ -122,7 +123,7 @@ impl<'a> Settings<'a> {
         self
     }
 
-    /// Refuses what makes no sense for these records.
+    /// Checks the settings against layout and records.
     pub(super) fn check(&self, layout: &Layout, records: &[Record]) -> Result<(), Error> {
         if let Noise::Given(sigma) = &self.noise {
             if sigma.len() != layout.outputs.len() {

@@ -1,4 +1,4 @@
-//! What the model says of a record at given values of its unknowns.
+//! Prediction of a record at given values of its unknowns.
 
 use super::{Objective, Problem};
 use crate::error::Error;
@@ -10,7 +10,7 @@ use crate::sweep::RunError;
 pub struct Simulated {
     /// Predicted outputs, a column each; NaN where there is no prediction.
     pub outputs: Vec<Vec<f64>>,
-    /// Measured less predicted; NaN where there is nothing to compare.
+    /// Measured minus predicted; NaN where either is missing.
     pub residuals: Vec<Vec<f64>>,
     /// The state at the first sample.
     pub initial_state: Vec<f64>,
@@ -21,7 +21,7 @@ impl Objective<'_> {
     pub(crate) fn predict(&self, e: usize, coordinates: &[f64]) -> Result<Simulated, Error> {
         let record = &self.problem.records[e];
         let measured: Vec<&[f64]> = record.outputs().iter().map(|channel| &*channel.values).collect();
-        // A filter needs the measurements; else, predictions are wanted where nothing was measured, too.
+        // A filter needs the measurements; otherwise outputs are predicted where nothing was measured, too.
         let filters = self.sweep.predicts_variance();
         let compared = if filters { self.problem.clone() } else { self.problem.against_zero() };
         let objective = self.of(&compared, self.sweep);

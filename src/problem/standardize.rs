@@ -11,14 +11,15 @@ pub(super) struct Standardize<'s> {
     /// The whitening of each lane.
     whitening: Vec<&'s Whitening>,
     prefilter: Option<(&'s Butterworth, Vec<f64>)>,
-    /// What the entries of the rows of a sample are multiplied by, output by output, column by column, lane by lane; empty
-    /// where all are one. Of each job: how fast the quantities move with the coordinates; and one over the noise level.
+    /// Factors of the entries of the rows of a sample, output by output, column by column, lane by lane; empty where
+    /// all are one. A factor is the derivative of the quantity with respect to its coordinate, divided by the noise
+    /// level.
     factors: Vec<f64>,
     width: Width,
 }
 
 impl<'s> Standardize<'s> {
-    /// For windows of so many lanes.
+    /// For windows of `lanes` lanes.
     pub fn new(jobs: &[&'s Job<'s>], lanes: usize) -> Self {
         let objective = jobs[0].objective;
         let prefilter = objective.problem.settings.prefilter.as_ref().map(|filter| (filter, vec![]));

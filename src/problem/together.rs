@@ -1,4 +1,4 @@
-//! Passes over the single records of several problems, side by side in lanes.
+//! Passes over the single records of several problems, in parallel lanes.
 
 use super::batches::in_batches;
 use super::linearize::parts;
@@ -21,7 +21,7 @@ pub(crate) fn linearize_together(points: &[At<'_>]) -> Vec<Result<Linearization,
     answers.into_iter().zip(points).map(alone).collect()
 }
 
-/// What is gathered without slopes from each; `None` for one that fails.
+/// The accumulator of each, in a pass without slopes; `None` for one that fails.
 pub(crate) fn gather_together<A: Accumulate>(points: &[At<'_>], make: impl Fn(usize) -> A + Sync) -> Vec<Option<A>> {
     let mut answers: Vec<Option<A>> = points.iter().map(|_| None).collect();
     let run = |members: &[usize], jobs: &[&Job<'_>]| gather(jobs, members.iter().map(|&i| make(i)).collect());

@@ -1,7 +1,7 @@
-//! [`Unknowns`]: the free quantities of a fit in a row, and how parameters and initial states follow from them.
+//! [`Unknowns`]: the vector of the free quantities of a fit, and the parameters and initial states that follow from it.
 //!
-//! The row holds the parameters that all experiments share, then for each experiment its free initial states and its own
-//! parameters. The optimizer works on coordinates: values, or their logarithms.
+//! The vector holds the parameters that all experiments share, then for each experiment its free initial states and its
+//! local parameters. The optimizer works on coordinates: values, or their logarithms.
 
 use crate::error::Error;
 use crate::layout::{Layout, Quantity};
@@ -40,13 +40,13 @@ pub(crate) struct Values {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Unknowns {
-    /// What each experiment is called in reports and errors.
+    /// The name of each experiment in reports and errors.
     pub labels: Vec<String>,
     pub parameters: Vec<Parameter>,
     /// What is known of each experiment's initial state.
     initial: Vec<Vec<Parameter>>,
     pub row: Vec<Free>,
-    /// Where in the row each experiment's own unknowns begin, and the end of the row.
+    /// Index of the first local unknown of each experiment, then the number of unknowns.
     begins: Vec<usize>,
 }
 
@@ -141,7 +141,7 @@ impl Unknowns {
         self.columns(experiment).map(seed).collect()
     }
 
-    /// How fast the quantity of each column moves with its coordinate.
+    /// Derivative of the quantity of each column with respect to its coordinate.
     pub fn scales(&self, experiment: usize, coordinates: &[f64]) -> Vec<f64> {
         let scale = |i: usize| {
             let transform = self.row[i].parameter.transform;

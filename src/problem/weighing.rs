@@ -19,8 +19,8 @@ impl<'o> Weighing<'o> {
         Weighing { objective, experiment, loss, kappa, cost: 0.0 }
     }
 
-    /// Counts the cost of a standardized error; for its row, and for that of its variance, the factor of the slopes and
-    /// the weighted error.
+    /// Adds the cost of a standardized error; returns, for its row and for that of its variance, the factor of the
+    /// slopes and the weighted error.
     #[inline]
     pub(super) fn rows(&mut self, window: &Window, k: usize, j: usize, lane: usize) -> [(f64, f64); 2] {
         let z = window.error(k, j, lane);

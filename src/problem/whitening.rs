@@ -3,7 +3,7 @@
 use crate::information::SquareMatrix;
 use crate::sweep::Window;
 
-/// What is said of the measurement noise.
+/// How the measurement noise is given.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Noise {
     /// Its standard deviation per output.
@@ -53,7 +53,7 @@ impl Whitening {
         }
     }
 
-    /// The same with all standard deviations longer by a factor.
+    /// The same with all standard deviations multiplied by a factor.
     pub fn widened(&self, factor: f64) -> Self {
         match self {
             Whitening::Diagonal(sigma) => Whitening::Diagonal(sigma.iter().map(|s| s * factor).collect()),
@@ -80,7 +80,7 @@ impl Whitening {
 fn mix(covariance: &SquareMatrix, inverse: &SquareMatrix, window: &mut Window, k: usize, lane: usize) {
     let outputs = covariance.size();
     let here: Vec<usize> = (0..outputs).filter(|&j| window.is_measured(k, j, lane)).collect();
-    // Where outputs are missing, those left have a covariance of their own.
+    // Where outputs are missing, the covariance is that of the measured ones.
     let part = (here.len() < outputs).then(|| factor_of_part(covariance, &here));
     let factor = part.as_ref().unwrap_or(inverse);
     let lanes = window.lanes();

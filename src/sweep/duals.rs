@@ -12,14 +12,14 @@ use crate::record::Record;
 use core::cell::Cell;
 use std::sync::Arc;
 
-/// A model run as compiled, in dual numbers.
+/// A model's own code, run in dual numbers.
 pub(crate) struct DualSweep<'a, M: Model> {
     pub layout: Arc<Layout>,
     pub model: Handle<'a, M>,
     pub loops: Arc<dyn Loops<M> + 'a>,
     pub method: Arc<dyn Method>,
     pub predictor: Arc<dyn Prediction>,
-    /// Why the model is not run as a graph.
+    /// Why the model was not traced.
     pub reason: String,
 }
 
@@ -115,7 +115,7 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
     }
 }
 
-/// The state that the outputs of a sample give; alone, if the outputs must not depend on the parameters besides.
+/// The state that follows from the outputs of a sample. With `alone`, the outputs must not depend on parameters.
 pub(crate) fn measured_state(
     layout: &Layout,
     functions: &dyn Functions<Duals>,
@@ -132,7 +132,7 @@ pub(crate) fn measured_state(
     }
 }
 
-/// A record run in plain numbers, to find what fails in it.
+/// Runs a record in plain numbers to find the cause of a failure.
 pub(crate) struct FailureSearch<'w> {
     pub layout: &'w Layout,
     pub values: &'w dyn Functions<f64>,
@@ -146,7 +146,8 @@ impl FailureSearch<'_> {
         Failure { experiment: self.record.name().to_owned(), sample: k, time: self.record.time(k), signal, value, hint }
     }
 
-    /// What fails in a simulation from this state; where nothing does, the error that is largest against the noise.
+    /// The cause of a failure in a simulation from this state; where nothing fails, the error that is largest relative
+    /// to the noise.
     pub fn locate(&self, state: &[f64], p: &[f64], sample: usize, sigma: &[f64], stops: &dyn Fn() -> bool) -> Located {
         let broken = |k, signal, value, hint| Located::Broken(self.failure(k, signal, value, hint));
         let unsound = |values: &[f64]| {
@@ -166,7 +167,8 @@ impl FailureSearch<'_> {
             plant.output(&x, &mut y);
             for (j, (&y, channel)) in y.iter().zip(self.record.outputs()).enumerate() {
                 let found = channel.values[k];
-                // What was not measured need not be predicted in a fit; where a prediction was asked for, it stopped here.
+                // An output that was not measured need not be finite, except at the sample where the failure was
+                // noticed.
                 if !y.is_finite() && (!found.is_nan() || k == sample) {
                     let hint = if y.is_nan() { UNDEFINED } else { OVERFLOW };
                     return broken(k, format!("output `{}`", self.layout.outputs[j].name), y, hint);
@@ -200,7 +202,8 @@ impl FailureSearch<'_> {
     }
 }
 
-/// A state as large as this is about to overflow; a method then gets stuck, or computes infinity less infinity.
+/// From this magnitude on, a failure counts as overflow: an integrator may be stuck or have computed infinity minus
+/// infinity.
 const RUNAWAY: f64 = 1e100;
 
 const STUCK: &str = "; no step is short enough, or 100,000 of them do not reach the next sample: the model is too stiff for \

@@ -13,10 +13,10 @@ use core::cell::Cell;
 const WINDOW: usize = 128;
 /// Slopes of a pass.
 const SLOPES: usize = 8;
-/// Slopes below this are gone for good; squared they are denormal.
+/// Slopes below this are set to zero: their squares are denormal.
 const NEGLIGIBLE: f64 = 1e-150;
 
-/// What a run needs besides the piece.
+/// Model, integrator and predictor of a run.
 pub(crate) struct Filter<'f> {
     pub layout: &'f Layout,
     pub values: &'f dyn Functions<f64>,
@@ -34,7 +34,7 @@ struct Pass<S> {
     used: usize,
 }
 
-/// A number, and how its slopes are read and cleaned.
+/// A number with access to its slopes.
 trait Number: Stepped {
     fn with(value: f64, slope: &dyn Fn(usize) -> f64) -> Self;
     fn slope(&self, i: usize) -> f64;
@@ -101,8 +101,8 @@ impl Filter<'_> {
     /// Runs a piece.
     pub fn run(&self, piece: &Piece<'_>, seeds: &[Seed], visit: Visit<'_>) -> Result<Reached, RunError> {
         match seeds.is_empty() {
-            true => self.walk::<f64>(self.values, self.predictor.values(), piece, seeds, visit),
-            false => self.walk::<Duals>(self.duals, self.predictor.duals(), piece, seeds, visit),
+            true => self.run_windows::<f64>(self.values, self.predictor.values(), piece, seeds, visit),
+            false => self.run_windows::<Duals>(self.duals, self.predictor.duals(), piece, seeds, visit),
         }
     }
 
@@ -116,7 +116,7 @@ impl Filter<'_> {
         SlicePlant { layout: self.layout, functions, duals: self.duals, method: self.method, between, p, step }
     }
 
-    fn walk<S: Number>(
+    fn run_windows<S: Number>(
         &self,
         functions: &dyn Functions<S>,
         steps: &dyn Steps<S>,
@@ -159,7 +159,7 @@ impl Filter<'_> {
         Ok(Reached { carry, slopes })
     }
 
-    /// Predicts and takes in the outputs of a sample, and goes on to the next.
+    /// Predicts the outputs of a sample, corrects the carry with the measured ones, and advances to the next sample.
     #[expect(clippy::too_many_arguments, reason = "one place in two sequences")]
     fn sample<S: Number>(
         &self,
@@ -188,7 +188,7 @@ impl Filter<'_> {
                     row[pass.first + i] = sign * value.slope(i);
                 }
             };
-            // The slopes of the prediction are those of the error turned over.
+            // The slopes of the prediction are the negative slopes of the error.
             write(window.row_mut(k, j), &error, -1.0);
             if window.has_variances() {
                 write(window.variance_row_mut(k, j), &variance, 1.0);

@@ -1,8 +1,8 @@
 //! [`Loops`]: the loop over the samples, compiled for a model and an integrator, in numbers with slopes.
 //!
-//! This is how models are run that cannot be read as a graph. Slopes with respect to the initial state die away like
-//! `exp(-t / T)`; after some ten thousand samples they are denormal numbers, on which processors are up to 60 times slower;
-//! so slopes below 1e-150 are set to zero between windows.
+//! Models that cannot be traced run this way. Slopes with respect to the initial state decay like `exp(-t / T)`; after
+//! some ten thousand samples they are denormal numbers, on which processors are up to 60 times slower; so slopes below
+//! 1e-150 are set to zero between windows.
 
 use super::{Piece, Reached, RunError, Seed, Visit, Window};
 use crate::dispatch::{Kernel, has_wide, run};
@@ -18,15 +18,15 @@ use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
 use std::sync::Arc;
 
-/// Samples per window: short enough for two outputs and eight slopes to stay in the nearest cache.
+/// Samples per window: two outputs with eight slopes fit into the first-level cache.
 const WINDOW: usize = 128;
 
-/// Slopes below this are gone for good; squared they are denormal.
+/// Slopes below this are set to zero: their squares are denormal.
 const NEGLIGIBLE: f64 = 1e-150;
 
 /// A number with a fixed count of slopes.
 trait Number: Scalar {
-    /// What the slopes are made of.
+    /// The type of a slope.
     type Slope: lanes::Number;
     const SLOPES: usize;
     fn with(value: f64, slope: impl Fn(usize) -> f64) -> Self;
@@ -137,9 +137,9 @@ impl<M: Model, D: Number> Pass<M, D> {
     }
 }
 
-/// The loop over the samples for a model, whatever the integrator.
+/// The loop over the samples for a model, with the integrator's type erased.
 pub(crate) trait Loops<M: Model>: Send + Sync {
-    /// Runs a piece, its samples predicted from measured states so many samples before if `restart` says so.
+    /// Runs a piece. With `restart`, samples are predicted from the measured states that many samples before.
     fn run(
         &self,
         model: &M,
@@ -166,24 +166,24 @@ impl<M: Model, I: Integrator> Loops<M> for I {
         visit: Visit<'_>,
     ) -> Result<Reached, RunError> {
         let task = Task { model, integrator: self, piece, seeds, restart };
-        // The wide loop is made for the hold that nearly all records have.
+        // The AVX-512 loop is compiled for the zero-order hold only, which nearly all records have.
         let wide = has_wide() && piece.record.input_hold() == Hold::Zero;
-        // A build that is not made for speed is soon compiled: same numbers, more passes.
+        // Debug builds compile fewer variants, to save compile time: same numbers, more passes.
         #[cfg(debug_assertions)]
         return match (seeds.len(), wide) {
-            (0, _) => task.walk::<f64>(visit),
-            (_, false) => task.walk::<Dual<4>>(visit),
-            (_, true) => task.walk::<Dual<4, Fused>>(visit),
+            (0, _) => task.run_windows::<f64>(visit),
+            (_, false) => task.run_windows::<Dual<4>>(visit),
+            (_, true) => task.run_windows::<Dual<4, Fused>>(visit),
         };
         #[cfg(not(debug_assertions))]
         match (seeds.len(), wide) {
-            (0, _) => task.walk::<f64>(visit),
-            (1..=4, false) => task.walk::<Dual<4>>(visit),
-            (5 | 6 | 9..=12, false) => task.walk::<Dual<6>>(visit),
-            (_, false) => task.walk::<Dual<8>>(visit),
-            (1..=4, true) => task.walk::<Dual<4, Fused>>(visit),
-            (5 | 6 | 9..=12, true) => task.walk::<Dual<6, Fused>>(visit),
-            (_, true) => task.walk::<Dual<8, Fused>>(visit),
+            (0, _) => task.run_windows::<f64>(visit),
+            (1..=4, false) => task.run_windows::<Dual<4>>(visit),
+            (5 | 6 | 9..=12, false) => task.run_windows::<Dual<6>>(visit),
+            (_, false) => task.run_windows::<Dual<8>>(visit),
+            (1..=4, true) => task.run_windows::<Dual<4, Fused>>(visit),
+            (5 | 6 | 9..=12, true) => task.run_windows::<Dual<6, Fused>>(visit),
+            (_, true) => task.run_windows::<Dual<8, Fused>>(visit),
         }
     }
 
@@ -203,7 +203,7 @@ struct Task<'t, M: Model, I> {
 }
 
 impl<M: Model, I: Integrator> Task<'_, M, I> {
-    fn walk<D: Number>(&self, visit: Visit<'_>) -> Result<Reached, RunError> {
+    fn run_windows<D: Number>(&self, visit: Visit<'_>) -> Result<Reached, RunError> {
         let (piece, seeds) = (self.piece, self.seeds);
         let count = seeds.len().div_ceil(D::SLOPES.max(1)).max(1);
         let mut passes: Vec<Pass<M, D>> = (0..count).map(|i| Pass::new(piece, seeds, i * D::SLOPES)).collect();
@@ -258,7 +258,7 @@ impl<M: Model, I: Integrator, D: Number> Fill<'_, '_, M, I, D> {
         p: &Of<M::Parameters, D>,
         step: &mut f64,
     ) -> Result<Of<M::State, D>, Stuck> {
-        // Known to the compiler in the wide loop, which then computes once per interval what depends on the input alone.
+        // A constant in the AVX-512 loop, so that the compiler moves out of the stages what depends on the input alone.
         let hold = if <D::Slope as lanes::Number>::FUSED { Hold::Zero } else { self.task.piece.record.input_hold() };
         let u0 = self.rows.inputs[k];
         let u1 = if hold == Hold::First { self.rows.inputs[k + 1] } else { u0 };
@@ -266,7 +266,7 @@ impl<M: Model, I: Integrator, D: Number> Fill<'_, '_, M, I, D> {
         ModelSystem { model: self.task.model, interval: &interval, p }.step(self.task.integrator, x, step)
     }
 
-    /// The measured state from which a sample is predicted, so many samples before; `None` if it was not measured.
+    /// The measured state from which a sample is predicted, `restart` samples before; `None` if it was not measured.
     fn restarted(&self, sample: usize, restart: usize) -> Option<(Of<M::State, D>, usize)> {
         let n = M::State::LEN;
         if sample < restart {
@@ -291,7 +291,7 @@ impl<M: Model, I: Integrator, D: Number> Kernel for Fill<'_, '_, M, I, D> {
         let mut whole = true;
         for k in 0..=samples {
             let row = before + k;
-            // Where the way to this sample begins, and how many intervals it has.
+            // The state from which this sample is predicted, and the number of intervals between.
             let mut intervals = usize::from(k > 0 && row < self.rows.times.len());
             if let Some(restart) = self.task.restart {
                 if k == samples {
@@ -307,7 +307,7 @@ impl<M: Model, I: Integrator, D: Number> Kernel for Fill<'_, '_, M, I, D> {
                 };
                 (x, intervals, step) = (from, count, 0.0);
             }
-            // The only place from which the model's step is called: with two of them compilers inline neither.
+            // The only call of the model's step: with two calls the compiler inlines neither.
             for from in row - intervals..row {
                 x = self.advance(from, x, &p, &mut step).map_err(|Stuck| RunError::Failed { sample: begin + k })?;
             }

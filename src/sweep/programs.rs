@@ -1,11 +1,11 @@
-//! [`ProgramSweep`]: models that were read as graphs, run as programs, pieces side by side.
+//! [`ProgramSweep`]: traced models, run as compiled programs, pieces in parallel lanes.
 
 mod columns;
 mod derived;
 mod horizon;
 mod run;
 
-use super::{Joints, Located, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
+use super::{Coupling, Located, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
 use crate::engine::{Program, Sampling, Trajectories};
 use crate::equations::Equations;
 use crate::error::Error;
@@ -25,15 +25,15 @@ pub(crate) struct ProgramSweep<'a> {
     equations: Arc<Equations>,
     method: Arc<dyn Method>,
     predictor: Arc<dyn Prediction>,
-    /// The same equations in dual numbers: for what is not a pass over many samples.
+    /// The same equations in dual numbers, for all that is not a pass over many samples.
     plain: Arc<dyn Sweep + 'a>,
-    joints: Joints,
+    coupling: Coupling,
     /// By hold: zero, first.
     recurrences: [OnceLock<Arc<Recurrence>>; 2],
     programs: Mutex<Vec<(Key, Program)>>,
 }
 
-/// What a program was compiled for.
+/// What a program depends on besides the recurrence.
 #[derive(Clone, Debug, PartialEq)]
 struct Key {
     hold: Hold,
@@ -42,7 +42,7 @@ struct Key {
     purpose: Purpose,
 }
 
-/// What is asked of a program.
+/// What a program computes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Purpose {
     /// Rows of many trajectories.
@@ -62,18 +62,18 @@ impl<'a> ProgramSweep<'a> {
         predictor: Arc<dyn Prediction>,
         plain: Arc<dyn Sweep + 'a>,
     ) -> Result<Self, Untraceable> {
-        let joints = match predictor.restarts() {
-            Some(_) => Joints::Restarted,
-            None if equations.layout().kind == Kind::Static => Joints::Restarted,
-            None if predictor.is_simulation() && equations.is_affine() => Joints::Affine,
-            None => Joints::Nonlinear,
+        let coupling = match predictor.restarts() {
+            Some(_) => Coupling::Restarted,
+            None if equations.layout().kind == Kind::Static => Coupling::Restarted,
+            None if predictor.is_simulation() && equations.is_affine() => Coupling::Affine,
+            None => Coupling::Nonlinear,
         };
         let sweep = ProgramSweep {
             equations,
             method,
             predictor,
             plain,
-            joints,
+            coupling,
             recurrences: [OnceLock::new(), OnceLock::new()],
             programs: Mutex::new(vec![]),
         };
@@ -132,8 +132,8 @@ impl Sweep for ProgramSweep<'_> {
         }
     }
 
-    fn joints(&self) -> Joints {
-        self.joints
+    fn coupling(&self) -> Coupling {
+        self.coupling
     }
 
     fn prepare(&self, record: &Record, parameters: &[f64]) -> Result<Prepared, Error> {

@@ -1,9 +1,9 @@
-//! [`Window`]: prediction errors and slopes of a run of samples, of several pieces side by side.
+//! [`Window`]: prediction errors and slopes of consecutive samples of several pieces, in lanes.
 
-/// Prediction errors and slopes of a run of samples of several pieces side by side, in lanes.
+/// Prediction errors and slopes of consecutive samples of several pieces, one per lane.
 ///
-/// A row is one output of one sample: its slopes with respect to the seeds, then the prediction error; each entry holds one
-/// number per lane. Rows without a measurement, or beyond the end of a lane's piece, are zero. Where variances are
+/// A row is one output of one sample: its slopes with respect to the seeds, then the prediction error; each entry holds
+/// one number per lane. Rows without a measurement, or beyond the end of a lane's piece, are zero. Where variances are
 /// predicted they stand in rows of the same shape: slopes, then the variance.
 #[derive(Clone, Debug)]
 pub struct Window {
@@ -48,7 +48,7 @@ impl Window {
         }
     }
 
-    /// Numbers side by side in each entry.
+    /// Numbers in each entry, one per lane.
     pub fn lanes(&self) -> usize {
         self.lanes
     }
@@ -97,7 +97,7 @@ impl Window {
         &mut self.variances[..used]
     }
 
-    /// All rows that there is room for.
+    /// All rows, used or not.
     pub fn all_rows_mut(&mut self) -> &mut [f64] {
         &mut self.values
     }
@@ -175,7 +175,7 @@ impl Window {
         self.measured[sample * self.outputs + output]
     }
 
-    /// Says which lanes have measured an output at a sample.
+    /// Sets which lanes have measured an output at a sample, a bit each.
     #[inline(always)]
     pub fn set_measured(&mut self, sample: usize, output: usize, lanes: u32) {
         self.measured[sample * self.outputs + output] = lanes;
@@ -195,7 +195,7 @@ impl Window {
         }
     }
 
-    /// Sets rows without a measurement to zero, after something has run over them.
+    /// Sets rows without a measurement to zero, after a filter has been applied to all rows.
     pub fn clear_unmeasured(&mut self) {
         let (lanes, width) = (self.lanes, self.columns * self.lanes);
         let all = u32::MAX >> (32 - lanes);

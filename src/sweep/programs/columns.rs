@@ -7,7 +7,7 @@ use crate::sweep::Piece;
 use crate::wide::{self, Task, Wide, Width};
 use std::sync::Arc;
 
-/// Numbers of several pieces' records, sample by sample, column by column, with the lanes side by side.
+/// Numbers of several pieces' records, sample by sample, column by column, lane by lane.
 pub(super) struct Columns<'r> {
     records: Vec<&'r Record>,
     /// The derived columns of each lane's record, where they are kept.

@@ -5,7 +5,7 @@ use crate::record::{self, Record, Time};
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Numbers that are worth keeping from pass to pass; columns of longer records are computed window by window.
+/// Most numbers that are kept from pass to pass; columns of longer records are computed window by window.
 const KEPT: usize = 4_000_000;
 
 /// The derived columns of a record, by the programs that read them: computed once and read at every pass. Copies share

@@ -1,4 +1,5 @@
-//! Predictions a fixed number of samples ahead: every restart is a trajectory of its own, so they run side by side.
+//! Predictions a fixed number of samples ahead: every restart is a trajectory of its own, so restarts run in parallel
+//! lanes.
 
 use super::run::{Run, WINDOW};
 use crate::engine::Program;

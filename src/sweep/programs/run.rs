@@ -1,4 +1,4 @@
-//! Pieces side by side through a program.
+//! Runs pieces in the lanes of a program.
 
 use super::columns::Columns;
 use crate::engine::{Group, Program};
@@ -6,11 +6,11 @@ use crate::record::Time;
 use crate::sweep::{Piece, Reached, RunError, Visit, Window};
 use crate::wide::{self, Task, Wide, Width};
 
-/// Samples per window. Lanes of any length see the same windows, counted from their begin, so that their bits do not
-/// depend on each other.
+/// Samples per window. Windows are counted from the begin of each piece, so that a lane's bits do not depend on the
+/// length of another.
 pub(super) const WINDOW: usize = 64;
 
-/// Pieces on their way through their records.
+/// Pieces that run in the lanes of a group.
 pub(super) struct Run<'r> {
     program: &'r Program,
     group: Group,
@@ -30,7 +30,7 @@ impl<'r> Run<'r> {
     pub fn new(program: &'r Program, pieces: Vec<Piece<'r>>) -> Self {
         let mut group = program.group(pieces.len());
         let lanes = group.lanes();
-        // Lanes without a piece do what the first does.
+        // Lanes without a piece repeat the first.
         let piece = |lane: usize| pieces.get(lane).unwrap_or(&pieces[0]);
         for lane in 0..lanes {
             group.set_parameters(lane, piece(lane).parameters);
@@ -55,7 +55,7 @@ impl<'r> Run<'r> {
         run
     }
 
-    /// Puts every lane to the begin of its piece.
+    /// Sets every lane to the begin of its piece.
     fn start(&mut self) {
         for lane in 0..self.group.lanes() {
             let piece = self.pieces.get(lane).unwrap_or(&self.pieces[0]);
@@ -63,7 +63,7 @@ impl<'r> Run<'r> {
         }
     }
 
-    /// Begins anew with other pieces of the same records with the same parameters, as many as before.
+    /// Starts again with other pieces, as many as before, of the same records with the same parameters.
     pub fn restart(&mut self, change: impl FnOnce(&mut [Piece<'r>])) {
         change(&mut self.pieces);
         self.start();
@@ -82,8 +82,8 @@ impl<'r> Run<'r> {
         self.pieces.iter().map(|piece| piece.samples.len()).max().unwrap_or(0)
     }
 
-    /// Runs a window of all pieces, which begins so many samples after they do, and says where those have come to that end
-    /// with it.
+    /// Runs a window of all pieces, `begin` samples after their first one, and writes the final carries of those that
+    /// end with it into `reached`.
     pub fn next(&mut self, begin: usize, window: &mut Window, reached: &mut [Reached]) {
         let samples = WINDOW.min(self.longest() - begin);
         self.read(begin, samples);
@@ -101,7 +101,7 @@ impl<'r> Run<'r> {
         }
     }
 
-    /// Reads inputs and measurements of samples that begin so many after the pieces do.
+    /// Reads the inputs of a window that begins `begin` samples after the first of each piece.
     fn read(&mut self, begin: usize, samples: usize) {
         for (lane, to) in self.begins.iter_mut().enumerate() {
             *to = self.pieces.get(lane).unwrap_or(&self.pieces[0]).samples.start + begin;
@@ -122,7 +122,7 @@ impl<'r> Run<'r> {
         reached.into_iter().map(Ok).collect()
     }
 
-    /// Runs the first piece and notes its carry at some samples, which rise.
+    /// Runs the first piece and returns its carry at the samples `at`, in ascending order.
     pub fn follow(mut self, at: &[usize]) -> Result<Vec<Vec<f64>>, RunError> {
         let mut sample = self.pieces[0].samples.start;
         let mut found = Vec::with_capacity(at.len());
@@ -151,7 +151,7 @@ impl<'r> Run<'r> {
         reached
     }
 
-    /// Where the pieces arrive that end within the window that is about to run, with samples of their records to come.
+    /// The final carries of pieces that end within the next window, but before the end of their records.
     fn end_within(&self, window: &Window, samples: usize, reached: &mut [Reached]) {
         for (lane, (piece, reached)) in self.pieces.iter().zip(reached).enumerate() {
             let here = window.samples[lane];
@@ -164,7 +164,7 @@ impl<'r> Run<'r> {
         }
     }
 
-    /// Runs a window and makes prediction errors of the outputs.
+    /// Runs a window and turns predicted outputs into prediction errors.
     fn fill(&mut self, window: &mut Window, samples: usize) {
         let (lanes, outputs, columns) = (self.group.lanes(), window.outputs(), window.columns());
         let width = columns * lanes;
@@ -207,7 +207,7 @@ impl<'r> Run<'r> {
     }
 }
 
-/// Makes errors of means, in the last column of each row; whether all are finite.
+/// Turns means into errors in the last column of each row; returns whether all are finite.
 struct Errors<'e> {
     rows: &'e mut [f64],
     measured: &'e [f64],
