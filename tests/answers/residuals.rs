@@ -73,10 +73,11 @@ fn noise_passes() {
 #[test]
 fn jarque_bera_is_that_of_scipy() {
     let white = [
-        0.02, -0.63, 0.64, -1.22, 0.79, 0.38, -0.13, -1.43, -3.0, -2.71, 1.08, 0.33, 0.42, -0.78, 2.2, -2.24, 0.79, 0.72,
-        1.97, 1.65, -0.21, -0.02, 0.68, -0.39, -0.16, 4.29, 0.53, 2.49, 3.17, -1.31,
+        0.02, -0.63, 0.64, -1.22, 0.79, 0.38, -0.13, -1.43, -3.0, -2.71, 1.08, 0.33, 0.42, -0.78, 2.2, -2.24, 0.79,
+        0.72, 1.97, 1.65, -0.21, -0.02, 0.68, -0.39, -0.16, 4.29, 0.53, 2.49, 3.17, -1.31,
     ];
-    let test = |residuals: &Residuals| residuals.tests.iter().find(|t| t.name.starts_with("Jarque-Bera")).unwrap().clone();
+    let test =
+        |residuals: &Residuals| residuals.tests.iter().find(|t| t.name.starts_with("Jarque-Bera")).unwrap().clone();
     let found = test(&examined(30, 1, |k, _, _| white[k]));
     assert_eq!(found.name, "Jarque-Bera");
     // SciPy prints 17 digits; the residuals carry the rounding of the outputs they come from.
