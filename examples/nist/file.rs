@@ -10,6 +10,8 @@ pub struct File {
     pub name: String,
     /// For each parameter: the two starts, the certified value and its certified standard error.
     pub parameters: Vec<[f64; 4]>,
+    /// The certified residual standard deviation.
+    pub residual: f64,
     /// What was measured: the response, then the predictors.
     pub data: Vec<Vec<f64>>,
 }
@@ -28,6 +30,8 @@ pub struct Found {
     pub parameters: f64,
     /// Fewest correct digits of a standard error.
     pub standard_errors: f64,
+    /// Correct digits of the residual standard deviation.
+    pub residual: f64,
 }
 
 impl File {
@@ -43,9 +47,12 @@ impl File {
             <[f64; 4]>::try_from(numbers(values)?).ok()
         };
         let parameters = text.lines().filter_map(parameter).collect();
+        let residual =
+            text.lines().find_map(|line| line.strip_prefix("Residual Standard Deviation:")?.trim().parse().ok());
+        let residual = residual.ok_or_else(|| format!("{}: no residual standard deviation", path.display()))?;
         let (_, data) = text.rsplit_once("\nData:").ok_or_else(|| format!("{}: no line `Data:`", path.display()))?;
         let data = data.lines().skip(1).filter_map(numbers).filter(|row| row.len() > 1).collect();
-        Ok(File { name, parameters, data })
+        Ok(File { name, parameters, residual, data })
     }
 
     /// Fits it from both starts.
@@ -86,6 +93,7 @@ impl File {
             iterations: estimate.iterations,
             parameters: least.0,
             standard_errors: least.1,
+            residual: digits(estimate.outputs[0].fit.sigma, self.residual),
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Residuals: measured less predicted outputs. If the model is complete, they are noise.
 //!
-//! Tests take correlated residuals into account by their effective number: `n / (1 + 2 sum rho(k))`, the sum over the lags
-//! up to the first that is not positive (Bayley and Hammersley, J. Royal Statistical Society suppl. 8 (1946) 184).
+//! Tests of the mean and the spread, and those of the shape where residuals are not white, take their correlation into account
+//! by their effective number: `n / (1 + 2 sum rho(k))`, the sum over the lags up to the first that is not positive (Bayley and
+//! Hammersley, J. Royal Statistical Society suppl. 8 (1946) 184).
 
 mod correlation;
 mod normality;
@@ -14,7 +15,7 @@ pub use outliers::Outlier;
 pub use period::{Period, Spectrum};
 pub use spread::Spread;
 
-use super::Test;
+use super::{LEVEL, Test};
 use crate::error::Error;
 use crate::problem::Simulated;
 use crate::record::{Channel, Record};
@@ -239,7 +240,7 @@ impl Series {
              (predict over a shorter horizon); classical intervals are too narrow",
         ));
         result.tests.push(normality::mean(self, effective));
-        normality::shape(self, effective, &mut result);
+        normality::shape(self, p >= LEVEL, &mut result);
         for signal in inputs.iter().chain(outputs).filter(|signal| signal.deviation > 0.0) {
             let (correlation, test) = correlation::between(self, &result.autocorrelation, signal);
             result.correlations.push(correlation);

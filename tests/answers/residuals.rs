@@ -68,6 +68,33 @@ fn noise_passes() {
     assert!(refused.values().all(|count| *count <= 10), "{refused:?}");
 }
 
+/// Of white residuals as SciPy 1.17's `jarque_bera` gives it, though lag 1 happens to be positive (0.109); of their running sum,
+/// which is colored, with the effective number of residuals in the place of 30, and a name that says so.
+#[test]
+fn jarque_bera_is_that_of_scipy() {
+    let white = [
+        0.02, -0.63, 0.64, -1.22, 0.79, 0.38, -0.13, -1.43, -3.0, -2.71, 1.08, 0.33, 0.42, -0.78, 2.2, -2.24, 0.79,
+        0.72, 1.97, 1.65, -0.21, -0.02, 0.68, -0.39, -0.16, 4.29, 0.53, 2.49, 3.17, -1.31,
+    ];
+    let test =
+        |residuals: &Residuals| residuals.tests.iter().find(|t| t.name.starts_with("Jarque-Bera")).unwrap().clone();
+    let found = test(&examined(30, 1, |k, _, _| white[k]));
+    assert_eq!(found.name, "Jarque-Bera");
+    // SciPy prints 17 digits; the residuals carry the rounding of the outputs they come from.
+    assert!((found.statistic / 0.318_450_228_757_759_7 - 1.0).abs() < 1e-9, "{found:?}");
+    assert!((found.p_value / 0.852_804_358_835_401_7 - 1.0).abs() < 1e-9, "{found:?}");
+
+    let mut sum = 0.0;
+    let colored = examined(30, 1, |k, _, _| {
+        sum += white[k];
+        sum
+    });
+    let found = test(&colored);
+    assert_eq!(found.name, "Jarque-Bera, effective number of residuals");
+    let expected = 3.645_078_766_892_085_7 * 4.881_091_973_303_236 / 30.0;
+    assert!((found.statistic / expected - 1.0).abs() < 1e-9, "{found:?}");
+}
+
 /// A coloring is no period, however strong.
 #[test]
 fn colored_noise_has_no_period() {

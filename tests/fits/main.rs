@@ -13,6 +13,7 @@ mod fleet;
 mod kalman;
 mod models;
 mod nist;
+mod noise;
 mod optimizers;
 mod recovery;
 #[path = "../common/shared.rs"]

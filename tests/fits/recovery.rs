@@ -194,6 +194,17 @@ fn what_is_fixed_stays_and_bounds_hold() {
     let estimate = Fit::new(&Lag, &record).parameters(bounded).run().unwrap();
     assert_eq!(estimate.parameters.gain, 1.8);
     assert_eq!(estimate.knowledge.gain, Knowledge::Held { bound: 1.8 });
+    // The cost falls outward at a lower bound, too.
+    let bounded = Branch { gain: free(2.5).within(2.2, 9.0), tau: free(0.08) };
+    let above = Fit::new(&Lag, &record).parameters(bounded).run().unwrap();
+    assert_eq!((above.parameters.gain, above.knowledge.gain), (2.2, Knowledge::Held { bound: 2.2 }));
+    // And inward from a bound that the start is on: nothing is held.
+    let bounded = Branch { gain: free(1.8).within(1.8, 9.0), tau: free(0.08) };
+    let inside = Fit::new(&Lag, &record).parameters(bounded).run().unwrap();
+    assert!(
+        (inside.parameters.gain / 2.0 - 1.0).abs() < 0.05 && inside.knowledge.gain.standard_error().is_some(),
+        "{inside}"
+    );
     // The rest is what a fit finds where the bound is a fixed value.
     let reference = Fit::new(&Lag, &record).parameters(Branch { gain: fixed(1.8), tau: free(0.08) }).run().unwrap();
     assert!((estimate.parameters.tau / reference.parameters.tau - 1.0).abs() < 1e-9);

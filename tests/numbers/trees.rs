@@ -1,5 +1,6 @@
 //! Least squares over trees of unknowns, against the same rows in dense matrices.
 
+mod bounds;
 mod covariance;
 mod rank;
 mod steps;

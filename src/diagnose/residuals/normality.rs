@@ -23,9 +23,11 @@ const NOT_NORMAL: &str = "the residuals are not normal: outliers (use a robust l
 
 /// Jarque and Bera's test (International Statistical Review 55 (1987) 163) and Anderson and Darling's with Stephens'
 /// p-values (D'Agostino and Stephens, *Goodness-of-Fit Techniques*, 1986, table 4.9). Both take the residuals to be
-/// independent; the former counts the effective number, the latter takes so many of them, evenly.
-pub(super) fn shape(residuals: &Series, effective: f64, result: &mut Residuals) {
+/// independent. White ones are taken as they are; else Jarque and Bera's test counts the effective number, which its name
+/// says, and Anderson and Darling's takes so many of them, evenly.
+pub(super) fn shape(residuals: &Series, white: bool, result: &mut Residuals) {
     let n = residuals.count as f64;
+    let independent = if white { n } else { result.effective_samples };
     let (mut third, mut fourth) = (0.0, 0.0);
     for e in &residuals.values {
         let square = e * e;
@@ -35,12 +37,13 @@ pub(super) fn shape(residuals: &Series, effective: f64, result: &mut Residuals) 
     let sigma = residuals.deviation;
     result.skewness = third / n / sigma.powi(3);
     result.excess_kurtosis = fourth / n / sigma.powi(4) - 3.0;
-    let statistic = effective / 6.0 * (result.skewness.powi(2) + result.excess_kurtosis.powi(2) / 4.0);
+    let statistic = independent / 6.0 * (result.skewness.powi(2) + result.excess_kurtosis.powi(2) / 4.0);
     let p_value = chi_squared_tail(statistic, 2.0);
-    result.tests.push(Test::new("Jarque-Bera", statistic, p_value, NORMAL, NOT_NORMAL));
+    let name = if independent < n { "Jarque-Bera, effective number of residuals" } else { "Jarque-Bera" };
+    result.tests.push(Test::new(name, statistic, p_value, NORMAL, NOT_NORMAL));
 
     // More than a few thousand tell nothing new, and every distribution is not normal in the tenth digit.
-    let wanted = effective.clamp(8.0, 5000.0);
+    let wanted = independent.clamp(8.0, 5000.0);
     let every = (n / wanted).ceil().max(1.0) as usize;
     let present = (0..residuals.values.len()).filter(|&k| !residuals.is_missing(k));
     let mut sample: Vec<f64> = present.step_by(every).map(|k| residuals.values[k]).collect();

@@ -1,0 +1,101 @@
+#![cfg(feature = "std")]
+//! The noise that a fit reports, and what autocorrelated noise does to the standard errors.
+
+use crate::common::*;
+use greybox::*;
+
+const STEP: f64 = 5e-3;
+const LAG: Branch = Branch { gain: 2.0, tau: 0.05 };
+
+/// A lag with errors of standard deviation `sigma`, each with the correlation `rho` to the one before.
+fn lag(samples: usize, sigma: f64, rho: f64, seed: u64) -> ExperimentOf<Lag> {
+    let inputs = levels(samples, 12, seed).into_iter().map(|u| Voltage { u }).collect();
+    let record = simulated(&Lag, STEP, inputs, Current { i: 0.0 }, LAG);
+    let (mut noise, mut error) = (Noise(seed), 0.0);
+    let disturbed = |y: Current| {
+        error = rho * error + (1.0 - rho * rho).sqrt() * sigma * noise.gauss();
+        Current { i: y.i + error }
+    };
+    let outputs = record.outputs().map(disturbed).collect();
+    with_outputs(&Lag, &record, outputs)
+}
+
+fn lag_free() -> Branch<Parameter> {
+    Branch { gain: free(1.5), tau: free(0.08) }
+}
+
+/// Root of the mean square over `n`, and noise over `n - p`: of each output, where they are two.
+#[test]
+fn unknowns_are_taken_from_the_degrees_of_freedom_of_each_output() {
+    let inputs = levels(40, 1, 5).into_iter().map(|u| Voltage { u }).collect();
+    let exact = simulated(&Line, 1.0, inputs, Nothing, Affine { slope: 1.5, offset: -0.7 });
+    let record = noisy(&Line, &exact, Pair { y: 0.3, z: 0.2 }, &mut Noise(1));
+    let fit = || Fit::new(&Line, &record).parameters(Affine { slope: free(1.0), offset: free(0.5) });
+    let estimate = fit().run().unwrap();
+    let (y, z) = (estimate.quality.y, estimate.quality.z);
+    let wider = (80.0f64 / 78.0).sqrt();
+    // Rounds end where the noise changes by less than 1e-6 of itself; ten times that.
+    for output in [y, z] {
+        assert!((output.sigma / output.rmse / wider - 1.0).abs() < 1e-5, "{output:?}");
+    }
+    // The standard errors are those of that noise.
+    let given = fit().noise(Pair { y: y.sigma, z: z.sigma }).run().unwrap();
+    for (found, expected) in estimate.unknowns.iter().zip(&given.unknowns) {
+        let errors = [found, expected].map(|unknown| unknown.knowledge.standard_error().unwrap());
+        assert!((errors[0] / errors[1] - 1.0).abs() < 1e-7, "{errors:?}");
+    }
+}
+
+/// Weights are no part of the noise: the errors' mean square over `n - 2`, whatever the weights.
+#[test]
+fn weights_leave_the_noise_its_degrees_of_freedom() {
+    let record = lag(60, 0.05, 0.0, 4);
+    let fit = Fit::new(&Lag, &record).parameters(lag_free()).weighting(|s: &Sample<Lag>| 1.0 + s.u.u.abs());
+    let found = fit.run().unwrap().quality.i;
+    assert!((found.sigma / found.rmse / (60.0f64 / 58.0).sqrt() - 1.0).abs() < 1e-12, "{found:?}");
+}
+
+/// Under Gaussian noise a robust scale is the standard deviation: of 2,000 errors within 5 %, three of its standard errors,
+/// `1 / sqrt(2 * 2000)` over an efficiency of 0.9.
+#[test]
+fn a_robust_loss_keeps_the_size_of_gaussian_noise() {
+    let record = lag(2000, 0.05, 0.0, 1);
+    let fit = Fit::new(&Lag, &record).parameters(lag_free()).loss(Huber::default());
+    let found = fit.run().unwrap().quality.i;
+    assert!((found.sigma / 0.05 - 1.0).abs() < 0.05, "{found:?}");
+}
+
+/// Errors that white noise would show once in some thousands of times (p = 1.5e-4) are autocorrelated: the level is 1 %.
+#[test]
+fn weak_autocorrelation_is_seen() {
+    let covariance = |rho: f64| {
+        let estimate = Fit::new(&Lag, &lag(400, 0.05, rho, 2)).parameters(lag_free()).run().unwrap();
+        println!("{rho}: {:?} {:?}", estimate.method.covariance, estimate.warnings);
+        estimate.method.covariance
+    };
+    assert_eq!(covariance(0.0), CovarianceMethod::Classical);
+    assert!(matches!(covariance(0.35), CovarianceMethod::Hac { .. }));
+}
+
+/// Two records that share no unknown are fitted as each alone, but for the degrees of freedom: covariances that allow for
+/// autocorrelation have the factor `n / (n - p)`, 100 / 98 alone and 500 / 496 together.
+#[test]
+fn autocorrelated_errors_have_their_small_sample_factor() {
+    let records = [lag(100, 0.05, 0.9, 3).named("short"), lag(400, 0.05, 0.9, 7).named("long")];
+    let own = Branch { gain: free(1.5).per_experiment(), tau: free(0.08).per_experiment() };
+    let alone = Fit::new(&Lag, &records[0]).parameters(lag_free()).run().unwrap();
+    let together = Fit::new(&Lag, &records).parameters(own).run().unwrap();
+    for estimate in [&alone.method, &together.method] {
+        assert!(matches!(estimate.covariance, CovarianceMethod::Hac { .. }), "{estimate:?}");
+    }
+    for name in ["gain", "tau"] {
+        let variance = |unknowns: &[Unknown]| {
+            let own =
+                unknowns.iter().find(|u| u.name.starts_with(name) && u.experiment.is_none_or(|e| e == 0)).unwrap();
+            own.knowledge.standard_error().unwrap().powi(2)
+        };
+        let ratio = variance(&alone.unknowns) / variance(&together.unknowns);
+        // The searches end within 1e-6 of a standard error of each other.
+        assert!((ratio / ((100.0 / 98.0) / (500.0 / 496.0)) - 1.0).abs() < 1e-5, "{name}: {ratio}");
+    }
+}
