@@ -16,6 +16,7 @@ mod nist;
 mod noise;
 mod optimizers;
 mod recovery;
+mod segments;
 #[path = "../common/shared.rs"]
 mod shared;
 mod user_code;

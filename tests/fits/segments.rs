@@ -1,0 +1,130 @@
+//! Records cut into segments give what they give as a whole.
+
+use greybox::{Estimate, ExperimentOf, Fit, Model, Of, Scalar, Simulator, Time, fixed, free, signals};
+
+signals! {
+    pub struct State { a: "", b: "" }
+    pub struct Input { u: "" }
+    pub struct Output { y: "" }
+    pub struct Coefficients { p: "", q: "", r: "" }
+}
+
+/// Plants of two states. One that asks for a value cannot be traced: it runs with dual numbers, uncut.
+#[derive(Clone, Copy)]
+struct Plant {
+    kind: usize,
+    whole: bool,
+}
+
+impl Model for Plant {
+    type State = State;
+    type Input = Input;
+    type Output = Output;
+    type Parameters = Coefficients;
+
+    fn derivative<S: Scalar>(&self, _t: S, x: &State<S>, u: &Input<S>, c: &Coefficients<S>) -> State<S> {
+        if self.whole {
+            let _ = x.a.value();
+        }
+        let (State { a, b }, Coefficients { p, q, r }, u) = (*x, *c, u.u);
+        let one = |x: S| x + 1.0;
+        let (da, db) = match self.kind {
+            // Affine in their states.
+            0 => ((u - a) * p, (a - b) * q),
+            1 => (b, u * r - a * p - b * q),
+            2 => ((b - a) * p + u, (a - b) * q - b * r),
+            3 => (u * r - a * p, a * u * q - b),
+            // Not.
+            4 => (b, u - a.sin() * p - b * q),
+            5 => (b, u * r - a * p - a * a * a * q - b * 0.2),
+            6 => (b, (-(a * a) + 1.0) * b * p - a * q + u * r),
+            7 => (b, u - b * b * b * p - b * q - a * r),
+            8 => (b, u - b * b.abs() * p - a * q - b * r),
+            9 => (u * p - one(a).sqrt() * q + q, one(a).sqrt() * q - one(b).sqrt() * r + r - q),
+            10 => (b, u - (b * 20.0).tanh() * p - b * q - a * r),
+            11 => (a * (-a + 1.0) * p + u * q, (a - b) * r),
+            12 => ((a * p - a * b * q) + u * 0.1, a * b * 0.5 - b * r),
+            13 => (u - a * p / (a * a + 0.5) * q, (a - b) * r),
+            14 => ((u - a * p) / (one(a * a * q)), (a - b) * r),
+            15 => (u * 2.0 - (one(a).powi(4) - 1.0) * p * 0.2 - a * q, (a - b) * r),
+            16 => ((u - a) * p - ((a * 2.0).exp() - 1.0) * q * 0.1, (a - b) * r),
+            17 => ((u - a) * p - a * (b * 0.5).exp() * q * 0.3, a * 0.4 - b * r),
+            18 => (b, u - (a + a * a * 0.3) * p - b * q * (a * a * 0.2 + 1.0) - (b * 5.0).tanh() * r * 0.2),
+            19 => (b * p, u - a * b * q - b * r),
+            20 => (b, u * u.abs() - a * p - (a - 0.3).abs() * q - b * r),
+            21 => (u - a * p + (a * b).cos() * q * 0.1, (a * a - b) * r),
+            22 => (b, u.tanh() * 2.0 - a.hypot(b * 0.5) * a * p - b * q - a * r * 0.5),
+            _ => ((u - a.atan() * p) * q, (a.sin() - b) * r),
+        };
+        State { a: da, b: db }
+    }
+
+    fn output<S: Scalar>(&self, _t: S, x: &State<S>, _u: &Input<S>, _c: &Coefficients<S>) -> Output<S> {
+        Output { y: x.a + x.b * 0.5 }
+    }
+}
+
+const AFFINE: std::ops::Range<usize> = 0..4;
+const NONLINEAR: std::ops::Range<usize> = 4..24;
+
+fn record(kind: usize, noise: f64, samples: usize) -> ExperimentOf<Plant> {
+    let model = Plant { kind, whole: false };
+    let truth = Coefficients { p: 1.1, q: 0.7, r: 0.9 };
+    let steps = |k: usize| [0.3, 1.1, -0.4, 0.8, 0.1, 1.4, -0.2][k / 90 % 7] + 0.2 * (k as f64 * 0.013).sin();
+    let inputs: Vec<_> = (0..samples).map(|k| Input { u: steps(k) }).collect();
+    let time = Time::Uniform { start: 0.0, step: 0.05 };
+    let run = Simulator::new(&model).run(&truth, &State { a: 0.2, b: 0.1 }, time, &inputs).unwrap();
+    run.with_noise(Output { y: noise }, kind as u64).experiment(&model).unwrap()
+}
+
+fn fit(kind: usize, whole: bool, record: &ExperimentOf<Plant>, start: [f64; 3]) -> Option<Estimate<Plant>> {
+    let record = record.clone().initial(State { a: free(0.2), b: fixed(0.1) });
+    let start = start.map(|factor| free(factor).within(0.01, 20.0));
+    let parameters: Of<Coefficients, _> = Coefficients { p: start[0], q: start[1], r: start[2] };
+    Fit::new(&Plant { kind, whole }, &record).parameters(parameters).noise(Output { y: 0.05 }).run().ok()
+}
+
+/// Near starts, and starts a factor of three to five off, each way.
+const STARTS: [[f64; 3]; 5] = [[1.0, 1.0, 1.0], [3.0, 0.3, 2.0], [0.3, 2.0, 0.3], [0.25, 0.2, 4.0], [5.0, 3.0, 0.2]];
+
+/// Where the whole record leads to a minimum, so do its segments, and to the same; how many did.
+fn compare(kinds: std::ops::Range<usize>, noise: f64, samples: usize) -> (usize, usize) {
+    let (mut found, mut tried) = (0, 0);
+    for kind in kinds {
+        let record = record(kind, noise, samples);
+        for start in STARTS {
+            tried += 1;
+            let (whole, cut) = (fit(kind, true, &record, start), fit(kind, false, &record, start));
+            let Some(whole) = whole.filter(|whole| whole.outcome.converged()) else { continue };
+            let cut = cut.unwrap_or_else(|| panic!("kind {kind} from {start:?}: no estimate"));
+            assert!(whole.method.engine.contains("dual") && cut.method.engine.contains("graph"));
+            let what = format!("kind {kind} from {start:?}: {} {} {}", cut.cost, whole.cost, cut.outcome);
+            // Costs of the same minimum differ by rounding and by what the search leaves: a relative step of 1e-8.
+            assert!(cut.outcome.converged() && (cut.cost - whole.cost).abs() <= 1e-8 * whole.cost, "{what}");
+            for (a, b) in cut.unknowns.iter().zip(&whole.unknowns) {
+                let Some(error) = b.knowledge.standard_error() else { continue };
+                assert!((a.value - b.value).abs() <= 1e-3 * error, "{what}: {} {} {}", a.name, a.value, b.value);
+                let Some(own) = a.knowledge.standard_error() else { panic!("{what}: {} is not known", a.name) };
+                assert!((own / error - 1.0).abs() <= 1e-4, "{what}: {} known to {own}, {error}", a.name);
+            }
+            found += 1;
+        }
+    }
+    (found, tried)
+}
+
+#[test]
+fn affine_plants_from_far_starts() {
+    for noise in [0.0005, 0.05, 0.5] {
+        let (found, tried) = compare(AFFINE, noise, 2000);
+        println!("noise {noise}: {found} of {tried}");
+        assert!(found == tried, "noise {noise}: {found} of {tried}");
+    }
+}
+
+#[test]
+fn twenty_nonlinear_plants_from_far_starts() {
+    let (found, tried) = compare(NONLINEAR, 0.05, 800);
+    println!("{found} of {tried}");
+    assert!(found * 100 >= tried * 95, "{found} of {tried}");
+}
