@@ -3,8 +3,10 @@
 mod display;
 mod prediction;
 pub(crate) mod student;
+mod warning;
 
 pub use prediction::Prediction;
+pub use warning::{Warning, WarningCode};
 
 use crate::information::{Covariance, SquareMatrix};
 use crate::layout::Layout;
@@ -149,15 +151,6 @@ impl fmt::Display for Direction {
         let moves: Vec<String> = self.moves.iter().map(step).collect();
         write!(f, "{} are known only together: {} changes nothing", names.join(", "), moves.join(" with "))
     }
-}
-
-/// Something the reader of an estimate must know.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Warning {
-    /// How bad it is.
-    pub severity: Severity,
-    /// What it is, with the numbers and the remedy.
-    pub text: String,
 }
 
 /// What one experiment has for itself.

@@ -82,7 +82,7 @@
 //! | choose what is predicted | [`FreeRun`], [`Horizon`], [`Kalman`] |
 //! | weigh or filter errors, limit outliers | [`Weighting`], [`Loss`], [`Butterworth`] |
 //! | choose a search | [`optimize`]; argmin's solvers by [`Problem::objective`] |
-//! | read the result | [`Estimate`], [`Knowledge`], [`Warning`], [`Summary`] |
+//! | read the result | [`Estimate`], [`Knowledge`], [`Warning`], [`WarningCode`], [`Summary`] |
 //! | judge it | [`diagnose`], [`Report`] |
 //! | test a model | [`check`] |
 //! | estimate online | [`online`] |
@@ -202,7 +202,7 @@ pub use {
     error::{Error, Failure},
     estimate::{
         CovarianceMethod, Direction, Estimate, Knowledge, Method, NoiseModel, OutputFit, Prediction, Summary, Unknown,
-        Warning,
+        Warning, WarningCode,
     },
     experiment::{Experiment, ExperimentOf, Sample},
     fit::{Answers, Fit, Fleet, Records},

@@ -1,7 +1,7 @@
 //! Warnings about the data and the method of an estimate.
 
 use super::conclude::{Covariances, Judgement};
-use crate::estimate::{CovarianceMethod, Direction, Knowledge, Unknown, Warning};
+use crate::estimate::{CovarianceMethod, Direction, Knowledge, Unknown, Warning, WarningCode};
 use crate::layout::Kind;
 use crate::numeral::{counted, exact, number, p_value, percent};
 use crate::optimize::Severity;
@@ -14,8 +14,8 @@ const ZERO_DEVIATION: f64 = 1e-6;
 /// Factor by which autocorrelation may widen an interval before the severity is raised.
 const CORRELATION_MATTERS: f64 = 2.0;
 
-fn care(text: String) -> Warning {
-    Warning { severity: Severity::UsableWithCare, text }
+fn care(code: WarningCode, text: String) -> Warning {
+    Warning { code, severity: Severity::UsableWithCare, text }
 }
 
 impl Judgement<'_> {
@@ -33,21 +33,24 @@ impl Judgement<'_> {
         for unknown in unknowns {
             if let Knowledge::Held { bound } = unknown.knowledge {
                 let (Unknown { name, unit, .. }, bound) = (unknown, exact(bound));
-                warnings.push(care(format!("`{name}` is held at its bound {bound} {unit}: the data want it beyond")));
+                warnings.push(care(
+                    WarningCode::HeldAtBound,
+                    format!("`{name}` is held at its bound {bound} {unit}: the data want it beyond"),
+                ));
             }
         }
-        warnings.extend(
-            directions.iter().map(|d| care(format!("{d}; fix one, add a prior, or excite the system differently"))),
-        );
+        warnings.extend(directions.iter().map(|d| {
+            care(WarningCode::Unidentified, format!("{d}; fix one, add a prior, or excite the system differently"))
+        }));
         warnings.extend(self.step(unknowns));
         if !self.end.outcome.converged() && unknowns.iter().any(|row| row.knowledge.standard_error().is_some()) {
             let text =
                 "standard errors and intervals are those of a minimum, where the search did not arrive".to_owned();
-            warnings.push(Warning { severity: Severity::NotUsable, text });
+            warnings.push(Warning { code: WarningCode::NotAtMinimum, severity: Severity::NotUsable, text });
         }
         if let Some(write_error) = &self.end.write_error {
             let text = format!("the checkpoint could not be written ({write_error}); the search went on without it");
-            warnings.push(Warning { severity: Severity::Usable, text });
+            warnings.push(Warning { code: WarningCode::CheckpointNotWritten, severity: Severity::Usable, text });
         }
         warnings.extend(self.autocorrelation(covariances));
         warnings
@@ -61,10 +64,14 @@ impl Judgement<'_> {
                 "{measured} measurement(s) for {} unknown(s) leave nothing to tell the accuracy by; fix some, or record more",
                 unknowns.len()
             );
-            return Some(Warning { severity, text });
+            return Some(Warning { code: WarningCode::TooFewMeasurements, severity, text });
         }
         let none = unknowns.iter().all(|row| row.knowledge == Knowledge::Unidentified);
-        none.then(|| Warning { severity, text: "the data determine none of the unknowns".to_owned() })
+        none.then(|| Warning {
+            code: WarningCode::NothingDetermined,
+            severity,
+            text: "the data determine none of the unknowns".to_owned(),
+        })
     }
 
     /// Whether a predicted variance goes to zero: there the likelihood has no maximum.
@@ -81,7 +88,7 @@ impl Judgement<'_> {
             number(rmse, 2),
             unit = output.unit
         );
-        Some(Warning { severity: Severity::NotUsable, text })
+        Some(Warning { code: WarningCode::UnboundedLikelihood, severity: Severity::NotUsable, text })
     }
 
     fn gaps(&self) -> Vec<Warning> {
@@ -93,10 +100,13 @@ impl Judgement<'_> {
         let gaps = |(record, label): (&crate::record::Record, &String)| {
             let gaps = record.gaps();
             let (count, first) = (counted(gaps.len() as u64, "gap"), gaps.first()?);
-            Some(care(format!(
-                "time jumps in experiment `{label}` ({count}, the first: {first}): the input is taken as held meanwhile, \
+            Some(care(
+                WarningCode::TimeGaps,
+                format!(
+                    "time jumps in experiment `{label}` ({count}, the first: {first}): the input is taken as held meanwhile, \
                  which is seldom what happened; fit the pieces between (Experiment::without_gaps)"
-            )))
+                ),
+            ))
         };
         records.filter_map(gaps).collect()
     }
@@ -114,7 +124,7 @@ impl Judgement<'_> {
         let finer = finer.integrator();
         (shift > STEP_SHIFT).then(|| {
             let (part, errors) = (percent(part, 2), number(shift, 2));
-            care(format!(
+            care(WarningCode::CoarseStep, format!(
                 "the step is too coarse: with {finer} `{name}` would move by {part} of itself ({errors} standard errors); use \
                  a finer step"
             ))
@@ -132,7 +142,7 @@ impl Judgement<'_> {
         );
         let CovarianceMethod::Hac { lags } = covariances.method else {
             text += "; the intervals take them as white and are too narrow if the order of the samples matters";
-            return Some(care(text));
+            return Some(care(WarningCode::ColoredErrors, text));
         };
         let white = |i: usize| {
             let unit = covariances.unit.as_ref()?;
@@ -145,7 +155,7 @@ impl Judgement<'_> {
             text += &format!(", which makes them up to {} times as wide as for white errors", number(widest, 3));
         }
         let severity = if widest > CORRELATION_MATTERS { Severity::UsableWithCare } else { Severity::Usable };
-        Some(Warning { severity, text })
+        Some(Warning { code: WarningCode::ColoredErrors, severity, text })
     }
 }
 

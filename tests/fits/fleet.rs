@@ -49,7 +49,7 @@ fn same(fleet: &Result<Estimate<Surface>, Error>, single: &Result<Estimate<Surfa
             let kind = |estimate: &Estimate<Surface>| std::mem::discriminant(&estimate.outcome);
             assert_eq!(kind(fleet), kind(single), "{what}: {} {}", fleet.outcome, single.outcome);
             let kinds = |estimate: &Estimate<Surface>| -> Vec<_> {
-                estimate.warnings.iter().map(std::mem::discriminant).collect()
+                estimate.warnings.iter().map(|warning| warning.code).collect()
             };
             assert_eq!(kinds(fleet), kinds(single), "{what}: {:?} {:?}", fleet.warnings, single.warnings);
         }

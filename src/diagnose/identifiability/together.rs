@@ -67,7 +67,7 @@ pub(crate) fn reworded(warning: &Warning, directions: &[Direction], unknowns: &[
         let advice = warning.text.strip_prefix(&direction.to_string())?;
         Some(together(&absolute(direction, unknowns), 0.0, unknowns)? + advice)
     });
-    Warning { severity: warning.severity, text: found.unwrap_or_else(|| warning.text.clone()) }
+    Warning { code: warning.code, severity: warning.severity, text: found.unwrap_or_else(|| warning.text.clone()) }
 }
 
 /// The changes of a direction in the unknowns' own units.
