@@ -48,6 +48,13 @@ impl Window {
         }
     }
 
+    /// Says that no lane holds a sample.
+    pub(crate) fn forget(&mut self) {
+        self.begin.fill(0);
+        self.samples.fill(0);
+        self.whole = false;
+    }
+
     /// Numbers in each entry, one per lane.
     pub fn lanes(&self) -> usize {
         self.lanes
