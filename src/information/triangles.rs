@@ -39,7 +39,8 @@ impl Triangles {
         Self::with(Width::widest(), columns, lanes)
     }
 
-    fn with(width: Width, columns: usize, lanes: usize) -> Self {
+    /// The same for these registers.
+    pub(crate) fn with(width: Width, columns: usize, lanes: usize) -> Self {
         let all = columns + 1;
         // The lanes of a single register are absorbed where they stand.
         let copied = if lanes == width.lanes() { 0 } else { absorb::ROWS * all * REGISTER + LINE };

@@ -45,15 +45,15 @@ impl<'o> Absorber<'o> {
             self.weigh(window);
         }
         if window.has_variances() {
-            self.absorb_rows(window.lanes(), window.variance_rows_mut(), count);
+            self.absorb_rows(window.lanes(), window.width, window.variance_rows_mut(), count);
         }
-        self.absorb_rows(window.lanes(), window.rows_mut(), count);
+        self.absorb_rows(window.lanes(), window.width, window.rows_mut(), count);
     }
 
-    fn absorb_rows(&mut self, lanes: usize, rows: &mut [f64], count: usize) {
+    fn absorb_rows(&mut self, lanes: usize, width: Width, rows: &mut [f64], count: usize) {
         match lanes {
             1 => self.alone.get_or_insert_with(|| Alone::new(self.columns)).absorb(rows),
-            _ => self.triangles.get_or_insert_with(|| Triangles::new(self.columns, lanes)).absorb(rows, count),
+            _ => self.triangles.get_or_insert_with(|| Triangles::with(width, self.columns, lanes)).absorb(rows, count),
         }
     }
 
@@ -61,7 +61,8 @@ impl<'o> Absorber<'o> {
     fn square(&mut self, window: &mut Window) {
         let (lanes, columns, outputs) = (window.lanes(), window.columns(), window.outputs());
         self.squares.resize(lanes, 0.0);
-        wide::run(Width::widest(), Square { rows: window.rows_mut(), columns, squares: &mut self.squares });
+        let width = window.width;
+        wide::run(width, Square { rows: window.rows_mut(), columns, squares: &mut self.squares });
         for (lane, rows) in self.rows.iter_mut().enumerate() {
             *rows += match window.whole {
                 true => (window.samples[lane] * outputs) as u64,

@@ -4,7 +4,7 @@ use super::columns::Columns;
 use super::workspace::{Compiled, Workspace};
 use crate::record::Time;
 use crate::sweep::{Piece, Reached, RunError, Visit, Window};
-use crate::wide::{self, Task, Wide, Width};
+use crate::wide::{self, Task, Wide};
 
 /// Samples per window. Windows are counted from the begin of each piece, so that a lane's bits do not depend on the
 /// length of another.
@@ -178,9 +178,9 @@ impl<'r> Run<'r> {
             }
         }
         self.columns.read_measured(begins, samples, measured);
-        let rows = window.all_rows_mut();
+        let (register, rows) = (window.width, window.all_rows_mut());
         let errors = Errors { rows, measured, samples: samples * outputs, columns, lanes };
-        let finite = wide::run(Width::widest(), errors);
+        let finite = wide::run(register, errors);
         let all_lanes = u32::MAX >> (32 - lanes);
         let pieces = u32::MAX >> (32 - self.pieces.len());
         window.whole = finite && self.pieces.iter().enumerate().all(|(lane, _)| window.samples[lane] == samples);

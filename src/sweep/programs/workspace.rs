@@ -53,6 +53,7 @@ impl Workspace {
         let rows = WINDOW + usize::from(program.reads_next());
         let mut window = Window::new(lanes, program.outputs(), program.seeds().len(), WINDOW, variances);
         window.carry = vec![0.0; program.carried() * lanes];
+        window.width = program.width();
         Workspace {
             group,
             inputs: vec![0.0; rows * program.columns().len() * lanes],
