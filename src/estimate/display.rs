@@ -51,7 +51,7 @@ impl fmt::Display for Summary {
         line(f, &search, 0)?;
         let said = ["loss", "weighting", "pre-filter"].into_iter().zip([&m.loss, &m.weighting, &m.prefilter]);
         let said: Vec<String> = said.map(|(name, value)| format!("{name} {value}")).collect();
-        line(f, &format!("{}; {}; {}", m.predictor, m.integrator, said.join("; ")), 0)?;
+        line(f, &format!("{}; {}; model {}; {}", m.predictor, m.integrator, m.engine, said.join("; ")), 0)?;
         write!(f, "{}", wrapped(&format!("noise {}; covariance {}", m.noise, m.covariance), 0, 2))
     }
 }
