@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 pub struct GaussNewton {
     /// When to stop.
     pub stop: Stop,
+    #[serde(with = "crate::real")]
     x: Vec<f64>,
     trials: u64,
     outcome: Option<Outcome>,

@@ -33,6 +33,7 @@ struct Saved<S> {
     format: String,
     problem: String,
     iterations: u64,
+    #[serde(with = "crate::real")]
     coordinates: Vec<f64>,
     /// The solver as it was set, as text.
     settings: String,

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 /// What an unknown is in the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(tag = "code", content = "number", rename_all = "snake_case")]
 pub enum Role {
     /// Parameter number.
     Parameter(usize),
