@@ -2,7 +2,8 @@
 
 use greybox::optimize::Outcome;
 use greybox::{
-    Estimate, Experiment, ExperimentOf, Fit, Knowledge, Model, Scalar, Summary, Time, fixed, free, signals, simulate,
+    Estimate, Experiment, ExperimentOf, Fit, Knowledge, Loss, Model, Sample, Scalar, Summary, Time, fixed, free,
+    signals, simulate,
 };
 use jsonschema::{Registry, Validator};
 use serde_json::Value;
@@ -14,9 +15,13 @@ signals! {
     pub struct Coil { r: "ohm", l: "H", i0: "A" }
 }
 
-/// `l di/dt = u - r i`, seen with an offset `i0`
+/// `l di/dt = u - r i`, measured by a sensor of known gain with an offset `i0`
 #[derive(Clone, Debug)]
-struct Winding;
+struct Winding {
+    gain: f64,
+}
+
+const WINDING: Winding = Winding { gain: 1.0 };
 
 #[rustfmt::skip]
 impl Model for Winding {
@@ -25,7 +30,7 @@ impl Model for Winding {
         Current { i: (u.u - p.r * x.i) / p.l }
     }
     fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, p: &Coil<S>) -> Current<S> {
-        Current { i: x.i + p.i0 }
+        Current { i: x.i * self.gain + p.i0 }
     }
 }
 
@@ -33,14 +38,14 @@ fn record() -> ExperimentOf<Winding> {
     let time = Time::Uniform { start: 0.0, step: 1e-3 };
     let inputs: Vec<Voltage> = (0..300).map(|k| Voltage { u: if k / 25 % 2 == 0 { 5.0 } else { -3.0 } }).collect();
     let truth = Coil { r: 2.0, l: 0.02, i0: 0.0 };
-    let run = simulate(&Winding, &truth, &Current { i: 0.0 }, time.clone(), &inputs).unwrap();
+    let run = simulate(&WINDING, &truth, &Current { i: 0.0 }, time.clone(), &inputs).unwrap();
     let noisy = run.with_noise(Current { i: 0.02 }, 7);
-    Experiment::new(&Winding, time, inputs, noisy.outputs).unwrap().initial(Current { i: fixed(0.0) })
+    Experiment::new(&WINDING, time, inputs, noisy.outputs).unwrap().initial(Current { i: fixed(0.0) })
 }
 
 fn estimate() -> Estimate<Winding> {
     let parameters = Coil { r: free(1.0).within(0.0, 10.0), l: free(0.05).log(), i0: fixed(0.0) };
-    Fit::new(&Winding, &record()).parameters(parameters).run().unwrap()
+    Fit::new(&WINDING, &record()).parameters(parameters).run().unwrap()
 }
 
 /// Both schemas, for references between them.
@@ -149,7 +154,7 @@ fn experiments_follow_the_same_rule() {
     let record = record();
     let mut outputs: Vec<Current> = record.outputs().collect();
     outputs[3].i = f64::NAN;
-    let record = Experiment::new(&Winding, record.times().clone(), record.inputs().collect(), outputs).unwrap();
+    let record = Experiment::new(&WINDING, record.times().clone(), record.inputs().collect(), outputs).unwrap();
     let record = record.initial(Current { i: free(0.0).within(-1.0, f64::INFINITY) });
     let text = serde_json::to_string(&record).unwrap();
     assert!(text.contains(",null,") && text.contains("\"upper\":\"Infinity\""), "{text}");
@@ -157,4 +162,51 @@ fn experiments_follow_the_same_rule() {
     assert_eq!(serde_json::to_string(&read).unwrap(), text);
     let wrong = serde_json::from_str::<ExperimentOf<Winding>>(&text.replace("\"Infinity\"", "\"inf\"")).unwrap_err();
     assert!(wrong.to_string().contains("expected a number, null, \"Infinity\" or \"-Infinity\""), "{wrong}");
+}
+
+/// Least squares in other units: nothing but its values tells one from another.
+#[derive(Clone)]
+struct Scaled(f64);
+
+impl std::fmt::Debug for Scaled {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Scaled")
+    }
+}
+
+impl Loss for Scaled {
+    fn rho(&self, z: f64) -> f64 {
+        self.0 * z * z / 2.0
+    }
+    fn psi(&self, z: f64) -> f64 {
+        self.0 * z
+    }
+}
+
+/// A model of the same type with another constant, another weighting of the same form and another loss of the same name
+/// are other problems; the same ones are not.
+#[test]
+fn a_checkpoint_knows_constants_and_closures() {
+    let path = std::env::temp_dir().join(format!("greybox_checkpoint_{}.json", std::process::id()));
+    let record = record();
+    let run = |gain: f64, power: i32, loss: f64| {
+        let model = Winding { gain };
+        let parameters = Coil { r: free(1.0), l: free(0.05).log(), i0: fixed(0.0) };
+        let weighting = move |s: &Sample<Winding>| s.u.u.abs().powi(power);
+        Fit::new(&model, &record)
+            .parameters(parameters)
+            .weighting(weighting)
+            .loss(Scaled(loss))
+            .checkpoint(&path, 1)
+            .run()
+    };
+    let _ = std::fs::remove_file(&path);
+    let first = run(1.0, 1, 1.0).unwrap();
+    let again = run(1.0, 1, 1.0).unwrap();
+    assert!((again.parameters.r / first.parameters.r - 1.0).abs() < 1e-9, "the same problem goes on");
+    for (gain, power, loss) in [(1.001, 1, 1.0), (1.0, 2, 1.0), (1.0, 1, 0.5)] {
+        let refused = run(gain, power, loss).unwrap_err().to_string();
+        assert!(refused.contains("another problem") && refused.contains("constants"), "{refused}");
+    }
+    std::fs::remove_file(&path).unwrap();
 }
