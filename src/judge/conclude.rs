@@ -253,7 +253,11 @@ impl<'j> Judgement<'j> {
                 (None, Some(covariance)) => {
                     let standard_error = covariance.standard_error(i);
                     let (lower, upper) = student::interval(value, standard_error, transform, 0.95, self.degrees);
-                    Knowledge::Known { standard_error, lower, upper }
+                    // A factor beyond the largest number: nothing is known of a logarithm.
+                    match lower.is_finite() && upper.is_finite() {
+                        true => Knowledge::Known { standard_error, lower, upper },
+                        false => Knowledge::Unidentified,
+                    }
                 }
             };
             let index = |change: f64| {
