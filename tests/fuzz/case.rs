@@ -282,6 +282,9 @@ fn agree<M: Model>(fleet: &Result<Estimate<M>, Error>, single: &Result<Estimate<
             check(near || !single.outcome.converged(), || format!("the fleet finds {a:?}, the single fit {b:?}"))
         }
         (Err(fleet), Err(_)) => said(fleet),
+        // How far a fit comes within its time is chance.
+        (_, Err(single)) if single.to_string().contains("time limit") => Ok(()),
+        (Err(fleet), _) if fleet.to_string().contains("time limit") => Ok(()),
         (Ok(fleet), Err(single)) => Err(format!("the fleet finds {}, the single fit says {single}", fleet.outcome)),
         (Err(fleet), Ok(single)) => Err(format!("the fleet says {fleet}, the single fit finds {}", single.outcome)),
     }
