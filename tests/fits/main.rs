@@ -6,6 +6,7 @@ mod bad_input;
 mod bad_models;
 mod checks;
 mod closed_forms;
+mod closure_sweep;
 #[path = "../common/mod.rs"]
 mod common;
 mod far_starts;
