@@ -85,6 +85,11 @@ fn through<M: Model + Clone + 'static>(draw: &mut Draw, model: &M) -> Result<Tal
             Err(error) => return said(&error).map(|()| tally),
         };
         for (answer, record) in fleet.run(records.iter().cloned()).zip(&records) {
+            // A single fit cuts longer records into segments, whose first slopes are approximate; from far away it may go
+            // to another minimum.
+            if record.len() >= 512 {
+                continue;
+            }
             agree(&answer, &settings.applied(Fit::new(model, record).parameters(declared)).run())?;
         }
         tally.fleets = 1;
@@ -279,7 +284,9 @@ fn agree<M: Model>(fleet: &Result<Estimate<M>, Error>, single: &Result<Estimate<
             let values = |one: &Estimate<M>| known.iter().map(|&i| one.unknowns[i].value).collect::<Vec<_>>();
             let (a, b) = (values(fleet), values(single));
             let near = a.iter().zip(&b).all(|(a, b)| (a - b).abs() <= 1e-6 * a.abs().max(b.abs()));
-            check(near || !single.outcome.converged(), || format!("the fleet finds {a:?}, the single fit {b:?}"))
+            check(near || !single.outcome.converged(), || {
+                format!("the fleet finds {a:?}, {}, the single fit {b:?}, {}", fleet.outcome, single.outcome)
+            })
         }
         (Err(fleet), Err(_)) => said(fleet),
         // How far a fit comes within its time is chance.
