@@ -49,8 +49,10 @@ pub struct Test {
     /// Name of the test.
     pub name: String,
     /// Its statistic.
+    #[serde(with = "crate::real")]
     pub statistic: f64,
     /// Probability of such a statistic, or one further out, if the hypothesis is true.
+    #[serde(with = "crate::real")]
     pub p_value: f64,
     /// Whether the hypothesis may stand: `p_value` is at least [`LEVEL`].
     pub passed: bool,

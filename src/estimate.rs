@@ -1,19 +1,22 @@
 //! [`Summary`]: what a fit found, and how well it is known; and [`Estimate`], the same by the model's names.
 
 mod display;
+mod format;
+mod json;
 mod prediction;
 pub(crate) mod student;
 mod warning;
 
+pub use format::{Format, Version};
 pub use prediction::Prediction;
 pub use warning::{Warning, WarningCode};
 
 use crate::information::{Covariance, SquareMatrix};
 use crate::layout::Layout;
 use crate::model::Model;
-use crate::numeral::{counted, number, or_nan, pairs_or_nan};
+use crate::numeral::{counted, number};
 use crate::optimize::{Outcome, Severity};
-use crate::parameter::{Parameter, Transform, unbounded_above, unbounded_below};
+use crate::parameter::{Parameter, Transform};
 use crate::problem::Role;
 use crate::signals::{Of, Signals};
 use core::fmt;
@@ -21,19 +24,20 @@ use core::ops::Deref;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// What is known of one quantity.
+/// What is known of one quantity; in JSON with its name as `code`, in small letters.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "code", rename_all = "snake_case")]
 pub enum Knowledge {
     /// It was estimated; the interval covers it with 95 % probability (asymmetric, if its logarithm was estimated).
     Known {
         /// Standard error, in its own unit.
-        #[serde(deserialize_with = "or_nan")]
+        #[serde(with = "crate::real")]
         standard_error: f64,
-        /// Lower end of the 95 % interval; `null` in JSON stands for none.
-        #[serde(with = "unbounded_below")]
+        /// Lower end of the 95 % interval; minus infinity stands for none.
+        #[serde(with = "crate::real")]
         lower: f64,
-        /// Upper end of the 95 % interval; `null` in JSON stands for none.
-        #[serde(with = "unbounded_above")]
+        /// Upper end of the 95 % interval; infinity stands for none.
+        #[serde(with = "crate::real")]
         upper: f64,
     },
     /// It was given.
@@ -41,6 +45,7 @@ pub enum Knowledge {
     /// The data push it against this bound; it is kept there, and has no interval.
     Held {
         /// The bound.
+        #[serde(with = "crate::real")]
         bound: f64,
     },
     /// The data do not determine it; its value is where the search left it.
@@ -70,17 +75,19 @@ pub struct Unknown {
     /// Index of the experiment that it belongs to; `None` if all share it.
     pub experiment: Option<usize>,
     /// Estimated value.
-    #[serde(deserialize_with = "or_nan")]
+    #[serde(with = "crate::real")]
     pub value: f64,
     /// Where the search started.
-    #[serde(deserialize_with = "or_nan")]
+    #[serde(with = "crate::real")]
     pub start: f64,
     /// What is known of it.
     pub knowledge: Knowledge,
     /// Parametric error index (%), the others refitted: the relative change that doubles the sum of squares, in linear
     /// approximation (Tenerz 2011, eq. 5.14). Low is well excited. `None` where there is no interval, or the value is 0.
+    #[serde(with = "crate::real")]
     pub error_index: Option<f64>,
     /// The same with the others held.
+    #[serde(with = "crate::real")]
     pub error_index_held: Option<f64>,
     /// The coordinate that the optimizer worked in.
     pub transform: Transform,
@@ -95,7 +102,7 @@ pub struct ParameterEstimate {
     /// Unit.
     pub unit: String,
     /// Value; of a parameter that each experiment has for itself, the first experiment's.
-    #[serde(deserialize_with = "or_nan")]
+    #[serde(with = "crate::real")]
     pub value: f64,
     /// What is known of it.
     pub knowledge: Knowledge,
@@ -110,12 +117,13 @@ pub struct OutputFit {
     /// Samples measured.
     pub samples: u64,
     /// Root of the mean squared prediction error, in the output's unit, before any pre-filter.
-    #[serde(deserialize_with = "or_nan")]
+    #[serde(with = "crate::real")]
     pub rmse: f64,
     /// Fit (%): `100 (1 - |y - y_hat| / |y - mean y|)`; `None` if the measurement is constant.
+    #[serde(with = "crate::real")]
     pub fit_percent: Option<f64>,
     /// Standard deviation of the noise: given, or estimated from the (filtered) errors with `N - p` in the denominator.
-    #[serde(deserialize_with = "or_nan")]
+    #[serde(with = "crate::real")]
     pub sigma: f64,
 }
 
@@ -136,7 +144,7 @@ pub struct OutputEstimate {
 pub struct Direction {
     /// Name and relative change (to the largest among them) of each; moving them together so changes no prediction.
     /// Absolute, where the value is zero.
-    #[serde(deserialize_with = "pairs_or_nan")]
+    #[serde(with = "crate::real")]
     pub moves: Vec<(String, f64)>,
 }
 
@@ -162,13 +170,16 @@ pub struct ExperimentEstimate {
     /// Number of samples.
     pub samples: u64,
     /// Parameters of this experiment in the model's order: the common ones and its own.
+    #[serde(with = "crate::real")]
     pub parameters: Vec<f64>,
     /// State at the first sample.
+    #[serde(with = "crate::real")]
     pub initial_state: Vec<f64>,
 }
 
 /// Where the noise levels came from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum NoiseModel {
     /// They were given.
     Given,
@@ -192,8 +203,9 @@ impl fmt::Display for NoiseModel {
     }
 }
 
-/// How the covariance of the unknowns was made.
+/// How the covariance of the unknowns was made; in JSON with its name as `code`, in small letters with underscores.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "code", rename_all = "snake_case")]
 pub enum CovarianceMethod {
     /// From the curvature of the cost, for white errors.
     #[default]
@@ -253,6 +265,10 @@ pub struct Method {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Summary {
+    /// What kind of file its JSON is.
+    pub format: Format,
+    /// Which version of it.
+    pub version: Version,
     /// The model's quantities.
     pub layout: Layout,
     /// The parameters, in the model's order.
@@ -275,18 +291,19 @@ pub struct Summary {
     /// What the reader must know.
     pub warnings: Vec<Warning>,
     /// The minimized cost: the weighted sum of `rho` of the standardized errors, and half the squares of the priors.
-    #[serde(deserialize_with = "or_nan")]
+    #[serde(with = "crate::real")]
     pub cost: f64,
     /// Measurements used (samples times outputs).
     pub measurements: u64,
     /// `-2 ln` of the Gaussian likelihood of the (filtered) errors; not defined for weighted or robust fits.
+    #[serde(with = "crate::real")]
     pub deviance: Option<f64>,
     /// Trial steps of the search.
     pub iterations: u64,
     /// Passes over the data with slopes.
     pub evaluations: u64,
     /// Time taken (s).
-    #[serde(deserialize_with = "or_nan")]
+    #[serde(with = "crate::real")]
     pub seconds: f64,
     /// How it was made.
     pub method: Method,
@@ -419,6 +436,7 @@ impl<M: Model> Estimate<M> {
             parameters: M::Parameters::from_fn(|j| one.parameters[j]),
             initial_state: M::State::from_fn(|i| one.initial_state[i]),
         };
+        summary.check()?;
         Ok(Estimate {
             parameters: M::Parameters::from_fn(|j| summary.parameters[j].value),
             knowledge: M::Parameters::from_fn(|j| summary.parameters[j].knowledge),

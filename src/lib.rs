@@ -108,6 +108,7 @@ pub mod models;
 pub mod online;
 mod parameter;
 pub mod pmsm;
+mod real;
 mod scalar;
 mod signals;
 pub mod units;
@@ -131,6 +132,8 @@ mod estimate;
 mod experiment;
 #[cfg(feature = "std")]
 mod fit;
+#[cfg(feature = "std")]
+mod format;
 #[cfg(feature = "std")]
 mod functions;
 #[cfg(feature = "std")]

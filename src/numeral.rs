@@ -1,9 +1,7 @@
-//! How numbers are written: rounded for readers, and as null in JSON where they are not finite.
+//! How numbers are written for readers.
 
 #[cfg(test)]
 mod tests;
-
-use serde::{Deserialize, Deserializer};
 
 /// Digits that every `f64` can be trusted with; one more would show the rounding to binary (`1.1500000000000001`).
 const EXACT: usize = 15;
@@ -90,15 +88,4 @@ fn written(value: f64, digits: usize) -> String {
 /// Without the zeros that a fraction ends in.
 fn trimmed(text: &str) -> &str {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
-}
-
-/// Reads a number that is null where it was not finite, because JSON has no value for it: null is not a number.
-pub(crate) fn or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
-}
-
-/// The same of numbers with names.
-pub(crate) fn pairs_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<(String, f64)>, D::Error> {
-    let pairs = Vec::<(String, Option<f64>)>::deserialize(deserializer)?;
-    Ok(pairs.into_iter().map(|(name, value)| (name, value.unwrap_or(f64::NAN))).collect())
 }

@@ -34,12 +34,15 @@ pub struct Bootstrap {
     /// Refits begun.
     pub tried: u64,
     /// Standard deviation of each unknown over the refits.
+    #[serde(with = "crate::real")]
     pub standard_errors: Vec<f64>,
     /// Mean over the refits less the estimate.
+    #[serde(with = "crate::real")]
     pub bias: Vec<f64>,
     /// The 95 % interval of each: the percentiles of the refits, their deviations from the estimate stretched by
     /// `sqrt(n / (n - p))` for the degrees of freedom that residuals have lost (Davison and Hinkley, *Bootstrap Methods*,
     /// 1997, section 6.2.3).
+    #[serde(with = "crate::real")]
     pub intervals: Vec<(f64, f64)>,
     /// The seed that makes the same again.
     pub seed: u64,

@@ -15,14 +15,17 @@ pub struct Drift {
     /// Its unit.
     pub unit: String,
     /// Value and standard error in each of the estimates that know it.
+    #[serde(with = "crate::real")]
     pub values: Vec<(f64, f64)>,
     /// Mean, weighted by the inverse variances.
+    #[serde(with = "crate::real")]
     pub mean: f64,
     /// Whether they are one value (Cochran, Biometrics 10 (1954) 101).
     pub change: Test,
     /// Whether they show no trend, by the weighted regression on their number.
     pub trend: Test,
     /// Change from estimate to estimate, in the unit.
+    #[serde(with = "crate::real")]
     pub slope: f64,
 }
 

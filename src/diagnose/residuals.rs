@@ -41,19 +41,26 @@ pub struct Residuals {
     /// Residuals there are.
     pub samples: u64,
     /// How many independent ones they are worth.
+    #[serde(with = "crate::real")]
     pub effective_samples: f64,
     /// Mean, in the unit.
+    #[serde(with = "crate::real")]
     pub mean: f64,
     /// Standard deviation, in the unit.
+    #[serde(with = "crate::real")]
     pub standard_deviation: f64,
     /// Third standardized moment; zero for a symmetric distribution.
+    #[serde(with = "crate::real")]
     pub skewness: f64,
     /// Fourth standardized moment less three; zero for a normal distribution.
+    #[serde(with = "crate::real")]
     pub excess_kurtosis: f64,
     /// Correlation with the residuals 1, 2, ... samples before.
+    #[serde(with = "crate::real")]
     pub autocorrelation: Vec<f64>,
     /// White residuals stay within plus and minus this at 99 of 100 lags, each lag for itself; the test of Ljung and Box
     /// judges all lags together.
+    #[serde(with = "crate::real")]
     pub autocorrelation_band: f64,
     /// Correlation with each input and measured output that is not constant.
     pub correlations: Vec<Correlation>,

@@ -39,8 +39,10 @@ pub struct Restarts {
 #[serde(deny_unknown_fields)]
 pub struct Better {
     /// Its sum of squares as a part of the estimate's.
+    #[serde(with = "crate::real")]
     pub cost_ratio: f64,
     /// Names and values of the unknowns there.
+    #[serde(with = "crate::real")]
     pub unknowns: Vec<(String, f64)>,
 }
 
@@ -49,10 +51,12 @@ pub struct Better {
 #[serde(deny_unknown_fields)]
 pub struct Minimum {
     /// Its cost as a part of the estimate's, which is one.
+    #[serde(with = "crate::real")]
     pub cost_ratio: f64,
     /// Searches that ended in it.
     pub searches: u64,
     /// Names and values of the unknowns there.
+    #[serde(with = "crate::real")]
     pub unknowns: Vec<(String, f64)>,
 }
 

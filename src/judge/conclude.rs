@@ -6,8 +6,8 @@ use super::residual_pass::{Residuals, reason, residual_pass};
 use super::{noise, sandwich};
 use crate::error::Error;
 use crate::estimate::{
-    CovarianceMethod, ExperimentEstimate, Knowledge, Method, NoiseModel, OutputEstimate, ParameterEstimate, Summary,
-    Unknown, student,
+    CovarianceMethod, ExperimentEstimate, Format, Knowledge, Method, NoiseModel, OutputEstimate, ParameterEstimate,
+    Summary, Unknown, Version, student,
 };
 use crate::information::{Covariance, Undetermined};
 use crate::layout::{Kind, Quantity};
@@ -98,6 +98,8 @@ pub(crate) fn conclude_from(
     let problem = objective.problem;
     let measurements = judgement.residuals.measured;
     Ok(Summary {
+        format: Format,
+        version: Version,
         layout: problem.layout().clone(),
         parameters: judgement.parameters(&unknowns),
         experiments: judgement.experiments(),
@@ -251,7 +253,11 @@ impl<'j> Judgement<'j> {
                 (None, Some(covariance)) => {
                     let standard_error = covariance.standard_error(i);
                     let (lower, upper) = student::interval(value, standard_error, transform, 0.95, self.degrees);
-                    Knowledge::Known { standard_error, lower, upper }
+                    // A factor beyond the largest number: nothing is known of a logarithm.
+                    match lower.is_finite() && upper.is_finite() {
+                        true => Knowledge::Known { standard_error, lower, upper },
+                        false => Knowledge::Unidentified,
+                    }
                 }
             };
             let index = |change: f64| {

@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 pub struct GaussNewton {
     /// When to stop.
     pub stop: Stop,
+    #[serde(with = "crate::real")]
     x: Vec<f64>,
     trials: u64,
     outcome: Option<Outcome>,
@@ -69,7 +70,8 @@ impl GaussNewton {
         if let Some(outcome) = ended {
             return self.end(point, outcome);
         }
-        self.line = Line { step: point.full.clone().unwrap_or_default(), ..Line::default() };
+        let none = || vec![0.0; point.x.len()];
+        self.line = Line { step: point.full.clone().unwrap_or_else(none), ..Line::default() };
         self.shorten(point);
     }
 

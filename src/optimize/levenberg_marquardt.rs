@@ -32,6 +32,7 @@ pub struct LevenbergMarquardt<S = OwnSize> {
     pub stop: Stop,
     /// What a unit step of each unknown counts.
     pub scaling: S,
+    #[serde(with = "crate::real")]
     x: Vec<f64>,
     seen: Seen,
     descent: Descent,
@@ -56,7 +57,9 @@ pub struct LevenbergMarquardt<S = OwnSize> {
 /// A try that has ended.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Try {
+    #[serde(with = "crate::real")]
     x: Vec<f64>,
+    #[serde(with = "crate::real")]
     cost: f64,
     outcome: Outcome,
     trials: u64,

@@ -153,8 +153,9 @@ impl<'a> Settings<'a> {
                 if !(weight >= 0.0 && weight.is_finite()) {
                     let (name, t) = (record.name(), exact(record.time(k)));
                     return Err(Error::Option(format!(
-                        "weighting: the weight of sample {k} (t = {t} s) of experiment `{name}` is {weight}; weights must \
-                         be finite and not negative"
+                        "weighting: the weight of sample {k} (t = {t} s) of experiment `{name}` is {}; weights must \
+                         be finite and not negative",
+                        exact(weight)
                     )));
                 }
                 counts |= weight > 0.0 && record.outputs().iter().any(|channel| !channel.values[k].is_nan());

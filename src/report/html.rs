@@ -150,8 +150,9 @@ fn section(to: &mut Markup, section: &Section, level: usize, prose: &mut Prose) 
 fn title(to: &mut Markup, section: &Section) {
     to.text(&section.title);
     if section.severity > Severity::Usable {
+        let class = format!("mark {}", class(section.severity));
         let attributes: [(&str, &dyn Display); 4] = [
-            ("class", &format_args!("mark {}", class(section.severity))),
+            ("class", &class),
             ("role", &"img"),
             ("aria-label", &"named in the verdict"),
             ("title", &"named in the verdict"),

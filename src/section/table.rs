@@ -1,7 +1,7 @@
 //! [`Table`]: rows of named columns.
 
 use super::plain;
-use crate::numeral::{error_size, fit, number, or_nan, percent, resolved};
+use crate::numeral::{error_size, fit, number, percent, resolved};
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
@@ -29,8 +29,8 @@ pub enum Cell {
     Text(String),
     /// A number for programs, and how a reader sees it.
     Number {
-        /// The number; null in JSON, if it is not finite.
-        #[serde(deserialize_with = "or_nan")]
+        /// The number.
+        #[serde(with = "crate::real")]
         value: f64,
         /// The same rounded, perhaps with a unit.
         text: String,
