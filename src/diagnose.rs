@@ -74,6 +74,25 @@ impl Test {
 
 /// Tests of something (nested models, drift) as a section of a report; where one fails, the estimate is to be used with
 /// care.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// # let problem = Fit::new(&model, &record).parameters(start).problem()?;
+/// # let estimate = problem.run()?;
+/// use greybox::{Report, diagnose};
+/// let fixed = Winding { ls: greybox::fixed(4.1e-3), ..start };
+/// let restricted = Fit::new(&model, &record).parameters(fixed).run()?;
+/// let [a, b] = [&*restricted, &estimate].map(|one| diagnose::Candidate::new("model", one));
+/// let test = diagnose::likelihood_ratio(&a, &b)?;
+/// let report = Report::new(&problem, &estimate)?.with(diagnose::tested("nested models", [&test]));
+/// assert!(report.to_string().contains("likelihood ratio"));
+/// # Ok(())
+/// # }
+/// ```
 pub fn tested<'a>(about: &str, tests: impl IntoIterator<Item = &'a Test>) -> Section {
     let tests: Vec<&Test> = tests.into_iter().collect();
     let part = Section::new(format!("tests-{about}"), about).table(results(about, tests.iter().copied()));

@@ -77,6 +77,23 @@ impl<M: Model> Clone for Stepping<M> {
 ///
 /// Defaults: simulation error, squared loss, no weighting, noise estimated per output,
 /// [`LevenbergMarquardt`](crate::optimize::LevenbergMarquardt), and the default integrator of the model's kind.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// use greybox::{Huber, Rk4};
+/// let estimate = Fit::new(&model, &record)
+///     .parameters(Winding { rs: free(1.0).within(0.01, 10.0), ls: free(2e-3).log(), ke: free(0.7) })
+///     .loss(Huber::default())
+///     .integrator(Rk4 { substeps: 2 })
+///     .run()?;
+/// assert!((estimate.parameters.ke / 0.95 - 1.0).abs() < 0.001);
+/// # Ok(())
+/// # }
+/// ```
 pub struct Fit<'a, M: Model> {
     model: &'a M,
     experiments: &'a [ExperimentOf<M>],

@@ -50,6 +50,22 @@ pub struct Bootstrap {
 /// # Errors
 /// An estimate of another problem or one that cannot be simulated, and fewer than twenty refits that end; a time limit or a
 /// flag that stops it.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// # let problem = Fit::new(&model, &record).parameters(start).problem()?;
+/// # let estimate = problem.run()?;
+/// use greybox::diagnose::{Resampling, bootstrap};
+/// let drawn = bootstrap(&problem, &estimate, Resampling::Residuals, 100, 1)?; // 100 refits, seed 1
+/// let by_slopes = estimate.unknowns[0].knowledge.standard_error().unwrap();
+/// assert!((drawn.standard_errors[0] / by_slopes - 1.0).abs() < 0.3); // 100 refits know it to 7 %
+/// # Ok(())
+/// # }
+/// ```
 pub fn bootstrap(
     problem: &Problem<'_>,
     estimate: &Summary,

@@ -64,6 +64,20 @@ const SAME: f64 = 1e-6;
 ///
 /// # Errors
 /// A reach that is not above one, an estimate of another problem; a time limit or a flag that stops it.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// # let problem = Fit::new(&model, &record).parameters(start).problem()?;
+/// # let estimate = problem.run()?;
+/// let found = greybox::diagnose::restarts(&problem, &estimate, 10, 3.0, 1)?; // within a factor of 3, seed 1
+/// assert!(found.better.is_none() && found.same > 0, "{}", found.meaning);
+/// # Ok(())
+/// # }
+/// ```
 pub fn restarts(
     problem: &Problem<'_>,
     estimate: &Summary,
