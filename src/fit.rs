@@ -31,7 +31,7 @@ use argmin::core::observers::{Observe, ObserverMode};
 use core::marker::PhantomData;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicU64};
 use std::time::Duration;
 
 /// A model and its records, before the parameters are declared.
@@ -157,6 +157,12 @@ impl<'a, M: Model> Fit<'a, M> {
     /// Stops the search at its best point so far when the flag is set (by another thread, a signal handler).
     pub fn cancel(self, flag: Arc<AtomicBool>) -> Self {
         self.set(|settings| settings.cancel(flag))
+    }
+
+    /// Adds one to the counter whenever a search of a diagnosis that makes many ([`restarts`](crate::diagnose::restarts),
+    /// [`bootstrap`](crate::diagnose::bootstrap)) has ended, for a display of progress by another thread.
+    pub fn counter(self, counter: Arc<AtomicU64>) -> Self {
+        self.set(|settings| settings.counter(counter))
     }
 
     /// Stops the search at its best point so far after this time.

@@ -62,9 +62,26 @@ pub(crate) fn p_value(p: f64) -> String {
     if p < 1e-15 { "p < 1e-15".to_owned() } else { format!("p = {}", number(p, 2)) }
 }
 
-/// A number of things: `1 gap`, `3 gaps`.
+/// A number of things: `1 gap`, `3 gaps`, `24,841 samples`.
 pub(crate) fn counted(count: u64, thing: &str) -> String {
-    format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
+    format!("{} {thing}{}", whole(count), if count == 1 { "" } else { "s" })
+}
+
+/// A whole number, from five digits on in groups of three: `9999`, `24,841`.
+pub(crate) fn whole(count: u64) -> String {
+    let digits = count.to_string();
+    if digits.len() < 5 {
+        return digits;
+    }
+    let first = digits.len() % 3;
+    let mut text = digits[..first].to_owned();
+    for (k, digit) in digits[first..].chars().enumerate() {
+        if k % 3 == 0 && !text.is_empty() {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
 }
 
 fn written(value: f64, digits: usize) -> String {

@@ -1,12 +1,12 @@
 //! Bootstrap: refits of what the model could as well have measured. It asks for no normal distribution, and in blocks for
 //! no white residuals.
 
-use super::{Pinned, check_complete, minimize};
+use super::{Pinned, check_complete, minimize, searches};
 use crate::error::Error;
 use crate::estimate::Summary;
 use crate::numeral::resolved;
 use crate::optimize::LeastSquares;
-use crate::problem::{Problem, Simulated, each};
+use crate::problem::{Problem, Simulated};
 use crate::random::Random;
 use crate::record::Record;
 use crate::section::{Cell, Section, Table};
@@ -102,7 +102,7 @@ pub fn bootstrap(
         let (place, _) = minimize(Pinned { problem: &again, bounds: again.bounds() }, best.clone())?;
         Some(estimate.unknowns.iter().zip(&place).map(|(u, &c)| u.transform.to_value(c)).collect())
     };
-    let found: Vec<Vec<f64>> = each(count, refit).into_iter().flatten().collect();
+    let found: Vec<Vec<f64>> = searches(problem, count, refit).into_iter().flatten().collect();
     check_complete(problem, &control, "the bootstrap")?;
     if found.len() < 20 {
         return Err(Error::Option(format!(

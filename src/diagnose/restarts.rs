@@ -1,12 +1,12 @@
 //! Restarts: whether a search from elsewhere ends in a better minimum.
 
-use super::{Pinned, check_complete, linearize, minimize};
+use super::{Pinned, check_complete, linearize, minimize, searches};
 use crate::error::Error;
 use crate::estimate::Summary;
 use crate::numeral::number;
 use crate::optimize::{LeastSquares, Severity};
 use crate::parameter::Transform;
-use crate::problem::{Problem, each};
+use crate::problem::Problem;
 use crate::random::Random;
 use crate::section::{Axis, Cell, Curves, Drawing, Layer, Plot, Section, Style, Table};
 use serde::{Deserialize, Serialize};
@@ -115,7 +115,9 @@ pub fn restarts(
             })
             .collect()
     };
-    let found = each(count, |attempt| minimize(Pinned { problem: &objective, bounds: bounds.clone() }, start(attempt)));
+    let found = searches(problem, count, |attempt| {
+        minimize(Pinned { problem: &objective, bounds: bounds.clone() }, start(attempt))
+    });
     check_complete(problem, &control, "the search from other starts")?;
     let mut result = Restarts {
         tried: count as u64,

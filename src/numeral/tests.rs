@@ -50,6 +50,14 @@ fn a_fit_is_told_from_perfect() {
     assert_eq!((rounded(0.015, 0.001), rounded(1.000_02e-3, 0.001)), ("0.015".to_owned(), "0.001".to_owned()));
 }
 
+/// Groups of three from five digits on, where the eye no longer counts.
+#[test]
+fn large_counts_are_grouped() {
+    let texts = [0, 999, 4000, 10_000, 123_456, 9_876_543].map(whole);
+    assert_eq!(texts, ["0", "999", "4000", "10,000", "123,456", "9,876,543"]);
+    assert_eq!(counted(24_841, "sample"), "24,841 samples");
+}
+
 /// What is written as null is read as not a number.
 #[test]
 fn null_is_not_a_number() {

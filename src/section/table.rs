@@ -1,7 +1,7 @@
 //! [`Table`]: rows of named columns.
 
 use super::plain;
-use crate::numeral::{error_size, fit, number, or_nan, percent, resolved};
+use crate::numeral::{error_size, fit, number, or_nan, percent, resolved, whole};
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
@@ -150,6 +150,6 @@ impl From<String> for Cell {
 
 impl From<u64> for Cell {
     fn from(count: u64) -> Cell {
-        Cell::Number { value: count as f64, text: count.to_string() }
+        Cell::Number { value: count as f64, text: whole(count) }
     }
 }
