@@ -69,19 +69,25 @@ pub(crate) fn counted(count: u64, thing: &str) -> String {
 
 /// A whole number, from five digits on in groups of three: `9999`, `24,841`.
 pub(crate) fn whole(count: u64) -> String {
-    let digits = count.to_string();
-    if digits.len() < 5 {
-        return digits;
+    grouped(&count.to_string())
+}
+
+/// A written number whose digits before the point are in groups of three, if they are five or more: `-12,646.37`.
+pub(crate) fn grouped(text: &str) -> String {
+    let sign = if text.starts_with('-') { 1 } else { 0 };
+    let digits = text[sign..].chars().take_while(char::is_ascii_digit).count();
+    if digits < 5 {
+        return text.to_owned();
     }
-    let first = digits.len() % 3;
-    let mut text = digits[..first].to_owned();
-    for (k, digit) in digits[first..].chars().enumerate() {
-        if k % 3 == 0 && !text.is_empty() {
-            text.push(',');
+    let (whole, rest) = text.split_at(sign + digits);
+    let mut found = String::with_capacity(text.len() + digits / 3);
+    for (k, c) in whole.chars().enumerate() {
+        if k > sign && (sign + digits - k).is_multiple_of(3) {
+            found.push(',');
         }
-        text.push(digit);
+        found.push(c);
     }
-    text
+    found + rest
 }
 
 fn written(value: f64, digits: usize) -> String {

@@ -55,6 +55,8 @@ fn a_fit_is_told_from_perfect() {
 fn large_counts_are_grouped() {
     let texts = [0, 999, 4000, 10_000, 123_456, 9_876_543].map(whole);
     assert_eq!(texts, ["0", "999", "4000", "10,000", "123,456", "9,876,543"]);
+    let numbers = ["-12646.37", "-999.5", "1.2345e10", "123456.5", "0.12345"].map(grouped);
+    assert_eq!(numbers, ["-12,646.37", "-999.5", "1.2345e10", "123,456.5", "0.12345"]);
     assert_eq!(counted(24_841, "sample"), "24,841 samples");
 }
 

@@ -14,6 +14,7 @@ use greybox::{Estimate, Experiment, ExperimentOf, Fit, Model, Report, Time, fixe
 use models::{Behind, Coil, Current, Force, Mass, Position, Rotor, Shaft, Speed, Spring, Swing, Torque, Voltage};
 use std::path::Path;
 
+type Motor = (Surface, ExperimentOf<Surface>, Winding<greybox::Parameter>);
 type Outcome = Result<(), Box<dyn std::error::Error>>;
 
 /// Compares a picture with its files, or writes them.
@@ -104,7 +105,7 @@ fn chapter_1_rotor() -> Outcome {
 fn chapter_2_half_a_sample() -> Outcome {
     let model = Surface::new(4)?;
     let truth = Winding { rs: 3.6, ls: 1.8e-3, ke: 0.5 };
-    let voltage = |k: usize| Drive { ud: if k / 10 % 2 == 0 { 7.2 } else { -7.2 }, uq: 0.0, w: 0.0 };
+    let voltage = |k: usize| Drive { ud: if (k / 10).is_multiple_of(2) { 7.2 } else { -7.2 }, uq: 0.0, w: 0.0 };
     let both: Vec<Drive> = (0..800).map(|k| voltage(k / 2)).collect();
     let time = Time::Uniform { start: 0.0, step: 0.125e-3 };
     let still = Currents { id: 0.0, iq: 0.0 };
@@ -120,7 +121,7 @@ fn chapter_2_half_a_sample() -> Outcome {
 }
 
 /// The small record of a motor, and where its fits start.
-fn motor() -> Result<(Surface, ExperimentOf<Surface>, Winding<greybox::Parameter>), Box<dyn std::error::Error>> {
+fn motor() -> Result<Motor, Box<dyn std::error::Error>> {
     let model = Surface::new(4)?;
     let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
     Ok((model, record, Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) }))
