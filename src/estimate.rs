@@ -399,6 +399,25 @@ impl Summary {
 
 /// What a fit found, and how well it is known, by the names of its model; everything of the [`Summary`] can be read from
 /// it, too.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// use greybox::Knowledge;
+/// let estimate = Fit::new(&model, &record).parameters(start).run()?;
+/// let rs: f64 = estimate.parameters.rs; // by the model's names
+/// if let Knowledge::Known { standard_error, lower, upper } = estimate.knowledge.rs {
+///     println!("{rs:.4} ± {standard_error:.4} ohm, {lower:.4} to {upper:.4}");
+///     assert!(lower < 0.63 && 0.63 < upper); // the truth
+/// }
+/// assert!(estimate.outcome.converged() && estimate.warnings.is_empty()); // from its `Summary`
+/// assert!(estimate.quality.id.fit_percent.unwrap() > 98.0);
+/// # Ok(())
+/// # }
+/// ```
 pub struct Estimate<M: Model> {
     /// The parameters; of those that each experiment has for itself, the first experiment's.
     pub parameters: Of<M::Parameters, f64>,

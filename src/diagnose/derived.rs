@@ -31,6 +31,20 @@ pub struct Derived {
 
 /// A function of the parameters with its interval: `derived(&estimate, "kt", |p| p.ke * 1.5)`. Parameters that each
 /// experiment has for itself are those of the first; fixed ones count as exact.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// let estimate = Fit::new(&model, &record).parameters(start).run()?;
+/// // The electrical time constant, with the correlation of both parameters.
+/// let tau = greybox::diagnose::derived(&estimate, "tau", |p| p.ls / p.rs);
+/// assert!((tau.value - 6.347e-3).abs() < 1e-5 && tau.standard_error.unwrap() < 1e-5);
+/// # Ok(())
+/// # }
+/// ```
 pub fn derived<M: Model>(
     estimate: &Estimate<M>,
     name: &str,

@@ -119,6 +119,21 @@ const CLOSE: f64 = 1e-3;
 /// # Errors
 /// A name that no unknown has, a probability not between 0 and 1, an estimate of another problem; a time limit or a flag that
 /// stops it.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// # let problem = Fit::new(&model, &record).parameters(start).problem()?;
+/// # let estimate = problem.run()?;
+/// let profile = greybox::diagnose::profile(&problem, &estimate, "rs", 0.95)?;
+/// assert!(profile.covers(0.63)); // the truth
+/// assert!(!profile.covers(0.64));
+/// # Ok(())
+/// # }
+/// ```
 pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probability: f64) -> Result<Profile, Error> {
     let control = problem.control(Instant::now());
     let (objective, best) = problem.at_within(estimate, &control)?;
