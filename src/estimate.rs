@@ -84,6 +84,10 @@ pub struct Unknown {
     pub error_index_held: Option<f64>,
     /// The coordinate that the optimizer worked in.
     pub transform: Transform,
+    /// Degrees of freedom of Student's t in its interval: those of the fit, or fewer where the variance of colored errors
+    /// is itself an estimate from few independent stretches.
+    #[serde(deserialize_with = "or_nan")]
+    pub degrees_of_freedom: f64,
 }
 
 /// A parameter of the model: what was declared of it, and what was found.
@@ -318,7 +322,7 @@ impl Summary {
         if !(probability > 0.0 && probability < 1.0) {
             return None;
         }
-        Some(student::interval(unknown.value, error, unknown.transform, probability, self.degrees_of_freedom()))
+        Some(student::interval(unknown.value, error, unknown.transform, probability, unknown.degrees_of_freedom))
     }
 
     /// Correlation of some unknowns, by their numbers; zero where there is no interval, one on the diagonal.

@@ -1,7 +1,7 @@
 //! From the end of a search to a [`Summary`].
 
 use super::directions;
-use super::hac::{Hac, hac};
+use super::hac::hac;
 use super::residual_pass::{Residuals, reason, residual_pass};
 use super::{noise, sandwich};
 use crate::error::Error;
@@ -66,6 +66,8 @@ pub(super) struct Covariances {
     pub unknowns: Option<Covariance>,
     pub method: CovarianceMethod,
     pub unit: Option<Covariance>,
+    /// Degrees of freedom of the variance of each unknown.
+    pub degrees: Vec<f64>,
 }
 
 /// The summary at the end of a search; the objective has the whitening that it ended with.
@@ -215,8 +217,13 @@ impl<'j> Judgement<'j> {
             objective.problem.layout().kind != Kind::Static && self.residuals.measured >= CORRELATED_SAMPLES
         });
         let found = autocorrelated.and_then(|_| hac(objective, x, self.linear, &self.undetermined.held));
-        let found =
-            found.and_then(|Hac { sandwich, lags }| Some((sandwich.covariance(&self.undetermined.held)?, lags)));
+        let mut degrees = vec![self.degrees; self.slopes.len()];
+        let found = found.and_then(|hac| {
+            let covariance = hac.sandwich.covariance(&self.undetermined.held)?;
+            let of_hac = hac.degrees(objective, unit.as_ref()?);
+            degrees.iter_mut().zip(of_hac).for_each(|(degrees, of_hac)| *degrees = degrees.min(of_hac));
+            Some((covariance, hac.lags))
+        });
         let (found, method, factor) = match found {
             Some((covariance, lags)) => (Some(covariance), CovarianceMethod::Hac { lags: lags as u64 }, small_sample),
             None if sandwich::is_needed(objective) => {
@@ -235,7 +242,7 @@ impl<'j> Judgement<'j> {
         let seen = self.seen().into_iter().zip(&self.slopes);
         let in_units: Vec<f64> = seen.map(|(seen, slope)| if seen { *slope } else { 0.0 }).collect();
         let unknowns = found.map(|covariance| covariance.times(factor).scaled(&in_units));
-        Covariances { unknowns, method, unit }
+        Covariances { unknowns, method, unit, degrees }
     }
 
     fn unknowns(&self, covariances: &Covariances) -> Vec<Unknown> {
@@ -245,12 +252,13 @@ impl<'j> Judgement<'j> {
             let (unknown, value) = (&free[i], self.values[i]);
             let transform = unknown.parameter.transform;
             let covariance = covariances.unknowns.as_ref().filter(|_| seen[i] && self.degrees > 0.0);
+            let degrees_of_freedom = covariances.degrees[i];
             let knowledge = match (self.held_at[i], covariance) {
                 (Some(bound), _) => Knowledge::Held { bound },
                 (None, None) => Knowledge::Unidentified,
                 (None, Some(covariance)) => {
                     let standard_error = covariance.standard_error(i);
-                    let (lower, upper) = student::interval(value, standard_error, transform, 0.95, self.degrees);
+                    let (lower, upper) = student::interval(value, standard_error, transform, 0.95, degrees_of_freedom);
                     Knowledge::Known { standard_error, lower, upper }
                 }
             };
@@ -269,6 +277,7 @@ impl<'j> Judgement<'j> {
                 error_index: covariances.unit.as_ref().and_then(|unit| index(unit.standard_error(i))),
                 error_index_held: index(1.0 / self.norms[i]),
                 transform,
+                degrees_of_freedom,
             }
         };
         (0..free.len()).map(one).collect()

@@ -143,8 +143,7 @@ fn armature(random: &mut Random, samples: usize, rho: f64) -> Trial {
 const LAG: Lag = Lag { k: 2.0, tau: 0.05 };
 
 fn lag(random: &mut Random, samples: usize, rho: f64) -> Trial {
-    let inputs: Vec<Voltage> =
-        levels(random, samples, 20).into_iter().map(|u| Voltage { u: 1.5 + 0.5 * u }).collect();
+    let inputs: Vec<Voltage> = levels(random, samples, 20).into_iter().map(|u| Voltage { u: 1.5 + 0.5 * u }).collect();
     let mut outputs = clean(&FirstOrder, 0.01, &inputs, &Level { x: 0.0 }, &LAG);
     let noise = autoregressive(random, samples, rho);
     outputs.iter_mut().zip(noise).for_each(|(y, e)| y.x += 0.1 * e);
