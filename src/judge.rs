@@ -1,6 +1,7 @@
 //! Evaluation of the result of a search: noise, covariance, null directions, warnings.
 
 mod conclude;
+mod data_noise;
 mod directions;
 mod hac;
 pub(crate) mod noise;

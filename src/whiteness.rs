@@ -46,12 +46,6 @@ impl Autocorrelation {
     pub fn append(&mut self, other: &Autocorrelation) {
         self.sums.iter_mut().zip(&other.sums).for_each(|(sum, other)| *sum += other);
     }
-
-    /// Correlation with the value `1, 2, ...` samples before; zeros if there is no value but zero.
-    pub fn coefficients(&self) -> Vec<f64> {
-        let whole = if self.sums[0] > 0.0 { self.sums[0] } else { f64::INFINITY };
-        self.sums[1..].iter().map(|sum| sum / whole).collect()
-    }
 }
 
 /// A portmanteau test of errors whose size may change from sample to sample.
@@ -91,15 +85,17 @@ impl Portmanteau {
         self.squares.append(&other.squares);
     }
 
-    /// Correlation with the error before.
-    pub fn first(&self) -> f64 {
-        self.errors.coefficients().first().copied().unwrap_or(0.0)
+    /// The sum of products at a lag over its standard deviation without correlation, and the autocorrelation.
+    pub fn at(&self, lag: usize) -> (f64, f64) {
+        let (sum, squares) = (self.errors.sums[lag], self.squares.sums[lag]);
+        let over = |part: f64, whole: f64| if whole > 0.0 { part / whole } else { 0.0 };
+        (over(sum, squares.sqrt()), over(sum, self.errors.sums[0]))
     }
 
-    /// The probability that errors without correlation show as much of it at the lags from `first` on.
-    pub fn p_value(&self, first: usize) -> f64 {
-        let lags = self.errors.sums.iter().zip(&self.squares.sums).skip(first);
-        let terms: Vec<f64> = lags.filter(|(_, squares)| **squares > 0.0).map(|(sum, q)| sum * sum / q).collect();
+    /// The probability that errors without correlation show as much of it at lags `1..=lags`.
+    pub fn p_value(&self, lags: usize) -> f64 {
+        let sums = self.errors.sums.iter().zip(&self.squares.sums).skip(1).take(lags);
+        let terms: Vec<f64> = sums.filter(|(_, squares)| **squares > 0.0).map(|(sum, q)| sum * sum / q).collect();
         chi_squared_tail(terms.iter().sum(), terms.len() as f64)
     }
 }
@@ -158,6 +154,10 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
+    fn coefficients(of: &Autocorrelation) -> Vec<f64> {
+        of.sums[1..].iter().map(|sum| sum / of.sums[0]).collect()
+    }
+
     /// In one run or in many, the sums are those of the definition.
     #[test]
     fn runs_make_the_whole() {
@@ -167,7 +167,7 @@ mod tests {
             runs.add(run);
         }
         let whole: f64 = e.iter().map(|e| e * e).sum();
-        for (k, found) in runs.coefficients().into_iter().enumerate() {
+        for (k, found) in coefficients(&runs).into_iter().enumerate() {
             let expected = (k + 1..300).map(|t| e[t] * e[t - k - 1]).sum::<f64>() / whole;
             assert!((found - expected).abs() < 1e-14, "lag {}: {found} {expected}", k + 1);
         }
@@ -182,7 +182,7 @@ mod tests {
             let mut joined = piece(&e[..a]);
             joined.follow(&piece(&e[a..b]));
             joined.follow(&piece(&e[b..]));
-            for (found, expected) in joined.coefficients().iter().zip(runs.coefficients()) {
+            for (found, expected) in coefficients(&joined).iter().zip(coefficients(&runs)) {
                 assert!((found - expected).abs() < 1e-14, "{cuts:?}: {found} {expected}");
             }
         }

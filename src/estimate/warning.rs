@@ -30,6 +30,10 @@ pub enum WarningCode {
     TimeGaps,
     /// An unknown is held at a bound.
     HeldAtBound,
+    /// Noise in the measured states from which predictions restart.
+    RestartNoise,
+    /// Noise declared for the inputs, which biases the estimate.
+    InputNoise,
     /// Unknowns that the data cannot tell apart.
     Unidentified,
     /// A finer step would move an unknown.

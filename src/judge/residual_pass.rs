@@ -10,6 +10,8 @@ use std::sync::Arc;
 
 /// Lags of the whiteness test.
 const LAGS: usize = 20;
+/// Longest horizon over which errors are correlated.
+const HORIZON: usize = 100;
 /// Every how many windows one is simulated again with a finer step, and the most of them per record.
 const EVERY: usize = 16;
 const AGAIN: usize = 16;
@@ -38,6 +40,9 @@ pub(crate) struct Whiteness {
     pub p_value: f64,
     /// Autocorrelation at lag one.
     pub first: f64,
+    /// Standardized sum of products of errors a horizon apart, and their autocorrelation; zeros where predictions do not
+    /// restart, or from too far.
+    pub at_restart: (f64, f64),
 }
 
 /// Sums over one experiment.
@@ -70,7 +75,7 @@ impl<'s> Sums<'s> {
             outputs: vec![OutputSums::default(); outputs],
             measured: 0,
             log_determinant: 0.0,
-            portmanteaus: vec![Portmanteau::new(LAGS); outputs],
+            portmanteaus: vec![Portmanteau::new(LAGS.max(horizon(objective))); outputs],
             least_sigma: vec![f64::INFINITY; outputs],
             again: vec![],
             run: vec![],
@@ -200,7 +205,11 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
     let whiteness = |j: usize| {
         let mut total = all[0].portmanteaus[j].clone();
         all[1..].iter().for_each(|one| total.append(&one.portmanteaus[j]));
-        Whiteness { p_value: total.p_value(1), first: total.first() }
+        let at_restart = match horizon(objective) {
+            0 => (0.0, 0.0),
+            steps => total.at(steps),
+        };
+        Whiteness { p_value: total.p_value(LAGS), first: total.at(1).1, at_restart }
     };
     Residuals {
         outputs: sums.iter().map(OutputSums::fit).collect(),
@@ -212,6 +221,11 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
             .map(|j| all.iter().map(|one| one.least_sigma[j]).fold(f64::INFINITY, f64::min))
             .collect(),
     }
+}
+
+/// The horizon of predictions that restart; zero where they do not, or from too far.
+fn horizon(objective: &Objective<'_>) -> usize {
+    objective.sweep.restarts().filter(|steps| *steps <= HORIZON).unwrap_or(0)
 }
 
 fn failed(objective: &Objective<'_>, coordinates: &[f64]) -> Error {

@@ -52,6 +52,8 @@ impl Judgement<'_> {
             let text = format!("the checkpoint could not be written ({write_error}); the search went on without it");
             warnings.push(Warning { code: WarningCode::CheckpointNotWritten, severity: Severity::Usable, text });
         }
+        warnings.extend(self.restart_noise(unknowns));
+        warnings.extend(self.input_noise(unknowns));
         warnings.extend(self.autocorrelation(covariances));
         warnings
     }
@@ -137,7 +139,7 @@ impl Judgement<'_> {
         let output = &self.objective.problem.layout().outputs[output].name;
         let (probability, first) = (p_value(white.p_value.min(1.0)), number(white.first, 2));
         let mut text = format!(
-            "the errors of `{output}` are not white (Ljung-Box {probability}, correlation with the error before \
+            "the errors of `{output}` are not white (portmanteau {probability}, correlation with the error before \
              {first}): the model misses a part, or the noise is colored"
         );
         let CovarianceMethod::Hac { lags } = covariances.method else {

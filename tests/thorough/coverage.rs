@@ -40,6 +40,8 @@ struct Findings {
     codes: Vec<(WarningCode, f64)>,
     /// Part (%) with a HAC covariance.
     hac: f64,
+    /// Mean error of each unknown in standard errors.
+    bias: Vec<f64>,
 }
 
 fn number_from(variable: &str, otherwise: u64) -> u64 {
@@ -79,6 +81,11 @@ fn examine(case: &Case, records: u64, seed: u64) -> Findings {
             None => codes.push((warning.code, percent(1, trials.len()))),
         }
     }
+    let error = |trial: &Trial, i: usize| {
+        let unknown = &trial.summary.unknowns[i];
+        unknown.knowledge.standard_error().map_or(0.0, |error| (unknown.value - trial.truth[i]) / error)
+    };
+    let bias = |i: usize| trials.iter().map(|trial| error(trial, i)).sum::<f64>() / trials.len() as f64;
     let is_hac = |trial: &&Trial| matches!(trial.summary.method.covariance, greybox::CovarianceMethod::Hac { .. });
     Findings {
         name: case.name,
@@ -92,15 +99,16 @@ fn examine(case: &Case, records: u64, seed: u64) -> Findings {
             .map(|severity| percent(with(severity), trials.len())),
         codes,
         hac: percent(trials.iter().filter(is_hac).count(), trials.len()),
+        bias: (0..trials[0].truth.len()).map(bias).collect(),
     }
 }
 
 impl Findings {
     fn print(&self) {
-        let Findings { name, covered, missed, severity: [usable, care, not], codes, hac, .. } = self;
+        let Findings { name, covered, missed, severity: [usable, care, not], codes, hac, bias, .. } = self;
         let missed: Vec<String> = missed.iter().map(|[low, high]| format!("{low:.1}/{high:.1}")).collect();
         println!(
-            "{name:50} covered {covered:5.1?} missed {} usable {usable:.0} care {care:.0} not {not:.0} HAC {hac:.0} {codes:.0?}",
+            "{name:50} covered {covered:5.1?} missed {} usable {usable:.0} care {care:.0} not {not:.0} HAC {hac:.0} bias {bias:.1?} {codes:.0?}",
             missed.join(" ")
         );
     }
@@ -122,9 +130,19 @@ fn coverage() {
     for case in cases::all().iter().filter(|case| case.name.contains(&only)) {
         let findings = examine(case, records, seed);
         findings.print();
+        if std::env::var("COVERAGE_TEXT").is_ok() {
+            examine_text(case, seed);
+        }
         if !findings.holds() {
             wrong.push(format!("{}: {:.1?}", findings.name, findings.covered));
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+fn examine_text(case: &Case, seed: u64) {
+    for r in 0..2 {
+        let t = (case.trial)(&mut Random(seed.wrapping_mul(77) + r));
+        t.summary.warnings.iter().for_each(|w| println!("    {}", w.text));
+    }
 }

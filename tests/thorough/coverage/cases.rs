@@ -200,6 +200,7 @@ fn noisy_input(random: &mut Random, voltage: f64, speed: f64) -> Trial {
     }
     let record = record(&Armature, 2e-3, inputs, outputs, Current { i: 1.0 });
     let fit = Fit::new(&Armature, &record).parameters(winding());
+    let fit = fit.input_noise(Supply { u: voltage, w: 10.0 * speed });
     Trial { summary: fit.run().unwrap().into_summary(), truth: vec![WINDING.r, WINDING.l, WINDING.ke] }
 }
 
