@@ -1,5 +1,6 @@
 //! Evaluation of the result of a search: noise, covariance, null directions, warnings.
 
+mod bounds;
 mod conclude;
 mod data_noise;
 mod directions;

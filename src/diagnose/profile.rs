@@ -125,7 +125,7 @@ pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probabilit
     }
     let unknown = &estimate.unknowns[index];
     let linear = linearize(&objective, &best, "the profile")?;
-    let at_bound = |i: usize| i != index && matches!(estimate.unknowns[i].knowledge, Knowledge::Held { .. });
+    let at_bound = |i: usize| i != index && matches!(estimate.unknowns[i].knowledge, Knowledge::Held { end: None, .. });
     let held = undetermined(&linear, &(0..best.len()).map(at_bound).collect::<Vec<bool>>()).held;
     let covariance = linear.covariance(&held);
     // How far one standard error is, and how the others go along.

@@ -1,13 +1,14 @@
 //! From the end of a search to a [`Summary`].
 
-use super::directions;
 use super::hac::hac;
 use super::residual_pass::{Residuals, reason, residual_pass};
+use super::{bounds, directions};
 use super::{noise, sandwich};
 use crate::error::Error;
+use crate::estimate::student::Spread;
 use crate::estimate::{
     CovarianceMethod, ExperimentEstimate, Knowledge, Method, NoiseModel, OutputEstimate, ParameterEstimate, Summary,
-    Unknown, student,
+    Unknown,
 };
 use crate::information::{Covariance, Undetermined};
 use crate::layout::{Kind, Quantity};
@@ -53,6 +54,11 @@ pub(super) struct Judgement<'j> {
     /// Null directions of the scaled unknowns; and the unknowns held for the covariance: at a bound, or one for each
     /// null direction.
     pub undetermined: Undetermined,
+    /// Which unknowns the covariance takes as exact: those that are held, without those released, and one for each null
+    /// direction.
+    pub exact: Vec<bool>,
+    /// From the estimate to that without the bounds of the released unknowns.
+    pub release: Vec<f64>,
     /// Degrees of freedom: measurements minus estimated unknowns, at least zero.
     pub degrees: f64,
     /// Estimated noise level relative to that by which the errors were divided.
@@ -176,6 +182,8 @@ impl<'j> Judgement<'j> {
             _ if noise::only_scales(objective) => (linear.sum_of_squares() / degrees.max(1.0)).sqrt(),
             _ => (measured as f64 / degrees.max(1.0)).sqrt(),
         };
+        let (exact, release) =
+            bounds::released(linear, &undetermined, &at_bounds, Spread { standard_error: widening, degrees });
         let sigma = objective.whitening.sigma();
         let below = |(fit, sigma): (&crate::estimate::OutputFit, &f64)| fit.rmse < ROUNDING * sigma;
         let rounding = matches!(noise, Noise::Given(_)) && residuals.outputs.iter().zip(&sigma).all(below);
@@ -189,15 +197,18 @@ impl<'j> Judgement<'j> {
             norms,
             held_at,
             undetermined,
+            exact,
+            release,
             degrees,
             widening,
             rounding,
         })
     }
 
-    /// Whether an unknown is neither held at a bound nor part of a null direction.
+    /// Whether an unknown is neither held at a bound, without being released, nor part of a null direction.
     fn seen(&self) -> Vec<bool> {
-        let mut seen: Vec<bool> = self.held_at.iter().map(Option::is_none).collect();
+        let mut seen: Vec<bool> =
+            self.held_at.iter().zip(&self.exact).map(|(at, exact)| at.is_none() || !exact).collect();
         for direction in &self.undetermined.directions {
             directions::taking_part(direction).for_each(|(i, _)| seen[i] = false);
         }
@@ -211,15 +222,15 @@ impl<'j> Judgement<'j> {
 
     fn covariances(&self) -> Covariances {
         let (objective, x) = (self.objective, &self.end.coordinates);
-        let unit = self.linear.covariance(&self.undetermined.held);
+        let unit = self.linear.covariance(&self.exact);
         let small_sample = self.residuals.measured as f64 / self.degrees.max(1.0);
         let autocorrelated = self.autocorrelated().filter(|_| {
             objective.problem.layout().kind != Kind::Static && self.residuals.measured >= CORRELATED_SAMPLES
         });
-        let found = autocorrelated.and_then(|_| hac(objective, x, self.linear, &self.undetermined.held));
+        let found = autocorrelated.and_then(|_| hac(objective, x, self.linear, &self.exact));
         let mut degrees = vec![self.degrees; self.slopes.len()];
         let found = found.and_then(|hac| {
-            let covariance = hac.sandwich.covariance(&self.undetermined.held)?;
+            let covariance = hac.sandwich.covariance(&self.exact)?;
             let of_hac = hac.degrees(objective, unit.as_ref()?);
             degrees.iter_mut().zip(of_hac).for_each(|(degrees, of_hac)| *degrees = degrees.min(of_hac));
             Some((covariance, hac.lags))
@@ -229,12 +240,12 @@ impl<'j> Judgement<'j> {
             None if sandwich::is_needed(objective) => {
                 let filtered = objective.problem.settings.prefilter.is_some();
                 let method = if filtered { CovarianceMethod::FilteredSandwich } else { CovarianceMethod::Sandwich };
-                (sandwich::sandwich(objective, x, &self.undetermined.held).ok().flatten(), method, 1.0)
+                (sandwich::sandwich(objective, x, &self.exact).ok().flatten(), method, 1.0)
             }
             // The widening applies to the errors, not to the priors.
             None if self.widening != 1.0 && objective.problem.unknowns.priors(x).next().is_some() => {
                 let widened = objective.with(objective.whitening.widened(self.widening));
-                let covariance = widened.evaluate(x).ok().and_then(|linear| linear.covariance(&self.undetermined.held));
+                let covariance = widened.evaluate(x).ok().and_then(|linear| linear.covariance(&self.exact));
                 (covariance, CovarianceMethod::Classical, 1.0)
             }
             None => (unit.clone(), CovarianceMethod::Classical, self.widening * self.widening),
@@ -254,12 +265,20 @@ impl<'j> Judgement<'j> {
             let covariance = covariances.unknowns.as_ref().filter(|_| seen[i] && self.degrees > 0.0);
             let degrees_of_freedom = covariances.degrees[i];
             let knowledge = match (self.held_at[i], covariance) {
-                (Some(bound), _) => Knowledge::Held { bound },
+                (Some(bound), None) => Knowledge::Held { bound, end: None },
                 (None, None) => Knowledge::Unidentified,
-                (None, Some(covariance)) => {
+                (held, Some(covariance)) => {
                     let standard_error = covariance.standard_error(i);
-                    let (lower, upper) = student::interval(value, standard_error, transform, 0.95, degrees_of_freedom);
-                    Knowledge::Known { standard_error, lower, upper }
+                    let spread =
+                        Spread { standard_error: standard_error / self.slopes[i], degrees: degrees_of_freedom };
+                    let (lower, upper) = spread.interval(self.end.coordinates[i] + self.release[i], transform, 0.95);
+                    match held {
+                        Some(bound) => {
+                            let end = if bound == unknown.parameter.lower { upper } else { lower };
+                            Knowledge::Held { bound, end: Some(end) }
+                        }
+                        None => Knowledge::Known { standard_error, lower, upper },
+                    }
                 }
             };
             let index = |change: f64| {

@@ -31,11 +31,15 @@ impl Judgement<'_> {
         warnings.extend(self.unbounded());
         warnings.extend(self.gaps());
         for unknown in unknowns {
-            if let Knowledge::Held { bound } = unknown.knowledge {
+            if let Knowledge::Held { bound, end } = unknown.knowledge {
                 let (Unknown { name, unit, .. }, bound) = (unknown, exact(bound));
+                let reaches = match end {
+                    Some(end) => format!("; its 95 % interval reaches from there to {} {unit}", number(end, 3)),
+                    None => String::new(),
+                };
                 warnings.push(care(
                     WarningCode::HeldAtBound,
-                    format!("`{name}` is held at its bound {bound} {unit}: the data want it beyond"),
+                    format!("`{name}` is held at its bound {bound} {unit}: the data want it beyond{reaches}"),
                 ));
             }
         }

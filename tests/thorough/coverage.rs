@@ -48,9 +48,11 @@ fn number_from(variable: &str, otherwise: u64) -> u64 {
     std::env::var(variable).ok().and_then(|text| text.parse().ok()).unwrap_or(otherwise)
 }
 
+/// The ends of an interval; of unknowns at their lower bound, too.
 fn interval(knowledge: &Knowledge) -> (f64, f64) {
     match *knowledge {
         Knowledge::Known { lower, upper, .. } => (lower, upper),
+        Knowledge::Held { bound, end: Some(end) } => (bound, end),
         _ => (f64::NAN, f64::NAN),
     }
 }
