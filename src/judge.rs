@@ -2,6 +2,8 @@
 
 mod bounds;
 mod conclude;
+mod covariances;
+mod curved;
 mod data_noise;
 mod directions;
 mod hac;

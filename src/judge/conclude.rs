@@ -1,9 +1,9 @@
 //! From the end of a search to a [`Summary`].
 
-use super::hac::hac;
+use super::covariances::Covariances;
+use super::noise;
 use super::residual_pass::{Residuals, reason, residual_pass};
 use super::{bounds, directions};
-use super::{noise, sandwich};
 use crate::error::Error;
 use crate::estimate::student::Spread;
 use crate::estimate::{
@@ -11,12 +11,10 @@ use crate::estimate::{
     Unknown,
 };
 use crate::information::{Covariance, Undetermined};
-use crate::layout::{Kind, Quantity};
+use crate::layout::Quantity;
 use crate::optimize::{Linearization, Outcome};
 use crate::problem::{Memory, Noise, Objective, Role, Whitening};
 
-/// Below this number of measurements a HAC covariance is less accurate than the classical one.
-const CORRELATED_SAMPLES: u64 = 100;
 /// Residuals below this fraction of a given sigma are round-off: no whiteness test, no HAC.
 const ROUNDING: f64 = 0.1;
 /// Significance level of the whiteness test.
@@ -65,15 +63,6 @@ pub(super) struct Judgement<'j> {
     pub widening: f64,
     /// Whether the errors are far enough below a given noise to be round-off.
     pub rounding: bool,
-}
-
-/// The covariance of the unknowns in their own units, how it was made, and that of unit noise in coordinates.
-pub(super) struct Covariances {
-    pub unknowns: Option<Covariance>,
-    pub method: CovarianceMethod,
-    pub unit: Option<Covariance>,
-    /// Degrees of freedom of the variance of each unknown.
-    pub degrees: Vec<f64>,
 }
 
 /// The summary at the end of a search; the objective has the whitening that it ended with.
@@ -206,7 +195,7 @@ impl<'j> Judgement<'j> {
     }
 
     /// Whether an unknown is neither held at a bound, without being released, nor part of a null direction.
-    fn seen(&self) -> Vec<bool> {
+    pub(super) fn seen(&self) -> Vec<bool> {
         let mut seen: Vec<bool> =
             self.held_at.iter().zip(&self.exact).map(|(at, exact)| at.is_none() || !exact).collect();
         for direction in &self.undetermined.directions {
@@ -218,42 +207,6 @@ impl<'j> Judgement<'j> {
     /// The errors' autocorrelation; not computed where residuals are round-off.
     pub(super) fn autocorrelated(&self) -> Option<(usize, super::residual_pass::Whiteness)> {
         self.residuals.least_white().filter(|(_, white)| white.p_value < WHITENESS_LEVEL && !self.rounding)
-    }
-
-    fn covariances(&self) -> Covariances {
-        let (objective, x) = (self.objective, &self.end.coordinates);
-        let unit = self.linear.covariance(&self.exact);
-        let small_sample = self.residuals.measured as f64 / self.degrees.max(1.0);
-        let autocorrelated = self.autocorrelated().filter(|_| {
-            objective.problem.layout().kind != Kind::Static && self.residuals.measured >= CORRELATED_SAMPLES
-        });
-        let found = autocorrelated.and_then(|_| hac(objective, x, self.linear, &self.exact));
-        let mut degrees = vec![self.degrees; self.slopes.len()];
-        let found = found.and_then(|hac| {
-            let covariance = hac.sandwich.covariance(&self.exact)?;
-            let of_hac = hac.degrees(objective, unit.as_ref()?);
-            degrees.iter_mut().zip(of_hac).for_each(|(degrees, of_hac)| *degrees = degrees.min(of_hac));
-            Some((covariance, hac.lags))
-        });
-        let (found, method, factor) = match found {
-            Some((covariance, lags)) => (Some(covariance), CovarianceMethod::Hac { lags: lags as u64 }, small_sample),
-            None if sandwich::is_needed(objective) => {
-                let filtered = objective.problem.settings.prefilter.is_some();
-                let method = if filtered { CovarianceMethod::FilteredSandwich } else { CovarianceMethod::Sandwich };
-                (sandwich::sandwich(objective, x, &self.exact).ok().flatten(), method, 1.0)
-            }
-            // The widening applies to the errors, not to the priors.
-            None if self.widening != 1.0 && objective.problem.unknowns.priors(x).next().is_some() => {
-                let widened = objective.with(objective.whitening.widened(self.widening));
-                let covariance = widened.evaluate(x).ok().and_then(|linear| linear.covariance(&self.exact));
-                (covariance, CovarianceMethod::Classical, 1.0)
-            }
-            None => (unit.clone(), CovarianceMethod::Classical, self.widening * self.widening),
-        };
-        let seen = self.seen().into_iter().zip(&self.slopes);
-        let in_units: Vec<f64> = seen.map(|(seen, slope)| if seen { *slope } else { 0.0 }).collect();
-        let unknowns = found.map(|covariance| covariance.times(factor).scaled(&in_units));
-        Covariances { unknowns, method, unit, degrees }
     }
 
     fn unknowns(&self, covariances: &Covariances) -> Vec<Unknown> {

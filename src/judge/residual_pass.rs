@@ -209,7 +209,11 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
             0 => (0.0, 0.0),
             steps => total.at(steps),
         };
-        Whiteness { p_value: total.p_value(LAGS), first: total.at(1).1, at_restart }
+        Whiteness {
+            p_value: total.p_value(LAGS.min(sums[j].count as usize / 4).max(1)),
+            first: total.at(1).1,
+            at_restart,
+        }
     };
     Residuals {
         outputs: sums.iter().map(OutputSums::fit).collect(),

@@ -1,6 +1,7 @@
 //! Warnings about the data and the method of an estimate.
 
-use super::conclude::{Covariances, Judgement};
+use super::conclude::Judgement;
+use super::covariances::Covariances;
 use crate::estimate::{CovarianceMethod, Direction, Knowledge, Unknown, Warning, WarningCode};
 use crate::layout::Kind;
 use crate::numeral::{counted, exact, number, p_value, percent};
@@ -56,6 +57,7 @@ impl Judgement<'_> {
             let text = format!("the checkpoint could not be written ({write_error}); the search went on without it");
             warnings.push(Warning { code: WarningCode::CheckpointNotWritten, severity: Severity::Usable, text });
         }
+        warnings.extend(self.curved(unknowns, covariances));
         warnings.extend(self.restart_noise(unknowns));
         warnings.extend(self.input_noise(unknowns));
         warnings.extend(self.autocorrelation(covariances));

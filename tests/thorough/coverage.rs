@@ -145,6 +145,7 @@ fn coverage() {
 fn examine_text(case: &Case, seed: u64) {
     for r in 0..2 {
         let t = (case.trial)(&mut Random(seed.wrapping_mul(77) + r));
+        println!("    {:?}", t.summary.unknowns.iter().map(|u| (u.value, u.knowledge)).collect::<Vec<_>>());
         t.summary.warnings.iter().for_each(|w| println!("    {}", w.text));
     }
 }
