@@ -1,11 +1,16 @@
 //! Evaluation of the result of a search: noise, covariance, null directions, warnings.
 
+mod color;
 mod conclude;
+mod data;
 mod directions;
+mod explained;
 mod hac;
+mod known;
 pub(crate) mod noise;
 mod residual_pass;
 mod sandwich;
+mod suspects;
 mod warnings;
 
 pub(crate) use conclude::{SearchEnd, conclude, conclude_from};

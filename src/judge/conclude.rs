@@ -2,6 +2,7 @@
 
 use super::directions;
 use super::hac::{Hac, hac};
+use super::known::is_error;
 use super::residual_pass::{Residuals, reason, residual_pass};
 use super::{noise, sandwich};
 use crate::error::Error;
@@ -171,7 +172,9 @@ impl<'j> Judgement<'j> {
         let noise = &objective.problem.settings.noise;
         let widening = match noise {
             Noise::Given(_) | Noise::Predicted => 1.0,
-            _ if noise::only_scales(objective) => (linear.sum_of_squares() / degrees.max(1.0)).sqrt(),
+            _ if noise::only_scales(objective) => {
+                (linear.sum_of_squares() / degrees.max(1.0)).sqrt().max(noise::rounding(objective))
+            }
             _ => (measured as f64 / degrees.max(1.0)).sqrt(),
         };
         let sigma = objective.whitening.sigma();
@@ -194,7 +197,7 @@ impl<'j> Judgement<'j> {
     }
 
     /// Whether an unknown is neither held at a bound nor part of a null direction.
-    fn seen(&self) -> Vec<bool> {
+    pub(super) fn seen(&self) -> Vec<bool> {
         let mut seen: Vec<bool> = self.held_at.iter().map(Option::is_none).collect();
         for direction in &self.undetermined.directions {
             directions::taking_part(direction).for_each(|(i, _)| seen[i] = false);
@@ -245,6 +248,7 @@ impl<'j> Judgement<'j> {
             let (unknown, value) = (&free[i], self.values[i]);
             let transform = unknown.parameter.transform;
             let covariance = covariances.unknowns.as_ref().filter(|_| seen[i] && self.degrees > 0.0);
+            let covariance = covariance.filter(|covariance| is_error(covariance.standard_error(i)));
             let knowledge = match (self.held_at[i], covariance) {
                 (Some(bound), _) => Knowledge::Held { bound },
                 (None, None) => Knowledge::Unidentified,

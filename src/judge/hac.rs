@@ -85,6 +85,10 @@ fn long_run(objective: &Objective<'_>, e: usize, coordinates: &[f64], kept: &[us
     let w = root.solve_upper_triangular(&DMatrix::identity(n, n))?;
     let standard = |product: &DMatrix<f64>| w.transpose() * product * &w / length;
     let (one, two) = (standard(&products[0]), standard(&products[1]));
+    // A decomposition of what is not finite would panic.
+    if !one.iter().all(|value| value.is_finite()) {
+        return None;
+    }
     let mut svd = one.clone().try_svd(true, true, f64::EPSILON, 1000)?;
     svd.singular_values.iter_mut().for_each(|value| *value = value.min(LARGEST));
     let a = svd.recompose().ok()?;

@@ -26,6 +26,8 @@ pub(crate) struct Residuals {
     pub step_error: f64,
     /// The whiteness of each output's errors.
     pub whiteness: Vec<Whiteness>,
+    /// Mean and standard deviation of each output's measurements.
+    pub levels: Vec<(f64, f64)>,
     /// The smallest standard deviation that was predicted for a measurement of each output; infinite without
     /// predictions.
     pub least_sigma: Vec<f64>,
@@ -38,6 +40,43 @@ pub(crate) struct Whiteness {
     pub p_value: f64,
     /// Autocorrelation at lag one.
     pub first: f64,
+    /// The part of the errors' variance that follows from the errors before, by an autoregression over all lags, less
+    /// what white errors show by chance.
+    pub predicted: f64,
+    /// How many errors have the information of one independent error on a slow signal.
+    pub dependence: f64,
+}
+
+impl Whiteness {
+    /// From the autocorrelations at lags `1, 2, ...` of so many errors.
+    fn new(coefficients: &[f64], count: u64) -> Self {
+        let (_, p_value) = ljung_box(coefficients, count);
+        let (first, lags) = (coefficients.first().copied().unwrap_or(0.0), coefficients.len() as f64);
+        // What chance leaves, as in an adjusted coefficient of determination.
+        let free = (count as f64 - lags).max(1.0) / (count as f64).max(1.0);
+        let predicted = (1.0 - innovation(coefficients) / free).clamp(0.0, 1.0);
+        let positive: f64 = coefficients.iter().take_while(|rho| **rho > 0.0).sum();
+        let autoregression = (1.0 + first) / (1.0 - first).max(f64::EPSILON);
+        let dependence = (1.0 + 2.0 * positive).max(autoregression).max(1.0);
+        Whiteness { p_value, first, predicted, dependence }
+    }
+}
+
+/// Variance of the errors less what follows from those before, as a part of it (Levinson and Durbin's recursion).
+fn innovation(coefficients: &[f64]) -> f64 {
+    let (mut variance, mut model): (f64, Vec<f64>) = (1.0, vec![]);
+    for (k, rho) in coefficients.iter().enumerate() {
+        let known: f64 = model.iter().enumerate().map(|(i, a)| a * coefficients[k - 1 - i]).sum();
+        let next = (rho - known) / variance;
+        if !(next.abs() < 1.0) {
+            return variance;
+        }
+        let turned: Vec<f64> = model.iter().rev().map(|a| next * a).collect();
+        model.iter_mut().zip(turned).for_each(|(a, by)| *a -= by);
+        model.push(next);
+        variance *= 1.0 - next * next;
+    }
+    variance
 }
 
 /// Sums over one experiment.
@@ -192,12 +231,11 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
     let whiteness = |j: usize| {
         let mut total = all[0].autocorrelations[j].clone();
         all[1..].iter().for_each(|one| total.append(&one.autocorrelations[j]));
-        let coefficients = total.coefficients();
-        let (_, p_value) = ljung_box(&coefficients, total.count());
-        Whiteness { p_value, first: coefficients.first().copied().unwrap_or(0.0) }
+        Whiteness::new(&total.coefficients(), total.count())
     };
     Residuals {
         outputs: sums.iter().map(OutputSums::fit).collect(),
+        levels: sums.iter().map(OutputSums::level).collect(),
         measured,
         log_determinant,
         step_error,
@@ -335,6 +373,13 @@ impl OutputSums {
         self.sum += other.sum + n * shift;
         self.errors += other.errors;
         self.count += other.count;
+    }
+
+    /// Mean and standard deviation of the values.
+    fn level(&self) -> (f64, f64) {
+        let n = self.count.max(1) as f64;
+        let spread = (self.squares - self.sum * self.sum / n).max(0.0);
+        (self.first + self.sum / n, (spread / n).sqrt())
     }
 
     fn fit(&self) -> OutputFit {

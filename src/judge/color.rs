@@ -1,0 +1,60 @@
+//! Warnings about errors that are correlated over time.
+
+use super::conclude::{Covariances, Judgement};
+use crate::estimate::{CovarianceMethod, Warning, WarningCode};
+use crate::numeral::{counted, number, p_value, percent};
+use crate::optimize::Severity;
+
+/// Level of the test of whiteness below which the color is no chance; between this and the level at which intervals are
+/// widened it is a note.
+const CERTAIN: f64 = 1e-4;
+/// The part of an output's movement that is an error, and follows from the errors before: below the first it is a note,
+/// above the second the model is wrong or the noise hides the plant.
+const SMALL: f64 = 1e-3;
+const LARGE: f64 = 0.5;
+
+impl Judgement<'_> {
+    /// Whether the errors are autocorrelated, how much of the output that is, and what of it the intervals allow for.
+    pub(super) fn autocorrelation(&self, covariances: &Covariances) -> Option<Warning> {
+        let (output, white) = self.autocorrelated()?;
+        let colored = |j: usize| {
+            let (rmse, (_, moves)) = (self.residuals.outputs[j].rmse, self.residuals.levels[j]);
+            if moves > 0.0 { rmse / moves * self.residuals.whiteness[j].predicted.sqrt() } else { 0.0 }
+        };
+        let count = self.residuals.whiteness.len();
+        let certain = (0..count).filter(|&j| self.residuals.whiteness[j].p_value * (count as f64) < CERTAIN);
+        let part = certain.map(colored).fold(0.0, f64::max);
+        let severity = match part {
+            part if part > LARGE => Severity::NotUsable,
+            part if part > SMALL => Severity::UsableWithCare,
+            _ => Severity::Usable,
+        };
+        let output = &self.objective.problem.layout().outputs[output].name;
+        let (probability, first) = (p_value(white.p_value.min(1.0)), number(white.first, 2));
+        let mut text = format!(
+            "the errors of `{output}` are not white (Ljung-Box {probability}, correlation with the error before \
+             {first}): the model misses a part, or the noise is colored"
+        );
+        if part > SMALL {
+            text += &format!("; the colored part is {} of what an output moves", percent(part, 2));
+        }
+        let CovarianceMethod::Hac { lags } = covariances.method else {
+            text += "; the intervals take them as white and are too narrow if the order of the samples matters";
+            return Some(Warning { code: WarningCode::ColoredErrors, severity, text });
+        };
+        let white = |i: usize| {
+            let unit = covariances.unit.as_ref()?;
+            Some(unit.standard_error(i) * self.widening * self.slopes[i].abs()).filter(|error| *error > 0.0)
+        };
+        let widened = |i: usize| Some(covariances.unknowns.as_ref()?.standard_error(i) / white(i)?);
+        let widest = (0..self.slopes.len()).filter_map(widened).fold(0.0, f64::max);
+        text += &format!(
+            "; the intervals allow for colored noise (HAC over {}, prewhitened), not for a wrong model",
+            counted(lags, "lag")
+        );
+        if widest > 1.0 {
+            text += &format!("; they are up to {} times as wide as for white errors", number(widest, 3));
+        }
+        Some(Warning { code: WarningCode::ColoredErrors, severity, text })
+    }
+}

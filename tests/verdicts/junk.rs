@@ -1,0 +1,291 @@
+//! Records that no fit can make sense of, or whose fit misleads.
+
+use crate::plants::*;
+use crate::random::Random;
+use greybox::pmsm::Surface;
+
+/// A kind of fault, and what is said of it with this seed.
+pub struct Junk {
+    pub name: &'static str,
+    pub judged: fn(u64) -> Found,
+    /// Why it cannot be seen in principle, where that is so.
+    pub unseen: Option<&'static str>,
+}
+
+const SAMPLES: usize = 500;
+/// Noise, as a part of the standard deviation of each output.
+const NOISE: f64 = 0.02;
+
+/// A record of the plant of this number with a little noise, and what a fault makes of it.
+fn spoiled(seed: u64, fault: impl Fn(&mut Columns, &mut Random)) -> Found {
+    spoil(plant(seed), seed, fault)
+}
+
+/// The same of a plant with two outputs.
+fn spoiled_two(seed: u64, fault: impl Fn(&mut Columns, &mut Random)) -> Found {
+    spoil(plant_of_two(seed), seed, fault)
+}
+
+fn spoil(plant: Box<dyn Plant>, seed: u64, fault: impl Fn(&mut Columns, &mut Random)) -> Found {
+    let mut columns = plant.record(seed, SAMPLES).noisy(NOISE, 0.0, seed);
+    fault(&mut columns, &mut Random(seed ^ 0xfa17));
+    plant.fit(&columns, &How::default(), seed)
+}
+
+/// The record of one plant given to the model of another.
+fn mistaken<A: greybox::Model, B: greybox::Model>(measured: Bench<A>, model: Bench<B>, seed: u64) -> Found {
+    let record = measured.record(seed, SAMPLES).noisy(NOISE, 0.0, seed);
+    model.fit(&Columns { step: model.step, ..record }, &How::default(), seed)
+}
+
+fn shuffle(values: &mut [f64], random: &mut Random) {
+    for k in (1..values.len()).rev() {
+        values.swap(k, (random.uniform() * (k + 1) as f64) as usize);
+    }
+}
+
+fn range(values: &[f64]) -> (f64, f64) {
+    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)))
+}
+
+/// Each column delayed by so many samples.
+fn delayed(columns: &mut [Vec<f64>], by: usize) {
+    for column in columns {
+        let first = column[0];
+        column.rotate_right(by);
+        column[..by].fill(first);
+    }
+}
+
+const fn seen(name: &'static str, judged: fn(u64) -> Found) -> Junk {
+    Junk { name, judged, unseen: None }
+}
+
+const fn unseen(name: &'static str, why: &'static str, judged: fn(u64) -> Found) -> Junk {
+    Junk { name, judged, unseen: Some(why) }
+}
+
+fn sensors() -> Vec<Junk> {
+    vec![
+        seen("dead sensors: all outputs zero", |s| spoiled(s, |c, _| c.y.iter_mut().for_each(|y| y.fill(0.0)))),
+        seen("stuck sensors: all outputs one", |s| spoiled(s, |c, _| c.y.iter_mut().for_each(|y| y.fill(1.0)))),
+        seen("one of two outputs dead", |s| spoiled_two(s, |c, _| c.y[(s % 2) as usize].fill(0.0))),
+        seen("outputs are white noise", |s| spoiled(s, |c, r| c.y.iter_mut().flatten().for_each(|y| *y = r.normal()))),
+        seen("outputs are a random walk", |s| {
+            spoiled(s, |c, r| {
+                for y in &mut c.y {
+                    let mut at = 0.0;
+                    y.iter_mut().for_each(|y| {
+                        at += r.normal();
+                        *y = at;
+                    });
+                }
+            })
+        }),
+        seen("outputs are a sine of their own", |s| {
+            spoiled(s, |c, r| {
+                for y in &mut c.y {
+                    let (rate, sigma) = (0.02 + 0.1 * r.uniform(), deviation(y));
+                    y.iter_mut()
+                        .enumerate()
+                        .for_each(|(k, y)| *y = sigma * ((rate * k as f64).sin() + 0.02 * r.normal()));
+                }
+            })
+        }),
+        seen("one of two outputs is noise", |s| {
+            spoiled_two(s, |c, r| {
+                let y = &mut c.y[(s % 2) as usize];
+                let sigma = deviation(y);
+                y.iter_mut().for_each(|y| *y = sigma * r.normal());
+            })
+        }),
+        seen("sensor stuck for the last third", |s| {
+            spoiled(s, |c, _| {
+                for y in &mut c.y {
+                    let stuck = y[2 * SAMPLES / 3];
+                    y[2 * SAMPLES / 3..].fill(stuck);
+                }
+            })
+        }),
+        seen("sensor clipped to the middle half of its range", |s| {
+            spoiled(s, |c, _| {
+                for y in &mut c.y {
+                    let (low, high) = range(y);
+                    let quarter = 0.25 * (high - low);
+                    y.iter_mut().for_each(|y| *y = y.clamp(low + quarter, high - quarter));
+                }
+            })
+        }),
+        seen("sensor of two values", |s| {
+            spoiled(s, |c, _| {
+                for y in &mut c.y {
+                    let (middle, sigma) = (y.iter().sum::<f64>() / y.len() as f64, deviation(y));
+                    y.iter_mut().for_each(|y| *y = middle + if *y > middle { sigma } else { -sigma });
+                }
+            })
+        }),
+        seen("sentinels -999 in one of fifty samples", |s| {
+            spoiled(s, |c, r| c.y.iter_mut().flatten().filter(|_| r.uniform() < 0.02).for_each(|y| *y = -999.0))
+        }),
+        seen("a block of the outputs repeated", |s| {
+            spoiled(s, |c, _| c.y.iter_mut().for_each(|y| y.copy_within(50..200, 300)))
+        }),
+        seen("sensor rectified", |s| {
+            spoiled(s, |c, _| {
+                for y in &mut c.y {
+                    let middle = y.iter().sum::<f64>() / y.len() as f64;
+                    y.iter_mut().for_each(|y| *y = middle + (*y - middle).abs());
+                }
+            })
+        }),
+        seen("drift as large as the signal", |s| {
+            spoiled(s, |c, _| {
+                for y in &mut c.y {
+                    let sigma = deviation(y);
+                    y.iter_mut().enumerate().for_each(|(k, y)| *y += 3.0 * sigma * k as f64 / SAMPLES as f64);
+                }
+            })
+        }),
+        seen("hum of half the signal", |s| {
+            spoiled(s, |c, _| {
+                for y in &mut c.y {
+                    let sigma = deviation(y);
+                    y.iter_mut().enumerate().for_each(|(k, y)| *y += 0.7 * sigma * (0.9 * k as f64).sin());
+                }
+            })
+        }),
+    ]
+}
+
+fn pairs() -> Vec<Junk> {
+    vec![
+        seen("outputs swapped", |s| spoiled_two(s, |c, _| c.y.swap(0, 1))),
+        seen("one of two outputs with a gain of 1.25", |s| {
+            spoiled_two(s, |c, _| c.y[(s % 2) as usize].iter_mut().for_each(|y| *y *= 1.25))
+        }),
+        seen("one of two outputs with the wrong sign", |s| {
+            spoiled_two(s, |c, _| c.y[(s % 2) as usize].iter_mut().for_each(|y| *y = -*y))
+        }),
+        seen("one of two outputs ten samples late", |s| spoiled_two(s, |c, _| delayed(&mut c.y[..1], 10))),
+        seen("inputs swapped", |s| {
+            let plant = surface();
+            let mut record = plant.record(s, SAMPLES).noisy(NOISE, 0.0, s);
+            record.u.swap(0, 1);
+            plant.fit(&record, &How::default(), s)
+        }),
+    ]
+}
+
+fn inputs() -> Vec<Junk> {
+    vec![
+        seen("inputs shuffled", |s| spoiled(s, |c, r| c.u.iter_mut().for_each(|u| shuffle(u, r)))),
+        seen("inputs of another record", |s| {
+            let plant = plant(s);
+            let record = plant.record(s, SAMPLES).noisy(NOISE, 0.0, s);
+            plant.fit(&Columns { u: plant.inputs(s + 77, SAMPLES), ..record }, &How::default(), s)
+        }),
+        seen("inputs reversed in time", |s| spoiled(s, |c, _| c.u.iter_mut().for_each(|u| u.reverse()))),
+        seen("plant at rest, inputs zero", |s| {
+            let plant = surface();
+            let mut random = Random(s);
+            let rest = Columns { step: 5e-4, times: None, u: vec![vec![0.0; SAMPLES]; 3], y: vec![] };
+            let noise = |_| (0..SAMPLES).map(|_| 0.05 * random.normal()).collect();
+            let y = (0..2).map(noise).collect();
+            plant.fit(&Columns { y, ..rest }, &How::default(), s)
+        }),
+        seen("constant input, plant at rest", |s| {
+            let plant = lag();
+            let mut random = Random(s);
+            let y = vec![(0..SAMPLES).map(|_| 0.1 * random.normal()).collect()];
+            let rest = Columns { step: 0.05, times: None, u: vec![vec![0.7; SAMPLES]], y };
+            plant.fit(&rest, &How::default(), s)
+        }),
+        seen("constant input, outputs noise about a level", |s| {
+            let plant = lag();
+            let mut random = Random(s);
+            let y = vec![(0..SAMPLES).map(|_| 3.0 + 0.1 * random.normal()).collect()];
+            let rest = Columns { step: 0.05, times: None, u: vec![vec![0.7; SAMPLES]], y };
+            plant.fit(&rest, &How::default(), s)
+        }),
+        seen("inputs twenty samples late", |s| spoiled(s, |c, _| delayed(&mut c.u, 20))),
+        seen("inputs with noise of their own size", |s| {
+            spoiled(s, |c, r| {
+                for u in &mut c.u {
+                    let sigma = deviation(u);
+                    u.iter_mut().for_each(|u| *u += sigma * r.normal());
+                }
+            })
+        }),
+        seen("wrong sign of all inputs", |s| {
+            spoiled(s + u64::from(s % 7 == 6 || s % 7 == 4), |c, _| c.u.iter_mut().flatten().for_each(|u| *u = -*u))
+        }),
+        seen("sentinels 9999 in the inputs", |s| {
+            spoiled(s, |c, r| c.u.iter_mut().flatten().filter(|_| r.uniform() < 0.01).for_each(|u| *u = 9999.0))
+        }),
+    ]
+}
+
+fn plants() -> Vec<Junk> {
+    vec![
+        seen("an oscillator taken for a lag", |s| mistaken(oscillator(), lag(), s)),
+        seen("a lag taken for an oscillator with a fixed start", |s| mistaken(lag(), oscillator(), s)),
+        seen("records of two plants joined", |s| {
+            let plant = plant(s);
+            let truth: Vec<f64> = plant.truth();
+            let other: Vec<f64> = truth.iter().map(|p| p * 1.8).collect();
+            let u = plant.inputs(s, SAMPLES);
+            let (mut a, b) = (plant.simulated(u.clone(), &truth), plant.simulated(u, &other));
+            for (a, b) in a.y.iter_mut().zip(&b.y) {
+                a[SAMPLES / 2..].copy_from_slice(&b[SAMPLES / 2..]);
+            }
+            plant.fit(&a.noisy(NOISE, 0.0, s), &How::default(), s)
+        }),
+        seen("more unknowns than the record tells: three samples", |s| {
+            spoiled(s, |c, _| c.u.iter_mut().chain(&mut c.y).for_each(|column| column.truncate(3)))
+        }),
+        seen("unit of time wrong by 1,000", |s| spoiled(s, |c, _| c.step *= 1e3)),
+        seen("unit of the outputs wrong by 1,000", |s| {
+            // Only where a parameter scales all outputs.
+            let plant = lag();
+            let mut record = plant.record(s, SAMPLES).noisy(NOISE, 0.0, s);
+            record.y[0].iter_mut().for_each(|y| *y *= 1e3);
+            plant.fit(&record, &How::default(), s)
+        }),
+        seen("aliasing: every fortieth sample of a fast plant", |s| {
+            spoiled(s, |c, _| {
+                let thin = |column: &mut Vec<f64>| *column = column.iter().step_by(40).copied().collect();
+                c.u.iter_mut().chain(&mut c.y).for_each(thin);
+                c.step *= 40.0;
+            })
+        }),
+        seen("given noise 1e9 times the errors", |s| {
+            let plant = plant(s);
+            let record = plant.record(s, SAMPLES).noisy(NOISE, 0.0, s);
+            let sigma = record.y.iter().map(|y| 1e9 * deviation(y)).collect();
+            plant.fit(&record, &How { noise: Some(sigma), ..How::default() }, s)
+        }),
+        seen("given noise a hundredth of the errors", |s| {
+            let plant = plant(s);
+            let record = plant.record(s, SAMPLES).noisy(NOISE, 0.0, s);
+            let sigma = record.y.iter().map(|y| 0.01 * NOISE * deviation(y)).collect();
+            plant.fit(&record, &How { noise: Some(sigma), ..How::default() }, s)
+        }),
+        unseen("time scaled by a tenth", "time constants scale with it: another plant, right in itself", |s| {
+            spoil(Box::new(lag()), s, |c, _| c.step *= 1.1)
+        }),
+        unseen("outputs scaled by a tenth", "the gain scales with them: another plant, right in itself", |s| {
+            spoil(Box::new(lag()), s, |c, _| c.y[0].iter_mut().for_each(|y| *y *= 1.1))
+        }),
+        seen("wrong pole pairs", |s| {
+            let plant = surface();
+            let record = plant.record(s, SAMPLES).noisy(NOISE, 0.0, s);
+            let wrong = Bench { model: Surface::new(8).unwrap(), ..surface() };
+            wrong.fit(&record, &How::default(), s)
+        }),
+    ]
+}
+
+/// All kinds.
+pub fn all() -> Vec<Junk> {
+    [sensors(), pairs(), inputs(), plants()].into_iter().flatten().collect()
+}
