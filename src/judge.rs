@@ -11,6 +11,7 @@ pub(crate) mod noise;
 mod residual_pass;
 mod sandwich;
 mod suspects;
+mod together;
 mod warnings;
 
 pub(crate) use conclude::{SearchEnd, conclude, conclude_from};

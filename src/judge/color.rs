@@ -14,16 +14,26 @@ const SMALL: f64 = 1e-3;
 const LARGE: f64 = 0.5;
 
 impl Judgement<'_> {
-    /// Whether the errors are autocorrelated, how much of the output that is, and what of it the intervals allow for.
-    pub(super) fn autocorrelation(&self, covariances: &Covariances) -> Option<Warning> {
-        let (output, white) = self.autocorrelated()?;
-        let colored = |j: usize| {
+    /// Whether the errors of an output are correlated over time, beyond chance and rounding.
+    pub(super) fn is_colored(&self) -> bool {
+        self.autocorrelated().is_some_and(|(_, white)| white.p_value < CERTAIN) && self.colored_part() > SMALL
+    }
+
+    /// The largest part of an output's movement that is an error and follows from the errors before.
+    fn colored_part(&self) -> f64 {
+        let part = |j: usize| {
             let (rmse, (_, moves)) = (self.residuals.outputs[j].rmse, self.residuals.levels[j]);
             if moves > 0.0 { rmse / moves * self.residuals.whiteness[j].predicted.sqrt() } else { 0.0 }
         };
         let count = self.residuals.whiteness.len();
         let certain = (0..count).filter(|&j| self.residuals.whiteness[j].p_value * (count as f64) < CERTAIN);
-        let part = certain.map(colored).fold(0.0, f64::max);
+        certain.map(part).fold(0.0, f64::max)
+    }
+
+    /// Whether the errors are autocorrelated, how much of the output that is, and what of it the intervals allow for.
+    pub(super) fn autocorrelation(&self, covariances: &Covariances) -> Option<Warning> {
+        let (output, white) = self.autocorrelated()?;
+        let part = self.colored_part();
         let severity = match part {
             part if part > LARGE => Severity::NotUsable,
             part if part > SMALL => Severity::UsableWithCare,

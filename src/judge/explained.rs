@@ -25,8 +25,12 @@ const FAR_BELOW: f64 = 100.0;
 
 impl Judgement<'_> {
     /// How many errors have the information of one independent error.
-    fn dependence(&self, j: usize) -> f64 {
-        if self.objective.problem.layout().kind == Kind::Static { 1.0 } else { self.residuals.whiteness[j].dependence }
+    pub(super) fn dependence(&self, j: usize) -> f64 {
+        if self.is_static() { 1.0 } else { self.residuals.whiteness[j].dependence }
+    }
+
+    pub(super) fn is_static(&self) -> bool {
+        self.objective.problem.layout().kind == Kind::Static
     }
 
     /// Sum of squared errors relative to that about the output's mean.

@@ -5,7 +5,7 @@ mod repeated;
 mod values;
 
 use super::{Channel, Record};
-use crate::numeral::{exact, percent};
+use crate::numeral::exact;
 use core::fmt;
 use core::ops::Range;
 use serde::{Deserialize, Serialize};
@@ -133,17 +133,13 @@ impl ChannelInspection {
         self.range.filter(|(least, greatest)| least == greatest).map(|(value, _)| value)
     }
 
-    /// What is worth mentioning, in words; empty if nothing is.
+    /// What is worth mentioning of its values, in words; empty if nothing is.
     pub fn remarks(&self) -> Vec<String> {
         let mut remarks = vec![];
         if let Some(value) = self.constant() {
             remarks.push(format!("is {} throughout", exact(value)));
         } else if let Some(levels) = self.levels.filter(|levels| *levels <= 8) {
             remarks.push(format!("has {levels} values only"));
-        }
-        if self.missing > 0 {
-            let part = self.missing as f64 / self.samples.max(1) as f64;
-            remarks.push(format!("{} missing", percent(part, 2)));
         }
         remarks.extend(self.suspicions.iter().map(Suspicion::to_string));
         remarks

@@ -5,8 +5,8 @@ use greybox::models::DcMotor;
 use greybox::optimize::Severity;
 use greybox::pmsm::Surface;
 use greybox::{
-    Experiment, ExperimentOf, Fit, Hold, Huber, Kind, Model, Nothing, Of, Parameter, Scalar, Signals, Simulator, Time,
-    WarningCode, free, signals,
+    Experiment, ExperimentOf, Fit, Hold, Horizon, Huber, Kind, Model, Nothing, Of, Parameter, Rk45, Scalar, Signals,
+    Simulator, Time, WarningCode, free, signals,
 };
 
 /// The columns of a record.
@@ -55,9 +55,10 @@ pub fn deviation(values: &[f64]) -> f64 {
 pub struct How {
     pub noise: Option<Vec<f64>>,
     pub robust: bool,
-    /// The signs of the starts are those of the truth but for these parameters.
+    /// Starts have the opposite sign of the truth.
     pub opposite: bool,
-    pub hold: Hold,
+    /// Predictions from the last measurement on, instead of a simulation.
+    pub one_step: bool,
 }
 
 /// What was said of a fit.
@@ -65,15 +66,13 @@ pub struct Found {
     pub severity: Severity,
     /// The warnings that are no mere notes.
     pub codes: Vec<WarningCode>,
-    /// Largest error of a parameter in standard errors, and relative to its value.
+    /// Largest error of a parameter in standard errors.
     pub errors: f64,
-    pub part: f64,
     pub text: String,
 }
 
 /// A model whose truth is known.
 pub trait Plant {
-    fn outputs(&self) -> usize;
     fn truth(&self) -> Vec<f64>;
     /// Inputs of so many samples that excite it.
     fn inputs(&self, seed: u64, samples: usize) -> Vec<Vec<f64>>;
@@ -99,10 +98,10 @@ pub struct Bench<M: Model> {
 }
 
 impl<M: Model> Bench<M> {
-    fn experiment(&self, columns: &Columns, hold: Hold) -> ExperimentOf<M> {
+    fn experiment(&self, columns: &Columns) -> ExperimentOf<M> {
         let inputs = (0..columns.len()).map(|k| M::Input::from_fn(|i| columns.u[i][k])).collect();
         let outputs = (0..columns.len()).map(|k| M::Output::from_fn(|j| columns.y[j][k])).collect();
-        let record = Experiment::new(&self.model, columns.time(), inputs, outputs).unwrap().hold(hold);
+        let record = Experiment::new(&self.model, columns.time(), inputs, outputs).unwrap().hold(self.hold);
         match self.told {
             true => record.initial(M::State::from_fn(|i| greybox::fixed(self.initial[i]))),
             false => record,
@@ -111,10 +110,6 @@ impl<M: Model> Bench<M> {
 }
 
 impl<M: Model> Plant for Bench<M> {
-    fn outputs(&self) -> usize {
-        M::Output::LEN
-    }
-
     fn truth(&self) -> Vec<f64> {
         self.truth.clone()
     }
@@ -139,15 +134,20 @@ impl<M: Model> Plant for Bench<M> {
         let rows: Vec<Of<M::Input, f64>> = (0..samples).map(|k| M::Input::from_fn(|i| u[i][k])).collect();
         let (truth, start) = (M::Parameters::from_fn(|i| truth[i]), M::State::from_fn(|i| self.initial[i]));
         let time = Time::Uniform { start: 0.0, step: self.step };
-        let run = Simulator::new(&self.model).hold(self.hold).run(&truth, &start, time, &rows).unwrap();
+        let simulator = Simulator::new(&self.model).hold(self.hold);
+        let exact = Rk45 { relative: 1e-12, absolute: 1e-14 };
+        let run = match M::KIND {
+            Kind::Continuous => simulator.integrator(exact).run(&truth, &start, time, &rows),
+            _ => simulator.run(&truth, &start, time, &rows),
+        };
+        let run = run.unwrap();
         let outputs: Vec<_> = run.outputs.into_iter().map(M::Output::into_array).collect();
         let y = (0..M::Output::LEN).map(|j| outputs.iter().map(|row| row.as_ref()[j]).collect()).collect();
         Columns { step: self.step, times: None, u, y }
     }
 
     fn fit(&self, columns: &Columns, how: &How, seed: u64) -> Found {
-        let hold = if how.hold == Hold::default() { self.hold } else { how.hold };
-        let record = self.experiment(columns, hold);
+        let record = self.experiment(columns);
         let mut random = Random(seed ^ 0x57a7);
         let start = |i: usize| -> Parameter {
             let sign = if how.opposite { -1.0 } else { 1.0 };
@@ -158,23 +158,23 @@ impl<M: Model> Plant for Bench<M> {
             Some(sigma) => fit.noise(M::Output::from_fn(|j| sigma[j])),
             None => fit,
         };
+        let fit = if how.one_step { fit.predictor(Horizon { steps: 1, filter: None }) } else { fit };
         let fit = if how.robust { fit.loss(Huber::default()) } else { fit };
         let estimate = match fit.run() {
             Ok(estimate) => estimate,
             Err(error) => {
                 let text = error.to_string();
-                return Found { severity: Severity::NotUsable, codes: vec![], errors: 0.0, part: 0.0, text };
+                return Found { severity: Severity::NotUsable, codes: vec![], errors: 0.0, text };
             }
         };
-        let (mut errors, mut part) = (0.0f64, 0.0f64);
+        let mut errors = 0.0f64;
         for (found, truth) in estimate.summary().parameters.iter().zip(&self.truth) {
             let error = (found.value - truth).abs();
-            part = part.max(error / truth.abs());
             errors = errors.max(found.knowledge.standard_error().map_or(0.0, |one| error / one));
         }
         let told = estimate.warnings.iter().filter(|warning| warning.severity > Severity::Usable);
         let codes = told.map(|warning| warning.code).collect();
-        Found { severity: estimate.severity(), codes, errors, part, text: estimate.to_string() }
+        Found { severity: estimate.severity(), codes, errors, text: estimate.to_string() }
     }
 }
 
@@ -188,6 +188,9 @@ signals! { pub struct Masses { t1: "K", t2: "K" } }
 signals! { pub struct Walls { c1: "J/K", c2: "J/K", r12: "K/W", ra: "K/W" } }
 signals! { pub struct Poles { a: "1", b: "1" } }
 signals! { pub struct Line { a: "1", b: "V" } }
+signals! { pub struct Two { y: "V", z: "V" } }
+signals! { pub struct Plane { a: "1", b: "1", c: "V" } }
+signals! { pub struct Ringing { d: "1/s", c: "1/s^2" } }
 
 /// `tau dy/dt = k u - y`.
 pub struct FirstOrder;
@@ -285,6 +288,36 @@ impl Model for Straight {
     }
 }
 
+/// `y = a u + c`, `z = a b u - c`.
+pub struct Planar;
+
+impl Model for Planar {
+    type State = Nothing;
+    type Input = Force;
+    type Output = Two;
+    type Parameters = Plane;
+    const KIND: Kind = Kind::Static;
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Force<S>, p: &Plane<S>) -> Two<S> {
+        Two { y: p.a * u.u + p.c, z: p.a * p.b * u.u - p.c }
+    }
+}
+
+/// An oscillator without an input.
+pub struct Free;
+
+impl Model for Free {
+    type State = Motion;
+    type Input = Nothing;
+    type Output = Motion;
+    type Parameters = Ringing;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Motion<S>, _u: &Nothing, p: &Ringing<S>) -> Motion<S> {
+        Motion { x: x.v, v: -(p.d * x.v + p.c * x.x) }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, _u: &Nothing, _p: &Ringing<S>) -> Motion<S> {
+        *x
+    }
+}
+
 fn bench<M: Model + 'static>(
     model: M,
     truth: &[f64],
@@ -327,6 +360,14 @@ pub fn recursion() -> Bench<Recursion> {
 
 pub fn line() -> Bench<Straight> {
     bench(Straight, &[2.5, -0.7], 0.1, &[(0.5, 2.0, 3)], &[])
+}
+
+pub fn plane() -> Bench<Planar> {
+    bench(Planar, &[2.0, 0.5, 0.3], 0.1, &[(0.5, 2.0, 3)], &[])
+}
+
+pub fn ringing() -> Bench<Free> {
+    bench(Free, &[0.3, 9.0], 0.05, &[], &[1.0, 0.0])
 }
 
 /// The plants that faults of a record are tried on, one after the other.

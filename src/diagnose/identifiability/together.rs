@@ -21,10 +21,8 @@ pub(super) fn together(moves: &[(String, f64)], left: f64, unknowns: &[Unknown])
     let up = moves.iter().filter(|step| relative(step) > 0.0).count();
     let one_way = up == 0 || up == moves.len();
     let rising = moves.iter().filter(|(_, by)| *by > 0.0).count();
-    let (how, in_units) = if one_unit && same(moves.iter().map(|(_, by)| *by)) && [0, moves.len()].contains(&rising) {
-        ("up to a common shift", true)
-    } else if one_unit && same(moves.iter().map(|(_, by)| *by)) && moves.len() == 2 {
-        ("as their sum", true)
+    let (how, in_units) = if one_unit && same(moves.iter().map(|(_, by)| *by)) {
+        (if moves.len() == 2 && rising == 1 { "as their sum" } else { "up to a common shift" }, true)
     } else if not_zero && same(moves.iter().map(relative)) && one_way {
         (if moves.len() == 2 { "as their ratio" } else { "up to a common factor" }, false)
     } else if not_zero && same(moves.iter().map(relative)) && moves.len() == 2 {
