@@ -3,12 +3,15 @@
 use crate::plants::*;
 use crate::random::Random;
 use greybox::Hold;
+use greybox::WarningCode::{self, *};
 use greybox::pmsm::Surface;
 
 /// A kind of fault, and what is said of it with this seed.
 pub struct Junk {
     pub name: &'static str,
     pub judged: fn(u64) -> Found,
+    /// What must be named every time.
+    pub named: Option<WarningCode>,
     /// Why it cannot be seen in principle, where that is so.
     pub unseen: Option<&'static str>,
 }
@@ -59,19 +62,30 @@ fn delayed(columns: &mut [Vec<f64>], by: usize) {
 }
 
 const fn seen(name: &'static str, judged: fn(u64) -> Found) -> Junk {
-    Junk { name, judged, unseen: None }
+    Junk { name, judged, named: None, unseen: None }
+}
+
+/// A fault that is named every time.
+const fn named(name: &'static str, code: WarningCode, judged: fn(u64) -> Found) -> Junk {
+    Junk { name, judged, named: Some(code), unseen: None }
 }
 
 const fn unseen(name: &'static str, why: &'static str, judged: fn(u64) -> Found) -> Junk {
-    Junk { name, judged, unseen: Some(why) }
+    Junk { name, judged, named: None, unseen: Some(why) }
 }
 
 fn sensors() -> Vec<Junk> {
     vec![
-        seen("dead sensors: all outputs zero", |s| spoiled(s, |c, _| c.y.iter_mut().for_each(|y| y.fill(0.0)))),
-        seen("stuck sensors: all outputs one", |s| spoiled(s, |c, _| c.y.iter_mut().for_each(|y| y.fill(1.0)))),
-        seen("one of two outputs dead", |s| spoiled_two(s, |c, _| c.y[(s % 2) as usize].fill(0.0))),
-        seen("outputs are white noise", |s| spoiled(s, |c, r| c.y.iter_mut().flatten().for_each(|y| *y = r.normal()))),
+        named("dead sensors: all outputs zero", ConstantOutput, |s| {
+            spoiled(s, |c, _| c.y.iter_mut().for_each(|y| y.fill(0.0)))
+        }),
+        named("stuck sensors: all outputs one", ConstantOutput, |s| {
+            spoiled(s, |c, _| c.y.iter_mut().for_each(|y| y.fill(1.0)))
+        }),
+        named("one of two outputs dead", ConstantOutput, |s| spoiled_two(s, |c, _| c.y[(s % 2) as usize].fill(0.0))),
+        named("outputs are white noise", Unexplained, |s| {
+            spoiled(s, |c, r| c.y.iter_mut().flatten().for_each(|y| *y = r.normal()))
+        }),
         seen("outputs are a random walk", |s| {
             spoiled(s, |c, r| {
                 for y in &mut c.y {
@@ -108,7 +122,7 @@ fn sensors() -> Vec<Junk> {
                 }
             })
         }),
-        seen("sensor clipped to the middle half of its range", |s| {
+        named("sensor clipped to the middle half of its range", Clipped, |s| {
             spoiled(s, |c, _| {
                 for y in &mut c.y {
                     let (low, high) = range(y);
@@ -117,7 +131,7 @@ fn sensors() -> Vec<Junk> {
                 }
             })
         }),
-        seen("sensor of two values", |s| {
+        named("sensor of two values", CoarseOutput, |s| {
             spoiled(s, |c, _| {
                 for y in &mut c.y {
                     let (middle, sigma) = (y.iter().sum::<f64>() / y.len() as f64, deviation(y));
@@ -125,10 +139,10 @@ fn sensors() -> Vec<Junk> {
                 }
             })
         }),
-        seen("sentinels -999 in one of fifty samples", |s| {
+        named("sentinels -999 in one of fifty samples", Sentinel, |s| {
             spoiled(s, |c, r| c.y.iter_mut().flatten().filter(|_| r.uniform() < 0.02).for_each(|y| *y = -999.0))
         }),
-        seen("a block of the outputs repeated", |s| {
+        named("a block of the outputs repeated", Repeated, |s| {
             spoiled(s, |c, _| c.y.iter_mut().for_each(|y| y.copy_within(50..200, 300)))
         }),
         seen("sensor rectified", |s| {
@@ -186,7 +200,7 @@ fn inputs() -> Vec<Junk> {
             plant.fit(&Columns { u: plant.inputs(s + 77, SAMPLES), ..record }, &How::default(), s)
         }),
         seen("inputs reversed in time", |s| spoiled(s, |c, _| c.u.iter_mut().for_each(|u| u.reverse()))),
-        seen("plant at rest, inputs zero", |s| {
+        named("plant at rest, inputs zero", Unexplained, |s| {
             let plant = surface();
             let mut random = Random(s);
             let rest = Columns { step: 5e-4, times: None, u: vec![vec![0.0; SAMPLES]; 3], y: vec![] };
@@ -194,7 +208,7 @@ fn inputs() -> Vec<Junk> {
             let y = (0..2).map(noise).collect();
             plant.fit(&Columns { y, ..rest }, &How::default(), s)
         }),
-        seen("constant input, plant at rest", |s| {
+        named("constant input, plant at rest", HoldsZero, |s| {
             let plant = lag();
             let mut random = Random(s);
             let y = vec![(0..SAMPLES).map(|_| 0.1 * random.normal()).collect()];
@@ -209,7 +223,7 @@ fn inputs() -> Vec<Junk> {
             plant.fit(&rest, &How::default(), s)
         }),
         seen("inputs twenty samples late", |s| spoiled(s, |c, _| delayed(&mut c.u, 20))),
-        seen("inputs with noise of their own size", |s| {
+        named("inputs with noise of their own size", ColoredErrors, |s| {
             spoiled(s, |c, r| {
                 for u in &mut c.u {
                     let sigma = deviation(u);
@@ -220,7 +234,7 @@ fn inputs() -> Vec<Junk> {
         seen("wrong sign of all inputs", |s| {
             spoiled(s + u64::from(s % 7 == 6 || s % 7 == 4), |c, _| c.u.iter_mut().flatten().for_each(|u| *u = -*u))
         }),
-        seen("sentinels 9999 in the inputs", |s| {
+        named("sentinels 9999 in the inputs", Sentinel, |s| {
             spoiled(s, |c, r| c.u.iter_mut().flatten().filter(|_| r.uniform() < 0.01).for_each(|u| *u = 9999.0))
         }),
     ]
@@ -263,7 +277,7 @@ fn told_wrong() -> Vec<Junk> {
             let record = oscillator().record(s, SAMPLES).noisy(NOISE, 0.0, s);
             Bench { initial: vec![0.8, -1.0], ..oscillator() }.fit(&record, &How::default(), s)
         }),
-        seen("start of the opposite sign, and so is the gain", |s| {
+        named("start of the opposite sign, and so is the gain", SignChanged, |s| {
             let record = line().record(s, SAMPLES).noisy(NOISE, 0.0, s);
             line().fit(&record, &How { opposite: true, ..How::default() }, s)
         }),
@@ -286,7 +300,7 @@ fn told_wrong() -> Vec<Junk> {
             let record = plant.record(s, SAMPLES).noisy(NOISE, 0.0, s);
             plant.fit(&Columns { u: plant.inputs(s + 5, SAMPLES), ..record }, &How::default(), s)
         }),
-        seen("static outputs that contradict each other", |s| {
+        named("static outputs that contradict each other", OutputsContradict, |s| {
             let mut record = plane().record(s, SAMPLES).noisy(NOISE, 0.0, s);
             record.y[0].iter_mut().for_each(|y| *y += 0.5);
             plane().fit(&record, &How::default(), s)
@@ -299,7 +313,7 @@ fn told_wrong() -> Vec<Junk> {
                 }
             })
         }),
-        seen("noise a hundred times the signal", |s| {
+        named("noise a hundred times the signal", HoldsZero, |s| {
             let plant = plant(s);
             plant.fit(&plant.record(s, SAMPLES).noisy(100.0, 0.0, s), &How::default(), s)
         }),
@@ -336,7 +350,7 @@ fn plants() -> Vec<Junk> {
         seen("unit of time wrong by 1,000", |s| {
             spoil(if s % 7 == 5 { plant(0) } else { plant(s) }, s, |c, _| c.step *= 1e3)
         }),
-        seen("unit of the outputs wrong by 1,000", |s| {
+        named("unit of the outputs wrong by 1,000", FarFromStart, |s| {
             // Only where a parameter scales all outputs.
             let plant = lag();
             let mut record = plant.record(s, SAMPLES).noisy(NOISE, 0.0, s);
@@ -350,13 +364,13 @@ fn plants() -> Vec<Junk> {
                 c.step *= 40.0;
             })
         }),
-        seen("given noise 1e9 times the errors", |s| {
+        named("given noise 1e9 times the errors", GivenNoise, |s| {
             let plant = plant(s);
             let record = plant.record(s, SAMPLES).noisy(NOISE, 0.0, s);
             let sigma = record.y.iter().map(|y| 1e9 * deviation(y)).collect();
             plant.fit(&record, &How { noise: Some(sigma), ..How::default() }, s)
         }),
-        seen("given noise a hundredth of the errors", |s| {
+        named("given noise a hundredth of the errors", GivenNoise, |s| {
             let plant = plant(s);
             let record = plant.record(s, SAMPLES).noisy(NOISE, 0.0, s);
             let sigma = record.y.iter().map(|y| 0.01 * NOISE * deviation(y)).collect();
