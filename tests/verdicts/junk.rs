@@ -16,7 +16,7 @@ pub struct Junk {
     pub unseen: Option<&'static str>,
 }
 
-const SAMPLES: usize = 500;
+const SAMPLES: usize = 400;
 /// Noise, as a part of the standard deviation of each output.
 const NOISE: f64 = 0.02;
 
@@ -143,7 +143,7 @@ fn sensors() -> Vec<Junk> {
             spoiled(s, |c, r| c.y.iter_mut().flatten().filter(|_| r.uniform() < 0.02).for_each(|y| *y = -999.0))
         }),
         named("a block of the outputs repeated", Repeated, |s| {
-            spoiled(s, |c, _| c.y.iter_mut().for_each(|y| y.copy_within(50..200, 300)))
+            spoiled(s, |c, _| c.y.iter_mut().for_each(|y| y.copy_within(50..200, 230)))
         }),
         seen("sensor rectified", |s| {
             spoiled(s, |c, _| {

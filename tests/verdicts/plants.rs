@@ -355,7 +355,7 @@ pub fn brushed() -> Bench<DcMotor> {
 }
 
 pub fn recursion() -> Bench<Recursion> {
-    bench(Recursion, &[0.85, 0.4], 1.0, &[(0.2, 1.0, 5)], &[0.0])
+    bench(Recursion, &[0.6, 0.4], 1.0, &[(0.2, 1.0, 5)], &[0.0])
 }
 
 pub fn line() -> Bench<Straight> {
