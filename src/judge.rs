@@ -10,6 +10,7 @@ mod known;
 pub(crate) mod noise;
 mod residual_pass;
 mod sandwich;
+mod shape;
 mod suspects;
 mod together;
 mod warnings;

@@ -52,6 +52,10 @@ pub enum WarningCode {
     SignChanged,
     /// A parameter of another order of magnitude than its start.
     FarFromStart,
+    /// Errors of a static model that follow from an input.
+    WrongShape,
+    /// Parameters that differ from record to record.
+    RecordsContradict,
     /// Parameters that differ from output to output.
     OutputsContradict,
     /// Parameters that differ from the first half of the data to the second.

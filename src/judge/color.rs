@@ -1,16 +1,17 @@
 //! Warnings about errors that are correlated over time.
 
 use super::conclude::{Covariances, Judgement};
+use super::residual_pass::Whiteness;
 use crate::estimate::{CovarianceMethod, Warning, WarningCode};
 use crate::numeral::{counted, number, p_value, percent};
 use crate::optimize::Severity;
 
 /// Level of the test of whiteness below which the color is no chance; between this and the level at which intervals are
 /// widened it is a note.
-const CERTAIN: f64 = 1e-4;
+pub(super) const CERTAIN: f64 = 1e-4;
 /// The part of an output's movement that is an error, and follows from the errors before: below the first it is a note,
 /// above the second the model is wrong or the noise hides the plant.
-const SMALL: f64 = 1e-3;
+pub(super) const SMALL: f64 = 1e-3;
 const LARGE: f64 = 0.5;
 
 impl Judgement<'_> {
@@ -21,24 +22,23 @@ impl Judgement<'_> {
 
     /// The largest part of an output's movement that is an error and follows from the errors before.
     fn colored_part(&self) -> f64 {
-        let part = |j: usize| {
-            let (rmse, (_, moves)) = (self.residuals.outputs[j].rmse, self.residuals.levels[j]);
-            if moves > 0.0 { rmse / moves * self.residuals.whiteness[j].predicted.sqrt() } else { 0.0 }
-        };
-        let count = self.residuals.whiteness.len();
-        let certain = (0..count).filter(|&j| self.residuals.whiteness[j].p_value * (count as f64) < CERTAIN);
-        certain.map(part).fold(0.0, f64::max)
+        let whiteness = self.residuals.whiteness.iter().enumerate();
+        let count = whiteness.len() as f64;
+        let certain = whiteness.filter(|(_, white)| white.p_value * count < CERTAIN);
+        certain.map(|(j, white)| self.colored(j, white)).fold(0.0, f64::max)
+    }
+
+    /// The part of an output's movement that is an error and follows from others.
+    pub(super) fn colored(&self, j: usize, white: &Whiteness) -> f64 {
+        let (rmse, (_, moves)) = (self.residuals.outputs[j].rmse, self.residuals.levels[j]);
+        if moves > 0.0 { rmse / moves * white.predicted.sqrt() } else { 0.0 }
     }
 
     /// Whether the errors are autocorrelated, how much of the output that is, and what of it the intervals allow for.
     pub(super) fn autocorrelation(&self, covariances: &Covariances) -> Option<Warning> {
         let (output, white) = self.autocorrelated()?;
         let part = self.colored_part();
-        let severity = match part {
-            part if part > LARGE => Severity::NotUsable,
-            part if part > SMALL => Severity::UsableWithCare,
-            _ => Severity::Usable,
-        };
+        let severity = severity(part);
         let output = &self.objective.problem.layout().outputs[output].name;
         let (probability, first) = (p_value(white.p_value.min(1.0)), number(white.first, 2));
         let mut text = format!(
@@ -66,5 +66,14 @@ impl Judgement<'_> {
             text += &format!("; they are up to {} times as wide as for white errors", number(widest, 3));
         }
         Some(Warning { code: WarningCode::ColoredErrors, severity, text })
+    }
+}
+
+/// How severe it is that such a part of an output's movement is an error that follows from others.
+pub(super) fn severity(part: f64) -> Severity {
+    match part {
+        part if part > LARGE => Severity::NotUsable,
+        part if part > SMALL => Severity::UsableWithCare,
+        _ => Severity::Usable,
     }
 }

@@ -18,7 +18,8 @@ const LITTLE: f64 = 5.0;
 const MUCH: f64 = 0.5;
 /// An output stands at a level, and the model gives that level, if movement and errors are below this part of it.
 const LEVEL_PART: f64 = 0.1;
-/// Errors of such times the given noise, either way, say that it is wrong; beyond the second, that intervals mean nothing.
+/// Errors of such times the given noise, either way, say that it is wrong; beyond the second, or below the third where the
+/// noise is larger than all that the output moves, that intervals mean nothing.
 const DIFFERENT: f64 = 2.0;
 const FAR: f64 = 10.0;
 const FAR_BELOW: f64 = 100.0;
@@ -81,8 +82,8 @@ impl Judgement<'_> {
             let at_level = moves.max(rmse) < LEVEL_PART * level.abs();
             let severity = match another(j) {
                 // Held by a controller, and given by the model.
-                true if at_level => continue,
-                true if !worse => Severity::UsableWithCare,
+                true if at_level && !worse => continue,
+                true if at_level || !worse => Severity::UsableWithCare,
                 _ if partly => Severity::UsableWithCare,
                 _ => Severity::NotUsable,
             };
@@ -113,8 +114,9 @@ impl Judgement<'_> {
             if above.min(1.0 - above) > LEVEL / 2.0 || ratio > 1.0 && self.objective.is_robust() {
                 return None;
             }
+            let (_, moves) = self.residuals.levels[j];
             let severity = match ratio {
-                ratio if ratio > FAR || ratio < FAR_BELOW.recip() => Severity::NotUsable,
+                ratio if ratio > FAR || ratio < FAR_BELOW.recip() && sigma[j] > moves => Severity::NotUsable,
                 ratio if ratio > DIFFERENT || ratio < DIFFERENT.recip() => Severity::UsableWithCare,
                 _ => Severity::Usable,
             };

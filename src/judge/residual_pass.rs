@@ -9,7 +9,7 @@ use crate::whiteness::{Autocorrelation, dot, ljung_box};
 use std::sync::Arc;
 
 /// Lags of the whiteness test.
-const LAGS: usize = 20;
+pub(super) const LAGS: usize = 20;
 /// Every how many windows one is simulated again with a finer step, and the most of them per record.
 const EVERY: usize = 16;
 const AGAIN: usize = 16;
@@ -49,7 +49,7 @@ pub(crate) struct Whiteness {
 
 impl Whiteness {
     /// From the autocorrelations at lags `1, 2, ...` of so many errors.
-    fn new(coefficients: &[f64], count: u64) -> Self {
+    pub fn new(coefficients: &[f64], count: u64) -> Self {
         let (_, p_value) = ljung_box(coefficients, count);
         let (first, lags) = (coefficients.first().copied().unwrap_or(0.0), coefficients.len() as f64);
         // What chance leaves, as in an adjusted coefficient of determination.

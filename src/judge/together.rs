@@ -1,4 +1,4 @@
-//! The same parameters from parts of the data: from each output alone, and from each half of the records.
+//! The same parameters from parts of the data: from each output, from each record, from each half of the records.
 //!
 //! At the minimum each part has a triangle of its own, and with it a step to the minimum that it would have by itself. If
 //! all parts follow one model, what they gain by steps of their own over the common one is noise: chi squared with as many
@@ -23,6 +23,8 @@ const APART: f64 = 4.0;
 const FAR_APART: f64 = 0.25;
 /// Rows that are absorbed together.
 const ROWS: usize = 256;
+/// More records than these are not compared one by one.
+const RECORDS: usize = 12;
 /// More unknowns than these are not compared: the triangles of all parts are kept.
 const MOST: usize = 200;
 
@@ -93,7 +95,7 @@ struct Piece {
 }
 
 impl Judgement<'_> {
-    /// Parameters that differ between outputs or halves of the data. Compared where errors are correlated, because what
+    /// Parameters that differ between outputs, records or halves of the data. Compared where errors are correlated, because what
     /// contradicts the model is, and of static models with several outputs.
     pub(super) fn contradictions(&self, unknowns: &[Unknown]) -> Vec<Warning> {
         let objective = self.objective;
@@ -117,12 +119,17 @@ impl Judgement<'_> {
             .for_each(|part| part.triangle.absorb(&mut part.block));
         let outputs = objective.outputs();
         let layout = &objective.problem.layout().outputs;
-        let output = |j: usize| self.piece(&all, &[(j, 0), (j, 1)], format!("`{}` alone", layout[j].name));
+        let output = |j: usize| self.piece(&all, |_, one, _| one == j, format!("`{}` alone", layout[j].name));
         let half = |h: usize| {
-            let places: Vec<(usize, usize)> = (0..outputs).map(|j| (j, h)).collect();
-            self.piece(&all, &places, format!("the {} half of the data", ["first", "second"][h]))
+            self.piece(&all, |_, _, one| one == h, format!("the {} half of the data", ["first", "second"][h]))
         };
+        let labels = &objective.problem.unknowns.labels;
+        let record = |e: usize| self.piece(&all, |one, _, _| one == e, format!("`{}` alone", labels[e]));
         let mut warnings = vec![];
+        if (2..=RECORDS).contains(&all.len()) {
+            let pieces = (0..all.len()).filter_map(record).collect();
+            warnings.extend(self.compared(pieces, unknowns, WarningCode::RecordsContradict));
+        }
         if outputs > 1 {
             let pieces = (0..outputs).filter_map(output).collect();
             warnings.extend(self.compared(pieces, unknowns, WarningCode::OutputsContradict));
@@ -134,16 +141,26 @@ impl Judgement<'_> {
         warnings
     }
 
-    /// The triangles of some outputs and halves, over all experiments, each divided by the noise that is left when its own
-    /// step is taken.
-    fn piece(&self, all: &[Halves<'_>], places: &[(usize, usize)], name: String) -> Option<Piece> {
+    /// The triangles of chosen experiments, outputs and halves, those of each output divided by the noise that is left when
+    /// its own step is taken.
+    fn piece(&self, all: &[Halves<'_>], chosen: impl Fn(usize, usize, usize) -> bool, name: String) -> Option<Piece> {
         let shared = self.objective.problem.unknowns.shared();
         let held = &self.undetermined.held;
-        let mut merged: Vec<Information> = vec![];
-        for place in places {
-            let parts = || all.iter().map(|halves| &halves.of[place.0][place.1]);
-            let (squares, count) = parts().fold((0.0, 0), |(s, n), part| (s + part.squares, n + part.count));
-            let linear = Linearization::new(0.0, shared, parts().map(|part| part.triangle.clone()).collect());
+        let empty = || all.iter().map(|halves| Information::new(halves.row.len())).collect::<Vec<_>>();
+        let (mut merged, mut dependence) = (empty(), 1.0f64);
+        for j in 0..self.objective.outputs() {
+            let (mut triangles, mut squares, mut count) = (empty(), 0.0, 0);
+            for (e, halves) in all.iter().enumerate() {
+                for (_, part) in halves.of[j].iter().enumerate().filter(|(h, _)| chosen(e, j, *h)) {
+                    triangles[e].merge(&part.triangle);
+                    squares += part.squares;
+                    count += part.count;
+                }
+            }
+            if count == 0 {
+                continue;
+            }
+            let linear = Linearization::new(0.0, shared, triangles);
             let own = directions::undetermined(&linear, held).held;
             let step = linear.step(&vec![0.0; own.len()], &own)?;
             let free = own.iter().filter(|held| !**held).count() as f64;
@@ -151,15 +168,12 @@ impl Judgement<'_> {
             if !(variance > 0.0 && variance.is_finite()) {
                 return None;
             }
-            let triangles = parts().map(|part| scaled(&part.triangle, variance.sqrt().recip()));
-            match merged.is_empty() {
-                true => merged = triangles.collect(),
-                false => merged.iter_mut().zip(triangles).for_each(|(all, one)| all.merge(&one)),
+            for (all, (triangle, _)) in merged.iter_mut().zip(linear.columns()) {
+                all.merge(&scaled(triangle, variance.sqrt().recip()));
             }
+            dependence = dependence.max(self.dependence(j));
         }
-        let dependence = places.iter().map(|place| self.dependence(place.0)).fold(1.0, f64::max);
-        let linear = Linearization::new(0.0, shared, merged);
-        Piece::new(name, linear, held, dependence)
+        Piece::new(name, Linearization::new(0.0, shared, merged), held, dependence)
     }
 
     /// Whether pieces follow one set of parameters.

@@ -31,6 +31,7 @@ impl Judgement<'_> {
         warnings.extend(self.data());
         warnings.extend(self.unexplained());
         warnings.extend(self.given_noise());
+        warnings.extend(self.shape());
         warnings.extend(self.contradictions(unknowns));
         warnings.extend(self.knowledge(unknowns, covariances));
         warnings.extend(self.unbounded());

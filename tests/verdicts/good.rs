@@ -180,6 +180,11 @@ fn samplings() -> Vec<Good> {
             let record = plant.simulated(vec![], &plant.truth()).noisy(0.03, 0.0, s);
             plant.fit(&record, &How::default(), s)
         }),
+        good("three records of one plant", |s| {
+            let plant = plant(s);
+            let record = |s: u64| plant.record(s, 300).noisy(0.05, 0.0, s);
+            plant.fit_all(&[record(s), record(s + 100), record(s + 200)], &How::default(), s)
+        }),
         good("static model of two outputs", |s| noisy(&plane(), SAMPLES, 0.1, s)),
         good("predicted one step ahead, little noise", |s| {
             let plant = lag();

@@ -235,7 +235,7 @@ fn inputs() -> Vec<Junk> {
             spoiled(s + u64::from(s % 7 == 6 || s % 7 == 4), |c, _| c.u.iter_mut().flatten().for_each(|u| *u = -*u))
         }),
         named("sentinels 9999 in the inputs", Sentinel, |s| {
-            spoiled(s, |c, r| c.u.iter_mut().flatten().filter(|_| r.uniform() < 0.01).for_each(|u| *u = 9999.0))
+            spoiled(s, |c, _| c.u.iter_mut().flatten().step_by(90).for_each(|u| *u = 9999.0))
         }),
     ]
 }
@@ -342,6 +342,19 @@ fn plants() -> Vec<Junk> {
                 a[SAMPLES / 2..].copy_from_slice(&b[SAMPLES / 2..]);
             }
             plant.fit(&a.noisy(NOISE, 0.0, s), &How::default(), s)
+        }),
+        seen("two records, one of another plant", |s| {
+            let plant = plant(s);
+            let other: Vec<f64> = plant.truth().iter().map(|p| p * 1.5).collect();
+            let first = plant.record(s, SAMPLES).noisy(NOISE, 0.0, s);
+            let second = plant.simulated(plant.inputs(s + 1, SAMPLES), &other).noisy(NOISE, 0.0, s + 1);
+            plant.fit_all(&[first, second], &How::default(), s)
+        }),
+        named("static curve taken for a line", WrongShape, |s| {
+            let plant = line();
+            let mut record = plant.record(s, SAMPLES).noisy(NOISE, 0.0, s);
+            record.y[0].iter_mut().zip(&record.u[0]).for_each(|(y, u)| *y += 0.3 * u * u);
+            plant.fit(&record, &How::default(), s)
         }),
         seen("more unknowns than the record tells: three samples", |s| {
             spoiled(s, |c, _| c.u.iter_mut().chain(&mut c.y).for_each(|column| column.truncate(3)))

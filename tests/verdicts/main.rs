@@ -1,5 +1,6 @@
 //! Verdicts on records of many kinds, good and bad: what is junk is never called usable, and what is good is.
 
+mod extremes;
 mod good;
 mod junk;
 mod levels;
@@ -30,7 +31,6 @@ struct Row {
 
 fn row(name: &'static str, judged: fn(u64) -> Found, bad: impl Fn(&Found) -> bool) -> Row {
     let mut row = Row { name, counts: [0; 3], codes: BTreeMap::new(), worst: String::new(), errors: 0.0 };
-    let begin = std::time::Instant::now();
     for seed in first()..first() + SEEDS {
         let found = judged(seed);
         row.counts[found.severity as usize] += 1;
@@ -42,7 +42,6 @@ fn row(name: &'static str, judged: fn(u64) -> Found, bad: impl Fn(&Found) -> boo
             row.worst = format!("{name}, seed {seed}:\n{}", found.text);
         }
     }
-    eprintln!("TIME {:.2} {name}", begin.elapsed().as_secs_f64());
     row
 }
 

@@ -78,7 +78,12 @@ pub trait Plant {
     fn inputs(&self, seed: u64, samples: usize) -> Vec<Vec<f64>>;
     /// What it makes of inputs, with these parameters.
     fn simulated(&self, u: Vec<Vec<f64>>, truth: &[f64]) -> Columns;
-    fn fit(&self, columns: &Columns, how: &How, seed: u64) -> Found;
+    /// A fit of several records at once.
+    fn fit_all(&self, records: &[Columns], how: &How, seed: u64) -> Found;
+
+    fn fit(&self, columns: &Columns, how: &How, seed: u64) -> Found {
+        self.fit_all(std::slice::from_ref(columns), how, seed)
+    }
 
     fn record(&self, seed: u64, samples: usize) -> Columns {
         self.simulated(self.inputs(seed, samples), &self.truth())
@@ -146,14 +151,14 @@ impl<M: Model> Plant for Bench<M> {
         Columns { step: self.step, times: None, u, y }
     }
 
-    fn fit(&self, columns: &Columns, how: &How, seed: u64) -> Found {
-        let record = self.experiment(columns);
+    fn fit_all(&self, records: &[Columns], how: &How, seed: u64) -> Found {
+        let records: Vec<_> = records.iter().map(|columns| self.experiment(columns)).collect();
         let mut random = Random(seed ^ 0x57a7);
         let start = |i: usize| -> Parameter {
             let sign = if how.opposite { -1.0 } else { 1.0 };
             free(sign * self.truth[i] * (0.35 * (2.0 * random.uniform() - 1.0)).exp())
         };
-        let fit = Fit::new(&self.model, &record).parameters(M::Parameters::from_fn(start));
+        let fit = Fit::new(&self.model, &records).parameters(M::Parameters::from_fn(start));
         let fit = match &how.noise {
             Some(sigma) => fit.noise(M::Output::from_fn(|j| sigma[j])),
             None => fit,
@@ -189,6 +194,7 @@ signals! { pub struct Walls { c1: "J/K", c2: "J/K", r12: "K/W", ra: "K/W" } }
 signals! { pub struct Poles { a: "1", b: "1" } }
 signals! { pub struct Line { a: "1", b: "V" } }
 signals! { pub struct Two { y: "V", z: "V" } }
+signals! { pub struct Factors { a: "1", b: "1" } }
 signals! { pub struct Plane { a: "1", b: "1", c: "V" } }
 signals! { pub struct Ringing { d: "1/s", c: "1/s^2" } }
 
@@ -299,6 +305,21 @@ impl Model for Planar {
     const KIND: Kind = Kind::Static;
     fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Force<S>, p: &Plane<S>) -> Two<S> {
         Two { y: p.a * u.u + p.c, z: p.a * p.b * u.u - p.c }
+    }
+}
+
+/// `y = a b u`: two parameters that only their product is known of.
+#[derive(Clone)]
+pub struct Product;
+
+impl Model for Product {
+    type State = Nothing;
+    type Input = Force;
+    type Output = Level;
+    type Parameters = Factors;
+    const KIND: Kind = Kind::Static;
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Force<S>, p: &Factors<S>) -> Level<S> {
+        Level { y: p.a * p.b * u.u }
     }
 }
 
