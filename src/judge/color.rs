@@ -77,3 +77,22 @@ pub(super) fn severity(part: f64) -> Severity {
         _ => Severity::Usable,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of an autoregression of order one with correlation `r`, the part `r^2` of the variance follows from the error before,
+    /// and `(1 + r) / (1 - r)` errors count for one; of white noise nothing follows, and each counts.
+    #[test]
+    fn an_autoregression_is_predicted() {
+        let many = 1_000_000_000;
+        for r in [0.0, 0.3, 0.9f64] {
+            let coefficients: Vec<f64> = (1..=20).map(|k| r.powi(k)).collect();
+            let white = Whiteness::new(&coefficients, many);
+            // The adjustment for 20 lags of so many errors is 2e-8.
+            assert!((white.predicted - r * r).abs() < 1e-7, "{r}: {}", white.predicted);
+            assert!((white.dependence - (1.0 + r) / (1.0 - r)).abs() < 1e-9, "{r}: {}", white.dependence);
+        }
+    }
+}

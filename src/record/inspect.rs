@@ -107,7 +107,12 @@ impl Record {
 
 fn inspect(channel: &Channel, pieces: &[Range<usize>], output: bool) -> ChannelInspection {
     let values = &channel.values[..];
-    let found = values::Values::of(values, pieces, output);
+    let mut found = values::Values::of(values, pieces, output);
+    // What is constant, or takes few values, in some pieces may not in others.
+    let whole = [0..values.len()];
+    if pieces.len() > 1 && (found.least >= found.greatest || output && found.levels.is_some()) {
+        found = values::Values::of(values, &whole, output);
+    }
     let mut suspicions = found.sentinel().into_iter().collect::<Vec<_>>();
     if output && suspicions.is_empty() {
         suspicions.extend(found.clipped());
@@ -118,7 +123,7 @@ fn inspect(channel: &Channel, pieces: &[Range<usize>], output: bool) -> ChannelI
     }
     ChannelInspection {
         name: channel.name.clone(),
-        samples: pieces.iter().map(Range::len).sum(),
+        samples: found.measured + found.missing,
         missing: found.missing,
         range: (found.least <= found.greatest).then_some((found.least, found.greatest)),
         levels: found.levels.as_ref().map(Vec::len),

@@ -35,7 +35,7 @@ struct Extreme {
 pub(super) struct Values<'v> {
     values: &'v [f64],
     pieces: &'v [Range<usize>],
-    measured: usize,
+    pub measured: usize,
     pub missing: usize,
     pub least: f64,
     pub greatest: f64,
