@@ -5,6 +5,7 @@ mod prediction;
 pub(crate) mod student;
 mod warning;
 
+pub(crate) use display::held;
 pub use prediction::Prediction;
 pub use warning::{Warning, WarningCode};
 
@@ -38,10 +39,13 @@ pub enum Knowledge {
     },
     /// It was given.
     Fixed,
-    /// The data push it against this bound; it is kept there, and has no interval.
+    /// The data push it against this bound; it is kept there.
     Held {
         /// The bound.
         bound: f64,
+        /// Other end of its 95 % interval, which begins at the bound: the part within the bounds of the interval that it
+        /// would have without them. `None` where no part is, or where there is no slope at the bound.
+        end: Option<f64>,
     },
     /// The data do not determine it; its value is where the search left it.
     Unidentified,
@@ -84,6 +88,10 @@ pub struct Unknown {
     pub error_index_held: Option<f64>,
     /// The coordinate that the optimizer worked in.
     pub transform: Transform,
+    /// Degrees of freedom of Student's t in its interval: those of the fit, or fewer where the variance of colored errors
+    /// is itself an estimate from few independent stretches.
+    #[serde(deserialize_with = "or_nan")]
+    pub degrees_of_freedom: f64,
 }
 
 /// A parameter of the model: what was declared of it, and what was found.
@@ -318,7 +326,19 @@ impl Summary {
         if !(probability > 0.0 && probability < 1.0) {
             return None;
         }
-        Some(student::interval(unknown.value, error, unknown.transform, probability, self.degrees_of_freedom()))
+        let Knowledge::Known { lower, upper, .. } = unknown.knowledge else { return None };
+        let (to_coordinate, slope) =
+            (|value| unknown.transform.to_coordinate(value), unknown.transform.slope(unknown.value));
+        // Next to an unknown that is held, an interval is not centered at the estimate.
+        let moved = 0.5 * (to_coordinate(lower) + to_coordinate(upper)) - to_coordinate(unknown.value);
+        let shift = if self.releases() && moved.is_finite() { moved } else { 0.0 };
+        let spread = student::Spread { standard_error: error / slope, degrees: unknown.degrees_of_freedom };
+        Some(spread.interval(to_coordinate(unknown.value) + shift, unknown.transform, probability))
+    }
+
+    /// Whether an unknown at a bound has an interval, for which those of all others allow.
+    fn releases(&self) -> bool {
+        self.unknowns.iter().any(|unknown| matches!(unknown.knowledge, Knowledge::Held { end: Some(_), .. }))
     }
 
     /// Correlation of some unknowns, by their numbers; zero where there is no interval, one on the diagonal.

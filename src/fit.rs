@@ -114,6 +114,13 @@ impl<'a, M: Model> Fit<'a, M> {
         self.set(|settings| settings.noise(M::Output::into_array(sigma).as_ref().to_vec()))
     }
 
+    /// Declares the standard deviation of the noise of each input, in its unit; zero for none. It changes neither the
+    /// estimate nor its intervals: the bias that it causes is estimated (Cook and Stefanski 1994), and named by a warning
+    /// where it is above a quarter of a standard error.
+    pub fn input_noise(self, sigma: Of<M::Input, f64>) -> Self {
+        self.set(|settings| settings.input_noise(M::Input::into_array(sigma).as_ref().to_vec()))
+    }
+
     /// Estimates the covariance of the noise of all outputs, instead of a standard deviation per output.
     pub fn noise_covariance(self) -> Self {
         self.set(Settings::noise_covariance)

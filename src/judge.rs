@@ -1,8 +1,12 @@
 //! Evaluation of the result of a search: noise, covariance, null directions, warnings.
 
+mod bounds;
 mod color;
 mod conclude;
+mod covariances;
+mod curved;
 mod data;
+mod data_noise;
 mod directions;
 mod explained;
 mod hac;
@@ -14,6 +18,7 @@ mod shape;
 mod suspects;
 mod together;
 mod warnings;
+mod whiteness;
 
 pub(crate) use conclude::{SearchEnd, conclude, conclude_from};
 pub(crate) use directions::undetermined;

@@ -50,7 +50,9 @@ pub(crate) fn widths(
     experiment: usize,
     probability: f64,
 ) -> Result<Widths, Error> {
-    let quantile = student::quantile(0.5 + probability / 2.0, estimate.degrees_of_freedom());
+    let known = estimate.unknowns.iter().filter(|unknown| unknown.knowledge.standard_error().is_some());
+    let degrees = known.map(|unknown| unknown.degrees_of_freedom).fold(estimate.degrees_of_freedom(), f64::min);
+    let quantile = student::quantile(0.5 + probability / 2.0, degrees);
     // Slopes in the outputs' own units, and the covariance in the optimizer's coordinates.
     let objective = objective.in_units();
     // A filter needs the measurements; else, bands are wanted where nothing was measured, too.

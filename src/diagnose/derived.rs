@@ -57,7 +57,9 @@ pub fn derived<M: Model>(
     let pairs = (0..moved.len()).flat_map(|a| (0..moved.len()).map(move |b| (a, b)));
     let variance: f64 = pairs.map(|(a, b)| gradient[moved[a]] * c[(a, b)] * gradient[moved[b]]).sum();
     let standard_error = Some(variance.max(0.0).sqrt()).filter(|error| known && error.is_finite() && value.is_finite());
-    let degrees = estimate.degrees_of_freedom();
-    let interval = standard_error.map(|error| student::interval(value, error, Transform::Identity, 0.95, degrees));
+    let degrees = moved.iter().map(|&i| estimate.unknowns[i].degrees_of_freedom);
+    let degrees = degrees.fold(estimate.degrees_of_freedom(), f64::min);
+    let interval = standard_error
+        .map(|standard_error| student::Spread { standard_error, degrees }.interval(value, Transform::Identity, 0.95));
     Derived { name: name.to_owned(), value, standard_error, interval }
 }

@@ -125,7 +125,7 @@ pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probabilit
     }
     let unknown = &estimate.unknowns[index];
     let linear = linearize(&objective, &best, "the profile")?;
-    let at_bound = |i: usize| i != index && matches!(estimate.unknowns[i].knowledge, Knowledge::Held { .. });
+    let at_bound = |i: usize| i != index && matches!(estimate.unknowns[i].knowledge, Knowledge::Held { end: None, .. });
     let held = undetermined(&linear, &(0..best.len()).map(at_bound).collect::<Vec<bool>>()).held;
     let covariance = linear.covariance(&held);
     // How far one standard error is, and how the others go along.
@@ -142,7 +142,7 @@ pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probabilit
         _ => 1.0,
     };
     let scale = error.unwrap_or((0.1 * best[index]).abs().max(1e-6)) * inflation.sqrt();
-    let quantile = student::quantile(0.5 + probability / 2.0, estimate.degrees_of_freedom());
+    let quantile = student::quantile(0.5 + probability / 2.0, unknown.degrees_of_freedom);
     let bounds = objective.bounds();
     let values = |coordinates: &[f64]| -> Vec<f64> {
         estimate.unknowns.iter().zip(coordinates).map(|(u, &c)| u.transform.to_value(c)).collect()

@@ -72,10 +72,16 @@ fn row(unknown: &Unknown) -> Vec<Cell> {
             let known = [error_size(standard_error).into(), format!("{lower} … {upper}").into(), index.into()];
             head(Cell::resolved(*value, standard_error)).chain(known).collect()
         }
-        Knowledge::Held { bound } => said(format!("held at its bound {}", exact(bound))),
+        Knowledge::Held { bound, end } => said(held(bound, end)),
         Knowledge::Unidentified => said("not determined by the data".to_owned()),
         Knowledge::Fixed => said("fixed".to_owned()),
     }
+}
+
+/// What is said of an unknown at its bound.
+pub(crate) fn held(bound: f64, end: Option<f64>) -> String {
+    let held = format!("held at its bound {}", exact(bound));
+    end.map_or(held.clone(), |end| format!("{held}; 95 % to {}", number(end, 3)))
 }
 
 fn fixed_row(parameter: &ParameterEstimate) -> Vec<Cell> {

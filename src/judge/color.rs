@@ -1,7 +1,8 @@
 //! Warnings about errors that are correlated over time.
 
-use super::conclude::{Covariances, Judgement};
-use super::residual_pass::Whiteness;
+use super::conclude::Judgement;
+use super::covariances::Covariances;
+use super::whiteness::Whiteness;
 use crate::estimate::{CovarianceMethod, Warning, WarningCode};
 use crate::numeral::{counted, number, p_value, percent};
 use crate::optimize::Severity;
@@ -42,7 +43,7 @@ impl Judgement<'_> {
         let output = &self.objective.problem.layout().outputs[output].name;
         let (probability, first) = (p_value(white.p_value.min(1.0)), number(white.first, 2));
         let mut text = format!(
-            "the errors of `{output}` are not white (Ljung-Box {probability}, correlation with the error before \
+            "the errors of `{output}` are not white (portmanteau {probability}, correlation with the error before \
              {first}): the model misses a part, or the noise is colored"
         );
         if part > SMALL {
@@ -75,24 +76,5 @@ pub(super) fn severity(part: f64) -> Severity {
         part if part > LARGE => Severity::NotUsable,
         part if part > SMALL => Severity::UsableWithCare,
         _ => Severity::Usable,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Of an autoregression of order one with correlation `r`, the part `r^2` of the variance follows from the error before,
-    /// and `(1 + r) / (1 - r)` errors count for one; of white noise nothing follows, and each counts.
-    #[test]
-    fn an_autoregression_is_predicted() {
-        let many = 1_000_000_000;
-        for r in [0.0, 0.3, 0.9f64] {
-            let coefficients: Vec<f64> = (1..=20).map(|k| r.powi(k)).collect();
-            let white = Whiteness::new(&coefficients, many);
-            // The adjustment for 20 lags of so many errors is 2e-8.
-            assert!((white.predicted - r * r).abs() < 1e-7, "{r}: {}", white.predicted);
-            assert!((white.dependence - (1.0 + r) / (1.0 - r)).abs() < 1e-9, "{r}: {}", white.dependence);
-        }
     }
 }

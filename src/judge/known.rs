@@ -1,7 +1,8 @@
 //! Warnings about what is known of the parameters: standard errors that are none, intervals that hold zero, signs and
 //! sizes that are not those of the start.
 
-use super::conclude::{Covariances, Judgement};
+use super::conclude::Judgement;
+use super::covariances::Covariances;
 use super::warnings::care;
 use crate::estimate::{Knowledge, Unknown, Warning, WarningCode};
 use crate::numeral::{exact, number};

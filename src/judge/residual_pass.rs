@@ -1,15 +1,16 @@
 //! One pass over the data without slopes: the residuals at the estimate.
 
+use super::whiteness::{LAGS, Whiteness};
 use crate::error::Error;
 use crate::estimate::OutputFit;
 use crate::optimize::Infeasible;
 use crate::problem::{Accumulate, At, Objective, each, gather_together};
 use crate::sweep::{Piece, Prepared, Sweep, Window};
-use crate::whiteness::{Autocorrelation, dot, ljung_box};
+use crate::whiteness::{Portmanteau, dot};
 use std::sync::Arc;
 
-/// Lags of the whiteness test.
-pub(super) const LAGS: usize = 20;
+/// Longest horizon over which errors are correlated.
+const HORIZON: usize = 100;
 /// Every how many windows one is simulated again with a finer step, and the most of them per record.
 const EVERY: usize = 16;
 const AGAIN: usize = 16;
@@ -33,52 +34,6 @@ pub(crate) struct Residuals {
     pub least_sigma: Vec<f64>,
 }
 
-/// Whiteness test of the errors of an output.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Whiteness {
-    /// p-value of the Ljung-Box test.
-    pub p_value: f64,
-    /// Autocorrelation at lag one.
-    pub first: f64,
-    /// The part of the errors' variance that follows from the errors before, by an autoregression over all lags, less
-    /// what white errors show by chance.
-    pub predicted: f64,
-    /// How many errors have the information of one independent error on a slow signal.
-    pub dependence: f64,
-}
-
-impl Whiteness {
-    /// From the autocorrelations at lags `1, 2, ...` of so many errors.
-    pub fn new(coefficients: &[f64], count: u64) -> Self {
-        let (_, p_value) = ljung_box(coefficients, count);
-        let (first, lags) = (coefficients.first().copied().unwrap_or(0.0), coefficients.len() as f64);
-        // What chance leaves, as in an adjusted coefficient of determination.
-        let free = (count as f64 - lags).max(1.0) / (count as f64).max(1.0);
-        let predicted = (1.0 - innovation(coefficients) / free).clamp(0.0, 1.0);
-        let positive: f64 = coefficients.iter().take_while(|rho| **rho > 0.0).sum();
-        let autoregression = (1.0 + first) / (1.0 - first).max(f64::EPSILON);
-        let dependence = (1.0 + 2.0 * positive).max(autoregression).max(1.0);
-        Whiteness { p_value, first, predicted, dependence }
-    }
-}
-
-/// Variance of the errors less what follows from those before, as a part of it (Levinson and Durbin's recursion).
-fn innovation(coefficients: &[f64]) -> f64 {
-    let (mut variance, mut model): (f64, Vec<f64>) = (1.0, vec![]);
-    for (k, rho) in coefficients.iter().enumerate() {
-        let known: f64 = model.iter().enumerate().map(|(i, a)| a * coefficients[k - 1 - i]).sum();
-        let next = (rho - known) / variance;
-        if !(next.abs() < 1.0) {
-            return variance;
-        }
-        let turned: Vec<f64> = model.iter().rev().map(|a| next * a).collect();
-        model.iter_mut().zip(turned).for_each(|(a, by)| *a -= by);
-        model.push(next);
-        variance *= 1.0 - next * next;
-    }
-    variance
-}
-
 /// Sums over one experiment.
 struct Sums<'s> {
     objective: &'s Objective<'s>,
@@ -86,7 +41,7 @@ struct Sums<'s> {
     outputs: Vec<OutputSums>,
     measured: u64,
     log_determinant: f64,
-    autocorrelations: Vec<Autocorrelation>,
+    portmanteaus: Vec<Portmanteau>,
     least_sigma: Vec<f64>,
     /// The windows to be simulated again.
     again: Vec<Sampled>,
@@ -109,10 +64,18 @@ impl<'s> Sums<'s> {
             outputs: vec![OutputSums::default(); outputs],
             measured: 0,
             log_determinant: 0.0,
-            autocorrelations: vec![Autocorrelation::new(LAGS); outputs],
+            portmanteaus: vec![Portmanteau::new(LAGS.max(horizon(objective))); outputs],
             least_sigma: vec![f64::INFINITY; outputs],
             again: vec![],
             run: vec![],
+        }
+    }
+
+    /// Multiplies the errors in `run` by the roots of their weights.
+    fn standardize(&mut self, begin: usize) {
+        if self.objective.is_weighted() {
+            let weight = |k: usize| self.objective.weight(self.experiment, begin + k);
+            self.run.iter_mut().enumerate().for_each(|(k, error)| *error *= weight(k).sqrt());
         }
     }
 
@@ -157,10 +120,10 @@ impl Accumulate for Sums<'_> {
             let values = &record.outputs()[j].values[begin..begin + samples];
             if window.whole && !window.has_variances() {
                 self.outputs[j].add_all(values, &self.run);
-                self.autocorrelations[j].add(&self.run, samples as u64);
+                self.standardize(begin);
+                self.portmanteaus[j].add(&self.run);
                 continue;
             }
-            let mut count = 0;
             for (k, (&y, &error)) in values.iter().zip(&self.run).enumerate() {
                 if window.is_measured(k, j, lane) {
                     let unit = window.variance_root(k, j, lane);
@@ -168,10 +131,10 @@ impl Accumulate for Sums<'_> {
                     if window.has_variances() {
                         self.least_sigma[j] = self.least_sigma[j].min(unit);
                     }
-                    count += 1;
                 }
             }
-            self.autocorrelations[j].add(&self.run, count);
+            self.standardize(begin);
+            self.portmanteaus[j].add(&self.run);
         }
         // Those in which a multiple of the distance lies.
         let distance = (EVERY * window.capacity()).max(record.len() / AGAIN);
@@ -186,7 +149,7 @@ impl Accumulate for Sums<'_> {
         self.measured += later.measured;
         self.log_determinant += later.log_determinant;
         self.outputs.iter_mut().zip(&later.outputs).for_each(|(sums, later)| sums.append(later));
-        self.autocorrelations.iter_mut().zip(&later.autocorrelations).for_each(|(sums, later)| sums.follow(later));
+        self.portmanteaus.iter_mut().zip(&later.portmanteaus).for_each(|(sums, later)| sums.follow(later));
         self.least_sigma.iter_mut().zip(&later.least_sigma).for_each(|(least, later)| *least = least.min(*later));
         self.again.extend(later.again);
     }
@@ -229,9 +192,9 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
         sums.iter_mut().zip(&one.outputs).for_each(|(sum, one)| sum.append(one));
     }
     let whiteness = |j: usize| {
-        let mut total = all[0].autocorrelations[j].clone();
-        all[1..].iter().for_each(|one| total.append(&one.autocorrelations[j]));
-        Whiteness::new(&total.coefficients(), total.count())
+        let mut total = all[0].portmanteaus[j].clone();
+        all[1..].iter().for_each(|one| total.append(&one.portmanteaus[j]));
+        Whiteness::of(&total, sums[j].count, horizon(objective))
     };
     Residuals {
         outputs: sums.iter().map(OutputSums::fit).collect(),
@@ -244,6 +207,11 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
             .map(|j| all.iter().map(|one| one.least_sigma[j]).fold(f64::INFINITY, f64::min))
             .collect(),
     }
+}
+
+/// The horizon of predictions that restart; zero where they do not, or from too far.
+fn horizon(objective: &Objective<'_>) -> usize {
+    objective.sweep.restarts().filter(|steps| *steps <= HORIZON).unwrap_or(0)
 }
 
 fn failed(objective: &Objective<'_>, coordinates: &[f64]) -> Error {

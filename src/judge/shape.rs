@@ -3,11 +3,11 @@
 
 use super::color;
 use super::conclude::Judgement;
-use super::residual_pass::{LAGS, Whiteness};
+use super::whiteness::{LAGS, Whiteness};
 use crate::estimate::{Warning, WarningCode};
 use crate::numeral::{p_value, percent};
 use crate::sweep::Window;
-use crate::whiteness::Autocorrelation;
+use crate::whiteness::Portmanteau;
 
 /// Records that are looked at, and samples of each: the first ones.
 const RECORDS: usize = 8;
@@ -21,7 +21,7 @@ impl Judgement<'_> {
         if !self.is_static() || layout.inputs.is_empty() || objective.sweep.predicts_variance() {
             return None;
         }
-        let mut sums = vec![Autocorrelation::new(LAGS); count * layout.inputs.len()];
+        let mut sums = vec![(Portmanteau::new(LAGS), 0); count * layout.inputs.len()];
         for e in 0..objective.experiments().min(RECORDS) {
             let errors = self.first_errors(e);
             for (i, input) in objective.problem.records[e].inputs().iter().enumerate() {
@@ -29,13 +29,15 @@ impl Judgement<'_> {
                 order.sort_by(|a, b| input.values[*a].total_cmp(&input.values[*b]));
                 for (j, errors) in errors.iter().enumerate() {
                     let sorted: Vec<f64> = order.iter().filter_map(|&k| errors[k]).collect();
-                    let mut own = Autocorrelation::new(LAGS);
-                    own.add(&sorted, sorted.len() as u64);
-                    sums[i * count + j].append(&own);
+                    let mut own = Portmanteau::new(LAGS);
+                    own.add(&sorted);
+                    let (sum, errors) = &mut sums[i * count + j];
+                    sum.append(&own);
+                    *errors += sorted.len() as u64;
                 }
             }
         }
-        let white: Vec<Whiteness> = sums.iter().map(|sum| Whiteness::new(&sum.coefficients(), sum.count())).collect();
+        let white: Vec<Whiteness> = sums.iter().map(|(sum, errors)| Whiteness::of(sum, *errors, 0)).collect();
         let least = |a: &usize, b: &usize| white[*a].p_value.total_cmp(&white[*b].p_value);
         let number = (0..white.len()).min_by(least)?;
         let (i, j, white) = (number / count, number % count, white[number]);

@@ -1,6 +1,7 @@
 //! Warnings about the data and the method of an estimate.
 
-use super::conclude::{Covariances, Judgement};
+use super::conclude::Judgement;
+use super::covariances::Covariances;
 use crate::estimate::{Direction, Knowledge, Unknown, Warning, WarningCode};
 use crate::layout::Kind;
 use crate::numeral::{counted, exact, number, percent};
@@ -37,11 +38,15 @@ impl Judgement<'_> {
         warnings.extend(self.unbounded());
         warnings.extend(self.gaps());
         for unknown in unknowns {
-            if let Knowledge::Held { bound } = unknown.knowledge {
+            if let Knowledge::Held { bound, end } = unknown.knowledge {
                 let (Unknown { name, unit, .. }, bound) = (unknown, exact(bound));
+                let reaches = match end {
+                    Some(end) => format!("; its 95 % interval reaches from there to {} {unit}", number(end, 3)),
+                    None => String::new(),
+                };
                 warnings.push(care(
                     WarningCode::HeldAtBound,
-                    format!("`{name}` is held at its bound {bound} {unit}: the data want it beyond"),
+                    format!("`{name}` is held at its bound {bound} {unit}: the data want it beyond{reaches}"),
                 ));
             }
         }
@@ -58,6 +63,9 @@ impl Judgement<'_> {
             let text = format!("the checkpoint could not be written ({write_error}); the search went on without it");
             warnings.push(Warning { code: WarningCode::CheckpointNotWritten, severity: Severity::Usable, text });
         }
+        warnings.extend(self.curved(unknowns, covariances));
+        warnings.extend(self.restart_noise(unknowns));
+        warnings.extend(self.input_noise(unknowns));
         warnings.extend(self.autocorrelation(covariances));
         warnings
     }
@@ -129,7 +137,7 @@ impl Judgement<'_> {
         let objective = self.objective.of(self.objective.problem, &*finer);
         let (name, shift, part) = shift(&objective, &self.end.coordinates, unknowns)?;
         let finer = finer.integrator();
-        (shift > STEP_SHIFT && !(part < DIGITS)).then(|| {
+        (shift > STEP_SHIFT && part >= DIGITS).then(|| {
             let (part, errors) = (percent(part, 2), number(shift, 2));
             care(WarningCode::CoarseStep, format!(
                 "the step is too coarse: with {finer} `{name}` would move by {part} of itself ({errors} standard errors); use \

@@ -93,13 +93,9 @@ impl Record {
 
     fn inspect_within(&self, whole: usize) -> Inspection {
         let n = self.len();
-        let pieces: Vec<Range<usize>> = match n <= whole {
-            true => vec![0..n],
-            false => {
-                let count = WHOLE / PIECE;
-                (0..count).map(|i| i * (n - PIECE) / (count - 1)).map(|begin| begin..begin + PIECE).collect()
-            }
-        };
+        let (count, length) = if n <= whole { (1, n) } else { (WHOLE / PIECE, PIECE) };
+        let begin = |i: usize| i * (n - length) / (count - 1).max(1);
+        let pieces: Vec<Range<usize>> = (0..count).map(|i| begin(i)..begin(i) + length).collect();
         let all = |channels: &[Channel], output| channels.iter().map(|one| inspect(one, &pieces, output)).collect();
         Inspection { inputs: all(&self.inputs, false), outputs: all(&self.outputs, true) }
     }
@@ -109,13 +105,14 @@ fn inspect(channel: &Channel, pieces: &[Range<usize>], output: bool) -> ChannelI
     let values = &channel.values[..];
     let mut found = values::Values::of(values, pieces, output);
     // What is constant, or takes few values, in some pieces may not in others.
-    let whole = [0..values.len()];
+    let whole = 0..values.len();
     if pieces.len() > 1 && (found.least >= found.greatest || output && found.levels.is_some()) {
-        found = values::Values::of(values, &whole, output);
+        found = values::Values::of(values, std::slice::from_ref(&whole), output);
     }
-    let mut suspicions = found.sentinel().into_iter().collect::<Vec<_>>();
+    let extremes = found.extremes().map_or(vec![], Vec::from);
+    let mut suspicions = Vec::from_iter(found.sentinel(&extremes));
     if output && suspicions.is_empty() {
-        suspicions.extend(found.clipped());
+        suspicions.extend(found.clipped(&extremes));
         suspicions.extend(found.frozen().filter(|_| suspicions.is_empty()));
         if suspicions.is_empty() && pieces.len() == 1 && found.continuous() {
             suspicions.extend(repeated::repeated(values));

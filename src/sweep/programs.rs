@@ -125,6 +125,10 @@ impl Sweep for ProgramSweep<'_> {
         self.predictor.predicts_variance()
     }
 
+    fn restarts(&self) -> Option<usize> {
+        self.plain.restarts()
+    }
+
     fn lanes(&self, record: &Record, seeds: &[Seed]) -> usize {
         match self.predictor.restarts() {
             Some(_) => 1,

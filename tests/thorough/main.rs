@@ -7,6 +7,8 @@ mod colored;
 #[path = "../common/mod.rs"]
 mod common;
 #[cfg(not(debug_assertions))]
+mod coverage;
+#[cfg(not(debug_assertions))]
 mod intervals;
 #[cfg(not(debug_assertions))]
 mod monte_carlo;

@@ -5,8 +5,8 @@ use rustc_hash::FxHashMap;
 
 /// The shortest block that is reported.
 const SHORTEST: usize = 20;
-/// Values that are kept to be found again, about.
-const KEPT: usize = 1024;
+/// Values that are kept to be found again, about. A block is found that holds one of them, of `n / 64` values almost always.
+const KEPT: usize = 64;
 
 /// The longest block that occurs twice. Of all values those are compared whose bits end so (all of a short column), so
 /// that both occurrences of a block offer the same ones.
@@ -46,8 +46,9 @@ mod tests {
         for n in [300, 20_000] {
             let mut values: Vec<f64> = (0..n).map(|k| (k as f64 * 0.618_033_988_749_895).sin()).collect();
             assert_eq!(repeated(&values), None);
-            values.copy_within(40..160, 170);
-            assert_eq!(repeated(&values), Some(Suspicion::Repeated { samples: 40..160, again: 170 }), "{n}");
+            let end = 40 + 2 * n / 5;
+            values.copy_within(40..end, end + 10);
+            assert_eq!(repeated(&values), Some(Suspicion::Repeated { samples: 40..end, again: end + 10 }), "{n}");
         }
     }
 

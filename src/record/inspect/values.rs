@@ -20,14 +20,11 @@ const BY_CHANCE: f64 = 1e-6;
 /// A column in which fewer of the values equal the one before is taken as continuous.
 const REPEATS: f64 = 0.05;
 
-/// An extreme value, and the values next to it.
-struct Extreme {
+/// An extreme value, how often it occurs, the value next to it, and the range of all others.
+pub(super) struct Extreme {
     value: f64,
     count: usize,
-    /// The value next to it, and how often that occurs.
     next: f64,
-    neighbors: usize,
-    /// The range of all others.
     others: f64,
 }
 
@@ -132,47 +129,57 @@ impl<'v> Values<'v> {
         (self.repeats - inside.min(self.repeats)) as f64 / (self.measured.saturating_sub(inside).max(1)) as f64
     }
 
-    fn extreme(&self, greatest: bool) -> Extreme {
-        let value = if greatest { self.greatest } else { self.least };
-        let (mut low, mut high, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0);
-        for &other in self.pieces.iter().flat_map(|piece| &self.values[piece.clone()]) {
-            let here = other == value;
-            count += usize::from(here);
-            low = if other < low && !here { other } else { low };
-            high = if other > high && !here { other } else { high };
-        }
-        let next = if greatest { high } else { low };
-        let neighbors = match count >= AT_LIMIT {
-            true => self.pieces.iter().flat_map(|piece| &self.values[piece.clone()]).filter(|v| **v == next).count(),
-            false => 0,
-        };
-        Extreme { value, count, next, neighbors, others: high - low }
-    }
-
-    /// The greatest or least value, if it is far away from all others.
-    pub fn sentinel(&self) -> Option<Suspicion> {
+    /// The greatest and the least value; `None` where there are few values.
+    pub fn extremes(&self) -> Option<[Extreme; 2]> {
         if self.levels.is_some() || self.least >= self.greatest {
             return None;
         }
-        let one = |greatest: bool| {
-            let Extreme { value, count, next, others, .. } = self.extreme(greatest);
+        // In four parts each, which the compiler may keep in vector lanes.
+        let (mut low, mut high) = ([f64::INFINITY; 4], [f64::NEG_INFINITY; 4]);
+        let (mut at_least, mut at_greatest) = ([0u64; 4], [0u64; 4]);
+        for piece in self.pieces {
+            for four in self.values[piece.clone()].chunks(4) {
+                for (i, &value) in four.iter().enumerate() {
+                    let (is_least, is_greatest) = (value == self.least, value == self.greatest);
+                    at_least[i] += u64::from(is_least);
+                    at_greatest[i] += u64::from(is_greatest);
+                    low[i] = if value < low[i] && !is_least { value } else { low[i] };
+                    high[i] = if value > high[i] && !is_greatest { value } else { high[i] };
+                }
+            }
+        }
+        let low = low.into_iter().fold(f64::INFINITY, f64::min);
+        let high = high.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        let one = |value: f64, next: f64, count: [u64; 4], others: f64| {
+            let count = count.iter().sum::<u64>() as usize;
+            Extreme { value, count, next, others }
+        };
+        Some([
+            one(self.greatest, high, at_greatest, high - self.least),
+            one(self.least, low, at_least, self.greatest - low),
+        ])
+    }
+
+    /// The greatest or least value, if it is far away from all others.
+    pub fn sentinel(&self, extremes: &[Extreme]) -> Option<Suspicion> {
+        let one = |&Extreme { value, count, next, others }: &Extreme| {
             let far = (value - next).abs() > FAR * others && others > 0.0;
             let seldom = count as f64 <= SENTINELS * self.measured as f64;
             (far && seldom && (count > 1 || KNOWN.contains(&value))).then_some(Suspicion::Sentinel { value, count })
         };
-        one(true).or_else(|| one(false))
+        extremes.iter().find_map(one)
     }
 
     /// The extreme values that occur more often than their neighbors.
-    pub fn clipped(&self) -> Vec<Suspicion> {
-        if self.levels.is_some() {
-            return vec![];
-        }
-        let one = |greatest: bool| {
-            let Extreme { value, count, neighbors, .. } = self.extreme(greatest);
-            (count >= AT_LIMIT + NEIGHBORS * neighbors).then_some(Suspicion::Clipped { value, count })
+    pub fn clipped(&self, extremes: &[Extreme]) -> Vec<Suspicion> {
+        let at = |next: f64| {
+            let values = self.pieces.iter().flat_map(|piece| &self.values[piece.clone()]);
+            values.filter(|value| **value == next).count()
         };
-        [true, false].into_iter().filter_map(one).collect()
+        let clips =
+            |extreme: &&Extreme| extreme.count >= AT_LIMIT && extreme.count >= AT_LIMIT + NEIGHBORS * at(extreme.next);
+        let one = |&Extreme { value, count, .. }: &Extreme| Suspicion::Clipped { value, count };
+        extremes.iter().filter(clips).map(one).collect()
     }
 
     /// The longest run of one value, if chance does not make it.
