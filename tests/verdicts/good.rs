@@ -40,13 +40,13 @@ fn edited(seed: u64, how: &How, edit: impl Fn(&mut Columns, &mut Random)) -> Fou
 fn sizes() -> Vec<Good> {
     vec![
         // The default step is the larger error here.
-        with("no noise", &[CoarseStep], |s| noisy(&*plant(s), SAMPLES, 0.0, s)),
+        with("no noise", &[CoarseStep, CurvedInterval], |s| noisy(&*plant(s), SAMPLES, 0.0, s)),
         with("noise 0.01 %", &[CoarseStep], |s| noisy(&*plant(s), SAMPLES, 1e-4, s)),
         good("noise 0.1 %", |s| noisy(&*plant(s), SAMPLES, 1e-3, s)),
         good("noise 1 %", |s| noisy(&*plant(s), SAMPLES, 1e-2, s)),
         good("noise 10 %", |s| noisy(&*plant(s), SAMPLES, 0.1, s)),
         // Of a friction that is small anyway.
-        with("noise 30 %", &[HoldsZero], |s| noisy(&*plant(s), SAMPLES, 0.3, s)),
+        with("noise 30 %", &[HoldsZero, CurvedInterval], |s| noisy(&*plant(s), SAMPLES, 0.3, s)),
         good("80 samples", |s| noisy(&*plant(s), 80, 0.02, s)),
         good("200 samples", |s| noisy(&*plant(s), 200, 0.02, s)),
         good("5,000 samples", |s| noisy(&*plant(s), 5000, 0.02, s)),
@@ -63,7 +63,7 @@ fn noises() -> Vec<Good> {
             let plant = plant(s);
             plant.fit(&plant.record(s, SAMPLES).noisy(0.05, 0.9, s), &How::default(), s)
         }),
-        with("colored noise of 30 %, correlation 0.7", &[ColoredErrors, HoldsZero], |s| {
+        with("colored noise of 30 %, correlation 0.7", &[ColoredErrors, HoldsZero, CurvedInterval], |s| {
             let plant = plant(s);
             plant.fit(&plant.record(s, SAMPLES).noisy(0.3, 0.7, s), &How::default(), s)
         }),
@@ -174,7 +174,8 @@ fn samplings() -> Vec<Good> {
             let far = Bench { truth: vec![0.4, 1.5], ..lag() };
             far.fit(&record, &How::default(), s)
         }),
-        good("one output is held constant by a controller", regulated),
+        // The inertia is known to a quarter of itself.
+        with("one output is held constant by a controller", &[CurvedInterval], regulated),
         good("free decay of a model without inputs", |s| {
             let plant = ringing();
             let record = plant.simulated(vec![], &plant.truth()).noisy(0.03, 0.0, s);
@@ -186,7 +187,8 @@ fn samplings() -> Vec<Good> {
             plant.fit_all(&[record(s), record(s + 100), record(s + 200)], &How::default(), s)
         }),
         good("static model of two outputs", |s| noisy(&plane(), SAMPLES, 0.1, s)),
-        good("predicted one step ahead, little noise", |s| {
+        // Every measurement is a start, noise included.
+        with("predicted one step ahead, little noise", &[RestartNoise], |s| {
             let plant = lag();
             plant.fit(&plant.record(s, SAMPLES).noisy(1e-4, 0.0, s), &How { one_step: true, ..How::default() }, s)
         }),
