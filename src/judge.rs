@@ -1,16 +1,24 @@
 //! Evaluation of the result of a search: noise, covariance, null directions, warnings.
 
 mod bounds;
+mod color;
 mod conclude;
 mod covariances;
 mod curved;
+mod data;
 mod data_noise;
 mod directions;
+mod explained;
 mod hac;
+mod known;
 pub(crate) mod noise;
 mod residual_pass;
 mod sandwich;
+mod shape;
+mod suspects;
+mod together;
 mod warnings;
+mod whiteness;
 
 pub(crate) use conclude::{SearchEnd, conclude, conclude_from};
 pub(crate) use directions::undetermined;

@@ -224,7 +224,7 @@ pub use {
     predict::{FreeRun, Horizon, Kalman, Plant, Predictor},
     prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
     problem::{Objective, Problem, Search},
-    record::{Gap, Initial, Time},
+    record::{ChannelInspection, Gap, Initial, Inspection, Suspicion, Time},
     recurrence::{InvalidRecurrence, Recurrence},
     regress::{Assumption, LinearEstimate, PooledRegression, Regression, RegressionError},
     report::Report,

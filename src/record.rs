@@ -5,6 +5,7 @@ mod column;
 mod csv;
 mod cycles;
 mod edit;
+mod inspect;
 #[cfg(feature = "npy")]
 mod npy;
 mod stored;
@@ -14,6 +15,7 @@ pub use column::{Channel, Column};
 #[cfg(feature = "csv")]
 pub use csv::CsvFile;
 pub use cycles::Gap;
+pub use inspect::{ChannelInspection, Inspection, Suspicion};
 pub(crate) use stored::Stored;
 #[cfg(feature = "csv")]
 pub(crate) use time::Clock;

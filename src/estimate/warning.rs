@@ -24,6 +24,42 @@ pub enum WarningCode {
     TooFewMeasurements,
     /// The data determine none of the unknowns.
     NothingDetermined,
+    /// An output that never moves.
+    ConstantOutput,
+    /// An input that never moves.
+    ConstantInput,
+    /// One exact value far away from all others, which stands for a missing measurement.
+    Sentinel,
+    /// An output that stops at a limit.
+    Clipped,
+    /// An output that stands still where the model moves.
+    Frozen,
+    /// A block of an output that occurs twice.
+    Repeated,
+    /// An output of few values.
+    CoarseOutput,
+    /// Most of an output was not measured.
+    MissingMeasurements,
+    /// An output that the model explains no better than its mean does.
+    Unexplained,
+    /// Errors of another size than the given noise.
+    GivenNoise,
+    /// Parameters that cannot be told from zero.
+    HoldsZero,
+    /// A standard error that is zero or not finite.
+    NoStandardError,
+    /// A parameter of the opposite sign than its start.
+    SignChanged,
+    /// A parameter of another order of magnitude than its start.
+    FarFromStart,
+    /// Errors of a static model that follow from an input.
+    WrongShape,
+    /// Parameters that differ from record to record.
+    RecordsContradict,
+    /// Parameters that differ from output to output.
+    OutputsContradict,
+    /// Parameters that differ from the first half of the data to the second.
+    HalvesContradict,
     /// A predicted variance goes to zero, and the likelihood to infinity.
     UnboundedLikelihood,
     /// Time jumps within a record.

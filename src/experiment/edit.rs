@@ -4,7 +4,7 @@
 use super::{Experiment, Sample};
 use crate::error::Error;
 use crate::model::Model;
-use crate::record::Gap;
+use crate::record::{Gap, Inspection};
 use crate::signals::{Of, Signals};
 use std::ops::RangeBounds;
 
@@ -106,10 +106,17 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
         self.record.without_gaps().into_iter().map(Self::of).collect()
     }
 
-    /// Where time jumps: a step of more than 1.5 times the median one, so that a sample or more is lost. Over a gap the
-    /// input is held as between any two samples, which is seldom what happened.
+    /// Where time jumps: in even sampling a step of more than 1.5 times the median one, so that a sample or more is lost;
+    /// in uneven sampling a step far beyond the spread of the others. Over a gap the input is held as between any two
+    /// samples, which is seldom what happened.
     pub fn gaps(&self) -> Vec<Gap> {
         self.record.gaps()
+    }
+
+    /// What the columns show before any model: constant, clipped, frozen or repeated values, sentinels, few levels, missing
+    /// measurements. Every fit looks for them, too, and warns of those that its errors confirm.
+    pub fn inspect(&self) -> Inspection {
+        self.record.inspect()
     }
 
     /// The share of the samples, from 0 to 1, in which each output was measured.

@@ -1,6 +1,7 @@
 //! From the end of a search to a [`Summary`].
 
 use super::covariances::Covariances;
+use super::known::is_error;
 use super::noise;
 use super::residual_pass::{Residuals, reason, residual_pass};
 use super::{bounds, directions};
@@ -170,7 +171,9 @@ impl<'j> Judgement<'j> {
         let noise = &objective.problem.settings.noise;
         let widening = match noise {
             Noise::Given(_) | Noise::Predicted => 1.0,
-            _ if noise::only_scales(objective) => (linear.sum_of_squares() / degrees.max(1.0)).sqrt(),
+            _ if noise::only_scales(objective) => {
+                (linear.sum_of_squares() / degrees.max(1.0)).sqrt().max(noise::rounding(objective))
+            }
             _ => (measured as f64 / degrees.max(1.0)).sqrt(),
         };
         let (exact, release) =
@@ -207,7 +210,7 @@ impl<'j> Judgement<'j> {
     }
 
     /// The errors' autocorrelation; not computed where residuals are round-off.
-    pub(super) fn autocorrelated(&self) -> Option<(usize, super::residual_pass::Whiteness)> {
+    pub(super) fn autocorrelated(&self) -> Option<(usize, super::whiteness::Whiteness)> {
         self.residuals.least_white().filter(|(_, white)| white.p_value < WHITENESS_LEVEL && !self.rounding)
     }
 
@@ -218,6 +221,7 @@ impl<'j> Judgement<'j> {
             let (unknown, value) = (&free[i], self.values[i]);
             let transform = unknown.parameter.transform;
             let covariance = covariances.unknowns.as_ref().filter(|_| seen[i] && self.degrees > 0.0);
+            let covariance = covariance.filter(|covariance| is_error(covariance.standard_error(i)));
             let degrees_of_freedom = covariances.degrees[i];
             let knowledge = match (self.held_at[i], covariance) {
                 (Some(bound), None) => Knowledge::Held { bound, end: None },

@@ -32,7 +32,7 @@ pub(crate) fn named(
 ) -> Direction {
     let change = |i: usize, d: f64| {
         let step = d / if norms[i] > 0.0 { norms[i] } else { 1.0 } * slopes[i];
-        if values[i] == 0.0 { step } else { step / values[i].abs() }
+        if values[i] == 0.0 { step } else { step / values[i] }
     };
     let mut moves: Vec<(String, f64)> =
         taking_part(direction).map(|(i, d)| (unknowns.row[i].name.clone(), change(i, d))).collect();

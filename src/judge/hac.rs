@@ -168,6 +168,10 @@ fn bias(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 
 /// The matrix with its singular values limited to those of a stable autoregression.
 fn stable(a: DMatrix<f64>) -> Option<DMatrix<f64>> {
+    // A decomposition of what is not finite would panic.
+    if !a.iter().all(|entry| entry.is_finite()) {
+        return None;
+    }
     let mut svd = a.try_svd(true, true, f64::EPSILON, 1000)?;
     svd.singular_values.iter_mut().for_each(|value| *value = value.min(LARGEST));
     svd.recompose().ok()

@@ -144,6 +144,12 @@ pub(crate) fn reproduces(objective: &Objective<'_>, coordinates: &[f64]) -> bool
     moments(objective, coordinates, &vec![1.0; objective.outputs()], None).is_ok_and(reproduced)
 }
 
+/// Noise of the first output below which errors are round-off of the simulation, in its unit; zero without a measurement
+/// but zero.
+pub(crate) fn rounding(objective: &Objective<'_>) -> f64 {
+    ROUNDING * magnitudes(objective).first().copied().unwrap_or(0.0)
+}
+
 /// Largest measured magnitude of each output.
 fn magnitudes(objective: &Objective<'_>) -> Vec<f64> {
     let largest = |values: &[f64]| values.iter().fold(0.0f64, |largest, y| largest.max(y.abs()));

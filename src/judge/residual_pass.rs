@@ -1,5 +1,6 @@
 //! One pass over the data without slopes: the residuals at the estimate.
 
+use super::whiteness::{LAGS, Whiteness};
 use crate::error::Error;
 use crate::estimate::OutputFit;
 use crate::optimize::Infeasible;
@@ -8,8 +9,6 @@ use crate::sweep::{Piece, Prepared, Sweep, Window};
 use crate::whiteness::{Portmanteau, dot};
 use std::sync::Arc;
 
-/// Lags of the whiteness test.
-const LAGS: usize = 20;
 /// Longest horizon over which errors are correlated.
 const HORIZON: usize = 100;
 /// Every how many windows one is simulated again with a finer step, and the most of them per record.
@@ -28,21 +27,11 @@ pub(crate) struct Residuals {
     pub step_error: f64,
     /// The whiteness of each output's errors.
     pub whiteness: Vec<Whiteness>,
+    /// Mean and standard deviation of each output's measurements.
+    pub levels: Vec<(f64, f64)>,
     /// The smallest standard deviation that was predicted for a measurement of each output; infinite without
     /// predictions.
     pub least_sigma: Vec<f64>,
-}
-
-/// Whiteness test of the errors of an output.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Whiteness {
-    /// p-value of the portmanteau test.
-    pub p_value: f64,
-    /// Autocorrelation at lag one.
-    pub first: f64,
-    /// Standardized sum of products of errors a horizon apart, and their autocorrelation; zeros where predictions do not
-    /// restart, or from too far.
-    pub at_restart: (f64, f64),
 }
 
 /// Sums over one experiment.
@@ -205,18 +194,11 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
     let whiteness = |j: usize| {
         let mut total = all[0].portmanteaus[j].clone();
         all[1..].iter().for_each(|one| total.append(&one.portmanteaus[j]));
-        let at_restart = match horizon(objective) {
-            0 => (0.0, 0.0),
-            steps => total.at(steps),
-        };
-        Whiteness {
-            p_value: total.p_value(LAGS.min(sums[j].count as usize / 4).max(1)),
-            first: total.at(1).1,
-            at_restart,
-        }
+        Whiteness::of(&total, sums[j].count, horizon(objective))
     };
     Residuals {
         outputs: sums.iter().map(OutputSums::fit).collect(),
+        levels: sums.iter().map(OutputSums::level).collect(),
         measured,
         log_determinant,
         step_error,
@@ -359,6 +341,13 @@ impl OutputSums {
         self.sum += other.sum + n * shift;
         self.errors += other.errors;
         self.count += other.count;
+    }
+
+    /// Mean and standard deviation of the values.
+    fn level(&self) -> (f64, f64) {
+        let n = self.count.max(1) as f64;
+        let spread = (self.squares - self.sum * self.sum / n).max(0.0);
+        (self.first + self.sum / n, (spread / n).sqrt())
     }
 
     fn fit(&self) -> OutputFit {

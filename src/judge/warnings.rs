@@ -2,9 +2,9 @@
 
 use super::conclude::Judgement;
 use super::covariances::Covariances;
-use crate::estimate::{CovarianceMethod, Direction, Knowledge, Unknown, Warning, WarningCode};
+use crate::estimate::{Direction, Knowledge, Unknown, Warning, WarningCode};
 use crate::layout::Kind;
-use crate::numeral::{counted, exact, number, p_value, percent};
+use crate::numeral::{counted, exact, number, percent};
 use crate::optimize::Severity;
 use crate::problem::Objective;
 
@@ -12,10 +12,10 @@ use crate::problem::Objective;
 const STEP_SHIFT: f64 = 0.5;
 /// A predicted standard deviation below this fraction of the errors counts as zero.
 const ZERO_DEVIATION: f64 = 1e-6;
-/// Factor by which autocorrelation may widen an interval before the severity is raised.
-const CORRELATION_MATTERS: f64 = 2.0;
+/// Smallest part of an unknown's value that a finer step must move it by for a warning.
+const DIGITS: f64 = 1e-6;
 
-fn care(code: WarningCode, text: String) -> Warning {
+pub(super) fn care(code: WarningCode, text: String) -> Warning {
     Warning { code, severity: Severity::UsableWithCare, text }
 }
 
@@ -29,6 +29,12 @@ impl Judgement<'_> {
     ) -> Vec<Warning> {
         let mut warnings = vec![];
         warnings.extend(self.of_the_data(unknowns));
+        warnings.extend(self.data());
+        warnings.extend(self.unexplained());
+        warnings.extend(self.given_noise());
+        warnings.extend(self.shape());
+        warnings.extend(self.contradictions(unknowns));
+        warnings.extend(self.knowledge(unknowns, covariances));
         warnings.extend(self.unbounded());
         warnings.extend(self.gaps());
         for unknown in unknowns {
@@ -101,7 +107,8 @@ impl Judgement<'_> {
 
     fn gaps(&self) -> Vec<Warning> {
         let problem = self.objective.problem;
-        if problem.layout().kind == Kind::Static {
+        // Nothing is held between samples without a state or without an input.
+        if problem.layout().kind == Kind::Static || problem.layout().inputs.is_empty() {
             return vec![];
         }
         let records = problem.records.iter().zip(&problem.unknowns.labels);
@@ -130,40 +137,13 @@ impl Judgement<'_> {
         let objective = self.objective.of(self.objective.problem, &*finer);
         let (name, shift, part) = shift(&objective, &self.end.coordinates, unknowns)?;
         let finer = finer.integrator();
-        (shift > STEP_SHIFT).then(|| {
+        (shift > STEP_SHIFT && part >= DIGITS).then(|| {
             let (part, errors) = (percent(part, 2), number(shift, 2));
             care(WarningCode::CoarseStep, format!(
                 "the step is too coarse: with {finer} `{name}` would move by {part} of itself ({errors} standard errors); use \
                  a finer step"
             ))
         })
-    }
-
-    /// Whether the errors are autocorrelated, and what of it the intervals allow for.
-    fn autocorrelation(&self, covariances: &Covariances) -> Option<Warning> {
-        let (output, white) = self.autocorrelated()?;
-        let output = &self.objective.problem.layout().outputs[output].name;
-        let (probability, first) = (p_value(white.p_value.min(1.0)), number(white.first, 2));
-        let mut text = format!(
-            "the errors of `{output}` are not white (portmanteau {probability}, correlation with the error before \
-             {first}): the model misses a part, or the noise is colored"
-        );
-        let CovarianceMethod::Hac { lags } = covariances.method else {
-            text += "; the intervals take them as white and are too narrow if the order of the samples matters";
-            return Some(care(WarningCode::ColoredErrors, text));
-        };
-        let white = |i: usize| {
-            let unit = covariances.unit.as_ref()?;
-            Some(unit.standard_error(i) * self.widening * self.slopes[i].abs()).filter(|error| *error > 0.0)
-        };
-        let widened = |i: usize| Some(covariances.unknowns.as_ref()?.standard_error(i) / white(i)?);
-        let widest = (0..self.slopes.len()).filter_map(widened).fold(0.0, f64::max);
-        text += &format!("; the intervals allow for it (HAC over {}, prewhitened)", counted(lags, "lag"));
-        if widest > 1.0 {
-            text += &format!(", which makes them up to {} times as wide as for white errors", number(widest, 3));
-        }
-        let severity = if widest > CORRELATION_MATTERS { Severity::UsableWithCare } else { Severity::Usable };
-        Some(Warning { code: WarningCode::ColoredErrors, severity, text })
     }
 }
 

@@ -156,6 +156,13 @@ impl Point {
         left == 0.0 || left > 0.0 && small && left <= ROUNDINGS.powi(2) * unknowns
     }
 
+    /// By how much the cost jumps, as a part of it, because the data are rounded before the model is subtracted.
+    fn rounding(&self) -> f64 {
+        let left = self.linear.sum_of_squares().sqrt();
+        let norm = self.linear.data_norm().filter(|_| left > 0.0);
+        norm.map_or(0.0, |norm| ROUNDINGS * f64::EPSILON * norm / left)
+    }
+
     /// Whether the residual is far below the data.
     fn is_next_to_data(&self) -> bool {
         self.linear.data_norm().is_some_and(|norm| self.linear.sum_of_squares() <= (ROUNDING * norm).powi(2))
@@ -184,7 +191,7 @@ impl Point {
     /// off what the slopes promised; `rough` says that they were off however short.
     pub fn stuck(&self, failed: u64, noise: f64, rough: bool) -> Outcome {
         let (step, gradient) = (self.relative_step(), self.cosine());
-        let noise = noise.max(self.linear.roughness());
+        let noise = noise.max(self.linear.roughness()).max(self.rounding());
         let left = self.potential / self.cost_size();
         if self.is_next_to_data() {
             Outcome::Exact

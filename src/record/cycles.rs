@@ -22,8 +22,29 @@ impl fmt::Display for Gap {
     }
 }
 
-/// A step this much longer than the median one is a gap: half way to one lost sample.
+/// Of even sampling, a step this much longer than the median one is a gap: half way to one lost sample.
 const GAP: f64 = 1.5;
+/// Sampling is even if half of the steps are within this part of the median one.
+const EVEN: f64 = 0.1;
+/// Of uneven sampling, a step is a gap that is beyond the longest tenth by so many times the distance of that from the
+/// median: of intervals between independent events, three of 100,000 are.
+const BEYOND: f64 = 5.0;
+
+/// The longest step that is no gap.
+fn longest_step(stamps: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    if steps.is_empty() {
+        return f64::INFINITY;
+    }
+    let (middle, tenth) = (steps.len() / 2, steps.len() * 9 / 10);
+    let median = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let alike = steps.iter().filter(|step| (*step / median - 1.0).abs() <= EVEN).count();
+    if 2 * alike >= steps.len() {
+        return GAP * median;
+    }
+    let long = *steps.select_nth_unstable_by(tenth, f64::total_cmp).1;
+    (GAP * median).max(long + BEYOND * (long - median))
+}
 
 impl Record {
     /// Each run of samples for which `running` holds, if it is at least `shortest` samples long, as a record of its own,
@@ -54,11 +75,12 @@ impl Record {
         self.pieces(runs, 0, "piece")
     }
 
-    /// Where time jumps: a step of more than 1.5 times the median one, so that a sample or more is lost. Over a gap the
-    /// input is held as between any two samples, which is seldom what happened.
+    /// Where time jumps: in even sampling a step of more than 1.5 times the median one, so that a sample or more is lost;
+    /// in uneven sampling a step far beyond the spread of the others. Over a gap the input is held as between any two
+    /// samples, which is seldom what happened.
     pub fn gaps(&self) -> Vec<Gap> {
         let Time::Stamps(stamps) = &self.time else { return Vec::new() };
-        let longest = self.sample_time() * GAP;
+        let longest = longest_step(stamps);
         let steps = stamps.windows(2).enumerate();
         steps.filter(|(_, t)| t[1] - t[0] > longest).map(|(k, t)| Gap { sample: k + 1, from: t[0], to: t[1] }).collect()
     }

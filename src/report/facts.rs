@@ -46,6 +46,8 @@ pub(super) struct Signal {
     pub role: &'static str,
     /// Samples that were not measured.
     pub missing: u64,
+    /// What its values show before any model, in words.
+    pub remarks: Vec<String>,
     /// Least value, mean and greatest value, if any was measured.
     pub values: Option<[f64; 3]>,
 }

@@ -10,7 +10,7 @@ use crate::interval::Hold;
 use crate::judge::output_fit;
 use crate::layout::Kind;
 use crate::problem::{Problem, Simulated};
-use crate::record::{Channel, Record as Measured};
+use crate::record::{Channel, ChannelInspection, Inspection, Record as Measured};
 use crate::section::{Drawing, Keep, Line, Panel, PanelKind, Plot, Samples, Style, Timeline, identifier};
 use core::ops::Range;
 
@@ -90,8 +90,9 @@ impl<'a> Columns<'a> {
             (_, Hold::Zero) => "inputs hold from sample to sample",
             _ => "inputs are straight lines from sample to sample",
         };
-        let inputs = record.inputs().iter().map(|channel| signal(channel, "input"));
-        let outputs = record.outputs().iter().map(|channel| signal(channel, "output"));
+        let Inspection { inputs, outputs } = record.inspect();
+        let inputs = record.inputs().iter().zip(&inputs).map(|(channel, found)| signal(channel, found, "input"));
+        let outputs = record.outputs().iter().zip(&outputs).map(|(channel, found)| signal(channel, found, "output"));
         let timeline = self.timeline(numbers);
         let single = timeline.stretches.first().is_some_and(|whole| whole.samples_per_column == 1);
         let fits = examined.into_iter().enumerate().map(|(j, residuals)| {
@@ -185,14 +186,14 @@ impl<'a> Columns<'a> {
     }
 }
 
-fn signal(channel: &Channel, role: &'static str) -> Signal {
+fn signal(channel: &Channel, found: &ChannelInspection, role: &'static str) -> Signal {
     let (name, unit, values) = (channel.name.clone(), channel.unit.clone(), &*channel.values);
     let measured = || values.iter().copied().filter(|value| !value.is_nan());
     let count = measured().count();
     let (low, high) = (measured().reduce(f64::min), measured().reduce(f64::max));
     let mean = measured().sum::<f64>() / count.max(1) as f64;
     let values_of = low.zip(high).map(|(low, high)| [low, mean, high]);
-    Signal { name, unit, role, missing: (values.len() - count) as u64, values: values_of }
+    Signal { name, unit, role, missing: (values.len() - count) as u64, remarks: found.remarks(), values: values_of }
 }
 
 /// The samples about one.

@@ -3,6 +3,7 @@
 mod bad_records;
 mod csv;
 mod edits;
+mod inspect;
 mod npy;
 #[path = "../common/shared.rs"]
 mod shared;

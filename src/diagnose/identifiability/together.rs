@@ -15,13 +15,14 @@ pub(super) fn together(moves: &[(String, f64)], left: f64, unknowns: &[Unknown])
     let moves: Vec<(&Unknown, f64)> = moves.iter().map(of).collect::<Option<_>>()?;
     let (first, _) = moves.first().filter(|_| moves.len() > 1)?;
     let names = listed(moves.iter().map(|(unknown, _)| format!("`{}`", unknown.name)).collect());
-    let relative = |(unknown, by): &(&Unknown, f64)| by / unknown.value.abs();
+    let relative = |(unknown, by): &(&Unknown, f64)| by / unknown.value;
     let one_unit = moves.iter().all(|(unknown, _)| unknown.unit == first.unit);
     let not_zero = moves.iter().all(|(unknown, _)| unknown.value != 0.0);
-    let up = moves.iter().filter(|(_, by)| *by > 0.0).count();
+    let up = moves.iter().filter(|step| relative(step) > 0.0).count();
     let one_way = up == 0 || up == moves.len();
+    let rising = moves.iter().filter(|(_, by)| *by > 0.0).count();
     let (how, in_units) = if one_unit && same(moves.iter().map(|(_, by)| *by)) {
-        ("up to a common shift", true)
+        (if moves.len() == 2 && rising == 1 { "as their sum" } else { "up to a common shift" }, true)
     } else if not_zero && same(moves.iter().map(relative)) && one_way {
         (if moves.len() == 2 { "as their ratio" } else { "up to a common factor" }, false)
     } else if not_zero && same(moves.iter().map(relative)) && moves.len() == 2 {
@@ -72,7 +73,7 @@ pub(crate) fn reworded(warning: &Warning, directions: &[Direction], unknowns: &[
 
 /// The changes of a direction in the unknowns' own units.
 fn absolute(direction: &Direction, unknowns: &[Unknown]) -> Vec<(String, f64)> {
-    let size = |name: &str| unknowns.iter().find(|u| u.name == name).map_or(0.0, |unknown| unknown.value.abs());
-    let scaled = |(name, by): &(String, f64)| (name.clone(), if size(name) > 0.0 { by * size(name) } else { *by });
+    let value = |name: &str| unknowns.iter().find(|u| u.name == name).map_or(0.0, |unknown| unknown.value);
+    let scaled = |(name, by): &(String, f64)| (name.clone(), if value(name) == 0.0 { *by } else { by * value(name) });
     direction.moves.iter().map(scaled).collect()
 }

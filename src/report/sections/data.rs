@@ -12,11 +12,13 @@ pub(super) fn section(facts: &Facts) -> Section {
     let section = Section::new("data", "Data");
     let section = match facts.records.as_slice() {
         [single] => {
-            section.says(format!("{}: {}.", super::quoted(&single.name), extent(single))).table(signals(single))
+            let section = section.says(format!("{}: {}.", super::quoted(&single.name), extent(single)));
+            remarks(single).into_iter().fold(section.table(signals(single)), Section::says)
         }
         records => records.iter().take(SHOWN).enumerate().fold(section, |section, (i, record)| {
             let part = Section::new(format!("data-{}", i + 1), record.name.as_str());
-            section.part(part.says(format!("{}.", extent(record))).table(signals(record)).folded())
+            let part = part.says(format!("{}.", extent(record))).table(signals(record));
+            section.part(remarks(record).into_iter().fold(part, Section::says).folded())
         }),
     };
     let section = if facts.single() { section } else { section.folded() };
@@ -30,6 +32,12 @@ pub(super) fn section(facts: &Facts) -> Section {
 fn size(value: f64, range: f64) -> Cell {
     let rounding = value.abs() < 5e-5 * range;
     Cell::Number { value, text: number(if rounding { 0.0 } else { value }, 4) }
+}
+
+/// What the values of the signals show before any model, a sentence for each signal of which there is something to say.
+fn remarks(record: &Record) -> Vec<String> {
+    let said = record.signals.iter().filter(|signal| !signal.remarks.is_empty());
+    said.map(|signal| format!("`{}`: {}.", signal.name, signal.remarks.join("; "))).collect()
 }
 
 /// The columns of a record.

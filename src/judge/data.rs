@@ -1,0 +1,216 @@
+//! Warnings about the data themselves: what the look at the columns found, where the errors confirm it.
+
+use super::conclude::Judgement;
+use super::suspects::{Split, Suspect, splits};
+use crate::estimate::{Warning, WarningCode};
+use crate::numeral::{counted, exact, number, percent};
+use crate::optimize::Severity;
+use crate::record::{ChannelInspection, Inspection, Suspicion};
+
+/// Errors below this part of an output's range or level are rounding: the model reproduces what is suspicious.
+const REPRODUCED: f64 = 1e-6;
+/// Mean squared errors at suspicious samples beyond so many times those elsewhere confirm the suspicion.
+const LARGER: f64 = 2.0;
+/// Suspicious samples that make so much of the sum of squares decide the estimate.
+const DECIDE: f64 = 0.5;
+/// Outputs with so few values are coarse, where the errors are larger than this part of a step.
+const FEW: usize = 8;
+const PART_OF_STEP: f64 = 0.1;
+/// So much of an output missing is worth a note.
+const MISSING: f64 = 0.5;
+/// Warnings of one kind; more are counted.
+const NAMED: usize = 4;
+
+fn warning(code: WarningCode, severity: Severity, text: String) -> Warning {
+    Warning { code, severity, text }
+}
+
+impl Judgement<'_> {
+    /// Warnings about the columns of the records.
+    pub(super) fn data(&self) -> Vec<Warning> {
+        let found: Vec<Inspection> = self.objective.problem.records.iter().map(|r| r.inspect_some()).collect();
+        let mut warnings = self.constant_outputs(&found);
+        warnings.extend(self.constant_inputs(&found));
+        warnings.extend(self.suspicions(&found));
+        warnings.extend(self.coarse(&found));
+        warnings.extend(self.sentinels_of_inputs(&found));
+        warnings.extend(self.missing(&found));
+        warnings
+    }
+
+    /// ` of experiment ...`, if there are several.
+    fn of_experiment(&self, e: usize) -> String {
+        let labels = &self.objective.problem.unknowns.labels;
+        if labels.len() > 1 { format!(" of experiment `{}`", labels[e]) } else { String::new() }
+    }
+
+    /// The value of a channel that is the same in all records.
+    fn constant<'i>(found: &'i [Inspection], of: impl Fn(&'i Inspection) -> &'i ChannelInspection) -> Option<f64> {
+        let mut values = found.iter().map(|one| of(one).constant());
+        let first = values.next()??;
+        values.all(|value| value == Some(first)).then_some(first)
+    }
+
+    fn constant_outputs(&self, found: &[Inspection]) -> Vec<Warning> {
+        let outputs = &self.objective.problem.layout().outputs;
+        let still: Vec<Option<f64>> =
+            (0..outputs.len()).map(|j| Self::constant(found, |one| &one.outputs[j])).collect();
+        let all = still.iter().all(Option::is_some);
+        let one = |(j, value): (usize, &Option<f64>)| {
+            let (value, rmse) = ((*value)?, self.residuals.outputs[j].rmse);
+            // A controller may hold an output; the model then gives the same.
+            let held = !all && rmse <= REPRODUCED * value.abs();
+            let (name, unit) = (&outputs[j].name, &outputs[j].unit);
+            let text = format!(
+                "the output `{name}` is {} {unit} throughout: it never moves and says nothing of the parameters; check the \
+                 sensor, or excite the plant",
+                exact(value)
+            );
+            let severity = if held { Severity::Usable } else { Severity::NotUsable };
+            Some(warning(WarningCode::ConstantOutput, severity, text))
+        };
+        still.iter().enumerate().filter_map(one).collect()
+    }
+
+    fn constant_inputs(&self, found: &[Inspection]) -> Vec<Warning> {
+        let inputs = &self.objective.problem.layout().inputs;
+        let one = |(i, input): (usize, &crate::layout::Quantity)| {
+            let value = Self::constant(found, |one| &one.inputs[i])?;
+            // Nothing can be mistaken for the effect of an input that is zero.
+            let severity = if value == 0.0 { Severity::Usable } else { Severity::UsableWithCare };
+            let text = format!(
+                "the input `{}` is {} {} throughout: what it drives cannot be told from an offset; vary it",
+                input.name,
+                exact(value),
+                input.unit
+            );
+            Some(warning(WarningCode::ConstantInput, severity, text))
+        };
+        inputs.iter().enumerate().filter_map(one).collect()
+    }
+
+    /// What is suspicious of an output, and confirmed by the errors.
+    fn suspicions(&self, found: &[Inspection]) -> Vec<Warning> {
+        let mut suspicions: Vec<(Suspect, &ChannelInspection, &Suspicion)> = vec![];
+        for (e, inspection) in found.iter().enumerate() {
+            for (j, channel) in inspection.outputs.iter().enumerate() {
+                for suspicion in &channel.suspicions {
+                    suspicions.push((Suspect::new(e, j, suspicion), channel, suspicion));
+                }
+            }
+        }
+        if suspicions.is_empty() {
+            return vec![];
+        }
+        let (suspects, named): (Vec<Suspect>, Vec<_>) =
+            suspicions.into_iter().map(|(suspect, channel, suspicion)| (suspect, (channel, suspicion))).unzip();
+        let splits = splits(self.objective, &self.end.coordinates, &suspects);
+        let mut warnings = vec![];
+        for ((suspect, (channel, suspicion)), split) in suspects.iter().zip(named).zip(&splits) {
+            let Some((code, severity, advice)) = self.confirmed(channel, suspicion, split) else { continue };
+            if warnings.len() < NAMED {
+                let of = self.of_experiment(suspect.experiment);
+                let text = format!(
+                    "the output `{}`{of} {suspicion}, and the model differs there by {} {}: {advice}",
+                    channel.name,
+                    number(split.rms(), 2),
+                    self.objective.problem.layout().outputs[suspect.output].unit
+                );
+                warnings.push(warning(code, severity, text));
+            }
+        }
+        warnings
+    }
+
+    /// Code, severity and remedy of a suspicion that the errors confirm.
+    fn confirmed(
+        &self,
+        channel: &ChannelInspection,
+        suspicion: &Suspicion,
+        split: &Split,
+    ) -> Option<(WarningCode, Severity, &'static str)> {
+        let (least, greatest) = channel.range?;
+        if split.rms() <= REPRODUCED * (greatest - least) {
+            return None;
+        }
+        let decides = |bad: bool| if bad { Severity::NotUsable } else { Severity::UsableWithCare };
+        let dominates = split.share() > DECIDE;
+        match suspicion {
+            Suspicion::Sentinel { .. } => (split.ratio() > LARGER).then_some((
+                WarningCode::Sentinel,
+                decides(dominates && !self.objective.is_robust()),
+                "it stands for a missing measurement; replace it by NaN",
+            )),
+            Suspicion::Clipped { .. } => Some((
+                WarningCode::Clipped,
+                decides(dominates),
+                "the sensor is at its limit; replace these samples by NaN, or use a wider range",
+            )),
+            Suspicion::Frozen { .. } => (split.ratio() > LARGER).then_some((
+                WarningCode::Frozen,
+                decides(dominates),
+                "the sensor was stuck; replace these samples by NaN",
+            )),
+            Suspicion::Repeated { .. } => Some((
+                WarningCode::Repeated,
+                decides(dominates),
+                "a buffer was written twice; leave one of the blocks out",
+            )),
+        }
+    }
+
+    /// Outputs of few values, whose errors are not far below the step between them.
+    fn coarse(&self, found: &[Inspection]) -> Vec<Warning> {
+        let outputs = self.objective.problem.layout().outputs.iter().enumerate();
+        let one = |(j, output): (usize, &crate::layout::Quantity)| {
+            let levels = found.iter().map(|one| one.outputs[j].levels).try_fold(0, |most, n| Some(most.max(n?)))?;
+            let step = found.iter().filter_map(|one| one.outputs[j].step).reduce(f64::min)?;
+            let rmse = self.residuals.outputs[j].rmse;
+            (levels <= FEW && rmse > PART_OF_STEP * step).then(|| {
+                let text = format!(
+                    "the output `{}` has {levels} values only, {} {} apart: its rounding is no noise, and parameters are off \
+                     by it; measure it finer",
+                    output.name,
+                    number(step, 3),
+                    output.unit
+                );
+                warning(WarningCode::CoarseOutput, Severity::UsableWithCare, text)
+            })
+        };
+        outputs.filter_map(one).collect()
+    }
+
+    fn sentinels_of_inputs(&self, found: &[Inspection]) -> Vec<Warning> {
+        let channels = found.iter().enumerate().flat_map(|(e, one)| one.inputs.iter().map(move |channel| (e, channel)));
+        let one = |(e, channel): (usize, &ChannelInspection)| {
+            let suspicion = channel.suspicions.first()?;
+            let text = format!(
+                "the input `{}`{} {suspicion}: if it stands for a missing measurement, give the value that acted on the \
+                 plant, or leave these samples out",
+                channel.name,
+                self.of_experiment(e)
+            );
+            Some(warning(WarningCode::Sentinel, Severity::UsableWithCare, text))
+        };
+        channels.filter_map(one).take(NAMED).collect()
+    }
+
+    fn missing(&self, found: &[Inspection]) -> Vec<Warning> {
+        let outputs = self.objective.problem.layout().outputs.iter().enumerate();
+        let one = |(j, output): (usize, &crate::layout::Quantity)| {
+            let of = |count: fn(&ChannelInspection) -> usize| found.iter().map(|one| count(&one.outputs[j])).sum();
+            let (missing, samples): (usize, usize) = (of(|one| one.missing), of(|one| one.samples));
+            let part = missing as f64 / samples.max(1) as f64;
+            (part > MISSING).then(|| {
+                let text = format!(
+                    "{} of the measurements of `{}` are missing ({} are left)",
+                    percent(part, 2),
+                    output.name,
+                    counted(self.residuals.outputs[j].samples, "measurement")
+                );
+                warning(WarningCode::MissingMeasurements, Severity::Usable, text)
+            })
+        };
+        outputs.filter_map(one).collect()
+    }
+}

@@ -1,0 +1,135 @@
+//! Warnings about what is known of the parameters: standard errors that are none, intervals that hold zero, signs and
+//! sizes that are not those of the start.
+
+use super::conclude::Judgement;
+use super::covariances::Covariances;
+use super::warnings::care;
+use crate::estimate::{Knowledge, Unknown, Warning, WarningCode};
+use crate::numeral::{exact, number};
+use crate::optimize::Severity;
+use crate::problem::Role;
+
+/// A parameter so many times its start, or one such part of it, is in another unit.
+const ANOTHER_UNIT: f64 = 400.0;
+
+/// Names in backquotes, with commas.
+fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+}
+
+/// Whether an interval is as wide as the value, so that it holds zero (or, of a logarithm, spans as much).
+fn holds_zero(unknown: &Unknown) -> bool {
+    match unknown.knowledge {
+        Knowledge::Known { lower, upper, .. } => upper - lower >= 2.0 * unknown.value.abs(),
+        _ => false,
+    }
+}
+
+impl Judgement<'_> {
+    /// What is said of the parameters one by one.
+    pub(super) fn knowledge(&self, unknowns: &[Unknown], covariances: &Covariances) -> Vec<Warning> {
+        let mut warnings = vec![];
+        warnings.extend(self.without_error(unknowns, covariances));
+        warnings.extend(self.near_zero(unknowns));
+        warnings.extend(opposite(unknowns));
+        warnings.extend(far_from_start(unknowns));
+        warnings
+    }
+
+    /// Unknowns whose standard error came out as zero, infinite or not a number.
+    fn without_error(&self, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
+        let covariance = covariances.unknowns.as_ref().filter(|_| self.degrees > 0.0)?;
+        let seen = self.seen();
+        let wrong = |(i, _): &(usize, &Unknown)| seen[*i] && !is_error(covariance.standard_error(*i));
+        let wrong: Vec<(usize, &Unknown)> = unknowns.iter().enumerate().filter(wrong).collect();
+        let (first, _) = *wrong.first()?;
+        let text = format!(
+            "the standard error of {} is {}: nothing is known of it; check noise, loss and weighting, and whether the outputs \
+             move at all",
+            listed(wrong.iter().map(|(_, unknown)| unknown.name.as_str())),
+            number(covariance.standard_error(first), 2)
+        );
+        Some(Warning { code: WarningCode::NoStandardError, severity: Severity::NotUsable, text })
+    }
+
+    /// Parameters that cannot be told from zero.
+    fn near_zero(&self, unknowns: &[Unknown]) -> Option<Warning> {
+        let rows = &self.objective.problem.unknowns.row;
+        let own = |(i, unknown): &(usize, &Unknown)| {
+            matches!(unknown.role, Role::Parameter(_)) && rows[*i].parameter.prior.is_none()
+        };
+        let parameters: Vec<&Unknown> = unknowns.iter().enumerate().filter(own).map(|(_, unknown)| unknown).collect();
+        let unknown: Vec<&&Unknown> = parameters.iter().filter(|unknown| holds_zero(unknown)).collect();
+        if unknown.is_empty() {
+            return None;
+        }
+        let nothing = |unknown: &&Unknown| holds_zero(unknown) || unknown.knowledge == Knowledge::Unidentified;
+        let all = parameters.iter().all(nothing);
+        let names = listed(unknown.iter().map(|unknown| unknown.name.as_str()));
+        let text = match all {
+            false => format!(
+                "{names} cannot be told from zero: an interval is wider than its value; excite what depends on it, or fix it \
+                 at zero"
+            ),
+            true => format!(
+                "no parameter is known: the intervals of {names} are wider than their values; vary {} more, or measure longer",
+                match self.objective.problem.layout().inputs.as_slice() {
+                    [] => "the initial state".to_owned(),
+                    inputs => listed(inputs.iter().map(|input| input.name.as_str())),
+                }
+            ),
+        };
+        let severity = if all { Severity::NotUsable } else { Severity::UsableWithCare };
+        Some(Warning { code: WarningCode::HoldsZero, severity, text })
+    }
+}
+
+/// Whether a number can be a standard error.
+pub(super) fn is_error(error: f64) -> bool {
+    error > 0.0 && error.is_finite()
+}
+
+/// The parameters that a start was given for, with the ratio of value and start.
+fn started(unknowns: &[Unknown]) -> impl Iterator<Item = (&Unknown, f64)> {
+    let known = |unknown: &&Unknown| {
+        matches!(unknown.role, Role::Parameter(_))
+            && unknown.start != 0.0
+            && unknown.knowledge.standard_error().is_some()
+    };
+    unknowns.iter().filter(known).map(|unknown| (unknown, unknown.value / unknown.start))
+}
+
+/// Parameters of the opposite sign than their start.
+fn opposite(unknowns: &[Unknown]) -> Vec<Warning> {
+    let turned = started(unknowns).filter(|(unknown, ratio)| *ratio < 0.0 && !holds_zero(unknown));
+    let one = |(unknown, _): (&Unknown, f64)| {
+        let Unknown { name, value, start, unit, .. } = unknown;
+        let text = format!(
+            "`{name}` is {} {unit}, but its start was {}: the sign has changed; check the signs of the signals, or give a \
+             bound",
+            number(*value, 4),
+            exact(*start)
+        );
+        care(WarningCode::SignChanged, text)
+    };
+    turned.map(one).collect()
+}
+
+/// Parameters of another order of magnitude than their start.
+fn far_from_start(unknowns: &[Unknown]) -> Vec<Warning> {
+    let far = started(unknowns).filter(|(unknown, ratio)| {
+        let size = ratio.abs();
+        !holds_zero(unknown) && (size > ANOTHER_UNIT || size < ANOTHER_UNIT.recip())
+    });
+    let one = |(unknown, ratio): (&Unknown, f64)| {
+        let Unknown { name, value, start, unit, .. } = unknown;
+        let text = format!(
+            "`{name}` is {} {unit}, {} times its start {}: check the units of signals and time",
+            number(*value, 4),
+            number(ratio, 2),
+            exact(*start)
+        );
+        care(WarningCode::FarFromStart, text)
+    };
+    far.map(one).collect()
+}

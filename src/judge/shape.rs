@@ -1,0 +1,74 @@
+//! Whether the errors of a static model follow from its inputs: in order of an input's size they are white if the shape of
+//! the model is right, whatever the order of the samples in time.
+
+use super::color;
+use super::conclude::Judgement;
+use super::whiteness::{LAGS, Whiteness};
+use crate::estimate::{Warning, WarningCode};
+use crate::numeral::{p_value, percent};
+use crate::sweep::Window;
+use crate::whiteness::Portmanteau;
+
+/// Records that are looked at, and samples of each: the first ones.
+const RECORDS: usize = 8;
+const SAMPLES: usize = 16_384;
+
+impl Judgement<'_> {
+    /// The output and the input that it depends on otherwise than the model says, most certainly so.
+    pub(super) fn shape(&self) -> Option<Warning> {
+        let objective = self.objective;
+        let (layout, count) = (objective.problem.layout(), objective.outputs());
+        if !self.is_static() || layout.inputs.is_empty() || objective.sweep.predicts_variance() {
+            return None;
+        }
+        let mut sums = vec![(Portmanteau::new(LAGS), 0); count * layout.inputs.len()];
+        for e in 0..objective.experiments().min(RECORDS) {
+            let errors = self.first_errors(e);
+            for (i, input) in objective.problem.records[e].inputs().iter().enumerate() {
+                let mut order: Vec<usize> = (0..errors[0].len()).collect();
+                order.sort_by(|a, b| input.values[*a].total_cmp(&input.values[*b]));
+                for (j, errors) in errors.iter().enumerate() {
+                    let sorted: Vec<f64> = order.iter().filter_map(|&k| errors[k]).collect();
+                    let mut own = Portmanteau::new(LAGS);
+                    own.add(&sorted);
+                    let (sum, errors) = &mut sums[i * count + j];
+                    sum.append(&own);
+                    *errors += sorted.len() as u64;
+                }
+            }
+        }
+        let white: Vec<Whiteness> = sums.iter().map(|(sum, errors)| Whiteness::of(sum, *errors, 0)).collect();
+        let least = |a: &usize, b: &usize| white[*a].p_value.total_cmp(&white[*b].p_value);
+        let number = (0..white.len()).min_by(least)?;
+        let (i, j, white) = (number / count, number % count, white[number]);
+        let (chance, part) = (white.p_value * sums.len() as f64, self.colored(j, &white));
+        (chance < color::CERTAIN && part > color::SMALL).then(|| {
+            let text = format!(
+                "the errors of `{}` follow from the input `{}` ({} in order of its size): the model has the wrong shape, by {} of \
+                 what the output moves, and no interval allows for that",
+                layout.outputs[j].name,
+                layout.inputs[i].name,
+                p_value(chance),
+                percent(part, 2)
+            );
+            Warning { code: WarningCode::WrongShape, severity: color::severity(part), text }
+        })
+    }
+
+    /// The first errors of an experiment, output by output; `None` where nothing was measured.
+    fn first_errors(&self, e: usize) -> Vec<Vec<Option<f64>>> {
+        let mut errors = vec![vec![]; self.objective.outputs()];
+        let visit = &mut |window: &mut Window| {
+            for k in 0..window.samples[0] {
+                for (j, errors) in errors.iter_mut().enumerate() {
+                    let error = window.error(k, j, 0);
+                    errors.push((window.is_measured(k, j, 0) && error.is_finite()).then_some(error));
+                }
+            }
+            errors[0].len() < SAMPLES
+        };
+        // It stops early where there are enough.
+        let _ = self.objective.run_alone(e, &self.end.coordinates, false, visit);
+        errors
+    }
+}

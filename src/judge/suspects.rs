@@ -1,0 +1,109 @@
+//! Whether the errors at suspicious samples are larger than elsewhere: a plant at rest stands still by right, a sensor that
+//! froze does not.
+
+use crate::problem::{Accumulate, Objective};
+use crate::record::{Record, Suspicion};
+use crate::sweep::Window;
+use core::ops::Range;
+
+/// Samples of an output that may be wrong.
+pub(super) struct Suspect {
+    pub experiment: usize,
+    pub output: usize,
+    inside: Inside,
+}
+
+enum Inside {
+    Value(f64),
+    Samples(Range<usize>),
+}
+
+/// Sum of squared errors, and how many there were.
+#[derive(Clone, Copy, Default)]
+struct Errors {
+    squares: f64,
+    count: u64,
+}
+
+/// The errors inside and outside the samples of a suspect.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Split {
+    inside: Errors,
+    outside: Errors,
+}
+
+impl Suspect {
+    pub fn new(experiment: usize, output: usize, suspicion: &Suspicion) -> Self {
+        let inside = match suspicion {
+            Suspicion::Sentinel { value, .. } | Suspicion::Clipped { value, .. } => Inside::Value(*value),
+            Suspicion::Frozen { samples, .. } => Inside::Samples(samples.clone()),
+            Suspicion::Repeated { samples, again } => Inside::Samples(*again..again + samples.len()),
+        };
+        Suspect { experiment, output, inside }
+    }
+}
+
+impl Split {
+    /// Root of the mean squared error inside.
+    pub fn rms(&self) -> f64 {
+        (self.inside.squares / self.inside.count.max(1) as f64).sqrt()
+    }
+
+    /// Mean squared error inside, relative to that outside.
+    pub fn ratio(&self) -> f64 {
+        let mean = |errors: Errors| errors.squares / errors.count.max(1) as f64;
+        mean(self.inside) / mean(self.outside).max(f64::MIN_POSITIVE)
+    }
+
+    /// Part of the sum of squares that lies inside.
+    pub fn share(&self) -> f64 {
+        self.inside.squares / (self.inside.squares + self.outside.squares).max(f64::MIN_POSITIVE)
+    }
+}
+
+struct Sums<'s> {
+    record: &'s Record,
+    suspects: Vec<&'s Suspect>,
+    splits: Vec<Split>,
+}
+
+impl Accumulate for Sums<'_> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        for (suspect, split) in self.suspects.iter().zip(&mut self.splits) {
+            let values = &self.record.outputs()[suspect.output].values;
+            for k in (0..window.samples[lane]).filter(|k| window.is_measured(*k, suspect.output, lane)) {
+                let sample = window.begin[lane] + k;
+                let inside = match &suspect.inside {
+                    Inside::Value(value) => values[sample] == *value,
+                    Inside::Samples(samples) => samples.contains(&sample),
+                };
+                let errors = if inside { &mut split.inside } else { &mut split.outside };
+                errors.squares += window.error(k, suspect.output, lane).powi(2);
+                errors.count += 1;
+            }
+        }
+    }
+
+    fn append(&mut self, later: Self) {
+        for (split, later) in self.splits.iter_mut().zip(later.splits) {
+            for (errors, later) in [(&mut split.inside, later.inside), (&mut split.outside, later.outside)] {
+                errors.squares += later.squares;
+                errors.count += later.count;
+            }
+        }
+    }
+}
+
+/// The errors of each suspect, by one pass over the data; empty where they cannot be evaluated.
+pub(super) fn splits(objective: &Objective<'_>, coordinates: &[f64], suspects: &[Suspect]) -> Vec<Split> {
+    let plain = objective.in_units();
+    let of = |experiment: usize| suspects.iter().filter(move |suspect| suspect.experiment == experiment);
+    let make = |experiment: usize| {
+        let suspects: Vec<&Suspect> = of(experiment).collect();
+        let splits = vec![Split::default(); suspects.len()];
+        Sums { record: &objective.problem.records[experiment], suspects, splits }
+    };
+    let Ok(found) = plain.gather(coordinates, false, make) else { return vec![] };
+    // In the order of the experiments, which is that of the suspects.
+    found.into_iter().flat_map(|sums| sums.splits).collect()
+}

@@ -1,0 +1,414 @@
+//! Plants, and what their records are made of.
+
+use crate::random::Random;
+use greybox::models::DcMotor;
+use greybox::optimize::Severity;
+use greybox::pmsm::Surface;
+use greybox::{
+    Experiment, ExperimentOf, Fit, Hold, Horizon, Huber, Kind, Model, Nothing, Of, Parameter, Rk45, Scalar, Signals,
+    Simulator, Time, WarningCode, free, signals,
+};
+
+/// The columns of a record.
+#[derive(Clone)]
+pub struct Columns {
+    pub step: f64,
+    /// Of samples that are not evenly spaced.
+    pub times: Option<Vec<f64>>,
+    pub u: Vec<Vec<f64>>,
+    pub y: Vec<Vec<f64>>,
+}
+
+impl Columns {
+    pub fn len(&self) -> usize {
+        self.y[0].len()
+    }
+
+    /// Adds Gaussian noise: a part of the standard deviation of each output, with this correlation from sample to sample.
+    pub fn noisy(mut self, part: f64, correlation: f64, seed: u64) -> Self {
+        let mut random = Random(seed ^ 0x5eed);
+        for y in &mut self.y {
+            let sigma = part * deviation(y);
+            let mut e = random.normal();
+            for y in y.iter_mut() {
+                *y += sigma * e;
+                e = correlation * e + (1.0 - correlation * correlation).sqrt() * random.normal();
+            }
+        }
+        self
+    }
+
+    fn time(&self) -> Time {
+        self.times.clone().map_or(Time::Uniform { start: 0.0, step: self.step }, Time::Stamps)
+    }
+}
+
+/// Standard deviation of a column.
+pub fn deviation(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n).sqrt()
+}
+
+/// How a record is fitted.
+#[derive(Clone, Default)]
+pub struct How {
+    pub noise: Option<Vec<f64>>,
+    pub robust: bool,
+    /// Starts have the opposite sign of the truth.
+    pub opposite: bool,
+    /// Predictions from the last measurement on, instead of a simulation.
+    pub one_step: bool,
+}
+
+/// What was said of a fit.
+pub struct Found {
+    pub severity: Severity,
+    /// The warnings that are no mere notes.
+    pub codes: Vec<WarningCode>,
+    /// Largest error of a parameter in standard errors.
+    pub errors: f64,
+    pub text: String,
+}
+
+/// A model whose truth is known.
+pub trait Plant {
+    fn truth(&self) -> Vec<f64>;
+    /// Inputs of so many samples that excite it.
+    fn inputs(&self, seed: u64, samples: usize) -> Vec<Vec<f64>>;
+    /// What it makes of inputs, with these parameters.
+    fn simulated(&self, u: Vec<Vec<f64>>, truth: &[f64]) -> Columns;
+    /// A fit of several records at once.
+    fn fit_all(&self, records: &[Columns], how: &How, seed: u64) -> Found;
+
+    fn fit(&self, columns: &Columns, how: &How, seed: u64) -> Found {
+        self.fit_all(std::slice::from_ref(columns), how, seed)
+    }
+
+    fn record(&self, seed: u64, samples: usize) -> Columns {
+        self.simulated(self.inputs(seed, samples), &self.truth())
+    }
+}
+
+/// A model with parameters, a sample time (s), inputs (mean, amplitude, samples per level) and the state it begins in.
+pub struct Bench<M: Model> {
+    pub model: M,
+    pub truth: Vec<f64>,
+    pub step: f64,
+    pub drive: Vec<(f64, f64, usize)>,
+    pub initial: Vec<f64>,
+    /// Whether the state at the first sample is told to the fit, because the outputs do not give it.
+    pub told: bool,
+    pub hold: Hold,
+}
+
+impl<M: Model> Bench<M> {
+    fn experiment(&self, columns: &Columns) -> ExperimentOf<M> {
+        let inputs = (0..columns.len()).map(|k| M::Input::from_fn(|i| columns.u[i][k])).collect();
+        let outputs = (0..columns.len()).map(|k| M::Output::from_fn(|j| columns.y[j][k])).collect();
+        let record = Experiment::new(&self.model, columns.time(), inputs, outputs).unwrap().hold(self.hold);
+        match self.told {
+            true => record.initial(M::State::from_fn(|i| greybox::fixed(self.initial[i]))),
+            false => record,
+        }
+    }
+}
+
+impl<M: Model> Plant for Bench<M> {
+    fn truth(&self) -> Vec<f64> {
+        self.truth.clone()
+    }
+
+    fn inputs(&self, seed: u64, samples: usize) -> Vec<Vec<f64>> {
+        let mut random = Random(seed.wrapping_mul(0x9e37_79b9) ^ 0xd1ce);
+        let column = |&(mean, amplitude, hold): &(f64, f64, usize)| {
+            let mut level = 0.0;
+            let level = |k: usize| {
+                if k % hold == 0 {
+                    level = mean + amplitude * (2.0 * random.uniform() - 1.0);
+                }
+                level
+            };
+            (0..samples).map(level).collect()
+        };
+        self.drive.iter().map(column).collect()
+    }
+
+    fn simulated(&self, u: Vec<Vec<f64>>, truth: &[f64]) -> Columns {
+        let samples = u.first().map_or(400, Vec::len);
+        let rows: Vec<Of<M::Input, f64>> = (0..samples).map(|k| M::Input::from_fn(|i| u[i][k])).collect();
+        let (truth, start) = (M::Parameters::from_fn(|i| truth[i]), M::State::from_fn(|i| self.initial[i]));
+        let time = Time::Uniform { start: 0.0, step: self.step };
+        let simulator = Simulator::new(&self.model).hold(self.hold);
+        let exact = Rk45 { relative: 1e-12, absolute: 1e-14 };
+        let run = match M::KIND {
+            Kind::Continuous => simulator.integrator(exact).run(&truth, &start, time, &rows),
+            _ => simulator.run(&truth, &start, time, &rows),
+        };
+        let run = run.unwrap();
+        let outputs: Vec<_> = run.outputs.into_iter().map(M::Output::into_array).collect();
+        let y = (0..M::Output::LEN).map(|j| outputs.iter().map(|row| row.as_ref()[j]).collect()).collect();
+        Columns { step: self.step, times: None, u, y }
+    }
+
+    fn fit_all(&self, records: &[Columns], how: &How, seed: u64) -> Found {
+        let records: Vec<_> = records.iter().map(|columns| self.experiment(columns)).collect();
+        let mut random = Random(seed ^ 0x57a7);
+        let start = |i: usize| -> Parameter {
+            let sign = if how.opposite { -1.0 } else { 1.0 };
+            free(sign * self.truth[i] * (0.35 * (2.0 * random.uniform() - 1.0)).exp())
+        };
+        let fit = Fit::new(&self.model, &records).parameters(M::Parameters::from_fn(start));
+        let fit = match &how.noise {
+            Some(sigma) => fit.noise(M::Output::from_fn(|j| sigma[j])),
+            None => fit,
+        };
+        let fit = if how.one_step { fit.predictor(Horizon { steps: 1, filter: None }) } else { fit };
+        let fit = if how.robust { fit.loss(Huber::default()) } else { fit };
+        let estimate = match fit.run() {
+            Ok(estimate) => estimate,
+            Err(error) => {
+                let text = error.to_string();
+                return Found { severity: Severity::NotUsable, codes: vec![], errors: 0.0, text };
+            }
+        };
+        let mut errors = 0.0f64;
+        for (found, truth) in estimate.summary().parameters.iter().zip(&self.truth) {
+            let error = (found.value - truth).abs();
+            errors = errors.max(found.knowledge.standard_error().map_or(0.0, |one| error / one));
+        }
+        let told = estimate.warnings.iter().filter(|warning| warning.severity > Severity::Usable);
+        let codes = told.map(|warning| warning.code).collect();
+        Found { severity: estimate.severity(), codes, errors, text: estimate.to_string() }
+    }
+}
+
+signals! { pub struct Level { y: "V" } }
+signals! { pub struct Force { u: "V" } }
+signals! { pub struct Lag { k: "1", tau: "s" } }
+signals! { pub struct Spring { m: "kg", d: "N s/m", c: "N/m" } }
+signals! { pub struct Motion { x: "m", v: "m/s" } }
+signals! { pub struct Tank { a: "m^2", c: "m^2" } }
+signals! { pub struct Masses { t1: "K", t2: "K" } }
+signals! { pub struct Walls { c1: "J/K", c2: "J/K", r12: "K/W", ra: "K/W" } }
+signals! { pub struct Poles { a: "1", b: "1" } }
+signals! { pub struct Line { a: "1", b: "V" } }
+signals! { pub struct Two { y: "V", z: "V" } }
+signals! { pub struct Factors { a: "1", b: "1" } }
+signals! { pub struct Plane { a: "1", b: "1", c: "V" } }
+signals! { pub struct Ringing { d: "1/s", c: "1/s^2" } }
+
+/// `tau dy/dt = k u - y`.
+pub struct FirstOrder;
+
+impl Model for FirstOrder {
+    type State = Level;
+    type Input = Force;
+    type Output = Level;
+    type Parameters = Lag;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Force<S>, p: &Lag<S>) -> Level<S> {
+        Level { y: (p.k * u.u - x.y) / p.tau }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Force<S>, _p: &Lag<S>) -> Level<S> {
+        *x
+    }
+}
+
+/// A mass on a spring under a force, its position measured.
+pub struct Oscillator;
+
+impl Model for Oscillator {
+    type State = Motion;
+    type Input = Force;
+    type Output = Level;
+    type Parameters = Spring;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Force<S>, p: &Spring<S>) -> Motion<S> {
+        Motion { x: x.v, v: (u.u - p.d * x.v - p.c * x.x) / p.m }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, _u: &Force<S>, _p: &Spring<S>) -> Level<S> {
+        Level { y: x.x }
+    }
+}
+
+/// The level of a tank with an outlet.
+pub struct Vessel;
+
+impl Model for Vessel {
+    type State = Level;
+    type Input = Force;
+    type Output = Level;
+    type Parameters = Tank;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Force<S>, p: &Tank<S>) -> Level<S> {
+        Level { y: (u.u - p.c * (x.y * x.y + 1e-6).sqrt().sqrt()) / p.a }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Force<S>, _p: &Tank<S>) -> Level<S> {
+        *x
+    }
+}
+
+/// A heated mass and one behind it, both temperatures above the surroundings' measured.
+pub struct Heated;
+
+impl Model for Heated {
+    type State = Masses;
+    type Input = Force;
+    type Output = Masses;
+    type Parameters = Walls;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Masses<S>, u: &Force<S>, p: &Walls<S>) -> Masses<S> {
+        let flow = (x.t1 - x.t2) / p.r12;
+        Masses { t1: (u.u - flow) / p.c1, t2: (flow - x.t2 / p.ra) / p.c2 }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Masses<S>, _u: &Force<S>, _p: &Walls<S>) -> Masses<S> {
+        *x
+    }
+}
+
+/// `x[k+1] = a x[k] + b u[k]`.
+pub struct Recursion;
+
+impl Model for Recursion {
+    type State = Level;
+    type Input = Force;
+    type Output = Level;
+    type Parameters = Poles;
+    const KIND: Kind = Kind::Discrete;
+    fn next<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Force<S>, p: &Poles<S>) -> Level<S> {
+        Level { y: p.a * x.y + p.b * u.u }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Force<S>, _p: &Poles<S>) -> Level<S> {
+        *x
+    }
+}
+
+/// `y = a u + b`.
+pub struct Straight;
+
+impl Model for Straight {
+    type State = Nothing;
+    type Input = Force;
+    type Output = Level;
+    type Parameters = Line;
+    const KIND: Kind = Kind::Static;
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Force<S>, p: &Line<S>) -> Level<S> {
+        Level { y: p.a * u.u + p.b }
+    }
+}
+
+/// `y = a u + c`, `z = a b u - c`.
+pub struct Planar;
+
+impl Model for Planar {
+    type State = Nothing;
+    type Input = Force;
+    type Output = Two;
+    type Parameters = Plane;
+    const KIND: Kind = Kind::Static;
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Force<S>, p: &Plane<S>) -> Two<S> {
+        Two { y: p.a * u.u + p.c, z: p.a * p.b * u.u - p.c }
+    }
+}
+
+/// `y = a b u`: two parameters that only their product is known of.
+#[derive(Clone)]
+pub struct Product;
+
+impl Model for Product {
+    type State = Nothing;
+    type Input = Force;
+    type Output = Level;
+    type Parameters = Factors;
+    const KIND: Kind = Kind::Static;
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Force<S>, p: &Factors<S>) -> Level<S> {
+        Level { y: p.a * p.b * u.u }
+    }
+}
+
+/// An oscillator without an input.
+pub struct Free;
+
+impl Model for Free {
+    type State = Motion;
+    type Input = Nothing;
+    type Output = Motion;
+    type Parameters = Ringing;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Motion<S>, _u: &Nothing, p: &Ringing<S>) -> Motion<S> {
+        Motion { x: x.v, v: -(p.d * x.v + p.c * x.x) }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, _u: &Nothing, _p: &Ringing<S>) -> Motion<S> {
+        *x
+    }
+}
+
+fn bench<M: Model + 'static>(
+    model: M,
+    truth: &[f64],
+    step: f64,
+    drive: &[(f64, f64, usize)],
+    initial: &[f64],
+) -> Bench<M> {
+    let (truth, drive, initial) = (truth.to_vec(), drive.to_vec(), initial.to_vec());
+    Bench { model, truth, step, drive, initial, told: false, hold: Hold::default() }
+}
+
+pub fn lag() -> Bench<FirstOrder> {
+    bench(FirstOrder, &[2.0, 0.3], 0.05, &[(0.3, 1.0, 13)], &[0.0])
+}
+
+pub fn oscillator() -> Bench<Oscillator> {
+    Bench { told: true, ..bench(Oscillator, &[0.5, 0.4, 8.0], 0.05, &[(0.0, 3.0, 17)], &[0.0, 0.0]) }
+}
+
+pub fn tank() -> Bench<Vessel> {
+    bench(Vessel, &[0.8, 0.6], 0.5, &[(1.0, 0.5, 15)], &[1.5])
+}
+
+pub fn heated() -> Bench<Heated> {
+    bench(Heated, &[900.0, 4000.0, 0.4, 0.8], 60.0, &[(25.0, 25.0, 25)], &[0.0, 0.0])
+}
+
+pub fn surface() -> Bench<Surface> {
+    let drive = [(0.0, 3.0, 11), (6.0, 8.0, 17), (10.0, 12.0, 60)];
+    bench(Surface::new(4).unwrap(), &[0.6, 4e-3, 0.5], 5e-4, &drive, &[0.0, 0.0])
+}
+
+pub fn brushed() -> Bench<DcMotor> {
+    bench(DcMotor, &[1.2, 2e-3, 0.06, 5e-5, 2e-4], 5e-4, &[(2.0, 12.0, 20), (0.0, 0.05, 45)], &[0.0, 0.0])
+}
+
+pub fn recursion() -> Bench<Recursion> {
+    bench(Recursion, &[0.6, 0.4], 1.0, &[(0.2, 1.0, 5)], &[0.0])
+}
+
+pub fn line() -> Bench<Straight> {
+    bench(Straight, &[2.5, -0.7], 0.1, &[(0.5, 2.0, 3)], &[])
+}
+
+pub fn plane() -> Bench<Planar> {
+    bench(Planar, &[2.0, 0.5, 0.3], 0.1, &[(0.5, 2.0, 3)], &[])
+}
+
+pub fn ringing() -> Bench<Free> {
+    bench(Free, &[0.3, 9.0], 0.05, &[], &[1.0, 0.0])
+}
+
+/// The plants that faults of a record are tried on, one after the other.
+pub fn plant(number: u64) -> Box<dyn Plant> {
+    match number % 7 {
+        0 => Box::new(lag()),
+        1 => Box::new(surface()),
+        2 => Box::new(oscillator()),
+        3 => Box::new(brushed()),
+        4 => Box::new(tank()),
+        5 => Box::new(recursion()),
+        _ => Box::new(heated()),
+    }
+}
+
+/// Those with two outputs.
+pub fn plant_of_two(number: u64) -> Box<dyn Plant> {
+    match number % 3 {
+        0 => Box::new(surface()),
+        1 => Box::new(brushed()),
+        _ => Box::new(heated()),
+    }
+}
