@@ -43,12 +43,11 @@ impl Judgement<'_> {
     }
 
     fn for_colored_errors(&self, unit: &Covariance) -> Option<Found> {
-        let hac = hac(self.objective, &self.end.coordinates, self.linear, &self.exact)?;
+        let hac = hac(self.objective, &self.end.coordinates, self.linear, (&self.exact, unit))?;
         let covariance = Some(hac.sandwich.covariance(&self.exact)?);
         let degrees = hac.degrees(self.objective, unit).into_iter().map(|degrees| degrees.min(self.degrees));
-        let factor = self.residuals.measured as f64 / self.degrees.max(1.0);
         let method = CovarianceMethod::Hac { lags: hac.lags as u64 };
-        Some(Found { covariance, method, factor, degrees: degrees.collect() })
+        Some(Found { covariance, method, factor: 1.0, degrees: degrees.collect() })
     }
 
     fn for_white_errors(&self, unit: &Option<Covariance>) -> Found {

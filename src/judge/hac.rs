@@ -8,7 +8,9 @@
 //! score is kept longer than the bandwidth.
 //!
 //! The autoregression works on scores of unit covariance: so its singular values are below one, and the result does not
-//! depend on the choice of units or parameters.
+//! depend on the choice of units or parameters. Its coefficients are corrected for the bias of least squares. The variance
+//! that comes out is an estimate from few independent stretches of the record, so intervals take Student's t with the
+//! degrees of freedom that the errors of the autoregression and of the sums leave.
 
 mod scores;
 
@@ -21,6 +23,8 @@ use scores::{EachScore, Lagged, MovingSums};
 
 /// Largest singular value of the autoregression (Andrews and Monahan 1992, section 3).
 const LARGEST: f64 = 0.97;
+/// Longest window by the rule for long records.
+const LONGEST: f64 = 500.0;
 /// Rows that are absorbed together.
 const ROWS: usize = 256;
 
@@ -31,12 +35,12 @@ pub(crate) struct Hac {
     runs: Vec<LongRun>,
 }
 
-/// Two passes with slopes. `None` where the scores of the unknowns that are not held are linearly dependent.
+/// Two passes with slopes; `inverse` is the inverse of the curvature. `None` where the scores of the unknowns that are not held are linearly dependent.
 pub(crate) fn hac(
     objective: &Objective<'_>,
     coordinates: &[f64],
     linear: &Linearization,
-    held: &[bool],
+    (held, inverse): (&[bool], &Covariance),
 ) -> Option<Hac> {
     let mut found = match sandwich::is_needed(objective) {
         true => sandwich::curvature(objective, coordinates).ok()?,
@@ -47,7 +51,9 @@ pub(crate) fn hac(
         let columns = unknowns.columns(e).enumerate();
         columns.filter(|(_, i)| !held[*i]).map(|(c, _)| c).collect()
     };
-    let runs = each(objective.experiments(), |e| LongRun::of(objective, e, coordinates, kept(e)));
+    let runs = each(objective.experiments(), |e| {
+        LongRun::of(objective, e, coordinates, (kept(e), sandwich::of_experiment(objective, inverse, e)))
+    });
     let runs: Vec<LongRun> = runs.into_iter().collect::<Option<_>>()?;
     let mut scores: Vec<Information> =
         runs.iter().enumerate().map(|(e, run)| run.triangle(unknowns.columns(e).count())).collect();
@@ -97,9 +103,14 @@ struct LongRun {
 }
 
 impl LongRun {
-    fn of(objective: &Objective<'_>, e: usize, coordinates: &[f64], kept: Vec<usize>) -> Option<Self> {
+    fn of(
+        objective: &Objective<'_>,
+        e: usize,
+        coordinates: &[f64],
+        (kept, inverse): (Vec<usize>, DMatrix<f64>),
+    ) -> Option<Self> {
         let n = kept.len();
-        let each_score = || EachScore::new(objective, e, &kept, Lagged::new(n));
+        let each_score = || EachScore::new(objective, e, (&kept, &inverse), Lagged::new(n));
         let lagged = objective.gather_one(coordinates, e, true, each_score).ok()?.into;
         let Lagged { count, mut triangle, mut block, products, .. } = lagged;
         triangle.absorb(&mut block);
@@ -115,7 +126,7 @@ impl LongRun {
         }
         let a = stable(&one + bias(&one)? / length)?;
         let window = bandwidth(&one, &two, &a, count);
-        let each_score = || EachScore::new(objective, e, &kept, MovingSums::new(&w, &a, window));
+        let each_score = || EachScore::new(objective, e, (&kept, &inverse), MovingSums::new(&w, &a, window));
         let sums = objective.gather_one(coordinates, e, true, each_score).ok()?.into.triangle();
         // Scores that sum to zero have moving sums that are smaller by their part of the record.
         let part = window as f64 / length;
@@ -197,6 +208,6 @@ fn bandwidth(one: &DMatrix<f64>, two: &DMatrix<f64>, a: &DMatrix<f64>, count: us
     // Andrews' rule uses the correlation at lag one only; the rule of Lazarus, Lewis, Stock and Watson (J. Business and
     // Economic Statistics 36 (2018) 541) allows for what the autoregression leaves at longer lags, and its price, fewer
     // degrees of freedom, is counted.
-    let longer = 1.3 * length.sqrt();
+    let longer = (1.3 * length.sqrt()).min(LONGEST);
     (andrews.max(longer).ceil() as usize + 1).clamp(1, (count / 2).max(1))
 }

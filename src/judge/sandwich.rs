@@ -18,7 +18,7 @@ use crate::sweep::Window;
 use nalgebra::DMatrix;
 
 /// One less the leverage of a measurement that alone determines an unknown: its error is rounding.
-const ALONE: f64 = 1e-6;
+pub(super) const ALONE: f64 = 1e-6;
 /// Rows that are absorbed together.
 const ROWS: usize = 256;
 
@@ -88,6 +88,12 @@ pub(crate) fn prior_row(objective: &Objective<'_>, e: usize, i: usize, slope: f6
     objective.problem.unknowns.columns(e).map(|c| if c == i { slope } else { 0.0 }).collect()
 }
 
+/// The rows and columns of one experiment.
+pub(super) fn of_experiment(objective: &Objective<'_>, covariance: &Covariance, e: usize) -> DMatrix<f64> {
+    let columns: Vec<usize> = objective.problem.unknowns.columns(e).collect();
+    DMatrix::from(&covariance.dense(&columns))
+}
+
 /// Passes over the data at a point.
 struct Passes<'p> {
     objective: &'p Objective<'p>,
@@ -151,7 +157,7 @@ impl Passes<'_> {
     /// The triangle of each experiment's scores, sample by sample.
     fn scores(&self, inverse: &Covariance) -> Result<Vec<Information>, Infeasible> {
         let make = |experiment: usize| {
-            let inverse = self.of_experiment(inverse, experiment);
+            let inverse = of_experiment(self.objective, inverse, experiment);
             let columns = inverse.nrows();
             let (scores, block) = (Information::new(columns), Block::new(columns, ROWS));
             Scores { objective: self.objective, experiment, inverse, scores, block, row: vec![0.0; columns] }
@@ -193,18 +199,13 @@ impl Passes<'_> {
         let (mut scores, mut taken) = (vec![], 0.0);
         for e in 0..self.objective.experiments() {
             let mut gathered = self.objective.gather_one(self.coordinates, e, true, || make(e))?;
-            let (triangle, part) = gathered.scores(filter, &factor, &self.of_experiment(inverse, e), outputs);
+            let (triangle, part) =
+                gathered.scores(filter, &factor, &of_experiment(self.objective, inverse, e), outputs);
             scores.push(triangle);
             taken += part;
         }
         let expected: f64 = tally.expected.iter().sum();
         Ok((scores, expected / (expected - taken).max(f64::MIN_POSITIVE)))
-    }
-
-    /// The rows and columns of one experiment.
-    fn of_experiment(&self, covariance: &Covariance, e: usize) -> DMatrix<f64> {
-        let columns: Vec<usize> = self.objective.problem.unknowns.columns(e).collect();
-        DMatrix::from(&covariance.dense(&columns))
     }
 }
 
@@ -352,7 +353,7 @@ impl Backward<'_> {
 }
 
 /// `v' m v`.
-fn form(m: &DMatrix<f64>, v: &[f64]) -> f64 {
+pub(super) fn form(m: &DMatrix<f64>, v: &[f64]) -> f64 {
     let product =
         |(column, b): (nalgebra::DVectorView<'_, f64>, &f64)| column.iter().zip(v).map(|(m, a)| m * a).sum::<f64>() * b;
     m.column_iter().zip(v).map(product).sum()

@@ -1,4 +1,5 @@
-//! The winding's rise between a cold and a warm record of the disturbed robot, and how often its interval covers it.
+//! The winding's rise between a cold and a warm record of axis 5 of the disturbed robot, and how often its interval covers
+//! it: motors that differ by 10 % in each parameter, and rises of 20 to 50 K.
 
 use crate::random::Random;
 use greybox::Butterworth;
@@ -21,7 +22,7 @@ fn resistance(axis: &Axis, simulation: Simulation) -> Estimated {
 
 #[test]
 fn winding_temperature() {
-    let records: u64 = std::env::var("COVERAGE_RECORDS").ok().and_then(|text| text.parse().ok()).unwrap_or(20);
+    let records: u64 = std::env::var("COVERAGE_RECORDS").ok().and_then(|text| text.parse().ok()).unwrap_or(8);
     let axis = Axis::reference(5).unwrap();
     let read = |seed: u64| {
         let mut random = Random(seed);
@@ -46,5 +47,8 @@ fn winding_temperature() {
     let deviation = (found.iter().map(|e| (e.value - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
     let std = found.iter().map(|e| e.std).sum::<f64>() / n;
     let covered = found.iter().filter(|e| e.value.abs() < 1.96 * e.std).count() as f64 / n;
+    // Conservative: 98.8 % of 80 records. What the equations miss repeats in every record, and is counted as noise.
+    assert!(covered >= 0.87, "covered {covered}");
+    assert!(mean.abs() < 0.5 * std, "mean {mean}, said {std}");
     println!("error of the winding rise: mean {mean}, deviation {deviation}, said {std}, covered {covered}");
 }

@@ -2,6 +2,7 @@
 
 use super::ROWS;
 use crate::information::{Block, Information};
+use crate::judge::sandwich::{ALONE, form};
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
 use nalgebra::DMatrix;
@@ -14,18 +15,28 @@ pub(super) trait AccumulateScores: Send {
     fn append(&mut self, later: Self);
 }
 
-/// The score of each sample, `sum over the outputs of w psi(z) g`, in the columns kept.
+/// The score of each sample, `sum over the outputs of w psi(z) g`, in the columns kept; each error divided by one less its
+/// leverage, as in the sandwich for independent errors.
 pub(super) struct EachScore<'s, T> {
     objective: &'s Objective<'s>,
     experiment: usize,
     kept: &'s [usize],
+    /// The inverse of the curvature in all columns of the experiment.
+    inverse: &'s DMatrix<f64>,
+    slopes: Vec<f64>,
     score: Vec<f64>,
     pub into: T,
 }
 
 impl<'s, T> EachScore<'s, T> {
-    pub fn new(objective: &'s Objective<'s>, experiment: usize, kept: &'s [usize], into: T) -> Self {
-        EachScore { objective, experiment, kept, score: vec![0.0; kept.len()], into }
+    pub fn new(
+        objective: &'s Objective<'s>,
+        experiment: usize,
+        (kept, inverse): (&'s [usize], &'s DMatrix<f64>),
+        into: T,
+    ) -> Self {
+        let (slopes, score) = (vec![0.0; inverse.nrows()], vec![0.0; kept.len()]);
+        EachScore { objective, experiment, kept, inverse, slopes, score, into }
     }
 }
 
@@ -37,9 +48,11 @@ impl<T: AccumulateScores> Accumulate for EachScore<'_, T> {
             self.score.fill(0.0);
             for j in 0..window.outputs() {
                 let z = window.error(k, j, lane);
-                let psi = weight * loss.map_or(z, |loss| loss.psi(z));
+                self.slopes.iter_mut().enumerate().for_each(|(c, slope)| *slope = window.at(k, j, c, lane));
+                let less = (1.0 - weight * form(self.inverse, &self.slopes)).max(ALONE);
+                let psi = weight * loss.map_or(z, |loss| loss.psi(z)) / less;
                 for (score, &c) in self.score.iter_mut().zip(self.kept) {
-                    *score += psi * window.at(k, j, c, lane);
+                    *score += psi * self.slopes[c];
                 }
                 if window.has_variances() {
                     let variance = window.variance_row(k, j);
