@@ -305,3 +305,50 @@ fn the_scale_of_a_weighting_does_not_matter() {
     // The errors are those of the noise, 0.1 A, known to one part in sqrt(2 * 450): 3.3 %.
     assert!((one.quality.i.sigma / 0.1 - 1.0).abs() < 0.1, "{one}");
 }
+
+mod product {
+    use greybox::*;
+
+    signals! {
+        struct Factors { a: "1", b: "1" }
+        struct Force { u: "1" }
+        struct Answer { y: "1" }
+    }
+
+    /// Two parameters that appear as their product alone.
+    struct Product;
+
+    impl Model for Product {
+        type State = Nothing;
+        type Input = Force;
+        type Output = Answer;
+        type Parameters = Factors;
+        const KIND: Kind = Kind::Static;
+
+        fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Force<S>, p: &Factors<S>) -> Answer<S> {
+            Answer { y: p.a * p.b * u.u }
+        }
+    }
+
+    /// Rounding that the triangles of several records leave together in the direction that nothing is known of would
+    /// move a nearly undamped step as far as one likes.
+    #[test]
+    fn a_product_is_found_from_any_number_of_records() {
+        for count in [1, 2, 3, 6, 12] {
+            let record = |r: usize| {
+                let time = Time::Uniform { start: 0.0, step: 0.01 };
+                let inputs: Vec<Force> = (0..500).map(|k| Force { u: (0.37 * (k + 31 * r) as f64).sin() }).collect();
+                let run = simulate(&Product, &Factors { a: 2.0, b: 1.5 }, &Nothing {}, time, &inputs).unwrap();
+                run.with_noise(Answer { y: 0.1 }, r as u64).experiment(&Product).unwrap().named(format!("{r}"))
+            };
+            let records: Vec<_> = (0..count).map(record).collect();
+            let estimate = Fit::new(&Product, &records).parameters(Factors::splat(free(0.7))).run().unwrap();
+            assert!(estimate.outcome.converged(), "{count}: {estimate}");
+            assert_eq!(estimate.directions.len(), 1, "{estimate}");
+            // Three standard errors of the product, 0.1 / sqrt(500 / 2) for one record.
+            let product = estimate.parameters.a * estimate.parameters.b;
+            assert!((product - 3.0).abs() < 0.02, "{count}: {product}");
+            assert!((estimate.quality.y.sigma / 0.1 - 1.0).abs() < 0.1, "{estimate}");
+        }
+    }
+}

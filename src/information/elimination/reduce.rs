@@ -86,8 +86,9 @@ impl Elimination {
         let rows = piece.columns.len() + 1 + own + passed_up;
         let mut gather = Gather::new(&piece.columns, &columns, rows, space);
         gather.own_rows(&piece.triangle, &piece.columns, terms.origin);
-        gather.damping(&columns[..own], terms.damping);
         piece.children.iter().for_each(|&child| gather.passed_up(self.child(child, done)));
+        let mut gather = gather.cleaned(&columns, piece.children.len() + 1, &columns[..own], terms.damping);
+        gather.damping(&columns[..own], terms.damping);
         Reduced { own, triangle: Cow::Owned(gather.triangle()), columns: Cow::Owned(columns) }
     }
 
@@ -102,8 +103,10 @@ impl Elimination {
         let columns: Vec<usize> = shared.iter().copied().filter(|&i| !terms.holds(i)).collect();
         let passed_up: usize = self.children(None).iter().map(|&child| self.child(child, done).passed_up()).sum();
         let mut gather = Gather::new(&shared, &columns, columns.len() + passed_up, space);
+        let children = self.children(None);
+        children.iter().for_each(|&child| gather.passed_up(self.child(child, done)));
+        let mut gather = gather.cleaned(&columns, children.len(), &columns, terms.damping);
         gather.damping(&columns, terms.damping);
-        self.children(None).iter().for_each(|&child| gather.passed_up(self.child(child, done)));
         Reduced { own: columns.len(), triangle: Cow::Owned(gather.triangle()), columns: Cow::Owned(columns) }
     }
 
@@ -214,6 +217,18 @@ impl<'s> Gather<'s> {
         }
     }
 
+    /// The same rows, those of several triangles as one: rounding that they leave together is cleaned before damping is
+    /// added, which may be far smaller than it.
+    fn cleaned(self, columns: &[usize], triangles: usize, own: &[usize], damping: &[f64]) -> Gather<'s> {
+        if triangles < 2 || own.iter().all(|&unknown| entry(damping, unknown) == 0.0) {
+            return self;
+        }
+        let (merged, space) = self.finished();
+        let mut gather = Gather::new(columns, columns, columns.len() + 1 + own.len(), space);
+        gather.own_rows(&merged, columns, &[]);
+        gather
+    }
+
     fn damping(&mut self, own: &[usize], damping: &[f64]) {
         for unknown in own {
             let value = entry(damping, *unknown);
@@ -236,11 +251,15 @@ impl<'s> Gather<'s> {
         }
     }
 
-    pub fn triangle(mut self) -> Information {
+    pub fn triangle(self) -> Information {
+        self.finished().0
+    }
+
+    fn finished(mut self) -> (Information, &'s mut Space) {
         if let Some(block) = &mut self.space.block {
             self.information.absorb(block);
         }
         self.information.rows = self.rows;
-        self.information
+        (self.information, self.space)
     }
 }
