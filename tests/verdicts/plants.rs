@@ -124,7 +124,7 @@ impl<M: Model> Plant for Bench<M> {
         let column = |&(mean, amplitude, hold): &(f64, f64, usize)| {
             let mut level = 0.0;
             let level = |k: usize| {
-                if k % hold == 0 {
+                if k.is_multiple_of(hold) {
                     level = mean + amplitude * (2.0 * random.uniform() - 1.0);
                 }
                 level
