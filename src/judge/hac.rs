@@ -109,11 +109,17 @@ impl LongRun {
         let w = root.solve_upper_triangular(&DMatrix::identity(n, n))?;
         let standard = |product: &DMatrix<f64>| w.transpose() * product * &w / length;
         let (one, two) = (standard(&products[0]), standard(&products[1]));
+        // Scores of overflowing slopes; the decompositions do not end with them.
+        if one.iter().chain(&two).any(|value| !value.is_finite()) {
+            return None;
+        }
         let a = stable(&one + bias(&one)? / length)?;
         let window = bandwidth(&one, &two, &a, count);
         let each_score = || EachScore::new(objective, e, &kept, MovingSums::new(&w, &a, window));
         let sums = objective.gather_one(coordinates, e, true, each_score).ok()?.into.triangle();
-        let sums = DMatrix::from_fn(n, n, |i, j| sums.at(i, j));
+        // Scores that sum to zero have moving sums that are smaller by their part of the record.
+        let part = window as f64 / length;
+        let sums = DMatrix::from_fn(n, n, |i, j| sums.at(i, j)) / (1.0 - part + part * part / 3.0).sqrt();
         let recolor = (DMatrix::identity(n, n) - &a).try_inverse()?;
         let fresh = DMatrix::identity(n, n) - &a * one.transpose() - &one * a.transpose() + &a * a.transpose();
         let finite = |m: &DMatrix<f64>| m.iter().all(|value| value.is_finite());
@@ -188,8 +194,9 @@ fn bandwidth(one: &DMatrix<f64>, two: &DMatrix<f64>, a: &DMatrix<f64>, count: us
         }
     }
     let andrews = if below > 0.0 { 1.1447 * (above / below * length).cbrt() } else { 0.0 };
-    // Andrews' rule uses the correlation at lag one only; the longer of Schwert's rules (J. Business and Economic
-    // Statistics 7 (1989) 147) allows for what the autoregression leaves at longer lags.
-    let schwert = 12.0 * (length / 100.0).powf(0.25);
-    (andrews.max(schwert).ceil() as usize + 1).clamp(1, (count / 2).max(1))
+    // Andrews' rule uses the correlation at lag one only; the rule of Lazarus, Lewis, Stock and Watson (J. Business and
+    // Economic Statistics 36 (2018) 541) allows for what the autoregression leaves at longer lags, and its price, fewer
+    // degrees of freedom, is counted.
+    let longer = 1.3 * length.sqrt();
+    (andrews.max(longer).ceil() as usize + 1).clamp(1, (count / 2).max(1))
 }

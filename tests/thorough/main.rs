@@ -21,3 +21,5 @@ mod random;
 fn in_optimized_builds_only() {
     println!("nothing tested: run `cargo test --release --test thorough`");
 }
+#[cfg(not(debug_assertions))]
+mod temperature;

@@ -1,0 +1,85 @@
+//! [`Whiteness`]: how much the errors of an output are correlated over time.
+
+use crate::whiteness::Portmanteau;
+
+/// Lags of the test.
+pub(super) const LAGS: usize = 20;
+
+/// Whiteness of the errors of an output.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Whiteness {
+    /// p-value of the portmanteau test.
+    pub p_value: f64,
+    /// Autocorrelation at lag one.
+    pub first: f64,
+    /// The part of the errors' variance that follows from the errors before, by an autoregression over all lags, less
+    /// what white errors show by chance.
+    pub predicted: f64,
+    /// How many errors have the information of one independent error on a slow signal.
+    pub dependence: f64,
+    /// Standardized sum of products of errors a horizon apart, and their autocorrelation; zeros where predictions do not
+    /// restart, or from too far.
+    pub at_restart: (f64, f64),
+}
+
+impl Whiteness {
+    /// Of so many errors, with predictions that restart after so many samples (zero: never, or from too far).
+    pub fn of(errors: &Portmanteau, count: u64, restart: usize) -> Self {
+        let coefficients: Vec<f64> = (1..=LAGS).map(|lag| errors.at(lag).1).collect();
+        let (predicted, dependence) = color(&coefficients, count);
+        Whiteness {
+            p_value: errors.p_value(LAGS.min(count as usize / 4).max(1)),
+            first: coefficients[0],
+            predicted,
+            dependence,
+            at_restart: if restart == 0 { (0.0, 0.0) } else { errors.at(restart) },
+        }
+    }
+}
+
+/// What follows from the errors before, and how many errors count for one, from the autocorrelations at lags `1, 2, ...` of
+/// so many errors.
+fn color(coefficients: &[f64], count: u64) -> (f64, f64) {
+    let (first, lags) = (coefficients[0], coefficients.len() as f64);
+    // What chance leaves, as in an adjusted coefficient of determination.
+    let free = (count as f64 - lags).max(1.0) / (count as f64).max(1.0);
+    let predicted = (1.0 - innovation(coefficients) / free).clamp(0.0, 1.0);
+    let positive: f64 = coefficients.iter().take_while(|rho| **rho > 0.0).sum();
+    let autoregression = (1.0 + first) / (1.0 - first).max(f64::EPSILON);
+    (predicted, (1.0 + 2.0 * positive).max(autoregression).max(1.0))
+}
+
+/// Variance of the errors less what follows from those before, as a part of it (Levinson and Durbin's recursion).
+fn innovation(coefficients: &[f64]) -> f64 {
+    let (mut variance, mut model): (f64, Vec<f64>) = (1.0, vec![]);
+    for (k, rho) in coefficients.iter().enumerate() {
+        let known: f64 = model.iter().enumerate().map(|(i, a)| a * coefficients[k - 1 - i]).sum();
+        let next = (rho - known) / variance;
+        if next.is_nan() || next.abs() >= 1.0 {
+            return variance;
+        }
+        let turned: Vec<f64> = model.iter().rev().map(|a| next * a).collect();
+        model.iter_mut().zip(turned).for_each(|(a, by)| *a -= by);
+        model.push(next);
+        variance *= 1.0 - next * next;
+    }
+    variance
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of an autoregression of order one with correlation `r`, the part `r^2` of the variance follows from the error before,
+    /// and `(1 + r) / (1 - r)` errors count for one; of white noise nothing follows, and each counts.
+    #[test]
+    fn an_autoregression_is_predicted() {
+        for r in [0.0, 0.3, 0.9f64] {
+            let coefficients: Vec<f64> = (1..=20).map(|k| r.powi(k)).collect();
+            let (predicted, dependence) = color(&coefficients, 1_000_000_000);
+            // The adjustment for 20 lags of so many errors is 2e-8.
+            assert!((predicted - r * r).abs() < 1e-7, "{r}: {predicted}");
+            assert!((dependence - (1.0 + r) / (1.0 - r)).abs() < 1e-9, "{r}: {dependence}");
+        }
+    }
+}
