@@ -9,6 +9,8 @@ use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 /// Noise below this fraction of the output's magnitude is round-off of the simulation.
 const ROUNDING: f64 = 1e-15;
+/// The smallest noise that errors can be divided by.
+const SMALLEST: f64 = 1e-280;
 /// Mean errors below this fraction of the output's magnitude are round-off, which accumulates along a record.
 const REPRODUCED: f64 = 1e-12;
 
@@ -144,10 +146,11 @@ pub(crate) fn reproduces(objective: &Objective<'_>, coordinates: &[f64]) -> bool
     moments(objective, coordinates, &vec![1.0; objective.outputs()], None).is_ok_and(reproduced)
 }
 
-/// Noise of the first output below which errors are round-off of the simulation, in its unit; zero without a measurement
-/// but zero.
+/// Noise of the first output below which errors are round-off of the simulation, in its unit; zero where the measurements
+/// are so small that dividing by it overflows.
 pub(crate) fn rounding(objective: &Objective<'_>) -> f64 {
-    ROUNDING * magnitudes(objective).first().copied().unwrap_or(0.0)
+    let noise = ROUNDING * magnitudes(objective).first().copied().unwrap_or(0.0);
+    if noise > SMALLEST { noise } else { 0.0 }
 }
 
 /// Largest measured magnitude of each output.
