@@ -22,7 +22,8 @@ use core::ops::Deref;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// What is known of one quantity.
+/// What is known of one quantity. `docs/intervals.md` in the repository lists how each interval is made, what it assumes,
+/// and how often it was found to cover.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Knowledge {
     /// It was estimated; the interval covers it with 95 % probability (asymmetric, if its logarithm was estimated).

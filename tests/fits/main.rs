@@ -10,6 +10,7 @@ mod closed_forms;
 mod common;
 mod far_starts;
 mod fleet;
+mod interval_limits;
 mod kalman;
 mod models;
 mod nist;
