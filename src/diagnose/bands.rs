@@ -22,6 +22,21 @@ pub struct Bands {
 ///
 /// # Errors
 /// No such record, a probability not between 0 and 1, an estimate of another problem, a simulation that fails.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// # let problem = Fit::new(&model, &record).parameters(start).problem()?;
+/// # let estimate = problem.run()?;
+/// let bands = greybox::diagnose::bands(&problem, &estimate, 0, 0.95)?; // of the first record
+/// let (noise_free, new) = (bands.confidence[0][100], bands.prediction[0][100]); // half widths for id, sample 100 (A)
+/// assert!(noise_free < new && (new / 1.96 - 0.05).abs() < 0.002); // the noise of the record is 0.05 A
+/// # Ok(())
+/// # }
+/// ```
 pub fn bands(problem: &Problem<'_>, estimate: &Summary, experiment: usize, probability: f64) -> Result<Bands, Error> {
     let (objective, best) = problem.at(estimate)?;
     let count = problem.records().len();

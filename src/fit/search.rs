@@ -3,8 +3,7 @@
 use crate::error::Error;
 use crate::judge::{SearchEnd, noise};
 use crate::optimize::{Infeasible, Outcome};
-use crate::problem::{CheckpointFile, Memory, Noise, Objective, Optimizer, Problem, Round, RoundError, Whitening};
-use std::hash::{DefaultHasher, Hash, Hasher};
+use crate::problem::{CheckpointFile, Fingerprint, Memory, Objective, Optimizer, Round, RoundError, Whitening};
 use std::sync::Arc;
 
 /// Rounds end when the noise levels change by less than this, relatively: no unknown then moves by more than that
@@ -18,7 +17,7 @@ pub(super) fn search(plain: &Objective<'_>, optimizer: &Arc<dyn Optimizer>) -> R
     let Some((path, every)) = &problem.settings.checkpoint else {
         return Rounds::new(plain, optimizer)?.run(None);
     };
-    let mut checkpoint = CheckpointFile::new(path.clone(), *every, fingerprint(problem), optimizer.settings()?);
+    let mut checkpoint = CheckpointFile::new(path.clone(), *every, Fingerprint::new(plain), optimizer.settings()?);
     let mut rounds = match optimizer.resume(&checkpoint)? {
         Some((place, iterations, saved)) if place.len() == problem.unknowns.start().len() => {
             checkpoint.before = iterations;
@@ -185,25 +184,4 @@ fn stopped(objective: &Objective<'_>) -> Error {
         ),
         _ => "the fit was cancelled before its start had been evaluated; lower the flag to run it".to_owned(),
     })
-}
-
-/// A hash of the data and of all settings that the cost depends on.
-fn fingerprint(problem: &Problem<'_>) -> String {
-    let mut hash = DefaultHasher::new();
-    env!("CARGO_PKG_VERSION").hash(&mut hash);
-    let (sweep, settings) = (&problem.sweep, &problem.settings);
-    (sweep.identity(), sweep.layout(), sweep.integrator(), sweep.predictor()).hash(&mut hash);
-    for record in &problem.records {
-        (record.name(), record.len(), format!("{:?}{:?}", record.input_hold(), record.initial_state())).hash(&mut hash);
-        (0..record.len()).for_each(|k| record.time(k).to_bits().hash(&mut hash));
-        for channel in record.inputs().iter().chain(record.outputs()) {
-            channel.values.iter().for_each(|value| value.to_bits().hash(&mut hash));
-        }
-    }
-    format!("{:?}{:?}", problem.unknowns.parameters, problem.unknowns.row).hash(&mut hash);
-    settings.weights.as_ref().map(|weights| weights.describe()).hash(&mut hash);
-    settings.loss.as_ref().map(|loss| loss.describe()).hash(&mut hash);
-    let noise: &Noise = &settings.noise;
-    format!("{:?}{noise:?}", settings.prefilter).hash(&mut hash);
-    format!("{:016x}", hash.finish())
 }

@@ -7,8 +7,8 @@ use super::{bounds, directions};
 use crate::error::Error;
 use crate::estimate::student::Spread;
 use crate::estimate::{
-    CovarianceMethod, ExperimentEstimate, Knowledge, Method, NoiseModel, OutputEstimate, ParameterEstimate, Summary,
-    Unknown,
+    CovarianceMethod, ExperimentEstimate, Format, Knowledge, Method, NoiseModel, OutputEstimate, ParameterEstimate,
+    Summary, Unknown, Version,
 };
 use crate::information::{Covariance, Undetermined};
 use crate::layout::Quantity;
@@ -95,6 +95,8 @@ pub(crate) fn conclude_from(
     let problem = objective.problem;
     let measurements = judgement.residuals.measured;
     Ok(Summary {
+        format: Format,
+        version: Version,
         layout: problem.layout().clone(),
         parameters: judgement.parameters(&unknowns),
         experiments: judgement.experiments(),
@@ -228,8 +230,10 @@ impl<'j> Judgement<'j> {
                     match held {
                         Some(bound) => {
                             let end = if bound == unknown.parameter.lower { upper } else { lower };
-                            Knowledge::Held { bound, end: Some(end) }
+                            Knowledge::Held { bound, end: Some(end).filter(|end| end.is_finite()) }
                         }
+                        // A factor beyond the largest number: nothing is known of a logarithm.
+                        None if !(lower.is_finite() && upper.is_finite()) => Knowledge::Unidentified,
                         None => Knowledge::Known { standard_error, lower, upper },
                     }
                 }

@@ -120,6 +120,10 @@ impl LongRun {
         let w = root.solve_upper_triangular(&DMatrix::identity(n, n))?;
         let standard = |product: &DMatrix<f64>| w.transpose() * product * &w / length;
         let (one, two) = (standard(&products[0]), standard(&products[1]));
+        // Scores of overflowing slopes; the decompositions do not end with them.
+        if one.iter().chain(&two).any(|value| !value.is_finite()) {
+            return None;
+        }
         let a = stable(&one + bias(&one)? / length)?;
         let window = bandwidth(&one, &two, &a, count);
         let each_score = || EachScore::new(objective, e, (&kept, &inverse), MovingSums::new(&w, &a, window));

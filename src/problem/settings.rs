@@ -11,7 +11,7 @@ use crate::record::Record;
 use crate::sweep::Sweep;
 use argmin::core::observers::{Observe, ObserverMode};
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicU64};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -36,6 +36,7 @@ pub struct Settings<'a> {
     pub(crate) weights: Option<Arc<dyn Weights + 'a>>,
     pub(crate) prefilter: Option<Butterworth>,
     pub(crate) cancel: Option<Arc<AtomicBool>>,
+    pub(crate) counter: Option<Arc<AtomicU64>>,
     pub(crate) time_limit: Option<Duration>,
     pub(crate) observers: Vec<(Observer, ObserverMode)>,
     pub(crate) checkpoint: Option<(PathBuf, u64)>,
@@ -51,6 +52,7 @@ impl Default for Settings<'_> {
             weights: None,
             prefilter: None,
             cancel: None,
+            counter: None,
             time_limit: None,
             observers: vec![],
             checkpoint: None,
@@ -102,6 +104,12 @@ impl<'a> Settings<'a> {
     /// Stops the search at its best point so far when the flag is set.
     pub fn cancel(mut self, flag: Arc<AtomicBool>) -> Self {
         self.cancel = Some(flag);
+        self
+    }
+
+    /// Adds one to the counter whenever a search of a diagnosis that makes many (restarts, bootstrap) has ended.
+    pub fn counter(mut self, counter: Arc<AtomicU64>) -> Self {
+        self.counter = Some(counter);
         self
     }
 
@@ -178,8 +186,9 @@ impl<'a> Settings<'a> {
                 if !(weight >= 0.0 && weight.is_finite()) {
                     let (name, t) = (record.name(), exact(record.time(k)));
                     return Err(Error::Option(format!(
-                        "weighting: the weight of sample {k} (t = {t} s) of experiment `{name}` is {weight}; weights must \
-                         be finite and not negative"
+                        "weighting: the weight of sample {k} (t = {t} s) of experiment `{name}` is {}; weights must \
+                         be finite and not negative",
+                        exact(weight)
                     )));
                 }
                 counts |= weight > 0.0 && record.outputs().iter().any(|channel| !channel.values[k].is_nan());
