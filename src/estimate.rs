@@ -25,7 +25,8 @@ use core::ops::Deref;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// What is known of one quantity; in JSON with its name as `code`, in small letters.
+/// What is known of one quantity; in JSON with its name as `code`, in small letters. `docs/intervals.md` in the repository
+/// lists how each interval is made, what it assumes, and how often it was found to cover.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "code", rename_all = "snake_case")]
 pub enum Knowledge {

@@ -197,4 +197,18 @@ mod tests {
         assert!((q - expected).abs() < 1e-12, "{q}");
         assert!((p - (-expected / 2.0).exp()).abs() < 1e-10, "{p}");
     }
+
+    /// By hand: e = (1, 2, -1, 3) has products 2, -2, -3 at lag one and -1, 6 at lag two.
+    #[test]
+    fn portmanteau_by_hand() {
+        let mut test = Portmanteau::new(2);
+        test.add(&[1.0, 2.0]);
+        test.add(&[-1.0, 3.0]);
+        let (one, two) = (-3.0 / 17f64.sqrt(), 5.0 / 37f64.sqrt());
+        assert!((test.at(1).0 - one).abs() < 1e-15 && (test.at(2).0 - two).abs() < 1e-15);
+        assert!((test.at(1).1 + 3.0 / 15.0).abs() < 1e-15);
+        // Two degrees of freedom have the tail `exp(-q / 2)`.
+        let expected = (-(one * one + two * two) / 2.0).exp();
+        assert!((test.p_value(2) - expected).abs() < 1e-12, "{}", test.p_value(2));
+    }
 }

@@ -211,3 +211,38 @@ fn bandwidth(one: &DMatrix<f64>, two: &DMatrix<f64>, a: &DMatrix<f64>, count: us
     let longer = (1.3 * length.sqrt()).min(LONGEST);
     (andrews.max(longer).ceil() as usize + 1).clamp(1, (count / 2).max(1))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One series: `1 + 3 a` (Kendall, Biometrika 41 (1954) 403). Two alike: `1 + 2 a + 2 a`, by the eigenvalues' sum.
+    #[test]
+    fn bias_of_an_autoregression() {
+        let one = bias(&DMatrix::from_element(1, 1, 0.5)).unwrap();
+        assert!((one[(0, 0)] - 2.5).abs() < 1e-12, "{one}");
+        let two = bias(&DMatrix::from_diagonal_element(2, 2, 0.5)).unwrap();
+        assert!((two[(0, 0)] - 3.0).abs() < 1e-12 && two[(0, 1)].abs() < 1e-12, "{two}");
+    }
+
+    /// One series with autoregression `a` and a window of one sample: relative variances `4 (1 + a)/((1 - a) n)` by the
+    /// autoregression and `4/(3 n)` by the sums.
+    #[test]
+    fn variance_of_the_variance() {
+        let (a, n) = (0.9, 1000.0);
+        let of = |value: f64| DMatrix::from_element(1, 1, value);
+        let run = LongRun {
+            kept: vec![0],
+            count: n,
+            window: 1,
+            root: of(1.0),
+            sums: of((n * (1.0 - a * a)).sqrt()),
+            recolor: of(1.0 / (1.0 - a)),
+            fresh: of(1.0 - a * a),
+        };
+        let (variance, spread) = run.variance(&[2.0]);
+        assert!((variance / (4.0 * n * (1.0 + a) / (1.0 - a)) - 1.0).abs() < 1e-12, "{variance}");
+        let expected = 4.0 * (1.0 + a) / ((1.0 - a) * n) + 4.0 / (3.0 * n);
+        assert!((spread / (variance * variance) / expected - 1.0).abs() < 1e-12, "{spread}");
+    }
+}

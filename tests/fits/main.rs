@@ -12,6 +12,7 @@ mod common;
 mod extremes;
 mod far_starts;
 mod fleet;
+mod interval_limits;
 mod kalman;
 mod models;
 mod nist;

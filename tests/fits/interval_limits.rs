@@ -1,0 +1,131 @@
+//! Where an interval is not the symmetric linear one, or does not hold: at bounds, with curvature, with noise in inputs and
+//! restarts.
+
+use crate::common::*;
+use greybox::*;
+
+fn line(noise: &mut Noise) -> ExperimentOf<Line> {
+    let inputs: Vec<Voltage> = levels(40, 1, 9).into_iter().map(|u| Voltage { u: u + 0.5 }).collect();
+    let measured = |u: &Voltage, noise: &mut Noise| {
+        let (a, b) = (0.3 * noise.gauss(), 0.2 * noise.gauss());
+        Pair { y: 1.5 * u.u - 0.7 + a, z: -0.7 * u.u - 1.5 + b }
+    };
+    let outputs = inputs.iter().map(|u| measured(u, noise)).collect();
+    Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap()
+}
+
+fn ends(knowledge: Knowledge) -> (f64, f64) {
+    let Knowledge::Known { lower, upper, .. } = knowledge else { panic!("{knowledge:?}") };
+    (lower, upper)
+}
+
+/// The model is linear and the noise given, so intervals beside a bound are those without it, but for one more degree of
+/// freedom: 79 in the place of 78 move the quantile by 0.0004.
+#[test]
+fn a_bound_within_the_interval_leaves_the_intervals_of_the_free_fit() {
+    let record = line(&mut Noise(5));
+    let fit = |slope: Parameter| {
+        let parameters = Affine { slope, offset: free(0.0) };
+        Fit::new(&Line, &record).parameters(parameters).noise(Pair { y: 0.3, z: 0.2 }).run().unwrap()
+    };
+    let open = fit(free(1.0));
+    let error = open.knowledge.slope.standard_error().unwrap();
+    let near = fit(free(3.0).within(open.parameters.slope + error, 10.0));
+    let Knowledge::Held { bound, end: Some(end) } = near.knowledge.slope else { panic!("{near}") };
+    assert_eq!(bound, open.parameters.slope + error);
+    let close = |a: f64, b: f64| (a - b).abs() < 5e-4 * error;
+    assert!(close(end, ends(open.knowledge.slope).1), "{end}");
+    let (found, expected) = (ends(near.knowledge.offset), ends(open.knowledge.offset));
+    assert!(close(found.0, expected.0) && close(found.1, expected.1), "{found:?} {expected:?}");
+    let (lower, upper) = near.interval("offset", 0.95).unwrap();
+    assert!(close(lower, expected.0) && close(upper, expected.1), "{lower} {upper}");
+    // Three standard errors away nothing within the bounds is left, and the others are estimated with it as it is.
+    let far = fit(free(3.0).within(open.parameters.slope + 3.0 * error, 10.0));
+    assert!(matches!(far.knowledge.slope, Knowledge::Held { end: None, .. }), "{far}");
+    let (lower, upper) = ends(far.knowledge.offset);
+    assert!((0.5 * (lower + upper) - far.parameters.offset).abs() < 1e-12, "{far}");
+}
+
+/// For `N` samples of `m` outputs with an estimated covariance and `p` unknowns, with `d = N - p/m`: the variance is
+/// `N/(d - m + 1) (d - 1)/(d - m)` times that of the estimated covariance as it stands, and Student's t has `d - m + 1`
+/// degrees of freedom.
+#[test]
+fn an_estimated_noise_covariance_costs_degrees_of_freedom() {
+    let record = line(&mut Noise(6));
+    let parameters = Affine { slope: free(1.0), offset: free(0.0) };
+    let estimate = Fit::new(&Line, &record).parameters(parameters).noise_covariance().run().unwrap();
+    let (n, m, d) = (40.0, 2.0, 39.0);
+    assert_eq!(estimate.unknowns[0].degrees_of_freedom, d - m + 1.0);
+    let s = estimate.noise_covariance.as_ref().unwrap();
+    let covariance = nalgebra::Matrix2::from_fn(|i, j| s[(i, j)] * d / n);
+    let inverse = covariance.try_inverse().unwrap();
+    let rows = record.inputs().map(|u| nalgebra::Matrix2::new(u.u, 1.0, -1.0, u.u));
+    let information: nalgebra::Matrix2<f64> = rows.map(|g| g.transpose() * inverse * g).sum();
+    let expected = information.try_inverse().unwrap() * (n / (d - m + 1.0) * (d - 1.0) / (d - m));
+    // The covariance of the last round differs from that of the estimate by what the round changed.
+    let ratio = estimate.covariance.get(0, 0) / expected[(0, 0)];
+    assert!((ratio - 1.0).abs() < 1e-6, "{ratio}");
+}
+
+fn has(estimate: &Summary, code: WarningCode) -> bool {
+    estimate.warnings.iter().any(|warning| warning.code == code)
+}
+
+/// A step seen little longer than the time constant, with much noise: the interval of the time constant is bent, that of its
+/// logarithm far less; with little noise neither is.
+#[test]
+fn bent_intervals_are_named() {
+    let truth = Branch { gain: 2.0, tau: 0.5 };
+    let clean = simulated(&Lag, 0.01, vec![Voltage { u: 1.0 }; 60], Current { i: 0.0 }, truth);
+    let fit = |sigma: f64, tau: Parameter| {
+        let record = noisy(&Lag, &clean, Current { i: sigma }, &mut Noise(3));
+        let fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau });
+        fit.noise(Current { i: sigma }).run().unwrap().into_summary()
+    };
+    assert!(has(&fit(0.15, free(0.4)), WarningCode::CurvedInterval));
+    assert!(!has(&fit(0.01, free(0.4)), WarningCode::CurvedInterval));
+}
+
+/// A slope through noisy inputs is drawn to zero by `slope s^2 / (s^2 + mean u^2)`; half of the inputs' power is noise here.
+#[test]
+fn noise_of_inputs_is_declared_and_its_bias_said() {
+    let record = line(&mut Noise(5));
+    let fit = |u: f64| {
+        let parameters = Affine { slope: free(1.0), offset: fixed(-0.7) };
+        Fit::new(&Line, &record).parameters(parameters).input_noise(Voltage { u })
+    };
+    let quiet = fit(0.0).run().unwrap();
+    assert!(!has(&quiet, WarningCode::InputNoise));
+    let noisy = fit(0.3).run().unwrap();
+    let warning = noisy.warnings.iter().find(|warning| warning.code == WarningCode::InputNoise).unwrap();
+    assert!(warning.text.contains("`slope`"), "{}", warning.text);
+    assert_eq!(noisy.parameters, quiet.parameters);
+    for wrong in [-1.0, f64::NAN, f64::INFINITY] {
+        let error = fit(wrong).run().unwrap_err().to_string();
+        assert!(error.contains("the noise of input `u`"), "{error}");
+    }
+}
+
+/// Restarts from noisy states bias a prediction one sample ahead; from clean ones they do not.
+#[test]
+fn noise_in_restarts_is_named() {
+    let inputs = levels(2000, 20, 4).into_iter().map(|u| Voltage { u }).collect();
+    let clean = simulated(&Lag, 5e-3, inputs, Current { i: 0.0 }, Branch { gain: 2.0, tau: 0.05 });
+    let fit = |record: &ExperimentOf<Lag>| {
+        let fit = Fit::new(&Lag, record).parameters(Branch { gain: free(1.5), tau: free(0.06) });
+        fit.predictor(Horizon::new(1)).run().unwrap().into_summary()
+    };
+    let noise = noisy(&Lag, &clean, Current { i: 0.1 }, &mut Noise(8));
+    let named = fit(&noise);
+    assert!(has(&named, WarningCode::RestartNoise) && named.severity() == optimize::Severity::NotUsable);
+    // Noise in the state, which is measured exactly: dx = (k u - x)/tau dt + dw.
+    let (mut x, mut process) = (0.0, Noise(9));
+    let decay = (-5e-3f64 / 0.05).exp();
+    let next = |u: Voltage| {
+        let now = x;
+        x = 2.0 * u.u + (x - 2.0 * u.u) * decay + 0.05 * process.gauss();
+        Current { i: now }
+    };
+    let outputs = clean.inputs().map(next).collect();
+    assert!(!has(&fit(&with_outputs(&Lag, &clean, outputs)), WarningCode::RestartNoise));
+}
