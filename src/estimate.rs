@@ -7,6 +7,7 @@ mod prediction;
 pub(crate) mod student;
 mod warning;
 
+pub(crate) use display::held;
 pub use format::{Format, Version};
 pub use prediction::Prediction;
 pub use warning::{Warning, WarningCode};
@@ -42,11 +43,15 @@ pub enum Knowledge {
     },
     /// It was given.
     Fixed,
-    /// The data push it against this bound; it is kept there, and has no interval.
+    /// The data push it against this bound; it is kept there.
     Held {
         /// The bound.
         #[serde(with = "crate::real")]
         bound: f64,
+        /// Other end of its 95 % interval, which begins at the bound: the part within the bounds of the interval that it
+        /// would have without them. `None` where no part is, or where there is no slope at the bound.
+        #[serde(with = "crate::real")]
+        end: Option<f64>,
     },
     /// The data do not determine it; its value is where the search left it.
     Unidentified,
@@ -91,6 +96,10 @@ pub struct Unknown {
     pub error_index_held: Option<f64>,
     /// The coordinate that the optimizer worked in.
     pub transform: Transform,
+    /// Degrees of freedom of Student's t in its interval: those of the fit, or fewer where the variance of colored errors
+    /// is itself an estimate from few independent stretches.
+    #[serde(with = "crate::real")]
+    pub degrees_of_freedom: f64,
 }
 
 /// A parameter of the model: what was declared of it, and what was found.
@@ -335,7 +344,19 @@ impl Summary {
         if !(probability > 0.0 && probability < 1.0) {
             return None;
         }
-        Some(student::interval(unknown.value, error, unknown.transform, probability, self.degrees_of_freedom()))
+        let Knowledge::Known { lower, upper, .. } = unknown.knowledge else { return None };
+        let (to_coordinate, slope) =
+            (|value| unknown.transform.to_coordinate(value), unknown.transform.slope(unknown.value));
+        // Next to an unknown that is held, an interval is not centered at the estimate.
+        let moved = 0.5 * (to_coordinate(lower) + to_coordinate(upper)) - to_coordinate(unknown.value);
+        let shift = if self.releases() && moved.is_finite() { moved } else { 0.0 };
+        let spread = student::Spread { standard_error: error / slope, degrees: unknown.degrees_of_freedom };
+        Some(spread.interval(to_coordinate(unknown.value) + shift, unknown.transform, probability))
+    }
+
+    /// Whether an unknown at a bound has an interval, for which those of all others allow.
+    fn releases(&self) -> bool {
+        self.unknowns.iter().any(|unknown| matches!(unknown.knowledge, Knowledge::Held { end: Some(_), .. }))
     }
 
     /// Correlation of some unknowns, by their numbers; zero where there is no interval, one on the diagonal.
@@ -399,6 +420,25 @@ impl Summary {
 
 /// What a fit found, and how well it is known, by the names of its model; everything of the [`Summary`] can be read from
 /// it, too.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// use greybox::Knowledge;
+/// let estimate = Fit::new(&model, &record).parameters(start).run()?;
+/// let rs: f64 = estimate.parameters.rs; // by the model's names
+/// if let Knowledge::Known { standard_error, lower, upper } = estimate.knowledge.rs {
+///     println!("{rs:.4} ± {standard_error:.4} ohm, {lower:.4} to {upper:.4}");
+///     assert!(lower < 0.63 && 0.63 < upper); // the truth
+/// }
+/// assert!(estimate.outcome.converged() && estimate.warnings.is_empty()); // from its `Summary`
+/// assert!(estimate.quality.id.fit_percent.unwrap() > 98.0);
+/// # Ok(())
+/// # }
+/// ```
 pub struct Estimate<M: Model> {
     /// The parameters; of those that each experiment has for itself, the first experiment's.
     pub parameters: Of<M::Parameters, f64>,

@@ -70,6 +70,8 @@
 //!
 //! # Where to find what
 //!
+//! The [`guide`] has fifteen short chapters, from a first fit to writing an integrator.
+//!
 //! | to | see |
 //! |---|---|
 //! | write a model | [`Model`], [`signals!`], [`Scalar`]; [`Numeric`] for functions over `f64`; [`models`] and [`pmsm`] for those that ship |
@@ -140,6 +142,8 @@ mod functions;
 mod fused;
 #[cfg(feature = "std")]
 pub mod graph;
+#[cfg(feature = "csv")]
+pub mod guide;
 #[cfg(feature = "std")]
 mod information;
 #[cfg(feature = "std")]

@@ -60,9 +60,32 @@ pub(crate) fn p_value(p: f64) -> String {
     if p < 1e-15 { "p < 1e-15".to_owned() } else { format!("p = {}", number(p, 2)) }
 }
 
-/// A number of things: `1 gap`, `3 gaps`.
+/// A number of things: `1 gap`, `3 gaps`, `24,841 samples`.
 pub(crate) fn counted(count: u64, thing: &str) -> String {
-    format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
+    format!("{} {thing}{}", whole(count), if count == 1 { "" } else { "s" })
+}
+
+/// A whole number, from five digits on in groups of three: `9999`, `24,841`.
+pub(crate) fn whole(count: u64) -> String {
+    grouped(&count.to_string())
+}
+
+/// A written number whose digits before the point are in groups of three, if they are five or more: `-12,646.37`.
+pub(crate) fn grouped(text: &str) -> String {
+    let sign = if text.starts_with('-') { 1 } else { 0 };
+    let digits = text[sign..].chars().take_while(char::is_ascii_digit).count();
+    if digits < 5 {
+        return text.to_owned();
+    }
+    let (whole, rest) = text.split_at(sign + digits);
+    let mut found = String::with_capacity(text.len() + digits / 3);
+    for (k, c) in whole.chars().enumerate() {
+        if k > sign && (sign + digits - k).is_multiple_of(3) {
+            found.push(',');
+        }
+        found.push(c);
+    }
+    found + rest
 }
 
 fn written(value: f64, digits: usize) -> String {

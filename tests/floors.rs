@@ -33,6 +33,7 @@ const FLOORS: &[(&str, &[&str])] = &[
     // A report reads diagnoses.
     ("roof: a reader", &["report"]),
     ("wing", &["models", "pmsm"]),
+    ("documentation", &["guide"]),
 ];
 
 /// Rooms that may use the crate's public list, names in capitals.

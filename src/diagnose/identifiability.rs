@@ -94,6 +94,21 @@ const SEED: u64 = 1;
 ///
 /// # Errors
 /// An estimate of another problem, or one that cannot be simulated any more.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// # let problem = Fit::new(&model, &record).parameters(start).problem()?;
+/// # let estimate = problem.run()?;
+/// let found = greybox::diagnose::identifiability(&problem, &estimate)?;
+/// assert_eq!(found.rank, 5); // three parameters and two initial currents
+/// assert!(found.condition.unwrap() < 2.0 && found.collinear.is_empty() && found.advice.is_empty());
+/// # Ok(())
+/// # }
+/// ```
 pub fn identifiability(problem: &Problem<'_>, estimate: &Summary) -> Result<Identifiability, Error> {
     let (objective, best) = problem.at(estimate)?;
     let linear = objective.linearize(&best).map_err(|error| Error::Optimizer(error.to_string()))?;

@@ -119,6 +119,21 @@ const CLOSE: f64 = 1e-3;
 /// # Errors
 /// A name that no unknown has, a probability not between 0 and 1, an estimate of another problem; a time limit or a flag that
 /// stops it.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// # let problem = Fit::new(&model, &record).parameters(start).problem()?;
+/// # let estimate = problem.run()?;
+/// let profile = greybox::diagnose::profile(&problem, &estimate, "rs", 0.95)?;
+/// assert!(profile.covers(0.63)); // the truth
+/// assert!(!profile.covers(0.64));
+/// # Ok(())
+/// # }
+/// ```
 pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probability: f64) -> Result<Profile, Error> {
     let control = problem.control(Instant::now());
     let (objective, best) = problem.at_within(estimate, &control)?;
@@ -133,7 +148,7 @@ pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probabilit
     }
     let unknown = &estimate.unknowns[index];
     let linear = linearize(&objective, &best, "the profile")?;
-    let at_bound = |i: usize| i != index && matches!(estimate.unknowns[i].knowledge, Knowledge::Held { .. });
+    let at_bound = |i: usize| i != index && matches!(estimate.unknowns[i].knowledge, Knowledge::Held { end: None, .. });
     let held = undetermined(&linear, &(0..best.len()).map(at_bound).collect::<Vec<bool>>()).held;
     let covariance = linear.covariance(&held);
     // How far one standard error is, and how the others go along.
@@ -150,7 +165,7 @@ pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probabilit
         _ => 1.0,
     };
     let scale = error.unwrap_or((0.1 * best[index]).abs().max(1e-6)) * inflation.sqrt();
-    let quantile = student::quantile(0.5 + probability / 2.0, estimate.degrees_of_freedom());
+    let quantile = student::quantile(0.5 + probability / 2.0, unknown.degrees_of_freedom);
     let bounds = objective.bounds();
     let values = |coordinates: &[f64]| -> Vec<f64> {
         estimate.unknowns.iter().zip(coordinates).map(|(u, &c)| u.transform.to_value(c)).collect()

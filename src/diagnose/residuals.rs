@@ -85,6 +85,20 @@ pub struct Residuals {
 /// # Errors
 /// A prediction that is not of this record, or a prediction that is infinite. Too few residuals for a test (fewer than
 /// [`FEWEST`]), and residuals that do not vary, are not errors: the tests are left out.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// let estimate = Fit::new(&model, &record).parameters(start).run()?;
+/// let prediction = estimate.predict(&model, &record)?;
+/// let [id, iq] = &greybox::diagnose::residuals::examine(&prediction.columns, record.record())?[..] else { panic!() };
+/// assert!((id.standard_deviation - 0.05).abs() < 0.001 && iq.autocorrelation[0].abs() < 0.05);
+/// # Ok(())
+/// # }
+/// ```
 pub fn examine(prediction: &Simulated, record: &Record) -> Result<Vec<Residuals>, Error> {
     let found = prediction.residuals.first().map_or(0, Vec::len);
     if found != record.len() {

@@ -1,12 +1,12 @@
 //! Restarts: whether a search from elsewhere ends in a better minimum.
 
-use super::{Pinned, check_complete, linearize, minimize};
+use super::{Pinned, check_complete, linearize, minimize, searches};
 use crate::error::Error;
 use crate::estimate::Summary;
 use crate::numeral::number;
 use crate::optimize::{LeastSquares, Severity};
 use crate::parameter::Transform;
-use crate::problem::{Problem, each};
+use crate::problem::Problem;
 use crate::random::Random;
 use crate::section::{Axis, Cell, Curves, Drawing, Layer, Plot, Section, Style, Table};
 use serde::{Deserialize, Serialize};
@@ -68,6 +68,20 @@ const SAME: f64 = 1e-6;
 ///
 /// # Errors
 /// A reach that is not above one, an estimate of another problem; a time limit or a flag that stops it.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// # let problem = Fit::new(&model, &record).parameters(start).problem()?;
+/// # let estimate = problem.run()?;
+/// let found = greybox::diagnose::restarts(&problem, &estimate, 10, 3.0, 1)?; // within a factor of 3, seed 1
+/// assert!(found.better.is_none() && found.same > 0, "{}", found.meaning);
+/// # Ok(())
+/// # }
+/// ```
 pub fn restarts(
     problem: &Problem<'_>,
     estimate: &Summary,
@@ -105,7 +119,9 @@ pub fn restarts(
             })
             .collect()
     };
-    let found = each(count, |attempt| minimize(Pinned { problem: &objective, bounds: bounds.clone() }, start(attempt)));
+    let found = searches(problem, count, |attempt| {
+        minimize(Pinned { problem: &objective, bounds: bounds.clone() }, start(attempt))
+    });
     check_complete(problem, &control, "the search from other starts")?;
     let mut result = Restarts {
         tried: count as u64,

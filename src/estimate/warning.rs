@@ -30,6 +30,12 @@ pub enum WarningCode {
     TimeGaps,
     /// An unknown is held at a bound.
     HeldAtBound,
+    /// The model bends so much within an interval that it should be asymmetric.
+    CurvedInterval,
+    /// Noise in the measured states from which predictions restart.
+    RestartNoise,
+    /// Noise declared for the inputs, which biases the estimate.
+    InputNoise,
     /// Unknowns that the data cannot tell apart.
     Unidentified,
     /// A finer step would move an unknown.

@@ -49,3 +49,13 @@ fn a_fit_is_told_from_perfect() {
     assert_eq!(fits, ["99.9979", "99.20", "95.50", "100.0", "-48432"]);
     assert_eq!((rounded(0.015, 0.001), rounded(1.000_02e-3, 0.001)), ("0.015".to_owned(), "0.001".to_owned()));
 }
+
+/// Groups of three from five digits on, where the eye no longer counts.
+#[test]
+fn large_counts_are_grouped() {
+    let texts = [0, 999, 4000, 10_000, 123_456, 9_876_543].map(whole);
+    assert_eq!(texts, ["0", "999", "4000", "10,000", "123,456", "9,876,543"]);
+    let numbers = ["-12646.37", "-999.5", "1.2345e10", "123456.5", "0.12345"].map(grouped);
+    assert_eq!(numbers, ["-12,646.37", "-999.5", "1.2345e10", "123,456.5", "0.12345"]);
+    assert_eq!(counted(24_841, "sample"), "24,841 samples");
+}

@@ -26,6 +26,20 @@ use serde::{Deserialize, Serialize};
 ///
 /// A search that ends without a minimum, or where unknowns have lost their influence, is tried once more from the start, with
 /// steps that may be ten times the unknowns' sizes; the better end counts.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// use greybox::{OwnSize, optimize::{LevenbergMarquardt, Stop}};
+/// let quick = LevenbergMarquardt::new(Stop { iterations: 200, ..Stop::default() }, OwnSize);
+/// let estimate = Fit::new(&model, &record).parameters(start).optimizer(quick).run()?;
+/// assert!(estimate.outcome.converged() && estimate.iterations < 20);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LevenbergMarquardt<S = OwnSize> {
     /// When to stop.

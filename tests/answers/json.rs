@@ -69,7 +69,7 @@ fn spoiled(estimate: &Summary, value: f64) -> Summary {
     let mut spoiled = estimate.clone();
     (spoiled.cost, spoiled.seconds, spoiled.deviance) = (value, value, Some(value));
     spoiled.outcome = Outcome::Rough { noise: value, errors: value };
-    spoiled.unknowns[0].knowledge = Knowledge::Held { bound: value };
+    spoiled.unknowns[0].knowledge = Knowledge::Held { bound: value, end: None };
     spoiled.unknowns[1].knowledge = Knowledge::Known { standard_error: value, lower: value, upper: value };
     spoiled.unknowns[1].error_index = Some(value);
     spoiled.parameters[0].value = value;

@@ -236,18 +236,23 @@ fn shown(report: &Report) -> Result<(), String> {
     Ok(())
 }
 
-/// What is known has a finite value, a finite standard error and finite ends about the value.
+/// What is known has a finite value, a finite standard error and finite ends, about the value unless another
+/// unknown at its bound moves them.
 fn known(summary: &Summary) -> Result<(), String> {
+    let moved = summary.unknowns.iter().any(|u| matches!(u.knowledge, Knowledge::Held { end: Some(_), .. }));
     for unknown in &summary.unknowns {
         let (name, value) = (&unknown.name, unknown.value);
         check(value.is_finite(), || format!("{name} is {value}"))?;
         match unknown.knowledge {
             Knowledge::Known { standard_error, lower, upper } => {
                 let sound = standard_error >= 0.0 && standard_error.is_finite();
-                let ends = lower <= value && value <= upper && lower.is_finite() && upper.is_finite();
+                let about = lower <= value && value <= upper || moved && lower < upper;
+                let ends = about && lower.is_finite() && upper.is_finite();
                 check(sound && ends, || format!("{name} = {value} is known to {standard_error}, {lower} to {upper}"))?;
             }
-            Knowledge::Held { bound } => check(bound.is_finite(), || format!("{name} is held at {bound}"))?,
+            Knowledge::Held { bound, end } => {
+                check(bound.is_finite() && end.is_none_or(f64::is_finite), || format!("{name} is held at {bound}"))?;
+            }
             Knowledge::Fixed | Knowledge::Unidentified => {}
         }
     }
