@@ -161,21 +161,21 @@ fn parameters_without_sense() {
     run(free(0.001).within(0.01, 10.0), &["`r`", "0.001", "outside its bounds 0.01 to 10"]);
     run(free(1.0).within(10.0, 0.1), &["`r`", "10", "0.1", "lower must be below the upper"]);
     run(free(1.0).within(1.0, 1.0), &["`r`", "1 and 1", "use fixed"]);
-    run(free(1.0).within(f64::NAN, 2.0), &["`r`", "NaN and 2"]);
-    run(free(1.0).within(0.0, f64::NAN), &["`r`", "0 and NaN"]);
-    run(free(f64::NAN), &["`r`", "NaN", "finite start"]);
+    run(free(1.0).within(f64::NAN, 2.0), &["`r`", "not a number and 2"]);
+    run(free(1.0).within(0.0, f64::NAN), &["`r`", "0 and not a number"]);
+    run(free(f64::NAN), &["`r`", "not a number", "finite start"]);
     run(free(f64::INFINITY), &["`r`", "inf", "finite start"]);
-    run(fixed(f64::NAN), &["`r`", "NaN", "finite"]);
+    run(fixed(f64::NAN), &["`r`", "not a number", "finite"]);
     run(fixed(5.0).within(0.0, 1.0), &["`r`", "5", "outside its bounds 0 to 1"]);
     run(free(-1.0).log(), &["`r`", "-1", "no logarithm", ".log()"]);
     run(free(0.0).log(), &["`r`", "0", "no logarithm"]);
-    for std in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        run(free(1.0).prior(1.0, std), &["`r`", "prior", &format!("1 +- {std}"), "positive"]);
+    for (std, text) in [(0.0, "0"), (-1.0, "-1"), (f64::NAN, "not a number"), (f64::INFINITY, "infinite")] {
+        run(free(1.0).prior(1.0, std), &["`r`", "prior", &format!("1 +- {text}"), "positive"]);
     }
-    run(free(1.0).prior(f64::NAN, 1.0), &["`r`", "prior", "NaN +- 1"]);
+    run(free(1.0).prior(f64::NAN, 1.0), &["`r`", "prior", "not a number +- 1"]);
     let initial = |i: Parameter| fit(&record.clone().initial(Current { i })).run();
     says(initial(free(5.0).within(-1.0, 1.0)), &["`i(0)`", "5", "outside its bounds -1 to 1"]);
-    says(initial(fixed(f64::NAN)), &["`i(0)`", "NaN"]);
+    says(initial(fixed(f64::NAN)), &["`i(0)`", "not a number"]);
     // A bound of a logarithm below zero is none.
     sound(Fit::new(&Rl, &record).parameters(Coil { r: free(1.0).log().within(-1.0, 9.0), l: free(0.03) }).run());
 }
@@ -219,10 +219,8 @@ fn settings_without_sense() {
             says(fit(&record).optimizer(LevenbergMarquardt::new(stop, JacobianColumns)).run(), &parts);
             says(fit(&record).optimizer(GaussNewton::new(stop)).run(), &parts);
         }
-        says(
-            fit(&record).integrator(Rk45 { relative: bad, absolute: 1e-9 }).run(),
-            &["relative", "Rk45", &bad.to_string()],
-        );
+        let text = if bad.is_finite() { format!("{bad:e}") } else { bad.to_string() };
+        says(fit(&record).integrator(Rk45 { relative: bad, absolute: 1e-9 }).run(), &["relative", "Rk45", &text]);
         says(
             fit(&record).integrator(Esdirk { relative: 1e-9, absolute: bad }).run(),
             &["absolute", "Esdirk", &bad.to_string()],
@@ -234,7 +232,7 @@ fn settings_without_sense() {
     says(weighted("speed", Law::Absolute), &["`speed`", "it has: u"]);
     says(weighted("u", Law::Square { scale: 0.0 }), &["scale", "`u`", "0", "positive"]);
     says(weighted("u", Law::Above { threshold: 1e3 }), &["weighting", "|u| >= 1000", "zero at every sample"]);
-    says(fit(&record).weighting(|_: &Sample<Rl>| f64::NAN).run(), &["sample 0", "t = 0 s", "`bench`", "NaN"]);
+    says(fit(&record).weighting(|_: &Sample<Rl>| f64::NAN).run(), &["sample 0", "t = 0 s", "`bench`", "not a number"]);
     says(fit(&record).weighting(|s: &Sample<Rl>| 0.1 - s.t).run(), &["sample 101", "`bench`", "not negative"]);
     // Pre-filters.
     says(Butterworth::low_pass(4, 600.0, H), &["600 Hz", "half the sampling rate, 500 Hz"]);

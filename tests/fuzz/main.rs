@@ -16,6 +16,9 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Cases without a time budget.
 const CASES: u64 = 60;
+/// Cases that have shown a fault: a line search without a step, scores that overflow, a drawing of excitations that are no
+/// numbers, intervals without an end.
+const FOUND: [u64; 5] = [462, 620, 397, 1556, 1577];
 /// A case that takes longer hangs: its fit has a limit of a second, its diagnoses of as much each.
 const HANG: Duration = Duration::from_secs(120);
 
@@ -53,8 +56,8 @@ fn random_fits_end_soundly() {
     let begin = Instant::now();
     let budget = number("GREYBOX_FUZZ_SECONDS").map(Duration::from_secs);
     let goes_on = |case: u64| budget.map_or(case < first + CASES, |budget| begin.elapsed() < budget);
-    let (mut tally, mut wrong, mut slowest, mut case) = (case::Tally::default(), vec![], (0, 0), first);
-    while goes_on(case) {
+    let (mut tally, mut wrong, mut slowest) = (case::Tally::default(), vec![], (0, 0));
+    for case in FOUND.into_iter().chain((first..).take_while(|case| goes_on(*case))) {
         let started = Instant::now();
         let result = run(case);
         slowest = slowest.max((started.elapsed().as_millis(), case));
@@ -65,10 +68,10 @@ fn random_fits_end_soundly() {
                 wrong.push(case);
             }
         }
-        case += 1;
+        tally.cases += 1;
     }
-    println!("cases {first} to {}: {tally:?}; the slowest took {} ms: {}", case - 1, slowest.0, slowest.1);
+    println!("from case {first} on: {tally:?}; the slowest took {} ms: {}", slowest.0, slowest.1);
     assert!(wrong.is_empty(), "wrong cases: {wrong:?}; run one alone with GREYBOX_FUZZ_CASE");
-    // Most cases must come so far that there is something to judge.
-    assert!(tally.fits * 5 >= tally.cases, "{tally:?}");
+    // Enough cases must come so far that there is something to judge.
+    assert!(tally.fits * 10 >= tally.cases, "{tally:?}");
 }
