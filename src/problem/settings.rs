@@ -15,6 +15,9 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+/// All searches of a fit are in memory together.
+const MOST_STARTS: usize = 100_000;
+
 pub(crate) type Observer = Arc<Mutex<Box<dyn Observe<LeastSquaresState> + Send>>>;
 
 /// The weight of each sample of a record.
@@ -39,6 +42,7 @@ pub struct Settings<'a> {
     pub(crate) observers: Vec<(Observer, ObserverMode)>,
     pub(crate) checkpoint: Option<(PathBuf, u64)>,
     pub(crate) optimizer: Arc<dyn Optimizer>,
+    pub(crate) starts: usize,
 }
 
 impl Default for Settings<'_> {
@@ -53,6 +57,7 @@ impl Default for Settings<'_> {
             observers: vec![],
             checkpoint: None,
             optimizer: Arc::new(<LevenbergMarquardt>::default()),
+            starts: 1,
         }
     }
 }
@@ -87,6 +92,13 @@ impl<'a> Settings<'a> {
     /// as zero.
     pub fn prefilter(mut self, filter: Butterworth) -> Self {
         self.prefilter = Some(filter);
+        self
+    }
+
+    /// Searches from so many starts and keeps the best end; the first is the declared one
+    /// ([`Fit::starts`](crate::Fit::starts)).
+    pub fn starts(mut self, count: usize) -> Self {
+        self.starts = count;
         self
     }
 
@@ -134,6 +146,10 @@ impl<'a> Settings<'a> {
                 let what = format!("the noise of output `{}`", layout.outputs[j].name);
                 return Err(Error::NotPositive { what, value: sigma[j] });
             }
+        }
+        if !(1..=MOST_STARTS).contains(&self.starts) {
+            let count = self.starts;
+            return Err(Error::Option(format!("a fit from {count} starts was asked for; take 1 to {MOST_STARTS}")));
         }
         self.loss.as_ref().map_or(Ok(()), |loss| loss.check())?;
         if let Some(filter) = &self.prefilter {
