@@ -32,10 +32,11 @@ use crate::numeral::p_value;
 use crate::optimize::{
     Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization, Machine, Severity,
 };
-use crate::problem::{Control, Objective, Problem};
+use crate::problem::{Control, Objective, Problem, each};
 use crate::section::{Cell, Section, Table};
 use argmin::core::{Executor, State};
 use serde::{Deserialize, Serialize};
+use std::sync::atomic::Ordering;
 
 /// The probability of error below which a hypothesis is given up.
 pub const LEVEL: f64 = 0.01;
@@ -47,8 +48,10 @@ pub struct Test {
     /// Name of the test.
     pub name: String,
     /// Its statistic.
+    #[serde(with = "crate::real")]
     pub statistic: f64,
     /// Probability of such a statistic, or one further out, if the hypothesis is true.
+    #[serde(with = "crate::real")]
     pub p_value: f64,
     /// Whether the hypothesis may stand: `p_value` is at least [`LEVEL`].
     pub passed: bool,
@@ -72,6 +75,25 @@ impl Test {
 
 /// Tests of something (nested models, drift) as a section of a report; where one fails, the estimate is to be used with
 /// care.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// # let problem = Fit::new(&model, &record).parameters(start).problem()?;
+/// # let estimate = problem.run()?;
+/// use greybox::{Report, diagnose};
+/// let fixed = Winding { ls: greybox::fixed(4.1e-3), ..start };
+/// let restricted = Fit::new(&model, &record).parameters(fixed).run()?;
+/// let [a, b] = [&*restricted, &estimate].map(|one| diagnose::Candidate::new("model", one));
+/// let test = diagnose::likelihood_ratio(&a, &b)?;
+/// let report = Report::new(&problem, &estimate)?.with(diagnose::tested("nested models", [&test]));
+/// assert!(report.to_string().contains("likelihood ratio"));
+/// # Ok(())
+/// # }
+/// ```
 pub fn tested<'a>(about: &str, tests: impl IntoIterator<Item = &'a Test>) -> Section {
     let tests: Vec<&Test> = tests.into_iter().collect();
     let part = Section::new(format!("tests-{about}"), about).table(results(about, tests.iter().copied()));
@@ -116,6 +138,17 @@ impl<L: LeastSquares> LeastSquares for Pinned<'_, L> {
     fn sizes(&self) -> Vec<Option<f64>> {
         self.problem.sizes()
     }
+}
+
+/// Searches side by side; each that has ended is counted, where the fit was given a counter.
+fn searches<T: Send>(problem: &Problem<'_>, count: usize, search: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
+    each(count, |k| {
+        let found = search(k);
+        if let Some(counter) = &problem.settings.counter {
+            counter.fetch_add(1, Ordering::Relaxed);
+        }
+        found
+    })
 }
 
 /// Refuses a result that was not computed to its end.

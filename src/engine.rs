@@ -177,6 +177,16 @@ impl Program {
         self.0.width.lanes() * self.0.registers(usize::MAX)
     }
 
+    /// The registers that it runs on.
+    pub(crate) fn width(&self) -> Width {
+        self.0.width
+    }
+
+    /// Lanes of the group for so many trajectories.
+    pub fn lanes_for(&self, trajectories: usize) -> usize {
+        self.0.width.lanes() * self.0.registers(trajectories)
+    }
+
     /// A group of at least so many lanes, if it can be: the smallest such group, or the largest.
     pub fn group(&self, lanes: usize) -> Group {
         Group::new(Arc::clone(&self.0), self.0.registers(lanes))

@@ -37,7 +37,7 @@ pub enum Error {
     },
     /// A time or input that is not a finite number.
     #[error(
-        "experiment `{experiment}`: `{signal}` is {value} at sample {sample} (t = {} s); only outputs may be missing (NaN)", exact(*time)
+        "experiment `{experiment}`: `{signal}` is {} at sample {sample} (t = {} s); only outputs may be missing (NaN)", short(*value), exact(*time)
     )]
     NotFinite {
         /// Name of the experiment.
@@ -66,7 +66,7 @@ pub enum Error {
         time: f64,
     },
     /// A sample time, factor or scale that must be a positive finite number.
-    #[error("{what} is {value}; it must be positive and finite")]
+    #[error("{what} is {}; it must be positive and finite", short(*value))]
     NotPositive {
         /// What it is.
         what: String,

@@ -1,11 +1,15 @@
 //! [`Summary`]: what a fit found, and how well it is known; and [`Estimate`], the same by the model's names.
 
 mod display;
+mod format;
+mod json;
 mod prediction;
 mod starts;
 pub(crate) mod student;
 mod warning;
 
+pub(crate) use display::held;
+pub use format::{Format, Version};
 pub use prediction::Prediction;
 pub use starts::{FailedStart, Minimum, Starts};
 pub use warning::{Warning, WarningCode};
@@ -13,9 +17,9 @@ pub use warning::{Warning, WarningCode};
 use crate::information::{Covariance, SquareMatrix};
 use crate::layout::Layout;
 use crate::model::Model;
-use crate::numeral::{counted, number, or_nan, pairs_or_nan};
+use crate::numeral::{counted, number};
 use crate::optimize::{Outcome, Severity};
-use crate::parameter::{Parameter, Transform, unbounded_above, unbounded_below};
+use crate::parameter::{Parameter, Transform};
 use crate::problem::Role;
 use crate::signals::{Of, Signals};
 use core::fmt;
@@ -23,27 +27,33 @@ use core::ops::Deref;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// What is known of one quantity.
+/// What is known of one quantity; in JSON with its name as `code`, in small letters.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "code", rename_all = "snake_case")]
 pub enum Knowledge {
     /// It was estimated; the interval covers it with 95 % probability (asymmetric, if its logarithm was estimated).
     Known {
         /// Standard error, in its own unit.
-        #[serde(deserialize_with = "or_nan")]
+        #[serde(with = "crate::real")]
         standard_error: f64,
-        /// Lower end of the 95 % interval; `null` in JSON stands for none.
-        #[serde(with = "unbounded_below")]
+        /// Lower end of the 95 % interval; minus infinity stands for none.
+        #[serde(with = "crate::real")]
         lower: f64,
-        /// Upper end of the 95 % interval; `null` in JSON stands for none.
-        #[serde(with = "unbounded_above")]
+        /// Upper end of the 95 % interval; infinity stands for none.
+        #[serde(with = "crate::real")]
         upper: f64,
     },
     /// It was given.
     Fixed,
-    /// The data push it against this bound; it is kept there, and has no interval.
+    /// The data push it against this bound; it is kept there.
     Held {
         /// The bound.
+        #[serde(with = "crate::real")]
         bound: f64,
+        /// Other end of its 95 % interval, which begins at the bound: the part within the bounds of the interval that it
+        /// would have without them. `None` where no part is, or where there is no slope at the bound.
+        #[serde(with = "crate::real")]
+        end: Option<f64>,
     },
     /// The data do not determine it; its value is where the search left it.
     Unidentified,
@@ -72,20 +82,26 @@ pub struct Unknown {
     /// Index of the experiment that it belongs to; `None` if all share it.
     pub experiment: Option<usize>,
     /// Estimated value.
-    #[serde(deserialize_with = "or_nan")]
+    #[serde(with = "crate::real")]
     pub value: f64,
     /// Where the search started.
-    #[serde(deserialize_with = "or_nan")]
+    #[serde(with = "crate::real")]
     pub start: f64,
     /// What is known of it.
     pub knowledge: Knowledge,
     /// Parametric error index (%), the others refitted: the relative change that doubles the sum of squares, in linear
     /// approximation (Tenerz 2011, eq. 5.14). Low is well excited. `None` where there is no interval, or the value is 0.
+    #[serde(with = "crate::real")]
     pub error_index: Option<f64>,
     /// The same with the others held.
+    #[serde(with = "crate::real")]
     pub error_index_held: Option<f64>,
     /// The coordinate that the optimizer worked in.
     pub transform: Transform,
+    /// Degrees of freedom of Student's t in its interval: those of the fit, or fewer where the variance of colored errors
+    /// is itself an estimate from few independent stretches.
+    #[serde(with = "crate::real")]
+    pub degrees_of_freedom: f64,
 }
 
 /// A parameter of the model: what was declared of it, and what was found.
@@ -97,7 +113,7 @@ pub struct ParameterEstimate {
     /// Unit.
     pub unit: String,
     /// Value; of a parameter that each experiment has for itself, the first experiment's.
-    #[serde(deserialize_with = "or_nan")]
+    #[serde(with = "crate::real")]
     pub value: f64,
     /// What is known of it.
     pub knowledge: Knowledge,
@@ -112,12 +128,13 @@ pub struct OutputFit {
     /// Samples measured.
     pub samples: u64,
     /// Root of the mean squared prediction error, in the output's unit, before any pre-filter.
-    #[serde(deserialize_with = "or_nan")]
+    #[serde(with = "crate::real")]
     pub rmse: f64,
     /// Fit (%): `100 (1 - |y - y_hat| / |y - mean y|)`; `None` if the measurement is constant.
+    #[serde(with = "crate::real")]
     pub fit_percent: Option<f64>,
     /// Standard deviation of the noise: given, or estimated from the (filtered) errors with `N - p` in the denominator.
-    #[serde(deserialize_with = "or_nan")]
+    #[serde(with = "crate::real")]
     pub sigma: f64,
 }
 
@@ -138,7 +155,7 @@ pub struct OutputEstimate {
 pub struct Direction {
     /// Name and relative change (to the largest among them) of each; moving them together so changes no prediction.
     /// Absolute, where the value is zero.
-    #[serde(deserialize_with = "pairs_or_nan")]
+    #[serde(with = "crate::real")]
     pub moves: Vec<(String, f64)>,
 }
 
@@ -164,13 +181,16 @@ pub struct ExperimentEstimate {
     /// Number of samples.
     pub samples: u64,
     /// Parameters of this experiment in the model's order: the common ones and its own.
+    #[serde(with = "crate::real")]
     pub parameters: Vec<f64>,
     /// State at the first sample.
+    #[serde(with = "crate::real")]
     pub initial_state: Vec<f64>,
 }
 
 /// Where the noise levels came from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum NoiseModel {
     /// They were given.
     Given,
@@ -194,8 +214,9 @@ impl fmt::Display for NoiseModel {
     }
 }
 
-/// How the covariance of the unknowns was made.
+/// How the covariance of the unknowns was made; in JSON with its name as `code`, in small letters with underscores.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "code", rename_all = "snake_case")]
 pub enum CovarianceMethod {
     /// From the curvature of the cost, for white errors.
     #[default]
@@ -255,6 +276,10 @@ pub struct Method {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Summary {
+    /// What kind of file its JSON is.
+    pub format: Format,
+    /// Which version of it.
+    pub version: Version,
     /// The model's quantities.
     pub layout: Layout,
     /// The parameters, in the model's order.
@@ -279,18 +304,19 @@ pub struct Summary {
     /// What the reader must know.
     pub warnings: Vec<Warning>,
     /// The minimized cost: the weighted sum of `rho` of the standardized errors, and half the squares of the priors.
-    #[serde(deserialize_with = "or_nan")]
+    #[serde(with = "crate::real")]
     pub cost: f64,
     /// Measurements used (samples times outputs).
     pub measurements: u64,
     /// `-2 ln` of the Gaussian likelihood of the (filtered) errors; not defined for weighted or robust fits.
+    #[serde(with = "crate::real")]
     pub deviance: Option<f64>,
     /// Trial steps of the search.
     pub iterations: u64,
     /// Passes over the data with slopes.
     pub evaluations: u64,
     /// Time taken (s).
-    #[serde(deserialize_with = "or_nan")]
+    #[serde(with = "crate::real")]
     pub seconds: f64,
     /// How it was made.
     pub method: Method,
@@ -327,7 +353,19 @@ impl Summary {
         if !(probability > 0.0 && probability < 1.0) {
             return None;
         }
-        Some(student::interval(unknown.value, error, unknown.transform, probability, self.degrees_of_freedom()))
+        let Knowledge::Known { lower, upper, .. } = unknown.knowledge else { return None };
+        let (to_coordinate, slope) =
+            (|value| unknown.transform.to_coordinate(value), unknown.transform.slope(unknown.value));
+        // Next to an unknown that is held, an interval is not centered at the estimate.
+        let moved = 0.5 * (to_coordinate(lower) + to_coordinate(upper)) - to_coordinate(unknown.value);
+        let shift = if self.releases() && moved.is_finite() { moved } else { 0.0 };
+        let spread = student::Spread { standard_error: error / slope, degrees: unknown.degrees_of_freedom };
+        Some(spread.interval(to_coordinate(unknown.value) + shift, unknown.transform, probability))
+    }
+
+    /// Whether an unknown at a bound has an interval, for which those of all others allow.
+    fn releases(&self) -> bool {
+        self.unknowns.iter().any(|unknown| matches!(unknown.knowledge, Knowledge::Held { end: Some(_), .. }))
     }
 
     /// Correlation of some unknowns, by their numbers; zero where there is no interval, one on the diagonal.
@@ -391,6 +429,25 @@ impl Summary {
 
 /// What a fit found, and how well it is known, by the names of its model; everything of the [`Summary`] can be read from
 /// it, too.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// use greybox::Knowledge;
+/// let estimate = Fit::new(&model, &record).parameters(start).run()?;
+/// let rs: f64 = estimate.parameters.rs; // by the model's names
+/// if let Knowledge::Known { standard_error, lower, upper } = estimate.knowledge.rs {
+///     println!("{rs:.4} ± {standard_error:.4} ohm, {lower:.4} to {upper:.4}");
+///     assert!(lower < 0.63 && 0.63 < upper); // the truth
+/// }
+/// assert!(estimate.outcome.converged() && estimate.warnings.is_empty()); // from its `Summary`
+/// assert!(estimate.quality.id.fit_percent.unwrap() > 98.0);
+/// # Ok(())
+/// # }
+/// ```
 pub struct Estimate<M: Model> {
     /// The parameters; of those that each experiment has for itself, the first experiment's.
     pub parameters: Of<M::Parameters, f64>,
@@ -428,6 +485,7 @@ impl<M: Model> Estimate<M> {
             parameters: M::Parameters::from_fn(|j| one.parameters[j]),
             initial_state: M::State::from_fn(|i| one.initial_state[i]),
         };
+        summary.check()?;
         Ok(Estimate {
             parameters: M::Parameters::from_fn(|j| summary.parameters[j].value),
             knowledge: M::Parameters::from_fn(|j| summary.parameters[j].knowledge),

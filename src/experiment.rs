@@ -27,6 +27,24 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 /// [`split`](Experiment::split), [`cycles`](Experiment::cycles), [`without_gaps`](Experiment::without_gaps)),
 /// [joined](Experiment::join) and [thinned](Experiment::decimate) into others; pieces share the columns of the whole. As
 /// JSON it keeps everything; what is read back is checked again.
+///
+/// ```
+/// use greybox::{Experiment, Hold, Time, fixed, pmsm::{Currents, Drive, Surface}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let model = Surface::new(4)?;
+/// let time = Time::Uniform { start: 0.0, step: 1e-3 };
+/// let inputs = (0..50).map(|k| Drive { ud: 0.0, uq: f64::from(k), w: 10.0 }).collect();
+/// let outputs = (0..50).map(|k| Currents { id: 0.0, iq: if k == 7 { f64::NAN } else { 0.1 } }).collect();
+/// let record = Experiment::new(&model, time, inputs, outputs)?
+///     .named("ramp")
+///     .hold(Hold::First)
+///     .initial(Currents { id: fixed(0.0), iq: fixed(0.0) });
+/// assert_eq!((record.len(), record.coverage().iq), (50, 0.98)); // one sample of iq is missing
+/// let (fit, validation) = record.split(0.8)?;
+/// assert_eq!((fit.len(), validation.len()), (40, 10));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Experiment<X: Signals, U: Signals, Y: Signals> {
     record: Record,

@@ -32,7 +32,7 @@ use argmin::core::observers::{Observe, ObserverMode};
 use core::marker::PhantomData;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicU64};
 use std::time::Duration;
 
 /// A model and its records, before the parameters are declared.
@@ -79,6 +79,23 @@ impl<M: Model> Clone for Stepping<M> {
 ///
 /// Defaults: simulation error, squared loss, no weighting, noise estimated per output,
 /// [`LevenbergMarquardt`](crate::optimize::LevenbergMarquardt), and the default integrator of the model's kind.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// use greybox::{Huber, Rk4};
+/// let estimate = Fit::new(&model, &record)
+///     .parameters(Winding { rs: free(1.0).within(0.01, 10.0), ls: free(2e-3).log(), ke: free(0.7) })
+///     .loss(Huber::default())
+///     .integrator(Rk4 { substeps: 2 })
+///     .run()?;
+/// assert!((estimate.parameters.ke / 0.95 - 1.0).abs() < 0.001);
+/// # Ok(())
+/// # }
+/// ```
 pub struct Fit<'a, M: Model> {
     model: &'a M,
     experiments: &'a [ExperimentOf<M>],
@@ -121,6 +138,13 @@ impl<'a, M: Model> Fit<'a, M> {
     /// Without it, the noise is estimated from the errors.
     pub fn noise(self, sigma: Of<M::Output, f64>) -> Self {
         self.set(|settings| settings.noise(M::Output::into_array(sigma).as_ref().to_vec()))
+    }
+
+    /// Declares the standard deviation of the noise of each input, in its unit; zero for none. It changes neither the
+    /// estimate nor its intervals: the bias that it causes is estimated (Cook and Stefanski 1994), and named by a warning
+    /// where it is above a quarter of a standard error.
+    pub fn input_noise(self, sigma: Of<M::Input, f64>) -> Self {
+        self.set(|settings| settings.input_noise(M::Input::into_array(sigma).as_ref().to_vec()))
     }
 
     /// Estimates the covariance of the noise of all outputs, instead of a standard deviation per output.
@@ -182,6 +206,11 @@ impl<'a, M: Model> Fit<'a, M> {
     /// Stops the search at its best point so far when the flag is set (by another thread, a signal handler).
     pub fn cancel(self, flag: Arc<AtomicBool>) -> Self {
         self.set(|settings| settings.cancel(flag))
+    }
+
+    /// Adds one to the counter whenever a search of a diagnosis that makes many ([`bootstrap`](crate::diagnose::bootstrap)) has ended, for a display of progress by another thread.
+    pub fn counter(self, counter: Arc<AtomicU64>) -> Self {
+        self.set(|settings| settings.counter(counter))
     }
 
     /// Stops the search at its best point so far after this time.

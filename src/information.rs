@@ -40,6 +40,7 @@ pub struct Information {
     columns: usize,
     rows: u64,
     // Row after row, each from its diagonal on; the last holds the root of the residual sum of squares.
+    #[serde(with = "crate::real")]
     triangle: Vec<f64>,
 }
 
@@ -272,6 +273,7 @@ fn norm(entries: impl Iterator<Item = f64> + Clone) -> f64 {
 struct Stored {
     columns: usize,
     rows: u64,
+    #[serde(with = "crate::real")]
     triangle: Vec<f64>,
 }
 

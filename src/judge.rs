@@ -1,6 +1,10 @@
 //! Evaluation of the result of a search: noise, covariance, null directions, warnings.
 
+mod bounds;
 mod conclude;
+mod covariances;
+mod curved;
+mod data_noise;
 mod directions;
 mod hac;
 pub(crate) mod noise;

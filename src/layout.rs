@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// Whether time is continuous, discrete, or plays no part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Kind {
     /// `dx/dt = f(t, x, u; p)`, written as [`Model::derivative`](crate::Model::derivative).
     Continuous,

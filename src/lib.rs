@@ -70,6 +70,8 @@
 //!
 //! # Where to find what
 //!
+//! The [`guide`] has fifteen short chapters, from a first fit to writing an integrator.
+//!
 //! | to | see |
 //! |---|---|
 //! | write a model | [`Model`], [`signals!`], [`Scalar`]; [`Numeric`] for functions over `f64`; [`models`] and [`pmsm`] for those that ship |
@@ -108,6 +110,7 @@ pub mod models;
 pub mod online;
 mod parameter;
 pub mod pmsm;
+mod real;
 mod scalar;
 mod signals;
 pub mod units;
@@ -132,11 +135,15 @@ mod experiment;
 #[cfg(feature = "std")]
 mod fit;
 #[cfg(feature = "std")]
+mod format;
+#[cfg(feature = "std")]
 mod functions;
 #[cfg(feature = "std")]
 mod fused;
 #[cfg(feature = "std")]
 pub mod graph;
+#[cfg(feature = "csv")]
+pub mod guide;
 #[cfg(feature = "std")]
 mod information;
 #[cfg(feature = "std")]

@@ -12,6 +12,30 @@ use crate::signals::{Of, Signals};
 /// multiply from the right (`x * 2.0`).
 ///
 /// The names and units of all quantities come from the four signal types.
+///
+/// ```
+/// use greybox::{Model, Scalar, signals};
+/// signals! {
+///     pub struct Level { h: "m" }
+///     pub struct Inflow { q: "m^3/s" }
+///     pub struct Tank { area: "m^2", outlet: "m^2" }
+/// }
+/// struct Draining;
+/// impl Model for Draining {
+///     type State = Level;
+///     type Input = Inflow;
+///     type Output = Level;
+///     type Parameters = Tank;
+///     fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Inflow<S>, p: &Tank<S>) -> Level<S> {
+///         Level { h: (u.q - p.outlet * (x.h * 19.62).sqrt()) / p.area }
+///     }
+///     fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Inflow<S>, _p: &Tank<S>) -> Level<S> {
+///         *x
+///     }
+/// }
+/// let slope = Draining.derivative(0.0, &Level { h: 1.0 }, &Inflow { q: 0.0 }, &Tank { area: 0.5, outlet: 4e-4 });
+/// assert!((slope.h + 4e-4 * 19.62f64.sqrt() / 0.5).abs() < 1e-15);
+/// ```
 pub trait Model: Send + Sync {
     /// The states `x`; [`Nothing`](crate::Nothing) for a static model.
     type State: Signals;

@@ -1,9 +1,7 @@
-//! How numbers are written: rounded for readers, and as null in JSON where they are not finite.
+//! How numbers are written for readers.
 
 #[cfg(test)]
 mod tests;
-
-use serde::{Deserialize, Deserializer};
 
 /// Digits that every `f64` can be trusted with; one more would show the rounding to binary (`1.1500000000000001`).
 const EXACT: usize = 15;
@@ -62,9 +60,32 @@ pub(crate) fn p_value(p: f64) -> String {
     if p < 1e-15 { "p < 1e-15".to_owned() } else { format!("p = {}", number(p, 2)) }
 }
 
-/// A number of things: `1 gap`, `3 gaps`.
+/// A number of things: `1 gap`, `3 gaps`, `24,841 samples`.
 pub(crate) fn counted(count: u64, thing: &str) -> String {
-    format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
+    format!("{} {thing}{}", whole(count), if count == 1 { "" } else { "s" })
+}
+
+/// A whole number, from five digits on in groups of three: `9999`, `24,841`.
+pub(crate) fn whole(count: u64) -> String {
+    grouped(&count.to_string())
+}
+
+/// A written number whose digits before the point are in groups of three, if they are five or more: `-12,646.37`.
+pub(crate) fn grouped(text: &str) -> String {
+    let sign = if text.starts_with('-') { 1 } else { 0 };
+    let digits = text[sign..].chars().take_while(char::is_ascii_digit).count();
+    if digits < 5 {
+        return text.to_owned();
+    }
+    let (whole, rest) = text.split_at(sign + digits);
+    let mut found = String::with_capacity(text.len() + digits / 3);
+    for (k, c) in whole.chars().enumerate() {
+        if k > sign && (sign + digits - k).is_multiple_of(3) {
+            found.push(',');
+        }
+        found.push(c);
+    }
+    found + rest
 }
 
 fn written(value: f64, digits: usize) -> String {
@@ -90,15 +111,4 @@ fn written(value: f64, digits: usize) -> String {
 /// Without the zeros that a fraction ends in.
 fn trimmed(text: &str) -> &str {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
-}
-
-/// Reads a number that is null where it was not finite, because JSON has no value for it: null is not a number.
-pub(crate) fn or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
-}
-
-/// The same of numbers with names.
-pub(crate) fn pairs_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<(String, f64)>, D::Error> {
-    let pairs = Vec::<(String, Option<f64>)>::deserialize(deserializer)?;
-    Ok(pairs.into_iter().map(|(name, value)| (name, value.unwrap_or(f64::NAN))).collect())
 }

@@ -91,11 +91,14 @@ pub enum Infeasible {
 #[serde(deny_unknown_fields)]
 pub struct Stop {
     /// Converged, if no unknown would move by more than this part of itself (or, near zero, of its standard error).
+    #[serde(with = "crate::real")]
     pub step: f64,
     /// Converged, if the residual is orthogonal to every column of the Jacobian to this cosine.
+    #[serde(with = "crate::real")]
     pub gradient: f64,
     /// Converged, if a step lowered the cost by less than this part, and the next would; zero switches the test off. A convenience of other
     /// tools: on hard problems it stops with few right digits.
+    #[serde(with = "crate::real")]
     pub cost: f64,
     /// Most trial steps.
     pub iterations: u64,

@@ -36,14 +36,15 @@ pub fn fixed(value: f64) -> Parameter {
 #[serde(deny_unknown_fields)]
 pub struct Parameter {
     /// Where the search starts; the value itself, if fixed.
+    #[serde(with = "crate::real")]
     pub start: f64,
     /// Whether the fit may move it.
     pub free: bool,
-    /// Lower bound; `null` in JSON stands for none.
-    #[serde(with = "unbounded_below")]
+    /// Lower bound; minus infinity stands for none.
+    #[serde(with = "crate::real")]
     pub lower: f64,
-    /// Upper bound; `null` in JSON stands for none.
-    #[serde(with = "unbounded_above")]
+    /// Upper bound; infinity stands for none.
+    #[serde(with = "crate::real")]
     pub upper: f64,
     /// What is known beforehand, as one more measurement.
     pub prior: Option<Prior>,
@@ -60,13 +61,16 @@ pub struct Parameter {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Prior {
     /// Expected value.
+    #[serde(with = "crate::real")]
     pub mean: f64,
     /// Standard deviation.
+    #[serde(with = "crate::real")]
     pub std: f64,
 }
 
 /// The coordinate that the optimizer works in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Transform {
     /// The value itself.
     Identity,
@@ -127,20 +131,3 @@ impl Transform {
         }
     }
 }
-
-// JSON has no infinity: an absent bound is a null.
-macro_rules! nullable {
-    ($module:ident, $absent:expr) => {
-        pub(crate) mod $module {
-            use serde::{Deserialize, Deserializer, Serialize, Serializer};
-            pub fn serialize<S: Serializer>(bound: &f64, serializer: S) -> Result<S::Ok, S::Error> {
-                (*bound != $absent).then_some(*bound).serialize(serializer)
-            }
-            pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-                Ok(Option::deserialize(deserializer)?.unwrap_or($absent))
-            }
-        }
-    };
-}
-nullable!(unbounded_below, f64::NEG_INFINITY);
-nullable!(unbounded_above, f64::INFINITY);

@@ -7,6 +7,7 @@ mod checkpoint;
 mod control;
 mod curvature;
 mod finer;
+mod fingerprint;
 mod linearize;
 mod objective;
 mod pass;
@@ -23,8 +24,9 @@ mod whitening;
 pub(crate) use batches::each;
 pub(crate) use checkpoint::CheckpointFile;
 pub(crate) use control::Control;
-use finer::Finer;
+pub(crate) use finer::Finer;
 pub(crate) use finer::MakeSweep;
+pub(crate) use fingerprint::Fingerprint;
 pub use objective::Objective;
 pub(crate) use pass::Accumulate;
 pub use search::Search;
@@ -64,7 +66,7 @@ pub struct Problem<'a> {
     pub(crate) cuts: Cuts,
     /// Whether the method was chosen by the library, which then answers for its step.
     pub(crate) refines: bool,
-    finer: Option<Arc<dyn Finer + 'a>>,
+    pub(crate) finer: Option<Arc<dyn Finer + 'a>>,
 }
 
 impl<'a> Problem<'a> {

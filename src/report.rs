@@ -35,9 +35,9 @@
 //!
 //! # JSON
 //!
-//! `schema/report.schema.json` describes it. A number that is not finite (a standard error without a degree of freedom) is
-//! null, because JSON has no value for it; read back, it is not a number (for a bound: none). Drawings are left out
-//! unless asked for.
+//! `schema/report.schema.json` describes it. JSON has no value for what is not finite: a number that is not a number
+//! (a standard error without a degree of freedom) is null, and the infinities are the texts `"Infinity"` and `"-Infinity"`.
+//! The same holds for estimates, experiments and all else that is stored. Drawings are left out unless asked for.
 
 mod chart;
 mod facts;

@@ -14,14 +14,19 @@ pub trait Scaling: Clone + Debug + Send + Sync {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Seen {
     /// The start.
+    #[serde(with = "crate::real")]
     pub start: Vec<f64>,
     /// The present point.
+    #[serde(with = "crate::real")]
     pub x: Vec<f64>,
     /// The largest magnitude so far.
+    #[serde(with = "crate::real")]
     pub largest: Vec<f64>,
     /// The largest norm of the Jacobian's column so far.
+    #[serde(with = "crate::real")]
     pub norms: Vec<f64>,
     /// The size of those unknowns whose magnitude does not tell it: one for a logarithm.
+    #[serde(with = "crate::real")]
     pub sizes: Vec<Option<f64>>,
 }
 
@@ -74,6 +79,7 @@ pub struct Unscaled;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Nominal(
     /// One positive magnitude per unknown, in the optimizer's coordinates; where missing, that of the start.
+    #[serde(with = "crate::real")]
     pub Vec<f64>,
 );
 

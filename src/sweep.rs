@@ -108,6 +108,12 @@ pub trait Sweep: Send + Sync {
         false
     }
 
+    /// How many samples lie between a prediction and the measured state that it restarts from; `None` where predictions
+    /// do not restart.
+    fn restarts(&self) -> Option<usize> {
+        None
+    }
+
     /// How many pieces of records like this one run in parallel lanes. [`run`](Sweep::run) is never given more, nor
     /// pieces of records that differ in their holds or in their kind of time.
     fn lanes(&self, record: &Record, seeds: &[Seed]) -> usize {

@@ -1,4 +1,4 @@
-//! Whether errors are white: autocorrelations gathered run by run, and the portmanteau test of Ljung and Box.
+//! Whether errors are white: autocorrelations gathered run by run, and portmanteau tests.
 
 use crate::wide::{self, Task, Wide, Width};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -12,24 +12,21 @@ pub(crate) struct Autocorrelation {
     first: Vec<f64>,
     /// The last values, then those of the run at hand.
     values: Vec<f64>,
-    /// How many values were measured.
-    count: u64,
 }
 
 impl Autocorrelation {
     pub fn new(lags: usize) -> Self {
-        Autocorrelation { sums: vec![0.0; lags + 1], first: vec![], values: vec![0.0; lags], count: 0 }
+        Autocorrelation { sums: vec![0.0; lags + 1], first: vec![], values: vec![0.0; lags] }
     }
 
-    /// The next values in order of time, zero where missing; `count` of them were measured.
-    pub fn add(&mut self, run: &[f64], count: u64) {
+    /// The next values in order of time, zero where missing.
+    pub fn add(&mut self, run: &[f64]) {
         let lags = self.sums.len() - 1;
         let missing = (lags - self.first.len()).min(run.len());
         self.first.extend_from_slice(&run[..missing]);
         self.values.extend_from_slice(run);
         wide::run(Width::widest(), Products { run, values: &self.values, sums: &mut self.sums });
         self.values.drain(..run.len());
-        self.count += count;
     }
 
     /// As if the values of the other had followed.
@@ -48,18 +45,58 @@ impl Autocorrelation {
     /// Adds the sums of another record.
     pub fn append(&mut self, other: &Autocorrelation) {
         self.sums.iter_mut().zip(&other.sums).for_each(|(sum, other)| *sum += other);
-        self.count += other.count;
+    }
+}
+
+/// A portmanteau test of errors whose size may change from sample to sample.
+///
+/// At each lag the sum of products `e[t] e[t - k]` is divided by the root of the sum of their squares, which is its
+/// standard deviation where the errors are uncorrelated, whatever their variances (Dalla, Giraitis and Phillips,
+/// Econometric Theory 38 (2022) 595, section 2). Where the variances are equal, it is the test of Box and Pierce.
+#[derive(Clone, Debug)]
+pub(crate) struct Portmanteau {
+    errors: Autocorrelation,
+    squares: Autocorrelation,
+    squared: Vec<f64>,
+}
+
+impl Portmanteau {
+    pub fn new(lags: usize) -> Self {
+        Portmanteau { errors: Autocorrelation::new(lags), squares: Autocorrelation::new(lags), squared: vec![] }
     }
 
-    /// How many values were measured.
-    pub fn count(&self) -> u64 {
-        self.count
+    /// The next errors in order of time, zero where missing.
+    pub fn add(&mut self, run: &[f64]) {
+        self.squared.clear();
+        self.squared.extend(run.iter().map(|e| e * e));
+        self.errors.add(run);
+        self.squares.add(&self.squared);
     }
 
-    /// Correlation with the value `1, 2, ...` samples before; zeros if there is no value but zero.
-    pub fn coefficients(&self) -> Vec<f64> {
-        let whole = if self.sums[0] > 0.0 { self.sums[0] } else { f64::INFINITY };
-        self.sums[1..].iter().map(|sum| sum / whole).collect()
+    /// As if the errors of the other had followed.
+    pub fn follow(&mut self, next: &Portmanteau) {
+        self.errors.follow(&next.errors);
+        self.squares.follow(&next.squares);
+    }
+
+    /// Adds the sums of another record.
+    pub fn append(&mut self, other: &Portmanteau) {
+        self.errors.append(&other.errors);
+        self.squares.append(&other.squares);
+    }
+
+    /// The sum of products at a lag over its standard deviation without correlation, and the autocorrelation.
+    pub fn at(&self, lag: usize) -> (f64, f64) {
+        let (sum, squares) = (self.errors.sums[lag], self.squares.sums[lag]);
+        let over = |part: f64, whole: f64| if whole > 0.0 { part / whole } else { 0.0 };
+        (over(sum, squares.sqrt()), over(sum, self.errors.sums[0]))
+    }
+
+    /// The probability that errors without correlation show as much of it at lags `1..=lags`.
+    pub fn p_value(&self, lags: usize) -> f64 {
+        let sums = self.errors.sums.iter().zip(&self.squares.sums).skip(1).take(lags);
+        let terms: Vec<f64> = sums.filter(|(_, squares)| **squares > 0.0).map(|(sum, q)| sum * sum / q).collect();
+        chi_squared_tail(terms.iter().sum(), terms.len() as f64)
     }
 }
 
@@ -117,32 +154,35 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
+    fn coefficients(of: &Autocorrelation) -> Vec<f64> {
+        of.sums[1..].iter().map(|sum| sum / of.sums[0]).collect()
+    }
+
     /// In one run or in many, the sums are those of the definition.
     #[test]
     fn runs_make_the_whole() {
         let e: Vec<f64> = (0..300).map(|k| ((k * k) as f64 * 0.37).sin()).collect();
         let mut runs = Autocorrelation::new(12);
         for run in [&e[..5], &e[5..133], &e[133..134], &e[134..]] {
-            runs.add(run, run.len() as u64);
+            runs.add(run);
         }
         let whole: f64 = e.iter().map(|e| e * e).sum();
-        for (k, found) in runs.coefficients().into_iter().enumerate() {
+        for (k, found) in coefficients(&runs).into_iter().enumerate() {
             let expected = (k + 1..300).map(|t| e[t] * e[t - k - 1]).sum::<f64>() / whole;
             assert!((found - expected).abs() < 1e-14, "lag {}: {found} {expected}", k + 1);
         }
-        assert_eq!(runs.count(), 300);
         // So do pieces of any length, each with its own runs.
         for cuts in [[100, 200], [5, 8], [1, 299], [290, 295]] {
             let piece = |e: &[f64]| {
                 let mut piece = Autocorrelation::new(12);
-                e.chunks(7).for_each(|run| piece.add(run, run.len() as u64));
+                e.chunks(7).for_each(|run| piece.add(run));
                 piece
             };
             let [a, b] = cuts;
             let mut joined = piece(&e[..a]);
             joined.follow(&piece(&e[a..b]));
             joined.follow(&piece(&e[b..]));
-            for (found, expected) in joined.coefficients().iter().zip(runs.coefficients()) {
+            for (found, expected) in coefficients(&joined).iter().zip(coefficients(&runs)) {
                 assert!((found - expected).abs() < 1e-14, "{cuts:?}: {found} {expected}");
             }
         }

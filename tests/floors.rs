@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// The rooms, floor by floor. Each may import from all the rows above its own, and from nothing else.
 const FLOORS: &[(&str, &[&str])] = &[
     ("ground: hardware", &["lanes", "wide"]),
-    ("ground: beside numbers", &["scalar", "units", "dispatch", "random", "numeral", "whiteness"]),
+    ("ground: beside numbers", &["scalar", "units", "dispatch", "random", "numeral", "whiteness", "real", "format"]),
     ("ground: numbers", &["dual", "fused", "signals"]),
     ("ground: vectors of numbers", &["information", "error", "by_name", "layout", "graph"]),
     ("say: words", &["model", "parameter", "scaling", "interval"]),
@@ -33,6 +33,7 @@ const FLOORS: &[(&str, &[&str])] = &[
     // A report reads diagnoses.
     ("roof: a reader", &["report"]),
     ("wing", &["models", "pmsm"]),
+    ("documentation", &["guide"]),
 ];
 
 /// Rooms that may use the crate's public list, names in capitals.

@@ -8,7 +8,7 @@ use greybox::optimize::LeastSquaresState;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 /// Whether to print in color: to a terminal, unless NO_COLOR is set (no-color.org).
@@ -45,6 +45,20 @@ pub fn steps(count: usize, what: &str) -> ProgressBar {
         Ok(style) => bar.with_style(style),
         Err(_) => bar,
     }
+}
+
+/// The same of steps that the library counts (`Fit::counter`).
+pub fn counted(count: usize, what: &str, counter: &Arc<AtomicU64>) -> ProgressBar {
+    counter.store(0, Ordering::Relaxed);
+    let (bar, counter) = (steps(count, what), counter.clone());
+    let shown = bar.clone();
+    std::thread::spawn(move || {
+        while !shown.is_finished() {
+            shown.set_position(counter.load(Ordering::Relaxed));
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    });
+    bar
 }
 
 /// Shows a search as a moving line.

@@ -10,7 +10,7 @@ use greybox::diagnose::{Convergence, Resampling, bootstrap, profile};
 use greybox::models::{Axis, ControlledAxisMotion, PositioningLoop};
 use greybox::report::{Origin, Section};
 use greybox::{CsvFile, ExperimentOf, Fit, Hold, Model, Of, Parameter, Report, fixed, free};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::{error::Error, fs::File, io::BufRead, io::BufReader, path::PathBuf, process::ExitCode, sync::Arc};
 
 mod drive;
@@ -77,11 +77,12 @@ fn reported<M: Model + Clone>(
     stop: &Arc<AtomicBool>,
     assumed: Option<Section>,
 ) -> Result<Report, greybox::Error> {
-    let convergence = Convergence::default();
+    let (convergence, counter) = (Convergence::default(), Arc::new(AtomicU64::new(0)));
     let problem = Fit::new(model, record)
         .parameters(start)
         .starts(arguments.starts)
         .cancel(stop.clone())
+        .counter(counter.clone())
         .observe(terminal::Search(terminal::spinner("fit")), ObserverMode::Always)
         .observe(convergence.clone(), ObserverMode::Always)
         .problem()?;
@@ -102,7 +103,7 @@ fn reported<M: Model + Clone>(
     }
     bar.finish_and_clear();
     if let Some(refits) = arguments.bootstrap.filter(|_| going()) {
-        let bar = terminal::spinner("refits of resampled records");
+        let bar = terminal::counted(refits, "refits of resampled records", &counter);
         report = with(report, bootstrap(&problem, &estimate, Resampling::Blocks(0), refits, 1).map(Section::from))?;
         bar.finish_and_clear();
     }

@@ -22,6 +22,21 @@ pub struct Bands {
 ///
 /// # Errors
 /// No such record, a probability not between 0 and 1, an estimate of another problem, a simulation that fails.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// # let problem = Fit::new(&model, &record).parameters(start).problem()?;
+/// # let estimate = problem.run()?;
+/// let bands = greybox::diagnose::bands(&problem, &estimate, 0, 0.95)?; // of the first record
+/// let (noise_free, new) = (bands.confidence[0][100], bands.prediction[0][100]); // half widths for id, sample 100 (A)
+/// assert!(noise_free < new && (new / 1.96 - 0.05).abs() < 0.002); // the noise of the record is 0.05 A
+/// # Ok(())
+/// # }
+/// ```
 pub fn bands(problem: &Problem<'_>, estimate: &Summary, experiment: usize, probability: f64) -> Result<Bands, Error> {
     let (objective, best) = problem.at(estimate)?;
     let count = problem.records().len();
@@ -50,7 +65,9 @@ pub(crate) fn widths(
     experiment: usize,
     probability: f64,
 ) -> Result<Widths, Error> {
-    let quantile = student::quantile(0.5 + probability / 2.0, estimate.degrees_of_freedom());
+    let known = estimate.unknowns.iter().filter(|unknown| unknown.knowledge.standard_error().is_some());
+    let degrees = known.map(|unknown| unknown.degrees_of_freedom).fold(estimate.degrees_of_freedom(), f64::min);
+    let quantile = student::quantile(0.5 + probability / 2.0, degrees);
     // Slopes in the outputs' own units, and the covariance in the optimizer's coordinates.
     let objective = objective.in_units();
     // A filter needs the measurements; else, bands are wanted where nothing was measured, too.

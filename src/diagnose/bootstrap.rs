@@ -1,12 +1,12 @@
 //! Bootstrap: refits of what the model could as well have measured. It asks for no normal distribution, and in blocks for
 //! no white residuals.
 
-use super::{Pinned, check_complete, minimize};
+use super::{Pinned, check_complete, minimize, searches};
 use crate::error::Error;
 use crate::estimate::Summary;
 use crate::numeral::resolved;
 use crate::optimize::LeastSquares;
-use crate::problem::{Problem, Simulated, each};
+use crate::problem::{Problem, Simulated};
 use crate::random::Random;
 use crate::record::Record;
 use crate::section::{Cell, Section, Table};
@@ -34,12 +34,15 @@ pub struct Bootstrap {
     /// Refits begun.
     pub tried: u64,
     /// Standard deviation of each unknown over the refits.
+    #[serde(with = "crate::real")]
     pub standard_errors: Vec<f64>,
     /// Mean over the refits less the estimate.
+    #[serde(with = "crate::real")]
     pub bias: Vec<f64>,
     /// The 95 % interval of each: the percentiles of the refits, their deviations from the estimate stretched by
     /// `sqrt(n / (n - p))` for the degrees of freedom that residuals have lost (Davison and Hinkley, *Bootstrap Methods*,
     /// 1997, section 6.2.3).
+    #[serde(with = "crate::real")]
     pub intervals: Vec<(f64, f64)>,
     /// The seed that makes the same again.
     pub seed: u64,
@@ -50,6 +53,22 @@ pub struct Bootstrap {
 /// # Errors
 /// An estimate of another problem or one that cannot be simulated, and fewer than twenty refits that end; a time limit or a
 /// flag that stops it.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// # let problem = Fit::new(&model, &record).parameters(start).problem()?;
+/// # let estimate = problem.run()?;
+/// use greybox::diagnose::{Resampling, bootstrap};
+/// let drawn = bootstrap(&problem, &estimate, Resampling::Residuals, 100, 1)?; // 100 refits, seed 1
+/// let by_slopes = estimate.unknowns[0].knowledge.standard_error().unwrap();
+/// assert!((drawn.standard_errors[0] / by_slopes - 1.0).abs() < 0.3); // 100 refits know it to 7 %
+/// # Ok(())
+/// # }
+/// ```
 pub fn bootstrap(
     problem: &Problem<'_>,
     estimate: &Summary,
@@ -86,7 +105,7 @@ pub fn bootstrap(
         let (place, _) = minimize(Pinned { problem: &again, bounds: again.bounds() }, best.clone())?;
         Some(estimate.unknowns.iter().zip(&place).map(|(u, &c)| u.transform.to_value(c)).collect())
     };
-    let found: Vec<Vec<f64>> = each(count, refit).into_iter().flatten().collect();
+    let found: Vec<Vec<f64>> = searches(problem, count, refit).into_iter().flatten().collect();
     check_complete(problem, &control, "the bootstrap")?;
     if found.len() < 20 {
         return Err(Error::Option(format!(

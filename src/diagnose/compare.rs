@@ -54,6 +54,23 @@ impl Candidate {
 ///
 /// # Errors
 /// Fits of other data, weighted or robust ones (which have no likelihood), and a `full` that has no more unknowns.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// # let problem = Fit::new(&model, &record).parameters(start).problem()?;
+/// # let estimate = problem.run()?;
+/// use greybox::diagnose::{Candidate, likelihood_ratio};
+/// let fixed = Winding { ls: greybox::fixed(4.1e-3), ..start }; // the data sheet's inductance
+/// let restricted = Fit::new(&model, &record).parameters(fixed).run()?;
+/// let test = likelihood_ratio(&Candidate::new("data sheet", &restricted), &Candidate::new("all free", &estimate))?;
+/// assert!(!test.passed && test.p_value < 1e-6); // the record contradicts the data sheet
+/// # Ok(())
+/// # }
+/// ```
 pub fn likelihood_ratio(restricted: &Candidate, full: &Candidate) -> Result<Test, Error> {
     let more = nested(restricted, full)?;
     let (Some(one), Some(other)) = (restricted.estimate.deviance, full.estimate.deviance) else {
@@ -69,6 +86,35 @@ pub fn likelihood_ratio(restricted: &Candidate, full: &Candidate) -> Result<Test
 ///
 /// # Errors
 /// As [`likelihood_ratio`], and fits of several outputs.
+///
+/// ```
+/// use greybox::diagnose::{Candidate, f_test};
+/// use greybox::{Kind, Model, Nothing, Scalar, Time, fixed, free, signals, simulate, Fit};
+/// signals! {
+///     pub struct Load { f: "N" }
+///     pub struct Length { y: "m" }
+///     pub struct Spring { stiffness: "N/m", rest: "m" }
+/// }
+/// # #[derive(Clone)]
+/// # struct Hooke;
+/// # impl Model for Hooke {
+/// #     type State = Nothing; type Input = Load; type Output = Length; type Parameters = Spring;
+/// #     const KIND: Kind = Kind::Static;
+/// #     fn output<S: Scalar>(&self, _: S, _: &Nothing, u: &Load<S>, p: &Spring<S>) -> Length<S> {
+/// #         Length { y: p.rest + u.f / p.stiffness }
+/// #     }
+/// # }
+/// # fn main() -> Result<(), greybox::Error> {
+/// let loads: Vec<Load> = (0..20).map(|k| Load { f: f64::from(k) }).collect();
+/// let time = Time::Uniform { start: 0.0, step: 1.0 };
+/// let run = simulate(&Hooke, &Spring { stiffness: 40.0, rest: 0.1 }, &Nothing, time, &loads)?;
+/// let record = run.with_noise(Length { y: 0.01 }, 1).experiment(&Hooke)?;
+/// let fit = |rest| Fit::new(&Hooke, &record).parameters(Spring { stiffness: free(10.0), rest }).run();
+/// let (without, with) = (fit(fixed(0.0))?, fit(free(0.0))?);
+/// assert!(!f_test(&Candidate::new("no rest length", &without), &Candidate::new("rest length", &with))?.passed);
+/// # Ok(())
+/// # }
+/// ```
 pub fn f_test(restricted: &Candidate, full: &Candidate) -> Result<Test, Error> {
     let more = nested(restricted, full)?;
     let ([one], [other], true) = (
@@ -135,6 +181,21 @@ pub type NamedQualities = Vec<(String, OutputFit)>;
 ///
 /// # Errors
 /// As [`Estimate::predict`]; predicting ahead needs outputs that give the state.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// let (first, second) = record.split(0.6)?;
+/// let estimate = Fit::new(&model, &first).parameters(start).run()?;
+/// let validation = greybox::diagnose::validate(&estimate, &model, &second, &[10])?; // simulated, and 10 samples ahead
+/// let (_, simulated) = &validation.qualities[0];
+/// assert!(simulated[0].1.fit_percent.unwrap() > 98.0); // of id
+/// # Ok(())
+/// # }
+/// ```
 pub fn validate<M: Model>(
     estimate: &Estimate<M>,
     model: &M,
@@ -158,6 +219,20 @@ pub fn validate<M: Model>(
 ///
 /// # Errors
 /// Fewer than two records, and those of the fits and simulations.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// let blocks: Vec<_> = (0..4).map(|k| record.slice(k * 500..(k + 1) * 500)).collect::<Result<_, _>>()?;
+/// let fit = |others: &[_]| Fit::new(&model, others).parameters(start).run();
+/// let left_out = greybox::diagnose::cross_validate(&model, &blocks, fit)?;
+/// assert_eq!(left_out.len(), 4);
+/// # Ok(())
+/// # }
+/// ```
 pub fn cross_validate<M: Model>(
     model: &M,
     records: &[ExperimentOf<M>],

@@ -1,6 +1,5 @@
 //! How the cost fell from iteration to iteration.
 
-use crate::numeral::or_nan;
 use crate::optimize::LeastSquaresState;
 use crate::section::{Axis, Cell, Curves, Drawing, Layer, Plot, Section, Style, Table};
 use argmin::core::observers::Observe;
@@ -15,7 +14,7 @@ pub struct Iteration {
     /// Its number; zero is the start.
     pub iteration: u64,
     /// The cost after it.
-    #[serde(deserialize_with = "or_nan")]
+    #[serde(with = "crate::real")]
     pub cost: f64,
 }
 

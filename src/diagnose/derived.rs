@@ -18,16 +18,33 @@ pub struct Derived {
     /// Its name.
     pub name: String,
     /// Its value.
+    #[serde(with = "crate::real")]
     pub value: f64,
     /// Its standard error, to first order (Rao, *Linear Statistical Inference and Its Applications*, 1973, section 6a.2);
     /// `None` if it depends on a parameter that has none because it is held or not determined, or is not a number.
+    #[serde(with = "crate::real")]
     pub standard_error: Option<f64>,
     /// The 95 % interval by Student's t.
+    #[serde(with = "crate::real")]
     pub interval: Option<(f64, f64)>,
 }
 
 /// A function of the parameters with its interval: `derived(&estimate, "kt", |p| p.ke * 1.5)`. Parameters that each
 /// experiment has for itself are those of the first; fixed ones count as exact.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// let estimate = Fit::new(&model, &record).parameters(start).run()?;
+/// // The electrical time constant, with the correlation of both parameters.
+/// let tau = greybox::diagnose::derived(&estimate, "tau", |p| p.ls / p.rs);
+/// assert!((tau.value - 6.347e-3).abs() < 1e-5 && tau.standard_error.unwrap() < 1e-5);
+/// # Ok(())
+/// # }
+/// ```
 pub fn derived<M: Model>(
     estimate: &Estimate<M>,
     name: &str,
@@ -57,7 +74,9 @@ pub fn derived<M: Model>(
     let pairs = (0..moved.len()).flat_map(|a| (0..moved.len()).map(move |b| (a, b)));
     let variance: f64 = pairs.map(|(a, b)| gradient[moved[a]] * c[(a, b)] * gradient[moved[b]]).sum();
     let standard_error = Some(variance.max(0.0).sqrt()).filter(|error| known && error.is_finite() && value.is_finite());
-    let degrees = estimate.degrees_of_freedom();
-    let interval = standard_error.map(|error| student::interval(value, error, Transform::Identity, 0.95, degrees));
+    let degrees = moved.iter().map(|&i| estimate.unknowns[i].degrees_of_freedom);
+    let degrees = degrees.fold(estimate.degrees_of_freedom(), f64::min);
+    let interval = standard_error
+        .map(|standard_error| student::Spread { standard_error, degrees }.interval(value, Transform::Identity, 0.95));
     Derived { name: name.to_owned(), value, standard_error, interval }
 }

@@ -15,19 +15,38 @@ pub struct Drift {
     /// Its unit.
     pub unit: String,
     /// Value and standard error in each of the estimates that know it.
+    #[serde(with = "crate::real")]
     pub values: Vec<(f64, f64)>,
     /// Mean, weighted by the inverse variances.
+    #[serde(with = "crate::real")]
     pub mean: f64,
     /// Whether they are one value (Cochran, Biometrics 10 (1954) 101).
     pub change: Test,
     /// Whether they show no trend, by the weighted regression on their number.
     pub trend: Test,
     /// Change from estimate to estimate, in the unit.
+    #[serde(with = "crate::real")]
     pub slope: f64,
 }
 
 /// Drift of each parameter over estimates in order of time, of one model and different records; parameters that fewer than
 /// three of them know are left out.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// let hours: Vec<_> = (0..4)
+///     .map(|k| Ok(Fit::new(&model, &record.slice(k * 500..(k + 1) * 500)?).parameters(start).run()?.into_summary()))
+///     .collect::<Result<_, greybox::Error>>()?;
+/// let drift = greybox::diagnose::drift(&hours);
+/// assert_eq!(drift[0].name, "rs");
+/// assert!(drift[0].trend.passed); // the record was simulated with one resistance
+/// # Ok(())
+/// # }
+/// ```
 pub fn drift(summaries: &[Summary]) -> Vec<Drift> {
     let Some(first) = summaries.first() else { return vec![] };
     let of = |unknown: &Unknown| {

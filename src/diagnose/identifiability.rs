@@ -25,6 +25,7 @@ pub struct Identifiability {
     /// How many directions of the unknowns the records determine at the estimate.
     pub rank: u64,
     /// Largest over smallest singular value of the sensitivities scaled to unit columns; `None` if the smallest is zero.
+    #[serde(with = "crate::real")]
     pub condition: Option<f64>,
     /// The largest rank at random points about the estimate: if below the number of unknowns, no record with these inputs
     /// determines them all (Pohjanpalo, Math. Biosciences 41 (1978) 21, by numbers).
@@ -44,8 +45,10 @@ pub struct Collinear {
     /// Collinearity index (Brun, Reichert and Kuensch, Water Resources Research 37 (2001) 1015, eq. 6): a change of one that
     /// the others answer leaves `1 / index` of its effect. Above 10 to 15 they are hardly identifiable together. `None` if
     /// nothing is left at all.
+    #[serde(with = "crate::real")]
     pub index: Option<f64>,
     /// Names and changes, in their own units and the largest effect first, that answer each other.
+    #[serde(with = "crate::real")]
     pub moves: Vec<(String, f64)>,
 }
 
@@ -57,8 +60,10 @@ pub struct Excitation {
     pub name: String,
     /// Root of the sum of its squared standardized sensitivities, times its value (or one, if zero): how many standard
     /// deviations of noise a relative change of one moves the outputs by.
+    #[serde(with = "crate::real")]
     pub strength: f64,
     /// Part of its information that comes through each output, by name.
+    #[serde(with = "crate::real")]
     pub outputs: Vec<(String, f64)>,
     /// Part that comes from each tenth of each experiment, in order.
     pub segments: Vec<Segment>,
@@ -71,8 +76,10 @@ pub struct Segment {
     /// Name of the experiment.
     pub experiment: String,
     /// Time of its first sample (s).
+    #[serde(with = "crate::real")]
     pub from: f64,
     /// Part of the unknown's information, 0 to 1.
+    #[serde(with = "crate::real")]
     pub share: f64,
 }
 
@@ -87,6 +94,21 @@ const SEED: u64 = 1;
 ///
 /// # Errors
 /// An estimate of another problem, or one that cannot be simulated any more.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// # let problem = Fit::new(&model, &record).parameters(start).problem()?;
+/// # let estimate = problem.run()?;
+/// let found = greybox::diagnose::identifiability(&problem, &estimate)?;
+/// assert_eq!(found.rank, 5); // three parameters and two initial currents
+/// assert!(found.condition.unwrap() < 2.0 && found.collinear.is_empty() && found.advice.is_empty());
+/// # Ok(())
+/// # }
+/// ```
 pub fn identifiability(problem: &Problem<'_>, estimate: &Summary) -> Result<Identifiability, Error> {
     let (objective, best) = problem.at(estimate)?;
     let linear = objective.linearize(&best).map_err(|error| Error::Optimizer(error.to_string()))?;

@@ -25,8 +25,10 @@ pub struct Profile {
     /// Its unit.
     pub unit: String,
     /// Its estimate.
+    #[serde(with = "crate::real")]
     pub value: f64,
     /// Probability with which the interval covers the truth.
+    #[serde(with = "crate::real")]
     pub probability: f64,
     /// Lower end of the interval.
     pub lower: End,
@@ -34,15 +36,18 @@ pub struct Profile {
     pub upper: End,
     /// Its standard error by the slopes at the estimate, where it has one: the curve's quadratic approximation is
     /// `((z - z0) / s)^2` with the coordinate `z` that the optimizer worked in.
+    #[serde(with = "crate::real")]
     pub standard_error: Option<f64>,
     /// That coordinate.
     pub transform: Transform,
     /// The curve, by rising value.
     pub points: Vec<ProfilePoint>,
     /// The interval ends where the rise reaches this.
+    #[serde(with = "crate::real")]
     pub threshold: f64,
     /// By how much the rise is divided, because the errors are colored, weighted or bent: the square of the standard error
     /// said by the estimate over the classical one.
+    #[serde(with = "crate::real")]
     pub inflation: f64,
     /// What came up on the way.
     pub severity: Severity,
@@ -55,10 +60,13 @@ pub struct Profile {
 #[serde(deny_unknown_fields)]
 pub struct ProfilePoint {
     /// Value of the unknown.
+    #[serde(with = "crate::real")]
     pub value: f64,
     /// Rise of the deviance (twice the cost) over its minimum, divided by the inflation.
+    #[serde(with = "crate::real")]
     pub rise: f64,
     /// Values of all unknowns there.
+    #[serde(with = "crate::real")]
     pub unknowns: Vec<f64>,
 }
 
@@ -66,11 +74,11 @@ pub struct ProfilePoint {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum End {
     /// The data exclude what is beyond.
-    At(f64),
+    At(#[serde(with = "crate::real")] f64),
     /// They do not: the interval goes on to this bound of the parameter.
-    Bound(f64),
+    Bound(#[serde(with = "crate::real")] f64),
     /// They do not as far as was looked, and no bound is declared; the last value tried.
-    Open(f64),
+    Open(#[serde(with = "crate::real")] f64),
 }
 
 impl End {
@@ -111,6 +119,21 @@ const CLOSE: f64 = 1e-3;
 /// # Errors
 /// A name that no unknown has, a probability not between 0 and 1, an estimate of another problem; a time limit or a flag that
 /// stops it.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// # let problem = Fit::new(&model, &record).parameters(start).problem()?;
+/// # let estimate = problem.run()?;
+/// let profile = greybox::diagnose::profile(&problem, &estimate, "rs", 0.95)?;
+/// assert!(profile.covers(0.63)); // the truth
+/// assert!(!profile.covers(0.64));
+/// # Ok(())
+/// # }
+/// ```
 pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probability: f64) -> Result<Profile, Error> {
     let control = problem.control(Instant::now());
     let (objective, best) = problem.at_within(estimate, &control)?;
@@ -125,7 +148,7 @@ pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probabilit
     }
     let unknown = &estimate.unknowns[index];
     let linear = linearize(&objective, &best, "the profile")?;
-    let at_bound = |i: usize| i != index && matches!(estimate.unknowns[i].knowledge, Knowledge::Held { .. });
+    let at_bound = |i: usize| i != index && matches!(estimate.unknowns[i].knowledge, Knowledge::Held { end: None, .. });
     let held = undetermined(&linear, &(0..best.len()).map(at_bound).collect::<Vec<bool>>()).held;
     let covariance = linear.covariance(&held);
     // How far one standard error is, and how the others go along.
@@ -142,7 +165,7 @@ pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probabilit
         _ => 1.0,
     };
     let scale = error.unwrap_or((0.1 * best[index]).abs().max(1e-6)) * inflation.sqrt();
-    let quantile = student::quantile(0.5 + probability / 2.0, estimate.degrees_of_freedom());
+    let quantile = student::quantile(0.5 + probability / 2.0, unknown.degrees_of_freedom);
     let bounds = objective.bounds();
     let values = |coordinates: &[f64]| -> Vec<f64> {
         estimate.unknowns.iter().zip(coordinates).map(|(u, &c)| u.transform.to_value(c)).collect()

@@ -41,19 +41,26 @@ pub struct Residuals {
     /// Residuals there are.
     pub samples: u64,
     /// How many independent ones they are worth.
+    #[serde(with = "crate::real")]
     pub effective_samples: f64,
     /// Mean, in the unit.
+    #[serde(with = "crate::real")]
     pub mean: f64,
     /// Standard deviation, in the unit.
+    #[serde(with = "crate::real")]
     pub standard_deviation: f64,
     /// Third standardized moment; zero for a symmetric distribution.
+    #[serde(with = "crate::real")]
     pub skewness: f64,
     /// Fourth standardized moment less three; zero for a normal distribution.
+    #[serde(with = "crate::real")]
     pub excess_kurtosis: f64,
     /// Correlation with the residuals 1, 2, ... samples before.
+    #[serde(with = "crate::real")]
     pub autocorrelation: Vec<f64>,
     /// White residuals stay within plus and minus this at 99 of 100 lags, each lag for itself; the test of Ljung and Box
     /// judges all lags together.
+    #[serde(with = "crate::real")]
     pub autocorrelation_band: f64,
     /// Correlation with each input and measured output that is not constant.
     pub correlations: Vec<Correlation>,
@@ -78,6 +85,20 @@ pub struct Residuals {
 /// # Errors
 /// A prediction that is not of this record, or a prediction that is infinite. Too few residuals for a test (fewer than
 /// [`FEWEST`]), and residuals that do not vary, are not errors: the tests are left out.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// let estimate = Fit::new(&model, &record).parameters(start).run()?;
+/// let prediction = estimate.predict(&model, &record)?;
+/// let [id, iq] = &greybox::diagnose::residuals::examine(&prediction.columns, record.record())?[..] else { panic!() };
+/// assert!((id.standard_deviation - 0.05).abs() < 0.001 && iq.autocorrelation[0].abs() < 0.05);
+/// # Ok(())
+/// # }
+/// ```
 pub fn examine(prediction: &Simulated, record: &Record) -> Result<Vec<Residuals>, Error> {
     let found = prediction.residuals.first().map_or(0, Vec::len);
     if found != record.len() {

@@ -163,8 +163,13 @@ impl Group {
     /// Runs through a block of samples. `inputs`: sample, column, lane, with one sample more if the program
     /// [reads the next](super::Program::reads_next). `rows`: sample, output, slopes and mean, lane; then variances likewise.
     pub fn run(&mut self, inputs: &[f64], rows: &mut [f64], samples: usize) {
-        let program = Arc::clone(&self.program);
         self.clear_negligible();
+        self.go_on(inputs, rows, samples);
+    }
+
+    /// Runs on within a block.
+    pub(crate) fn go_on(&mut self, inputs: &[f64], rows: &mut [f64], samples: usize) {
+        let program = Arc::clone(&self.program);
         let lanes = self.lanes();
         let (code, slots, width) = (&program.code, &mut self.numbers[self.first..], program.width);
         if let Some(machine) = &program.machine {
@@ -177,7 +182,8 @@ impl Group {
         }
     }
 
-    fn clear_negligible(&mut self) {
+    /// Sets negligible slopes to zero.
+    pub(crate) fn clear_negligible(&mut self) {
         let (values, carried, lanes) = (self.program.pattern.rows.len(), self.program.code.carried, self.lanes());
         for slope in &mut self.numbers[self.first + values * lanes..self.first + carried * lanes] {
             if slope.abs() < NEGLIGIBLE {

@@ -1,7 +1,7 @@
 //! An estimate as plain text, within the 80 columns of a terminal.
 
 use super::{Knowledge, ParameterEstimate, Summary, Unknown};
-use crate::numeral::{error_size, exact, number, resolved};
+use crate::numeral::{counted, error_size, exact, number, resolved};
 use crate::optimize::Severity;
 use crate::section::{Cell, Table, wrapped};
 use core::fmt;
@@ -39,7 +39,11 @@ impl fmt::Display for Summary {
             [output.name.as_str().into(), rmse, output.unit.as_str().into(), sigma, fit]
         });
         writeln!(f, "{}\n", Table::new("", ["output", "rmse", "unit", "noise", "fit"]).rows(outputs))?;
-        let mut figures = format!("{} measurements, {} unknowns", self.measurements, self.unknowns.len());
+        let mut figures = format!(
+            "{}, {}",
+            counted(self.measurements, "measurement"),
+            counted(self.unknowns.len() as u64, "unknown")
+        );
         for (name, value) in [("FPE", self.fpe()), ("AIC", self.aic()), ("AICc", self.aicc()), ("BIC", self.bic())] {
             figures += &value.map_or(String::new(), |value| format!(", {name} {}", number(value, 6)));
         }
@@ -51,7 +55,7 @@ impl fmt::Display for Summary {
         line(f, &search, 0)?;
         let said = ["loss", "weighting", "pre-filter"].into_iter().zip([&m.loss, &m.weighting, &m.prefilter]);
         let said: Vec<String> = said.map(|(name, value)| format!("{name} {value}")).collect();
-        line(f, &format!("{}; {}; {}", m.predictor, m.integrator, said.join("; ")), 0)?;
+        line(f, &format!("{}; {}; model {}; {}", m.predictor, m.integrator, m.engine, said.join("; ")), 0)?;
         write!(f, "{}", wrapped(&format!("noise {}; covariance {}", m.noise, m.covariance), 0, 2))
     }
 }
@@ -72,10 +76,16 @@ fn row(unknown: &Unknown) -> Vec<Cell> {
             let known = [error_size(standard_error).into(), format!("{lower} … {upper}").into(), index.into()];
             head(Cell::resolved(*value, standard_error)).chain(known).collect()
         }
-        Knowledge::Held { bound } => said(format!("held at its bound {}", exact(bound))),
+        Knowledge::Held { bound, end } => said(held(bound, end)),
         Knowledge::Unidentified => said("not determined by the data".to_owned()),
         Knowledge::Fixed => said("fixed".to_owned()),
     }
+}
+
+/// What is said of an unknown at its bound.
+pub(crate) fn held(bound: f64, end: Option<f64>) -> String {
+    let held = format!("held at its bound {}", exact(bound));
+    end.map_or(held.clone(), |end| format!("{held}; 95 % to {}", number(end, 3)))
 }
 
 fn fixed_row(parameter: &ParameterEstimate) -> Vec<Cell> {

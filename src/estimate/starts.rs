@@ -1,6 +1,6 @@
 //! [`Starts`]: the minima that searches from several starts found.
 
-use crate::numeral::{counted, number, or_nan, pairs_or_nan};
+use crate::numeral::{counted, number};
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
@@ -29,12 +29,12 @@ pub struct Starts {
 pub struct Minimum {
     /// Its cost relative to the estimate's. Where noise levels of several outputs are estimated or variances predicted: the
     /// ratio of the estimated noise variances, as a geometric mean over the measurements.
-    #[serde(deserialize_with = "or_nan")]
+    #[serde(with = "crate::real")]
     pub cost_ratio: f64,
     /// Searches that ended in it.
     pub searches: u64,
     /// Names and values of the unknowns there.
-    #[serde(deserialize_with = "pairs_or_nan")]
+    #[serde(with = "crate::real")]
     pub unknowns: Vec<(String, f64)>,
 }
 
@@ -43,7 +43,7 @@ pub struct Minimum {
 #[serde(deny_unknown_fields)]
 pub struct FailedStart {
     /// Names and values of the unknowns where it began.
-    #[serde(deserialize_with = "pairs_or_nan")]
+    #[serde(with = "crate::real")]
     pub start: Vec<(String, f64)>,
     /// Why it found none.
     pub reason: String,

@@ -27,17 +27,25 @@ pub(crate) fn quantile(probability: f64, degrees: f64) -> f64 {
     }
 }
 
-/// The two-sided interval of a quantity with this standard error, symmetric in the coordinate it was estimated in.
-pub(crate) fn interval(
-    value: f64,
-    standard_error: f64,
-    transform: Transform,
-    probability: f64,
-    degrees: f64,
-) -> (f64, f64) {
-    let coordinate = transform.to_coordinate(value);
-    let reach = quantile(0.5 + probability / 2.0, degrees) * standard_error / transform.slope(value);
-    (transform.to_value(coordinate - reach), transform.to_value(coordinate + reach))
+/// How far an estimate scatters in the coordinate that it was estimated in.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Spread {
+    pub standard_error: f64,
+    /// Degrees of freedom of that standard error.
+    pub degrees: f64,
+}
+
+impl Spread {
+    /// Half the width of the two-sided interval, in coordinates.
+    pub fn reach(&self, probability: f64) -> f64 {
+        quantile(0.5 + probability / 2.0, self.degrees) * self.standard_error
+    }
+
+    /// The two-sided interval about a coordinate.
+    pub fn interval(&self, center: f64, transform: Transform, probability: f64) -> (f64, f64) {
+        let reach = self.reach(probability);
+        (transform.to_value(center - reach), transform.to_value(center + reach))
+    }
 }
 
 #[cfg(test)]

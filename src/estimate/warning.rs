@@ -32,6 +32,12 @@ pub enum WarningCode {
     HeldAtBound,
     /// A parameter that was declared positive is not.
     NotPositive,
+    /// The model bends so much within an interval that it should be asymmetric.
+    CurvedInterval,
+    /// Noise in the measured states from which predictions restart.
+    RestartNoise,
+    /// Noise declared for the inputs, which biases the estimate.
+    InputNoise,
     /// Unknowns that the data cannot tell apart.
     Unidentified,
     /// A finer step would move an unknown.

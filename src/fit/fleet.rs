@@ -25,7 +25,7 @@ const AHEAD: usize = 4;
 ///
 /// The model is compiled once. Records with the same hold and the same kind of time (uniform or not) run in parallel
 /// vector lanes, groups of them on threads. Every answer is that of [`Fit::run`] of the record, up to rounding; a
-/// record that fails does not affect the others.
+/// record that fails does not affect the others. Records that are fitted together share the sum of their time limits.
 pub struct Fleet<'a, M: Model> {
     sweep: Arc<dyn Sweep + 'a>,
     parameters: Vec<Parameter>,

@@ -95,7 +95,7 @@ impl<'p> Search<'p> {
 /// The estimate of each problem, all of the same sweep and of one record each.
 pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Error>> {
     let begin = Instant::now();
-    let controls: Vec<Control> = problems.iter().map(|problem| problem.control(begin)).collect();
+    let controls: Vec<Control> = problems.iter().map(|problem| control(problem, begin, problems.len())).collect();
     let plain: Vec<Objective<'_>> = problems.iter().zip(&controls).map(|(p, control)| p.in_units(control)).collect();
     let first = |plain| match Rounds::new(plain, &plain.problem.settings.optimizer, plain.problem.unknowns.start()) {
         Ok(rounds) => Stage::Searching(Box::new(Search::new(rounds))),
@@ -118,6 +118,12 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
         }
     }
     conclude_together(problems, &plain, stages, begin)
+}
+
+/// Stop conditions of a fit together with others: the sum of their time limits is left to all.
+fn control(problem: &Problem<'_>, begin: Instant, together: usize) -> Control {
+    let limit = problem.settings.time_limit.and_then(|limit| limit.checked_mul(u32::try_from(together).ok()?));
+    Control { deadline: limit.and_then(|limit| begin.checked_add(limit)), ..problem.control(begin) }
 }
 
 fn conclude_together(

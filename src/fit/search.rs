@@ -3,8 +3,7 @@
 use crate::error::Error;
 use crate::judge::{SearchEnd, noise};
 use crate::optimize::{Infeasible, Outcome};
-use crate::problem::{CheckpointFile, Memory, Noise, Objective, Optimizer, Problem, Round, RoundError, Whitening};
-use std::hash::{DefaultHasher, Hash, Hasher};
+use crate::problem::{CheckpointFile, Fingerprint, Memory, Objective, Optimizer, Round, RoundError, Whitening};
 use std::sync::Arc;
 
 /// Rounds end when the noise levels change by less than this, relatively: no unknown then moves by more than that
@@ -15,7 +14,7 @@ const NOISE_ROUNDS: u32 = 100;
 /// Searches from the start, or from a checkpoint. `plain` leaves errors in the units of the outputs.
 pub(super) fn search(plain: &Objective<'_>, optimizer: &Arc<dyn Optimizer>) -> Result<SearchEnd, Error> {
     let problem = plain.problem;
-    let Some(mut checkpoint) = checkpoint(problem, optimizer)? else {
+    let Some(mut checkpoint) = checkpoint(plain, optimizer)? else {
         return Rounds::new(plain, optimizer, problem.unknowns.start())?.run(None);
     };
     let mut rounds = match optimizer.resume(&checkpoint)? {
@@ -36,13 +35,13 @@ pub(super) fn search(plain: &Objective<'_>, optimizer: &Arc<dyn Optimizer>) -> R
 
 /// The checkpoint of a search with this optimizer, if one is asked for.
 pub(super) fn checkpoint(
-    problem: &Problem<'_>,
+    plain: &Objective<'_>,
     optimizer: &Arc<dyn Optimizer>,
 ) -> Result<Option<CheckpointFile>, Error> {
     let file = |(path, every): &(std::path::PathBuf, u64)| {
-        Ok(CheckpointFile::new(path.clone(), *every, fingerprint(problem), optimizer.settings()?))
+        Ok(CheckpointFile::new(path.clone(), *every, Fingerprint::new(plain), optimizer.settings()?))
     };
-    problem.settings.checkpoint.as_ref().map(file).transpose()
+    plain.problem.settings.checkpoint.as_ref().map(file).transpose()
 }
 
 /// Searches with fixed noise, one after the other, with the noise estimated between them.
@@ -201,26 +200,4 @@ fn stopped(objective: &Objective<'_>) -> Error {
         ),
         _ => "the fit was cancelled before its start had been evaluated; lower the flag to run it".to_owned(),
     })
-}
-
-/// A hash of the data and of all settings that the cost depends on.
-fn fingerprint(problem: &Problem<'_>) -> String {
-    let mut hash = DefaultHasher::new();
-    env!("CARGO_PKG_VERSION").hash(&mut hash);
-    let (sweep, settings) = (&problem.sweep, &problem.settings);
-    (sweep.identity(), sweep.layout(), sweep.integrator(), sweep.predictor()).hash(&mut hash);
-    for record in &problem.records {
-        (record.name(), record.len(), format!("{:?}{:?}", record.input_hold(), record.initial_state())).hash(&mut hash);
-        (0..record.len()).for_each(|k| record.time(k).to_bits().hash(&mut hash));
-        for channel in record.inputs().iter().chain(record.outputs()) {
-            channel.values.iter().for_each(|value| value.to_bits().hash(&mut hash));
-        }
-    }
-    format!("{:?}{:?}", problem.unknowns.parameters, problem.unknowns.row).hash(&mut hash);
-    settings.starts.hash(&mut hash);
-    settings.weights.as_ref().map(|weights| weights.describe()).hash(&mut hash);
-    settings.loss.as_ref().map(|loss| loss.describe()).hash(&mut hash);
-    let noise: &Noise = &settings.noise;
-    format!("{:?}{noise:?}", settings.prefilter).hash(&mut hash);
-    format!("{:016x}", hash.finish())
 }

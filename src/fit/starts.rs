@@ -38,7 +38,7 @@ pub(super) fn search_from_many(
     count: usize,
 ) -> Result<SearchEnd, Error> {
     let starts = draw::starts(plain, count);
-    let file = checkpoint(plain.problem, optimizer)?;
+    let file = checkpoint(plain, optimizer)?;
     let resumed = file.as_ref().map(CheckpointFile::load::<Places>).transpose()?.flatten();
     let (cycle, places) = match resumed {
         Some((_, cycle, Some(places))) if places.0.len() == count => (cycle, places.0),

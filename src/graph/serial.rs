@@ -49,43 +49,14 @@ impl TryFrom<Nodes> for Graph {
     }
 }
 
-/// A number, or a word where the format has no such number.
-#[derive(Serialize, Deserialize)]
-#[serde(untagged)]
-enum Number {
-    Finite(f64),
-    Word(Word),
-}
-
-#[derive(Serialize, Deserialize)]
-enum Word {
-    #[serde(rename = "inf")]
-    Infinity,
-    #[serde(rename = "-inf")]
-    NegativeInfinity,
-    #[serde(rename = "nan")]
-    NotANumber,
-}
-
 impl Serialize for Constant {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let number = match self.value() {
-            f64::INFINITY => Number::Word(Word::Infinity),
-            f64::NEG_INFINITY => Number::Word(Word::NegativeInfinity),
-            value if value.is_nan() => Number::Word(Word::NotANumber),
-            value => Number::Finite(value),
-        };
-        number.serialize(serializer)
+        crate::real::serialize(&self.value(), serializer)
     }
 }
 
 impl<'de> Deserialize<'de> for Constant {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Ok(Constant::from(match Number::deserialize(deserializer)? {
-            Number::Finite(value) => value,
-            Number::Word(Word::Infinity) => f64::INFINITY,
-            Number::Word(Word::NegativeInfinity) => f64::NEG_INFINITY,
-            Number::Word(Word::NotANumber) => f64::NAN,
-        }))
+        crate::real::deserialize(deserializer).map(|value: f64| Constant::from(value))
     }
 }

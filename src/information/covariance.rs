@@ -30,8 +30,10 @@ pub(super) struct Part {
     pub own: Vec<usize>,
     pub border: Vec<usize>,
     /// A row for each own unknown, a column for each of the border.
+    #[serde(with = "crate::real")]
     pub gain: Vec<f64>,
     /// Covariance of `z`, a row for each own unknown.
+    #[serde(with = "crate::real")]
     pub variance: Vec<f64>,
     /// Of a sandwich only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -43,8 +45,10 @@ pub(super) struct Part {
 #[serde(deny_unknown_fields)]
 pub(super) struct Scores {
     /// From the scores of the own unknowns to `z`, a row for each.
+    #[serde(with = "crate::real")]
     pub response: Vec<f64>,
     /// Covariance of `z` (rows) with the scores that are passed on to the border (columns).
+    #[serde(with = "crate::real")]
     pub passed: Vec<f64>,
 }
 

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// A dense square matrix, indexed `m[(row, column)]`; serialized as a list of rows.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Vec<Vec<f64>>", into = "Vec<Vec<f64>>")]
+#[serde(try_from = "Rows", into = "Rows")]
 pub struct SquareMatrix {
     size: usize,
     entries: Vec<f64>,
@@ -56,6 +56,23 @@ impl IndexMut<(usize, usize)> for SquareMatrix {
     fn index_mut(&mut self, (i, j): (usize, usize)) -> &mut f64 {
         assert!(i < self.size && j < self.size, "entry ({i}, {j}) of a square matrix of size {}", self.size);
         &mut self.entries[i * self.size + j]
+    }
+}
+
+/// The matrix as it is stored.
+#[derive(Serialize, Deserialize)]
+struct Rows(#[serde(with = "crate::real")] Vec<Vec<f64>>);
+
+impl From<SquareMatrix> for Rows {
+    fn from(matrix: SquareMatrix) -> Self {
+        Rows(matrix.into())
+    }
+}
+
+impl TryFrom<Rows> for SquareMatrix {
+    type Error = String;
+    fn try_from(Rows(rows): Rows) -> Result<Self, String> {
+        rows.try_into()
     }
 }
 

@@ -39,9 +39,12 @@ impl Triangles {
         Self::with(Width::widest(), columns, lanes)
     }
 
-    fn with(width: Width, columns: usize, lanes: usize) -> Self {
+    /// The same for these registers.
+    pub(crate) fn with(width: Width, columns: usize, lanes: usize) -> Self {
         let all = columns + 1;
-        let scratch = vec![0.0; absorb::ROWS * all * REGISTER + LINE];
+        // The lanes of a single register are absorbed where they stand.
+        let copied = if lanes == width.lanes() { 0 } else { absorb::ROWS * all * REGISTER + LINE };
+        let scratch = vec![0.0; copied];
         Triangles {
             columns,
             lanes,
@@ -49,7 +52,7 @@ impl Triangles {
             width,
             entries: vec![0.0; all * (all + 1) / 2 * lanes.next_multiple_of(REGISTER)],
             factors: vec![0.0; all * REGISTER],
-            start: scratch.as_ptr().align_offset(LINE * size_of::<f64>()).min(LINE),
+            start: scratch.as_ptr().align_offset(LINE * size_of::<f64>()).min(LINE).min(copied),
             scratch,
         }
     }

@@ -6,6 +6,20 @@ use serde::{Deserialize, Serialize};
 
 /// What a fit uses when nothing is said: [`Rk4`] for continuous models, [`Discrete`] for discrete ones, nothing for
 /// static ones.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// let four = greybox::Automatic { continuous: greybox::Rk4 { substeps: 4 } };
+/// let estimate = Fit::new(&model, &record).parameters(start).integrator(four).run()?;
+/// assert_eq!(estimate.method.integrator, "Runge-Kutta 4, 4 steps per sample");
+/// assert!((estimate.parameters.rs / 0.63 - 1.0).abs() < 0.002);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Automatic {
     /// The method for a continuous model.

@@ -9,6 +9,19 @@ use serde::{Deserialize, Serialize};
 ///
 /// The fastest choice where the sample time is short against the model's time constants; a report warns where doubling
 /// the steps moves the answer.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// let estimate = Fit::new(&model, &record).parameters(start).integrator(greybox::Rk4 { substeps: 2 }).run()?;
+/// assert_eq!(estimate.method.integrator, "Runge-Kutta 4, 2 steps per sample");
+/// assert!((estimate.parameters.rs / 0.63 - 1.0).abs() < 0.002);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Rk4 {
     /// Steps from sample to sample; zero counts as one.

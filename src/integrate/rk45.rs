@@ -10,6 +10,30 @@ use serde::{Deserialize, Serialize};
 /// jumps or bends, and carry on with the same step.
 ///
 /// For models that are fast at times and slow at others. A stiff one needs [`Esdirk`](super::Esdirk).
+///
+/// ```
+/// # use greybox::{Fit, Model, Scalar, Time, free, signals, simulate};
+/// # signals! { pub struct Heat { t: "K" } pub struct Power { p: "W" } pub struct Body { c: "J/K", g: "W/K^4" } }
+/// # #[derive(Clone)]
+/// # struct Radiating;
+/// # impl Model for Radiating {
+/// #     type State = Heat; type Input = Power; type Output = Heat; type Parameters = Body;
+/// #     fn derivative<S: Scalar>(&self, _t: S, x: &Heat<S>, u: &Power<S>, p: &Body<S>) -> Heat<S> {
+/// #         Heat { t: (u.p - p.g * x.t.powi(4)) / p.c }
+/// #     }
+/// #     fn output<S: Scalar>(&self, _t: S, x: &Heat<S>, _u: &Power<S>, _p: &Body<S>) -> Heat<S> { *x }
+/// # }
+/// # fn main() -> Result<(), greybox::Error> {
+/// # let powers: Vec<Power> = (0..200).map(|k| Power { p: if k < 100 { 500.0 } else { 50.0 } }).collect();
+/// # let time = Time::Uniform { start: 0.0, step: 2.0 };
+/// # let run = simulate(&Radiating, &Body { c: 100.0, g: 1e-9 }, &Heat { t: 300.0 }, time, &powers)?;
+/// # let record = run.with_noise(Heat { t: 1.0 }, 1).experiment(&Radiating)?;
+/// # let start = Body { c: free(200.0).log(), g: free(3e-9).log() };
+/// let estimate = Fit::new(&Radiating, &record).parameters(start).integrator(greybox::Rk45::default()).run()?;
+/// assert!((estimate.parameters.c / 100.0 - 1.0).abs() < 0.02);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rk45 {

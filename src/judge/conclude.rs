@@ -1,21 +1,20 @@
 //! From the end of a search to a [`Summary`].
 
-use super::directions;
-use super::hac::{Hac, hac};
+use super::covariances::Covariances;
+use super::noise;
 use super::residual_pass::{Residuals, reason, residual_pass};
-use super::{noise, sandwich};
+use super::{bounds, directions};
 use crate::error::Error;
+use crate::estimate::student::Spread;
 use crate::estimate::{
-    CovarianceMethod, ExperimentEstimate, Knowledge, Method, NoiseModel, OutputEstimate, ParameterEstimate, Starts,
-    Summary, Unknown, student,
+    CovarianceMethod, ExperimentEstimate, Format, Knowledge, Method, NoiseModel, OutputEstimate, ParameterEstimate,
+    Starts, Summary, Unknown, Version,
 };
 use crate::information::{Covariance, Undetermined};
-use crate::layout::{Kind, Quantity};
+use crate::layout::Quantity;
 use crate::optimize::{Linearization, Outcome};
 use crate::problem::{Memory, Noise, Objective, Role, Whitening};
 
-/// Below this number of measurements a HAC covariance is less accurate than the classical one.
-const CORRELATED_SAMPLES: u64 = 100;
 /// Residuals below this fraction of a given sigma are round-off: no whiteness test, no HAC.
 const ROUNDING: f64 = 0.1;
 /// Significance level of the whiteness test.
@@ -55,19 +54,17 @@ pub(super) struct Judgement<'j> {
     /// Null directions of the scaled unknowns; and the unknowns held for the covariance: at a bound, or one for each
     /// null direction.
     pub undetermined: Undetermined,
+    /// Which unknowns the covariance takes as exact: those that are held, without those released, and one for each null
+    /// direction.
+    pub exact: Vec<bool>,
+    /// From the estimate to that without the bounds of the released unknowns.
+    pub release: Vec<f64>,
     /// Degrees of freedom: measurements minus estimated unknowns, at least zero.
     pub degrees: f64,
     /// Estimated noise level relative to that by which the errors were divided.
     pub widening: f64,
     /// Whether the errors are far enough below a given noise to be round-off.
     pub rounding: bool,
-}
-
-/// The covariance of the unknowns in their own units, how it was made, and that of unit noise in coordinates.
-pub(super) struct Covariances {
-    pub unknowns: Option<Covariance>,
-    pub method: CovarianceMethod,
-    pub unit: Option<Covariance>,
 }
 
 /// The summary at the end of a search; the objective has the whitening that it ended with.
@@ -100,6 +97,8 @@ pub(crate) fn conclude_from(
     let problem = objective.problem;
     let measurements = judgement.residuals.measured;
     Ok(Summary {
+        format: Format,
+        version: Version,
         layout: problem.layout().clone(),
         parameters: judgement.parameters(&unknowns),
         experiments: judgement.experiments(),
@@ -177,6 +176,8 @@ impl<'j> Judgement<'j> {
             _ if noise::only_scales(objective) => (linear.sum_of_squares() / degrees.max(1.0)).sqrt(),
             _ => (measured as f64 / degrees.max(1.0)).sqrt(),
         };
+        let (exact, release) =
+            bounds::released(linear, &undetermined, &at_bounds, Spread { standard_error: widening, degrees });
         let sigma = objective.whitening.sigma();
         let below = |(fit, sigma): (&crate::estimate::OutputFit, &f64)| fit.rmse < ROUNDING * sigma;
         let rounding = matches!(noise, Noise::Given(_)) && residuals.outputs.iter().zip(&sigma).all(below);
@@ -190,15 +191,18 @@ impl<'j> Judgement<'j> {
             norms,
             held_at,
             undetermined,
+            exact,
+            release,
             degrees,
             widening,
             rounding,
         })
     }
 
-    /// Whether an unknown is neither held at a bound nor part of a null direction.
-    fn seen(&self) -> Vec<bool> {
-        let mut seen: Vec<bool> = self.held_at.iter().map(Option::is_none).collect();
+    /// Whether an unknown is neither held at a bound, without being released, nor part of a null direction.
+    pub(super) fn seen(&self) -> Vec<bool> {
+        let mut seen: Vec<bool> =
+            self.held_at.iter().zip(&self.exact).map(|(at, exact)| at.is_none() || !exact).collect();
         for direction in &self.undetermined.directions {
             directions::taking_part(direction).for_each(|(i, _)| seen[i] = false);
         }
@@ -210,37 +214,6 @@ impl<'j> Judgement<'j> {
         self.residuals.least_white().filter(|(_, white)| white.p_value < WHITENESS_LEVEL && !self.rounding)
     }
 
-    fn covariances(&self) -> Covariances {
-        let (objective, x) = (self.objective, &self.end.coordinates);
-        let unit = self.linear.covariance(&self.undetermined.held);
-        let small_sample = self.residuals.measured as f64 / self.degrees.max(1.0);
-        let autocorrelated = self.autocorrelated().filter(|_| {
-            objective.problem.layout().kind != Kind::Static && self.residuals.measured >= CORRELATED_SAMPLES
-        });
-        let found = autocorrelated.and_then(|_| hac(objective, x, self.linear, &self.undetermined.held));
-        let found =
-            found.and_then(|Hac { sandwich, lags }| Some((sandwich.covariance(&self.undetermined.held)?, lags)));
-        let (found, method, factor) = match found {
-            Some((covariance, lags)) => (Some(covariance), CovarianceMethod::Hac { lags: lags as u64 }, small_sample),
-            None if sandwich::is_needed(objective) => {
-                let filtered = objective.problem.settings.prefilter.is_some();
-                let method = if filtered { CovarianceMethod::FilteredSandwich } else { CovarianceMethod::Sandwich };
-                (sandwich::sandwich(objective, x, &self.undetermined.held).ok().flatten(), method, 1.0)
-            }
-            // The widening applies to the errors, not to the priors.
-            None if self.widening != 1.0 && objective.problem.unknowns.priors(x).next().is_some() => {
-                let widened = objective.with(objective.whitening.widened(self.widening));
-                let covariance = widened.evaluate(x).ok().and_then(|linear| linear.covariance(&self.undetermined.held));
-                (covariance, CovarianceMethod::Classical, 1.0)
-            }
-            None => (unit.clone(), CovarianceMethod::Classical, self.widening * self.widening),
-        };
-        let seen = self.seen().into_iter().zip(&self.slopes);
-        let in_units: Vec<f64> = seen.map(|(seen, slope)| if seen { *slope } else { 0.0 }).collect();
-        let unknowns = found.map(|covariance| covariance.times(factor).scaled(&in_units));
-        Covariances { unknowns, method, unit }
-    }
-
     fn unknowns(&self, covariances: &Covariances) -> Vec<Unknown> {
         let (free, seen) = (&self.objective.problem.unknowns.row, self.seen());
         let root = self.linear.sum_of_squares().sqrt();
@@ -248,13 +221,24 @@ impl<'j> Judgement<'j> {
             let (unknown, value) = (&free[i], self.values[i]);
             let transform = unknown.parameter.transform;
             let covariance = covariances.unknowns.as_ref().filter(|_| seen[i] && self.degrees > 0.0);
+            let degrees_of_freedom = covariances.degrees[i];
             let knowledge = match (self.held_at[i], covariance) {
-                (Some(bound), _) => Knowledge::Held { bound },
+                (Some(bound), None) => Knowledge::Held { bound, end: None },
                 (None, None) => Knowledge::Unidentified,
-                (None, Some(covariance)) => {
+                (held, Some(covariance)) => {
                     let standard_error = covariance.standard_error(i);
-                    let (lower, upper) = student::interval(value, standard_error, transform, 0.95, self.degrees);
-                    Knowledge::Known { standard_error, lower, upper }
+                    let spread =
+                        Spread { standard_error: standard_error / self.slopes[i], degrees: degrees_of_freedom };
+                    let (lower, upper) = spread.interval(self.end.coordinates[i] + self.release[i], transform, 0.95);
+                    match held {
+                        Some(bound) => {
+                            let end = if bound == unknown.parameter.lower { upper } else { lower };
+                            Knowledge::Held { bound, end: Some(end).filter(|end| end.is_finite()) }
+                        }
+                        // A factor beyond the largest number: nothing is known of a logarithm.
+                        None if !(lower.is_finite() && upper.is_finite()) => Knowledge::Unidentified,
+                        None => Knowledge::Known { standard_error, lower, upper },
+                    }
                 }
             };
             let index = |change: f64| {
@@ -272,6 +256,7 @@ impl<'j> Judgement<'j> {
                 error_index: covariances.unit.as_ref().and_then(|unit| index(unit.standard_error(i))),
                 error_index_held: index(1.0 / self.norms[i]),
                 transform,
+                degrees_of_freedom,
             }
         };
         (0..free.len()).map(one).collect()

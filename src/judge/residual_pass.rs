@@ -5,11 +5,13 @@ use crate::estimate::OutputFit;
 use crate::optimize::Infeasible;
 use crate::problem::{Accumulate, At, Objective, each, gather_together};
 use crate::sweep::{Piece, Prepared, Sweep, Window};
-use crate::whiteness::{Autocorrelation, dot, ljung_box};
+use crate::whiteness::{Portmanteau, dot};
 use std::sync::Arc;
 
 /// Lags of the whiteness test.
 const LAGS: usize = 20;
+/// Longest horizon over which errors are correlated.
+const HORIZON: usize = 100;
 /// Every how many windows one is simulated again with a finer step, and the most of them per record.
 const EVERY: usize = 16;
 const AGAIN: usize = 16;
@@ -34,10 +36,13 @@ pub(crate) struct Residuals {
 /// Whiteness test of the errors of an output.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Whiteness {
-    /// p-value of the Ljung-Box test.
+    /// p-value of the portmanteau test.
     pub p_value: f64,
     /// Autocorrelation at lag one.
     pub first: f64,
+    /// Standardized sum of products of errors a horizon apart, and their autocorrelation; zeros where predictions do not
+    /// restart, or from too far.
+    pub at_restart: (f64, f64),
 }
 
 /// Sums over one experiment.
@@ -47,7 +52,7 @@ struct Sums<'s> {
     outputs: Vec<OutputSums>,
     measured: u64,
     log_determinant: f64,
-    autocorrelations: Vec<Autocorrelation>,
+    portmanteaus: Vec<Portmanteau>,
     least_sigma: Vec<f64>,
     /// The windows to be simulated again.
     again: Vec<Sampled>,
@@ -70,10 +75,18 @@ impl<'s> Sums<'s> {
             outputs: vec![OutputSums::default(); outputs],
             measured: 0,
             log_determinant: 0.0,
-            autocorrelations: vec![Autocorrelation::new(LAGS); outputs],
+            portmanteaus: vec![Portmanteau::new(LAGS.max(horizon(objective))); outputs],
             least_sigma: vec![f64::INFINITY; outputs],
             again: vec![],
             run: vec![],
+        }
+    }
+
+    /// Multiplies the errors in `run` by the roots of their weights.
+    fn standardize(&mut self, begin: usize) {
+        if self.objective.is_weighted() {
+            let weight = |k: usize| self.objective.weight(self.experiment, begin + k);
+            self.run.iter_mut().enumerate().for_each(|(k, error)| *error *= weight(k).sqrt());
         }
     }
 
@@ -118,10 +131,10 @@ impl Accumulate for Sums<'_> {
             let values = &record.outputs()[j].values[begin..begin + samples];
             if window.whole && !window.has_variances() {
                 self.outputs[j].add_all(values, &self.run);
-                self.autocorrelations[j].add(&self.run, samples as u64);
+                self.standardize(begin);
+                self.portmanteaus[j].add(&self.run);
                 continue;
             }
-            let mut count = 0;
             for (k, (&y, &error)) in values.iter().zip(&self.run).enumerate() {
                 if window.is_measured(k, j, lane) {
                     let unit = window.variance_root(k, j, lane);
@@ -129,10 +142,10 @@ impl Accumulate for Sums<'_> {
                     if window.has_variances() {
                         self.least_sigma[j] = self.least_sigma[j].min(unit);
                     }
-                    count += 1;
                 }
             }
-            self.autocorrelations[j].add(&self.run, count);
+            self.standardize(begin);
+            self.portmanteaus[j].add(&self.run);
         }
         // Those in which a multiple of the distance lies.
         let distance = (EVERY * window.capacity()).max(record.len() / AGAIN);
@@ -147,7 +160,7 @@ impl Accumulate for Sums<'_> {
         self.measured += later.measured;
         self.log_determinant += later.log_determinant;
         self.outputs.iter_mut().zip(&later.outputs).for_each(|(sums, later)| sums.append(later));
-        self.autocorrelations.iter_mut().zip(&later.autocorrelations).for_each(|(sums, later)| sums.follow(later));
+        self.portmanteaus.iter_mut().zip(&later.portmanteaus).for_each(|(sums, later)| sums.follow(later));
         self.least_sigma.iter_mut().zip(&later.least_sigma).for_each(|(least, later)| *least = least.min(*later));
         self.again.extend(later.again);
     }
@@ -190,11 +203,17 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
         sums.iter_mut().zip(&one.outputs).for_each(|(sum, one)| sum.append(one));
     }
     let whiteness = |j: usize| {
-        let mut total = all[0].autocorrelations[j].clone();
-        all[1..].iter().for_each(|one| total.append(&one.autocorrelations[j]));
-        let coefficients = total.coefficients();
-        let (_, p_value) = ljung_box(&coefficients, total.count());
-        Whiteness { p_value, first: coefficients.first().copied().unwrap_or(0.0) }
+        let mut total = all[0].portmanteaus[j].clone();
+        all[1..].iter().for_each(|one| total.append(&one.portmanteaus[j]));
+        let at_restart = match horizon(objective) {
+            0 => (0.0, 0.0),
+            steps => total.at(steps),
+        };
+        Whiteness {
+            p_value: total.p_value(LAGS.min(sums[j].count as usize / 4).max(1)),
+            first: total.at(1).1,
+            at_restart,
+        }
     };
     Residuals {
         outputs: sums.iter().map(OutputSums::fit).collect(),
@@ -206,6 +225,11 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
             .map(|j| all.iter().map(|one| one.least_sigma[j]).fold(f64::INFINITY, f64::min))
             .collect(),
     }
+}
+
+/// The horizon of predictions that restart; zero where they do not, or from too far.
+fn horizon(objective: &Objective<'_>) -> usize {
+    objective.sweep.restarts().filter(|steps| *steps <= HORIZON).unwrap_or(0)
 }
 
 fn failed(objective: &Objective<'_>, coordinates: &[f64]) -> Error {

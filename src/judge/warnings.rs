@@ -1,6 +1,7 @@
 //! Warnings about the data and the method of an estimate.
 
-use super::conclude::{Covariances, Judgement};
+use super::conclude::Judgement;
+use super::covariances::Covariances;
 use crate::estimate::{CovarianceMethod, Direction, Knowledge, Unknown, Warning, WarningCode};
 use crate::layout::Kind;
 use crate::numeral::{counted, exact, number, p_value, percent};
@@ -33,11 +34,15 @@ impl Judgement<'_> {
         warnings.extend(self.unbounded());
         warnings.extend(self.gaps());
         for unknown in unknowns {
-            if let Knowledge::Held { bound } = unknown.knowledge {
+            if let Knowledge::Held { bound, end } = unknown.knowledge {
                 let (Unknown { name, unit, .. }, bound) = (unknown, exact(bound));
+                let reaches = match end {
+                    Some(end) => format!("; its 95 % interval reaches from there to {} {unit}", number(end, 3)),
+                    None => String::new(),
+                };
                 warnings.push(care(
                     WarningCode::HeldAtBound,
-                    format!("`{name}` is held at its bound {bound} {unit}: the data want it beyond"),
+                    format!("`{name}` is held at its bound {bound} {unit}: the data want it beyond{reaches}"),
                 ));
             }
         }
@@ -58,6 +63,9 @@ impl Judgement<'_> {
             let text = format!("the checkpoint could not be written ({write_error}); the search went on without it");
             warnings.push(Warning { code: WarningCode::CheckpointNotWritten, severity: Severity::Usable, text });
         }
+        warnings.extend(self.curved(unknowns, covariances));
+        warnings.extend(self.restart_noise(unknowns));
+        warnings.extend(self.input_noise(unknowns));
         warnings.extend(self.autocorrelation(covariances));
         warnings
     }
@@ -165,7 +173,7 @@ impl Judgement<'_> {
         let output = &self.objective.problem.layout().outputs[output].name;
         let (probability, first) = (p_value(white.p_value.min(1.0)), number(white.first, 2));
         let mut text = format!(
-            "the errors of `{output}` are not white (Ljung-Box {probability}, correlation with the error before \
+            "the errors of `{output}` are not white (portmanteau {probability}, correlation with the error before \
              {first}): the model misses a part, or the noise is colored"
         );
         let CovarianceMethod::Hac { lags } = covariances.method else {

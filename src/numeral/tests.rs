@@ -50,15 +50,12 @@ fn a_fit_is_told_from_perfect() {
     assert_eq!((rounded(0.015, 0.001), rounded(1.000_02e-3, 0.001)), ("0.015".to_owned(), "0.001".to_owned()));
 }
 
-/// What is written as null is read as not a number.
+/// Groups of three from five digits on, where the eye no longer counts.
 #[test]
-fn null_is_not_a_number() {
-    #[derive(serde::Serialize, serde::Deserialize)]
-    struct One(#[serde(deserialize_with = "or_nan")] f64);
-    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        let text = serde_json::to_string(&One(value)).unwrap();
-        assert_eq!(text, "null");
-        assert!(serde_json::from_str::<One>(&text).unwrap().0.is_nan());
-    }
-    assert_eq!(serde_json::from_str::<One>("0.1").unwrap().0, 0.1);
+fn large_counts_are_grouped() {
+    let texts = [0, 999, 4000, 10_000, 123_456, 9_876_543].map(whole);
+    assert_eq!(texts, ["0", "999", "4000", "10,000", "123,456", "9,876,543"]);
+    let numbers = ["-12646.37", "-999.5", "1.2345e10", "123456.5", "0.12345"].map(grouped);
+    assert_eq!(numbers, ["-12,646.37", "-999.5", "1.2345e10", "123,456.5", "0.12345"]);
+    assert_eq!(counted(24_841, "sample"), "24,841 samples");
 }

@@ -35,6 +35,31 @@ pub struct EkfStart<M: Model> {
 ///
 /// `N` is the number of states plus free parameters (a greater one works, and costs). A parameter with a
 /// [`log`](Parameter::log) is filtered as its logarithm: it stays positive.
+///
+/// ```
+/// use greybox::online::{Ekf, EkfStart, Watch};
+/// use greybox::pmsm::{Currents, Drive, Surface, Winding};
+/// use greybox::{Hold, fixed, free};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let start = EkfStart {
+///     state: Currents { id: free(0.0).prior(0.0, 1.0), iq: free(0.0).prior(0.0, 1.0) },
+///     parameters: Winding { rs: free(0.5).prior(0.5, 0.2), ls: fixed(4e-3), ke: fixed(0.95) },
+///     state_drift: Currents { id: 0.01, iq: 0.01 },
+///     parameter_drift: Winding { rs: 1e-5, ls: 0.0, ke: 0.0 },
+///     noise: Currents { id: 0.05, iq: 0.05 },
+///     hold: Hold::Zero,
+///     watch: Watch { limit: Currents { id: 8.0, iq: 8.0 }, patience: 10 },
+/// };
+/// let mut filter = Ekf::<Surface, 3>::new(Surface::new(4)?, 1e-3, start)?; // two states and one parameter
+/// for k in 0..200 {
+///     // 3 V along the flux at standstill: in the end 3 V / 0.63 ohm.
+///     let id = 3.0 / 0.63 * (1.0 - (-0.63 / 4e-3 * 1e-3 * f64::from(k)).exp());
+///     filter.update(f64::from(k) * 1e-3, &Drive { ud: 3.0, uq: 0.0, w: 0.0 }, &Currents { id, iq: 0.0 });
+/// }
+/// assert!((filter.parameters().rs - 0.63).abs() < 3.0 * filter.deviations().rs);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy)]
 pub struct Ekf<M: Model, const N: usize, I: Integrator = Automatic> {
     model: M,

@@ -62,6 +62,32 @@ pub struct MrasStart<M: Model> {
 ///
 /// The adaptation law says how the parameters move: [`Gradient`] for any model, laws of a wing (the motor's are in
 /// [`pmsm`](crate::pmsm)), or a closure.
+///
+/// ```
+/// use greybox::online::{Mras, MrasStart, Moment, Order, Rate, Stepping, Watch};
+/// use greybox::pmsm::{Currents, Drive, Surface, Winding};
+/// use greybox::{fixed, free};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let start = MrasStart {
+///     parameters: Winding { rs: free(0.4), ls: fixed(4e-3), ke: fixed(0.95) },
+///     pull: Currents { id: 100.0, iq: 100.0 },
+///     order: Order::UpdateThenPredict,
+///     stepping: Stepping::Split,
+///     watch: Watch { limit: Currents { id: 10.0, iq: 10.0 }, patience: 10 },
+/// };
+/// // The law is a closure: the resistance rises where less current flows than was predicted.
+/// let law = |seen: &Moment<'_, Surface>| Winding {
+///     rs: Rate::Adapt(-seen.e.id * seen.x.id), ls: Rate::Adapt(0.0), ke: Rate::Adapt(0.0),
+/// };
+/// let mut observer = Mras::new(Surface::new(4)?, law, 1e-3, start)?;
+/// for k in 0..2000 {
+///     let id = 3.0 / 0.63 * (1.0 - (-0.63 / 4e-3 * 1e-3 * f64::from(k)).exp());
+///     observer.update(f64::from(k) * 1e-3, &Drive { ud: 3.0, uq: 0.0, w: 0.0 }, &Currents { id, iq: 0.0 });
+/// }
+/// assert!((observer.parameters().rs - 0.63).abs() < 0.005);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy)]
 pub struct Mras<M: Model, L> {
     model: M,

@@ -7,7 +7,9 @@ use serde::{Deserialize, Serialize};
 /// How long steps may be, in sizes of the unknowns.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Reach {
+    #[serde(with = "crate::real")]
     pub first: f64,
+    #[serde(with = "crate::real")]
     pub later: f64,
 }
 
@@ -17,15 +19,17 @@ enum Longest {
     First,
     Later,
     /// In the metric of the damping.
-    Length(f64),
+    Length(#[serde(with = "crate::real")] f64),
 }
 
 /// The memory of a descent: damping, length of the next step, and what the last trials were like.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Descent {
     reach: Reach,
+    #[serde(with = "crate::real")]
     lambda: f64,
     /// The part to which `lambda` falls after the next good step.
+    #[serde(with = "crate::real")]
     fall: f64,
     longest: Longest,
     /// Trials in a row that were rejected where the cost resolves nothing.
@@ -35,12 +39,15 @@ pub(super) struct Descent {
     /// Trials in a row that could not be evaluated.
     pub failed: u64,
     /// How far, as a part of the cost, the last rejected trials were off what the slopes promised.
+    #[serde(with = "crate::real")]
     pub noise: f64,
     /// Rejected trials in a row that kept their promise no better than the longer ones before, and the last one's mismatch.
+    #[serde(with = "crate::real")]
     rough: (u32, f64),
     /// Trials so far.
     pub trials: u64,
     /// The last trial that was worth a mark, and cost and potential then.
+    #[serde(with = "crate::real")]
     mark: (u64, f64, f64),
     /// Accepted steps in a row that lowered the cost by less than a tenth.
     slow: u32,

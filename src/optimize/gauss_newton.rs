@@ -12,10 +12,25 @@ use serde::{Deserialize, Serialize};
 /// Each step is the minimizer of the linearized sum of squares, halved until the cost falls by a part of what was promised
 /// (Armijo). Fast near a well-determined minimum; [`LevenbergMarquardt`](super::LevenbergMarquardt) is the safer choice
 /// elsewhere. Directions that the data do not determine are damped by 1e-8. Bounds are part of the linearized minimization.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// use greybox::optimize::GaussNewton;
+/// let near = Winding { rs: free(0.6), ls: free(3.8e-3), ke: free(0.9) };
+/// let estimate = Fit::new(&model, &record).parameters(near).optimizer(GaussNewton::default()).run()?;
+/// assert!(estimate.outcome.converged());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct GaussNewton {
     /// When to stop.
     pub stop: Stop,
+    #[serde(with = "crate::real")]
     x: Vec<f64>,
     trials: u64,
     outcome: Option<Outcome>,
@@ -69,7 +84,8 @@ impl GaussNewton {
         if let Some(outcome) = ended {
             return self.end(point, outcome);
         }
-        self.line = Line { step: point.full.clone().unwrap_or_default(), ..Line::default() };
+        let none = || vec![0.0; point.x.len()];
+        self.line = Line { step: point.full.clone().unwrap_or_else(none), ..Line::default() };
         self.shorten(point);
     }
 

@@ -26,12 +26,27 @@ use serde::{Deserialize, Serialize};
 ///
 /// A search that ends without a minimum, or where unknowns have lost their influence, is tried once more from the start, with
 /// steps that may be ten times the unknowns' sizes; the better end counts.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// use greybox::{OwnSize, optimize::{LevenbergMarquardt, Stop}};
+/// let quick = LevenbergMarquardt::new(Stop { iterations: 200, ..Stop::default() }, OwnSize);
+/// let estimate = Fit::new(&model, &record).parameters(start).optimizer(quick).run()?;
+/// assert!(estimate.outcome.converged() && estimate.iterations < 20);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LevenbergMarquardt<S = OwnSize> {
     /// When to stop.
     pub stop: Stop,
     /// What a unit step of each unknown counts.
     pub scaling: S,
+    #[serde(with = "crate::real")]
     x: Vec<f64>,
     seen: Seen,
     descent: Descent,
@@ -56,7 +71,9 @@ pub struct LevenbergMarquardt<S = OwnSize> {
 /// A try that has ended.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Try {
+    #[serde(with = "crate::real")]
     x: Vec<f64>,
+    #[serde(with = "crate::real")]
     cost: f64,
     outcome: Outcome,
     trials: u64,

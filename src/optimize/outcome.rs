@@ -4,26 +4,32 @@ use super::PRECISION;
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
-/// How a search ended, with the numbers.
+/// How a search ended, with the numbers; in JSON with its name as `code`, in small letters with underscores.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "code", rename_all = "snake_case")]
 pub enum Outcome {
     /// The next step is negligible and the residual orthogonal to the Jacobian.
     Converged {
         /// Largest relative size of the next step.
+        #[serde(with = "crate::real")]
         step: f64,
         /// Largest cosine between the residual and a column of the Jacobian.
+        #[serde(with = "crate::real")]
         gradient: f64,
     },
     /// A step lowered the cost by a negligible part (only if such a stop was asked for).
     CostUnchanged {
         /// The relative decrease.
+        #[serde(with = "crate::real")]
         decrease: f64,
     },
     /// The cost cannot resolve a further step, and what the step would gain no longer shrinks.
     LimitOfPrecision {
         /// Largest cosine between the residual and a column of the Jacobian.
+        #[serde(with = "crate::real")]
         gradient: f64,
         /// Largest relative size of the next step; where it is large, this is a plateau.
+        #[serde(with = "crate::real")]
         step: f64,
     },
     /// Nothing was left to explain: the model reproduces the data to their rounding.
@@ -32,15 +38,19 @@ pub enum Outcome {
     /// point, or steps do not keep what slopes promise, however short.
     Rough {
         /// By how much the cost jumps, as a part of it.
+        #[serde(with = "crate::real")]
         noise: f64,
         /// How long the next step would be, in standard errors of the unknowns.
+        #[serde(with = "crate::real")]
         errors: f64,
     },
     /// However short, no step lowers the cost, and yet the gradient is not zero.
     Stalled {
         /// Largest cosine between the residual and a column of the Jacobian.
+        #[serde(with = "crate::real")]
         gradient: f64,
         /// Largest relative size of the next step.
+        #[serde(with = "crate::real")]
         step: f64,
         /// How many of the last trial steps could not be simulated.
         failed: u64,
@@ -50,6 +60,7 @@ pub enum Outcome {
         /// How many have lost it.
         lost: usize,
         /// Largest cosine between the residual and a column of the Jacobian.
+        #[serde(with = "crate::real")]
         gradient: f64,
     },
     /// Many steps in a row lowered the cost by next to nothing, where slopes promise more.
@@ -57,6 +68,7 @@ pub enum Outcome {
         /// How many.
         trials: u64,
         /// By which part of the cost the next full step would lower it, if the slopes held.
+        #[serde(with = "crate::real")]
         promised: f64,
     },
     /// The limit of iterations was met first.
@@ -72,6 +84,7 @@ pub enum Outcome {
 
 /// Whether to trust what a search found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Severity {
     /// Nothing speaks against it.
     Usable,

@@ -16,6 +16,19 @@ use serde::{Deserialize, Serialize};
 ///
 /// The first samples are predicted from the initial state. Where the state was not measured, the output `steps` samples
 /// later is not predicted.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// use greybox::Horizon;
+/// let estimate = Fit::new(&model, &record).parameters(start).predictor(Horizon::new(20)).run()?; // 20 samples ahead
+/// assert!((estimate.parameters.ls / 4e-3 - 1.0).abs() < 0.01);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Horizon {

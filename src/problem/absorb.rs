@@ -17,29 +17,27 @@ pub(super) struct Absorber<'o> {
     rows: Vec<u64>,
     /// Plain sums of squares, lane by lane.
     squares: Vec<f64>,
-    triangles: Triangles,
+    columns: usize,
+    triangles: Option<Triangles>,
     alone: Option<Alone>,
 }
 
 impl<'o> Absorber<'o> {
     pub fn new(jobs: &[&Job<'o>]) -> Self {
         let objective = jobs[0].objective;
-        let columns = jobs[0].seeds.len();
         Absorber {
             weighing: jobs.iter().map(|job| Weighing::new(job.objective, job.experiment)).collect(),
             plain: objective.loss().is_none() && !objective.is_weighted() && !objective.sweep.predicts_variance(),
             rows: vec![0; jobs.len()],
             squares: vec![],
-            triangles: Triangles::new(columns, 0),
+            columns: jobs[0].seeds.len(),
+            triangles: None,
             alone: None,
         }
     }
 
     /// Absorbs a window; its contents are overwritten.
     pub fn absorb(&mut self, window: &mut Window) {
-        if self.triangles.lanes() != window.lanes() && window.lanes() > 1 {
-            self.triangles = Triangles::new(window.columns() - 1, window.lanes());
-        }
         let count = window.len() * window.outputs();
         if self.plain {
             self.square(window);
@@ -47,15 +45,15 @@ impl<'o> Absorber<'o> {
             self.weigh(window);
         }
         if window.has_variances() {
-            self.absorb_rows(window.lanes(), window.variance_rows_mut(), count);
+            self.absorb_rows(window.lanes(), window.width, window.variance_rows_mut(), count);
         }
-        self.absorb_rows(window.lanes(), window.rows_mut(), count);
+        self.absorb_rows(window.lanes(), window.width, window.rows_mut(), count);
     }
 
-    fn absorb_rows(&mut self, lanes: usize, rows: &mut [f64], count: usize) {
+    fn absorb_rows(&mut self, lanes: usize, width: Width, rows: &mut [f64], count: usize) {
         match lanes {
-            1 => self.alone.get_or_insert_with(|| Alone::new(self.triangles.columns())).absorb(rows),
-            _ => self.triangles.absorb(rows, count),
+            1 => self.alone.get_or_insert_with(|| Alone::new(self.columns)).absorb(rows),
+            _ => self.triangles.get_or_insert_with(|| Triangles::with(width, self.columns, lanes)).absorb(rows, count),
         }
     }
 
@@ -63,7 +61,8 @@ impl<'o> Absorber<'o> {
     fn square(&mut self, window: &mut Window) {
         let (lanes, columns, outputs) = (window.lanes(), window.columns(), window.outputs());
         self.squares.resize(lanes, 0.0);
-        wide::run(Width::widest(), Square { rows: window.rows_mut(), columns, squares: &mut self.squares });
+        let width = window.width;
+        wide::run(width, Square { rows: window.rows_mut(), columns, squares: &mut self.squares });
         for (lane, rows) in self.rows.iter_mut().enumerate() {
             *rows += match window.whole {
                 true => (window.samples[lane] * outputs) as u64,
@@ -99,9 +98,10 @@ impl<'o> Absorber<'o> {
     /// Cost and triangle of a job.
     pub fn part(&mut self, lane: usize) -> (f64, Information) {
         let cost = self.weighing[lane].cost + 0.5 * self.squares.get(lane).unwrap_or(&0.0);
-        let triangle = match &mut self.alone {
-            Some(alone) => alone.triangle(),
-            None => self.triangles.triangle(lane),
+        let triangle = match (&mut self.alone, &self.triangles) {
+            (Some(alone), _) => alone.triangle(),
+            (None, Some(triangles)) => triangles.triangle(lane),
+            (None, None) => Information::new(self.columns),
         };
         (cost, triangle.of_rows(self.rows[lane]))
     }

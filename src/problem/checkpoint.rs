@@ -4,6 +4,7 @@
 //! new run after 0 iterations, unreported. So the file holds a fingerprint of data and settings, and only the point and
 //! the solver's internal state are taken over: the search continues, however the old one ended.
 
+use super::Fingerprint;
 use crate::error::Error;
 use crate::optimize::LeastSquaresState;
 use argmin::core::State;
@@ -18,7 +19,7 @@ use std::sync::{Arc, Mutex};
 pub(crate) struct CheckpointFile {
     pub path: PathBuf,
     pub every: u64,
-    pub fingerprint: String,
+    pub fingerprint: Fingerprint,
     /// The solver as it is set in this run, as text.
     pub settings: String,
     /// Iterations of earlier runs.
@@ -30,23 +31,25 @@ pub(crate) struct CheckpointFile {
 #[derive(Serialize, Deserialize)]
 struct Saved<S> {
     /// What the file is.
-    format: String,
-    problem: String,
+    format: Format,
+    version: Version,
+    problem: Fingerprint,
     iterations: u64,
+    #[serde(with = "crate::real")]
     coordinates: Vec<f64>,
     /// The solver as it was set, as text.
     settings: String,
     solver: S,
 }
 
-const FORMAT: &str = "greybox checkpoint 1";
+crate::format::format!("greybox checkpoint", 2);
 
 /// Point, iterations so far, and the solver if it can be resumed.
 type Resumed<S> = (Vec<f64>, u64, Option<S>);
 
 impl CheckpointFile {
     /// A file for the search of one problem.
-    pub fn new(path: PathBuf, every: u64, fingerprint: String, settings: String) -> Self {
+    pub fn new(path: PathBuf, every: u64, fingerprint: Fingerprint, settings: String) -> Self {
         CheckpointFile { path, every, fingerprint, settings, before: 0, write_error: Arc::default() }
     }
 
@@ -78,14 +81,11 @@ impl CheckpointFile {
             Err(error) => return Err(Error::File { path: self.path.clone(), source: Box::new(error) }),
         };
         let wrong = |problem: String| Error::Checkpoint { path: self.path.clone(), problem };
-        let saved: Saved<S> = serde_json::from_str(&text)
+        let saved: Saved<S> = crate::format::read::<Format, Version, _>(&text)
             .map_err(|error| wrong(format!("it cannot be read ({error}); delete it to start afresh")))?;
-        if saved.format != FORMAT {
-            return Err(wrong(format!("its format is `{}`, not `{FORMAT}`; delete it to start afresh", saved.format)));
-        }
-        if saved.problem != self.fingerprint {
+        if !saved.problem.is_same(&self.fingerprint) {
             return Err(wrong(
-                "it belongs to another problem (other data, model, parameters or settings); delete it or name another file"
+                "it belongs to another problem (other data, equations, constants, weighting, parameters or settings); delete it or name another file"
                     .to_owned(),
             ));
         }
@@ -96,7 +96,8 @@ impl CheckpointFile {
     /// Writes a temporary file in the same folder and renames it.
     pub fn write<S: Serialize>(&self, coordinates: &[f64], iterations: u64, solver: &S) -> Result<(), Error> {
         let saved = Saved {
-            format: FORMAT.to_owned(),
+            format: Format,
+            version: Version,
             problem: self.fingerprint.clone(),
             iterations: self.before + iterations,
             coordinates: coordinates.to_vec(),

@@ -66,7 +66,7 @@ fn second(here: f64, beyond: f64, slopes: &[f64], along: &[f64]) -> f64 {
 impl Objective<'_> {
     /// Slopes at a point, and in the place of the errors their second derivatives along a direction: by the errors a
     /// tenth of the direction away, with the slopes. Not for predicted variances.
-    pub(super) fn second_along(&self, x: &[f64], along: &[f64]) -> Result<Linearization, Infeasible> {
+    pub(crate) fn second_along(&self, x: &[f64], along: &[f64]) -> Result<Linearization, Infeasible> {
         let unknowns = &self.problem.unknowns;
         let far: Vec<f64> = x.iter().zip(along).map(|(x, along)| x + FAR * along).collect();
         let beyond = self.gather(&far, false, |_| Errors(vec![]))?;

@@ -54,7 +54,8 @@ fn cut(samples: usize, whole: bool) -> Vec<Range<usize>> {
         return std::iter::once(0..samples).collect();
     }
     let grains = samples.div_ceil(GRAIN);
-    let begin = |s: usize| (s * grains / segments * GRAIN).min(samples);
+    // Rounded up: the last segment, which hands nothing on, is a shortest one.
+    let begin = |s: usize| ((s * grains).div_ceil(segments) * GRAIN).min(samples);
     (0..segments).map(|s| begin(s)..begin(s + 1)).collect()
 }
 

@@ -11,7 +11,7 @@ use crate::record::Record;
 use crate::sweep::Sweep;
 use argmin::core::observers::{Observe, ObserverMode};
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicU64};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -34,10 +34,12 @@ pub(crate) trait Weights: Send + Sync {
 #[derive(Clone)]
 pub struct Settings<'a> {
     pub(crate) noise: Noise,
+    pub(crate) input_noise: Option<Vec<f64>>,
     pub(crate) loss: Option<Arc<dyn Loss + 'a>>,
     pub(crate) weights: Option<Arc<dyn Weights + 'a>>,
     pub(crate) prefilter: Option<Butterworth>,
     pub(crate) cancel: Option<Arc<AtomicBool>>,
+    pub(crate) counter: Option<Arc<AtomicU64>>,
     pub(crate) time_limit: Option<Duration>,
     pub(crate) observers: Vec<(Observer, ObserverMode)>,
     pub(crate) checkpoint: Option<(PathBuf, u64)>,
@@ -49,10 +51,12 @@ impl Default for Settings<'_> {
     fn default() -> Self {
         Settings {
             noise: Noise::PerOutput,
+            input_noise: None,
             loss: None,
             weights: None,
             prefilter: None,
             cancel: None,
+            counter: None,
             time_limit: None,
             observers: vec![],
             checkpoint: None,
@@ -67,6 +71,13 @@ impl<'a> Settings<'a> {
     /// Without it, the noise is estimated from the errors.
     pub fn noise(mut self, sigma: Vec<f64>) -> Self {
         self.noise = Noise::Given(sigma);
+        self
+    }
+
+    /// Declares the standard deviation of the noise of each input, in its unit; zero for none. It changes neither the
+    /// estimate nor its intervals: the bias that it causes is estimated, and named by a warning.
+    pub fn input_noise(mut self, sigma: Vec<f64>) -> Self {
+        self.input_noise = Some(sigma);
         self
     }
 
@@ -105,6 +116,12 @@ impl<'a> Settings<'a> {
     /// Stops the search at its best point so far when the flag is set.
     pub fn cancel(mut self, flag: Arc<AtomicBool>) -> Self {
         self.cancel = Some(flag);
+        self
+    }
+
+    /// Adds one to the counter whenever a search of a diagnosis that makes many (bootstrap) has ended.
+    pub fn counter(mut self, counter: Arc<AtomicU64>) -> Self {
+        self.counter = Some(counter);
         self
     }
 
@@ -151,11 +168,27 @@ impl<'a> Settings<'a> {
             let count = self.starts;
             return Err(Error::Option(format!("a fit from {count} starts was asked for; take 1 to {MOST_STARTS}")));
         }
+        self.check_input_noise(layout)?;
         self.loss.as_ref().map_or(Ok(()), |loss| loss.check())?;
         if let Some(filter) = &self.prefilter {
             records.iter().try_for_each(|record| filter.check(record))?;
         }
         self.check_weights(records)
+    }
+
+    fn check_input_noise(&self, layout: &Layout) -> Result<(), Error> {
+        let Some(sigma) = &self.input_noise else { return Ok(()) };
+        if sigma.len() != layout.inputs.len() {
+            let (found, expected) = (sigma.len(), layout.inputs.len());
+            return Err(Error::Option(format!("{found} noise level(s) are given for {expected} input(s)")));
+        }
+        match sigma.iter().position(|s| !(*s >= 0.0 && s.is_finite())) {
+            Some(j) => Err(Error::Option(format!(
+                "the noise of input `{}` is {}; it must be finite and not negative",
+                layout.inputs[j].name, sigma[j]
+            ))),
+            None => Ok(()),
+        }
     }
 
     /// Weights must be finite, not negative, and not zero wherever something was measured.
@@ -169,8 +202,9 @@ impl<'a> Settings<'a> {
                 if !(weight >= 0.0 && weight.is_finite()) {
                     let (name, t) = (record.name(), exact(record.time(k)));
                     return Err(Error::Option(format!(
-                        "weighting: the weight of sample {k} (t = {t} s) of experiment `{name}` is {weight}; weights must \
-                         be finite and not negative"
+                        "weighting: the weight of sample {k} (t = {t} s) of experiment `{name}` is {}; weights must \
+                         be finite and not negative",
+                        exact(weight)
                     )));
                 }
                 counts |= weight > 0.0 && record.outputs().iter().any(|channel| !channel.values[k].is_nan());

@@ -4,7 +4,7 @@ use super::Whitening;
 use super::pass::Job;
 use crate::prefilter::Butterworth;
 use crate::sweep::Window;
-use crate::wide::{self, Task, Wide, Width};
+use crate::wide::{self, Task, Wide};
 
 /// From errors and slopes in the units of the outputs to standardized ones, with respect to the coordinates.
 pub(super) struct Standardize<'s> {
@@ -15,7 +15,6 @@ pub(super) struct Standardize<'s> {
     /// all are one. A factor is the derivative of the quantity with respect to its coordinate, divided by the noise
     /// level.
     factors: Vec<f64>,
-    width: Width,
 }
 
 impl<'s> Standardize<'s> {
@@ -25,7 +24,7 @@ impl<'s> Standardize<'s> {
         let prefilter = objective.problem.settings.prefilter.as_ref().map(|filter| (filter, vec![]));
         let predicted = objective.sweep.predicts_variance();
         let columns = jobs[0].seeds.len() + 1;
-        let mut factors = vec![];
+        let mut factors = Vec::with_capacity(objective.outputs() * columns * lanes);
         for j in 0..objective.outputs() {
             let unit = |job: &Job<'_>| match &job.objective.whitening {
                 Whitening::Diagonal(sigma) if !predicted => 1.0 / sigma[j],
@@ -40,7 +39,7 @@ impl<'s> Standardize<'s> {
             factors.clear();
         }
         let whitening = jobs.iter().map(|job| &job.objective.whitening).collect();
-        Standardize { whitening, prefilter, factors, width: Width::widest() }
+        Standardize { whitening, prefilter, factors }
     }
 
     /// The lane and the sample whose error is not finite, where there is one.
@@ -59,9 +58,9 @@ impl<'s> Standardize<'s> {
             self.whitening.iter().enumerate().for_each(|(lane, whitening)| whitening.decorrelate(window, lane));
         }
         if !self.factors.is_empty() {
-            wide::run(self.width, Multiply { rows: window.rows_mut(), factors: &self.factors });
+            wide::run(window.width, Multiply { rows: window.rows_mut(), factors: &self.factors });
             if window.has_variances() {
-                wide::run(self.width, Multiply { rows: window.variance_rows_mut(), factors: &self.factors });
+                wide::run(window.width, Multiply { rows: window.variance_rows_mut(), factors: &self.factors });
             }
         }
         if self.factors.contains(&0.0) {

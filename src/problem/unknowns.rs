@@ -5,6 +5,7 @@
 
 use crate::error::Error;
 use crate::layout::{Layout, Quantity};
+use crate::numeral::exact;
 use crate::parameter::{Parameter, Transform, fixed, free};
 use crate::record::{Initial, Record};
 use crate::sweep::{Seed, Sweep};
@@ -12,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 /// What an unknown is in the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(tag = "code", content = "number", rename_all = "snake_case")]
 pub enum Role {
     /// Parameter number.
     Parameter(usize),
@@ -196,14 +198,18 @@ fn check(name: &str, parameter: &Parameter) -> Result<(), Error> {
     let Parameter { start, free, lower, upper, prior, transform, per_experiment, positive } = *parameter;
     let wrong = |problem: String| Err(Error::Parameter { parameter: name.to_owned(), problem });
     if !start.is_finite() {
-        return wrong(format!("its value is {start}; give a finite start"));
+        return wrong(format!("its value is {}; give a finite start", exact(start)));
     }
     if lower.is_nan() || upper.is_nan() || lower > upper || free && lower == upper {
+        let (lower, upper) = (exact(lower), exact(upper));
         return wrong(format!("its bounds are {lower} and {upper}; the lower must be below the upper (or use fixed)"));
     }
     if start < lower || start > upper {
         return wrong(format!(
-            "its start {start} lies outside its bounds {lower} to {upper}; move the start, or the bounds"
+            "its start {} lies outside its bounds {} to {}; move the start, or the bounds",
+            exact(start),
+            exact(lower),
+            exact(upper)
         ));
     }
     if positive && (start <= 0.0 || upper <= 0.0) {
@@ -227,12 +233,13 @@ fn check(name: &str, parameter: &Parameter) -> Result<(), Error> {
         ));
     }
     if transform == Transform::Log && start <= 0.0 {
-        return wrong(format!("its start {start} has no logarithm; start above zero or leave .log() out"));
+        return wrong(format!("its start {} has no logarithm; start above zero or leave .log() out", exact(start)));
     }
     match prior {
         Some(p) if !(p.mean.is_finite() && p.std > 0.0 && p.std.is_finite()) => wrong(format!(
             "its prior is {} +- {}; mean and standard deviation must be finite, the latter positive",
-            p.mean, p.std
+            exact(p.mean),
+            exact(p.std)
         )),
         _ => Ok(()),
     }

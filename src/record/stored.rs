@@ -6,6 +6,7 @@ use crate::by_name::Entries;
 use crate::interval::Hold;
 use crate::layout::Quantity;
 use crate::parameter::Parameter;
+use crate::real::{Read, Written};
 use serde::ser::SerializeStruct;
 use serde::{Deserialize, Serialize, Serializer};
 
@@ -36,7 +37,7 @@ impl Serialize for Columns<'_> {
 
 impl Serialize for Values<'_> {
     fn serialize<Z: Serializer>(&self, serializer: Z) -> Result<Z::Ok, Z::Error> {
-        serializer.collect_seq(self.0.iter().map(|value| Some(*value).filter(|value| !value.is_nan())))
+        serializer.collect_seq(self.0.iter().map(Written))
     }
 }
 
@@ -83,8 +84,8 @@ pub(crate) struct Stored {
     hold: Hold,
     initial: StoredInitial,
     time: Time,
-    inputs: Entries<Vec<Option<f64>>>,
-    outputs: Entries<Vec<Option<f64>>>,
+    inputs: Entries<Read<Vec<f64>>>,
+    outputs: Entries<Read<Vec<f64>>>,
 }
 
 impl Stored {
@@ -96,10 +97,9 @@ impl Stored {
         outputs: &[Quantity],
     ) -> Result<Record, String> {
         let initial = self.initial.into_initial(&states)?;
-        let channels = |columns: Entries<Vec<Option<f64>>>, quantities: &[Quantity]| {
+        let channels = |columns: Entries<Read<Vec<f64>>>, quantities: &[Quantity]| {
             let columns = columns.in_order(names(quantities))?.into_iter().zip(quantities);
-            let channel = |(column, quantity): (Vec<Option<f64>>, &Quantity)| {
-                let values: Vec<f64> = column.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect();
+            let channel = |(Read(values), quantity): (Read<Vec<f64>>, &Quantity)| {
                 Channel::new(&quantity.name, &quantity.unit, values)
             };
             Ok::<_, String>(columns.map(channel).collect::<Vec<Channel>>())

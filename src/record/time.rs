@@ -9,12 +9,14 @@ pub enum Time {
     /// `start + k * step`.
     Uniform {
         /// Time of the first sample (s).
+        #[serde(with = "crate::real")]
         start: f64,
         /// From sample to sample (s).
+        #[serde(with = "crate::real")]
         step: f64,
     },
     /// One stamp per sample, increasing.
-    Stamps(Vec<f64>),
+    Stamps(#[serde(with = "crate::real")] Vec<f64>),
 }
 
 impl Time {

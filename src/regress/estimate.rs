@@ -37,10 +37,12 @@ pub struct LinearEstimate<P: Signals> {
     /// Covariance of the parameters, in the order of their declaration.
     pub covariance: SquareMatrix,
     /// Root mean square of the residuals, not weighted, in the unit of `y`.
+    #[serde(with = "crate::real")]
     pub rms: f64,
     /// Rows with a weight above zero.
     pub rows: u64,
     /// Condition number of the weighted regressor columns, each scaled to unit norm.
+    #[serde(with = "crate::real")]
     pub condition: f64,
     /// What the standard errors assume of the residuals.
     pub assumption: Assumption,

@@ -150,8 +150,9 @@ fn section(to: &mut Markup, section: &Section, level: usize, prose: &mut Prose) 
 fn title(to: &mut Markup, section: &Section) {
     to.text(&section.title);
     if section.severity > Severity::Usable {
+        let class = format!("mark {}", class(section.severity));
         let attributes: [(&str, &dyn Display); 4] = [
-            ("class", &format_args!("mark {}", class(section.severity))),
+            ("class", &class),
             ("role", &"img"),
             ("aria-label", &"named in the verdict"),
             ("title", &"named in the verdict"),
@@ -196,16 +197,9 @@ fn beside(to: &mut Markup, table: &Table, plot: &Plot, prose: &mut Prose) {
     });
 }
 
-/// One sentence is a paragraph, several are a list after the first.
+/// Each sentence is a paragraph.
 fn paragraphs(to: &mut Markup, section: &Section, prose: &mut Prose) {
-    if let [first, rest @ ..] = section.sentences.as_slice() {
-        to.node("p", &[], |p| prose.sentence(p, first));
-        if !rest.is_empty() {
-            to.node("ul", &[], |list| {
-                rest.iter().for_each(|text| list.node("li", &[], |item| prose.sentence(item, text)));
-            });
-        }
-    }
+    section.sentences.iter().for_each(|text| to.node("p", &[], |p| prose.sentence(p, text)));
 }
 
 fn figure(to: &mut Markup, plot: &Plot, prose: &mut Prose) {

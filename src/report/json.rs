@@ -1,6 +1,6 @@
 //! A report as JSON.
 
-use super::Report;
+use super::{Format, Report, Version};
 use crate::error::Error;
 use crate::section::{Plot, Section};
 
@@ -28,7 +28,10 @@ impl Report {
     /// # Errors
     /// A text that is no report, or one of another version; with its line and column.
     pub fn from_json(text: &str) -> Result<Self, Error> {
-        serde_json::from_str(text).map_err(|error| Error::Option(format!("no report: {error}")))
+        let report: Report = crate::format::read::<Format, Version, _>(text)
+            .map_err(|error| Error::Option(format!("no report: {error}")))?;
+        report.estimate.check()?;
+        Ok(report)
     }
 }
 

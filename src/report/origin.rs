@@ -2,6 +2,7 @@
 
 use super::Report;
 use crate::error::Error;
+use crate::numeral::whole;
 use crate::section::{Cell, Section, Table};
 use core::fmt::Write;
 use sha2::{Digest, Sha256};
@@ -73,7 +74,7 @@ impl Origin {
     fn table(&self) -> Table {
         let table = Table::new("Made from", ["what", "is"]);
         let files = self.files.iter().map(|(path, size, hash)| {
-            let text = format!("{}, {size} bytes, SHA-256 {hash}", path.display());
+            let text = format!("{}, {} bytes, SHA-256 {hash}", path.display(), whole(*size));
             ["file".into(), text.into()]
         });
         let date = self.at.and_then(humantime_of).map(|date| ("date", date));

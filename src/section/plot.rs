@@ -20,6 +20,7 @@ pub struct Plot {
 
 /// What is drawn.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Drawing {
     /// Curves, bars and levels over a pair of axes.
     Curves(Curves),
@@ -54,8 +55,10 @@ pub struct Axis {
     /// Whether it is logarithmic; what is not above zero is not drawn then.
     pub logarithmic: bool,
     /// What is shown besides the layers.
+    #[serde(with = "crate::real")]
     pub from: Option<f64>,
     /// Nothing beyond this is shown.
+    #[serde(with = "crate::real")]
     pub to: Option<f64>,
 }
 
@@ -85,12 +88,14 @@ pub enum Style {
 
 /// One of the things drawn.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Layer {
     /// A curve through points.
     Line {
         /// What it stands for.
         style: Style,
         /// `x` and `y`.
+        #[serde(with = "crate::real")]
         points: Vec<(f64, f64)>,
     },
     /// Points.
@@ -98,6 +103,7 @@ pub enum Layer {
         /// What they stand for.
         style: Style,
         /// `x` and `y`.
+        #[serde(with = "crate::real")]
         points: Vec<(f64, f64)>,
     },
     /// Bars of equal width, standing on zero.
@@ -105,15 +111,19 @@ pub enum Layer {
         /// What they stand for.
         style: Style,
         /// Left edge of the first.
+        #[serde(with = "crate::real")]
         first: f64,
         /// Width of each.
+        #[serde(with = "crate::real")]
         width: f64,
         /// Heights.
+        #[serde(with = "crate::real")]
         heights: Vec<f64>,
     },
     /// A value of `y` to compare with.
     Level {
         /// The value.
+        #[serde(with = "crate::real")]
         value: f64,
         /// What it is; may be empty.
         label: String,
@@ -121,6 +131,7 @@ pub enum Layer {
     /// A value of `x` to look at.
     Mark {
         /// The value.
+        #[serde(with = "crate::real")]
         value: f64,
         /// What it is; may be empty.
         label: String,
@@ -144,6 +155,7 @@ pub struct Interval {
     /// Its name.
     pub name: String,
     /// Ends of its interval relative to its size (%).
+    #[serde(with = "crate::real")]
     pub ends: Option<(f64, f64)>,
     /// Why there is no interval; else empty.
     pub why: String,
@@ -158,6 +170,7 @@ pub struct Heat {
     /// What stands above the columns.
     pub columns: Vec<String>,
     /// Row by row, from -1 to 1; `None` where nothing is known.
+    #[serde(with = "crate::real")]
     pub cells: Vec<Vec<Option<f64>>>,
     /// Whether the numbers are parts that are read in percent, and colored by their part of the row's largest.
     pub percent: bool,

@@ -1,7 +1,7 @@
 //! [`Table`]: rows of named columns.
 
 use super::plain;
-use crate::numeral::{error_size, fit, number, or_nan, percent, resolved};
+use crate::numeral::{error_size, fit, grouped, number, percent, resolved, whole};
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
@@ -29,8 +29,8 @@ pub enum Cell {
     Text(String),
     /// A number for programs, and how a reader sees it.
     Number {
-        /// The number; null in JSON, if it is not finite.
-        #[serde(deserialize_with = "or_nan")]
+        /// The number.
+        #[serde(with = "crate::real")]
         value: f64,
         /// The same rounded, perhaps with a unit.
         text: String,
@@ -91,7 +91,7 @@ impl fmt::Display for Table {
 impl Cell {
     /// A number with so many significant digits.
     pub fn number(value: f64, digits: usize) -> Cell {
-        Cell::Number { value, text: number(value, digits) }
+        Cell::Number { value, text: grouped(&number(value, digits)) }
     }
 
     /// A number, if there is one.
@@ -150,6 +150,6 @@ impl From<String> for Cell {
 
 impl From<u64> for Cell {
     fn from(count: u64) -> Cell {
-        Cell::Number { value: count as f64, text: count.to_string() }
+        Cell::Number { value: count as f64, text: whole(count) }
     }
 }

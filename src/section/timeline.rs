@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Timeline {
     /// Time of the record's first sample (s), which all others count from.
+    #[serde(with = "crate::real")]
     pub start: f64,
     /// What is drawn below each other.
     pub panels: Vec<Panel>,
@@ -66,6 +67,7 @@ pub struct Stretch {
     /// Samples in one column; one, if they are drawn one by one.
     pub samples_per_column: u64,
     /// Time of the first sample in each column (s from the start). A column without any value is a gap.
+    #[serde(with = "crate::real")]
     pub t: Vec<f64>,
     /// The values of each line, panel by panel.
     pub traces: Vec<Trace>,
@@ -76,10 +78,13 @@ pub struct Stretch {
 #[serde(deny_unknown_fields)]
 pub struct Trace {
     /// Least values; of half widths of a band, the medians.
+    #[serde(with = "crate::real")]
     pub low: Vec<Option<f64>>,
     /// Greatest values; empty where they are the least ones.
+    #[serde(with = "crate::real")]
     pub high: Vec<Option<f64>>,
     /// Means; empty where they are the least values, or where no band is drawn about them.
+    #[serde(with = "crate::real")]
     pub mean: Vec<Option<f64>>,
 }
 

@@ -48,6 +48,10 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
         self.predictor.predicts_variance()
     }
 
+    fn restarts(&self) -> Option<usize> {
+        self.predictor.restarts().map(|horizon| horizon.steps)
+    }
+
     fn prepare(&self, record: &Record, parameters: &[f64]) -> Result<Prepared, Error> {
         let restarts = match self.predictor.restarts() {
             Some(horizon) => horizon.states(&self.layout, &self.model, record, parameters)?,

@@ -20,6 +20,8 @@ use std::sync::Arc;
 
 /// Samples per window: two outputs with eight slopes fit into the first-level cache.
 const WINDOW: usize = 128;
+/// The same where a single sample may take many steps: after each window a fit looks at its time limit.
+const ADAPTIVE_WINDOW: usize = 8;
 
 /// Slopes below this are set to zero: their squares are denormal.
 const NEGLIGIBLE: f64 = 1e-150;
@@ -233,12 +235,13 @@ impl<M: Model, I: Integrator> Task<'_, M, I> {
         let (piece, seeds) = (self.piece, self.seeds);
         let count = seeds.len().div_ceil(D::SLOPES.max(1)).max(1);
         let mut passes: Vec<Pass<M, D>> = (0..count).map(|i| Pass::new(piece, seeds, i * D::SLOPES)).collect();
-        let mut window = Window::new(1, M::Output::LEN, seeds.len(), WINDOW, false);
+        let capacity = if I::FIXED { WINDOW } else { ADAPTIVE_WINDOW };
+        let mut window = Window::new(1, M::Output::LEN, seeds.len(), capacity, false);
         window.carry = vec![0.0; M::State::LEN];
         let mut rows = Rows::<M>::new(piece.record);
         let mut begin = piece.samples.start;
         while begin < piece.samples.end {
-            let samples = WINDOW.min(piece.samples.end - begin);
+            let samples = capacity.min(piece.samples.end - begin);
             (window.begin[0], window.samples[0]) = (begin, samples);
             rows.read(begin, samples, self.restart.unwrap_or(0));
             for (entry, x) in window.carry.iter_mut().zip(M::State::into_array(passes[0].x)) {

@@ -4,6 +4,7 @@ mod columns;
 mod derived;
 mod horizon;
 mod run;
+mod workspace;
 
 use super::{Coupling, Located, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
 use crate::engine::{Program, Sampling, Trajectories};
@@ -19,6 +20,7 @@ use crate::recurrence::Recurrence;
 pub(crate) use derived::Derived;
 use run::Run;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use workspace::Compiled;
 
 /// Equations run by compiled programs.
 pub(crate) struct ProgramSweep<'a> {
@@ -30,7 +32,7 @@ pub(crate) struct ProgramSweep<'a> {
     coupling: Coupling,
     /// By hold: zero, first.
     recurrences: [OnceLock<Arc<Recurrence>>; 2],
-    programs: Mutex<Vec<(Key, Program)>>,
+    programs: Mutex<Vec<(Key, Arc<Compiled>)>>,
 }
 
 /// What a program depends on besides the recurrence.
@@ -91,7 +93,7 @@ impl<'a> ProgramSweep<'a> {
     }
 
     /// The program for records like this one; `None` where there can be none.
-    fn program(&self, record: &Record, seeds: &[Seed], purpose: Purpose) -> Option<Program> {
+    fn program(&self, record: &Record, seeds: &[Seed], purpose: Purpose) -> Option<Arc<Compiled>> {
         let sampling = match record.times() {
             Time::Uniform { .. } => Sampling::Uniform,
             Time::Stamps(_) => Sampling::Irregular,
@@ -106,7 +108,7 @@ impl<'a> ProgramSweep<'a> {
             Purpose::Rows => Program::compile(&recurrence, seeds, sampling, Trajectories::Many),
             Purpose::Carry => Program::compile(&recurrence.without_outputs(), &[], sampling, Trajectories::One),
         };
-        let program = program.ok()?;
+        let program = Arc::new(Compiled::new(program.ok()?));
         programs.push((key, program.clone()));
         Some(program)
     }
@@ -125,10 +127,14 @@ impl Sweep for ProgramSweep<'_> {
         self.predictor.predicts_variance()
     }
 
+    fn restarts(&self) -> Option<usize> {
+        self.plain.restarts()
+    }
+
     fn lanes(&self, record: &Record, seeds: &[Seed]) -> usize {
         match self.predictor.restarts() {
             Some(_) => 1,
-            None => self.program(record, seeds, Purpose::Rows).map_or(1, |program| program.lanes()),
+            None => self.program(record, seeds, Purpose::Rows).map_or(1, |compiled| compiled.program.lanes()),
         }
     }
 
@@ -199,7 +205,7 @@ impl Sweep for ProgramSweep<'_> {
 
     fn engine(&self) -> String {
         let programs = self.programs.lock().unwrap_or_else(PoisonError::into_inner);
-        match programs.iter().any(|(_, program)| program.machine_code() > 0) {
+        match programs.iter().any(|(_, compiled)| compiled.program.machine_code() > 0) {
             true => "read as a graph, run as machine code".to_owned(),
             false => "read as a graph, run by the interpreter".to_owned(),
         }

@@ -1,5 +1,7 @@
 //! [`Window`]: prediction errors and slopes of consecutive samples of several pieces, in lanes.
 
+use crate::wide::Width;
+
 /// Prediction errors and slopes of consecutive samples of several pieces, one per lane.
 ///
 /// A row is one output of one sample: its slopes with respect to the seeds, then the prediction error; each entry holds
@@ -25,6 +27,8 @@ pub struct Window {
     pub carry: Vec<f64>,
     /// Whether it is known that every lane with a piece has as many samples, all measured, and all errors are finite.
     pub(crate) whole: bool,
+    /// The registers that its lanes are made for.
+    pub(crate) width: Width,
 }
 
 impl Window {
@@ -45,7 +49,15 @@ impl Window {
             measured: vec![0; capacity * outputs],
             carry: vec![],
             whole: false,
+            width: Width::widest(),
         }
+    }
+
+    /// Says that no lane holds a sample.
+    pub(crate) fn forget(&mut self) {
+        self.begin.fill(0);
+        self.samples.fill(0);
+        self.whole = false;
     }
 
     /// Numbers in each entry, one per lane.

@@ -104,7 +104,20 @@ macro_rules! register {
             }
             #[inline(always)]
             fn transpose(square: [Self; 8]) -> [Self; 8] {
-                unsafe { $transpose(square.map(|row| row.0)) }.map($name)
+                // Loops, because closures are not always inlined, and cost more than the work if they are not.
+                let (mut numbers, mut rows) = ([square[0].0; 8], square);
+                let mut i = 0;
+                while i < $lanes {
+                    numbers[i] = square[i].0;
+                    i += 1;
+                }
+                let numbers = unsafe { $transpose(numbers) };
+                i = 0;
+                while i < $lanes {
+                    rows[i] = $name(numbers[i]);
+                    i += 1;
+                }
+                rows
             }
         }
     };
@@ -144,21 +157,32 @@ register! {
 unsafe fn eight([a, b, c, d, e, f, g, h]: [__m512d; 8]) -> [__m512d; 8] {
     // SAFETY: as the caller says.
     unsafe {
-        let quarter = |a, b, c, d| {
-            let (even, odd) = (_mm512_shuffle_f64x2::<0x88>(a, b), _mm512_shuffle_f64x2::<0xdd>(a, b));
-            let (even_, odd_) = (_mm512_shuffle_f64x2::<0x88>(c, d), _mm512_shuffle_f64x2::<0xdd>(c, d));
-            [
-                _mm512_shuffle_f64x2::<0x88>(even, even_),
-                _mm512_shuffle_f64x2::<0x88>(odd, odd_),
-                _mm512_shuffle_f64x2::<0xdd>(even, even_),
-                _mm512_shuffle_f64x2::<0xdd>(odd, odd_),
-            ]
-        };
-        let low = |a, b| _mm512_unpacklo_pd(a, b);
-        let high = |a, b| _mm512_unpackhi_pd(a, b);
-        let [r0, r2, r4, r6] = quarter(low(a, b), low(c, d), low(e, f), low(g, h));
-        let [r1, r3, r5, r7] = quarter(high(a, b), high(c, d), high(e, f), high(g, h));
+        let (ab, cd) = (_mm512_unpacklo_pd(a, b), _mm512_unpacklo_pd(c, d));
+        let (ef, gh) = (_mm512_unpacklo_pd(e, f), _mm512_unpacklo_pd(g, h));
+        let [r0, r2, r4, r6] = quarters(ab, cd, ef, gh);
+        let (ab, cd) = (_mm512_unpackhi_pd(a, b), _mm512_unpackhi_pd(c, d));
+        let (ef, gh) = (_mm512_unpackhi_pd(e, f), _mm512_unpackhi_pd(g, h));
+        let [r1, r3, r5, r7] = quarters(ab, cd, ef, gh);
         [r0, r1, r2, r3, r4, r5, r6, r7]
+    }
+}
+
+/// Transposes four by four pairs. (A closure would not always be inlined.)
+///
+/// # Safety
+/// AVX-512 must be there.
+#[inline(always)]
+unsafe fn quarters(a: __m512d, b: __m512d, c: __m512d, d: __m512d) -> [__m512d; 4] {
+    // SAFETY: as the caller says.
+    unsafe {
+        let (even, odd) = (_mm512_shuffle_f64x2::<0x88>(a, b), _mm512_shuffle_f64x2::<0xdd>(a, b));
+        let (even_, odd_) = (_mm512_shuffle_f64x2::<0x88>(c, d), _mm512_shuffle_f64x2::<0xdd>(c, d));
+        [
+            _mm512_shuffle_f64x2::<0x88>(even, even_),
+            _mm512_shuffle_f64x2::<0x88>(odd, odd_),
+            _mm512_shuffle_f64x2::<0xdd>(even, even_),
+            _mm512_shuffle_f64x2::<0xdd>(odd, odd_),
+        ]
     }
 }
 

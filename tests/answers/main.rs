@@ -4,6 +4,7 @@ mod compare;
 mod filters;
 mod gallery;
 mod identifiability;
+mod json;
 mod pages;
 #[path = "../common/random.rs"]
 mod random;

@@ -59,7 +59,7 @@ fn a_gap_in_time_is_named() {
 fn a_parameter_on_its_bound_has_no_interval() {
     let parameters = Lag { k: free(1.0).within(0.0, 1.8), tau: free(0.1).log() };
     let estimate = Fit::new(&FirstOrder, &record(0..0)).parameters(parameters).run().unwrap();
-    assert_eq!(estimate.knowledge.k, Knowledge::Held { bound: 1.8 });
+    assert_eq!(estimate.knowledge.k, Knowledge::Held { bound: 1.8, end: None });
     assert_eq!(estimate.covariance.get(0, 0), 0.0);
     assert!(estimate.warnings.iter().any(|w| w.text.contains("`k` is held at its bound 1.8")), "{estimate}");
 }

@@ -123,3 +123,11 @@ fn answers_come_as_they_are_asked_for() {
         Fleet::new(&model).parameters(parameters()).checkpoint("nowhere", 1).fleet().err().unwrap().to_string();
     assert!(refused.contains("checkpoint"), "{refused}");
 }
+
+#[test]
+fn a_time_limit_of_nothing_stops_every_fit_of_a_fleet() {
+    let model = Surface::new(4).unwrap();
+    let records = [motor(&model, 1, 400), motor(&model, 2, 400), motor(&model, 3, 400)];
+    let fleet = Fleet::new(&model).parameters(parameters()).time_limit(std::time::Duration::ZERO).fleet().unwrap();
+    assert_eq!(fleet.run(records).filter(Result::is_err).count(), 3);
+}

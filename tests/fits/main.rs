@@ -6,9 +6,11 @@ mod bad_input;
 mod bad_models;
 mod checks;
 mod closed_forms;
+mod closure_sweep;
 #[path = "../common/mod.rs"]
 mod common;
 mod declared;
+mod extremes;
 mod far_starts;
 mod fleet;
 mod kalman;

@@ -193,11 +193,11 @@ fn what_is_fixed_stays_and_bounds_hold() {
     let bounded = Branch { gain: free(1.5).within(0.0, 1.8), tau: free(0.08) };
     let estimate = Fit::new(&Lag, &record).parameters(bounded).run().unwrap();
     assert_eq!(estimate.parameters.gain, 1.8);
-    assert_eq!(estimate.knowledge.gain, Knowledge::Held { bound: 1.8 });
+    assert_eq!(estimate.knowledge.gain, Knowledge::Held { bound: 1.8, end: None });
     // The cost falls outward at a lower bound, too.
     let bounded = Branch { gain: free(2.5).within(2.2, 9.0), tau: free(0.08) };
     let above = Fit::new(&Lag, &record).parameters(bounded).run().unwrap();
-    assert_eq!((above.parameters.gain, above.knowledge.gain), (2.2, Knowledge::Held { bound: 2.2 }));
+    assert_eq!((above.parameters.gain, above.knowledge.gain), (2.2, Knowledge::Held { bound: 2.2, end: None }));
     // And inward from a bound that the start is on: nothing is held.
     let bounded = Branch { gain: free(1.8).within(1.8, 9.0), tau: free(0.08) };
     let inside = Fit::new(&Lag, &record).parameters(bounded).run().unwrap();

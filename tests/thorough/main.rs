@@ -7,6 +7,8 @@ mod colored;
 #[path = "../common/mod.rs"]
 mod common;
 #[cfg(not(debug_assertions))]
+mod coverage;
+#[cfg(not(debug_assertions))]
 mod intervals;
 #[cfg(not(debug_assertions))]
 mod monte_carlo;
@@ -19,3 +21,5 @@ mod random;
 fn in_optimized_builds_only() {
     println!("nothing tested: run `cargo test --release --test thorough`");
 }
+#[cfg(not(debug_assertions))]
+mod temperature;

@@ -17,12 +17,14 @@ pub struct Correlation {
     /// The first lag (samples): the signal this much before the residual; negative where it comes after.
     pub first_lag: i64,
     /// Correlation at that lag and the following ones.
+    #[serde(with = "crate::real")]
     pub values: Vec<f64>,
     /// The first lag that the test looks at; it looks at all lags from there on.
     pub tested_from: i64,
     /// Without correlation all tested lags stay within plus and minus this with 99 % probability: the test fails where one
     /// does not. It allows for the two signals' own autocorrelations (Bartlett; Ljung, *System Identification*, 1999, eq.
     /// 16.65).
+    #[serde(with = "crate::real")]
     pub band: f64,
 }
 

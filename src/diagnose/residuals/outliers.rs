@@ -10,10 +10,13 @@ pub struct Outlier {
     /// Index of the sample, from zero.
     pub sample: u64,
     /// Its time (s).
+    #[serde(with = "crate::real")]
     pub time: f64,
     /// The residual, in the output's unit.
+    #[serde(with = "crate::real")]
     pub residual: f64,
     /// Its distance from the median in robust standard deviations.
+    #[serde(with = "crate::real")]
     pub sigmas: f64,
 }
 

@@ -16,14 +16,19 @@ use std::f64::consts::TAU;
 #[serde(deny_unknown_fields)]
 pub struct Period {
     /// Its length (s).
+    #[serde(with = "crate::real")]
     pub seconds: f64,
     /// Its length in samples.
+    #[serde(with = "crate::real")]
     pub samples: f64,
     /// Its frequency (Hz).
+    #[serde(with = "crate::real")]
     pub frequency: f64,
     /// Amplitude of the line, in the output's unit.
+    #[serde(with = "crate::real")]
     pub amplitude: f64,
     /// Part of the residuals' variance.
+    #[serde(with = "crate::real")]
     pub share: f64,
 }
 
@@ -37,10 +42,13 @@ const REACH: (usize, usize) = (60, 6);
 #[serde(deny_unknown_fields)]
 pub struct Spectrum {
     /// Middle of each part of the frequencies up to half the sampling frequency (Hz).
+    #[serde(with = "crate::real")]
     pub frequency: Vec<f64>,
     /// Mean power density in it, one-sided, in the square of the output's unit per Hz.
+    #[serde(with = "crate::real")]
     pub density: Vec<f64>,
     /// The greatest power density in it.
+    #[serde(with = "crate::real")]
     pub greatest: Vec<f64>,
 }
 

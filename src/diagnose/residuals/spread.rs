@@ -16,12 +16,15 @@ pub struct Spread {
     /// Unit of the signal.
     pub unit: String,
     /// Middle of each part of the signal's range in which it was met.
+    #[serde(with = "crate::real")]
     pub at: Vec<f64>,
     /// Standard deviation of the residuals there, in the output's unit.
+    #[serde(with = "crate::real")]
     pub deviation: Vec<f64>,
     /// How many residuals there are.
     pub count: Vec<u64>,
     /// Part of the variance of the squared residuals that the signal explains.
+    #[serde(with = "crate::real")]
     pub share: f64,
 }
 

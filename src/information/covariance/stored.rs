@@ -1,25 +1,35 @@
 //! How a [`Covariance`] is stored, and what is checked of a stored one.
 
-use super::{Covariance, Part};
+use super::{Covariance, Part, SquareMatrix};
 use serde::{Deserialize, Serialize};
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Stored {
+    #[serde(with = "crate::real")]
     scales: Vec<f64>,
     parts: Vec<Part>,
+    /// The matrix itself, row by row, for other programs; it follows from the rest, and is not read.
+    #[serde(default)]
+    matrix: Option<SquareMatrix>,
 }
 
+/// With more unknowns the matrix is left out: a file's size is linear in their number.
+const DENSE: usize = 100;
+
 impl From<Covariance> for Stored {
-    fn from(Covariance { scales, parts, .. }: Covariance) -> Self {
-        Stored { scales, parts }
+    fn from(covariance: Covariance) -> Self {
+        let all: Vec<usize> = (0..covariance.size()).collect();
+        let matrix = (all.len() <= DENSE).then(|| covariance.dense(&all));
+        let Covariance { scales, parts, .. } = covariance;
+        Stored { scales, parts, matrix }
     }
 }
 
 impl TryFrom<Stored> for Covariance {
     type Error = String;
 
-    fn try_from(Stored { scales, parts }: Stored) -> Result<Self, String> {
+    fn try_from(Stored { scales, parts, .. }: Stored) -> Result<Self, String> {
         let mut taken = vec![false; scales.len()];
         if parts.is_empty() {
             return Err("a covariance has at least the part of the shared unknowns".to_owned());

@@ -71,8 +71,10 @@ impl Elimination {
         let shared: Vec<usize> = (0..self.shared).collect();
         let piece = number.checked_sub(1);
         let all = piece.map_or(&shared, |piece| &self.pieces[piece].columns);
-        let mut gather = Gather::new(all, &columns, space);
-        if let Some(scores) = piece.and_then(|piece| scores.get(piece)) {
+        let own = piece.and_then(|piece| scores.get(piece));
+        let below: usize = self.children(piece).iter().map(|child| passed[responses.len() - 2 - child].nrows()).sum();
+        let mut gather = Gather::new(all, &columns, own.map_or(0, |own| own.columns() + 1) + below, space);
+        if let Some(scores) = own {
             gather.own_rows(scores, all, &[]);
         }
         for child in self.children(piece) {

@@ -37,7 +37,7 @@ pub(super) struct Reduction<'a> {
 
 /// Working space of an elimination.
 pub(super) struct Space {
-    block: Block,
+    block: Option<Block>,
     row: Vec<f64>,
     /// Column of each unknown in the triangle that is being made.
     place: Vec<usize>,
@@ -45,7 +45,7 @@ pub(super) struct Space {
 
 impl Space {
     pub fn new(unknowns: usize) -> Self {
-        Space { block: Block::new(0, 0), row: vec![], place: vec![usize::MAX; unknowns] }
+        Space { block: None, row: vec![], place: vec![usize::MAX; unknowns] }
     }
 }
 
@@ -82,20 +82,28 @@ impl Elimination {
         let mut columns: Vec<usize> = free_own.collect();
         let own = columns.len();
         columns.extend(border.iter().copied().filter(|&i| !terms.holds(i)));
-        let mut gather = Gather::new(&piece.columns, &columns, space);
+        let passed_up: usize = piece.children.iter().map(|&child| self.child(child, done).passed_up()).sum();
+        let rows = piece.columns.len() + 1 + own + passed_up;
+        let mut gather = Gather::new(&piece.columns, &columns, rows, space);
         gather.own_rows(&piece.triangle, &piece.columns, terms.origin);
         gather.damping(&columns[..own], terms.damping);
-        piece.children.iter().for_each(|child| gather.passed_up(&done[self.pieces.len() - 1 - child]));
+        piece.children.iter().for_each(|&child| gather.passed_up(self.child(child, done)));
         Reduced { own, triangle: Cow::Owned(gather.triangle()), columns: Cow::Owned(columns) }
+    }
+
+    /// A reduced piece, given all with higher numbers, the last first.
+    fn child<'d, 'a>(&self, number: usize, done: &'d [Reduced<'a>]) -> &'d Reduced<'a> {
+        &done[self.pieces.len() - 1 - number]
     }
 
     /// The shared unknowns, given all pieces, the last first.
     pub(super) fn reduce_shared<'a>(&self, done: &[Reduced<'a>], terms: Terms<'_>, space: &mut Space) -> Reduced<'a> {
         let shared: Vec<usize> = (0..self.shared).collect();
         let columns: Vec<usize> = shared.iter().copied().filter(|&i| !terms.holds(i)).collect();
-        let mut gather = Gather::new(&shared, &columns, space);
+        let passed_up: usize = self.children(None).iter().map(|&child| self.child(child, done).passed_up()).sum();
+        let mut gather = Gather::new(&shared, &columns, columns.len() + passed_up, space);
         gather.damping(&columns, terms.damping);
-        self.children(None).iter().for_each(|child| gather.passed_up(&done[self.pieces.len() - 1 - child]));
+        self.children(None).iter().for_each(|&child| gather.passed_up(self.child(child, done)));
         Reduced { own: columns.len(), triangle: Cow::Owned(gather.triangle()), columns: Cow::Owned(columns) }
     }
 
@@ -128,6 +136,11 @@ impl Terms<'_> {
 }
 
 impl Reduced<'_> {
+    /// How many rows it passes to its parent.
+    fn passed_up(&self) -> usize {
+        self.columns.len() + 1 - self.own
+    }
+
     /// Whether each own unknown has more of its column for itself than rounding.
     fn is_determined(&self, norms: &[f64], damping: &[f64]) -> bool {
         let usable = |(i, &unknown): (usize, &usize)| {
@@ -156,10 +169,11 @@ pub(super) struct Gather<'s> {
 }
 
 impl<'s> Gather<'s> {
-    /// For a triangle of `columns`, out of rows whose unknowns are among `all`.
-    pub fn new(all: &[usize], columns: &[usize], space: &'s mut Space) -> Self {
-        if space.block.columns() != columns.len() || space.block.capacity() == 0 {
-            space.block = Block::new(columns.len(), ROWS);
+    /// For a triangle of `columns`, out of rows whose unknowns are among `all`; `rows` are expected.
+    pub fn new(all: &[usize], columns: &[usize], rows: usize, space: &'s mut Space) -> Self {
+        let capacity = rows.clamp(1, ROWS);
+        if space.block.as_ref().is_none_or(|block| block.columns() != columns.len() || block.capacity() < capacity) {
+            space.block = Some(Block::new(columns.len(), capacity));
         }
         space.row.clear();
         space.row.resize(columns.len(), 0.0);
@@ -217,11 +231,15 @@ impl<'s> Gather<'s> {
                 *entry = *slope;
             }
         }
-        self.information.gather(block, row, y);
+        if let Some(block) = block {
+            self.information.gather(block, row, y);
+        }
     }
 
     pub fn triangle(mut self) -> Information {
-        self.information.absorb(&mut self.space.block);
+        if let Some(block) = &mut self.space.block {
+            self.information.absorb(block);
+        }
         self.information.rows = self.rows;
         self.information
     }

@@ -207,8 +207,8 @@ fn labels(layer: &Layer, frame: &Frame, svg: &mut Markup, x: &Scale, y: &Scale) 
         Layer::Dots { style, points } => {
             for (a, b) in points.iter().map(|(a, b)| (x.at(*a), y.at(*b))).filter(|(a, b)| inside(*a) && inside(*b)) {
                 let (cx, cy) = (frame.x(a), Short(h * (1.0 - b)));
-                let dot: [(&str, &dyn Display); 4] =
-                    [("class", &format_args!("point {}", class(*style))), ("cx", &cx), ("cy", &cy), ("r", &3)];
+                let class = format!("point {}", class(*style));
+                let dot: [(&str, &dyn Display); 4] = [("class", &class), ("cx", &cx), ("cy", &cy), ("r", &3)];
                 svg.leaf("circle", &dot);
             }
         }

@@ -31,6 +31,10 @@ const NARROW: f64 = 1e-4;
 const DECADES: f64 = 1e-4;
 /// A range smaller than this part of its distance from zero is rounding.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
+/// Smaller numbers are drawn as zero and larger ones lie off the axis: powers of ten for their labels would under- or
+/// overflow.
+const SMALLEST: f64 = 1e-290;
+const LARGEST: f64 = 1e290;
 
 impl Scale {
     /// An axis that shows the whole range, and something at all if that is empty.
@@ -38,12 +42,13 @@ impl Scale {
         let shown = |value: f64| if axis.logarithmic { value.log10() } else { value };
         let range = range.map(|(from, to)| (shown(from), shown(to)));
         let (from, to) = range.filter(|(from, to)| from.is_finite() && to.is_finite()).unwrap_or((0.0, 1.0));
+        let (from, to) = (from.clamp(-LARGEST, LARGEST), to.clamp(-LARGEST, LARGEST));
         let size = from.abs().max(to.abs());
-        let least = if axis.logarithmic { DECADES } else { (ROUNDING * size).max(f64::MIN_POSITIVE) };
+        let least = if axis.logarithmic { DECADES } else { (ROUNDING * size).max(SMALLEST) };
         let (from, to) = match to - from > least {
             true => (from, to),
             false if axis.logarithmic => (from - 0.5, to + 0.5),
-            false if from == 0.0 => (-1.0, 1.0),
+            false if size <= SMALLEST => (-1.0, 1.0),
             false => (from - 0.1 * from.abs(), to + 0.1 * to.abs()),
         };
         Scale { name: axis.name.clone(), unit: axis.unit.clone(), logarithmic: axis.logarithmic, from, to }
@@ -175,9 +180,21 @@ mod tests {
             labels(-2e-4, 3e-4),
             ("y (1e-6 m)".into(), ["−200", "−100", "0", "100", "200", "300"].map(String::from).into())
         );
-        for (from, to) in [(0.0, 0.0), (3.0, 3.0), (-1e300, 1e300), (1e9, 1e9 + 5.0), (f64::NAN, 1.0)] {
+        for (from, to) in [
+            (0.0, 0.0),
+            (3.0, 3.0),
+            (-1e300, 1e300),
+            (1e9, 1e9 + 5.0),
+            (f64::NAN, 1.0),
+            (1e-312, 3e-310),
+            (f64::MIN, f64::MAX),
+        ] {
             let scale = Scale::new(&Axis::new("t", "s"), Some((from, to)));
             let ticks = scale.ticks();
+            assert!(
+                !scale.title().contains("not a number") && ticks.iter().all(|tick| tick.label.len() < 12),
+                "{scale:?}"
+            );
             assert!(ticks.len() >= 2 && ticks.iter().all(|tick| (-1e-9..=1.0 + 1e-9).contains(&tick.at)), "{scale:?}");
         }
     }

@@ -81,7 +81,7 @@ pub(super) fn extent(record: &Record) -> String {
         begin => format!(" from t = {} s{}", exact(*begin), date(*begin)),
     };
     let (duration, step) = (rounded(end - begin, *sample_time), number(*sample_time, 4));
-    format!("{samples} samples over {duration} s{start}, every {step} s; {gaps}")
+    format!("{} over {duration} s{start}, every {step} s; {gaps}", counted(*samples, "sample"))
 }
 
 /// The day that a time stands for, if it counts from 1970 (POSIX time) and lies in this half of the century.

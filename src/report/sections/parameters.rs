@@ -1,7 +1,7 @@
 //! What is known of the parameters and initial states.
 
-use crate::estimate::{Knowledge, ParameterEstimate, Unknown};
-use crate::numeral::{exact, number, resolved};
+use crate::estimate::{Knowledge, ParameterEstimate, Unknown, held};
+use crate::numeral::{number, resolved};
 use crate::report::facts::Facts;
 use crate::section::{Cell, Drawing, Forest, Interval, Plot, Section, Table};
 
@@ -55,7 +55,7 @@ fn row(unknown: &Unknown) -> [Cell; 6] {
             let interval = format!("{lower} … {upper}").into();
             (Cell::resolved(*value, standard_error), Cell::error(standard_error), interval, index)
         }
-        Knowledge::Held { bound } => said(format!("held at its bound {}", exact(bound))),
+        Knowledge::Held { bound, end } => said(held(bound, end)),
         Knowledge::Unidentified => said("not determined by the data".to_owned()),
         Knowledge::Fixed => said("fixed".to_owned()),
     };

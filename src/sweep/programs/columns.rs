@@ -49,7 +49,7 @@ impl<'r> Columns<'r> {
         let outputs = (0..program.outputs()).map(|j| records.iter().map(|r| &r.outputs()[j].values[..]).collect());
         let (inputs, outputs) = (inputs.collect(), outputs.collect());
         let next = usize::from(program.reads_next());
-        Columns { lanes: records.len(), width: Width::widest(), inputs, outputs, records, derived, next }
+        Columns { lanes: records.len(), width: program.width(), inputs, outputs, records, derived, next }
     }
 
     /// Rows of inputs that so many samples need.
@@ -125,18 +125,19 @@ impl<'r> Columns<'r> {
         stride: usize,
         to: &mut [f64],
     ) {
+        let register = self.width.lanes();
         let mut lane = 0;
         while lane < self.lanes {
-            let eight = self.lanes - lane >= LANES;
+            let whole = (2..=self.lanes - lane).contains(&register);
             let from: [&[f64]; LANES] = std::array::from_fn(|l| {
-                let lane = if eight { lane + l } else { lane };
+                let lane = if whole { lane + l % register } else { lane };
                 let values = values(lane);
                 &values[begin.map_or(0, |begin| begin[lane]).min(values.len())..]
             });
-            if eight && from.iter().all(|values| values.len() >= rows) {
+            if whole && from.iter().all(|values| values.len() >= rows) {
                 let from = from.map(|values| &values[..rows]);
                 wide::run(self.width, Transpose { from, stride, to: &mut to[lane..] });
-                lane += LANES;
+                lane += register;
                 continue;
             }
             let last = values(lane).last().copied().unwrap_or(0.0);
@@ -148,11 +149,12 @@ impl<'r> Columns<'r> {
     }
 }
 
-/// Lanes that are transposed together.
+/// Lanes of the widest register.
 const LANES: usize = 8;
 
-/// Turns eight columns of the same length into rows of eight.
+/// Turns as many columns of the same length as a register has lanes into rows.
 struct Transpose<'t> {
+    /// Those after the first register's worth are not read.
     from: [&'t [f64]; LANES],
     stride: usize,
     to: &'t mut [f64],
@@ -166,26 +168,26 @@ impl Task for Transpose<'_> {
         let Transpose { from, stride, to } = self;
         let rows = from[0].len();
         let whole = rows - rows % W::LANES;
-        let mut first = 0;
-        while first < LANES {
-            let mut k = 0;
-            while k < whole {
-                let row = |lane: usize| W::load(&from[first + lane % W::LANES][k..]);
-                let square = W::transpose(std::array::from_fn(row));
-                let mut row = 0;
-                while row < W::LANES {
-                    square[row].store(&mut to[(k + row) * stride + first..]);
-                    row += 1;
-                }
-                k += W::LANES;
-            }
-            first += W::LANES;
-        }
-        let mut k = whole;
-        while k < rows {
-            let to = &mut to[k * stride..][..LANES];
+        let mut k = 0;
+        while k < whole {
+            let mut square = [W::splat(0.0); LANES];
             let mut lane = 0;
-            while lane < LANES {
+            while lane < W::LANES {
+                square[lane] = W::load(&from[lane][k..]);
+                lane += 1;
+            }
+            let square = W::transpose(square);
+            let mut row = 0;
+            while row < W::LANES {
+                square[row].store(&mut to[(k + row) * stride..]);
+                row += 1;
+            }
+            k += W::LANES;
+        }
+        while k < rows {
+            let to = &mut to[k * stride..][..W::LANES];
+            let mut lane = 0;
+            while lane < W::LANES {
                 to[lane] = from[lane][k];
                 lane += 1;
             }

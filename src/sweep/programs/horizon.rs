@@ -2,13 +2,13 @@
 //! lanes.
 
 use super::run::{Run, WINDOW};
-use crate::engine::Program;
+use super::workspace::Compiled;
 use crate::sweep::{Piece, Reached, RunError, Visit, Window};
 use std::ops::Range;
 
 /// Runs a piece; its windows have one lane.
-pub(super) fn run(program: &Program, piece: &Piece<'_>, steps: usize, visit: Visit<'_>) -> Result<Reached, RunError> {
-    let (outputs, seeds) = (program.outputs(), program.seeds().len());
+pub(super) fn run(compiled: &Compiled, piece: &Piece<'_>, steps: usize, visit: Visit<'_>) -> Result<Reached, RunError> {
+    let (outputs, seeds) = (compiled.program.outputs(), compiled.program.seeds().len());
     let mut window = Window::new(1, outputs, seeds, WINDOW, false);
     let all = piece.samples.clone();
     // The first samples of a record are simulated from its begin.
@@ -16,7 +16,7 @@ pub(super) fn run(program: &Program, piece: &Piece<'_>, steps: usize, visit: Vis
     if !simulated.is_empty() {
         let from_begin = Piece { samples: 0..simulated.end, ..piece.clone() };
         let mut go_on = true;
-        Run::new(program, vec![from_begin]).all(&mut |many| {
+        Run::new(compiled, vec![from_begin]).all(&mut |many| {
             (window.begin[0], window.samples[0]) = (many.begin[0], many.samples[0]);
             let rows = (0..many.samples[0]).flat_map(|k| (0..outputs).map(move |j| (k, j)));
             rows.for_each(|(k, j)| copy(many, (k, 0), &mut window, k, j));
@@ -27,7 +27,7 @@ pub(super) fn run(program: &Program, piece: &Piece<'_>, steps: usize, visit: Vis
             return Err(RunError::Stopped);
         }
     }
-    let mut restarts = Restarts::new(program, piece, steps);
+    let mut restarts = Restarts::new(compiled, piece, steps);
     for begin in (simulated.end..all.end).step_by(WINDOW) {
         let samples = begin..all.end.min(begin + WINDOW);
         (window.begin[0], window.samples[0]) = (begin, samples.len());
@@ -46,22 +46,20 @@ struct Restarts<'r> {
     steps: usize,
     states: usize,
     measured: &'r [f64],
-    many: Window,
 }
 
 impl<'r> Restarts<'r> {
-    fn new(program: &'r Program, piece: &Piece<'r>, steps: usize) -> Self {
-        let (states, seeds) = (program.carried(), program.seeds().len());
+    fn new(compiled: &'r Compiled, piece: &Piece<'r>, steps: usize) -> Self {
+        let (states, seeds) = (compiled.program.carried(), compiled.program.seeds().len());
         let one = Piece { samples: 0..steps + 1, slopes: vec![0.0; states * seeds], ..piece.clone() };
-        let lanes = program.lanes();
-        let run = Run::new(program, vec![one; lanes]);
-        let many = run.empty_window();
-        Restarts { run, lanes, steps, states, measured: &piece.prepared.restarts, many }
+        let lanes = compiled.program.lanes();
+        let run = Run::new(compiled, vec![one; lanes]);
+        Restarts { run, lanes, steps, states, measured: &piece.prepared.restarts }
     }
 
     /// The rows of some samples.
     fn fill(&mut self, samples: Range<usize>, window: &mut Window) {
-        let Restarts { run, lanes, steps, states, measured, many } = self;
+        let Restarts { run, lanes, steps, states, measured } = self;
         let first = samples.start;
         for group in samples.clone().step_by(*lanes) {
             let there = (*lanes).min(samples.end - group);
@@ -74,13 +72,13 @@ impl<'r> Restarts<'r> {
             });
             let mut last = 0;
             for begin in (0..*steps + 1).step_by(WINDOW) {
-                run.next(begin, many, &mut []);
+                run.next(begin, &mut []);
                 last = *steps - begin;
             }
             for (lane, sample) in (group..group + there).enumerate() {
                 let known = measured[(sample - *steps) * *states..][..*states].iter().all(|x| !x.is_nan());
                 for j in 0..window.outputs() {
-                    copy(many, (last, lane), window, sample - first, j);
+                    copy(run.window(), (last, lane), window, sample - first, j);
                     if !known {
                         window.set_measured(sample - first, j, 0);
                         window.row_mut(sample - first, j).fill(0.0);

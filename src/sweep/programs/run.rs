@@ -1,10 +1,10 @@
 //! Runs pieces in the lanes of a program.
 
 use super::columns::Columns;
-use crate::engine::{Group, Program};
+use super::workspace::{Compiled, Workspace};
 use crate::record::Time;
 use crate::sweep::{Piece, Reached, RunError, Visit, Window};
-use crate::wide::{self, Task, Wide, Width};
+use crate::wide::{self, Task, Wide};
 
 /// Samples per window. Windows are counted from the begin of each piece, so that a lane's bits do not depend on the
 /// length of another.
@@ -12,24 +12,16 @@ pub(super) const WINDOW: usize = 64;
 
 /// Pieces that run in the lanes of a group.
 pub(super) struct Run<'r> {
-    program: &'r Program,
-    group: Group,
+    compiled: &'r Compiled,
     pieces: Vec<Piece<'r>>,
     columns: Columns<'r>,
-    /// Sample, column, lane.
-    inputs: Vec<f64>,
-    /// Sample, output, lane: as measured.
-    measured: Vec<f64>,
-    /// Where variances are predicted, all rows of each sample.
-    rows: Vec<f64>,
-    /// First sample of each lane.
-    begins: Vec<usize>,
+    space: Workspace,
 }
 
 impl<'r> Run<'r> {
-    pub fn new(program: &'r Program, pieces: Vec<Piece<'r>>) -> Self {
-        let mut group = program.group(pieces.len());
-        let lanes = group.lanes();
+    pub fn new(compiled: &'r Compiled, pieces: Vec<Piece<'r>>) -> Self {
+        let mut space = compiled.workspace(pieces.len());
+        let (group, lanes) = (&mut space.group, space.begins.len());
         // Lanes without a piece repeat the first.
         let piece = |lane: usize| pieces.get(lane).unwrap_or(&pieces[0]);
         for lane in 0..lanes {
@@ -39,27 +31,17 @@ impl<'r> Run<'r> {
             }
         }
         group.prepare();
-        let columns = Columns::new(program, (0..lanes).map(piece));
-        let rows = WINDOW * program.row_length() * lanes;
-        let mut run = Run {
-            program,
-            group,
-            pieces,
-            inputs: vec![0.0; columns.rows(WINDOW) * program.columns().len() * lanes],
-            columns,
-            measured: vec![0.0; WINDOW * program.outputs() * lanes],
-            rows: if program.variances() > 0 { vec![0.0; rows] } else { vec![] },
-            begins: vec![0; lanes],
-        };
+        let columns = Columns::new(&compiled.program, (0..lanes).map(piece));
+        let mut run = Run { compiled, pieces, columns, space };
         run.start();
         run
     }
 
     /// Sets every lane to the begin of its piece.
     fn start(&mut self) {
-        for lane in 0..self.group.lanes() {
+        for lane in 0..self.space.group.lanes() {
             let piece = self.pieces.get(lane).unwrap_or(&self.pieces[0]);
-            self.group.resume(lane, &piece.carry, &piece.slopes);
+            self.space.group.resume(lane, &piece.carry, &piece.slopes);
         }
     }
 
@@ -69,13 +51,9 @@ impl<'r> Run<'r> {
         self.start();
     }
 
-    /// A window for these pieces.
-    pub fn empty_window(&self) -> Window {
-        let (lanes, seeds) = (self.group.lanes(), self.program.seeds().len());
-        let samples = WINDOW.min(self.longest());
-        let mut window = Window::new(lanes, self.program.outputs(), seeds, samples, self.program.variances() > 0);
-        window.carry = vec![0.0; self.program.carried() * lanes];
-        window
+    /// The window that was run last.
+    pub fn window(&self) -> &Window {
+        &self.space.window
     }
 
     fn longest(&self) -> usize {
@@ -84,41 +62,49 @@ impl<'r> Run<'r> {
 
     /// Runs a window of all pieces, `begin` samples after their first one, and writes the final carries of those that
     /// end with it into `reached`.
-    pub fn next(&mut self, begin: usize, window: &mut Window, reached: &mut [Reached]) {
+    pub fn next(&mut self, begin: usize, reached: &mut [Reached]) {
         let samples = WINDOW.min(self.longest() - begin);
         self.read(begin, samples);
+        let Workspace { group, window, .. } = &mut self.space;
         for (lane, Piece { samples: all, .. }) in self.pieces.iter().enumerate() {
             window.begin[lane] = all.start + begin;
             window.samples[lane] = all.len().saturating_sub(begin).min(WINDOW);
         }
-        self.group.carries(&mut window.carry);
-        self.end_within(window, samples, reached);
-        self.fill(window, samples);
-        for (lane, reached) in reached.iter_mut().enumerate() {
-            if begin + samples == self.pieces[lane].samples.len() {
-                *reached = self.reached(&self.group, lane);
-            }
+        group.carries(&mut window.carry);
+        self.fill(begin, samples, reached);
+    }
+
+    /// Predicts the samples `begin..end` of the window.
+    fn predict(&mut self, begin: usize, end: usize) {
+        let Workspace { group, inputs, rows, window, .. } = &mut self.space;
+        let program = &self.compiled.program;
+        if begin == 0 {
+            group.clear_negligible();
         }
+        let rows = if window.has_variances() { rows } else { window.all_rows_mut() };
+        let (inputs_at, rows_at) = (program.columns().len() * group.lanes(), program.row_length() * group.lanes());
+        group.go_on(&inputs[begin * inputs_at..], &mut rows[begin * rows_at..], end - begin);
     }
 
     /// Reads the inputs of a window that begins `begin` samples after the first of each piece.
     fn read(&mut self, begin: usize, samples: usize) {
-        for (lane, to) in self.begins.iter_mut().enumerate() {
+        let Workspace { begins, inputs, .. } = &mut self.space;
+        for (lane, to) in begins.iter_mut().enumerate() {
             *to = self.pieces.get(lane).unwrap_or(&self.pieces[0]).samples.start + begin;
         }
-        self.columns.read(self.program, &self.begins, samples, &mut self.inputs);
+        self.columns.read(&self.compiled.program, begins, samples, inputs);
     }
 
     /// Runs all pieces to their ends.
     pub fn all(mut self, visit: Visit<'_>) -> Vec<Result<Reached, RunError>> {
-        let mut window = self.empty_window();
         let mut reached = vec![Reached::default(); self.pieces.len()];
         for begin in (0..self.longest()).step_by(WINDOW) {
-            self.next(begin, &mut window, &mut reached);
-            if !visit(&mut window) {
+            self.next(begin, &mut reached);
+            if !visit(&mut self.space.window) {
                 return vec![Err(RunError::Stopped); self.pieces.len()];
             }
         }
+        self.compiled.keep(self.space);
         reached.into_iter().map(Ok).collect()
     }
 
@@ -130,47 +116,59 @@ impl<'r> Run<'r> {
             while sample < next {
                 let samples = WINDOW.min(next - sample);
                 self.read(sample - self.pieces[0].samples.start, samples);
-                self.group.run(&self.inputs, &mut [], samples);
+                let Workspace { group, inputs, .. } = &mut self.space;
+                group.run(inputs, &mut [], samples);
                 sample += samples;
             }
-            let mut carry = vec![0.0; self.program.carried()];
-            self.group.carry(0, &mut carry);
+            let mut carry = vec![0.0; self.compiled.program.carried()];
+            self.space.group.carry(0, &mut carry);
             if carry.iter().any(|x| !x.is_finite()) {
                 return Err(RunError::Failed { sample: next });
             }
             found.push(carry);
         }
+        self.compiled.keep(self.space);
         Ok(found)
     }
 
-    fn reached(&self, group: &Group, lane: usize) -> Reached {
-        let (carried, seeds) = (self.program.carried(), self.program.seeds().len());
+    fn reached(&self, lane: usize) -> Reached {
+        let program = &self.compiled.program;
+        let (carried, seeds) = (program.carried(), program.seeds().len());
         let mut reached = Reached { carry: vec![0.0; carried], slopes: vec![0.0; carried * seeds] };
-        group.carry(lane, &mut reached.carry);
-        group.carry_slopes(lane, &mut reached.slopes);
+        self.space.group.carry(lane, &mut reached.carry);
+        self.space.group.carry_slopes(lane, &mut reached.slopes);
         reached
     }
 
-    /// The final carries of pieces that end within the next window, but before the end of their records.
-    fn end_within(&self, window: &Window, samples: usize, reached: &mut [Reached]) {
-        for (lane, (piece, reached)) in self.pieces.iter().zip(reached).enumerate() {
-            let here = window.samples[lane];
-            if here > 0 && here < samples && piece.samples.end < piece.record.len() {
-                let mut group = self.group.clone();
-                let mut rows = vec![0.0; here * self.program.row_length() * group.lanes()];
-                group.run(&self.inputs, &mut rows, here);
-                *reached = self.reached(&group, lane);
-            }
-        }
+    /// The numbers of samples of this window after which pieces end, in ascending order, that are continued by another.
+    fn ends(&self, samples: usize) -> Vec<usize> {
+        let continued = |(piece, here): &(&Piece<'_>, &usize)| {
+            (1..samples).contains(*here) && piece.samples.end < piece.record.len()
+        };
+        let ends = self.pieces.iter().zip(&self.space.window.samples).filter(continued);
+        let mut ends: Vec<usize> = ends.map(|(_, here)| *here).collect();
+        ends.sort_unstable();
+        ends.dedup();
+        ends
     }
 
-    /// Runs a window and turns predicted outputs into prediction errors.
-    fn fill(&mut self, window: &mut Window, samples: usize) {
-        let (lanes, outputs, columns) = (self.group.lanes(), window.outputs(), window.columns());
+    /// Runs a window, `begin` samples after the first of each piece, and turns predicted outputs into prediction errors.
+    fn fill(&mut self, begin: usize, samples: usize, reached: &mut [Reached]) {
+        let mut done = 0;
+        for end in self.ends(samples).into_iter().chain([samples]) {
+            self.predict(done, end);
+            for (lane, reached) in reached.iter_mut().enumerate() {
+                if begin + end == self.pieces[lane].samples.len() {
+                    *reached = self.reached(lane);
+                }
+            }
+            done = end;
+        }
+        let Workspace { group, measured, rows, begins, window, .. } = &mut self.space;
+        let (lanes, outputs, columns) = (group.lanes(), window.outputs(), window.columns());
         let width = columns * lanes;
         if window.has_variances() {
-            self.group.run(&self.inputs, &mut self.rows, samples);
-            for (k, rows) in self.rows.chunks_exact(2 * outputs * width).take(samples).enumerate() {
+            for (k, rows) in rows.chunks_exact(2 * outputs * width).take(samples).enumerate() {
                 for (j, row) in rows.chunks_exact(width).enumerate() {
                     match j.checked_sub(outputs) {
                         None => window.row_mut(k, j).copy_from_slice(row),
@@ -178,13 +176,11 @@ impl<'r> Run<'r> {
                     }
                 }
             }
-        } else {
-            self.group.run(&self.inputs, window.all_rows_mut(), samples);
         }
-        self.columns.read_measured(&self.begins, samples, &mut self.measured);
-        let rows = window.all_rows_mut();
-        let errors = Errors { rows, measured: &self.measured, samples: samples * outputs, columns, lanes };
-        let finite = wide::run(Width::widest(), errors);
+        self.columns.read_measured(begins, samples, measured);
+        let (register, rows) = (window.width, window.all_rows_mut());
+        let errors = Errors { rows, measured, samples: samples * outputs, columns, lanes };
+        let finite = wide::run(register, errors);
         let all_lanes = u32::MAX >> (32 - lanes);
         let pieces = u32::MAX >> (32 - self.pieces.len());
         window.whole = finite && self.pieces.iter().enumerate().all(|(lane, _)| window.samples[lane] == samples);
@@ -196,7 +192,7 @@ impl<'r> Run<'r> {
             let active = (0..self.pieces.len()).filter(|&lane| k < window.samples[lane]);
             let active = active.fold(0u32, |bits, lane| bits | 1 << lane);
             for j in 0..outputs {
-                let measured = self.measured[(k * outputs + j) * lanes..][..lanes].iter().enumerate();
+                let measured = measured[(k * outputs + j) * lanes..][..lanes].iter().enumerate();
                 let there = measured.fold(0u32, |bits, (lane, y)| bits | u32::from(!y.is_nan()) << lane);
                 window.set_measured(k, j, there & active);
                 if there & active != all_lanes {

@@ -1,0 +1,3 @@
+//! [`Format`] and [`Version`] of an estimate's JSON.
+
+crate::format::format!("greybox estimate", 1);

@@ -1,0 +1,84 @@
+//! The covariance of the unknowns: classical, a sandwich, or HAC, and its degrees of freedom.
+
+use super::conclude::Judgement;
+use super::hac::hac;
+use super::sandwich;
+use crate::estimate::CovarianceMethod;
+use crate::information::Covariance;
+use crate::layout::Kind;
+use crate::problem::Whitening;
+
+/// Below this number of measurements a HAC covariance is less accurate than the classical one.
+const CORRELATED_SAMPLES: u64 = 100;
+
+/// The covariance of the unknowns in their own units, how it was made, and that of unit noise in coordinates.
+pub(super) struct Covariances {
+    pub unknowns: Option<Covariance>,
+    pub method: CovarianceMethod,
+    pub unit: Option<Covariance>,
+    /// Degrees of freedom of the variance of each unknown.
+    pub degrees: Vec<f64>,
+}
+
+/// A covariance in coordinates.
+struct Found {
+    covariance: Option<Covariance>,
+    method: CovarianceMethod,
+    factor: f64,
+    degrees: Vec<f64>,
+}
+
+impl Judgement<'_> {
+    pub(super) fn covariances(&self) -> Covariances {
+        let unit = self.linear.covariance(&self.exact);
+        let autocorrelated = self.autocorrelated().filter(|_| {
+            self.objective.problem.layout().kind != Kind::Static && self.residuals.measured >= CORRELATED_SAMPLES
+        });
+        let found = autocorrelated.and_then(|_| self.for_colored_errors(unit.as_ref()?));
+        let Found { covariance, method, factor, degrees } = found.unwrap_or_else(|| self.for_white_errors(&unit));
+        let seen = self.seen().into_iter().zip(&self.slopes);
+        let in_units: Vec<f64> = seen.map(|(seen, slope)| if seen { *slope } else { 0.0 }).collect();
+        let unknowns = covariance.map(|covariance| covariance.times(factor).scaled(&in_units));
+        Covariances { unknowns, method, unit, degrees }
+    }
+
+    fn for_colored_errors(&self, unit: &Covariance) -> Option<Found> {
+        let hac = hac(self.objective, &self.end.coordinates, self.linear, &self.exact)?;
+        let covariance = Some(hac.sandwich.covariance(&self.exact)?);
+        let degrees = hac.degrees(self.objective, unit).into_iter().map(|degrees| degrees.min(self.degrees));
+        let factor = self.residuals.measured as f64 / self.degrees.max(1.0);
+        let method = CovarianceMethod::Hac { lags: hac.lags as u64 };
+        Some(Found { covariance, method, factor, degrees: degrees.collect() })
+    }
+
+    fn for_white_errors(&self, unit: &Option<Covariance>) -> Found {
+        let (objective, x) = (self.objective, &self.end.coordinates);
+        let (weights, degrees) = self.estimated_weights();
+        let degrees = vec![degrees; self.slopes.len()];
+        if sandwich::is_needed(objective) {
+            let filtered = objective.problem.settings.prefilter.is_some();
+            let method = if filtered { CovarianceMethod::FilteredSandwich } else { CovarianceMethod::Sandwich };
+            let covariance = sandwich::sandwich(objective, x, &self.exact).ok().flatten();
+            return Found { covariance, method, factor: weights, degrees };
+        }
+        let method = CovarianceMethod::Classical;
+        // The widening applies to the errors, not to the priors.
+        if self.widening != 1.0 && objective.problem.unknowns.priors(x).next().is_some() {
+            let widened = objective.with(objective.whitening.widened(self.widening));
+            let covariance = widened.evaluate(x).ok().and_then(|linear| linear.covariance(&self.exact));
+            return Found { covariance, method, factor: weights, degrees };
+        }
+        Found { covariance: unit.clone(), method, factor: weights * self.widening * self.widening, degrees }
+    }
+
+    /// The factor by which weights between outputs that were estimated themselves, as a full noise covariance, widen the
+    /// covariance, and the degrees of freedom that they leave: exact for the mean of Gaussian vectors (Rao, Biometrika 54
+    /// (1967) 259), with `degrees` per output for the number of samples less one.
+    fn estimated_weights(&self) -> (f64, f64) {
+        let Whitening::Full { covariance, .. } = &self.objective.whitening else { return (1.0, self.degrees) };
+        let outputs = covariance.size() as f64;
+        let degrees = self.degrees / outputs;
+        let left = (degrees - outputs).max(1.0);
+        (degrees / (left + 1.0) * (degrees - 1.0) / left, left + 1.0)
+    }
+}

@@ -1,0 +1,70 @@
+//! Whether the model is close enough to linear over the width of the intervals.
+//!
+//! Along the profile of an unknown, prediction moves by `t v + t^2/2 a` in units of its own tangent space, with `v` the
+//! direction of one standard error and `a` the second derivative of the predictions along it, projected onto their
+//! slopes (the parameter-effects curvature of Bates and Watts, J. Royal Statistical Society B 42 (1980) 1, in that
+//! direction). The ends of the profile's interval solve `t + t^2/2 a_i / s_i = -+z`; those of the linear one are `-+z`.
+
+use super::conclude::Judgement;
+use super::covariances::Covariances;
+use crate::estimate::{Unknown, Warning, WarningCode};
+use crate::numeral::{number, percent};
+use crate::optimize::Severity;
+use crate::parameter::Transform;
+
+/// Standard errors below this part of the value are not examined: two passes over the data each.
+const SMALL: f64 = 0.15;
+/// At most so many unknowns are examined, those with the largest relative errors.
+const MOST: usize = 8;
+/// Part of the half width by which an end may move without a warning.
+const ASYMMETRY: f64 = 0.25;
+/// Quantile of the normal distribution for an interval of 95 %.
+const QUANTILE: f64 = 1.96;
+
+impl Judgement<'_> {
+    /// The unknown whose interval is bent most, if that matters.
+    pub(super) fn curved(&self, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
+        if self.objective.sweep.predicts_variance() || self.rounding {
+            return None;
+        }
+        let relative = |i: usize| {
+            let error = unknowns[i].knowledge.standard_error().filter(|error| error.is_finite())?;
+            Some((error / unknowns[i].value.abs(), i)).filter(|(part, _)| *part > SMALL)
+        };
+        let mut examined: Vec<(f64, usize)> = (0..unknowns.len()).filter_map(relative).collect();
+        examined.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let bent = examined.into_iter().take(MOST).filter_map(|(_, i)| Some((i, self.asymmetry(i, covariances)?)));
+        let (i, asymmetry) = bent.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+        if asymmetry.abs() <= ASYMMETRY {
+            return None;
+        }
+        let unknown = &unknowns[i];
+        let by_logarithm = match unknown.transform {
+            Transform::Identity if unknown.value > 0.0 => "estimate its logarithm (.log()), or ",
+            _ => "",
+        };
+        let side = if asymmetry > 0.0 { "below" } else { "above" };
+        let text = format!(
+            "the interval of `{}` is linear where the model is not: by its curvature it should reach {} further {side} than \
+             it says ({} standard errors of curvature); {by_logarithm}take diagnose::profile",
+            unknown.name,
+            percent(asymmetry.abs(), 2),
+            number(2.0 * asymmetry.abs() / QUANTILE, 2)
+        );
+        Some(Warning { code: WarningCode::CurvedInterval, severity: Severity::UsableWithCare, text })
+    }
+
+    /// By which part of its half width the ends of an interval move where the curvature is counted, positive where they
+    /// move down.
+    fn asymmetry(&self, i: usize, covariances: &Covariances) -> Option<f64> {
+        let covariance = covariances.unknowns.as_ref()?;
+        let error = covariance.standard_error(i);
+        let along: Vec<f64> = (0..self.slopes.len())
+            .map(|j| if self.exact[j] { 0.0 } else { covariance.get(j, i) / (error * self.slopes[j]) })
+            .collect();
+        let second = self.objective.second_along(&self.end.coordinates, &along).ok()?;
+        // The errors are bent against the predictions.
+        let bend = -second.step(&vec![0.0; along.len()], &self.exact)?[i] * self.slopes[i];
+        Some(0.5 * QUANTILE * bend / error).filter(|asymmetry| asymmetry.is_finite())
+    }
+}

@@ -1,0 +1,135 @@
+//! Bias by noise in what the predictions are made from: in measured states from which they restart, and in inputs.
+//!
+//! Noise there enters predictions and their slopes together, and their product does not vanish on average: estimates are
+//! drawn off (attenuation, for a line). To second order in the noise the bias is proportional to its variance, so noise
+//! of the same size, added once more, moves the estimate by as much again (simulation and extrapolation: Cook and
+//! Stefanski, J. American Statistical Association 89 (1994) 1314). One Gauss-Newton step measures it, as the mean of noise
+//! added and subtracted, in which all but the second order cancels.
+
+use super::conclude::Judgement;
+use crate::error::Error;
+use crate::estimate::{Unknown, Warning, WarningCode};
+use crate::numeral::{number, p_value, percent};
+use crate::optimize::Severity;
+use crate::problem::Problem;
+use crate::random::Random;
+use crate::record::{Channel, Record};
+use statrs::distribution::{ContinuousCDF, Normal};
+
+/// Draws of noise, each added and subtracted.
+const DRAWS: u64 = 4;
+/// A bias below this many standard errors is not worth a word.
+const BIAS: f64 = 0.25;
+/// Significance level of the test for noise in restarts.
+const LEVEL: f64 = 0.01;
+
+/// An unknown and its bias.
+struct Bias<'u> {
+    unknown: &'u Unknown,
+    /// In standard errors.
+    errors: f64,
+    /// In the unknown's unit, with its sign.
+    change: f64,
+}
+
+impl Judgement<'_> {
+    /// The largest bias, in standard errors, by noise that `with` adds to the problem: a factor (1 or -1) and the number of
+    /// the draw.
+    fn largest_bias<'p, 'u>(
+        &'p self,
+        unknowns: &'u [Unknown],
+        with: impl Fn(f64, u64) -> Result<Problem<'p>, Error>,
+    ) -> Option<Bias<'u>> {
+        let held: Vec<bool> = unknowns.iter().map(|row| row.knowledge.standard_error().is_none()).collect();
+        let none = vec![0.0; unknowns.len()];
+        let mut mean: Vec<f64> = self.linear.step(&none, &held)?.iter().map(|step| -step).collect();
+        for (draw, sign) in (0..DRAWS).flat_map(|draw| [(draw, 1.0), (draw, -1.0)]) {
+            let problem = with(sign, draw).ok()?;
+            let objective = self.objective.of(&problem, self.objective.sweep);
+            let step = objective.evaluate(&self.end.coordinates).ok()?.step(&none, &held)?;
+            mean.iter_mut().zip(&step).for_each(|(mean, step)| *mean += step / (2 * DRAWS) as f64);
+        }
+        let bias = |(unknown, step): (&'u Unknown, &f64)| {
+            let change = step * unknown.transform.slope(unknown.value);
+            let error = unknown.knowledge.standard_error().filter(|error| *error > 0.0)?;
+            Some(Bias { unknown, errors: change.abs() / error, change })
+        };
+        unknowns.iter().zip(&mean).filter_map(bias).max_by(|a, b| a.errors.total_cmp(&b.errors))
+    }
+
+    /// Whether noise in the states from which predictions restart biases the estimate. Such noise is in the error at
+    /// the restart, and with the opposite sign in the error a horizon later.
+    pub(super) fn restart_noise(&self, unknowns: &[Unknown]) -> Option<Warning> {
+        let steps = self.objective.sweep.restarts()?;
+        let outputs = &self.residuals.outputs;
+        let found = self.residuals.whiteness.iter().map(|white| white.at_restart);
+        let tail = |z: f64| outputs.len() as f64 * Normal::standard().cdf(z);
+        let least = found.clone().map(|(z, _)| tail(z)).fold(1.0, f64::min);
+        if least >= LEVEL || self.rounding {
+            return None;
+        }
+        let deviation = |((_, rho), fit): ((f64, f64), &crate::estimate::OutputFit)| fit.rmse * (-rho).max(0.0).sqrt();
+        let sigma: Vec<f64> = found.zip(outputs).map(deviation).collect();
+        let problem = self.objective.problem;
+        let bias = self.largest_bias(unknowns, |sign, draw| {
+            let records = problem.records.iter().enumerate();
+            let noisy = records.map(|(e, record)| {
+                let outputs = noisy(&record.outputs, &sigma, sign, draw, e);
+                Record { outputs, ..record.clone() }
+            });
+            // The measurements that predictions are compared with stay as they are.
+            let restarted = problem.with_records(noisy.collect())?;
+            Ok(Problem { records: problem.records.clone(), ..restarted })
+        })?;
+        let Bias { unknown, errors, .. } = bias;
+        let severity = if errors > BIAS { Severity::NotUsable } else { Severity::UsableWithCare };
+        let text = format!(
+            "the states from which predictions restart are noisy: errors {steps} sample(s) apart are negatively correlated \
+             ({}), and the noise biases the estimate, `{}` by about {} standard errors (more where the inputs are fed back \
+             from the same measurements); use Kalman with Model::noise, filter the restarts (Horizon::filtered), or take a \
+             longer horizon",
+            p_value(least),
+            unknown.name,
+            number(errors, 2)
+        );
+        Some(Warning { code: WarningCode::RestartNoise, severity, text })
+    }
+
+    /// The bias by the noise of inputs that was declared.
+    pub(super) fn input_noise(&self, unknowns: &[Unknown]) -> Option<Warning> {
+        let problem = self.objective.problem;
+        let sigma = problem.settings.input_noise.as_ref()?;
+        let bias = self.largest_bias(unknowns, |sign, draw| {
+            let records = problem.records.iter().enumerate();
+            let noisy = records.map(|(e, record)| {
+                let inputs = noisy(&record.inputs, sigma, sign, draw, e);
+                Record { inputs, ..record.clone() }
+            });
+            problem.with_records(noisy.collect())
+        })?;
+        let Bias { unknown, errors, change } = bias;
+        if errors < BIAS {
+            return None;
+        }
+        let text = format!(
+            "the noise declared for the inputs biases `{}` by about {} {} ({} of it, {} standard errors), which no interval \
+             allows for; measure the inputs better, filter record and outputs alike, or average over periods",
+            unknown.name,
+            number(change, 2),
+            unknown.unit,
+            percent((change / unknown.value).abs(), 2),
+            number(errors, 2)
+        );
+        Some(Warning { code: WarningCode::InputNoise, severity: Severity::UsableWithCare, text })
+    }
+}
+
+/// The channels with Gaussian noise of these standard deviations, times a sign.
+fn noisy(channels: &[Channel], sigma: &[f64], sign: f64, draw: u64, experiment: usize) -> Vec<Channel> {
+    let one = |(j, (channel, sigma)): (usize, (&Channel, &f64))| {
+        let mut random = Random::stream(draw, (experiment * channels.len() + j) as u64);
+        let values = channel.values.iter().map(|value| value + sign * sigma * random.normal());
+        channel.with(values.collect::<Vec<f64>>())
+    };
+    channels.iter().zip(sigma).enumerate().map(one).collect()
+}

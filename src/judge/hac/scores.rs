@@ -1,0 +1,224 @@
+//! Accumulators of scores in order of time.
+
+use super::ROWS;
+use crate::information::{Block, Information};
+use crate::problem::{Accumulate, Objective};
+use crate::sweep::Window;
+use nalgebra::DMatrix;
+use std::collections::VecDeque;
+
+/// An accumulator of scores in order of time.
+pub(super) trait AccumulateScores: Send {
+    fn take(&mut self, score: &[f64]);
+    /// Adds the accumulator of the scores that follow.
+    fn append(&mut self, later: Self);
+}
+
+/// The score of each sample, `sum over the outputs of w psi(z) g`, in the columns kept.
+pub(super) struct EachScore<'s, T> {
+    objective: &'s Objective<'s>,
+    experiment: usize,
+    kept: &'s [usize],
+    score: Vec<f64>,
+    pub into: T,
+}
+
+impl<'s, T> EachScore<'s, T> {
+    pub fn new(objective: &'s Objective<'s>, experiment: usize, kept: &'s [usize], into: T) -> Self {
+        EachScore { objective, experiment, kept, score: vec![0.0; kept.len()], into }
+    }
+}
+
+impl<T: AccumulateScores> Accumulate for EachScore<'_, T> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        let loss = self.objective.loss();
+        for k in 0..window.samples[lane] {
+            let weight = self.objective.weight(self.experiment, window.begin[lane] + k);
+            self.score.fill(0.0);
+            for j in 0..window.outputs() {
+                let z = window.error(k, j, lane);
+                let psi = weight * loss.map_or(z, |loss| loss.psi(z));
+                for (score, &c) in self.score.iter_mut().zip(self.kept) {
+                    *score += psi * window.at(k, j, c, lane);
+                }
+                if window.has_variances() {
+                    let variance = window.variance_row(k, j);
+                    let at = |column: usize| variance[column * window.lanes() + lane];
+                    let second = weight * at(window.columns() - 1);
+                    for (score, &c) in self.score.iter_mut().zip(self.kept) {
+                        *score += second * at(c);
+                    }
+                }
+            }
+            self.into.take(&self.score);
+        }
+    }
+
+    fn append(&mut self, later: Self) {
+        self.into.append(later.into);
+    }
+}
+
+/// Sums of products of the scores with those one and two samples before, and the triangle of the scores themselves.
+pub(super) struct Lagged {
+    pub count: usize,
+    pub triangle: Information,
+    pub block: Block,
+    pub products: [DMatrix<f64>; 2],
+    /// The last two scores, the last one first.
+    before: [Vec<f64>; 2],
+    /// The first two.
+    first: Vec<Vec<f64>>,
+}
+
+impl Lagged {
+    pub fn new(n: usize) -> Self {
+        Lagged {
+            count: 0,
+            triangle: Information::new(n),
+            block: Block::new(n, ROWS),
+            products: [DMatrix::zeros(n, n), DMatrix::zeros(n, n)],
+            before: [vec![0.0; n], vec![0.0; n]],
+            first: vec![],
+        }
+    }
+
+    /// Products of a score with those before it.
+    fn multiply(&mut self, score: &[f64]) {
+        for (product, before) in self.products.iter_mut().zip(&self.before) {
+            for (j, before) in before.iter().enumerate() {
+                for (i, score) in score.iter().enumerate() {
+                    product[(i, j)] += score * before;
+                }
+            }
+        }
+        self.before.swap(0, 1);
+        self.before[0].copy_from_slice(score);
+    }
+}
+
+impl AccumulateScores for Lagged {
+    fn take(&mut self, score: &[f64]) {
+        if self.first.len() < 2 {
+            self.first.push(score.to_vec());
+        }
+        self.multiply(score);
+        self.triangle.gather(&mut self.block, score, 0.0);
+        self.count += 1;
+    }
+
+    fn append(&mut self, mut later: Self) {
+        // The products of its first scores among themselves are those of both: they are counted once, here.
+        let nothing = || vec![0.0; later.before[0].len()];
+        let mut alone = Lagged { before: [nothing(), nothing()], ..Lagged::new(later.before[0].len()) };
+        for score in &later.first {
+            self.multiply(score);
+            alone.multiply(score);
+            if self.first.len() < 2 {
+                self.first.push(score.clone());
+            }
+        }
+        for (i, product) in self.products.iter_mut().enumerate() {
+            *product += &later.products[i] - &alone.products[i];
+        }
+        if later.count >= 2 {
+            self.before = later.before;
+        }
+        self.triangle.absorb(&mut self.block);
+        later.triangle.absorb(&mut later.block);
+        self.triangle.merge(&later.triangle);
+        self.count += later.count;
+    }
+}
+
+/// Triangle of the moving sums of `window` prewhitened scores, each divided by the root of the window.
+pub(super) struct MovingSums<'m> {
+    w: &'m DMatrix<f64>,
+    a: &'m DMatrix<f64>,
+    window: usize,
+    /// The first `window` scores, with which a sum reaches back to those before; they are prewhitened and summed when
+    /// these are known.
+    first: Vec<Vec<f64>>,
+    recent: VecDeque<Vec<f64>>,
+    sums: Vec<f64>,
+    before: Vec<f64>,
+    triangle: Information,
+    block: Block,
+}
+
+impl<'m> MovingSums<'m> {
+    pub fn new(w: &'m DMatrix<f64>, a: &'m DMatrix<f64>, window: usize) -> Self {
+        let n = a.nrows();
+        MovingSums {
+            w,
+            a,
+            window,
+            first: vec![],
+            recent: (0..window).map(|_| vec![0.0; n]).collect(),
+            sums: vec![0.0; n],
+            before: vec![0.0; n],
+            triangle: Information::new(n),
+            block: Block::new(n, ROWS),
+        }
+    }
+
+    /// A score of unit covariance, prewhitened by the one before it.
+    fn prewhitened(&mut self, score: &[f64]) -> Vec<f64> {
+        let n = score.len();
+        let z: Vec<f64> = (0..n).map(|j| (0..=j).map(|i| score[i] * self.w[(i, j)]).sum()).collect();
+        let rest = |i: usize| z[i] - (0..n).map(|j| self.a[(i, j)] * self.before[j]).sum::<f64>();
+        let fresh = (0..n).map(rest).collect();
+        self.before = z;
+        fresh
+    }
+
+    fn slide(&mut self, new: &[f64], counts: bool) {
+        let part = (self.window as f64).sqrt().recip();
+        let mut oldest = self.recent.pop_front().unwrap_or_default();
+        for ((sum, new), old) in self.sums.iter_mut().zip(new).zip(&mut oldest) {
+            *sum += new - std::mem::replace(old, *new);
+        }
+        self.recent.push_back(oldest);
+        if counts {
+            let row: Vec<f64> = self.sums.iter().map(|sum| sum * part).collect();
+            self.triangle.gather(&mut self.block, &row, 0.0);
+        }
+    }
+
+    /// The triangle, after the first scores were summed from zero and the last ones were shifted out of the window.
+    pub fn triangle(self) -> Information {
+        let n = self.sums.len();
+        let mut whole = MovingSums { first: vec![vec![]; self.window], ..MovingSums::new(self.w, self.a, self.window) };
+        whole.append(self);
+        let nothing = vec![0.0; n];
+        for _ in 1..whole.window {
+            whole.slide(&nothing, true);
+        }
+        whole.triangle.absorb(&mut whole.block);
+        whole.triangle
+    }
+}
+
+impl AccumulateScores for MovingSums<'_> {
+    fn take(&mut self, score: &[f64]) {
+        let counts = self.first.len() == self.window;
+        if !counts {
+            self.first.push(score.to_vec());
+        }
+        let fresh = self.prewhitened(score);
+        self.slide(&fresh, counts);
+    }
+
+    fn append(&mut self, mut later: Self) {
+        for score in &later.first {
+            self.take(score);
+        }
+        // With a full window of its own scores, it no longer depends on those before.
+        if later.first.len() == later.window {
+            (self.recent, self.sums, self.before) = (later.recent, later.sums, later.before);
+        }
+        self.triangle.absorb(&mut self.block);
+        later.triangle.absorb(&mut later.block);
+        self.triangle.merge(&later.triangle);
+    }
+}

@@ -1,0 +1,66 @@
+//! [`Compiled`]: a program with memory for its runs, which the next run uses again.
+
+use super::run::WINDOW;
+use crate::engine::{Group, Program};
+use crate::sweep::Window;
+use std::sync::{Mutex, PoisonError};
+
+/// A program, and the memory of the runs that have ended: a fit runs it some ten times, a fleet thousands of times.
+pub(super) struct Compiled {
+    pub program: Program,
+    idle: Mutex<Vec<Workspace>>,
+}
+
+/// Memory of a run.
+pub(super) struct Workspace {
+    pub group: Group,
+    /// Sample, column, lane.
+    pub inputs: Vec<f64>,
+    /// Sample, output, lane: as measured.
+    pub measured: Vec<f64>,
+    /// Where variances are predicted, all rows of each sample.
+    pub rows: Vec<f64>,
+    /// First sample of each lane.
+    pub begins: Vec<usize>,
+    pub window: Window,
+}
+
+impl Compiled {
+    pub fn new(program: Program) -> Self {
+        Compiled { program, idle: Mutex::new(vec![]) }
+    }
+
+    /// Memory for a run of so many pieces. Lanes, steps and samples are to be set.
+    pub fn workspace(&self, pieces: usize) -> Workspace {
+        let lanes = self.program.lanes_for(pieces);
+        let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = idle.iter().position(|space| space.group.lanes() == lanes).map(|at| idle.swap_remove(at));
+        drop(idle);
+        known.unwrap_or_else(|| Workspace::new(&self.program, pieces))
+    }
+
+    /// Takes memory back.
+    pub fn keep(&self, mut space: Workspace) {
+        space.window.forget();
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(space);
+    }
+}
+
+impl Workspace {
+    fn new(program: &Program, pieces: usize) -> Self {
+        let group = program.group(pieces);
+        let (lanes, variances) = (group.lanes(), program.variances() > 0);
+        let rows = WINDOW + usize::from(program.reads_next());
+        let mut window = Window::new(lanes, program.outputs(), program.seeds().len(), WINDOW, variances);
+        window.carry = vec![0.0; program.carried() * lanes];
+        window.width = program.width();
+        Workspace {
+            group,
+            inputs: vec![0.0; rows * program.columns().len() * lanes],
+            measured: vec![0.0; WINDOW * program.outputs() * lanes],
+            rows: if variances { vec![0.0; WINDOW * program.row_length() * lanes] } else { vec![] },
+            begins: vec![0; lanes],
+            window,
+        }
+    }
+}

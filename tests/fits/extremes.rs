@@ -1,0 +1,84 @@
+//! Numbers near the ends of what an `f64` can hold: an answer or an error, and nothing known that is not finite.
+
+use greybox::optimize::{GaussNewton, LevenbergMarquardt};
+use greybox::*;
+
+signals! {
+    pub struct In { u: "V" }
+    pub struct Out { y: "m" }
+    pub struct Line { a: "m/V", b: "m" }
+}
+
+/// `y = a u + b`
+#[derive(Clone)]
+struct Straight;
+
+#[rustfmt::skip]
+impl Model for Straight {
+    type State = Nothing; type Input = In; type Output = Out; type Parameters = Line;
+    const KIND: Kind = Kind::Static;
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &In<S>, p: &Line<S>) -> Out<S> { Out { y: p.a * u.u + p.b } }
+}
+
+/// Errors are autocorrelated by 0.9, a tenth of the input at first.
+fn record(input: f64, output: f64) -> ExperimentOf<Straight> {
+    let inputs: Vec<In> = (0..300).map(|k| In { u: input * (0.1 * k as f64).sin() }).collect();
+    let mut error = 0.0;
+    let outputs = (0..300).map(|k| {
+        error = 0.9 * error + 0.04 * (2.399 * (k * k % 97) as f64).sin();
+        Out { y: output * ((0.1 * k as f64).sin() + error) }
+    });
+    Experiment::new(&Straight, Time::Uniform { start: 0.0, step: 0.01 }, inputs, outputs.collect()).unwrap()
+}
+
+fn assert_finite(what: &str, estimate: &Estimate<Straight>) {
+    for unknown in &estimate.unknowns {
+        if let Knowledge::Known { standard_error, lower, upper } = unknown.knowledge {
+            let finite = standard_error.is_finite() && lower.is_finite() && upper.is_finite();
+            assert!(finite && unknown.value.is_finite(), "{what}: {unknown:?}");
+        }
+    }
+}
+
+/// Inputs and outputs of any size: squares of them, and products of slopes and errors, under- and overflow.
+#[test]
+fn records_of_any_size() {
+    let mut answers = 0;
+    for exponent in [-320, -310, -200, -160, -100, 0, 100, 150, 160, 200, 290, 300] {
+        for output in [0, exponent] {
+            let record = record(10f64.powi(exponent), 10f64.powi(output));
+            let fit = || Fit::new(&Straight, &record).parameters(Line { a: free(1.0), b: free(0.0) });
+            for (name, fit) in [
+                ("Levenberg-Marquardt", fit().optimizer(LevenbergMarquardt::default())),
+                ("Gauss-Newton", fit().optimizer(GaussNewton::default())),
+            ] {
+                let what = format!("inputs of 1e{exponent}, outputs of 1e{output}, {name}");
+                let problem = fit.problem().unwrap();
+                let Ok(summary) = problem.run() else { continue };
+                let estimate = Estimate::of(summary).unwrap();
+                assert_finite(&what, &estimate);
+                let text = estimate.to_json().unwrap();
+                assert_eq!(Summary::from_json(&text).unwrap().to_json().unwrap(), text, "{what}");
+                let report = Report::new(&problem, &estimate).unwrap();
+                assert!(!report.to_html().contains("\"NaN"), "{what}");
+                answers += 1;
+            }
+        }
+    }
+    // Without overflow there is an answer.
+    assert!(answers >= 24, "{answers} of 48");
+}
+
+/// A logarithm about which nothing is known: its interval would be from zero to infinity.
+#[test]
+fn an_interval_without_an_end_is_no_knowledge() {
+    let inputs: Vec<In> = (0..100).map(|k| In { u: f64::from(k % 2) }).collect();
+    let outputs = (0..100).map(|k| Out { y: [0.1, -0.1, -0.1, 0.1][k % 4] - 0.1 * f64::from(k as u32 % 2) }).collect();
+    let record = Experiment::new(&Straight, Time::Uniform { start: 0.0, step: 0.01 }, inputs, outputs).unwrap();
+    let parameters = Line { a: free(1.0).log(), b: fixed(0.0) };
+    let estimate = Fit::new(&Straight, &record).parameters(parameters).run().unwrap();
+    // The best value is below zero, and a logarithm ends where the output no longer feels it.
+    assert!(estimate.parameters.a < 1e-4, "{estimate}");
+    assert_finite("a logarithm at zero", &estimate);
+    assert!(matches!(estimate.knowledge.a, Knowledge::Unidentified | Knowledge::Held { .. }), "{estimate}");
+}
