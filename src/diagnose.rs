@@ -11,7 +11,6 @@ mod drift;
 mod identifiability;
 mod profile;
 pub mod residuals;
-mod restarts;
 mod side_by_side;
 
 pub use bands::{Bands, bands};
@@ -26,7 +25,6 @@ pub use drift::{Drift, drift};
 pub(crate) use identifiability::reworded;
 pub use identifiability::{COLLINEAR, Collinear, Excitation, Identifiability, Segment, identifiability};
 pub use profile::{End, Profile, ProfilePoint, profile};
-pub use restarts::{Better, Minimum, Restarts, restarts};
 pub use side_by_side::{Compared, ComparedOutput, DataUse};
 
 use crate::error::Error;

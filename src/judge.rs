@@ -15,6 +15,7 @@ pub(crate) mod noise;
 mod residual_pass;
 mod sandwich;
 mod shape;
+mod starts;
 mod suspects;
 mod together;
 mod warnings;

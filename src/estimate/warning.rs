@@ -66,6 +66,8 @@ pub enum WarningCode {
     TimeGaps,
     /// An unknown is held at a bound.
     HeldAtBound,
+    /// A parameter that was declared positive is not.
+    NotPositive,
     /// The model bends so much within an interval that it should be asymmetric.
     CurvedInterval,
     /// Noise in the measured states from which predictions restart.
@@ -78,6 +80,12 @@ pub enum WarningCode {
     CoarseStep,
     /// Intervals of a search that did not end at a minimum.
     NotAtMinimum,
+    /// One of several starts led to the estimate.
+    MinimumFoundOnce,
+    /// Another minimum explains the data as well.
+    RivalMinimum,
+    /// The declared start leads to another minimum.
+    DeclaredStartElsewhere,
     /// The checkpoint could not be written.
     CheckpointNotWritten,
     /// The errors are autocorrelated.

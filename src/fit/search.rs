@@ -14,10 +14,9 @@ const NOISE_ROUNDS: u32 = 100;
 /// Searches from the start, or from a checkpoint. `plain` leaves errors in the units of the outputs.
 pub(super) fn search(plain: &Objective<'_>, optimizer: &Arc<dyn Optimizer>) -> Result<SearchEnd, Error> {
     let problem = plain.problem;
-    let Some((path, every)) = &problem.settings.checkpoint else {
-        return Rounds::new(plain, optimizer)?.run(None);
+    let Some(mut checkpoint) = checkpoint(plain, optimizer)? else {
+        return Rounds::new(plain, optimizer, problem.unknowns.start())?.run(None);
     };
-    let mut checkpoint = CheckpointFile::new(path.clone(), *every, Fingerprint::new(plain), optimizer.settings()?);
     let mut rounds = match optimizer.resume(&checkpoint)? {
         Some((place, iterations, saved)) if place.len() == problem.unknowns.start().len() => {
             checkpoint.before = iterations;
@@ -32,6 +31,17 @@ pub(super) fn search(plain: &Objective<'_>, optimizer: &Arc<dyn Optimizer>) -> R
     };
     rounds.iterations = checkpoint.before;
     rounds.run(Some(checkpoint))
+}
+
+/// The checkpoint of a search with this optimizer, if one is asked for.
+pub(super) fn checkpoint(
+    plain: &Objective<'_>,
+    optimizer: &Arc<dyn Optimizer>,
+) -> Result<Option<CheckpointFile>, Error> {
+    let file = |(path, every): &(std::path::PathBuf, u64)| {
+        Ok(CheckpointFile::new(path.clone(), *every, Fingerprint::new(plain), optimizer.settings()?))
+    };
+    plain.problem.settings.checkpoint.as_ref().map(file).transpose()
 }
 
 /// Searches with fixed noise, one after the other, with the noise estimated between them.
@@ -51,10 +61,10 @@ pub(super) struct Rounds<'r> {
 }
 
 impl<'r> Rounds<'r> {
-    /// From the start. With noise estimated at the start, the first round need not find an exact minimum.
-    pub fn new(plain: &'r Objective<'r>, optimizer: &Arc<dyn Optimizer>) -> Result<Self, Error> {
+    /// From a start. With noise estimated there, the first round need not find an exact minimum.
+    pub fn new(plain: &'r Objective<'r>, optimizer: &Arc<dyn Optimizer>, start: Vec<f64>) -> Result<Self, Error> {
         let first = noise::is_estimated(plain).then(|| optimizer.rough());
-        Rounds::from(plain, optimizer, plain.problem.unknowns.start(), first)
+        Rounds::from(plain, optimizer, start, first)
     }
 
     /// From a point; `first` is the search of the first round, if it differs.
@@ -93,6 +103,11 @@ impl<'r> Rounds<'r> {
                 return Ok(end);
             }
         }
+    }
+
+    /// Trial steps of the rounds that have ended.
+    pub fn iterations(&self) -> u64 {
+        self.iterations
     }
 
     /// The objective of the next round.
@@ -138,6 +153,7 @@ impl<'r> Rounds<'r> {
             name: result.name,
             write_error: None,
             memory: self.memory.clone(),
+            starts: None,
         })
     }
 }

@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::estimate::student::Spread;
 use crate::estimate::{
     CovarianceMethod, ExperimentEstimate, Format, Knowledge, Method, NoiseModel, OutputEstimate, ParameterEstimate,
-    Summary, Unknown, Version,
+    Starts, Summary, Unknown, Version,
 };
 use crate::information::{Covariance, Undetermined};
 use crate::layout::Quantity;
@@ -36,6 +36,8 @@ pub(crate) struct SearchEnd {
     pub write_error: Option<String>,
     /// Carries at the begins of the segments there.
     pub memory: Memory,
+    /// What searches from other starts found, if there were any.
+    pub starts: Option<Starts>,
 }
 
 /// The end of a search, and the quantities derived from it.
@@ -111,6 +113,7 @@ pub(crate) fn conclude_from(
         },
         directions,
         outcome: end.outcome,
+        starts: end.starts.clone(),
         warnings,
         cost: linear.cost,
         measurements,

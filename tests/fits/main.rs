@@ -9,6 +9,7 @@ mod closed_forms;
 mod closure_sweep;
 #[path = "../common/mod.rs"]
 mod common;
+mod declared;
 mod extremes;
 mod far_starts;
 mod fleet;
@@ -19,7 +20,9 @@ mod nist;
 mod noise;
 mod optimizers;
 mod recovery;
+mod refining;
 mod segments;
 #[path = "../common/shared.rs"]
 mod shared;
+mod starts;
 mod user_code;

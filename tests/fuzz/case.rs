@@ -3,7 +3,7 @@
 use crate::models::{Broken, Lag, Line, Oscillator, Pendulum, Regression};
 use crate::random::Random;
 use crate::values::{Draw, parameter, record};
-use greybox::diagnose::{Resampling, bootstrap, profile, restarts, validate};
+use greybox::diagnose::{Resampling, bootstrap, profile, validate};
 use greybox::optimize::{GaussNewton, LevenbergMarquardt, Stop};
 use greybox::pmsm::Surface;
 use greybox::{
@@ -22,20 +22,18 @@ pub struct Tally {
     pub reports: u64,
     pub profiles: u64,
     pub bootstraps: u64,
-    pub restarts: u64,
     pub fleets: u64,
 }
 
 impl Tally {
     pub fn add(&mut self, other: &Tally) {
-        let Tally { cases: _, records, fits, converged, reports, profiles, bootstraps, restarts, fleets } = other;
+        let Tally { cases: _, records, fits, converged, reports, profiles, bootstraps, fleets } = other;
         self.records += records;
         self.fits += fits;
         self.converged += converged;
         self.reports += reports;
         self.profiles += profiles;
         self.bootstraps += bootstraps;
-        self.restarts += restarts;
         self.fleets += fleets;
     }
 }
@@ -202,15 +200,6 @@ fn judged(draw: &mut Draw, problem: &Problem<'_>, summary: &Summary, tally: &mut
             Ok(bootstrap) => {
                 report = report.with(bootstrap);
                 tally.bootstraps = 1;
-            }
-            Err(error) => said(&error)?,
-        }
-    }
-    if draw.chance(0.1) {
-        match restarts(problem, summary, 3, 2.0, 1) {
-            Ok(restarts) => {
-                report = report.with(restarts);
-                tally.restarts = 1;
             }
             Err(error) => said(&error)?,
         }
