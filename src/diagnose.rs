@@ -11,7 +11,6 @@ mod drift;
 mod identifiability;
 mod profile;
 pub mod residuals;
-mod restarts;
 mod side_by_side;
 
 pub use bands::{Bands, bands};
@@ -26,7 +25,6 @@ pub use drift::{Drift, drift};
 pub(crate) use identifiability::reworded;
 pub use identifiability::{COLLINEAR, Collinear, Excitation, Identifiability, Segment, identifiability};
 pub use profile::{End, Profile, ProfilePoint, profile};
-pub use restarts::{Better, Minimum, Restarts, restarts};
 pub use side_by_side::{Compared, ComparedOutput, DataUse};
 
 use crate::error::Error;
@@ -34,11 +32,10 @@ use crate::numeral::p_value;
 use crate::optimize::{
     Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization, Machine, Severity,
 };
-use crate::problem::{Control, Objective, Problem, each};
+use crate::problem::{Control, Objective, Problem};
 use crate::section::{Cell, Section, Table};
 use argmin::core::{Executor, State};
 use serde::{Deserialize, Serialize};
-use std::sync::atomic::Ordering;
 
 /// The probability of error below which a hypothesis is given up.
 pub const LEVEL: f64 = 0.01;
@@ -138,17 +135,6 @@ impl<L: LeastSquares> LeastSquares for Pinned<'_, L> {
     fn sizes(&self) -> Vec<Option<f64>> {
         self.problem.sizes()
     }
-}
-
-/// Searches side by side; each that has ended is counted, where the fit was given a counter.
-fn searches<T: Send>(problem: &Problem<'_>, count: usize, search: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
-    each(count, |k| {
-        let found = search(k);
-        if let Some(counter) = &problem.settings.counter {
-            counter.fetch_add(1, Ordering::Relaxed);
-        }
-        found
-    })
 }
 
 /// Refuses a result that was not computed to its end.

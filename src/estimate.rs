@@ -2,10 +2,12 @@
 
 mod display;
 mod prediction;
+mod starts;
 pub(crate) mod student;
 mod warning;
 
 pub use prediction::Prediction;
+pub use starts::{FailedStart, Minimum, Starts};
 pub use warning::{Warning, WarningCode};
 
 use crate::information::{Covariance, SquareMatrix};
@@ -272,6 +274,8 @@ pub struct Summary {
     pub directions: Vec<Direction>,
     /// How the search ended.
     pub outcome: Outcome,
+    /// What searches from other starts found; `None` if none were tried.
+    pub starts: Option<Starts>,
     /// What the reader must know.
     pub warnings: Vec<Warning>,
     /// The minimized cost: the weighted sum of `rho` of the standardized errors, and half the squares of the priors.
@@ -308,6 +312,11 @@ impl Summary {
     pub fn severity(&self) -> Severity {
         let outcome = if self.outcome.converged() { Severity::Usable } else { Severity::NotUsable };
         self.warnings.iter().map(|warning| warning.severity).fold(outcome, Severity::max)
+    }
+
+    /// Whether other starts were tried, and how many agree.
+    pub(crate) fn searches(&self) -> String {
+        self.starts.as_ref().map_or("no other start was tried".to_owned(), Starts::to_string)
     }
 
     /// Interval of one unknown with the given probability (0 to 1), by Student's t; `None` if it has none, or if there is

@@ -5,6 +5,7 @@ mod lockstep;
 mod predict;
 mod run;
 mod search;
+mod starts;
 
 pub use fleet::{Answers, Fleet};
 
@@ -154,13 +155,46 @@ impl<'a, M: Model> Fit<'a, M> {
         self.set(|settings| settings.prefilter(filter))
     }
 
+    /// Searches from `count` starts and keeps the best end; 1, unless set. [`Summary::starts`](crate::Summary::starts)
+    /// reports the minima that were found.
+    ///
+    /// The first start is the declared one. The others are a Latin hypercube (McKay, Beckman and Conover, Technometrics 21
+    /// (1979) 239), the same in every run. Of each unknown they span
+    /// - its prior, where it has one, cut off at its bounds;
+    /// - else its bounds, if both are finite: evenly in the logarithm if that is estimated, or if the bounds have one sign and
+    ///   span a decade;
+    /// - else a factor of 10 to either side of its declared start, evenly in the logarithm, cut off at its bounds. A parameter
+    ///   that starts at zero moves to either side by as much as changes the prediction by the errors at the declared start; an
+    ///   initial state keeps its start.
+    ///
+    /// The searches advance together, in parallel lanes where the model is compiled and in threads; the result is the same
+    /// for any number of threads. A search is given up when it is still above the best minimum found after many times the
+    /// steps that those which found a minimum took.
+    /// A time limit, a flag and a checkpoint hold for all searches together; an observer sees the best point so far.
+    ///
+    /// ```
+    /// # use greybox::*;
+    /// # use greybox::pmsm::{Surface, Winding};
+    /// # fn example(model: &Surface, record: &ExperimentOf<Surface>) -> Result<(), Error> {
+    /// let parameters = Winding { rs: free(1.0).within(0.01, 10.0), ls: free(2e-3).log(), ke: free(0.7).prior(0.7, 0.1) };
+    /// let estimate = Fit::new(model, record).parameters(parameters).starts(20).run()?;
+    /// if let Some(starts) = &estimate.starts {
+    ///     println!("{} of {} searches agree", starts.agreed, starts.tried);
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn starts(self, count: usize) -> Self {
+        self.set(|settings| settings.starts(count))
+    }
+
     /// Stops the search at its best point so far when the flag is set (by another thread, a signal handler).
     pub fn cancel(self, flag: Arc<AtomicBool>) -> Self {
         self.set(|settings| settings.cancel(flag))
     }
 
-    /// Adds one to the counter whenever a search of a diagnosis that makes many ([`restarts`](crate::diagnose::restarts),
-    /// [`bootstrap`](crate::diagnose::bootstrap)) has ended, for a display of progress by another thread.
+    /// Adds one to the counter whenever a refit of [`bootstrap`](crate::diagnose::bootstrap) has ended, for a display of
+    /// progress by another thread.
     pub fn counter(self, counter: Arc<AtomicU64>) -> Self {
         self.set(|settings| settings.counter(counter))
     }

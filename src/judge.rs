@@ -6,6 +6,7 @@ mod hac;
 pub(crate) mod noise;
 mod residual_pass;
 mod sandwich;
+mod starts;
 mod warnings;
 
 pub(crate) use conclude::{SearchEnd, conclude, conclude_from};

@@ -205,8 +205,8 @@ pub use {
     equations::{Dependence, Equations, InvalidEquations},
     error::{Error, Failure},
     estimate::{
-        CovarianceMethod, Direction, Estimate, Knowledge, Method, NoiseModel, OutputFit, Prediction, Summary, Unknown,
-        Warning, WarningCode,
+        CovarianceMethod, Direction, Estimate, FailedStart, Knowledge, Method, Minimum, NoiseModel, OutputFit,
+        Prediction, Starts, Summary, Unknown, Warning, WarningCode,
     },
     experiment::{Experiment, ExperimentOf, Sample},
     fit::{Answers, Fit, Fleet, Records},

@@ -114,7 +114,7 @@ impl Report {
     }
 
     /// Adds a section: a diagnosis ([`Profile`](crate::diagnose::Profile), [`Bootstrap`](crate::diagnose::Bootstrap),
-    /// [`Restarts`](crate::diagnose::Restarts), [`Compared`](crate::diagnose::Compared) records, ...) or one's own. The
+    /// [`Compared`](crate::diagnose::Compared) records, ...) or one's own. The
     /// report is then at least as severe. What a section of the same `id` says is added to the one that is there.
     pub fn with(mut self, section: impl Into<Section>) -> Self {
         let section = section.into();

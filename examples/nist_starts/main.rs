@@ -2,6 +2,9 @@
 //! and what they cost. The starts, and what SciPy makes of them, come from `starts.py` beside this file:
 //!
 //! `nist_starts FOLDER_OF_DAT FOLDER_OF_STARTS [PROBLEM...]`
+//!
+//! With `--starts=20` in front, each fit searches from 20 starts, of which the one in the file is the declared one
+//! (`Fit::starts`).
 
 #[path = "../nist/file.rs"]
 #[allow(dead_code, reason = "this example reads the files and fits them its own way")]
@@ -10,8 +13,8 @@ mod file;
 mod problems;
 
 use file::File;
-use greybox::optimize::{Domain, LeastSquares, LevenbergMarquardt, Machine, Outcome, Request};
-use greybox::{Error, Fit, Model, Nothing, Objective, Signals, free};
+use greybox::optimize::{Domain, LeastSquares, LevenbergMarquardt, Machine, Request};
+use greybox::{Error, Fit, Model, Nothing, Objective, Signals, WarningCode, free};
 use problems::{Predictors, Response, Task};
 use std::path::Path;
 use std::time::Instant;
@@ -20,12 +23,14 @@ use std::time::Instant;
 struct Starts<'a> {
     file: &'a File,
     starts: &'a [Vec<f64>],
+    /// Searches of each fit.
+    searches: usize,
 }
 
-/// Sum of squares, how the search ended, evaluations.
+/// Sum of squares, whether nothing is said against it, evaluations.
 struct Ended {
     squares: f64,
-    outcome: Outcome,
+    silent: bool,
     evaluations: u64,
 }
 
@@ -41,7 +46,7 @@ fn search(objective: &Objective<'_>, start: &[f64]) -> Ended {
             Request::Curvature { x, along } => search.tell_curvature(objective.curvature(x, along)),
             Request::Ended(outcome) => {
                 let squares = search.linearization().map_or(f64::INFINITY, |linear| 2.0 * linear.cost);
-                return Ended { squares, outcome, evaluations: evaluations - 1 };
+                return Ended { squares, silent: outcome.converged(), evaluations: evaluations - 1 };
             }
         }
     }
@@ -58,14 +63,31 @@ impl Task for Starts<'_> {
         let objective = problem.objective()?;
         let certified =
             2.0 * objective.linearize(&objective.start()).map_err(|e| Error::Optimizer(e.to_string()))?.cost;
-        Ok((certified, self.starts.iter().map(|start| search(&objective, start)).collect()))
+        let many = |start: &Vec<f64>| {
+            let value = |i: usize| start.get(i).copied().unwrap_or(f64::NAN);
+            let parameters = M::Parameters::from_fn(|i| free(value(i)));
+            let found = Fit::new(model, &record).parameters(parameters).starts(self.searches).run();
+            found.map_or(Ended { squares: f64::INFINITY, silent: false, evaluations: 0 }, |found| {
+                let codes = [WarningCode::MinimumFoundOnce, WarningCode::RivalMinimum];
+                let doubted = found.warnings.iter().any(|warning| codes.contains(&warning.code));
+                let evaluations = found.starts.as_ref().map_or(0, |starts| starts.evaluations);
+                Ended { squares: 2.0 * found.cost, silent: found.outcome.converged() && !doubted, evaluations }
+            })
+        };
+        let ended = match self.searches {
+            1 => self.starts.iter().map(|start| search(&objective, start)).collect(),
+            _ => self.starts.iter().map(many).collect(),
+        };
+        Ok((certified, ended))
     }
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [folder, starts, wanted @ ..] = &arguments[..] else {
-        return Err("usage: nist_starts FOLDER_OF_DAT FOLDER_OF_STARTS [PROBLEM...]".into());
+    let searches = arguments.first().and_then(|first| first.strip_prefix("--starts=")).map(str::parse).transpose()?;
+    let arguments = &arguments[usize::from(searches.is_some())..];
+    let [folder, starts, wanted @ ..] = arguments else {
+        return Err("usage: nist_starts [--starts=N] FOLDER_OF_DAT FOLDER_OF_STARTS [PROBLEM...]".into());
     };
     println!(
         "starts           of  right  wrong without a word  evaluations of right ones, median, and all   ms/search"
@@ -83,13 +105,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let starts = std::fs::read_to_string(path)?.lines().map(numbers).collect::<Result<Vec<_>, _>>()?;
         let file = File::read(&Path::new(folder).join(format!("{name}.dat")))?;
         let begin = Instant::now();
-        let task = Starts { file: &file, starts: &starts };
+        let task = Starts { file: &file, starts: &starts, searches: searches.unwrap_or(1) };
         let (certified, all) = problems::by_name(name, task).ok_or("not a known problem")??;
         let time = begin.elapsed().as_secs_f64() * 1e3 / all.len() as f64;
         let is_right = |ended: &&Ended| ended.squares <= certified * (1.0 + 1e-4) + 1e-22;
         let mut right: Vec<u64> = all.iter().filter(is_right).map(|ended| ended.evaluations).collect();
         right.sort_unstable();
-        let silent = all.iter().filter(|ended| !is_right(ended) && ended.outcome.converged()).count();
+        let silent = all.iter().filter(|ended| !is_right(ended) && ended.silent).count();
         let median = right.get(right.len() / 2).copied().unwrap_or(0);
         let sum: u64 = all.iter().map(|ended| ended.evaluations).sum();
         let count = all.len();

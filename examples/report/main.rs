@@ -6,7 +6,7 @@
 
 use argmin::core::observers::ObserverMode;
 use clap::Parser;
-use greybox::diagnose::{Convergence, Resampling, bootstrap, profile, restarts};
+use greybox::diagnose::{Convergence, Resampling, bootstrap, profile};
 use greybox::models::{Axis, ControlledAxisMotion, PositioningLoop};
 use greybox::report::{Origin, Section};
 use greybox::{CsvFile, ExperimentOf, Fit, Hold, Model, Of, Parameter, Report, fixed, free};
@@ -33,9 +33,9 @@ struct Arguments {
     /// Adds so many refits of resampled records.
     #[arg(long, value_name = "REFITS")]
     bootstrap: Option<usize>,
-    /// Adds so many searches from other starts.
-    #[arg(long, value_name = "SEARCHES")]
-    starts: Option<usize>,
+    /// Searches from so many starts.
+    #[arg(long, value_name = "SEARCHES", default_value_t = 1)]
+    starts: usize,
 }
 
 fn main() -> ExitCode {
@@ -80,6 +80,7 @@ fn reported<M: Model + Clone>(
     let (convergence, counter) = (Convergence::default(), Arc::new(AtomicU64::new(0)));
     let problem = Fit::new(model, record)
         .parameters(start)
+        .starts(arguments.starts)
         .cancel(stop.clone())
         .counter(counter.clone())
         .observe(terminal::Search(terminal::spinner("fit")), ObserverMode::Always)
@@ -101,11 +102,6 @@ fn reported<M: Model + Clone>(
         bar.inc(1);
     }
     bar.finish_and_clear();
-    if let Some(searches) = arguments.starts.filter(|_| going()) {
-        let bar = terminal::counted(searches, "searches from other starts", &counter);
-        report = with(report, restarts(&problem, &estimate, searches, 10.0, 1).map(Section::from))?;
-        bar.finish_and_clear();
-    }
     if let Some(refits) = arguments.bootstrap.filter(|_| going()) {
         let bar = terminal::counted(refits, "refits of resampled records", &counter);
         report = with(report, bootstrap(&problem, &estimate, Resampling::Blocks(0), refits, 1).map(Section::from))?;

@@ -21,7 +21,7 @@ impl fmt::Display for Summary {
         let line = |f: &mut fmt::Formatter<'_>, text: &str, indent: usize| {
             writeln!(f, "{:indent$}{}", "", wrapped(text, indent, indent + 2))
         };
-        line(f, &format!("Verdict: {}. Search: {}.", self.severity(), self.outcome), 0)?;
+        line(f, &format!("Verdict: {}. Search: {}; {}.", self.severity(), self.outcome, self.searches()), 0)?;
         if !self.outcome.converged() {
             line(f, self.outcome.advice(), 2)?;
         }

@@ -36,6 +36,12 @@ pub enum WarningCode {
     CoarseStep,
     /// Intervals of a search that did not end at a minimum.
     NotAtMinimum,
+    /// One of several starts led to the estimate.
+    MinimumFoundOnce,
+    /// Another minimum explains the data as well.
+    RivalMinimum,
+    /// The declared start leads to another minimum.
+    DeclaredStartElsewhere,
     /// The checkpoint could not be written.
     CheckpointNotWritten,
     /// The errors are autocorrelated.

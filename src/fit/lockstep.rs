@@ -11,17 +11,17 @@ use std::time::Instant;
 static NEVER: Control = Control::NEVER;
 
 /// A search that has not ended.
-struct Search<'p> {
+pub(super) struct Search<'p> {
     rounds: Rounds<'p>,
-    objective: Objective<'p>,
-    machine: Box<dyn Machine + Send>,
+    pub objective: Objective<'p>,
+    pub machine: Box<dyn Machine + Send>,
     name: String,
     iterations: u64,
     evaluations: u64,
 }
 
 /// The state of one record's fit.
-enum Stage<'p> {
+pub(super) enum Stage<'p> {
     Searching(Box<Search<'p>>),
     Ended(Box<SearchEnd>),
     /// To be fitted by itself: its start cannot be evaluated, and the single fit gives the detailed error.
@@ -29,7 +29,7 @@ enum Stage<'p> {
 }
 
 impl<'p> Search<'p> {
-    fn new(rounds: Rounds<'p>) -> Self {
+    pub fn new(rounds: Rounds<'p>) -> Self {
         let objective = rounds.objective();
         let mut machine = rounds.next.machine();
         machine.begin(rounds.coordinates.clone(), Domain::of(&objective));
@@ -38,15 +38,20 @@ impl<'p> Search<'p> {
     }
 
     /// The point at which it requests cost and slopes.
-    fn requested(&self) -> Option<At<'_>> {
+    pub fn requested(&self) -> Option<At<'_>> {
         match self.machine.request() {
             Request::Linearize(x) => Some((&self.objective, x)),
             _ => None,
         }
     }
 
+    /// Trial steps so far.
+    pub fn trials(&self) -> u64 {
+        self.rounds.iterations() + self.iterations
+    }
+
     /// Passes on the evaluation and advances the search to its next request.
-    fn tell(mut self: Box<Self>, answer: Result<Linearization, Infeasible>) -> Stage<'p> {
+    pub fn tell(mut self: Box<Self>, answer: Result<Linearization, Infeasible>) -> Stage<'p> {
         self.evaluations += 1;
         match (self.machine.linearization().is_some(), &answer) {
             (false, Err(_)) => return Stage::Alone,
@@ -92,7 +97,7 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
     let begin = Instant::now();
     let controls: Vec<Control> = problems.iter().map(|problem| problem.control(begin)).collect();
     let plain: Vec<Objective<'_>> = problems.iter().zip(&controls).map(|(p, control)| p.in_units(control)).collect();
-    let first = |plain| match Rounds::new(plain, &plain.problem.settings.optimizer) {
+    let first = |plain| match Rounds::new(plain, &plain.problem.settings.optimizer, plain.problem.unknowns.start()) {
         Ok(rounds) => Stage::Searching(Box::new(Search::new(rounds))),
         Err(_) => Stage::Alone,
     };

@@ -1,6 +1,7 @@
 //! Running a problem: search, estimate at a given point, objective, prediction.
 
 use super::search::{search, start_error};
+use super::starts::search_from_many;
 use crate::error::Error;
 use crate::estimate::{NoiseModel, Summary};
 use crate::judge::{SearchEnd, conclude, noise};
@@ -27,7 +28,10 @@ impl Problem<'_> {
         settings.optimizer.check()?;
         let control = self.control(begin);
         let plain = self.in_units(&control);
-        let end = search(&plain, &settings.optimizer)?;
+        let end = match settings.starts {
+            1 => search(&plain, &settings.optimizer)?,
+            count => search_from_many(&plain, &settings.optimizer, count)?,
+        };
         // The time limit does not apply to the conclusion.
         let objective = plain.with(end.whitening.clone());
         let objective = Objective { memory: end.memory.clone(), control: &NEVER, ..objective };
@@ -81,6 +85,7 @@ impl Problem<'_> {
             name: "search by argmin".to_owned(),
             write_error: None,
             memory: objective.memory.clone(),
+            starts: None,
         };
         conclude(&objective.with(whitening), &end, begin.elapsed().as_secs_f64())
     }

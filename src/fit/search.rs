@@ -15,10 +15,9 @@ const NOISE_ROUNDS: u32 = 100;
 /// Searches from the start, or from a checkpoint. `plain` leaves errors in the units of the outputs.
 pub(super) fn search(plain: &Objective<'_>, optimizer: &Arc<dyn Optimizer>) -> Result<SearchEnd, Error> {
     let problem = plain.problem;
-    let Some((path, every)) = &problem.settings.checkpoint else {
-        return Rounds::new(plain, optimizer)?.run(None);
+    let Some(mut checkpoint) = checkpoint(problem, optimizer)? else {
+        return Rounds::new(plain, optimizer, problem.unknowns.start())?.run(None);
     };
-    let mut checkpoint = CheckpointFile::new(path.clone(), *every, fingerprint(problem), optimizer.settings()?);
     let mut rounds = match optimizer.resume(&checkpoint)? {
         Some((place, iterations, saved)) if place.len() == problem.unknowns.start().len() => {
             checkpoint.before = iterations;
@@ -33,6 +32,17 @@ pub(super) fn search(plain: &Objective<'_>, optimizer: &Arc<dyn Optimizer>) -> R
     };
     rounds.iterations = checkpoint.before;
     rounds.run(Some(checkpoint))
+}
+
+/// The checkpoint of a search with this optimizer, if one is asked for.
+pub(super) fn checkpoint(
+    problem: &Problem<'_>,
+    optimizer: &Arc<dyn Optimizer>,
+) -> Result<Option<CheckpointFile>, Error> {
+    let file = |(path, every): &(std::path::PathBuf, u64)| {
+        Ok(CheckpointFile::new(path.clone(), *every, fingerprint(problem), optimizer.settings()?))
+    };
+    problem.settings.checkpoint.as_ref().map(file).transpose()
 }
 
 /// Searches with fixed noise, one after the other, with the noise estimated between them.
@@ -52,10 +62,10 @@ pub(super) struct Rounds<'r> {
 }
 
 impl<'r> Rounds<'r> {
-    /// From the start. With noise estimated at the start, the first round need not find an exact minimum.
-    pub fn new(plain: &'r Objective<'r>, optimizer: &Arc<dyn Optimizer>) -> Result<Self, Error> {
+    /// From a start. With noise estimated there, the first round need not find an exact minimum.
+    pub fn new(plain: &'r Objective<'r>, optimizer: &Arc<dyn Optimizer>, start: Vec<f64>) -> Result<Self, Error> {
         let first = noise::is_estimated(plain).then(|| optimizer.rough());
-        Rounds::from(plain, optimizer, plain.problem.unknowns.start(), first)
+        Rounds::from(plain, optimizer, start, first)
     }
 
     /// From a point; `first` is the search of the first round, if it differs.
@@ -94,6 +104,11 @@ impl<'r> Rounds<'r> {
                 return Ok(end);
             }
         }
+    }
+
+    /// Trial steps of the rounds that have ended.
+    pub fn iterations(&self) -> u64 {
+        self.iterations
     }
 
     /// The objective of the next round.
@@ -139,6 +154,7 @@ impl<'r> Rounds<'r> {
             name: result.name,
             write_error: None,
             memory: self.memory.clone(),
+            starts: None,
         })
     }
 }
@@ -201,6 +217,7 @@ fn fingerprint(problem: &Problem<'_>) -> String {
         }
     }
     format!("{:?}{:?}", problem.unknowns.parameters, problem.unknowns.row).hash(&mut hash);
+    settings.starts.hash(&mut hash);
     settings.weights.as_ref().map(|weights| weights.describe()).hash(&mut hash);
     settings.loss.as_ref().map(|loss| loss.describe()).hash(&mut hash);
     let noise: &Noise = &settings.noise;

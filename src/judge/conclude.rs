@@ -6,8 +6,8 @@ use super::residual_pass::{Residuals, reason, residual_pass};
 use super::{noise, sandwich};
 use crate::error::Error;
 use crate::estimate::{
-    CovarianceMethod, ExperimentEstimate, Knowledge, Method, NoiseModel, OutputEstimate, ParameterEstimate, Summary,
-    Unknown, student,
+    CovarianceMethod, ExperimentEstimate, Knowledge, Method, NoiseModel, OutputEstimate, ParameterEstimate, Starts,
+    Summary, Unknown, student,
 };
 use crate::information::{Covariance, Undetermined};
 use crate::layout::{Kind, Quantity};
@@ -36,6 +36,8 @@ pub(crate) struct SearchEnd {
     pub write_error: Option<String>,
     /// Carries at the begins of the segments there.
     pub memory: Memory,
+    /// What searches from other starts found, if there were any.
+    pub starts: Option<Starts>,
 }
 
 /// The end of a search, and the quantities derived from it.
@@ -111,6 +113,7 @@ pub(crate) fn conclude_from(
         },
         directions,
         outcome: end.outcome,
+        starts: end.starts.clone(),
         warnings,
         cost: linear.cost,
         measurements,

@@ -48,6 +48,9 @@ impl Judgement<'_> {
                 "standard errors and intervals are those of a minimum, where the search did not arrive".to_owned();
             warnings.push(Warning { code: WarningCode::NotAtMinimum, severity: Severity::NotUsable, text });
         }
+        if let Some(starts) = &self.end.starts {
+            warnings.extend(super::starts::warnings(starts, self.residuals.measured));
+        }
         if let Some(write_error) = &self.end.write_error {
             let text = format!("the checkpoint could not be written ({write_error}); the search went on without it");
             warnings.push(Warning { code: WarningCode::CheckpointNotWritten, severity: Severity::Usable, text });

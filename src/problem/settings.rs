@@ -15,6 +15,9 @@ use std::sync::atomic::{AtomicBool, AtomicU64};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+/// All searches of a fit are in memory together.
+const MOST_STARTS: usize = 100_000;
+
 pub(crate) type Observer = Arc<Mutex<Box<dyn Observe<LeastSquaresState> + Send>>>;
 
 /// The weight of each sample of a record.
@@ -40,6 +43,7 @@ pub struct Settings<'a> {
     pub(crate) observers: Vec<(Observer, ObserverMode)>,
     pub(crate) checkpoint: Option<(PathBuf, u64)>,
     pub(crate) optimizer: Arc<dyn Optimizer>,
+    pub(crate) starts: usize,
 }
 
 impl Default for Settings<'_> {
@@ -55,6 +59,7 @@ impl Default for Settings<'_> {
             observers: vec![],
             checkpoint: None,
             optimizer: Arc::new(<LevenbergMarquardt>::default()),
+            starts: 1,
         }
     }
 }
@@ -92,13 +97,20 @@ impl<'a> Settings<'a> {
         self
     }
 
+    /// Searches from so many starts and keeps the best end; the first is the declared one
+    /// ([`Fit::starts`](crate::Fit::starts)).
+    pub fn starts(mut self, count: usize) -> Self {
+        self.starts = count;
+        self
+    }
+
     /// Stops the search at its best point so far when the flag is set.
     pub fn cancel(mut self, flag: Arc<AtomicBool>) -> Self {
         self.cancel = Some(flag);
         self
     }
 
-    /// Adds one to the counter whenever a search of a diagnosis that makes many (restarts, bootstrap) has ended.
+    /// Adds one to the counter whenever a refit of a bootstrap has ended.
     pub fn counter(mut self, counter: Arc<AtomicU64>) -> Self {
         self.counter = Some(counter);
         self
@@ -142,6 +154,10 @@ impl<'a> Settings<'a> {
                 let what = format!("the noise of output `{}`", layout.outputs[j].name);
                 return Err(Error::NotPositive { what, value: sigma[j] });
             }
+        }
+        if !(1..=MOST_STARTS).contains(&self.starts) {
+            let count = self.starts;
+            return Err(Error::Option(format!("a fit from {count} starts was asked for; take 1 to {MOST_STARTS}")));
         }
         self.loss.as_ref().map_or(Ok(()), |loss| loss.check())?;
         if let Some(filter) = &self.prefilter {

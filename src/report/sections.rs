@@ -7,6 +7,7 @@ mod parameters;
 mod records;
 mod reproduce;
 mod residuals;
+mod starts;
 
 use super::facts::Facts;
 use crate::section::Section;
@@ -19,6 +20,7 @@ pub(super) fn all(facts: &Facts) -> Vec<Section> {
     sections.extend(records::sections(facts));
     sections.extend(residuals::section(facts));
     sections.push(identifiability::section(facts));
+    sections.extend(starts::section(facts));
     sections.extend([data::section(facts), reproduce::section(facts)]);
     sections
 }

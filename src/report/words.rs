@@ -33,7 +33,7 @@ pub(super) fn sign_of_reason(severity: Severity) -> &'static str {
 /// How the search ended, and what to do about it if it ended badly.
 pub(super) fn search(report: &Report) -> String {
     let estimate = &report.estimate;
-    let mut text = format!("Search: {}.", estimate.outcome);
+    let mut text = format!("Search: {}; {}.", estimate.outcome, estimate.searches());
     if !estimate.outcome.converged() {
         text = format!("{text} {}", estimate.outcome.advice());
     }

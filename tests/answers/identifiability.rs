@@ -2,7 +2,7 @@
 
 use crate::random::Random;
 use crate::shared::shared;
-use greybox::diagnose::{End, identifiability, profile, restarts};
+use greybox::diagnose::{End, identifiability, profile};
 use greybox::optimize::Severity;
 use greybox::{Butterworth, Horizon, zero_phase};
 use greybox::{Estimate, Experiment, Fit, Kind, Knowledge, Model, Nothing, Scalar, Time, fixed, free, signals};
@@ -110,8 +110,9 @@ fn a_profile_follows_the_bound() {
     {
         println!("{lower} {low} {high} {upper}");
     }
-    let again = restarts(&problem, &estimate, 8, 3.0, 1).unwrap();
-    assert_eq!((again.severity, again.better.is_none(), again.failed), (Severity::Usable, true, 0), "{again:?}");
+    let again = Fit::new(&Binding, &record).parameters(parameters).starts(8).run().unwrap();
+    let starts = again.starts.as_ref().unwrap();
+    assert_eq!((again.severity(), starts.agreed, starts.failed.len()), (Severity::Usable, 8, 0), "{starts:?}");
 }
 
 /// Known one-sidedly, a profile still covers 93 to 97 %: 1,000 records, binomial spread 0.7 %.

@@ -2,7 +2,7 @@
 
 use crate::random::Random;
 use greybox::diagnose::residuals::examine;
-use greybox::diagnose::{Compared, Convergence, DataUse, Iteration, bands, profile, restarts};
+use greybox::diagnose::{Compared, Convergence, DataUse, Iteration, bands, profile};
 use greybox::optimize::Severity;
 use greybox::report::{Drawing, Layer, Plot, Section, Style, Timeline};
 use greybox::{Error, Experiment, ExperimentOf, Fit, Model, Report, Scalar, Time, free, signals};
@@ -345,12 +345,13 @@ fn models_are_compared_on_both_kinds_of_data() {
 #[test]
 fn starts_and_iterations_are_drawn() {
     let record = [record(even(200), 0.02, 44)];
-    let problem = Fit::new(&Lag, &record).parameters(branch()).problem().unwrap();
+    let problem = Fit::new(&Lag, &record).parameters(branch()).starts(12).problem().unwrap();
     let estimate = problem.run().unwrap();
-    let found = restarts(&problem, &estimate, 12, 3.0, 5).unwrap();
+    let found = estimate.starts.as_ref().unwrap();
     let ended: u64 = found.minima.iter().map(|minimum| minimum.searches).sum();
-    assert_eq!(ended + found.failed, 12);
-    let section = Section::from(&found);
+    assert_eq!(ended + found.failed.len() as u64, 12);
+    let report = Report::new(&problem, &estimate).unwrap();
+    let section = report.sections.iter().find(|section| section.id == "starts").unwrap();
     let Layer::Line { points, .. } = &layers(&section.plots[0])[0] else { panic!() };
     assert_eq!(points.last().unwrap().0, ended as f64);
     assert!(points.windows(2).all(|pair| pair[0].1 <= pair[1].1));

@@ -1,6 +1,5 @@
 //! Failures that other programs do not report: each is named here.
 
-use greybox::diagnose::restarts;
 use greybox::optimize::Severity;
 use greybox::{
     Error, Estimate, Experiment, Fit, Kind, Knowledge, Model, Nothing, Report, Scalar, Time, fixed, free, signals,
@@ -73,17 +72,12 @@ fn a_guess_far_off_arrives_or_is_named() {
             let tau = if transformed { free(guess).log() } else { free(guess) };
             let record = record(0..0);
             let fit = Fit::new(&FirstOrder, &record).parameters(Lag { k: free(1.0), tau });
-            let problem = match fit.problem() {
-                Ok(problem) => problem,
-                Err(error) => panic!("{error}"),
-            };
-            match problem.run().and_then(Estimate::<FirstOrder>::of) {
+            match fit.starts(16).run() {
                 Ok(estimate) => {
                     let arrived = (estimate.parameters.tau / 0.05 - 1.0).abs() < 0.01;
-                    let again = restarts(&problem, &estimate, 16, 1000.0, 1).unwrap();
-                    let said = estimate.severity().max(again.severity);
-                    println!("{guess} {transformed}: tau = {} {said:?} {}", estimate.parameters.tau, again.meaning);
-                    assert!(arrived || said == Severity::NotUsable, "{estimate}\n{again:?}");
+                    let (tau, starts) = (estimate.parameters.tau, &estimate.starts);
+                    println!("{guess} {transformed}: tau = {tau} {:?} {starts:?}", estimate.severity());
+                    assert!(arrived || estimate.severity() == Severity::NotUsable, "{estimate}\n{starts:?}");
                 }
                 Err(error) => {
                     println!("{guess} {transformed}: {error}");
@@ -166,7 +160,6 @@ fn what_is_known_together_still_counts() {
 mod emps {
     use super::*;
     use crate::shared::shared;
-    use greybox::diagnose::Restarts;
 
     signals! { struct Motion { q: "m", v: "m/s" } }
     signals! { struct Position { q: "m" } }
@@ -192,7 +185,7 @@ mod emps {
         }
     }
 
-    /// Simulated from a bad start, the search may end at some mass that is wrong; then the estimate or its restarts say so.
+    /// Simulated from a bad start, the search may end at some mass that is wrong; then it says so.
     #[test]
     fn a_wrong_mass_is_named() {
         let Some(path) = shared("emps/emps.csv") else { return };
@@ -205,14 +198,10 @@ mod emps {
         let record = record.initial(Motion { q: fixed(rows[0][2]), v: fixed(0.0) });
         for m in [13.0, 500.0] {
             let parameters = Slide { m: free(m), fv: free(100.0), fc: free(10.0), offset: free(0.0) };
-            let problem = Fit::new(&Emps, &record).parameters(parameters).problem().unwrap();
-            let estimate = Estimate::<Emps>::of(problem.run().unwrap()).unwrap();
+            let estimate = Fit::new(&Emps, &record).parameters(parameters).starts(6).run().unwrap();
             println!("{estimate}");
             let found = (estimate.parameters.m / 95.1 - 1.0).abs() < 0.05;
-            let again: Restarts = restarts(&problem, &estimate, 6, 3.0, 1).unwrap();
-            let said = estimate.severity().max(again.severity);
-            println!("from {m}: m = {} {said:?} {again:?}", estimate.parameters.m);
-            assert!(found || said == Severity::NotUsable, "{estimate}\n{again:?}");
+            assert!(found || estimate.severity() == Severity::NotUsable, "{estimate}\n{:?}", estimate.starts);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Time limit and flag hold for what is asked of an estimate, too, where that is further searches.
 
-use greybox::diagnose::{Resampling, bootstrap, profile, restarts};
+use greybox::diagnose::{Resampling, bootstrap, profile};
 use greybox::*;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -41,7 +41,6 @@ fn diagnoses_that_search_stop_with_the_fit() {
         let errors = [
             profile(problem, &estimate, "a", 0.95).unwrap_err().to_string(),
             bootstrap(problem, &estimate, Resampling::Residuals, 100, 1).unwrap_err().to_string(),
-            restarts(problem, &estimate, 8, 3.0, 1).unwrap_err().to_string(),
         ];
         for error in errors {
             assert!(error.contains(word), "{error}");

@@ -19,4 +19,5 @@ mod recovery;
 mod segments;
 #[path = "../common/shared.rs"]
 mod shared;
+mod starts;
 mod user_code;

@@ -171,10 +171,8 @@ fn chapter_10_waterfall() -> Outcome {
     let run = simulate(&Mass, &Spring { k: 40.0, d: 0.1 }, &Swing { x: 0.0, v: 0.0 }, time, &pushes)?;
     let record = run.with_noise(Position { x: 0.02 }, 1).experiment(&Mass)?;
     let record = record.initial(Swing { x: fixed(0.0), v: fixed(0.0) });
-    let guess = Spring { k: free(60.0).log(), d: fixed(0.1) };
-    let problem = Fit::new(&Mass, &record).parameters(guess).problem()?;
+    let guess = Spring { k: free(60.0).log().within(10.0, 100.0), d: fixed(0.1) };
+    let problem = Fit::new(&Mass, &record).parameters(guess).starts(20).problem()?;
     let estimate = problem.run()?;
-    let others = diagnose::restarts(&problem, &estimate, 40, 5.0, 1)?;
-    let section = Section::from(others);
-    check("waterfall", section.all_plots().first().ok_or("no plot")?)
+    check("waterfall", plot(&Report::new(&problem, &estimate)?.sections, "starts"))
 }

@@ -1,0 +1,204 @@
+//! Searches from several starts, side by side: [`Fit::starts`](super::Fit::starts).
+
+mod draw;
+mod minima;
+mod progress;
+
+use super::lockstep::{Search, Stage};
+use super::search::{Rounds, checkpoint, start_error};
+use crate::error::Error;
+use crate::judge::SearchEnd;
+use crate::optimize::{Infeasible, LeastSquares, Linearization};
+use crate::problem::{At, CheckpointFile, Objective, Optimizer, each, linearize_together};
+use minima::{Comparison, End};
+use progress::{Places, Progress};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// So many searches of a single record are run in lanes; fewer have more of the lanes with each record cut into segments.
+const TOGETHER: usize = 4;
+/// A search that is above the best minimum is given up after so many times the trial steps of the median search that found a
+/// minimum, if a quarter of the searches have found one, and after so many at the least.
+const PATIENCE: u64 = 10;
+const LEAST_TRIALS: u64 = 100;
+const QUARTER: usize = 4;
+
+type Answer = Result<Linearization, Infeasible>;
+
+/// A search from one of the starts.
+enum Run<'p> {
+    Searching(Box<Search<'p>>),
+    Ended { end: Box<SearchEnd>, level: f64 },
+    Failed(String),
+}
+
+/// Searches from the declared start and others; the best end, with what all of them found.
+pub(super) fn search_from_many(
+    plain: &Objective<'_>,
+    optimizer: &Arc<dyn Optimizer>,
+    count: usize,
+) -> Result<SearchEnd, Error> {
+    let starts = draw::starts(plain, count);
+    let file = checkpoint(plain.problem, optimizer)?;
+    let resumed = file.as_ref().map(CheckpointFile::load::<Places>).transpose()?.flatten();
+    let (cycle, places) = match resumed {
+        Some((_, cycle, Some(places))) if places.0.len() == count => (cycle, places.0),
+        _ => (0, starts.iter().cloned().map(Ok).collect::<Vec<_>>()),
+    };
+    let begin = |i: usize| begin(plain, optimizer, &places[i]);
+    let runs = each(count, begin);
+    let mut searches = Searches { plain, comparison: Comparison::new(plain), runs, cycle, wide: is_wide(plain) };
+    if let Some(file) = &file {
+        // Written at once, so that a path that cannot be written is reported before the search.
+        progress::write(&searches, file)?;
+    }
+    searches.run(file.as_ref());
+    let ends: Vec<Result<SearchEnd, String>> = searches.runs.into_iter().map(Run::end).collect();
+    let Some((best, found)) = minima::found(plain, &starts, &ends) else {
+        return Err(declared_error(plain, &starts[0]));
+    };
+    let end = ends.into_iter().nth(best).and_then(Result::ok).ok_or_else(|| declared_error(plain, &starts[0]))?;
+    Ok(SearchEnd { starts: Some(found), write_error: file.and_then(|file| file.write_error()), ..end })
+}
+
+/// Why nothing came of any start: the error of the declared one.
+fn declared_error(plain: &Objective<'_>, declared: &[f64]) -> Error {
+    let error = plain.linearize(declared).err();
+    start_error(plain, declared, error.unwrap_or(Infeasible::Failed(String::new())))
+}
+
+fn begin<'p>(plain: &'p Objective<'p>, optimizer: &Arc<dyn Optimizer>, place: &Result<Vec<f64>, String>) -> Run<'p> {
+    let place = match place {
+        Ok(place) => place.clone(),
+        Err(reason) => return Run::Failed(reason.clone()),
+    };
+    match Rounds::new(plain, optimizer, place) {
+        Ok(rounds) => Run::Searching(Box::new(Search::new(rounds))),
+        Err(error) => Run::Failed(error.to_string()),
+    }
+}
+
+/// Whether single records run in more than one lane.
+fn is_wide(plain: &Objective<'_>) -> bool {
+    let problem = plain.problem;
+    let single = problem.records.len() == 1 && problem.settings.prefilter.is_none();
+    single && problem.sweep.lanes(&problem.records[0], &problem.unknowns.seeds(0)) > 1
+}
+
+impl<'p> Run<'p> {
+    /// Passes on an evaluation. One that fails at the start is told why.
+    fn told(self, answer: Answer, plain: &Objective<'_>, comparison: &Comparison) -> Run<'p> {
+        let Run::Searching(search) = self else { return self };
+        if let (None, Err(error)) = (search.machine.linearization(), &answer) {
+            return Run::Failed(start_error(plain, search.machine.place(), error.clone()).to_string());
+        }
+        match search.tell(answer) {
+            Stage::Searching(search) => Run::Searching(search),
+            Stage::Ended(end) => match End::new(plain, comparison, &end) {
+                Some(End { level, .. }) => Run::Ended { level, end },
+                None => Run::Failed("its end cannot be evaluated".to_owned()),
+            },
+            Stage::Alone => Run::Failed("its start cannot be evaluated".to_owned()),
+        }
+    }
+
+    /// Where it stands, and its comparable cost there; `None` where it has none.
+    fn place(&self, comparison: &Comparison) -> Option<(&[f64], f64)> {
+        match self {
+            Run::Searching(search) => {
+                let cost = search.machine.linearization()?.cost;
+                Some((search.machine.place(), comparison.level(&search.objective, cost)))
+            }
+            Run::Ended { end, level } => Some((&end.coordinates, *level)),
+            Run::Failed(_) => None,
+        }
+    }
+
+    fn end(self) -> Result<SearchEnd, String> {
+        match self {
+            Run::Ended { end, .. } => Ok(*end),
+            Run::Failed(reason) => Err(reason),
+            Run::Searching(_) => Err("it was not run to its end".to_owned()),
+        }
+    }
+}
+
+/// All searches of a fit.
+struct Searches<'p> {
+    plain: &'p Objective<'p>,
+    comparison: Comparison,
+    runs: Vec<Run<'p>>,
+    /// Evaluations that each search was given so far.
+    cycle: u64,
+    wide: bool,
+}
+
+impl<'p> Searches<'p> {
+    fn run(&mut self, file: Option<&CheckpointFile>) {
+        let mut progress = Progress::begin(self);
+        while self.advance() {
+            self.cycle += 1;
+            self.give_up_hopeless();
+            progress.show(self);
+            if let Some(file) = file.filter(|file| self.cycle.is_multiple_of(file.every.max(1))) {
+                file.note(progress::write(self, file));
+            }
+        }
+        if let Some(file) = file {
+            file.note(progress::write(self, file));
+        }
+        progress.end(self);
+    }
+
+    /// Gives each search the evaluation that it requests; false if there was none to give.
+    fn advance(&mut self) -> bool {
+        let requesting = self.runs.iter().enumerate().filter_map(|(i, run)| match run {
+            Run::Searching(search) => Some((i, search.requested()?)),
+            _ => None,
+        });
+        let (requesting, points): (Vec<usize>, Vec<At<'_>>) = requesting.unzip();
+        let answers = match self.wide && points.len() >= TOGETHER {
+            true => linearize_together(&points),
+            false => each(points.len(), |i| points[i].0.linearize(points[i].1)),
+        };
+        let taken = requesting.iter().zip(answers).map(|(&i, answer)| {
+            let run = std::mem::replace(&mut self.runs[i], Run::Failed(String::new()));
+            Mutex::new(Some((run, answer)))
+        });
+        let taken: Vec<_> = taken.collect();
+        let (plain, comparison) = (self.plain, &self.comparison);
+        let told = each(taken.len(), |i| {
+            let (run, answer) = taken[i].lock().unwrap_or_else(PoisonError::into_inner).take()?;
+            Some(run.told(answer, plain, comparison))
+        });
+        for (&i, run) in requesting.iter().zip(told) {
+            self.runs[i] = run.unwrap_or(Run::Failed(String::new()));
+        }
+        !requesting.is_empty()
+    }
+
+    fn give_up_hopeless(&mut self) {
+        let minima = self.runs.iter().filter_map(|run| match run {
+            Run::Ended { end, level } if end.outcome.converged() => Some((*level, end.iterations)),
+            _ => None,
+        });
+        let (levels, mut trials): (Vec<f64>, Vec<u64>) = minima.unzip();
+        if trials.len() * QUARTER < self.runs.len() {
+            return;
+        }
+        trials.sort_unstable();
+        let (best, typical) = (levels.into_iter().fold(f64::INFINITY, f64::min), trials[trials.len() / 2]);
+        let most = LEAST_TRIALS.max(PATIENCE * typical);
+        for run in &mut self.runs {
+            let Run::Searching(search) = run else { continue };
+            let Some(linear) = search.machine.linearization() else { continue };
+            let level = self.comparison.level(&search.objective, linear.cost);
+            if search.trials() > most && level > best {
+                let ratio = crate::numeral::number(self.comparison.ratio(level, best), 3);
+                *run = Run::Failed(format!(
+                    "given up after {} steps at {ratio} times the best cost: the median search that found a minimum took {typical}",
+                    search.trials()
+                ));
+            }
+        }
+    }
+}

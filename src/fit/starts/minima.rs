@@ -1,0 +1,166 @@
+//! Which ends of searches are the same minimum, and which is the best.
+
+use crate::estimate::{FailedStart, Minimum, Starts};
+use crate::judge::{SearchEnd, noise};
+use crate::optimize::{LeastSquares, Linearization, Outcome};
+use crate::problem::{Noise, Objective, each};
+
+/// Costs that differ by less than this part are the same.
+const SAME_COST: f64 = 1e-6;
+/// Unknowns that differ by less than this part of a standard error are the same, or by less than this part of themselves.
+const SAME_ERRORS: f64 = 0.1;
+const SAME_DIGITS: f64 = 1e-6;
+
+/// How the costs of ends with different noise levels compare.
+pub(super) struct Comparison {
+    /// Sets of outputs measured together, and at how many samples; where noise levels are estimated.
+    measured: Vec<(Vec<usize>, f64)>,
+    /// Measurements where costs are logarithms of likelihoods; `None` where they are sums.
+    likelihood: Option<f64>,
+}
+
+impl Comparison {
+    pub fn new(plain: &Objective<'_>) -> Self {
+        let records = &plain.problem.records;
+        let here = |e: usize, k: usize| -> Vec<usize> {
+            (0..plain.outputs()).filter(|&j| !records[e].outputs()[j].values[k].is_nan()).collect()
+        };
+        let predicted = plain.problem.settings.noise == Noise::Predicted;
+        let mut measured: Vec<(Vec<usize>, f64)> = vec![];
+        if predicted || noise::is_estimated(plain) {
+            let samples = (0..records.len()).flat_map(|e| (0..records[e].len()).map(move |k| (e, k)));
+            for (e, k) in samples.filter(|&(e, k)| plain.weight(e, k) > 0.0) {
+                let outputs = here(e, k);
+                match measured.iter_mut().find(|(set, _)| *set == outputs) {
+                    Some((_, count)) => *count += 1.0,
+                    None => measured.push((outputs, 1.0)),
+                }
+            }
+        }
+        let count = measured.iter().map(|(outputs, count)| outputs.len() as f64 * count).sum::<f64>();
+        let likelihood = (!measured.is_empty()).then_some(count.max(1.0));
+        if predicted {
+            measured.clear();
+        }
+        Comparison { measured, likelihood }
+    }
+
+    /// The cost of this objective, with the logarithm of its noise levels.
+    pub fn level(&self, objective: &Objective<'_>, cost: f64) -> f64 {
+        let sets = self.measured.iter();
+        cost + sets.map(|(here, count)| 0.5 * count * objective.whitening.log_determinant(here)).sum::<f64>()
+    }
+
+    /// How large one level is relative to another; at most `f64::MAX`.
+    pub fn ratio(&self, level: f64, best: f64) -> f64 {
+        let ratio = match self.likelihood {
+            Some(count) => (2.0 * (level - best) / count).exp(),
+            None if level == best => 1.0,
+            None => level / best,
+        };
+        ratio.min(f64::MAX)
+    }
+}
+
+/// The end of a search, with slopes and comparable cost there.
+pub(super) struct End<'s> {
+    pub search: &'s SearchEnd,
+    linear: Linearization,
+    pub level: f64,
+}
+
+impl<'s> End<'s> {
+    pub fn new(plain: &Objective<'_>, comparison: &Comparison, search: &'s SearchEnd) -> Option<Self> {
+        let objective = plain.with(search.whitening.clone());
+        let linear = search.linear.clone().or_else(|| objective.linearize(&search.coordinates).ok())?;
+        let level = comparison.level(&objective, linear.cost);
+        level.is_finite().then_some(End { search, linear, level })
+    }
+
+    fn is_minimum(&self) -> bool {
+        self.search.outcome.converged()
+    }
+
+    /// By how much costs at this end may differ from what they would be without rounding and tolerances, as a part.
+    fn tolerance(&self) -> f64 {
+        match self.search.outcome {
+            Outcome::Rough { noise, .. } => noise.max(SAME_COST),
+            _ => SAME_COST,
+        }
+    }
+
+    /// Whether another end, not a better one, is the same minimum.
+    fn is(&self, other: &End<'_>, comparison: &Comparison) -> bool {
+        let both_exact = [self, other].iter().all(|end| end.search.outcome == Outcome::Exact);
+        let tolerance = self.tolerance().max(other.tolerance());
+        if !both_exact && comparison.ratio(other.level, self.level) > 1.0 + tolerance {
+            return false;
+        }
+        let (x, other) = (&self.search.coordinates, &other.search.coordinates);
+        let step: Vec<f64> = other.iter().zip(x).map(|(b, a)| b - a).collect();
+        let slope: f64 = self.linear.gradient().iter().zip(&step).map(|(g, d)| g * d).sum();
+        // Norm of the change of the predictions.
+        let change = (-2.0 * (slope + self.linear.predicted_reduction(&step))).max(0.0).sqrt();
+        let sigma = (self.linear.sum_of_squares() / self.linear.rows().max(1) as f64).sqrt();
+        let digits: f64 = self.linear.column_norms().iter().zip(x).map(|(norm, x)| norm * x.abs()).sum();
+        change <= SAME_ERRORS * sigma + SAME_DIGITS * digits
+    }
+}
+
+/// What the searches found: the ends in the order of the starts, each a search or why there is none.
+pub(super) fn found(
+    plain: &Objective<'_>,
+    starts: &[Vec<f64>],
+    ends: &[Result<SearchEnd, String>],
+) -> Option<(usize, Starts)> {
+    let comparison = Comparison::new(plain);
+    let ended = |i: usize| End::new(plain, &comparison, ends[i].as_ref().ok()?);
+    let found: Vec<Option<End<'_>>> = each(ends.len(), ended);
+    let mut order: Vec<usize> = (0..ends.len()).filter(|&i| found[i].is_some()).collect();
+    let level = |i: usize| found[i].as_ref().map_or(f64::INFINITY, |end| end.level);
+    order.sort_by(|&a, &b| level(a).total_cmp(&level(b)));
+    let minimum = |i: &usize| found[*i].as_ref().is_some_and(End::is_minimum);
+    let lowest = *order.first()?;
+    // A search that found no minimum is the best only if it is lower by more than rounding.
+    let best =
+        order.iter().copied().find(minimum).filter(|&i| comparison.ratio(level(i), level(lowest)) <= 1.0 + SAME_COST);
+    let best = best.unwrap_or(lowest);
+    let mut kinds: Vec<Vec<usize>> = vec![];
+    for &i in order.iter().filter(|i| minimum(i)) {
+        let Some(end) = &found[i] else { continue };
+        let is = |kind: &&mut Vec<usize>| found[kind[0]].as_ref().is_some_and(|first| first.is(end, &comparison));
+        match kinds.iter_mut().find(is) {
+            Some(kind) => kind.push(i),
+            None => kinds.push(vec![i]),
+        }
+    }
+    // Of ends that are the same minimum the first start's stands for all: the declared one's, wherever it is one of them.
+    kinds.iter_mut().for_each(|kind| kind.sort_unstable());
+    let best = kinds.iter().find(|kind| kind.contains(&best)).map_or(best, |kind| kind[0]);
+    let named = |x: &[f64]| plain.names().into_iter().zip(plain.problem.unknowns.values(x)).collect::<Vec<_>>();
+    let minima = kinds.iter().filter_map(|kind| {
+        let end = found[kind[0]].as_ref()?;
+        let cost_ratio = comparison.ratio(end.level, level(best));
+        Some(Minimum { cost_ratio, searches: kind.len() as u64, unknowns: named(&end.search.coordinates) })
+    });
+    let failed = starts.iter().zip(ends).filter_map(|(start, end)| {
+        let reason = match end {
+            Ok(end) if end.outcome.converged() => return None,
+            Ok(end) => end.outcome.to_string(),
+            Err(reason) => reason.clone(),
+        };
+        Some(FailedStart { start: named(start), reason })
+    });
+    let agreed = kinds.iter().find(|kind| kind.contains(&best)).map_or(0, Vec::len) as u64;
+    let evaluations = ends.iter().flatten().map(|end| end.evaluations).sum();
+    let declared = kinds.iter().position(|kind| kind.contains(&0));
+    let starts = Starts {
+        tried: starts.len() as u64,
+        agreed,
+        minima: minima.collect(),
+        declared,
+        failed: failed.collect(),
+        evaluations,
+    };
+    Some((best, starts))
+}

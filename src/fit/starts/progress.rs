@@ -1,0 +1,91 @@
+//! Observers and the checkpoint of searches from several starts.
+
+use super::{Run, Searches};
+use crate::error::Error;
+use crate::optimize::LeastSquaresState;
+use crate::problem::{CheckpointFile, Observer};
+use argmin::core::observers::{Observe, ObserverMode};
+use argmin::core::{KV, State};
+use serde::{Deserialize, Serialize};
+use std::sync::PoisonError;
+
+/// What a checkpoint keeps: the point of each search, or why there is none.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Places(pub Vec<Result<Vec<f64>, String>>);
+
+/// Writes the checkpoint.
+pub(super) fn write(searches: &Searches<'_>, file: &CheckpointFile) -> Result<(), Error> {
+    let place = |run: &Run<'_>| match run {
+        Run::Searching(search) => Ok(search.machine.place().to_vec()),
+        Run::Ended { end, .. } => Ok(end.coordinates.clone()),
+        Run::Failed(reason) => Err(reason.clone()),
+    };
+    let places = Places(searches.runs.iter().map(place).collect());
+    let best = best(searches).map_or(vec![], |(place, _)| place.to_vec());
+    file.write(&best, searches.cycle, &places)
+}
+
+/// The best point so far, and its comparable cost.
+fn best<'s>(searches: &'s Searches<'_>) -> Option<(&'s [f64], f64)> {
+    let places = searches.runs.iter().filter_map(|run| run.place(&searches.comparison));
+    places.min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Shows observers the best point so far, after each evaluation of all searches.
+pub(super) struct Progress {
+    state: LeastSquaresState,
+}
+
+impl Progress {
+    pub fn begin(searches: &Searches<'_>) -> Self {
+        let mut progress = Progress { state: LeastSquaresState::new() };
+        progress.update(searches);
+        observed(searches, |observer, _| {
+            // An observer that fails does not stop a fit.
+            let _ = observer.observe_init("searches from several starts", &progress.state, &KV::new());
+        });
+        progress
+    }
+
+    pub fn show(&mut self, searches: &Searches<'_>) {
+        let before = self.state.best_cost;
+        self.update(searches);
+        let is_best = self.state.best_cost < before;
+        let running = searches.runs.iter().filter(|run| matches!(run, Run::Searching(_))).count();
+        let kv = argmin::kv!("running" => running as u64;);
+        observed(searches, |observer, mode| {
+            let wanted = match mode {
+                ObserverMode::Always => true,
+                ObserverMode::Every(n) => self.state.iter.is_multiple_of(n),
+                ObserverMode::NewBest => is_best,
+                ObserverMode::Never => false,
+            };
+            if wanted {
+                let _ = observer.observe_iter(&self.state, &kv);
+            }
+        });
+    }
+
+    pub fn end(&self, searches: &Searches<'_>) {
+        observed(searches, |observer, _| {
+            let _ = observer.observe_final(&self.state);
+        });
+    }
+
+    fn update(&mut self, searches: &Searches<'_>) {
+        self.state.iter = searches.cycle;
+        if let Some((place, level)) = best(searches) {
+            (self.state.param, self.state.cost) = (Some(place.to_vec()), level);
+            if level < self.state.best_cost {
+                (self.state.best_param, self.state.best_cost) = (Some(place.to_vec()), level);
+            }
+        }
+    }
+}
+
+fn observed(searches: &Searches<'_>, mut show: impl FnMut(&mut dyn Observe<LeastSquaresState>, ObserverMode)) {
+    for (observer, mode) in &searches.plain.problem.settings.observers {
+        let observer: &Observer = observer;
+        show(&mut **observer.lock().unwrap_or_else(PoisonError::into_inner), *mode);
+    }
+}

@@ -1,0 +1,46 @@
+//! What searches from other starts say about an estimate.
+
+use crate::estimate::{Minimum, Starts, Warning, WarningCode};
+use crate::numeral::{counted, number};
+use crate::optimize::Severity;
+
+/// 95 % quantile of the chi-square distribution with one degree of freedom: minima whose deviances differ by less cannot be
+/// told apart.
+const INDISTINGUISHABLE: f64 = 3.84;
+
+/// Warnings about an estimate that is the best end of these searches.
+pub(super) fn warnings(starts: &Starts, measurements: u64) -> Vec<Warning> {
+    let Starts { tried, agreed, minima, declared, failed, .. } = starts;
+    let mut warnings = vec![];
+    if *agreed == 1 && *tried > 1 {
+        let (others, none) = (minima.len() - 1, counted(failed.len() as u64, "search"));
+        let text = format!(
+            "only one of {tried} starts led to this minimum ({none} found no minimum, {others} other(s) found): there may be \
+             a better one; try more starts, or give bounds"
+        );
+        warnings.push(Warning { code: WarningCode::MinimumFoundOnce, severity: Severity::UsableWithCare, text });
+    }
+    let at = |minimum: &Minimum| {
+        let places = minimum.unknowns.iter().map(|(name, value)| format!("`{name}` = {}", number(*value, 5)));
+        places.collect::<Vec<_>>().join(", ")
+    };
+    let rival = |minimum: &&Minimum| measurements as f64 * minimum.cost_ratio.ln() < INDISTINGUISHABLE;
+    if let Some(rival) = minima.iter().skip(1).find(rival).filter(|_| *agreed > 0) {
+        let text = format!(
+            "another minimum explains the data as well, with {} times the cost, at {}: bounds or a prior must tell which one \
+             is meant",
+            number(rival.cost_ratio, 6),
+            at(rival)
+        );
+        warnings.push(Warning { code: WarningCode::RivalMinimum, severity: Severity::UsableWithCare, text });
+    }
+    if let Some(declared) = declared.filter(|declared| *declared > 0).and_then(|declared| minima.get(declared)) {
+        let text = format!(
+            "the declared start leads to another minimum, with {} times the cost, at {}",
+            number(declared.cost_ratio, 3),
+            at(declared)
+        );
+        warnings.push(Warning { code: WarningCode::DeclaredStartElsewhere, severity: Severity::Usable, text });
+    }
+    warnings
+}
