@@ -15,7 +15,7 @@ use crate::error::Error;
 use crate::estimate::Estimate;
 use crate::experiment::{ExperimentOf, Sample};
 use crate::functions::Handle;
-use crate::integrate::{Automatic, Integrator, Method};
+use crate::integrate::{Automatic, Esdirk, Integrator, Method, Rk4};
 use crate::layout::{Kind, Layout};
 use crate::loss::Loss;
 use crate::model::Model;
@@ -23,10 +23,10 @@ use crate::optimize::LeastSquaresState;
 use crate::parameter::Parameter;
 use crate::predict::{FreeRun, Prediction, Predictor};
 use crate::prefilter::Butterworth;
-use crate::problem::{Problem, Search, Settings, Weights};
+use crate::problem::{MakeSweep, Problem, Search, Settings, Weights};
 use crate::record::Record;
 use crate::signals::{Of, Signals};
-use crate::sweep::{DualSweep, Loops, ProgramSweep, Sweep};
+use crate::sweep::{DualSweep, Loops, Narrow, ProgramSweep, Sweep};
 use crate::weighting::Weighting;
 use argmin::core::observers::{Observe, ObserverMode};
 use core::marker::PhantomData;
@@ -50,6 +50,7 @@ impl<'a, M: Model> Records<'a, M> {
             experiments: self.experiments,
             parameters,
             stepping: Stepping::new(Automatic::default()),
+            is_default: true,
             predictor: Arc::new(FreeRun),
             settings: Settings::default(),
         }
@@ -100,6 +101,8 @@ pub struct Fit<'a, M: Model> {
     experiments: &'a [ExperimentOf<M>],
     parameters: Of<M::Parameters, Parameter>,
     stepping: Stepping<M>,
+    /// Whether the integrator was not chosen.
+    is_default: bool,
     predictor: Arc<dyn Prediction>,
     settings: Settings<'a>,
 }
@@ -111,9 +114,14 @@ impl<'a, M: Model> Fit<'a, M> {
         Records { model, experiments: records.as_ref() }
     }
 
-    /// Sets the integrator.
+    /// Sets the integrator. It is kept, with a warning if its step moves the answer.
+    ///
+    /// Without it, a fit of a continuous model begins with [`Rk4`], one step per sample. While a finer step would move an
+    /// unknown by more than a tenth of its standard error, or where the start cannot be simulated, it takes 4, 16 and 64 steps
+    /// per sample and then [`Esdirk`]; the estimate names the method
+    /// ([`Method::integrator`](crate::Method)), and is not usable if none is fine enough.
     pub fn integrator(self, integrator: impl Integrator) -> Self {
-        Fit { stepping: Stepping::new(integrator), ..self }
+        Fit { stepping: Stepping::new(integrator), is_default: false, ..self }
     }
 
     /// Sets the predictor, whose prediction error is minimized.
@@ -231,7 +239,8 @@ impl<'a, M: Model> Fit<'a, M> {
         let sweep = sweep(Handle::Borrowed(self.model), &self.stepping, &self.predictor)?;
         let (records, parameters) = (records::<M>(self.experiments), declared::<M>(self.parameters));
         let problem = Problem::new(sweep, records, &parameters, self.settings)?;
-        Estimate::of(problem.run_since(begin)?)
+        let finer = finer(Handle::Borrowed(self.model), self.is_default, &self.predictor);
+        Estimate::of(problem.refining(finer).run_since(begin)?)
     }
 }
 
@@ -243,8 +252,10 @@ impl<'a, M: Model + Clone + 'a> Fit<'a, M> {
     /// As [`run`](Fit::run).
     pub fn problem(self) -> Result<Problem<'a>, Error> {
         let model = Handle::Shared(Arc::new(self.model.clone()));
-        let sweep = sweep(model, &self.stepping, &self.predictor)?;
-        Problem::new(sweep, records::<M>(self.experiments), &declared::<M>(self.parameters), self.settings)
+        let sweep = sweep(model.clone(), &self.stepping, &self.predictor)?;
+        let (records, parameters) = (records::<M>(self.experiments), declared::<M>(self.parameters));
+        let problem = Problem::new(sweep, records, &parameters, self.settings)?;
+        Ok(problem.refining(finer(model, self.is_default, &self.predictor)))
     }
 }
 
@@ -295,6 +306,25 @@ pub(crate) fn sweep<'a, M: Model + 'a>(
         Ok(sweep) => Arc::new(sweep),
         Err(untraceable) => plain(untraceable.reason),
     })
+}
+
+/// The sweeps by the methods that follow a default one that is too coarse.
+fn finer<'a, M: Model + 'a>(
+    model: Handle<'a, M>,
+    is_default: bool,
+    predictor: &Arc<dyn Prediction>,
+) -> Vec<MakeSweep<'a>> {
+    if !is_default || M::KIND != Kind::Continuous || predictor.predicts_variance() {
+        return vec![];
+    }
+    let by = |stepping: Stepping<M>| -> MakeSweep<'a> {
+        let (model, predictor) = (model.clone(), predictor.clone());
+        Arc::new(move || sweep(model.clone(), &stepping, &predictor))
+    };
+    let steps = [4, 16, 64].map(|substeps| by(Stepping::new(Automatic { continuous: Rk4 { substeps } })));
+    let stiff = Esdirk::default();
+    let stiff = by(Stepping { loops: Arc::new(Narrow(stiff)), method: Arc::new(stiff) });
+    steps.into_iter().chain([stiff]).collect()
 }
 
 /// A typed weighting as untyped [`Weights`].

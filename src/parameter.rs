@@ -18,6 +18,7 @@ pub fn fixed(value: f64) -> Parameter {
         prior: None,
         transform: Transform::Identity,
         per_experiment: false,
+        positive: false,
     }
 }
 
@@ -27,6 +28,7 @@ pub fn fixed(value: f64) -> Parameter {
 /// use greybox::{fixed, free};
 /// let rs = free(1.0).within(0.01, 10.0); // estimated, in bounds
 /// let ls = free(2e-3).log(); // positive: estimated as ln(ls)
+/// let j = free(1e-3).positive(); // a value that is not positive would show that model or record are wrong
 /// let ke = free(0.7).prior(0.72, 0.05); // known beforehand to 0.72 +- 0.05
 /// let np = fixed(4.0);
 /// ```
@@ -49,6 +51,9 @@ pub struct Parameter {
     pub transform: Transform,
     /// Whether each experiment has a value of its own (a winding cold and warm).
     pub per_experiment: bool,
+    /// Whether only a positive value has a meaning; an estimate that is not positive is then not usable.
+    #[serde(default)]
+    pub positive: bool,
 }
 
 /// Knowledge from elsewhere: a Gaussian measurement of the parameter in its own unit.
@@ -83,6 +88,12 @@ impl Parameter {
     /// Estimates the logarithm: for positive quantities known to a factor rather than to a difference.
     pub fn log(self) -> Self {
         Parameter { transform: Transform::Log, ..self }
+    }
+
+    /// Declares that only a positive value has a meaning (a resistance, a mass, a friction), from physics. The search is not
+    /// bounded: data that lead it to zero or below contradict the model, and the estimate is then not usable.
+    pub fn positive(self) -> Self {
+        Parameter { positive: true, ..self }
     }
 
     /// Gives each experiment a value of its own.

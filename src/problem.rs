@@ -6,6 +6,7 @@ mod batches;
 mod checkpoint;
 mod control;
 mod curvature;
+mod finer;
 mod linearize;
 mod objective;
 mod pass;
@@ -22,6 +23,8 @@ mod whitening;
 pub(crate) use batches::each;
 pub(crate) use checkpoint::CheckpointFile;
 pub(crate) use control::Control;
+use finer::Finer;
+pub(crate) use finer::MakeSweep;
 pub use objective::Objective;
 pub(crate) use pass::Accumulate;
 pub use search::Search;
@@ -33,7 +36,7 @@ pub(crate) use settings::{Observer, Weights};
 pub use simulate::Simulated;
 pub(crate) use together::{At, gather_together, linearize_together};
 pub use unknowns::Role;
-pub(crate) use unknowns::{Unknowns, Values};
+pub(crate) use unknowns::{Free, Unknowns, Values};
 use weighing::Weighing;
 pub(crate) use whitening::{Noise, Whitening};
 
@@ -59,6 +62,9 @@ pub struct Problem<'a> {
     /// Mean of `psi(z) z` for Gaussian `z`; needed where variances are predicted, one for least squares.
     pub(crate) kappa: f64,
     pub(crate) cuts: Cuts,
+    /// Whether the method was chosen by the library, which then answers for its step.
+    pub(crate) refines: bool,
+    finer: Option<Arc<dyn Finer + 'a>>,
 }
 
 impl<'a> Problem<'a> {
@@ -101,7 +107,8 @@ impl<'a> Problem<'a> {
             _ => 1.0,
         };
         let cuts = Cuts::new(&*sweep, &records, settings.prefilter.is_some());
-        Ok(Problem { sweep, records, prepared, unknowns, settings, kappa, cuts })
+        let (refines, finer) = (false, None);
+        Ok(Problem { sweep, records, prepared, unknowns, settings, kappa, cuts, refines, finer })
     }
 
     fn prepared(sweep: &dyn Sweep, records: &[Record], parameters: &[Parameter]) -> Result<Vec<Prepared>, Error> {
@@ -112,7 +119,7 @@ impl<'a> Problem<'a> {
     /// The same problem with other measurements of the same experiments.
     pub(crate) fn with_records(&self, records: Vec<Record>) -> Result<Self, Error> {
         let prepared = Problem::prepared(&*self.sweep, &records, &self.unknowns.parameters)?;
-        Ok(Problem { records, prepared, ..self.clone() })
+        Ok(Problem { records, prepared, finer: None, ..self.clone() })
     }
 
     /// Every output must have been measured at least once.

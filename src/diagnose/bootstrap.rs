@@ -98,7 +98,7 @@ pub fn bootstrap(
         let records = parts.map(|((record, prediction), residuals)| {
             resampled(record, prediction, draw(residuals, record.len(), resampling, &mut random))
         });
-        let again = problem.with_records(records.collect()).ok()?;
+        let again = objective.problem.with_records(records.collect()).ok()?;
         let again = objective.of(&again, objective.sweep);
         let (place, _) = minimize(Pinned { problem: &again, bounds: again.bounds() }, best.clone())?;
         Some(estimate.unknowns.iter().zip(&place).map(|(u, &c)| u.transform.to_value(c)).collect())

@@ -30,6 +30,8 @@ pub enum WarningCode {
     TimeGaps,
     /// An unknown is held at a bound.
     HeldAtBound,
+    /// A parameter that was declared positive is not.
+    NotPositive,
     /// Unknowns that the data cannot tell apart.
     Unidentified,
     /// A finer step would move an unknown.

@@ -41,7 +41,17 @@ impl<M: Model> Fit<'_, M> {
     /// As [`run`](Fit::run), and a simulation that fails.
     pub fn predict(&self, estimate: &Estimate<M>, record: &ExperimentOf<M>) -> Result<Prediction<M>, Error> {
         let model = crate::functions::Handle::Borrowed(self.model);
-        let sweep = super::sweep(model, &self.stepping, &self.predictor)?;
+        let mut sweep = super::sweep(model.clone(), &self.stepping, &self.predictor)?;
+        // The method of the estimate, where the fit would have come to it by itself.
+        for finer in super::finer(model, self.is_default, &self.predictor) {
+            if sweep.integrator() == estimate.method.integrator {
+                break;
+            }
+            let finer = finer()?;
+            if finer.integrator() == estimate.method.integrator {
+                sweep = finer;
+            }
+        }
         predict(sweep, record.record(), estimate).map(|found| typed(found, record))
     }
 }

@@ -3,9 +3,9 @@
 use super::search::{search, start_error};
 use super::starts::search_from_many;
 use crate::error::Error;
-use crate::estimate::{NoiseModel, Summary};
+use crate::estimate::{NoiseModel, Summary, Warning, WarningCode};
 use crate::judge::{SearchEnd, conclude, noise};
-use crate::optimize::{LeastSquares, LevenbergMarquardt};
+use crate::optimize::{LeastSquares, LevenbergMarquardt, Outcome, Severity};
 use crate::problem::{Control, Objective, Problem, Whitening};
 use std::time::Instant;
 
@@ -22,8 +22,35 @@ impl Problem<'_> {
         self.run_since(Instant::now())
     }
 
-    /// The same; the time limit counts from `begin`.
+    /// The same; the time limit counts from `begin`. A default method whose step moves the answer, or with which the start
+    /// cannot be simulated, gives way to a finer one.
     pub(super) fn run_since(&self, begin: Instant) -> Result<Summary, Error> {
+        let control = self.control(begin);
+        let mut found = self.run_by_method(begin);
+        for finer in self.by_method().skip(1) {
+            let goes_on = match &found {
+                Ok(found) => found.outcome != Outcome::Exact && coarse_step(found).is_some(),
+                Err(error) => matches!(error, Error::Start(_)),
+            };
+            if !goes_on || control.stops() {
+                break;
+            }
+            // What a fixed step can simulate, an adaptive one would only make rough.
+            if found.is_ok() && !finer.sweep.has_fixed_steps() {
+                break;
+            }
+            found = match (found, finer.run_by_method(begin)) {
+                (Ok(before), Ok(again)) if is_better(&before, &again) => Ok(after(&before, again)),
+                (Ok(before), Ok(again)) => return Ok(kept(before, &again)),
+                (Err(_), again @ Ok(_)) => again,
+                (before, Err(_)) => before,
+            };
+        }
+        found
+    }
+
+    /// The same with this method.
+    fn run_by_method(&self, begin: Instant) -> Result<Summary, Error> {
         let settings = &self.settings;
         settings.optimizer.check()?;
         let control = self.control(begin);
@@ -109,6 +136,7 @@ impl Problem<'_> {
         control: &'p Control,
     ) -> Result<(Objective<'p>, Vec<f64>), Error> {
         self.check_estimate(estimate)?;
+        let problem = self.by_name(&estimate.method.integrator);
         let sigma = estimate.sigma();
         let full = estimate.noise_covariance.clone().and_then(Whitening::full);
         // An output without any error gives no noise level.
@@ -116,10 +144,10 @@ impl Problem<'_> {
         let whitening = match estimate.method.noise {
             NoiseModel::Predicted => Whitening::none(sigma.len()),
             _ if noisy => full.unwrap_or(Whitening::Diagonal(sigma)),
-            _ => self.objective()?.whitening,
+            _ => problem.objective()?.whitening,
         };
         let coordinates = estimate.unknowns.iter().map(|u| u.transform.to_coordinate(u.value)).collect();
-        Ok((self.in_units(control).with(whitening), coordinates))
+        Ok((problem.in_units(control).with(whitening), coordinates))
     }
 
     fn check_estimate(&self, estimate: &Summary) -> Result<(), Error> {
@@ -155,6 +183,39 @@ impl Problem<'_> {
         estimate: &Summary,
         record: &crate::record::Record,
     ) -> Result<crate::problem::Simulated, Error> {
-        super::predict::predict(self.sweep.clone(), record, estimate)
+        let problem = self.by_name(&estimate.method.integrator);
+        super::predict::predict(problem.sweep.clone(), record, estimate)
     }
+}
+
+/// The warning that a finer step would move an unknown.
+fn coarse_step(found: &Summary) -> Option<&Warning> {
+    found.warnings.iter().find(|warning| warning.code == WarningCode::CoarseStep)
+}
+
+/// Whether a finer method explains the data no worse than a coarser one: records that were simulated with the coarser step
+/// are explained by that alone.
+fn is_better(before: &Summary, again: &Summary) -> bool {
+    const INDISTINGUISHABLE: f64 = 4.0;
+    let explains = before.deviance.zip(again.deviance).is_none_or(|(before, again)| again < before + INDISTINGUISHABLE);
+    again.outcome.converged() && explains || !before.outcome.converged()
+}
+
+/// The estimate of a finer method, with the work of both.
+fn after(before: &Summary, again: Summary) -> Summary {
+    Summary {
+        iterations: before.iterations + again.iterations,
+        evaluations: before.evaluations + again.evaluations,
+        ..again
+    }
+}
+
+/// The estimate of a coarser method, which explains the data better than a finer one.
+fn kept(mut before: Summary, again: &Summary) -> Summary {
+    if let Some(warning) = before.warnings.iter_mut().find(|warning| warning.code == WarningCode::CoarseStep) {
+        warning.severity = warning.severity.min(Severity::UsableWithCare);
+        warning.text +=
+            &format!("; {} explains the data worse, so that the coarser step was kept", again.method.integrator);
+    }
+    before
 }

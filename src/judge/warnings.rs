@@ -7,8 +7,10 @@ use crate::numeral::{counted, exact, number, p_value, percent};
 use crate::optimize::Severity;
 use crate::problem::Objective;
 
-/// Largest change of a parameter with a finer step, in standard errors, without a warning.
+/// Largest change of a parameter with a finer step, in standard errors, without a warning: with a method that was chosen, and
+/// with one of the library's choice (beyond the former it makes the estimate unusable).
 const STEP_SHIFT: f64 = 0.5;
+const REFINED_SHIFT: f64 = 0.1;
 /// A predicted standard deviation below this fraction of the errors counts as zero.
 const ZERO_DEVIATION: f64 = 1e-6;
 /// Factor by which autocorrelation may widen an interval before the severity is raised.
@@ -39,6 +41,7 @@ impl Judgement<'_> {
                 ));
             }
         }
+        warnings.extend(self.not_positive());
         warnings.extend(directions.iter().map(|d| {
             care(WarningCode::Unidentified, format!("{d}; fix one, add a prior, or excite the system differently"))
         }));
@@ -94,6 +97,23 @@ impl Judgement<'_> {
         Some(Warning { code: WarningCode::UnboundedLikelihood, severity: Severity::NotUsable, text })
     }
 
+    /// Parameters that were declared positive and are not.
+    fn not_positive(&self) -> Vec<Warning> {
+        let unknowns = self.objective.problem.unknowns.row.iter().zip(&self.values);
+        let wrong = unknowns.filter(|(unknown, value)| unknown.parameter.positive && **value <= 0.0);
+        let warning = |(unknown, value): (&crate::problem::Free, &f64)| {
+            let text = format!(
+                "`{}` is {} {}, but was declared positive: model and record contradict each other; check units, signs and the \
+                 hold of the inputs",
+                unknown.name,
+                number(*value, 4),
+                unknown.unit
+            );
+            Warning { code: WarningCode::NotPositive, severity: Severity::NotUsable, text }
+        };
+        wrong.map(warning).collect()
+    }
+
     fn gaps(&self) -> Vec<Warning> {
         let problem = self.objective.problem;
         if problem.layout().kind == Kind::Static {
@@ -118,19 +138,24 @@ impl Judgement<'_> {
     /// bound is not enough.
     fn step(&self, unknowns: &[Unknown]) -> Option<Warning> {
         // The noise, where the errors were not divided by it.
-        if self.residuals.step_error / self.widening <= STEP_SHIFT {
+        let refines = self.objective.problem.refines;
+        let most = if refines { REFINED_SHIFT } else { STEP_SHIFT };
+        if self.residuals.step_error / self.widening <= most {
             return None;
         }
         let finer = self.objective.sweep.refined()?;
         let objective = self.objective.of(self.objective.problem, &*finer);
         let (name, shift, part) = shift(&objective, &self.end.coordinates, unknowns)?;
         let finer = finer.integrator();
-        (shift > STEP_SHIFT).then(|| {
+        let severity = if refines && shift > STEP_SHIFT { Severity::NotUsable } else { Severity::UsableWithCare };
+        (shift > most).then(|| {
             let (part, errors) = (percent(part, 2), number(shift, 2));
-            care(WarningCode::CoarseStep, format!(
-                "the step is too coarse: with {finer} `{name}` would move by {part} of itself ({errors} standard errors); use \
-                 a finer step"
-            ))
+            let tried = if refines { "no method that was tried steps finely enough" } else { "the step is too coarse" };
+            let text = format!(
+                "{tried}: with {finer} `{name}` would move by {part} of itself ({errors} standard errors); use a finer step, \
+                 or smooth the model"
+            );
+            Warning { code: WarningCode::CoarseStep, severity, text }
         })
     }
 

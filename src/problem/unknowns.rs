@@ -193,7 +193,7 @@ fn initial_state(sweep: &dyn Sweep, record: &Record, parameters: &[Parameter]) -
 }
 
 fn check(name: &str, parameter: &Parameter) -> Result<(), Error> {
-    let Parameter { start, free, lower, upper, prior, transform, .. } = *parameter;
+    let Parameter { start, free, lower, upper, prior, transform, per_experiment, positive } = *parameter;
     let wrong = |problem: String| Err(Error::Parameter { parameter: name.to_owned(), problem });
     if !start.is_finite() {
         return wrong(format!("its value is {start}; give a finite start"));
@@ -206,8 +206,25 @@ fn check(name: &str, parameter: &Parameter) -> Result<(), Error> {
             "its start {start} lies outside its bounds {lower} to {upper}; move the start, or the bounds"
         ));
     }
+    if positive && (start <= 0.0 || upper <= 0.0) {
+        return wrong(format!(
+            "it is declared positive, but its start is {start} and its upper bound {upper}; start above zero, or leave \
+             .positive() out"
+        ));
+    }
     if !free {
-        return Ok(());
+        let said = [(prior.is_some(), "prior"), (per_experiment, "value per experiment")];
+        return match said.into_iter().find(|(said, _)| *said) {
+            Some((_, what)) => {
+                wrong(format!("its {what} has no effect because it is fixed; declare it free, or leave that out"))
+            }
+            None => Ok(()),
+        };
+    }
+    if transform == Transform::Log && lower < 0.0 && lower.is_finite() {
+        return wrong(format!(
+            "its lower bound {lower} has no effect because its logarithm is estimated; bound it above zero, or leave .log() out"
+        ));
     }
     if transform == Transform::Log && start <= 0.0 {
         return wrong(format!("its start {start} has no logarithm; start above zero or leave .log() out"));

@@ -44,6 +44,7 @@ const fn parameter(start: f64) -> Parameter {
         prior: None,
         transform: Transform::Identity,
         per_experiment: false,
+        positive: false,
     }
 }
 

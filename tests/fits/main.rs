@@ -8,6 +8,7 @@ mod checks;
 mod closed_forms;
 #[path = "../common/mod.rs"]
 mod common;
+mod declared;
 mod far_starts;
 mod fleet;
 mod kalman;
@@ -16,6 +17,7 @@ mod nist;
 mod noise;
 mod optimizers;
 mod recovery;
+mod refining;
 mod segments;
 #[path = "../common/shared.rs"]
 mod shared;

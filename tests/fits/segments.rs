@@ -1,6 +1,6 @@
 //! Records cut into segments give what they give as a whole.
 
-use greybox::{Estimate, ExperimentOf, Fit, Model, Of, Scalar, Simulator, Time, fixed, free, signals};
+use greybox::{Estimate, ExperimentOf, Fit, Model, Of, Rk4, Scalar, Simulator, Time, fixed, free, signals};
 
 signals! {
     pub struct State { a: "", b: "" }
@@ -81,7 +81,12 @@ fn fit(kind: usize, whole: bool, record: &ExperimentOf<Plant>, start: [f64; 3]) 
     let record = record.clone().initial(State { a: free(0.2), b: fixed(0.1) });
     let start = start.map(|factor| free(factor).within(0.01, 20.0));
     let parameters: Of<Coefficients, _> = Coefficients { p: start[0], q: start[1], r: start[2] };
-    Fit::new(&Plant { kind, whole }, &record).parameters(parameters).noise(Output { y: 0.05 }).run().ok()
+    Fit::new(&Plant { kind, whole }, &record)
+        .parameters(parameters)
+        .noise(Output { y: 0.05 })
+        .integrator(Rk4::default())
+        .run()
+        .ok()
 }
 
 /// Near starts, and starts a factor of three to five off, each way.

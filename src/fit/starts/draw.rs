@@ -59,7 +59,7 @@ fn sizes(plain: &Objective<'_>, declared: &[f64]) -> Vec<f64> {
 fn drawn(parameter: &Parameter, part: f64, size: f64) -> f64 {
     let Parameter { start, upper, prior, transform, .. } = *parameter;
     let is_log = transform == Transform::Log;
-    let lower = if is_log { parameter.lower.max(0.0) } else { parameter.lower };
+    let lower = if is_log || parameter.positive { parameter.lower.max(0.0) } else { parameter.lower };
     let between = |low: f64, high: f64| low + part * (high - low);
     let geometric = |low: f64, high: f64| low * (high / low).powf(part);
     let whole = lower.is_finite() && upper.is_finite();

@@ -32,6 +32,9 @@ fn kind(parameter: &Parameter) -> String {
     if parameter.transform == Transform::Log {
         kind += ", as its logarithm";
     }
+    if parameter.positive {
+        kind += ", positive";
+    }
     if parameter.per_experiment {
         kind += ", one per experiment";
     }

@@ -1,0 +1,62 @@
+//! [`Finer`]: the same problem by ever finer methods, for fits whose integrator was not chosen.
+
+use super::{Cuts, Problem, Settings};
+use crate::error::Error;
+use crate::sweep::Sweep;
+use std::sync::{Arc, OnceLock};
+
+/// Makes the sweep by a method.
+pub(crate) type MakeSweep<'a> = Arc<dyn Fn() -> Result<Arc<dyn Sweep + 'a>, Error> + Send + Sync + 'a>;
+
+/// A problem by finer methods.
+pub(crate) trait Finer: Send + Sync {
+    /// The problem by one of the methods; `None` after the last, and for a method that does not serve it.
+    fn by(&self, number: usize) -> Option<&Problem<'_>>;
+}
+
+/// The problem by each method is made when it is first needed.
+struct ByMethods<'a> {
+    base: Problem<'a>,
+    methods: Vec<MakeSweep<'a>>,
+    made: Vec<OnceLock<Option<Problem<'a>>>>,
+}
+
+impl Finer for ByMethods<'_> {
+    fn by(&self, number: usize) -> Option<&Problem<'_>> {
+        let (make, made) = (self.methods.get(number)?, self.made.get(number)?);
+        made.get_or_init(|| self.base.with_sweep(make().ok()?).ok()).as_ref()
+    }
+}
+
+impl<'a> Problem<'a> {
+    /// The same problem, which a run takes on to these methods, one after the other, as long as a finer step would move an
+    /// unknown.
+    pub(crate) fn refining(self, methods: Vec<MakeSweep<'a>>) -> Self {
+        if methods.is_empty() {
+            return self;
+        }
+        // What is prepared of the records is another for each method, and so is a checkpoint.
+        let settings = Settings { checkpoint: None, ..self.settings.clone() };
+        let base = Problem { prepared: vec![], refines: true, settings, ..self.clone() };
+        let made = methods.iter().map(|_| OnceLock::new()).collect();
+        Problem { refines: true, finer: Some(Arc::new(ByMethods { base, methods, made })), ..self }
+    }
+
+    fn with_sweep(&self, sweep: Arc<dyn Sweep + 'a>) -> Result<Self, Error> {
+        let prepared = Problem::prepared(&*sweep, &self.records, &self.unknowns.parameters)?;
+        let cuts = Cuts::new(&*sweep, &self.records, self.settings.prefilter.is_some());
+        Ok(Problem { sweep, prepared, cuts, ..self.clone() })
+    }
+
+    /// The problem by each method in turn, this one first.
+    pub(crate) fn by_method(&self) -> impl Iterator<Item = &Problem<'_>> {
+        let finer = self.finer.iter();
+        std::iter::once::<&Problem<'_>>(self).chain(finer.flat_map(|finer| (0..).map_while(|number| finer.by(number))))
+    }
+
+    /// The problem by the method of this description, as an estimate names it; this one if there is none.
+    pub(crate) fn by_name(&self, integrator: &str) -> &Problem<'_> {
+        let is = |problem: &&Problem<'_>| problem.sweep.integrator() == integrator;
+        self.by_method().find(is).unwrap_or(self)
+    }
+}

@@ -1,0 +1,79 @@
+//! What is declared of parameters holds, and what has no effect is refused.
+
+use crate::shared::shared;
+use greybox::models::{Axis, ControlledAxisMotion, PositioningLoop};
+use greybox::optimize::Severity;
+use greybox::*;
+
+signals! { pub struct Push { u: "N" } }
+signals! { pub struct Speed { v: "m/s" } }
+signals! { pub struct Cart { m: "kg", f: "N s/m" } }
+
+/// `m dv/dt = u - f v`.
+#[derive(Clone)]
+struct Rolling;
+
+impl Model for Rolling {
+    type State = Speed;
+    type Input = Push;
+    type Output = Speed;
+    type Parameters = Cart;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Speed<S>, u: &Push<S>, p: &Cart<S>) -> Speed<S> {
+        Speed { v: (u.u - p.f * x.v) / p.m }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Speed<S>, _u: &Push<S>, _p: &Cart<S>) -> Speed<S> {
+        *x
+    }
+}
+
+fn record(f: f64) -> ExperimentOf<Rolling> {
+    let input: Vec<Push> = (0..300).map(|k| Push { u: if k / 40 % 2 == 0 { 1.0 } else { -1.0 } }).collect();
+    let time = Time::Uniform { start: 0.0, step: 0.01 };
+    let run = Simulator::new(&Rolling).run(&Cart { m: 1.0, f }, &Speed { v: 0.0 }, time, &input).unwrap();
+    run.with_noise(Speed { v: 0.002 }, 1).experiment(&Rolling).unwrap()
+}
+
+#[test]
+fn a_positive_parameter_that_is_not_makes_the_estimate_unusable() {
+    for (truth, usable) in [(0.4, true), (-0.4, false)] {
+        let record = record(truth);
+        for f in [free(0.1).positive(), free(0.1)] {
+            let fit = Fit::new(&Rolling, &record).parameters(Cart { m: free(2.0).positive(), f }).run().unwrap();
+            let found = fit.warnings.iter().find(|warning| warning.code == WarningCode::NotPositive);
+            assert!((fit.parameters.f - truth).abs() < 0.02, "the search is not bounded: {fit}");
+            assert_eq!(found.is_some(), f.positive && !usable, "{fit}");
+            if let Some(warning) = found {
+                assert!(fit.severity() == Severity::NotUsable && warning.text.contains("`f` is -0.4"), "{fit}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_wrong_hold_of_the_benchmark_is_not_usable() {
+    let Some(path) = shared("emps/emps.csv") else { return };
+    let model = PositioningLoop::EMPS;
+    let rest = ControlledAxisMotion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) };
+    let axis =
+        Axis { m: free(80.0).positive(), fv: free(150.0).positive(), fc: free(15.0).positive(), offset: free(0.0) };
+    let record = Experiment::from_csv(&model, path).unwrap().initial(rest);
+    let wrong = Fit::new(&model, &record).parameters(axis).run().unwrap();
+    assert!(wrong.severity() == Severity::NotUsable && wrong.parameters.fv < 0.0, "{wrong}");
+    let right = Fit::new(&model, &record.hold(Hold::First)).parameters(axis).run().unwrap();
+    assert!(right.warnings.iter().all(|warning| warning.code != WarningCode::NotPositive), "{right}");
+}
+
+#[test]
+fn what_has_no_effect_is_refused() {
+    let record = record(0.4);
+    for (parameter, word) in [
+        (fixed(0.4).prior(0.4, 0.1), "its prior has no effect because it is fixed"),
+        (fixed(0.4).per_experiment(), "its value per experiment has no effect"),
+        (free(0.4).log().within(-1.0, 1.0), "its lower bound -1 has no effect"),
+        (free(-0.4).positive(), "declared positive, but its start is -0.4"),
+    ] {
+        let fit = Fit::new(&Rolling, &record).parameters(Cart { m: free(2.0), f: parameter });
+        let error = fit.run().unwrap_err().to_string();
+        assert!(error.contains(word) && error.contains("`f`"), "{error}");
+    }
+}

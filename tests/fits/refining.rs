@@ -1,0 +1,87 @@
+//! Fits whose integrator was not chosen take a finer one where the default step would decide the answer.
+
+use approx::assert_relative_eq;
+use greybox::optimize::Severity;
+use greybox::*;
+
+signals! { pub struct Masses { first: "rad/s", twist: "rad", second: "rad/s" } }
+signals! { pub struct Torque { tau: "N m" } }
+signals! { pub struct First { first: "rad/s" } }
+signals! { pub struct Coupling { j1: "kg m2", j2: "kg m2", c: "N m", d: "N m s" } }
+
+/// Two masses and a coupling.
+#[derive(Clone)]
+struct Coupled;
+
+impl Model for Coupled {
+    type State = Masses;
+    type Input = Torque;
+    type Output = First;
+    type Parameters = Coupling;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Masses<S>, u: &Torque<S>, p: &Coupling<S>) -> Masses<S> {
+        let spring = p.c * x.twist + p.d * (x.first - x.second);
+        Masses { first: (u.tau - spring) / p.j1, twist: x.first - x.second, second: spring / p.j2 }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Masses<S>, _u: &Torque<S>, _p: &Coupling<S>) -> First<S> {
+        First { first: x.first }
+    }
+}
+
+/// Steps of 1 ms; a stiffness of `c` turns by `sqrt(150 c) / 1000` rad in one.
+fn record(c: f64, d: f64) -> (Coupling, ExperimentOf<Coupled>) {
+    let time = Time::Uniform { start: 0.0, step: 1e-3 };
+    let input: Vec<Torque> = (0..1_000).map(|k| Torque { tau: if k / 37 % 2 == 0 { 1.0 } else { -0.8 } }).collect();
+    let (p, rest) = (Coupling { j1: 1e-2, j2: 2e-2, c, d }, Masses::from([0.0; 3]));
+    let exact = Rk45 { relative: 1e-11, absolute: 1e-13 };
+    let run = Simulator::new(&Coupled).integrator(exact).run(&p, &rest, time, &input).unwrap();
+    let record = run.with_noise(First { first: 0.002 }, 4).experiment(&Coupled).unwrap();
+    (p, record.initial(Masses::map(rest, fixed)))
+}
+
+fn near(p: Coupling) -> Coupling<Parameter> {
+    Coupling::map(Coupling { j1: 1.1 * p.j1, j2: p.j2 / 1.1, c: 1.001 * p.c, ..p }, free)
+}
+
+/// From a step that is fine to one with which Runge-Kutta's method is unstable.
+#[test]
+fn the_default_method_is_as_fine_as_the_plant_asks_for() {
+    for (c, d, method) in [
+        (5.0, 0.02, "1 step per sample"),
+        (3e3, 0.1, "4 steps per sample"),
+        (6e4, 0.5, "16 steps per sample"),
+        (1e6, 5.0, "64 steps per sample"),
+    ] {
+        let (truth, record) = record(c, d);
+        let fit = Fit::new(&Coupled, &record).parameters(near(truth)).run().unwrap();
+        println!("{fit}");
+        assert!(fit.method.integrator.contains(method), "{c}: {}", fit.method.integrator);
+        assert!(fit.severity() < Severity::NotUsable, "{fit}");
+        assert!(fit.warnings.iter().all(|warning| warning.code != WarningCode::CoarseStep), "{fit}");
+        // The stiffest plant turns by 12 rad in a sample: its stiffness has aliases, its inertias have none.
+        let told = if c < 1e6 { 4 } else { 2 };
+        for (unknown, truth) in fit.unknowns.iter().zip(Coupling::into_array(truth)).take(told) {
+            // Four standard errors: one of 16 is further out in a tenth of a percent of all records.
+            if let Some(error) = unknown.knowledge.standard_error() {
+                assert!((unknown.value - truth).abs() < 4.0 * error, "{c}: {unknown:?} for {truth}");
+            }
+        }
+        // What is made of the estimate uses the same method.
+        let problem = Fit::new(&Coupled, &record).parameters(near(truth)).problem().unwrap();
+        let found = problem.run().unwrap();
+        assert_eq!((found.cost, &found.method), (fit.cost, &fit.method));
+        let again = fit.predict(&Coupled, &record).unwrap().quality.first.rmse;
+        assert_relative_eq!(again, fit.quality.first.rmse, max_relative = 1e-9);
+        let report = Report::new(&problem, &found).unwrap();
+        assert_eq!(report.estimate.method.integrator, fit.method.integrator);
+    }
+}
+
+/// A method that was chosen stays, and a warning says that it is too coarse.
+#[test]
+fn a_method_that_was_chosen_stays() {
+    let (truth, record) = record(3e3, 0.1);
+    let fit = Fit::new(&Coupled, &record).parameters(near(truth)).integrator(Rk4 { substeps: 1 }).run().unwrap();
+    assert!(fit.method.integrator.contains("1 step per sample"), "{fit}");
+    let warning = fit.warnings.iter().find(|warning| warning.code == WarningCode::CoarseStep).unwrap();
+    assert!(warning.severity == Severity::UsableWithCare && warning.text.contains("2 steps per sample"), "{fit}");
+}
