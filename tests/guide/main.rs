@@ -104,7 +104,7 @@ fn chapter_1_rotor() -> Outcome {
 #[test]
 fn chapter_2_half_a_sample() -> Outcome {
     let model = Surface::new(4)?;
-    let truth = Winding { rs: 3.6, ls: 1.8e-3, ke: 0.5 };
+    let truth = Winding { rs: 3.6, ls: 1.72e-3, ke: 0.5 };
     let voltage = |k: usize| Drive { ud: if (k / 10).is_multiple_of(2) { 7.2 } else { -7.2 }, uq: 0.0, w: 0.0 };
     let both: Vec<Drive> = (0..800).map(|k| voltage(k / 2)).collect();
     let time = Time::Uniform { start: 0.0, step: 0.125e-3 };
