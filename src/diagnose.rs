@@ -32,11 +32,10 @@ use crate::numeral::p_value;
 use crate::optimize::{
     Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization, Machine, Severity,
 };
-use crate::problem::{Control, Objective, Problem, each};
+use crate::problem::{Control, Objective, Problem};
 use crate::section::{Cell, Section, Table};
 use argmin::core::{Executor, State};
 use serde::{Deserialize, Serialize};
-use std::sync::atomic::Ordering;
 
 /// The probability of error below which a hypothesis is given up.
 pub const LEVEL: f64 = 0.01;
@@ -138,17 +137,6 @@ impl<L: LeastSquares> LeastSquares for Pinned<'_, L> {
     fn sizes(&self) -> Vec<Option<f64>> {
         self.problem.sizes()
     }
-}
-
-/// Searches side by side; each that has ended is counted, where the fit was given a counter.
-fn searches<T: Send>(problem: &Problem<'_>, count: usize, search: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
-    each(count, |k| {
-        let found = search(k);
-        if let Some(counter) = &problem.settings.counter {
-            counter.fetch_add(1, Ordering::Relaxed);
-        }
-        found
-    })
 }
 
 /// Refuses a result that was not computed to its end.

@@ -208,7 +208,8 @@ impl<'a, M: Model> Fit<'a, M> {
         self.set(|settings| settings.cancel(flag))
     }
 
-    /// Adds one to the counter whenever a search of a diagnosis that makes many ([`bootstrap`](crate::diagnose::bootstrap)) has ended, for a display of progress by another thread.
+    /// Adds one to the counter whenever a refit of [`bootstrap`](crate::diagnose::bootstrap) has ended, for a display of
+    /// progress by another thread.
     pub fn counter(self, counter: Arc<AtomicU64>) -> Self {
         self.set(|settings| settings.counter(counter))
     }

@@ -65,8 +65,9 @@ pub fn counted(count: usize, what: &str, counter: &Arc<AtomicU64>) -> ProgressBa
 pub struct Search(pub ProgressBar);
 
 impl Observe<LeastSquaresState> for Search {
-    fn observe_iter(&mut self, state: &LeastSquaresState, _: &KV) -> Result<(), argmin::core::Error> {
-        self.0.set_message(format!("iteration {}, cost {:.6e}", state.get_iter(), state.get_cost()));
+    fn observe_iter(&mut self, state: &LeastSquaresState, kv: &KV) -> Result<(), argmin::core::Error> {
+        let running = kv.get("running").map_or(String::new(), |count| format!("{count} searches running, "));
+        self.0.set_message(format!("{running}iteration {}, cost {:.6e}", state.get_iter(), state.get_cost()));
         Ok(())
     }
 

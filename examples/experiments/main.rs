@@ -36,11 +36,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments = Arguments::parse();
     let mut reports = Vec::new();
     let stop = terminal::interrupted()?;
-    let bar = terminal::spinner("experiments");
-    for number in (1..=6u8).take_while(|_| !stop.load(std::sync::atomic::Ordering::Relaxed)) {
-        if arguments.experiment != "all" && arguments.experiment != number.to_string() {
-            continue;
-        }
+    let wanted: Vec<u8> =
+        (1..=6).filter(|number| ["all", &number.to_string()].contains(&arguments.experiment.as_str())).collect();
+    let bar = terminal::steps(wanted.len(), "experiments");
+    for number in wanted.into_iter().take_while(|_| !stop.load(std::sync::atomic::Ordering::Relaxed)) {
         bar.set_message(format!("experiment {number}"));
         let report = match number {
             1 => ideal::torque_step()?,
@@ -54,6 +53,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             bar.suspend(|| println!("{report}"));
         }
         reports.push(report);
+        bar.inc(1);
     }
     bar.finish_and_clear();
     if let Some(folder) = &arguments.plots {

@@ -1,16 +1,17 @@
 //! Bootstrap: refits of what the model could as well have measured. It asks for no normal distribution, and in blocks for
 //! no white residuals.
 
-use super::{Pinned, check_complete, minimize, searches};
+use super::{Pinned, check_complete, minimize};
 use crate::error::Error;
 use crate::estimate::Summary;
 use crate::numeral::resolved;
 use crate::optimize::LeastSquares;
-use crate::problem::{Problem, Simulated};
+use crate::problem::{Problem, Simulated, each};
 use crate::random::Random;
 use crate::record::Record;
 use crate::section::{Cell, Section, Table};
 use serde::{Deserialize, Serialize};
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// What is drawn.
@@ -105,7 +106,14 @@ pub fn bootstrap(
         let (place, _) = minimize(Pinned { problem: &again, bounds: again.bounds() }, best.clone())?;
         Some(estimate.unknowns.iter().zip(&place).map(|(u, &c)| u.transform.to_value(c)).collect())
     };
-    let found: Vec<Vec<f64>> = searches(problem, count, refit).into_iter().flatten().collect();
+    let counted = |number: usize| {
+        let found = refit(number);
+        if let Some(counter) = &problem.settings.counter {
+            counter.fetch_add(1, Ordering::Relaxed);
+        }
+        found
+    };
+    let found: Vec<Vec<f64>> = each(count, counted).into_iter().flatten().collect();
     check_complete(problem, &control, "the bootstrap")?;
     if found.len() < 20 {
         return Err(Error::Option(format!(

@@ -119,7 +119,7 @@ impl<'a> Settings<'a> {
         self
     }
 
-    /// Adds one to the counter whenever a search of a diagnosis that makes many (bootstrap) has ended.
+    /// Adds one to the counter whenever a refit of a bootstrap has ended.
     pub fn counter(mut self, counter: Arc<AtomicU64>) -> Self {
         self.counter = Some(counter);
         self
