@@ -299,7 +299,7 @@ fn parameters_say_all_they_are_told() {
     assert!(p.free && p.per_experiment && (p.lower, p.upper) == (0.1, 4.0));
     assert_eq!(serde_json::from_str::<Parameter>(&serde_json::to_string(&p).unwrap()).unwrap(), p);
     let text = serde_json::to_string(&fixed(3.0)).unwrap();
-    assert!(text.contains(r#""lower":null,"upper":null"#), "{text}");
+    assert!(text.contains(r#""lower":"-Infinity","upper":"Infinity""#), "{text}");
     assert_eq!(serde_json::from_str::<Parameter>(&text).unwrap(), fixed(3.0));
     let odd = text.replace("lower", "lowest");
     assert!(serde_json::from_str::<Parameter>(&odd).unwrap_err().to_string().contains("unknown field `lowest`"));
