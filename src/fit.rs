@@ -15,7 +15,7 @@ use crate::error::Error;
 use crate::estimate::Estimate;
 use crate::experiment::{ExperimentOf, Sample};
 use crate::functions::Handle;
-use crate::integrate::{Automatic, Esdirk, Integrator, Method, Rk4};
+use crate::integrate::{Automatic, Integrator, Method, Rk4};
 use crate::layout::{Kind, Layout};
 use crate::loss::Loss;
 use crate::model::Model;
@@ -26,7 +26,7 @@ use crate::prefilter::Butterworth;
 use crate::problem::{MakeSweep, Problem, Search, Settings, Weights};
 use crate::record::Record;
 use crate::signals::{Of, Signals};
-use crate::sweep::{DualSweep, Loops, Narrow, ProgramSweep, Sweep};
+use crate::sweep::{DualSweep, Loops, ProgramSweep, Sweep};
 use crate::weighting::Weighting;
 use argmin::core::observers::{Observe, ObserverMode};
 use core::marker::PhantomData;
@@ -118,8 +118,9 @@ impl<'a, M: Model> Fit<'a, M> {
     ///
     /// Without it, a fit of a continuous model begins with [`Rk4`], one step per sample. While a finer step would move an
     /// unknown by more than a tenth of its standard error, or where the start cannot be simulated, it takes 4, 16 and 64 steps
-    /// per sample and then [`Esdirk`]; the estimate names the method
-    /// ([`Method::integrator`](crate::Method)), and is not usable if none is fine enough.
+    /// per sample; the estimate names the method ([`Method::integrator`](crate::Method)), and is not usable if none is fine
+    /// enough. Stiff models then need [`Esdirk`](crate::Esdirk), which is not tried by itself: where a start explodes, it
+    /// would follow for hours.
     pub fn integrator(self, integrator: impl Integrator) -> Self {
         Fit { stepping: Stepping::new(integrator), is_default: false, ..self }
     }
@@ -328,10 +329,7 @@ fn finer<'a, M: Model + 'a>(
         let (model, predictor) = (model.clone(), predictor.clone());
         Arc::new(move || sweep(model.clone(), &stepping, &predictor))
     };
-    let steps = [4, 16, 64].map(|substeps| by(Stepping::new(Automatic { continuous: Rk4 { substeps } })));
-    let stiff = Esdirk::default();
-    let stiff = by(Stepping { loops: Arc::new(Narrow(stiff)), method: Arc::new(stiff) });
-    steps.into_iter().chain([stiff]).collect()
+    [4, 16, 64].map(|substeps| by(Stepping::new(Automatic { continuous: Rk4 { substeps } }))).into()
 }
 
 /// A typed weighting as untyped [`Weights`].

@@ -10,7 +10,7 @@ mod programs;
 mod window;
 
 pub(crate) use duals::{DualSweep, OVERFLOW};
-pub(crate) use loops::{Loops, Narrow};
+pub(crate) use loops::Loops;
 pub(crate) use programs::{Derived, ProgramSweep};
 pub use window::Window;
 
@@ -199,11 +199,6 @@ pub trait Sweep: Send + Sync {
     /// The same with a finer step, if there is one.
     fn refined<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
         None
-    }
-
-    /// Whether the integrator's steps do not depend on the values.
-    fn has_fixed_steps(&self) -> bool {
-        true
     }
 
     /// Description of the integrator and its settings.

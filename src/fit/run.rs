@@ -5,7 +5,7 @@ use super::starts::search_from_many;
 use crate::error::Error;
 use crate::estimate::{NoiseModel, Summary, Warning, WarningCode};
 use crate::judge::{SearchEnd, conclude, noise};
-use crate::optimize::{LeastSquares, LevenbergMarquardt, Outcome, Severity};
+use crate::optimize::{LeastSquares, LevenbergMarquardt, Severity};
 use crate::problem::{Control, Objective, Problem, Whitening};
 use std::time::Instant;
 
@@ -29,14 +29,10 @@ impl Problem<'_> {
         let mut found = self.run_by_method(begin);
         for finer in self.by_method().skip(1) {
             let goes_on = match &found {
-                Ok(found) => found.outcome != Outcome::Exact && coarse_step(found).is_some(),
+                Ok(found) => coarse_step(found).is_some(),
                 Err(error) => matches!(error, Error::Start(_)),
             };
             if !goes_on || control.stops() {
-                break;
-            }
-            // What a fixed step can simulate, an adaptive one would only make rough.
-            if found.is_ok() && !finer.sweep.has_fixed_steps() {
                 break;
             }
             found = match (found, finer.run_by_method(begin)) {

@@ -9,7 +9,7 @@ use super::conclude::Judgement;
 use super::covariances::Covariances;
 use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::numeral::{number, percent};
-use crate::optimize::Severity;
+use crate::optimize::{Outcome, Severity};
 use crate::parameter::Transform;
 
 /// Standard errors below this part of the value are not examined: two passes over the data each.
@@ -24,7 +24,7 @@ const QUANTILE: f64 = 1.96;
 impl Judgement<'_> {
     /// The unknown whose interval is bent most, if that matters.
     pub(super) fn curved(&self, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
-        if self.objective.sweep.predicts_variance() || self.rounding {
+        if self.objective.sweep.predicts_variance() || self.rounding || self.end.outcome == Outcome::Exact {
             return None;
         }
         let relative = |i: usize| {

@@ -18,8 +18,10 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Draws of noise, each added and subtracted.
 const DRAWS: u64 = 4;
-/// A bias below this many standard errors is not worth a word.
+/// A bias above this many standard errors makes an estimate unusable.
 const BIAS: f64 = 0.25;
+/// And below this many not even in a warning.
+const NO_BIAS: f64 = 0.1;
 /// Significance level of the test for noise in restarts.
 const LEVEL: f64 = 0.01;
 
@@ -82,6 +84,9 @@ impl Judgement<'_> {
             Ok(Problem { records: problem.records.clone(), ..restarted })
         })?;
         let Bias { unknown, errors, .. } = bias;
+        if errors < NO_BIAS {
+            return None;
+        }
         let severity = if errors > BIAS { Severity::NotUsable } else { Severity::UsableWithCare };
         let text = format!(
             "the states from which predictions restart are noisy: errors {steps} sample(s) apart are negatively correlated \

@@ -5,7 +5,7 @@ use super::covariances::Covariances;
 use crate::estimate::{Direction, Knowledge, Unknown, Warning, WarningCode};
 use crate::layout::Kind;
 use crate::numeral::{counted, exact, number, percent};
-use crate::optimize::Severity;
+use crate::optimize::{Outcome, Severity};
 use crate::problem::Objective;
 
 /// Largest change of a parameter with a finer step, in standard errors, without a warning: with a method that was chosen, and
@@ -155,7 +155,8 @@ impl Judgement<'_> {
         // The noise, where the errors were not divided by it.
         let refines = self.objective.problem.refines;
         let most = if refines { REFINED_SHIFT } else { STEP_SHIFT };
-        if self.residuals.step_error / self.widening <= most {
+        // Data that are reproduced to their rounding were made with this step.
+        if self.end.outcome == Outcome::Exact || self.residuals.step_error / self.widening <= most {
             return None;
         }
         let finer = self.objective.sweep.refined()?;

@@ -102,10 +102,6 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
         Some(Arc::new(DualSweep { layout, model, loops, method, predictor, reason }))
     }
 
-    fn has_fixed_steps(&self) -> bool {
-        self.method.is_fixed()
-    }
-
     fn integrator(&self) -> String {
         self.method.describe(self.layout.kind)
     }

@@ -191,10 +191,6 @@ impl Sweep for ProgramSweep<'_> {
         self.plain.refined()
     }
 
-    fn has_fixed_steps(&self) -> bool {
-        self.plain.has_fixed_steps()
-    }
-
     fn integrator(&self) -> String {
         self.plain.integrator()
     }

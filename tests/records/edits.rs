@@ -217,7 +217,7 @@ fn json() -> serde_json::Value {
 fn json_is_readable() {
     let initial = serde_json::json!({"Given": {"x": {
         "start": 1.0, "free": true, "lower": 0.0, "upper": 9.0, "prior": {"mean": 1.0, "std": 0.5},
-        "transform": "log", "per_experiment": false,
+        "transform": "log", "per_experiment": false, "positive": false,
     }}});
     let expected = serde_json::json!({
         "name": "record", "hold": "Zero", "initial": initial,
