@@ -14,6 +14,8 @@ use crate::parameter::Transform;
 
 /// Standard errors below this part of the value are not examined: two passes over the data each.
 const SMALL: f64 = 0.15;
+/// Records of more measurements are not examined: the predictions at two more points are kept in memory.
+const LONGEST: u64 = 200_000;
 /// At most so many unknowns are examined, those with the largest relative errors.
 const MOST: usize = 8;
 /// Part of the half width by which an end may move without a warning.
@@ -24,7 +26,8 @@ const QUANTILE: f64 = 1.96;
 impl Judgement<'_> {
     /// The unknown whose interval is bent most, if that matters.
     pub(super) fn curved(&self, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
-        if self.objective.sweep.predicts_variance() || self.rounding || self.end.outcome == Outcome::Exact {
+        let long = self.residuals.measured > LONGEST;
+        if long || self.objective.sweep.predicts_variance() || self.rounding || self.end.outcome == Outcome::Exact {
             return None;
         }
         let relative = |i: usize| {
