@@ -166,6 +166,9 @@ impl LongRun {
 /// By how much least squares underestimates an autoregression of standardized scores that sum to zero, times their
 /// number (Nicholls and Pope, Australian J. Statistics 30A (1988) 296, theorem 2).
 fn bias(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    if a.is_empty() {
+        return Some(a.clone());
+    }
     let n = a.nrows();
     let a = stable(a.clone())?;
     let identity = DMatrix::<Complex<f64>>::identity(n, n);
@@ -179,6 +182,9 @@ fn bias(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 
 /// The matrix with its singular values limited to those of a stable autoregression.
 fn stable(a: DMatrix<f64>) -> Option<DMatrix<f64>> {
+    if a.is_empty() {
+        return Some(a);
+    }
     // A decomposition of what is not finite would panic.
     if !a.iter().all(|entry| entry.is_finite()) {
         return None;
