@@ -11,6 +11,7 @@ mod warning;
 pub(crate) use display::held;
 pub use format::{Format, Version};
 pub use prediction::Prediction;
+pub(crate) use starts::times_the_cost;
 pub use starts::{FailedStart, Minimum, Starts};
 pub use warning::{Warning, WarningCode};
 

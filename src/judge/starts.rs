@@ -1,6 +1,6 @@
 //! What searches from other starts say about an estimate.
 
-use crate::estimate::{Minimum, Starts, Warning, WarningCode};
+use crate::estimate::{Minimum, Starts, Warning, WarningCode, times_the_cost};
 use crate::numeral::{counted, number};
 use crate::optimize::Severity;
 
@@ -27,17 +27,16 @@ pub(super) fn warnings(starts: &Starts, measurements: u64) -> Vec<Warning> {
     let rival = |minimum: &&Minimum| measurements as f64 * minimum.cost_ratio.ln() < INDISTINGUISHABLE;
     if let Some(rival) = minima.iter().skip(1).find(rival).filter(|_| *agreed > 0) {
         let text = format!(
-            "another minimum explains the data as well, with {} times the cost, at {}: bounds or a prior must tell which one \
-             is meant",
-            number(rival.cost_ratio, 6),
+            "another minimum explains the data as well, with {}, at {}: bounds or a prior must tell which one is meant",
+            times_the_cost(rival.cost_ratio),
             at(rival)
         );
         warnings.push(Warning { code: WarningCode::RivalMinimum, severity: Severity::UsableWithCare, text });
     }
     if let Some(declared) = declared.filter(|declared| *declared > 0).and_then(|declared| minima.get(declared)) {
         let text = format!(
-            "the declared start leads to another minimum, with {} times the cost, at {}",
-            number(declared.cost_ratio, 3),
+            "the declared start leads to another minimum, with {}, at {}",
+            times_the_cost(declared.cost_ratio),
             at(declared)
         );
         warnings.push(Warning { code: WarningCode::DeclaredStartElsewhere, severity: Severity::Usable, text });

@@ -1,14 +1,15 @@
 // Opens a report in a headless browser: `node check.mjs REPORT.html [FOLDER]`. At 375 and at 1440 pixels, in light and in
 // dark, it must pass axe without a violation, fit the width, log no error and ask for nothing from elsewhere; a narrow page
-// must not be too long; zoom.mjs plays what a reader does to see more. With a folder, a picture of each is kept there to be
-// looked at, and the page on paper.
+// must not be too long; rows.mjs judges what is drawn and said, zoom.mjs plays what a reader does to see more. With a folder,
+// a picture of each is kept there to be looked at, and the page on paper.
 //
 // `run.sh` calls it where a browser and node are there, and fetches the packages of package.json beside this file.
-import { readFileSync } from "node:fs";
+import { readFileSync, statSync } from "node:fs";
 import { createRequire } from "node:module";
 import { basename, resolve } from "node:path";
 import { pathToFileURL } from "node:url";
 import { chromium } from "playwright-core";
+import { rows } from "./rows.mjs";
 import { terms } from "./terms.mjs";
 import { zoom } from "./zoom.mjs";
 
@@ -21,6 +22,7 @@ const browser = await chromium.launch({
 });
 const troubles = [];
 const longest = 14_000;
+const largest = 3_000_000;
 const name = basename(report, ".html");
 
 // What lies beyond the right edge, or is cut off by what it stands in.
@@ -45,6 +47,8 @@ const overlapping = () => {
   return overlaps.length;
 };
 
+const size = statSync(report).size;
+if (size > largest) troubles.push(`${size} bytes`);
 for (const width of [375, 1440]) {
   for (const colorScheme of ["light", "dark"]) {
     const trouble = (text) => troubles.push(`${width} px, ${colorScheme}: ${text}`);
@@ -64,6 +68,7 @@ for (const width of [375, 1440]) {
     // What can be opened is checked open.
     await page.evaluate(() => document.querySelectorAll("details").forEach((details) => (details.open = true)));
     for (const text of await page.evaluate(clipped)) trouble(`is cut off: ${text}`);
+    await rows(page, trouble);
     const overlaps = await page.evaluate(overlapping);
     if (overlaps) trouble(`${overlaps} labels overlap`);
     await page.evaluate(axe);

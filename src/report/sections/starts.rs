@@ -38,7 +38,7 @@ fn minima(starts: &Starts) -> Table {
     Table::new("Minima found", columns).rows(starts.minima.iter().enumerate().map(row)).at_most(LISTED)
 }
 
-/// Where the minima are, a column each.
+/// Where several minima are, a column each; a single one is the estimate.
 fn places(starts: &Starts) -> Table {
     let shown = &starts.minima[..starts.minima.len().min(LISTED)];
     let numbers = (1..=shown.len()).map(|i| i.to_string());
@@ -49,7 +49,8 @@ fn places(starts: &Starts) -> Table {
         [Cell::from(name.as_str())].into_iter().chain(values.map(|value| Cell::optional(value, 4))).collect::<Vec<_>>()
     };
     let table = Table { columns, ..Table::new("Unknowns at each minimum", []) };
-    table.rows(names.enumerate().map(row)).at_most(UNKNOWNS)
+    let several = shown.len() > 1;
+    table.rows(names.enumerate().filter(|_| several).map(row)).at_most(UNKNOWNS)
 }
 
 fn failed(starts: &Starts) -> Table {
