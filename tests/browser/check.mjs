@@ -82,7 +82,7 @@ for (const width of [375, 1440]) {
     await context.close();
   }
 }
-// On paper the legend keeps its colors, and nothing is wider than the sheet.
+// On paper the legend keeps its colors, and what is closed is named as such.
 const paper = await (await browser.newContext({ viewport: { width: 794, height: 1123 } })).newPage();
 await paper.goto(pathToFileURL(resolve(report)).href);
 await paper.emulateMedia({ media: "print" });
@@ -92,6 +92,11 @@ const uncolored = await paper.evaluate(() => {
   return keys.filter((key) => style(key).borderTopColor === style(document.body).borderTopColor || style(key).printColorAdjust !== "exact").length;
 });
 if (uncolored) troubles.push(`on paper: ${uncolored} keys of legends have no color`);
+const unnamed = await paper.evaluate(() => {
+  const closed = [...document.querySelectorAll("details:not([open]) > summary")].filter((summary) => summary.checkVisibility());
+  return document.querySelectorAll("details").length && closed.every((summary) => getComputedStyle(summary, "::after").content.includes("closed")) ? 0 : 1;
+});
+if (unnamed) troubles.push("on paper: what is closed is not named");
 if (folder) await paper.pdf({ path: `${folder}/${name}.pdf`, format: "A4", printBackground: false });
 await browser.close();
 troubles.forEach((trouble) => console.log(trouble));
