@@ -21,6 +21,10 @@ pub(super) fn section(facts: &Facts) -> Option<Section> {
         Some(_) => section,
         None => section.says("The search from the declared start found no minimum.".to_owned()),
     };
+    let section = match facts.estimate.directions.is_empty() {
+        true => section,
+        false => section.says("Minima of the same cost may differ along what the data do not determine only."),
+    };
     let section = section.table(minima(starts)).table(places(starts));
     Some(section.table(failed(starts)).plot(waterfall(&starts.minima)))
 }
