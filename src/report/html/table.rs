@@ -9,6 +9,8 @@ use core::fmt::Display;
 /// or cards as long as the screen.
 const CELLS: usize = 48;
 const COLUMNS: usize = 9;
+/// Names of rows with more letters are broken where the table is scrolled.
+const NAME: usize = 26;
 /// Words of fewer letters stay on one line.
 const SHORT: usize = 20;
 /// Width of a narrow screen without its margins, of a letter in a table, and between two columns (px).
@@ -26,8 +28,10 @@ pub(super) fn draw(to: &mut Markup, table: &Table, prose: &mut Prose) {
         _ => "cards",
     };
     let fitting: Attributes<'_> = &[("class", &kind)];
+    let long = |row: &Vec<Cell>| row.first().is_some_and(|name| name.text().chars().count() > NAME);
+    let scrolled = if table.rows.iter().any(long) { "scroll long" } else { "scroll" };
     let scroll: Attributes<'_> =
-        &[("class", &"scroll"), ("tabindex", &"0"), ("role", &"group"), ("aria-label", &table.caption)];
+        &[("class", &scrolled), ("tabindex", &"0"), ("role", &"group"), ("aria-label", &table.caption)];
     let prose_in_it = (0..table.columns.len()).any(|column| table.is_prose(column));
     let small = table.rows.len() * table.columns.len() <= CELLS;
     let fits = kind != "cards" || table.columns.len() <= COLUMNS && (small || prose_in_it);
