@@ -25,7 +25,9 @@ impl Autocorrelation {
         let missing = (lags - self.first.len()).min(run.len());
         self.first.extend_from_slice(&run[..missing]);
         self.values.extend_from_slice(run);
+        self.values.resize(lags + run.len() + LAGS, 0.0);
         wide::run(Width::widest(), Products { run, values: &self.values, sums: &mut self.sums });
+        self.values.truncate(lags + run.len());
         self.values.drain(..run.len());
     }
 
@@ -100,10 +102,13 @@ impl Portmanteau {
     }
 }
 
+/// Lags whose sums are kept in registers together.
+const LAGS: usize = 24;
+
 /// Adds the products of a run with itself and with what came before to the sums of all lags.
 struct Products<'p> {
     run: &'p [f64],
-    /// As many values as there are lags, then those of the run.
+    /// As many values as there are lags, then those of the run, then [`LAGS`] zeros.
     values: &'p [f64],
     sums: &'p mut [f64],
 }
@@ -113,9 +118,16 @@ impl Task for Products<'_> {
 
     #[inline(always)]
     fn run<W: Wide>(self) {
-        let lags = self.sums.len() - 1;
-        for (k, sum) in self.sums.iter_mut().enumerate() {
-            *sum += dot(self.run, &self.values[lags - k..]);
+        // The longest lag comes first: its values are the earliest.
+        for (block, sums) in self.sums.rchunks_mut(LAGS).enumerate() {
+            let values = &self.values[block * LAGS..];
+            let mut totals = [0.0; LAGS];
+            for (e, before) in self.run.iter().zip(values.windows(LAGS)) {
+                for (total, before) in totals.iter_mut().zip(before) {
+                    *total += e * before;
+                }
+            }
+            sums.iter_mut().rev().zip(totals).for_each(|(sum, total)| *sum += total);
         }
     }
 }
