@@ -231,7 +231,7 @@ pub use {
     scalar::Table,
     scaling::{JacobianColumns, Nominal, OwnSize, Scaling, Seen, Unscaled},
     simulate::{Simulation, Simulator, simulate},
-    weighting::{BySignal, Law, Weighting},
+    weighting::{BySignal, WeightFunction, Weighting},
 };
 
 /// The README's code, compiled and run.

@@ -9,7 +9,7 @@ use greybox::pmsm::{
     AngledDrive, Cabled, Currents, Injection, InverterFed, Mechanics, Misaligned, Salient, Shaft, ShaftMotion, Surface,
     Torque, Winding,
 };
-use greybox::{Butterworth, BySignal, Experiment, Fit, Horizon, Law, Time, fixed, free, hampel, signals};
+use greybox::{Butterworth, BySignal, Experiment, Fit, Horizon, Time, WeightFunction, fixed, free, hampel, signals};
 
 signals! {
     /// A salient motor behind cable and inverter, and how its record is aligned.
@@ -175,7 +175,8 @@ fn grey_box_of_the_surface_model_weighted_by_speed() {
     // A debug build leaves out the fit that is not weighted.
     for weighted in [true, false].into_iter().take(if cfg!(debug_assertions) { 1 } else { 2 }) {
         let fit = Fit::new(&model, &record).parameters(start);
-        let fit = if weighted { fit.weighting(BySignal::new("w", Law::Square { scale: 100.0 })) } else { fit };
+        let fit =
+            if weighted { fit.weighting(BySignal::new("w", WeightFunction::Square { scale: 100.0 })) } else { fit };
         let p = fit.run().unwrap().parameters;
         assert!(percent(p.ke, axis.ke).abs() < 0.15, "{}", percent(p.ke, axis.ke));
         assert!(percent(p.ls, axis.ls).abs() < 0.3, "{}", percent(p.ls, axis.ls));
