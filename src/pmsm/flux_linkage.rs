@@ -25,7 +25,7 @@ wraps_motor! {
     /// ```
     /// use greybox::pmsm::{FluxLinkage, FluxWinding, Surface};
     /// let model = FluxLinkage::<_, FluxWinding>::new(Surface::new(4)?);
-    /// # Ok::<(), greybox::pmsm::Error>(())
+    /// # Ok::<(), greybox::pmsm::MotorError>(())
     /// ```
     FluxLinkage, M::Input
 }

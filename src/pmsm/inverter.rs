@@ -1,7 +1,7 @@
 //! The voltage-source inverter: how much voltage there is, when it acts, and what dead time takes from it.
 
 use super::frames::{Phases, Stator, clarke, inverse_clarke, rotate_out_of};
-use super::{Error, PolePairs};
+use super::{MotorError, PolePairs};
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
@@ -17,8 +17,8 @@ pub enum Modulation {
 
 impl Modulation {
     /// Longest voltage vector (V, phase peak) from a direct voltage `vdc` (V).
-    pub fn v_max(self, vdc: f64) -> Result<f64, Error> {
-        let vdc = Error::positive("direct voltage", vdc, "V")?;
+    pub fn v_max(self, vdc: f64) -> Result<f64, MotorError> {
+        let vdc = MotorError::positive("direct voltage", vdc, "V")?;
         Ok(match self {
             Modulation::SpaceVector => vdc / Scalar::sqrt(3.0),
             Modulation::Sine => vdc / 2.0,
@@ -61,8 +61,9 @@ impl Carrier {
 }
 
 /// Speed (rad/s, mechanical) at which the EMF alone uses up `v_max` (V, phase peak): no current can be driven beyond it.
-pub fn top_speed(ke: f64, v_max: f64) -> Result<f64, Error> {
-    Ok(Error::positive("voltage limit", v_max, "V")? / (super::SQRT_2_3 * Error::positive("Ke", ke, "V s/rad")?))
+pub fn top_speed(ke: f64, v_max: f64) -> Result<f64, MotorError> {
+    Ok(MotorError::positive("voltage limit", v_max, "V")?
+        / (super::SQRT_2_3 * MotorError::positive("Ke", ke, "V s/rad")?))
 }
 
 /// Voltage lost to dead time and to the valves: `vdt tanh(i/i0)` in each phase; 2 V and 0.15 A for a well-compensated

@@ -55,7 +55,7 @@ wraps_motor! {
     ///     }
     /// }
     /// let model = InverterFed::<_, Mine>::new(Saturated::new(4)?);
-    /// # Ok::<(), greybox::pmsm::Error>(())
+    /// # Ok::<(), greybox::pmsm::MotorError>(())
     /// ```
     InverterFed, AngledDrive
 }
