@@ -149,12 +149,7 @@ impl<P: Signals> PooledRegression<P> {
 
     fn assumption(&self) -> Assumption {
         let lags = self.sets.iter().filter_map(|set| set.lags).max();
-        let mut weights = self.sets.iter().flat_map(|set| &set.rows).map(|row| row.weight).filter(|w| *w > 0.0);
-        match (lags, weights.next()) {
-            (Some(lags), _) => Assumption::Correlated { lags },
-            (None, Some(first)) if weights.any(|weight| weight != first) => Assumption::OwnVariance,
-            _ => Assumption::EqualVariance,
-        }
+        Assumption::of(lags, self.sets.iter().flat_map(|set| &set.rows).map(|row| row.weight))
     }
 
     /// The triangles of the sets' scores, in the order of their columns.
