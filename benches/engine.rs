@@ -7,8 +7,11 @@ use greybox::engine::{Program, Sampling, Trajectories};
 use greybox::graph::Seed;
 use greybox::pmsm::{Surface, Winding};
 use greybox::{
-    Dual, Equations, Esdirk, Hold, Integrator, Interval, Model, ModelSystem, Of, Recurrence, Rk4, Rk45, Scalar,
-    Signals, signals,
+    Dual, Esdirk, Hold, Interval, Model, Of, Rk4, Rk45, Scalar, Signals,
+    equations::Equations,
+    integrate::{Integrator, ModelSystem},
+    recurrence::Recurrence,
+    signals,
 };
 
 const SAMPLES: usize = 2000;

@@ -8,7 +8,7 @@ use greybox::models::{
 };
 use greybox::optimize::{LeastSquares, LevenbergMarquardt, Linearization};
 use greybox::pmsm::{Drive, Machine, MachineParameters, Salient, SalientWinding, Surface, VoltageAndLoad, Winding};
-use greybox::{Experiment, Fit, Information, Model, Of, Signals, Time, free};
+use greybox::{Experiment, Fit, Model, Of, Signals, Time, free, information::Information};
 
 const SAMPLES: usize = 20_000;
 const STEP: f64 = 1e-4;

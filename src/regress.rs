@@ -36,7 +36,7 @@ const ALONE: f64 = 1e-6;
 /// let estimate = regression.solve()?;
 /// assert!((estimate.parameters.r - 2.0).abs() < 0.02);
 /// println!("{estimate}");
-/// # Ok::<(), greybox::RegressionError>(())
+/// # Ok::<(), greybox::regress::RegressionError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Regression<P: Signals> {

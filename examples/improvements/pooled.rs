@@ -5,7 +5,7 @@ use greybox::pmsm::offline::{Extended, Spans, extended, search_i0};
 use greybox::pmsm::program::Cycle;
 use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::{Compensated, CompensatedSalientWinding, EmfHarmonic, ExactSalient, ExactStep, HeldIn};
-use greybox::{Fit, PooledRegression, Regression, free};
+use greybox::{Fit, Regression, free, regress::PooledRegression};
 
 /// What all cycles of a motor have in common: what belongs to the motor. How dead time acts on the mean voltage depends on how
 /// fast the currents pass through zero.

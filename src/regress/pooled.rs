@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 /// are linear in the number of sets.
 ///
 /// ```
-/// use greybox::{PooledRegression, Regression, signals};
+/// use greybox::{Regression, signals, regress::PooledRegression};
 /// signals! {
 ///     /// A straight line.
 ///     pub struct Line { slope: "V/s", offset: "V" }
@@ -25,7 +25,7 @@ use nalgebra::DMatrix;
 /// let found = PooledRegression::new([line(1.0), line(-2.0)], Line { slope: true, offset: false }).solve()?;
 /// assert!((found[1].parameters.slope - 3.0).abs() < 1e-12);
 /// assert!((found[1].parameters.offset + 2.0).abs() < 1e-12);
-/// # Ok::<(), greybox::RegressionError>(())
+/// # Ok::<(), greybox::regress::RegressionError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct PooledRegression<P: Signals> {

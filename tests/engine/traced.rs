@@ -12,7 +12,7 @@ use greybox::pmsm::{
     InverterFedWinding, Machine, MachineParameters, MachineState, Mechanics, Misaligned, Salient, SalientWinding,
     Saturated, SaturatedWinding, Shaft, ShaftMotion, Surface, Torque, VoltageAndLoad, Winding,
 };
-use greybox::{Automatic, Equations, Hold, Kind, Model, Nothing, Rk4, Scalar, Signals, signals};
+use greybox::{Automatic, Hold, Kind, Model, Nothing, Rk4, Scalar, Signals, equations::Equations, signals};
 
 signals! {
     pub struct Pair { a: "1", b: "1" }

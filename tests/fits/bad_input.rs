@@ -3,6 +3,7 @@
 
 use approx::assert_relative_eq;
 use greybox::optimize::{GaussNewton, LevenbergMarquardt, Outcome, Severity, Stop};
+use greybox::optimize::{JacobianColumns, Scaling, Seen};
 use greybox::*;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;

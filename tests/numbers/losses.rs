@@ -1,6 +1,7 @@
 //! Losses against their requirements and the published efficiencies; weightings against their formulas.
 
 use approx::assert_relative_eq;
+use greybox::loss::expectations;
 use greybox::*;
 
 fn losses() -> Vec<Box<dyn Loss>> {
