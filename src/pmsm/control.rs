@@ -56,13 +56,13 @@ pub struct Command {
     pub limited: bool,
 }
 
-/// Shortest time constant, in sample times, for which lambda tuning with one sample of computation delay and a held
-/// voltage does not overshoot at standstill.
-pub const SHORTEST_LAMBDA: f64 = 4.0;
-
 impl CurrentControl {
     /// Lambda tuning: `kp = ls/lambda`, `ki = rs/lambda` give a first-order closed loop of time constant `lambda` (s). The
-    /// voltage is not limited; see [`CurrentControl::limited`].
+    /// voltage is not limited; see [`CurrentControl::limited`]. With one sample of computation delay and a held voltage, the
+    /// current does not overshoot at standstill from `lambda` of four sample times on.
+    ///
+    /// # Errors
+    /// A `lambda`, resistance or inductance that is not positive; a back-EMF that is not finite.
     pub fn lambda_tuned(rs: f64, ls: f64, ke: f64, pole_pairs: PolePairs, lambda: f64) -> Result<Self, MotorError> {
         let lambda = MotorError::positive("closed-loop time constant lambda", lambda, "s")?;
         Ok(CurrentControl {
@@ -201,6 +201,8 @@ impl PositionControl {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const SHORTEST_LAMBDA: f64 = 4.0;
 
     const TS: f64 = 0.126e-3;
     const RS: f64 = 0.4;
