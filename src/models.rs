@@ -13,6 +13,6 @@ mod positioning;
 
 pub use dc_motor::{Armature, DcMotor, Feed, Rotation};
 pub use positioning::{
-    Axis, AxisMotion, Command, ControlledAxisMotion, ControlledAxisOutput, Position, Positioning, PositioningLoop,
-    Reference,
+    AxisMotion, AxisParameters, Command, ControlledAxisMotion, ControlledAxisOutput, Position, Positioning,
+    PositioningLoop, Reference,
 };

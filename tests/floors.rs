@@ -148,8 +148,8 @@ fn an_import_from_above_is_seen() {
     };
     assert_eq!(seen(&["loss"], "use crate::error::Error;\n/// [`check`](crate::check)\nuse core::fmt;"), 0);
     assert_eq!(seen(&["loss"], "use crate::fit::Fit;"), 1);
-    assert_eq!(seen(&["loss"], "use crate::weighting::Law;"), 1, "a sibling");
-    assert_eq!(seen(&["loss"], "use crate::{error::{Error, Failure}, fit, weighting::Law};"), 2);
+    assert_eq!(seen(&["loss"], "use crate::weighting::BySignal;"), 1, "a sibling");
+    assert_eq!(seen(&["loss"], "use crate::{error::{Error, Failure}, fit, weighting::BySignal};"), 2);
     assert_eq!(seen(&["loss"], "fn f() { crate::estimate::number(1.0) }"), 1);
     assert_eq!(seen(&["loss"], "use super::fit::Fit;"), 1);
     assert_eq!(seen(&["fit", "run"], "use super::objective::Halt; use super::super::report::text;"), 1);

@@ -18,7 +18,7 @@ mod terminal;
 use clap::Parser;
 use greybox::pmsm::drive::Simulation;
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::Axis;
+use greybox::pmsm::robot::RobotAxis;
 use methods::{Result, run};
 use report::Report;
 use std::path::PathBuf;
@@ -38,7 +38,7 @@ fn main() -> Result<()> {
     let stop = terminal::interrupted()?;
     let bar = terminal::steps(7, "axes");
     for number in (1..=6).take_while(|_| !stop.load(std::sync::atomic::Ordering::Relaxed)) {
-        let axis = Axis::reference(number)?;
+        let axis = RobotAxis::reference(number)?;
         let simulation = Simulation::new(axis)?;
         let cycles = run(simulation, Program::speed_cycles(&axis, 20, 1.0)?);
         let water = run(simulation, Program::water_cutting(&axis, 6)?);

@@ -193,30 +193,6 @@ impl Machine for GaussNewton {
     }
 }
 
-impl<O: LeastSquares> Solver<O, LeastSquaresState> for GaussNewton {
-    fn name(&self) -> &str {
-        "Gauss-Newton"
-    }
-
-    fn init(
-        &mut self,
-        problem: &mut Problem<O>,
-        state: LeastSquaresState,
-    ) -> Result<(LeastSquaresState, Option<KV>), Error> {
-        machine::init(self, problem, state)
-    }
-
-    fn next_iter(
-        &mut self,
-        problem: &mut Problem<O>,
-        state: LeastSquaresState,
-    ) -> Result<(LeastSquaresState, Option<KV>), Error> {
-        let state = machine::next_iter(self, problem, state)?;
-        let cosine = self.point.as_ref().map_or(0.0, Point::cosine);
-        Ok((state, Some(argmin::kv!("gradient" => cosine;))))
-    }
-
-    fn terminate(&mut self, _state: &LeastSquaresState) -> TerminationStatus {
-        machine::termination(self)
-    }
-}
+machine::solver!([] GaussNewton, "Gauss-Newton", |search| {
+    argmin::kv!("gradient" => search.point.as_ref().map_or(0.0, Point::cosine);)
+});

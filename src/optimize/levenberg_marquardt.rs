@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 /// # let model = Surface::new(4)?;
 /// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
 /// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
-/// use greybox::{OwnSize, optimize::{LevenbergMarquardt, Stop}};
+/// use greybox::optimize::{LevenbergMarquardt, Stop, OwnSize};
 /// let quick = LevenbergMarquardt::new(Stop { iterations: 200, ..Stop::default() }, OwnSize);
 /// let estimate = Fit::new(&model, &record).parameters(start).optimizer(quick).run()?;
 /// assert!(estimate.outcome.converged() && estimate.iterations < 20);

@@ -5,7 +5,7 @@
 //! `iq/(iq + (rs/ls + F) id/we)` of the resistance's error. So the pull `F` must be strong, or `id` of the sign that makes
 //! the denominator grow; else the turns drive the two apart.
 
-use super::Error;
+use super::MotorError;
 use serde::{Deserialize, Serialize};
 
 /// A staircase of d current, 0, A/2, A, repeated after a rest; the back-EMF's estimate is frozen meanwhile.
@@ -19,7 +19,7 @@ pub struct Injection {
 
 /// What an [`Injection`] asks for at one time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Stair {
+pub struct InjectionStep {
     /// Reference of the d current (A).
     pub id: f64,
     /// Whether the back-EMF may be adapted: not under injection, nor until its transient has gone.
@@ -34,8 +34,8 @@ impl Injection {
     ///
     /// # Errors
     /// An amplitude of zero; times that are not positive, or do not fit into one another.
-    pub fn new(amplitude: f64, step: f64, settle: f64, period: f64) -> Result<Self, Error> {
-        let refuse = |quantity, value, unit, must| Err(Error::OutOfRange { quantity, value, unit, must });
+    pub fn new(amplitude: f64, step: f64, settle: f64, period: f64) -> Result<Self, MotorError> {
+        let refuse = |quantity, value, unit, must| Err(MotorError::OutOfRange { quantity, value, unit, must });
         if amplitude == 0.0 || !amplitude.is_finite() {
             return refuse(
                 "injected d current",
@@ -44,7 +44,7 @@ impl Injection {
                 "be a number other than zero, or nothing is seen of the resistance",
             );
         }
-        let step = Error::positive("duration of a stair", step, "s")?;
+        let step = MotorError::positive("duration of a stair", step, "s")?;
         if !(0.0..step).contains(&settle) {
             return refuse("settling time", settle, "s", "be zero or more and shorter than a stair");
         }
@@ -55,16 +55,16 @@ impl Injection {
     }
 
     /// What to do at time `t` (s); the first stair starts at 0.
-    pub fn at(&self, t: f64) -> Stair {
+    pub fn at(&self, t: f64) -> InjectionStep {
         let into = crate::Scalar::rem_euclid(t, self.period);
         let stair = crate::Scalar::floor(into / self.step);
         let settled = into - stair * self.step >= self.settle;
         if stair == 0.0 {
-            Stair { id: 0.0, adapt_ke: false, adapt_rs: settled }
+            InjectionStep { id: 0.0, adapt_ke: false, adapt_rs: settled }
         } else if stair < 3.0 {
-            Stair { id: self.amplitude * stair * 0.5, adapt_ke: false, adapt_rs: settled }
+            InjectionStep { id: self.amplitude * stair * 0.5, adapt_ke: false, adapt_rs: settled }
         } else {
-            Stair { id: 0.0, adapt_ke: into - 3.0 * self.step >= self.settle, adapt_rs: false }
+            InjectionStep { id: 0.0, adapt_ke: into - 3.0 * self.step >= self.settle, adapt_rs: false }
         }
     }
 }
@@ -76,7 +76,7 @@ mod tests {
     #[test]
     fn climbs_rests_and_repeats() {
         let injection = Injection::new(-8.0, 0.1, 0.02, 1.0).unwrap();
-        let stair = |id, adapt_ke, adapt_rs| Stair { id, adapt_ke, adapt_rs };
+        let stair = |id, adapt_ke, adapt_rs| InjectionStep { id, adapt_ke, adapt_rs };
         for t in [0.0, 3.0] {
             assert_eq!(injection.at(t + 0.01), stair(0.0, false, false));
             assert_eq!(injection.at(t + 0.05), stair(0.0, false, true));

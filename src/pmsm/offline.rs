@@ -11,7 +11,7 @@ mod mechanics;
 mod plain;
 mod validate;
 
-pub use equations::{Equations, WEAK, hardly_seen};
+pub use equations::{Equations, hardly_seen};
 pub use extended::{Extended, extended, search_i0};
 pub use mechanics::mechanics;
 pub use plain::{Axes, Form, plain};

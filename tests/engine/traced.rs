@@ -3,8 +3,8 @@
 use crate::steps::agrees;
 use greybox::graph::{Function, Graph, Leaf, Symbol};
 use greybox::models::{
-    Armature, Axis, AxisMotion, Command, ControlledAxisMotion, DcMotor, Feed, Positioning, PositioningLoop, Reference,
-    Rotation,
+    Armature, AxisMotion, AxisParameters, Command, ControlledAxisMotion, DcMotor, Feed, Positioning, PositioningLoop,
+    Reference, Rotation,
 };
 use greybox::pmsm::{
     AngledDrive, Cabled, Compensated, CompensatedDrive, CompensatedSalientWinding, CompensatedWinding, Currents, Drive,
@@ -12,7 +12,7 @@ use greybox::pmsm::{
     InverterFedWinding, Machine, MachineParameters, MachineState, Mechanics, Misaligned, Salient, SalientWinding,
     Saturated, SaturatedWinding, Shaft, ShaftMotion, Surface, Torque, VoltageAndLoad, Winding,
 };
-use greybox::{Automatic, Equations, Hold, Kind, Model, Nothing, Rk4, Scalar, Signals, signals};
+use greybox::{Automatic, Hold, Kind, Model, Nothing, Rk4, Scalar, Signals, equations::Equations, signals};
 
 signals! {
     pub struct Pair { a: "1", b: "1" }
@@ -189,7 +189,7 @@ fn shipped_models_run_on_lanes() {
     let feed = swing::<Feed>(Feed { u: 24.0, tau_l: 0.1 }, 60);
     let armature = Armature { r: 1.0, l: 1e-3, k: 0.05, j: 1e-4, b: 1e-5 };
     agrees::<_, _, 7>(&DcMotor, &rk4, Hold::Zero, Rotation::from([0.5, 10.0]), armature, &feed, 1e-4);
-    let axis = Axis { m: 95.0, fv: 200.0, fc: 20.0, offset: -3.0 };
+    let axis = AxisParameters { m: 95.0, fv: 200.0, fc: 20.0, offset: -3.0 };
     let command = swing::<Command>(Command { vir: 2.0 }, 60);
     agrees::<_, _, 6>(&Positioning::EMPS, &rk4, Hold::Zero, AxisMotion { q: 0.1, v: 0.0 }, axis, &command, 1e-3);
     let reference = swing::<Reference>(Reference { qg: 0.1 }, 60);

@@ -3,6 +3,7 @@
 
 use approx::assert_relative_eq;
 use greybox::optimize::{GaussNewton, LevenbergMarquardt, Outcome, Severity, Stop};
+use greybox::optimize::{JacobianColumns, Scaling, Seen};
 use greybox::*;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -230,9 +231,12 @@ fn settings_without_sense() {
     says(fit(&record).integrator(Rk45 { relative: 0.0, absolute: 0.0 }).run(), &["relative", "Rk45", "0"]);
     // Weightings.
     let weighted = |signal: &str, law| fit(&record).weighting(BySignal::new(signal, law)).run();
-    says(weighted("speed", Law::Absolute), &["`speed`", "it has: u"]);
-    says(weighted("u", Law::Square { scale: 0.0 }), &["scale", "`u`", "0", "positive"]);
-    says(weighted("u", Law::Above { threshold: 1e3 }), &["weighting", "|u| >= 1000", "zero at every sample"]);
+    says(weighted("speed", WeightFunction::Absolute), &["`speed`", "it has: u"]);
+    says(weighted("u", WeightFunction::Square { scale: 0.0 }), &["scale", "`u`", "0", "positive"]);
+    says(
+        weighted("u", WeightFunction::Above { threshold: 1e3 }),
+        &["weighting", "|u| >= 1000", "zero at every sample"],
+    );
     says(fit(&record).weighting(|_: &Sample<Rl>| f64::NAN).run(), &["sample 0", "t = 0 s", "`bench`", "not a number"]);
     says(fit(&record).weighting(|s: &Sample<Rl>| 0.1 - s.t).run(), &["sample 101", "`bench`", "not negative"]);
     // Pre-filters.

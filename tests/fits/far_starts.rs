@@ -3,7 +3,7 @@
 use crate::common::Noise;
 use crate::shared::shared;
 use approx::assert_relative_eq;
-use greybox::models::{Axis, AxisMotion, Positioning};
+use greybox::models::{AxisMotion, AxisParameters, Positioning};
 use greybox::optimize::LeastSquares;
 use greybox::*;
 
@@ -218,7 +218,7 @@ fn the_emps_record_is_fitted_in_open_loop_from_far() {
     let Some(path) = shared("emps/emps.csv") else { return };
     let model = Positioning::EMPS;
     let record = Experiment::from_csv(&model, path).unwrap().initial(AxisMotion { q: free(0.0), v: fixed(0.0) });
-    let start = Axis {
+    let start = AxisParameters {
         m: free(43.003797).log(),
         fv: free(170.22234).log(),
         fc: free(2.5872915).log(),

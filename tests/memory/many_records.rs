@@ -1,7 +1,7 @@
 //! Records in one problem: the memory of steps and covariances is linear in their number.
 
 use crate::allocator::most_bytes;
-use greybox::{Elimination, Information};
+use greybox::information::{Elimination, Information};
 use std::time::Instant;
 
 const SHARED: usize = 3;

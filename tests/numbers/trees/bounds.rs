@@ -2,8 +2,8 @@
 
 use super::steps::{ROUNDING, problems};
 use super::{Random, close};
+use greybox::information::{Elimination, Information};
 use greybox::nalgebra::DVector;
-use greybox::{Elimination, Information};
 
 /// A step is the minimizer within its room exactly if the slope along each unknown is zero inside the room, and falls
 /// outward on its ends (Karush, Kuhn and Tucker).
