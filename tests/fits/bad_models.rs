@@ -83,7 +83,7 @@ fn free_pair(a: f64, b: f64) -> Pair<Parameter> {
 }
 
 #[track_caller]
-fn says<T>(result: Result<T, Error>, parts: &[&str]) -> Error {
+pub fn says<T>(result: Result<T, Error>, parts: &[&str]) -> Error {
     let Err(error) = result else { panic!("no error; expected {parts:?}") };
     let message = error.to_string();
     println!("{message}\n");
@@ -213,7 +213,7 @@ fn a_start_where_the_model_is_undefined() {
     let open = open.unwrap();
     says(
         Fit::new(&Rootless, &open).parameters(free_pair(1.0, 1.0)).run(),
-        &["output `x` is not a number", "Experiment::initial"],
+        &["output `x` is NaN where x = 0", "give a start for it with Experiment::initial"],
     );
 }
 
