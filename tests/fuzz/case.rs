@@ -82,11 +82,6 @@ fn through<M: Model + Clone + 'static>(draw: &mut Draw, model: &M) -> Result<Tal
             Err(error) => return said(&error).map(|()| tally),
         };
         for (answer, record) in fleet.run(records.iter().cloned()).zip(&records) {
-            // A single fit cuts longer records into segments, whose first slopes are approximate; from far away it may go
-            // to another minimum.
-            if record.len() >= 512 {
-                continue;
-            }
             agree(&answer, &settings.applied(Fit::new(model, record).parameters(declared)).run())?;
         }
         tally.fleets = 1;
@@ -234,7 +229,7 @@ fn known(summary: &Summary) -> Result<(), String> {
         check(value.is_finite(), || format!("{name} is {value}"))?;
         match unknown.knowledge {
             Knowledge::Known { standard_error, lower, upper } => {
-                let sound = standard_error >= 0.0 && standard_error.is_finite();
+                let sound = standard_error > 0.0 && standard_error.is_finite();
                 let about = lower <= value && value <= upper || moved && lower < upper;
                 let ends = about && lower.is_finite() && upper.is_finite();
                 check(sound && ends, || format!("{name} = {value} is known to {standard_error}, {lower} to {upper}"))?;

@@ -73,5 +73,5 @@ fn random_fits_end_soundly() {
     println!("from case {first} on: {tally:?}; the slowest took {} ms: {}", slowest.0, slowest.1);
     assert!(wrong.is_empty(), "wrong cases: {wrong:?}; run one alone with GREYBOX_FUZZ_CASE");
     // Enough cases must come so far that there is something to judge.
-    assert!(tally.fits * 10 >= tally.cases, "{tally:?}");
+    assert!(tally.fits * 5 >= tally.cases, "{tally:?}");
 }
