@@ -8,7 +8,7 @@ use greybox::optimize::{GaussNewton, LevenbergMarquardt, Stop};
 use greybox::pmsm::Surface;
 use greybox::{
     Automatic, Butterworth, Cauchy, Error, Esdirk, Estimate, ExperimentOf, Fit, Fleet, Horizon, Huber, JacobianColumns,
-    Knowledge, Model, OwnSize, Problem, Report, Rk4, Rk45, Sample, Signals, SoftL1, Summary, Tukey,
+    Kind, Knowledge, Model, OwnSize, Problem, Report, Rk4, Rk45, Sample, Signals, SoftL1, Summary, Tukey,
 };
 use std::time::Duration;
 
@@ -151,7 +151,9 @@ impl Settings {
             2 => fit,
             _ => fit.optimizer(LevenbergMarquardt::new(stop, JacobianColumns)),
         };
-        fit = match self.integrator {
+        // Other kinds of models are refused.
+        let integrator = if M::KIND == Kind::Continuous { self.integrator } else { usize::MAX };
+        fit = match integrator {
             0 => fit.integrator(Rk4 { substeps: 3 }),
             1 => fit.integrator(Rk45 { relative: 1e-6, absolute: 1e-9 }),
             2 => fit.integrator(Esdirk { relative: 1e-6, absolute: 1e-9 }),
@@ -288,14 +290,10 @@ fn agree<M: Model>(fleet: &Result<Estimate<M>, Error>, single: &Result<Estimate<
 
 /// A text for readers has words where there is no number.
 fn in_words(what: &str, text: &str) -> Result<(), String> {
-    let bare = |word: &&str| matches!(word.trim_matches(|c: char| !c.is_alphanumeric()), "NaN" | "inf");
-    let mut words = text.split([' ', '<', '>', '"', '\'', '%', '=', ',', ';']).peekable();
-    let mut before = "";
-    while let Some(word) = words.next() {
-        check(!bare(&word), || format!("its {what} has \"{before} {word} {}\"", words.peek().unwrap_or(&"")))?;
-        before = word;
-    }
-    Ok(())
+    let bare = |word: &str| matches!(word.trim_matches(|c: char| !c.is_alphanumeric()), "NaN" | "inf");
+    let wrong = |line: &&str| line.split([' ', '<', '>', '"', '\'', '%', '=', ',', ';']).any(bare);
+    let line = text.lines().find(wrong);
+    check(line.is_none(), || format!("its {what} has \"{:.400}\"", line.unwrap_or_default().trim()))
 }
 
 fn check(sound: bool, wrong: impl FnOnce() -> String) -> Result<(), String> {
