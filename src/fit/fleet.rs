@@ -1,19 +1,20 @@
 //! [`Fleet`]: the same fit of many records, each by itself.
 
 use super::lockstep::fit_together;
-use super::{Fit, Records, declared, sweep};
+use super::{Fit, Records, declared, finer, sweep};
 use crate::error::Error;
 use crate::estimate::{Estimate, Summary};
 use crate::experiment::ExperimentOf;
 use crate::functions::Handle;
 use crate::model::Model;
 use crate::parameter::Parameter;
-use crate::problem::{Problem, Settings, each};
+use crate::problem::{FinerSweeps, Problem, Settings, each};
 use crate::record::Record;
 use crate::sweep::Sweep;
 use core::marker::PhantomData;
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Records whose fits are advanced together: more than there are lanes, so that few lanes are idle when some have
 /// ended.
@@ -28,6 +29,7 @@ const AHEAD: usize = 4;
 /// record that fails does not affect the others. Records that are fitted together share the sum of their time limits.
 pub struct Fleet<'a, M: Model> {
     sweep: Arc<dyn Sweep + 'a>,
+    finer: Arc<FinerSweeps<'a>>,
     parameters: Vec<Parameter>,
     settings: Settings<'a>,
     model: PhantomData<fn() -> M>,
@@ -46,8 +48,9 @@ impl<'a, M: Model> Fit<'a, M> {
         }
         self.settings.optimizer.check()?;
         let sweep = sweep(Handle::Borrowed(self.model), &self.stepping, &self.predictor)?;
+        let finer = finer(Handle::Borrowed(self.model), self.is_default, &self.predictor);
         let (parameters, settings) = (declared::<M>(self.parameters), self.settings);
-        Ok(Fleet { sweep, parameters, settings, model: PhantomData })
+        Ok(Fleet { sweep, finer, parameters, settings, model: PhantomData })
     }
 }
 
@@ -93,7 +96,8 @@ impl<'a, M: Model> Fleet<'a, M> {
     }
 
     fn problem(&self, record: Record) -> Result<Problem<'a>, Error> {
-        Problem::new(self.sweep.clone(), vec![record], &self.parameters, self.settings.clone())
+        let problem = Problem::new(self.sweep.clone(), vec![record], &self.parameters, self.settings.clone())?;
+        Ok(problem.refining(self.finer.clone()))
     }
 
     fn group(&self, records: &[Record]) -> Vec<Result<Summary, Error>> {
@@ -111,7 +115,7 @@ impl<'a, M: Model> Fleet<'a, M> {
         }
         let single = self.settings.prefilter.is_none() && self.settings.starts == 1;
         let mut found = match single && self.is_wide(&valid) {
-            true => fit_together(&valid),
+            true => fit_together(&valid, Instant::now()),
             false => valid.iter().map(Problem::run).collect(),
         }
         .into_iter();
