@@ -21,6 +21,10 @@ pub(super) fn section(facts: &Facts) -> Option<Section> {
         Some(_) => section,
         None => section.says("The search from the declared start found no minimum.".to_owned()),
     };
+    let section = match facts.estimate.directions.is_empty() {
+        true => section,
+        false => section.says("Minima of the same cost may differ along what the data do not determine only."),
+    };
     let section = section.table(minima(starts)).table(places(starts));
     Some(section.table(failed(starts)).plot(waterfall(&starts.minima)))
 }
@@ -38,7 +42,7 @@ fn minima(starts: &Starts) -> Table {
     Table::new("Minima found", columns).rows(starts.minima.iter().enumerate().map(row)).at_most(LISTED)
 }
 
-/// Where the minima are, a column each.
+/// Where several minima are, a column each; a single one is the estimate.
 fn places(starts: &Starts) -> Table {
     let shown = &starts.minima[..starts.minima.len().min(LISTED)];
     let numbers = (1..=shown.len()).map(|i| i.to_string());
@@ -49,7 +53,8 @@ fn places(starts: &Starts) -> Table {
         [Cell::from(name.as_str())].into_iter().chain(values.map(|value| Cell::optional(value, 4))).collect::<Vec<_>>()
     };
     let table = Table { columns, ..Table::new("Unknowns at each minimum", []) };
-    table.rows(names.enumerate().map(row)).at_most(UNKNOWNS)
+    let several = shown.len() > 1;
+    table.rows(names.enumerate().filter(|_| several).map(row)).at_most(UNKNOWNS)
 }
 
 fn failed(starts: &Starts) -> Table {
