@@ -1,6 +1,6 @@
 //! The permanent magnet synchronous motor (PMSM) and its drive.
 //!
-//! Conventions, the same everywhere in this wing:
+//! Conventions, the same everywhere in this module:
 //!
 //! | quantity | convention |
 //! |---|---|

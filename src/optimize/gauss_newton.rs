@@ -49,7 +49,7 @@ struct Line {
     trial: Vec<f64>,
     halvings: u32,
     /// Trials that the cost could not resolve.
-    blind: u32,
+    unresolved: u32,
     failed: u64,
     /// How far, as a part of the cost, the trials were off what the slopes promised.
     noise: f64,
@@ -57,8 +57,8 @@ struct Line {
 
 const SUFFICIENT: f64 = 1e-4;
 const HALVINGS: u32 = 60;
-/// Fewer are enough where the cost has no digits left.
-const BLIND: u32 = 10;
+/// Fewer are enough where the differences of cost are rounding.
+const UNRESOLVED: u32 = 10;
 /// A step that shrinks a column of the Jacobian to less than this part went too far.
 const LOST: f64 = 1e-10;
 
@@ -93,8 +93,8 @@ impl GaussNewton {
     fn shorten(&mut self, point: Point) {
         let line = &mut self.line;
         line.trial = point.towards(&line.step);
-        line.blind += u32::from(-point.slope(&line.step) <= point.resolution());
-        if line.trial == point.x || line.blind > BLIND || line.halvings > HALVINGS {
+        line.unresolved += u32::from(-point.slope(&line.step) <= point.resolution());
+        if line.trial == point.x || line.unresolved > UNRESOLVED || line.halvings > HALVINGS {
             let outcome = point.stuck(line.failed, line.noise, false);
             return self.end(point, outcome);
         }

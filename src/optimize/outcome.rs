@@ -86,7 +86,7 @@ pub enum Outcome {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
-    /// Nothing speaks against it.
+    /// No check contradicts it.
     Usable,
     /// Read the warnings first.
     UsableWithCare,
@@ -144,7 +144,7 @@ impl Outcome {
                 "Look for parameters that only appear together, and fix one of them or give it a prior; or start closer."
             }
             Outcome::IterationLimit { .. } => {
-                "Allow more iterations, or start closer; if it creeps, look for parameters that only appear together."
+                "Allow more iterations, or start closer; if the cost hardly falls any more, look for parameters that only appear together."
             }
             Outcome::TimeLimit => "Allow more time, or resume from the checkpoint.",
             Outcome::Cancelled => "Resume from the checkpoint to go on.",

@@ -8,7 +8,7 @@ use crate::section::{Axis, Cell, Curves, Drawing, Layer, Plot, Section, Style, T
 /// Rows of a table.
 const LISTED: usize = 10;
 
-/// The minima and the failures as tables, and the searches by rising cost as a stair (a waterfall plot).
+/// The minima and the failures as tables, and the searches by rising cost as a waterfall plot.
 pub(super) fn section(facts: &Facts) -> Option<Section> {
     let starts = facts.estimate.starts.as_ref()?;
     let section = Section::new("starts", "Searches from several starts").says(format!("{starts}."));
