@@ -8,7 +8,7 @@ use greybox::nalgebra::DVector;
 /// A step is the minimizer within its limits exactly if the slope along each unknown is zero inside the limits, and falls
 /// outward on its ends (Karush, Kuhn and Tucker).
 #[test]
-fn a_bounded_step_is_the_minimizer_within_its_room() {
+fn a_bounded_step_is_the_minimizer_within_its_limits() {
     let mut on_ends = 0;
     for (problem, mut random) in problems() {
         let n = problem.unknowns();
