@@ -138,7 +138,10 @@ crate::signals! {
 pub struct PolePairs(u32);
 
 impl PolePairs {
-    /// `count` pole pairs; zero is an error.
+    /// `count` pole pairs.
+    ///
+    /// # Errors
+    /// Zero.
     pub const fn new(count: u32) -> Result<Self, MotorError> {
         if count == 0 { Err(MotorError::NoPolePairs) } else { Ok(PolePairs(count)) }
     }
