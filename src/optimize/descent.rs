@@ -38,10 +38,10 @@ pub(super) struct Descent {
     unresolved: u32,
     /// Trials in a row that could not be evaluated.
     pub failed: u64,
-    /// How far, as a part of the cost, the last rejected trials were off what the slopes promised.
+    /// How far, as a part of the cost, the last rejected trials were off the predicted decrease.
     #[serde(with = "crate::real")]
     pub noise: f64,
-    /// Rejected trials in a row that kept their promise no better than the longer ones before, and the last one's mismatch.
+    /// Rejected trials in a row whose gain was no nearer to the predicted one than that of the longer ones before, and the last one's difference.
     #[serde(with = "crate::real")]
     rough: (u32, f64),
     /// Trials so far.
@@ -61,12 +61,12 @@ pub(super) struct Trial {
     /// The diagonal by which it was damped, and its length in the metric of the scales.
     pub damping: Vec<f64>,
     pub length: f64,
-    promised: f64,
+    predicted: f64,
     resolved: bool,
 }
 
 const FALL: f64 = 0.1;
-/// A step that gains so much of what was promised is a good one.
+/// A step that gains so much of the predicted decrease is a good one.
 const GOOD: f64 = 0.9;
 const ACCEPT: f64 = 1e-4;
 /// The next step after one that was rejected.
@@ -122,15 +122,15 @@ impl Descent {
         };
         let (lambda, step) = limited(point, scales, self.lambda, longest)?;
         self.lambda = lambda;
-        let (x, promised) = (point.towards(&step), point.linear.predicted_reduction(&step));
-        let resolved = promised > point.resolution();
+        let (x, predicted) = (point.towards(&step), point.linear.predicted_reduction(&step));
+        let resolved = predicted > point.resolution();
         let damping = damping(scales, lambda);
         let length = length(scales, &step);
         let spent = self.is_rough() || self.undecided >= UNDECIDED || self.unresolved >= UNRESOLVED && !resolved;
-        (x != point.x && !spent).then_some(Trial { x, step, damping, length, promised, resolved })
+        (x != point.x && !spent).then_some(Trial { x, step, damping, length, predicted, resolved })
     }
 
-    /// Whether slopes are not those of the cost: however short the steps, they do not keep what slopes promise.
+    /// Whether slopes are not those of the cost: however short the steps, they do not gain what slopes predict.
     pub fn is_rough(&self) -> bool {
         self.rough.0 >= ROUGH
     }
@@ -156,7 +156,7 @@ impl Descent {
         let cost = point.cost();
         let gain = match next {
             None => f64::NEG_INFINITY,
-            Some(next) if trial.resolved => (cost - next.cost()) / trial.promised,
+            Some(next) if trial.resolved => (cost - next.cost()) / trial.predicted,
             Some(next) => self.gain_by_slope(point, trial, next),
         };
         if gain <= ACCEPT {
@@ -174,7 +174,7 @@ impl Descent {
             self.lambda *= self.fall;
             self.fall *= FALL;
         } else {
-            // Nielsen (1999): smooth between no change at half the promised gain and a tenth at the full one.
+            // Nielsen (1999): smooth between no change at half the predicted gain and a tenth at the full one.
             self.lambda *= (1.0 - (2.0 * gain - 1.0).powi(3)).clamp(FALL, 2.0);
             self.fall = FALL;
         }
@@ -186,7 +186,7 @@ impl Descent {
         self.failed = if failed { self.failed + 1 } else { 0 };
         if trial.resolved && !failed {
             // Of a smooth cost this falls with the length of the step; what stays is noise.
-            self.noise = ((1.0 - gain).abs() * trial.promised / cost).max(0.125 * self.noise);
+            self.noise = ((1.0 - gain).abs() * trial.predicted / cost).max(0.125 * self.noise);
             let falls = 1.0 - gain < SMOOTH * self.rough.1;
             self.rough = (if falls { 0 } else { self.rough.0 + 1 }, 1.0 - gain);
         }

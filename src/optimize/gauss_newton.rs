@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// The method of Gauss and Newton with a backtracking line search (Nocedal and Wright, *Numerical Optimization*, 2006,
 /// sections 3.1 and 10.3), in bounds.
 ///
-/// Each step is the minimizer of the linearized sum of squares, halved until the cost falls by a part of what was promised
+/// Each step is the minimizer of the linearized sum of squares, halved until the cost falls by a part of the predicted decrease
 /// (Armijo). Fast near a well-determined minimum; [`LevenbergMarquardt`](super::LevenbergMarquardt) is the safer choice
 /// elsewhere. Directions that the data do not determine are damped by 1e-8. Bounds are part of the linearized minimization.
 ///
@@ -51,7 +51,7 @@ struct Line {
     /// Trials that the cost could not resolve.
     unresolved: u32,
     failed: u64,
-    /// How far, as a part of the cost, the trials were off what the slopes promised.
+    /// How far, as a part of the cost, the trials were off the predicted decrease.
     noise: f64,
 }
 
@@ -115,7 +115,7 @@ impl GaussNewton {
             false => decrease > 0.0 && decrease >= -SUFFICIENT * slope,
         };
         self.line.noise = ((decrease + slope).abs() / point.cost_size()).max(0.125 * self.line.noise);
-        // A plateau, that no slope leads back from.
+        // A plateau, where slopes are zero.
         let lost = point.norms.iter().zip(&next.norms).any(|(before, after)| *after < LOST * before);
         enough && !lost
     }

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 /// Each trial is the minimizer of the linearized sum of squares plus `lambda |D step|^2`, computed from the triangle; the
 /// trial brings its slopes along. `D` is the [`Scaling`]. `lambda` is the least, not below the last one, with which the step
 /// is no longer than allowed: a tenth of the unknowns' sizes at first, their sizes later, a quarter of the last step after
-/// one that gained nothing (found as by More 1978). After a step that kept its promise `lambda` falls, ever faster; after one
+/// one that gained nothing (found as by More 1978). After a step that gained what was predicted `lambda` falls, ever faster; after one
 /// that half did it stays (Nielsen 1999). Bounds are part of the minimization: an unknown that would cross one is put on it,
 /// and the others are minimized again. Where the cost can no longer resolve a step, the slope along the step decides
 /// instead. The undamped step decides when to stop, so that heavy damping never looks like a minimum.

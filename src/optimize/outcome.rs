@@ -35,7 +35,7 @@ pub enum Outcome {
     /// Nothing was left to explain: the model reproduces the data to their rounding.
     Exact,
     /// No step lowers the cost, which is rough: what the next step would gain is below what the cost jumps from point to
-    /// point, or steps do not keep what slopes promise, however short.
+    /// point, or steps do not gain what slopes predict, however short.
     Rough {
         /// By how much the cost jumps, as a part of it.
         #[serde(with = "crate::real")]
@@ -63,7 +63,7 @@ pub enum Outcome {
         #[serde(with = "crate::real")]
         gradient: f64,
     },
-    /// Many steps in a row lowered the cost by next to nothing, where slopes promise more.
+    /// Many steps in a row lowered the cost by next to nothing, where slopes predict more.
     Creeping {
         /// How many.
         trials: u64,
@@ -189,7 +189,7 @@ impl fmt::Display for Outcome {
             ),
             Outcome::Creeping { trials, promised } => write!(
                 f,
-                "not converged: {trials} steps hardly lowered the cost, of which the slopes promise {:.1} %",
+                "not converged: {trials} steps hardly lowered the cost, of which the slopes predict {:.1} %",
                 100.0 * promised
             ),
             Outcome::IterationLimit { iterations } => write!(f, "not converged after {iterations} iterations"),

@@ -188,7 +188,7 @@ impl Point {
     }
 
     /// How a search ends here that no step leads away from. `noise` is how far, as a part of the cost, the last trials were
-    /// off what the slopes promised; `rough` says that they were off however short.
+    /// off what the slopes predicted; `rough` says that they were off however short.
     pub fn stuck(&self, failed: u64, noise: f64, rough: bool) -> Outcome {
         let (step, gradient) = (self.relative_step(), self.cosine());
         let noise = noise.max(self.linear.roughness()).max(self.rounding());
