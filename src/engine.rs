@@ -2,7 +2,7 @@
 //!
 //! A [`Recurrence`] is differentiated as a whole, with respect to chosen seeds, scheduled to instructions, and run on *lanes*:
 //! each lane is a trajectory of its own, with its own parameters, start and record. A lane's bits depend on nothing but its
-//! own numbers: not on its neighbors, nor on the number of lanes, nor on what runs the instructions.
+//! own numbers: not on other lanes, nor on the number of lanes, nor on what runs the instructions.
 //!
 //! The interpreter runs everywhere. Where the processor is an x86-64 with AVX2, and the feature `jit` is on, the instructions
 //! become machine code.
@@ -93,7 +93,7 @@ impl Program {
         let step = Step::new(recurrence, seeds, sampling == Sampling::Uniform);
         let parameters = parameters(recurrence);
         let roots: Vec<_> = step.rows.iter().flatten().chain(&step.next).copied().collect();
-        let derived = derive::dear(&step.tape, &roots);
+        let derived = derive::costly(&step.tape, &roots);
         let (tape, next, rows) = (&step.tape, &step.next, &step.rows);
         let code = schedule(&Roots { tape, next, rows, parameters, derived: &derived })?;
         let (width, machine) = choice::engine(&code, trajectories);

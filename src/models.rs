@@ -1,4 +1,4 @@
-//! Models that ship beside the motor's wing: a direct-current motor, and a linear axis on its own and under its controller.
+//! Models that ship beside the motors of [`pmsm`](crate::pmsm): a direct-current motor, and a linear axis on its own and under its controller.
 //!
 //! | model | equations | for |
 //! |---|---|---|

@@ -1,6 +1,6 @@
 //! The permanent magnet synchronous motor (PMSM) and its drive.
 //!
-//! Conventions, the same everywhere in this wing:
+//! Conventions, the same everywhere in this module:
 //!
 //! | quantity | convention |
 //! |---|---|
@@ -138,7 +138,10 @@ crate::signals! {
 pub struct PolePairs(u32);
 
 impl PolePairs {
-    /// `count` pole pairs; zero is an error.
+    /// `count` pole pairs.
+    ///
+    /// # Errors
+    /// Zero.
     pub const fn new(count: u32) -> Result<Self, MotorError> {
         if count == 0 { Err(MotorError::NoPolePairs) } else { Ok(PolePairs(count)) }
     }

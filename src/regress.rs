@@ -1,7 +1,7 @@
 //! [`Regression`]: linear least squares from rows of named regressors.
 //!
 //! For models that are linear in their parameters, `y = phi . theta + error`: all at once, without start and without
-//! iteration. The rows are kept, because honest standard errors need the residuals in their order; the solution itself
+//! iteration. The rows are kept, because standard errors that allow for correlation need the residuals in their order; the solution itself
 //! comes from the [`Information`] triangle.
 
 mod error;

@@ -11,7 +11,7 @@ const NEGLIGIBLE: f64 = 1e-150;
 /// Numbers in a cache line.
 const LINE: usize = 8;
 
-/// Trajectories side by side: their parameters, what they carry, and room to compute.
+/// Trajectories side by side: their parameters, what they carry, and working memory.
 ///
 /// Set parameters and steps, [`prepare`](Self::prepare), [`start`](Self::start) each lane, [`run`](Self::run) block by block.
 ///

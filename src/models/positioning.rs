@@ -40,7 +40,7 @@ crate::signals! {
         /// Command to the drive, as the controller gives it.
         vir: "V",
     }
-    /// Parameters of a linear axis, as the load feels them.
+    /// Parameters of a linear axis, referred to the load.
     pub struct AxisParameters {
         /// Mass, with the inertia of all that turns; must be positive.
         m: "kg",

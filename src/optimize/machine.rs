@@ -54,7 +54,7 @@ impl Domain {
 /// }
 /// ```
 ///
-/// What is serialized of a search is its place and memory, not the slopes there: after [`resume`](Machine::resume) it asks
+/// A search is serialized with its point and its settings, without the slopes there: after [`resume`](Machine::resume) it asks
 /// for them again, and goes on as if it had not been interrupted.
 pub trait Machine {
     /// Begins anew at a point.

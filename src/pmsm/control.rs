@@ -138,6 +138,9 @@ pub struct SpeedControl {
 
 impl SpeedControl {
     /// Bandwidth `wc` (rad/s) and damping `zeta` for an inertia `j` (kg m^2).
+    ///
+    /// # Errors
+    /// An inertia, bandwidth or damping that is not positive.
     pub fn tuned(j: f64, wc: f64, zeta: f64) -> Result<Self, MotorError> {
         let j = MotorError::positive("inertia", j, "kg m^2")?;
         let wc = MotorError::positive("bandwidth of the speed control", wc, "rad/s")?;
@@ -177,6 +180,9 @@ pub struct PositionControl {
 
 impl PositionControl {
     /// Gain `kv` (1/s), largest speed (rad/s) and acceleration (rad/s^2).
+    ///
+    /// # Errors
+    /// A gain, speed or acceleration that is not positive.
     pub fn new(kv: f64, w_max: f64, a_max: f64) -> Result<Self, MotorError> {
         Ok(PositionControl {
             kv: MotorError::positive("gain of the position control", kv, "1/s")?,

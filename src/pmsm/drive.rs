@@ -108,6 +108,9 @@ const SPEED_FILTER: f64 = 300.0;
 
 impl Simulation {
     /// The reference drive of an axis with all disturbances, winding and magnet at 20 C.
+    ///
+    /// # Errors
+    /// A quantity of the axis outside its range.
     pub fn new(axis: RobotAxis) -> Result<Self, MotorError> {
         axis.check()?;
         let control = CurrentControl::lambda_tuned(axis.rs, axis.ls, axis.ke, axis.pole_pairs, 1e-3)?;

@@ -17,6 +17,9 @@ pub enum Modulation {
 
 impl Modulation {
     /// Longest voltage vector (V, phase peak) from a direct voltage `vdc` (V).
+    ///
+    /// # Errors
+    /// A voltage that is not positive.
     pub fn v_max(self, vdc: f64) -> Result<f64, MotorError> {
         let vdc = MotorError::positive("direct voltage", vdc, "V")?;
         Ok(match self {
@@ -61,6 +64,9 @@ impl Carrier {
 }
 
 /// Speed (rad/s, mechanical) at which the EMF alone uses up `v_max` (V, phase peak): no current can be driven beyond it.
+///
+/// # Errors
+/// A back-EMF or voltage that is not positive.
 pub fn top_speed(ke: f64, v_max: f64) -> Result<f64, MotorError> {
     Ok(MotorError::positive("voltage limit", v_max, "V")?
         / (super::SQRT_2_3 * MotorError::positive("Ke", ke, "V s/rad")?))

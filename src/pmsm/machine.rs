@@ -59,7 +59,10 @@ pub struct Machine<M = Salient, P = MachineParameters> {
 }
 
 impl Machine {
-    /// A salient motor with this many pole pairs behind a gear; zero pole pairs or a gear that is not positive are errors.
+    /// A salient motor with this many pole pairs behind a gear.
+    ///
+    /// # Errors
+    /// Zero pole pairs, a gear that is not positive.
     pub fn new(pole_pairs: u32, gear: f64) -> Result<Self, MotorError> {
         Ok(Machine::of(Salient::new(pole_pairs)?, Shaft::new(gear)?))
     }

@@ -39,6 +39,9 @@ pub struct Constants {
 
 impl Geometry {
     /// `psi_m = pi l1 l2 Bm Ns / (4 np)` and `L = pi mu0 l1 l2 Ns^2 / (8 g np^2)`.
+    ///
+    /// # Errors
+    /// A length, diameter, gap, flux density or number of turns that is not positive.
     pub fn constants(&self) -> Result<Constants, MotorError> {
         let area = MotorError::positive("motor length", self.length, "m")?
             * MotorError::positive("rotor diameter", self.rotor_diameter, "m")?;

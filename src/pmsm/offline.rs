@@ -92,6 +92,9 @@ impl Spans {
 
     /// The intervals of a record without angle, which is added up from the speed and starts at `theta` (rad, mechanical;
     /// it matters to the dead time only). The outputs must be there in every sample and the samples evenly spaced.
+    ///
+    /// # Errors
+    /// An output that is missing, samples that are not evenly spaced.
     pub fn from_experiment<X: Signals>(
         experiment: &Experiment<X, Drive, Currents>,
         pole_pairs: PolePairs,

@@ -92,6 +92,9 @@ fn moving_average(values: &[f64], width: usize) -> Vec<f64> {
 impl Program {
     /// Experiments 3, 4 and 5: `count` back-and-forth cycles of speeds rising evenly from 15 rad/s to the axis's largest,
     /// at `share` of its largest acceleration.
+    ///
+    /// # Errors
+    /// A share or an axis whose acceleration or sample time is not positive.
     pub fn speed_cycles(axis: &RobotAxis, count: usize, share: f64) -> Result<Program, MotorError> {
         let a = MotorError::positive("acceleration", share * axis.a_max, "rad/s^2")?;
         let mut composer = Composer::new(axis)?;
@@ -105,6 +108,9 @@ impl Program {
     }
 
     /// Experiment 6, material handling: slow approach, fast transfer, slow approach, both ways.
+    ///
+    /// # Errors
+    /// An axis whose acceleration or sample time is not positive.
     pub fn material_handling(axis: &RobotAxis, repeats: usize) -> Result<Program, MotorError> {
         let a = MotorError::positive("acceleration", axis.a_max, "rad/s^2")?;
         let v = 0.85 * axis.w_max;
@@ -121,6 +127,9 @@ impl Program {
     }
 
     /// Experiment 6, water cutting: slow contours, then short moves; the same speeds on every axis.
+    ///
+    /// # Errors
+    /// An axis whose acceleration or sample time is not positive.
     pub fn water_cutting(axis: &RobotAxis, repeats: usize) -> Result<Program, MotorError> {
         let a = MotorError::positive("acceleration", axis.a_max, "rad/s^2")?;
         let mut composer = Composer::new(axis)?;

@@ -52,6 +52,9 @@ pub const V_MAX: f64 = 346.410_161_513_775_44;
 
 impl RobotAxis {
     /// Axis 1 to 6 of the reference robot.
+    ///
+    /// # Errors
+    /// A number that is not 1 to 6.
     pub const fn reference(number: u8) -> Result<RobotAxis, MotorError> {
         //       R,    L mH, Ke,  J,      w_max, acc,    Tg,  cable, Imax, Tc,   Bv,     gear,  cogging
         let row = match number {
@@ -107,6 +110,9 @@ impl RobotAxis {
     }
 
     /// Refuses an axis that no motor is like.
+    ///
+    /// # Errors
+    /// The first quantity outside its range.
     pub fn check(&self) -> Result<(), MotorError> {
         for (quantity, value, unit) in [
             ("resistance", self.rs, "ohm"),

@@ -40,7 +40,10 @@ pub struct Saturated {
 }
 
 impl Saturated {
-    /// A motor with this many pole pairs; zero is an error.
+    /// A motor with this many pole pairs.
+    ///
+    /// # Errors
+    /// Zero pole pairs.
     pub const fn new(pole_pairs: u32) -> Result<Self, MotorError> {
         match PolePairs::new(pole_pairs) {
             Ok(pole_pairs) => Ok(Saturated { pole_pairs }),

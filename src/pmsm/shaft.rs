@@ -58,7 +58,10 @@ pub struct Shaft {
 }
 
 impl Shaft {
-    /// A rotor behind a gear that turns the arm once in `gear` turns of the motor; not positive is an error.
+    /// A rotor behind a gear that turns the arm once in `gear` turns of the motor.
+    ///
+    /// # Errors
+    /// A gear that is not positive.
     pub fn new(gear: f64) -> Result<Self, MotorError> {
         Ok(Shaft { gear: MotorError::positive("gear ratio", gear, "turns")? })
     }

@@ -15,7 +15,10 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// A motor with this many pole pairs; zero is an error.
+    /// A motor with this many pole pairs.
+    ///
+    /// # Errors
+    /// Zero pole pairs.
     pub const fn new(pole_pairs: u32) -> Result<Self, MotorError> {
         match PolePairs::new(pole_pairs) {
             Ok(pole_pairs) => Ok(Surface { pole_pairs }),

@@ -25,7 +25,10 @@ pub const REFERENCE: f64 = 20.0;
 pub struct Celsius(f64);
 
 impl Celsius {
-    /// `degrees` Celsius; below -273.15, infinite or not a number is an error.
+    /// `degrees` Celsius.
+    ///
+    /// # Errors
+    /// Below -273.15, infinite, or not a number.
     pub fn new(degrees: f64) -> Result<Self, MotorError> {
         if (-273.15..f64::INFINITY).contains(&degrees) {
             Ok(Celsius(degrees))
@@ -109,6 +112,9 @@ impl Default for Magnet {
 
 impl Magnet {
     /// The magnet with a share `loss` of its flux lost to age (0.01 to 0.02 over a life), within `0..1`.
+    ///
+    /// # Errors
+    /// A share outside `0..1`.
     pub fn aged(self, loss: f64) -> Result<Self, MotorError> {
         if (0.0..1.0).contains(&loss) {
             Ok(Magnet { ageing: loss, ..self })
@@ -171,6 +177,9 @@ pub struct Estimated {
 ///
 /// `cold` and `warm` may contain the cable (it cancels); `r20` is the *motor's* phase resistance at 20 C alone: with the
 /// cable in it, 35 K read 22 K on the reference robot. The three errors are taken as independent.
+///
+/// # Errors
+/// An `r20` that is not positive; a result that is not finite.
 pub fn winding_rise(cold: Estimated, warm: Estimated, r20: Estimated) -> Result<Estimated, MotorError> {
     MotorError::positive("resistance of the motor at 20 C", r20.value, "ohm")?;
     propagate([cold, warm, r20], |[cold, warm, r20]| (warm - cold) / (r20 * COPPER))
@@ -178,6 +187,9 @@ pub fn winding_rise(cold: Estimated, warm: Estimated, r20: Estimated) -> Result<
 
 /// Rise (K) of the magnet between a cold and a warm estimate of Ke, below [`KNEE`]; `cold_at` is the temperature of the
 /// cold one. The two errors are taken as independent.
+///
+/// # Errors
+/// A cold Ke that is not positive, a `cold_at` at which no flux is left; a result that is not finite.
 pub fn magnet_rise(cold: Estimated, warm: Estimated, cold_at: Celsius) -> Result<Estimated, MotorError> {
     MotorError::positive("Ke of the cold motor", cold.value, "V s/rad")?;
     let cold_factor =

@@ -145,6 +145,9 @@ impl Cable {
     pub const COPPER: f64 = 0.017_241;
 
     /// Resistance per phase at 20 C (ohm), to be added to the motor's; linear in the length.
+    ///
+    /// # Errors
+    /// A length below zero, a cross-section that is not positive.
     pub fn resistance(&self) -> Result<f64, MotorError> {
         let length = if self.length == 0.0 { 0.0 } else { MotorError::positive("cable length", self.length, "m")? };
         let cross_section = MotorError::positive("cable cross-section", self.cross_section, "mm^2")?;

@@ -1,6 +1,7 @@
 //! Every way in which a fit can be asked for nonsense: an error, outcome or warning that names the thing, the number and
 //! the remedy. What is wrong with records alone stands in `bad_records.rs`.
 
+use crate::common::{Coil, Current, Rl, Voltage};
 use approx::assert_relative_eq;
 use greybox::optimize::{GaussNewton, LevenbergMarquardt, Outcome, Severity, Stop};
 use greybox::optimize::{JacobianColumns, Scaling, Seen};
@@ -8,27 +9,6 @@ use greybox::*;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
-
-signals! { pub struct Current { i: "A" } }
-signals! { pub struct Voltage { u: "V" } }
-signals! { pub struct Coil { r: "ohm", l: "H" } }
-
-/// `l i' = u - r i`.
-#[derive(Clone)]
-struct Rl;
-
-impl Model for Rl {
-    type State = Current;
-    type Input = Voltage;
-    type Output = Current;
-    type Parameters = Coil;
-    fn derivative<S: Scalar>(&self, _t: S, x: &Current<S>, u: &Voltage<S>, p: &Coil<S>) -> Current<S> {
-        Current { i: (u.u - p.r * x.i) / p.l }
-    }
-    fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, _p: &Coil<S>) -> Current<S> {
-        *x
-    }
-}
 
 const H: f64 = 1e-3;
 const EVEN: Time = Time::Uniform { start: 0.0, step: H };

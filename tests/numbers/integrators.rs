@@ -30,7 +30,7 @@ fn orders() {
     }
 }
 
-/// Walks from sample to sample, at `times`, with the inputs held as said.
+/// Steps from sample to sample, at `times`, with the inputs held as said.
 fn simulate<M: Model, I: Integrator, S: Scalar>(
     model: &M,
     integrator: &I,
