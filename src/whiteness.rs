@@ -53,36 +53,53 @@ impl Autocorrelation {
 /// At each lag the sum of products `e[t] e[t - k]` is divided by the root of the sum of their squares, which is its
 /// standard deviation where the errors are uncorrelated, whatever their variances (Dalla, Giraitis and Phillips,
 /// Econometric Theory 38 (2022) 595, section 2). Where the variances are equal, it is the test of Box and Pierce.
+///
+/// A few large errors can decide these sums; the signs of neighbors weigh all errors alike.
 #[derive(Clone, Debug)]
 pub(crate) struct Portmanteau {
     errors: Autocorrelation,
     squares: Autocorrelation,
-    squared: Vec<f64>,
+    signs: Autocorrelation,
+    measured: Autocorrelation,
+    run: Vec<f64>,
 }
 
 impl Portmanteau {
     pub fn new(lags: usize) -> Self {
-        Portmanteau { errors: Autocorrelation::new(lags), squares: Autocorrelation::new(lags), squared: vec![] }
+        let [errors, squares, signs, measured] = [lags, lags, 1, 1].map(Autocorrelation::new);
+        Portmanteau { errors, squares, signs, measured, run: vec![] }
     }
 
     /// The next errors in order of time, zero where missing.
     pub fn add(&mut self, run: &[f64]) {
-        self.squared.clear();
-        self.squared.extend(run.iter().map(|e| e * e));
         self.errors.add(run);
-        self.squares.add(&self.squared);
+        let of: [(&mut Autocorrelation, fn(f64) -> f64); 3] = [
+            (&mut self.squares, |e| e * e),
+            (&mut self.signs, |e| if e == 0.0 { 0.0 } else { e.signum() }),
+            (&mut self.measured, |e| if e == 0.0 { 0.0 } else { 1.0 }),
+        ];
+        for (sums, number) in of {
+            self.run.clear();
+            self.run.extend(run.iter().map(|e| number(*e)));
+            sums.add(&self.run);
+        }
+    }
+
+    /// The sums, one kind after the other.
+    fn all(&mut self) -> [&mut Autocorrelation; 4] {
+        [&mut self.errors, &mut self.squares, &mut self.signs, &mut self.measured]
     }
 
     /// As if the errors of the other had followed.
     pub fn follow(&mut self, next: &Portmanteau) {
-        self.errors.follow(&next.errors);
-        self.squares.follow(&next.squares);
+        let theirs = [&next.errors, &next.squares, &next.signs, &next.measured];
+        self.all().into_iter().zip(theirs).for_each(|(sums, next)| sums.follow(next));
     }
 
     /// Adds the sums of another record.
     pub fn append(&mut self, other: &Portmanteau) {
-        self.errors.append(&other.errors);
-        self.squares.append(&other.squares);
+        let theirs = [&other.errors, &other.squares, &other.signs, &other.measured];
+        self.all().into_iter().zip(theirs).for_each(|(sums, other)| sums.append(other));
     }
 
     /// The sum of products at a lag over its standard deviation without correlation, and the autocorrelation.
@@ -97,6 +114,12 @@ impl Portmanteau {
         let sums = self.errors.sums.iter().zip(&self.squares.sums).skip(1).take(lags);
         let terms: Vec<f64> = sums.filter(|(_, squares)| **squares > 0.0).map(|(sum, q)| sum * sum / q).collect();
         chi_squared_tail(terms.iter().sum(), terms.len() as f64)
+    }
+
+    /// The probability that errors without correlation agree, or disagree, as often in sign with the error before.
+    pub fn sign_p_value(&self) -> f64 {
+        let (sum, pairs) = (self.signs.sums[1], self.measured.sums[1]);
+        if pairs > 0.0 { chi_squared_tail(sum * sum / pairs, 1.0) } else { 1.0 }
     }
 }
 
@@ -210,5 +233,7 @@ mod tests {
         // Two degrees of freedom have the tail `exp(-q / 2)`.
         let expected = (-(one * one + two * two) / 2.0).exp();
         assert!((test.p_value(2) - expected).abs() < 1e-12, "{}", test.p_value(2));
+        // Of three pairs one agrees in sign: a third of a standard normal square, whose tail at 1 / 3 is 0.563703.
+        assert!((test.sign_p_value() - 0.563703).abs() < 1e-6, "{}", test.sign_p_value());
     }
 }

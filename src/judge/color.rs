@@ -49,7 +49,7 @@ impl Judgement<'_> {
         let output = &self.objective.problem.layout().outputs[output].name;
         let (probability, first) = (p_value(white.p_value.min(1.0)), number(white.first, 2));
         let mut text = format!(
-            "the errors of `{output}` are not white (portmanteau {probability}, correlation with the error before \
+            "the errors of `{output}` are not white ({probability}, correlation with the error before \
              {first}): the model misses a part, or the noise is colored"
         );
         if part > SMALL {
