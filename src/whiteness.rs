@@ -116,10 +116,14 @@ impl Portmanteau {
         chi_squared_tail(terms.iter().sum(), terms.len() as f64)
     }
 
-    /// The probability that errors without correlation agree, or disagree, as often in sign with the error before.
-    pub fn sign_p_value(&self) -> f64 {
-        let (sum, pairs) = (self.signs.sums[1], self.measured.sums[1]);
-        if pairs > 0.0 { chi_squared_tail(sum * sum / pairs, 1.0) } else { 1.0 }
+    /// The probability that errors without correlation agree, or disagree, as often in sign with the error before, or that
+    /// they have as large a correlation with it: the larger of both. Where noise changes much in size, signs alone show what
+    /// an estimate is off by where there is little noise.
+    pub fn neighbors_p_value(&self) -> f64 {
+        let (count, pairs) = (self.measured.sums[0], self.measured.sums[1]);
+        let tail = |square: f64| chi_squared_tail(square, 1.0);
+        let signs = if pairs > 0.0 { tail(self.signs.sums[1].powi(2) / pairs) } else { 1.0 };
+        signs.max(tail(count * self.at(1).1.powi(2)))
     }
 }
 
@@ -233,7 +237,8 @@ mod tests {
         // Two degrees of freedom have the tail `exp(-q / 2)`.
         let expected = (-(one * one + two * two) / 2.0).exp();
         assert!((test.p_value(2) - expected).abs() < 1e-12, "{}", test.p_value(2));
-        // Of three pairs one agrees in sign: a third of a standard normal square, whose tail at 1 / 3 is 0.563703.
-        assert!((test.sign_p_value() - 0.563703).abs() < 1e-6, "{}", test.sign_p_value());
+        // Of three pairs one agrees in sign: a square of 1 / 3; of four errors, that of their correlation is 4 (3 / 15)^2,
+        // which is less. The tail of a standard normal square at 0.16 is 0.689157.
+        assert!((test.neighbors_p_value() - 0.689157).abs() < 1e-6, "{}", test.neighbors_p_value());
     }
 }

@@ -11,7 +11,7 @@ use crate::optimize::Severity;
 /// widened it is a note.
 pub(super) const CERTAIN: f64 = 1e-4;
 /// A level that is enough where the colored part is above the second.
-const LIKELY: f64 = 1e-3;
+const LIKELY: f64 = 5e-4;
 const MUCH: f64 = 0.05;
 /// The part of an output's movement that is an error, and follows from the errors before: below the first it is a note,
 /// above the second the model is wrong or the noise hides the plant.

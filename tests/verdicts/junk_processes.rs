@@ -42,9 +42,7 @@ fn curve<M: Model + 'static>(
 
 fn sensors() -> Vec<Junk> {
     vec![
-        named("dead sensors of processes", ConstantOutput, |s| {
-            spoiled(s, |c, _| c.y.iter_mut().for_each(|y| y.fill(0.0)))
-        }),
+        seen("dead sensors of processes", |s| spoiled(s, |c, _| c.y.iter_mut().for_each(|y| y.fill(0.0)))),
         seen("processes: outputs are white noise", |s| {
             spoiled(s, |c, r| c.y.iter_mut().flatten().for_each(|y| *y = r.normal()))
         }),

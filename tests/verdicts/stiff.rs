@@ -43,10 +43,10 @@ const TRUTH: Constants = Constants { k1: 1.71, k2: 0.43, k3: 8.32, k4: 0.69, k5:
 fn record() -> ExperimentOf<Hires> {
     let start = Species { y1: 1.0, y8: 0.0057, ..Species::default() };
     // Dense at first, to 320 s in all.
-    let times: Vec<f64> = (0..120).map(|k| 320.0 * (f64::from(k) / 119.0).powi(3)).collect();
+    let times: Vec<f64> = (0..60).map(|k| 320.0 * (f64::from(k) / 59.0).powi(3)).collect();
     let exact = Esdirk { relative: 1e-10, absolute: 1e-14 };
     let run =
-        Simulator::new(&Hires).integrator(exact).run(&TRUTH, &start, Time::Stamps(times), &[Nothing; 120]).unwrap();
+        Simulator::new(&Hires).integrator(exact).run(&TRUTH, &start, Time::Stamps(times), &[Nothing; 60]).unwrap();
     let largest = |j: usize| run.outputs.iter().map(|y| Species::into_array(*y)[j]).fold(0.0, f64::max);
     let noise = Species::from_fn(|j| 0.01 * largest(j));
     run.with_noise(noise, 4).experiment(&Hires).unwrap().initial(Species::map(start, fixed))
