@@ -11,7 +11,7 @@ use crate::optimize::Severity;
 /// widened it is a note.
 pub(super) const CERTAIN: f64 = 1e-4;
 /// A level that is enough where the colored part is above the second.
-const LIKELY: f64 = 1e-3;
+const LIKELY: f64 = 5e-4;
 const MUCH: f64 = 0.05;
 /// The part of an output's movement that is an error, and follows from the errors before: below the first it is a note,
 /// above the second the model is wrong or noise dominates the output.
@@ -49,7 +49,7 @@ impl Judgement<'_> {
         let output = &self.objective.problem.layout().outputs[output].name;
         let (probability, first) = (p_value(white.p_value.min(1.0)), number(white.first, 2));
         let mut text = format!(
-            "the errors of `{output}` are not white (portmanteau {probability}, correlation with the error before \
+            "the errors of `{output}` are not white ({probability}, correlation with the error before \
              {first}): the model misses a part, or the noise is colored"
         );
         if part > SMALL {

@@ -53,7 +53,7 @@ impl Judgement<'_> {
         let output = &self.objective.problem.layout().outputs[j].name;
         let text = format!(
             "{} of the errors of `{output}` are beyond {FAR} robust standard deviations, of all and of their neighbors, and make {} of the sum of squares: outliers, \
-             or moments that the model misses; take a robust loss (Huber, Tukey), or replace these samples by NaN",
+             or moments that the model misses; take a robust loss (Huber, Tukey), or mark these samples as missing",
             percent(far.len() as f64 / errors.len() as f64, 2),
             percent(share, 2)
         );

@@ -65,10 +65,15 @@ impl Place<'_> {
     /// The same for entries that the outputs determine; the others are zero, or one where the equations are undefined there.
     ///
     /// # Errors
-    /// Equations that are undefined at both.
+    /// Outputs that are undefined at both.
     pub fn guess(&self, y: &[f64]) -> Result<Guess, String> {
-        let at = |from: f64| self.nearest(y, from).and_then(|guess| self.moves(&guess.state).map(|()| guess));
-        at(0.0).or_else(|reason| at(1.0).map_err(|_| reason))
+        let zero = self.nearest(y, 0.0);
+        let is_start = |guess: &Guess| !guess.open.contains(&true) || self.moves(&guess.state);
+        if zero.as_ref().is_ok_and(is_start) {
+            return zero;
+        }
+        // Where both are undefined, the simulation says what is wrong.
+        self.nearest(y, 1.0).ok().filter(is_start).map_or(zero, Ok)
     }
 
     /// The state nearest to one of equal entries whose outputs are the measured ones, by Newton's method.
@@ -138,21 +143,14 @@ impl Place<'_> {
     }
 
     /// Whether derivative or next state are finite at a state, with their slopes.
-    fn moves(&self, x: &[f64]) -> Result<(), String> {
-        if self.layout.kind == Kind::Static {
-            return Ok(());
-        }
+    fn moves(&self, x: &[f64]) -> bool {
         let (u, p) = (constants(self.u), constants(self.p));
         let mut to = vec![Dual::constant(0.0); x.len()];
-        for first in (0..x.len()).step_by(LANES) {
-            self.functions.state(Dual::constant(self.t), &Self::seeded(x, first), &u, &p, &mut to);
-            let wrong = |to: &Duals| !to.value.is_finite() || to.slopes.iter().any(|slope| !slope.is_finite());
-            if let Some(i) = to.iter().position(wrong) {
-                let name = &self.layout.states[i].name;
-                return Err(format!("the model's equation of `{name}` is undefined where {}", self.at(x)));
-            }
-        }
-        Ok(())
+        self.layout.kind == Kind::Static
+            || (0..x.len()).step_by(LANES).all(|first| {
+                self.functions.state(Dual::constant(self.t), &Self::seeded(x, first), &u, &p, &mut to);
+                to.iter().all(|to| to.value.is_finite() && to.slopes.iter().all(|slope| slope.is_finite()))
+            })
     }
 
     /// The state in words: `x = 0, v = 0`.

@@ -42,11 +42,23 @@ fn curve<M: Model + 'static>(
 
 fn sensors() -> Vec<Junk> {
     vec![
-        named("dead sensors of processes", ConstantOutput, |s| {
-            spoiled(s, |c, _| c.y.iter_mut().for_each(|y| y.fill(0.0)))
-        }),
+        seen("dead sensors of processes", |s| spoiled(s, |c, _| c.y.iter_mut().for_each(|y| y.fill(0.0)))),
         seen("processes: outputs are white noise", |s| {
             spoiled(s, |c, r| c.y.iter_mut().flatten().for_each(|y| *y = r.normal()))
+        }),
+        seen("noise, its covariance estimated", |s| {
+            let plant = plant_of_two(s);
+            let mut record = plant.record(s, SAMPLES);
+            let mut random = Random(s);
+            record.y.iter_mut().flatten().for_each(|y| *y = random.normal());
+            plant.fit(&record, &How { covariance: true, ..How::default() }, s)
+        }),
+        seen("noise, from six starts", |s| {
+            let plant = process([2, 3, 8][s as usize % 3]);
+            let mut record = plant.record(s, 200);
+            let mut random = Random(s);
+            record.y.iter_mut().flatten().for_each(|y| *y = random.normal().abs());
+            plant.fit(&record, &How { starts: 6, ..How::default() }, s)
         }),
         seen("processes: noise about the level of the outputs", |s| {
             spoiled(s, |c, r| {

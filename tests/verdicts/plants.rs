@@ -65,6 +65,10 @@ pub struct How {
     pub opposite: bool,
     /// Predictions from the last measurement on, instead of a simulation.
     pub one_step: bool,
+    /// The covariance of the noise of all outputs is estimated.
+    pub covariance: bool,
+    /// From so many starts; zero for one.
+    pub starts: usize,
     /// What else is declared of a parameter, by its number.
     pub declare: Option<fn(usize, Parameter) -> Parameter>,
 }
@@ -178,6 +182,8 @@ impl<M: Model> Plant for Bench<M> {
             None => fit,
         };
         let fit = if how.one_step { fit.predictor(Horizon { steps: 1, filter: None }) } else { fit };
+        let fit = if how.covariance { fit.noise_covariance() } else { fit };
+        let fit = if how.starts > 0 { fit.starts(how.starts) } else { fit };
         let fit = if how.robust { fit.loss(Huber::default()) } else { fit };
         let estimate = match fit.run() {
             Ok(estimate) => estimate,
