@@ -1,7 +1,7 @@
 //! Fits whose integrator was not chosen take a finer one where the default step would decide the answer.
 
 use approx::assert_relative_eq;
-use greybox::optimize::Severity;
+use greybox::optimize::{Outcome, Severity};
 use greybox::*;
 
 signals! { pub struct Masses { first: "rad/s", twist: "rad", second: "rad/s" } }
@@ -104,4 +104,18 @@ fn a_fleet_refines_as_single_fits_do() {
             }
         }
     }
+}
+
+/// The cost of an implicit method jumps with the number of its steps: a search that finds no way down says by how much, and how
+/// far away the minimum of a finer tolerance is, which is no stall.
+#[test]
+fn a_cost_as_rough_as_its_tolerance_is_no_stall() {
+    let (truth, record) = record(1e6, 5.0);
+    let coarse = Esdirk { relative: 1e-6, absolute: 1e-9 };
+    let fit = Fit::new(&Coupled, &record).parameters(near(truth)).integrator(coarse).run().unwrap();
+    let Outcome::Rough { noise, errors } = fit.outcome else { panic!("{}", fit.outcome) };
+    // The plant turns by 12 rad in each of 1,000 samples, so that tolerances add up to a thousandth of the cost or so, which may
+    // hide a step of a standard error.
+    assert!((1e-5..1e-2).contains(&noise) && (0.1..10.0).contains(&errors), "{}", fit.outcome);
+    assert!(!fit.outcome.converged() && fit.severity() == Severity::NotUsable, "{fit}");
 }
