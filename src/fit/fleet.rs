@@ -25,8 +25,9 @@ const AHEAD: usize = 4;
 /// The same fit of many records, each by itself: motors on a test bench, drives in the field.
 ///
 /// The model is compiled once. Records with the same hold and the same kind of time (uniform or not) run in parallel
-/// vector lanes, groups of them on threads. Every answer is that of [`Fit::run`] of the record, up to rounding; a
-/// record that fails does not affect the others. Records that are fitted together share the sum of their time limits.
+/// vector lanes, groups of them on threads. Every answer is that of [`Fit::run`] of the record, up to rounding, finer steps
+/// of a default integrator included; a record that fails does not affect the others. Records that are fitted together share
+/// the sum of their time limits.
 pub struct Fleet<'a, M: Model> {
     sweep: Arc<dyn Sweep + 'a>,
     finer: Arc<FinerSweeps<'a>>,
