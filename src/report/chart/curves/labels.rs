@@ -13,6 +13,8 @@ const BELOW: f64 = 14.0;
 const HEIGHT: f64 = 11.0;
 const UNDER: f64 = 3.0;
 const WIDTH: f64 = 6.3;
+/// What is left free at both ends of a label (px).
+const BESIDE: f64 = 4.0;
 /// The least width of a drawing on a page (px).
 const NARROW: f64 = 275.0;
 
@@ -54,7 +56,8 @@ fn place(label: &str, level: f64, height: f64, obstacles: &[(f64, f64)]) -> (f64
     let places = ends.flat_map(|end| [ABOVE, BELOW].map(|shift| (end, level + shift)));
     let places = places.filter(|(_, base)| *base > HEIGHT && *base < height);
     let crossed = |&(end, base): &(f64, f64)| {
-        let (across, upright) = (end - width..=end, base - HEIGHT..=base + UNDER);
+        let beside = BESIDE / NARROW;
+        let (across, upright) = (end - width - beside..=end + beside, base - HEIGHT..=base + UNDER);
         obstacles.iter().filter(|(x, y)| across.contains(x) && upright.contains(y)).count()
     };
     places.min_by_key(crossed).unwrap_or((1.0, level + BELOW))
