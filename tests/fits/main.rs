@@ -21,6 +21,8 @@ mod noise;
 mod optimizers;
 mod recovery;
 mod refining;
+#[path = "../common/refused.rs"]
+mod refused;
 mod segments;
 #[path = "../common/shared.rs"]
 mod shared;
