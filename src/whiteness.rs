@@ -98,6 +98,14 @@ impl Portmanteau {
         self.all().into_iter().zip(theirs).for_each(|(sums, next)| sums.follow(next));
     }
 
+    /// The same with all autocorrelations nearer to zero by this much.
+    pub fn without(mut self, correlation: f64) -> Self {
+        let sums = &mut self.errors.sums;
+        let part = correlation * sums[0];
+        sums[1..].iter_mut().for_each(|sum| *sum = sum.signum() * (sum.abs() - part).max(0.0));
+        self
+    }
+
     /// Adds the sums of another record.
     pub fn append(&mut self, other: &Portmanteau) {
         let theirs = [&other.errors, &other.squares, &other.signs, &other.measured];
@@ -131,6 +139,8 @@ impl Portmanteau {
 
 /// Lags whose sums are kept in registers together.
 const LAGS: usize = 24;
+/// Fewer lags than these are summed one by one.
+const FEW: usize = 4;
 
 /// Adds the products of a run with itself and with what came before to the sums of all lags.
 struct Products<'p> {
@@ -145,6 +155,11 @@ impl Task for Products<'_> {
 
     #[inline(always)]
     fn run<W: Wide>(self) {
+        let lags = self.sums.len() - 1;
+        if lags < FEW {
+            let sums = self.sums.iter_mut().enumerate();
+            return sums.for_each(|(k, sum)| *sum += dot(self.run, &self.values[lags - k..]));
+        }
         // The longest lag comes first: its values are the earliest.
         for (block, sums) in self.sums.rchunks_mut(LAGS).enumerate() {
             let values = &self.values[block * LAGS..];

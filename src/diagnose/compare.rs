@@ -170,11 +170,11 @@ pub struct Validation {
     /// Name of the record.
     pub experiment: String,
     /// Samples predicted ahead, `None` for a simulation; and names and quality of the outputs.
-    pub qualities: Vec<(Option<u64>, Vec<(String, OutputFit)>)>,
+    pub qualities: Vec<(Option<u64>, NamedQualities)>,
 }
 
 /// Name and quality of each output.
-type NamedQualities = Vec<(String, OutputFit)>;
+pub type NamedQualities = Vec<(String, OutputFit)>;
 
 /// Simulates a record with the estimate's parameters, and predicts it each number of samples of `steps` ahead. What the
 /// record leaves open of its initial state is estimated from it.

@@ -2,6 +2,7 @@
 //! the remedy. What is wrong with records alone stands in `bad_records.rs`.
 
 use crate::common::{Coil, Current, Rl, Voltage};
+use crate::refused::says;
 use approx::assert_relative_eq;
 use greybox::optimize::{GaussNewton, LevenbergMarquardt, Outcome, Severity, Stop};
 use greybox::optimize::{JacobianColumns, Scaling, Seen};
@@ -64,18 +65,6 @@ fn record() -> ExperimentOf<Rl> {
 /// The fit of the record above.
 fn fit(record: &ExperimentOf<Rl>) -> Fit<'_, Rl> {
     Fit::new(&Rl, record).parameters(START)
-}
-
-/// The message of an error; it must hold every one of `parts`.
-#[track_caller]
-fn says<T>(result: Result<T, Error>, parts: &[&str]) -> Error {
-    let Err(error) = result else { panic!("no error; expected {parts:?}") };
-    let message = error.to_string();
-    println!("{message}\n");
-    for part in parts {
-        assert!(message.contains(part), "`{part}` is not in: {message}");
-    }
-    error
 }
 
 /// No public number of an estimate is anything but a number, its report holds none, and it survives JSON.
