@@ -14,7 +14,6 @@ use crate::sweep::Sweep;
 use core::marker::PhantomData;
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::time::Instant;
 
 /// Records whose fits are advanced together: more than there are lanes, so that few lanes are idle when some have
 /// ended.
@@ -116,7 +115,7 @@ impl<'a, M: Model> Fleet<'a, M> {
         }
         let single = self.settings.prefilter.is_none() && self.settings.starts == 1;
         let mut found = match single && self.is_wide(&valid) {
-            true => fit_together(&valid, Instant::now()),
+            true => fit_together(&valid),
             false => valid.iter().map(Problem::run).collect(),
         }
         .into_iter();

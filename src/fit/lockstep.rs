@@ -93,10 +93,10 @@ impl<'p> Search<'p> {
     }
 }
 
-/// The estimate of each problem, all of the same sweep and of one record each. The time limit counts from `begin`, for all
-/// of them together. Default methods give way to finer ones as in a fit of each alone.
-pub(super) fn fit_together(problems: &[Problem<'_>], begin: Instant) -> Vec<Result<Summary, Error>> {
-    let Some(control) = problems.first().map(|first| control(first, begin, problems.len())) else { return vec![] };
+/// The estimate of each problem, all of the same sweep and of one record each. Default methods give way to finer ones as in a
+/// fit of each alone.
+pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Error>> {
+    let Some(control) = problems.first().map(|first| control(first, problems.len())) else { return vec![] };
     let all: Vec<&Problem<'_>> = problems.iter().collect();
     let mut attempts: Vec<Attempt> = by_one_method(&all, &control).into_iter().map(Attempt::new).collect();
     for number in 0.. {
@@ -118,7 +118,8 @@ pub(super) fn fit_together(problems: &[Problem<'_>], begin: Instant) -> Vec<Resu
 }
 
 /// The stop conditions of fits together: the sum of their time limits is left to all.
-fn control(problem: &Problem<'_>, begin: Instant, together: usize) -> Control {
+fn control(problem: &Problem<'_>, together: usize) -> Control {
+    let begin = Instant::now();
     let limit = problem.settings.time_limit.and_then(|limit| limit.checked_mul(u32::try_from(together).ok()?));
     Control { deadline: limit.and_then(|limit| begin.checked_add(limit)), ..problem.control(begin) }
 }

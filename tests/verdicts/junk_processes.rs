@@ -42,31 +42,8 @@ fn curve<M: Model + 'static>(
 
 fn sensors() -> Vec<Junk> {
     vec![
-        seen("dead sensors of processes", |s| spoiled(s, |c, _| c.y.iter_mut().for_each(|y| y.fill(0.0)))),
         seen("processes: outputs are white noise", |s| {
             spoiled(s, |c, r| c.y.iter_mut().flatten().for_each(|y| *y = r.normal()))
-        }),
-        seen("noise, its covariance estimated", |s| {
-            let plant = plant_of_two(s);
-            let mut record = plant.record(s, SAMPLES);
-            let mut random = Random(s);
-            record.y.iter_mut().flatten().for_each(|y| *y = random.normal());
-            plant.fit(&record, &How { covariance: true, ..How::default() }, s)
-        }),
-        seen("noise, from six starts", |s| {
-            let plant = process([2, 3, 8][s as usize % 3]);
-            let mut record = plant.record(s, 200);
-            let mut random = Random(s);
-            record.y.iter_mut().flatten().for_each(|y| *y = random.normal().abs());
-            plant.fit(&record, &How { starts: 6, ..How::default() }, s)
-        }),
-        seen("processes: noise about the level of the outputs", |s| {
-            spoiled(s, |c, r| {
-                for y in &mut c.y {
-                    let (mean, sigma) = (y.iter().sum::<f64>() / y.len() as f64, deviation(y));
-                    y.iter_mut().for_each(|y| *y = mean + 0.3 * sigma * r.normal());
-                }
-            })
         }),
         seen("processes: outputs are a random walk", |s| {
             spoiled(s, |c, r| {
@@ -159,9 +136,6 @@ fn inputs() -> Vec<Junk> {
             plant.fit(&Columns { u: plant.inputs(s + 31, SAMPLES), ..record }, &How::default(), s)
         }),
         seen("processes: inputs thirty samples late", |s| spoil(&*driven(s), s, |c, _| delayed(&mut c.u, 30))),
-        seen("battery: current of the wrong sign", |s| {
-            spoil(&battery(), s, |c, _| c.u[0].iter_mut().for_each(|u| *u = -*u))
-        }),
         seen("battery: current in milliampere", |s| {
             spoil(&battery(), s, |c, _| c.u[0].iter_mut().for_each(|u| *u *= 1e3))
         }),
@@ -189,9 +163,6 @@ fn inputs() -> Vec<Junk> {
 fn models() -> Vec<Junk> {
     vec![
         seen("predator and prey swapped", |s| spoil(&predator_prey(), s, |c, _| c.y.swap(0, 1))),
-        seen("pendulum: angle in degrees", |s| {
-            spoil(&pendulum(), s, |c, _| c.y[0].iter_mut().for_each(|y| *y = y.to_degrees()))
-        }),
         seen("two decays taken for one, 60 samples", |s| {
             curve(exponential(), 60, s, |t, _, r| 2.0 * (-t / 0.6).exp() + 1.5 * (-t / 5.0).exp() + 0.02 * r.normal())
         }),
@@ -211,13 +182,6 @@ fn models() -> Vec<Junk> {
         }),
         seen("decay: noise", |s| curve(exponential(), 30, s, |_, _, r| r.normal())),
         seen("decay: as many samples as parameters", |s| curve(exponential(), 3, s, |t, _, _| (-t).exp())),
-        seen("process of another plant", |s| {
-            let (a, b) = (process(s), process(s + 4));
-            let record = b.record(s, SAMPLES).noisy(NOISE, 0.0, s);
-            let own = a.record(s, SAMPLES);
-            let y = own.y.iter().enumerate().map(|(j, _)| record.y[j % record.y.len()].clone()).collect();
-            a.fit(&Columns { y, ..own }, &How::default(), s)
-        }),
         seen("processes: the plant changes at half time", |s| {
             let plant = process(s);
             let truth = plant.truth();
