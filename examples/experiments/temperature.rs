@@ -9,7 +9,7 @@ use greybox::pmsm::Winding;
 use greybox::pmsm::drive::Simulation;
 use greybox::pmsm::offline::Axes;
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::Axis;
+use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::temperature::{Celsius, Estimated, magnet_rise, winding_rise};
 
 /// Motor and cable resistance, and Ke, of a whole record.
@@ -26,7 +26,7 @@ pub fn temperature() -> Result<Report> {
     let (mut winding_read, mut magnet_read) = (Vec::new(), Vec::new());
     let (mut ratio_off, mut l_off) = (0f64, 0f64);
     for number in 1..=6 {
-        let axis = Axis::reference(number)?;
+        let axis = RobotAxis::reference(number)?;
         let program = || Program::speed_cycles(&axis, 8, 1.0);
         let cold = run(Simulation::new(axis)?, program()?);
         let warm = run(Simulation::new(axis)?.heated(warm_at, warm_at), program()?);

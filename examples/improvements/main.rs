@@ -18,7 +18,7 @@ mod terminal;
 use clap::Parser;
 use greybox::pmsm::drive::Simulation;
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::Axis;
+use greybox::pmsm::robot::RobotAxis;
 use methods::{Result, run};
 use report::Report;
 use std::path::PathBuf;
@@ -40,7 +40,7 @@ fn main() -> Result<()> {
     let bar = terminal::steps(9, "axes");
     let going = || !stop.load(Ordering::Relaxed);
     for number in (1..=6).take_while(|_| going()) {
-        let axis = Axis::reference(number)?;
+        let axis = RobotAxis::reference(number)?;
         let simulation = Simulation::new(axis)?;
         let cycles = run(simulation, Program::speed_cycles(&axis, 20, 1.0)?);
         let water = run(simulation, Program::water_cutting(&axis, 6)?);

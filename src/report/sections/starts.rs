@@ -10,7 +10,7 @@ const LISTED: usize = 10;
 /// Unknowns whose values at the minima are listed.
 const UNKNOWNS: usize = 20;
 
-/// The minima and the failures as tables, and the searches by rising cost as a stair (a waterfall plot).
+/// The minima and the failures as tables, and the searches by rising cost as a waterfall plot.
 pub(super) fn section(facts: &Facts) -> Option<Section> {
     let starts = facts.estimate.starts.as_ref()?;
     let section = Section::new("starts", "Searches from several starts").says(format!("{starts}."));
