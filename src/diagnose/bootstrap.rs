@@ -53,8 +53,7 @@ pub struct Bootstrap {
 ///
 /// # Errors
 /// An estimate of another problem or one that cannot be simulated, blocks longer than half of an experiment, fewer than twenty
-/// refits that end; a time limit or a
-/// flag that stops it.
+/// refits that end; a time limit or a flag that stops it.
 ///
 /// ```
 /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
