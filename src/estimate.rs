@@ -17,6 +17,7 @@ pub use format::{Format, Version};
 pub use method::{CovarianceMethod, Method, NoiseModel};
 pub use prediction::Prediction;
 pub use quantities::{Direction, ExperimentEstimate, Knowledge, OutputEstimate, OutputFit, ParameterEstimate, Unknown};
+pub(crate) use starts::times_the_cost;
 pub use starts::{FailedStart, Minimum, Starts};
 pub use typed::Estimate;
 pub use warning::{Warning, WarningCode};

@@ -20,7 +20,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 /// One measured record of inputs `U` and outputs `Y`, and what is known of the state `X` at its first sample.
 ///
 /// Time increases, inputs are finite, lengths agree; an output that was not measured is `NaN`. Unless told otherwise the
-/// input is held from sample to sample, and the initial state is estimated from a start that the first sample gives.
+/// input is held from sample to sample, and the initial state is estimated, from a start that the first measurements give.
 ///
 /// It is made of vectors ([`new`](Experiment::new)), of columns ([`from_columns`](Experiment::from_columns)) or of a CSV
 /// file (`from_csv`, `CsvFile`), and cut ([`slice`](Experiment::slice), [`between`](Experiment::between),

@@ -18,6 +18,7 @@ pub use levenberg_marquardt::LevenbergMarquardt;
 pub use linearization::Linearization;
 pub use machine::{Domain, Machine, Request};
 pub use outcome::{Outcome, Severity};
+pub(crate) use point::within_tolerance;
 
 use crate::error::Error;
 use serde::{Deserialize, Serialize};

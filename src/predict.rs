@@ -3,13 +3,15 @@
 mod free_run;
 mod horizon;
 mod kalman;
-pub(crate) mod measured;
+mod measured;
 mod plant;
 mod symbolic;
 
 pub use free_run::FreeRun;
 pub use horizon::Horizon;
 pub use kalman::Kalman;
+pub use measured::Guess;
+pub(crate) use measured::Place;
 pub use plant::Plant;
 pub(crate) use plant::{Between, SlicePlant, Stepped};
 pub(crate) use symbolic::recurrence;

@@ -29,7 +29,7 @@ use crate::parameter::Parameter;
 /// What is known of the state at the first sample.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Initial {
-    /// It is estimated, starting from what the first sample says.
+    /// It is estimated, starting from what the first measurement of each output says, and from zero where that says nothing.
     #[default]
     Estimated,
     /// It is what the first sample says, taken as exact.

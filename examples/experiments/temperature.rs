@@ -20,7 +20,7 @@ fn whole(run: &Run) -> Result<(Estimated, Estimated)> {
 }
 
 pub fn temperature() -> Result<Report> {
-    let mut report = Report::new("Experiment 4: the same, warm (55 C), six axes");
+    let mut report = Report::new("Experiment 4: the same, warm (55 °C), six axes");
     let warm_at = Celsius::new(55.0)?;
     let (mut rows, mut ke_panels, mut r_panels) = (Vec::new(), Vec::new(), Vec::new());
     let (mut winding_read, mut magnet_read) = (Vec::new(), Vec::new());
@@ -49,10 +49,10 @@ pub fn temperature() -> Result<Report> {
             let found =
                 |found: &[(f64, LinearEstimate<Winding>)]| found.iter().map(|(w, e)| (*w, of(&e.parameters))).collect();
             let series = vec![
-                curve("20 C", found(&plain_cold)),
-                curve("55 C", found(&plain_warm)),
-                level("reference at 20 C", cold_truth, ends),
-                level("reference at 55 C", warm_truth, ends),
+                curve("20 °C", found(&plain_cold)),
+                curve("55 °C", found(&plain_warm)),
+                level("reference at 20 °C", cold_truth, ends),
+                level("reference at 55 °C", warm_truth, ends),
             ];
             Panel { title: format!("axis {number}"), series }
         };

@@ -198,11 +198,23 @@ impl Point {
         } else if gradient <= PRECISION {
             Outcome::LimitOfPrecision { gradient, step }
         } else if rough || left <= noise {
-            let noise = noise.max(left);
-            // A step of `d` standard errors gains `d^2 / (2 rows)` of the sum of squares.
-            Outcome::Rough { noise, errors: (left * self.linear.rows() as f64).sqrt() }
+            self.rough(noise.max(left))
         } else {
             Outcome::Stalled { gradient, step, failed }
         }
     }
+
+    fn rough(&self, noise: f64) -> Outcome {
+        let left = self.potential / self.cost_size();
+        // A step of `d` standard errors gains `d^2 / (2 rows)` of the sum of squares.
+        Outcome::Rough { noise, errors: (left * self.linear.rows() as f64).sqrt() }
+    }
+}
+
+/// How a search ended at a point where no step lowers its cost, by cost and slopes there of a finer tolerance: [`Outcome::Rough`]
+/// if these promise less than the two costs differ by; else `None`.
+pub(crate) fn within_tolerance(x: &[f64], cost: f64, finer: Linearization, domain: &Domain) -> Option<Outcome> {
+    let point = Point::new(x.to_vec(), finer, domain)?;
+    let noise = (point.cost() - cost).abs();
+    (point.potential <= noise).then(|| point.rough(noise / point.cost_size()))
 }

@@ -251,10 +251,7 @@ fn stopped_before_or_soon_after_the_start() {
 #[test]
 fn missing_and_constant_outputs() {
     let parts = ["`record`", "output `i`", "missing in every sample"];
-    says(
-        fit(&record_of(&Rl, &[f64::NAN; 50])).run(),
-        &["1 state(s), i", "0 measured", "t = 0 s", "Experiment::initial"],
-    );
+    says(fit(&record_of(&Rl, &[f64::NAN; 50])).run(), &parts);
     let unmeasured = record_of(&Rl, &[f64::NAN; 50]).initial(Current { i: fixed(0.0) });
     assert!(matches!(says(fit(&unmeasured).run(), &parts), Error::OutputMissing { .. }));
     // A prediction needs no measurement if the initial state is known.

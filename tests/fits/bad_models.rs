@@ -203,7 +203,7 @@ fn a_start_where_the_model_is_undefined() {
     let open = open.unwrap();
     says(
         Fit::new(&Rootless, &open).parameters(free_pair(1.0, 1.0)).run(),
-        &["output `x` is not a number", "Experiment::initial"],
+        &["output `x` is NaN where x = 0", "give a start for it with Experiment::initial"],
     );
 }
 

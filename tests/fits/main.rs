@@ -13,6 +13,7 @@ mod declared;
 mod extremes;
 mod far_starts;
 mod fleet;
+mod guessed_states;
 mod interval_limits;
 mod kalman;
 mod models;

@@ -35,6 +35,12 @@ fn missing_column() {
     says(renamed, &["no column `rpm` for `w`", "t, ud, speed, id, iq"]);
     refused("semicolon.csv", "t;ud;w;id;iq\n0;1;2;3;4\n", &["t;ud;w;id;iq", "CsvFile::delimiter"]);
     refused("nameless.csv", "0,1,2,3,4\n1,1,2,3,4\n", &["no column `t`", "0, 1, 2, 3, 4", "must hold the names"]);
+    // Of many columns the ten nearest.
+    let many: Vec<String> = (0..40).map(|k| format!("channel{k}")).collect();
+    let header = format!("t,{},motor_ud,UD,w,id,iq\n", many.join(","));
+    let parts = ["no column `ud`", "of its 46 columns these are nearest: UD, motor_ud, id, t"];
+    let error = refused("many.csv", &header, &parts);
+    assert_eq!(error.to_string().matches("channel").count(), 6, "{error}");
     refused("capitals.csv", "Time,ud,w,id,iq\n", &["no column `t`", "CsvFile::column", "CsvFile::sample_time"]);
 }
 
