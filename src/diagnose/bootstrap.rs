@@ -52,8 +52,8 @@ pub struct Bootstrap {
 /// Refits `count` records made of the prediction and resampled residuals, from the estimate on.
 ///
 /// # Errors
-/// An estimate of another problem or one that cannot be simulated, and fewer than twenty refits that end; a time limit or a
-/// flag that stops it.
+/// An estimate of another problem or one that cannot be simulated, blocks longer than half of an experiment, fewer than twenty
+/// refits that end; a time limit or a flag that stops it.
 ///
 /// ```
 /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
@@ -92,6 +92,7 @@ pub fn bootstrap(
             purpose: "with all outputs, to resample",
         });
     }
+    check_blocks(problem, &residuals, resampling)?;
     let refit = |number: usize| -> Option<Vec<f64>> {
         if control.stops() {
             return None;
@@ -157,6 +158,20 @@ fn spread(estimate: &Summary, found: &[Vec<f64>], tried: usize, seed: u64) -> Bo
         result.intervals.push((at(0.025), at(0.975)));
     }
     result
+}
+
+/// Refuses blocks longer than half of an experiment's residuals: its resamples would hardly differ, and with them the refits.
+fn check_blocks(problem: &Problem<'_>, residuals: &[Vec<Vec<f64>>], resampling: Resampling) -> Result<(), Error> {
+    let Resampling::Blocks(length) = resampling else { return Ok(()) };
+    match residuals.iter().position(|own| length > own.len() / 2) {
+        Some(e) => Err(Error::Option(format!(
+            "blocks of {length} residuals are longer than half of experiment `{}`, which has {}: its resamples would hardly \
+             differ; take shorter blocks, or zero for the cube root of the samples",
+            problem.records()[e].name(),
+            residuals[e].len()
+        ))),
+        None => Ok(()),
+    }
 }
 
 /// The residuals of the samples of which all outputs have one, sample by sample. Centered: a mean that the model left would

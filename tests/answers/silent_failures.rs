@@ -1,6 +1,7 @@
 //! Failures that other programs do not report: each is named here.
 
 use crate::common::{Branch, Current, Lag, Voltage};
+use greybox::diagnose::{Resampling, bootstrap};
 use greybox::optimize::Severity;
 use greybox::{
     Error, Estimate, Experiment, Fit, Kind, Knowledge, Model, Nothing, Report, Scalar, Time, fixed, free, signals,
@@ -72,6 +73,18 @@ fn no_success_on_what_is_not_a_number() {
     let parameters = Branch { gain: free(1.0), tau: fixed(-1e-3) };
     let error = Fit::new(&Lag, &record(0..0)).parameters(parameters).run().unwrap_err();
     assert!(matches!(&error, Error::Start(failure) if failure.signal == "state `i`" && failure.time > 0.0), "{error}");
+}
+
+/// Of blocks as long as the record there is one resample only, whose refits do not scatter.
+#[test]
+fn blocks_as_long_as_the_record_are_refused() {
+    let parameters = Branch { gain: free(1.0), tau: free(0.1) };
+    let record = record(0..0);
+    let problem = Fit::new(&Lag, &record).parameters(parameters).problem().unwrap();
+    let summary = problem.run().unwrap();
+    let error = bootstrap(&problem, &summary, Resampling::Blocks(1001), 20, 1).unwrap_err().to_string();
+    assert!(error.contains("blocks of 1001 residuals") && error.contains("which has 2000"), "{error}");
+    assert!(bootstrap(&problem, &summary, Resampling::Blocks(1000), 20, 1).is_ok());
 }
 
 signals! { struct Amplified { g: "1", b: "V", c: "V", idle: "1" } }
