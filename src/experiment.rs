@@ -173,6 +173,9 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     }
 
     /// Time of sample `k` (s).
+    ///
+    /// # Panics
+    /// From [`len`](Self::len) on where time was given by stamps, like a slice.
     #[inline(always)]
     pub fn time(&self, k: usize) -> f64 {
         self.record.time(k)
@@ -184,12 +187,18 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     }
 
     /// Inputs of sample `k`.
+    ///
+    /// # Panics
+    /// From [`len`](Self::len) on, like a slice.
     #[inline(always)]
     pub fn input(&self, k: usize) -> Of<U, f64> {
         U::from_fn(|i| self.record.inputs[i].values[k])
     }
 
     /// Measured outputs of sample `k`; NaN where missing.
+    ///
+    /// # Panics
+    /// From [`len`](Self::len) on, like a slice.
     #[inline(always)]
     pub fn output(&self, k: usize) -> Of<Y, f64> {
         Y::from_fn(|j| self.record.outputs[j].values[k])

@@ -3,6 +3,7 @@
 mod fleet;
 mod lockstep;
 mod predict;
+mod refine;
 mod run;
 mod search;
 mod starts;
@@ -23,7 +24,7 @@ use crate::optimize::LeastSquaresState;
 use crate::parameter::Parameter;
 use crate::predict::{FreeRun, Prediction, Predictor};
 use crate::prefilter::Butterworth;
-use crate::problem::{MakeSweep, Problem, Search, Settings, Weights};
+use crate::problem::{FinerSweeps, MakeSweep, Problem, Search, Settings, Weights};
 use crate::record::Record;
 use crate::signals::{Of, Signals};
 use crate::sweep::{DualSweep, Loops, ProgramSweep, Sweep};
@@ -284,18 +285,7 @@ pub(crate) fn sweep<'a, M: Model + 'a>(
     predictor: &Arc<dyn Prediction>,
 ) -> Result<Arc<dyn Sweep + 'a>, Error> {
     let Stepping { loops, method } = stepping.clone();
-    if !method.serves(M::KIND) {
-        let word = |kind| match kind {
-            Kind::Continuous => "continuous",
-            Kind::Discrete => "discrete",
-            Kind::Static => "static",
-        };
-        let kinds = [Kind::Continuous, Kind::Discrete, Kind::Static];
-        let serves = kinds.into_iter().find(|&kind| method.serves(kind)).map_or("no", word);
-        let integrator = method.describe(M::KIND);
-        return Err(Error::WrongIntegrator { model: word(M::KIND), integrator, serves });
-    }
-    method.check()?;
+    method.check(M::KIND)?;
     let layout = Arc::new(Layout::of::<M>());
     predictor.check(&layout)?;
     let traced = match only_duals() {
@@ -321,15 +311,16 @@ fn finer<'a, M: Model + 'a>(
     model: Handle<'a, M>,
     is_default: bool,
     predictor: &Arc<dyn Prediction>,
-) -> Vec<MakeSweep<'a>> {
+) -> Arc<FinerSweeps<'a>> {
     if !is_default || M::KIND != Kind::Continuous || predictor.predicts_variance() {
-        return vec![];
+        return FinerSweeps::new(vec![]);
     }
     let by = |stepping: Stepping<M>| -> MakeSweep<'a> {
         let (model, predictor) = (model.clone(), predictor.clone());
         Arc::new(move || sweep(model.clone(), &stepping, &predictor))
     };
-    [4, 16, 64].map(|substeps| by(Stepping::new(Automatic { continuous: Rk4 { substeps } }))).into()
+    let finer = [4, 16, 64].map(|substeps| by(Stepping::new(Automatic { continuous: Rk4 { substeps } })));
+    FinerSweeps::new(finer.into())
 }
 
 /// A typed weighting as untyped [`Weights`].

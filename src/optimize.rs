@@ -12,11 +12,13 @@ mod machine;
 mod outcome;
 mod point;
 
+pub use crate::scaling::{JacobianColumns, Nominal, OwnSize, Scaling, Seen, Unscaled};
 pub use gauss_newton::GaussNewton;
 pub use levenberg_marquardt::LevenbergMarquardt;
 pub use linearization::Linearization;
 pub use machine::{Domain, Machine, Request};
 pub use outcome::{Outcome, Severity};
+pub(crate) use point::within_tolerance;
 
 use crate::error::Error;
 use serde::{Deserialize, Serialize};

@@ -10,6 +10,7 @@ const NORMAL_SPREAD: f64 = 1.4826;
 /// Where more than half of a neighbourhood are equal, the deviation is zero: there, a value is left alone unless it
 /// differs by more than `floor` (a sensor's step is a good one). What is not a number is never replaced, nor counted.
 pub fn hampel(values: &mut [f64], reach: usize, sigmas: f64, floor: f64) -> Vec<usize> {
+    let reach = reach.min(values.len());
     let original = values.to_vec();
     let mut replaced = Vec::new();
     let mut window = Vec::with_capacity(2 * reach + 1);

@@ -165,7 +165,7 @@ impl Record {
         if self.states.is_empty() { 1 } else { 2 }
     }
 
-    /// The record, if it keeps its promises.
+    /// The record, if it is valid.
     pub(crate) fn checked(self) -> Result<Self, Error> {
         let mut channels = self.inputs.iter().chain(&self.outputs);
         let Some(first) = channels.next() else {

@@ -201,6 +201,11 @@ pub trait Sweep: Send + Sync {
         None
     }
 
+    /// Whether the integrator chooses its steps by a tolerance, so that the cost jumps where their number changes.
+    fn is_adaptive(&self) -> bool {
+        false
+    }
+
     /// The same with a finer step, if there is one.
     fn refined<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
         None

@@ -25,7 +25,9 @@ impl Autocorrelation {
         let missing = (lags - self.first.len()).min(run.len());
         self.first.extend_from_slice(&run[..missing]);
         self.values.extend_from_slice(run);
+        self.values.resize(lags + run.len() + LAGS, 0.0);
         wide::run(Width::widest(), Products { run, values: &self.values, sums: &mut self.sums });
+        self.values.truncate(lags + run.len());
         self.values.drain(..run.len());
     }
 
@@ -95,6 +97,14 @@ impl Portmanteau {
         self.all().into_iter().zip(theirs).for_each(|(sums, next)| sums.follow(next));
     }
 
+    /// The same with all autocorrelations nearer to zero by this much.
+    pub fn without(mut self, correlation: f64) -> Self {
+        let sums = &mut self.errors.sums;
+        let part = correlation * sums[0];
+        sums[1..].iter_mut().for_each(|sum| *sum = sum.signum() * (sum.abs() - part).max(0.0));
+        self
+    }
+
     /// Adds the sums of another record.
     pub fn append(&mut self, other: &Portmanteau) {
         let theirs = [&other.errors, &other.squares, &other.signs, &other.measured];
@@ -126,10 +136,15 @@ impl Portmanteau {
     }
 }
 
+/// Lags whose sums are kept in registers together.
+const LAGS: usize = 24;
+/// Fewer lags than these are summed one by one.
+const FEW: usize = 4;
+
 /// Adds the products of a run with itself and with what came before to the sums of all lags.
 struct Products<'p> {
     run: &'p [f64],
-    /// As many values as there are lags, then those of the run.
+    /// As many values as there are lags, then those of the run, then [`LAGS`] zeros.
     values: &'p [f64],
     sums: &'p mut [f64],
 }
@@ -140,8 +155,20 @@ impl Task for Products<'_> {
     #[inline(always)]
     fn run<W: Wide>(self) {
         let lags = self.sums.len() - 1;
-        for (k, sum) in self.sums.iter_mut().enumerate() {
-            *sum += dot(self.run, &self.values[lags - k..]);
+        if lags < FEW {
+            let sums = self.sums.iter_mut().enumerate();
+            return sums.for_each(|(k, sum)| *sum += dot(self.run, &self.values[lags - k..]));
+        }
+        // The longest lag comes first: its values are the earliest.
+        for (block, sums) in self.sums.rchunks_mut(LAGS).enumerate() {
+            let values = &self.values[block * LAGS..];
+            let mut totals = [0.0; LAGS];
+            for (e, before) in self.run.iter().zip(values.windows(LAGS)) {
+                for (total, before) in totals.iter_mut().zip(before) {
+                    *total += e * before;
+                }
+            }
+            sums.iter_mut().rev().zip(totals).for_each(|(sum, total)| *sum += total);
         }
     }
 }

@@ -1,14 +1,14 @@
 //! [`Fleet`]: the same fit of many records, each by itself.
 
 use super::lockstep::fit_together;
-use super::{Fit, Records, declared, sweep};
+use super::{Fit, Records, declared, finer, sweep};
 use crate::error::Error;
 use crate::estimate::{Estimate, Summary};
 use crate::experiment::ExperimentOf;
 use crate::functions::Handle;
 use crate::model::Model;
 use crate::parameter::Parameter;
-use crate::problem::{Problem, Settings, each};
+use crate::problem::{FinerSweeps, Problem, Settings, each};
 use crate::record::Record;
 use crate::sweep::Sweep;
 use core::marker::PhantomData;
@@ -24,10 +24,12 @@ const AHEAD: usize = 4;
 /// The same fit of many records, each by itself: motors on a test bench, drives in the field.
 ///
 /// The model is compiled once. Records with the same hold and the same kind of time (uniform or not) run in parallel
-/// vector lanes, groups of them on threads. Every answer is that of [`Fit::run`] of the record, up to rounding; a
-/// record that fails does not affect the others. Records that are fitted together share the sum of their time limits.
+/// vector lanes, groups of them on threads. Every answer is that of [`Fit::run`] of the record, up to rounding, finer steps
+/// of a default integrator included; a record that fails does not affect the others. Records that are fitted together share
+/// the sum of their time limits.
 pub struct Fleet<'a, M: Model> {
     sweep: Arc<dyn Sweep + 'a>,
+    finer: Arc<FinerSweeps<'a>>,
     parameters: Vec<Parameter>,
     settings: Settings<'a>,
     model: PhantomData<fn() -> M>,
@@ -46,8 +48,9 @@ impl<'a, M: Model> Fit<'a, M> {
         }
         self.settings.optimizer.check()?;
         let sweep = sweep(Handle::Borrowed(self.model), &self.stepping, &self.predictor)?;
+        let finer = finer(Handle::Borrowed(self.model), self.is_default, &self.predictor);
         let (parameters, settings) = (declared::<M>(self.parameters), self.settings);
-        Ok(Fleet { sweep, parameters, settings, model: PhantomData })
+        Ok(Fleet { sweep, finer, parameters, settings, model: PhantomData })
     }
 }
 
@@ -93,7 +96,8 @@ impl<'a, M: Model> Fleet<'a, M> {
     }
 
     fn problem(&self, record: Record) -> Result<Problem<'a>, Error> {
-        Problem::new(self.sweep.clone(), vec![record], &self.parameters, self.settings.clone())
+        let problem = Problem::new(self.sweep.clone(), vec![record], &self.parameters, self.settings.clone())?;
+        Ok(problem.refining(self.finer.clone()))
     }
 
     fn group(&self, records: &[Record]) -> Vec<Result<Summary, Error>> {

@@ -1,5 +1,6 @@
 //! Fits of single records in lockstep: one evaluation of all of them is one pass over lanes.
 
+use super::refine::Attempt;
 use super::search::Rounds;
 use crate::error::Error;
 use crate::estimate::Summary;
@@ -92,11 +93,41 @@ impl<'p> Search<'p> {
     }
 }
 
-/// The estimate of each problem, all of the same sweep and of one record each.
+/// The estimate of each problem, all of the same sweep and of one record each. Default methods give way to finer ones as in a
+/// fit of each alone.
 pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Error>> {
+    let Some(control) = problems.first().map(|first| control(first, problems.len())) else { return vec![] };
+    let all: Vec<&Problem<'_>> = problems.iter().collect();
+    let mut attempts: Vec<Attempt> = by_one_method(&all, &control).into_iter().map(Attempt::new).collect();
+    for number in 0.. {
+        let coarse = attempts.iter().map(Attempt::is_coarse);
+        let finer: Vec<Option<&Problem<'_>>> =
+            coarse.zip(&all).map(|(coarse, problem)| if coarse { problem.finer(number) } else { None }).collect();
+        let problems: Vec<&Problem<'_>> = finer.iter().flatten().copied().collect();
+        if problems.is_empty() || control.stops() {
+            break;
+        }
+        let mut found = by_one_method(&problems, &control).into_iter();
+        let next = |(attempt, finer): (Attempt, &Option<_>)| match finer.and_then(|_| found.next()) {
+            Some(again) => attempt.or(again),
+            None => attempt,
+        };
+        attempts = attempts.into_iter().zip(&finer).map(next).collect();
+    }
+    attempts.into_iter().map(|attempt| attempt.found).collect()
+}
+
+/// The stop conditions of fits together: the sum of their time limits is left to all.
+fn control(problem: &Problem<'_>, together: usize) -> Control {
     let begin = Instant::now();
-    let controls: Vec<Control> = problems.iter().map(|problem| control(problem, begin, problems.len())).collect();
-    let plain: Vec<Objective<'_>> = problems.iter().zip(&controls).map(|(p, control)| p.in_units(control)).collect();
+    let limit = problem.settings.time_limit.and_then(|limit| limit.checked_mul(u32::try_from(together).ok()?));
+    Control { deadline: limit.and_then(|limit| begin.checked_add(limit)), ..problem.control(begin) }
+}
+
+/// The estimate of each problem, by its own method.
+fn by_one_method(problems: &[&Problem<'_>], control: &Control) -> Vec<Result<Summary, Error>> {
+    let begin = Instant::now();
+    let plain: Vec<Objective<'_>> = problems.iter().map(|problem| problem.in_units(control)).collect();
     let first = |plain| match Rounds::new(plain, &plain.problem.settings.optimizer, plain.problem.unknowns.start()) {
         Ok(rounds) => Stage::Searching(Box::new(Search::new(rounds))),
         Err(_) => Stage::Alone,
@@ -117,19 +148,13 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
             }
         }
     }
-    conclude_together(problems, &plain, stages, begin)
-}
-
-/// Stop conditions of a fit together with others: the sum of their time limits is left to all.
-fn control(problem: &Problem<'_>, begin: Instant, together: usize) -> Control {
-    let limit = problem.settings.time_limit.and_then(|limit| limit.checked_mul(u32::try_from(together).ok()?));
-    Control { deadline: limit.and_then(|limit| begin.checked_add(limit)), ..problem.control(begin) }
+    conclude_together(&plain, stages, control, begin)
 }
 
 fn conclude_together(
-    problems: &[Problem<'_>],
     plain: &[Objective<'_>],
     stages: Vec<Stage<'_>>,
+    control: &Control,
     begin: Instant,
 ) -> Vec<Result<Summary, Error>> {
     let ended = |(stage, plain): (&Stage<'_>, _)| match stage {
@@ -142,17 +167,17 @@ fn conclude_together(
         _ => None,
     });
     let mut residuals = residuals_together(&points.collect::<Vec<_>>()).into_iter();
-    let seconds = begin.elapsed().as_secs_f64() / problems.len() as f64;
-    let finish = |((stage, objective), problem): ((&Stage<'_>, &Option<Objective<'_>>), &Problem<'_>)| match (
+    let seconds = begin.elapsed().as_secs_f64() / plain.len() as f64;
+    let finish = |((stage, objective), plain): ((&Stage<'_>, &Option<Objective<'_>>), &Objective<'_>)| match (
         stage, objective,
     ) {
         (Stage::Ended(end), Some(objective)) => match residuals.next().flatten() {
             Some(residuals) => conclude_from(objective, end, residuals, seconds),
             None => conclude(objective, end, seconds),
         },
-        _ => problem.run(),
+        _ => plain.problem.run_within(Instant::now(), control),
     };
-    stages.iter().zip(&objectives).zip(problems).map(finish).collect()
+    stages.iter().zip(&objectives).zip(plain).map(finish).collect()
 }
 
 /// The objective that a search ended with. The time limit does not apply to the conclusion.

@@ -43,14 +43,10 @@ impl<M: Model> Fit<'_, M> {
         let model = crate::functions::Handle::Borrowed(self.model);
         let mut sweep = super::sweep(model.clone(), &self.stepping, &self.predictor)?;
         // The method of the estimate, where the fit would have come to it by itself.
-        for finer in super::finer(model, self.is_default, &self.predictor) {
-            if sweep.integrator() == estimate.method.integrator {
-                break;
-            }
-            let finer = finer()?;
-            if finer.integrator() == estimate.method.integrator {
-                sweep = finer;
-            }
+        let method = &estimate.method.integrator;
+        if sweep.integrator() != *method {
+            let finer = super::finer(model, self.is_default, &self.predictor);
+            sweep = finer.by_name(method).unwrap_or(sweep);
         }
         predict(sweep, record.record(), estimate).map(|found| typed(found, record))
     }

@@ -1,11 +1,12 @@
 //! Running a problem: search, estimate at a given point, objective, prediction.
 
+use super::refine::Attempt;
 use super::search::{search, start_error};
 use super::starts::search_from_many;
 use crate::error::Error;
-use crate::estimate::{NoiseModel, Summary, Warning, WarningCode};
+use crate::estimate::{NoiseModel, Summary};
 use crate::judge::{SearchEnd, conclude, noise};
-use crate::optimize::{LeastSquares, LevenbergMarquardt, Severity};
+use crate::optimize::{LeastSquares, LevenbergMarquardt};
 use crate::problem::{Control, Objective, Problem, Whitening};
 use std::time::Instant;
 
@@ -26,31 +27,21 @@ impl Problem<'_> {
     /// cannot be simulated, gives way to a finer one.
     pub(super) fn run_since(&self, begin: Instant) -> Result<Summary, Error> {
         let control = self.control(begin);
-        let mut found = self.run_by_method(begin);
+        let mut attempt = Attempt::new(self.run_within(begin, &control));
         for finer in self.by_method().skip(1) {
-            let goes_on = match &found {
-                Ok(found) => coarse_step(found).is_some(),
-                Err(error) => matches!(error, Error::Start(_)),
-            };
-            if !goes_on || control.stops() {
+            if !attempt.is_coarse() || control.stops() {
                 break;
             }
-            found = match (found, finer.run_by_method(begin)) {
-                (Ok(before), Ok(again)) if is_better(&before, &again) => Ok(after(&before, again)),
-                (Ok(before), Ok(again)) => return Ok(kept(before, &again)),
-                (Err(_), again @ Ok(_)) => again,
-                (before, Err(_)) => before,
-            };
+            attempt = attempt.or(finer.run_within(begin, &control));
         }
-        found
+        attempt.found
     }
 
-    /// The same with this method.
-    fn run_by_method(&self, begin: Instant) -> Result<Summary, Error> {
+    /// The same by this method alone.
+    pub(super) fn run_within(&self, begin: Instant, control: &Control) -> Result<Summary, Error> {
         let settings = &self.settings;
         settings.optimizer.check()?;
-        let control = self.control(begin);
-        let plain = self.in_units(&control);
+        let plain = self.in_units(control);
         let end = match settings.starts {
             1 => search(&plain, &settings.optimizer)?,
             count => search_from_many(&plain, &settings.optimizer, count)?,
@@ -182,36 +173,4 @@ impl Problem<'_> {
         let problem = self.by_name(&estimate.method.integrator);
         super::predict::predict(problem.sweep.clone(), record, estimate)
     }
-}
-
-/// The warning that a finer step would move an unknown.
-fn coarse_step(found: &Summary) -> Option<&Warning> {
-    found.warnings.iter().find(|warning| warning.code == WarningCode::CoarseStep)
-}
-
-/// Whether a finer method explains the data no worse than a coarser one: records that were simulated with the coarser step
-/// are explained by that alone.
-fn is_better(before: &Summary, again: &Summary) -> bool {
-    const INDISTINGUISHABLE: f64 = 4.0;
-    let explains = before.deviance.zip(again.deviance).is_none_or(|(before, again)| again < before + INDISTINGUISHABLE);
-    again.outcome.converged() && explains || !before.outcome.converged()
-}
-
-/// The estimate of a finer method, with the work of both.
-fn after(before: &Summary, again: Summary) -> Summary {
-    Summary {
-        iterations: before.iterations + again.iterations,
-        evaluations: before.evaluations + again.evaluations,
-        ..again
-    }
-}
-
-/// The estimate of a coarser method, which explains the data better than a finer one.
-fn kept(mut before: Summary, again: &Summary) -> Summary {
-    if let Some(warning) = before.warnings.iter_mut().find(|warning| warning.code == WarningCode::CoarseStep) {
-        warning.severity = warning.severity.min(Severity::UsableWithCare);
-        warning.text +=
-            &format!("; {} explains the data worse, so that the coarser step was kept", again.method.integrator);
-    }
-    before
 }

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::judge::{SearchEnd, noise};
-use crate::optimize::{Infeasible, Outcome};
+use crate::optimize::{Domain, Infeasible, LeastSquares, Outcome, within_tolerance};
 use crate::problem::{CheckpointFile, Fingerprint, Memory, Objective, Optimizer, Round, RoundError, Whitening};
 use std::sync::Arc;
 
@@ -126,6 +126,11 @@ impl<'r> Rounds<'r> {
         if lost && noise::reproduces(&objective, &self.coordinates) {
             outcome = Outcome::Exact;
         }
+        if matches!(outcome, Outcome::Stalled { .. } | Outcome::Creeping { .. })
+            && let Some(rough) = within_finer_tolerance(&objective, &self.coordinates)
+        {
+            outcome = rough;
+        }
         let mut settled = self.known || !outcome.converged();
         if !settled {
             let found = noise::estimate(&objective, &self.coordinates).unwrap_or_else(|_| self.whitening.clone());
@@ -156,6 +161,15 @@ impl<'r> Rounds<'r> {
             starts: None,
         })
     }
+}
+
+/// How a search ended that found no step to lower the cost of an adaptive integrator, whose number of steps changes from point
+/// to point; `None` if a finer tolerance promises more than the cost is off.
+fn within_finer_tolerance(objective: &Objective<'_>, coordinates: &[f64]) -> Option<Outcome> {
+    let finer = if objective.sweep.is_adaptive() { objective.sweep.refined()? } else { return None };
+    let cost = objective.cost_at(coordinates).ok()?;
+    let finer = objective.of(objective.problem, &*finer).linearize(coordinates).ok()?;
+    within_tolerance(coordinates, cost, finer, &Domain::of(objective))
 }
 
 /// Why the start could not be evaluated.

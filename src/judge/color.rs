@@ -14,7 +14,7 @@ pub(super) const CERTAIN: f64 = 1e-4;
 const LIKELY: f64 = 5e-4;
 const MUCH: f64 = 0.05;
 /// The part of an output's movement that is an error, and follows from the errors before: below the first it is a note,
-/// above the second the model is wrong or the noise hides the plant.
+/// above the second the model is wrong or noise dominates the output.
 pub(super) const SMALL: f64 = 1e-3;
 const LARGE: f64 = 0.5;
 

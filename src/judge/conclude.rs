@@ -14,6 +14,7 @@ use crate::estimate::{
 use crate::information::{Covariance, Undetermined};
 use crate::layout::Quantity;
 use crate::optimize::{Linearization, Outcome};
+use crate::parameter::Transform;
 use crate::problem::{Memory, Noise, Objective, Role, Whitening};
 
 /// Residuals below this fraction of a given sigma are round-off: no whiteness test, no HAC.
@@ -239,8 +240,12 @@ impl<'j> Judgement<'j> {
                             let end = if bound == unknown.parameter.lower { upper } else { lower };
                             Knowledge::Held { bound, end: Some(end).filter(|end| end.is_finite()) }
                         }
-                        // A factor beyond the largest number: nothing is known of a logarithm.
-                        None if !(lower.is_finite() && upper.is_finite()) => Knowledge::Unidentified,
+                        // Beyond the largest or below the smallest number: nothing is known of a logarithm.
+                        None if !(lower.is_finite() && upper.is_finite())
+                            || transform == Transform::Log && upper == 0.0 =>
+                        {
+                            Knowledge::Unidentified
+                        }
                         None => Knowledge::Known { standard_error, lower, upper },
                     }
                 }

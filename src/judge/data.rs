@@ -143,17 +143,17 @@ impl Judgement<'_> {
             Suspicion::Sentinel { .. } => (split.ratio() > LARGER).then_some((
                 WarningCode::Sentinel,
                 decides(dominates && !self.objective.is_robust()),
-                "it stands for a missing measurement; replace it by NaN",
+                "it stands for a missing measurement; mark it as missing",
             )),
             Suspicion::Clipped { .. } => Some((
                 WarningCode::Clipped,
                 decides(dominates),
-                "the sensor is at its limit; replace these samples by NaN, or use a wider range",
+                "the sensor is at its limit; mark these samples as missing, or use a wider range",
             )),
             Suspicion::Frozen { .. } => (split.ratio() > LARGER).then_some((
                 WarningCode::Frozen,
                 decides(dominates),
-                "the sensor was stuck; replace these samples by NaN",
+                "the sensor was stuck; mark these samples as missing",
             )),
             Suspicion::Repeated { .. } => Some((
                 WarningCode::Repeated,

@@ -197,7 +197,11 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
     let whiteness = |j: usize| {
         let mut total = all[0].portmanteaus[j].clone();
         all[1..].iter().for_each(|one| total.append(&one.portmanteaus[j]));
-        Whiteness::of(&total, sums[j].count, horizon(objective))
+        // Errors of a short record are correlated by its own unknowns, at each lag by no more than their number in errors.
+        let unknowns = &objective.problem.unknowns;
+        let own = if all.len() > 1 { unknowns.row.len() - unknowns.shared() } else { 0 };
+        let count = sums[j].count;
+        Whiteness::of(&total.without(own as f64 / count.max(1) as f64), count, horizon(objective))
     };
     Residuals {
         outputs: sums.iter().map(OutputSums::fit).collect(),

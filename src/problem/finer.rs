@@ -14,32 +14,54 @@ pub(crate) trait Finer: Send + Sync {
     fn by(&self, number: usize) -> Option<&Problem<'_>>;
 }
 
+/// Sweeps by finer and finer methods. Each is made when it is first needed, once for all problems that share these.
+pub(crate) struct FinerSweeps<'a> {
+    make: Vec<MakeSweep<'a>>,
+    made: Vec<OnceLock<Option<Arc<dyn Sweep + 'a>>>>,
+}
+
+impl<'a> FinerSweeps<'a> {
+    pub fn new(make: Vec<MakeSweep<'a>>) -> Arc<Self> {
+        let made = make.iter().map(|_| OnceLock::new()).collect();
+        Arc::new(FinerSweeps { make, made })
+    }
+
+    fn get(&self, number: usize) -> Option<Arc<dyn Sweep + 'a>> {
+        let (make, made) = (self.make.get(number)?, self.made.get(number)?);
+        made.get_or_init(|| make().ok()).clone()
+    }
+
+    /// The sweep by the method of this description.
+    pub fn by_name(&self, integrator: &str) -> Option<Arc<dyn Sweep + 'a>> {
+        (0..).map_while(|number| self.get(number)).find(|sweep| sweep.integrator() == integrator)
+    }
+}
+
 /// The problem by each method is made when it is first needed.
 struct ByMethods<'a> {
     base: Problem<'a>,
-    methods: Vec<MakeSweep<'a>>,
+    sweeps: Arc<FinerSweeps<'a>>,
     made: Vec<OnceLock<Option<Problem<'a>>>>,
 }
 
 impl Finer for ByMethods<'_> {
     fn by(&self, number: usize) -> Option<&Problem<'_>> {
-        let (make, made) = (self.methods.get(number)?, self.made.get(number)?);
-        made.get_or_init(|| self.base.with_sweep(make().ok()?).ok()).as_ref()
+        self.made.get(number)?.get_or_init(|| self.base.with_sweep(self.sweeps.get(number)?).ok()).as_ref()
     }
 }
 
 impl<'a> Problem<'a> {
     /// The same problem, which a run takes on to these methods, one after the other, as long as a finer step would move an
     /// unknown.
-    pub(crate) fn refining(self, methods: Vec<MakeSweep<'a>>) -> Self {
-        if methods.is_empty() {
+    pub(crate) fn refining(self, sweeps: Arc<FinerSweeps<'a>>) -> Self {
+        if sweeps.make.is_empty() {
             return self;
         }
         // What is prepared of the records is another for each method, and so is a checkpoint.
         let settings = Settings { checkpoint: None, ..self.settings.clone() };
         let base = Problem { prepared: vec![], refines: true, settings, ..self.clone() };
-        let made = methods.iter().map(|_| OnceLock::new()).collect();
-        Problem { refines: true, finer: Some(Arc::new(ByMethods { base, methods, made })), ..self }
+        let made = sweeps.make.iter().map(|_| OnceLock::new()).collect();
+        Problem { refines: true, finer: Some(Arc::new(ByMethods { base, sweeps, made })), ..self }
     }
 
     fn with_sweep(&self, sweep: Arc<dyn Sweep + 'a>) -> Result<Self, Error> {
@@ -48,10 +70,14 @@ impl<'a> Problem<'a> {
         Ok(Problem { sweep, prepared, cuts, ..self.clone() })
     }
 
+    /// The problem by a finer method, numbered from the coarsest; `None` after the last.
+    pub(crate) fn finer(&self, number: usize) -> Option<&Problem<'_>> {
+        self.finer.as_ref()?.by(number)
+    }
+
     /// The problem by each method in turn, this one first.
     pub(crate) fn by_method(&self) -> impl Iterator<Item = &Problem<'_>> {
-        let finer = self.finer.iter();
-        std::iter::once::<&Problem<'_>>(self).chain(finer.flat_map(|finer| (0..).map_while(|number| finer.by(number))))
+        std::iter::once::<&Problem<'_>>(self).chain((0..).map_while(|number| self.finer(number)))
     }
 
     /// The problem by the method of this description, as an estimate names it; this one if there is none.

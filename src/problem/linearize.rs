@@ -14,6 +14,10 @@ use std::sync::Arc;
 /// The corrected errors are exact; slopes with respect to parameters are off by as much, relatively, as the guesses
 /// are.
 const MOVED: f64 = 0.1;
+/// The same at the first point, where no slopes are known that guesses could follow from.
+const MOVED_FIRST: f64 = 1e-6;
+/// Samples before a segment from which its first guess is simulated: fast plants forget their state within them.
+const RUN_IN: usize = 128;
 
 /// Cost, triangle and final carry of one segment.
 pub(super) struct Part {
@@ -36,9 +40,9 @@ impl Objective<'_> {
         let values = self.values(coordinates);
         let cuts = &self.problem.cuts;
         let chained = (0..self.experiments()).any(|e| cuts.is_chained(e));
-        let (guess, exact) = if chained { self.guess(coordinates, &values)? } else { (None, true) };
+        let (guess, most) = if chained { self.guess(coordinates, &values)? } else { (None, f64::INFINITY) };
         let mut found = self.triangles(coordinates, &values, guess.as_ref())?;
-        if !exact && found.moved > MOVED * 2.0 * found.cost {
+        if found.moved > most * 2.0 * found.cost {
             found = self.triangles(coordinates, &values, found.borders.as_ref())?;
         }
         let Triangulation { cost, blocks, borders, .. } = found;
@@ -72,17 +76,17 @@ impl Objective<'_> {
         }
     }
 
-    /// The carry at the begin of each segment, and whether it is exact. A guess is enough where it can be corrected:
-    /// with an affine model and a cost that is a sum of squares.
-    fn guess(&self, coordinates: &[f64], values: &[Values]) -> Result<(Option<Borders>, bool), Infeasible> {
+    /// The carry at the begin of each segment, and the part of the squared errors that its correction may change. A guess is
+    /// enough where it can be corrected: with an affine model and a cost that is a sum of squares.
+    fn guess(&self, coordinates: &[f64], values: &[Values]) -> Result<(Option<Borders>, f64), Infeasible> {
         if let Some(known) = self.memory.at(coordinates) {
-            return Ok((Some((*known).clone()), true));
+            return Ok((Some((*known).clone()), f64::INFINITY));
         }
         if !self.problem.cuts.affine || self.loss().is_some() {
-            return Ok((Some(self.simulated_borders(coordinates, values)?), true));
+            return Ok((Some(self.simulated_borders(coordinates, values)?), f64::INFINITY));
         }
         let Some(best) = self.memory.best() else {
-            return Ok((Some(self.initial_borders(coordinates, values)), false));
+            return Ok((Some(self.first_borders(coordinates, values)), MOVED_FIRST));
         };
         let mut guess = Borders { point: coordinates.to_vec(), values: values.to_vec(), ..(*best).clone() };
         for (e, borders) in guess.of.iter_mut().enumerate() {
@@ -97,17 +101,36 @@ impl Objective<'_> {
                 *border = Border { carry: best.moved(e, s + 1, &change), slopes: vec![] };
             }
         }
-        Ok((Some(guess), false))
+        Ok((Some(guess), MOVED))
     }
 
-    /// Every segment begins with the carry of the first.
-    fn initial_borders(&self, coordinates: &[f64], values: &[Values]) -> Borders {
-        let of = |e: usize| {
-            let carry = self.job(e, &values[e], coordinates, false).piece.carry;
-            let borders = self.problem.cuts.segments[e].len() - 1;
-            vec![Border { carry, slopes: vec![] }; borders]
+    /// The carry that the last samples before each segment lead to from the carry of the first one.
+    fn first_borders(&self, coordinates: &[f64], values: &[Values]) -> Borders {
+        let run_in = |e: usize| {
+            let whole = self.job(e, &values[e], coordinates, false);
+            let before = self.problem.cuts.segments[e].split_last().map_or(&[][..], |(_, before)| before);
+            let job = move |samples: &std::ops::Range<usize>| {
+                let from = samples.end.saturating_sub(RUN_IN).max(samples.start);
+                let piece = Piece { samples: from..samples.end, ..whole.piece.clone() };
+                Job { objective: self, experiment: e, seeds: vec![], scales: vec![], piece }
+            };
+            before.iter().map(job)
         };
-        let of = (0..self.experiments()).map(of).collect();
+        let jobs: Vec<Job<'_>> = (0..self.experiments()).flat_map(run_in).collect();
+        // A run that fails leaves its begin as the guess.
+        let end = |_: &[usize], jobs: &[&Job<'_>]| {
+            let pieces: Vec<Piece<'_>> = jobs.iter().map(|job| job.piece.clone()).collect();
+            let reached = self.sweep.run(&pieces, &[], &mut |_| !self.control.stops());
+            let carry = |(reached, piece): (Result<Reached, RunError>, Piece<'_>)| {
+                reached.map_or(piece.carry, |reached| reached.carry)
+            };
+            Ok(reached.into_iter().zip(pieces).map(carry).collect())
+        };
+        let mut carries = in_batches(&jobs, end).unwrap_or_default().into_iter();
+        let mut border =
+            |_: &std::ops::Range<usize>| Border { carry: carries.next().unwrap_or_default(), slopes: vec![] };
+        let of =
+            self.problem.cuts.segments.iter().map(|segments| segments[1..].iter().map(&mut border).collect()).collect();
         Borders { point: coordinates.to_vec(), cost: f64::INFINITY, values: values.to_vec(), of }
     }
 

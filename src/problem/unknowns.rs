@@ -233,8 +233,9 @@ fn check(name: &str, parameter: &Parameter) -> Result<(), Error> {
     }
     if positive && (start <= 0.0 || upper <= 0.0) {
         return wrong(format!(
-            "it is declared positive, but its start is {start} and its upper bound {upper}; start above zero, or leave \
-             .positive() out"
+            "it is declared positive, but its start is {} and its upper bound {}; start above zero, or leave .positive() out",
+            exact(start),
+            exact(upper)
         ));
     }
     if !free {
@@ -248,7 +249,8 @@ fn check(name: &str, parameter: &Parameter) -> Result<(), Error> {
     }
     if transform == Transform::Log && lower < 0.0 && lower.is_finite() {
         return wrong(format!(
-            "its lower bound {lower} has no effect because its logarithm is estimated; bound it above zero, or leave .log() out"
+            "its lower bound {} has no effect because its logarithm is estimated; bound it above zero, or leave .log() out",
+            exact(lower)
         ));
     }
     if transform == Transform::Log && start <= 0.0 {

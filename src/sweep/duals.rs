@@ -107,6 +107,10 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
         Some(search.locate(state, parameters, sample, sigma, stops))
     }
 
+    fn is_adaptive(&self) -> bool {
+        !self.method.is_fixed()
+    }
+
     fn refined<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
         let (loops, method) = self.loops.refined(M::KIND)?;
         let (layout, model, predictor) = (self.layout.clone(), self.model.clone(), self.predictor.clone());

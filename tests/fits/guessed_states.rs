@@ -1,6 +1,6 @@
 //! Initial states that the outputs do not give, or not at the first sample, start where they can, and the report says so.
 
-use crate::bad_models::says;
+use crate::refused::says;
 use greybox::optimize::Severity;
 use greybox::*;
 

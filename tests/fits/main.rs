@@ -22,6 +22,8 @@ mod noise;
 mod optimizers;
 mod recovery;
 mod refining;
+#[path = "../common/refused.rs"]
+mod refused;
 mod segments;
 #[path = "../common/shared.rs"]
 mod shared;

@@ -133,3 +133,31 @@ fn twenty_nonlinear_plants_from_far_starts() {
     println!("{found} of {tried}");
     assert!(found * 100 >= tried * 95, "{found} of {tried}");
 }
+
+/// The slopes at a start where nothing is known of the borders between segments, against those of the record as a whole, in
+/// units in which each column has length one: plants that forget within a segment and such that do not.
+#[test]
+fn the_first_slopes_are_those_of_the_whole_record() {
+    use greybox::optimize::LeastSquares;
+    for (kind, p) in AFFINE.flat_map(|kind| [1.3, 0.2, 0.03].map(|p| (kind, p))) {
+        let record = record(kind, 0.05, 1_500).initial(State { a: free(0.2), b: fixed(0.1) });
+        let gradient = |whole: bool| {
+            let model = Plant { kind, whole };
+            let problem = Fit::new(&model, &record)
+                .parameters(Coefficients { p: free(p), q: free(0.5), r: free(0.7) })
+                .noise(Output { y: 0.05 })
+                .integrator(Rk4::default())
+                .problem()
+                .unwrap();
+            let objective = problem.objective().unwrap();
+            let linear = objective.linearize(&objective.start()).unwrap();
+            let size = linear.column_norms().into_iter().map(move |norm| norm * (2.0 * linear.cost).sqrt());
+            (linear.gradient(), size.collect::<Vec<_>>())
+        };
+        let ((cut, sizes), (whole, _)) = (gradient(false), gradient(true));
+        for ((a, b), size) in cut.into_iter().zip(whole).zip(sizes) {
+            // What the guesses are off by may change the squared errors by a millionth, and the slopes by its root.
+            assert!((a - b).abs() <= 1e-3 * size, "plant {kind}, p = {p}: {a} {b} of {size}");
+        }
+    }
+}

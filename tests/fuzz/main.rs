@@ -17,8 +17,9 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 /// Cases without a time budget.
 const CASES: u64 = 60;
 /// Cases that have shown a fault: a line search without a step, scores that overflow, a drawing of excitations that are no
-/// numbers, intervals without an end.
-const FOUND: [u64; 5] = [462, 620, 397, 1556, 1577];
+/// numbers, intervals without an end or below the smallest number, fleets that kept a coarse step, words for what is missing,
+/// errors with numbers of 300 digits.
+const FOUND: [u64; 11] = [462, 620, 397, 1556, 1577, 457, 1234, 1420, 1601, 1889, 100_503];
 /// A case that takes longer hangs: its fit has a limit of a second, its diagnoses of as much each.
 const HANG: Duration = Duration::from_secs(120);
 
@@ -73,5 +74,5 @@ fn random_fits_end_soundly() {
     println!("from case {first} on: {tally:?}; the slowest took {} ms: {}", slowest.0, slowest.1);
     assert!(wrong.is_empty(), "wrong cases: {wrong:?}; run one alone with GREYBOX_FUZZ_CASE");
     // Enough cases must come so far that there is something to judge.
-    assert!(tally.fits * 10 >= tally.cases, "{tally:?}");
+    assert!(tally.fits * 5 >= tally.cases, "{tally:?}");
 }

@@ -150,7 +150,8 @@ pub fn record<M: Model>(draw: &mut Draw, model: &M) -> Option<ExperimentOf<M>> {
 /// A declaration of a parameter or initial state.
 pub fn parameter(draw: &mut Draw) -> Parameter {
     let start = if draw.chance(0.8) { draw.usual().abs() } else { draw.number(0.3) };
-    let mut parameter = if draw.chance(0.85) { free(start) } else { fixed(start) };
+    let is_free = draw.chance(0.85);
+    let mut parameter = if is_free { free(start) } else { fixed(start) };
     if draw.chance(0.2) {
         let (a, b) = (draw.number(0.2), draw.number(0.2));
         parameter = if draw.chance(0.9) {
@@ -162,10 +163,12 @@ pub fn parameter(draw: &mut Draw) -> Parameter {
     if draw.chance(0.15) {
         parameter = parameter.log();
     }
-    if draw.chance(0.1) {
-        parameter = parameter.prior(draw.number(0.1), draw.number(0.1).abs());
+    // What is fixed has neither.
+    let prior = draw.chance(0.1).then(|| (draw.number(0.1), draw.number(0.1).abs()));
+    if let Some((mean, std)) = prior.filter(|_| is_free) {
+        parameter = parameter.prior(mean, std);
     }
-    if draw.chance(0.1) {
+    if draw.chance(0.1) && is_free {
         parameter = parameter.per_experiment();
     }
     parameter

@@ -1,27 +1,10 @@
 //! Every way in which a record can be wrong: an error that names the thing, the number and the place.
 #![cfg(feature = "csv")]
 
-use greybox::{CsvFile, Error, Experiment, Model, Scalar, Time, signals};
+use crate::pmsm::{Currents, Drive, Pmsm, Winding};
+use crate::refused::says;
+use greybox::{CsvFile, Error, Experiment, Model, Scalar, Time};
 use std::path::PathBuf;
-
-signals! {
-    pub struct Currents { id: "A", iq: "A" }
-    pub struct Drive { ud: "V", w: "rad/s" }
-    pub struct Winding { rs: "ohm" }
-}
-
-struct Pmsm;
-
-impl Model for Pmsm {
-    type State = Currents;
-    type Input = Drive;
-    type Output = Currents;
-    type Parameters = Winding;
-
-    fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
-        *x
-    }
-}
 
 const U: Drive = Drive { ud: 1.0, w: 2.0 };
 const Y: Currents = Currents { id: 3.0, iq: 4.0 };
@@ -36,17 +19,6 @@ fn file(name: &str, text: impl AsRef<[u8]>) -> PathBuf {
     std::fs::create_dir_all(path.parent().unwrap()).unwrap();
     std::fs::write(&path, text).unwrap();
     path
-}
-
-/// The message of an error; it must hold every one of `parts`.
-#[track_caller]
-fn says<T>(result: Result<T, Error>, parts: &[&str]) -> Error {
-    let Err(error) = result else { panic!("no error; expected {parts:?}") };
-    let message = error.to_string();
-    for part in parts {
-        assert!(message.contains(part), "`{part}` is not in: {message}");
-    }
-    error
 }
 
 /// Reads a file of this text and checks what the error says.

@@ -1,0 +1,70 @@
+//! Fits whose integrator was not chosen: finer methods, as long as a finer step would move an unknown.
+
+use crate::error::Error;
+use crate::estimate::{Summary, Warning, WarningCode};
+use crate::optimize::Severity;
+
+/// The best answer by the methods tried so far.
+pub(super) struct Attempt {
+    pub found: Result<Summary, Error>,
+    /// Whether a finer method was tried and is no better.
+    ended: bool,
+}
+
+impl Attempt {
+    pub fn new(found: Result<Summary, Error>) -> Self {
+        Attempt { found, ended: false }
+    }
+
+    /// Whether a finer method is to be tried: a finer step would move an unknown, or the start cannot be simulated.
+    pub fn is_coarse(&self) -> bool {
+        let coarse = match &self.found {
+            Ok(found) => coarse_step(found).is_some(),
+            Err(error) => matches!(error, Error::Start(_)),
+        };
+        coarse && !self.ended
+    }
+
+    /// This answer or that of a finer method.
+    pub fn or(self, again: Result<Summary, Error>) -> Self {
+        let (found, ended) = match (self.found, again) {
+            (Ok(before), Ok(again)) if is_better(&before, &again) => (Ok(after(&before, again)), false),
+            (Ok(before), Ok(again)) => (Ok(kept(before, &again)), true),
+            (Err(_), again @ Ok(_)) => (again, false),
+            (before, Err(_)) => (before, false),
+        };
+        Attempt { found, ended }
+    }
+}
+
+/// The warning that a finer step would move an unknown.
+fn coarse_step(found: &Summary) -> Option<&Warning> {
+    found.warnings.iter().find(|warning| warning.code == WarningCode::CoarseStep)
+}
+
+/// Whether a finer method explains the data no worse than a coarser one: records that were simulated with the coarser step
+/// are explained by that alone.
+fn is_better(before: &Summary, again: &Summary) -> bool {
+    const INDISTINGUISHABLE: f64 = 4.0;
+    let explains = before.deviance.zip(again.deviance).is_none_or(|(before, again)| again < before + INDISTINGUISHABLE);
+    again.outcome.converged() && explains || !before.outcome.converged()
+}
+
+/// The estimate of a finer method, with the work of both.
+fn after(before: &Summary, again: Summary) -> Summary {
+    Summary {
+        iterations: before.iterations + again.iterations,
+        evaluations: before.evaluations + again.evaluations,
+        ..again
+    }
+}
+
+/// The estimate of a coarser method, which explains the data better than a finer one.
+fn kept(mut before: Summary, again: &Summary) -> Summary {
+    if let Some(warning) = before.warnings.iter_mut().find(|warning| warning.code == WarningCode::CoarseStep) {
+        warning.severity = warning.severity.min(Severity::UsableWithCare);
+        warning.text +=
+            &format!("; {} explains the data worse, so that the coarser step was kept", again.method.integrator);
+    }
+    before
+}
