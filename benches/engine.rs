@@ -3,12 +3,15 @@
 //! to its program.
 
 use divan::{Bencher, black_box, counter::ItemsCount};
-use greybox::engine::{Differentiated, Program, Sampling, Trajectories};
+use greybox::engine::{Program, Sampling, Trajectories};
 use greybox::graph::Seed;
 use greybox::pmsm::{Surface, Winding};
 use greybox::{
-    Dual, Equations, Esdirk, Hold, Integrator, Interval, Model, ModelSystem, Of, Recurrence, Rk4, Rk45, Scalar,
-    Signals, signals,
+    Dual, Esdirk, Hold, Interval, Model, Of, Rk4, Rk45, Scalar, Signals,
+    equations::Equations,
+    integrate::{Integrator, ModelSystem},
+    recurrence::Recurrence,
+    signals,
 };
 
 const SAMPLES: usize = 2000;
@@ -111,31 +114,18 @@ fn duals<M: Model, const N: usize>(bencher: Bencher, model: &M, p: &[f64]) {
     });
 }
 
-/// Eight slopes through an adaptive method: of a Rust model on duals, or of its compiled right-hand side.
-fn adaptive<M: Model, I: Integrator>(bencher: Bencher, model: &M, integrator: &I, p: &[f64], compiled: bool) {
+/// Eight slopes of a Rust model through an adaptive method, on duals.
+fn adaptive<M: Model, I: Integrator>(bencher: Bencher, model: &M, integrator: &I, p: &[f64]) {
     let p = M::Parameters::from_fn(|j| Dual::<8>::variable(p[j], j));
-    let differentiated = Differentiated::new(&Equations::trace(model).unwrap()).unwrap();
-    let mut system = differentiated.system(M::Parameters::into_array(p).as_ref());
     let input = |k: usize| -> Of<M::Input, f64> { M::Input::from_fn(|i| (0.037 * (k * 3 + i) as f64).sin()) };
     let time = |k: usize| (k as f64 * 1e-2, (k + 1) as f64 * 1e-2);
     bencher.counter(ItemsCount::new(100usize)).bench_local(|| {
-        let (mut step, start) = (0.0, M::State::from_fn(|_| Dual::<8>::constant(0.1)));
-        if compiled {
-            let mut x = M::State::into_array(start).as_ref().iter().copied().collect();
-            for k in 0..100 {
-                let u = M::Input::into_array(input(k));
-                system.set_interval(time(k).0, time(k).1, u.as_ref(), u.as_ref(), Hold::Zero);
-                x = integrator.advance(&system, x, &mut step).unwrap();
-            }
-            black_box(x);
-        } else {
-            let mut x = start;
-            for k in 0..100 {
-                let interval = Interval { t0: time(k).0, t1: time(k).1, u0: input(k), u1: input(k), hold: Hold::Zero };
-                x = ModelSystem { model, interval: &interval, p: &p }.step(integrator, x, &mut step).unwrap();
-            }
-            black_box(x);
+        let (mut step, mut x) = (0.0, M::State::from_fn(|_| Dual::<8>::constant(0.1)));
+        for k in 0..100 {
+            let interval = Interval { t0: time(k).0, t1: time(k).1, u0: input(k), u1: input(k), hold: Hold::Zero };
+            x = ModelSystem { model, interval: &interval, p: &p }.step(integrator, x, &mut step).unwrap();
         }
+        black_box(x);
     });
 }
 
@@ -201,17 +191,17 @@ mod coupled {
 mod adaptive_methods {
     use super::*;
 
-    #[divan::bench(args = [false, true])]
-    fn rk45_motor(bencher: Bencher, compiled: bool) {
+    #[divan::bench]
+    fn rk45_motor(bencher: Bencher) {
         let p: [f64; 3] = MOTOR.into();
-        adaptive(bencher, &Surface::new(4).unwrap(), &Rk45::default(), &p, compiled);
+        adaptive(bencher, &Surface::new(4).unwrap(), &Rk45::default(), &p);
     }
-    #[divan::bench(args = [false, true])]
-    fn rk45_coupled(bencher: Bencher, compiled: bool) {
-        adaptive(bencher, &Coupled, &Rk45::default(), &TEN, compiled);
+    #[divan::bench]
+    fn rk45_coupled(bencher: Bencher) {
+        adaptive(bencher, &Coupled, &Rk45::default(), &TEN);
     }
-    #[divan::bench(args = [false, true])]
-    fn esdirk_coupled(bencher: Bencher, compiled: bool) {
-        adaptive(bencher, &Coupled, &Esdirk::default(), &TEN, compiled);
+    #[divan::bench]
+    fn esdirk_coupled(bencher: Bencher) {
+        adaptive(bencher, &Coupled, &Esdirk::default(), &TEN);
     }
 }

@@ -4,11 +4,11 @@
 use argmin::core::CostFunction;
 use divan::{Bencher, counter::ItemsCount};
 use greybox::models::{
-    Armature, Axis, Command, ControlledAxisOutput, DcMotor, Feed, Positioning, PositioningLoop, Reference,
+    Armature, AxisParameters, Command, ControlledAxisOutput, DcMotor, Feed, Positioning, PositioningLoop, Reference,
 };
 use greybox::optimize::{LeastSquares, LevenbergMarquardt, Linearization};
 use greybox::pmsm::{Drive, Machine, MachineParameters, Salient, SalientWinding, Surface, VoltageAndLoad, Winding};
-use greybox::{Experiment, Fit, Information, Model, Of, Signals, Time, free};
+use greybox::{Experiment, Fit, Model, Of, Signals, Time, free, information::Information};
 
 const SAMPLES: usize = 20_000;
 const STEP: f64 = 1e-4;
@@ -41,8 +41,8 @@ models! {
     machine: Machine::new(4, 100.0).unwrap(), VoltageAndLoad { ud: 5.0, uq: 40.0, tau_l: 0.1 },
         MachineParameters { rs: 0.63, ld: 4e-3, lq: 5e-3, ke: 0.95, j: 0.012, bv: 4e-3, tc: 1.2, tg: 1.0 };
     dc_motor: DcMotor, Feed { u: 24.0, tau_l: 0.1 }, Armature { r: 1.0, l: 1e-3, k: 0.05, j: 1e-4, b: 1e-5 };
-    positioning: Positioning::EMPS, Command { vir: 2.0 }, Axis { m: 95.0, fv: 200.0, fc: 20.0, offset: -3.0 };
-    positioning_loop: PositioningLoop::EMPS, Reference { qg: 0.1 }, Axis { m: 95.0, fv: 200.0, fc: 20.0, offset: -3.0 };
+    positioning: Positioning::EMPS, Command { vir: 2.0 }, AxisParameters { m: 95.0, fv: 200.0, fc: 20.0, offset: -3.0 };
+    positioning_loop: PositioningLoop::EMPS, Reference { qg: 0.1 }, AxisParameters { m: 95.0, fv: 200.0, fc: 20.0, offset: -3.0 };
 }
 
 fn run<M: Model + Clone>(

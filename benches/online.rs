@@ -5,7 +5,7 @@ use greybox::online::{EkfStart, Forgetting, MrasStart, Order, Rls, Stepping, Wat
 use greybox::pmsm::drive::Simulation;
 use greybox::pmsm::inverter::Carrier;
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::{Axis, V_DC};
+use greybox::pmsm::robot::{RobotAxis, V_DC};
 use greybox::pmsm::{
     AngledDrive, Currents, Drive, ExactStep, ExactSurface, HeldIn, InverterFed, InverterFedWinding, KeLyapunov,
     MotorLaw, RsLyapunov, SQRT_2_3, Winding,
@@ -53,7 +53,7 @@ fn drive(bencher: Bencher, simulation: Simulation) {
 }
 
 fn axis_1() -> Simulation {
-    Simulation::new(Axis::reference(1).unwrap()).unwrap()
+    Simulation::new(RobotAxis::reference(1).unwrap()).unwrap()
 }
 
 #[divan::bench(sample_count = 20)]

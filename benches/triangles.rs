@@ -2,7 +2,7 @@
 //! [`Triangles`], where the items are rows times lanes: `cargo bench --bench triangles`.
 
 use divan::{Bencher, counter::ItemsCount};
-use greybox::{Block, Information, Triangles};
+use greybox::information::{Block, Information, Triangles};
 
 /// Columns of a row, `y` included.
 const COLUMNS: [usize; 11] = [2, 3, 4, 5, 6, 7, 8, 9, 12, 15, 16];

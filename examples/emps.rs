@@ -6,7 +6,7 @@
 //! reference, as on the bench, and position and command are compared.
 
 use clap::Parser;
-use greybox::models::{Axis, ControlledAxisMotion, PositioningLoop};
+use greybox::models::{AxisParameters, ControlledAxisMotion, PositioningLoop};
 use greybox::{Experiment, Fit, Hold, Signals, fixed, free};
 use std::{path::PathBuf, process::ExitCode};
 
@@ -18,7 +18,7 @@ struct Arguments {
 }
 
 /// Janot, Gautier, Brunot 2019: inverse-dynamics least squares on the same record.
-const PUBLISHED: Axis = Axis { m: 95.1089, fv: 203.5034, fc: 20.3935, offset: -3.1648 };
+const PUBLISHED: AxisParameters = AxisParameters { m: 95.1089, fv: 203.5034, fc: 20.3935, offset: -3.1648 };
 
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
@@ -37,13 +37,13 @@ fn run(arguments: &Arguments) -> Result<(), greybox::Error> {
         .hold(Hold::First) // the reference is a smooth curve, sampled
         .initial(ControlledAxisMotion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) }); // it starts at rest
     let estimate = Fit::new(&model, &record)
-        .parameters(Axis { m: free(80.0), fv: free(150.0), fc: free(15.0), offset: free(0.0) })
+        .parameters(AxisParameters { m: free(80.0), fv: free(150.0), fc: free(15.0), offset: free(0.0) })
         .run()?;
     println!("{estimate}\n");
 
     println!("{:<10} {:>10} {:>10} {:>10}", "", "published", "here", "difference");
-    let (here, published) = (Axis::into_array(estimate.parameters), Axis::into_array(PUBLISHED));
-    for ((name, here), published) in Axis::NAMES.iter().zip(here).zip(published) {
+    let (here, published) = (AxisParameters::into_array(estimate.parameters), AxisParameters::into_array(PUBLISHED));
+    for ((name, here), published) in AxisParameters::NAMES.iter().zip(here).zip(published) {
         println!("{name:<10} {published:>10.4} {here:>10.4} {:>8.2} %", 100.0 * (here / published - 1.0));
     }
 

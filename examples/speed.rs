@@ -6,7 +6,7 @@
 
 use greybox::optimize::{LevenbergMarquardt, Stop};
 use greybox::pmsm::{Currents, Drive, SQRT_2_3, Winding};
-use greybox::{Estimate, Experiment, ExperimentOf, Fit, Fleet, Model, OwnSize, Records, Scalar, Time, free};
+use greybox::{Estimate, Experiment, ExperimentOf, Fit, Fleet, Model, Records, Scalar, Time, free, optimize::OwnSize};
 use std::error::Error;
 
 struct Pmsm {

@@ -15,11 +15,11 @@ use crate::signals::{Nothing, Of, Signals};
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Disagreement {
-    /// A loss that breaks its law.
-    #[error("the loss breaks its law at z = {z}: {law}: {found} against {expected}")]
+    /// A loss that breaks a requirement of [`Loss`].
+    #[error("the loss breaks a requirement at z = {z}: {requirement}: {found} against {expected}")]
     Loss {
         /// What should hold.
-        law: &'static str,
+        requirement: &'static str,
         /// The standardized error.
         z: f64,
         /// What the loss says.
@@ -45,17 +45,17 @@ pub enum Disagreement {
     },
 }
 
-/// Whether a loss keeps the law of [`Loss`]: even, zero at zero, `z^2 / 2` near it, never falling, `psi` its derivative,
+/// Whether a loss meets the requirements of [`Loss`]: even, zero at zero, `z^2 / 2` near it, never falling, `psi` its derivative,
 /// `weight` and `slope` in agreement with `psi`. Looked at in 400 places up to |z| = 40, to 1e-5.
 ///
 /// # Errors
 /// The first [`Disagreement`].
 pub fn loss(loss: &dyn Loss) -> Result<(), Disagreement> {
-    let agree = |law, z, found: f64, expected: f64| {
+    let agree = |requirement, z, found: f64, expected: f64| {
         if (found - expected).abs() <= 1e-5 * (1.0 + expected.abs()) {
             return Ok(());
         }
-        Err(Disagreement::Loss { law, z, found, expected })
+        Err(Disagreement::Loss { requirement, z, found, expected })
     };
     agree("rho(0) is 0", 0.0, loss.rho(0.0), 0.0)?;
     agree("the weight at 0 is 1", 0.0, loss.weight(0.0), 1.0)?;

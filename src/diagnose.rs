@@ -23,7 +23,7 @@ pub use convergence::{Convergence, Iteration};
 pub use derived::{Derived, derived};
 pub use drift::{Drift, drift};
 pub(crate) use identifiability::reworded;
-pub use identifiability::{COLLINEAR, Collinear, Excitation, Identifiability, Segment, identifiability};
+pub use identifiability::{Collinear, Excitation, Identifiability, Segment, identifiability};
 pub use profile::{End, Profile, ProfilePoint, profile};
 pub use side_by_side::{Compared, ComparedOutput, DataUse};
 
@@ -38,7 +38,7 @@ use argmin::core::{Executor, State};
 use serde::{Deserialize, Serialize};
 
 /// The probability of error below which a hypothesis is given up.
-pub const LEVEL: f64 = 0.01;
+pub(crate) const LEVEL: f64 = 0.01;
 
 /// A hypothesis and whether the data are against it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -52,7 +52,7 @@ pub struct Test {
     /// Probability of such a statistic, or one further out, if the hypothesis is true.
     #[serde(with = "crate::real")]
     pub p_value: f64,
-    /// Whether the hypothesis may stand: `p_value` is at least [`LEVEL`].
+    /// Whether the hypothesis may stand: `p_value` is at least 0.01.
     pub passed: bool,
     /// What the result means; where it failed, what that usually comes from.
     pub meaning: String,
@@ -64,7 +64,7 @@ impl Test {
         p_value(self.p_value)
     }
 
-    /// Passed if `p_value` is at least [`LEVEL`]; the meaning is the first if passed, else the second.
+    /// Passed if `p_value` is at least `LEVEL`; the meaning is the first if passed, else the second.
     pub(crate) fn new(name: impl Into<String>, statistic: f64, p_value: f64, passed: &str, failed: &str) -> Self {
         let holds = p_value >= LEVEL;
         let meaning = if holds { passed } else { failed }.to_owned();

@@ -2,7 +2,7 @@
 //!
 //! A [`Recurrence`] is differentiated as a whole, with respect to chosen seeds, scheduled to instructions, and run on *lanes*:
 //! each lane is a trajectory of its own, with its own parameters, start and record. A lane's bits depend on nothing but its
-//! own numbers: not on its neighbors, nor on the number of lanes, nor on what runs the instructions.
+//! own numbers: not on other lanes, nor on the number of lanes, nor on what runs the instructions.
 //!
 //! The interpreter runs everywhere. Where the processor is an x86-64 with AVX2, and the feature `jit` is on, the instructions
 //! become machine code.
@@ -14,20 +14,16 @@ mod functions;
 mod fusion;
 mod group;
 mod interpret;
-mod jets;
 #[cfg(all(feature = "jit", target_arch = "x86_64"))]
 mod machine;
 mod schedule;
 mod step;
-mod system;
 
 pub(crate) use choice::only_duals;
 pub use code::Column;
 pub use group::Group;
 pub use schedule::TooLarge;
-pub use system::{Differentiated, DifferentiatedSystem};
 
-use crate::equations::Equations;
 use crate::graph::{Leaf, Node, Pattern, Seed};
 use crate::recurrence::Recurrence;
 use crate::wide::Width;
@@ -65,25 +61,13 @@ struct Compiled {
     code: Sound,
     derivation: Derivation,
     pattern: Pattern,
-    shape: Shape,
+    seeds: Vec<Seed>,
+    parameters: usize,
     outputs: usize,
     variances: usize,
     width: Width,
     trajectories: Trajectories,
     machine: Option<Machine>,
-}
-
-/// What slopes there are.
-#[derive(Debug)]
-struct Shape {
-    seeds: Vec<Seed>,
-    /// Slopes of each output.
-    slopes: usize,
-    parameters: usize,
-    /// The first of the parameters that are a direction.
-    direction: Option<usize>,
-    /// Whether what depends on the record alone comes as columns.
-    derives: bool,
 }
 
 /// As many parameters as a recurrence depends on, and those before them.
@@ -107,58 +91,18 @@ impl Program {
         trajectories: Trajectories,
     ) -> Result<Self, TooLarge> {
         let step = Step::new(recurrence, seeds, sampling == Sampling::Uniform);
-        let shape = Shape {
-            seeds: seeds.to_vec(),
-            slopes: seeds.len(),
-            parameters: parameters(recurrence),
-            direction: None,
-            derives: true,
-        };
-        Program::of_step(step, recurrence, shape, trajectories)
-    }
-
-    /// What is carried and the outputs, with their first and second derivatives along a direction in the space of the
-    /// seeds that each lane is told ([`Group::set_direction`]): two slopes per output, the first derivative and the second.
-    ///
-    /// # Errors
-    /// If it needs too many numbers at a time.
-    pub fn compile_second(recurrence: &Recurrence, seeds: &[Seed], sampling: Sampling) -> Result<Self, TooLarge> {
-        let own = parameters(recurrence);
-        let step = jets::second_along(recurrence, seeds, own, sampling == Sampling::Uniform);
-        let shape = Shape {
-            seeds: seeds.to_vec(),
-            slopes: 2,
-            parameters: own + seeds.len(),
-            direction: Some(own),
-            derives: true,
-        };
-        Program::of_step(step, recurrence, shape, Trajectories::Many)
-    }
-
-    /// The right-hand side of equations with one tangent per lane.
-    fn right_hand_side(equations: &Equations) -> Result<Self, TooLarge> {
-        let recurrence = jets::right_hand_side(equations);
-        let parameters = 2 * equations.layout().parameters.len();
-        let shape = Shape { seeds: vec![], slopes: 0, parameters, direction: None, derives: false };
-        Program::of_step(Step::new(&recurrence, &[], true), &recurrence, shape, Trajectories::Many)
-    }
-
-    fn of_step(
-        step: Step,
-        recurrence: &Recurrence,
-        shape: Shape,
-        trajectories: Trajectories,
-    ) -> Result<Self, TooLarge> {
+        let parameters = parameters(recurrence);
         let roots: Vec<_> = step.rows.iter().flatten().chain(&step.next).copied().collect();
-        let derived = if shape.derives { derive::dear(&step.tape, &roots) } else { vec![] };
-        let (tape, parameters) = (&step.tape, shape.parameters);
-        let code = schedule(&Roots { tape, next: &step.next, rows: &step.rows, parameters, derived: &derived })?;
+        let derived = derive::costly(&step.tape, &roots);
+        let (tape, next, rows) = (&step.tape, &step.next, &step.rows);
+        let code = schedule(&Roots { tape, next, rows, parameters, derived: &derived })?;
         let (width, machine) = choice::engine(&code, trajectories);
         Ok(Program(Arc::new(Compiled {
             code,
             derivation: Derivation::new(&step.tape, &derived)?,
             pattern: step.pattern,
-            shape,
+            seeds: seeds.to_vec(),
+            parameters,
             outputs: recurrence.mean().len(),
             variances: recurrence.variance().len(),
             width,
@@ -204,12 +148,12 @@ impl Program {
 
     /// What slopes are taken with respect to.
     pub fn seeds(&self) -> &[Seed] {
-        &self.0.shape.seeds
+        &self.0.seeds
     }
 
     /// Numbers that each sample's rows have: for each output the slopes and the mean, then for each variance the same.
     pub fn row_length(&self) -> usize {
-        (self.0.outputs + self.0.variances) * (self.0.shape.slopes + 1)
+        (self.0.outputs + self.0.variances) * (self.0.seeds.len() + 1)
     }
 
     /// Outputs.

@@ -84,7 +84,7 @@ pub enum Error {
         output: String,
     },
     /// A column that the file does not have.
-    #[error("{}: no column `{column}`{}; the file has: {}", path.display(), wanted_by(signal, column), listed(available, signal))]
+    #[error("{}: no column `{column}`{}; {}", path.display(), wanted_by(signal, column), listed(available, column, signal))]
     MissingColumn {
         /// The file.
         path: PathBuf,
@@ -184,14 +184,14 @@ pub enum Error {
         serves: &'static str,
     },
     /// An initial state, or a restart, that the outputs do not give.
-    #[error(
-        "experiment `{experiment}`: the state cannot be read from the outputs ({reason}); give it with Experiment::initial"
-    )]
+    #[error("experiment `{experiment}`: the state cannot be computed from the outputs ({reason}); {remedy}")]
     StateNotMeasured {
         /// Name of the experiment.
         experiment: String,
         /// Why not.
         reason: String,
+        /// What to do instead.
+        remedy: &'static str,
     },
     /// A simulation that fails where the search was to start.
     #[error("the start cannot be evaluated: {0}")]
@@ -243,15 +243,30 @@ pub struct Failure {
     pub hint: &'static str,
 }
 
+/// Columns of a file that are listed; of more, those whose names are nearest to the one wanted.
+const LISTED: usize = 10;
+
 /// The columns that a file has, and what the list gives away.
-fn listed(columns: &[String], wanted: &str) -> String {
+fn listed(columns: &[String], wanted: &str, signal: &str) -> String {
     let remedy = match columns {
         [single] if single.contains([';', '\t', '|']) => "set what stands between cells with CsvFile::delimiter",
         _ if columns.iter().all(|name| name.parse::<f64>().is_ok()) => "its first line must hold the names",
-        _ if wanted == "t" => "name another with CsvFile::column, or give CsvFile::sample_time",
+        _ if signal == "t" => "name another with CsvFile::column, or give CsvFile::sample_time",
         _ => "name another with CsvFile::column",
     };
-    format!("{}; {remedy}", columns.join(", "))
+    if columns.len() <= LISTED {
+        return format!("the file has: {}; {remedy}", columns.join(", "));
+    }
+    let wanted = wanted.to_lowercase();
+    // Those that contain the name come first.
+    let near = |name: &str| {
+        let name = name.to_lowercase();
+        strsim::normalized_damerau_levenshtein(&name, &wanted) + if name.contains(&wanted) { 1.0 } else { 0.0 }
+    };
+    let mut names: Vec<(f64, &str)> = columns.iter().map(|name| (near(name), name.as_str())).collect();
+    names.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let nearest: Vec<&str> = names[..LISTED].iter().map(|(_, name)| *name).collect();
+    format!("of its {} columns these are nearest: {}; {remedy}", columns.len(), nearest.join(", "))
 }
 
 /// A number without the hundreds of zeros that a large or small one would be printed with.

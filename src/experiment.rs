@@ -20,7 +20,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 /// One measured record of inputs `U` and outputs `Y`, and what is known of the state `X` at its first sample.
 ///
 /// Time increases, inputs are finite, lengths agree; an output that was not measured is `NaN`. Unless told otherwise the
-/// input is held from sample to sample, and the initial state is estimated from a start that the first sample gives.
+/// input is held from sample to sample, and the initial state is estimated, from a start that the first measurements give.
 ///
 /// It is made of vectors ([`new`](Experiment::new)), of columns ([`from_columns`](Experiment::from_columns)) or of a CSV
 /// file (`from_csv`, `CsvFile`), and cut ([`slice`](Experiment::slice), [`between`](Experiment::between),
@@ -173,6 +173,9 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     }
 
     /// Time of sample `k` (s).
+    ///
+    /// # Panics
+    /// From [`len`](Self::len) on where time was given by stamps, like a slice.
     #[inline(always)]
     pub fn time(&self, k: usize) -> f64 {
         self.record.time(k)
@@ -184,12 +187,18 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     }
 
     /// Inputs of sample `k`.
+    ///
+    /// # Panics
+    /// From [`len`](Self::len) on, like a slice.
     #[inline(always)]
     pub fn input(&self, k: usize) -> Of<U, f64> {
         U::from_fn(|i| self.record.inputs[i].values[k])
     }
 
     /// Measured outputs of sample `k`; NaN where missing.
+    ///
+    /// # Panics
+    /// From [`len`](Self::len) on, like a slice.
     #[inline(always)]
     pub fn output(&self, k: usize) -> Of<Y, f64> {
         Y::from_fn(|j| self.record.outputs[j].values[k])

@@ -285,18 +285,7 @@ pub(crate) fn sweep<'a, M: Model + 'a>(
     predictor: &Arc<dyn Prediction>,
 ) -> Result<Arc<dyn Sweep + 'a>, Error> {
     let Stepping { loops, method } = stepping.clone();
-    if !method.serves(M::KIND) {
-        let word = |kind| match kind {
-            Kind::Continuous => "continuous",
-            Kind::Discrete => "discrete",
-            Kind::Static => "static",
-        };
-        let kinds = [Kind::Continuous, Kind::Discrete, Kind::Static];
-        let serves = kinds.into_iter().find(|&kind| method.serves(kind)).map_or("no", word);
-        let integrator = method.describe(M::KIND);
-        return Err(Error::WrongIntegrator { model: word(M::KIND), integrator, serves });
-    }
-    method.check()?;
+    method.check(M::KIND)?;
     let layout = Arc::new(Layout::of::<M>());
     predictor.check(&layout)?;
     let traced = match only_duals() {

@@ -12,6 +12,8 @@ mod explained;
 mod hac;
 mod known;
 pub(crate) mod noise;
+mod outliers;
+mod output_sums;
 mod residual_pass;
 mod sandwich;
 mod shape;
@@ -23,4 +25,5 @@ mod whiteness;
 
 pub(crate) use conclude::{SearchEnd, conclude, conclude_from};
 pub(crate) use directions::undetermined;
-pub(crate) use residual_pass::{output_fit, residuals_together};
+pub(crate) use output_sums::output_fit;
+pub(crate) use residual_pass::residuals_together;

@@ -101,7 +101,7 @@
 #[cfg(feature = "std")]
 mod dispatch;
 mod dual;
-mod integrate;
+pub mod integrate;
 mod interval;
 mod lanes;
 mod layout;
@@ -125,7 +125,7 @@ pub mod diagnose;
 #[doc(hidden)]
 pub mod engine;
 #[cfg(feature = "std")]
-mod equations;
+pub mod equations;
 #[cfg(feature = "std")]
 mod error;
 #[cfg(feature = "std")]
@@ -145,11 +145,11 @@ pub mod graph;
 #[cfg(feature = "csv")]
 pub mod guide;
 #[cfg(feature = "std")]
-mod information;
+pub mod information;
 #[cfg(feature = "std")]
 mod judge;
 #[cfg(feature = "std")]
-mod loss;
+pub mod loss;
 #[cfg(feature = "std")]
 mod numeral;
 #[cfg(feature = "std")]
@@ -161,7 +161,7 @@ mod outliers;
 #[cfg(feature = "std")]
 mod predict;
 #[cfg(feature = "std")]
-mod prefilter;
+pub mod prefilter;
 #[cfg(feature = "std")]
 pub mod problem;
 #[cfg(feature = "std")]
@@ -169,7 +169,7 @@ mod random;
 #[cfg(feature = "std")]
 pub mod record;
 #[cfg(feature = "std")]
-mod recurrence;
+pub mod recurrence;
 #[cfg(feature = "std")]
 pub mod regress;
 #[cfg(feature = "std")]
@@ -193,7 +193,7 @@ mod wide;
 pub use {approx, nalgebra, serde};
 
 pub use dual::Dual;
-pub use integrate::{Automatic, Discrete, Esdirk, Integrator, ModelSystem, Rk4, Rk45, Square, Stuck, System};
+pub use integrate::{Automatic, Discrete, Esdirk, Rk4, Rk45};
 pub use interval::{Hold, Interval};
 pub use layout::Kind;
 pub use model::Model;
@@ -205,7 +205,6 @@ pub use signals::{Entry, Nothing, Of, Signals};
 pub use record::CsvFile;
 #[cfg(feature = "std")]
 pub use {
-    equations::{Dependence, Equations, InvalidEquations},
     error::{Error, Failure},
     estimate::{
         CovarianceMethod, Direction, Estimate, FailedStart, Knowledge, Method, Minimum, NoiseModel, OutputFit,
@@ -213,25 +212,19 @@ pub use {
     },
     experiment::{Experiment, ExperimentOf, Sample},
     fit::{Answers, Fit, Fleet, Records},
-    information::{
-        BadPiece, Block, Covariance, Elimination, Information, NoSpectrum, RankDeficient, Spectrum, SquareMatrix,
-        Triangles, Undetermined,
-    },
     layout::{Layout, Quantity},
-    loss::{Cauchy, Expectations, Huber, Loss, SoftL1, Squared, Tukey, expectations},
-    numeric::{Derivative, Next, Numeric, StateEquation},
+    loss::{Cauchy, Huber, Loss, SoftL1, Squared, Tukey},
+    numeric::Numeric,
     outliers::hampel,
     predict::{FreeRun, Horizon, Kalman, Plant, Predictor},
-    prefilter::{Butterworth, FilterState, Linear, Pass, zero_phase},
+    prefilter::{Butterworth, zero_phase},
     problem::{Objective, Problem, Search},
     record::{ChannelInspection, Gap, Initial, Inspection, Suspicion, Time},
-    recurrence::{InvalidRecurrence, Recurrence},
-    regress::{Assumption, LinearEstimate, PooledRegression, Regression, RegressionError},
+    regress::{LinearEstimate, Regression},
     report::Report,
     scalar::Table,
-    scaling::{JacobianColumns, Nominal, OwnSize, Scaling, Seen, Unscaled},
     simulate::{Simulation, Simulator, simulate},
-    weighting::{BySignal, Law, Weighting},
+    weighting::{BySignal, WeightFunction, Weighting},
 };
 
 /// The README's code, compiled and run.

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 /// The cost of a standardized error.
 ///
-/// The law: `rho` is even, zero at zero, never falls with `|z|`, and behaves as `z^2 / 2` near zero;
+/// Requirements: `rho` is even, zero at zero, never falls with `|z|`, and behaves as `z^2 / 2` near zero;
 /// [`check::loss`](crate::check::loss) tests it. A new loss writes `rho` and `psi`:
 ///
 /// ```

@@ -1,4 +1,4 @@
-//! Models that ship beside the motor's wing: a direct-current motor, and a linear axis on its own and under its controller.
+//! Models that ship beside the motors of [`pmsm`](crate::pmsm): a direct-current motor, and a linear axis on its own and under its controller.
 //!
 //! | model | equations | for |
 //! |---|---|---|
@@ -13,6 +13,6 @@ mod positioning;
 
 pub use dc_motor::{Armature, DcMotor, Feed, Rotation};
 pub use positioning::{
-    Axis, AxisMotion, Command, ControlledAxisMotion, ControlledAxisOutput, Position, Positioning, PositioningLoop,
-    Reference,
+    AxisMotion, AxisParameters, Command, ControlledAxisMotion, ControlledAxisOutput, Position, Positioning,
+    PositioningLoop, Reference,
 };

@@ -7,8 +7,8 @@
 //! | [`Ekf`] | any [`Model`](crate::Model): states and parameters together, with their covariance |
 //! | [`Rls`] | outputs linear in the parameters |
 //!
-//! Every update returns its innovation and an [`Outcome`]. An observer that diverges stops: it keeps the last estimates
-//! that made sense, and says [`Outcome::Diverged`] until it is started anew.
+//! Every update returns its innovation and an [`UpdateOutcome`]. An observer that diverges stops: it keeps the last estimates
+//! that made sense, and says [`UpdateOutcome::Diverged`] until it is started anew.
 
 mod ekf;
 mod mras;
@@ -16,7 +16,7 @@ mod rls;
 mod ud_factors;
 
 pub use ekf::{Ekf, EkfStart};
-pub use mras::{Gradient, Law, Moment, Mras, MrasStart, Order, Rate, Stepping};
+pub use mras::{AdaptationLaw, Gradient, Moment, Mras, MrasStart, Order, Rate, Stepping};
 pub use rls::{Forgetting, Rls};
 pub use ud_factors::{MeasurementGain, UdFactors};
 
@@ -30,13 +30,13 @@ pub struct Update<Y> {
     /// Measured less expected outputs, before the correction; zero for an output that was not used.
     pub innovation: Y,
     /// What became of the estimates.
-    pub outcome: Outcome,
+    pub outcome: UpdateOutcome,
 }
 
 /// What became of the estimates in one update.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Outcome {
+pub enum UpdateOutcome {
     /// The first sample: there was no expectation to compare with.
     #[error("started")]
     Started,

@@ -12,6 +12,7 @@ mod machine;
 mod outcome;
 mod point;
 
+pub use crate::scaling::{JacobianColumns, Nominal, OwnSize, Scaling, Seen, Unscaled};
 pub use gauss_newton::GaussNewton;
 pub use levenberg_marquardt::LevenbergMarquardt;
 pub use linearization::Linearization;

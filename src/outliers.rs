@@ -1,5 +1,8 @@
 //! Outliers, removed from a record *before* anything filters it: a filter spreads one bad sample over many good ones.
 
+/// Ratio of the standard deviation of a normal distribution to the median absolute deviation.
+const NORMAL_SPREAD: f64 = 1.4826;
+
 /// Replaces by their neighbourhood's median the values that lie further than `sigmas` robust standard deviations from it,
 /// the neighbourhood being `reach` samples to each side (F. R. Hampel, J. Am. Stat. Assoc. 69 (1974) 383-393; the
 /// deviation is 1.4826 times the median absolute one). Returns the positions replaced.
@@ -7,6 +10,7 @@
 /// Where more than half of a neighbourhood are equal, the deviation is zero: there, a value is left alone unless it
 /// differs by more than `floor` (a sensor's step is a good one). What is not a number is never replaced, nor counted.
 pub fn hampel(values: &mut [f64], reach: usize, sigmas: f64, floor: f64) -> Vec<usize> {
+    let reach = reach.min(values.len());
     let original = values.to_vec();
     let mut replaced = Vec::new();
     let mut window = Vec::with_capacity(2 * reach + 1);
@@ -14,17 +18,21 @@ pub fn hampel(values: &mut [f64], reach: usize, sigmas: f64, floor: f64) -> Vec<
         let near = &original[k.saturating_sub(reach)..original.len().min(k.saturating_add(reach + 1))];
         window.clear();
         window.extend(near.iter().filter(|v| !v.is_nan()));
-        let Some(center) = median(&mut window) else { continue };
-        for v in &mut window {
-            *v = (*v - center).abs();
-        }
-        let deviation = 1.4826 * median(&mut window).unwrap_or(0.0);
+        let Some((center, deviation)) = center_and_deviation(&mut window) else { continue };
         if (*value - center).abs() > (sigmas * deviation).max(floor) {
             *value = center;
             replaced.push(k);
         }
     }
     replaced
+}
+
+/// The median, and 1.4826 times the median distance from it: mean and standard deviation of normal values with outliers. The
+/// values are overwritten; `None` without any.
+pub(crate) fn center_and_deviation(values: &mut [f64]) -> Option<(f64, f64)> {
+    let center = median(values)?;
+    values.iter_mut().for_each(|value| *value = (*value - center).abs());
+    Some((center, NORMAL_SPREAD * median(values)?))
 }
 
 /// The median; of an even number the mean of the middle two.

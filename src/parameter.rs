@@ -1,4 +1,4 @@
-//! [`Parameter`]: what is known of a quantity before the data speak.
+//! [`Parameter`]: what is known of a quantity before the fit.
 
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};

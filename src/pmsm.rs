@@ -1,6 +1,6 @@
 //! The permanent magnet synchronous motor (PMSM) and its drive.
 //!
-//! Conventions, the same everywhere in this wing:
+//! Conventions, the same everywhere in this module:
 //!
 //! | quantity | convention |
 //! |---|---|
@@ -83,7 +83,7 @@ pub use compensated::{Compensated, CompensatedDrive, CompensatedSalientWinding, 
 pub use emf_harmonic::{EmfHarmonic, SixthHarmonic};
 pub use exact::{ExactSalient, ExactStep, ExactSurface, HeldIn};
 pub use flux_linkage::{FluxLinkage, FluxWinding};
-pub use injection::{Injection, Stair};
+pub use injection::{Injection, InjectionStep};
 pub use inverter_fed::{AngledDrive, DeadTimeLoss, InverterFed, InverterFedWinding, dead_time};
 pub use machine::{Machine, MachineParameters, MachineState, VoltageAndLoad};
 pub use misaligned::{Misaligned, Misalignment};
@@ -138,9 +138,12 @@ crate::signals! {
 pub struct PolePairs(u32);
 
 impl PolePairs {
-    /// `count` pole pairs; zero is an error.
-    pub const fn new(count: u32) -> Result<Self, Error> {
-        if count == 0 { Err(Error::NoPolePairs) } else { Ok(PolePairs(count)) }
+    /// `count` pole pairs.
+    ///
+    /// # Errors
+    /// Zero.
+    pub const fn new(count: u32) -> Result<Self, MotorError> {
+        if count == 0 { Err(MotorError::NoPolePairs) } else { Ok(PolePairs(count)) }
     }
 
     /// The number.
@@ -163,8 +166,8 @@ impl PolePairs {
 }
 
 impl TryFrom<u32> for PolePairs {
-    type Error = Error;
-    fn try_from(count: u32) -> Result<Self, Error> {
+    type Error = MotorError;
+    fn try_from(count: u32) -> Result<Self, MotorError> {
         PolePairs::new(count)
     }
 }
@@ -177,7 +180,7 @@ impl From<PolePairs> for u32 {
 
 /// Why a motor, a drive or a temperature was refused.
 #[derive(Clone, Copy, PartialEq, Serialize, thiserror::Error)]
-pub enum Error {
+pub enum MotorError {
     /// A motor needs at least one pole pair.
     #[error("a motor has at least one pole pair; got 0 (count magnet poles, divide by 2)")]
     NoPolePairs,
@@ -196,24 +199,28 @@ pub enum Error {
 }
 
 /// The same sentence: it is what a `main` that returns the error shows.
-impl core::fmt::Debug for Error {
+impl core::fmt::Debug for MotorError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         core::fmt::Display::fmt(self, f)
     }
 }
 
-impl Error {
+impl MotorError {
     /// `value` if it is positive and finite.
-    pub(crate) fn positive(quantity: &'static str, value: f64, unit: &'static str) -> Result<f64, Error> {
+    pub(crate) fn positive(quantity: &'static str, value: f64, unit: &'static str) -> Result<f64, MotorError> {
         if value > 0.0 && value.is_finite() {
             Ok(value)
         } else {
-            Err(Error::OutOfRange { quantity, value, unit, must: "be positive and finite" })
+            Err(MotorError::OutOfRange { quantity, value, unit, must: "be positive and finite" })
         }
     }
 
     /// `value` if it is finite.
-    pub(crate) fn finite(quantity: &'static str, value: f64, unit: &'static str) -> Result<f64, Error> {
-        if value.is_finite() { Ok(value) } else { Err(Error::OutOfRange { quantity, value, unit, must: "be finite" }) }
+    pub(crate) fn finite(quantity: &'static str, value: f64, unit: &'static str) -> Result<f64, MotorError> {
+        if value.is_finite() {
+            Ok(value)
+        } else {
+            Err(MotorError::OutOfRange { quantity, value, unit, must: "be finite" })
+        }
     }
 }

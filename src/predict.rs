@@ -3,13 +3,15 @@
 mod free_run;
 mod horizon;
 mod kalman;
-pub(crate) mod measured;
+mod measured;
 mod plant;
 mod symbolic;
 
 pub use free_run::FreeRun;
 pub use horizon::Horizon;
 pub use kalman::Kalman;
+pub use measured::Guess;
+pub(crate) use measured::Place;
 pub use plant::Plant;
 pub(crate) use plant::{Between, SlicePlant, Stepped};
 pub(crate) use symbolic::recurrence;
@@ -63,9 +65,7 @@ pub trait Predictor: Debug + Clone + Send + Sync + 'static {
     /// Mean and variance of an output, from a carry that was corrected with the outputs before it. The variance is
     /// ignored unless [`predicts_variance`](Predictor::predicts_variance).
     fn predict<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &[S], output: usize) -> (S, S) {
-        let mut y = vec![S::from(0.0); plant.layout().outputs.len()];
-        plant.output(&carry[..plant.layout().states.len()], &mut y);
-        (y[output], S::from(1.0))
+        (mean(plant, carry, output), S::from(1.0))
     }
 
     /// Corrects the carry with the prediction error of an output that was measured.
@@ -83,6 +83,13 @@ pub trait Predictor: Debug + Clone + Send + Sync + 'static {
 
     /// Name and settings in a short text, for reports.
     fn describe(&self) -> String;
+}
+
+/// An output of the state that begins the carry.
+fn mean<S: Scalar>(plant: &dyn Plant<S>, carry: &[S], output: usize) -> S {
+    let mut y = vec![S::from(0.0); plant.layout().outputs.len()];
+    plant.output(&carry[..plant.layout().states.len()], &mut y);
+    y[output]
 }
 
 /// A [`Predictor`] as a trait object.

@@ -103,7 +103,7 @@ pub enum Pass {
 /// A Butterworth filter: flat in its pass band, `1/sqrt(2)` (-3 dB) at the cut-off, falling with `order * 20` dB per decade.
 ///
 /// ```
-/// use greybox::{Butterworth, FilterState};
+/// use greybox::{Butterworth, prefilter::FilterState};
 /// let filter = Butterworth::low_pass(4, 100.0, 0.126e-3)?; // 100 Hz, sampled every 0.126 ms
 /// let mut state = FilterState::default(); // at rest
 /// let y = filter.step(&mut state, 1.0);

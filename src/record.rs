@@ -29,7 +29,7 @@ use crate::parameter::Parameter;
 /// What is known of the state at the first sample.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Initial {
-    /// It is estimated, starting from what the first sample says.
+    /// It is estimated, starting from what the first measurement of each output says, and from zero where that says nothing.
     #[default]
     Estimated,
     /// It is what the first sample says, taken as exact.
@@ -165,7 +165,7 @@ impl Record {
         if self.states.is_empty() { 1 } else { 2 }
     }
 
-    /// The record, if it keeps its promises.
+    /// The record, if it is valid.
     pub(crate) fn checked(self) -> Result<Self, Error> {
         let mut channels = self.inputs.iter().chain(&self.outputs);
         let Some(first) = channels.next() else {

@@ -86,12 +86,6 @@ impl Recurrence {
         Ok(Recurrence { next: next.to_vec(), mean: mean.to_vec(), variance: variance.to_vec(), graph })
     }
 
-    /// What is expected of outputs that depend on nothing that is carried.
-    pub(crate) fn of_outputs(graph: &Graph, mean: &[Id]) -> Self {
-        let (graph, mean) = graph.pruned(mean);
-        Recurrence { graph, next: vec![], mean, variance: vec![] }
-    }
-
     /// The arithmetic.
     pub fn graph(&self) -> &Graph {
         &self.graph

@@ -1,7 +1,7 @@
 //! [`Regression`]: linear least squares from rows of named regressors.
 //!
 //! For models that are linear in their parameters, `y = phi . theta + error`: all at once, without start and without
-//! iteration. The rows are kept, because honest standard errors need the residuals in their order; the solution itself
+//! iteration. The rows are kept, because standard errors that allow for correlation need the residuals in their order; the solution itself
 //! comes from the [`Information`] triangle.
 
 mod error;
@@ -36,7 +36,7 @@ const ALONE: f64 = 1e-6;
 /// let estimate = regression.solve()?;
 /// assert!((estimate.parameters.r - 2.0).abs() < 0.02);
 /// println!("{estimate}");
-/// # Ok::<(), greybox::RegressionError>(())
+/// # Ok::<(), greybox::regress::RegressionError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Regression<P: Signals> {
@@ -167,12 +167,7 @@ impl<P: Signals> Regression<P> {
     }
 
     fn assumption(&self) -> Assumption {
-        let mut weights = self.rows.iter().map(|row| row.weight).filter(|&weight| weight > 0.0);
-        match (self.lags, weights.next()) {
-            (Some(lags), _) => Assumption::Correlated { lags },
-            (None, Some(first)) if weights.any(|weight| weight != first) => Assumption::OwnVariance,
-            _ => Assumption::EqualVariance,
-        }
+        Assumption::of(self.lags, self.rows.iter().map(|row| row.weight))
     }
 
     fn sandwich(

@@ -2,9 +2,8 @@
 
 use crate::error::{Error, Failure};
 use crate::experiment::{Experiment, ExperimentOf};
-use crate::integrate::{Automatic, Integrator, ModelSystem, Stuck};
+use crate::integrate::{Automatic, Integrator, Method, ModelSystem, Stuck};
 use crate::interval::{Hold, Interval};
-use crate::layout::Kind;
 use crate::model::Model;
 use crate::random::Random;
 use crate::record::Time;
@@ -115,18 +114,7 @@ impl<'a, M: Model, I: Integrator> Simulator<'a, M, I> {
             let value = M::Input::into_array(inputs[sample]).as_ref()[i];
             return Err(Error::NotFinite { experiment, signal, value, sample, time: time.at(sample) });
         }
-        if !self.integrator.serves(M::KIND) {
-            let word = |kind| match kind {
-                Kind::Continuous => "continuous",
-                Kind::Discrete => "discrete",
-                Kind::Static => "static",
-            };
-            let kinds = [Kind::Continuous, Kind::Discrete, Kind::Static];
-            let serves = kinds.into_iter().find(|&kind| self.integrator.serves(kind)).map_or("no", word);
-            let integrator = self.integrator.describe(M::KIND);
-            return Err(Error::WrongIntegrator { model: word(M::KIND), integrator, serves });
-        }
-        self.integrator.check()
+        Method::check(&self.integrator, M::KIND)
     }
 }
 

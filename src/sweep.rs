@@ -15,6 +15,7 @@ pub(crate) use programs::{Derived, ProgramSweep};
 pub use window::Window;
 
 pub use crate::graph::Seed;
+pub use crate::predict::Guess;
 
 use crate::error::{Error, Failure};
 use crate::layout::Layout;
@@ -166,19 +167,23 @@ pub trait Sweep: Send + Sync {
         Ok(found)
     }
 
-    /// The state that follows from the outputs of a sample. With `alone`, the outputs must not depend on parameters.
+    /// The state that follows from the outputs of a sample, whatever the parameters.
     ///
     /// # Errors
     /// Why the outputs do not determine the state.
-    fn measured_state(
-        &self,
-        record: &Record,
-        sample: usize,
-        parameters: &[f64],
-        alone: bool,
-    ) -> Result<Vec<f64>, String> {
-        let _ = (record, sample, parameters, alone);
+    fn measured_state(&self, record: &Record, sample: usize, parameters: &[f64]) -> Result<Vec<f64>, String> {
+        let _ = (record, sample, parameters);
         Err("the sweep does not solve outputs for states".to_owned())
+    }
+
+    /// A start for the state at the first sample, from the first measurement of each output.
+    ///
+    /// # Errors
+    /// Equations that are undefined where the state is sought.
+    fn guessed_state(&self, record: &Record, parameters: &[f64]) -> Result<Guess, String> {
+        let _ = (record, parameters);
+        let n = self.layout().states.len();
+        Ok(Guess { state: vec![0.0; n], open: vec![true; n] })
     }
 
     /// The exact cause of a failure that was noticed at `sample`. Where nothing fails, the error that is largest

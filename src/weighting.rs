@@ -39,8 +39,8 @@ impl<M: Model, F: Fn(&Sample<M>) -> f64 + Send + Sync> Weighting<M> for F {
 /// A weight by one input, such as the speed (M. Tenerz, LiTH-ISY-EX--11/4495--SE, 2011, eq. 5.9).
 ///
 /// ```
-/// use greybox::{BySignal, Law};
-/// let weighting = BySignal::new("w", Law::Square { scale: 100.0 }); // (w / 100)^2
+/// use greybox::{BySignal, WeightFunction};
+/// let weighting = BySignal::new("w", WeightFunction::Square { scale: 100.0 }); // (w / 100)^2
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -48,13 +48,13 @@ pub struct BySignal {
     /// Name of the input.
     pub signal: String,
     /// What becomes of it.
-    pub law: Law,
+    pub function: WeightFunction,
 }
 
 /// The weight as a function of an input `w`, in its unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub enum Law {
+pub enum WeightFunction {
     /// `|w|`.
     Absolute,
     /// `(w / scale)^2`.
@@ -70,9 +70,9 @@ pub enum Law {
 }
 
 impl BySignal {
-    /// The weight `law` of the input named `signal`.
-    pub fn new(signal: impl Into<String>, law: Law) -> Self {
-        BySignal { signal: signal.into(), law }
+    /// The weight `function` of the input named `signal`.
+    pub fn new(signal: impl Into<String>, function: WeightFunction) -> Self {
+        BySignal { signal: signal.into(), function }
     }
 }
 
@@ -81,11 +81,11 @@ impl<M: Model> Weighting<M> for BySignal {
     fn weight(&self, sample: &Sample<M>) -> f64 {
         let inputs = M::Input::into_array(sample.u);
         let w = M::Input::position(&self.signal).map_or(f64::NAN, |i| inputs.as_ref()[i]);
-        match self.law {
-            Law::Absolute => w.abs(),
-            Law::Square { scale } => (w / scale).powi(2),
-            Law::Above { .. } if w.is_nan() => w,
-            Law::Above { threshold } => f64::from(u8::from(w.abs() >= threshold)),
+        match self.function {
+            WeightFunction::Absolute => w.abs(),
+            WeightFunction::Square { scale } => (w / scale).powi(2),
+            WeightFunction::Above { .. } if w.is_nan() => w,
+            WeightFunction::Above { threshold } => f64::from(u8::from(w.abs() >= threshold)),
         }
     }
 
@@ -94,10 +94,10 @@ impl<M: Model> Weighting<M> for BySignal {
             let available = M::Input::NAMES.iter().map(|&name| name.to_owned()).collect();
             return Err(Error::UnknownSignal { signal: self.signal.clone(), available });
         }
-        let (what, value) = match self.law {
-            Law::Absolute => return Ok(()),
-            Law::Square { scale } => ("scale", scale),
-            Law::Above { threshold } => ("threshold", threshold),
+        let (what, value) = match self.function {
+            WeightFunction::Absolute => return Ok(()),
+            WeightFunction::Square { scale } => ("scale", scale),
+            WeightFunction::Above { threshold } => ("threshold", threshold),
         };
         if value > 0.0 && value.is_finite() {
             return Ok(());
@@ -107,10 +107,10 @@ impl<M: Model> Weighting<M> for BySignal {
 
     fn describe(&self) -> String {
         let w = &self.signal;
-        match self.law {
-            Law::Absolute => format!("|{w}|"),
-            Law::Square { scale } => format!("({w}/{scale})^2"),
-            Law::Above { threshold } => format!("1 where |{w}| >= {threshold}, else 0"),
+        match self.function {
+            WeightFunction::Absolute => format!("|{w}|"),
+            WeightFunction::Square { scale } => format!("({w}/{scale})^2"),
+            WeightFunction::Above { threshold } => format!("1 where |{w}| >= {threshold}, else 0"),
         }
     }
 }

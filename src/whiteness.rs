@@ -25,7 +25,9 @@ impl Autocorrelation {
         let missing = (lags - self.first.len()).min(run.len());
         self.first.extend_from_slice(&run[..missing]);
         self.values.extend_from_slice(run);
+        self.values.resize(lags + run.len() + LAGS, 0.0);
         wide::run(Width::widest(), Products { run, values: &self.values, sums: &mut self.sums });
+        self.values.truncate(lags + run.len());
         self.values.drain(..run.len());
     }
 
@@ -53,36 +55,61 @@ impl Autocorrelation {
 /// At each lag the sum of products `e[t] e[t - k]` is divided by the root of the sum of their squares, which is its
 /// standard deviation where the errors are uncorrelated, whatever their variances (Dalla, Giraitis and Phillips,
 /// Econometric Theory 38 (2022) 595, section 2). Where the variances are equal, it is the test of Box and Pierce.
+///
+/// A few large errors can decide these sums; the signs of neighbors weigh all errors alike.
 #[derive(Clone, Debug)]
 pub(crate) struct Portmanteau {
     errors: Autocorrelation,
     squares: Autocorrelation,
-    squared: Vec<f64>,
+    signs: Autocorrelation,
+    measured: Autocorrelation,
+    run: Vec<f64>,
 }
 
 impl Portmanteau {
     pub fn new(lags: usize) -> Self {
-        Portmanteau { errors: Autocorrelation::new(lags), squares: Autocorrelation::new(lags), squared: vec![] }
+        let [errors, squares, signs, measured] = [lags, lags, 1, 1].map(Autocorrelation::new);
+        Portmanteau { errors, squares, signs, measured, run: vec![] }
     }
 
     /// The next errors in order of time, zero where missing.
     pub fn add(&mut self, run: &[f64]) {
-        self.squared.clear();
-        self.squared.extend(run.iter().map(|e| e * e));
         self.errors.add(run);
-        self.squares.add(&self.squared);
+        let of: [(&mut Autocorrelation, fn(f64) -> f64); 3] = [
+            (&mut self.squares, |e| e * e),
+            (&mut self.signs, |e| if e == 0.0 { 0.0 } else { e.signum() }),
+            (&mut self.measured, |e| if e == 0.0 { 0.0 } else { 1.0 }),
+        ];
+        for (sums, number) in of {
+            self.run.clear();
+            self.run.extend(run.iter().map(|e| number(*e)));
+            sums.add(&self.run);
+        }
+    }
+
+    /// The sums, one kind after the other.
+    fn all(&mut self) -> [&mut Autocorrelation; 4] {
+        [&mut self.errors, &mut self.squares, &mut self.signs, &mut self.measured]
     }
 
     /// As if the errors of the other had followed.
     pub fn follow(&mut self, next: &Portmanteau) {
-        self.errors.follow(&next.errors);
-        self.squares.follow(&next.squares);
+        let theirs = [&next.errors, &next.squares, &next.signs, &next.measured];
+        self.all().into_iter().zip(theirs).for_each(|(sums, next)| sums.follow(next));
+    }
+
+    /// The same with all autocorrelations nearer to zero by this much.
+    pub fn without(mut self, correlation: f64) -> Self {
+        let sums = &mut self.errors.sums;
+        let part = correlation * sums[0];
+        sums[1..].iter_mut().for_each(|sum| *sum = sum.signum() * (sum.abs() - part).max(0.0));
+        self
     }
 
     /// Adds the sums of another record.
     pub fn append(&mut self, other: &Portmanteau) {
-        self.errors.append(&other.errors);
-        self.squares.append(&other.squares);
+        let theirs = [&other.errors, &other.squares, &other.signs, &other.measured];
+        self.all().into_iter().zip(theirs).for_each(|(sums, other)| sums.append(other));
     }
 
     /// The sum of products at a lag over its standard deviation without correlation, and the autocorrelation.
@@ -98,12 +125,27 @@ impl Portmanteau {
         let terms: Vec<f64> = sums.filter(|(_, squares)| **squares > 0.0).map(|(sum, q)| sum * sum / q).collect();
         chi_squared_tail(terms.iter().sum(), terms.len() as f64)
     }
+
+    /// The probability that errors without correlation agree, or disagree, as often in sign with the error before, or that
+    /// they have as large a correlation with it: the larger of both. Where noise changes much in size, signs alone show what
+    /// an estimate is off by where there is little noise.
+    pub fn neighbors_p_value(&self) -> f64 {
+        let (count, pairs) = (self.measured.sums[0], self.measured.sums[1]);
+        let tail = |square: f64| chi_squared_tail(square, 1.0);
+        let signs = if pairs > 0.0 { tail(self.signs.sums[1].powi(2) / pairs) } else { 1.0 };
+        signs.max(tail(count * self.at(1).1.powi(2)))
+    }
 }
+
+/// Lags whose sums are kept in registers together.
+const LAGS: usize = 24;
+/// Fewer lags than these are summed one by one.
+const FEW: usize = 4;
 
 /// Adds the products of a run with itself and with what came before to the sums of all lags.
 struct Products<'p> {
     run: &'p [f64],
-    /// As many values as there are lags, then those of the run.
+    /// As many values as there are lags, then those of the run, then [`LAGS`] zeros.
     values: &'p [f64],
     sums: &'p mut [f64],
 }
@@ -114,8 +156,20 @@ impl Task for Products<'_> {
     #[inline(always)]
     fn run<W: Wide>(self) {
         let lags = self.sums.len() - 1;
-        for (k, sum) in self.sums.iter_mut().enumerate() {
-            *sum += dot(self.run, &self.values[lags - k..]);
+        if lags < FEW {
+            let sums = self.sums.iter_mut().enumerate();
+            return sums.for_each(|(k, sum)| *sum += dot(self.run, &self.values[lags - k..]));
+        }
+        // The longest lag comes first: its values are the earliest.
+        for (block, sums) in self.sums.rchunks_mut(LAGS).enumerate() {
+            let values = &self.values[block * LAGS..];
+            let mut totals = [0.0; LAGS];
+            for (e, before) in self.run.iter().zip(values.windows(LAGS)) {
+                for (total, before) in totals.iter_mut().zip(before) {
+                    *total += e * before;
+                }
+            }
+            sums.iter_mut().rev().zip(totals).for_each(|(sum, total)| *sum += total);
         }
     }
 }
@@ -210,5 +264,8 @@ mod tests {
         // Two degrees of freedom have the tail `exp(-q / 2)`.
         let expected = (-(one * one + two * two) / 2.0).exp();
         assert!((test.p_value(2) - expected).abs() < 1e-12, "{}", test.p_value(2));
+        // Of three pairs one agrees in sign: a square of 1 / 3; of four errors, that of their correlation is 4 (3 / 15)^2,
+        // which is less. The tail of a standard normal square at 0.16 is 0.689157.
+        assert!((test.neighbors_p_value() - 0.689157).abs() < 1e-6, "{}", test.neighbors_p_value());
     }
 }

@@ -88,6 +88,18 @@ pub(crate) trait Wide: Copy + Send + Sync + 'static {
         lanes.iter().all(|lane| *lane < limit)
     }
 
+    /// The lanes joined by a function of two numbers, from the first on.
+    #[inline(always)]
+    fn fold(self, f: impl Fn(f64, f64) -> f64) -> f64 {
+        let mut lanes = [0.0; 8];
+        self.store(&mut lanes);
+        let mut all = lanes[0];
+        for lane in &lanes[1..Self::LANES] {
+            all = f(all, *lane);
+        }
+        all
+    }
+
     /// Each lane through a function of one number.
     #[inline(always)]
     fn map(self, f: impl Fn(f64) -> f64) -> Self {

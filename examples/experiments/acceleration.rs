@@ -8,13 +8,13 @@ use greybox::pmsm::Winding;
 use greybox::pmsm::drive::Simulation;
 use greybox::pmsm::offline::Axes;
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::Axis;
+use greybox::pmsm::robot::RobotAxis;
 
 pub fn acceleration() -> Result<Report> {
     let mut report = Report::new("Experiment 5: the same with 0.35 of the acceleration");
     let (mut better, mut cells, mut panels) = (0, 0, Vec::new());
     for number in [1, 2, 6] {
-        let axis = Axis::reference(number)?;
+        let axis = RobotAxis::reference(number)?;
         let fast = per_cycle(&run(Simulation::new(axis)?, Program::speed_cycles(&axis, 20, 1.0)?), Axes::Both)?;
         let slow = per_cycle(&run(Simulation::new(axis)?, Program::speed_cycles(&axis, 20, 0.35)?), Axes::Both)?;
         let errors = |e: &Winding| [e.rs / axis.rs, percent(e.ls, axis.ls), percent(e.ke, axis.ke)];
@@ -26,7 +26,7 @@ pub fn acceleration() -> Result<Report> {
             better += usize::from(slow[0] < fast[0]) + usize::from(slow[1].abs() < fast[1].abs());
         }
         let columns = ["R ratio", "slow", "L err %", "slow", "Ke err %", "slow"];
-        let title = format!("Axis {number}: full and low acceleration");
+        let title = format!("RobotAxis {number}: full and low acceleration");
         report.table(title, &columns, rows.into_iter().step_by(3).collect());
         for (quantity, which, truth) in [("R / motor's R", 0, 1.0), ("error of L (%)", 1, 0.0)] {
             let of = |found: &[(f64, greybox::LinearEstimate<Winding>)]| {

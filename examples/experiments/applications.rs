@@ -7,7 +7,7 @@ use crate::speeds::by_speed;
 use greybox::pmsm::drive::Simulation;
 use greybox::pmsm::offline::{Form, Validation, voltages};
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::Axis;
+use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::{KeLyapunov, Winding};
 
 /// Errors of Ke (%) by axis: least squares, weighted by w^2, nonlinear grey box, extended least squares.
@@ -22,7 +22,7 @@ pub fn applications() -> Result<Report> {
     let (mut material, mut water) = (Errors::default(), Errors::default());
     let (mut tracks, mut traces) = (Vec::new(), Vec::new());
     for number in 1..=6 {
-        let axis = Axis::reference(number)?;
+        let axis = RobotAxis::reference(number)?;
         let simulation = Simulation::new(axis)?;
         for (title, errors) in [("material handling", &mut material), ("water cutting", &mut water)] {
             let program = |n| match title {

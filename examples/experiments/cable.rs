@@ -5,14 +5,14 @@ use crate::methods::*;
 use crate::report::Report;
 use greybox::pmsm::drive::Simulation;
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::Axis;
+use greybox::pmsm::robot::RobotAxis;
 
 /// Resistance of axis 2 against the length of its cable.
 pub fn cable(report: &mut Report) -> Result<()> {
-    let axis = Axis::reference(2)?;
+    let axis = RobotAxis::reference(2)?;
     let (mut plain, mut extended, mut truth) = (Vec::new(), Vec::new(), Vec::new());
     for length in [0.0, 7.0, 20.0, 50.0] {
-        let with_cable = Axis { r_cable: axis.r_cable * length / 20.0, ..axis };
+        let with_cable = RobotAxis { r_cable: axis.r_cable * length / 20.0, ..axis };
         let run = run(Simulation::new(with_cable)?, Program::speed_cycles(&with_cable, 4, 1.0)?);
         plain.push((length, equations(&run.spans)?.solve()?.parameters.rs));
         extended.push((length, solve_extended(&run.spans)?.parameters.r));

@@ -3,7 +3,7 @@
 use crate::figure::{Figure, Panel, Series, curve, reference, thin};
 use crate::methods::Result;
 use crate::report::Report;
-use greybox::online::{Law, Mras, MrasStart, Order, Outcome, Stepping, Watch};
+use greybox::online::{AdaptationLaw, Mras, MrasStart, Order, Stepping, UpdateOutcome, Watch};
 use greybox::pmsm::adaptive::{Adaptive, Instant};
 use greybox::pmsm::control::{CurrentControl, PositionControl, SpeedControl};
 use greybox::pmsm::{
@@ -14,7 +14,12 @@ use greybox::{fixed, free};
 
 const TS: f64 = 0.126e-3;
 
-fn observer<L: Law<ExactSurface>>(start: Winding, law: L, ts: f64, order: Order) -> Result<Mras<ExactSurface, L>> {
+fn observer<L: AdaptationLaw<ExactSurface>>(
+    start: Winding,
+    law: L,
+    ts: f64,
+    order: Order,
+) -> Result<Mras<ExactSurface, L>> {
     let start = MrasStart {
         parameters: Winding {
             rs: free(start.rs).within(0.0, 20.0),
@@ -41,7 +46,7 @@ fn errors(now: &Instant) -> (f64, f64) {
     (100.0 * (now.estimate.rs / p.rs - 1.0), 100.0 * (now.estimate.ke / p.ke - 1.0))
 }
 
-fn step_of_torque<L: Law<ExactSurface>>(law: L, torque: f64, id: f64) -> Result<Vec<Instant>> {
+fn step_of_torque<L: AdaptationLaw<ExactSurface>>(law: L, torque: f64, id: f64) -> Result<Vec<Instant>> {
     let start = Winding { rs: 0.4, ls: 4e-3, ke: 1.28 };
     let drive = Adaptive {
         machine: Machine::new(4, 1.0)?,
@@ -90,7 +95,7 @@ pub fn torque_step() -> Result<Report> {
         (bias - 3.906).abs() < 0.05,
     );
     let stopped = reversed.iter().find_map(|now| match now.outcome {
-        Outcome::Diverged(why) => Some((now.t, why)),
+        UpdateOutcome::Diverged(why) => Some((now.t, why)),
         _ => None,
     });
     let found = stopped.map_or("it did not stop".to_owned(), |(t, why)| format!("stopped at {t:.3} s: {why}"));
@@ -142,7 +147,7 @@ struct Followed {
     kt: Vec<(f64, f64)>,
 }
 
-fn step_of_position<L: Law<ExactSurface>>(law: L, start: f64, ts: f64, order: Order) -> Result<Followed> {
+fn step_of_position<L: AdaptationLaw<ExactSurface>>(law: L, start: f64, ts: f64, order: Order) -> Result<Followed> {
     let rotor = MachineParameters { rs: 0.4, ld: 4e-3, lq: 4e-3, ke: 0.95, j: 0.2, bv: 0.02, tc: 0.0, tg: 0.0 };
     let drive = Adaptive {
         machine: Machine::new(4, 1.0)?,

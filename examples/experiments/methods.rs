@@ -1,10 +1,10 @@
 //! The estimators that are compared, each from a record to numbers.
 
-use greybox::online::{Law, Mras, MrasStart, Order, Stepping, Watch};
+use greybox::online::{AdaptationLaw, Mras, MrasStart, Order, Stepping, Watch};
 use greybox::pmsm::drive::Simulation;
 use greybox::pmsm::offline::{Axes, Equations, Extended, Form, Spans, extended, plain, search_i0};
 use greybox::pmsm::program::{Cycle, Program};
-use greybox::pmsm::robot::Axis;
+use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::{Currents, Drive, ExactStep, ExactSurface, HeldIn, MotorLaw, NotAdapted, Surface, Winding};
 use greybox::{Butterworth, Experiment, Fit, LinearEstimate, Time, fixed, free};
 
@@ -12,7 +12,7 @@ pub type Result<T> = core::result::Result<T, Box<dyn std::error::Error>>;
 
 /// A record by sample intervals, and its cycles.
 pub struct Run {
-    pub axis: Axis,
+    pub axis: RobotAxis,
     pub spans: Spans,
     pub cycles: Vec<Cycle>,
 }
@@ -47,7 +47,7 @@ pub fn per_cycle(run: &Run, axes: Axes) -> Result<Vec<(f64, LinearEstimate<Windi
 }
 
 /// The thesis' nonlinear grey box (5.2.3): simulated against measured currents, from 1.5 R, 1.2 L and 0.9 Ke.
-pub fn grey_box(spans: &Spans, axis: &Axis) -> Result<Winding> {
+pub fn grey_box(spans: &Spans, axis: &RobotAxis) -> Result<Winding> {
     let model = Surface::new(axis.pole_pairs.into())?;
     let (inputs, outputs) =
         spans.spans.iter().map(|span| (Drive { ud: span.ud, uq: span.uq, w: span.w }, span.i0)).unzip();
@@ -71,7 +71,12 @@ pub fn solve_extended(spans: &Spans) -> Result<LinearEstimate<Extended>> {
 
 /// Error of Ke (%) over time of the observer with this resistance and inductance, fed with the voltage less the dead time
 /// of `vdt` (V), from 10 % below.
-pub fn mras<L: Law<ExactSurface>>(run: &Run, (rs, ls): (f64, f64), vdt: f64, law: L) -> Result<Vec<(f64, f64)>> {
+pub fn mras<L: AdaptationLaw<ExactSurface>>(
+    run: &Run,
+    (rs, ls): (f64, f64),
+    vdt: f64,
+    law: L,
+) -> Result<Vec<(f64, f64)>> {
     let (axis, ts) = (&run.axis, run.spans.ts);
     let ke = free(0.9 * axis.ke).within(0.0, 10.0 * axis.ke);
     let start = MrasStart {

@@ -11,7 +11,7 @@ use greybox::pmsm::Winding;
 use greybox::pmsm::drive::Simulation;
 use greybox::pmsm::offline::{Axes, Spans};
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::Axis;
+use greybox::pmsm::robot::RobotAxis;
 
 pub const CYCLE_SPEED: &str = "largest speed of the cycle (rad/s)";
 
@@ -19,7 +19,7 @@ pub type Found = Vec<(f64, LinearEstimate<Winding>)>;
 
 /// Of one axis: its speeds, least squares from both equations and from q alone, the grey box.
 struct Compared {
-    axis: Axis,
+    axis: RobotAxis,
     both: Found,
     q: Found,
     grey_box: Vec<(f64, Winding)>,
@@ -29,7 +29,7 @@ pub fn speeds() -> Result<Report> {
     let mut report = Report::new("Experiment 3: back-and-forth cycles of rising speed, six axes, cold");
     let mut all = Vec::new();
     for number in 1..=6 {
-        let axis = Axis::reference(number)?;
+        let axis = RobotAxis::reference(number)?;
         let run = run(Simulation::new(axis)?, Program::speed_cycles(&axis, 20, 1.0)?);
         let (both, q) = (per_cycle(&run, Axes::Both)?, per_cycle(&run, Axes::Q)?);
         let compared = Compared { axis, both, q, grey_box: grey_box_per_cycle(&run)? };
@@ -73,7 +73,7 @@ fn table(report: &mut Report, compared: &Compared) {
         "Ke %",
     ];
     let rows = compared.both.iter().zip(&compared.grey_box).map(row).collect();
-    report.table(format!("Axis {}, least squares and grey box per cycle", axis.number), &columns, rows);
+    report.table(format!("RobotAxis {}, least squares and grey box per cycle", axis.number), &columns, rows);
 }
 
 fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
@@ -93,7 +93,7 @@ fn claims(report: &mut Report, all: &[Compared]) {
         format!("{low:.2} to {high:.2} times the motor's (cable and dead time)"),
         low > 1.5 && high < 2.5 && high - low > 0.2,
     );
-    let at_top = |of: fn(&Winding) -> f64, truth: fn(&Axis) -> f64| {
+    let at_top = |of: fn(&Winding) -> f64, truth: fn(&RobotAxis) -> f64| {
         let last = |c: &Compared| c.both.last().map(|(_, e)| percent(of(&e.parameters), truth(&c.axis)).abs());
         range(all.iter().filter_map(last))
     };
@@ -128,7 +128,7 @@ fn claims(report: &mut Report, all: &[Compared]) {
 /// R, L and Ke of every method against speed, an axis in each panel.
 fn against_speed(report: &mut Report, all: &[Compared]) {
     type Of = fn(&Winding) -> f64;
-    type Truth = fn(&Axis) -> f64;
+    type Truth = fn(&RobotAxis) -> f64;
     let quantities: [(&str, &str, &str, Of, Truth); 3] = [
         ("exp3-rs", "Resistance", "R (ohm)", |p| p.rs, |a| a.rs),
         ("exp3-ls", "Inductance", "L (mH)", |p| 1e3 * p.ls, |a| 1e3 * a.ls),

@@ -9,7 +9,7 @@ use greybox::pmsm::Winding;
 use greybox::pmsm::drive::Simulation;
 use greybox::pmsm::offline::Axes;
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::Axis;
+use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::temperature::{Celsius, Estimated, magnet_rise, winding_rise};
 
 /// Motor and cable resistance, and Ke, of a whole record.
@@ -20,13 +20,13 @@ fn whole(run: &Run) -> Result<(Estimated, Estimated)> {
 }
 
 pub fn temperature() -> Result<Report> {
-    let mut report = Report::new("Experiment 4: the same, warm (55 C), six axes");
+    let mut report = Report::new("Experiment 4: the same, warm (55 °C), six axes");
     let warm_at = Celsius::new(55.0)?;
     let (mut rows, mut ke_panels, mut r_panels) = (Vec::new(), Vec::new(), Vec::new());
     let (mut winding_read, mut magnet_read) = (Vec::new(), Vec::new());
     let (mut ratio_off, mut l_off) = (0f64, 0f64);
     for number in 1..=6 {
-        let axis = Axis::reference(number)?;
+        let axis = RobotAxis::reference(number)?;
         let program = || Program::speed_cycles(&axis, 8, 1.0);
         let cold = run(Simulation::new(axis)?, program()?);
         let warm = run(Simulation::new(axis)?.heated(warm_at, warm_at), program()?);
@@ -49,10 +49,10 @@ pub fn temperature() -> Result<Report> {
             let found =
                 |found: &[(f64, LinearEstimate<Winding>)]| found.iter().map(|(w, e)| (*w, of(&e.parameters))).collect();
             let series = vec![
-                curve("20 C", found(&plain_cold)),
-                curve("55 C", found(&plain_warm)),
-                level("reference at 20 C", cold_truth, ends),
-                level("reference at 55 C", warm_truth, ends),
+                curve("20 °C", found(&plain_cold)),
+                curve("55 °C", found(&plain_warm)),
+                level("reference at 20 °C", cold_truth, ends),
+                level("reference at 55 °C", warm_truth, ends),
             ];
             Panel { title: format!("axis {number}"), series }
         };

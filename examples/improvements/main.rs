@@ -18,10 +18,11 @@ mod terminal;
 use clap::Parser;
 use greybox::pmsm::drive::Simulation;
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::Axis;
+use greybox::pmsm::robot::RobotAxis;
 use methods::{Result, run};
 use report::Report;
 use std::path::PathBuf;
+use std::sync::atomic::Ordering;
 
 /// Compares the methods of the thesis with what this library adds.
 #[derive(Parser)]
@@ -36,9 +37,10 @@ fn main() -> Result<()> {
     let mut report = Report::new("Beyond the thesis: the same records, before and after");
     let (mut offline, mut online) = (offline::Offline::default(), online::Online::default());
     let stop = terminal::interrupted()?;
-    let bar = terminal::steps(7, "axes");
-    for number in (1..=6).take_while(|_| !stop.load(std::sync::atomic::Ordering::Relaxed)) {
-        let axis = Axis::reference(number)?;
+    let bar = terminal::steps(9, "axes");
+    let going = || !stop.load(Ordering::Relaxed);
+    for number in (1..=6).take_while(|_| going()) {
+        let axis = RobotAxis::reference(number)?;
         let simulation = Simulation::new(axis)?;
         let cycles = run(simulation, Program::speed_cycles(&axis, 20, 1.0)?);
         let water = run(simulation, Program::water_cutting(&axis, 6)?);
@@ -49,9 +51,10 @@ fn main() -> Result<()> {
     bar.set_message("axis 1, variants");
     offline.report(&mut report);
     online.report(&mut report);
-    others::injection(&mut report)?;
-    others::switching(&mut report)?;
-    others::outliers(&mut report)?;
+    for variant in [others::injection, others::switching, others::outliers].iter().take_while(|_| going()) {
+        variant(&mut report)?;
+        bar.inc(1);
+    }
     bar.finish_and_clear();
     if let Some(folder) = &arguments.plots {
         sheet::write(folder, "Beyond the thesis: figures", &report.figures)?;

@@ -6,7 +6,7 @@ use crate::methods::*;
 use crate::pooled::{compensated_grey_box, cycles, one_by_one, pooled};
 use crate::report::Report;
 use greybox::pmsm::offline::Axes;
-use greybox::pmsm::robot::Axis;
+use greybox::pmsm::robot::RobotAxis;
 
 /// Errors of one method against speed (%): Ke, and R of motor and cable.
 #[derive(Default)]
@@ -29,7 +29,7 @@ const GOAL: (f64, f64) = (0.1, 1.0);
 
 #[derive(Default)]
 pub struct Offline {
-    axes: Vec<(Axis, [Errors; 5])>,
+    axes: Vec<(RobotAxis, [Errors; 5])>,
 }
 
 impl Offline {
@@ -63,7 +63,7 @@ impl Offline {
         let quantities: [(&str, Of, f64); 2] = [("Ke", |e| &e.ke, GOAL.0), ("R (motor and cable)", |e| &e.r, GOAL.1)];
         for (quantity, of, goal) in quantities {
             let worst = |errors: &Errors| of(errors).iter().map(|(_, e)| e.abs()).fold(0.0, f64::max);
-            let row = |(axis, all): &(Axis, [Errors; 5])| {
+            let row = |(axis, all): &(RobotAxis, [Errors; 5])| {
                 (format!("axis {}", axis.number), all.iter().map(worst).collect::<Vec<f64>>())
             };
             let rows: Vec<_> = self.axes.iter().map(row).collect();
@@ -100,7 +100,7 @@ impl Offline {
         of: fn(&Errors) -> &Vec<(f64, f64)>,
         goal: f64,
     ) {
-        let panel = |(axis, all): &(Axis, [Errors; 5])| {
+        let panel = |(axis, all): &(RobotAxis, [Errors; 5])| {
             let curves = METHODS.into_iter().zip(all).map(|(label, errors)| curve(label, of(errors).clone()));
             let goal = level("goal", goal, (15.0, axis.w_max));
             Panel { title: format!("axis {}", axis.number), series: curves.chain([goal]).collect() }

@@ -8,10 +8,10 @@ use greybox::pmsm::drive::{Log, Simulation};
 use greybox::pmsm::inverter::Carrier;
 use greybox::pmsm::offline::Spans;
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::{Axis, V_DC};
+use greybox::pmsm::robot::{RobotAxis, V_DC};
 
-fn axis_1() -> Result<(Axis, Simulation, Program)> {
-    let axis = Axis::reference(1)?;
+fn axis_1() -> Result<(RobotAxis, Simulation, Program)> {
+    let axis = RobotAxis::reference(1)?;
     Ok((axis, Simulation::new(axis)?, Program::speed_cycles(&axis, 4, 1.0)?))
 }
 

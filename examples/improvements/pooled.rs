@@ -3,9 +3,9 @@
 use crate::methods::*;
 use greybox::pmsm::offline::{Extended, Spans, extended, search_i0};
 use greybox::pmsm::program::Cycle;
-use greybox::pmsm::robot::Axis;
+use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::{Compensated, CompensatedSalientWinding, EmfHarmonic, ExactSalient, ExactStep, HeldIn};
-use greybox::{Fit, PooledRegression, Regression, free};
+use greybox::{Fit, Regression, free, regress::PooledRegression};
 
 /// What all cycles of a motor have in common: what belongs to the motor. How dead time acts on the mean voltage depends on how
 /// fast the currents pass through zero.
@@ -50,7 +50,7 @@ impl CycleSpans {
 
 /// The grey box with dead time, saliency and the EMF's harmonic, all cycles together: the resistance in common, and Ke of
 /// each cycle.
-pub fn compensated_grey_box(axis: &Axis, cycles: &[CycleSpans]) -> Result<(f64, Vec<(f64, f64)>)> {
+pub fn compensated_grey_box(axis: &RobotAxis, cycles: &[CycleSpans]) -> Result<(f64, Vec<(f64, f64)>)> {
     let ts = cycles.first().map_or(axis.ts, |cycle| cycle.spans.ts);
     let step = ExactStep::new(axis.pole_pairs.into(), ts, HeldIn::Stationary)?;
     let motor = EmfHarmonic::<_, CompensatedSalientWinding>::new(ExactSalient(step));

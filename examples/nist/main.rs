@@ -13,22 +13,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     if paths.is_empty() {
         return Err("usage: nist FILE.dat...".into());
     }
-    println!("problem   start  digits of: parameters  standard errors  residual deviation  steps  outcome");
+    println!("Digits that agree with the certified values");
+    println!("problem   start  parameters  std. errors  std. deviation  steps  outcome");
     for path in paths {
         for found in File::read(Path::new(&path))?.fit()? {
-            let outcome = found.outcome.to_string();
-            // The numbers in brackets, where it ended well, are beyond the edge of a terminal.
-            let outcome = if found.outcome.converged() { "converged" } else { &outcome };
-            println!(
-                "{:<10}    {} {:>22.1} {:>16.1} {:>19.1} {:>6}  {}",
-                found.name,
-                found.start,
-                found.parameters,
-                found.standard_errors,
-                found.residual,
-                found.iterations,
-                outcome
-            );
+            let (converged, why) = (found.outcome.converged(), found.outcome.to_string());
+            let numbers =
+                format!("{:>10.1} {:>12.1} {:>15.1}", found.parameters, found.standard_errors, found.residual);
+            let outcome = if converged { "converged" } else { "not converged" };
+            println!("{:<10} {:>4}  {numbers} {:>6}  {outcome}", found.name, found.start, found.iterations);
+            if !converged {
+                println!("  {why}");
+            }
         }
     }
     Ok(())

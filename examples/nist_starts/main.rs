@@ -11,12 +11,15 @@
 mod file;
 #[path = "../nist/problems.rs"]
 mod problems;
+#[path = "../common/terminal.rs"]
+mod terminal;
 
 use file::File;
 use greybox::optimize::{Domain, LeastSquares, LevenbergMarquardt, Machine, Request};
 use greybox::{Error, Fit, Model, Nothing, Objective, Signals, WarningCode, free};
 use problems::{Predictors, Response, Task};
 use std::path::Path;
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// Searches from many starts.
@@ -89,16 +92,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let [folder, starts, wanted @ ..] = arguments else {
         return Err("usage: nist_starts [--starts=N] FOLDER_OF_DAT FOLDER_OF_STARTS [PROBLEM...]".into());
     };
-    println!(
-        "starts           of  right  wrong without a word  evaluations of right ones, median, and all   ms/search"
-    );
+    println!("silent: wrong, and it was not said; median: evaluations of the right ones");
+    println!("starts             of  right  silent  median  evaluations  ms/search");
     let mut paths: Vec<_> =
         std::fs::read_dir(starts)?.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>()?;
     paths.sort();
-    for path in paths.iter().filter(|path| path.extension().is_some_and(|extension| extension == "txt")) {
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "txt"));
+    let (stop, bar) = (terminal::interrupted()?, terminal::steps(paths.len(), "problems"));
+    for path in paths.iter().take_while(|_| !stop.load(Ordering::Relaxed)) {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let name = stem.split('_').next().unwrap_or_default();
         if !wanted.is_empty() && !wanted.iter().any(|wanted| wanted == name) {
+            bar.inc(1);
             continue;
         }
         let numbers = |line: &str| line.split_whitespace().map(str::parse).collect::<Result<Vec<f64>, _>>();
@@ -115,7 +120,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let median = right.get(right.len() / 2).copied().unwrap_or(0);
         let sum: u64 = all.iter().map(|ended| ended.evaluations).sum();
         let count = all.len();
-        println!("{stem:15} {count:4} {:6} {silent:21} {median:31} {sum:12} {time:11.2}", right.len());
+        let row = format!("{stem:15} {count:5} {:6} {silent:7} {median:7} {sum:12} {time:10.2}", right.len());
+        bar.suspend(|| println!("{row}"));
+        bar.inc(1);
     }
+    bar.finish_and_clear();
     Ok(())
 }

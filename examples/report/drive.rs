@@ -125,5 +125,7 @@ fn assumed(tried: &[Tried]) -> Section {
         [u64::from(tried.pole_pairs).into(), frame(tried.held_in).into(), Cell::number(tried.error, 3)]
     };
     let table = Table::new("Errors of the alternatives", ["pole pairs", "voltage held", "rms error (A)"]);
-    Section::new("drive", "What was taken of the drive").says(text).table(table.rows(tried.iter().map(row)).at_most(6))
+    Section::new("drive", "Pole pairs and hold of the drive")
+        .says(text)
+        .table(table.rows(tried.iter().map(row)).at_most(6))
 }

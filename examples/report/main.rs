@@ -7,7 +7,7 @@
 use argmin::core::observers::ObserverMode;
 use clap::Parser;
 use greybox::diagnose::{Convergence, Resampling, bootstrap, profile};
-use greybox::models::{Axis, ControlledAxisMotion, PositioningLoop};
+use greybox::models::{AxisParameters, ControlledAxisMotion, PositioningLoop};
 use greybox::report::{Origin, Section};
 use greybox::{CsvFile, ExperimentOf, Fit, Hold, Model, Of, Parameter, Report, fixed, free};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -57,7 +57,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         let model = PositioningLoop::EMPS;
         let rest = ControlledAxisMotion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) };
         let record = CsvFile::new(&arguments.file).read(&model)?.hold(Hold::First).initial(rest);
-        let axis = Axis { m: free(80.0), fv: free(150.0), fc: free(15.0), offset: free(0.0) };
+        let axis = AxisParameters { m: free(80.0), fv: free(150.0), fc: free(15.0), offset: free(0.0) };
         reported(&model, &record, axis, arguments, &stop, None)?
     } else {
         let drive = drive::found(&arguments.file, &columns, &arguments.drive, &stop)?;

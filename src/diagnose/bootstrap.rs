@@ -121,11 +121,16 @@ pub fn bootstrap(
             found.len()
         )));
     }
+    Ok(spread(estimate, &found, count, seed))
+}
+
+/// Scatter and percentiles of the refits that ended, of `tried` in all.
+fn spread(estimate: &Summary, found: &[Vec<f64>], tried: usize, seed: u64) -> Bootstrap {
     let stretch = (estimate.measurements as f64 / estimate.degrees_of_freedom().max(1.0)).sqrt();
     let mut result = Bootstrap {
         unknowns: estimate.unknowns.iter().map(|unknown| unknown.name.clone()).collect(),
         converged: found.len() as u64,
-        tried: count as u64,
+        tried: tried as u64,
         standard_errors: vec![],
         bias: vec![],
         intervals: vec![],
@@ -151,7 +156,7 @@ pub fn bootstrap(
         result.bias.push(mean - unknown.value);
         result.intervals.push((at(0.025), at(0.975)));
     }
-    Ok(result)
+    result
 }
 
 /// The residuals of the samples of which all outputs have one, sample by sample. Centered: a mean that the model left would

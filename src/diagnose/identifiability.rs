@@ -84,7 +84,7 @@ pub struct Segment {
 }
 
 /// Indices from here on are listed (Brun et al. 2001, section 3.2).
-pub const COLLINEAR: f64 = 10.0;
+const COLLINEAR: f64 = 10.0;
 /// Singular values below this part of the largest are rounding.
 const RANK: f64 = 1e-11;
 const POINTS: u64 = 3;

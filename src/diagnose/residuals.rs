@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 /// Lags of correlations: up to 25, and never more than a quarter of the samples.
 const LAGS: usize = 25;
 /// The fewest residuals that tests say anything of.
-pub const FEWEST: u64 = 20;
+const FEWEST: u64 = 20;
 
 /// What the residuals of one output show.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -84,7 +84,7 @@ pub struct Residuals {
 ///
 /// # Errors
 /// A prediction that is not of this record, or a prediction that is infinite. Too few residuals for a test (fewer than
-/// [`FEWEST`]), and residuals that do not vary, are not errors: the tests are left out.
+/// 20), and residuals that do not vary, are not errors: the tests are left out.
 ///
 /// ```
 /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};

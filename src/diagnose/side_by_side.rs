@@ -20,17 +20,26 @@ pub enum DataUse {
 
 /// One record, and what each of several models predicts of it.
 ///
-/// ```no_run
-/// # use greybox::{Estimate, ExperimentOf, Report, diagnose::{Compared, DataUse}, pmsm::Surface};
-/// # fn show(
-/// #     report: Report, model: &Surface, linear: &Estimate<Surface>, full: &Estimate<Surface>,
-/// #     fitted: &ExperimentOf<Surface>, other: &ExperimentOf<Surface>,
-/// # ) -> Result<Report, greybox::Error> {
-/// let both = |record: &ExperimentOf<Surface>, part| {
-///     Compared::new(record.record(), part).with("full", &full.predict(model, record)?)?.with("linear", &linear.predict(model, record)?)
+/// ```
+/// # use greybox::diagnose::{Compared, DataUse};
+/// # use greybox::{Estimate, Experiment, ExperimentOf, Fit, Report, fixed, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// let (fitted, other) = Experiment::from_csv(&model, "examples/data/pmsm.csv")?.split(0.6)?;
+/// let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// let problem = Fit::new(&model, &fitted).parameters(start).problem()?;
+/// let free = Estimate::of(problem.run()?)?;
+/// let given = Fit::new(&model, &fitted).parameters(Winding { ls: fixed(2e-3), ..start }).run()?;
+/// let compared = |record: &ExperimentOf<Surface>, part| {
+///     let (free, given) = (free.predict(&model, record)?, given.predict(&model, record)?);
+///     Compared::new(record.record(), part).with("all free", &free)?.with("ls given", &given)
 /// };
-/// let report = report.with(vec![both(fitted, DataUse::Estimation)?, both(other, DataUse::Validation)?]);
-/// # Ok(report)
+/// let both = vec![compared(&fitted, DataUse::Estimation)?, compared(&other, DataUse::Validation)?];
+/// # let fits = both[1].outputs[0].fit_percent();
+/// # assert!(fits[0] > Some(98.0) && fits[1] < Some(95.0), "{fits:?}");
+/// let report = Report::new(&problem, &free)?.with(both); // a table of all fits, and all curves over time
+/// # assert!(report.to_markdown().contains("ls given"));
+/// # Ok(())
 /// # }
 /// ```
 #[derive(Clone, Debug, PartialEq)]

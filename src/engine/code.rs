@@ -88,7 +88,7 @@ pub enum Column {
     Input(usize),
     /// An output as measured; not a number where there is none.
     Measured(usize),
-    /// What depends on the record alone and is dear, computed once a record.
+    /// What depends on the record alone and is costly, computed once a record.
     Derived(usize),
 }
 

@@ -1,4 +1,5 @@
-//! What depends on a record alone and is dear: computed once a record, and read as a column.
+//! Derived columns: costly operations whose operands are the record's columns alone. They are computed once for each record
+//! instead of at each evaluation, and read like measured columns.
 
 use super::code::{Column, Sound};
 use super::interpret::{Once, Run};
@@ -6,21 +7,22 @@ use super::schedule::{Roots, TooLarge, schedule};
 use crate::graph::{Id, Node, Tape};
 use crate::wide::{Width, run};
 
-/// The dear nodes of a record that others read: functions and quotients, and what is made of them.
-pub(super) fn dear(tape: &Tape, roots: &[Id]) -> Vec<Id> {
+/// The nodes that become derived columns: functions and quotients of the record's columns, and what is computed from them,
+/// where nodes that vary with unknowns read them.
+pub(super) fn costly(tape: &Tape, roots: &[Id]) -> Vec<Id> {
     let reached = tape.graph.reached(roots);
-    let mut dear = vec![false; tape.graph.len()];
+    let mut costly = vec![false; tape.graph.len()];
     let mut read = vec![false; tape.graph.len()];
     roots.iter().for_each(|root| read[root.index()] = true);
     for (i, node) in tape.graph.nodes().iter().enumerate().filter(|(i, _)| reached[*i]) {
         if tape.depends[i].on_record_alone() {
-            let costly = matches!(node, Node::Function(..) | Node::Function2(..) | Node::Table { .. });
-            dear[i] = costly || node.operands().any(|operand| dear[operand.index()]);
+            let itself = matches!(node, Node::Function(..) | Node::Function2(..) | Node::Table { .. });
+            costly[i] = itself || node.operands().any(|operand| costly[operand.index()]);
         } else {
             node.operands().for_each(|operand| read[operand.index()] = true);
         }
     }
-    (0..dear.len()).filter(|i| dear[*i] && read[*i]).map(Id::new).collect()
+    (0..costly.len()).filter(|i| costly[*i] && read[*i]).map(Id::new).collect()
 }
 
 /// The program of the derived columns: consecutive samples are its lanes.

@@ -11,7 +11,7 @@ const NEGLIGIBLE: f64 = 1e-150;
 /// Numbers in a cache line.
 const LINE: usize = 8;
 
-/// Trajectories side by side: their parameters, what they carry, and room to compute.
+/// Trajectories side by side: their parameters, what they carry, and working memory.
 ///
 /// Set parameters and steps, [`prepare`](Self::prepare), [`start`](Self::start) each lane, [`run`](Self::run) block by block.
 ///
@@ -64,8 +64,7 @@ impl Group {
 
     /// A lane's parameters; those that nothing depends on may be left out at the end.
     pub fn set_parameters(&mut self, lane: usize, values: &[f64]) {
-        let shape = &self.program.shape;
-        let (carried, parameters) = (self.program.code.carried, shape.direction.unwrap_or(shape.parameters));
+        let (carried, parameters) = (self.program.code.carried, self.program.parameters);
         for (j, value) in values[..].iter().take(parameters).enumerate() {
             self.slot(carried + j)[lane] = *value;
         }
@@ -89,39 +88,14 @@ impl Group {
         }
     }
 
-    /// The direction of a lane, one component for each seed, of a program of second derivatives; before
-    /// [`prepare`](Self::prepare) and [`start`](Self::start).
-    pub fn set_direction(&mut self, lane: usize, direction: &[f64]) {
-        if let Some(first) = self.program.shape.direction {
-            let first = self.program.code.carried + first;
-            for (s, component) in direction.iter().take(self.program.shape.seeds.len()).enumerate() {
-                self.slot(first + s)[lane] = *component;
-            }
-        }
-    }
-
-    /// Slope `number` of entry `i` at the start.
-    fn slope_at_start(&self, lane: usize, i: usize, number: usize) -> f64 {
-        let (seeds, own) = (&self.program.shape.seeds, Seed::Carry(i));
-        let component = |first: usize| {
-            let seeded = (0..seeds.len()).filter(|s| seeds[*s] == own);
-            seeded.map(|s| self.number(self.program.code.carried + first + s, lane)).sum()
-        };
-        match self.program.shape.direction {
-            None => f64::from(u8::from(seeds[number] == own)),
-            Some(first) if number == 0 => component(first),
-            Some(_) => 0.0,
-        }
-    }
-
     /// A lane's start: what it carries, with a slope of one for each seed that is an entry of it.
     pub fn start(&mut self, lane: usize, carry: &[f64]) {
         let program = Arc::clone(&self.program);
         for (i, row) in program.pattern.rows.iter().enumerate() {
             self.slot(i)[lane] = carry[i];
-            for (number, at) in row.iter().enumerate() {
+            for (seed, at) in program.seeds.iter().zip(row) {
                 if let Some(at) = at {
-                    self.slot(*at)[lane] = self.slope_at_start(lane, i, number);
+                    self.slot(*at)[lane] = f64::from(u8::from(*seed == Seed::Carry(i)));
                 }
             }
         }

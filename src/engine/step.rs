@@ -46,7 +46,7 @@ impl Step {
     }
 
     /// The same step in operations that registers have.
-    pub fn lowered(self) -> Self {
+    fn lowered(self) -> Self {
         let roots: Vec<Id> = self.next.iter().chain(self.rows.iter().flatten()).copied().collect();
         let (tape, new) = lowered(&self.tape, &roots);
         let (next, rest) = new.split_at(self.next.len());

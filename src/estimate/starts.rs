@@ -49,6 +49,14 @@ pub struct FailedStart {
     pub reason: String,
 }
 
+/// A cost relative to the estimate's, in words.
+pub(crate) fn times_the_cost(ratio: f64) -> String {
+    match number(ratio, 3).as_str() {
+        "1" => "the same cost".to_owned(),
+        ratio => format!("{ratio} times the cost"),
+    }
+}
+
 impl fmt::Display for Starts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Starts { tried, agreed, minima, failed, .. } = self;
@@ -56,10 +64,10 @@ impl fmt::Display for Starts {
         let others: &[Minimum] = if *agreed > 0 { &minima[1..] } else { minima };
         if let Some(next) = others.first() {
             let searches = others.iter().map(|minimum| minimum.searches).sum::<u64>();
-            let ratio = number(next.cost_ratio, 3);
+            let cost = times_the_cost(next.cost_ratio);
             match others.len() {
-                1 => write!(f, ", {searches} ended in another minimum of {ratio} times the cost")?,
-                n => write!(f, ", {searches} ended in {n} other minima of {ratio} times the cost or more")?,
+                1 => write!(f, ", {searches} ended in another minimum of {cost}")?,
+                n => write!(f, ", {searches} ended in {n} other minima of {cost} or more")?,
             }
         }
         match failed.len() {

@@ -34,7 +34,7 @@ pub enum WarningCode {
     Clipped,
     /// An output that stands still where the model moves.
     Frozen,
-    /// A block of an output that occurs twice.
+    /// A block of an output, or a whole record, that occurs twice.
     Repeated,
     /// An output of few values.
     CoarseOutput,
@@ -62,6 +62,10 @@ pub enum WarningCode {
     HalvesContradict,
     /// A predicted variance goes to zero, and the likelihood to infinity.
     UnboundedLikelihood,
+    /// Errors far beyond the others under a squared loss.
+    Outliers,
+    /// An initial state that neither the user nor the outputs give a start for.
+    GuessedStart,
     /// Time jumps within a record.
     TimeGaps,
     /// An unknown is held at a bound.

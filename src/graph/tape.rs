@@ -1,4 +1,4 @@
-//! [`Tape`]: a graph on its way to a program.
+//! [`Tape`]: a graph that is being made into a program.
 //!
 //! Values stay what the text says. Slopes, and the steps of an integrator, are *relaxed*: their signs are gathered, factors
 //! that do not vary within a pass are multiplied with each other first, and a sum of products becomes one instruction.

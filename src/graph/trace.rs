@@ -212,7 +212,7 @@ impl Graph {
                 None => return self.merged(&runs),
             }
             if runs.len() == MAX_PATHS {
-                return Err(Untraceable::new("its comparisons have more than 64 ways through it"));
+                return Err(Untraceable::new("its comparisons have more than 64 paths"));
             }
         }
     }

@@ -55,7 +55,7 @@ impl Block {
         self.len == 0
     }
 
-    /// Whether there is no room for another row.
+    /// Whether no further row fits.
     #[inline(always)]
     pub fn is_full(&self) -> bool {
         self.len >= self.capacity

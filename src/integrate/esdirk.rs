@@ -112,18 +112,11 @@ impl Integrator for Esdirk {
         step: &mut f64,
     ) -> Result<Y::Vector<Y::Scalar>, Stuck> {
         let (_, length) = system.interval();
-        let zero = system.vector(|_| 0.0);
-        let mut k: [_; STAGES] = core::array::from_fn(|_| system.vector(|_| Y::Scalar::from(0.0)));
-        let (mut start, mut end) = (f64::NAN, f64::NAN);
         let tolerance = Tolerance { relative: self.relative, absolute: self.absolute };
-        tolerance.cross(4.0, system, x, step, |x, tau, h| {
-            if tau == end {
-                k.swap(0, STAGES - 1);
-                start = tau;
-            }
+        tolerance.cross_in_stages((4.0, &ERROR), system, x, step, |x, tau, h, first, k| {
             let mut stage = x.clone();
-            for i in usize::from(tau == start)..STAGES {
-                let base = combined(system, x, h, &A[i][..i], &k);
+            for i in first..STAGES {
+                let base = combined(system, x, h, &A[i][..i], k);
                 let position = (tau + C[i] * h) / length;
                 // The slope k of the stage solves k = f(base + h gamma k); the first guess keeps the last stage.
                 let gamma_h = GAMMA * h;
@@ -147,9 +140,7 @@ impl Integrator for Esdirk {
                 }
                 stage = axpy::<Y, _>(system, &base, gamma_h, &k[i]);
             }
-            (start, end) = (tau, tau + h);
-            let slopes = core::array::from_fn::<_, STAGES, _>(|i| values(system, &k[i]));
-            Some((stage, combined(system, &zero, h, &ERROR, &slopes)))
+            Some(stage)
         })
     }
 

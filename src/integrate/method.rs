@@ -129,8 +129,8 @@ pub(crate) trait Method: Debug + Send + Sync {
     fn advance_duals(&self, field: &Field<'_, Duals>, x: Vec<Duals>, step: &mut f64) -> Result<Vec<Duals>, Stuck>;
     fn advance_symbols(&self, field: &SymbolicField<'_>, x: Vec<Symbol>) -> Result<Vec<Symbol>, Stuck>;
     fn is_fixed(&self) -> bool;
-    fn serves(&self, kind: Kind) -> bool;
-    fn check(&self) -> Result<(), Error>;
+    /// Refuses models of a kind that the method does not serve, and settings that make no sense.
+    fn check(&self, kind: Kind) -> Result<(), Error>;
     fn describe(&self, kind: Kind) -> String;
 }
 
@@ -151,12 +151,18 @@ impl<I: Integrator> Method for I {
         I::FIXED
     }
 
-    fn serves(&self, kind: Kind) -> bool {
-        Integrator::serves(self, kind)
-    }
-
-    fn check(&self) -> Result<(), Error> {
-        Integrator::check(self)
+    fn check(&self, kind: Kind) -> Result<(), Error> {
+        if self.serves(kind) {
+            return Integrator::check(self);
+        }
+        let word = |kind| match kind {
+            Kind::Continuous => "continuous",
+            Kind::Discrete => "discrete",
+            Kind::Static => "static",
+        };
+        let kinds = [Kind::Continuous, Kind::Discrete, Kind::Static];
+        let serves = kinds.into_iter().find(|&kind| self.serves(kind)).map_or("no", word);
+        Err(Error::WrongIntegrator { model: word(kind), integrator: Integrator::describe(self, kind), serves })
     }
 
     fn describe(&self, kind: Kind) -> String {

@@ -1,7 +1,7 @@
 //! [`Rk45`]: the explicit Runge-Kutta pair of orders 5 and 4 of Dormand and Prince (J. R. Dormand, P. J. Prince, "A family
 //! of embedded Runge-Kutta formulae", Journal of Computational and Applied Mathematics 6, 1980, 19-26, table 2).
 
-use super::tolerance::{combined, values};
+use super::tolerance::combined;
 use super::{Integrator, Stuck, System, Tolerance};
 use crate::layout::Kind;
 use serde::{Deserialize, Serialize};
@@ -78,24 +78,14 @@ impl Integrator for Rk45 {
         step: &mut f64,
     ) -> Result<Y::Vector<Y::Scalar>, Stuck> {
         let (_, length) = system.interval();
-        let zero = system.vector(|_| 0.0);
-        let mut k: [_; STAGES] = core::array::from_fn(|_| system.vector(|_| Y::Scalar::from(0.0)));
-        // The times whose derivatives stand in the first and in the last stage.
-        let (mut start, mut end) = (f64::NAN, f64::NAN);
         let tolerance = Tolerance { relative: self.relative, absolute: self.absolute };
-        tolerance.cross(5.0, system, x, step, |x, tau, h| {
-            if tau == end {
-                k.swap(0, STAGES - 1);
-                start = tau;
-            }
+        tolerance.cross_in_stages((5.0, &ERROR), system, x, step, |x, tau, h, first, k| {
             let mut stage = x.clone();
-            for i in usize::from(tau == start)..STAGES {
-                stage = combined(system, x, h, &A[i][..i], &k);
+            for i in first..STAGES {
+                stage = combined(system, x, h, &A[i][..i], k);
                 k[i] = system.derivative((tau + C[i] * h) / length, &stage);
             }
-            (start, end) = (tau, tau + h);
-            let slopes = core::array::from_fn::<_, STAGES, _>(|i| values(system, &k[i]));
-            Some((stage, combined(system, &zero, h, &ERROR, &slopes)))
+            Some(stage)
         })
     }
 

@@ -110,6 +110,45 @@ impl Tolerance {
     }
 }
 
+impl Tolerance {
+    /// Crosses the system's interval as [`cross`](Self::cross) does, by a Runge-Kutta method whose last stage is the first of
+    /// the next step. `stages(x, tau, h, first, k)` computes the slopes `k` of the stages from number `first` on, and the state
+    /// at the end of the step; `error` has the weights of the slopes in the step's error.
+    #[inline(always)]
+    pub fn cross_in_stages<Y: System, const STAGES: usize>(
+        &self,
+        (power, error): (f64, &[f64; STAGES]),
+        system: &Y,
+        x: Y::Vector<Y::Scalar>,
+        memory: &mut f64,
+        mut stages: impl FnMut(
+            &Y::Vector<Y::Scalar>,
+            f64,
+            f64,
+            usize,
+            &mut Slopes<Y, STAGES>,
+        ) -> Option<Y::Vector<Y::Scalar>>,
+    ) -> Result<Y::Vector<Y::Scalar>, Stuck> {
+        let zero = system.vector(|_| 0.0);
+        let mut k: Slopes<Y, STAGES> = core::array::from_fn(|_| system.vector(|_| Y::Scalar::from(0.0)));
+        // The times whose slopes are those of the first and of the last stage.
+        let (mut start, mut end) = (f64::NAN, f64::NAN);
+        self.cross(power, system, x, memory, |x, tau, h| {
+            if tau == end {
+                k.swap(0, STAGES - 1);
+                start = tau;
+            }
+            let to = stages(x, tau, h, usize::from(tau == start), &mut k)?;
+            (start, end) = (tau, tau + h);
+            let slopes = core::array::from_fn::<_, STAGES, _>(|i| values(system, &k[i]));
+            Some((to, combined(system, &zero, h, error, &slopes)))
+        })
+    }
+}
+
+/// The slopes of the stages of a step.
+pub(crate) type Slopes<Y, const STAGES: usize> = [<Y as System>::Vector<<Y as System>::Scalar>; STAGES];
+
 /// `x + h (a[0] k[0] + a[1] k[1] + ...)`, entry by entry.
 #[inline(always)]
 pub(crate) fn combined<Y: System, S: Scalar>(

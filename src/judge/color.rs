@@ -10,23 +10,29 @@ use crate::optimize::Severity;
 /// Level of the test of whiteness below which the color is no chance; between this and the level at which intervals are
 /// widened it is a note.
 pub(super) const CERTAIN: f64 = 1e-4;
+/// A level that is enough where the colored part is above the second.
+const LIKELY: f64 = 5e-4;
+const MUCH: f64 = 0.05;
 /// The part of an output's movement that is an error, and follows from the errors before: below the first it is a note,
-/// above the second the model is wrong or the noise hides the plant.
+/// above the second the model is wrong or noise dominates the output.
 pub(super) const SMALL: f64 = 1e-3;
 const LARGE: f64 = 0.5;
 
 impl Judgement<'_> {
     /// Whether the errors of an output are correlated over time, beyond chance and rounding.
     pub(super) fn is_colored(&self) -> bool {
-        self.autocorrelated().is_some_and(|(_, white)| white.p_value < CERTAIN) && self.colored_part() > SMALL
+        self.autocorrelated().is_some() && self.colored_part() > SMALL
     }
 
     /// The largest part of an output's movement that is an error and follows from the errors before.
     fn colored_part(&self) -> f64 {
         let whiteness = self.residuals.whiteness.iter().enumerate();
         let count = whiteness.len() as f64;
-        let certain = whiteness.filter(|(_, white)| white.p_value * count < CERTAIN);
-        certain.map(|(j, white)| self.colored(j, white)).fold(0.0, f64::max)
+        let parts = whiteness.filter_map(|(j, white)| {
+            let (chance, part) = (white.p_value * count, self.colored(j, white));
+            (chance < CERTAIN || chance < LIKELY && part > MUCH).then_some(part)
+        });
+        parts.fold(0.0, f64::max)
     }
 
     /// The part of an output's movement that is an error and follows from others.
@@ -43,7 +49,7 @@ impl Judgement<'_> {
         let output = &self.objective.problem.layout().outputs[output].name;
         let (probability, first) = (p_value(white.p_value.min(1.0)), number(white.first, 2));
         let mut text = format!(
-            "the errors of `{output}` are not white (portmanteau {probability}, correlation with the error before \
+            "the errors of `{output}` are not white ({probability}, correlation with the error before \
              {first}): the model misses a part, or the noise is colored"
         );
         if part > SMALL {

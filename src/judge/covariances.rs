@@ -21,7 +21,7 @@ pub(super) struct Covariances {
 }
 
 /// A covariance in coordinates.
-struct Found {
+struct CoordinateCovariance {
     covariance: Option<Covariance>,
     method: CovarianceMethod,
     factor: f64,
@@ -35,22 +35,23 @@ impl Judgement<'_> {
             self.objective.problem.layout().kind != Kind::Static && self.residuals.measured >= CORRELATED_SAMPLES
         });
         let found = autocorrelated.and_then(|_| self.for_colored_errors(unit.as_ref()?));
-        let Found { covariance, method, factor, degrees } = found.unwrap_or_else(|| self.for_white_errors(&unit));
+        let CoordinateCovariance { covariance, method, factor, degrees } =
+            found.unwrap_or_else(|| self.for_white_errors(&unit));
         let seen = self.seen().into_iter().zip(&self.slopes);
         let in_units: Vec<f64> = seen.map(|(seen, slope)| if seen { *slope } else { 0.0 }).collect();
         let unknowns = covariance.map(|covariance| covariance.times(factor).scaled(&in_units));
         Covariances { unknowns, method, unit, degrees }
     }
 
-    fn for_colored_errors(&self, unit: &Covariance) -> Option<Found> {
+    fn for_colored_errors(&self, unit: &Covariance) -> Option<CoordinateCovariance> {
         let hac = hac(self.objective, &self.end.coordinates, self.linear, (&self.exact, unit))?;
         let covariance = Some(hac.sandwich.covariance(&self.exact)?);
         let degrees = hac.degrees(self.objective, unit).into_iter().map(|degrees| degrees.min(self.degrees));
         let method = CovarianceMethod::Hac { lags: hac.lags as u64 };
-        Some(Found { covariance, method, factor: 1.0, degrees: degrees.collect() })
+        Some(CoordinateCovariance { covariance, method, factor: 1.0, degrees: degrees.collect() })
     }
 
-    fn for_white_errors(&self, unit: &Option<Covariance>) -> Found {
+    fn for_white_errors(&self, unit: &Option<Covariance>) -> CoordinateCovariance {
         let (objective, x) = (self.objective, &self.end.coordinates);
         let (weights, degrees) = self.estimated_weights();
         let degrees = vec![degrees; self.slopes.len()];
@@ -58,16 +59,21 @@ impl Judgement<'_> {
             let filtered = objective.problem.settings.prefilter.is_some();
             let method = if filtered { CovarianceMethod::FilteredSandwich } else { CovarianceMethod::Sandwich };
             let covariance = sandwich::sandwich(objective, x, &self.exact).ok().flatten();
-            return Found { covariance, method, factor: weights, degrees };
+            return CoordinateCovariance { covariance, method, factor: weights, degrees };
         }
         let method = CovarianceMethod::Classical;
         // The widening applies to the errors, not to the priors.
         if self.widening != 1.0 && objective.problem.unknowns.priors(x).next().is_some() {
             let widened = objective.with(objective.whitening.widened(self.widening));
             let covariance = widened.evaluate(x).ok().and_then(|linear| linear.covariance(&self.exact));
-            return Found { covariance, method, factor: weights, degrees };
+            return CoordinateCovariance { covariance, method, factor: weights, degrees };
         }
-        Found { covariance: unit.clone(), method, factor: weights * self.widening * self.widening, degrees }
+        CoordinateCovariance {
+            covariance: unit.clone(),
+            method,
+            factor: weights * self.widening * self.widening,
+            degrees,
+        }
     }
 
     /// The factor by which weights between outputs that were estimated themselves, as a full noise covariance, widen the

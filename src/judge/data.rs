@@ -5,7 +5,7 @@ use super::suspects::{Split, Suspect, splits};
 use crate::estimate::{Warning, WarningCode};
 use crate::numeral::{counted, exact, number, percent};
 use crate::optimize::Severity;
-use crate::record::{ChannelInspection, Inspection, Suspicion};
+use crate::record::{ChannelInspection, Inspection, Record, Suspicion};
 
 /// Errors below this part of an output's range or level are rounding: the model reproduces what is suspicious.
 const REPRODUCED: f64 = 1e-6;
@@ -13,13 +13,16 @@ const REPRODUCED: f64 = 1e-6;
 const LARGER: f64 = 2.0;
 /// Suspicious samples that make so much of the sum of squares decide the estimate.
 const DECIDE: f64 = 0.5;
-/// Outputs with so few values are coarse, where the errors are larger than this part of a step.
+/// Outputs with so few values are coarse, where each occurs so many times and the errors are larger than this part of a step.
 const FEW: usize = 8;
+const TIMES: usize = 4;
 const PART_OF_STEP: f64 = 0.1;
 /// So much of an output missing is worth a note.
 const MISSING: f64 = 0.5;
 /// Warnings of one kind; more are counted.
 const NAMED: usize = 4;
+/// Of so many records each is compared with each other.
+const COMPARED: usize = 300;
 
 fn warning(code: WarningCode, severity: Severity, text: String) -> Warning {
     Warning { code, severity, text }
@@ -35,6 +38,7 @@ impl Judgement<'_> {
         warnings.extend(self.coarse(&found));
         warnings.extend(self.sentinels_of_inputs(&found));
         warnings.extend(self.missing(&found));
+        warnings.extend(self.twice());
         warnings
     }
 
@@ -166,7 +170,8 @@ impl Judgement<'_> {
             let levels = found.iter().map(|one| one.outputs[j].levels).try_fold(0, |most, n| Some(most.max(n?)))?;
             let step = found.iter().filter_map(|one| one.outputs[j].step).reduce(f64::min)?;
             let rmse = self.residuals.outputs[j].rmse;
-            (levels <= FEW && rmse > PART_OF_STEP * step).then(|| {
+            let often = self.residuals.outputs[j].samples >= (TIMES * levels) as u64;
+            (levels <= FEW && often && rmse > PART_OF_STEP * step).then(|| {
                 let text = format!(
                     "the output `{}` has {levels} values only, {} {} apart: its rounding is no noise, and parameters are off \
                      by it; measure it finer",
@@ -193,6 +198,25 @@ impl Judgement<'_> {
             Some(warning(WarningCode::Sentinel, Severity::UsableWithCare, text))
         };
         channels.filter_map(one).take(NAMED).collect()
+    }
+
+    /// Whether two records hold the same measurements.
+    fn twice(&self) -> Option<Warning> {
+        let (records, labels) = (&self.objective.problem.records, &self.objective.problem.unknowns.labels);
+        let same = |a: &Record, b: &Record| {
+            let columns = || a.outputs().iter().zip(b.outputs()).map(|(a, b)| (&a.values[..], &b.values[..]));
+            let equal = |(a, b): (&f64, &f64)| a == b || a.is_nan() && b.is_nan();
+            let moves = |a: &[f64]| a.iter().any(|y| !y.is_nan() && *y != a[0]);
+            a.len() == b.len() && columns().all(|(a, b)| a.iter().zip(b).all(equal)) && columns().any(|(a, _)| moves(a))
+        };
+        let pairs = (1..records.len().min(COMPARED)).flat_map(|b| (0..b).map(move |a| (a, b)));
+        let (a, b) = pairs.into_iter().find(|&(a, b)| same(&records[a], &records[b]))?;
+        let text = format!(
+            "the experiments `{}` and `{}` hold the same measurements, which count twice: intervals are too narrow; leave one \
+             out",
+            labels[a], labels[b]
+        );
+        Some(warning(WarningCode::Repeated, Severity::UsableWithCare, text))
     }
 
     fn missing(&self, found: &[Inspection]) -> Vec<Warning> {

@@ -18,9 +18,10 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Draws of noise, each added and subtracted.
 const DRAWS: u64 = 4;
-/// A bias above this many standard errors makes an estimate unusable.
+/// Noise in restarts that biases by more than this many standard errors makes an estimate unusable; noise that was declared of
+/// inputs and biases by more is warned of.
 const BIAS: f64 = 0.25;
-/// And below this many not even in a warning.
+/// Below this many, noise in restarts is not mentioned.
 const NO_BIAS: f64 = 0.1;
 /// Significance level of the test for noise in restarts.
 const LEVEL: f64 = 0.01;

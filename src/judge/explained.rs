@@ -90,8 +90,8 @@ impl Judgement<'_> {
             let output = &self.objective.problem.layout().outputs[j].name;
             let than = if worse { "worse than" } else { "no better than" };
             let text = format!(
-                "the model explains `{output}` {than} its mean does (fit {} %): check signals, signs, units and the start, or \
-                 excite the plant; if noise is all that is left, give its size",
+                "the model explains `{output}` {than} its mean does (fit {} %): check signals, signs, units and the start \
+                 (Fit::starts searches from more), or excite the plant; if noise is all that is left, give its size",
                 fit(fit_percent)
             );
             warnings.push(Warning { code: WarningCode::Unexplained, severity, text });

@@ -212,7 +212,7 @@ fn bandwidth(one: &DMatrix<f64>, two: &DMatrix<f64>, a: &DMatrix<f64>, count: us
     }
     let andrews = if below > 0.0 { 1.1447 * (above / below * length).cbrt() } else { 0.0 };
     // Andrews' rule uses the correlation at lag one only; the rule of Lazarus, Lewis, Stock and Watson (J. Business and
-    // Economic Statistics 36 (2018) 541) allows for what the autoregression leaves at longer lags, and its price, fewer
+    // Economic Statistics 36 (2018) 541) allows for what the autoregression leaves at longer lags, and what that costs, fewer
     // degrees of freedom, is counted.
     let longer = (1.3 * length.sqrt()).min(LONGEST);
     (andrews.max(longer).ceil() as usize + 1).clamp(1, (count / 2).max(1))

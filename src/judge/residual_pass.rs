@@ -1,12 +1,13 @@
 //! One pass over the data without slopes: the residuals at the estimate.
 
+use super::output_sums::OutputSums;
 use super::whiteness::{LAGS, Whiteness};
 use crate::error::Error;
 use crate::estimate::OutputFit;
 use crate::optimize::Infeasible;
 use crate::problem::{Accumulate, At, Objective, each, gather_together};
 use crate::sweep::{Piece, Prepared, Sweep, Window};
-use crate::whiteness::{Portmanteau, dot};
+use crate::whiteness::Portmanteau;
 use std::sync::Arc;
 
 /// Longest horizon over which errors are correlated.
@@ -29,6 +30,8 @@ pub(crate) struct Residuals {
     pub whiteness: Vec<Whiteness>,
     /// Mean and standard deviation of each output's measurements.
     pub levels: Vec<(f64, f64)>,
+    /// Mean fourth power of each output's errors, relative to the square of their mean square: 3 of normal ones.
+    pub kurtosis: Vec<f64>,
     /// The smallest standard deviation that was predicted for a measurement of each output; infinite without
     /// predictions.
     pub least_sigma: Vec<f64>,
@@ -194,11 +197,16 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
     let whiteness = |j: usize| {
         let mut total = all[0].portmanteaus[j].clone();
         all[1..].iter().for_each(|one| total.append(&one.portmanteaus[j]));
-        Whiteness::of(&total, sums[j].count, horizon(objective))
+        // Errors of a short record are correlated by its own unknowns, at each lag by no more than their number in errors.
+        let unknowns = &objective.problem.unknowns;
+        let own = if all.len() > 1 { unknowns.row.len() - unknowns.shared() } else { 0 };
+        let count = sums[j].count;
+        Whiteness::of(&total.without(own as f64 / count.max(1) as f64), count, horizon(objective))
     };
     Residuals {
         outputs: sums.iter().map(OutputSums::fit).collect(),
         levels: sums.iter().map(OutputSums::level).collect(),
+        kurtosis: sums.iter().map(OutputSums::kurtosis).collect(),
         measured,
         log_determinant,
         step_error,
@@ -289,94 +297,6 @@ impl Residuals {
             |a: &Whiteness, b: &Whiteness| a.p_value.total_cmp(&b.p_value).then(b.first.total_cmp(&a.first));
         tested.min_by(|a, b| strongest(&a.1, &b.1))
     }
-}
-
-/// Running sums of an output and its error.
-#[derive(Clone, Copy, Debug, Default)]
-struct OutputSums {
-    count: u64,
-    first: f64,
-    sum: f64,
-    squares: f64,
-    errors: f64,
-}
-
-impl OutputSums {
-    fn add(&mut self, y: f64, error: f64) {
-        if self.count == 0 {
-            self.first = y;
-        }
-        // Relative to the first value, so that a large mean loses no digits.
-        let y = y - self.first;
-        self.count += 1;
-        self.sum += y;
-        self.squares += y * y;
-        self.errors += error * error;
-    }
-
-    /// Adds values, all of which were measured.
-    fn add_all(&mut self, values: &[f64], errors: &[f64]) {
-        let Some(first) = values.first() else { return };
-        if self.count == 0 {
-            self.first = *first;
-        }
-        let first = self.first;
-        self.count += values.len() as u64;
-        self.sum += total(values.iter().map(|y| y - first));
-        self.squares += total(values.iter().map(|y| (y - first) * (y - first)));
-        self.errors += dot(errors, errors);
-    }
-
-    /// As if the other's values had been added after its own.
-    fn append(&mut self, other: &OutputSums) {
-        if other.count == 0 {
-            return;
-        }
-        if self.count == 0 {
-            *self = *other;
-            return;
-        }
-        let (shift, n) = (other.first - self.first, other.count as f64);
-        self.squares += other.squares + 2.0 * shift * other.sum + n * shift * shift;
-        self.sum += other.sum + n * shift;
-        self.errors += other.errors;
-        self.count += other.count;
-    }
-
-    /// Mean and standard deviation of the values.
-    fn level(&self) -> (f64, f64) {
-        let n = self.count.max(1) as f64;
-        let spread = (self.squares - self.sum * self.sum / n).max(0.0);
-        (self.first + self.sum / n, (spread / n).sqrt())
-    }
-
-    fn fit(&self) -> OutputFit {
-        let n = self.count as f64;
-        let spread = self.squares - self.sum * self.sum / n;
-        let fit_percent = (spread > 0.0).then(|| 100.0 * (1.0 - (self.errors / spread).sqrt()));
-        OutputFit {
-            samples: self.count,
-            rmse: if self.count > 0 { (self.errors / n).sqrt() } else { 0.0 },
-            fit_percent,
-            sigma: 0.0,
-        }
-    }
-}
-
-/// A sum in accumulators that the compiler may keep in vector lanes.
-fn total(numbers: impl ExactSizeIterator<Item = f64>) -> f64 {
-    let mut sums = [0.0; 4];
-    numbers.enumerate().for_each(|(k, number)| sums[k % 4] += number);
-    sums.iter().sum()
-}
-
-/// The fit of an output from its measured values and their errors; NaN where missing.
-pub(crate) fn output_fit(measured: &[f64], residuals: &[f64]) -> OutputFit {
-    let mut sums = OutputSums::default();
-    for (&y, &error) in measured.iter().zip(residuals).filter(|(_, error)| !error.is_nan()) {
-        sums.add(y, error);
-    }
-    sums.fit()
 }
 
 /// The error of an infeasible point.

@@ -10,7 +10,7 @@ use crate::sweep::Window;
 use crate::whiteness::Portmanteau;
 
 /// Records that are looked at, and samples of each: the first ones.
-const RECORDS: usize = 8;
+pub(super) const RECORDS: usize = 8;
 const SAMPLES: usize = 16_384;
 
 impl Judgement<'_> {
@@ -56,7 +56,7 @@ impl Judgement<'_> {
     }
 
     /// The first errors of an experiment, output by output; `None` where nothing was measured.
-    fn first_errors(&self, e: usize) -> Vec<Vec<Option<f64>>> {
+    pub(super) fn first_errors(&self, e: usize) -> Vec<Vec<Option<f64>>> {
         let mut errors = vec![vec![]; self.objective.outputs()];
         let visit = &mut |window: &mut Window| {
             for k in 0..window.samples[0] {

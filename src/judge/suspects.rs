@@ -1,5 +1,5 @@
-//! Whether the errors at suspicious samples are larger than elsewhere: a plant at rest stands still by right, a sensor that
-//! froze does not.
+//! Whether the errors at suspicious samples are larger than elsewhere: the output of a plant at rest is constant, too, but its
+//! errors are no larger than elsewhere; those of a frozen sensor are.
 
 use crate::problem::{Accumulate, Objective};
 use crate::record::{Record, Suspicion};

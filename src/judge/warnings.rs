@@ -16,6 +16,8 @@ const REFINED_SHIFT: f64 = 0.1;
 const ZERO_DEVIATION: f64 = 1e-6;
 /// Smallest part of an unknown's value that a finer step must move it by for a warning.
 const DIGITS: f64 = 1e-6;
+/// Guessed initial states that are named; more are counted.
+const NAMED: usize = 4;
 
 pub(super) fn care(code: WarningCode, text: String) -> Warning {
     Warning { code, severity: Severity::UsableWithCare, text }
@@ -35,10 +37,12 @@ impl Judgement<'_> {
         warnings.extend(self.unexplained());
         warnings.extend(self.given_noise());
         warnings.extend(self.shape());
+        warnings.extend(self.outliers());
         warnings.extend(self.contradictions(unknowns));
         warnings.extend(self.knowledge(unknowns, covariances));
         warnings.extend(self.unbounded());
         warnings.extend(self.gaps());
+        warnings.extend(self.guessed_starts());
         for unknown in unknowns {
             if let Knowledge::Held { bound, end } = unknown.knowledge {
                 let (Unknown { name, unit, .. }, bound) = (unknown, exact(bound));
@@ -63,7 +67,7 @@ impl Judgement<'_> {
             warnings.push(Warning { code: WarningCode::NotAtMinimum, severity: Severity::NotUsable, text });
         }
         if let Some(starts) = &self.end.starts {
-            warnings.extend(super::starts::warnings(starts, self.residuals.measured));
+            warnings.extend(super::starts::warnings(starts, self.residuals.measured, !directions.is_empty()));
         }
         if let Some(write_error) = &self.end.write_error {
             let text = format!("the checkpoint could not be written ({write_error}); the search went on without it");
@@ -126,6 +130,22 @@ impl Judgement<'_> {
             Warning { code: WarningCode::NotPositive, severity: Severity::NotUsable, text }
         };
         wrong.map(warning).collect()
+    }
+
+    /// Initial states whose start is a guess of the library.
+    fn guessed_starts(&self) -> Option<Warning> {
+        let rows = &self.objective.problem.unknowns.row;
+        let guessed: Vec<_> = rows.iter().filter(|unknown| unknown.guessed).collect();
+        let first = guessed.first()?;
+        let names: Vec<String> = guessed.iter().take(NAMED).map(|unknown| format!("`{}`", unknown.name)).collect();
+        let more = if guessed.len() > NAMED { format!(" and {} more", guessed.len() - NAMED) } else { String::new() };
+        let text = format!(
+            "the outputs do not give {}{more}: estimated, from a start of {}; if it is known, or nearly, say so \
+             (Experiment::initial)",
+            names.join(", "),
+            exact(first.parameter.start)
+        );
+        Some(Warning { code: WarningCode::GuessedStart, severity: Severity::Usable, text })
     }
 
     fn gaps(&self) -> Vec<Warning> {

@@ -2,13 +2,14 @@
 
 use crate::whiteness::Portmanteau;
 
-/// Lags of the test.
+/// Lags of the portmanteau test, and of one that sees more of what only neighbors share.
 pub(super) const LAGS: usize = 20;
+const FEW: usize = 3;
 
 /// Whiteness of the errors of an output.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Whiteness {
-    /// p-value of the portmanteau test.
+    /// Three times the least p-value of three tests: over 3 lags, over 20, and of neighbors.
     pub p_value: f64,
     /// Autocorrelation at lag one.
     pub first: f64,
@@ -27,8 +28,9 @@ impl Whiteness {
     pub fn of(errors: &Portmanteau, count: u64, restart: usize) -> Self {
         let coefficients: Vec<f64> = (1..=LAGS).map(|lag| errors.at(lag).1).collect();
         let (predicted, dependence) = color(&coefficients, count);
+        let over = |lags: usize| errors.p_value(lags.min(count as usize / 4).max(1));
         Whiteness {
-            p_value: errors.p_value(LAGS.min(count as usize / 4).max(1)),
+            p_value: (3.0 * over(FEW).min(over(LAGS)).min(errors.neighbors_p_value())).min(1.0),
             first: coefficients[0],
             predicted,
             dependence,

@@ -40,8 +40,8 @@ crate::signals! {
         /// Command to the drive, as the controller gives it.
         vir: "V",
     }
-    /// Parameters of a linear axis, as the load feels them.
-    pub struct Axis {
+    /// Parameters of a linear axis, referred to the load.
+    pub struct AxisParameters {
         /// Mass, with the inertia of all that turns; must be positive.
         m: "kg",
         /// Viscous friction; negative is not physical.
@@ -82,7 +82,7 @@ impl Positioning {
     pub const EMPS: Positioning = Positioning { gtau: 35.150_651_88, width: 5e-4 };
 
     #[inline]
-    fn acceleration<S: Scalar>(&self, v: S, vir: S, p: &Axis<S>) -> S {
+    fn acceleration<S: Scalar>(&self, v: S, vir: S, p: &AxisParameters<S>) -> S {
         (vir * self.gtau - p.fv * v - p.fc * (v / self.width).tanh() - p.offset) / p.m
     }
 }
@@ -91,15 +91,15 @@ impl Model for Positioning {
     type State = AxisMotion;
     type Input = Command;
     type Output = Position;
-    type Parameters = Axis;
+    type Parameters = AxisParameters;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: S, x: &AxisMotion<S>, u: &Command<S>, p: &Axis<S>) -> AxisMotion<S> {
+    fn derivative<S: Scalar>(&self, _t: S, x: &AxisMotion<S>, u: &Command<S>, p: &AxisParameters<S>) -> AxisMotion<S> {
         AxisMotion { q: x.v, v: self.acceleration(x.v, u.vir, p) }
     }
 
     #[inline]
-    fn output<S: Scalar>(&self, _t: S, x: &AxisMotion<S>, _u: &Command<S>, _p: &Axis<S>) -> Position<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &AxisMotion<S>, _u: &Command<S>, _p: &AxisParameters<S>) -> Position<S> {
         Position { qm: x.q }
     }
 }
@@ -150,7 +150,7 @@ impl Model for PositioningLoop {
     type State = ControlledAxisMotion;
     type Input = Reference;
     type Output = ControlledAxisOutput;
-    type Parameters = Axis;
+    type Parameters = AxisParameters;
 
     #[inline]
     fn derivative<S: Scalar>(
@@ -158,7 +158,7 @@ impl Model for PositioningLoop {
         _t: S,
         x: &ControlledAxisMotion<S>,
         u: &Reference<S>,
-        p: &Axis<S>,
+        p: &AxisParameters<S>,
     ) -> ControlledAxisMotion<S> {
         let v = self.axis.acceleration(x.v, self.command(x, u), p);
         ControlledAxisMotion { q: x.v, v, vm: (x.v - x.vm) / self.lag }
@@ -170,7 +170,7 @@ impl Model for PositioningLoop {
         _t: S,
         x: &ControlledAxisMotion<S>,
         u: &Reference<S>,
-        _p: &Axis<S>,
+        _p: &AxisParameters<S>,
     ) -> ControlledAxisOutput<S> {
         ControlledAxisOutput { qm: x.q, vir: self.command(x, u) }
     }

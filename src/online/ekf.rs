@@ -2,7 +2,7 @@
 //! Jacobians are the exact slopes of the model's own text. States come first in the joint vector: `U D U^T` then keeps
 //! the parameters' covariance in a block of its own, which survives when the state must start anew.
 
-use super::{Beat, Clock, Divergence, Guard, ObserverError, Outcome, UdFactors, Update, Watch};
+use super::{Beat, Clock, Divergence, Guard, ObserverError, UdFactors, Update, UpdateOutcome, Watch};
 use super::{check_all_positive, check_starts, in_bounds, not_finite, prior_std};
 use crate::dual::Dual;
 use crate::integrate::{Automatic, Integrator, ModelSystem};
@@ -149,10 +149,10 @@ impl<M: Model, const N: usize, I: Integrator> Ekf<M, N, I> {
     pub fn update(&mut self, t: f64, u: &Of<M::Input, f64>, y: &Of<M::Output, f64>) -> Update<Of<M::Output, f64>> {
         let none = M::Output::splat(0.0);
         if let Some(divergence) = self.stopped {
-            return Update { innovation: none, outcome: Outcome::Diverged(divergence) };
+            return Update { innovation: none, outcome: UpdateOutcome::Diverged(divergence) };
         }
         if let Some(signal) = not_finite::<M::Input>(u).or(if t.is_finite() { None } else { Some("t") }) {
-            return Update { innovation: none, outcome: Outcome::Missing { signal } };
+            return Update { innovation: none, outcome: UpdateOutcome::Missing { signal } };
         }
         let before = (self.x, self.p, self.covariance);
         match self.step(t, u, y) {
@@ -160,7 +160,7 @@ impl<M: Model, const N: usize, I: Integrator> Ekf<M, N, I> {
             Err((innovation, divergence)) => {
                 (self.x, self.p, self.covariance) = before;
                 self.stopped = Some(divergence);
-                Update { innovation, outcome: Outcome::Diverged(divergence) }
+                Update { innovation, outcome: UpdateOutcome::Diverged(divergence) }
             }
         }
     }
@@ -174,7 +174,7 @@ impl<M: Model, const N: usize, I: Integrator> Ekf<M, N, I> {
             (Beat::Regular, Some(u0)) => {
                 let interval = Interval { t0: since, t1: t, u0, u1: *u, hold: self.start.hold };
                 self.predict(&interval).map_err(|divergence| (none, divergence))?;
-                Outcome::Corrected
+                UpdateOutcome::Corrected
             }
             (Beat::Jump { found }, _) => {
                 let mut variances = M::State::array_from_fn(|_| 0.0);
@@ -183,9 +183,9 @@ impl<M: Model, const N: usize, I: Integrator> Ekf<M, N, I> {
                     *variance = known.prior.map_or(0.0, |prior| prior.std * prior.std);
                 }
                 self.covariance.renew(variances.as_ref());
-                Outcome::Restarted { expected: self.clock.ts, found }
+                UpdateOutcome::Restarted { expected: self.clock.ts, found }
             }
-            _ => Outcome::Started,
+            _ => UpdateOutcome::Started,
         };
 
         let u = M::Input::map(*u, Dual::from);
@@ -198,7 +198,7 @@ impl<M: Model, const N: usize, I: Integrator> Ekf<M, N, I> {
         for i in 0..M::Output::LEN {
             let (y, Dual { value, slopes }) = (y.as_ref()[i], y_hat.as_ref()[i]);
             if !y.is_finite() {
-                outcome = Outcome::Missing { signal: M::Output::NAMES[i] };
+                outcome = UpdateOutcome::Missing { signal: M::Output::NAMES[i] };
                 continue;
             }
             let mut e = y - value;

@@ -8,9 +8,9 @@
 mod law;
 mod stability;
 
-pub use law::{Gradient, Law, Moment, Rate};
+pub use law::{AdaptationLaw, Gradient, Moment, Rate};
 
-use super::{Beat, Clock, Divergence, Guard, ObserverError, Outcome, Update, Watch};
+use super::{Beat, Clock, Divergence, Guard, ObserverError, Update, UpdateOutcome, Watch};
 use super::{check_identity, check_starts, in_bounds, not_finite};
 use crate::integrate::{Automatic, ModelSystem};
 use crate::interval::{Hold, Interval};
@@ -102,7 +102,7 @@ pub struct Mras<M: Model, L> {
     stopped: Option<Divergence>,
 }
 
-impl<M: Model, L: Law<M>> Mras<M, L> {
+impl<M: Model, L: AdaptationLaw<M>> Mras<M, L> {
     /// An observer for samples `ts` seconds apart; its states start from the first measured ones.
     ///
     /// # Errors
@@ -146,26 +146,26 @@ impl<M: Model, L: Law<M>> Mras<M, L> {
     pub fn update(&mut self, t: f64, u: &Of<M::Input, f64>, measured: &Of<M::State, f64>) -> Update<Of<M::State, f64>> {
         let none = M::State::splat(0.0);
         if let Some(divergence) = self.stopped {
-            return Update { innovation: none, outcome: Outcome::Diverged(divergence) };
+            return Update { innovation: none, outcome: UpdateOutcome::Diverged(divergence) };
         }
         if let Some(signal) = not_finite::<M::Input>(u).or(if t.is_finite() { None } else { Some("t") }) {
-            return Update { innovation: none, outcome: Outcome::Missing { signal } };
+            return Update { innovation: none, outcome: UpdateOutcome::Missing { signal } };
         }
         let missing = not_finite::<M::State>(measured);
         let last = self.clock.last;
         let mut outcome = match (self.clock.beat(t), missing) {
-            (Beat::Regular, None) => Outcome::Corrected,
-            (Beat::Regular, Some(signal)) => Outcome::Missing { signal },
+            (Beat::Regular, None) => UpdateOutcome::Corrected,
+            (Beat::Regular, Some(signal)) => UpdateOutcome::Missing { signal },
             // Without a state to start from, the next sample must try again.
             (_, Some(signal)) => {
                 self.clock.last = last;
-                return Update { innovation: none, outcome: Outcome::Missing { signal } };
+                return Update { innovation: none, outcome: UpdateOutcome::Missing { signal } };
             }
             (beat, None) => {
                 self.x = *measured;
                 match beat {
-                    Beat::Jump { found } => Outcome::Restarted { expected: self.clock.ts, found },
-                    _ => Outcome::Started,
+                    Beat::Jump { found } => UpdateOutcome::Restarted { expected: self.clock.ts, found },
+                    _ => UpdateOutcome::Started,
                 }
             }
         };
@@ -178,13 +178,13 @@ impl<M: Model, L: Law<M>> Mras<M, L> {
         };
         match self.step(t, u, innovation) {
             Ok(held) => {
-                if let (Outcome::Corrected, Some(held)) = (outcome, held) {
+                if let (UpdateOutcome::Corrected, Some(held)) = (outcome, held) {
                     outcome = held;
                 }
             }
             Err(divergence) => {
                 self.stopped = Some(divergence);
-                outcome = Outcome::Diverged(divergence);
+                outcome = UpdateOutcome::Diverged(divergence);
             }
         }
         Update { innovation, outcome }
@@ -192,7 +192,12 @@ impl<M: Model, L: Law<M>> Mras<M, L> {
 
     /// Corrects and predicts; says which parameter was held.
     #[inline(always)]
-    fn step(&mut self, t: f64, u: &Of<M::Input, f64>, e: Of<M::State, f64>) -> Result<Option<Outcome>, Divergence> {
+    fn step(
+        &mut self,
+        t: f64,
+        u: &Of<M::Input, f64>,
+        e: Of<M::State, f64>,
+    ) -> Result<Option<UpdateOutcome>, Divergence> {
         let ts = self.clock.ts;
         let rates = self.law.rates(&Moment { model: &self.model, ts, t, x: &self.x, e: &e, u, p: &self.p });
         let (rates, p) = (M::Parameters::into_array(rates), M::Parameters::into_array(self.p));
@@ -205,7 +210,7 @@ impl<M: Model, L: Law<M>> Mras<M, L> {
                 Rate::Adapt(rate) => p + rate * ts,
                 Rate::Hold { quantity, value, limit } => {
                     let parameter = M::Parameters::NAMES[i];
-                    held.get_or_insert(Outcome::Held { parameter, quantity, value, limit });
+                    held.get_or_insert(UpdateOutcome::Held { parameter, quantity, value, limit });
                     p
                 }
             }

@@ -1,7 +1,8 @@
 //! Recursive least squares in factored form (Bierman 1977), with forgetting that cannot wind up.
 
 use super::{
-    Divergence, ObserverError, Outcome, UdFactors, Update, check_identity, check_positive, check_starts, in_bounds,
+    Divergence, ObserverError, UdFactors, Update, UpdateOutcome, check_identity, check_positive, check_starts,
+    in_bounds,
 };
 use crate::parameter::Parameter;
 use crate::signals::{Of, Signals};
@@ -116,14 +117,14 @@ impl<P: Signals, const N: usize> Rls<P, N> {
     pub fn update<const R: usize>(&mut self, equations: &[(Of<P, f64>, f64); R]) -> Update<[f64; R]> {
         let mut innovation = [0.0; R];
         if let Some(divergence) = self.stopped {
-            return Update { innovation, outcome: Outcome::Diverged(divergence) };
+            return Update { innovation, outcome: UpdateOutcome::Diverged(divergence) };
         }
         let before = (self.p, self.covariance);
         let mut p = [0.0; N];
         p.copy_from_slice(P::into_array(self.p).as_ref());
         let start = p;
         self.covariance.scale(self.forgetting.growth(&self.covariance));
-        let mut outcome = Outcome::Corrected;
+        let mut outcome = UpdateOutcome::Corrected;
         for ((regressor, y), innovation) in equations.iter().zip(&mut innovation) {
             let mut h = [0.0; N];
             h.copy_from_slice(P::into_array(*regressor).as_ref());
@@ -133,7 +134,7 @@ impl<P: Signals, const N: usize> Rls<P, N> {
                 now -= h[i] * p[i];
             }
             if !prior.is_finite() {
-                outcome = Outcome::Missing { signal: super::not_finite::<P>(regressor).unwrap_or("y") };
+                outcome = UpdateOutcome::Missing { signal: super::not_finite::<P>(regressor).unwrap_or("y") };
                 continue;
             }
             *innovation = prior;
@@ -146,7 +147,7 @@ impl<P: Signals, const N: usize> Rls<P, N> {
         if let Err(divergence) = in_bounds::<P>(&self.p, &self.known) {
             (self.p, self.covariance) = before;
             self.stopped = Some(divergence);
-            outcome = Outcome::Diverged(divergence);
+            outcome = UpdateOutcome::Diverged(divergence);
         }
         Update { innovation, outcome }
     }

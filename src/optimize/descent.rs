@@ -33,15 +33,15 @@ pub(super) struct Descent {
     fall: f64,
     longest: Longest,
     /// Trials in a row that were rejected where the cost resolves nothing.
-    blind: u32,
+    undecided: u32,
     /// Trials since the cost last resolved one.
     unresolved: u32,
     /// Trials in a row that could not be evaluated.
     pub failed: u64,
-    /// How far, as a part of the cost, the last rejected trials were off what the slopes promised.
+    /// How far, as a part of the cost, the last rejected trials were off the predicted decrease.
     #[serde(with = "crate::real")]
     pub noise: f64,
-    /// Rejected trials in a row that kept their promise no better than the longer ones before, and the last one's mismatch.
+    /// Rejected trials in a row whose gain was no nearer to the predicted one than that of the longer ones before, and the last one's difference.
     #[serde(with = "crate::real")]
     rough: (u32, f64),
     /// Trials so far.
@@ -61,26 +61,26 @@ pub(super) struct Trial {
     /// The diagonal by which it was damped, and its length in the metric of the scales.
     pub damping: Vec<f64>,
     pub length: f64,
-    promised: f64,
+    predicted: f64,
     resolved: bool,
 }
 
 const FALL: f64 = 0.1;
-/// A step that gains so much of what was promised is a good one.
+/// A step that gains so much of the predicted decrease is a good one.
 const GOOD: f64 = 0.9;
 const ACCEPT: f64 = 1e-4;
 /// The next step after one that was rejected.
 const SHORTER: f64 = 0.25;
-/// Five trials are enough where the cost has no digits left.
-const BLIND: u32 = 5;
-/// And so many where the slopes still lead on: enough to win ten digits at half the distance a step.
+/// Five trials are enough where the differences of cost are rounding.
+const UNDECIDED: u32 = 5;
+/// So many where the slopes still predict a decrease: enough for ten digits if each step halves the distance.
 const UNRESOLVED: u32 = 60;
-/// A step of a quarter of the length keeps its promise four times as well where the cost is smooth; if less than this part
-/// better, so many times in a row, it is not.
+/// Where the cost is smooth, the relative error of the predicted decrease falls to a quarter with a step of a quarter of the
+/// length. The cost is called rough when that error stays above this part of the one before, so many times in a row.
 const SMOOTH: f64 = 0.7;
 const ROUGH: u32 = 8;
 const COST_ROUNDING: f64 = 1e-10;
-/// So many trials creep that together neither lower the cost by this part
+/// The search is called creeping when so many trials together neither lower the cost by this part
 const CREEPING: u64 = 300;
 const CREEPING_FALL: f64 = 0.01;
 /// nor leave the next full step no more than this part of what it would have gained before.
@@ -95,7 +95,7 @@ impl Descent {
             lambda: 0.0,
             fall: FALL,
             longest: Longest::First,
-            blind: 0,
+            undecided: 0,
             unresolved: 0,
             failed: 0,
             noise: 0.0,
@@ -122,15 +122,15 @@ impl Descent {
         };
         let (lambda, step) = limited(point, scales, self.lambda, longest)?;
         self.lambda = lambda;
-        let (x, promised) = (point.towards(&step), point.linear.predicted_reduction(&step));
-        let resolved = promised > point.resolution();
+        let (x, predicted) = (point.towards(&step), point.linear.predicted_reduction(&step));
+        let resolved = predicted > point.resolution();
         let damping = damping(scales, lambda);
         let length = length(scales, &step);
-        let spent = self.is_rough() || self.blind >= BLIND || self.unresolved >= UNRESOLVED && !resolved;
-        (x != point.x && !spent).then_some(Trial { x, step, damping, length, promised, resolved })
+        let spent = self.is_rough() || self.undecided >= UNDECIDED || self.unresolved >= UNRESOLVED && !resolved;
+        (x != point.x && !spent).then_some(Trial { x, step, damping, length, predicted, resolved })
     }
 
-    /// Whether slopes are not those of the cost: however short the steps, they do not keep what slopes promise.
+    /// Whether slopes are not those of the cost: however short the steps, they do not gain what slopes predict.
     pub fn is_rough(&self) -> bool {
         self.rough.0 >= ROUGH
     }
@@ -156,8 +156,8 @@ impl Descent {
         let cost = point.cost();
         let gain = match next {
             None => f64::NEG_INFINITY,
-            Some(next) if trial.resolved => (cost - next.cost()) / trial.promised,
-            Some(next) => self.blind_gain(point, trial, next),
+            Some(next) if trial.resolved => (cost - next.cost()) / trial.predicted,
+            Some(next) => self.gain_by_slope(point, trial, next),
         };
         if gain <= ACCEPT {
             self.reject(trial, gain, point.cost_size(), next.is_none());
@@ -165,7 +165,7 @@ impl Descent {
         }
         let next_cost = next.map_or(cost, Point::cost);
         self.slow = if trial.resolved && cost - next_cost < SLOW.1 * point.cost_size() { self.slow + 1 } else { 0 };
-        (self.blind, self.failed, self.noise, self.longest) = (0, 0, 0.0, Longest::Later);
+        (self.undecided, self.failed, self.noise, self.longest) = (0, 0, 0.0, Longest::Later);
         if trial.resolved {
             self.rough = (0, f64::MAX);
         }
@@ -174,7 +174,7 @@ impl Descent {
             self.lambda *= self.fall;
             self.fall *= FALL;
         } else {
-            // Nielsen (1999): smooth between no change at half the promised gain and a tenth at the full one.
+            // Nielsen (1999): smooth between no change at half the predicted gain and a tenth at the full one.
             self.lambda *= (1.0 - (2.0 * gain - 1.0).powi(3)).clamp(FALL, 2.0);
             self.fall = FALL;
         }
@@ -182,11 +182,11 @@ impl Descent {
     }
 
     fn reject(&mut self, trial: &Trial, gain: f64, cost: f64, failed: bool) {
-        self.blind += u32::from(!trial.resolved);
+        self.undecided += u32::from(!trial.resolved);
         self.failed = if failed { self.failed + 1 } else { 0 };
         if trial.resolved && !failed {
             // Of a smooth cost this falls with the length of the step; what stays is noise.
-            self.noise = ((1.0 - gain).abs() * trial.promised / cost).max(0.125 * self.noise);
+            self.noise = ((1.0 - gain).abs() * trial.predicted / cost).max(0.125 * self.noise);
             let falls = 1.0 - gain < SMOOTH * self.rough.1;
             self.rough = (if falls { 0 } else { self.rough.0 + 1 }, 1.0 - gain);
         }
@@ -194,10 +194,10 @@ impl Descent {
         self.fall = FALL;
     }
 
-    /// Where the cost decides nothing, the slope along the step does: in the metric of the damped step the gradient of a
-    /// convergent iteration shrinks steadily.
-    fn blind_gain(&self, point: &Point, trial: &Trial, next: &Point) -> f64 {
-        let again = next.linear.step_within(&trial.damping, &next.held, &next.room);
+    /// The gain of a step whose change of cost is rounding, by the slopes along it: in the metric of the damped step the
+    /// gradient of a convergent iteration shrinks at every step.
+    fn gain_by_slope(&self, point: &Point, trial: &Trial, next: &Point) -> f64 {
+        let again = next.linear.step_within(&trial.damping, &next.held, &next.limits);
         let part = again.map_or(f64::INFINITY, |again| next.slope(&again) / point.slope(&trial.step));
         let rounding = COST_ROUNDING.max(point.linear.roughness());
         match part {
@@ -223,7 +223,7 @@ fn limited(point: &Point, scales: &[f64], lambda: f64, longest: f64) -> Option<(
     const NEAR: f64 = 0.1;
     const TRIALS: u32 = 20;
     let at = |lambda: f64| {
-        let step = point.linear.step_within(&damping(scales, lambda), &point.held, &point.room)?;
+        let step = point.linear.step_within(&damping(scales, lambda), &point.held, &point.limits)?;
         Some((length(scales, &step), step))
     };
     let first = at(lambda);

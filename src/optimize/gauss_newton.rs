@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// The method of Gauss and Newton with a backtracking line search (Nocedal and Wright, *Numerical Optimization*, 2006,
 /// sections 3.1 and 10.3), in bounds.
 ///
-/// Each step is the minimizer of the linearized sum of squares, halved until the cost falls by a part of what was promised
+/// Each step is the minimizer of the linearized sum of squares, halved until the cost falls by a part of the predicted decrease
 /// (Armijo). Fast near a well-determined minimum; [`LevenbergMarquardt`](super::LevenbergMarquardt) is the safer choice
 /// elsewhere. Directions that the data do not determine are damped by 1e-8. Bounds are part of the linearized minimization.
 ///
@@ -49,16 +49,16 @@ struct Line {
     trial: Vec<f64>,
     halvings: u32,
     /// Trials that the cost could not resolve.
-    blind: u32,
+    unresolved: u32,
     failed: u64,
-    /// How far, as a part of the cost, the trials were off what the slopes promised.
+    /// How far, as a part of the cost, the trials were off the predicted decrease.
     noise: f64,
 }
 
 const SUFFICIENT: f64 = 1e-4;
 const HALVINGS: u32 = 60;
-/// Fewer are enough where the cost has no digits left.
-const BLIND: u32 = 10;
+/// Fewer are enough where the differences of cost are rounding.
+const UNRESOLVED: u32 = 10;
 /// A step that shrinks a column of the Jacobian to less than this part went too far.
 const LOST: f64 = 1e-10;
 
@@ -93,8 +93,8 @@ impl GaussNewton {
     fn shorten(&mut self, point: Point) {
         let line = &mut self.line;
         line.trial = point.towards(&line.step);
-        line.blind += u32::from(-point.slope(&line.step) <= point.resolution());
-        if line.trial == point.x || line.blind > BLIND || line.halvings > HALVINGS {
+        line.unresolved += u32::from(-point.slope(&line.step) <= point.resolution());
+        if line.trial == point.x || line.unresolved > UNRESOLVED || line.halvings > HALVINGS {
             let outcome = point.stuck(line.failed, line.noise, false);
             return self.end(point, outcome);
         }
@@ -115,7 +115,7 @@ impl GaussNewton {
             false => decrease > 0.0 && decrease >= -SUFFICIENT * slope,
         };
         self.line.noise = ((decrease + slope).abs() / point.cost_size()).max(0.125 * self.line.noise);
-        // A plateau, that no slope leads back from.
+        // A plateau, where slopes are zero.
         let lost = point.norms.iter().zip(&next.norms).any(|(before, after)| *after < LOST * before);
         enough && !lost
     }
@@ -193,30 +193,6 @@ impl Machine for GaussNewton {
     }
 }
 
-impl<O: LeastSquares> Solver<O, LeastSquaresState> for GaussNewton {
-    fn name(&self) -> &str {
-        "Gauss-Newton"
-    }
-
-    fn init(
-        &mut self,
-        problem: &mut Problem<O>,
-        state: LeastSquaresState,
-    ) -> Result<(LeastSquaresState, Option<KV>), Error> {
-        machine::init(self, problem, state)
-    }
-
-    fn next_iter(
-        &mut self,
-        problem: &mut Problem<O>,
-        state: LeastSquaresState,
-    ) -> Result<(LeastSquaresState, Option<KV>), Error> {
-        let state = machine::next_iter(self, problem, state)?;
-        let cosine = self.point.as_ref().map_or(0.0, Point::cosine);
-        Ok((state, Some(argmin::kv!("gradient" => cosine;))))
-    }
-
-    fn terminate(&mut self, _state: &LeastSquaresState) -> TerminationStatus {
-        machine::termination(self)
-    }
-}
+machine::solver!([] GaussNewton, "Gauss-Newton", |search| {
+    argmin::kv!("gradient" => search.point.as_ref().map_or(0.0, Point::cosine);)
+});

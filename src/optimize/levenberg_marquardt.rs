@@ -1,6 +1,6 @@
 //! [`LevenbergMarquardt`]: damped Gauss-Newton steps.
 
-mod look;
+mod exploration;
 mod solver;
 
 use super::descent::{Descent, Reach, Trial, length};
@@ -8,7 +8,7 @@ use super::machine::{Domain, Machine, Request};
 use super::point::Point;
 use super::{Infeasible, Linearization, Outcome, Stop};
 use crate::scaling::{OwnSize, Scaling, Seen};
-use look::Look;
+use exploration::Exploration;
 use serde::{Deserialize, Serialize};
 
 /// The method of Levenberg (1944) and Marquardt (1963), in bounds, with steps measured by the unknowns' own sizes.
@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 /// Each trial is the minimizer of the linearized sum of squares plus `lambda |D step|^2`, computed from the triangle; the
 /// trial brings its slopes along. `D` is the [`Scaling`]. `lambda` is the least, not below the last one, with which the step
 /// is no longer than allowed: a tenth of the unknowns' sizes at first, their sizes later, a quarter of the last step after
-/// one that gained nothing (found as by More 1978). After a step that kept its promise `lambda` falls, ever faster; after one
+/// one that gained nothing (found as by More 1978). After a step that gained what was predicted `lambda` falls, ever faster; after one
 /// that half did it stays (Nielsen 1999). Bounds are part of the minimization: an unknown that would cross one is put on it,
 /// and the others are minimized again. Where the cost can no longer resolve a step, the slope along the step decides
 /// instead. The undamped step decides when to stop, so that heavy damping never looks like a minimum.
@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 /// # let model = Surface::new(4)?;
 /// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
 /// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
-/// use greybox::{OwnSize, optimize::{LevenbergMarquardt, Stop}};
+/// use greybox::optimize::{LevenbergMarquardt, Stop, OwnSize};
 /// let quick = LevenbergMarquardt::new(Stop { iterations: 200, ..Stop::default() }, OwnSize);
 /// let estimate = Fit::new(&model, &record).parameters(start).optimizer(quick).run()?;
 /// assert!(estimate.outcome.converged() && estimate.iterations < 20);
@@ -92,9 +92,9 @@ enum Stage {
     /// Those at a trial point.
     Step(Trial),
     /// The second derivative along a step.
-    Bend(Trial),
+    Accelerate(Trial),
     /// Those at points around the start or the end, where slopes show nothing.
-    Look(Look),
+    Explore(Exploration),
     /// Those where the first try ended, which was the better one.
     Return,
 }
@@ -105,8 +105,9 @@ const SECOND: Reach = Reach { first: 30.0, later: 30.0 };
 const FIRST_TRIALS: u64 = 2500;
 /// So often a search goes on that found a lower cost beside its end.
 const LEAPS: u64 = 5;
-/// A step is bent where twice the bend is no longer than this part of it (Transtrum and Sethna 2012).
-const BEND: f64 = 0.75;
+/// Half the geodesic acceleration is added to a step where twice the acceleration's length is at most this part of the step's
+/// (Transtrum and Sethna 2012).
+const ACCELERATION: f64 = 0.75;
 
 impl<S: Scaling> LevenbergMarquardt<S> {
     /// A search with this rule to stop and this scaling.
@@ -150,7 +151,7 @@ impl<S: Scaling> LevenbergMarquardt<S> {
             None => self.descent.propose(&point, &self.scales(), &self.seen),
         };
         match trial {
-            Some(trial) if self.curved && self.descent.is_slow(&trial) => self.stage = Stage::Bend(trial),
+            Some(trial) if self.curved && self.descent.is_slow(&trial) => self.stage = Stage::Accelerate(trial),
             Some(trial) => self.stage = Stage::Step(trial),
             None => {
                 let outcome = ended
@@ -186,17 +187,17 @@ impl<S: Scaling> LevenbergMarquardt<S> {
 
     /// Ends here like this, unless there is something that slopes do not show.
     fn end(&mut self, point: Point, outcome: Outcome) {
-        let mut look = Look::before_end(&point, outcome, &self.seen, self.unseen);
+        let mut exploration = Exploration::before_end(&point, outcome, &self.seen, self.unseen);
         if self.leaps >= LEAPS {
-            look.stop();
+            exploration.stop();
         }
-        self.go_look(point, look);
+        self.explore(point, exploration);
     }
 
-    fn go_look(&mut self, point: Point, look: Look) {
-        match look.next() {
-            None => self.end_look(point, &look),
-            Some(_) => (self.stage, self.point) = (Stage::Look(look), Some(point)),
+    fn explore(&mut self, point: Point, exploration: Exploration) {
+        match exploration.next() {
+            None => self.end_exploration(point, &exploration),
+            Some(_) => (self.stage, self.point) = (Stage::Explore(exploration), Some(point)),
         }
     }
 
@@ -249,8 +250,8 @@ impl<S: Scaling> LevenbergMarquardt<S> {
                 }
                 (self.steps, self.unseen) = (0, usize::MAX);
                 self.take(&point);
-                let look = Look::at_start(&point, &self.seen);
-                self.go_look(point, look);
+                let exploration = Exploration::at_start(&point, &self.seen);
+                self.explore(point, exploration);
             }
         }
     }
@@ -267,32 +268,32 @@ impl<S: Scaling> LevenbergMarquardt<S> {
         }
     }
 
-    /// Goes to a point that was looked at if the cost is lower there.
-    fn judge_look(&mut self, point: Point, mut look: Look, next: Option<Point>) {
-        match next.filter(|next| look.is_lower(&point, next)) {
+    /// Continues from an explored point if the cost is lower there.
+    fn judge_explored(&mut self, point: Point, mut exploration: Exploration, next: Option<Point>) {
+        match next.filter(|next| exploration.is_lower(&point, next)) {
             Some(next) => {
                 self.leaps += 1;
                 self.take(&next);
                 self.go_on(next);
             }
-            None => self.go_look(point, look),
+            None => self.explore(point, exploration),
         }
     }
 
-    /// Ends a try after a look around, or goes on with it.
-    fn end_look(&mut self, point: Point, look: &Look) {
-        match look.outcome(&point, self.leaps >= LEAPS) {
+    /// Ends a try after its exploration, or continues it.
+    fn end_exploration(&mut self, point: Point, exploration: &Exploration) {
+        match exploration.outcome(&point, self.leaps >= LEAPS) {
             None => self.go_on(point),
             Some(outcome) => self.end_try(point, outcome),
         }
     }
 
-    /// Bends a step by half the geodesic acceleration, unless that is too long to be trusted.
-    fn bend(&self, trial: &mut Trial, second: &Linearization) {
+    /// Adds half the geodesic acceleration to a step, unless it is too long to be trusted.
+    fn accelerate(&self, trial: &mut Trial, second: &Linearization) {
         let Some(point) = &self.point else { return };
-        let Some(bend) = second.step(&trial.damping, &point.held) else { return };
-        if length(&self.scales(), &bend) <= BEND * trial.length {
-            let step: Vec<f64> = trial.step.iter().zip(&bend).map(|(step, bend)| step + 0.5 * bend).collect();
+        let Some(acceleration) = second.step(&trial.damping, &point.held) else { return };
+        if length(&self.scales(), &acceleration) <= ACCELERATION * trial.length {
+            let step: Vec<f64> = trial.step.iter().zip(&acceleration).map(|(step, a)| step + 0.5 * a).collect();
             trial.x = point.towards(&step);
         }
     }
@@ -310,9 +311,9 @@ impl<S: Scaling> LevenbergMarquardt<S> {
     fn take(&mut self, point: &Point) {
         self.seen.add(&point.x, &point.norms);
         self.x.clone_from(&point.x);
-        // Rank is looked at ever more seldom: a decomposition at each step would be dear with many unknowns.
+        // Rank is determined at ever longer intervals: a decomposition at each step would cost too much with many unknowns.
         if self.steps == 0 || self.steps.is_power_of_two() {
-            self.unseen = self.unseen.min(point.blind().len());
+            self.unseen = self.unseen.min(point.without_influence().len());
         }
         self.steps += 1;
     }
@@ -333,8 +334,8 @@ impl<S: Scaling> Machine for LevenbergMarquardt<S> {
             (_, Some(outcome)) => Request::Ended(outcome),
             (Stage::Resume | Stage::Start | Stage::Return, None) => Request::Linearize(&self.x),
             (Stage::Step(trial), None) => Request::Linearize(&trial.x),
-            (Stage::Look(look), None) => Request::Linearize(look.next().unwrap_or(&self.x)),
-            (Stage::Bend(trial), None) => Request::Curvature { x: &self.x, along: &trial.step },
+            (Stage::Explore(exploration), None) => Request::Linearize(exploration.next().unwrap_or(&self.x)),
+            (Stage::Accelerate(trial), None) => Request::Curvature { x: &self.x, along: &trial.step },
         }
     }
 
@@ -350,11 +351,11 @@ impl<S: Scaling> Machine for LevenbergMarquardt<S> {
                 let next = told.and_then(|linear| Point::new(trial.x.clone(), linear, &self.domain));
                 self.judge_trial(point, &trial, next);
             }
-            (Stage::Look(mut look), Some(point), first) => {
+            (Stage::Explore(mut exploration), Some(point), first) => {
                 self.first = first;
-                let x = look.take();
+                let x = exploration.take();
                 let next = told.and_then(|linear| Point::new(x, linear, &self.domain));
-                self.judge_look(point, look, next);
+                self.judge_explored(point, exploration, next);
             }
             (stage, _, first) => {
                 let point = told.and_then(|linear| Point::new(self.x.clone(), linear, &self.domain));
@@ -364,12 +365,12 @@ impl<S: Scaling> Machine for LevenbergMarquardt<S> {
     }
 
     fn tell_curvature(&mut self, answer: Option<Result<Linearization, Infeasible>>) {
-        let Stage::Bend(mut trial) = std::mem::take(&mut self.stage) else { return };
+        let Stage::Accelerate(mut trial) = std::mem::take(&mut self.stage) else { return };
         match answer {
             None => self.curved = false,
             Some(Err(Infeasible::Cancelled)) => return self.cancel(),
             Some(Err(Infeasible::Failed(_))) => {}
-            Some(Ok(second)) => self.bend(&mut trial, &second),
+            Some(Ok(second)) => self.accelerate(&mut trial, &second),
         }
         self.stage = Stage::Step(trial);
     }

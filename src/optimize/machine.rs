@@ -54,7 +54,7 @@ impl Domain {
 /// }
 /// ```
 ///
-/// What is serialized of a search is its place and memory, not the slopes there: after [`resume`](Machine::resume) it asks
+/// A search is serialized with its point and its settings, without the slopes there: after [`resume`](Machine::resume) it asks
 /// for them again, and goes on as if it had not been interrupted.
 pub trait Machine {
     /// Begins anew at a point.
@@ -155,3 +155,38 @@ pub(super) fn termination(search: &impl Machine) -> TerminationStatus {
         Some(outcome) => TerminationReason::SolverExit(outcome.to_string()),
     })
 }
+
+/// Makes a [`Machine`] one of argmin's solvers: `[type parameters] search, name, |search| numbers`, the last those that
+/// argmin's observers see after each step.
+macro_rules! solver {
+    ([$($parameters:tt)*] $search:ty, $name:literal, |$this:ident| $numbers:expr) => {
+        impl<O: LeastSquares, $($parameters)*> Solver<O, LeastSquaresState> for $search {
+            fn name(&self) -> &str {
+                $name
+            }
+
+            fn init(
+                &mut self,
+                problem: &mut Problem<O>,
+                state: LeastSquaresState,
+            ) -> Result<(LeastSquaresState, Option<KV>), Error> {
+                machine::init(self, problem, state)
+            }
+
+            fn next_iter(
+                &mut self,
+                problem: &mut Problem<O>,
+                state: LeastSquaresState,
+            ) -> Result<(LeastSquaresState, Option<KV>), Error> {
+                let state = machine::next_iter(self, problem, state)?;
+                let $this = &*self;
+                Ok((state, Some($numbers)))
+            }
+
+            fn terminate(&mut self, _state: &LeastSquaresState) -> TerminationStatus {
+                machine::termination(self)
+            }
+        }
+    };
+}
+pub(super) use solver;

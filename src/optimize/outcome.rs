@@ -35,7 +35,7 @@ pub enum Outcome {
     /// Nothing was left to explain: the model reproduces the data to their rounding.
     Exact,
     /// No step lowers the cost, which is rough: what the next step would gain is below what the cost jumps from point to
-    /// point (of an adaptive integrator: changes with a finer tolerance), or steps do not keep what slopes promise, however
+    /// point (of an adaptive integrator: changes with a finer tolerance), or steps do not gain what slopes predict, however
     /// short.
     Rough {
         /// By how much the cost jumps, as a part of it.
@@ -64,7 +64,7 @@ pub enum Outcome {
         #[serde(with = "crate::real")]
         gradient: f64,
     },
-    /// Many steps in a row lowered the cost by next to nothing, where slopes promise more.
+    /// Many steps in a row lowered the cost by next to nothing, where slopes predict more.
     Creeping {
         /// How many.
         trials: u64,
@@ -87,7 +87,7 @@ pub enum Outcome {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
-    /// Nothing speaks against it.
+    /// No check contradicts it.
     Usable,
     /// Read the warnings first.
     UsableWithCare,
@@ -145,7 +145,7 @@ impl Outcome {
                 "Look for parameters that only appear together, and fix one of them or give it a prior; or start closer."
             }
             Outcome::IterationLimit { .. } => {
-                "Allow more iterations, or start closer; if it creeps, look for parameters that only appear together."
+                "Allow more iterations, or start closer; if the cost hardly falls any more, look for parameters that only appear together."
             }
             Outcome::TimeLimit => "Allow more time, or resume from the checkpoint.",
             Outcome::Cancelled => "Resume from the checkpoint to go on.",
@@ -190,7 +190,7 @@ impl fmt::Display for Outcome {
             ),
             Outcome::Creeping { trials, promised } => write!(
                 f,
-                "not converged: {trials} steps hardly lowered the cost, of which the slopes promise {:.1} %",
+                "not converged: {trials} steps hardly lowered the cost, of which the slopes predict {:.1} %",
                 100.0 * promised
             ),
             Outcome::IterationLimit { iterations } => write!(f, "not converged after {iterations} iterations"),

@@ -16,7 +16,7 @@ pub(super) struct Point {
     pub norms: Vec<f64>,
     pub held: Vec<bool>,
     /// How far each unknown may move, down and up.
-    pub room: Vec<(f64, f64)>,
+    pub limits: Vec<(f64, f64)>,
     bounds: Vec<(f64, f64)>,
     /// The step without damping, but for directions that the data do not determine.
     pub full: Option<Vec<f64>>,
@@ -34,7 +34,7 @@ const ROUNDINGS: f64 = 10.0;
 /// are damped.
 const RANK: f64 = 1e-10;
 
-/// How far away it is looked along a direction without influence, as a part of the unknowns' sizes.
+/// The distance explored along a direction without influence, as a part of the unknowns' sizes.
 const BESIDE: f64 = 1e-2;
 /// How far inside its bound an unknown without slopes is tried, as a part of its size.
 const INSIDE: f64 = 1e-3;
@@ -48,14 +48,14 @@ impl Point {
         }
         let mut bounds = domain.bounds.clone();
         bounds.resize(x.len(), (f64::NEG_INFINITY, f64::INFINITY));
-        let room: Vec<(f64, f64)> = bounds.iter().zip(&x).map(|(bound, x)| (bound.0 - x, bound.1 - x)).collect();
+        let limits: Vec<(f64, f64)> = bounds.iter().zip(&x).map(|(bound, x)| (bound.0 - x, bound.1 - x)).collect();
         // Held: what has no influence, and what sits on a bound that it would cross.
-        let on_bound = |i: usize| room[i].0 >= 0.0 && gradient[i] >= 0.0 || room[i].1 <= 0.0 && gradient[i] <= 0.0;
+        let on_bound = |i: usize| limits[i].0 >= 0.0 && gradient[i] >= 0.0 || limits[i].1 <= 0.0 && gradient[i] <= 0.0;
         let held: Vec<bool> = (0..x.len()).map(|i| norms[i] == 0.0 || on_bound(i)).collect();
         let damping: Vec<f64> = norms.iter().map(|norm| RANK * norm).collect();
-        let full = linear.step_within(&damping, &held, &room);
+        let full = linear.step_within(&damping, &held, &limits);
         let potential = full.as_ref().map_or(f64::INFINITY, |step| linear.predicted_reduction(step));
-        Some(Point { x, linear, gradient, norms, held, room, bounds, full, potential })
+        Some(Point { x, linear, gradient, norms, held, limits, bounds, full, potential })
     }
 
     pub fn cost(&self) -> f64 {
@@ -93,10 +93,10 @@ impl Point {
         self.gradient.iter().zip(step).map(|(g, d)| g * d).sum()
     }
 
-    /// `x + step`, exactly on the bound where the step uses up the room.
+    /// `x + step`, exactly on the bound where the step reaches its limit.
     pub fn towards(&self, step: &[f64]) -> Vec<f64> {
         let along = |i: usize| {
-            let ((down, up), (lower, upper)) = (self.room[i], self.bounds[i]);
+            let ((down, up), (lower, upper)) = (self.limits[i], self.bounds[i]);
             match step[i] {
                 step if step <= down => lower,
                 step if step >= up => upper,
@@ -113,8 +113,8 @@ impl Point {
     }
 
     /// The directions, of unknowns that are not on a bound, that have no influence.
-    pub fn blind(&self) -> Vec<Vec<f64>> {
-        let on_bound: Vec<bool> = self.room.iter().map(|(down, up)| *down >= 0.0 || *up <= 0.0).collect();
+    pub fn without_influence(&self) -> Vec<Vec<f64>> {
+        let on_bound: Vec<bool> = self.limits.iter().map(|(down, up)| *down >= 0.0 || *up <= 0.0).collect();
         let direction = |entries: Vec<(usize, f64)>| {
             let mut direction = vec![0.0; self.x.len()];
             for (i, entry) in entries {
@@ -136,9 +136,9 @@ impl Point {
     /// Points with an unknown inside that sits on its bound without slopes, one for each such unknown: slopes that are infinite
     /// at a bound are given as zeros.
     pub fn inside(&self, seen: &Seen) -> Vec<Vec<f64>> {
-        let free = |i: &usize| self.norms[*i] == 0.0 && (self.room[*i].0 < 0.0) != (self.room[*i].1 > 0.0);
+        let free = |i: &usize| self.norms[*i] == 0.0 && (self.limits[*i].0 < 0.0) != (self.limits[*i].1 > 0.0);
         let moved = |unknown: usize| {
-            let (down, up) = self.room[unknown];
+            let (down, up) = self.limits[unknown];
             let width = up.max(-down).min(1.0);
             let size = if seen.size(unknown) > 0.0 { seen.size(unknown).min(width) } else { width };
             let mut x = self.x.clone();
@@ -188,7 +188,7 @@ impl Point {
     }
 
     /// How a search ends here that no step leads away from. `noise` is how far, as a part of the cost, the last trials were
-    /// off what the slopes promised; `rough` says that they were off however short.
+    /// off what the slopes predicted; `rough` says that they were off however short.
     pub fn stuck(&self, failed: u64, noise: f64, rough: bool) -> Outcome {
         let (step, gradient) = (self.relative_step(), self.cosine());
         let noise = noise.max(self.linear.roughness()).max(self.rounding());

@@ -12,7 +12,7 @@
 
 use super::{Currents, SQRT_2_3};
 use crate::model::Model;
-use crate::online::{Law, Moment, Rate};
+use crate::online::{AdaptationLaw, Moment, Rate};
 use crate::signals::{Of, Signals, holds, place_of};
 use nalgebra::{Matrix2, Vector2};
 
@@ -200,7 +200,7 @@ crate::signals! {
     struct Speed { w: "rad/s" }
 }
 
-impl<M, R, K> Law<M> for MotorLaw<R, K>
+impl<M, R, K> AdaptationLaw<M> for MotorLaw<R, K>
 where
     M: Model<State = Currents>,
     R: Adaptation,

@@ -5,7 +5,7 @@ use super::control::{Command, CurrentControl};
 use super::machine::runge_kutta;
 use super::{Currents, Drive, Machine, MachineParameters, MachineState, SQRT_3_2, VoltageAndLoad, Winding};
 use crate::model::Model;
-use crate::online::{Law, Mras, Outcome};
+use crate::online::{AdaptationLaw, Mras, UpdateOutcome};
 
 /// Motor, current control and observer, sampled together.
 #[derive(Clone, Copy)]
@@ -34,13 +34,13 @@ pub struct Instant {
     /// The voltage from this sample to the next.
     pub command: Command,
     /// What the observer said of this sample.
-    pub outcome: Outcome,
+    pub outcome: UpdateOutcome,
 }
 
 impl<M, L> Adaptive<M, L>
 where
     M: Model<State = Currents, Input = Drive, Output = Currents, Parameters = Winding>,
-    L: Law<M>,
+    L: AdaptationLaw<M>,
 {
     /// Runs for `duration` (s) from rest and shows each sample to `see`.
     ///

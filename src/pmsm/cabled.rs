@@ -16,24 +16,15 @@ wraps_motor! {
     /// those of the motor `M` and of [`CableResistance`], by name.
     ///
     /// The data determine only the sum of both resistances: one of them is to be fixed, or known beforehand.
-    Cabled, M::Input
-}
-
-impl<M: MotorModel, P: Signals> Cabled<M, P> {
-    const RS: usize = place_of(M::Parameters::NAMES, "rs");
-
-    #[inline(always)]
-    fn through<S: Scalar>(
-        &self,
-        x: &Currents<S>,
-        u: &Of<M::Input, S>,
-        p: &Of<P, S>,
-        motor: impl FnOnce(&Currents<S>, &Of<M::Input, S>, &Of<M::Parameters, S>) -> Currents<S>,
-    ) -> Currents<S> {
+    Cabled, M::Input, |_wrapper, x, u, p, motor| {
         let mut winding = M::Parameters::into_array(P::part::<M::Parameters, S>(*p));
         winding.as_mut()[Self::RS] += P::part::<CableResistance, S>(*p).r_cable;
         motor(x, u, &M::Parameters::from_array(winding))
     }
+}
+
+impl<M: MotorModel, P: Signals> Cabled<M, P> {
+    const RS: usize = place_of(M::Parameters::NAMES, "rs");
 }
 
 impl<M: MotorModel, P: Signals> MotorModel for Cabled<M, P> {

@@ -59,18 +59,7 @@ wraps_motor! {
     /// [`InverterFed`](super::InverterFed) takes the simulated current instead: near zero current, where the sign decides,
     /// what the motor's harmonics do to the measured current then goes into the parameters (0.3 % of Ke at 15 rad/s on a
     /// small axis).
-    Compensated, CompensatedDrive
-}
-
-impl<M: MotorModel, P: Signals> Compensated<M, P> {
-    #[inline(always)]
-    fn through<S: Scalar>(
-        &self,
-        x: &Currents<S>,
-        u: &CompensatedDrive<S>,
-        p: &Of<P, S>,
-        motor: impl FnOnce(&Currents<S>, &Of<M::Input, S>, &Of<M::Parameters, S>) -> Currents<S>,
-    ) -> Currents<S> {
+    Compensated, CompensatedDrive, |_wrapper, x, u, p, motor| {
         let vdt = P::part::<DeadTimeSize, S>(*p).vdt;
         let u = CompensatedDrive { ud: u.ud - vdt * u.lost_d, uq: u.uq - vdt * u.lost_q, ..*u };
         motor(x, &CompensatedDrive::part::<M::Input, S>(u), &P::part::<M::Parameters, S>(*p))

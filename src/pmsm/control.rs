@@ -2,7 +2,7 @@
 //!
 //! They hold no heap and need no `std`: the same code may run in a drive.
 
-use super::{Currents, Error, PolePairs, SQRT_2_3};
+use super::{Currents, MotorError, PolePairs, SQRT_2_3};
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
@@ -56,20 +56,20 @@ pub struct Command {
     pub limited: bool,
 }
 
-/// Shortest time constant, in sample times, for which lambda tuning with one sample of computation delay and a held
-/// voltage does not overshoot at standstill.
-pub const SHORTEST_LAMBDA: f64 = 4.0;
-
 impl CurrentControl {
     /// Lambda tuning: `kp = ls/lambda`, `ki = rs/lambda` give a first-order closed loop of time constant `lambda` (s). The
-    /// voltage is not limited; see [`CurrentControl::limited`].
-    pub fn lambda_tuned(rs: f64, ls: f64, ke: f64, pole_pairs: PolePairs, lambda: f64) -> Result<Self, Error> {
-        let lambda = Error::positive("closed-loop time constant lambda", lambda, "s")?;
+    /// voltage is not limited; see [`CurrentControl::limited`]. With one sample of computation delay and a held voltage, the
+    /// current does not overshoot at standstill from `lambda` of four sample times on.
+    ///
+    /// # Errors
+    /// A `lambda`, resistance or inductance that is not positive; a back-EMF that is not finite.
+    pub fn lambda_tuned(rs: f64, ls: f64, ke: f64, pole_pairs: PolePairs, lambda: f64) -> Result<Self, MotorError> {
+        let lambda = MotorError::positive("closed-loop time constant lambda", lambda, "s")?;
         Ok(CurrentControl {
-            kp: Error::positive("inductance", ls, "H")? / lambda,
-            ki: Error::positive("resistance", rs, "ohm")? / lambda,
+            kp: MotorError::positive("inductance", ls, "H")? / lambda,
+            ki: MotorError::positive("resistance", rs, "ohm")? / lambda,
             ls,
-            ke: Error::finite("Ke", ke, "V s/rad")?,
+            ke: MotorError::finite("Ke", ke, "V s/rad")?,
             v_max: f64::INFINITY,
             pole_pairs,
             decoupling: Decoupling::Measured,
@@ -138,10 +138,13 @@ pub struct SpeedControl {
 
 impl SpeedControl {
     /// Bandwidth `wc` (rad/s) and damping `zeta` for an inertia `j` (kg m^2).
-    pub fn tuned(j: f64, wc: f64, zeta: f64) -> Result<Self, Error> {
-        let j = Error::positive("inertia", j, "kg m^2")?;
-        let wc = Error::positive("bandwidth of the speed control", wc, "rad/s")?;
-        let kp = 2.0 * Error::positive("damping of the speed control", zeta, "of 1")? * wc * j;
+    ///
+    /// # Errors
+    /// An inertia, bandwidth or damping that is not positive.
+    pub fn tuned(j: f64, wc: f64, zeta: f64) -> Result<Self, MotorError> {
+        let j = MotorError::positive("inertia", j, "kg m^2")?;
+        let wc = MotorError::positive("bandwidth of the speed control", wc, "rad/s")?;
+        let kp = 2.0 * MotorError::positive("damping of the speed control", zeta, "of 1")? * wc * j;
         let torque_max = f64::INFINITY;
         Ok(SpeedControl { kp, ki: wc * wc * j, j, kv: 0.0, torque_max, theta: 0.0, integral: 0.0 })
     }
@@ -177,11 +180,14 @@ pub struct PositionControl {
 
 impl PositionControl {
     /// Gain `kv` (1/s), largest speed (rad/s) and acceleration (rad/s^2).
-    pub fn new(kv: f64, w_max: f64, a_max: f64) -> Result<Self, Error> {
+    ///
+    /// # Errors
+    /// A gain, speed or acceleration that is not positive.
+    pub fn new(kv: f64, w_max: f64, a_max: f64) -> Result<Self, MotorError> {
         Ok(PositionControl {
-            kv: Error::positive("gain of the position control", kv, "1/s")?,
-            w_max: Error::positive("largest speed", w_max, "rad/s")?,
-            a_max: Error::positive("largest acceleration", a_max, "rad/s^2")?,
+            kv: MotorError::positive("gain of the position control", kv, "1/s")?,
+            w_max: MotorError::positive("largest speed", w_max, "rad/s")?,
+            a_max: MotorError::positive("largest acceleration", a_max, "rad/s^2")?,
             w: 0.0,
         })
     }
@@ -201,6 +207,8 @@ impl PositionControl {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const SHORTEST_LAMBDA: f64 = 4.0;
 
     const TS: f64 = 0.126e-3;
     const RS: f64 = 0.4;

@@ -10,10 +10,10 @@ use super::inverter::{Carrier, DeadTime, Inverter, aim};
 pub use super::log::{Log, Row, Warning};
 use super::plant::Plant;
 use super::program::Program;
-use super::robot::{Axis, V_MAX};
+use super::robot::{RobotAxis, V_MAX};
 use super::sensors::{CurrentSensors, Resolver};
 use super::temperature::Celsius;
-use super::{Currents, Error, Injection, MachineState, SQRT_3_2, SwitchingInverter};
+use super::{Currents, Injection, MachineState, MotorError, SQRT_3_2, SwitchingInverter};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
@@ -72,17 +72,17 @@ impl Disturbance {
 /// The drive of one axis, ready to run a [`Program`].
 ///
 /// ```
-/// use greybox::pmsm::{drive::{Disturbance, Simulation}, program::Program, robot::Axis};
-/// let axis = Axis::reference(1)?;
+/// use greybox::pmsm::{drive::{Disturbance, Simulation}, program::Program, robot::RobotAxis};
+/// let axis = RobotAxis::reference(1)?;
 /// let program = Program::speed_cycles(&axis, 2, 1.0)?;
 /// let log = Simulation::new(axis)?.without(Disturbance::DeadTime).run(&program);
 /// assert_eq!(log.rows.len(), program.targets.len());
-/// # Ok::<(), greybox::pmsm::Error>(())
+/// # Ok::<(), greybox::pmsm::MotorError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Simulation {
     /// The axis that the controllers are designed for: data sheet, 20 C.
-    pub nominal: Axis,
+    pub nominal: RobotAxis,
     /// What the axis is.
     pub plant: Plant,
     /// What makes the voltage.
@@ -108,7 +108,10 @@ const SPEED_FILTER: f64 = 300.0;
 
 impl Simulation {
     /// The reference drive of an axis with all disturbances, winding and magnet at 20 C.
-    pub fn new(axis: Axis) -> Result<Self, Error> {
+    ///
+    /// # Errors
+    /// A quantity of the axis outside its range.
+    pub fn new(axis: RobotAxis) -> Result<Self, MotorError> {
         axis.check()?;
         let control = CurrentControl::lambda_tuned(axis.rs, axis.ls, axis.ke, axis.pole_pairs, 1e-3)?;
         let speed = SpeedControl::tuned(axis.j, 60.0, 0.9)?;
@@ -173,13 +176,13 @@ impl Simulation {
     ///
     /// # Errors
     /// A direct voltage that cannot make the longest vector of the current control: `sqrt(3)` times its limit is needed.
-    pub fn switching(self, vdc: f64, carrier: Carrier) -> Result<Self, Error> {
+    pub fn switching(self, vdc: f64, carrier: Carrier) -> Result<Self, MotorError> {
         // Ten roundings: 600 V make exactly the 346.41 V that they allow.
         if vdc.is_finite() && vdc >= 3f64.sqrt() * self.current_control.v_max * (1.0 - 1e-15) {
             return Ok(Simulation { inverter: Inverter::Switching { vdc, carrier }, ..self });
         }
         let must = "be finite and at least sqrt(3) times the voltage limit of the current control";
-        Err(Error::OutOfRange { quantity: "direct voltage", value: vdc, unit: "V", must })
+        Err(MotorError::OutOfRange { quantity: "direct voltage", value: vdc, unit: "V", must })
     }
 
     /// With another seed for the sensors' noise.
@@ -245,7 +248,7 @@ mod tests {
     }
 
     fn reference() -> Simulation {
-        Simulation::new(Axis::reference(2).unwrap()).unwrap()
+        Simulation::new(RobotAxis::reference(2).unwrap()).unwrap()
     }
 
     #[test]
@@ -282,9 +285,9 @@ mod tests {
 
     #[test]
     fn limits_are_counted() {
-        let axis = Axis::reference(1).unwrap();
+        let axis = RobotAxis::reference(1).unwrap();
         // Beyond the speed at which the EMF uses up the voltage.
-        let fast = Program::speed_cycles(&Axis { w_max: 600.0, ..axis }, 2, 1.0).unwrap();
+        let fast = Program::speed_cycles(&RobotAxis { w_max: 600.0, ..axis }, 2, 1.0).unwrap();
         let log = Simulation::new(axis).unwrap().run(&fast);
         assert!(log.voltage_limited > 0);
         let warning = log.warnings().next().unwrap();
@@ -302,10 +305,10 @@ mod tests {
 
     #[test]
     fn impossible_axes_are_refused() {
-        assert!(Axis::reference(7).unwrap_err().to_string().contains("number of the robot's axis is 7"));
-        let axis = Axis::reference(1).unwrap();
-        let error = Simulation::new(Axis { ls: -4e-3, ..axis }).unwrap_err();
+        assert!(RobotAxis::reference(7).unwrap_err().to_string().contains("number of the robot's axis is 7"));
+        let axis = RobotAxis::reference(1).unwrap();
+        let error = Simulation::new(RobotAxis { ls: -4e-3, ..axis }).unwrap_err();
         assert_eq!(error.to_string(), "inductance is -0.004 H; it must be positive and finite");
-        assert!(Simulation::new(Axis { r_cable: f64::NAN, ..axis }).is_err());
+        assert!(Simulation::new(RobotAxis { r_cable: f64::NAN, ..axis }).is_err());
     }
 }

@@ -17,22 +17,13 @@ wraps_motor! {
     /// It is the fifth and seventh harmonic of the phases. At low speed, where a controller follows it, a
     /// model without it attributes it to `ke`: 0.2 % on the small axes of the reference robot. For a motor in
     /// exact steps it is taken at the input's angle, that of mid-interval, and held as the voltage is.
-    EmfHarmonic, AngledDrive
+    EmfHarmonic, AngledDrive, |wrapper, x, u, p, motor| {
+        let u = AngledDrive { uq: u.uq - wrapper.harmonic(u.theta, p) * u.w * SQRT_2_3, ..*u };
+        motor(x, &AngledDrive::part::<M::Input, S>(u), &P::part::<M::Parameters, S>(*p))
+    }
 }
 
 impl<M: MotorModel, P: Signals> EmfHarmonic<M, P> {
-    #[inline(always)]
-    fn through<S: Scalar>(
-        &self,
-        x: &Currents<S>,
-        u: &AngledDrive<S>,
-        p: &Of<P, S>,
-        motor: impl FnOnce(&Currents<S>, &Of<M::Input, S>, &Of<M::Parameters, S>) -> Currents<S>,
-    ) -> Currents<S> {
-        let u = AngledDrive { uq: u.uq - self.harmonic(u.theta, p) * u.w * SQRT_2_3, ..*u };
-        motor(x, &AngledDrive::part::<M::Input, S>(u), &P::part::<M::Parameters, S>(*p))
-    }
-
     /// What the harmonic adds to `ke` at a mechanical angle (rad).
     #[inline(always)]
     fn harmonic<S: Scalar>(&self, theta: S, p: &Of<P, S>) -> S {

@@ -9,8 +9,8 @@ mod salient;
 
 pub use salient::ExactSalient;
 
-use super::{AngledDrive, Currents, Drive, Error, MotorModel, PolePairs, SQRT_2_3, Winding, dead_time, units};
-use crate::online::{Law, Mras, MrasStart, ObserverError};
+use super::{AngledDrive, Currents, Drive, MotorError, MotorModel, PolePairs, SQRT_2_3, Winding, dead_time, units};
+use crate::online::{AdaptationLaw, Mras, MrasStart, ObserverError};
 use crate::{Kind, Model, Parameter, Scalar};
 use serde::{Deserialize, Serialize};
 
@@ -36,8 +36,8 @@ impl ExactStep {
     ///
     /// # Errors
     /// No pole pairs; a sample time that is not positive and finite.
-    pub fn new(pole_pairs: u32, ts: f64, held_in: HeldIn) -> Result<Self, Error> {
-        let ts = Error::positive("sample time", ts, "s")?;
+    pub fn new(pole_pairs: u32, ts: f64, held_in: HeldIn) -> Result<Self, MotorError> {
+        let ts = MotorError::positive("sample time", ts, "s")?;
         Ok(ExactStep { pole_pairs: PolePairs::new(pole_pairs)?, ts, held_in })
     }
 
@@ -108,7 +108,7 @@ impl ExactSurface {
     ///
     /// # Errors
     /// A resistance, inductance or back-EMF that does not start above zero; else as [`Mras::new`].
-    pub fn mras<L: Law<Self>>(self, law: L, start: MrasStart<Self>) -> Result<Mras<Self, L>, ObserverError> {
+    pub fn mras<L: AdaptationLaw<Self>>(self, law: L, start: MrasStart<Self>) -> Result<Mras<Self, L>, ObserverError> {
         let Winding { rs, ls, ke } = start.parameters;
         all_positive([("rs", rs), ("ls", ls), ("ke", ke)])?;
         Mras::new(self, law, self.0.ts, start)
@@ -210,7 +210,7 @@ pub(super) mod tests {
 
     #[test]
     fn what_makes_no_sense_is_refused() {
-        assert_eq!(ExactStep::new(0, TS, HeldIn::Rotor).unwrap_err(), Error::NoPolePairs);
+        assert_eq!(ExactStep::new(0, TS, HeldIn::Rotor).unwrap_err(), MotorError::NoPolePairs);
         let error = ExactStep::new(4, -1.0, HeldIn::Rotor).unwrap_err();
         assert_eq!(error.to_string(), "sample time is -1 s; it must be positive and finite");
     }

@@ -25,9 +25,11 @@ wraps_motor! {
     /// ```
     /// use greybox::pmsm::{FluxLinkage, FluxWinding, Surface};
     /// let model = FluxLinkage::<_, FluxWinding>::new(Surface::new(4)?);
-    /// # Ok::<(), greybox::pmsm::Error>(())
+    /// # Ok::<(), greybox::pmsm::MotorError>(())
     /// ```
-    FluxLinkage, M::Input
+    FluxLinkage, M::Input, |wrapper, x, u, p, motor| {
+        motor(x, u, &wrapper.winding(p))
+    }
 }
 
 impl<M: MotorModel, P: Signals> FluxLinkage<M, P> {
@@ -52,17 +54,6 @@ impl<M: MotorModel, P: Signals> FluxLinkage<M, P> {
             let value = entries.as_ref()[Self::PLACES[i]];
             if i == Self::KE { units::ke_from_psi_m(value, np) } else { value }
         })
-    }
-
-    #[inline(always)]
-    fn through<S: Scalar>(
-        &self,
-        x: &Currents<S>,
-        u: &Of<M::Input, S>,
-        p: &Of<P, S>,
-        motor: impl FnOnce(&Currents<S>, &Of<M::Input, S>, &Of<M::Parameters, S>) -> Currents<S>,
-    ) -> Currents<S> {
-        motor(x, u, &self.winding(p))
     }
 }
 

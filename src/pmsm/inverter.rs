@@ -1,7 +1,7 @@
 //! The voltage-source inverter: how much voltage there is, when it acts, and what dead time takes from it.
 
 use super::frames::{Phases, Stator, clarke, inverse_clarke, rotate_out_of};
-use super::{Error, PolePairs};
+use super::{MotorError, PolePairs};
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
@@ -17,8 +17,11 @@ pub enum Modulation {
 
 impl Modulation {
     /// Longest voltage vector (V, phase peak) from a direct voltage `vdc` (V).
-    pub fn v_max(self, vdc: f64) -> Result<f64, Error> {
-        let vdc = Error::positive("direct voltage", vdc, "V")?;
+    ///
+    /// # Errors
+    /// A voltage that is not positive.
+    pub fn v_max(self, vdc: f64) -> Result<f64, MotorError> {
+        let vdc = MotorError::positive("direct voltage", vdc, "V")?;
         Ok(match self {
             Modulation::SpaceVector => vdc / Scalar::sqrt(3.0),
             Modulation::Sine => vdc / 2.0,
@@ -61,8 +64,12 @@ impl Carrier {
 }
 
 /// Speed (rad/s, mechanical) at which the EMF alone uses up `v_max` (V, phase peak): no current can be driven beyond it.
-pub fn top_speed(ke: f64, v_max: f64) -> Result<f64, Error> {
-    Ok(Error::positive("voltage limit", v_max, "V")? / (super::SQRT_2_3 * Error::positive("Ke", ke, "V s/rad")?))
+///
+/// # Errors
+/// A back-EMF or voltage that is not positive.
+pub fn top_speed(ke: f64, v_max: f64) -> Result<f64, MotorError> {
+    Ok(MotorError::positive("voltage limit", v_max, "V")?
+        / (super::SQRT_2_3 * MotorError::positive("Ke", ke, "V s/rad")?))
 }
 
 /// Voltage lost to dead time and to the valves: `vdt tanh(i/i0)` in each phase; 2 V and 0.15 A for a well-compensated
@@ -90,12 +97,12 @@ impl DeadTime {
 
 /// The time from a measurement to the middle of the interval in which the voltage computed from it acts, in sample times:
 /// one for the computation, half of the hold.
-pub const DELAY: f64 = 1.5;
+const DELAY: f64 = 1.5;
 
 /// The stationary voltage vector for a command (V, rotor frame) computed at electrical angle `theta_e` (rad) and speed `w`
 /// (rad/s, mechanical), aimed at the rotor's angle in the middle of the interval in which it will act.
 #[inline]
-pub fn aim(command: (f64, f64), theta_e: f64, w: f64, pole_pairs: PolePairs, ts: f64) -> Stator {
+pub(super) fn aim(command: (f64, f64), theta_e: f64, w: f64, pole_pairs: PolePairs, ts: f64) -> Stator {
     let (alpha, beta) = rotate_out_of(command, theta_e + DELAY * pole_pairs.electrical(w) * ts);
     Stator { alpha, beta }
 }
@@ -103,7 +110,7 @@ pub fn aim(command: (f64, f64), theta_e: f64, w: f64, pole_pairs: PolePairs, ts:
 /// Share of the period `0..1` for which each upper valve is on, for a stationary vector `u` (V) out of `vdc` (V): the
 /// common part is placed so that the largest and smallest duty are equally far from their ends (space vector).
 #[inline]
-pub fn duties(u: Stator, vdc: f64) -> Phases {
+pub(super) fn duties(u: Stator, vdc: f64) -> Phases {
     let p = inverse_clarke(u);
     let middle = 0.5 * (Scalar::max(p.a, Scalar::max(p.b, p.c)) + Scalar::min(p.a, Scalar::min(p.b, p.c)));
     let duty = |v: f64| Scalar::clamp(0.5 + (v - middle) / vdc, 0.0, 1.0);

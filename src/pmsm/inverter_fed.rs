@@ -55,22 +55,11 @@ wraps_motor! {
     ///     }
     /// }
     /// let model = InverterFed::<_, Mine>::new(Saturated::new(4)?);
-    /// # Ok::<(), greybox::pmsm::Error>(())
+    /// # Ok::<(), greybox::pmsm::MotorError>(())
     /// ```
-    InverterFed, AngledDrive
-}
-
-impl<M: MotorModel, P: Signals> InverterFed<M, P> {
-    #[inline(always)]
-    fn through<S: Scalar>(
-        &self,
-        x: &Currents<S>,
-        u: &AngledDrive<S>,
-        p: &Of<P, S>,
-        motor: impl FnOnce(&Currents<S>, &Of<M::Input, S>, &Of<M::Parameters, S>) -> Currents<S>,
-    ) -> Currents<S> {
+    InverterFed, AngledDrive, |wrapper, x, u, p, motor| {
         let loss = P::part::<DeadTimeLoss, S>(*p);
-        let lost = dead_time(x, loss.i0, self.motor.pole_pairs().electrical(u.theta));
+        let lost = dead_time(x, loss.i0, wrapper.motor.pole_pairs().electrical(u.theta));
         let u = AngledDrive { ud: u.ud - loss.vdt * lost.0, uq: u.uq - loss.vdt * lost.1, ..*u };
         motor(x, &AngledDrive::part::<M::Input, S>(u), &P::part::<M::Parameters, S>(*p))
     }

@@ -45,6 +45,9 @@ impl Log {
     /// The record for identification: voltages held from sample to sample, the *mean* speed of the same interval
     /// (the difference of the angles at its two ends), currents at its begin. The last row, which has no interval, is left
     /// out.
+    ///
+    /// # Errors
+    /// Fewer than two rows; rows that are not finite.
     pub fn experiment(&self, model: &Surface) -> Result<Experiment<Currents, Drive, Currents>, crate::Error> {
         let (inputs, outputs) = self
             .rows

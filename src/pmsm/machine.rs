@@ -1,4 +1,4 @@
-use super::{AngledDrive, Currents, Error, Load, MotorModel, PolePairs, Salient, Shaft, ShaftMotion};
+use super::{AngledDrive, Currents, Load, MotorError, MotorModel, PolePairs, Salient, Shaft, ShaftMotion};
 use crate::integrate::{axpy, combined};
 use crate::{Kind, Model, Of, Scalar, Signals};
 use core::marker::PhantomData;
@@ -59,8 +59,11 @@ pub struct Machine<M = Salient, P = MachineParameters> {
 }
 
 impl Machine {
-    /// A salient motor with this many pole pairs behind a gear; zero pole pairs or a gear that is not positive are errors.
-    pub fn new(pole_pairs: u32, gear: f64) -> Result<Self, Error> {
+    /// A salient motor with this many pole pairs behind a gear.
+    ///
+    /// # Errors
+    /// Zero pole pairs, a gear that is not positive.
+    pub fn new(pole_pairs: u32, gear: f64) -> Result<Self, MotorError> {
         Ok(Machine::of(Salient::new(pole_pairs)?, Shaft::new(gear)?))
     }
 }

@@ -20,19 +20,8 @@ wraps_motor! {
     /// A voltage that acts `tau` late has turned back by `we tau` seen from the rotor, while a resolver that is `delta`
     /// ahead turns voltages, currents and EMF alike: at one speed the two are hardly distinguishable, over several they are.
     /// The motor inside is computed in the magnet's true frame.
-    Misaligned, AngledDrive
-}
-
-impl<M: MotorModel, P: Signals> Misaligned<M, P> {
-    #[inline(always)]
-    fn through<S: Scalar>(
-        &self,
-        x: &Currents<S>,
-        u: &AngledDrive<S>,
-        p: &Of<P, S>,
-        motor: impl FnOnce(&Currents<S>, &Of<M::Input, S>, &Of<M::Parameters, S>) -> Currents<S>,
-    ) -> Currents<S> {
-        let (Misalignment { tau, delta }, np) = (P::part::<Misalignment, S>(*p), self.motor.pole_pairs());
+    Misaligned, AngledDrive, |wrapper, x, u, p, motor| {
+        let (Misalignment { tau, delta }, np) = (P::part::<Misalignment, S>(*p), wrapper.motor.pole_pairs());
         let (ud, uq) = rotate_into((u.ud, u.uq), np.electrical(u.w) * tau - delta);
         let u = AngledDrive { ud, uq, w: u.w, theta: u.theta - np.mechanical(delta) };
         let (id, iq) = rotate_out_of((x.id, x.iq), delta);

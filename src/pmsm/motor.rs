@@ -1,6 +1,6 @@
 //! Motor constants from geometry (thesis (3.2) to (3.11)).
 
-use super::{Error, PolePairs, units};
+use super::{MotorError, PolePairs, units};
 use core::f64::consts::PI;
 use serde::{Deserialize, Serialize};
 
@@ -39,12 +39,15 @@ pub struct Constants {
 
 impl Geometry {
     /// `psi_m = pi l1 l2 Bm Ns / (4 np)` and `L = pi mu0 l1 l2 Ns^2 / (8 g np^2)`.
-    pub fn constants(&self) -> Result<Constants, Error> {
-        let area = Error::positive("motor length", self.length, "m")?
-            * Error::positive("rotor diameter", self.rotor_diameter, "m")?;
-        let gap = Error::positive("air gap", self.air_gap, "m")?;
-        let turns = Error::positive("number of turns", self.turns, "turns")?;
-        let flux_density = Error::positive("flux density", self.flux_density, "T")?;
+    ///
+    /// # Errors
+    /// A length, diameter, gap, flux density or number of turns that is not positive.
+    pub fn constants(&self) -> Result<Constants, MotorError> {
+        let area = MotorError::positive("motor length", self.length, "m")?
+            * MotorError::positive("rotor diameter", self.rotor_diameter, "m")?;
+        let gap = MotorError::positive("air gap", self.air_gap, "m")?;
+        let turns = MotorError::positive("number of turns", self.turns, "turns")?;
+        let flux_density = MotorError::positive("flux density", self.flux_density, "T")?;
         let np = self.pole_pairs.get();
         let psi_m = PI * area * flux_density * turns / (4.0 * np);
         let phase_inductance = PI * MU_0 * area * turns * turns / (8.0 * gap * np * np);

@@ -18,9 +18,14 @@ pub trait MotorModel: Model<State = Currents, Output = Currents> {
 /// Declares a model that wraps a motor `M`, with the parameters `P`: any signals that hold, by name, those of `M` and those
 /// of the wrapper.
 ///
-/// Its function `through` hands currents, input and parameters to the motor, and gives back the motor's answer.
+/// `|wrapper, x, u, p, motor| { ... }` makes of currents `x`, input `u` and parameters `p`, in numbers of type `S`, those of the
+/// motor, and of what the function `motor` gives for them (the derivative of its currents, or the next ones) those of the
+/// whole.
 macro_rules! wraps_motor {
-    ($(#[$meta:meta])* $name:ident, $input:ty) => {
+    (
+        $(#[$meta:meta])* $name:ident, $input:ty,
+        |$wrapper:ident, $x:ident, $u:ident, $p:ident, $motor:ident| $through:block
+    ) => {
         $(#[$meta])*
         #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
         #[serde(transparent)]
@@ -34,6 +39,18 @@ macro_rules! wraps_motor {
             /// Around this motor.
             pub const fn new(motor: M) -> Self {
                 $name { motor, parameters: core::marker::PhantomData }
+            }
+
+            #[inline(always)]
+            fn through<S: Scalar>(
+                &self,
+                $x: &Currents<S>,
+                $u: &Of<$input, S>,
+                $p: &Of<P, S>,
+                $motor: impl FnOnce(&Currents<S>, &Of<M::Input, S>, &Of<M::Parameters, S>) -> Currents<S>,
+            ) -> Currents<S> {
+                let $wrapper = self;
+                $through
             }
         }
 

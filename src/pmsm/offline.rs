@@ -11,7 +11,7 @@ mod mechanics;
 mod plain;
 mod validate;
 
-pub use equations::{Equations, WEAK, hardly_seen};
+pub use equations::{Equations, hardly_seen};
 pub use extended::{Extended, extended, search_i0};
 pub use mechanics::mechanics;
 pub use plain::{Axes, Form, plain};
@@ -92,6 +92,9 @@ impl Spans {
 
     /// The intervals of a record without angle, which is added up from the speed and starts at `theta` (rad, mechanical;
     /// it matters to the dead time only). The outputs must be there in every sample and the samples evenly spaced.
+    ///
+    /// # Errors
+    /// An output that is missing, samples that are not evenly spaced.
     pub fn from_experiment<X: Signals>(
         experiment: &Experiment<X, Drive, Currents>,
         pole_pairs: PolePairs,

@@ -1,6 +1,6 @@
 use super::frames::{Stator, rotate_into, rotate_out_of};
 use super::inverter::DeadTime;
-use super::robot::Axis;
+use super::robot::RobotAxis;
 use super::{COULOMB_WIDTH, Currents, Drive, MachineState, MotorModel, Salient, SalientWinding};
 use crate::integrate::axpy;
 use crate::model::Model;
@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plant {
     /// Values at the temperatures of the run.
-    pub axis: Axis,
+    pub axis: RobotAxis,
     /// What the inverter loses.
     pub dead_time: DeadTime,
     /// Sixth harmonic of EMF and torque constant, as a share of Ke.
@@ -54,7 +54,7 @@ impl Plant {
 
     /// Electromagnetic torque (N m).
     pub fn torque(&self, x: &MachineState) -> f64 {
-        let free = Plant { axis: Axis { tc: 0.0, bv: 0.0, tg: 0.0, cogging: 0.0, ..self.axis }, ..*self };
+        let free = Plant { axis: RobotAxis { tc: 0.0, bv: 0.0, tg: 0.0, cogging: 0.0, ..self.axis }, ..*self };
         self.axis.j * free.derivative(x, Stator::default()).w
     }
 

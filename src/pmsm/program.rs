@@ -1,8 +1,8 @@
 //! Motion programs: what the speed of an axis is asked to be, sample by sample.
 
-use super::Error;
+use super::MotorError;
 use super::control::Target;
-use super::robot::Axis;
+use super::robot::RobotAxis;
 use core::f64::consts::PI;
 use core::ops::Range;
 
@@ -38,8 +38,8 @@ struct Composer {
 }
 
 impl Composer {
-    fn new(axis: &Axis) -> Result<Self, Error> {
-        let ts = Error::positive("sample time", axis.ts, "s")?;
+    fn new(axis: &RobotAxis) -> Result<Self, MotorError> {
+        let ts = MotorError::positive("sample time", axis.ts, "s")?;
         Ok(Composer { ts, speeds: Vec::new(), cycles: Vec::new() })
     }
 
@@ -92,8 +92,11 @@ fn moving_average(values: &[f64], width: usize) -> Vec<f64> {
 impl Program {
     /// Experiments 3, 4 and 5: `count` back-and-forth cycles of speeds rising evenly from 15 rad/s to the axis's largest,
     /// at `share` of its largest acceleration.
-    pub fn speed_cycles(axis: &Axis, count: usize, share: f64) -> Result<Program, Error> {
-        let a = Error::positive("acceleration", share * axis.a_max, "rad/s^2")?;
+    ///
+    /// # Errors
+    /// A share or an axis whose acceleration or sample time is not positive.
+    pub fn speed_cycles(axis: &RobotAxis, count: usize, share: f64) -> Result<Program, MotorError> {
+        let a = MotorError::positive("acceleration", share * axis.a_max, "rad/s^2")?;
         let mut composer = Composer::new(axis)?;
         for k in 0..count {
             let v = 15.0 + (axis.w_max - 15.0) * k as f64 / (count.max(2) - 1) as f64;
@@ -105,8 +108,11 @@ impl Program {
     }
 
     /// Experiment 6, material handling: slow approach, fast transfer, slow approach, both ways.
-    pub fn material_handling(axis: &Axis, repeats: usize) -> Result<Program, Error> {
-        let a = Error::positive("acceleration", axis.a_max, "rad/s^2")?;
+    ///
+    /// # Errors
+    /// An axis whose acceleration or sample time is not positive.
+    pub fn material_handling(axis: &RobotAxis, repeats: usize) -> Result<Program, MotorError> {
+        let a = MotorError::positive("acceleration", axis.a_max, "rad/s^2")?;
         let v = 0.85 * axis.w_max;
         let mut composer = Composer::new(axis)?;
         for _ in 0..repeats {
@@ -121,8 +127,11 @@ impl Program {
     }
 
     /// Experiment 6, water cutting: slow contours, then short moves; the same speeds on every axis.
-    pub fn water_cutting(axis: &Axis, repeats: usize) -> Result<Program, Error> {
-        let a = Error::positive("acceleration", axis.a_max, "rad/s^2")?;
+    ///
+    /// # Errors
+    /// An axis whose acceleration or sample time is not positive.
+    pub fn water_cutting(axis: &RobotAxis, repeats: usize) -> Result<Program, MotorError> {
+        let a = MotorError::positive("acceleration", axis.a_max, "rad/s^2")?;
         let mut composer = Composer::new(axis)?;
         for _ in 0..repeats {
             composer.cycle(85.0, |c| {
@@ -152,7 +161,7 @@ mod tests {
 
     #[test]
     fn cycles_cover_the_program_and_reach_their_speed() {
-        let axis = Axis::reference(1).unwrap();
+        let axis = RobotAxis::reference(1).unwrap();
         let program = Program::speed_cycles(&axis, 20, 1.0).unwrap();
         assert_eq!(program.cycles.len(), 20);
         assert_eq!(program.cycles.last().unwrap().samples.end, program.targets.len());

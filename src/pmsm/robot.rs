@@ -1,12 +1,12 @@
 //! The reference robot: six axes of a medium-sized arm, and what each of them does.
 
 use super::temperature::{Celsius, Reading, magnet, winding};
-use super::{Error, PolePairs, SQRT_3_2};
+use super::{MotorError, PolePairs, SQRT_3_2};
 use serde::{Deserialize, Serialize};
 
 /// One axis: motor, load and limits. Values at 20 C, seen from the motor's side of the gear.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Axis {
+pub struct RobotAxis {
     /// Number, from 1 at the foot.
     pub number: u8,
     /// Pole pairs.
@@ -50,9 +50,12 @@ pub const V_DC: f64 = 600.0;
 /// Phase peak voltage limit of the reference drive: [`V_DC`] through space-vector modulation (V).
 pub const V_MAX: f64 = 346.410_161_513_775_44;
 
-impl Axis {
+impl RobotAxis {
     /// Axis 1 to 6 of the reference robot.
-    pub const fn reference(number: u8) -> Result<Axis, Error> {
+    ///
+    /// # Errors
+    /// A number that is not 1 to 6.
+    pub const fn reference(number: u8) -> Result<RobotAxis, MotorError> {
         //       R,    L mH, Ke,  J,      w_max, acc,    Tg,  cable, Imax, Tc,   Bv,     gear,  cogging
         let row = match number {
             1 => [0.40, 4.0, 0.95, 0.012, 350.0, 900.0, 0.0, 0.23, 60.0, 1.2, 0.004, 120.0, 0.108],
@@ -62,7 +65,7 @@ impl Axis {
             5 => [0.85, 6.0, 0.60, 0.0014, 450.0, 1500.0, 0.0, 0.459, 20.0, 0.40, 0.0010, 90.0, 0.036],
             6 => [0.92, 6.5, 0.50, 0.0007, 450.0, 1800.0, 0.0, 0.459, 15.0, 0.28, 0.0006, 60.0, 0.0252],
             _ => {
-                return Err(Error::OutOfRange {
+                return Err(MotorError::OutOfRange {
                     quantity: "number of the robot's axis",
                     value: number as f64,
                     unit: "",
@@ -76,7 +79,24 @@ impl Axis {
         };
         let [rs, l_mh, ke, j, w_max, a_max, tg, r_cable, i_max, tc, bv, gear, cogging] = row;
         let ls = l_mh / 1000.0;
-        Ok(Axis { number, pole_pairs, rs, ls, ke, j, w_max, a_max, tg, r_cable, i_max, tc, bv, gear, cogging, ts: TS })
+        Ok(RobotAxis {
+            number,
+            pole_pairs,
+            rs,
+            ls,
+            ke,
+            j,
+            w_max,
+            a_max,
+            tg,
+            r_cable,
+            i_max,
+            tc,
+            bv,
+            gear,
+            cogging,
+            ts: TS,
+        })
     }
 
     /// Torque per ampere of peak iq (N m/A).
@@ -85,12 +105,15 @@ impl Axis {
     }
 
     /// The axis with winding and magnet at these temperatures.
-    pub fn heated(&self, winding_at: Celsius, magnet_at: Celsius) -> Axis {
-        Axis { rs: self.rs * winding(winding_at), ke: self.ke * magnet(magnet_at, Reading::Local), ..*self }
+    pub fn heated(&self, winding_at: Celsius, magnet_at: Celsius) -> RobotAxis {
+        RobotAxis { rs: self.rs * winding(winding_at), ke: self.ke * magnet(magnet_at, Reading::Local), ..*self }
     }
 
     /// Refuses an axis that no motor is like.
-    pub fn check(&self) -> Result<(), Error> {
+    ///
+    /// # Errors
+    /// The first quantity outside its range.
+    pub fn check(&self) -> Result<(), MotorError> {
         for (quantity, value, unit) in [
             ("resistance", self.rs, "ohm"),
             ("inductance", self.ls, "H"),
@@ -100,7 +123,7 @@ impl Axis {
             ("gear ratio", self.gear, "turns"),
             ("sample time", self.ts, "s"),
         ] {
-            Error::positive(quantity, value, unit)?;
+            MotorError::positive(quantity, value, unit)?;
         }
         for (quantity, value, unit) in [
             ("cable resistance", self.r_cable, "ohm"),
@@ -109,7 +132,7 @@ impl Axis {
             ("gravity torque", self.tg, "N m"),
             ("cogging torque", self.cogging, "N m"),
         ] {
-            Error::finite(quantity, value, unit)?;
+            MotorError::finite(quantity, value, unit)?;
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-use super::{Currents, Drive, Error, MotorModel, PolePairs, SQRT_2_3, SQRT_3_2};
+use super::{Currents, Drive, MotorError, MotorModel, PolePairs, SQRT_2_3, SQRT_3_2};
 use crate::{Model, Scalar};
 use serde::{Deserialize, Serialize};
 
@@ -28,8 +28,11 @@ pub struct Salient {
 }
 
 impl Salient {
-    /// A motor with this many pole pairs; zero is an error.
-    pub const fn new(pole_pairs: u32) -> Result<Self, Error> {
+    /// A motor with this many pole pairs.
+    ///
+    /// # Errors
+    /// Zero pole pairs.
+    pub const fn new(pole_pairs: u32) -> Result<Self, MotorError> {
         match PolePairs::new(pole_pairs) {
             Ok(pole_pairs) => Ok(Salient { pole_pairs }),
             Err(error) => Err(error),

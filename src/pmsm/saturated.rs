@@ -1,4 +1,4 @@
-use super::{Currents, Drive, Error, MotorModel, PolePairs, units};
+use super::{Currents, Drive, MotorError, MotorModel, PolePairs, units};
 use crate::{Model, Scalar};
 use serde::{Deserialize, Serialize};
 
@@ -40,8 +40,11 @@ pub struct Saturated {
 }
 
 impl Saturated {
-    /// A motor with this many pole pairs; zero is an error.
-    pub const fn new(pole_pairs: u32) -> Result<Self, Error> {
+    /// A motor with this many pole pairs.
+    ///
+    /// # Errors
+    /// Zero pole pairs.
+    pub const fn new(pole_pairs: u32) -> Result<Self, MotorError> {
         match PolePairs::new(pole_pairs) {
             Ok(pole_pairs) => Ok(Saturated { pole_pairs }),
             Err(error) => Err(error),

@@ -1,4 +1,4 @@
-use super::{Error, units};
+use super::{MotorError, units};
 use crate::{Model, Scalar, Signals};
 use serde::{Deserialize, Serialize};
 
@@ -58,9 +58,12 @@ pub struct Shaft {
 }
 
 impl Shaft {
-    /// A rotor behind a gear that turns the arm once in `gear` turns of the motor; not positive is an error.
-    pub fn new(gear: f64) -> Result<Self, Error> {
-        Ok(Shaft { gear: Error::positive("gear ratio", gear, "turns")? })
+    /// A rotor behind a gear that turns the arm once in `gear` turns of the motor.
+    ///
+    /// # Errors
+    /// A gear that is not positive.
+    pub fn new(gear: f64) -> Result<Self, MotorError> {
+        Ok(Shaft { gear: MotorError::positive("gear ratio", gear, "turns")? })
     }
 
     /// Turns of the motor per turn of the arm.

@@ -148,7 +148,7 @@ fn phase_currents(x: &MachineState, pole_pairs: PolePairs) -> Phases {
 #[cfg(test)]
 mod tests {
     use super::super::frames::rotate_into;
-    use super::super::robot::{Axis, TS, V_DC};
+    use super::super::robot::{RobotAxis, TS, V_DC};
     use super::super::{Currents, Drive, ExactStep, HeldIn, Winding};
     use super::*;
 
@@ -156,7 +156,7 @@ mod tests {
 
     /// Axis 1, magnetically round, so heavy that its speed stays: what the exact step knows.
     fn round() -> Plant {
-        let axis = Axis { j: 1e12, r_cable: 0.0, ..Axis::reference(1).unwrap() };
+        let axis = RobotAxis { j: 1e12, r_cable: 0.0, ..RobotAxis::reference(1).unwrap() };
         let dead_time = DeadTime { vdt: 0.0, i0: 0.15 };
         Plant { axis, dead_time, emf_harmonic: 0.0, saliency: 0.0, saturation: 0.0 }
     }
@@ -251,7 +251,7 @@ mod tests {
     // inverter does, for currents large and small, of either sign.
     #[test]
     fn dead_time_takes_what_it_does_from_the_mean() {
-        let axis = Axis { ls: 100.0, rs: 1e-9, ..round().axis };
+        let axis = RobotAxis { ls: 100.0, rs: 1e-9, ..round().axis };
         let lossy = Plant { axis, dead_time: DeadTime { vdt: 2.0, i0: 0.15 }, ..round() };
         for carrier in CARRIERS {
             for (id, iq) in [(8.0, 3.0), (-8.0, 3.0), (0.05, 0.02), (0.2, -0.1)] {
@@ -274,7 +274,7 @@ mod tests {
     #[test]
     fn pulses_shorter_than_the_dead_time_are_swallowed() {
         // A dead time of 20 % of the period: at 5 A out of leg a and into the others, a's short pulse is lost.
-        let axis = Axis { ls: 100.0, rs: 1e-9, ..round().axis };
+        let axis = RobotAxis { ls: 100.0, rs: 1e-9, ..round().axis };
         let lossy = Plant { axis, dead_time: DeadTime { vdt: 120.0, i0: 0.15 }, ..round() };
         let start = MachineState { id: 5.0, iq: 0.0, w: 0.0, theta: 0.0 };
         let mut inverter = SwitchingInverter::new(&lossy, V_DC, Carrier::PerSample);

@@ -3,7 +3,7 @@
 //! One kelvin is 0.393 % of the winding's resistance and 0.11 % of Ke, both relative to 20 C. The thesis' (3.19) has the
 //! magnet's sign wrong and mixes absolute and relative slopes; the laws here are the corrected ones.
 
-use super::Error;
+use super::MotorError;
 use crate::dual::Dual;
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
@@ -25,13 +25,16 @@ pub const REFERENCE: f64 = 20.0;
 pub struct Celsius(f64);
 
 impl Celsius {
-    /// `degrees` Celsius; below -273.15, infinite or not a number is an error.
-    pub fn new(degrees: f64) -> Result<Self, Error> {
+    /// `degrees` Celsius.
+    ///
+    /// # Errors
+    /// Below -273.15, infinite, or not a number.
+    pub fn new(degrees: f64) -> Result<Self, MotorError> {
         if (-273.15..f64::INFINITY).contains(&degrees) {
             Ok(Celsius(degrees))
         } else {
             let must = "be finite and not below absolute zero (-273.15 C)";
-            Err(Error::OutOfRange { quantity: "temperature", value: degrees, unit: "C", must })
+            Err(MotorError::OutOfRange { quantity: "temperature", value: degrees, unit: "C", must })
         }
     }
 
@@ -47,8 +50,8 @@ impl Celsius {
 }
 
 impl TryFrom<f64> for Celsius {
-    type Error = Error;
-    fn try_from(degrees: f64) -> Result<Self, Error> {
+    type Error = MotorError;
+    fn try_from(degrees: f64) -> Result<Self, MotorError> {
         Celsius::new(degrees)
     }
 }
@@ -92,7 +95,7 @@ pub fn magnet(t: Celsius, reading: Reading) -> f64 {
 /// let mut magnet = Magnet::default();
 /// magnet.reach(Celsius::new(175.0)?);
 /// assert!((magnet.factor(Celsius::new(20.0)?) - 0.995).abs() < 1e-12); // half a per cent is gone for good
-/// # Ok::<(), greybox::pmsm::Error>(())
+/// # Ok::<(), greybox::pmsm::MotorError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Magnet {
@@ -109,11 +112,14 @@ impl Default for Magnet {
 
 impl Magnet {
     /// The magnet with a share `loss` of its flux lost to age (0.01 to 0.02 over a life), within `0..1`.
-    pub fn aged(self, loss: f64) -> Result<Self, Error> {
+    ///
+    /// # Errors
+    /// A share outside `0..1`.
+    pub fn aged(self, loss: f64) -> Result<Self, MotorError> {
         if (0.0..1.0).contains(&loss) {
             Ok(Magnet { ageing: loss, ..self })
         } else {
-            Err(Error::OutOfRange { quantity: "ageing", value: loss, unit: "of 1", must: "lie in 0..1" })
+            Err(MotorError::OutOfRange { quantity: "ageing", value: loss, unit: "of 1", must: "lie in 0..1" })
         }
     }
 
@@ -171,27 +177,33 @@ pub struct Estimated {
 ///
 /// `cold` and `warm` may contain the cable (it cancels); `r20` is the *motor's* phase resistance at 20 C alone: with the
 /// cable in it, 35 K read 22 K on the reference robot. The three errors are taken as independent.
-pub fn winding_rise(cold: Estimated, warm: Estimated, r20: Estimated) -> Result<Estimated, Error> {
-    Error::positive("resistance of the motor at 20 C", r20.value, "ohm")?;
+///
+/// # Errors
+/// An `r20` that is not positive; a result that is not finite.
+pub fn winding_rise(cold: Estimated, warm: Estimated, r20: Estimated) -> Result<Estimated, MotorError> {
+    MotorError::positive("resistance of the motor at 20 C", r20.value, "ohm")?;
     propagate([cold, warm, r20], |[cold, warm, r20]| (warm - cold) / (r20 * COPPER))
 }
 
 /// Rise (K) of the magnet between a cold and a warm estimate of Ke, below [`KNEE`]; `cold_at` is the temperature of the
 /// cold one. The two errors are taken as independent.
-pub fn magnet_rise(cold: Estimated, warm: Estimated, cold_at: Celsius) -> Result<Estimated, Error> {
-    Error::positive("Ke of the cold motor", cold.value, "V s/rad")?;
+///
+/// # Errors
+/// A cold Ke that is not positive, a `cold_at` at which no flux is left; a result that is not finite.
+pub fn magnet_rise(cold: Estimated, warm: Estimated, cold_at: Celsius) -> Result<Estimated, MotorError> {
+    MotorError::positive("Ke of the cold motor", cold.value, "V s/rad")?;
     let cold_factor =
-        Error::positive("magnet factor at the cold temperature", magnet(cold_at, Reading::Local), "of 1")?;
+        MotorError::positive("magnet factor at the cold temperature", magnet(cold_at, Reading::Local), "of 1")?;
     propagate([cold, warm], |[cold, warm]| (cold - warm) / (cold * (MAGNET / cold_factor)))
 }
 
 /// First-order propagation of independent errors.
-fn propagate<const N: usize>(of: [Estimated; N], f: impl Fn([Dual<N>; N]) -> Dual<N>) -> Result<Estimated, Error> {
+fn propagate<const N: usize>(of: [Estimated; N], f: impl Fn([Dual<N>; N]) -> Dual<N>) -> Result<Estimated, MotorError> {
     let result = f(core::array::from_fn(|i| Dual::variable(of[i].value, i)));
     let variance: f64 = result.slopes.iter().zip(of).map(|(slope, e)| (slope * e.std) * (slope * e.std)).sum();
     Ok(Estimated {
-        value: Error::finite("temperature rise", result.value, "K")?,
-        std: Error::finite("standard error of the temperature rise", Scalar::sqrt(variance), "K")?,
+        value: MotorError::finite("temperature rise", result.value, "K")?,
+        std: MotorError::finite("standard error of the temperature rise", Scalar::sqrt(variance), "K")?,
     })
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Each is written for any [`Scalar`], so that the uncertainty of an estimate goes through it with the slopes.
 
-use super::{Error, PolePairs, SQRT_2_3, SQRT_3_2};
+use super::{MotorError, PolePairs, SQRT_2_3, SQRT_3_2};
 use crate::scalar::Scalar;
 use core::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
 use serde::{Deserialize, Serialize};
@@ -130,7 +130,7 @@ pub fn rpm_from_rad_per_s<S: Scalar>(w: S) -> S {
 /// use greybox::pmsm::units::Cable;
 /// let cable = Cable { length: 20.0, cross_section: 1.5 };
 /// assert!((cable.resistance()? - 0.23).abs() < 1e-3); // axes 1 to 3 of the reference robot
-/// # Ok::<(), greybox::pmsm::Error>(())
+/// # Ok::<(), greybox::pmsm::MotorError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cable {
@@ -145,9 +145,12 @@ impl Cable {
     pub const COPPER: f64 = 0.017_241;
 
     /// Resistance per phase at 20 C (ohm), to be added to the motor's; linear in the length.
-    pub fn resistance(&self) -> Result<f64, Error> {
-        let length = if self.length == 0.0 { 0.0 } else { Error::positive("cable length", self.length, "m")? };
-        let cross_section = Error::positive("cable cross-section", self.cross_section, "mm^2")?;
+    ///
+    /// # Errors
+    /// A length below zero, a cross-section that is not positive.
+    pub fn resistance(&self) -> Result<f64, MotorError> {
+        let length = if self.length == 0.0 { 0.0 } else { MotorError::positive("cable length", self.length, "m")? };
+        let cross_section = MotorError::positive("cable cross-section", self.cross_section, "mm^2")?;
         Ok(Self::COPPER * length / cross_section)
     }
 }
@@ -217,6 +220,6 @@ mod tests {
         assert!(Cable { length: -1.0, cross_section: 1.0 }.resistance().is_err());
         let error = Cable { length: 1.0, cross_section: 0.0 }.resistance().unwrap_err();
         assert_eq!(error.to_string(), "cable cross-section is 0 mm^2; it must be positive and finite");
-        assert_eq!(PolePairs::new(0), Err(Error::NoPolePairs));
+        assert_eq!(PolePairs::new(0), Err(MotorError::NoPolePairs));
     }
 }

@@ -1,6 +1,7 @@
 //! [`Horizon`]: prediction a fixed number of samples ahead.
 
-use super::{Predictor, measured};
+use super::Predictor;
+use super::measured::Place;
 use crate::error::Error;
 use crate::functions::Functions;
 use crate::integrate::Duals;
@@ -72,17 +73,23 @@ impl Horizon {
                 record.name()
             )));
         }
-        let not_measured = |reason| Error::StateNotMeasured { experiment: record.name().to_owned(), reason };
+        let not_measured = |reason| Error::StateNotMeasured {
+            experiment: record.name().to_owned(),
+            reason,
+            remedy: "predictions restart from measured states: simulate the record whole (FreeRun, the default), estimate the \
+                     states by a filter (Kalman), or record the missing outputs",
+        };
         let mut why = None;
         let mut states = vec![f64::NAN; n * samples];
         let mut known = 0;
         for k in 0..samples {
             let (t, u, y) = (record.time(k), record.input(k), record.output(k));
-            match measured::state(layout, functions, t, &u, &y, p) {
+            let place = Place { layout, functions, t, u: &u, p };
+            match place.state(&y) {
                 Ok(x) => {
                     known += 1;
                     if known == 1
-                        && let Some(name) = measured::depends_on_parameter(layout, functions, t, &x, &u, p)
+                        && let Some(name) = place.depends_on_parameter(&x)
                     {
                         return Err(not_measured(format!("the outputs depend on the parameter `{name}`, too")));
                     }

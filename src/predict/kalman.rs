@@ -81,9 +81,7 @@ impl Predictor for Kalman {
     }
 
     fn predict<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &[S], output: usize) -> (S, S) {
-        let mut y = vec![S::from(0.0); plant.layout().outputs.len()];
-        plant.output(&carry[..plant.layout().states.len()], &mut y);
-        (y[output], self.gain(plant, carry, output).1)
+        (super::mean(plant, carry, output), self.gain(plant, carry, output).1)
     }
 
     fn correct<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S], output: usize, error: S) {

@@ -1,93 +1,199 @@
-//! The state that follows from the outputs of one sample, where they determine it.
+//! The state that follows from measured outputs, as far as they determine it.
 
 use crate::dual::Dual;
 use crate::functions::Functions;
 use crate::information::Information;
 use crate::integrate::Duals;
-use crate::layout::{Layout, Quantity};
+use crate::layout::{Kind, Layout, Quantity};
 use crate::numeral::exact;
 
 const LANES: usize = 8;
 const ITERATIONS: usize = 50;
+/// A step into a region where the outputs are undefined is halved so often at most.
+const HALVINGS: usize = 30;
+/// Damping of states that the outputs do not give, relative to the largest column of slopes.
+const DAMPING: f64 = 1e-6;
+/// A state of which a larger part than this comes from the damping is not given.
+const GIVEN: f64 = 0.01;
 
-/// The state whose outputs are the measured ones, by Newton's method from zero; an error text where there is none.
-pub(crate) fn state(
-    layout: &Layout,
-    functions: &dyn Functions<Duals>,
-    t: f64,
-    u: &[f64],
-    y: &[f64],
-    p: &[f64],
-) -> Result<Vec<f64>, String> {
-    let n = layout.states.len();
-    let mut x = vec![0.0; n];
-    if n == 0 {
-        return Ok(x);
-    }
-    let names = |quantities: &[Quantity]| quantities.iter().map(|q| q.name.as_str()).collect::<Vec<&str>>().join(", ");
-    let found = y.iter().filter(|y| y.is_finite()).count();
-    if found < n {
-        let (states, outputs) = (names(&layout.states), names(&layout.outputs));
-        let t = exact(t);
-        return Err(format!("{n} state(s), {states}, but {found} measured of the output(s) {outputs} at t = {t} s"));
-    }
-    let (u, p) = (constants(u), constants(p));
-    for iteration in 0..ITERATIONS {
-        let mut rows = vec![vec![0.0; n]; y.len()];
-        let mut errors = vec![0.0; y.len()];
-        let mut expected = vec![Dual::constant(0.0); y.len()];
-        for first in (0..n).step_by(LANES) {
-            let seeded: Vec<Duals> =
-                x.iter().enumerate().map(|(i, x)| Dual::variable(*x, i.wrapping_sub(first))).collect();
-            functions.output(Dual::constant(t), &seeded, &u, &p, &mut expected);
-            for (j, output) in expected.iter().enumerate() {
-                errors[j] = y[j] - output.value;
-                for lane in 0..LANES.min(n - first) {
-                    rows[j][first + lane] = output.slopes[lane];
-                }
-            }
-        }
-        if let Some(j) = (0..y.len()).find(|&j| y[j].is_finite() && errors[j].is_nan()) {
-            let (output, t) = (&layout.outputs[j].name, exact(t));
-            return Err(format!("the model's output `{output}` is not a number on the way to it, at t = {t} s"));
-        }
-        let mut information = Information::new(n);
-        for (row, &error) in rows.iter().zip(&errors).filter(|(_, error)| error.is_finite()) {
-            information.absorb_row(row, error);
-        }
-        let step = information.solve().map_err(|deficient| {
-            let state = layout.states.get(deficient.column).map_or("a state", |state| &state.name);
-            format!("the outputs do not depend on `{state}`")
-        })?;
-        x.iter_mut().zip(&step).for_each(|(x, step)| *x += step);
-        let size = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
-        if iteration > 0 && size(&step) <= 1e-12 * size(&x).max(f64::MIN_POSITIVE) {
-            return Ok(x);
-        }
-    }
-    Err("the outputs cannot be solved for the state".to_owned())
+/// Where outputs are solved for states: equations, time, inputs and parameters.
+pub(crate) struct Place<'p> {
+    pub layout: &'p Layout,
+    pub functions: &'p dyn Functions<Duals>,
+    pub t: f64,
+    pub u: &'p [f64],
+    pub p: &'p [f64],
 }
 
-/// The name of a parameter that the outputs depend on directly, if there is one: then they do not give the state alone.
-pub(crate) fn depends_on_parameter(
-    layout: &Layout,
-    functions: &dyn Functions<Duals>,
-    t: f64,
-    x: &[f64],
-    u: &[f64],
-    p: &[f64],
-) -> Option<String> {
-    let (x, u) = (constants(x), constants(u));
-    let mut y = vec![Dual::constant(0.0); layout.outputs.len()];
-    for first in (0..p.len()).step_by(LANES) {
-        let seeded: Vec<Duals> = p.iter().enumerate().map(|(i, p)| Dual::variable(*p, i.wrapping_sub(first))).collect();
-        functions.output(Dual::constant(t), &x, &u, &seeded, &mut y);
-        let depends = |lane: &usize| y.iter().any(|y| y.slopes[*lane] != 0.0);
-        if let Some(lane) = (0..LANES.min(p.len() - first)).find(depends) {
-            return Some(layout.parameters[first + lane].name.clone());
+/// A start for the state, and which of its entries the outputs do not give.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Guess {
+    /// The state; zero (one, where the equations are undefined at zero) in the entries that are not given.
+    pub state: Vec<f64>,
+    /// Whether the outputs leave the entry open.
+    pub open: Vec<bool>,
+}
+
+/// Errors of the outputs at a state, and their slopes with respect to the states.
+struct Slopes {
+    errors: Vec<f64>,
+    rows: Vec<Vec<f64>>,
+}
+
+impl Place<'_> {
+    /// The state whose outputs are the measured ones.
+    ///
+    /// # Errors
+    /// Why there is none.
+    pub fn state(&self, y: &[f64]) -> Result<Vec<f64>, String> {
+        let n = self.layout.states.len();
+        let found = y.iter().filter(|y| y.is_finite()).count();
+        if found < n {
+            let (states, outputs) = (names(&self.layout.states), names(&self.layout.outputs));
+            let t = exact(self.t);
+            return Err(format!(
+                "{n} state(s), {states}, but {found} measured of the output(s) {outputs} at t = {t} s"
+            ));
+        }
+        let Guess { state, open } = self.nearest(y, 0.0)?;
+        match open.iter().position(|open| *open) {
+            Some(i) => Err(format!("the outputs do not determine `{}`", self.layout.states[i].name)),
+            None => Ok(state),
         }
     }
-    None
+
+    /// The same for entries that the outputs determine; the others are zero, or one where the equations are undefined there.
+    ///
+    /// # Errors
+    /// Outputs that are undefined at both.
+    pub fn guess(&self, y: &[f64]) -> Result<Guess, String> {
+        let zero = self.nearest(y, 0.0);
+        let is_start = |guess: &Guess| !guess.open.contains(&true) || self.moves(&guess.state);
+        if zero.as_ref().is_ok_and(is_start) {
+            return zero;
+        }
+        // Where both are undefined, the simulation says what is wrong.
+        self.nearest(y, 1.0).ok().filter(is_start).map_or(zero, Ok)
+    }
+
+    /// The state nearest to one of equal entries whose outputs are the measured ones, by Newton's method.
+    fn nearest(&self, y: &[f64], from: f64) -> Result<Guess, String> {
+        let n = self.layout.states.len();
+        let mut x = vec![from; n];
+        if n == 0 {
+            return Ok(Guess { state: x, open: vec![] });
+        }
+        let mut at = self.slopes(&x, y)?;
+        for iteration in 0..ITERATIONS {
+            let mut information = Information::new(n);
+            for (row, &error) in at.rows.iter().zip(&at.errors).filter(|(_, error)| error.is_finite()) {
+                information.absorb_row(row, error);
+            }
+            let (mut step, open) = step(&information);
+            let mut next = self.moved(&x, &step, y);
+            for _ in 0..HALVINGS {
+                if next.is_ok() {
+                    break;
+                }
+                step.iter_mut().for_each(|step| *step *= 0.5);
+                next = self.moved(&x, &step, y);
+            }
+            (x, at) = next?;
+            let size = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
+            if iteration > 0 && size(&step) <= 1e-12 * size(&x).max(f64::MIN_POSITIVE) {
+                return Ok(Guess { state: x, open });
+            }
+        }
+        // A start near the measurements, which determine nothing for certain.
+        Ok(Guess { state: x, open: vec![true; n] })
+    }
+
+    fn moved(&self, x: &[f64], step: &[f64], y: &[f64]) -> Result<(Vec<f64>, Slopes), String> {
+        let next: Vec<f64> = x.iter().zip(step).map(|(x, step)| x + step).collect();
+        let slopes = self.slopes(&next, y)?;
+        Ok((next, slopes))
+    }
+
+    /// The states from `first` on as variables.
+    fn seeded(x: &[f64], first: usize) -> Vec<Duals> {
+        x.iter().enumerate().map(|(i, x)| Dual::variable(*x, i.wrapping_sub(first))).collect()
+    }
+
+    /// Errors and slopes at a state; an error text if those of a measured output are not finite.
+    fn slopes(&self, x: &[f64], y: &[f64]) -> Result<Slopes, String> {
+        let (n, u, p) = (x.len(), constants(self.u), constants(self.p));
+        let (mut errors, mut rows) = (vec![0.0; y.len()], vec![vec![0.0; n]; y.len()]);
+        let mut expected = vec![Dual::constant(0.0); y.len()];
+        for first in (0..n).step_by(LANES) {
+            self.functions.output(Dual::constant(self.t), &Self::seeded(x, first), &u, &p, &mut expected);
+            for (j, output) in expected.iter().enumerate() {
+                errors[j] = y[j] - output.value;
+                let lanes = &output.slopes[..LANES.min(n - first)];
+                rows[j][first..first + lanes.len()].copy_from_slice(lanes);
+                let what = match (output.value.is_finite(), lanes.iter().find(|slope| !slope.is_finite())) {
+                    _ if y[j].is_nan() => continue,
+                    (false, _) => format!("`{}` is {}", self.layout.outputs[j].name, output.value),
+                    (true, Some(slope)) => format!("`{}` has the slope {slope}", self.layout.outputs[j].name),
+                    (true, None) => continue,
+                };
+                return Err(format!("the model's output {what} where {}", self.at(x)));
+            }
+        }
+        Ok(Slopes { errors, rows })
+    }
+
+    /// Whether derivative or next state are finite at a state, with their slopes.
+    fn moves(&self, x: &[f64]) -> bool {
+        let (u, p) = (constants(self.u), constants(self.p));
+        let mut to = vec![Dual::constant(0.0); x.len()];
+        self.layout.kind == Kind::Static
+            || (0..x.len()).step_by(LANES).all(|first| {
+                self.functions.state(Dual::constant(self.t), &Self::seeded(x, first), &u, &p, &mut to);
+                to.iter().all(|to| to.value.is_finite() && to.slopes.iter().all(|slope| slope.is_finite()))
+            })
+    }
+
+    /// The state in words: `x = 0, v = 0`.
+    fn at(&self, x: &[f64]) -> String {
+        let states = self.layout.states.iter().zip(x).map(|(state, x)| format!("{} = {}", state.name, exact(*x)));
+        states.collect::<Vec<String>>().join(", ")
+    }
+
+    /// The name of a parameter that the outputs depend on directly, if there is one: then they do not give the state alone.
+    pub fn depends_on_parameter(&self, x: &[f64]) -> Option<String> {
+        let (x, u) = (constants(x), constants(self.u));
+        let mut y = vec![Dual::constant(0.0); self.layout.outputs.len()];
+        for first in (0..self.p.len()).step_by(LANES) {
+            self.functions.output(Dual::constant(self.t), &x, &u, &Self::seeded(self.p, first), &mut y);
+            let depends = |lane: &usize| y.iter().any(|y| y.slopes[*lane] != 0.0);
+            if let Some(lane) = (0..LANES.min(self.p.len() - first)).find(depends) {
+                return Some(self.layout.parameters[first + lane].name.clone());
+            }
+        }
+        None
+    }
+}
+
+/// The step to the minimum, and the entries that are not determined: those take the shortest step.
+fn step(information: &Information) -> (Vec<f64>, Vec<bool>) {
+    let n = information.columns();
+    if let Ok(step) = information.solve() {
+        return (step, vec![false; n]);
+    }
+    let largest = information.column_norms().into_iter().fold(0.0, f64::max);
+    let damping = if largest > 0.0 { DAMPING * largest } else { 1.0 };
+    let damped = information.damped(&vec![damping; n]);
+    // How much of an entry the row of its damping decides.
+    let of_damping = |i: usize| {
+        let row: Vec<f64> = (0..n).map(|j| if i == j { damping } else { 0.0 }).collect();
+        damped.leverage(&row).unwrap_or(1.0)
+    };
+    let open = (0..n).map(|i| of_damping(i) > GIVEN).collect();
+    (damped.solve().unwrap_or(vec![0.0; n]), open)
+}
+
+fn names(quantities: &[Quantity]) -> String {
+    quantities.iter().map(|quantity| quantity.name.as_str()).collect::<Vec<&str>>().join(", ")
 }
 
 fn constants(values: &[f64]) -> Vec<Duals> {

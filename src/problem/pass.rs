@@ -201,9 +201,13 @@ impl Objective<'_> {
         slopes: bool,
         make: impl Fn() -> A + Sync,
     ) -> Result<A, Infeasible> {
-        let values = self.values(coordinates);
-        let borders = self.borders(coordinates, &values, slopes)?;
-        let jobs = self.segments(e, &values[e], coordinates, slopes, borders.as_deref());
+        // Not the values of all experiments, if they are not asked for: this is called for each of them.
+        let borders = match self.problem.cuts.is_chained(e) {
+            true => self.borders(coordinates, &self.values(coordinates), slopes)?,
+            false => None,
+        };
+        let values = self.problem.unknowns.of_experiment(e, coordinates);
+        let jobs = self.segments(e, &values, coordinates, slopes, borders.as_deref());
         let mut found = self.run_jobs(jobs, &|_| make())?.into_iter();
         let mut whole = found.next().unwrap_or_else(make);
         found.for_each(|part| whole.append(part));

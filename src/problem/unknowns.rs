@@ -8,7 +8,7 @@ use crate::layout::{Layout, Quantity};
 use crate::numeral::exact;
 use crate::parameter::{Parameter, Transform, fixed, free};
 use crate::record::{Initial, Record};
-use crate::sweep::{Seed, Sweep};
+use crate::sweep::{Guess, Seed, Sweep};
 use serde::{Deserialize, Serialize};
 
 /// What an unknown is in the model.
@@ -31,6 +31,8 @@ pub(crate) struct Free {
     /// Index of the experiment that it belongs to; `None` if all share it.
     pub experiment: Option<usize>,
     pub parameter: Parameter,
+    /// Whether it is an initial state whose start nobody gave: neither the user nor the outputs.
+    pub guessed: bool,
 }
 
 /// Initial state and parameters of one experiment.
@@ -66,7 +68,7 @@ impl Unknowns {
         let free_of = |i: usize, experiment: Option<usize>| {
             let Quantity { name, unit } = layout.parameters[i].clone();
             let name = experiment.map_or(name.clone(), |e| format!("{name} [{}]", labels[e]));
-            Free { name, unit, role: Role::Parameter(i), experiment, parameter: parameters[i] }
+            Free { name, unit, role: Role::Parameter(i), experiment, parameter: parameters[i], guessed: false }
         };
         let chosen = |own: bool| {
             (0..parameters.len()).filter(move |&i| parameters[i].free && parameters[i].per_experiment == own)
@@ -75,13 +77,18 @@ impl Unknowns {
         let (mut begins, mut initial) = (vec![], vec![]);
         for (e, record) in records.iter().enumerate() {
             begins.push(row.len());
-            let state = initial_state(sweep, record, parameters)?;
+            let (state, open) = initial_state(sweep, record, parameters)?;
             for (i, (&known, Quantity { name, unit })) in state.iter().zip(&layout.states).enumerate() {
                 let name = labeled(&format!("{name}(0)"), e);
                 check(&name, &known)?;
+                if known.per_experiment {
+                    let problem =
+                        "every experiment has an initial state of its own; leave .per_experiment() out".to_owned();
+                    return Err(Error::Parameter { parameter: name, problem });
+                }
                 if known.free {
                     let (unit, role, experiment) = (unit.clone(), Role::InitialState(i), Some(e));
-                    row.push(Free { name, unit, role, experiment, parameter: known });
+                    row.push(Free { name, unit, role, experiment, parameter: known, guessed: open[i] });
                 }
             }
             row.extend(chosen(true).map(|i| free_of(i, Some(e))));
@@ -181,17 +188,29 @@ fn labels(records: &[Record]) -> Vec<String> {
     records.iter().map(label).collect()
 }
 
-/// What is known of the state at an experiment's first sample.
-fn initial_state(sweep: &dyn Sweep, record: &Record, parameters: &[Parameter]) -> Result<Vec<Parameter>, Error> {
-    let (how, alone): (fn(f64) -> Parameter, bool) = match record.initial_state() {
-        Initial::Given(state) => return Ok(state.clone()),
-        Initial::FirstSample => (fixed, true),
-        Initial::Estimated => (free, false),
-    };
+/// What is known of the state at an experiment's first sample, and which entries are a start that no output gives.
+fn initial_state(
+    sweep: &dyn Sweep,
+    record: &Record,
+    parameters: &[Parameter],
+) -> Result<(Vec<Parameter>, Vec<bool>), Error> {
     let p: Vec<f64> = parameters.iter().map(|p| p.start).collect();
-    let unknown = |reason| Error::StateNotMeasured { experiment: record.name().to_owned(), reason };
-    let x = sweep.measured_state(record, 0, &p, alone).map_err(unknown)?;
-    Ok(x.into_iter().map(how).collect())
+    let unknown = |reason, remedy| Error::StateNotMeasured { experiment: record.name().to_owned(), reason, remedy };
+    let (state, open) = match record.initial_state() {
+        Initial::Given(state) => (state.clone(), vec![false; state.len()]),
+        Initial::FirstSample => {
+            let remedy =
+                "leave initial_from_first_sample out to have it estimated, or give it with Experiment::initial";
+            let x = sweep.measured_state(record, 0, &p).map_err(|reason| unknown(reason, remedy))?;
+            (x.iter().map(|x| fixed(*x)).collect(), vec![false; x.len()])
+        }
+        Initial::Estimated => {
+            let remedy = "give a start for it with Experiment::initial";
+            let Guess { state, open } = sweep.guessed_state(record, &p).map_err(|reason| unknown(reason, remedy))?;
+            (state.into_iter().map(free).collect(), open)
+        }
+    };
+    Ok((state, open))
 }
 
 fn check(name: &str, parameter: &Parameter) -> Result<(), Error> {

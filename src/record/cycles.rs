@@ -22,7 +22,7 @@ impl fmt::Display for Gap {
     }
 }
 
-/// Of even sampling, a step this much longer than the median one is a gap: half way to one lost sample.
+/// Of even sampling, a step this much longer than the median one is a gap: midway between none and one lost sample.
 const GAP: f64 = 1.5;
 /// Sampling is even if half of the steps are within this part of the median one.
 const EVEN: f64 = 0.1;

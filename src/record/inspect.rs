@@ -10,7 +10,7 @@ use core::fmt;
 use core::ops::Range;
 use serde::{Deserialize, Serialize};
 
-/// What the columns of a record show. Nothing in it is an error in itself: a commanded voltage is clipped by right, and
+/// What the columns of a record show. Nothing in it is an error in itself: a commanded voltage is clipped on purpose, and
 /// an encoder at rest repeats its value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -38,7 +38,7 @@ pub struct ChannelInspection {
     /// Least distance of two of these values.
     pub step: Option<f64>,
     /// What is suspicious of an output. An input has sentinels only: commands are constant for a while, limited and
-    /// repeated by right.
+    /// repeated on purpose.
     pub suspicions: Vec<Suspicion>,
 }
 

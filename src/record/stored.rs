@@ -89,7 +89,7 @@ pub(crate) struct Stored {
 }
 
 impl Stored {
-    /// The record, if it has these signals and keeps its promises.
+    /// The record, if it has these signals and is valid.
     pub fn into_record(
         self,
         states: Vec<Quantity>,

@@ -20,6 +20,18 @@ pub enum Assumption {
     },
 }
 
+impl Assumption {
+    /// What so many lags and these weights of rows assume; a row of weight zero is not used.
+    pub(super) fn of(lags: Option<usize>, weights: impl Iterator<Item = f64>) -> Self {
+        let mut used = weights.filter(|&weight| weight > 0.0);
+        match (lags, used.next()) {
+            (Some(lags), _) => Assumption::Correlated { lags },
+            (None, Some(first)) if used.any(|weight| weight != first) => Assumption::OwnVariance,
+            _ => Assumption::EqualVariance,
+        }
+    }
+}
+
 /// The solution of a [`Regression`](super::Regression). It borrows nothing.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(bound(serialize = "Of<P, f64>: Serialize", deserialize = "Of<P, f64>: Deserialize<'de>"))]

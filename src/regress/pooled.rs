@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 /// are linear in the number of sets.
 ///
 /// ```
-/// use greybox::{PooledRegression, Regression, signals};
+/// use greybox::{Regression, signals, regress::PooledRegression};
 /// signals! {
 ///     /// A straight line.
 ///     pub struct Line { slope: "V/s", offset: "V" }
@@ -25,7 +25,7 @@ use nalgebra::DMatrix;
 /// let found = PooledRegression::new([line(1.0), line(-2.0)], Line { slope: true, offset: false }).solve()?;
 /// assert!((found[1].parameters.slope - 3.0).abs() < 1e-12);
 /// assert!((found[1].parameters.offset + 2.0).abs() < 1e-12);
-/// # Ok::<(), greybox::RegressionError>(())
+/// # Ok::<(), greybox::regress::RegressionError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct PooledRegression<P: Signals> {
@@ -149,12 +149,7 @@ impl<P: Signals> PooledRegression<P> {
 
     fn assumption(&self) -> Assumption {
         let lags = self.sets.iter().filter_map(|set| set.lags).max();
-        let mut weights = self.sets.iter().flat_map(|set| &set.rows).map(|row| row.weight).filter(|w| *w > 0.0);
-        match (lags, weights.next()) {
-            (Some(lags), _) => Assumption::Correlated { lags },
-            (None, Some(first)) if weights.any(|weight| weight != first) => Assumption::OwnVariance,
-            _ => Assumption::EqualVariance,
-        }
+        Assumption::of(lags, self.sets.iter().flat_map(|set| &set.rows).map(|row| row.weight))
     }
 
     /// The triangles of the sets' scores, in the order of their columns.

@@ -40,7 +40,7 @@ pub(super) fn page(report: &Report) -> String {
             });
         });
         html.node("body", &[], |body| {
-            let mut prose = Prose::new(size(report));
+            let mut prose = Prose::new(sizes(report));
             verdict(body, report, &mut prose);
             contents(body, report);
             body.node("main", &[], |main| {
@@ -58,16 +58,28 @@ pub(super) fn page(report: &Report) -> String {
     page.finish()
 }
 
-/// How finely signals are drawn before anyone zooms: the more of them, the less so.
-fn size(report: &Report) -> Size {
+/// How finely signals are drawn before anyone zooms, of what is open at first and of what is closed: the more of them, the
+/// less so. What is opened is drawn anew.
+fn sizes(report: &Report) -> [Size; 2] {
     /// Columns of all lines together, some 26 bytes each, and the fewest of one.
-    const ALL: usize = 20_000;
+    const ALL: usize = 10_000;
     const FEWEST: usize = 60;
-    let lines = report.plots().into_iter().map(|plot| match &plot.drawing {
+    let counted = report.sections.iter().map(|section| lines(section, false));
+    let [open, closed] = counted.fold([0, 0], |sum, lines| [sum[0] + lines[0], sum[1] + lines[1]]);
+    [open, closed].map(|lines| Size::Fluid((ALL / lines.max(1)).clamp(FEWEST, COLUMNS)))
+}
+
+/// Lines over time that are open at first, and those that are closed.
+fn lines(section: &Section, within_closed: bool) -> [usize; 2] {
+    let closed = within_closed || section.folded;
+    let of_plot = |plot: &Plot| match &plot.drawing {
         Some(Drawing::Timeline(timeline)) => timeline.lines().count(),
         _ => 0,
-    });
-    Size::Fluid((ALL / lines.sum::<usize>().max(1)).clamp(FEWEST, COLUMNS))
+    };
+    let mut found = [0, 0];
+    found[usize::from(closed)] = section.plots.iter().map(of_plot).sum();
+    let parts = section.parts.iter().map(|part| lines(part, closed));
+    parts.fold(found, |sum, lines| [sum[0] + lines[0], sum[1] + lines[1]])
 }
 
 /// The colors of both themes, as variables; paper is light.
@@ -137,7 +149,9 @@ fn section(to: &mut Markup, section: &Section, level: usize, prose: &mut Prose) 
                 details.node("summary", &[], |summary| {
                     summary.node(&heading, &[], |node| title(node, section));
                 });
+                prose.closed += 1;
                 content(details, section, level, prose);
+                prose.closed -= 1;
             });
         } else {
             to.node(&heading, &[], |node| title(node, section));
@@ -208,8 +222,8 @@ fn figure(to: &mut Markup, plot: &Plot, prose: &mut Prose) {
             figure.node("figcaption", &[], |caption| prose.sentence(caption, &plot.caption));
         }
         match &plot.drawing {
-            Some(Drawing::Timeline(timeline)) => signals::draw(figure, plot, timeline, prose.size),
-            _ => chart::draw(plot, figure, prose.size),
+            Some(Drawing::Timeline(timeline)) => signals::draw(figure, plot, timeline, prose.size()),
+            _ => chart::draw(plot, figure, prose.size()),
         }
     });
 }

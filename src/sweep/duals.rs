@@ -7,8 +7,8 @@ use crate::functions::{Functions, Handle};
 use crate::integrate::{Duals, Method, Stuck};
 use crate::layout::Layout;
 use crate::model::Model;
-use crate::predict::{Between, Plant, Prediction, SlicePlant, measured};
-use crate::record::Record;
+use crate::predict::{Between, Guess, Place, Plant, Prediction, SlicePlant};
+use crate::record::{Channel, Record};
 use core::cell::Cell;
 use std::sync::Arc;
 
@@ -77,8 +77,20 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
         pieces.iter().map(one).collect()
     }
 
-    fn measured_state(&self, record: &Record, sample: usize, p: &[f64], alone: bool) -> Result<Vec<f64>, String> {
-        measured_state(&self.layout, &self.model, record, sample, p, alone)
+    fn measured_state(&self, record: &Record, sample: usize, p: &[f64]) -> Result<Vec<f64>, String> {
+        let place =
+            Place { layout: &self.layout, functions: &self.model, t: record.time(sample), u: &record.input(sample), p };
+        let x = place.state(&record.output(sample))?;
+        match place.depends_on_parameter(&x) {
+            Some(name) => Err(format!("the outputs depend on the parameter `{name}`, too")),
+            None => Ok(x),
+        }
+    }
+
+    fn guessed_state(&self, record: &Record, p: &[f64]) -> Result<Guess, String> {
+        let first = |channel: &Channel| channel.values.iter().copied().find(|y| y.is_finite()).unwrap_or(f64::NAN);
+        let y: Vec<f64> = record.outputs().iter().map(first).collect();
+        Place { layout: &self.layout, functions: &self.model, t: record.time(0), u: &record.input(0), p }.guess(&y)
     }
 
     fn locate(
@@ -123,23 +135,6 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
     }
 }
 
-/// The state that follows from the outputs of a sample. With `alone`, the outputs must not depend on parameters.
-pub(crate) fn measured_state(
-    layout: &Layout,
-    functions: &dyn Functions<Duals>,
-    record: &Record,
-    sample: usize,
-    p: &[f64],
-    alone: bool,
-) -> Result<Vec<f64>, String> {
-    let (t, u, y) = (record.time(sample), record.input(sample), record.output(sample));
-    let x = measured::state(layout, functions, t, &u, &y, p)?;
-    match measured::depends_on_parameter(layout, functions, t, &x, &u, p).filter(|_| alone) {
-        Some(name) => Err(format!("the outputs depend on the parameter `{name}`, too")),
-        None => Ok(x),
-    }
-}
-
 /// Runs a record in plain numbers to find the cause of a failure.
 pub(crate) struct FailureSearch<'w> {
     pub layout: &'w Layout,
@@ -178,7 +173,7 @@ impl FailureSearch<'_> {
                 // An output that was not measured need not be finite, except at the sample where the failure was
                 // noticed.
                 if !y.is_finite() && (!found.is_nan() || k == sample) {
-                    let hint = if y.is_nan() { UNDEFINED } else { OVERFLOW };
+                    let hint = if y.is_nan() || runaway(&x).is_none() { UNDEFINED } else { OVERFLOW };
                     return broken(k, format!("output `{}`", self.layout.outputs[j].name), y, hint);
                 }
                 if ((found - y) / sigma[j]).abs() > (largest.2 / sigma[largest.1]).abs() {
@@ -217,8 +212,8 @@ const RUNAWAY: f64 = 1e100;
 const STUCK: &str = "; no step is short enough, or 100,000 of them do not reach the next sample: the model is too stiff for \
                      the method, jumps, or leaves its domain (take Esdirk, or smooth the model)";
 const UNDEFINED: &str = "; the equations are undefined there (a division by zero, a root or logarithm out of its domain, \
-                         or the `derivative` or `next` that Model::KIND asks for was not written): bound the parameters \
-                         or start elsewhere";
+                         or the `derivative` or `next` that Model::KIND asks for was not written): bound the parameters, \
+                         or start elsewhere (parameters and initial states)";
 pub(crate) const OVERFLOW: &str = "; the simulation overflows (an unstable model, or a step too long for its dynamics): \
                                    bound the parameters, take a shorter step or a stiff method, or predict over a shorter \
                                    horizon";

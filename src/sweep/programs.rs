@@ -14,7 +14,7 @@ use crate::graph::Untraceable;
 use crate::integrate::Method;
 use crate::interval::Hold;
 use crate::layout::{Kind, Layout};
-use crate::predict::{Prediction, recurrence};
+use crate::predict::{Guess, Prediction, recurrence};
 use crate::record::{Record, Time};
 use crate::recurrence::Recurrence;
 pub(crate) use derived::Derived;
@@ -171,8 +171,12 @@ impl Sweep for ProgramSweep<'_> {
         }
     }
 
-    fn measured_state(&self, record: &Record, sample: usize, p: &[f64], alone: bool) -> Result<Vec<f64>, String> {
-        self.plain.measured_state(record, sample, p, alone)
+    fn measured_state(&self, record: &Record, sample: usize, p: &[f64]) -> Result<Vec<f64>, String> {
+        self.plain.measured_state(record, sample, p)
+    }
+
+    fn guessed_state(&self, record: &Record, p: &[f64]) -> Result<Guess, String> {
+        self.plain.guessed_state(record, p)
     }
 
     fn locate(

@@ -5,7 +5,8 @@ use crate::pages::{Lag, Response, record, report};
 use crate::random::Random;
 use greybox::diagnose::{Compared, DataUse, profile};
 use greybox::{
-    Error, Experiment, ExperimentOf, Fit, Kind, Model, Nothing, Report, Scalar, Signals, Time, free, signals,
+    Error, Experiment, ExperimentOf, Fit, Kind, Model, Nothing, Report, Scalar, Signals, Time, WarningCode, free,
+    signals,
 };
 use std::path::PathBuf;
 
@@ -60,6 +61,20 @@ fn of_unclear(records: &[ExperimentOf<Unclear>]) -> Result<Report, Error> {
     let report = Report::new(&problem, &estimate)?;
     let names = ["d", "e"].into_iter();
     Ok(names.fold(report, |report, name| report.with(profile(&problem, &estimate, name, 0.95).unwrap())))
+}
+
+/// Along the product of `a` and `b` all ends of searches are one minimum: the product is what is warned of, not the ends.
+#[test]
+fn ends_along_what_is_not_determined_are_one_minimum() {
+    let estimate = Fit::new(&Unclear, &unclear(1, "bench")).parameters(pair()).starts(8).run().unwrap();
+    let codes: Vec<WarningCode> = estimate.warnings.iter().map(|warning| warning.code).collect();
+    let of_starts = [WarningCode::MinimumFoundOnce, WarningCode::RivalMinimum, WarningCode::DeclaredStartElsewhere];
+    assert!(
+        codes.contains(&WarningCode::Unidentified) && !codes.iter().any(|code| of_starts.contains(code)),
+        "{estimate}"
+    );
+    let starts = estimate.starts.as_ref().unwrap();
+    assert!(starts.minima.len() > 4 && starts.minima[4].cost_ratio < 1.0 + 1e-6, "{starts:?}");
 }
 
 #[test]

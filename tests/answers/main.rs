@@ -1,5 +1,7 @@
 //! What is said of an estimate: identifiability, diagnostics, comparison, reports.
 
+#[path = "../common/mod.rs"]
+mod common;
 mod compare;
 mod filters;
 mod gallery;

@@ -341,7 +341,7 @@ fn models_are_compared_on_both_kinds_of_data() {
     assert!(matches!(short, Err(Error::Lengths { found: 500, expected: 300, .. })));
 }
 
-/// Searches from elsewhere as a stair over their number, and the course of a search on a logarithmic axis.
+/// Searches from elsewhere as steps over their number, and the course of a search on a logarithmic axis.
 #[test]
 fn starts_and_iterations_are_drawn() {
     let record = [record(even(200), 0.02, 44)];

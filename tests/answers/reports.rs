@@ -1,4 +1,4 @@
-//! Reports: that every form of one is whole, safe against what stands in names, and honest about what is missing.
+//! Reports: that every form of one is whole, safe against what stands in names, and says what is missing.
 
 use greybox::diagnose::{Resampling, Test, bootstrap, profile, tested};
 use greybox::optimize::Severity;

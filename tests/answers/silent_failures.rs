@@ -1,55 +1,33 @@
 //! Failures that other programs do not report: each is named here.
 
+use crate::common::{Branch, Current, Lag, Voltage};
 use greybox::optimize::Severity;
 use greybox::{
     Error, Estimate, Experiment, Fit, Kind, Knowledge, Model, Nothing, Report, Scalar, Time, fixed, free, signals,
 };
 
-signals! { struct Level { x: "V" } }
-signals! { struct Drive { u: "V" } }
-signals! { struct Lag { k: "1", tau: "s" } }
-
-/// `tau dx/dt = k u - x`.
-#[derive(Clone)]
-struct FirstOrder;
-
-impl Model for FirstOrder {
-    type State = Level;
-    type Input = Drive;
-    type Output = Level;
-    type Parameters = Lag;
-
-    fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Drive<S>, p: &Lag<S>) -> Level<S> {
-        Level { x: (p.k * u.u - x.x) / p.tau }
-    }
-
-    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Drive<S>, _p: &Lag<S>) -> Level<S> {
-        *x
-    }
-}
-
-/// Steps of 0.01 s with `k = 2`, `tau = 0.05 s` and a little noise; the samples in `lost` are cut out.
-fn record(lost: std::ops::Range<usize>) -> Experiment<Level, Drive, Level> {
+/// Steps of 0.01 s with `gain = 2 A/V`, `tau = 0.05 s` and a little noise; the samples in `lost` are cut out.
+fn record(lost: std::ops::Range<usize>) -> Experiment<Current, Voltage, Current> {
     let (mut x, decay) = (0.0, (-0.2f64).exp());
     let (mut times, mut inputs, mut outputs) = (vec![], vec![], vec![]);
     for k in 0..2000usize {
         let u = if (k / 37) % 2 == 0 { 1.0 } else { -0.5 };
         if !lost.contains(&k) {
             times.push(k as f64 * 0.01);
-            inputs.push(Drive { u });
-            outputs.push(Level { x: x + 0.02 * ((k as f64 * 0.754_877_666_246_693).fract() - 0.5) });
+            inputs.push(Voltage { u });
+            outputs.push(Current { i: x + 0.02 * ((k as f64 * 0.754_877_666_246_693).fract() - 0.5) });
         }
         x = 2.0 * u + (x - 2.0 * u) * decay;
     }
-    Experiment::new(&FirstOrder, Time::from_stamps(times), inputs, outputs).unwrap()
+    Experiment::new(&Lag, Time::from_stamps(times), inputs, outputs).unwrap()
 }
 
 #[test]
 fn a_gap_in_time_is_named() {
-    let parameters = Lag { k: free(1.0), tau: free(0.1).log() };
-    let whole = Fit::new(&FirstOrder, &record(0..0)).parameters(parameters).run().unwrap();
+    let parameters = Branch { gain: free(1.0), tau: free(0.1).log() };
+    let whole = Fit::new(&Lag, &record(0..0)).parameters(parameters).run().unwrap();
     assert!(whole.warnings.iter().all(|w| !w.text.contains("time jumps")), "{whole}");
-    let torn = Fit::new(&FirstOrder, &record(700..760)).parameters(parameters).run().unwrap();
+    let torn = Fit::new(&Lag, &record(700..760)).parameters(parameters).run().unwrap();
     let warning = torn.warnings.iter().find(|w| w.text.contains("time jumps")).unwrap();
     assert!(warning.text.contains("no sample from 6.99 s to 7.6"), "{}", warning.text);
     assert!(torn.severity() >= Severity::UsableWithCare);
@@ -57,11 +35,11 @@ fn a_gap_in_time_is_named() {
 
 #[test]
 fn a_parameter_on_its_bound_has_no_interval() {
-    let parameters = Lag { k: free(1.0).within(0.0, 1.8), tau: free(0.1).log() };
-    let estimate = Fit::new(&FirstOrder, &record(0..0)).parameters(parameters).run().unwrap();
-    assert_eq!(estimate.knowledge.k, Knowledge::Held { bound: 1.8, end: None });
+    let parameters = Branch { gain: free(1.0).within(0.0, 1.8), tau: free(0.1).log() };
+    let estimate = Fit::new(&Lag, &record(0..0)).parameters(parameters).run().unwrap();
+    assert_eq!(estimate.knowledge.gain, Knowledge::Held { bound: 1.8, end: None });
     assert_eq!(estimate.covariance.get(0, 0), 0.0);
-    assert!(estimate.warnings.iter().any(|w| w.text.contains("`k` is held at its bound 1.8")), "{estimate}");
+    assert!(estimate.warnings.iter().any(|w| w.text.contains("`gain` is held at its bound 1.8")), "{estimate}");
 }
 
 /// From a thousand times too much or too little the search arrives, or the estimate is not called usable.
@@ -71,7 +49,7 @@ fn a_guess_far_off_arrives_or_is_named() {
         for transformed in [false, true] {
             let tau = if transformed { free(guess).log() } else { free(guess) };
             let record = record(0..0);
-            let fit = Fit::new(&FirstOrder, &record).parameters(Lag { k: free(1.0), tau });
+            let fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.0), tau });
             match fit.starts(16).run() {
                 Ok(estimate) => {
                     let arrived = (estimate.parameters.tau / 0.05 - 1.0).abs() < 0.01;
@@ -91,9 +69,9 @@ fn a_guess_far_off_arrives_or_is_named() {
 /// An unstable simulation is an error with its place, not a fit of nothing.
 #[test]
 fn no_success_on_what_is_not_a_number() {
-    let parameters = Lag { k: free(1.0), tau: fixed(-1e-3) };
-    let error = Fit::new(&FirstOrder, &record(0..0)).parameters(parameters).run().unwrap_err();
-    assert!(matches!(&error, Error::Start(failure) if failure.signal.contains('x') && failure.time > 0.0), "{error}");
+    let parameters = Branch { gain: free(1.0), tau: fixed(-1e-3) };
+    let error = Fit::new(&Lag, &record(0..0)).parameters(parameters).run().unwrap_err();
+    assert!(matches!(&error, Error::Start(failure) if failure.signal == "state `i`" && failure.time > 0.0), "{error}");
 }
 
 signals! { struct Amplified { g: "1", b: "V", c: "V", idle: "1" } }
@@ -104,20 +82,20 @@ struct Offsets;
 
 impl Model for Offsets {
     type State = Nothing;
-    type Input = Drive;
-    type Output = Level;
+    type Input = Voltage;
+    type Output = Current;
     type Parameters = Amplified;
     const KIND: Kind = Kind::Static;
 
-    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Drive<S>, p: &Amplified<S>) -> Level<S> {
-        Level { x: p.g * u.u + p.b + p.c + p.idle * 0.0 }
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Amplified<S>) -> Current<S> {
+        Current { i: p.g * u.u + p.b + p.c + p.idle * 0.0 }
     }
 }
 
-fn amplified() -> Experiment<Nothing, Drive, Level> {
-    let inputs: Vec<Drive> = (0..400).map(|k| Drive { u: 1.0 + (k as f64 * 0.37).sin() }).collect();
+fn amplified() -> Experiment<Nothing, Voltage, Current> {
+    let inputs: Vec<Voltage> = (0..400).map(|k| Voltage { u: 1.0 + (k as f64 * 0.37).sin() }).collect();
     let noise = |k: usize| 0.1 * ((k as f64 * 0.754_877_666_246_693).fract() - 0.5);
-    let outputs = inputs.iter().enumerate().map(|(k, u)| Level { x: 3.0 * u.u + 1.0 + noise(k) }).collect();
+    let outputs = inputs.iter().enumerate().map(|(k, u)| Current { i: 3.0 * u.u + 1.0 + noise(k) }).collect();
     Experiment::new(&Offsets, Time::Uniform { start: 0.0, step: 0.1 }, inputs, outputs).unwrap()
 }
 

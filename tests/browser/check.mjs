@@ -1,14 +1,15 @@
 // Opens a report in a headless browser: `node check.mjs REPORT.html [FOLDER]`. At 375 and at 1440 pixels, in light and in
 // dark, it must pass axe without a violation, fit the width, log no error and ask for nothing from elsewhere; a narrow page
-// must not be too long; zoom.mjs plays what a reader does to see more. With a folder, a picture of each is kept there to be
-// looked at, and the page on paper.
+// must not be too long; rows.mjs judges what is drawn and said, zoom.mjs plays what a reader does to see more. With a folder,
+// a picture of each is kept there to be looked at, and the page on paper.
 //
 // `run.sh` calls it where a browser and node are there, and fetches the packages of package.json beside this file.
-import { readFileSync } from "node:fs";
+import { readFileSync, statSync } from "node:fs";
 import { createRequire } from "node:module";
 import { basename, resolve } from "node:path";
 import { pathToFileURL } from "node:url";
 import { chromium } from "playwright-core";
+import { rows } from "./rows.mjs";
 import { terms } from "./terms.mjs";
 import { zoom } from "./zoom.mjs";
 
@@ -21,6 +22,7 @@ const browser = await chromium.launch({
 });
 const troubles = [];
 const longest = 14_000;
+const largest = 3_000_000;
 const name = basename(report, ".html");
 
 // What lies beyond the right edge, or is cut off by what it stands in.
@@ -45,6 +47,8 @@ const overlapping = () => {
   return overlaps.length;
 };
 
+const size = statSync(report).size;
+if (size > largest) troubles.push(`${size} bytes`);
 for (const width of [375, 1440]) {
   for (const colorScheme of ["light", "dark"]) {
     const trouble = (text) => troubles.push(`${width} px, ${colorScheme}: ${text}`);
@@ -64,6 +68,7 @@ for (const width of [375, 1440]) {
     // What can be opened is checked open.
     await page.evaluate(() => document.querySelectorAll("details").forEach((details) => (details.open = true)));
     for (const text of await page.evaluate(clipped)) trouble(`is cut off: ${text}`);
+    await rows(page, trouble);
     const overlaps = await page.evaluate(overlapping);
     if (overlaps) trouble(`${overlaps} labels overlap`);
     await page.evaluate(axe);
@@ -77,7 +82,7 @@ for (const width of [375, 1440]) {
     await context.close();
   }
 }
-// On paper the legend keeps its colors, and nothing is wider than the sheet.
+// On paper the legend keeps its colors, and what is closed is named as such.
 const paper = await (await browser.newContext({ viewport: { width: 794, height: 1123 } })).newPage();
 await paper.goto(pathToFileURL(resolve(report)).href);
 await paper.emulateMedia({ media: "print" });
@@ -87,6 +92,11 @@ const uncolored = await paper.evaluate(() => {
   return keys.filter((key) => style(key).borderTopColor === style(document.body).borderTopColor || style(key).printColorAdjust !== "exact").length;
 });
 if (uncolored) troubles.push(`on paper: ${uncolored} keys of legends have no color`);
+const unnamed = await paper.evaluate(() => {
+  const closed = [...document.querySelectorAll("details:not([open]) > summary")].filter((summary) => summary.checkVisibility());
+  return document.querySelectorAll("details").length && closed.every((summary) => getComputedStyle(summary, "::after").content.includes("closed")) ? 0 : 1;
+});
+if (unnamed) troubles.push("on paper: what is closed is not named");
 if (folder) await paper.pdf({ path: `${folder}/${name}.pdf`, format: "A4", printBackground: false });
 await browser.close();
 troubles.forEach((trouble) => console.log(trouble));

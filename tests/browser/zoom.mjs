@@ -80,7 +80,22 @@ export const zoom = async (page, trouble) => {
   if (!wheeled || (wheeled[1] - wheeled[0]) / length > 0.6) trouble(`the wheel shows ${wheeled} of ${length} s`);
   else if (Math.abs((wheeled[0] + 0.25 * (wheeled[1] - wheeled[0])) / length - 0.25) > 0.02) trouble(`the wheel zooms to ${wheeled}`);
 
-  // Keys: all, in, later, earlier, out; the focus stays.
+  await keys(page, root, length, all, trouble);
+  await deepest(page, root, whole, all, trouble);
+  await piece(page, root, at, trouble);
+  await page.keyboard.press("0");
+
+  // The values below the pointer.
+  await page.mouse.move(...(await at(0.3)));
+  const readout = await root.locator(".readout").innerText();
+  if (!/\d s\n/.test(readout) || !readout.includes("measured")) trouble(`below the pointer: ${readout}`);
+  if ((await root.locator(".cursor:visible").count()) < 2) trouble("the line at the pointer is not in all panels");
+  await page.mouse.move(1, 1);
+  await fingers(page, root, at, state, span, trouble, length);
+};
+
+// Keys: all, in, later, earlier, out; the focus stays.
+const keys = async (page, root, length, all, trouble) => {
   await root.focus();
   await page.keyboard.press("0");
   await all("the key 0");
@@ -95,8 +110,10 @@ export const zoom = async (page, trouble) => {
   await page.keyboard.press("-");
   await all("the key -");
   if (!(await state(page)).focus) trouble("the focus is lost");
+};
 
-  // Zoomed in as far as it goes, samples are shown one by one; the button keeps the focus though it can do nothing more.
+// Zoomed in as far as it goes, samples are shown one by one; the button keeps the focus though it can do nothing more.
+const deepest = async (page, root, whole, all, trouble) => {
   const zoomIn = root.getByRole("button", { name: "Zoom in" });
   await zoomIn.focus();
   for (let i = 0; i < 40 && (await zoomIn.getAttribute("aria-disabled")) !== "true"; i++) await page.keyboard.press("Enter");
@@ -108,14 +125,34 @@ export const zoom = async (page, trouble) => {
   if (deep.up.join() === whole.up.join()) trouble("the axis of values stays");
   await root.getByRole("button", { name: "all: show all" }).click();
   await all("the button all");
+};
 
-  // The values below the pointer.
-  await page.mouse.move(...(await at(0.3)));
-  const readout = await root.locator(".readout").innerText();
-  if (!/\d s\n/.test(readout) || !readout.includes("measured")) trouble(`below the pointer: ${readout}`);
-  if ((await root.locator(".cursor:visible").count()) < 2) trouble("the line at the pointer is not in all panels");
-  await page.mouse.move(1, 1);
-  await fingers(page, root, at, state, span, trouble, length);
+// Where the columns of the drawing hold many samples each, those about the largest residual are shown one by one.
+const piece = async (page, root, at, trouble) => {
+  const found = await page.evaluate(() => {
+    const { stretches } = JSON.parse(document.querySelector("[data-played] script").textContent);
+    const times = ({ even, traces, t }) => {
+      if (even) return [even[0], even[0] + even[1] * (atob(traces[0].low).length / 4 - 1)];
+      const all = new Float64Array(Uint8Array.from(atob(t), (letter) => letter.charCodeAt(0)).buffer);
+      return [all[0], all.at(-1)];
+    };
+    return stretches.length > 1 && { whole: times(stretches[0]), close: times(stretches[1]) };
+  });
+  if (!found) return;
+  const { whole, close } = found;
+  const middle = (close[0] + close[1]) / 2;
+  await root.focus();
+  await page.keyboard.down("Control");
+  for (let i = 0; i < 60; i++) {
+    const [from, to] = span(await state(page)) ?? whole;
+    if (to - from < (close[1] - close[0]) / 4) break;
+    await page.mouse.move(...(await at((middle - from) / (to - from))));
+    await page.mouse.wheel(0, -200);
+    await page.waitForTimeout(20);
+  }
+  await page.keyboard.up("Control");
+  const { shown } = await state(page);
+  if (!shown.includes("sample by sample")) trouble(`about the largest residual: ${shown}`);
 };
 
 // Two fingers that part show less, one finger moves on.

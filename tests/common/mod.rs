@@ -8,6 +8,7 @@ signals! { pub struct Current { i: "A" } }
 signals! { pub struct Pair { y: "V", z: "V" } }
 signals! { pub struct Affine { slope: "1", offset: "V" } }
 signals! { pub struct Branch { gain: "A/V", tau: "s" } }
+signals! { pub struct Coil { r: "ohm", l: "H" } }
 
 /// `y = slope u + offset`, `z = offset u - slope`: linear in its parameters, without state.
 #[derive(Clone)]
@@ -37,6 +38,23 @@ impl Model for Lag {
         Current { i: (p.gain * u.u - x.i) / p.tau }
     }
     fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, _p: &Branch<S>) -> Current<S> {
+        *x
+    }
+}
+
+/// `l di/dt = u - r i`.
+#[derive(Clone)]
+pub struct Rl;
+
+impl Model for Rl {
+    type State = Current;
+    type Input = Voltage;
+    type Output = Current;
+    type Parameters = Coil;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Current<S>, u: &Voltage<S>, p: &Coil<S>) -> Current<S> {
+        Current { i: (u.u - p.r * x.i) / p.l }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, _p: &Coil<S>) -> Current<S> {
         *x
     }
 }

@@ -6,7 +6,7 @@ use crate::tables::Mapped;
 use greybox::engine::{Program, Sampling, Trajectories};
 use greybox::graph::{Graph, Id, Leaf, Seed};
 use greybox::pmsm::{Machine, Salient};
-use greybox::{Equations, Extrapolation, Hold, Interpolation, Model, Recurrence, Rk4};
+use greybox::{Extrapolation, Hold, Interpolation, Model, Rk4, equations::Equations, recurrence::Recurrence};
 use std::process::Command;
 
 /// A number made of all bits of all rows (FNV-1a); all numbers that are none count as one.

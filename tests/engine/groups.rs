@@ -3,7 +3,9 @@
 use crate::steps::{Currents, Drive, Pmsm, Winding};
 use greybox::engine::{Column, Group, Program, Sampling, Trajectories};
 use greybox::graph::{Function, Graph, Id, Leaf, Seed};
-use greybox::{Dual, Equations, Hold, Interval, ModelSystem, Recurrence, Rk4, Signals};
+use greybox::{
+    Dual, Hold, Interval, Rk4, Signals, equations::Equations, integrate::ModelSystem, recurrence::Recurrence,
+};
 
 const P: [f64; 3] = [0.6, 3.5e-3, 0.9];
 const SEEDS: [Seed; 5] = [Seed::Parameter(0), Seed::Parameter(1), Seed::Parameter(2), Seed::Carry(0), Seed::Carry(1)];

@@ -3,7 +3,11 @@
 use greybox::engine::{Column, Program, Sampling, Trajectories};
 use greybox::graph::Seed;
 use greybox::{
-    Dual, Equations, Hold, Integrator, Interval, Model, ModelSystem, Of, Recurrence, Rk4, Scalar, Signals, signals,
+    Dual, Hold, Interval, Model, Of, Rk4, Scalar, Signals,
+    equations::Equations,
+    integrate::{Integrator, ModelSystem},
+    recurrence::Recurrence,
+    signals,
 };
 
 signals! {

@@ -2,7 +2,8 @@
 
 use crate::steps::agrees;
 use greybox::{
-    Dual, Equations, Extrapolation, Grid, Hold, Interpolation, Model, Rk4, Scalar, Table, TableError, signals,
+    Dual, Extrapolation, Grid, Hold, Interpolation, Model, Rk4, Scalar, Table, TableError, equations::Equations,
+    signals,
 };
 
 const X: [f64; 5] = [-1.0, 0.0, 0.5, 2.0, 3.0];

@@ -3,8 +3,8 @@
 use crate::steps::agrees;
 use greybox::graph::{Function, Graph, Leaf, Symbol};
 use greybox::models::{
-    Armature, Axis, AxisMotion, Command, ControlledAxisMotion, DcMotor, Feed, Positioning, PositioningLoop, Reference,
-    Rotation,
+    Armature, AxisMotion, AxisParameters, Command, ControlledAxisMotion, DcMotor, Feed, Positioning, PositioningLoop,
+    Reference, Rotation,
 };
 use greybox::pmsm::{
     AngledDrive, Cabled, Compensated, CompensatedDrive, CompensatedSalientWinding, CompensatedWinding, Currents, Drive,
@@ -12,7 +12,7 @@ use greybox::pmsm::{
     InverterFedWinding, Machine, MachineParameters, MachineState, Mechanics, Misaligned, Salient, SalientWinding,
     Saturated, SaturatedWinding, Shaft, ShaftMotion, Surface, Torque, VoltageAndLoad, Winding,
 };
-use greybox::{Automatic, Equations, Hold, Kind, Model, Nothing, Rk4, Scalar, Signals, signals};
+use greybox::{Automatic, Hold, Kind, Model, Nothing, Rk4, Scalar, Signals, equations::Equations, signals};
 
 signals! {
     pub struct Pair { a: "1", b: "1" }
@@ -103,7 +103,7 @@ fn branches_and_kinds_run_as_they_are_written() {
 }
 
 #[test]
-fn shipped_models_run_on_lanes() {
+fn shipped_motors_run_on_lanes() {
     let rk4 = Rk4::default();
     let drive = swing::<Drive>(Drive { ud: 20.0, uq: 40.0, w: 100.0 }, 60);
     let i = Currents { id: 1.0, iq: -2.0 };
@@ -151,6 +151,16 @@ fn shipped_models_run_on_lanes() {
         &torque,
         1e-3,
     );
+}
+
+#[test]
+fn exact_and_wrapped_motors_run_on_lanes() {
+    let rk4 = Rk4::default();
+    let drive = swing::<Drive>(Drive { ud: 20.0, uq: 40.0, w: 100.0 }, 60);
+    let angled = swing::<AngledDrive>(AngledDrive { ud: 20.0, uq: 40.0, w: 100.0, theta: 2.0 }, 60);
+    let i = Currents { id: 1.0, iq: -2.0 };
+    let winding = Winding { rs: 0.63, ls: 4e-3, ke: 0.95 };
+    let salient = SalientWinding { rs: 0.63, ld: 4e-3, lq: 5e-3, ke: 0.95 };
     for held in [HeldIn::Stationary, HeldIn::Rotor] {
         let step = ExactStep::new(4, 1e-4, held).unwrap();
         let exact = ExactSurface(step);
@@ -186,10 +196,15 @@ fn shipped_models_run_on_lanes() {
     let lost = swing::<CompensatedDrive>(CompensatedDrive::from([20.0, 40.0, 100.0, 2.0, 0.9, -0.4]), 60);
     let p = CompensatedSalientWinding::from([0.63, 4e-3, 5e-3, 0.95, 0.01, 2.0]);
     agrees::<_, _, 8>(&compensated, &Automatic::default(), Hold::Zero, i, p, &lost, 1e-4);
+}
+
+#[test]
+fn shipped_axes_and_brushed_motors_run_on_lanes() {
+    let rk4 = Rk4::default();
     let feed = swing::<Feed>(Feed { u: 24.0, tau_l: 0.1 }, 60);
     let armature = Armature { r: 1.0, l: 1e-3, k: 0.05, j: 1e-4, b: 1e-5 };
     agrees::<_, _, 7>(&DcMotor, &rk4, Hold::Zero, Rotation::from([0.5, 10.0]), armature, &feed, 1e-4);
-    let axis = Axis { m: 95.0, fv: 200.0, fc: 20.0, offset: -3.0 };
+    let axis = AxisParameters { m: 95.0, fv: 200.0, fc: 20.0, offset: -3.0 };
     let command = swing::<Command>(Command { vir: 2.0 }, 60);
     agrees::<_, _, 6>(&Positioning::EMPS, &rk4, Hold::Zero, AxisMotion { q: 0.1, v: 0.0 }, axis, &command, 1e-3);
     let reference = swing::<Reference>(Reference { qg: 0.1 }, 60);
@@ -206,7 +221,7 @@ model! { NeverEnds, Kind::Continuous, |_t, x, _u, p| {
     }
     Pair { a, b: x.b }
 }, *x }
-model! { TooManyWays, Kind::Continuous, |_t, x, _u, p| {
+model! { TooManyPaths, Kind::Continuous, |_t, x, _u, p| {
     let mut sum = x.a;
     for i in 0..9 {
         if x.b * f64::from(i) > p.k {
@@ -229,7 +244,7 @@ fn what_cannot_be_read_is_told() {
     );
     assert!(reason(Equations::trace(&Chains)).contains("`chain`"));
     assert!(reason(Equations::trace(&NeverEnds)).contains("48 open comparisons"));
-    assert!(reason(Equations::trace(&TooManyWays)).contains("64 ways"));
+    assert!(reason(Equations::trace(&TooManyPaths)).contains("64 paths"));
     assert!(reason(Equations::trace(&Panics)).contains("far too large"));
     // Nothing of a failed trace is left: symbols stand for nothing again, and the next trace is whole.
     let outside = Symbol::from(1.0) + Symbol::from(2.0);

@@ -9,6 +9,7 @@ use argmin::solver::neldermead::NelderMead;
 use argmin::solver::particleswarm::ParticleSwarm;
 use argmin::solver::quasinewton::LBFGS;
 use greybox::optimize::{GaussNewton, LeastSquaresState, LevenbergMarquardt, Outcome, Stop};
+use greybox::optimize::{JacobianColumns, Nominal, Unscaled};
 use greybox::*;
 use rand::SeedableRng;
 use std::path::PathBuf;

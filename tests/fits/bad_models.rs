@@ -1,6 +1,7 @@
 //! Models that a record cannot tell, that fail somewhere or everywhere, or that are stepped by the wrong method: what the
 //! user is told, and that the search goes around what it can go around.
 
+use crate::refused::says;
 use approx::assert_relative_eq;
 use greybox::optimize::Severity;
 use greybox::*;
@@ -80,17 +81,6 @@ fn record<M: Model<State = Position, Input = Force, Output = Position>>(
 
 fn free_pair(a: f64, b: f64) -> Pair<Parameter> {
     Pair { a: free(a), b: free(b) }
-}
-
-#[track_caller]
-fn says<T>(result: Result<T, Error>, parts: &[&str]) -> Error {
-    let Err(error) = result else { panic!("no error; expected {parts:?}") };
-    let message = error.to_string();
-    println!("{message}\n");
-    for part in parts {
-        assert!(message.contains(part), "`{part}` is not in: {message}");
-    }
-    error
 }
 
 /// The warnings in one text, which must hold every one of `parts`.
@@ -213,7 +203,7 @@ fn a_start_where_the_model_is_undefined() {
     let open = open.unwrap();
     says(
         Fit::new(&Rootless, &open).parameters(free_pair(1.0, 1.0)).run(),
-        &["output `x` is not a number", "Experiment::initial"],
+        &["output `x` is NaN where x = 0", "give a start for it with Experiment::initial"],
     );
 }
 

@@ -2,6 +2,7 @@
 
 use approx::assert_relative_eq;
 use greybox::check::Disagreement;
+use greybox::integrate::ModelSystem;
 use greybox::*;
 use std::f64::consts::PI;
 

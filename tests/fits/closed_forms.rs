@@ -3,6 +3,8 @@
 
 use crate::common::*;
 use argmin::core::{CostFunction, Gradient, Hessian, Jacobian, Operator};
+use greybox::information::Covariance;
+use greybox::prefilter::FilterState;
 use greybox::*;
 use nalgebra::{DMatrix, DVector};
 

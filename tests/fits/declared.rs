@@ -1,7 +1,7 @@
 //! What is declared of parameters holds, and what has no effect is refused.
 
 use crate::shared::shared;
-use greybox::models::{Axis, ControlledAxisMotion, PositioningLoop};
+use greybox::models::{AxisParameters, ControlledAxisMotion, PositioningLoop};
 use greybox::optimize::Severity;
 use greybox::*;
 
@@ -54,8 +54,12 @@ fn the_wrong_hold_of_the_benchmark_is_not_usable() {
     let Some(path) = shared("emps/emps.csv") else { return };
     let model = PositioningLoop::EMPS;
     let rest = ControlledAxisMotion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) };
-    let axis =
-        Axis { m: free(80.0).positive(), fv: free(150.0).positive(), fc: free(15.0).positive(), offset: free(0.0) };
+    let axis = AxisParameters {
+        m: free(80.0).positive(),
+        fv: free(150.0).positive(),
+        fc: free(15.0).positive(),
+        offset: free(0.0),
+    };
     let record = Experiment::from_csv(&model, path).unwrap().initial(rest);
     let wrong = Fit::new(&model, &record).parameters(axis).run().unwrap();
     assert!(wrong.severity() == Severity::NotUsable && wrong.parameters.fv < 0.0, "{wrong}");

@@ -3,7 +3,7 @@
 use crate::common::Noise;
 use crate::shared::shared;
 use approx::assert_relative_eq;
-use greybox::models::{Axis, AxisMotion, Positioning};
+use greybox::models::{AxisMotion, AxisParameters, Positioning};
 use greybox::optimize::LeastSquares;
 use greybox::*;
 
@@ -126,7 +126,7 @@ signals! { pub struct Coupling { j1: "kg m2", j2: "kg m2", c: "N m", d: "N m s",
 
 /// Two masses and a stiff coupling.
 #[derive(Clone)]
-struct Coupled;
+pub struct Coupled;
 
 impl Model for Coupled {
     type State = Masses;
@@ -143,17 +143,22 @@ impl Model for Coupled {
     }
 }
 
+/// A second of samples under a square wave of torque, from rest, with noise of this standard deviation (rad/s) on the speed.
+pub fn coupled(p: Coupling, sigma: f64) -> ExperimentOf<Coupled> {
+    let time = Time::Uniform { start: 0.0, step: 1e-3 };
+    let input: Vec<Torque> = (0..1_000).map(|k| Torque { tau: if k / 37 % 2 == 0 { 1.0 } else { -0.8 } }).collect();
+    let (exact, rest) = (Rk45 { relative: 1e-11, absolute: 1e-13 }, Masses::from([0.0; 3]));
+    let run = Simulator::new(&Coupled).integrator(exact).run(&p, &rest, time, &input).unwrap();
+    let record = run.with_noise(First { first: sigma }, 4).experiment(&Coupled).unwrap();
+    record.initial(Masses::map(rest, fixed))
+}
+
 /// An adaptive method's error is another at every point, and its slopes are not quite those of what it computes. Near the
 /// minimum no step then lowers the cost as it should: that is no stall.
 #[test]
 fn a_cost_as_rough_as_its_tolerance_is_minimized_within_it() {
-    let time = Time::Uniform { start: 0.0, step: 1e-3 };
-    let input: Vec<Torque> = (0..1_000).map(|k| Torque { tau: if k / 37 % 2 == 0 { 1.0 } else { -0.8 } }).collect();
-    let (p, rest) = (Coupling::from([1e-2, 2e-2, 1e5, 1.0, 0.05]), Masses::from([0.0; 3]));
-    let exact = Rk45 { relative: 1e-11, absolute: 1e-12 };
-    let run = Simulator::new(&Coupled).integrator(exact).run(&p, &rest, time, &input).unwrap();
-    let record = run.with_noise(First { first: 0.006 }, 4).experiment(&Coupled).unwrap();
-    let record = record.initial(Masses::map(rest, fixed));
+    let p = Coupling::from([1e-2, 2e-2, 1e5, 1.0, 0.05]);
+    let record = coupled(p, 0.006);
     for relative in [1e-4, 1e-6] {
         let off = Coupling { j1: 1.05 * p.j1, j2: p.j2 / 1.05, c: 1.05 * p.c, ..p };
         let method = Esdirk { relative, absolute: 1e-3 * relative };
@@ -219,7 +224,7 @@ fn the_emps_record_is_fitted_in_open_loop_from_far() {
     let Some(path) = shared("emps/emps.csv") else { return };
     let model = Positioning::EMPS;
     let record = Experiment::from_csv(&model, path).unwrap().initial(AxisMotion { q: free(0.0), v: fixed(0.0) });
-    let start = Axis {
+    let start = AxisParameters {
         m: free(43.003797).log(),
         fv: free(170.22234).log(),
         fc: free(2.5872915).log(),

@@ -4,6 +4,7 @@
 use crate::common::Noise;
 use argmin::core::{CostFunction, Gradient};
 use core::f64::consts::TAU;
+use greybox::optimize::JacobianColumns;
 use greybox::optimize::{LevenbergMarquardt, Stop};
 use greybox::*;
 use nalgebra::{DMatrix, DVector};
@@ -16,9 +17,9 @@ signals! { pub struct Dynamics { tau: "s", gain: "1", drift: "m", y: "m", z: "m"
 
 /// `x[k+1] = x[k] + w`, seen by two sensors of different noise.
 #[derive(Clone)]
-struct Walk;
+struct RandomWalk;
 
-impl Model for Walk {
+impl Model for RandomWalk {
     type State = Position;
     type Input = Push;
     type Output = Sensors;
@@ -258,9 +259,9 @@ where
 
 #[test]
 fn a_random_walk() {
-    let record = record(&Walk, Time::Uniform { start: 0.0, step: 1.0 }, |_, x, _, w| x + 0.2 * w, [1.0, 1.0]);
+    let record = record(&RandomWalk, Time::Uniform { start: 0.0, step: 1.0 }, |_, x, _, w| x + 0.2 * w, [1.0, 1.0]);
     let parameters = Levels { drift: free(0.5).log(), y: free(0.5).log(), z: free(0.4) };
-    let fit = Fit::new(&Walk, &record).parameters(parameters).predictor(Kalman);
+    let fit = Fit::new(&RandomWalk, &record).parameters(parameters).predictor(Kalman);
     agrees(fit, &|p| {
         let q = (p[0] * 2.0).exp();
         Chain {

@@ -13,6 +13,7 @@ mod declared;
 mod extremes;
 mod far_starts;
 mod fleet;
+mod guessed_states;
 mod interval_limits;
 mod kalman;
 mod models;
@@ -21,6 +22,8 @@ mod noise;
 mod optimizers;
 mod recovery;
 mod refining;
+#[path = "../common/refused.rs"]
+mod refused;
 mod segments;
 #[path = "../common/shared.rs"]
 mod shared;

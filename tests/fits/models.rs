@@ -7,7 +7,7 @@ use greybox::pmsm::{Drive, ExactStep, ExactSurface, HeldIn, Surface, Winding};
 use greybox::*;
 use proptest::prelude::*;
 
-const AXIS: Axis = Axis { m: 95.0, fv: 203.0, fc: 20.0, offset: -3.2 };
+const AXIS: AxisParameters = AxisParameters { m: 95.0, fv: 203.0, fc: 20.0, offset: -3.2 };
 
 proptest! {
     #[test]
@@ -76,7 +76,7 @@ fn the_emps_record_is_fitted_in_closed_loop() {
     let model = PositioningLoop::EMPS;
     let record = Experiment::from_csv(&model, path).unwrap().hold(Hold::First);
     let record = record.initial(ControlledAxisMotion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) });
-    let start = Axis { m: free(80.0), fv: free(150.0), fc: free(15.0), offset: free(0.0) };
+    let start = AxisParameters { m: free(80.0), fv: free(150.0), fc: free(15.0), offset: free(0.0) };
     let estimate = Fit::new(&model, &record).parameters(start).run().unwrap();
     let p = estimate.parameters;
     assert!(estimate.outcome.converged());

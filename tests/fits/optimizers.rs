@@ -8,7 +8,10 @@ mod stationary;
 
 use argmin::core::{Executor, Solver, State};
 use greybox::optimize::{GaussNewton, LeastSquares, LeastSquaresState, LevenbergMarquardt, Machine, Outcome, Stop};
-use greybox::{JacobianColumns, Nominal, OwnSize, Scalar, Scaling, Unscaled};
+use greybox::{
+    Scalar,
+    optimize::{JacobianColumns, Nominal, OwnSize, Scaling, Unscaled},
+};
 use problems::{D, PROBLEMS, Problem};
 
 /// Where a search ended: point, sum of squares, outcome, evaluations.

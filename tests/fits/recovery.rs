@@ -218,9 +218,9 @@ fn priors_are_measurements() {
     // Without influence on the outputs the prior comes back, whether or not the noise is known.
     let quiet: Vec<Voltage> = vec![Voltage { u: 0.0 }; 50];
     let truth = Affine { slope: 0.0, offset: 0.3 };
-    signals! { pub struct Unseen { offset: "V", ghost: "1" } }
-    struct Haunted;
-    impl Model for Haunted {
+    signals! { pub struct Unseen { offset: "V", unseen: "1" } }
+    struct WithoutEffect;
+    impl Model for WithoutEffect {
         type State = Nothing;
         type Input = Voltage;
         type Output = Voltage;
@@ -230,19 +230,20 @@ fn priors_are_measurements() {
             Voltage { u: p.offset }
         }
     }
-    let record = simulated(&Haunted, 1.0, quiet, Nothing, Unseen { offset: truth.offset, ghost: 0.0 });
-    let record = noisy(&Haunted, &record, Voltage { u: 0.1 }, &mut Noise(5));
-    let fit =
-        || Fit::new(&Haunted, &record).parameters(Unseen { offset: free(0.0), ghost: free(1.0).prior(4.0, 0.25) });
+    let record = simulated(&WithoutEffect, 1.0, quiet, Nothing, Unseen { offset: truth.offset, unseen: 0.0 });
+    let record = noisy(&WithoutEffect, &record, Voltage { u: 0.1 }, &mut Noise(5));
+    let fit = || {
+        Fit::new(&WithoutEffect, &record).parameters(Unseen { offset: free(0.0), unseen: free(1.0).prior(4.0, 0.25) })
+    };
     for estimate in [fit().noise(Voltage { u: 0.1 }).run().unwrap(), fit().run().unwrap()] {
-        assert!((estimate.parameters.ghost - 4.0).abs() < 1e-9, "{estimate}");
-        assert!((estimate.knowledge.ghost.standard_error().unwrap() - 0.25).abs() < 1e-9, "{estimate}");
+        assert!((estimate.parameters.unseen - 4.0).abs() < 1e-9, "{estimate}");
+        assert!((estimate.knowledge.unseen.standard_error().unwrap() - 0.25).abs() < 1e-9, "{estimate}");
     }
     // A mean of 50 at 0.1 each, and a prior: weighted by their precision.
     let mean = record.outputs().map(|y| y.u).sum::<f64>() / 50.0;
     let (data, prior) = (50.0 / 0.01, 1.0 / 0.02f64.powi(2));
-    let parameters = Unseen { offset: free(0.0).prior(0.5, 0.02), ghost: fixed(0.0) };
-    let estimate = Fit::new(&Haunted, &record).parameters(parameters).noise(Voltage { u: 0.1 }).run().unwrap();
+    let parameters = Unseen { offset: free(0.0).prior(0.5, 0.02), unseen: fixed(0.0) };
+    let estimate = Fit::new(&WithoutEffect, &record).parameters(parameters).noise(Voltage { u: 0.1 }).run().unwrap();
     let expected = (data * mean + prior * 0.5) / (data + prior);
     assert!((estimate.parameters.offset - expected).abs() < 1e-12);
     let error = estimate.knowledge.offset.standard_error().unwrap();

@@ -1,45 +1,19 @@
 //! Fits whose integrator was not chosen take a finer one where the default step would decide the answer.
 
+use crate::far_starts::{Coupled, Coupling, coupled};
 use approx::assert_relative_eq;
 use greybox::optimize::{Outcome, Severity};
 use greybox::*;
 
-signals! { pub struct Masses { first: "rad/s", twist: "rad", second: "rad/s" } }
-signals! { pub struct Torque { tau: "N m" } }
-signals! { pub struct First { first: "rad/s" } }
-signals! { pub struct Coupling { j1: "kg m2", j2: "kg m2", c: "N m", d: "N m s" } }
-
-/// Two masses and a coupling.
-#[derive(Clone)]
-struct Coupled;
-
-impl Model for Coupled {
-    type State = Masses;
-    type Input = Torque;
-    type Output = First;
-    type Parameters = Coupling;
-    fn derivative<S: Scalar>(&self, _t: S, x: &Masses<S>, u: &Torque<S>, p: &Coupling<S>) -> Masses<S> {
-        let spring = p.c * x.twist + p.d * (x.first - x.second);
-        Masses { first: (u.tau - spring) / p.j1, twist: x.first - x.second, second: spring / p.j2 }
-    }
-    fn output<S: Scalar>(&self, _t: S, x: &Masses<S>, _u: &Torque<S>, _p: &Coupling<S>) -> First<S> {
-        First { first: x.first }
-    }
-}
-
-/// Steps of 1 ms; a stiffness of `c` turns by `sqrt(150 c) / 1000` rad in one.
+/// Steps of 1 ms; a stiffness of `c` turns by `sqrt(150 c) / 1000` rad in one. Without friction.
 fn record(c: f64, d: f64) -> (Coupling, ExperimentOf<Coupled>) {
-    let time = Time::Uniform { start: 0.0, step: 1e-3 };
-    let input: Vec<Torque> = (0..1_000).map(|k| Torque { tau: if k / 37 % 2 == 0 { 1.0 } else { -0.8 } }).collect();
-    let (p, rest) = (Coupling { j1: 1e-2, j2: 2e-2, c, d }, Masses::from([0.0; 3]));
-    let exact = Rk45 { relative: 1e-11, absolute: 1e-13 };
-    let run = Simulator::new(&Coupled).integrator(exact).run(&p, &rest, time, &input).unwrap();
-    let record = run.with_noise(First { first: 0.002 }, 4).experiment(&Coupled).unwrap();
-    (p, record.initial(Masses::map(rest, fixed)))
+    let p = Coupling { j1: 1e-2, j2: 2e-2, c, d, f: 0.0 };
+    (p, coupled(p, 0.002))
 }
 
 fn near(p: Coupling) -> Coupling<Parameter> {
-    Coupling::map(Coupling { j1: 1.1 * p.j1, j2: p.j2 / 1.1, c: 1.001 * p.c, ..p }, free)
+    let start = Coupling { j1: 1.1 * p.j1, j2: p.j2 / 1.1, c: 1.001 * p.c, ..p };
+    Coupling { f: fixed(0.0), ..Coupling::map(start, free) }
 }
 
 /// From a step that is fine to one with which Runge-Kutta's method is unstable.

@@ -1,4 +1,4 @@
-//! Models of every kind, with honest and with broken equations.
+//! Models of every kind, with sound and with broken equations.
 
 use greybox::{Kind, Model, Nothing, Scalar, signals};
 

@@ -1,27 +1,9 @@
 //! Ten million samples in one fit: memory is the record and less than 10 MB. In release only (`cargo test --release`).
 
 use crate::allocator::most_bytes;
+use crate::common::{Coil, Current, Rl, Voltage};
 use greybox::*;
 use std::time::Instant;
-
-signals! { pub struct Current { i: "A" } }
-signals! { pub struct Voltage { u: "V" } }
-signals! { pub struct Coil { r: "ohm", l: "H" } }
-
-struct Rl;
-
-impl Model for Rl {
-    type State = Current;
-    type Input = Voltage;
-    type Output = Current;
-    type Parameters = Coil;
-    fn derivative<S: Scalar>(&self, _t: S, x: &Current<S>, u: &Voltage<S>, p: &Coil<S>) -> Current<S> {
-        Current { i: (u.u - p.r * x.i) / p.l }
-    }
-    fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, _p: &Coil<S>) -> Current<S> {
-        *x
-    }
-}
 
 #[test]
 #[cfg_attr(debug_assertions, ignore = "slow without optimization")]

@@ -8,8 +8,9 @@ use greybox::pmsm::{
     MotorLaw, RsLyapunov, Winding,
 };
 use greybox::{
-    Butterworth, Dual, Esdirk, Experiment, FilterState, Fit, Hold, Huber, Integrator, Interval, ModelSystem, Nothing,
-    Rk4, Rk45, Sample, Time, fixed, free,
+    Butterworth, Dual, Esdirk, Experiment, Fit, Hold, Huber, Interval, Nothing, Rk4, Rk45, Sample, Time, fixed, free,
+    integrate::{Integrator, ModelSystem},
+    prefilter::FilterState,
 };
 
 const TS: f64 = 0.126e-3;

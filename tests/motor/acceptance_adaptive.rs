@@ -1,6 +1,6 @@
 //! Experiments 1 and 2 of the thesis, and what they must show: an observer in the loop of an ideal drive.
 
-use greybox::online::{Law, Mras, MrasStart, Order, Outcome, Stepping, Watch};
+use greybox::online::{AdaptationLaw, Mras, MrasStart, Order, Stepping, UpdateOutcome, Watch};
 use greybox::pmsm::adaptive::{Adaptive, Instant};
 use greybox::pmsm::control::{CurrentControl, PositionControl, SpeedControl};
 use greybox::pmsm::{
@@ -14,7 +14,13 @@ const KE: f64 = 1.6;
 const RS: f64 = 0.5;
 const LS: f64 = 4e-3;
 
-fn observer<L: Law<ExactSurface>>(start: Winding, lowest: f64, law: L, ts: f64, order: Order) -> Mras<ExactSurface, L> {
+fn observer<L: AdaptationLaw<ExactSurface>>(
+    start: Winding,
+    lowest: f64,
+    law: L,
+    ts: f64,
+    order: Order,
+) -> Mras<ExactSurface, L> {
     let model = ExactSurface(ExactStep::new(4, ts, HeldIn::Rotor).unwrap());
     let start = MrasStart {
         parameters: Winding {
@@ -38,12 +44,12 @@ fn truth(t: f64) -> MachineParameters {
 }
 
 /// Experiment 1: every sample of 14 s. `id` is the share of iq that id is given.
-fn experiment_1<L: Law<ExactSurface>>(law: L, torque: f64, id: f64) -> Vec<Instant> {
+fn experiment_1<L: AdaptationLaw<ExactSurface>>(law: L, torque: f64, id: f64) -> Vec<Instant> {
     experiment_1_within(0.0, law, torque, id)
 }
 
 /// The same with a lowest bound for the estimates.
-fn experiment_1_within<L: Law<ExactSurface>>(lowest: f64, law: L, torque: f64, id: f64) -> Vec<Instant> {
+fn experiment_1_within<L: AdaptationLaw<ExactSurface>>(lowest: f64, law: L, torque: f64, id: f64) -> Vec<Instant> {
     let np = PolePairs::new(4).unwrap();
     let control = CurrentControl::lambda_tuned(0.8 * RS, LS, 0.0, np, 1e-3).unwrap();
     let drive = Adaptive {
@@ -123,10 +129,10 @@ fn experiment_1_the_direct_law_diverges_with_d_current_of_the_wrong_sign_and_say
     let seen = experiment_1(law, -100.0, 0.2);
     // The estimate leaves its bounds, the resistance being below zero, before 1.03 s; left to itself, its error is past
     // 100 % there.
-    let stopped = seen.iter().find(|now| matches!(now.outcome, Outcome::Diverged(_))).expect("it must say so");
+    let stopped = seen.iter().find(|now| matches!(now.outcome, UpdateOutcome::Diverged(_))).expect("it must say so");
     assert!(stopped.t > 1.0 && stopped.t < 1.03, "{}", stopped.t);
     let end = seen.last().unwrap();
-    assert!(matches!(end.outcome, Outcome::Diverged(_)), "{:?}", end.outcome);
+    assert!(matches!(end.outcome, UpdateOutcome::Diverged(_)), "{:?}", end.outcome);
     assert!(end.estimate.rs.is_finite() && end.estimate.ke.is_finite());
 
     let law = MotorLaw { rs: RsDirect { gain: -10.0 }, ke: KeLyapunov { gain: 1e-3 } };
@@ -140,7 +146,7 @@ fn experiment_1_the_direct_law_diverges_with_d_current_of_the_wrong_sign_and_say
 }
 
 /// Experiment 2: the integral of the absolute speed error (rad) over 5 s, and the torque constant's error (%) over time.
-fn experiment_2<L: Law<ExactSurface>>(law: L, start: f64, ts: f64, order: Order) -> (f64, Vec<(f64, f64)>) {
+fn experiment_2<L: AdaptationLaw<ExactSurface>>(law: L, start: f64, ts: f64, order: Order) -> (f64, Vec<(f64, f64)>) {
     const KE: f64 = 0.95;
     let rotor = MachineParameters { rs: 0.4, ld: LS, lq: LS, ke: KE, j: 0.2, bv: 0.02, tc: 0.0, tg: 0.0 };
     let np = PolePairs::new(4).unwrap();

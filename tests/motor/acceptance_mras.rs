@@ -6,11 +6,11 @@
 //! the voltage held in the rotor's frame makes an error of the other sign that hides a part of it, and reads 0.13 %.
 
 use crate::acceptance_records::{Record, cycles, percent, record};
-use greybox::online::{Law, MrasStart, Order, Stepping, Watch};
+use greybox::online::{AdaptationLaw, MrasStart, Order, Stepping, Watch};
 use greybox::pmsm::drive::{Disturbance, Simulation};
 use greybox::pmsm::offline::extended;
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::{Axis, TS};
+use greybox::pmsm::robot::{RobotAxis, TS};
 use greybox::pmsm::{
     AngledDrive, Currents, DeadZone, ExactStep, ExactSurface, HeldIn, KeLyapunov, MotorLaw, Normalized, NotAdapted,
     Winding,
@@ -18,7 +18,13 @@ use greybox::pmsm::{
 use greybox::{Butterworth, fixed, free};
 
 /// Of an observer with this resistance and inductance, fed with the voltage less `vdt` (V) of dead time.
-fn rms<L: Law<ExactSurface>>(record: &Record, (rs, ls): (f64, f64), vdt: f64, held_in: HeldIn, law: L) -> f64 {
+fn rms<L: AdaptationLaw<ExactSurface>>(
+    record: &Record,
+    (rs, ls): (f64, f64),
+    vdt: f64,
+    held_in: HeldIn,
+    law: L,
+) -> f64 {
     let ke = record.axis.ke;
     let step = ExactStep::new(4, TS, held_in).unwrap();
     let start = MrasStart {
@@ -91,7 +97,7 @@ fn each_improvement_of_the_observer_counts() {
 #[test]
 fn what_is_left_is_the_saliency() {
     for number in (1..=6).step_by(if cfg!(debug_assertions) { 6 } else { 5 }) {
-        let axis = Axis::reference(number).unwrap();
+        let axis = RobotAxis::reference(number).unwrap();
         let simulation = Simulation::new(axis).unwrap().without(Disturbance::Saliency);
         let record = record(simulation, Program::speed_cycles(&axis, 20, 1.0).unwrap());
         let total = (axis.rs + axis.r_cable, axis.ls);

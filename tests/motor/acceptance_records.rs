@@ -2,11 +2,11 @@
 //! they must reach. Records are simulated once and shared. A debug build looks at some of the cycles and axes only, and
 //! says so: all of them take it minutes.
 
-use greybox::online::{Ekf, EkfStart, Outcome, Watch};
+use greybox::online::{Ekf, EkfStart, UpdateOutcome, Watch};
 use greybox::pmsm::drive::{Log, Simulation};
 use greybox::pmsm::offline::{Axes, Form, Spans, extended, hardly_seen, plain, search_i0};
 use greybox::pmsm::program::{Cycle, Program};
-use greybox::pmsm::robot::{Axis, TS};
+use greybox::pmsm::robot::{RobotAxis, TS};
 use greybox::pmsm::{
     AngledDrive, Compensated, CompensatedWinding, Currents, ExactStep, ExactSurface, HeldIn, InverterFed,
     InverterFedWinding, Winding,
@@ -15,7 +15,7 @@ use greybox::{Butterworth, Fit, Hold, LinearEstimate, fixed, free};
 use std::sync::OnceLock;
 
 pub struct Record {
-    pub axis: Axis,
+    pub axis: RobotAxis,
     log: Log,
     pub spans: Spans,
     pub cycles: Vec<Cycle>,
@@ -32,7 +32,7 @@ pub fn record(simulation: Simulation, program: Program) -> Record {
 pub fn cycles(number: u8) -> &'static Record {
     static RECORDS: [OnceLock<Record>; 6] = [const { OnceLock::new() }; 6];
     RECORDS[number as usize - 1].get_or_init(|| {
-        let axis = Axis::reference(number).unwrap();
+        let axis = RobotAxis::reference(number).unwrap();
         record(Simulation::new(axis).unwrap(), Program::speed_cycles(&axis, 20, 1.0).unwrap())
     })
 }
@@ -70,7 +70,7 @@ pub fn percent(found: f64, truth: f64) -> f64 {
 
 #[test]
 fn without_disturbances_least_squares_finds_the_motor() {
-    let axis = Axis::reference(1).unwrap();
+    let axis = RobotAxis::reference(1).unwrap();
     let undisturbed = Simulation::new(axis).unwrap().undisturbed();
     let mut worst = Worst([0.0; 4]);
     let record_ = record(undisturbed, Program::speed_cycles(&axis, 20, 1.0).unwrap());
@@ -123,7 +123,7 @@ fn the_index_ranks_ke_best_everywhere() {
 
 #[test]
 fn water_cutting_least_squares_and_weighted() {
-    let axis = Axis::reference(1).unwrap();
+    let axis = RobotAxis::reference(1).unwrap();
     let record = record(Simulation::new(axis).unwrap(), Program::water_cutting(&axis, 4).unwrap());
     let equations = plain(&record.spans, Axes::Both, Form::Rotor).prefiltered(&filter());
     let weighted = equations.clone().weighted(|k| (record.spans.spans[k].w / 100.0).powi(2));
@@ -231,7 +231,7 @@ fn joint_filter(record: &Record) -> f64 {
         // What is known at the time: the speed of the interval that ends now.
         let u = AngledDrive { ud: row.ud, uq: row.uq, w: row.w, theta: row.theta + 0.5 * TS * row.w };
         let update = filter.update(k as f64 * TS, &u, &Currents { id: row.id, iq: row.iq });
-        assert!(!matches!(update.outcome, Outcome::Diverged(_)), "{}", update.outcome);
+        assert!(!matches!(update.outcome, UpdateOutcome::Diverged(_)), "{}", update.outcome);
         if k > half {
             sum += percent(filter.parameters().ke, axis.ke).powi(2);
             count += 1;
@@ -246,7 +246,7 @@ fn the_joint_filter_on_speed_cycles_and_water_cutting() {
         let rms = joint_filter(cycles(number));
         println!("axis {number}, joint filter, speed cycles: Ke rms {rms:.3} %");
         assert!(rms < 0.1, "axis {number}, speed cycles: Ke rms {rms} %");
-        let axis = Axis::reference(number).unwrap();
+        let axis = RobotAxis::reference(number).unwrap();
         let water = record(Simulation::new(axis).unwrap(), Program::water_cutting(&axis, 6).unwrap());
         let rms = joint_filter(&water);
         println!("axis {number}, joint filter, water cutting: Ke rms {rms:.3} %");

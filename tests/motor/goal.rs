@@ -9,7 +9,7 @@ use greybox::pmsm::offline::{Equations, Extended, Spans, extended, search_i0};
 use greybox::pmsm::program::Cycle;
 use greybox::pmsm::robot::TS;
 use greybox::pmsm::{Compensated, CompensatedSalientWinding, EmfHarmonic, ExactSalient, ExactStep, HeldIn};
-use greybox::{Fit, PooledRegression, free};
+use greybox::{Fit, free, regress::PooledRegression};
 use std::sync::OnceLock;
 
 /// What all cycles of an axis share: what belongs to the motor. How dead time acts on the mean voltage depends on how fast the

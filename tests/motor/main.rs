@@ -1,4 +1,4 @@
-//! The motor wing: frames, drives, observers, and the acceptance numbers of the reference study.
+//! Motors: frames, drives, observers, and the acceptance numbers of the reference study.
 
 mod acceptance_adaptive;
 mod acceptance_mras;

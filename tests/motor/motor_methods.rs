@@ -4,12 +4,12 @@ use greybox::pmsm::drive::{Disturbance, Log, Row, Simulation};
 use greybox::pmsm::frames::rotate_out_of;
 use greybox::pmsm::offline::{Axes, Form, Spans, extended, hardly_seen, mechanics, plain};
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::{Axis, TS};
+use greybox::pmsm::robot::{RobotAxis, TS};
 use greybox::pmsm::{
     AngledDrive, Cabled, Currents, Injection, InverterFed, Mechanics, Misaligned, Salient, Shaft, ShaftMotion, Surface,
     Torque, Winding,
 };
-use greybox::{Butterworth, BySignal, Experiment, Fit, Horizon, Law, Time, fixed, free, hampel, signals};
+use greybox::{Butterworth, BySignal, Experiment, Fit, Horizon, Time, WeightFunction, fixed, free, hampel, signals};
 
 signals! {
     /// A salient motor behind cable and inverter, and how its record is aligned.
@@ -30,7 +30,7 @@ fn percent(found: f64, truth: f64) -> f64 {
 // motor's parameters are as if there were neither.
 #[test]
 fn alignment_delay_and_angle_offset_are_found_together() {
-    let axis = Axis::reference(1).unwrap();
+    let axis = RobotAxis::reference(1).unwrap();
     let (tau, offset) = (30e-6, 5e-3);
     let mut simulation =
         Simulation::new(axis).unwrap().without(Disturbance::EmfHarmonic).without(Disturbance::Saturation);
@@ -75,7 +75,7 @@ fn alignment_delay_and_angle_offset_are_found_together() {
 
 #[test]
 fn inertia_friction_and_gravity_by_regression_and_by_fit() {
-    let axis = Axis::reference(2).unwrap();
+    let axis = RobotAxis::reference(2).unwrap();
     let log = cycles(Simulation::new(axis).unwrap(), 3);
     let shaft = Shaft::new(axis.gear).unwrap();
     let filter = Butterworth::low_pass(4, 10.0, TS).unwrap();
@@ -119,7 +119,7 @@ fn inertia_friction_and_gravity_by_regression_and_by_fit() {
 // the estimate is that of the clean record.
 #[test]
 fn outliers_are_taken_out_before_the_filter() {
-    let axis = Axis::reference(1).unwrap();
+    let axis = RobotAxis::reference(1).unwrap();
     let mut log = cycles(Simulation::new(axis).unwrap().undisturbed(), 4);
     let filter = Butterworth::low_pass(4, 100.0, TS).unwrap();
     let ls = |log: &Log| {
@@ -149,7 +149,7 @@ fn outliers_are_taken_out_before_the_filter() {
 // Stairs of d current make Ld and the resistance visible.
 #[test]
 fn injected_d_current_makes_ld_visible() {
-    let axis = Axis::reference(1).unwrap();
+    let axis = RobotAxis::reference(1).unwrap();
     let filter = Butterworth::low_pass(4, 100.0, TS).unwrap();
     let simulation = Simulation::new(axis).unwrap();
     let solve = |simulation| {
@@ -168,14 +168,15 @@ fn injected_d_current_makes_ld_visible() {
 // the stationary frame, which the model does not know, so Ke is off by sinc (0.13 % at 350 rad/s).
 #[test]
 fn grey_box_of_the_surface_model_weighted_by_speed() {
-    let axis = Axis::reference(1).unwrap();
+    let axis = RobotAxis::reference(1).unwrap();
     let model = Surface::new(4).unwrap();
     let record = cycles(Simulation::new(axis).unwrap().undisturbed(), 2).experiment(&model).unwrap();
     let start = Winding { rs: free(1.5 * axis.rs), ls: free(1.2 * axis.ls), ke: free(0.9 * axis.ke) };
     // A debug build leaves out the fit that is not weighted.
     for weighted in [true, false].into_iter().take(if cfg!(debug_assertions) { 1 } else { 2 }) {
         let fit = Fit::new(&model, &record).parameters(start);
-        let fit = if weighted { fit.weighting(BySignal::new("w", Law::Square { scale: 100.0 })) } else { fit };
+        let fit =
+            if weighted { fit.weighting(BySignal::new("w", WeightFunction::Square { scale: 100.0 })) } else { fit };
         let p = fit.run().unwrap().parameters;
         assert!(percent(p.ke, axis.ke).abs() < 0.15, "{}", percent(p.ke, axis.ke));
         assert!(percent(p.ls, axis.ls).abs() < 0.3, "{}", percent(p.ls, axis.ls));
@@ -185,7 +186,7 @@ fn grey_box_of_the_surface_model_weighted_by_speed() {
 
 #[test]
 fn bad_records_are_told() {
-    let axis = Axis::reference(1).unwrap();
+    let axis = RobotAxis::reference(1).unwrap();
     let log = cycles(Simulation::new(axis).unwrap(), 2);
     let spans = Spans::from_log(&log, axis.pole_pairs);
     // A cycle without motion says nothing of Ke.
@@ -220,7 +221,7 @@ fn bad_records_are_told() {
 #[test]
 fn any_sample_time_will_do() {
     for ts in [62.5e-6, 250e-6] {
-        let axis = Axis { ts, ..Axis::reference(1).unwrap() };
+        let axis = RobotAxis { ts, ..RobotAxis::reference(1).unwrap() };
         let mut simulation = Simulation::new(axis).unwrap().undisturbed();
         // The same plant step, 21 us; overshoot-free current control needs four samples.
         simulation.substeps = (ts / 21e-6).round() as u32;

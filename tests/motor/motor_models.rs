@@ -8,7 +8,7 @@ use greybox::pmsm::drive::{Disturbance, Simulation};
 use greybox::pmsm::frames::{Stator, rotate_out_of};
 use greybox::pmsm::offline::{Axes, Form, Spans, Validation, plain, voltages};
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::{Axis, TS};
+use greybox::pmsm::robot::{RobotAxis, TS};
 use greybox::pmsm::*;
 use greybox::{Fit, fixed, free, signals};
 
@@ -85,7 +85,7 @@ signals! {
 // but saturation and cogging: same slopes for the same voltage, at any angle.
 #[test]
 fn a_composed_model_is_the_simulated_axis() {
-    let axis = Axis::reference(2).unwrap();
+    let axis = RobotAxis::reference(2).unwrap();
     let plant = Simulation::new(axis).unwrap().without(Disturbance::Saturation).without(Disturbance::Cogging).plant;
     type Motor = InverterFed<EmfHarmonic<Cabled<Salient, Whole>, Whole>, Whole>;
     let motor: Motor = InverterFed::new(EmfHarmonic::new(Cabled::new(Salient::new(4).unwrap())));
@@ -127,7 +127,7 @@ fn a_composed_model_is_the_simulated_axis() {
 // Flux linkage in the place of Ke: the same fit in another unit, estimate and interval alike.
 #[test]
 fn flux_linkage_may_be_given_and_found() {
-    let axis = Axis::reference(1).unwrap();
+    let axis = RobotAxis::reference(1).unwrap();
     let surface = Surface::new(4).unwrap();
     let log = Simulation::new(axis).unwrap().undisturbed().run(&Program::speed_cycles(&axis, 2, 1.0).unwrap());
     let record = log.experiment(&surface).unwrap();
@@ -180,7 +180,7 @@ fn an_observer_of_a_salient_motor_has_no_error_of_inductance() {
 
 #[test]
 fn a_motor_without_pole_pairs_is_refused() {
-    assert_eq!(Surface::new(0), Err(Error::NoPolePairs));
+    assert_eq!(Surface::new(0), Err(MotorError::NoPolePairs));
     assert!(Machine::new(4, 0.0).is_err() && Shaft::new(f64::NAN).is_err());
     assert!(serde_json::from_str::<Surface>(r#"{"pole_pairs":0}"#).unwrap_err().to_string().contains("pole pair"));
 }
@@ -189,7 +189,7 @@ fn a_motor_without_pole_pairs_is_refused() {
 // voltages; with Ke 5 % off neither is.
 #[test]
 fn validation_both_ways() {
-    let axis = Axis::reference(1).unwrap();
+    let axis = RobotAxis::reference(1).unwrap();
     let log = Simulation::new(axis).unwrap().undisturbed().run(&Program::speed_cycles(&axis, 3, 1.0).unwrap());
     let spans = Spans::from_log(&log, axis.pole_pairs);
     let found = plain(&spans, Axes::Both, Form::Stationary).solve().unwrap().parameters;

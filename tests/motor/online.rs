@@ -3,8 +3,8 @@
 use approx::assert_relative_eq;
 use greybox::nalgebra::{SMatrix, SVector};
 use greybox::online::{
-    Divergence, Ekf, EkfStart, Forgetting, Gradient, Law, Moment, Mras, MrasStart, ObserverError, Order, Outcome, Rate,
-    Rls, Stepping, UdFactors, Watch,
+    AdaptationLaw, Divergence, Ekf, EkfStart, Forgetting, Gradient, Moment, Mras, MrasStart, ObserverError, Order,
+    Rate, Rls, Stepping, UdFactors, UpdateOutcome, Watch,
 };
 use greybox::pmsm::{
     AngledDrive, Currents, DirectCurrent, Drive, ExactStep, ExactSurface, HeldIn, Injection, InverterFed,
@@ -176,20 +176,20 @@ fn rls_says_what_is_wrong() {
     let nan = f64::NAN;
     let mut rls = Rls::<Line, 2>::new(line(1.0), 0.1, Forgetting::none()).unwrap();
     let row = Line { slope: 1.0, offset: 1.0 };
-    assert_eq!(rls.update(&[(row, nan)]).outcome, Outcome::Missing { signal: "y" });
-    assert_eq!(rls.update(&[(Line { offset: nan, ..row }, 1.0)]).outcome, Outcome::Missing { signal: "offset" });
+    assert_eq!(rls.update(&[(row, nan)]).outcome, UpdateOutcome::Missing { signal: "y" });
+    assert_eq!(rls.update(&[(Line { offset: nan, ..row }, 1.0)]).outcome, UpdateOutcome::Missing { signal: "offset" });
     assert_eq!(rls.parameters(), Line::default());
     let bounded = Line { slope: free(0.0).prior(0.0, 1.0).within(-1.0, 1.0), offset: fixed(0.0) };
     let mut rls = Rls::<Line, 2>::new(bounded, 0.1, Forgetting::none()).unwrap();
     let diverged = rls.update(&[(row, 5.0)]).outcome;
-    assert!(matches!(diverged, Outcome::Diverged(Divergence::Bounds { parameter: "slope", .. })), "{diverged}");
+    assert!(matches!(diverged, UpdateOutcome::Diverged(Divergence::Bounds { parameter: "slope", .. })), "{diverged}");
     // It has stopped, at the last estimates that made sense.
     assert_eq!(rls.update(&[(row, 0.0)]).outcome, diverged);
     assert_eq!(rls.parameters(), Line::default());
     // Windup until the covariance overflows ends in words, not in NaN.
     let mut rls = Rls::<Line, 2>::new(line(1.0), 0.1, Forgetting::factor(1e-3)).unwrap();
     let last = (0..300).map(|_| rls.update(&[(Line { slope: 0.0, offset: 1.0 }, 1.0)]).outcome).last().unwrap();
-    assert!(matches!(last, Outcome::Diverged(Divergence::NotFinite { .. })), "{last}");
+    assert!(matches!(last, UpdateOutcome::Diverged(Divergence::NotFinite { .. })), "{last}");
     assert!(rls.parameters().slope.is_finite() && rls.parameters().offset.is_finite());
 
     let new = |start, noise, factor| Rls::<Line, 2>::new(start, noise, Forgetting::factor(factor)).err().unwrap();
@@ -278,7 +278,11 @@ fn ekf_finds_parameters_and_knows_how_well() {
     let decay = f64::exp(-0.7 * h);
     for k in 0..n {
         let y = Level { x: x + 0.1 * noise.next() };
-        sum += if plain.update(k as f64 * h, &Nothing, &y).outcome == Outcome::Corrected { plain.nis() } else { 1.0 };
+        sum += if plain.update(k as f64 * h, &Nothing, &y).outcome == UpdateOutcome::Corrected {
+            plain.nis()
+        } else {
+            1.0
+        };
         log.update(k as f64 * h, &Nothing, &y);
         x = decay * x + (1.0 - decay) * 2.0 / 0.7;
     }
@@ -340,7 +344,7 @@ fn motor_ekf() -> Ekf<InverterFed<ExactSurface, InverterFedWinding>, 5> {
 #[test]
 fn joint_ekf_of_a_motor_finds_resistance_emf_and_dead_time() {
     let (mut ekf, mut bad) = (motor_ekf(), 0);
-    fed_motor(16_000, |t, u, y| bad += (ekf.update(t, &u, &y).outcome != Outcome::Corrected) as u32);
+    fed_motor(16_000, |t, u, y| bad += (ekf.update(t, &u, &y).outcome != UpdateOutcome::Corrected) as u32);
     let (p, std) = (ekf.parameters(), ekf.deviations());
     println!("{p:?} +- {std:?}");
     assert_eq!(bad, 1); // the start
@@ -366,15 +370,15 @@ fn ekf_survives_bad_samples_and_gaps() {
         }
         let update = ekf.update(t, &u, &y);
         assert!(update.innovation.id.is_finite() && update.innovation.iq.is_finite());
-        if update.outcome != Outcome::Corrected {
+        if update.outcome != UpdateOutcome::Corrected {
             outcomes.push((k, update.outcome));
         }
     });
     assert_eq!(outcomes.len(), 5, "{outcomes:?}");
-    assert_eq!(outcomes[1], (3_000, Outcome::Missing { signal: "iq" }));
-    assert_eq!(outcomes[2], (4_000, Outcome::Missing { signal: "w" }));
-    assert!(matches!(outcomes[3], (4_001, Outcome::Restarted { .. })));
-    assert!(matches!(outcomes[4], (9_001, Outcome::Restarted { expected: TS, found }) if found > 1.0));
+    assert_eq!(outcomes[1], (3_000, UpdateOutcome::Missing { signal: "iq" }));
+    assert_eq!(outcomes[2], (4_000, UpdateOutcome::Missing { signal: "w" }));
+    assert!(matches!(outcomes[3], (4_001, UpdateOutcome::Restarted { .. })));
+    assert!(matches!(outcomes[4], (9_001, UpdateOutcome::Restarted { expected: TS, found }) if found > 1.0));
     assert_relative_eq!(ekf.parameters().ke, 0.95, max_relative = 2e-3);
 }
 
@@ -387,7 +391,7 @@ fn ekf_stops_where_the_model_does_not_follow() {
         let y = if t > 0.2 { Currents { iq: 1e4, ..y } } else { y };
         let before = ekf.parameters();
         let outcome = ekf.update(t, &u, &y).outcome;
-        if let (Outcome::Diverged(why), None) = (outcome, first) {
+        if let (UpdateOutcome::Diverged(why), None) = (outcome, first) {
             (first, kept) = (Some(why), Some(before));
         }
     });
@@ -437,7 +441,7 @@ fn a_model_that_overflows_stops_the_observer() {
     let start = EkfStart { state, parameters, state_drift, parameter_drift, noise, hold, watch };
     let mut ekf = Ekf::<_, 2>::new(Explosive, 0.1, start).unwrap();
     let outcomes = [0.0, 0.1, 0.2].map(|t| ekf.update(t, &Nothing, &Level { x: 1.0 }).outcome);
-    assert!(matches!(outcomes[1], Outcome::Diverged(Divergence::NotFinite { .. })), "{:?}", outcomes[1]);
+    assert!(matches!(outcomes[1], UpdateOutcome::Diverged(Divergence::NotFinite { .. })), "{:?}", outcomes[1]);
     assert_eq!(outcomes[1], outcomes[2]);
     assert!(ekf.parameters().a.is_finite() && ekf.state().x.is_finite());
 }
@@ -459,7 +463,7 @@ where
 
 const FREE: Watch<Currents> = Watch { limit: Currents { id: 1e3, iq: 1e3 }, patience: 1 };
 
-fn surface_mras<L: Law<ExactSurface>>(law: L, parameters: Winding<Parameter>) -> Mras<ExactSurface, L> {
+fn surface_mras<L: AdaptationLaw<ExactSurface>>(law: L, parameters: Winding<Parameter>) -> Mras<ExactSurface, L> {
     let model = ExactSurface(ExactStep::new(4, TS, HeldIn::Stationary).unwrap());
     model.mras(law, mras_start(parameters, FREE)).unwrap()
 }
@@ -518,23 +522,29 @@ fn mras_names_what_it_cannot_use() {
     let mut mras = surface_mras(law, known());
     let u = Drive { ud: 0.0, uq: 0.0, w: 0.0 };
     let (none, nan) = (Currents::default(), f64::NAN);
-    assert_eq!(mras.update(0.0, &u, &none).outcome, Outcome::Started);
+    assert_eq!(mras.update(0.0, &u, &none).outcome, UpdateOutcome::Started);
     // Standstill and no d current: neither moves, and the first is named.
     let outcome = mras.update(TS, &u, &none).outcome;
-    assert_eq!(outcome, Outcome::Held { parameter: "rs", quantity: "d current (A)", value: 0.0, limit: 1.0 });
+    assert_eq!(outcome, UpdateOutcome::Held { parameter: "rs", quantity: "d current (A)", value: 0.0, limit: 1.0 });
     mras.adapt(Winding { rs: false, ls: true, ke: true });
     let outcome = mras.update(2.0 * TS, &u, &none).outcome;
     assert_eq!(outcome.to_string(), "`ke` held: speed (rad/s) is 0, and tells nothing below 20");
     let fast = Drive { w: 100.0, ..u };
-    assert_eq!(mras.update(3.0 * TS, &fast, &none).outcome, Outcome::Corrected);
-    assert_eq!(mras.update(4.0 * TS, &fast, &Currents { id: nan, iq: 0.0 }).outcome, Outcome::Missing { signal: "id" });
-    assert_eq!(mras.update(5.0 * TS, &Drive { uq: nan, ..u }, &none).outcome, Outcome::Missing { signal: "uq" });
-    assert!(matches!(mras.update(6.0 * TS, &fast, &none).outcome, Outcome::Restarted { .. }));
-    assert_eq!(mras.update(nan, &fast, &none).outcome, Outcome::Missing { signal: "t" });
-    assert_eq!(mras.update(7.0 * TS, &fast, &none).outcome, Outcome::Corrected);
+    assert_eq!(mras.update(3.0 * TS, &fast, &none).outcome, UpdateOutcome::Corrected);
+    assert_eq!(
+        mras.update(4.0 * TS, &fast, &Currents { id: nan, iq: 0.0 }).outcome,
+        UpdateOutcome::Missing { signal: "id" }
+    );
+    assert_eq!(mras.update(5.0 * TS, &Drive { uq: nan, ..u }, &none).outcome, UpdateOutcome::Missing { signal: "uq" });
+    assert!(matches!(mras.update(6.0 * TS, &fast, &none).outcome, UpdateOutcome::Restarted { .. }));
+    assert_eq!(mras.update(nan, &fast, &none).outcome, UpdateOutcome::Missing { signal: "t" });
+    assert_eq!(mras.update(7.0 * TS, &fast, &none).outcome, UpdateOutcome::Corrected);
     // Time runs back, and the sensor is dead: the restart waits for it.
-    assert_eq!(mras.update(0.0, &fast, &Currents { id: nan, iq: nan }).outcome, Outcome::Missing { signal: "id" });
-    assert!(matches!(mras.update(TS, &fast, &none).outcome, Outcome::Restarted { .. }));
+    assert_eq!(
+        mras.update(0.0, &fast, &Currents { id: nan, iq: nan }).outcome,
+        UpdateOutcome::Missing { signal: "id" }
+    );
+    assert!(matches!(mras.update(TS, &fast, &none).outcome, UpdateOutcome::Restarted { .. }));
     assert!(mras.state().iq.is_finite() && mras.parameters().ke.is_finite());
 }
 
@@ -553,19 +563,19 @@ fn injection_finds_the_resistance_and_leaves_the_emf_alone() {
     for k in 0..(8.4 / TS) as usize {
         let (t, w) = (k as f64 * TS, 60.0);
         // The back-EMF has the first turn: far off, it would be taken for resistance.
-        let stair = injection.at(t + 0.6);
-        let (ed, eq) = (stair.id - i.id, 10.0 - i.iq);
+        let now = injection.at(t + 0.6);
+        let (ed, eq) = (now.id - i.id, 10.0 - i.iq);
         let u = Drive {
-            ud: 4.0 * ed + truth.rs * stair.id - 4.0 * w * truth.ls * i.iq,
+            ud: 4.0 * ed + truth.rs * now.id - 4.0 * w * truth.ls * i.iq,
             uq: 4.0 * eq + truth.rs * 10.0 + 4.0 * w * truth.ls * i.id + greybox::pmsm::SQRT_2_3 * truth.ke * w,
             w,
         };
-        mras.adapt(Winding { rs: stair.adapt_rs && stair.id != 0.0, ls: false, ke: stair.adapt_ke });
+        mras.adapt(Winding { rs: now.adapt_rs && now.id != 0.0, ls: false, ke: now.adapt_ke });
         let before = mras.parameters();
         mras.update(t, &u, &i);
         let after = mras.parameters();
-        assert!(stair.adapt_ke || after.ke == before.ke);
-        assert!(stair.id != 0.0 || after.rs == before.rs);
+        assert!(now.adapt_ke || after.ke == before.ke);
+        assert!(now.id != 0.0 || after.rs == before.rs);
         i = step.advance(&i, &u, &truth);
     }
     let p = mras.parameters();
@@ -602,8 +612,9 @@ fn innovations_beyond_their_limit_stop_the_observer_after_its_patience() {
     let far = [0.0, 50.0, 0.0, 50.0, 51.0, 52.0];
     let outcomes: Vec<_> =
         (0..6).map(|k| mras.update(k as f64 * TS, &u, &Currents { id: far[k], iq: 0.0 }).outcome).collect();
-    assert_eq!(outcomes[4], Outcome::Corrected);
-    let Outcome::Diverged(Divergence::Innovation { signal: "id", value, limit: 5.0, samples: 3 }) = outcomes[5] else {
+    assert_eq!(outcomes[4], UpdateOutcome::Corrected);
+    let UpdateOutcome::Diverged(Divergence::Innovation { signal: "id", value, limit: 5.0, samples: 3 }) = outcomes[5]
+    else {
         panic!("{:?}", outcomes[5])
     };
     assert!(value > 40.0);

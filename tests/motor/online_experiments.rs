@@ -1,6 +1,6 @@
 //! Experiments 1 and 2 and the stability limits, with a minimal ideal plant of their own: the observers' numbers.
 
-use greybox::online::{Divergence, Mras, MrasStart, Order, Outcome, Stepping, Watch};
+use greybox::online::{Divergence, Mras, MrasStart, Order, Stepping, UpdateOutcome, Watch};
 use greybox::pmsm::{
     Adaptation, Currents, Drive, ExactStep, ExactSurface, HeldIn, KeLyapunov, MotorLaw, NotAdapted, RsDirect,
     RsLyapunov, SQRT_2_3, SQRT_3_2, Surface, Winding,
@@ -74,7 +74,7 @@ struct Row {
     ke_error: f64,
     rs_error: f64,
     torque: f64,
-    outcome: Outcome,
+    outcome: UpdateOutcome,
 }
 
 fn torque_step(torque: f64, id_per_iq: f64, rs_law: impl Adaptation, rs: Parameter) -> Vec<Row> {
@@ -165,9 +165,9 @@ fn experiment_1_without_the_resistance_leaves_its_share_in_ke() {
 fn experiment_1_with_torque_reversed_law_5_4_diverges_and_says_so() {
     let rs = free(0.8 * 0.5).within(0.0, 1.0);
     let rows = torque_step(-100.0, 0.2, RsDirect { gain: -10.0 }, rs);
-    let row = rows.iter().find(|row| matches!(row.outcome, Outcome::Diverged(_))).expect("said so");
+    let row = rows.iter().find(|row| matches!(row.outcome, UpdateOutcome::Diverged(_))).expect("said so");
     println!("{:.4} s: {}", row.t, row.outcome);
-    assert!(matches!(row.outcome, Outcome::Diverged(Divergence::Bounds { parameter: "rs", .. })));
+    assert!(matches!(row.outcome, UpdateOutcome::Diverged(Divergence::Bounds { parameter: "rs", .. })));
     // The error is past 100 % at 1.03 s; here it gets there at 1.0234 s (1.0241 s at a tenth of the sample time).
     assert!(row.t > 1.02 && row.t <= 1.03, "{}", row.t);
     assert!(rows.iter().all(|row| row.ke_error.is_finite() && row.rs_error.abs() <= 1.0));

@@ -6,7 +6,7 @@ use greybox::pmsm::drive::{Log, Simulation};
 use greybox::pmsm::inverter::Carrier;
 use greybox::pmsm::offline::{Axes, Form, Spans, extended, plain};
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::{Axis, TS, V_DC};
+use greybox::pmsm::robot::{RobotAxis, TS, V_DC};
 
 const CARRIERS: [Carrier; 2] = [Carrier::PerSample, Carrier::HalfPerSample];
 
@@ -18,7 +18,7 @@ fn run(simulation: Simulation) -> Log {
 // a few percent of its 1.5 A; the controller makes 4 V of an ampere.
 #[test]
 fn the_fundamental_is_that_of_the_mean_voltage() {
-    let simulation = Simulation::new(Axis::reference(1).unwrap()).unwrap().undisturbed();
+    let simulation = Simulation::new(RobotAxis::reference(1).unwrap()).unwrap().undisturbed();
     let mean = run(simulation);
     for carrier in CARRIERS {
         let switching = run(simulation.switching(V_DC, carrier).unwrap());
@@ -39,7 +39,7 @@ fn the_fundamental_is_that_of_the_mean_voltage() {
 // of the 2 V, which the regression reads as R (0.3 %), L and Ke a tenth of that.
 #[test]
 fn estimates_are_those_of_the_mean_voltage() {
-    let axis = Axis::reference(1).unwrap();
+    let axis = RobotAxis::reference(1).unwrap();
     let simulation = Simulation::new(axis).unwrap();
     let filter = Butterworth::low_pass(4, 100.0, TS).unwrap();
     let estimates = |simulation| {
@@ -61,7 +61,7 @@ fn estimates_are_those_of_the_mean_voltage() {
 
 #[test]
 fn switching_is_deterministic_and_needs_its_voltage() {
-    let simulation = Simulation::new(Axis::reference(4).unwrap()).unwrap();
+    let simulation = Simulation::new(RobotAxis::reference(4).unwrap()).unwrap();
     let switching = simulation.switching(V_DC, Carrier::PerSample).unwrap();
     assert_eq!(run(switching), run(switching));
     for vdc in [500.0, f64::NAN, -600.0] {

@@ -1,7 +1,7 @@
 #![cfg(feature = "std")]
 //! The information triangle against faer's QR, against itself, and against closed forms.
 use faer::{Mat, linalg::solvers::SolveLstsq};
-use greybox::{Block, Information, RankDeficient, SquareMatrix};
+use greybox::information::{Block, Information, RankDeficient, SquareMatrix};
 use proptest::{prelude::*, test_runner::RngSeed};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;

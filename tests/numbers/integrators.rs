@@ -3,6 +3,7 @@
 
 use approx::assert_relative_eq;
 use greybox::check::{Spiral, order};
+use greybox::integrate::{Integrator, ModelSystem, Stuck};
 use greybox::*;
 
 const RK45: Rk45 = Rk45 { relative: 1e-9, absolute: 1e-12 };
@@ -29,7 +30,7 @@ fn orders() {
     }
 }
 
-/// Walks from sample to sample, at `times`, with the inputs held as said.
+/// Steps from sample to sample, at `times`, with the inputs held as said.
 fn simulate<M: Model, I: Integrator, S: Scalar>(
     model: &M,
     integrator: &I,

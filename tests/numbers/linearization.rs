@@ -1,6 +1,6 @@
 //! The triangles of [`Linearization`] against the same rows in one dense triangle and against their definition.
 
-use greybox::Information;
+use greybox::information::Information;
 use greybox::optimize::Linearization;
 
 const SHARED: usize = 3;

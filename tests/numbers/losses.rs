@@ -1,6 +1,7 @@
-//! Losses against their law and the published efficiencies; weightings against their formulas.
+//! Losses against their requirements and the published efficiencies; weightings against their formulas.
 
 use approx::assert_relative_eq;
+use greybox::loss::expectations;
 use greybox::*;
 
 fn losses() -> Vec<Box<dyn Loss>> {
@@ -14,7 +15,7 @@ fn losses() -> Vec<Box<dyn Loss>> {
 }
 
 #[test]
-fn every_loss_keeps_the_law() {
+fn every_loss_meets_the_requirements() {
     for loss in losses() {
         check::loss(&*loss).unwrap_or_else(|why| panic!("{loss:?}: {why}"));
         loss.check().unwrap();
@@ -134,9 +135,9 @@ fn weight(weighting: impl Weighting<Machine>, w: f64) -> f64 {
 #[test]
 fn weightings() {
     assert_eq!(weight(|s: &Sample<Machine>| s.u.w.abs(), -3.0), 3.0);
-    assert_eq!(weight(BySignal::new("w", Law::Absolute), -3.0), 3.0);
-    assert_eq!(weight(BySignal::new("w", Law::Square { scale: 100.0 }), -50.0), 0.25);
-    let above = || BySignal::new("w", Law::Above { threshold: 20.0 });
+    assert_eq!(weight(BySignal::new("w", WeightFunction::Absolute), -3.0), 3.0);
+    assert_eq!(weight(BySignal::new("w", WeightFunction::Square { scale: 100.0 }), -50.0), 0.25);
+    let above = || BySignal::new("w", WeightFunction::Above { threshold: 20.0 });
     assert_eq!((weight(above(), -20.0), weight(above(), 19.9)), (1.0, 0.0));
     assert!(weight(above(), f64::NAN).is_nan());
 }
@@ -144,18 +145,18 @@ fn weightings() {
 #[test]
 fn a_weighting_by_signal_is_checked() {
     let check = |weighting: BySignal| Weighting::<Machine>::check(&weighting).map_err(|why| why.to_string());
-    check(BySignal::new("w", Law::Absolute)).unwrap();
-    let why = check(BySignal::new("speed", Law::Absolute)).unwrap_err();
+    check(BySignal::new("w", WeightFunction::Absolute)).unwrap();
+    let why = check(BySignal::new("speed", WeightFunction::Absolute)).unwrap_err();
     assert!(why.contains("`speed`") && why.contains("u, w"), "{why}");
-    assert!(weight(BySignal::new("speed", Law::Above { threshold: 1.0 }), 2.0).is_nan());
-    let why = check(BySignal::new("w", Law::Square { scale: 0.0 })).unwrap_err();
+    assert!(weight(BySignal::new("speed", WeightFunction::Above { threshold: 1.0 }), 2.0).is_nan());
+    let why = check(BySignal::new("w", WeightFunction::Square { scale: 0.0 })).unwrap_err();
     assert!(why.contains("the scale of the weighting by `w` is 0"), "{why}");
-    check(BySignal::new("w", Law::Above { threshold: f64::NAN })).unwrap_err();
+    check(BySignal::new("w", WeightFunction::Above { threshold: f64::NAN })).unwrap_err();
 }
 
 #[test]
 fn a_weighting_by_signal_describes_itself_and_round_trips() {
-    let weighting = BySignal::new("w", Law::Square { scale: 100.0 });
+    let weighting = BySignal::new("w", WeightFunction::Square { scale: 100.0 });
     assert_eq!(Weighting::<Machine>::describe(&weighting), "(w/100)^2");
     let back: BySignal = serde_json::from_str(&serde_json::to_string(&weighting).unwrap()).unwrap();
     assert_eq!(back, weighting);

@@ -1,7 +1,7 @@
 //! Numbers, the triangle, filters, losses, integrators: each against analytic cases.
 
+mod duals;
 mod filters;
-mod ground;
 mod information;
 mod integrators;
 mod linearization;

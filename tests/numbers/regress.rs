@@ -1,6 +1,10 @@
 #![cfg(feature = "std")]
 //! Linear least squares against certified numbers, identities, and the scatter of repeated experiments.
-use greybox::{Assumption, LinearEstimate, PooledRegression, Regression, RegressionError, Signals, signals};
+use greybox::{
+    LinearEstimate, Regression, Signals,
+    regress::{Assumption, PooledRegression, RegressionError},
+    signals,
+};
 
 signals! {
     /// Parameters of the tests.

@@ -5,8 +5,8 @@ mod covariance;
 mod rank;
 mod steps;
 
+use greybox::information::{Elimination, Information};
 use greybox::nalgebra::{DMatrix, DVector};
-use greybox::{Elimination, Information};
 
 /// Numbers in -1..1, the same each time (a linear congruence, Knuth's MMIX).
 pub struct Random(u64);

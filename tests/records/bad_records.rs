@@ -1,27 +1,10 @@
 //! Every way in which a record can be wrong: an error that names the thing, the number and the place.
 #![cfg(feature = "csv")]
 
-use greybox::{CsvFile, Error, Experiment, Model, Scalar, Time, signals};
+use crate::pmsm::{Currents, Drive, Pmsm, Winding};
+use crate::refused::says;
+use greybox::{CsvFile, Error, Experiment, Model, Scalar, Time};
 use std::path::PathBuf;
-
-signals! {
-    pub struct Currents { id: "A", iq: "A" }
-    pub struct Drive { ud: "V", w: "rad/s" }
-    pub struct Winding { rs: "ohm" }
-}
-
-struct Pmsm;
-
-impl Model for Pmsm {
-    type State = Currents;
-    type Input = Drive;
-    type Output = Currents;
-    type Parameters = Winding;
-
-    fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
-        *x
-    }
-}
 
 const U: Drive = Drive { ud: 1.0, w: 2.0 };
 const Y: Currents = Currents { id: 3.0, iq: 4.0 };
@@ -38,17 +21,6 @@ fn file(name: &str, text: impl AsRef<[u8]>) -> PathBuf {
     path
 }
 
-/// The message of an error; it must hold every one of `parts`.
-#[track_caller]
-fn says<T>(result: Result<T, Error>, parts: &[&str]) -> Error {
-    let Err(error) = result else { panic!("no error; expected {parts:?}") };
-    let message = error.to_string();
-    for part in parts {
-        assert!(message.contains(part), "`{part}` is not in: {message}");
-    }
-    error
-}
-
 /// Reads a file of this text and checks what the error says.
 #[track_caller]
 fn refused(name: &str, text: &str, parts: &[&str]) -> Error {
@@ -63,6 +35,12 @@ fn missing_column() {
     says(renamed, &["no column `rpm` for `w`", "t, ud, speed, id, iq"]);
     refused("semicolon.csv", "t;ud;w;id;iq\n0;1;2;3;4\n", &["t;ud;w;id;iq", "CsvFile::delimiter"]);
     refused("nameless.csv", "0,1,2,3,4\n1,1,2,3,4\n", &["no column `t`", "0, 1, 2, 3, 4", "must hold the names"]);
+    // Of many columns the ten nearest.
+    let many: Vec<String> = (0..40).map(|k| format!("channel{k}")).collect();
+    let header = format!("t,{},motor_ud,UD,w,id,iq\n", many.join(","));
+    let parts = ["no column `ud`", "of its 46 columns these are nearest: UD, motor_ud, id, t"];
+    let error = refused("many.csv", &header, &parts);
+    assert_eq!(error.to_string().matches("channel").count(), 6, "{error}");
     refused("capitals.csv", "Time,ud,w,id,iq\n", &["no column `t`", "CsvFile::column", "CsvFile::sample_time"]);
 }
 

@@ -1,28 +1,10 @@
 //! Records from CSV files as laboratories write them.
 #![cfg(feature = "csv")]
 
+use crate::pmsm::{Currents, Drive, Pmsm, Winding};
 use crate::shared::shared;
 use greybox::{CsvFile, Experiment, Kind, Model, Nothing, Scalar, Time, signals, units};
 use std::path::PathBuf;
-
-signals! {
-    pub struct Currents { id: "A", iq: "A" }
-    pub struct Drive { ud: "V", w: "rad/s" }
-    pub struct Winding { rs: "ohm" }
-}
-
-struct Pmsm;
-
-impl Model for Pmsm {
-    type State = Currents;
-    type Input = Drive;
-    type Output = Currents;
-    type Parameters = Winding;
-
-    fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
-        *x
-    }
-}
 
 fn file(name: &str, text: impl AsRef<[u8]>) -> PathBuf {
     let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);

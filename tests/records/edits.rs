@@ -1,5 +1,6 @@
 //! Cutting, thinning and describing records; and records in JSON that are none.
 
+use crate::refused::says;
 use approx::assert_relative_eq;
 use greybox::{Error, Experiment, ExperimentOf, Gap, Hold, Initial, Model, Sample, Scalar, Time, fixed, free, signals};
 
@@ -38,15 +39,6 @@ fn even(samples: usize) -> Record {
 
 fn u(record: &Record) -> Vec<f64> {
     record.inputs().map(|u| u.u).collect()
-}
-
-#[track_caller]
-fn says<T>(result: Result<T, impl std::fmt::Display>, parts: &[&str]) {
-    let Err(error) = result else { panic!("no error; expected {parts:?}") };
-    let message = error.to_string();
-    for part in parts {
-        assert!(message.contains(part), "`{part}` is not in: {message}");
-    }
 }
 
 #[test]

@@ -65,6 +65,12 @@ fn sentinels_are_far_and_exact() {
     u[7] = 9999.0;
     let found = inspected(&u, &signal(500)).inputs.remove(0);
     assert_eq!(found.suspicions, [Suspicion::Sentinel { value: 9999.0, count: 1 }]);
+    // A value that no program is known to write is one if it occurs twice, not if once.
+    let mut y = signal(500);
+    y[100] = -777.25;
+    assert!(suspicions(&y).is_empty());
+    y[333] = -777.25;
+    assert_eq!(suspicions(&y), [Suspicion::Sentinel { value: -777.25, count: 2 }]);
     // Outliers are not: no two are alike.
     let mut y = signal(500);
     (y[100], y[333]) = (-998.3, -870.1);

@@ -5,6 +5,9 @@ mod csv;
 mod edits;
 mod inspect;
 mod npy;
+mod pmsm;
+#[path = "../common/refused.rs"]
+mod refused;
 #[path = "../common/shared.rs"]
 mod shared;
 mod valid;

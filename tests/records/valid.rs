@@ -1,29 +1,11 @@
 //! Records survive files, cuts and joints.
 #![cfg(feature = "csv")]
 
-use greybox::{CsvFile, Experiment, ExperimentOf, Hold, Model, Sample, Scalar, Time, signals};
+use crate::pmsm::{Currents, Drive, Pmsm};
+use greybox::{CsvFile, Experiment, ExperimentOf, Hold, Sample, Time};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use std::path::PathBuf;
-
-signals! {
-    pub struct Currents { id: "A", iq: "A" }
-    pub struct Drive { ud: "V", w: "rad/s" }
-    pub struct Winding { rs: "ohm" }
-}
-
-struct Pmsm;
-
-impl Model for Pmsm {
-    type State = Currents;
-    type Input = Drive;
-    type Output = Currents;
-    type Parameters = Winding;
-
-    fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
-        *x
-    }
-}
 
 type Record = ExperimentOf<Pmsm>;
 

@@ -1,40 +1,15 @@
 //! Whether intervals cover the truth as often as they say, by simulation. Seeds are fixed.
 
+use crate::common::{Branch, Current, Lag, Voltage};
 use crate::random::Random;
 use greybox::diagnose::{Resampling, bands, bootstrap};
-use greybox::{
-    Butterworth, CovarianceMethod, Estimate, Experiment, Fit, Knowledge, Model, Sample, Scalar, Signals, Time, free,
-    signals,
-};
+use greybox::{Butterworth, CovarianceMethod, Estimate, Experiment, Fit, Knowledge, Sample, Signals, Time, free};
 
-signals! { struct Level { x: "V" } }
-signals! { struct Drive { u: "V" } }
-signals! { struct Lag { k: "1", tau: "s" } }
-
-/// `tau dx/dt = k u - x`.
-#[derive(Clone)]
-struct FirstOrder;
-
-impl Model for FirstOrder {
-    type State = Level;
-    type Input = Drive;
-    type Output = Level;
-    type Parameters = Lag;
-
-    fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Drive<S>, p: &Lag<S>) -> Level<S> {
-        Level { x: (p.k * u.u - x.x) / p.tau }
-    }
-
-    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Drive<S>, _p: &Lag<S>) -> Level<S> {
-        *x
-    }
-}
-
-const TRUTH: Lag = Lag { k: 2.0, tau: 0.05 };
+const TRUTH: Branch = Branch { gain: 2.0, tau: 0.05 };
 const STEP: f64 = 0.01;
 
 /// A record of slow random steps with noise of unit innovations and this autoregression.
-fn record(samples: usize, rho: f64, seed: u64) -> Experiment<Level, Drive, Level> {
+fn record(samples: usize, rho: f64, seed: u64) -> Experiment<Current, Voltage, Current> {
     let mut random = Random(seed.wrapping_mul(0x2545_f491_4f6c_dd1d));
     let (mut inputs, mut outputs) = (vec![], vec![]);
     let (mut x, mut noise, mut u) = (0.0, random.normal() / (1.0 - rho * rho).sqrt(), 1.0);
@@ -43,23 +18,23 @@ fn record(samples: usize, rho: f64, seed: u64) -> Experiment<Level, Drive, Level
         if k % 40 == 0 {
             u = 1.0 + random.uniform();
         }
-        inputs.push(Drive { u });
-        outputs.push(Level { x: x + 0.05 * noise });
-        x = TRUTH.k * u + (x - TRUTH.k * u) * decay;
+        inputs.push(Voltage { u });
+        outputs.push(Current { i: x + 0.05 * noise });
+        x = TRUTH.gain * u + (x - TRUTH.gain * u) * decay;
         noise = rho * noise + random.normal();
     }
-    Experiment::new(&FirstOrder, Time::Uniform { start: 0.0, step: STEP }, inputs, outputs).unwrap()
+    Experiment::new(&Lag, Time::Uniform { start: 0.0, step: STEP }, inputs, outputs).unwrap()
 }
 
-fn fit(samples: usize, rho: f64, seed: u64) -> Estimate<FirstOrder> {
+fn fit(samples: usize, rho: f64, seed: u64) -> Estimate<Lag> {
     let record = record(samples, rho, seed);
-    Fit::new(&FirstOrder, &record).parameters(Lag { k: free(1.5), tau: free(0.1).log() }).run().unwrap()
+    Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau: free(0.1).log() }).run().unwrap()
 }
 
 /// Part of the repetitions whose intervals cover the truth, for each parameter: as said, and classical ones (which the
 /// parametric error index holds).
 fn coverage(samples: usize, rho: f64, repetitions: u64) -> [(f64, f64); 2] {
-    let truth = Lag::<f64>::into_array(TRUTH);
+    let truth = Branch::<f64>::into_array(TRUTH);
     let mut covered = [(0.0, 0.0); 2];
     for seed in 0..repetitions {
         let estimate = fit(samples, rho, seed);
@@ -108,7 +83,7 @@ fn colored_noise_is_seen_and_allowed_for() {
 fn bootstraps_agree() {
     for (rho, resampling, tolerance) in [(0.0, Resampling::Residuals, 0.1), (0.9, Resampling::Blocks(100), 0.25)] {
         let record = record(5000, rho, 3);
-        let fit = Fit::new(&FirstOrder, &record).parameters(Lag { k: free(1.5), tau: free(0.1).log() });
+        let fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau: free(0.1).log() });
         let problem = fit.problem().unwrap();
         let estimate = problem.run().unwrap();
         let found = bootstrap(&problem, &estimate, resampling, 400, 1).unwrap();
@@ -129,10 +104,10 @@ fn bootstraps_agree() {
 #[test]
 fn bootstraps_agree_with_sandwiches() {
     let record = record(3000, 0.0, 11);
-    let parameters = Lag { k: free(1.5), tau: free(0.1).log() };
-    let plain = || Fit::new(&FirstOrder, &record).parameters(parameters);
+    let parameters = Branch { gain: free(1.5), tau: free(0.1).log() };
+    let plain = || Fit::new(&Lag, &record).parameters(parameters);
     let filter = Butterworth::low_pass(2, 10.0, STEP).unwrap();
-    let weighted = plain().weighting(|s: &Sample<FirstOrder>| (s.u.u - 1.0).powi(2));
+    let weighted = plain().weighting(|s: &Sample<Lag>| (s.u.u - 1.0).powi(2));
     for (what, fit, covariance) in [
         ("weighting", weighted, CovarianceMethod::Sandwich),
         ("pre-filter", plain().prefilter(filter), CovarianceMethod::FilteredSandwich),
@@ -153,11 +128,11 @@ fn bootstraps_agree_with_sandwiches() {
 /// Percentiles of refits cover 93 to 97 % of the time: 400 records of 300 samples, 200 refits each; binomial spread 1.1 %.
 #[test]
 fn bootstrap_covers() {
-    let truth = [TRUTH.k, TRUTH.tau];
+    let truth = [TRUTH.gain, TRUTH.tau];
     let mut covered = [0.0; 2];
     for seed in 0..400 {
         let record = record(300, 0.0, seed);
-        let fit = Fit::new(&FirstOrder, &record).parameters(Lag { k: free(1.5), tau: free(0.1).log() });
+        let fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau: free(0.1).log() });
         let problem = fit.problem().unwrap();
         let estimate = problem.run().unwrap();
         let found = bootstrap(&problem, &estimate, Resampling::Residuals, 200, seed).unwrap();
@@ -176,7 +151,7 @@ fn bands_cover() {
     let (mut confident, mut predicted) = (0.0, 0.0);
     for seed in 0..400 {
         let record = record(300, 0.0, seed);
-        let fit = Fit::new(&FirstOrder, &record).parameters(Lag { k: free(1.5), tau: free(0.1).log() });
+        let fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau: free(0.1).log() });
         let problem = fit.problem().unwrap();
         let estimate = problem.run().unwrap();
         let bands = bands(&problem, &estimate, 0, 0.95).unwrap();
@@ -184,7 +159,7 @@ fn bands_cover() {
         let (mut x, decay) = (0.0, (-STEP / TRUTH.tau).exp());
         let at = 200 + seed as usize % 90;
         for k in 0..at {
-            let steady = TRUTH.k * record.input(k).u;
+            let steady = TRUTH.gain * record.input(k).u;
             x = steady + (x - steady) * decay;
         }
         let error = (bands.outputs[0][at] - x).abs();

@@ -125,7 +125,7 @@ fn weighting_by_speed() {
     Study::of("motor, weighted by speed", vec![p.rs, p.ls, p.ke], |noise| {
         Fit::new(&model, &noisy(&model, &record, sigma, noise))
             .parameters(motor_free())
-            .weighting(BySignal::new("w", Law::Absolute))
+            .weighting(BySignal::new("w", WeightFunction::Absolute))
             .run()
             .unwrap()
     })

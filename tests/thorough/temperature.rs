@@ -6,11 +6,11 @@ use greybox::Butterworth;
 use greybox::pmsm::drive::Simulation;
 use greybox::pmsm::offline::{Extended, Spans, extended, search_i0};
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::Axis;
+use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::temperature::{Celsius, Estimated, winding_rise};
 use rayon::prelude::*;
 
-fn resistance(axis: &Axis, simulation: Simulation) -> Estimated {
+fn resistance(axis: &RobotAxis, simulation: Simulation) -> Estimated {
     let program = Program::speed_cycles(axis, 8, 1.0).unwrap();
     let spans = Spans::from_log(&simulation.run(&program), axis.pole_pairs);
     let filter = Butterworth::low_pass(4, 100.0, spans.ts).unwrap();
@@ -23,11 +23,11 @@ fn resistance(axis: &Axis, simulation: Simulation) -> Estimated {
 #[test]
 fn winding_temperature() {
     let records: u64 = std::env::var("COVERAGE_RECORDS").ok().and_then(|text| text.parse().ok()).unwrap_or(8);
-    let axis = Axis::reference(5).unwrap();
+    let axis = RobotAxis::reference(5).unwrap();
     let read = |seed: u64| {
         let mut random = Random(seed);
         let mut part = |least: f64, most: f64| least + (most - least) * random.uniform();
-        let axis = Axis {
+        let axis = RobotAxis {
             rs: axis.rs * part(0.9, 1.1),
             ls: axis.ls * part(0.9, 1.1),
             ke: axis.ke * part(0.9, 1.1),

@@ -17,15 +17,15 @@ pub struct Good {
 
 const SAMPLES: usize = 500;
 
-const fn good(name: &'static str, judged: fn(u64) -> Found) -> Good {
+pub const fn good(name: &'static str, judged: fn(u64) -> Found) -> Good {
     Good { name, judged, may: &[] }
 }
 
-const fn with(name: &'static str, may: &'static [WarningCode], judged: fn(u64) -> Found) -> Good {
+pub const fn with(name: &'static str, may: &'static [WarningCode], judged: fn(u64) -> Found) -> Good {
     Good { name, judged, may }
 }
 
-fn noisy(plant: &dyn Plant, samples: usize, part: f64, seed: u64) -> Found {
+pub fn noisy(plant: &dyn Plant, samples: usize, part: f64, seed: u64) -> Found {
     plant.fit(&plant.record(seed, samples).noisy(part, 0.0, seed), &How::default(), seed)
 }
 

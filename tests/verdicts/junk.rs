@@ -42,18 +42,18 @@ fn mistaken<A: greybox::Model, B: greybox::Model>(measured: Bench<A>, model: Ben
     model.fit(&Columns { step: model.step, ..record }, &How::default(), seed)
 }
 
-fn shuffle(values: &mut [f64], random: &mut Random) {
+pub fn shuffle(values: &mut [f64], random: &mut Random) {
     for k in (1..values.len()).rev() {
         values.swap(k, (random.uniform() * (k + 1) as f64) as usize);
     }
 }
 
-fn range(values: &[f64]) -> (f64, f64) {
+pub fn range(values: &[f64]) -> (f64, f64) {
     values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)))
 }
 
 /// Each column delayed by so many samples.
-fn delayed(columns: &mut [Vec<f64>], by: usize) {
+pub fn delayed(columns: &mut [Vec<f64>], by: usize) {
     for column in columns {
         let first = column[0];
         column.rotate_right(by);
@@ -61,16 +61,16 @@ fn delayed(columns: &mut [Vec<f64>], by: usize) {
     }
 }
 
-const fn seen(name: &'static str, judged: fn(u64) -> Found) -> Junk {
+pub const fn seen(name: &'static str, judged: fn(u64) -> Found) -> Junk {
     Junk { name, judged, named: None, unseen: None }
 }
 
 /// A fault that is named every time.
-const fn named(name: &'static str, code: WarningCode, judged: fn(u64) -> Found) -> Junk {
+pub const fn named(name: &'static str, code: WarningCode, judged: fn(u64) -> Found) -> Junk {
     Junk { name, judged, named: Some(code), unseen: None }
 }
 
-const fn unseen(name: &'static str, why: &'static str, judged: fn(u64) -> Found) -> Junk {
+pub const fn unseen(name: &'static str, why: &'static str, judged: fn(u64) -> Found) -> Junk {
     Junk { name, judged, named: None, unseen: Some(why) }
 }
 

@@ -2,11 +2,15 @@
 
 mod extremes;
 mod good;
+mod good_processes;
 mod junk;
+mod junk_processes;
 mod levels;
 mod plants;
+mod processes;
 #[path = "../common/random.rs"]
 mod random;
+mod stiff;
 
 use greybox::optimize::Severity;
 use plants::Found;
@@ -55,7 +59,7 @@ fn print(title: &str, rows: &[Row]) {
 
 #[test]
 fn junk_is_never_usable() {
-    let kinds = junk::all();
+    let kinds: Vec<_> = junk::all().into_iter().chain(junk_processes::all()).collect();
     assert!(kinds.len() >= 30, "{}", kinds.len());
     let wrong = |kind: &junk::Junk, found: &Found| {
         let named = kind.named.is_none_or(|code| found.codes.contains(&code));
@@ -73,7 +77,7 @@ fn junk_is_never_usable() {
 
 #[test]
 fn good_records_are_usable() {
-    let kinds = good::all();
+    let kinds: Vec<_> = good::all().into_iter().chain(good_processes::all()).collect();
     assert!(kinds.len() >= 30, "{}", kinds.len());
     let judged = |kind: &good::Good| {
         row(kind.name, kind.judged, |found| {

@@ -20,6 +20,12 @@ pub struct Columns {
 }
 
 impl Columns {
+    /// The first samples.
+    pub fn first(mut self, samples: usize) -> Self {
+        self.u.iter_mut().chain(&mut self.y).for_each(|column| column.truncate(samples));
+        self
+    }
+
     pub fn len(&self) -> usize {
         self.y[0].len()
     }
@@ -59,6 +65,12 @@ pub struct How {
     pub opposite: bool,
     /// Predictions from the last measurement on, instead of a simulation.
     pub one_step: bool,
+    /// The covariance of the noise of all outputs is estimated.
+    pub covariance: bool,
+    /// From so many starts; zero for one.
+    pub starts: usize,
+    /// What else is declared of a parameter, by its number.
+    pub declare: Option<fn(usize, Parameter) -> Parameter>,
 }
 
 /// What was said of a fit.
@@ -76,13 +88,18 @@ pub trait Plant {
     fn truth(&self) -> Vec<f64>;
     /// Inputs of so many samples that excite it.
     fn inputs(&self, seed: u64, samples: usize) -> Vec<Vec<f64>>;
-    /// What it makes of inputs, with these parameters.
-    fn simulated(&self, u: Vec<Vec<f64>>, truth: &[f64]) -> Columns;
+    /// What it makes of inputs at these times (even ones, if none are given), with these parameters.
+    fn simulated_at(&self, times: Option<Vec<f64>>, u: Vec<Vec<f64>>, truth: &[f64]) -> Columns;
     /// A fit of several records at once.
     fn fit_all(&self, records: &[Columns], how: &How, seed: u64) -> Found;
 
     fn fit(&self, columns: &Columns, how: &How, seed: u64) -> Found {
         self.fit_all(std::slice::from_ref(columns), how, seed)
+    }
+
+    /// The same at even times.
+    fn simulated(&self, u: Vec<Vec<f64>>, truth: &[f64]) -> Columns {
+        self.simulated_at(None, u, truth)
     }
 
     fn record(&self, seed: u64, samples: usize) -> Columns {
@@ -134,11 +151,11 @@ impl<M: Model> Plant for Bench<M> {
         self.drive.iter().map(column).collect()
     }
 
-    fn simulated(&self, u: Vec<Vec<f64>>, truth: &[f64]) -> Columns {
-        let samples = u.first().map_or(400, Vec::len);
+    fn simulated_at(&self, times: Option<Vec<f64>>, u: Vec<Vec<f64>>, truth: &[f64]) -> Columns {
+        let samples = u.first().map_or(times.as_ref().map_or(400, Vec::len), Vec::len);
         let rows: Vec<Of<M::Input, f64>> = (0..samples).map(|k| M::Input::from_fn(|i| u[i][k])).collect();
         let (truth, start) = (M::Parameters::from_fn(|i| truth[i]), M::State::from_fn(|i| self.initial[i]));
-        let time = Time::Uniform { start: 0.0, step: self.step };
+        let time = times.clone().map_or(Time::Uniform { start: 0.0, step: self.step }, Time::Stamps);
         let simulator = Simulator::new(&self.model).hold(self.hold);
         let exact = Rk45 { relative: 1e-12, absolute: 1e-14 };
         let run = match M::KIND {
@@ -148,7 +165,7 @@ impl<M: Model> Plant for Bench<M> {
         let run = run.unwrap();
         let outputs: Vec<_> = run.outputs.into_iter().map(M::Output::into_array).collect();
         let y = (0..M::Output::LEN).map(|j| outputs.iter().map(|row| row.as_ref()[j]).collect()).collect();
-        Columns { step: self.step, times: None, u, y }
+        Columns { step: self.step, times, u, y }
     }
 
     fn fit_all(&self, records: &[Columns], how: &How, seed: u64) -> Found {
@@ -156,7 +173,8 @@ impl<M: Model> Plant for Bench<M> {
         let mut random = Random(seed ^ 0x57a7);
         let start = |i: usize| -> Parameter {
             let sign = if how.opposite { -1.0 } else { 1.0 };
-            free(sign * self.truth[i] * (0.35 * (2.0 * random.uniform() - 1.0)).exp())
+            let start = free(sign * self.truth[i] * (0.35 * (2.0 * random.uniform() - 1.0)).exp());
+            how.declare.map_or(start, |declare| declare(i, start))
         };
         let fit = Fit::new(&self.model, &records).parameters(M::Parameters::from_fn(start));
         let fit = match &how.noise {
@@ -164,6 +182,8 @@ impl<M: Model> Plant for Bench<M> {
             None => fit,
         };
         let fit = if how.one_step { fit.predictor(Horizon { steps: 1, filter: None }) } else { fit };
+        let fit = if how.covariance { fit.noise_covariance() } else { fit };
+        let fit = if how.starts > 0 { fit.starts(how.starts) } else { fit };
         let fit = if how.robust { fit.loss(Huber::default()) } else { fit };
         let estimate = match fit.run() {
             Ok(estimate) => estimate,
@@ -339,7 +359,7 @@ impl Model for Free {
     }
 }
 
-fn bench<M: Model + 'static>(
+pub fn bench<M: Model + 'static>(
     model: M,
     truth: &[f64],
     step: f64,

@@ -9,6 +9,8 @@ use crate::record::Record;
 
 /// An output that holds so much of an unknown's information is the only one that tells it.
 const ONLY: f64 = 0.99;
+/// More than this is not told from all.
+const ALL: f64 = 0.999;
 /// So much of an unknown's information from one tenth of a record leaves little to the others.
 const ONCE: f64 = 0.9;
 
@@ -74,16 +76,17 @@ fn one_output(parameters: &[&Excitation]) -> Vec<String> {
         let names: Vec<String> = only.iter().map(|excited| format!("`{}`", excited.name)).collect();
         let others = outputs.iter().filter(|(name, _)| name != output);
         let others: Vec<String> = others.map(|(name, _)| format!("`{name}`")).collect();
-        let (verb, them, at_least) = match names.len() {
-            1 => ("is", "it", ""),
-            _ => ("are", "them", "at least "),
+        let (verb, them) = if names.len() == 1 { ("is", "it") } else { ("are", "them") };
+        let part = match names.len() {
+            _ if least > ALL => format!("more than {}", percent(ALL, 4)),
+            1 => percent(least, 4),
+            _ => format!("at least {}", percent(least, 4)),
         };
         let depend = if others.len() == 1 { "depends" } else { "depend" };
         Some(format!(
-            "{} {verb} seen only through `{output}` ({at_least}{} of the information): {} hardly {depend} on {them}, and \
+            "{} {verb} seen only through `{output}` ({part} of the information): {} hardly {depend} on {them}, and \
              cannot confirm {them}",
             names.join(", "),
-            percent(least, 4),
             others.join(", ")
         ))
     };

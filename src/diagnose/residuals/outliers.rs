@@ -1,5 +1,6 @@
 //! Residuals that no normal distribution accounts for.
 
+use crate::outliers::center_and_deviation;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -21,19 +22,14 @@ pub struct Outlier {
 }
 
 const KEPT: usize = 20;
-/// Ratio of the standard deviation of a normal distribution to the median absolute deviation.
-const NORMAL_SPREAD: f64 = 1.4826;
 
 /// The residuals further from the median than the largest of as many normal ones is with 99 % probability, in units of
 /// the median absolute deviation (Hampel, J. American Statistical Association 69 (1974) 383).
 pub(super) fn find(residuals: &[f64], times: &[f64]) -> (Vec<Outlier>, u64) {
     let mut values: Vec<f64> = residuals.iter().copied().filter(|e| e.is_finite()).collect();
-    let median = middle(&mut values);
-    values.iter_mut().for_each(|value| *value = (*value - median).abs());
-    let sigma = NORMAL_SPREAD * middle(&mut values);
-    if sigma == 0.0 {
+    let Some((median, sigma)) = center_and_deviation(&mut values).filter(|(_, sigma)| *sigma > 0.0) else {
         return (vec![], 0);
-    }
+    };
     let limit = -Normal::standard().inverse_cdf(0.005 / values.len() as f64);
     let far = |(k, e): (usize, &f64)| {
         let sigmas = (e - median) / sigma;
@@ -44,12 +40,4 @@ pub(super) fn find(residuals: &[f64], times: &[f64]) -> (Vec<Outlier>, u64) {
     found.sort_by(|a, b| b.sigmas.abs().total_cmp(&a.sigmas.abs()));
     found.truncate(KEPT);
     (found, count)
-}
-
-fn middle(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let half = values.len() / 2;
-    *values.select_nth_unstable_by(half, f64::total_cmp).1
 }

@@ -22,9 +22,9 @@ enum Event<'a> {
     Row(usize, Slot),
 }
 
-/// A number's place: in a register, or in memory.
+/// The location of a number: in a register, or in memory.
 #[derive(Clone, Copy)]
-enum Place {
+enum Location {
     Register(Register),
     Memory(MemoryOperand),
 }
@@ -214,14 +214,14 @@ impl<'a> Emitter<'a> {
     }
 
     /// A slot's number in a register, if it is there or will be read again soon; else in memory.
-    fn place(&mut self, slot: Slot) -> Result<Place, IcedError> {
+    fn place(&mut self, slot: Slot) -> Result<Location, IcedError> {
         if let Some(register) = self.registers.find(slot) {
-            return Ok(Place::Register(self.unit.register(register)));
+            return Ok(Location::Register(self.unit.register(register)));
         }
         if self.registers.is_worth_loading(self.registers.next[usize::from(slot)]) {
-            return self.load(slot).map(Place::Register);
+            return self.load(slot).map(Location::Register);
         }
-        Ok(Place::Memory(self.home(slot)))
+        Ok(Location::Memory(self.home(slot)))
     }
 
     fn row(&mut self, row: usize, slot: Slot) -> Emitted {

@@ -3,23 +3,24 @@
 use super::reduce::Terms;
 use super::{Elimination, entry};
 
-/// How often unknowns are released from the ends of their room; a few times suffice.
+/// How often unknowns are released from their limits; a few times suffice.
 const RELEASES: usize = 20;
-/// How often the way along the bounds is halved before only the part to the first end is gone.
+/// How often the step projected on the limits is halved; after that it ends where the first unknown reaches a limit.
 const HALVINGS: usize = 10;
-/// An unknown is kept on an end where the cosine between the residual and its column is below.
+/// An unknown is kept on a limit where the cosine between the residual and its column is below.
 const NEGLIGIBLE: f64 = 1e-12;
 
 impl Elimination {
-    /// As [`step`](Self::step), and within this room (at most zero, at least zero) for each unknown: the minimizer among
-    /// all steps that the room allows.
+    /// As [`step`](Self::step), within limits for each unknown's step (a lower one of at most zero, an upper one of at least
+    /// zero): the minimizer among all steps that the limits allow.
     ///
-    /// The way to a minimizer is projected on the room: unknowns that would leave it stay on its end. As much of the way
-    /// is gone, all or a half or a quarter and so on, as lowers the damped sum of squares further than to go straight
-    /// and stop where the first unknown gets to its end. The unknowns on their ends are kept there and the others
-    /// minimized again, until all stay within their room; then those whose slopes fall inward are released
-    /// (Bertsekas, SIAM J. Control Optim. 20 (1982) 221). Many pieces do so in as few stages as one.
-    pub fn step_within(&self, damping: &[f64], held: &[bool], room: &[(f64, f64)]) -> Option<Vec<f64>> {
+    /// Projected Newton steps (Bertsekas, SIAM J. Control Optim. 20 (1982) 221). The line to the unlimited minimizer is
+    /// projected on the limits: an unknown that would exceed its limit stays on it. Of this path the whole, a half, a quarter
+    /// and so on are tried, and the first is taken that lowers the damped sum of squares further than the straight line up
+    /// to the first limit. Unknowns on a limit are then kept there and the others minimized again. Once no unknown exceeds
+    /// its limits, those on a limit whose slope falls inward are released. The number of stages hardly grows with the number
+    /// of pieces.
+    pub fn step_within(&self, damping: &[f64], held: &[bool], limits: &[(f64, f64)]) -> Option<Vec<f64>> {
         let n = self.unknowns();
         let mut stage = Stage {
             held: (0..n).map(|i| held.get(i).copied().unwrap_or(false)).collect(),
@@ -28,12 +29,12 @@ impl Elimination {
             at: vec![0.0; n],
             step: self.step(damping, held)?,
         };
-        if stage.leaving(room).is_empty() {
+        if stage.leaving(limits).is_empty() {
             return Some(stage.step);
         }
         let mut releases = 0;
         loop {
-            let leaving = stage.leaving(room);
+            let leaving = stage.leaving(limits);
             if let Some(first) = leaving.iter().map(|leaving| leaving.part).min_by(f64::total_cmp) {
                 let part = self.part(&stage, first, &leaving, damping);
                 stage.advance(part, &leaving);
@@ -49,7 +50,7 @@ impl Elimination {
         }
     }
 
-    /// How much of the way to go.
+    /// The part of the path to take.
     fn part(&self, stage: &Stage, first: f64, leaving: &[Leaving], damping: &[f64]) -> f64 {
         let gain = |part: f64| {
             let step = stage.along(part, leaving);
@@ -87,26 +88,26 @@ impl Elimination {
 /// How far the search for a step within bounds has come.
 struct Stage {
     held: Vec<bool>,
-    /// Where unknowns were put on an end.
+    /// Where unknowns were put on a limit.
     put: Vec<f64>,
-    /// On which end: -1 for the lower one, 1 for the upper one.
+    /// On which limit: -1 for the lower one, 1 for the upper one.
     on_end: Vec<Option<f64>>,
     /// The point reached, and the minimizer that is to be reached from it.
     at: Vec<f64>,
     step: Vec<f64>,
 }
 
-/// A free unknown that leaves its room on the way.
+/// A free unknown that exceeds a limit on the path.
 struct Leaving {
     unknown: usize,
-    /// At what part of the way.
+    /// At which part of the path.
     part: f64,
     end: f64,
     side: f64,
 }
 
 impl Stage {
-    fn leaving(&self, room: &[(f64, f64)]) -> Vec<Leaving> {
+    fn leaving(&self, limits: &[(f64, f64)]) -> Vec<Leaving> {
         let leaving = |(unknown, &(down, up)): (usize, &(f64, f64))| {
             let (at, step) = (*self.at.get(unknown)?, self.step[unknown]);
             let (end, side) = match step {
@@ -117,17 +118,17 @@ impl Stage {
             };
             Some(Leaving { unknown, part: ((end - at) / (step - at)).clamp(0.0, 1.0), end, side })
         };
-        room.iter().enumerate().filter_map(leaving).collect()
+        limits.iter().enumerate().filter_map(leaving).collect()
     }
 
-    /// The point after this part of the way, those that have left their room by then on its end.
+    /// The point after this part of the path; unknowns that have exceeded a limit by then are on it.
     fn along(&self, part: f64, leaving: &[Leaving]) -> Vec<f64> {
         let mut point: Vec<f64> = self.at.iter().zip(&self.step).map(|(at, step)| at + part * (step - at)).collect();
         leaving.iter().filter(|leaving| leaving.part <= part).for_each(|leaving| point[leaving.unknown] = leaving.end);
         point
     }
 
-    /// Goes this part of the way.
+    /// Moves by this part of the path.
     fn advance(&mut self, part: f64, leaving: &[Leaving]) {
         self.at = self.along(part, leaving);
         for &Leaving { unknown, end, side, .. } in leaving.iter().filter(|leaving| leaving.part <= part) {

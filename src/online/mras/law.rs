@@ -40,12 +40,12 @@ pub enum Rate {
 }
 
 /// An adaptation law: how the error between measured and predicted states moves the parameters. Closures are laws.
-pub trait Law<M: Model> {
+pub trait AdaptationLaw<M: Model> {
     /// The rate of each parameter.
     fn rates(&self, now: &Moment<M>) -> Of<M::Parameters, Rate>;
 }
 
-impl<M: Model, F: Fn(&Moment<M>) -> Of<M::Parameters, Rate>> Law<M> for F {
+impl<M: Model, F: Fn(&Moment<M>) -> Of<M::Parameters, Rate>> AdaptationLaw<M> for F {
     #[inline(always)]
     fn rates(&self, now: &Moment<M>) -> Of<M::Parameters, Rate> {
         self(now)
@@ -63,7 +63,7 @@ pub struct Gradient<P, const N: usize> {
     pub gain: P,
 }
 
-impl<M: Model, const N: usize> Law<M> for Gradient<Of<M::Parameters, f64>, N> {
+impl<M: Model, const N: usize> AdaptationLaw<M> for Gradient<Of<M::Parameters, f64>, N> {
     #[inline]
     fn rates(&self, now: &Moment<M>) -> Of<M::Parameters, Rate> {
         const { assert!(N == M::Parameters::LEN, "the second parameter of Gradient is the number of parameters") };

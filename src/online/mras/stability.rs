@@ -1,6 +1,6 @@
 //! Stability of the sampled loop: the spectral radius of its error system, linearized where the estimates are right.
 
-use super::{Law, Moment, Mras, Order, Rate};
+use super::{AdaptationLaw, Moment, Mras, Order, Rate};
 use crate::dual::Dual;
 use crate::model::Model;
 use crate::online::ObserverError;
@@ -8,7 +8,7 @@ use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
 use nalgebra::SMatrix;
 
-impl<M: Model, L: Law<M>> Mras<M, L> {
+impl<M: Model, L: AdaptationLaw<M>> Mras<M, L> {
     /// By what factor the errors of states and parameters grow or shrink from sample to sample, in the long run, near an
     /// operating point (states and inputs there, with the present parameters): above one the observer is unstable.
     ///

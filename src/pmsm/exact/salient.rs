@@ -1,5 +1,5 @@
 use super::{ExactStep, HeldIn, all_positive};
-use crate::online::{Law, Mras, MrasStart, ObserverError};
+use crate::online::{AdaptationLaw, Mras, MrasStart, ObserverError};
 use crate::pmsm::{Currents, Drive, MotorModel, PolePairs, SQRT_2_3, Salient, SalientWinding};
 use crate::{Kind, Model, Scalar};
 use serde::{Deserialize, Serialize};
@@ -57,7 +57,7 @@ impl ExactSalient {
     ///
     /// # Errors
     /// A resistance, inductance or back-EMF that does not start above zero; else as [`Mras::new`].
-    pub fn mras<L: Law<Self>>(self, law: L, start: MrasStart<Self>) -> Result<Mras<Self, L>, ObserverError> {
+    pub fn mras<L: AdaptationLaw<Self>>(self, law: L, start: MrasStart<Self>) -> Result<Mras<Self, L>, ObserverError> {
         let SalientWinding { rs, ld, lq, ke } = start.parameters;
         all_positive([("rs", rs), ("ld", ld), ("lq", lq), ("ke", ke)])?;
         Mras::new(self, law, self.0.ts, start)

@@ -106,9 +106,9 @@ impl<P: Signals> Equations<P> {
 
 /// Index (%) above which a parameter counts as hardly seen: a change by two fifths of its value does no more than double
 /// the squared residual.
-pub const WEAK: f64 = 40.0;
+const WEAK: f64 = 40.0;
 
-/// Names of the parameters that the equations hardly see, by [`WEAK`]: what is left out of the equations may move them far
+/// Names of the parameters that the equations hardly see, by an index above 40 %: what is left out of the equations may move them far
 /// more than their standard errors say.
 pub fn hardly_seen<P: Signals>(estimate: &LinearEstimate<P>) -> Vec<&'static str> {
     let index = P::into_array(estimate.index);

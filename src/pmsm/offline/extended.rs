@@ -35,7 +35,7 @@ crate::signals! {
 /// The resistance and the harmonic are the same in all cycles of a motor: solved together by [`PooledRegression`], with
 /// the other parameters for each cycle, they are determined by the fast cycles, and known in the slow ones, which do not determine them.
 ///
-/// [`PooledRegression`]: crate::PooledRegression
+/// [`PooledRegression`]: crate::regress::PooledRegression
 pub fn extended(spans: &Spans, i0: f64) -> Equations<Extended> {
     let (q, d): (Vec<_>, Vec<_>) = spans
         .spans

@@ -9,7 +9,7 @@ use crate::record::{Channel, Clock, Initial, Record, Time};
 
 /// Where the number of one signal comes from.
 #[derive(Clone, Copy, Debug, Default)]
-struct Source {
+struct SignalColumn {
     column: usize,
     factor: f64,
     offset: f64,
@@ -88,7 +88,7 @@ impl CsvFile {
     }
 
     /// The time stamps of the first rows, for a clock that turned out uneven.
-    fn stamps(&self, t: Source, rows: usize) -> Result<Vec<f64>, Error> {
+    fn stamps(&self, t: SignalColumn, rows: usize) -> Result<Vec<f64>, Error> {
         let mut table = Table::open(self)?;
         let mut stamps = Vec::with_capacity(rows + 1);
         while stamps.len() < rows && table.next()? {
@@ -126,7 +126,7 @@ impl CsvFile {
         self.columns.iter().find(|column| column.signal == signal).cloned().unwrap_or_else(|| Column::new(signal))
     }
 
-    fn source(&self, table: &Table, signal: &str) -> Result<Source, Error> {
+    fn source(&self, table: &Table, signal: &str) -> Result<SignalColumn, Error> {
         let said = self.said(signal);
         let mut places = table.names().iter().enumerate().filter(|(_, name)| **name == said.name).map(|(at, _)| at);
         let (path, column) = (self.path.clone(), said.name.clone());
@@ -138,12 +138,12 @@ impl CsvFile {
             return Err(Error::AmbiguousColumn { path, column, first: at + 1, second: again + 1 });
         }
         let factor = if said.reversed { -said.factor } else { said.factor };
-        Ok(Source { column: at, factor, offset: said.offset })
+        Ok(SignalColumn { column: at, factor, offset: said.offset })
     }
 
     /// The value of a signal in the current row; NaN where missing, none where its cell is no number.
     #[inline]
-    fn value(&self, table: &Table, source: Source) -> Option<f64> {
+    fn value(&self, table: &Table, source: SignalColumn) -> Option<f64> {
         Some(self.number(table.cell(source.column))? * source.factor + source.offset)
     }
 
@@ -166,7 +166,15 @@ impl CsvFile {
 
     /// The error of a cell that is no number, or not a finite one.
     #[cold]
-    fn bad_cell(&self, table: &Table, source: Source, name: &str, signal: &str, sample: usize, time: f64) -> Error {
+    fn bad_cell(
+        &self,
+        table: &Table,
+        source: SignalColumn,
+        name: &str,
+        signal: &str,
+        sample: usize,
+        time: f64,
+    ) -> Error {
         let Some(value) = self.value(table, source) else {
             let (path, line, column) = (self.path.clone(), table.line(), table.names()[source.column].clone());
             let text = String::from_utf8_lossy(table.cell(source.column)).into_owned();

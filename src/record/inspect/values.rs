@@ -1,6 +1,7 @@
 //! [`Values`]: extremes, levels and runs of a column, in one pass and two over its extremes.
 
 use super::Suspicion;
+use crate::wide::{self, Task, Wide, Width};
 use core::ops::Range;
 
 /// Levels that are told apart.
@@ -58,30 +59,18 @@ impl<'v> Values<'v> {
             longest: 0..0,
         };
         for piece in pieces {
-            found.add_range(piece);
+            let values = &values[piece.clone()];
+            let range = wide::run(Width::widest(), Ends { values });
+            found.least = found.least.min(range.least);
+            found.greatest = found.greatest.max(range.greatest);
+            found.missing += range.missing;
+            found.measured += values.len() - range.missing;
             found.add_levels(piece);
             if runs {
                 found.add_runs(piece);
             }
         }
         found
-    }
-
-    fn add_range(&mut self, piece: &Range<usize>) {
-        let (mut least, mut greatest, mut missing) = ([self.least; 4], [self.greatest; 4], 0);
-        let values = &self.values[piece.clone()];
-        for four in values.chunks(4) {
-            for ((least, greatest), value) in least.iter_mut().zip(&mut greatest).zip(four) {
-                // False for what is not a number.
-                *least = if *value < *least { *value } else { *least };
-                *greatest = if *value > *greatest { *value } else { *greatest };
-                missing += usize::from(value.is_nan());
-            }
-        }
-        self.least = least.into_iter().fold(f64::INFINITY, f64::min);
-        self.greatest = greatest.into_iter().fold(f64::NEG_INFINITY, f64::max);
-        self.missing += missing;
-        self.measured += values.len() - missing;
     }
 
     fn add_levels(&mut self, piece: &Range<usize>) {
@@ -98,16 +87,30 @@ impl<'v> Values<'v> {
     }
 
     fn add_runs(&mut self, piece: &Range<usize>) {
-        let mut begin = piece.start;
-        for k in piece.start + 1..=piece.end {
-            let same = k < piece.end && self.values[k] == self.values[k - 1];
-            self.repeats += usize::from(same);
-            if !same {
-                if k - begin > self.longest.len() {
-                    self.longest = begin..k;
-                }
-                begin = k;
+        let values = &self.values[piece.clone()];
+        let mut begin = 0;
+        for first in (1..values.len()).step_by(BLOCK) {
+            let after = values.len().min(first + BLOCK);
+            if !wide::run(Width::widest(), Repeats { values: &values[first - 1..after] }) {
+                self.end_run(piece.start + begin..piece.start + first);
+                begin = after - 1;
+                continue;
             }
+            for k in first..after {
+                if values[k] == values[k - 1] {
+                    self.repeats += 1;
+                } else {
+                    self.end_run(piece.start + begin..piece.start + k);
+                    begin = k;
+                }
+            }
+        }
+        self.end_run(piece.start + begin..piece.end);
+    }
+
+    fn end_run(&mut self, run: Range<usize>) {
+        if run.len() > self.longest.len() {
+            self.longest = run;
         }
     }
 
@@ -134,26 +137,14 @@ impl<'v> Values<'v> {
         if self.levels.is_some() || self.least >= self.greatest {
             return None;
         }
-        // In four parts each, which the compiler may keep in vector lanes.
-        let (mut low, mut high) = ([f64::INFINITY; 4], [f64::NEG_INFINITY; 4]);
-        let (mut at_least, mut at_greatest) = ([0u64; 4], [0u64; 4]);
+        let (mut low, mut high, mut at_least, mut at_greatest) = (f64::INFINITY, f64::NEG_INFINITY, 0, 0);
         for piece in self.pieces {
-            for four in self.values[piece.clone()].chunks(4) {
-                for (i, &value) in four.iter().enumerate() {
-                    let (is_least, is_greatest) = (value == self.least, value == self.greatest);
-                    at_least[i] += u64::from(is_least);
-                    at_greatest[i] += u64::from(is_greatest);
-                    low[i] = if value < low[i] && !is_least { value } else { low[i] };
-                    high[i] = if value > high[i] && !is_greatest { value } else { high[i] };
-                }
-            }
+            let task = Neighbors { values: &self.values[piece.clone()], least: self.least, greatest: self.greatest };
+            let found = wide::run(Width::widest(), task);
+            (low, high) = (low.min(found.low), high.max(found.high));
+            (at_least, at_greatest) = (at_least + found.at_least, at_greatest + found.at_greatest);
         }
-        let low = low.into_iter().fold(f64::INFINITY, f64::min);
-        let high = high.into_iter().fold(f64::NEG_INFINITY, f64::max);
-        let one = |value: f64, next: f64, count: [u64; 4], others: f64| {
-            let count = count.iter().sum::<u64>() as usize;
-            Extreme { value, count, next, others }
-        };
+        let one = |value: f64, next: f64, count: usize, others: f64| Extreme { value, count, next, others };
         Some([
             one(self.greatest, high, at_greatest, high - self.least),
             one(self.least, low, at_least, self.greatest - low),
@@ -191,5 +182,103 @@ impl<'v> Values<'v> {
         let expected = self.measured as f64 * chance.powf(self.longest.len() as f64 - 1.0);
         let (value, samples) = (self.values[self.longest.start], self.longest.clone());
         (expected < BY_CHANCE).then_some(Suspicion::Frozen { value, samples })
+    }
+}
+
+/// Values that are looked at together for runs.
+const BLOCK: usize = 64;
+
+/// Least and greatest value, and how many are missing.
+struct Ends<'v> {
+    values: &'v [f64],
+}
+
+struct Span {
+    least: f64,
+    greatest: f64,
+    missing: usize,
+}
+
+impl Task for Ends<'_> {
+    type Output = Span;
+
+    #[inline(always)]
+    fn run<W: Wide>(self) -> Span {
+        let (mut least, mut greatest, mut missing) =
+            (W::splat(f64::INFINITY), W::splat(f64::NEG_INFINITY), W::splat(0.0));
+        let registers = self.values.chunks_exact(W::LANES);
+        let rest = registers.remainder();
+        for values in registers {
+            let values = W::load(values);
+            // False for what is not a number.
+            least = values.select_lt(least, values, least);
+            greatest = greatest.select_lt(values, values, greatest);
+            missing = missing.add(values.select_eq(values, W::splat(0.0), W::splat(1.0)));
+        }
+        let rest_missing = rest.iter().filter(|value| value.is_nan()).count();
+        Span {
+            least: rest.iter().copied().fold(least.fold(f64::min), f64::min),
+            greatest: rest.iter().copied().fold(greatest.fold(f64::max), f64::max),
+            missing: missing.fold(|a, b| a + b) as usize + rest_missing,
+        }
+    }
+}
+
+/// Whether a value equals the one before.
+struct Repeats<'v> {
+    values: &'v [f64],
+}
+
+impl Task for Repeats<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<W: Wide>(self) -> bool {
+        let pairs = self.values.iter().zip(&self.values[1..]);
+        pairs.fold(false, |any, (before, value)| any | (before == value))
+    }
+}
+
+/// How often the extremes occur, and the values next to them.
+struct Neighbors<'v> {
+    values: &'v [f64],
+    least: f64,
+    greatest: f64,
+}
+
+struct Beside {
+    low: f64,
+    high: f64,
+    at_least: usize,
+    at_greatest: usize,
+}
+
+impl Task for Neighbors<'_> {
+    type Output = Beside;
+
+    #[inline(always)]
+    fn run<W: Wide>(self) -> Beside {
+        let Neighbors { values, least, greatest } = self;
+        let (zero, one) = (W::splat(0.0), W::splat(1.0));
+        let (above, below) = (W::splat(f64::INFINITY), W::splat(f64::NEG_INFINITY));
+        let (mut low, mut high, mut at_least, mut at_greatest) = (above, below, zero, zero);
+        let registers = values.chunks_exact(W::LANES);
+        let rest = registers.remainder();
+        for values in registers {
+            let values = W::load(values);
+            at_least = at_least.add(values.select_eq(W::splat(least), one, zero));
+            at_greatest = at_greatest.add(values.select_eq(W::splat(greatest), one, zero));
+            let (up, down) =
+                (values.select_eq(W::splat(least), above, values), values.select_eq(W::splat(greatest), below, values));
+            low = up.select_lt(low, up, low);
+            high = high.select_lt(down, down, high);
+        }
+        let (up, down) = (rest.iter().filter(|v| **v != least), rest.iter().filter(|v| **v != greatest));
+        Beside {
+            low: up.copied().fold(low.fold(f64::min), f64::min),
+            high: down.copied().fold(high.fold(f64::max), f64::max),
+            at_least: at_least.fold(|a, b| a + b) as usize + rest.iter().filter(|v| **v == least).count(),
+            at_greatest: at_greatest.fold(|a, b| a + b) as usize + rest.iter().filter(|v| **v == greatest).count(),
+        }
     }
 }

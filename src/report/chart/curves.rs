@@ -1,5 +1,7 @@
 //! [`Curves`]: curves, bars and levels over one pair of axes.
 
+mod labels;
+
 use super::scale::Scale;
 use super::{Frame, LETTER, Margins, Short, Size, class};
 use crate::report::markup::Markup;
@@ -27,7 +29,7 @@ pub(super) fn draw(curves: &Curves, to: &mut Markup, size: Size, name: &str) {
         },
         |frame, svg| {
             for layer in &curves.layers {
-                labels(layer, frame, svg, &x, &y);
+                labels::draw(layer, curves, frame, svg, (&x, &y));
             }
         },
     );
@@ -194,38 +196,6 @@ fn layers(layer: &Layer, frame: &Frame, svg: &mut Markup, x: &Scale, y: &Scale) 
         Layer::Mark { .. } => ("mark", ""),
     };
     svg.leaf("path", &[("class", &format_args!("{shape}{style}")), ("d", &d)]);
-}
-
-/// Draws what keeps its shape: points and labels.
-fn labels(layer: &Layer, frame: &Frame, svg: &mut Markup, x: &Scale, y: &Scale) {
-    /// Where letters stand above or below their line (px).
-    const ABOVE: f64 = -5.0;
-    const BELOW: f64 = 14.0;
-    let h = frame.height;
-    let inside = |at: f64| (-1e-9..=1.0 + 1e-9).contains(&at);
-    match layer {
-        Layer::Dots { style, points } => {
-            for (a, b) in points.iter().map(|(a, b)| (x.at(*a), y.at(*b))).filter(|(a, b)| inside(*a) && inside(*b)) {
-                let (cx, cy) = (frame.x(a), Short(h * (1.0 - b)));
-                let class = format!("point {}", class(*style));
-                let dot: [(&str, &dyn Display); 4] = [("class", &class), ("cx", &cx), ("cy", &cy), ("r", &3)];
-                svg.leaf("circle", &dot);
-            }
-        }
-        Layer::Level { value, label } if !label.is_empty() && inside(y.at(*value)) => {
-            let at = h * (1.0 - y.at(*value));
-            let at = at + if at < 16.0 { BELOW } else { ABOVE };
-            let place: [(&str, &dyn Display); 3] = [("class", &"note end"), ("x", &frame.x(1.0)), ("y", &Short(at))];
-            svg.words("text", &place, label);
-        }
-        Layer::Mark { value, label } if !label.is_empty() && inside(x.at(*value)) => {
-            let at = x.at(*value);
-            let (side, shift) = if at > 0.7 { ("note end", -4) } else { ("note", 4) };
-            let place: [(&str, &dyn Display); 4] = [("class", &side), ("x", &frame.x(at)), ("y", &12), ("dx", &shift)];
-            svg.words("text", &place, label);
-        }
-        _ => {}
-    }
 }
 
 /// A line through places, broken where there is none; a lone place is a line of no length, whose round ends are seen.

@@ -9,9 +9,11 @@ use core::fmt::Display;
 /// Letters after a term that stay with it: `),`.
 const CLOSE: usize = 2;
 
-/// Which terms have been met, and how plots are drawn.
+/// Which terms have been met, and how plots are drawn: where they are open at first, and where they are closed.
 pub(super) struct Prose {
-    pub size: Size,
+    sizes: [Size; 2],
+    /// How many closed sections this stands in.
+    pub closed: u64,
     /// In this section, where a term is explained once.
     here: Vec<&'static str>,
     /// On the page.
@@ -20,8 +22,13 @@ pub(super) struct Prose {
 
 impl Prose {
     /// Nothing has been met.
-    pub fn new(size: Size) -> Prose {
-        Prose { size, here: vec![], met: vec![] }
+    pub fn new(sizes: [Size; 2]) -> Prose {
+        Prose { sizes, closed: 0, here: vec![], met: vec![] }
+    }
+
+    /// How plots are drawn here.
+    pub fn size(&self) -> Size {
+        self.sizes[usize::from(self.closed > 0)]
     }
 
     /// A new section begins.

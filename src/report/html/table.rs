@@ -11,18 +11,26 @@ const CELLS: usize = 48;
 const COLUMNS: usize = 9;
 /// Words of fewer letters stay on one line.
 const SHORT: usize = 20;
+/// Width of a narrow screen without its margins, of a letter in a table, and between two columns (px).
+const SCREEN: f64 = 340.0;
+const LETTER: f64 = 8.7;
+const BETWEEN: f64 = 24.0;
 /// What stands between the ends of an interval, which stay on one line.
 const SPACED: &str = " … ";
 
 pub(super) fn draw(to: &mut Markup, table: &Table, prose: &mut Prose) {
-    // A name and a value have room beside each other on any screen.
-    let kind = if table.columns.len() == 2 { "entries" } else { "cards" };
+    let kind = match table.columns.len() {
+        // A name and a value have room beside each other on any screen.
+        2 => "entries",
+        _ if narrow(table) => "narrow",
+        _ => "cards",
+    };
     let fitting: Attributes<'_> = &[("class", &kind)];
     let scroll: Attributes<'_> =
         &[("class", &"scroll"), ("tabindex", &"0"), ("role", &"group"), ("aria-label", &table.caption)];
     let prose_in_it = (0..table.columns.len()).any(|column| table.is_prose(column));
     let small = table.rows.len() * table.columns.len() <= CELLS;
-    let fits = kind == "entries" || table.columns.len() <= COLUMNS && (small || prose_in_it);
+    let fits = kind != "cards" || table.columns.len() <= COLUMNS && (small || prose_in_it);
     to.node("div", if fits { fitting } else { scroll }, |around| {
         around.node("table", &[("role", &"table")], |node| {
             node.node("caption", &[], |caption| prose.sentence(caption, &table.caption));
@@ -46,6 +54,16 @@ pub(super) fn draw(to: &mut Markup, table: &Table, prose: &mut Prose) {
             around.words("p", &[("class", &"note")], more);
         }
     });
+}
+
+/// Whether all columns have room beside each other on a narrow screen; names of columns are broken between words.
+fn narrow(table: &Table) -> bool {
+    let letters = |text: &str| text.chars().count();
+    let width = |(i, name): (usize, &String)| {
+        let cells = table.rows.iter().filter_map(|row| row.get(i)).map(|cell| letters(cell.text()));
+        cells.chain(name.split_whitespace().map(letters)).max().unwrap_or(0) as f64 * LETTER + BETWEEN
+    };
+    table.columns.iter().enumerate().map(width).sum::<f64>() - BETWEEN <= SCREEN
 }
 
 /// Roles are said, for a table that is laid out as cards is none to a browser any more.

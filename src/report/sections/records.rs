@@ -50,7 +50,7 @@ fn sentences(record: &Record) -> Vec<String> {
     };
     if let Some(per_column) = timeline.stretches.first().map(|whole| whole.samples_per_column).filter(|n| *n > 1) {
         said.push(format!(
-            "Each column of the drawing spans the least to the greatest of {per_column} samples. About the largest residual \
+            "Each column of the drawing spans {per_column} samples, from the least value to the greatest. About the largest residual \
              of each output, samples are shown one by one as one zooms in."
         ));
     }

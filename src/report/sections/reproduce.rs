@@ -7,19 +7,20 @@ use crate::report::facts::Facts;
 use crate::section::{Cell, Section, Table};
 
 pub(super) fn section(facts: &Facts) -> Section {
-    Section::new("reproduce", "To reproduce").table(declared(facts)).table(settings(facts)).table(figures(facts))
+    let parameters = Section::new("declared", "What was declared of the parameters").table(declared(facts)).folded();
+    let section = Section::new("reproduce", "To reproduce").table(settings(facts)).table(figures(facts));
+    section.part(Some(parameters).filter(|part| !part.is_empty()))
 }
 
-/// What was declared of the parameters.
 fn declared(facts: &Facts) -> Table {
     let rows = facts.estimate.parameters.iter().map(|ParameterEstimate { name, unit, declared: p, .. }| {
         let bounds = match (p.lower.is_finite(), p.upper.is_finite()) {
-            (false, false) => "none".to_owned(),
+            (false, false) => String::new(),
             (true, false) => format!("{} or more", exact(p.lower)),
             (false, true) => format!("{} or less", exact(p.upper)),
             (true, true) => format!("{} … {}", exact(p.lower), exact(p.upper)),
         };
-        let prior = p.prior.map_or("none".to_owned(), |prior| format!("{} ± {}", exact(prior.mean), exact(prior.std)));
+        let prior = p.prior.map_or(String::new(), |prior| format!("{} ± {}", exact(prior.mean), exact(prior.std)));
         let start = Cell::number(p.start, 15);
         [name.as_str().into(), kind(p).into(), start, unit.as_str().into(), bounds.into(), prior.into()]
     });

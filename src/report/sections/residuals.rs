@@ -244,7 +244,7 @@ fn spread(id: &str, record: &Record, fit: &OutputFit, over: &Spread) -> Plot {
     let Spread { signal, role, unit, at, deviation, .. } = over;
     let shift = if role == "time" { record.begin } else { 0.0 };
     let points: Vec<(f64, f64)> = at.iter().map(|at| at - shift).zip(deviation.iter().copied()).collect();
-    let all = Layer::Level { value: fit.residuals.standard_deviation, label: "all".to_owned() };
+    let all = Layer::Level { value: fit.residuals.standard_deviation, label: String::new() };
     let drawing = Curves {
         x: Axis::new(signal, unit),
         y: Axis::new("standard deviation", &fit.unit).from(0.0),
@@ -255,6 +255,6 @@ fn spread(id: &str, record: &Record, fit: &OutputFit, over: &Spread) -> Plot {
         ],
     };
     let title = format!("Size of the residual of {} of {} over {role} {signal}", fit.name, record.name);
-    let caption = format!("Size over {role} `{signal}`");
+    let caption = format!("Size over {role} `{signal}`; dashed, that of all residuals");
     Plot::new(format!("spread-{id}-{}-{signal}-{role}", fit.name), caption, title, Drawing::Curves(drawing))
 }

@@ -5,10 +5,12 @@ use crate::numeral::number;
 use crate::report::facts::Facts;
 use crate::section::{Axis, Cell, Curves, Drawing, Layer, Plot, Section, Style, Table};
 
-/// Rows of a table.
+/// Minima, and failures, in a table.
 const LISTED: usize = 10;
+/// Unknowns whose values at the minima are listed.
+const UNKNOWNS: usize = 20;
 
-/// The minima and the failures as tables, and the searches by rising cost as a stair (a waterfall plot).
+/// The minima and the failures as tables, and the searches by rising cost as a waterfall plot.
 pub(super) fn section(facts: &Facts) -> Option<Section> {
     let starts = facts.estimate.starts.as_ref()?;
     let section = Section::new("starts", "Searches from several starts").says(format!("{starts}."));
@@ -19,7 +21,12 @@ pub(super) fn section(facts: &Facts) -> Option<Section> {
         Some(_) => section,
         None => section.says("The search from the declared start found no minimum.".to_owned()),
     };
-    Some(section.table(minima(starts)).table(failed(starts)).plot(waterfall(&starts.minima)))
+    let section = match facts.estimate.directions.is_empty() {
+        true => section,
+        false => section.says("Minima of the same cost may differ along what the data do not determine only."),
+    };
+    let section = section.table(minima(starts)).table(places(starts));
+    Some(section.table(failed(starts)).plot(waterfall(&starts.minima)))
 }
 
 fn at(unknowns: &[(String, f64)]) -> Cell {
@@ -29,11 +36,25 @@ fn at(unknowns: &[(String, f64)]) -> Cell {
 
 fn minima(starts: &Starts) -> Table {
     let row = |(i, minimum): (usize, &Minimum)| {
-        let Minimum { cost_ratio, searches, unknowns } = minimum;
-        [Cell::from((i + 1) as u64), Cell::number(*cost_ratio, 5), (*searches).into(), at(unknowns)]
+        [Cell::from((i + 1) as u64), Cell::number(minimum.cost_ratio, 5), minimum.searches.into()]
     };
-    let columns = ["minimum", "cost / estimate's", "searches", "at"];
+    let columns = ["minimum", "cost / estimate's", "searches"];
     Table::new("Minima found", columns).rows(starts.minima.iter().enumerate().map(row)).at_most(LISTED)
+}
+
+/// Where several minima are, a column each; a single one is the estimate.
+fn places(starts: &Starts) -> Table {
+    let shown = &starts.minima[..starts.minima.len().min(LISTED)];
+    let numbers = (1..=shown.len()).map(|i| i.to_string());
+    let columns = ["unknown".to_owned()].into_iter().chain(numbers).collect();
+    let names = shown.first().map_or(&[][..], |minimum| &minimum.unknowns).iter().map(|(name, _)| name);
+    let row = |(i, name): (usize, &String)| {
+        let values = shown.iter().map(move |minimum| minimum.unknowns.get(i).map(|(_, value)| *value));
+        [Cell::from(name.as_str())].into_iter().chain(values.map(|value| Cell::optional(value, 4))).collect::<Vec<_>>()
+    };
+    let table = Table { columns, ..Table::new("Unknowns at each minimum", []) };
+    let several = shown.len() > 1;
+    table.rows(names.enumerate().filter(|_| several).map(row)).at_most(UNKNOWNS)
 }
 
 fn failed(starts: &Starts) -> Table {

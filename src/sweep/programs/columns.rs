@@ -15,14 +15,14 @@ pub(super) struct Columns<'r> {
     lanes: usize,
     width: Width,
     /// By column, then by lane.
-    inputs: Vec<Vec<Source<'r>>>,
+    inputs: Vec<Vec<ColumnSource<'r>>>,
     /// By output, then by lane.
     outputs: Vec<Vec<&'r [f64]>>,
     next: usize,
 }
 
 /// Where the numbers of a column come from.
-enum Source<'r> {
+enum ColumnSource<'r> {
     Values(&'r [f64]),
     Time,
     Step,
@@ -39,11 +39,11 @@ impl<'r> Columns<'r> {
         let of = |piece: &Piece<'r>| (piece.record, piece.prepared.derived.of(program, piece.record));
         let (records, derived): (Vec<&'r Record>, Vec<_>) = pieces.map(of).unzip();
         let source = |record: &'r Record, column: &Column| match *column {
-            Column::Time => Source::Time,
-            Column::Step => Source::Step,
-            Column::Input(i) => Source::Values(&record.inputs()[i].values),
-            Column::Measured(j) => Source::Values(&record.outputs()[j].values),
-            Column::Derived(n) => Source::Derived(n),
+            Column::Time => ColumnSource::Time,
+            Column::Step => ColumnSource::Step,
+            Column::Input(i) => ColumnSource::Values(&record.inputs()[i].values),
+            Column::Measured(j) => ColumnSource::Values(&record.outputs()[j].values),
+            Column::Derived(n) => ColumnSource::Derived(n),
         };
         let inputs = program.columns().iter().map(|column| records.iter().map(|r| source(r, column)).collect());
         let outputs = (0..program.outputs()).map(|j| records.iter().map(|r| &r.outputs()[j].values[..]).collect());
@@ -61,7 +61,7 @@ impl<'r> Columns<'r> {
     /// repeated.
     pub fn read(&self, program: &Program, begin: &[usize], samples: usize, to: &mut [f64]) {
         let (rows, stride) = (self.rows(samples), self.inputs.len() * self.lanes);
-        let derives = self.inputs.iter().any(|sources| matches!(sources[..], [Source::Derived(_), ..]));
+        let derives = self.inputs.iter().any(|sources| matches!(sources[..], [ColumnSource::Derived(_), ..]));
         let here = |lane: usize| match &self.derived[lane] {
             None if derives => derived(program, self.records[lane], begin[lane], rows),
             _ => vec![],
@@ -70,24 +70,24 @@ impl<'r> Columns<'r> {
         for (c, sources) in self.inputs.iter().enumerate() {
             let to = &mut to[c * self.lanes..];
             match sources.first() {
-                Some(Source::Values(_)) => {
+                Some(ColumnSource::Values(_)) => {
                     let values = |lane: usize| match sources[lane] {
-                        Source::Values(values) => values,
+                        ColumnSource::Values(values) => values,
                         _ => &[],
                     };
                     self.transpose(values, Some(begin), rows, stride, to);
                 }
-                Some(Source::Derived(n)) => {
+                Some(ColumnSource::Derived(n)) => {
                     let values = |lane: usize| match &self.derived[lane] {
                         Some(kept) => kept[*n].get(begin[lane]..).unwrap_or_default(),
                         None => &here[lane][*n],
                     };
                     self.transpose(values, None, rows, stride, to);
                 }
-                Some(Source::Time) => {
+                Some(ColumnSource::Time) => {
                     self.each(begin, rows, stride, to, |record, sample| record.time(sample.min(record.len() - 1)))
                 }
-                Some(Source::Step) => self.each(begin, rows, stride, to, step),
+                Some(ColumnSource::Step) => self.each(begin, rows, stride, to, step),
                 None => {}
             }
         }

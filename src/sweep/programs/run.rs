@@ -188,7 +188,11 @@ impl<'r> Run<'r> {
             (0..samples * outputs).for_each(|row| window.set_measured(row / outputs, row % outputs, pieces));
             return;
         }
-        for k in 0..samples {
+        // What all pieces have and is finite was measured.
+        let shortest = window.samples[..self.pieces.len()].iter().copied().min().unwrap_or(0);
+        let plain = if finite { shortest } else { 0 };
+        (0..plain * outputs).for_each(|row| window.set_measured(row / outputs, row % outputs, pieces));
+        for k in plain..samples {
             let active = (0..self.pieces.len()).filter(|&lane| k < window.samples[lane]);
             let active = active.fold(0u32, |bits, lane| bits | 1 << lane);
             for j in 0..outputs {

@@ -3,8 +3,8 @@
 use super::problems::{D, PROBLEMS, Problem};
 use super::{gauss_newton, levenberg_marquardt};
 use argmin::core::{Executor, State};
-use greybox::OwnSize;
 use greybox::optimize::LevenbergMarquardt;
+use greybox::optimize::OwnSize;
 
 const FREE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 

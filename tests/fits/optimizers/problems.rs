@@ -2,7 +2,7 @@
 //! (1981) 17-41, with their numbers there. The costs are sums of squares as printed; minimizers where they are unique.
 
 use greybox::optimize::{Infeasible, LeastSquares, Linearization};
-use greybox::{Dual, Information, Scalar};
+use greybox::{Dual, Scalar, information::Information};
 
 /// Enough slopes for the widest problem.
 pub type D = Dual<11>;

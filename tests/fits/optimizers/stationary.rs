@@ -3,7 +3,7 @@
 use super::problems::{D, PROBLEMS, Problem};
 use super::{Ended, levenberg_marquardt, run};
 use greybox::optimize::{Infeasible, LeastSquares, LevenbergMarquardt, Linearization, Machine, Outcome};
-use greybox::{OwnSize, Scalar};
+use greybox::{Scalar, optimize::OwnSize};
 
 type Residuals = fn(&[D]) -> Vec<D>;
 type Start = &'static [f64];

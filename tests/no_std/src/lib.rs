@@ -2,7 +2,7 @@
 #![no_std]
 
 use greybox::online::{
-    Ekf, EkfStart, Forgetting, Mras, MrasStart, ObserverError, Order, Outcome, Rls, Stepping, Watch,
+    Ekf, EkfStart, Forgetting, Mras, MrasStart, ObserverError, Order, UpdateOutcome, Rls, Stepping, Watch,
 };
 use greybox::pmsm::{
     AngledDrive, Currents, Drive, ExactStep, ExactSurface, HeldIn, InverterFed, InverterFedWinding, KeLyapunov,
@@ -55,7 +55,7 @@ pub fn warming_filter() -> Result<Ekf<Warming, 3>, ObserverError> {
 }
 
 /// One sample of each of the motor's observers.
-pub fn motor(ts: f64, i: Currents) -> Result<[Outcome; 3], ObserverError> {
+pub fn motor(ts: f64, i: Currents) -> Result<[UpdateOutcome; 3], ObserverError> {
     let Ok(step) = ExactStep::new(4, ts, HeldIn::Stationary) else {
         return Err(ObserverError::NotPositive { what: "the sample time", signal: "t", value: ts });
     };
@@ -101,7 +101,7 @@ pub fn motor(ts: f64, i: Currents) -> Result<[Outcome; 3], ObserverError> {
 pub extern "C" fn observe(ts: f64, id: f64, iq: f64) -> i32 {
     let warm = warming_filter().is_ok() && slope(id) == -id;
     let took =
-        motor(ts, Currents { id, iq }).is_ok_and(|all| all.iter().all(|one| !matches!(one, Outcome::Diverged(_))));
+        motor(ts, Currents { id, iq }).is_ok_and(|all| all.iter().all(|one| !matches!(one, UpdateOutcome::Diverged(_))));
     (warm && took) as i32
 }
 

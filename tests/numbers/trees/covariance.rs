@@ -1,8 +1,8 @@
 //! Covariances without the dense matrix, against the dense one.
 
 use super::{Problem, Random, random_tree};
+use greybox::information::{Covariance, Information};
 use greybox::nalgebra::DMatrix;
-use greybox::{Covariance, Information};
 
 /// Relative to the given variances. Condition below a few hundred, its square in the inverse.
 const ROUNDING: f64 = 1e-11;
@@ -113,7 +113,7 @@ fn scales_and_stored_covariances() {
         }
         assert_eq!((covariance.get(n, 0), covariance.standard_error(n)), (0.0, 0.0), "there is no such unknown");
     }
-    assert_eq!(Covariance::zeros(3).dense(&[0, 2]), greybox::SquareMatrix::zeros(2));
+    assert_eq!(Covariance::zeros(3).dense(&[0, 2]), greybox::information::SquareMatrix::zeros(2));
 }
 
 /// A stored covariance is checked: every index and length that the answers rely on.

@@ -1,8 +1,8 @@
 //! Rank and directions of which nothing is known.
 
 use super::{Problem, Random, random_tree};
+use greybox::information::{Elimination, Information, Undetermined};
 use greybox::nalgebra::DVector;
-use greybox::{Elimination, Information, Undetermined};
 
 /// As singular values are compared in fits.
 const TOLERANCE: f64 = 1e-11;

@@ -1,8 +1,8 @@
 //! Steps, damped or not.
 
 use super::{Problem, Random, close, random_tree};
+use greybox::information::{BadPiece, Elimination, Information};
 use greybox::nalgebra::DVector;
-use greybox::{BadPiece, Elimination, Information};
 
 /// Random rows, nine for each piece of at most seven columns: condition below a few hundred, so that 1e-12 is some
 /// thousand roundings.

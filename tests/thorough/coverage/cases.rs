@@ -2,6 +2,7 @@
 
 use super::models::*;
 use super::{Case, Trial};
+use crate::common::{Affine, Branch, Current, Lag, Line, Pair, Voltage};
 use crate::random::Random;
 use greybox::{
     Butterworth, Experiment, ExperimentOf, Fit, Horizon, Huber, Model, Of, Sample, Signals, Time, Tukey, WarningCode,
@@ -143,28 +144,28 @@ fn armature(random: &mut Random, samples: usize, rho: f64) -> Trial {
     Trial { summary: fit.run().unwrap().into_summary(), truth: vec![WINDING.r, WINDING.l, WINDING.ke] }
 }
 
-const LAG: Lag = Lag { k: 2.0, tau: 0.05 };
+const LAG: Branch = Branch { gain: 2.0, tau: 0.05 };
 
 fn lag(random: &mut Random, samples: usize, rho: f64) -> Trial {
     let inputs: Vec<Voltage> = levels(random, samples, 20).into_iter().map(|u| Voltage { u: 1.5 + 0.5 * u }).collect();
-    let mut outputs = clean(&FirstOrder, 0.01, &inputs, &Level { x: 0.0 }, &LAG);
+    let mut outputs = clean(&Lag, 0.01, &inputs, &Current { i: 0.0 }, &LAG);
     let noise = autoregressive(random, samples, rho);
-    outputs.iter_mut().zip(noise).for_each(|(y, e)| y.x += 0.1 * e);
-    let record = record(&FirstOrder, 0.01, inputs, outputs, Level { x: 0.0 });
-    let fit = Fit::new(&FirstOrder, &record).parameters(Lag { k: free(1.5), tau: free(0.08) });
-    Trial { summary: fit.run().unwrap().into_summary(), truth: vec![LAG.k, LAG.tau] }
+    outputs.iter_mut().zip(noise).for_each(|(y, e)| y.i += 0.1 * e);
+    let record = record(&Lag, 0.01, inputs, outputs, Current { i: 0.0 });
+    let fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau: free(0.08) });
+    Trial { summary: fit.run().unwrap().into_summary(), truth: vec![LAG.gain, LAG.tau] }
 }
 
 /// A step seen little longer than the time constant, whose standard error is some 0.6 of its value.
 fn poorly(random: &mut Random, by_logarithm: bool) -> Trial {
-    let truth = Lag { k: 2.0, tau: 0.5 };
+    let truth = Branch { gain: 2.0, tau: 0.5 };
     let inputs = vec![Voltage { u: 1.0 }; 60];
-    let mut outputs = clean(&FirstOrder, 0.01, &inputs, &Level { x: 0.0 }, &truth);
-    outputs.iter_mut().for_each(|y| y.x += 0.25 * random.normal());
-    let record = record(&FirstOrder, 0.01, inputs, outputs, Level { x: 0.0 });
+    let mut outputs = clean(&Lag, 0.01, &inputs, &Current { i: 0.0 }, &truth);
+    outputs.iter_mut().for_each(|y| y.i += 0.25 * random.normal());
+    let record = record(&Lag, 0.01, inputs, outputs, Current { i: 0.0 });
     let tau = free(0.3).within(1e-4, 100.0);
-    let parameters = Lag { k: free(1.5), tau: if by_logarithm { tau.log() } else { tau } };
-    let fit = Fit::new(&FirstOrder, &record).parameters(parameters);
+    let parameters = Branch { gain: free(1.5), tau: if by_logarithm { tau.log() } else { tau } };
+    let fit = Fit::new(&Lag, &record).parameters(parameters);
     Trial { summary: fit.run().unwrap().into_summary(), truth: vec![2.0, 0.5] }
 }
 
@@ -210,39 +211,39 @@ fn noisy_input(random: &mut Random, voltage: f64, speed: f64) -> Trial {
 
 fn robust(random: &mut Random, huber: bool) -> Trial {
     let inputs: Vec<Voltage> = levels(random, 300, 20).into_iter().map(|u| Voltage { u }).collect();
-    let mut outputs = clean(&FirstOrder, 0.01, &inputs, &Level { x: 0.5 }, &LAG);
+    let mut outputs = clean(&Lag, 0.01, &inputs, &Current { i: 0.5 }, &LAG);
     for y in &mut outputs {
         let size = if random.uniform() < 0.05 { 1.0 } else { 0.1 };
-        y.x += size * random.normal();
+        y.i += size * random.normal();
     }
-    let record = record(&FirstOrder, 0.01, inputs, outputs, Level { x: 0.5 });
-    let fit = Fit::new(&FirstOrder, &record).parameters(Lag { k: free(1.8), tau: free(0.06) });
+    let record = record(&Lag, 0.01, inputs, outputs, Current { i: 0.5 });
+    let fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.8), tau: free(0.06) });
     let fit = if huber { fit.loss(Huber(1.345)) } else { fit.loss(Tukey(4.685)) };
-    Trial { summary: fit.run().unwrap().into_summary(), truth: vec![LAG.k, LAG.tau] }
+    Trial { summary: fit.run().unwrap().into_summary(), truth: vec![LAG.gain, LAG.tau] }
 }
 
 fn filtered(random: &mut Random) -> Trial {
     let inputs: Vec<Voltage> = levels(random, 400, 12).into_iter().map(|u| Voltage { u }).collect();
-    let mut outputs = clean(&FirstOrder, 5e-3, &inputs, &Level { x: 0.5 }, &LAG);
-    outputs.iter_mut().for_each(|y| y.x += 0.1 * random.normal());
-    let record = record(&FirstOrder, 5e-3, inputs, outputs, Level { x: 0.5 }).initial(Level { x: free(0.4) });
-    let fit = Fit::new(&FirstOrder, &record).parameters(Lag { k: free(1.8), tau: free(0.06) });
+    let mut outputs = clean(&Lag, 5e-3, &inputs, &Current { i: 0.5 }, &LAG);
+    outputs.iter_mut().for_each(|y| y.i += 0.1 * random.normal());
+    let record = record(&Lag, 5e-3, inputs, outputs, Current { i: 0.5 }).initial(Current { i: free(0.4) });
+    let fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.8), tau: free(0.06) });
     let fit = fit.prefilter(Butterworth::low_pass(4, 20.0, 5e-3).unwrap());
-    Trial { summary: fit.run().unwrap().into_summary(), truth: vec![LAG.k, LAG.tau, 0.5] }
+    Trial { summary: fit.run().unwrap().into_summary(), truth: vec![LAG.gain, LAG.tau, 0.5] }
 }
 
 fn several(random: &mut Random) -> Trial {
     let gains = [1.6, 2.0, 2.4, 2.8, 3.2];
     let one = |random: &mut Random, (e, k): (usize, f64)| {
         let inputs: Vec<Voltage> = levels(random, 60, 12).into_iter().map(|u| Voltage { u }).collect();
-        let mut outputs = clean(&FirstOrder, 5e-3, &inputs, &Level { x: 0.5 }, &Lag { k, ..LAG });
-        outputs.iter_mut().for_each(|y| y.x += 0.1 * random.normal());
-        let record = record(&FirstOrder, 5e-3, inputs, outputs, Level { x: 0.5 });
-        record.named(format!("run {e}")).initial(Level { x: free(0.4) })
+        let mut outputs = clean(&Lag, 5e-3, &inputs, &Current { i: 0.5 }, &Branch { gain: k, ..LAG });
+        outputs.iter_mut().for_each(|y| y.i += 0.1 * random.normal());
+        let record = record(&Lag, 5e-3, inputs, outputs, Current { i: 0.5 });
+        record.named(format!("run {e}")).initial(Current { i: free(0.4) })
     };
     let records: Vec<_> = gains.into_iter().enumerate().map(|gain| one(random, gain)).collect();
-    let parameters = Lag { k: free(1.8).per_experiment(), tau: free(0.06).log() };
-    let summary = Fit::new(&FirstOrder, &records).parameters(parameters).run().unwrap().into_summary();
+    let parameters = Branch { gain: free(1.8).per_experiment(), tau: free(0.06).log() };
+    let summary = Fit::new(&Lag, &records).parameters(parameters).run().unwrap().into_summary();
     let mut truth = vec![LAG.tau];
     gains.iter().for_each(|gain| truth.extend([0.5, *gain]));
     Trial { summary, truth }

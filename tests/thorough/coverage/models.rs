@@ -1,29 +1,7 @@
-//! Models of the table of coverage.
+//! Models of the table of coverage, beside those that all tests share.
 
-use greybox::{Kind, Model, Nothing, Scalar, signals};
-
-signals! { pub struct Level { x: "V" } }
-signals! { pub struct Voltage { u: "V" } }
-signals! { pub struct Lag { k: "1", tau: "s" } }
-
-/// `tau dx/dt = k u - x`.
-#[derive(Clone)]
-pub struct FirstOrder;
-
-impl Model for FirstOrder {
-    type State = Level;
-    type Input = Voltage;
-    type Output = Level;
-    type Parameters = Lag;
-
-    fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Voltage<S>, p: &Lag<S>) -> Level<S> {
-        Level { x: (p.k * u.u - x.x) / p.tau }
-    }
-
-    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Voltage<S>, _p: &Lag<S>) -> Level<S> {
-        *x
-    }
-}
+use crate::common::Current;
+use greybox::{Model, Scalar, signals};
 
 signals! { pub struct Angle { q: "rad", v: "rad/s" } }
 signals! { pub struct Torque { u: "N m" } }
@@ -48,7 +26,6 @@ impl Model for Pendulum {
     }
 }
 
-signals! { pub struct Current { i: "A" } }
 signals! { pub struct Supply { u: "V", w: "rad/s" } }
 signals! { pub struct Winding { r: "ohm", l: "H", ke: "V s/rad" } }
 
@@ -68,24 +45,5 @@ impl Model for Armature {
 
     fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Supply<S>, _p: &Winding<S>) -> Current<S> {
         *x
-    }
-}
-
-signals! { pub struct Pair { y: "V", z: "V" } }
-signals! { pub struct Affine { slope: "1", offset: "V" } }
-
-/// `y = slope u + offset`, `z = offset u - slope`.
-#[derive(Clone)]
-pub struct Line;
-
-impl Model for Line {
-    type State = Nothing;
-    type Input = Voltage;
-    type Output = Pair;
-    type Parameters = Affine;
-    const KIND: Kind = Kind::Static;
-
-    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Affine<S>) -> Pair<S> {
-        Pair { y: p.slope * u.u + p.offset, z: p.offset * u.u - p.slope }
     }
 }

@@ -1,17 +1,17 @@
 //! Each instruction in those of the processor.
 
 use super::super::registers::NEVER;
-use super::{Emitted, Emitter, Instruction, Machine, Operation, Place, Slot};
+use super::{Emitted, Emitter, Instruction, Location, Machine, Operation, Slot};
 use crate::graph::{Function, Function2};
 use iced_x86::{IcedError, Register};
 use std::sync::Arc;
 
 impl Emitter<'_> {
     /// `to = a op b`
-    fn binary(&mut self, op: iced_x86::Code, to: Register, a: Register, b: Place) -> Emitted {
+    fn binary(&mut self, op: iced_x86::Code, to: Register, a: Register, b: Location) -> Emitted {
         self.put(match b {
-            Place::Register(b) => Machine::with3(op, to, a, b),
-            Place::Memory(b) => Machine::with3(op, to, a, b),
+            Location::Register(b) => Machine::with3(op, to, a, b),
+            Location::Memory(b) => Machine::with3(op, to, a, b),
         })
     }
 
@@ -163,7 +163,7 @@ impl Emitter<'_> {
                     let (product_number, product) = self.fresh()?;
                     self.binary(self.unit.mul, product, a, b)?;
                     let op = if minus { self.unit.sub } else { self.unit.add };
-                    self.binary(op, sum, sum, Place::Register(product))?;
+                    self.binary(op, sum, sum, Location::Register(product))?;
                     self.registers.free(product_number);
                 } else {
                     self.binary(if minus { self.unit.fnma } else { self.unit.fma }, sum, a, b)?;

@@ -1,4 +1,4 @@
-//! The ground floor: exact slopes against central differences and identities, and what `signals!` makes.
+//! Duals: exact slopes against central differences and identities, and what `signals!` makes.
 
 use approx::{assert_abs_diff_eq, assert_relative_eq, assert_relative_ne};
 use greybox::nalgebra::{SVector, Vector2};

@@ -1,4 +1,4 @@
-//! [`Look`]: points around a start or an end, where slopes show nothing.
+//! [`Exploration`]: points around a start or an end, where slopes show nothing.
 
 use crate::optimize::Outcome;
 use crate::optimize::point::Point;
@@ -6,7 +6,7 @@ use crate::scaling::Seen;
 
 /// A search that is to end like this, or to go on if it has just begun, unless the cost is lower at one of these points.
 #[derive(Clone, Debug)]
-pub(super) struct Look {
+pub(super) struct Exploration {
     outcome: Option<Outcome>,
     /// The last one next.
     points: Vec<Vec<f64>>,
@@ -17,30 +17,32 @@ pub(super) struct Look {
     flat: usize,
 }
 
-/// Where the cost changes by less than this part over a hundredth of the unknowns' sizes, there is nothing to see.
+/// The cost is flat where it changes by less than this part over a hundredth of the unknowns' sizes.
 const FLAT: f64 = 1e-9;
 
-impl Look {
+impl Exploration {
     /// Inside bounds where an unknown has no slopes.
     pub fn at_start(point: &Point, seen: &Seen) -> Self {
-        Look { outcome: None, points: point.inside(seen), beside: 0, lost: 0, flat: 0 }
+        Exploration { outcome: None, points: point.inside(seen), beside: 0, lost: 0, flat: 0 }
     }
 
     /// The same before a search ends, and along directions that have lost their influence on the way: there were this many
     /// without at the fewest.
     pub fn before_end(point: &Point, outcome: Outcome, seen: &Seen, unseen: usize) -> Self {
-        let mut look = Look { outcome: Some(outcome), points: vec![], beside: 0, lost: 0, flat: 0 };
-        let blind = point.blind();
-        if blind.len() > unseen && matches!(outcome, Outcome::Converged { .. } | Outcome::LimitOfPrecision { .. }) {
-            look.lost = blind.len() - unseen;
-            look.points = blind.iter().flat_map(|direction| point.beside(direction, seen)).collect();
-            look.beside = look.points.len();
+        let mut exploration = Exploration { outcome: Some(outcome), points: vec![], beside: 0, lost: 0, flat: 0 };
+        let without_influence = point.without_influence();
+        if without_influence.len() > unseen
+            && matches!(outcome, Outcome::Converged { .. } | Outcome::LimitOfPrecision { .. })
+        {
+            exploration.lost = without_influence.len() - unseen;
+            exploration.points = without_influence.iter().flat_map(|direction| point.beside(direction, seen)).collect();
+            exploration.beside = exploration.points.len();
         }
-        look.points.extend(point.inside(seen));
-        look
+        exploration.points.extend(point.inside(seen));
+        exploration
     }
 
-    /// Looks no further.
+    /// Leaves out the remaining points.
     pub fn stop(&mut self) {
         self.points.clear();
     }
@@ -64,7 +66,7 @@ impl Look {
 
     /// How the search ends after all; `None` if it has just begun. `spent` says that it has found lower costs too often.
     pub fn outcome(&self, point: &Point, spent: bool) -> Option<Outcome> {
-        // Of several lost directions the flat one may lie between those looked along; and a saddle that the search comes back
+        // Of several lost directions the flat one may lie between those explored; and a saddle that the search comes back
         // to is no minimum either.
         let plateau = self.flat > 0 || self.lost > 1 || self.lost > 0 && spent;
         self.outcome.map(|outcome| match plateau {

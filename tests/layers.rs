@@ -1,42 +1,43 @@
-//! The floors of the house: a file imports only from floors below its own, siblings never from each other.
+//! The layers of `ARCHITECTURE.md`: a module imports only from rows below its own, and modules of one row not from each
+//! other.
 //!
-//! A file's room is its name, or the name of the contract file that its folder stands beside: `fit/run.rs` belongs to
-//! `fit`. Within a room, parts use their contract and each other. What is said in comments, doc comments and unit tests is
-//! free, and the crate's public list (`crate::Model`) is for the wing and the roof, which stand on everything.
+//! The module of a file is its top one: `fit/run.rs` belongs to `fit`. Files of one module may import from each other.
+//! Comments, doc comments and unit tests are not examined. Names of the crate's public list (`crate::Model`) may be imported
+//! by results and shipped models only, which use most layers.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The rooms, floor by floor. Each may import from all the rows above its own, and from nothing else.
-const FLOORS: &[(&str, &[&str])] = &[
-    ("ground: hardware", &["lanes", "wide"]),
-    ("ground: beside numbers", &["scalar", "units", "dispatch", "random", "numeral", "whiteness", "real", "format"]),
-    ("ground: numbers", &["dual", "fused", "signals"]),
-    ("ground: vectors of numbers", &["information", "error", "by_name", "layout", "graph"]),
-    ("say: words", &["model", "parameter", "scaling", "interval"]),
-    ("say: records and functions by position", &["record", "functions"]),
-    ("say: equations as graphs", &["equations"]),
-    ("say: records by type", &["experiment"]),
+/// Row by row, the lowest first, the layer and its modules. Each may import from all earlier rows, and from nothing else.
+const LAYERS: &[(&str, &[&str])] = &[
+    ("vector registers", &["lanes", "wide"]),
+    ("numbers", &["scalar", "units", "dispatch", "random", "numeral", "whiteness", "real", "format"]),
+    ("numbers: with slopes, in vectors", &["dual", "fused", "signals"]),
+    ("numbers: graphs, triangles", &["information", "error", "by_name", "layout", "graph"]),
+    ("declarations", &["model", "parameter", "scaling", "interval"]),
+    ("data: records and functions by position", &["record", "functions"]),
+    ("data: equations as graphs", &["equations"]),
+    ("data: records by type", &["experiment"]),
     // Filtering a record is editing it, and a horizon may start from filtered states.
-    ("expect: one step", &["integrate", "prefilter"]),
-    ("expect: a step as a graph", &["recurrence"]),
-    ("expect: a step as a program", &["engine"]),
-    ("expect: a record", &["predict", "simulate"]),
-    ("expect: pieces of records", &["sweep"]),
-    ("learn: parts", &["loss", "weighting", "outliers", "optimize", "regress", "numeric", "online"]),
-    ("learn: the problem", &["problem"]),
-    ("learn: words and figures for a reader", &["section"]),
-    ("learn: the answer", &["estimate"]),
-    ("learn: the judgement", &["judge"]),
-    ("learn: the fit", &["fit"]),
-    ("roof: answers", &["diagnose", "check"]),
+    ("one step", &["integrate", "prefilter"]),
+    ("one step: as a graph", &["recurrence"]),
+    ("one step: as a program", &["engine"]),
+    ("one record", &["predict", "simulate"]),
+    ("one record: in pieces", &["sweep"]),
+    ("estimation: parts", &["loss", "weighting", "outliers", "optimize", "regress", "numeric", "online"]),
+    ("estimation: the problem", &["problem"]),
+    ("estimation: sections of a report", &["section"]),
+    ("estimation: the result", &["estimate"]),
+    ("estimation: judgement", &["judge"]),
+    ("estimation: the fit", &["fit"]),
+    ("results", &["diagnose", "check"]),
     // A report reads diagnoses.
-    ("roof: a reader", &["report"]),
-    ("wing", &["models", "pmsm"]),
+    ("results: reports", &["report"]),
+    ("models", &["models", "pmsm"]),
     ("documentation", &["guide"]),
 ];
 
-/// Rooms that may use the crate's public list, names in capitals.
+/// Modules that may use the crate's public list, names in capitals.
 const ABOVE_ALL: &[&str] = &["diagnose", "report", "check", "models", "pmsm"];
 
 fn files(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -89,45 +90,50 @@ fn heads(code: &str, prefix: &str) -> Vec<String> {
     found
 }
 
-/// The place of a file among the modules: `["fit", "run"]`.
+/// The path of a file among the modules: `["fit", "run"]`.
 fn place(root: &Path, file: &Path) -> Vec<String> {
     let inside = file.strip_prefix(root).unwrap().with_extension("");
     inside.iter().map(|part| part.to_str().unwrap().to_owned()).collect()
 }
 
-fn floors() -> BTreeMap<&'static str, usize> {
-    FLOORS.iter().enumerate().flat_map(|(floor, (_, rooms))| rooms.iter().map(move |&room| (room, floor))).collect()
+fn layers() -> BTreeMap<&'static str, usize> {
+    LAYERS
+        .iter()
+        .enumerate()
+        .flat_map(|(layer, (_, modules))| modules.iter().map(move |&module| (module, layer)))
+        .collect()
 }
 
-/// What of one file's code breaks the law.
+/// The imports of one file that the layers forbid.
 fn wrong(place: &[String], code: &str) -> Vec<String> {
-    let (floors, room) = (floors(), place[0].as_str());
-    let Some(&floor) = floors.get(room) else {
-        return vec![format!("`{room}` stands on no floor; give it one in tests/floors.rs")];
+    let (layers, module) = (layers(), place[0].as_str());
+    let Some(&layer) = layers.get(module) else {
+        return vec![format!("`{module}` is in no layer; add it to a row of tests/layers.rs")];
     };
-    let mut rooms = heads(code, "crate::");
-    // As many `super` as the file is deep lead to the other rooms.
-    rooms.extend(heads(code, &"super::".repeat(place.len())));
+    let mut modules = heads(code, "crate::");
+    // As many `super` as the file is deep lead to the other modules.
+    modules.extend(heads(code, &"super::".repeat(place.len())));
     let mut problems = vec![];
-    for other in rooms {
-        let listed = other.starts_with(char::is_uppercase) && ABOVE_ALL.contains(&room);
-        match floors.get(other.as_str()) {
-            _ if other == room || listed || other == "super" => {}
-            Some(&below) if below < floor => {}
+    for other in modules {
+        let listed = other.starts_with(char::is_uppercase) && ABOVE_ALL.contains(&module);
+        match layers.get(other.as_str()) {
+            _ if other == module || listed || other == "super" => {}
+            Some(&below) if below < layer => {}
             Some(&above) => problems.push(format!(
                 "`{}` ({}) imports from `{other}` ({})",
                 place.join("/"),
-                FLOORS[floor].0,
-                FLOORS[above].0
+                LAYERS[layer].0,
+                LAYERS[above].0
             )),
-            None => problems.push(format!("`{}` imports `crate::{other}`, which is no room below it", place.join("/"))),
+            None => problems
+                .push(format!("`{}` imports `crate::{other}`, which is no module of a lower row", place.join("/"))),
         }
     }
     problems
 }
 
 #[test]
-fn files_import_from_floors_below_only() {
+fn files_import_from_lower_layers_only() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let mut found = vec![];
     files(&root, &mut found);
@@ -148,13 +154,13 @@ fn an_import_from_above_is_seen() {
     };
     assert_eq!(seen(&["loss"], "use crate::error::Error;\n/// [`check`](crate::check)\nuse core::fmt;"), 0);
     assert_eq!(seen(&["loss"], "use crate::fit::Fit;"), 1);
-    assert_eq!(seen(&["loss"], "use crate::weighting::Law;"), 1, "a sibling");
-    assert_eq!(seen(&["loss"], "use crate::{error::{Error, Failure}, fit, weighting::Law};"), 2);
+    assert_eq!(seen(&["loss"], "use crate::weighting::BySignal;"), 1, "a sibling");
+    assert_eq!(seen(&["loss"], "use crate::{error::{Error, Failure}, fit, weighting::BySignal};"), 2);
     assert_eq!(seen(&["loss"], "fn f() { crate::estimate::number(1.0) }"), 1);
     assert_eq!(seen(&["loss"], "use super::fit::Fit;"), 1);
     assert_eq!(seen(&["fit", "run"], "use super::objective::Halt; use super::super::report::text;"), 1);
     assert_eq!(seen(&["loss"], "use crate::Model;"), 1, "the public list");
     assert_eq!(seen(&["pmsm", "surface"], "use crate::{Model, Kind}; use super::Drive;"), 0);
-    assert_eq!(seen(&["cellar"], ""), 1);
+    assert_eq!(seen(&["unlisted"], ""), 1);
     assert_eq!(seen(&["loss"], "#[cfg(test)]\nmod tests { use crate::fit::Fit; }"), 0);
 }

@@ -1,0 +1,89 @@
+//! [`Method`]: how an estimate was made.
+
+use crate::numeral::counted;
+use core::fmt;
+use serde::{Deserialize, Serialize};
+
+/// Where the noise levels came from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NoiseModel {
+    /// They were given.
+    Given,
+    /// Estimated per output.
+    #[default]
+    PerOutput,
+    /// Estimated as a full covariance.
+    Covariance,
+    /// The predictor predicted the variances.
+    Predicted,
+}
+
+impl fmt::Display for NoiseModel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            NoiseModel::Given => "given",
+            NoiseModel::PerOutput => "estimated per output",
+            NoiseModel::Covariance => "estimated as a full covariance",
+            NoiseModel::Predicted => "predicted",
+        })
+    }
+}
+
+/// How the covariance of the unknowns was made; in JSON with its name as `code`, in small letters with underscores.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "code", rename_all = "snake_case")]
+pub enum CovarianceMethod {
+    /// From the curvature of the cost, for white errors.
+    #[default]
+    Classical,
+    /// The sandwich, for errors that are independent from sample to sample.
+    Sandwich,
+    /// The sandwich, for errors that are white before the pre-filter.
+    FilteredSandwich,
+    /// Newey and West's, prewhitened, for autocorrelated errors.
+    Hac {
+        /// Lags over which correlation is allowed for.
+        lags: u64,
+    },
+}
+
+impl fmt::Display for CovarianceMethod {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            CovarianceMethod::Classical => f.write_str("classical (white errors)"),
+            CovarianceMethod::Sandwich => f.write_str("sandwich (errors independent from sample to sample)"),
+            CovarianceMethod::FilteredSandwich => f.write_str("sandwich (white errors before the pre-filter)"),
+            CovarianceMethod::Hac { lags } => {
+                let lags = counted(*lags, "lag");
+                write!(f, "HAC (Newey-West over {lags}, prewhitened, for colored errors)")
+            }
+        }
+    }
+}
+
+/// How an estimate was made; enough to make it again.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Method {
+    /// The search.
+    pub optimizer: String,
+    /// How the model was stepped.
+    pub integrator: String,
+    /// Which prediction error.
+    pub predictor: String,
+    /// How the equations were evaluated.
+    pub engine: String,
+    /// The loss.
+    pub loss: String,
+    /// The weighting.
+    pub weighting: String,
+    /// The pre-filter.
+    pub prefilter: String,
+    /// Where the noise levels came from.
+    pub noise: NoiseModel,
+    /// How the covariance was made.
+    pub covariance: CovarianceMethod,
+    /// Version of this library.
+    pub version: String,
+}

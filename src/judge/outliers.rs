@@ -1,0 +1,63 @@
+//! Whether a few errors far beyond the others decide a fit with a squared loss.
+
+use super::conclude::Judgement;
+use super::warnings::care;
+use crate::estimate::{Warning, WarningCode};
+use crate::numeral::percent;
+use crate::optimize::{Outcome, Severity};
+use crate::outliers::{center_and_deviation, hampel};
+
+/// Errors are looked at one by one where their kurtosis is beyond that of normal ones by so many of its standard deviations.
+const HEAVY: f64 = 5.0;
+/// Robust standard deviations from which on an error counts as an outlier: one of two million normal ones is.
+const FAR: f64 = 5.0;
+/// So many samples to either side are its neighbors: noise whose size changes slowly has no outliers.
+const NEIGHBORS: usize = 10;
+/// Outliers that make more of the sum of squares than this decide the fit; less than the other is no note worth.
+const DECIDE: f64 = 0.5;
+const LITTLE: f64 = 0.1;
+
+impl Judgement<'_> {
+    /// Outputs whose errors have outliers, of a fit by their squares.
+    pub(super) fn outliers(&self) -> Vec<Warning> {
+        let objective = self.objective;
+        let squares = objective.loss().is_none() && !objective.is_weighted() && !objective.sweep.predicts_variance();
+        if !squares || self.rounding || self.end.outcome == Outcome::Exact {
+            return vec![];
+        }
+        let heavy = |j: &usize| {
+            let count = self.residuals.outputs[*j].samples.max(1) as f64;
+            self.residuals.kurtosis[*j] > 3.0 + HEAVY * (24.0 / count).sqrt()
+        };
+        let heavy: Vec<usize> = (0..objective.outputs()).filter(heavy).collect();
+        if heavy.is_empty() {
+            return vec![];
+        }
+        let mut errors = vec![vec![]; objective.outputs()];
+        for e in 0..objective.experiments().min(super::shape::RECORDS) {
+            for (all, own) in errors.iter_mut().zip(self.first_errors(e)) {
+                all.extend(own.into_iter().flatten());
+            }
+        }
+        heavy.into_iter().filter_map(|j| self.outliers_of(j, &errors[j])).collect()
+    }
+
+    fn outliers_of(&self, j: usize, errors: &[f64]) -> Option<Warning> {
+        let (_, deviation) = center_and_deviation(&mut errors.to_vec())?;
+        let far = hampel(&mut errors.to_vec(), NEIGHBORS, FAR, FAR * deviation);
+        let squares = |errors: &mut dyn Iterator<Item = f64>| errors.map(|error| error * error).sum::<f64>();
+        let share = squares(&mut far.iter().map(|k| errors[*k])) / squares(&mut errors.iter().copied());
+        if !(deviation > 0.0 && share > LITTLE) {
+            return None;
+        }
+        let output = &self.objective.problem.layout().outputs[j].name;
+        let text = format!(
+            "{} of the errors of `{output}` are beyond {FAR} robust standard deviations, of all and of their neighbors, and make {} of the sum of squares: outliers, \
+             or moments that the model misses; take a robust loss (Huber, Tukey), or mark these samples as missing",
+            percent(far.len() as f64 / errors.len() as f64, 2),
+            percent(share, 2)
+        );
+        let severity = if share > DECIDE { Severity::UsableWithCare } else { Severity::Usable };
+        Some(Warning { severity, ..care(WarningCode::Outliers, text) })
+    }
+}
