@@ -4,7 +4,7 @@ use crate::models::{Broken, Lag, Line, Oscillator, Pendulum, Regression};
 use crate::random::Random;
 use crate::values::{Draw, parameter, record};
 use greybox::diagnose::{Resampling, bootstrap, profile, validate};
-use greybox::optimize::{GaussNewton, LevenbergMarquardt, Severity, Stop};
+use greybox::optimize::{GaussNewton, LevenbergMarquardt, Outcome, Severity, Stop};
 use greybox::pmsm::Surface;
 use greybox::{
     Automatic, Butterworth, Cauchy, Error, Esdirk, Estimate, ExperimentOf, Fit, Fleet, Horizon, Huber, Kind, Knowledge,
@@ -265,23 +265,31 @@ fn readable<M: Model>(estimate: &Estimate<M>) -> Result<(), String> {
 fn agree<M: Model>(fleet: &Result<Estimate<M>, Error>, single: &Result<Estimate<M>, Error>) -> Result<(), String> {
     match (fleet, single) {
         (Ok(fleet), Ok(single)) => {
-            let limited = |one: &Estimate<M>| one.outcome == greybox::optimize::Outcome::TimeLimit;
+            let limited = |one: &Estimate<M>| one.outcome == Outcome::TimeLimit;
             if limited(fleet) || limited(single) {
                 return Ok(());
             }
-            // Rounding moves what the data do not determine.
-            let is_known = |i: &usize| matches!(single.unknowns[*i].knowledge, Knowledge::Known { .. });
-            let known: Vec<usize> = (0..single.unknowns.len()).filter(is_known).collect();
-            let values = |one: &Estimate<M>| known.iter().map(|&i| one.unknowns[i].value).collect::<Vec<_>>();
-            let (a, b) = (values(fleet), values(single));
-            let near = a.iter().zip(&b).all(|(a, b)| (a - b).abs() <= 1e-6 * a.abs().max(b.abs()));
+            // Rounding moves what the data do not determine, and by some standard errors what they determine but for rounding.
+            let rounding = if single.outcome == Outcome::Exact { 10.0 } else { 1e-6 };
+            let known = |one: &Estimate<M>| -> Vec<(f64, f64)> {
+                let of = single.unknowns.iter().zip(&one.unknowns);
+                of.filter_map(|(single, one)| Some((one.value, single.knowledge.standard_error()?))).collect()
+            };
+            let (a, b) = (known(fleet), known(single));
+            let near = |((a, _), (b, error)): (&(f64, f64), &(f64, f64))| {
+                (a - b).abs() <= 1e-6 * a.abs().max(b.abs()) + rounding * error
+            };
+            let near = a.iter().zip(&b).all(near);
             let both = |holds: &dyn Fn(&Estimate<M>) -> bool| holds(fleet) && holds(single);
             let converged = both(&|one| one.outcome.converged());
             // Rounding decides where the cost is flat in all directions that are left.
             let flat = (fleet.cost - single.cost).abs() <= 1e-9 * single.cost.abs();
             let junk = flat && both(&|one| one.severity() == Severity::NotUsable);
             check(near || junk || !converged, || {
-                format!("the fleet finds {a:?}, {}, the single fit {b:?}, {}", fleet.outcome, single.outcome)
+                format!(
+                    "the fleet finds {a:?}, {}, the single fit (with standard errors) {b:?}, {}",
+                    fleet.outcome, single.outcome
+                )
             })
         }
         (Err(fleet), Err(_)) => said(fleet),
