@@ -75,12 +75,9 @@ impl Portmanteau {
     /// The next errors in order of time, zero where missing.
     pub fn add(&mut self, run: &[f64]) {
         self.errors.add(run);
-        let of: [(&mut Autocorrelation, fn(f64) -> f64); 3] = [
-            (&mut self.squares, |e| e * e),
-            (&mut self.signs, |e| if e == 0.0 { 0.0 } else { e.signum() }),
-            (&mut self.measured, |e| if e == 0.0 { 0.0 } else { 1.0 }),
-        ];
-        for (sums, number) in of {
+        let number: [fn(f64) -> f64; 3] =
+            [|e| e * e, |e| if e == 0.0 { 0.0 } else { e.signum() }, |e| if e == 0.0 { 0.0 } else { 1.0 }];
+        for (sums, number) in [&mut self.squares, &mut self.signs, &mut self.measured].into_iter().zip(number) {
             self.run.clear();
             self.run.extend(run.iter().map(|e| number(*e)));
             sums.add(&self.run);
