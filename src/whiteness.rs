@@ -75,13 +75,15 @@ impl Portmanteau {
     /// The next errors in order of time, zero where missing.
     pub fn add(&mut self, run: &[f64]) {
         self.errors.add(run);
-        let number: [fn(f64) -> f64; 3] =
-            [|e| e * e, |e| if e == 0.0 { 0.0 } else { e.signum() }, |e| if e == 0.0 { 0.0 } else { 1.0 }];
-        for (sums, number) in [&mut self.squares, &mut self.signs, &mut self.measured].into_iter().zip(number) {
-            self.run.clear();
-            self.run.extend(run.iter().map(|e| number(*e)));
-            sums.add(&self.run);
-        }
+        let sign = |e: &f64| if *e == 0.0 { 0.0 } else { e.signum() };
+        self.run.clear();
+        self.run.extend(run.iter().map(|e| e * e));
+        self.squares.add(&self.run);
+        self.run.clear();
+        self.run.extend(run.iter().map(sign));
+        self.signs.add(&self.run);
+        self.run.iter_mut().for_each(|sign| *sign *= *sign);
+        self.measured.add(&self.run);
     }
 
     /// The sums, one kind after the other.
