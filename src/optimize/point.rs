@@ -207,7 +207,7 @@ impl Point {
     fn rough(&self, noise: f64) -> Outcome {
         let left = self.potential / self.cost_size();
         // A step of `d` standard errors gains `d^2 / (2 rows)` of the sum of squares.
-        Outcome::Rough { noise, errors: (left * self.linear.rows() as f64).sqrt() }
+        Outcome::Rough { noise, errors: (left.max(0.0) * self.linear.rows() as f64).sqrt() }
     }
 }
 
