@@ -216,5 +216,7 @@ impl Point {
 pub(crate) fn within_tolerance(x: &[f64], cost: f64, finer: Linearization, domain: &Domain) -> Option<Outcome> {
     let point = Point::new(x.to_vec(), finer, domain)?;
     let noise = (point.cost() - cost).abs();
-    (point.potential <= noise).then(|| point.rough(noise / point.cost_size()))
+    // Of a cost of zero nothing is a part.
+    let part = noise / point.cost_size();
+    (point.potential <= noise && part.is_finite()).then(|| point.rough(part))
 }
