@@ -97,7 +97,7 @@ impl Portmanteau {
         self.all().into_iter().zip(theirs).for_each(|(sums, next)| sums.follow(next));
     }
 
-    /// The same with all autocorrelations nearer to zero by this much.
+    /// The same with the autocorrelation at each lag reduced in size by this much, to zero at least.
     pub fn without(mut self, correlation: f64) -> Self {
         let sums = &mut self.errors.sums;
         let part = correlation * sums[0];
@@ -266,5 +266,9 @@ mod tests {
         // Of three pairs one agrees in sign: a square of 1 / 3; of four errors, that of their correlation is 4 (3 / 15)^2,
         // which is less. The tail of a standard normal square at 0.16 is 0.689157.
         assert!((test.neighbors_p_value() - 0.689157).abs() < 1e-6, "{}", test.neighbors_p_value());
+        // The autocorrelations are -3/15 and 5/15; a reduction by 1/4 leaves nothing of the first.
+        let less = test.without(0.25);
+        assert_eq!(less.at(1), (0.0, 0.0));
+        assert!((less.at(2).1 - (5.0 / 15.0 - 0.25)).abs() < 1e-15, "{:?}", less.at(2));
     }
 }

@@ -7,13 +7,13 @@ use crate::numeral::percent;
 use crate::optimize::{Outcome, Severity};
 use crate::outliers::{center_and_deviation, hampel};
 
-/// Errors are looked at one by one where their kurtosis is beyond that of normal ones by so many of its standard deviations.
+/// Single errors are examined if the kurtosis exceeds that of a normal distribution by this many of its standard deviations.
 const HEAVY: f64 = 5.0;
 /// Robust standard deviations from which on an error counts as an outlier: one of two million normal ones is.
 const FAR: f64 = 5.0;
-/// So many samples to either side are its neighbors: noise whose size changes slowly has no outliers.
+/// Samples to either side with which an error is compared, too, so that slow changes of the noise level count as none.
 const NEIGHBORS: usize = 10;
-/// Outliers that make more of the sum of squares than this decide the fit; less than the other is no note worth.
+/// A warning if outliers make more than the first part of the sum of squares, a note if they make more than the second.
 const DECIDE: f64 = 0.5;
 const LITTLE: f64 = 0.1;
 

@@ -41,12 +41,13 @@ pub(super) struct Descent {
     /// How far, as a part of the cost, the last rejected trials were off the predicted decrease.
     #[serde(with = "crate::real")]
     pub noise: f64,
-    /// Rejected trials in a row whose gain was no nearer to the predicted one than that of the longer ones before, and the last one's difference.
+    /// Rejected trials in a row whose gain was no nearer to the predicted one than that of the longer trials before, and the
+    /// difference of the last one.
     #[serde(with = "crate::real")]
     rough: (u32, f64),
     /// Trials so far.
     pub trials: u64,
-    /// The last trial that was worth a mark, and cost and potential then.
+    /// The trial at which the search last made progress, with cost and predicted decrease at that point.
     #[serde(with = "crate::real")]
     mark: (u64, f64, f64),
     /// Accepted steps in a row that lowered the cost by less than a tenth.

@@ -211,12 +211,12 @@ impl Point {
     }
 }
 
-/// How a search ended at a point where no step lowers its cost, by cost and slopes there of a finer tolerance: [`Outcome::Rough`]
-/// if these promise less than the two costs differ by; else `None`.
+/// The outcome of a search that stopped at a point because no step lowers its cost, from cost and slopes of a finer tolerance
+/// at that point: [`Outcome::Rough`] if the full step would lower the cost by less than the two costs differ, else `None`.
 pub(crate) fn within_tolerance(x: &[f64], cost: f64, finer: Linearization, domain: &Domain) -> Option<Outcome> {
     let point = Point::new(x.to_vec(), finer, domain)?;
     let noise = (point.cost() - cost).abs();
-    // Of a cost of zero nothing is a part.
+    // The relative difference is not finite where the cost is zero.
     let part = noise / point.cost_size();
     (point.potential <= noise && part.is_finite()).then(|| point.rough(part))
 }

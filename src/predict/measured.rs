@@ -9,7 +9,7 @@ use crate::numeral::exact;
 
 const LANES: usize = 8;
 const ITERATIONS: usize = 50;
-/// A step into a region where the outputs are undefined is halved so often at most.
+/// A Newton step to a state where the outputs are undefined is halved this many times at most.
 const HALVINGS: usize = 30;
 /// Damping of states that the outputs do not give, relative to the largest column of slopes.
 const DAMPING: f64 = 1e-6;

@@ -14,9 +14,11 @@ use std::sync::Arc;
 /// The corrected errors are exact; slopes with respect to parameters are off by as much, relatively, as the guesses
 /// are.
 const MOVED: f64 = 0.1;
-/// The same at the first point, where no slopes are known that guesses could follow from.
+/// The same at the first point, where no slopes exist to extrapolate borders from: slopes are then right to the root of it,
+/// 1e-3, which leaves the first step of a search as it is.
 const MOVED_FIRST: f64 = 1e-6;
-/// Samples before a segment from which its first guess is simulated: fast plants forget their state within them.
+/// The first guess of a border is simulated from this many samples before it: in fast plants the effect of the state
+/// there has decayed by then.
 const RUN_IN: usize = 128;
 
 /// Cost, triangle and final carry of one segment.

@@ -282,3 +282,45 @@ impl Task for Neighbors<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Columns of a few hundred values, some missing, with runs that cross the borders of blocks and lengths that do not fill
+    /// registers, against plain loops over all values.
+    #[test]
+    fn registers_find_what_plain_loops_find() {
+        let mut bits = 1u64;
+        let mut next = |levels: u64| {
+            bits = bits.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (bits >> 33) % levels
+        };
+        for length in 0..300 {
+            let levels = [2, 30, 1_000_000][length % 3];
+            let mut values: Vec<f64> = (0..length).map(|_| next(levels) as f64 - 7.0).collect();
+            if length > 100 {
+                values[60..60 + length % 40].fill(3.5);
+                values[97] = f64::NAN;
+            }
+            let pieces = [0..length / 3, length / 3..length];
+            let found = Values::of(&values, &pieces, true);
+            let measured: Vec<f64> = values.iter().copied().filter(|value| !value.is_nan()).collect();
+            assert_eq!((found.measured, found.missing), (measured.len(), length - measured.len()));
+            assert_eq!(found.least, measured.iter().copied().fold(f64::INFINITY, f64::min));
+            assert_eq!(found.greatest, measured.iter().copied().fold(f64::NEG_INFINITY, f64::max));
+            let (mut repeats, mut longest) = (0, 0);
+            for piece in &pieces {
+                let runs = values[piece.clone()].chunk_by(|a, b| a == b);
+                runs.for_each(|run| (repeats, longest) = (repeats + run.len() - 1, longest.max(run.len())));
+            }
+            assert_eq!((found.repeats, found.longest.len()), (repeats, longest), "{length} values");
+            let Some([highest, lowest]) = found.extremes() else { continue };
+            for (extreme, sign) in [(highest, 1.0), (lowest, -1.0)] {
+                let others = measured.iter().map(|value| sign * value).filter(|value| *value != sign * extreme.value);
+                assert_eq!(sign * extreme.next, others.fold(f64::NEG_INFINITY, f64::max));
+                assert_eq!(extreme.count, measured.iter().filter(|value| **value == extreme.value).count());
+            }
+        }
+    }
+}
