@@ -301,7 +301,7 @@ mod tests {
             let mut values: Vec<f64> = (0..length).map(|_| next(levels) as f64 - 7.0).collect();
             if length > 100 {
                 // Of 300 lengths some let the run begin with the last value of a block.
-                values[length % 90..][..11].fill(3.5);
+                values[length % 89..][..11].fill(3.5);
                 values[97] = f64::NAN;
             }
             let pieces = [0..length / 3, length / 3..length];
