@@ -98,8 +98,9 @@ pub struct Stop {
     /// Converged, if the residual is orthogonal to every column of the Jacobian to this cosine.
     #[serde(with = "crate::real")]
     pub gradient: f64,
-    /// Converged, if a step lowered the cost by less than this part, and the next would; zero switches the test off. A convenience of other
-    /// tools: on hard problems it stops with few right digits.
+    /// Converged, if the next step, undamped, would lower the cost by no more than this part of it; zero switches the test
+    /// off. As an offset from the minimum (Bates and Watts 1981) it is the root of this part times the number of
+    /// measurements, in standard errors; on hard problems it stops with few right digits.
     #[serde(with = "crate::real")]
     pub cost: f64,
     /// Most trial steps.

@@ -159,16 +159,7 @@ impl Machine for GaussNewton {
         };
         self.trials += 1;
         match told.and_then(|linear| Point::new(self.line.trial.clone(), linear, &self.domain)) {
-            Some(next) if self.accepts(&point, &next) => {
-                let decrease = (point.cost() - next.cost()) / point.cost_size();
-                match next.gains_too_little(decrease, point.cost_size(), &self.stop) {
-                    true => {
-                        self.x.clone_from(&next.x);
-                        self.end(next, Outcome::CostUnchanged { decrease });
-                    }
-                    false => self.go_on(next),
-                }
-            }
+            Some(next) if self.accepts(&point, &next) => self.go_on(next),
             next => {
                 self.line.failed += u64::from(next.is_none());
                 self.line.step.iter_mut().for_each(|step| *step *= 0.5);

@@ -257,15 +257,10 @@ impl<S: Scaling> LevenbergMarquardt<S> {
     }
 
     fn judge_trial(&mut self, point: Point, trial: &Trial, next: Option<Point>) {
-        let (cost, size) = (point.cost(), point.cost_size());
         let accepted = self.descent.judge(&point, trial, next.as_ref());
         let Some(next) = next.filter(|_| accepted) else { return self.go_on(point) };
         self.take(&next);
-        let decrease = (cost - next.cost()) / size;
-        match next.gains_too_little(decrease, size, &self.stop) {
-            true => self.end(next, Outcome::CostUnchanged { decrease }),
-            false => self.go_on(next),
-        }
+        self.go_on(next);
     }
 
     /// Continues from an explored point if the cost is lower there.

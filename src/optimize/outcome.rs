@@ -17,9 +17,9 @@ pub enum Outcome {
         #[serde(with = "crate::real")]
         gradient: f64,
     },
-    /// A step lowered the cost by a negligible part (only if such a stop was asked for).
+    /// The next step would lower the cost by a negligible part (only if such a stop was asked for).
     CostUnchanged {
-        /// The relative decrease.
+        /// That part, by the slopes.
         #[serde(with = "crate::real")]
         decrease: f64,
     },
@@ -159,7 +159,9 @@ impl fmt::Display for Outcome {
             Outcome::Converged { step, gradient } => {
                 write!(f, "converged (relative step {step:.1e}, gradient cosine {gradient:.1e})")
             }
-            Outcome::CostUnchanged { decrease } => write!(f, "converged (cost fell by a part of {decrease:.1e} only)"),
+            Outcome::CostUnchanged { decrease } => {
+                write!(f, "converged (the next step would lower the cost by {decrease:.1e} of itself)")
+            },
             Outcome::LimitOfPrecision { gradient, step } => {
                 let not = if self.converged() { "converged to" } else { "not converged: this is" };
                 write!(f, "{not} the precision of the cost (relative step {step:.1e}, gradient cosine {gradient:.1e})")

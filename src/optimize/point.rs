@@ -178,13 +178,11 @@ impl Point {
             return Some(Outcome::Stalled { gradient: 0.0, step: 0.0, failed: 0 });
         }
         let (step, gradient) = (self.relative_step(), self.cosine());
-        (step <= stop.step && gradient <= stop.gradient).then_some(Outcome::Converged { step, gradient })
-    }
-
-    /// Whether the step to here, which lowered the cost by this part, and the full step from here fall short of what a stop by
-    /// the cost asks for. (A step that was short for its damping says nothing of the cost to come.)
-    pub fn gains_too_little(&self, decrease: f64, before: f64, stop: &Stop) -> bool {
-        stop.cost > 0.0 && decrease <= stop.cost && self.potential <= stop.cost * before
+        if step <= stop.step && gradient <= stop.gradient {
+            return Some(Outcome::Converged { step, gradient });
+        }
+        let decrease = self.potential / self.cost_size();
+        (stop.cost > 0.0 && decrease <= stop.cost).then_some(Outcome::CostUnchanged { decrease })
     }
 
     /// How a search ends here that no step leads away from. `noise` is how far, as a part of the cost, the last trials were
