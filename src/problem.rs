@@ -3,6 +3,7 @@
 mod absorb;
 mod as_argmin;
 mod batches;
+mod borders;
 mod checkpoint;
 mod control;
 mod curvature;

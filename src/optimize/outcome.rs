@@ -161,7 +161,7 @@ impl fmt::Display for Outcome {
             }
             Outcome::CostUnchanged { decrease } => {
                 write!(f, "converged (the next step would lower the cost by {decrease:.1e} of itself)")
-            },
+            }
             Outcome::LimitOfPrecision { gradient, step } => {
                 let not = if self.converged() { "converged to" } else { "not converged: this is" };
                 write!(f, "{not} the precision of the cost (relative step {step:.1e}, gradient cosine {gradient:.1e})")

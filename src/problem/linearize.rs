@@ -2,6 +2,7 @@
 
 use super::absorb::Absorber;
 use super::batches::{Broken, in_batches, run};
+use super::borders::Guess;
 use super::pass::Job;
 use super::segments::{Border, Borders};
 use super::{Objective, Values, Weighing};
@@ -9,17 +10,6 @@ use crate::information::{Chain, Information};
 use crate::optimize::{Infeasible, Linearization};
 use crate::sweep::{Piece, Reached, RunError, Seed};
 use std::sync::Arc;
-
-/// Part of the squared errors that the correction of guessed borders may change before the slopes are computed anew.
-/// The corrected errors are exact; slopes with respect to parameters are off by as much, relatively, as the guesses
-/// are.
-const MOVED: f64 = 0.1;
-/// The same at the first point, where no slopes exist to extrapolate borders from: slopes are then right to the root of it,
-/// 1e-3, which leaves the first step of a search as it is.
-const MOVED_FIRST: f64 = 1e-6;
-/// The first guess of a border is simulated from this many samples before it: in fast plants the effect of the state
-/// there has decayed by then.
-const RUN_IN: usize = 128;
 
 /// Cost, triangle and final carry of one segment.
 pub(super) struct Part {
@@ -42,11 +32,18 @@ impl Objective<'_> {
         let values = self.values(coordinates);
         let cuts = &self.problem.cuts;
         let chained = (0..self.experiments()).any(|e| cuts.is_chained(e));
-        let (guess, most) = if chained { self.guess(coordinates, &values)? } else { (None, f64::INFINITY) };
-        let mut found = self.triangles(coordinates, &values, guess.as_ref())?;
-        if found.moved > most * 2.0 * found.cost {
-            found = self.triangles(coordinates, &values, found.borders.as_ref())?;
-        }
+        let guess = if chained { self.guess(coordinates, &values)? } else { Guess::Right(None) };
+        let found = match guess {
+            Guess::Right(borders) => self.triangles(coordinates, &values, borders.as_ref())?,
+            Guess::Affine(borders, most) => {
+                let found = self.triangles(coordinates, &values, Some(&borders))?;
+                match found.moved > most * 2.0 * found.cost {
+                    true => self.triangles(coordinates, &values, found.borders.as_ref())?,
+                    false => found,
+                }
+            }
+            Guess::Nonlinear(borders, best) => self.repaired(coordinates, &values, borders, best)?,
+        };
         let Triangulation { cost, blocks, borders, .. } = found;
         if let Some(borders) = borders {
             self.memory.keep(Arc::new(borders));
@@ -78,66 +75,8 @@ impl Objective<'_> {
         }
     }
 
-    /// The carry at the begin of each segment, and the part of the squared errors that its correction may change. A guess is
-    /// enough where it can be corrected: with an affine model and a cost that is a sum of squares.
-    fn guess(&self, coordinates: &[f64], values: &[Values]) -> Result<(Option<Borders>, f64), Infeasible> {
-        if let Some(known) = self.memory.at(coordinates) {
-            return Ok((Some((*known).clone()), f64::INFINITY));
-        }
-        if !self.problem.cuts.affine || self.loss().is_some() {
-            return Ok((Some(self.simulated_borders(coordinates, values)?), f64::INFINITY));
-        }
-        let Some(best) = self.memory.best() else {
-            return Ok((Some(self.first_borders(coordinates, values)), MOVED_FIRST));
-        };
-        let mut guess = Borders { point: coordinates.to_vec(), values: values.to_vec(), ..(*best).clone() };
-        for (e, borders) in guess.of.iter_mut().enumerate() {
-            let quantity = |values: &Values, seed: &Seed| match *seed {
-                Seed::Carry(i) => values.x[i],
-                Seed::Parameter(j) => values.p[j],
-            };
-            let seeds = self.problem.unknowns.seeds(e);
-            let change = |seed| quantity(&values[e], seed) - quantity(&best.values[e], seed);
-            let change: Vec<f64> = seeds.iter().map(change).collect();
-            for (s, border) in borders.iter_mut().enumerate() {
-                *border = Border { carry: best.moved(e, s + 1, &change), slopes: vec![] };
-            }
-        }
-        Ok((Some(guess), MOVED))
-    }
-
-    /// The carry that the last samples before each segment lead to from the carry of the first one.
-    fn first_borders(&self, coordinates: &[f64], values: &[Values]) -> Borders {
-        let run_in = |e: usize| {
-            let whole = self.job(e, &values[e], coordinates, false);
-            let before = self.problem.cuts.segments[e].split_last().map_or(&[][..], |(_, before)| before);
-            let job = move |samples: &std::ops::Range<usize>| {
-                let from = samples.end.saturating_sub(RUN_IN).max(samples.start);
-                let piece = Piece { samples: from..samples.end, ..whole.piece.clone() };
-                Job { objective: self, experiment: e, seeds: vec![], scales: vec![], piece }
-            };
-            before.iter().map(job)
-        };
-        let jobs: Vec<Job<'_>> = (0..self.experiments()).flat_map(run_in).collect();
-        // A run that fails leaves its begin as the guess.
-        let end = |_: &[usize], jobs: &[&Job<'_>]| {
-            let pieces: Vec<Piece<'_>> = jobs.iter().map(|job| job.piece.clone()).collect();
-            let reached = self.sweep.run(&pieces, &[], &mut |_| !self.control.stops());
-            let carry = |(reached, piece): (Result<Reached, RunError>, Piece<'_>)| {
-                reached.map_or(piece.carry, |reached| reached.carry)
-            };
-            Ok(reached.into_iter().zip(pieces).map(carry).collect())
-        };
-        let mut carries = in_batches(&jobs, end).unwrap_or_default().into_iter();
-        let mut border =
-            |_: &std::ops::Range<usize>| Border { carry: carries.next().unwrap_or_default(), slopes: vec![] };
-        let of =
-            self.problem.cuts.segments.iter().map(|segments| segments[1..].iter().map(&mut border).collect()).collect();
-        Borders { point: coordinates.to_vec(), cost: f64::INFINITY, values: values.to_vec(), of }
-    }
-
     /// The triangles of all experiments, priors left out.
-    fn triangles(
+    pub(super) fn triangles(
         &self,
         coordinates: &[f64],
         values: &[Values],
@@ -153,7 +92,6 @@ impl Objective<'_> {
         for (e, segments) in self.problem.cuts.segments.iter().enumerate() {
             let parts: Vec<Part> = parts.by_ref().take(segments.len()).collect();
             if self.problem.cuts.is_chained(e) {
-                let guess = guess.map_or(&[][..], |guess| &guess.of[e]);
                 of.push(self.chain(e, &values[e], coordinates, parts, guess, &mut found));
             } else {
                 let mut parts = parts.into_iter();
@@ -173,7 +111,7 @@ impl Objective<'_> {
         }
         if guess.is_some() {
             let (point, cost, values) = (coordinates.to_vec(), found.cost, values.to_vec());
-            found.borders = Some(Borders { point, cost, values, of });
+            found.borders = Some(Borders { point, cost, values, of, right: false });
         }
         Ok(found)
     }
@@ -185,7 +123,7 @@ impl Objective<'_> {
         values: &Values,
         coordinates: &[f64],
         parts: Vec<Part>,
-        guess: &[Border],
+        guess: Option<&Borders>,
         found: &mut Triangulation,
     ) -> Vec<Border> {
         let whole = self.job(e, values, coordinates, true);
@@ -193,13 +131,14 @@ impl Objective<'_> {
         let parameters: Vec<usize> = (0..whole.seeds.len()).filter(is_parameter).collect();
         let Piece { carry, slopes, .. } = whole.piece;
         let mut chain = Chain::new(carry.len(), slopes, &parameters, &whole.scales);
-        let mut borders = Vec::with_capacity(guess.len());
+        let simulated_from = guess.map_or(&[][..], |guess| &guess.of[e]);
+        let mut borders = Vec::with_capacity(simulated_from.len());
         let simulated = parts.iter().map(|part| part.cost).sum::<f64>();
         for (s, part) in parts.iter().enumerate() {
             chain.add(&part.triangle);
-            if let Some(Border { carry, .. }) = guess.get(s) {
+            if let Some(Border { carry, .. }) = simulated_from.get(s) {
                 chain.go_on(&part.reached.carry, &part.reached.slopes, carry);
-                if !self.problem.cuts.affine {
+                if guess.is_some_and(|guess| guess.right) && !self.problem.cuts.affine {
                     chain.without_defect();
                 }
                 let (defect, slopes) = chain.begin();
@@ -276,10 +215,10 @@ pub(super) fn parts(jobs: &[&Job<'_>]) -> Result<Vec<Part>, Broken> {
 }
 
 /// Costs and triangles of all experiments at a point.
-struct Triangulation {
-    cost: f64,
+pub(super) struct Triangulation {
+    pub cost: f64,
     /// Sum of squares of what the correction of guessed borders changed.
-    moved: f64,
+    pub moved: f64,
     blocks: Vec<Information>,
-    borders: Option<Borders>,
+    pub borders: Option<Borders>,
 }

@@ -1,12 +1,11 @@
 //! Passes over the data: the segments of all records, run in lanes and on threads, and the accumulators of their
 //! windows.
 
-use super::batches::{Broken, each, in_batches, run};
-use super::segments::{Border, Borders};
+use super::batches::{Broken, in_batches, run};
+use super::segments::Borders;
 use super::{Objective, Values};
 use crate::optimize::Infeasible;
 use crate::sweep::{Piece, Reached, RunError, Seed, Visit, Window};
-use std::sync::Arc;
 
 /// An accumulator of the windows of a segment of an experiment.
 pub(crate) trait Accumulate: Send + Sized {
@@ -107,51 +106,6 @@ impl Objective<'_> {
         let visit = &mut |window: &mut Window| !self.control.stops() && visit(window);
         let reached = self.sweep.run(std::slice::from_ref(&job.piece), &job.seeds, visit);
         reached.into_iter().next().map_or(Ok(()), |reached| reached.map(|_| ()))
-    }
-
-    /// The borders of the segments at a point, with their slopes if `slopes` is set; `None` where nothing is
-    /// chained.
-    fn borders(
-        &self,
-        coordinates: &[f64],
-        values: &[Values],
-        slopes: bool,
-    ) -> Result<Option<Arc<Borders>>, Infeasible> {
-        let cuts = &self.problem.cuts;
-        if !(0..self.experiments()).any(|e| cuts.is_chained(e)) {
-            return Ok(None);
-        }
-        let known = |found: &Arc<Borders>| !slopes || found.has_slopes();
-        if let Some(found) = self.memory.at(coordinates).filter(known) {
-            return Ok(Some(found));
-        }
-        if slopes {
-            self.evaluate(coordinates)?;
-            if let Some(found) = self.memory.at(coordinates) {
-                return Ok(Some(found));
-            }
-        }
-        let found = Arc::new(self.simulated_borders(coordinates, values)?);
-        self.memory.keep(found.clone());
-        Ok(Some(found))
-    }
-
-    /// The borders of the segments at a point, simulated in values.
-    pub(super) fn simulated_borders(&self, coordinates: &[f64], values: &[Values]) -> Result<Borders, Infeasible> {
-        let one = |e: usize| {
-            let segments = &self.problem.cuts.segments[e];
-            if !self.problem.cuts.is_chained(e) {
-                return Ok(vec![]);
-            }
-            let job = self.job(e, &values[e], coordinates, false);
-            let at: Vec<usize> = segments[1..].iter().map(|samples| samples.start).collect();
-            self.sweep.follow(&job.piece, &at).map_err(|error| self.infeasible(e, error))
-        };
-        let borders =
-            |carries: Vec<Vec<f64>>| carries.into_iter().map(|carry| Border { carry, slopes: vec![] }).collect();
-        let of: Result<Vec<_>, Infeasible> =
-            each(self.experiments(), one).into_iter().map(|e| e.map(borders)).collect();
-        Ok(Borders { point: coordinates.to_vec(), cost: f64::INFINITY, values: values.to_vec(), of: of? })
     }
 
     /// One pass over all data: an accumulator per experiment, with the experiment's windows added in order of time.

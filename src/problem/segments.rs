@@ -74,6 +74,8 @@ pub(crate) struct Borders {
     pub cost: f64,
     pub values: Vec<Values>,
     pub of: Vec<Vec<Border>>,
+    /// Whether they are the simulated ones.
+    pub right: bool,
 }
 
 impl Borders {

@@ -1,0 +1,182 @@
+//! Where the segments of a record begin at a point that is to be evaluated: guessed, corrected, or simulated.
+
+use super::batches::{each, in_batches};
+use super::linearize::Triangulation;
+use super::pass::Job;
+use super::segments::{Border, Borders};
+use super::{Objective, Values};
+use crate::optimize::Infeasible;
+use crate::sweep::{Piece, Reached, RunError, Seed};
+use std::sync::Arc;
+
+/// Part of the squared errors that the correction of guessed borders may change before the slopes are computed anew.
+/// The corrected errors are exact; slopes with respect to parameters are off by as much, relatively, as the guesses
+/// are.
+const MOVED: f64 = 0.1;
+/// The same at the first point, where no slopes exist to extrapolate borders from: slopes are then right to the root of it,
+/// 1e-3, which leaves the first step of a search as it is.
+const MOVED_FIRST: f64 = 1e-6;
+/// Of a nonlinear model the correction is exact to the first order only: it is enough where it changes the squared errors by
+/// no more than this part of the difference of cost that the search has to judge,
+const MOVED_NONLINEAR: f64 = 1e-3;
+/// or by no more than rounding.
+const MOVED_ROUNDING: f64 = 1e-15;
+/// So often corrected borders are simulated from anew, if each time the correction falls to this part; then they are
+/// simulated from the begin of the record.
+const REPAIRS: (usize, f64) = (2, 0.01);
+/// The first guess of a border is simulated from this many samples before it: in fast plants the effect of the state
+/// there has decayed by then.
+const RUN_IN: usize = 128;
+
+/// The borders at a point, before it is evaluated.
+pub(super) enum Guess {
+    /// Simulated, or not needed.
+    Right(Option<Borders>),
+    /// To be corrected, which is exact but for the slopes; those are computed anew where the correction changes more than this
+    /// part of the squared errors.
+    Affine(Borders, f64),
+    /// To be corrected, which is exact to the first order; with the best cost so far.
+    Nonlinear(Borders, f64),
+}
+
+impl Objective<'_> {
+    /// The borders of the segments at a point, with their slopes if `slopes` is set; `None` where nothing is
+    /// chained.
+    pub(super) fn borders(
+        &self,
+        coordinates: &[f64],
+        values: &[Values],
+        slopes: bool,
+    ) -> Result<Option<Arc<Borders>>, Infeasible> {
+        let cuts = &self.problem.cuts;
+        if !(0..self.experiments()).any(|e| cuts.is_chained(e)) {
+            return Ok(None);
+        }
+        let known = |found: &Arc<Borders>| !slopes || found.has_slopes();
+        if let Some(found) = self.memory.at(coordinates).filter(known) {
+            return Ok(Some(found));
+        }
+        if slopes {
+            self.evaluate(coordinates)?;
+            if let Some(found) = self.memory.at(coordinates) {
+                return Ok(Some(found));
+            }
+        }
+        let found = Arc::new(self.simulated_borders(coordinates, values)?);
+        self.memory.keep(found.clone());
+        Ok(Some(found))
+    }
+
+    /// The borders of the segments at a point, simulated in values.
+    fn simulated_borders(&self, coordinates: &[f64], values: &[Values]) -> Result<Borders, Infeasible> {
+        let one = |e: usize| {
+            let segments = &self.problem.cuts.segments[e];
+            if !self.problem.cuts.is_chained(e) {
+                return Ok(vec![]);
+            }
+            let job = self.job(e, &values[e], coordinates, false);
+            let at: Vec<usize> = segments[1..].iter().map(|samples| samples.start).collect();
+            self.sweep.follow(&job.piece, &at).map_err(|error| self.infeasible(e, error))
+        };
+        let borders =
+            |carries: Vec<Vec<f64>>| carries.into_iter().map(|carry| Border { carry, slopes: vec![] }).collect();
+        let of: Result<Vec<_>, Infeasible> =
+            each(self.experiments(), one).into_iter().map(|e| e.map(borders)).collect();
+        let (point, cost, values) = (coordinates.to_vec(), f64::INFINITY, values.to_vec());
+        Ok(Borders { point, cost, values, of: of?, right: true })
+    }
+
+    /// The carry at the begin of each segment.
+    pub(super) fn guess(&self, coordinates: &[f64], values: &[Values]) -> Result<Guess, Infeasible> {
+        if let Some(known) = self.memory.at(coordinates) {
+            return Ok(Guess::Right(Some(Borders { right: true, ..(*known).clone() })));
+        }
+        let affine = self.problem.cuts.affine;
+        let squares = self.loss().is_none() && !self.sweep.predicts_variance();
+        match self.memory.best().filter(|_| squares) {
+            Some(best) if affine => Ok(Guess::Affine(self.extrapolated(coordinates, values, &best), MOVED)),
+            Some(best) => Ok(Guess::Nonlinear(self.extrapolated(coordinates, values, &best), best.cost)),
+            None if affine && squares => Ok(Guess::Affine(self.first_borders(coordinates, values), MOVED_FIRST)),
+            None => Ok(Guess::Right(Some(self.simulated_borders(coordinates, values)?))),
+        }
+    }
+
+    /// The borders as the slopes at another point tell.
+    fn extrapolated(&self, coordinates: &[f64], values: &[Values], from: &Borders) -> Borders {
+        let mut guess = Borders { point: coordinates.to_vec(), values: values.to_vec(), right: false, ..from.clone() };
+        for (e, borders) in guess.of.iter_mut().enumerate() {
+            let quantity = |values: &Values, seed: &Seed| match *seed {
+                Seed::Carry(i) => values.x[i],
+                Seed::Parameter(j) => values.p[j],
+            };
+            let seeds = self.problem.unknowns.seeds(e);
+            let change = |seed| quantity(&values[e], seed) - quantity(&from.values[e], seed);
+            let change: Vec<f64> = seeds.iter().map(change).collect();
+            for (s, border) in borders.iter_mut().enumerate() {
+                *border = Border { carry: from.moved(e, s + 1, &change), slopes: vec![] };
+            }
+        }
+        guess
+    }
+
+    /// Triangles of a nonlinear model from guessed borders, which are corrected and simulated from anew until the correction
+    /// no longer matters for a comparison with the best cost.
+    pub(super) fn repaired(
+        &self,
+        coordinates: &[f64],
+        values: &[Values],
+        mut borders: Borders,
+        best: f64,
+    ) -> Result<Triangulation, Infeasible> {
+        let (repairs, falls) = REPAIRS;
+        let mut last = f64::INFINITY;
+        for _ in 0..=repairs {
+            let found = match self.triangles(coordinates, values, Some(&borders)) {
+                Ok(found) => found,
+                Err(Infeasible::Cancelled) => return Err(Infeasible::Cancelled),
+                Err(Infeasible::Failed(_)) => break,
+            };
+            let difference = (found.cost - best).abs();
+            if found.moved <= (MOVED_NONLINEAR * difference).max(MOVED_ROUNDING * found.cost) {
+                return Ok(found);
+            }
+            match found.borders {
+                Some(corrected) if found.moved <= falls * last.min(found.cost / falls) => borders = corrected,
+                _ => break,
+            }
+            last = found.moved;
+        }
+        let borders = self.simulated_borders(coordinates, values)?;
+        self.triangles(coordinates, values, Some(&borders))
+    }
+
+    /// The carry that the last samples before each segment lead to from the carry of the first one.
+    fn first_borders(&self, coordinates: &[f64], values: &[Values]) -> Borders {
+        let run_in = |e: usize| {
+            let whole = self.job(e, &values[e], coordinates, false);
+            let before = self.problem.cuts.segments[e].split_last().map_or(&[][..], |(_, before)| before);
+            let job = move |samples: &std::ops::Range<usize>| {
+                let from = samples.end.saturating_sub(RUN_IN).max(samples.start);
+                let piece = Piece { samples: from..samples.end, ..whole.piece.clone() };
+                Job { objective: self, experiment: e, seeds: vec![], scales: vec![], piece }
+            };
+            before.iter().map(job)
+        };
+        let jobs: Vec<Job<'_>> = (0..self.experiments()).flat_map(run_in).collect();
+        // A run that fails leaves its begin as the guess.
+        let end = |_: &[usize], jobs: &[&Job<'_>]| {
+            let pieces: Vec<Piece<'_>> = jobs.iter().map(|job| job.piece.clone()).collect();
+            let reached = self.sweep.run(&pieces, &[], &mut |_| !self.control.stops());
+            let carry = |(reached, piece): (Result<Reached, RunError>, Piece<'_>)| {
+                reached.map_or(piece.carry, |reached| reached.carry)
+            };
+            Ok(reached.into_iter().zip(pieces).map(carry).collect())
+        };
+        let mut carries = in_batches(&jobs, end).unwrap_or_default().into_iter();
+        let mut border =
+            |_: &std::ops::Range<usize>| Border { carry: carries.next().unwrap_or_default(), slopes: vec![] };
+        let of =
+            self.problem.cuts.segments.iter().map(|segments| segments[1..].iter().map(&mut border).collect()).collect();
+        Borders { point: coordinates.to_vec(), cost: f64::INFINITY, values: values.to_vec(), of, right: false }
+    }
+}
