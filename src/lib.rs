@@ -116,6 +116,8 @@ mod signals;
 pub mod units;
 
 #[cfg(feature = "std")]
+mod aligned;
+#[cfg(feature = "std")]
 mod by_name;
 #[cfg(feature = "std")]
 pub mod check;

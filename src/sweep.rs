@@ -11,7 +11,7 @@ mod window;
 
 pub(crate) use duals::{DualSweep, OVERFLOW};
 pub(crate) use loops::Loops;
-pub(crate) use programs::{Derived, ProgramSweep};
+pub(crate) use programs::{Derived, Interleaved, ProgramSweep};
 pub use window::Window;
 
 pub use crate::graph::Seed;
@@ -30,6 +30,8 @@ pub struct Prepared {
     pub restarts: Vec<f64>,
     /// Columns that programs compute from the record alone.
     pub(crate) derived: Derived,
+    /// Columns of records that programs run side by side.
+    pub(crate) interleaved: Interleaved,
 }
 
 /// Consecutive samples of a record, with the carry at the first of them.

@@ -2,14 +2,12 @@
 
 use super::interpret::{Once, Run};
 use super::{Compiled, Seed};
+use crate::aligned::Aligned;
 use crate::wide::run;
 use std::sync::Arc;
 
 /// Slopes below this are set to zero between blocks: squared they are denormal, which slows processors down up to 60 times.
 const NEGLIGIBLE: f64 = 1e-150;
-
-/// Numbers in a cache line.
-const LINE: usize = 8;
 
 /// Trajectories side by side: their parameters, what they carry, and working memory.
 ///
@@ -17,30 +15,19 @@ const LINE: usize = 8;
 ///
 /// # Panics
 /// All methods, where there is no such lane, or where a slice is too short.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Group {
     program: Arc<Compiled>,
     registers: usize,
-    /// Slot, lane; from `first` on, where a cache line begins.
-    numbers: Vec<f64>,
-    first: usize,
-}
-
-impl Clone for Group {
-    fn clone(&self) -> Self {
-        let mut group = Group::new(Arc::clone(&self.program), self.registers);
-        let length = self.program.code.slots * self.lanes();
-        group.numbers[group.first..][..length].copy_from_slice(&self.numbers[self.first..][..length]);
-        group
-    }
+    /// Slot, lane.
+    numbers: Aligned,
 }
 
 impl Group {
     pub(super) fn new(program: Arc<Compiled>, registers: usize) -> Self {
         let lanes = registers * program.width.lanes();
-        let numbers = vec![0.0; program.code.slots * lanes + LINE];
-        let first = numbers.as_ptr().align_offset(LINE * size_of::<f64>()).min(LINE);
-        let mut group = Group { program, registers, numbers, first };
+        let numbers = Aligned::zeros(program.code.slots * lanes);
+        let mut group = Group { program, registers, numbers };
         for (slot, value) in group.program.clone().code.constants.iter() {
             group.slot(usize::from(*slot)).fill(*value);
         }
@@ -54,12 +41,12 @@ impl Group {
 
     fn slot(&mut self, slot: usize) -> &mut [f64] {
         let lanes = self.lanes();
-        &mut self.numbers[self.first + slot * lanes..][..lanes]
+        &mut self.numbers[slot * lanes..][..lanes]
     }
 
     fn number(&self, slot: usize, lane: usize) -> f64 {
         let lanes = self.lanes();
-        self.numbers[self.first + slot * lanes..][..lanes][lane]
+        self.numbers[slot * lanes..][..lanes][lane]
     }
 
     /// A lane's parameters; those that nothing depends on may be left out at the end.
@@ -80,7 +67,7 @@ impl Group {
     /// Computes what depends on parameters and steps alone: after they have been set, before anything runs.
     pub fn prepare(&mut self) {
         let program = Arc::clone(&self.program);
-        let (code, slots, width) = (&program.code, &mut self.numbers[self.first..], program.width);
+        let (code, slots, width) = (&program.code, &mut self.numbers[..], program.width);
         match self.registers {
             1 => run(width, Once::<1> { code, slots, width }),
             2 => run(width, Once::<2> { code, slots, width }),
@@ -111,7 +98,7 @@ impl Group {
     /// What all lanes carry, without slopes: entry, lane.
     pub fn carries(&self, carries: &mut [f64]) {
         let length = self.program.pattern.rows.len() * self.lanes();
-        carries[..length].copy_from_slice(&self.numbers[self.first..][..length]);
+        carries[..length].copy_from_slice(&self.numbers[..length]);
     }
 
     /// The slopes of what a lane carries: entry by entry, one for each seed.
@@ -145,7 +132,7 @@ impl Group {
     pub(crate) fn go_on(&mut self, inputs: &[f64], rows: &mut [f64], samples: usize) {
         let program = Arc::clone(&self.program);
         let lanes = self.lanes();
-        let (code, slots, width) = (&program.code, &mut self.numbers[self.first..], program.width);
+        let (code, slots, width) = (&program.code, &mut self.numbers[..], program.width);
         if let Some(machine) = &program.machine {
             return machine.run(code, lanes, slots, inputs, rows, samples);
         }
@@ -159,7 +146,7 @@ impl Group {
     /// Sets negligible slopes to zero.
     pub(crate) fn clear_negligible(&mut self) {
         let (values, carried, lanes) = (self.program.pattern.rows.len(), self.program.code.carried, self.lanes());
-        for slope in &mut self.numbers[self.first + values * lanes..self.first + carried * lanes] {
+        for slope in &mut self.numbers[values * lanes..carried * lanes] {
             if slope.abs() < NEGLIGIBLE {
                 *slope = 0.0;
             }

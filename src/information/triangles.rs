@@ -3,12 +3,11 @@
 mod absorb;
 
 use super::Information;
+use crate::aligned::Aligned;
 use crate::wide::{self, Width};
 
 /// Lanes are stored in multiples of the widest register's.
 const REGISTER: usize = 8;
-/// Numbers in a cache line.
-const LINE: usize = 8;
 
 /// The square-root triangles of `lanes` independent pieces (records, or segments of one), all with the same columns. Rows
 /// of all lanes are absorbed together by Householder reflections in vector registers (six columns: 1.5 ns per row and lane,
@@ -28,9 +27,8 @@ pub struct Triangles {
     entries: Vec<f64>,
     /// One number per column and lane of a register.
     factors: Vec<f64>,
-    /// The rows of one register's lanes, from `start` on, where a cache line begins.
-    scratch: Vec<f64>,
-    start: usize,
+    /// The rows of one register's lanes.
+    scratch: Aligned,
 }
 
 impl Triangles {
@@ -43,8 +41,7 @@ impl Triangles {
     pub(crate) fn with(width: Width, columns: usize, lanes: usize) -> Self {
         let all = columns + 1;
         // The lanes of a single register are absorbed where they stand.
-        let copied = if lanes == width.lanes() { 0 } else { absorb::ROWS * all * REGISTER + LINE };
-        let scratch = vec![0.0; copied];
+        let copied = if lanes == width.lanes() { 0 } else { absorb::ROWS * all * REGISTER };
         Triangles {
             columns,
             lanes,
@@ -52,8 +49,7 @@ impl Triangles {
             width,
             entries: vec![0.0; all * (all + 1) / 2 * lanes.next_multiple_of(REGISTER)],
             factors: vec![0.0; all * REGISTER],
-            start: scratch.as_ptr().align_offset(LINE * size_of::<f64>()).min(LINE).min(copied),
-            scratch,
+            scratch: Aligned::zeros(copied),
         }
     }
 
@@ -81,7 +77,7 @@ impl Triangles {
             triangles: &mut self.entries,
             rows: &mut rows[..count * stride],
             factors: &mut self.factors,
-            scratch: &mut self.scratch[self.start..],
+            scratch: &mut self.scratch,
         };
         wide::run(self.width, task);
     }

@@ -18,7 +18,7 @@ const MOVED: f64 = 0.1;
 const MOVED_FIRST: f64 = 1e-6;
 /// Of a nonlinear model the correction is exact to the first order only: it is enough where it changes the squared errors by
 /// no more than this part of the difference of cost that the search has to judge,
-const MOVED_NONLINEAR: f64 = 1e-3;
+const MOVED_NONLINEAR: f64 = 1e-6;
 /// or by no more than rounding.
 const MOVED_ROUNDING: f64 = 1e-15;
 /// So often corrected borders are simulated from anew, if each time the correction falls to this part; then they are

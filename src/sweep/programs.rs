@@ -3,6 +3,7 @@
 mod columns;
 mod derived;
 mod horizon;
+mod interleaved;
 mod run;
 mod workspace;
 
@@ -18,6 +19,7 @@ use crate::predict::{Guess, Prediction, recurrence};
 use crate::record::{Record, Time};
 use crate::recurrence::Recurrence;
 pub(crate) use derived::Derived;
+pub(crate) use interleaved::Interleaved;
 use run::Run;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use workspace::Compiled;

@@ -1,5 +1,6 @@
 //! [`Window`]: prediction errors and slopes of consecutive samples of several pieces, in lanes.
 
+use crate::aligned::Aligned;
 use crate::wide::Width;
 
 /// Prediction errors and slopes of consecutive samples of several pieces, one per lane.
@@ -17,8 +18,8 @@ pub struct Window {
     pub begin: Vec<usize>,
     /// Number of samples of each lane; zero for a lane without a piece.
     pub samples: Vec<usize>,
-    values: Vec<f64>,
-    variances: Vec<f64>,
+    values: Aligned,
+    variances: Aligned,
     /// Logarithm of each predicted variance, per row and lane, once the errors are standardized by them.
     pub(crate) log_variances: Vec<f64>,
     /// Per row, a bit for each lane that holds a measurement.
@@ -43,8 +44,8 @@ impl Window {
             capacity,
             begin: vec![0; lanes],
             samples: vec![0; lanes],
-            values: vec![0.0; size],
-            variances: vec![0.0; if variances { size } else { 0 }],
+            values: Aligned::zeros(size),
+            variances: Aligned::zeros(if variances { size } else { 0 }),
             log_variances: vec![0.0; if variances { capacity * outputs * lanes } else { 0 }],
             measured: vec![0; capacity * outputs],
             carry: vec![],
@@ -191,6 +192,11 @@ impl Window {
     #[inline(always)]
     pub fn set_measured(&mut self, sample: usize, output: usize, lanes: u32) {
         self.measured[sample * self.outputs + output] = lanes;
+    }
+
+    /// Sets which lanes have measured all outputs at the first samples, a bit each.
+    pub(crate) fn set_all_measured(&mut self, samples: usize, lanes: u32) {
+        self.measured[..samples * self.outputs].fill(lanes);
     }
 
     /// Sets a row to zero in the lanes without a measurement.

@@ -1,10 +1,12 @@
 //! Runs pieces in the lanes of a program.
 
 use super::columns::Columns;
+use super::interleaved::Kept;
 use super::workspace::{Compiled, Workspace};
 use crate::record::Time;
 use crate::sweep::{Piece, Reached, RunError, Visit, Window};
 use crate::wide::{self, Task, Wide};
+use std::sync::Arc;
 
 /// Samples per window. Windows are counted from the begin of each piece, so that a lane's bits do not depend on the
 /// length of another.
@@ -15,6 +17,8 @@ pub(super) struct Run<'r> {
     compiled: &'r Compiled,
     pieces: Vec<Piece<'r>>,
     columns: Columns<'r>,
+    /// What the columns are, from the first sample of each piece on, if it is kept.
+    kept: Option<Arc<Kept>>,
     space: Workspace,
 }
 
@@ -32,7 +36,7 @@ impl<'r> Run<'r> {
         }
         group.prepare();
         let columns = Columns::new(&compiled.program, (0..lanes).map(piece));
-        let mut run = Run { compiled, pieces, columns, space };
+        let mut run = Run { compiled, pieces, columns, kept: None, space };
         run.start();
         run
     }
@@ -64,7 +68,9 @@ impl<'r> Run<'r> {
     /// end with it into `reached`.
     pub fn next(&mut self, begin: usize, reached: &mut [Reached]) {
         let samples = WINDOW.min(self.longest() - begin);
-        self.read(begin, samples);
+        if self.kept.is_none() {
+            self.read(begin, samples);
+        }
         let Workspace { group, window, .. } = &mut self.space;
         for (lane, Piece { samples: all, .. }) in self.pieces.iter().enumerate() {
             window.begin[lane] = all.start + begin;
@@ -74,16 +80,18 @@ impl<'r> Run<'r> {
         self.fill(begin, samples, reached);
     }
 
-    /// Predicts the samples `begin..end` of the window.
-    fn predict(&mut self, begin: usize, end: usize) {
+    /// Predicts the samples `begin..end` of the window that begins `first` samples after the first of each piece.
+    fn predict(&mut self, first: usize, begin: usize, end: usize) {
         let Workspace { group, inputs, rows, window, .. } = &mut self.space;
         let program = &self.compiled.program;
         if begin == 0 {
             group.clear_negligible();
         }
+        let (inputs, read): (&[f64], usize) =
+            self.kept.as_ref().map_or((inputs, begin), |kept| (&kept.inputs, first + begin));
         let rows = if window.has_variances() { rows } else { window.all_rows_mut() };
         let (inputs_at, rows_at) = (program.columns().len() * group.lanes(), program.row_length() * group.lanes());
-        group.go_on(&inputs[begin * inputs_at..], &mut rows[begin * rows_at..], end - begin);
+        group.go_on(&inputs[read * inputs_at..], &mut rows[begin * rows_at..], end - begin);
     }
 
     /// Reads the inputs of a window that begins `begin` samples after the first of each piece.
@@ -97,6 +105,9 @@ impl<'r> Run<'r> {
 
     /// Runs all pieces to their ends.
     pub fn all(mut self, visit: Visit<'_>) -> Vec<Result<Reached, RunError>> {
+        let lanes = (0..self.space.group.lanes()).map(|lane| self.pieces.get(lane).unwrap_or(&self.pieces[0]));
+        let lanes: Vec<&Piece<'_>> = lanes.collect();
+        self.kept = lanes[0].prepared.interleaved.of(&self.compiled.program, &lanes, &self.columns);
         let mut reached = vec![Reached::default(); self.pieces.len()];
         for begin in (0..self.longest()).step_by(WINDOW) {
             self.next(begin, &mut reached);
@@ -156,7 +167,7 @@ impl<'r> Run<'r> {
     fn fill(&mut self, begin: usize, samples: usize, reached: &mut [Reached]) {
         let mut done = 0;
         for end in self.ends(samples).into_iter().chain([samples]) {
-            self.predict(done, end);
+            self.predict(begin, done, end);
             for (lane, reached) in reached.iter_mut().enumerate() {
                 if begin + end == self.pieces[lane].samples.len() {
                     *reached = self.reached(lane);
@@ -177,7 +188,13 @@ impl<'r> Run<'r> {
                 }
             }
         }
-        self.columns.read_measured(begins, samples, measured);
+        let measured: &[f64] = match &self.kept {
+            Some(kept) => &kept.measured[begin * outputs * lanes..],
+            None => {
+                self.columns.read_measured(begins, samples, measured);
+                measured
+            }
+        };
         let (register, rows) = (window.width, window.all_rows_mut());
         let errors = Errors { rows, measured, samples: samples * outputs, columns, lanes };
         let finite = wide::run(register, errors);
@@ -185,13 +202,13 @@ impl<'r> Run<'r> {
         let pieces = u32::MAX >> (32 - self.pieces.len());
         window.whole = finite && self.pieces.iter().enumerate().all(|(lane, _)| window.samples[lane] == samples);
         if window.whole {
-            (0..samples * outputs).for_each(|row| window.set_measured(row / outputs, row % outputs, pieces));
+            window.set_all_measured(samples, pieces);
             return;
         }
         // What all pieces have and is finite was measured.
         let shortest = window.samples[..self.pieces.len()].iter().copied().min().unwrap_or(0);
         let plain = if finite { shortest } else { 0 };
-        (0..plain * outputs).for_each(|row| window.set_measured(row / outputs, row % outputs, pieces));
+        window.set_all_measured(plain, pieces);
         for k in plain..samples {
             let active = (0..self.pieces.len()).filter(|&lane| k < window.samples[lane]);
             let active = active.fold(0u32, |bits, lane| bits | 1 << lane);

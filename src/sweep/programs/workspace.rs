@@ -1,6 +1,7 @@
 //! [`Compiled`]: a program with memory for its runs, which the next run uses again.
 
 use super::run::WINDOW;
+use crate::aligned::Aligned;
 use crate::engine::{Group, Program};
 use crate::sweep::Window;
 use std::sync::{Mutex, PoisonError};
@@ -15,9 +16,9 @@ pub(super) struct Compiled {
 pub(super) struct Workspace {
     pub group: Group,
     /// Sample, column, lane.
-    pub inputs: Vec<f64>,
+    pub inputs: Aligned,
     /// Sample, output, lane: as measured.
-    pub measured: Vec<f64>,
+    pub measured: Aligned,
     /// Where variances are predicted, all rows of each sample.
     pub rows: Vec<f64>,
     /// First sample of each lane.
@@ -56,8 +57,8 @@ impl Workspace {
         window.width = program.width();
         Workspace {
             group,
-            inputs: vec![0.0; rows * program.columns().len() * lanes],
-            measured: vec![0.0; WINDOW * program.outputs() * lanes],
+            inputs: Aligned::zeros(rows * program.columns().len() * lanes),
+            measured: Aligned::zeros(WINDOW * program.outputs() * lanes),
             rows: if variances { vec![0.0; WINDOW * program.row_length() * lanes] } else { vec![] },
             begins: vec![0; lanes],
             window,
