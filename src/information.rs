@@ -94,8 +94,15 @@ impl Information {
         let mut row = phi.to_vec();
         row.resize(self.columns, 0.0);
         row.push(y);
-        let mut rest = row.as_mut_slice();
-        let mut triangle = self.triangle.as_mut_slice();
+        self.rotate(&mut row, 0);
+        self.rows += 1;
+    }
+
+    /// Rotates a row into the triangle: its entries from this column on, and `y`. They are used up.
+    fn rotate(&mut self, row: &mut [f64], first: usize) {
+        let width = self.columns + 1;
+        let (mut rest, begin) = (row, first * (2 * width + 1 - first) / 2);
+        let mut triangle = &mut self.triangle[begin..];
         while let Some((&mut pivot, tail)) = rest.split_first_mut() {
             let (above, below) = triangle.split_at_mut(tail.len() + 1);
             if let Some((diagonal, above)) = above.split_first_mut()
@@ -110,7 +117,6 @@ impl Information {
             }
             (rest, triangle) = (tail, below);
         }
-        self.rows += 1;
     }
 
     /// The same, said to be made of so many rows.

@@ -56,6 +56,16 @@ impl Layout {
             parameters: quantities::<P>(),
         }
     }
+
+    /// Whether it is that of a model with these signals.
+    pub(crate) fn is<X: Signals, U: Signals, Y: Signals, P: Signals>(&self, kind: Kind) -> bool {
+        fn are<S: Signals>(quantities: &[Quantity]) -> bool {
+            let named = S::NAMES.iter().zip(S::UNITS).map(|(name, unit)| (*name, *unit));
+            named.eq(quantities.iter().map(|Quantity { name, unit }| (name.as_str(), unit.as_str())))
+        }
+        let of_states = self.kind == kind && are::<X>(&self.states);
+        of_states && are::<U>(&self.inputs) && are::<Y>(&self.outputs) && are::<P>(&self.parameters)
+    }
 }
 
 /// The quantities of a vector of signals.

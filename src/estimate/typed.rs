@@ -57,8 +57,8 @@ impl<M: Model> Estimate<M> {
     /// # Errors
     /// A summary of other quantities than the model has.
     pub fn of(summary: Summary) -> Result<Self, Error> {
-        let layout = Layout::of::<M>();
-        if summary.layout != layout {
+        if !summary.layout.is::<M::State, M::Input, M::Output, M::Parameters>(M::KIND) {
+            let layout = Layout::of::<M>();
             return Err(Error::Option(format!(
                 "the estimate is of another model: it has the quantities {:?}, the model has {layout:?}",
                 summary.layout

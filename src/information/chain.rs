@@ -21,6 +21,9 @@ pub(crate) struct Chain<'c> {
     slopes: Vec<f64>,
     defect: Vec<f64>,
     information: Information,
+    /// The rows of a segment, and one of them.
+    block: Block,
+    row: Vec<f64>,
     rows: u64,
     /// Sum of squares of what the defects changed.
     pub moved: f64,
@@ -31,9 +34,11 @@ pub(crate) struct Chain<'c> {
 impl<'c> Chain<'c> {
     /// From the slopes of the first segment's initial value with respect to the unknowns, row by row.
     pub fn new(carried: usize, slopes: Vec<f64>, parameters: &'c [usize], scales: &'c [f64]) -> Self {
-        let information = Information::new(scales.len());
+        let (n, information) = (scales.len(), Information::new(scales.len()));
+        let (block, row) = (Block::new(n, carried + parameters.len() + 1), vec![0.0; n]);
         let defect = vec![0.0; carried];
-        Chain { carried, parameters, scales, slopes, defect, information, rows: 0, moved: 0.0, squares: 0.0 }
+        let (moved, squares) = (0.0, 0.0);
+        Chain { carried, parameters, scales, slopes, defect, information, block, row, rows: 0, moved, squares }
     }
 
     /// What is known of the initial value that the next segment has: by how much its guess is off, and its slopes.
@@ -44,10 +49,8 @@ impl<'c> Chain<'c> {
     /// Takes in the triangle of the next segment, its columns the initial value and then the parameters.
     pub fn add(&mut self, segment: &Information) {
         let (n, c, m) = (self.scales.len(), self.carried, self.parameters.len());
-        let mut block = Block::new(n, c + m + 1);
-        let mut row = vec![0.0; n];
         for i in 0..=c + m {
-            let (y, slopes) = segment.row(i);
+            let (row, (y, slopes)) = (&mut self.row, segment.row(i));
             row.fill(0.0);
             let mut moved = 0.0;
             for (at, slope) in (i..c + m).zip(slopes) {
@@ -63,9 +66,9 @@ impl<'c> Chain<'c> {
             row.iter_mut().zip(self.scales).for_each(|(row, scale)| *row *= scale);
             self.moved += moved * moved;
             self.squares += (y - moved) * (y - moved);
-            self.information.gather(&mut block, &row, y - moved);
+            self.information.gather(&mut self.block, row, y - moved);
         }
-        self.information.absorb(&mut block);
+        self.information.absorb(&mut self.block);
         self.rows += segment.rows();
     }
 

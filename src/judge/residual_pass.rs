@@ -43,7 +43,8 @@ struct Sums<'s> {
     experiment: usize,
     outputs: Vec<OutputSums>,
     measured: u64,
-    log_determinant: f64,
+    /// That of the covariance of a sample with all outputs, and of all measurements so far.
+    log_determinants: (f64, f64),
     portmanteaus: Vec<Portmanteau>,
     least_sigma: Vec<f64>,
     /// The windows to be simulated again.
@@ -61,12 +62,13 @@ struct Sampled {
 impl<'s> Sums<'s> {
     fn new(objective: &'s Objective<'s>, experiment: usize) -> Self {
         let outputs = objective.outputs();
+        let all: Vec<usize> = (0..outputs).collect();
         Sums {
             objective,
             experiment,
             outputs: vec![OutputSums::default(); outputs],
             measured: 0,
-            log_determinant: 0.0,
+            log_determinants: (objective.whitening.log_determinant(&all), 0.0),
             portmanteaus: vec![Portmanteau::new(LAGS.max(horizon(objective))); outputs],
             least_sigma: vec![f64::INFINITY; outputs],
             again: vec![],
@@ -85,11 +87,9 @@ impl<'s> Sums<'s> {
     /// Counts the measurements of a window.
     fn count(&mut self, window: &Window, lane: usize) {
         let (outputs, samples) = (window.outputs(), window.samples[lane]);
-        let whitening = &self.objective.whitening;
-        let all: Vec<usize> = (0..outputs).collect();
-        let whole = whitening.log_determinant(&all);
+        let (whole, log_determinant) = (self.log_determinants.0, &mut self.log_determinants.1);
         if window.whole && !window.has_variances() && !self.objective.is_weighted() {
-            self.log_determinant += samples as f64 * whole;
+            *log_determinant += samples as f64 * whole;
             self.measured += (samples * outputs) as u64;
             return;
         }
@@ -97,13 +97,13 @@ impl<'s> Sums<'s> {
         for k in 0..samples {
             here.clear();
             here.extend((0..outputs).filter(|&j| window.is_measured(k, j, lane)));
-            self.log_determinant += match here.len() == outputs {
+            *log_determinant += match here.len() == outputs {
                 _ if window.has_variances() => {
                     let number = |j: usize| (k * outputs + j) * window.lanes() + lane;
                     here.iter().map(|&j| window.log_variances[number(j)]).sum()
                 }
                 true => whole,
-                false => whitening.log_determinant(&here),
+                false => self.objective.whitening.log_determinant(&here),
             };
             if !self.objective.is_weighted() || self.objective.weight(self.experiment, window.begin[lane] + k) > 0.0 {
                 self.measured += here.len() as u64;
@@ -119,7 +119,7 @@ impl Accumulate for Sums<'_> {
         let record = &self.objective.problem.records[self.experiment];
         for j in 0..outputs {
             self.run.clear();
-            self.run.extend((0..samples).map(|k| window.error(k, j, lane)));
+            self.run.extend(window.errors(j, lane));
             let values = &record.outputs()[j].values[begin..begin + samples];
             if window.whole && !window.has_variances() {
                 self.outputs[j].add_all(values, &self.run);
@@ -150,7 +150,7 @@ impl Accumulate for Sums<'_> {
 
     fn append(&mut self, later: Self) {
         self.measured += later.measured;
-        self.log_determinant += later.log_determinant;
+        self.log_determinants.1 += later.log_determinants.1;
         self.outputs.iter_mut().zip(&later.outputs).for_each(|(sums, later)| sums.append(later));
         self.portmanteaus.iter_mut().zip(&later.portmanteaus).for_each(|(sums, later)| sums.follow(later));
         self.least_sigma.iter_mut().zip(&later.least_sigma).for_each(|(least, later)| *least = least.min(*later));
@@ -191,7 +191,7 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
     let (mut measured, mut log_determinant) = (0, 0.0);
     for one in all {
         measured += one.measured;
-        log_determinant += one.log_determinant;
+        log_determinant += one.log_determinants.1;
         sums.iter_mut().zip(&one.outputs).for_each(|(sum, one)| sum.append(one));
     }
     let whiteness = |j: usize| {

@@ -53,15 +53,17 @@ fn color(coefficients: &[f64], count: u64) -> (f64, f64) {
 
 /// Variance of the errors less what follows from those before, as a part of it (Levinson and Durbin's recursion).
 fn innovation(coefficients: &[f64]) -> f64 {
-    let (mut variance, mut model): (f64, Vec<f64>) = (1.0, vec![]);
+    let (mut variance, mut model) = (1.0, Vec::with_capacity(coefficients.len()));
     for (k, rho) in coefficients.iter().enumerate() {
-        let known: f64 = model.iter().enumerate().map(|(i, a)| a * coefficients[k - 1 - i]).sum();
+        let known: f64 = model.iter().zip(coefficients[..k].iter().rev()).map(|(a, rho): (&f64, _)| a * rho).sum();
         let next = (rho - known) / variance;
         if next.is_nan() || next.abs() >= 1.0 {
             return variance;
         }
-        let turned: Vec<f64> = model.iter().rev().map(|a| next * a).collect();
-        model.iter_mut().zip(turned).for_each(|(a, by)| *a -= by);
+        for i in 0..k.div_ceil(2) {
+            let (a, b) = (model[i], model[k - 1 - i]);
+            (model[i], model[k - 1 - i]) = (a - next * b, b - next * a);
+        }
         model.push(next);
         variance *= 1.0 - next * next;
     }

@@ -156,6 +156,14 @@ impl Window {
         self.at(sample, output, self.columns - 1, lane)
     }
 
+    /// The prediction errors of an output, sample by sample.
+    #[inline(always)]
+    pub(crate) fn errors(&self, output: usize, lane: usize) -> impl Iterator<Item = f64> {
+        let first = ((output + 1) * self.columns - 1) * self.lanes + lane;
+        let errors = self.values.iter().skip(first).step_by(self.outputs * self.columns * self.lanes);
+        errors.take(self.samples[lane]).copied()
+    }
+
     /// The predicted variance; one where none is predicted.
     #[inline(always)]
     pub fn variance(&self, sample: usize, output: usize, lane: usize) -> f64 {

@@ -22,16 +22,18 @@ impl Elimination {
     /// of pieces.
     pub fn step_within(&self, damping: &[f64], held: &[bool], limits: &[(f64, f64)]) -> Option<Vec<f64>> {
         let n = self.unknowns();
+        let step = self.step(damping, held)?;
+        let free = |i: usize| !held.get(i).copied().unwrap_or(false);
+        if limits.iter().zip(&step).enumerate().all(|(i, ((down, up), step))| !free(i) || (down..=up).contains(&step)) {
+            return Some(step);
+        }
         let mut stage = Stage {
-            held: (0..n).map(|i| held.get(i).copied().unwrap_or(false)).collect(),
+            held: (0..n).map(|i| !free(i)).collect(),
             put: vec![0.0; n],
             on_end: vec![None; n],
             at: vec![0.0; n],
-            step: self.step(damping, held)?,
+            step,
         };
-        if stage.leaving(limits).is_empty() {
-            return Some(stage.step);
-        }
         let mut releases = 0;
         loop {
             let leaving = stage.leaving(limits);

@@ -118,12 +118,39 @@ impl Elimination {
 
     /// The minimizer, counted from the origin.
     pub(super) fn solve(&self, terms: Terms<'_>) -> Option<Vec<f64>> {
+        if let Some(alone) = self.alone(terms) {
+            let mut step = vec![0.0; self.unknowns()];
+            alone.is_determined(&self.norms, terms.damping).then(|| alone.substitute(&mut step))?;
+            return step.iter().all(|d| d.is_finite()).then_some(step);
+        }
         let Reduction { total, pieces } = self.reduce(terms);
         let mut step = vec![0.0; self.unknowns()];
         for piece in std::iter::once(&total).chain(&pieces) {
             piece.is_determined(&self.norms, terms.damping).then(|| piece.substitute(&mut step))?;
         }
         step.iter().all(|d| d.is_finite()).then_some(step)
+    }
+
+    /// The damped triangle of all unknowns, where there is one piece alone, none of them is held, and no pivot is rounding.
+    fn alone(&self, terms: Terms<'_>) -> Option<Reduced<'_>> {
+        let [piece] = self.pieces.as_slice() else { return None };
+        let (triangle, n) = (&piece.triangle, piece.columns.len());
+        let free = |&i: &usize| !terms.holds(i) && entry(terms.origin, i) == 0.0;
+        let sound = |i: usize| triangle.at(i, i) > triangle.tolerance() * self.norms[piece.columns[i]];
+        if n < self.unknowns() || !piece.columns.iter().all(free) || !(0..n).all(sound) {
+            return None;
+        }
+        let mut damped = triangle.clone();
+        let mut row = vec![0.0; n + 1];
+        for (i, &unknown) in piece.columns.iter().enumerate() {
+            let damping = entry(terms.damping, unknown);
+            if damping != 0.0 {
+                row[i..].fill(0.0);
+                row[i] = damping;
+                damped.rotate(&mut row[i..], i);
+            }
+        }
+        Some(Reduced { own: n, columns: Cow::Borrowed(&piece.columns), triangle: Cow::Owned(damped) })
     }
 
     /// What the data say of the shared unknowns alone, all others minimized out.
