@@ -49,3 +49,22 @@ impl Clone for Aligned {
         copy
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_and_copies_begin_at_a_cache_line() {
+        for count in [1, 7, 64, 1_000, 100_000] {
+            let mut numbers = Aligned::zeros(count);
+            numbers.iter_mut().enumerate().for_each(|(i, x)| *x = i as f64);
+            let copies: Vec<Aligned> = (0..3).map(|_| numbers.clone()).collect();
+            for copy in copies.iter().chain([&numbers]) {
+                assert_eq!(copy.as_ptr() as usize % 64, 0);
+                assert!(copy.len() == count && copy.iter().enumerate().all(|(i, x)| *x == i as f64));
+            }
+        }
+        assert!(Aligned::zeros(0).is_empty());
+    }
+}

@@ -8,7 +8,7 @@ use super::{Block, Information};
 /// value and to the parameters. With `x[s] = guess[s] + defect[s] + S[s] d` for changes `d` of the record's unknowns, the end of
 /// one segment is the begin of the next: `S[s + 1] = Phi S[s] + Psi P`, `defect[s + 1] = end[s] + Phi defect[s] - guess[s + 1]`
 /// (condensing of multiple shooting: H. G. Bock and K. J. Plitt, IFAC Proceedings 17 (1984) 1603). For models that are affine in
-/// their initial values the result is exact whatever the guesses; for others the guesses must be the simulated values.
+/// their initial values the result is exact whatever the guesses; for others to the first order of what the guesses are off.
 #[derive(Debug)]
 pub(crate) struct Chain<'c> {
     /// Entries of an initial value.

@@ -3,8 +3,8 @@
 //! A record is cut by its length alone, so that no bit of a result depends on the machine. The carry at the begin of a
 //! segment follows from the segments before. For models that are affine in their carry a guess is enough, because its
 //! error is corrected exactly afterwards ([`Chain`](crate::information::Chain)); the guess is extrapolated from a point
-//! evaluated before. For others the carries are simulated, in values alone, before the segments are run with their
-//! slopes.
+//! evaluated before. For others the correction is exact to the first order: corrected borders are simulated from anew
+//! until what is left no longer matters, and simulated from the begin of the record where that does not succeed soon.
 
 use super::Values;
 use crate::record::Record;

@@ -148,3 +148,72 @@ fn programs_predict_what_duals_predict() {
         compare(&Pendulum { linear: false }, Horizon::new(35), true, hold);
     }
 }
+
+/// A plant whose columns are kept: time is not among them.
+struct Cart;
+
+impl Model for Cart {
+    type State = Angle;
+    type Input = Torque;
+    type Output = Angle;
+    type Parameters = Given;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Angle<S>, u: &Torque<S>, p: &Given<S>) -> Angle<S> {
+        Angle { phi: x.w, w: u.m * p.b - x.phi * x.phi * p.g - x.w * p.d }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Angle<S>, u: &Torque<S>, _p: &Given<S>) -> Angle<S> {
+        Angle { phi: x.phi, w: x.w + u.m * 0.01 }
+    }
+}
+
+/// Columns that are kept from a pass are read again only by pieces of the same records at the same samples: same bits as
+/// without any memory, whatever ran before.
+#[test]
+fn kept_columns_are_those_of_the_records_at_hand() {
+    let model = Cart;
+    let (method, predictor): (Arc<dyn Method>, Arc<dyn Prediction>) = (Arc::new(Rk4::default()), Arc::new(FreeRun));
+    let plain: Arc<dyn Sweep> = Arc::new(DualSweep {
+        layout: Arc::new(Layout::of::<Cart>()),
+        model: Handle::Borrowed(&model),
+        loops: Arc::new(Rk4::default()),
+        method: method.clone(),
+        predictor: predictor.clone(),
+        reason: String::new(),
+    });
+    let equations = Arc::new(Equations::trace(&model).unwrap());
+    let programs = ProgramSweep::new(equations, method, predictor, plain).unwrap();
+    let first = record(300, 1.0, true);
+    let with_other_output = {
+        let outputs = record(300, 4.0, true).outputs().to_vec();
+        Record::new(Layout::of::<Cart>().states, first.times().clone(), first.inputs().to_vec(), outputs).unwrap()
+    };
+    let (second, third) = (record(300, 2.0, true), record(170, 3.0, true));
+    let p = [2.0, 0.3, 1.5, 0.2, 0.1];
+    let seeds = [Seed::Carry(1), Seed::Parameter(0), Seed::Parameter(2)];
+    let kept = Prepared::default();
+    let run = |records: [&Record; 2], samples: std::ops::Range<usize>, seeds: &[Seed], first: &Prepared| {
+        let other = Prepared::default();
+        let piece = |(record, prepared)| Piece {
+            record,
+            prepared,
+            samples: samples.clone(),
+            carry: vec![0.3, -0.2],
+            slopes: vec![0.5; 2 * seeds.len()],
+            parameters: &p,
+        };
+        rows(&programs, &[(records[0], first), (records[1], &other)].map(piece), seeds)
+    };
+    for (records, samples, seeds) in [
+        ([&first, &second], 0..170, &seeds[..]),
+        ([&first, &second], 0..170, &seeds[..]),
+        ([&first, &third], 0..170, &seeds[..]),
+        ([&first, &third], 0..170, &[]),
+        ([&with_other_output, &third], 0..170, &[]),
+        ([&with_other_output, &third], 0..170, &seeds[..]),
+        ([&first, &second], 64..170, &seeds[..]),
+        ([&first, &second], 0..150, &seeds[..]),
+        ([&first, &second], 150..300, &seeds[..]),
+    ] {
+        let found = run(records, samples.clone(), seeds, &kept);
+        assert_eq!(found, run(records, samples, seeds, &Prepared::default()));
+    }
+}
