@@ -61,40 +61,75 @@ impl Autocorrelation {
 pub(crate) struct Portmanteau {
     errors: Autocorrelation,
     squares: Autocorrelation,
-    signs: Autocorrelation,
-    measured: Autocorrelation,
+    neighbors: Neighbors,
     run: Vec<f64>,
+}
+
+/// How often errors agree in sign with the one before.
+#[derive(Clone, Copy, Debug, Default)]
+struct Neighbors {
+    /// Errors that are not zero, pairs of such, and pairs of equal sign less those of different sign.
+    errors: i64,
+    pairs: i64,
+    agreements: i64,
+    /// The signs of the first error and of the last.
+    first: Option<i64>,
+    last: i64,
+}
+
+impl Neighbors {
+    fn add(&mut self, run: &[f64]) {
+        let sign = |e: &f64| i64::from(*e > 0.0) - i64::from(*e < 0.0);
+        let Some(first) = run.first() else { return };
+        self.first.get_or_insert(sign(first));
+        let (mut errors, mut pairs, mut agreements, mut last) = (0, 0, 0, self.last);
+        for sign in run.iter().map(sign) {
+            errors += sign * sign;
+            pairs += sign * sign * last * last;
+            agreements += sign * last;
+            last = sign;
+        }
+        (self.errors, self.pairs) = (self.errors + errors, self.pairs + pairs);
+        (self.agreements, self.last) = (self.agreements + agreements, last);
+    }
+
+    /// As if the errors of the other had followed.
+    fn follow(&mut self, next: &Neighbors) {
+        let Some(first) = next.first else { return };
+        self.first.get_or_insert(first);
+        self.pairs += (first * self.last).abs();
+        self.agreements += first * self.last;
+        self.append(next);
+        self.last = next.last;
+    }
+
+    /// Adds the counts of another record.
+    fn append(&mut self, other: &Neighbors) {
+        (self.errors, self.pairs) = (self.errors + other.errors, self.pairs + other.pairs);
+        self.agreements += other.agreements;
+    }
 }
 
 impl Portmanteau {
     pub fn new(lags: usize) -> Self {
-        let [errors, squares, signs, measured] = [lags, lags, 1, 1].map(Autocorrelation::new);
-        Portmanteau { errors, squares, signs, measured, run: vec![] }
+        let [errors, squares] = [lags; 2].map(Autocorrelation::new);
+        Portmanteau { errors, squares, neighbors: Neighbors::default(), run: vec![] }
     }
 
     /// The next errors in order of time, zero where missing.
     pub fn add(&mut self, run: &[f64]) {
         self.errors.add(run);
-        let sign = |e: &f64| if *e == 0.0 { 0.0 } else { e.signum() };
         self.run.clear();
         self.run.extend(run.iter().map(|e| e * e));
         self.squares.add(&self.run);
-        self.run.clear();
-        self.run.extend(run.iter().map(sign));
-        self.signs.add(&self.run);
-        self.run.iter_mut().for_each(|sign| *sign *= *sign);
-        self.measured.add(&self.run);
-    }
-
-    /// The sums, one kind after the other.
-    fn all(&mut self) -> [&mut Autocorrelation; 4] {
-        [&mut self.errors, &mut self.squares, &mut self.signs, &mut self.measured]
+        self.neighbors.add(run);
     }
 
     /// As if the errors of the other had followed.
     pub fn follow(&mut self, next: &Portmanteau) {
-        let theirs = [&next.errors, &next.squares, &next.signs, &next.measured];
-        self.all().into_iter().zip(theirs).for_each(|(sums, next)| sums.follow(next));
+        self.errors.follow(&next.errors);
+        self.squares.follow(&next.squares);
+        self.neighbors.follow(&next.neighbors);
     }
 
     /// The same with the autocorrelation at each lag reduced in size by this much, to zero at least.
@@ -107,8 +142,9 @@ impl Portmanteau {
 
     /// Adds the sums of another record.
     pub fn append(&mut self, other: &Portmanteau) {
-        let theirs = [&other.errors, &other.squares, &other.signs, &other.measured];
-        self.all().into_iter().zip(theirs).for_each(|(sums, other)| sums.append(other));
+        self.errors.append(&other.errors);
+        self.squares.append(&other.squares);
+        self.neighbors.append(&other.neighbors);
     }
 
     /// The sum of products at a lag over its standard deviation without correlation, and the autocorrelation.
@@ -129,17 +165,15 @@ impl Portmanteau {
     /// they have as large a correlation with it: the larger of both. Where noise changes much in size, signs alone show what
     /// an estimate is off by where there is little noise.
     pub fn neighbors_p_value(&self) -> f64 {
-        let (count, pairs) = (self.measured.sums[0], self.measured.sums[1]);
+        let Neighbors { errors, pairs, agreements, .. } = self.neighbors;
         let tail = |square: f64| chi_squared_tail(square, 1.0);
-        let signs = if pairs > 0.0 { tail(self.signs.sums[1].powi(2) / pairs) } else { 1.0 };
-        signs.max(tail(count * self.at(1).1.powi(2)))
+        let signs = if pairs > 0 { tail((agreements as f64).powi(2) / pairs as f64) } else { 1.0 };
+        signs.max(tail(errors as f64 * self.at(1).1.powi(2)))
     }
 }
 
 /// Lags whose sums are kept in registers together.
 const LAGS: usize = 24;
-/// Fewer lags than these are summed one by one.
-const FEW: usize = 4;
 
 /// Adds the products of a run with itself and with what came before to the sums of all lags.
 struct Products<'p> {
@@ -154,11 +188,6 @@ impl Task for Products<'_> {
 
     #[inline(always)]
     fn run<W: Wide>(self) {
-        let lags = self.sums.len() - 1;
-        if lags < FEW {
-            let sums = self.sums.iter_mut().enumerate();
-            return sums.for_each(|(k, sum)| *sum += dot(self.run, &self.values[lags - k..]));
-        }
         // The longest lag comes first: its values are the earliest.
         for (block, sums) in self.sums.rchunks_mut(LAGS).enumerate() {
             let values = &self.values[block * LAGS..];
@@ -239,6 +268,33 @@ mod tests {
                 assert!((found - expected).abs() < 1e-14, "{cuts:?}: {found} {expected}");
             }
         }
+    }
+
+    /// Pieces of a record that follow one another have the neighbors of the whole; records beside one another do not.
+    #[test]
+    fn pieces_have_the_neighbors_of_the_whole() {
+        let e: Vec<f64> = (0..90).map(|k| if k % 7 == 0 { 0.0 } else { ((k * k) as f64 * 0.37).sin() }).collect();
+        let counts = |runs: &[&[f64]]| {
+            let mut pieces = runs.iter().map(|run| {
+                let mut piece = Neighbors::default();
+                run.chunks(4).for_each(|run| piece.add(run));
+                piece
+            });
+            let mut whole = pieces.next().unwrap();
+            pieces.for_each(|piece| whole.follow(&piece));
+            [whole.errors, whole.pairs, whole.agreements]
+        };
+        let sign = |e: f64| if e == 0.0 { 0.0 } else { e.signum() };
+        let pairs = || e.windows(2).map(|pair| sign(pair[0]) * sign(pair[1]));
+        let expected = [e.iter().map(|e| sign(*e).abs()).sum(), pairs().map(f64::abs).sum(), pairs().sum()];
+        for cuts in [vec![&e[..]], vec![&e[..14], &e[14..15], &e[15..]], vec![&[], &e[..60], &[], &e[60..]]] {
+            assert_eq!(counts(&cuts).map(|count| count as f64), expected, "{cuts:?}");
+        }
+        let (mut one, mut other) = (Neighbors::default(), Neighbors::default());
+        one.add(&[1.0, 2.0]);
+        other.add(&[3.0, -1.0]);
+        one.append(&other);
+        assert_eq!([one.errors, one.pairs, one.agreements], [4, 2, 0]);
     }
 
     /// By hand: n = 10, rho = (0.5, -0.2) gives 10 * 12 * (0.25 / 9 + 0.04 / 8); two degrees of freedom have the tail

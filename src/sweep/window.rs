@@ -116,12 +116,14 @@ impl Window {
     }
 
     /// The row of an output of a sample: entry by entry, each with its lanes.
+    #[inline(always)]
     pub fn row(&self, sample: usize, output: usize) -> &[f64] {
         let width = self.columns * self.lanes;
         &self.values[(sample * self.outputs + output) * width..][..width]
     }
 
     /// The same to be written.
+    #[inline(always)]
     pub fn row_mut(&mut self, sample: usize, output: usize) -> &mut [f64] {
         let width = self.columns * self.lanes;
         &mut self.values[(sample * self.outputs + output) * width..][..width]
