@@ -16,7 +16,9 @@ pub(crate) struct Autocorrelation {
 
 impl Autocorrelation {
     pub fn new(lags: usize) -> Self {
-        Autocorrelation { sums: vec![0.0; lags + 1], first: vec![], values: vec![0.0; lags] }
+        let mut values = Vec::with_capacity(lags + RUN + LAGS);
+        values.resize(lags, 0.0);
+        Autocorrelation { sums: vec![0.0; lags + 1], first: Vec::with_capacity(lags), values }
     }
 
     /// The next values in order of time, zero where missing.
@@ -172,6 +174,8 @@ impl Portmanteau {
     }
 }
 
+/// Values of a run that need no more memory; those of a window.
+const RUN: usize = 64;
 /// Lags whose sums are kept in registers together.
 const LAGS: usize = 24;
 
@@ -286,7 +290,7 @@ mod tests {
         };
         let sign = |e: f64| if e == 0.0 { 0.0 } else { e.signum() };
         let pairs = || e.windows(2).map(|pair| sign(pair[0]) * sign(pair[1]));
-        let expected = [e.iter().map(|e| sign(*e).abs()).sum(), pairs().map(f64::abs).sum(), pairs().sum()];
+        let expected: [f64; 3] = [e.iter().map(|e| sign(*e).abs()).sum(), pairs().map(f64::abs).sum(), pairs().sum()];
         for cuts in [vec![&e[..]], vec![&e[..14], &e[14..15], &e[15..]], vec![&[], &e[..60], &[], &e[60..]]] {
             assert_eq!(counts(&cuts).map(|count| count as f64), expected, "{cuts:?}");
         }
