@@ -233,8 +233,7 @@ fn spectrum(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
     };
     let drawing =
         Curves { x: Axis::new("frequency", "Hz").from(0.0), y: Axis::new("power density", unit).logarithmic(), layers };
-    let caption =
-        "Spectrum: the mean power density of each column, and, thin, the greatest; white residuals have a flat one";
+    let caption = "Spectrum: mean power density, and (thin) the greatest in each column; flat for white residuals";
     let title = format!("Spectrum of the residual of {} of {}", fit.name, record.name);
     let plot = Plot::new(format!("spectrum-{id}-{}", fit.name), caption, title, Drawing::Curves(drawing));
     (of.frequency.len() > 1).then_some(plot)
