@@ -28,7 +28,9 @@ pub(super) fn section(facts: &Facts) -> Option<Section> {
     let section = if clearest.p_value * all as f64 >= LEVEL {
         let text =
             format!("{count} of {all} tests of the residuals failed, none clearly: among so many that may be chance");
-        section.because(Severity::Usable, text)
+        section
+            .because(Severity::Usable, text)
+            .says(format!("Of {all} tests so many may fail by chance. If it is none:"))
     } else {
         let Test { name, meaning, .. } = clearest;
         let text = format!("{count} of {all} tests of the residuals failed, clearest {name} on {of}: {meaning}");
