@@ -2,6 +2,8 @@
 //! REPS times and prints the process CPU time of one fit as a line of JSON: `cpu_med` the median, `cpu_first` that of the
 //! first one, which compiles the model.
 //!
+//! It shows no progress, which would take time of the process that is measured.
+//!
 //! The files hold little-endian `f64` rows `[ud, uq, w, id, iq]`; row k was measured at `k * 0.126 ms`.
 
 use greybox::optimize::{LevenbergMarquardt, Stop};

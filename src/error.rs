@@ -194,7 +194,7 @@ pub enum Error {
         remedy: &'static str,
     },
     /// A simulation that fails where the search was to start.
-    #[error("the start cannot be evaluated: {0}")]
+    #[error("{NO_START}: {0}")]
     Start(Failure),
     /// A simulation, asked for by itself, that fails.
     #[error("the simulation fails: {0}")]
@@ -246,10 +246,16 @@ pub struct Failure {
 /// Columns of a file that are listed; of more, those whose names are nearest to the one wanted.
 const LISTED: usize = 10;
 
+/// How the error of a start that cannot be simulated begins.
+pub(crate) const NO_START: &str = "the start cannot be evaluated";
+
 /// The columns that a file has, and what the list gives away.
 fn listed(columns: &[String], wanted: &str, signal: &str) -> String {
     let remedy = match columns {
-        [single] if single.contains([';', '\t', '|']) => "set what stands between cells with CsvFile::delimiter",
+        [single] if single.contains([';', '\t', '|']) => {
+            "set what stands between cells with CsvFile::delimiter, or CsvFile::decimal_comma where numbers are written as 1,5"
+        }
+        _ if columns.iter().any(|name| name.contains('\u{FFFD}')) => "the file is not UTF-8; save it as UTF-8",
         _ if columns.iter().all(|name| name.parse::<f64>().is_ok()) => "its first line must hold the names",
         _ if signal == "t" => "name another with CsvFile::column, or give CsvFile::sample_time",
         _ => "name another with CsvFile::column",
@@ -277,9 +283,17 @@ fn short(value: f64) -> String {
 
 /// What a text that is not a number gives away.
 fn number_hint(text: &str) -> &'static str {
-    match text.replacen(',', ".", 1).parse::<f64>() {
-        Ok(_) => "; for decimal commas there is CsvFile::decimal_comma",
-        Err(_) => "",
+    let only = |letters: &str| text.chars().all(|letter| letter.is_ascii_digit() || letters.contains(letter));
+    if text.replacen(',', ".", 1).parse::<f64>().is_ok() {
+        "; for decimal commas there is CsvFile::decimal_comma"
+    } else if !text.contains(|letter: char| letter.is_ascii_digit()) {
+        "; a row of units is skipped by CsvFile::units_row, and an output that is missing is empty, NaN, NA or null"
+    } else if only("+-.,' ") {
+        "; numbers have no separators of thousands"
+    } else if only("-/.:TZ+ ") {
+        "; time is a number, such as the seconds since the start: convert it, or give CsvFile::sample_time"
+    } else {
+        ""
     }
 }
 

@@ -26,7 +26,7 @@ pub fn acceleration() -> Result<Report> {
             better += usize::from(slow[0] < fast[0]) + usize::from(slow[1].abs() < fast[1].abs());
         }
         let columns = ["R ratio", "slow", "L err %", "slow", "Ke err %", "slow"];
-        let title = format!("RobotAxis {number}: full and low acceleration");
+        let title = format!("Axis {number}: full and low acceleration");
         report.table(title, &columns, rows.into_iter().step_by(3).collect());
         for (quantity, which, truth) in [("R / motor's R", 0, 1.0), ("error of L (%)", 1, 0.0)] {
             let of = |found: &[(f64, greybox::LinearEstimate<Winding>)]| {

@@ -11,7 +11,7 @@ pub fn write(folder: &Path, title: &str, figures: &[Figure]) -> Result<(), Box<d
     std::fs::create_dir_all(folder)?;
     let mut page = format!(
         "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\">\
-         <meta name=\"viewport\" content=\"width=device-width\"><title>{0}</title><style>{STYLE}</style><h1>{0}</h1>\n",
+         <meta name=\"viewport\" content=\"width=device-width\"><title>{0}</title><style>{STYLE}</style><main><h1>{0}</h1>\n",
         escaped(title)
     );
     for figure in figures {
@@ -22,7 +22,7 @@ pub fn write(folder: &Path, title: &str, figures: &[Figure]) -> Result<(), Box<d
             figure.name
         );
     }
-    std::fs::write(folder.join("index.html"), page + "</html>\n")?;
+    std::fs::write(folder.join("index.html"), page + "</main></html>\n")?;
     Ok(())
 }
 

@@ -73,7 +73,7 @@ fn table(report: &mut Report, compared: &Compared) {
         "Ke %",
     ];
     let rows = compared.both.iter().zip(&compared.grey_box).map(row).collect();
-    report.table(format!("RobotAxis {}, least squares and grey box per cycle", axis.number), &columns, rows);
+    report.table(format!("Axis {}, least squares and grey box per cycle", axis.number), &columns, rows);
 }
 
 fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
@@ -155,7 +155,7 @@ fn against_speed(report: &mut Report, all: &[Compared]) {
         };
         let caption = match name {
             "exp3-rs" => {
-                "All methods find two to three times the motor's resistance: cable and dead time are a part of it, the latter most at low speed. Least squares from q alone and from both equations coincide."
+                "All methods find two to three times the motor's resistance, at the lowest speeds up to seven times: cable and dead time are a part of it, the latter most at low speed. Least squares from q alone and from both equations coincide."
             }
             "exp3-ls" => {
                 "The inductance is found too large at low speed, where dead time is taken for it, and comes near its reference above."

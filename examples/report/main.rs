@@ -50,7 +50,9 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let stop = terminal::interrupted()?;
-    let mut lines = BufReader::new(File::open(&arguments.file)?).lines();
+    let mut lines =
+        BufReader::new(File::open(&arguments.file).map_err(|error| format!("{}: {error}", arguments.file.display()))?)
+            .lines();
     let header = lines.next().transpose()?.unwrap_or_default();
     let columns: Vec<&str> = header.split(',').map(str::trim).collect();
     let report = if ["qg", "vir"].iter().all(|name| columns.contains(name)) {

@@ -18,6 +18,15 @@ pub enum DataUse {
     Validation,
 }
 
+impl DataUse {
+    fn word(self) -> &'static str {
+        match self {
+            DataUse::Estimation => "estimation",
+            DataUse::Validation => "validation",
+        }
+    }
+}
+
 /// One record, and what each of several models predicts of it.
 ///
 /// ```
@@ -144,10 +153,7 @@ impl From<&[Compared]> for Section {
         let columns = ["record", "data", "output"].into_iter().chain(models.iter().copied()).map(str::to_owned);
         let mut table = Table { columns: columns.collect(), ..Table::new("Fit of each model", []) };
         for record in records {
-            let data = match record.part {
-                DataUse::Estimation => "estimation",
-                DataUse::Validation => "validation",
-            };
+            let data = record.part.word();
             for output in &record.outputs {
                 let fits = output.fit_percent();
                 let of = |model: &&str| {
@@ -192,6 +198,7 @@ impl Compared {
         let timeline = Timeline::new(self.outputs.iter().map(panel).collect(), &samples, NUMBERS, &[]);
         let title = format!("Measured and predicted outputs of {} over time, model by model", self.record);
         let name = identifier(&format!("compare-{}", self.record));
-        Plot::new(name, self.record.clone(), title, Drawing::Timeline(timeline))
+        let caption = format!("{} ({})", self.record, self.part.word());
+        Plot::new(name, caption, title, Drawing::Timeline(timeline))
     }
 }

@@ -50,8 +50,12 @@ impl fmt::Display for Summary {
         line(f, &figures, 0)?;
         let m = &self.method;
         let seconds = number(self.seconds, 2);
-        let search =
-            format!("{}: {} iterations, {} evaluations, {seconds} s", m.optimizer, self.iterations, self.evaluations);
+        let search = format!(
+            "{}: {}, {}, {seconds} s",
+            m.optimizer,
+            counted(self.iterations, "iteration"),
+            counted(self.evaluations, "evaluation")
+        );
         line(f, &search, 0)?;
         let said = ["loss", "weighting", "pre-filter"].into_iter().zip([&m.loss, &m.weighting, &m.prefilter]);
         let said: Vec<String> = said.map(|(name, value)| format!("{name} {value}")).collect();

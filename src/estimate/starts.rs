@@ -4,6 +4,9 @@ use crate::numeral::{counted, number};
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
+/// Names written out in a sentence.
+const NAMED: usize = 6;
+
 /// What searches from several starts found ([`Fit::starts`](crate::Fit::starts)).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -23,7 +26,8 @@ pub struct Starts {
 }
 
 /// A minimum that searches ended in. Ends are the same minimum if their costs differ by less than a part of 1e-6 and their
-/// unknowns, along what the data determine, by less than a tenth of a standard error.
+/// unknowns, along what the data determine, by less than a tenth of a standard error. Where the data leave unknowns
+/// undetermined, these are not compared.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Minimum {
@@ -33,7 +37,9 @@ pub struct Minimum {
     pub cost_ratio: f64,
     /// Searches that ended in it.
     pub searches: u64,
-    /// Names and values of the unknowns there.
+    /// Unknowns whose values differ between these searches' ends, because the data do not determine them.
+    pub undetermined: Vec<String>,
+    /// Names and values of the unknowns there, from the first of its searches.
     #[serde(with = "crate::real")]
     pub unknowns: Vec<(String, f64)>,
 }
@@ -49,6 +55,15 @@ pub struct FailedStart {
     pub reason: String,
 }
 
+/// The first names of a list, and how many more there are.
+fn listed(names: &[String]) -> String {
+    let shown = names.iter().take(NAMED).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+    match names.len().saturating_sub(NAMED) {
+        0 => shown,
+        more => format!("{shown} and {more} more"),
+    }
+}
+
 /// A cost relative to the estimate's, in words.
 pub(crate) fn times_the_cost(ratio: f64) -> String {
     match number(ratio, 3).as_str() {
@@ -60,7 +75,15 @@ pub(crate) fn times_the_cost(ratio: f64) -> String {
 impl fmt::Display for Starts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Starts { tried, agreed, minima, failed, .. } = self;
-        write!(f, "{agreed} of {} agree", counted(*tried, "start"))?;
+        let tried = counted(*tried, "start");
+        match minima.first().filter(|minimum| *agreed > 0 && !minimum.undetermined.is_empty()) {
+            Some(Minimum { undetermined, .. }) => {
+                let names = listed(undetermined);
+                write!(f, "{agreed} of {tried} ended at the same cost with other values of {names}")?;
+                f.write_str(", which the data do not determine")?;
+            }
+            None => write!(f, "{agreed} of {tried} agree")?,
+        }
         let others: &[Minimum] = if *agreed > 0 { &minima[1..] } else { minima };
         if let Some(next) = others.first() {
             let searches = others.iter().map(|minimum| minimum.searches).sum::<u64>();
@@ -72,7 +95,7 @@ impl fmt::Display for Starts {
         }
         match failed.len() {
             0 => Ok(()),
-            n => write!(f, ", {n} found none"),
+            n => write!(f, ", {n} found no minimum"),
         }
     }
 }

@@ -22,6 +22,16 @@ pub(crate) fn taking_part(direction: &[(usize, f64)]) -> impl Iterator<Item = (u
     direction.iter().copied().filter(move |(_, d)| d.abs() > PART * largest)
 }
 
+/// The unknowns that take part in any null direction.
+pub(crate) fn in_null_directions(linear: &Linearization) -> Vec<usize> {
+    let directions = undetermined(linear, &[]).directions;
+    let mut found: Vec<usize> =
+        directions.iter().flat_map(|direction| taking_part(direction)).map(|(i, _)| i).collect();
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
 /// A direction of the scaled unknowns as relative changes by name.
 pub(crate) fn named(
     unknowns: &Unknowns,

@@ -8,20 +8,11 @@ use crate::optimize::Severity;
 /// told apart.
 const INDISTINGUISHABLE: f64 = 3.84;
 
-/// Minima whose costs differ by less than this part have the same cost.
-const SAME_COST: f64 = 1e-6;
-
-/// Warnings about an estimate that is the best end of these searches; where the data leave some unknowns undetermined, ends of
-/// the same cost are one minimum.
-pub(super) fn warnings(starts: &Starts, measurements: u64, undetermined: bool) -> Vec<Warning> {
+/// Warnings about an estimate that is the best end of these searches.
+pub(super) fn warnings(starts: &Starts, measurements: u64) -> Vec<Warning> {
     let Starts { tried, agreed, minima, declared, failed, .. } = starts;
-    let alike = match undetermined {
-        true => minima.iter().take_while(|minimum| minimum.cost_ratio < 1.0 + SAME_COST).count(),
-        false => 1,
-    };
-    let found: u64 = minima.iter().take(alike).map(|minimum| minimum.searches).sum();
     let mut warnings = vec![];
-    if *agreed > 0 && found == 1 && *tried > 1 {
+    if *agreed == 1 && *tried > 1 {
         let (others, none) = (minima.len() - 1, counted(failed.len() as u64, "search"));
         let text = format!(
             "only one of {tried} starts led to this minimum ({none} found no minimum, {others} other(s) found): there may be \
@@ -34,7 +25,7 @@ pub(super) fn warnings(starts: &Starts, measurements: u64, undetermined: bool) -
         places.collect::<Vec<_>>().join(", ")
     };
     let rival = |minimum: &&Minimum| measurements as f64 * minimum.cost_ratio.ln() < INDISTINGUISHABLE;
-    if let Some(rival) = minima.iter().skip(alike).find(rival).filter(|_| *agreed > 0) {
+    if let Some(rival) = minima.iter().skip(1).find(rival).filter(|_| *agreed > 0) {
         let text = format!(
             "another minimum explains the data as well, with {}, at {}: bounds or a prior must tell which one is meant",
             times_the_cost(rival.cost_ratio),
@@ -42,7 +33,7 @@ pub(super) fn warnings(starts: &Starts, measurements: u64, undetermined: bool) -
         );
         warnings.push(Warning { code: WarningCode::RivalMinimum, severity: Severity::UsableWithCare, text });
     }
-    if let Some(declared) = declared.filter(|declared| *declared >= alike).and_then(|declared| minima.get(declared)) {
+    if let Some(declared) = declared.filter(|declared| *declared > 0).and_then(|declared| minima.get(declared)) {
         let text = format!(
             "the declared start leads to another minimum, with {}, at {}",
             times_the_cost(declared.cost_ratio),

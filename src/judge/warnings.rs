@@ -67,7 +67,7 @@ impl Judgement<'_> {
             warnings.push(Warning { code: WarningCode::NotAtMinimum, severity: Severity::NotUsable, text });
         }
         if let Some(starts) = &self.end.starts {
-            warnings.extend(super::starts::warnings(starts, self.residuals.measured, !directions.is_empty()));
+            warnings.extend(super::starts::warnings(starts, self.residuals.measured));
         }
         if let Some(write_error) = &self.end.write_error {
             let text = format!("the checkpoint could not be written ({write_error}); the search went on without it");

@@ -62,8 +62,9 @@ use std::path::{Path, PathBuf};
 /// **Cells** stand between commas, may be quoted, and may have white space around them. An output that was not measured
 /// is empty, `NaN`, `NA` or `null`; inputs and time are always there.
 ///
-/// **Lines** that begin with `#` are comments, blank lines nothing. The names stand on the first line that is neither,
-/// or in the last comment if numbers follow it at once (as numpy writes them).
+/// **Lines** that begin with `#` are comments; they are passed over, as are blank lines, and a line such as `sep=;` above the
+/// names. The names stand on the first other line, or in the last comment if numbers follow it at once (as numpy writes
+/// them).
 ///
 /// **Time** increases. If evenly, up to a millionth of a step (see [`Time::from_stamps`](crate::Time::from_stamps)), it is
 /// stored as [`Time::Uniform`](crate::Time::Uniform) and costs no memory. A static model needs no time: without a column

@@ -105,12 +105,16 @@ fn line(text: &mut String, cells: &[String], widths: &[usize]) {
     text.push('\n');
 }
 
-/// A row of a name and a text that may take several lines.
+/// A row of a name and a text that may take several lines; below the name, where that is long.
 fn entry(text: &mut String, cells: &[String], width: usize) {
     let [name, value] = cells else { return };
     let begin = (width + BETWEEN).min(WIDTH / 2);
     // Writing to a string does not fail.
-    let _ = writeln!(text, "{name:<0$}{1}", begin, wrapped(value, begin.max(columns_of(name)), begin));
+    let _ = if columns_of(name) + BETWEEN > begin {
+        writeln!(text, "{}\n    {}", wrapped(name, 0, 2), wrapped(value, 4, 4))
+    } else {
+        writeln!(text, "{name:<0$}{1}", begin, wrapped(value, begin, begin))
+    };
 }
 
 /// A row as its name and, below it, its cells with the names of their columns. Each stays on one line, if it fits.
@@ -174,6 +178,9 @@ mod tests {
             text.ends_with("\n\ncycle  load (N m)\n0             0.5\n1             0.5\n2             0.5"),
             "{text}"
         );
+        let text = "why it ended ".repeat(9);
+        let two = Table::new("", ["a", "b"]).row([long.repeat(3).as_str().into(), text.as_str().into()]).to_string();
+        assert!(widest(&two) <= WIDTH && two.lines().count() == 4, "{two}");
         let rows = (0..9u64).map(|k| ["k".into(), k.into()]);
         assert!(Table::new("", ["name", "k"]).rows(rows).at_most(4).to_string().ends_with("and 5 more"));
     }

@@ -2,6 +2,7 @@
 
 use greybox::diagnose::{Resampling, Test, bootstrap, profile, tested};
 use greybox::optimize::Severity;
+use greybox::pmsm::{Surface, Winding};
 use greybox::report::{Cell, Drawing, Origin, Section, Table, Timeline};
 use greybox::{
     Error, Experiment, ExperimentOf, Fit, Kind, Model, Nothing, Report, Scalar, Signals, Time, fixed, free, signals,
@@ -295,6 +296,21 @@ fn only_the_problem_of_the_fit_is_reported_on() {
     let shifted = Line { offset: free(0.3), ..line() };
     let other = refused(Report::new(&Fit::new(&Friction, &long).parameters(shifted).problem().unwrap(), &estimate));
     assert!(other.contains("the estimate is of another problem"), "{other}");
+}
+
+/// Two of 32 tests of the small motor record fail, the clearest with p = 0.003: above 1 % in 32.
+#[test]
+fn tests_that_may_fail_by_chance_are_called_so() {
+    let model = Surface::new(4).unwrap();
+    let record = Experiment::from_csv(&model, "examples/data/pmsm.csv").unwrap();
+    let parameters = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+    let problem = Fit::new(&model, &record).parameters(parameters).problem().unwrap();
+    let report = Report::new(&problem, &problem.run().unwrap()).unwrap();
+    let section = report.sections.iter().find(|section| section.id == "residuals").unwrap();
+    assert_eq!(section.severity, Severity::Usable);
+    let reason = "2 of 32 tests of the residuals failed, none clearly: among so many that may be chance";
+    assert_eq!(section.reasons[0].text, reason);
+    assert_eq!(section.sentences[0], "Of 32 tests so many may fail by chance. If it is none:");
 }
 
 #[test]

@@ -122,7 +122,7 @@ fn ripple_is_found() {
     assert!((period.seconds / 0.137 - 1.0).abs() < 1e-4, "{period:?}");
     assert!((period.amplitude - 0.1).abs() < 0.03, "{period:?}");
     assert!(
-        residuals.tests.iter().any(|t| t.name == "periodogram" && t.meaning.contains("0.136994 s")),
+        residuals.tests.iter().any(|t| t.name == "periodogram" && t.meaning.contains("every 0.13699 s (7.300 Hz)")),
         "{:?}",
         residuals.tests
     );

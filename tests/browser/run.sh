@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Checks reports in a headless browser, light and dark, at 375 and 1440 pixels: run.sh REPORT.html...
+# Checks reports, and sheets of figures (index.html), in a headless browser at 375 and 1440 pixels: run.sh REPORT.html...
 # Where there is no browser, no node, or no way to their packages, it says that nothing was checked, and passes.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
@@ -12,5 +12,8 @@ if [ ! -d "$here/node_modules/axe-core" ] || [ ! -d "$here/node_modules/playwrig
   npm ci --silent --no-audit --no-fund --prefix "$here" || skip 'npm could not fetch axe-core and playwright-core'
 fi
 for report in "$@"; do
-  timeout 300 node "$here/check.mjs" "$report"
+  case "$report" in
+    */index.html) timeout 300 node "$here/sheet.mjs" "$report" ;;
+    *) timeout 300 node "$here/check.mjs" "$report" ;;
+  esac
 done

@@ -135,6 +135,43 @@ fn minima_that_explain_the_data_alike_are_told_apart() {
     }
 }
 
+signals! { pub struct Loose { first: "1/s", second: "1/s", one: "1", other: "1" } }
+
+/// The same beside two unknowns of which only the product acts.
+struct DecaysBeside;
+
+impl Model for DecaysBeside {
+    type State = Nothing;
+    type Input = Clock;
+    type Output = Both;
+    type Parameters = Loose;
+    const KIND: Kind = Kind::Static;
+
+    fn output<S: Scalar>(&self, t: S, x: &Nothing, u: &Clock<S>, p: &Loose<S>) -> Both<S> {
+        let pair = Pair { first: p.first, second: p.second };
+        Both { y: Decays.output(t, x, u, &pair).y, line: p.one * p.other * u.now }
+    }
+}
+
+signals! { pub struct Both { y: "m", line: "1" } }
+
+/// Ends along a curve of equal cost are one minimum; two minima of equal cost that the data do tell apart remain two.
+#[test]
+fn undetermined_unknowns_do_not_hide_another_minimum() {
+    let input: Vec<Clock> = (0..100).map(|k| Clock { now: 0.05 * f64::from(k) }).collect();
+    let time = Time::Uniform { start: 0.0, step: 0.05 };
+    let truth = Loose { first: 0.5, second: 3.0, one: 2.0, other: 0.5 };
+    let run = Simulator::new(&DecaysBeside).run(&truth, &Nothing {}, time, &input).unwrap();
+    let record = run.with_noise(Both { y: 0.02, line: 0.02 }, 3).experiment(&DecaysBeside).unwrap();
+    let within = |start: f64| free(start).within(0.1, 10.0);
+    let parameters = Loose { first: within(1.0), second: within(2.0), one: within(1.0), other: within(1.5) };
+    let fit = Fit::new(&DecaysBeside, &record).parameters(parameters).starts(20).run().unwrap();
+    let starts = fit.starts.as_ref().unwrap();
+    assert_eq!(starts.minima.len(), 2, "{starts:?}");
+    assert!(starts.minima.iter().all(|minimum| minimum.searches > 1 && minimum.undetermined == ["one", "other"]));
+    assert!(fit.warnings.iter().any(|one| one.code == WarningCode::RivalMinimum), "{fit}");
+}
+
 /// Priors and bounds hold; what has neither stays within a factor of ten, on its side of zero.
 #[test]
 fn starts_are_drawn_from_what_is_known() {

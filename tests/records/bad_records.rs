@@ -65,7 +65,14 @@ fn not_a_number() {
     says(comma, &["line 2", "`ud`", "`1,5`", "CsvFile::decimal_comma"]);
     let renamed = CsvFile::new(file("x.csv", "t,u,w,id,iq\n0,x,2,3,4\n")).column("ud", "u").read(&Pmsm);
     says(renamed, &["line 2", "column `u`", "`x`"]);
-    refused("units.csv", "t,ud,w,id,iq\ns,V,rad/s,A,A\n0,1,2,3,4\n", &["line 2", "`t`", "`s`"]);
+    let units = ["line 2", "`t`", "`s`", "CsvFile::units_row"];
+    refused("units.csv", "t,ud,w,id,iq\ns,V,rad/s,A,A\n0,1,2,3,4\n", &units);
+    refused("dash.csv", "t,ud,w,id,iq\n0,1,2,---,4\n", &["line 2", "`---`", "is empty, NaN, NA or null"]);
+    refused("date.csv", "t,ud,w,id,iq\n2026-03-01 12:00:00,1,2,3,4\n", &["line 2", "`t`", "CsvFile::sample_time"]);
+    let thousands = CsvFile::new(file("thousands.csv", "t;ud;w;id;iq\n0;1.234,5;2;3;4\n"));
+    says(thousands.decimal_comma().read(&Pmsm), &["line 2", "`1.234,5`", "separators of thousands"]);
+    let latin = Experiment::from_csv(&Pmsm, file("latin.csv", b"t,ud,w,F\xfcllstand,iq\n0,1,2,3,4\n"));
+    says(latin, &["no column `id`", "not UTF-8"]);
     let long = CsvFile::new(file("long.csv", format!("t;ud;w;id;iq\n0;{};2;3;4\n", "1".repeat(65))));
     says(long.decimal_comma().read(&Pmsm), &["line 2", "`ud`"]);
 }

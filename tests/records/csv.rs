@@ -50,6 +50,9 @@ fn reads_what_instruments_write() {
         ("crlf", plain.replace('\n', "\r\n"), CsvFile::new),
         ("no_last_newline", plain.trim_end().to_owned(), CsvFile::new),
         ("byte_order_mark", format!("\u{feff}{plain}"), CsvFile::new),
+        ("spreadsheet", format!("\u{feff}sep=;\r\n{}", plain.replace(',', ";")), |path| {
+            CsvFile::new(path).delimiter(b';')
+        }),
         ("spaces", plain.replace(',', " ,  "), CsvFile::new),
         ("quotes", plain.replace("1.5", "\" 1.5 \"").replace("ud", "\"ud\""), CsvFile::new),
         ("missing_nan", plain.replace(",,", ",NaN,"), CsvFile::new),

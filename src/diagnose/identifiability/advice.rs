@@ -23,7 +23,7 @@ pub(super) fn advice(found: &Identifiability, unknowns: &[Unknown], records: &[R
     if found.generic_rank < n {
         advice.push(format!(
             "wherever the parameters lie, the sensitivities to the {n} unknowns have rank {}: with these inputs and outputs no \
-             record tells all of them apart; fix {}, or measure or excite something else",
+             record tells all of them apart; fix {} of them, or measure a further signal",
             found.generic_rank,
             n - found.generic_rank
         ));

@@ -112,13 +112,14 @@ pub(super) fn find(residuals: &Series, step: f64) -> (Spectrum, Option<Period>, 
         amplitude: 2.0 * power[k].sqrt() / residuals.count as f64,
         share: (2.0 * power[k] / (energy * residuals.count as f64)).min(1.0),
     };
-    // The place of a line is known to the distance between lines, at least.
+    // The place of a line is known to the distance between lines, at least: that is the last digit.
     let lines = (n as f64 * step).recip();
+    let last_digit = 10.0 * lines;
     let failed = format!(
         "the residuals repeat every {} s ({} Hz): look for what turns or switches at that rate (cogging, eccentricity, \
          sampling, mains) and model it, or leave it out with a pre-filter",
-        resolved(period.seconds, lines * period.seconds.powi(2)),
-        resolved(period.frequency, lines)
+        resolved(period.seconds, last_digit * period.seconds.powi(2)),
+        resolved(period.frequency, last_digit)
     );
     let test = Test::new("periodogram", excess, p_value, "no period stands out", &failed);
     (gathered(&power, grid, n, step), (!test.passed && k > 0).then_some(period), test)

@@ -1,7 +1,7 @@
 //! Which ends of searches are the same minimum, and which is the best.
 
 use crate::estimate::{FailedStart, Minimum, Starts};
-use crate::judge::{SearchEnd, noise};
+use crate::judge::{SearchEnd, in_null_directions, noise};
 use crate::optimize::{LeastSquares, Linearization, Outcome};
 use crate::problem::{Noise, Objective, each};
 
@@ -89,15 +89,19 @@ impl<'s> End<'s> {
         }
     }
 
-    /// Whether another end, not a better one, is the same minimum.
-    fn is(&self, other: &End<'_>, comparison: &Comparison) -> bool {
+    /// Whether another end, not a better one, has the same cost.
+    fn costs_as_much_as(&self, other: &End<'_>, comparison: &Comparison) -> bool {
         let both_exact = [self, other].iter().all(|end| end.search.outcome == Outcome::Exact);
         let tolerance = self.tolerance().max(other.tolerance());
-        if !both_exact && comparison.ratio(other.level, self.level) > 1.0 + tolerance {
-            return false;
-        }
+        both_exact || comparison.ratio(other.level, self.level) <= 1.0 + tolerance
+    }
+
+    /// Whether another end of the same cost is at the same place, along what the data determine to first order; the unknowns
+    /// that they leave undetermined may be anywhere.
+    fn is_at(&self, other: &End<'_>, undetermined: &[usize]) -> bool {
         let (x, other) = (&self.search.coordinates, &other.search.coordinates);
-        let step: Vec<f64> = other.iter().zip(x).map(|(b, a)| b - a).collect();
+        let mut step: Vec<f64> = other.iter().zip(x).map(|(b, a)| b - a).collect();
+        undetermined.iter().for_each(|&j| step[j] = 0.0);
         let slope: f64 = self.linear.gradient().iter().zip(&step).map(|(g, d)| g * d).sum();
         // Norm of the change of the predictions.
         let change = (-2.0 * (slope + self.linear.predicted_reduction(&step))).max(0.0).sqrt();
@@ -105,6 +109,50 @@ impl<'s> End<'s> {
         let digits: f64 = self.linear.column_norms().iter().zip(x).map(|(norm, x)| norm * x.abs()).sum();
         change <= SAME_ERRORS * sigma + SAME_DIGITS * digits
     }
+}
+
+/// Ends that are one minimum.
+struct Kind<'e> {
+    /// Which searches; that of the lowest cost first, at last that of the first start.
+    searches: Vec<usize>,
+    first: &'e End<'e>,
+    /// What the data do not determine at the first end.
+    undetermined: Vec<usize>,
+}
+
+impl Kind<'_> {
+    /// Whether an end of no lower cost is this minimum. Undetermined unknowns are not compared: along a curve of equal cost,
+    /// such as that of a constant product, a first-order comparison would call each end another minimum.
+    fn holds(&self, end: &End<'_>, comparison: &Comparison) -> bool {
+        self.first.costs_as_much_as(end, comparison) && self.first.is_at(end, &self.undetermined)
+    }
+
+    /// The undetermined unknowns whose values differ between the ends.
+    fn differing(&self, found: &[Option<End<'_>>], values: impl Fn(&[f64]) -> Vec<f64>) -> Vec<usize> {
+        let ends = self.searches.iter().filter_map(|&i| found[i].as_ref());
+        let values: Vec<Vec<f64>> = ends.map(|end| values(&end.search.coordinates)).collect();
+        let differs = |j: &usize| {
+            let (low, high) = values
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x[*j]), high.max(x[*j])));
+            high - low > SAME_DIGITS * low.abs().max(high.abs())
+        };
+        self.undetermined.iter().copied().filter(differs).collect()
+    }
+}
+
+/// The minima among ends in this order of their costs.
+fn kinds<'e>(comparison: &Comparison, ends: impl Iterator<Item = (usize, &'e End<'e>)>) -> Vec<Kind<'e>> {
+    let mut kinds: Vec<Kind<'e>> = vec![];
+    for (i, end) in ends {
+        match kinds.iter_mut().find(|kind| kind.holds(end, comparison)) {
+            Some(kind) => kind.searches.push(i),
+            None => kinds.push(Kind { searches: vec![i], first: end, undetermined: in_null_directions(&end.linear) }),
+        }
+    }
+    // The first start's end stands for all: the declared one's, wherever it is one of them.
+    kinds.iter_mut().for_each(|kind| kind.searches.sort_unstable());
+    kinds
 }
 
 /// What the searches found: the ends in the order of the starts, each a search or why there is none.
@@ -125,23 +173,21 @@ pub(super) fn found(
     let best =
         order.iter().copied().find(minimum).filter(|&i| comparison.ratio(level(i), level(lowest)) <= 1.0 + SAME_COST);
     let best = best.unwrap_or(lowest);
-    let mut kinds: Vec<Vec<usize>> = vec![];
-    for &i in order.iter().filter(|i| minimum(i)) {
-        let Some(end) = &found[i] else { continue };
-        let is = |kind: &&mut Vec<usize>| found[kind[0]].as_ref().is_some_and(|first| first.is(end, &comparison));
-        match kinds.iter_mut().find(is) {
-            Some(kind) => kind.push(i),
-            None => kinds.push(vec![i]),
-        }
-    }
-    // Of ends that are the same minimum the first start's stands for all: the declared one's, wherever it is one of them.
-    kinds.iter_mut().for_each(|kind| kind.sort_unstable());
-    let best = kinds.iter().find(|kind| kind.contains(&best)).map_or(best, |kind| kind[0]);
-    let named = |x: &[f64]| plain.names().into_iter().zip(plain.problem.unknowns.values(x)).collect::<Vec<_>>();
+    let ended = order.iter().filter(|i| minimum(i)).filter_map(|&i| Some((i, found[i].as_ref()?)));
+    let kinds = kinds(&comparison, ended);
+    let of_best = kinds.iter().find(|kind| kind.searches.contains(&best));
+    let best = of_best.map_or(best, |kind| kind.searches[0]);
+    let agreed = of_best.map_or(0, |kind| kind.searches.len()) as u64;
+    let (names, values) = (plain.names(), |x: &[f64]| plain.problem.unknowns.values(x));
+    let named = |x: &[f64]| names.iter().cloned().zip(values(x)).collect::<Vec<_>>();
     let minima = kinds.iter().filter_map(|kind| {
-        let end = found[kind[0]].as_ref()?;
-        let cost_ratio = comparison.ratio(end.level, level(best));
-        Some(Minimum { cost_ratio, searches: kind.len() as u64, unknowns: named(&end.search.coordinates) })
+        let end = found[kind.searches[0]].as_ref()?;
+        Some(Minimum {
+            cost_ratio: comparison.ratio(end.level, level(best)),
+            searches: kind.searches.len() as u64,
+            undetermined: kind.differing(&found, values).into_iter().map(|j| names[j].clone()).collect(),
+            unknowns: named(&end.search.coordinates),
+        })
     });
     let failed = starts.iter().zip(ends).filter_map(|(start, end)| {
         let reason = match end {
@@ -151,9 +197,8 @@ pub(super) fn found(
         };
         Some(FailedStart { start: named(start), reason })
     });
-    let agreed = kinds.iter().find(|kind| kind.contains(&best)).map_or(0, Vec::len) as u64;
     let evaluations = ends.iter().flatten().map(|end| end.evaluations).sum();
-    let declared = kinds.iter().position(|kind| kind.contains(&0));
+    let declared = kinds.iter().position(|kind| kind.searches.contains(&0));
     let starts = Starts {
         tried: starts.len() as u64,
         agreed,

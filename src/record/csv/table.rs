@@ -53,7 +53,7 @@ impl Table {
             let text = line.trim_ascii();
             if text.first() == Some(&file.comment) {
                 remark = Some(text[1..].to_vec());
-            } else if !text.is_empty() {
+            } else if !text.is_empty() && !names_separator(text) {
                 break;
             }
         }
@@ -108,6 +108,11 @@ impl Table {
     pub(super) fn cell(&self, column: usize) -> &[u8] {
         self.row.get(column).unwrap_or_default().trim_ascii()
     }
+}
+
+/// Whether a line above the names tells a spreadsheet what stands between the cells, as in `sep=;`.
+fn names_separator(text: &[u8]) -> bool {
+    text.len() <= 5 && text.get(..4).is_some_and(|begin| begin.eq_ignore_ascii_case(b"sep="))
 }
 
 /// How the cells of a file stand in a line.

@@ -147,7 +147,7 @@ impl Scale {
 
 fn power_label(part: f64, power: i32) -> String {
     match power {
-        -2..=3 => format!("{}", part * 10f64.powi(power)).chars().take(6).collect(),
+        -3..=3 => format!("{}", part * 10f64.powi(power)).chars().take(6).collect(),
         _ => format!("{part}e{power}").replace('-', "−"),
     }
 }
@@ -215,6 +215,7 @@ mod tests {
         let label = |from, to| scale(from, to).ticks().into_iter().map(|tick| tick.label).collect::<Vec<_>>().join(" ");
         assert_eq!(label(1e-6, 1e2), "1e−6 1e−4 0.01 1 100");
         assert_eq!(label(0.9, 6.0), "1 2 5");
+        assert_eq!(label(3e-3, 3e-2), "0.005 0.01 0.02");
         assert!((scale(1e-2, 1e2).at(1.0) - 0.5).abs() < 1e-12 && scale(1e-2, 1e2).at(0.0) == f64::NEG_INFINITY);
     }
 }

@@ -34,15 +34,15 @@ fn records(facts: &Facts) -> Table {
     let named = facts.records.iter().take(1).flat_map(|record| &record.fits).take(OUTPUTS);
     let fits = named.map(|fit| format!("fit of {}", fit.name));
     let more = (outputs > OUTPUTS).then(|| "worst fit".to_owned());
-    let columns =
-        ["record", "samples", "duration (s)"].map(str::to_owned).into_iter().chain(fits).chain(more).collect();
+    let length = ["samples", "duration (s)"];
+    let columns = ["record".to_owned()].into_iter().chain(fits).chain(more).chain(length.map(str::to_owned)).collect();
     let mut order: Vec<&Record> = facts.records.iter().collect();
     order.sort_by(|a, b| worst(a).total_cmp(&worst(b)));
     let row = |record: &&Record| {
         let fits = record.fits.iter().take(OUTPUTS).map(|fit| Cell::fit(fit.fit_percent));
         let more = (outputs > OUTPUTS).then(|| Cell::fit(Some(worst(record)).filter(|fit| fit.is_finite())));
-        let head = [record.name.as_str().into(), record.samples.into(), Cell::number(record.end - record.begin, 4)];
-        head.into_iter().chain(fits).chain(more).collect::<Vec<_>>()
+        let length = [record.samples.into(), Cell::number(record.end - record.begin, 4)];
+        [record.name.as_str().into()].into_iter().chain(fits).chain(more).chain(length).collect::<Vec<_>>()
     };
     let table = Table { columns, ..Table::new("Records, the worst first", []) };
     table.rows(order.iter().map(row)).at_most(SHOWN)

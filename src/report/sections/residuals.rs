@@ -28,7 +28,9 @@ pub(super) fn section(facts: &Facts) -> Option<Section> {
     let section = if clearest.p_value * all as f64 >= LEVEL {
         let text =
             format!("{count} of {all} tests of the residuals failed, none clearly: among so many that may be chance");
-        section.because(Severity::Usable, text)
+        section
+            .because(Severity::Usable, text)
+            .says(format!("Of {all} tests so many may fail by chance. If it is none:"))
     } else {
         let Test { name, meaning, .. } = clearest;
         let text = format!("{count} of {all} tests of the residuals failed, clearest {name} on {of}: {meaning}");
@@ -233,7 +235,7 @@ fn spectrum(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
     };
     let drawing =
         Curves { x: Axis::new("frequency", "Hz").from(0.0), y: Axis::new("power density", unit).logarithmic(), layers };
-    let caption = "Spectrum: mean power density, thin the greatest; that of white residuals is flat";
+    let caption = "Spectrum: mean power density, and (thin) the greatest in each column; flat for white residuals";
     let title = format!("Spectrum of the residual of {} of {}", fit.name, record.name);
     let plot = Plot::new(format!("spectrum-{id}-{}", fit.name), caption, title, Drawing::Curves(drawing));
     (of.frequency.len() > 1).then_some(plot)

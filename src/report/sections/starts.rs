@@ -1,6 +1,7 @@
 //! The minima that searches from several starts found.
 
-use crate::estimate::{Minimum, Starts};
+use crate::error::NO_START;
+use crate::estimate::{FailedStart, Minimum, Starts};
 use crate::numeral::number;
 use crate::report::facts::Facts;
 use crate::section::{Axis, Cell, Curves, Drawing, Layer, Plot, Section, Style, Table};
@@ -21,9 +22,12 @@ pub(super) fn section(facts: &Facts) -> Option<Section> {
         Some(_) => section,
         None => section.says("The search from the declared start found no minimum.".to_owned()),
     };
-    let section = match facts.estimate.directions.is_empty() {
-        true => section,
-        false => section.says("Minima of the same cost may differ along what the data do not determine only."),
+    let refused = |failed: &FailedStart| failed.reason.starts_with(NO_START);
+    let section = match starts.failed.iter().any(refused) {
+        true => {
+            section.says("Narrower bounds keep the starts away from where the model cannot be simulated.".to_owned())
+        }
+        false => section,
     };
     let section = section.table(minima(starts)).table(places(starts));
     Some(section.table(failed(starts)).plot(waterfall(&starts.minima)))
@@ -58,8 +62,9 @@ fn places(starts: &Starts) -> Table {
 }
 
 fn failed(starts: &Starts) -> Table {
-    let rows = starts.failed.iter().map(|failed| [failed.reason.replace('`', "'").as_str().into(), at(&failed.start)]);
-    Table::new("Searches that found no minimum", ["why", "began at"]).rows(rows).at_most(LISTED)
+    let why = |reason: &str| reason.split("; ").next().unwrap_or(reason).replace('`', "'");
+    let rows = starts.failed.iter().map(|failed| [at(&failed.start), why(&failed.reason).as_str().into()]);
+    Table::new("Searches that found no minimum", ["began at", "why"]).rows(rows).at_most(LISTED)
 }
 
 fn waterfall(minima: &[Minimum]) -> Option<Plot> {
