@@ -3,6 +3,7 @@
 mod bounds;
 mod color;
 mod conclude;
+mod coupling;
 mod covariances;
 mod curved;
 mod data;
