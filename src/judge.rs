@@ -9,6 +9,7 @@ mod curved;
 mod data;
 mod data_noise;
 mod directions;
+mod dropouts;
 mod explained;
 mod hac;
 mod known;

@@ -46,8 +46,9 @@ impl Judgement<'_> {
     fn for_colored_errors(&self, unit: &Covariance) -> Option<CoordinateCovariance> {
         let hac = hac(self.objective, &self.end.coordinates, self.linear, (&self.exact, unit))?;
         let widened = self.residuals.measured as f64 / self.degrees.max(1.0);
-        let covariance = Some(hac.covariance(&self.exact, widened)?);
-        let degrees = hac.degrees(self.objective, unit).into_iter().map(|degrees| degrees.min(self.degrees));
+        let degrees = hac.degrees(self.objective, unit);
+        let covariance = Some(hac.covariance(&self.exact, widened, &degrees, self.coupled().is_some())?);
+        let degrees = degrees.into_iter().map(|degrees| degrees.min(self.degrees));
         let method = CovarianceMethod::Hac { lags: hac.lags as u64 };
         Some(CoordinateCovariance { covariance, method, factor: 1.0, degrees: degrees.collect() })
     }

@@ -26,6 +26,8 @@ use scores::{EachScore, Lagged, MovingSums};
 const LARGEST: f64 = 0.97;
 /// Longest window by the rule for long records.
 const LONGEST: f64 = 500.0;
+/// Standard deviations by which a variance by moving sums must be above that of stationary errors to be taken instead.
+const CERTAIN: f64 = 2.0;
 /// Rows that are absorbed together.
 const ROWS: usize = 256;
 
@@ -73,16 +75,22 @@ pub(crate) fn hac(
 }
 
 impl Hac {
-    /// The covariance of all unknowns that are not held: by the moving sums, with each standard error no smaller than that of
-    /// stationary errors; `widened` multiplies the variance of the latter.
-    pub fn covariance(&self, held: &[bool], widened: f64) -> Option<Covariance> {
+    /// The covariance of all unknowns that are not held. The standard errors are those of stationary errors, but where the moving
+    /// sums say more by over [`CERTAIN`] standard deviations of what they say (`degrees` of freedom), as they do for errors
+    /// whose size follows the slopes; or by anything at all, where the errors of several outputs are `coupled`. `widened`
+    /// multiplies the variance of stationary errors.
+    pub fn covariance(&self, held: &[bool], widened: f64, degrees: &[f64], coupled: bool) -> Option<Covariance> {
         let found = self.sandwich.covariance(held)?;
         let Some(stationary) = self.stationary.as_ref().and_then(|sandwich| sandwich.covariance(held)) else {
             return Some(found);
         };
-        let ratio = |i: usize| widened.sqrt() * stationary.standard_error(i) / found.standard_error(i);
-        let factors: Vec<f64> =
-            (0..held.len()).map(|i| Some(ratio(i)).filter(|r| r.is_finite()).unwrap_or(1.0).max(1.0)).collect();
+        let factor = |i: usize| {
+            let ratio = widened.sqrt() * stationary.standard_error(i) / found.standard_error(i);
+            let certain = if coupled { 0.0 } else { CERTAIN * (2.0 / degrees[i]).sqrt() };
+            let taken = ratio.is_finite() && (1.0 + certain) * ratio * ratio >= 1.0;
+            if taken { ratio } else { 1.0 }
+        };
+        let factors: Vec<f64> = (0..held.len()).map(factor).collect();
         Some(found.scaled(&factors))
     }
 
