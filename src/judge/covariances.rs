@@ -45,9 +45,8 @@ impl Judgement<'_> {
 
     fn for_colored_errors(&self, unit: &Covariance) -> Option<CoordinateCovariance> {
         let hac = hac(self.objective, &self.end.coordinates, self.linear, (&self.exact, unit))?;
-        let widened = self.residuals.measured as f64 / self.degrees.max(1.0);
         let degrees = hac.degrees(self.objective, unit);
-        let covariance = Some(hac.covariance(&self.exact, widened, &degrees, self.coupled().is_some())?);
+        let covariance = Some(hac.covariance(&self.exact, &degrees, self.coupled().is_some())?);
         let degrees = degrees.into_iter().map(|degrees| degrees.min(self.degrees));
         let method = CovarianceMethod::Hac { lags: hac.lags as u64 };
         Some(CoordinateCovariance { covariance, method, factor: 1.0, degrees: degrees.collect() })

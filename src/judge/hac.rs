@@ -67,7 +67,7 @@ pub(crate) fn hac(
         }
         scores
     };
-    let stationary = stationary::scores(objective, coordinates).ok()?;
+    let stationary = stationary::scores(objective, coordinates, inverse).ok()?;
     let stationary = stationary.map(|scores| found.with(with_priors(scores)));
     let scores = runs.iter().enumerate().map(|(e, run)| run.triangle(unknowns.columns(e).count())).collect();
     let lags = runs.iter().map(|run| run.window.saturating_sub(1)).max().unwrap_or(0);
@@ -77,15 +77,14 @@ pub(crate) fn hac(
 impl Hac {
     /// The covariance of all unknowns that are not held. The standard errors are those of stationary errors, but where the moving
     /// sums say more by over [`CERTAIN`] standard deviations of what they say (`degrees` of freedom), as they do for errors
-    /// whose size follows the slopes; or by anything at all, where the errors of several outputs are `coupled`. `widened`
-    /// multiplies the variance of stationary errors.
-    pub fn covariance(&self, held: &[bool], widened: f64, degrees: &[f64], coupled: bool) -> Option<Covariance> {
+    /// whose size follows the slopes; or by anything at all, where the errors of several outputs are `coupled`.
+    pub fn covariance(&self, held: &[bool], degrees: &[f64], coupled: bool) -> Option<Covariance> {
         let found = self.sandwich.covariance(held)?;
         let Some(stationary) = self.stationary.as_ref().and_then(|sandwich| sandwich.covariance(held)) else {
             return Some(found);
         };
         let factor = |i: usize| {
-            let ratio = widened.sqrt() * stationary.standard_error(i) / found.standard_error(i);
+            let ratio = stationary.standard_error(i) / found.standard_error(i);
             let certain = if coupled { 0.0 } else { CERTAIN * (2.0 / degrees[i]).sqrt() };
             let taken = ratio.is_finite() && (1.0 + certain) * ratio * ratio >= 1.0;
             if taken { ratio } else { 1.0 }

@@ -8,21 +8,30 @@
 //! record. (In which direction does not matter: a stationary sequence has the same covariances backward.)
 
 use super::ROWS;
-use crate::information::{Block, Information};
+use crate::information::{Block, Covariance, Information};
+use crate::judge::sandwich::{ALONE, form, of_experiment};
 use crate::optimize::Infeasible;
 use crate::problem::{Accumulate, Objective, each};
 use crate::sweep::Window;
 use crate::whiteness::Autocorrelation;
+use nalgebra::DMatrix;
 use std::collections::VecDeque;
 
 /// Highest order.
 const ORDER: usize = 20;
 /// The part of an impulse response's sum of squares that is left out, and its greatest length.
-const REST: f64 = 1e-4;
+const REST: f64 = 1e-8;
 const LONGEST: usize = 1000;
+/// An experiment with fewer measurements of an output takes the autoregression of all experiments together.
+const OWN: u64 = 100;
 
-/// Triangles of such scores, one per experiment over its columns; `None` where variances are predicted.
-pub(super) fn scores(objective: &Objective<'_>, coordinates: &[f64]) -> Result<Option<Vec<Information>>, Infeasible> {
+/// Triangles of such scores, one per experiment over its columns, by the inverse of the curvature; `None` where variances are
+/// predicted.
+pub(super) fn scores(
+    objective: &Objective<'_>,
+    coordinates: &[f64],
+    inverse: &Covariance,
+) -> Result<Option<Vec<Information>>, Infeasible> {
     if objective.sweep.predicts_variance() {
         return Ok(None);
     }
@@ -30,23 +39,28 @@ pub(super) fn scores(objective: &Objective<'_>, coordinates: &[f64]) -> Result<O
     let make = |experiment: usize| Errors {
         objective,
         experiment,
+        inverse: of_experiment(objective, inverse, experiment),
         sums: vec![(Autocorrelation::new(ORDER), 0); outputs],
         run: vec![],
     };
-    let mut all = objective.gather(coordinates, false, make)?.into_iter();
-    let Some(Errors { mut sums, .. }) = all.next() else { return Ok(None) };
-    for one in all {
-        for ((sums, count), (other, more)) in sums.iter_mut().zip(&one.sums) {
-            sums.append(other);
+    let all = objective.gather(coordinates, true, make)?;
+    let mut together = vec![(Autocorrelation::new(ORDER), 0); outputs];
+    for one in &all {
+        for ((sums, count), (own, more)) in together.iter_mut().zip(&one.sums) {
+            sums.append(own);
             *count += more;
         }
     }
-    let models: Vec<Autoregression> = sums.iter().map(|(sums, count)| Autoregression::of(sums, *count)).collect();
     let one = |e: usize| {
+        let own = all[e].sums.iter().zip(&together);
+        let models: Vec<Autoregression> = own
+            .map(|(own, together)| if own.1 < OWN { together } else { own })
+            .map(|(sums, count)| Autoregression::of(sums, *count))
+            .collect();
         let make = || Passed::new(objective, e, &models);
         Some(objective.gather_one(coordinates, e, true, make).ok()?.triangle())
     };
-    Ok(each(objective.experiments(), one).into_iter().collect())
+    Ok(each(all.len(), one).into_iter().collect())
 }
 
 /// `e[t] = sum over k of a[k] e[t - 1 - k]`, and an innovation.
@@ -100,10 +114,13 @@ fn length(coefficients: &[f64]) -> usize {
     LONGEST - response.iter().rev().take_while(short).count()
 }
 
-/// Autocorrelations of the influences of each output's measurements, one after the other, and their number.
+/// Autocorrelations of the influences of each output's measurements, one after the other, and their number. Errors of a fit
+/// are smaller than the noise, their variance by one less their leverage, by whose root each is divided.
 struct Errors<'e> {
     objective: &'e Objective<'e>,
     experiment: usize,
+    /// The inverse of the curvature in all columns of the experiment.
+    inverse: DMatrix<f64>,
     sums: Vec<(Autocorrelation, u64)>,
     run: Vec<f64>,
 }
@@ -111,14 +128,17 @@ struct Errors<'e> {
 impl Accumulate for Errors<'_> {
     fn add(&mut self, window: &Window, lane: usize) {
         let (objective, loss) = (self.objective, self.objective.loss());
+        let mut slopes = vec![0.0; self.inverse.nrows()];
         for (j, (sums, count)) in self.sums.iter_mut().enumerate() {
-            let influence = |k: usize| {
-                let z = window.error(k, j, lane);
-                objective.weight(self.experiment, window.begin[lane] + k).sqrt() * loss.map_or(z, |loss| loss.psi(z))
+            let mut influence = |k: usize| {
+                let (z, weight) = (window.error(k, j, lane), objective.weight(self.experiment, window.begin[lane] + k));
+                slopes.iter_mut().enumerate().for_each(|(c, slope)| *slope = window.at(k, j, c, lane));
+                let less = (1.0 - weight * form(&self.inverse, &slopes)).max(ALONE);
+                (weight / less).sqrt() * loss.map_or(z, |loss| loss.psi(z))
             };
             self.run.clear();
             let measured = (0..window.samples[lane]).filter(|&k| window.is_measured(k, j, lane));
-            self.run.extend(measured.map(influence));
+            self.run.extend(measured.map(&mut influence));
             *count += self.run.len() as u64;
             sums.add(&self.run);
         }
@@ -241,7 +261,7 @@ mod tests {
     use super::*;
 
     /// `e[t] = 0.8 e[t - 1] + w[t]` with innovations of unit variance; the impulse response `0.8^t`, whose squares are
-    /// `0.64^t`, has 1e-4 of them left after `ln 1e-4 / ln 0.64 = 20.6` samples.
+    /// `0.64^t`, has 1e-8 of them left after `ln 1e-8 / ln 0.64 = 41.3` samples.
     #[test]
     fn an_autoregression_by_its_autocorrelations() {
         let mut e = vec![0.0; 20_000];
@@ -255,7 +275,7 @@ mod tests {
         // Standard deviation of the coefficient: sqrt((1 - 0.64) / 20,000) = 0.0042; of the innovations' 0.005.
         assert!((found.coefficients[0] - 0.8).abs() < 0.02, "{:?}", found.coefficients);
         assert!((found.fresh - 1.0).abs() < 0.02, "{}", found.fresh);
-        assert_eq!(length(&[0.8]), 21);
+        assert_eq!(length(&[0.8]), 42);
         assert_eq!(length(&[]), 1);
     }
 }

@@ -33,7 +33,7 @@ pub fn all() -> Vec<Case> {
         case("armature, AR(1) 0.5, 500", short, |r| armature(r, 500, 0.5)),
         case("lag, AR(1) 0.5, 500, initial state free", wide, |r| begun(r, 0.5, 1)),
         case("lag, AR(1) 0.9, 500, initial state free", short, |r| begun(r, 0.9, 1)),
-        case("lag, AR(1) 0.9, 500 of 2500 measured", wide, |r| begun(r, 0.9, 5)),
+        case("lag, AR(1) 0.9, 500 of 2500 measured", slow, |r| begun(r, 0.9, 5)),
         case("two outputs with one noise, 200", wide, one_noise),
         warned(WarningCode::CurvedInterval, "tau poorly known", |r| poorly(r, false)),
         case("tau poorly known, by logarithm", (91.0, 97.0), |r| poorly(r, true)),
