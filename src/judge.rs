@@ -3,11 +3,13 @@
 mod bounds;
 mod color;
 mod conclude;
+mod coupling;
 mod covariances;
 mod curved;
 mod data;
 mod data_noise;
 mod directions;
+mod dropouts;
 mod explained;
 mod hac;
 mod known;

@@ -21,6 +21,7 @@
 //! | [`motor`] | constants from geometry | units |
 //! | [`temperature`] | winding and magnet laws, temperatures read back from estimates | |
 //! | [`Surface`], [`Salient`], [`Saturated`], [`Shaft`] | the equations, each a [`Model`](crate::Model) | frames |
+//! | `FluxMapped` | a motor with a measured flux map (with `std`) | look-up tables |
 //! | [`ExactSurface`], [`ExactSalient`] | the currents' equation in exact steps | |
 //! | [`InverterFed`], [`Compensated`], [`Cabled`], [`Misaligned`], [`EmfHarmonic`], [`FluxLinkage`] | what stands around a motor, each around any [`MotorModel`] | |
 //! | [`MotorLaw`] and its parts | adaptation laws for the motor's [`Mras`](crate::online::Mras) | |
@@ -60,6 +61,8 @@ mod compensated;
 mod emf_harmonic;
 mod exact;
 mod flux_linkage;
+#[cfg(feature = "std")]
+mod flux_mapped;
 mod injection;
 mod inverter_fed;
 #[cfg(feature = "std")]
@@ -83,6 +86,8 @@ pub use compensated::{Compensated, CompensatedDrive, CompensatedSalientWinding, 
 pub use emf_harmonic::{EmfHarmonic, SixthHarmonic};
 pub use exact::{ExactSalient, ExactStep, ExactSurface, HeldIn};
 pub use flux_linkage::{FluxLinkage, FluxWinding};
+#[cfg(feature = "std")]
+pub use flux_mapped::{FluxMapped, MappedWinding};
 pub use injection::{Injection, InjectionStep};
 pub use inverter_fed::{AngledDrive, DeadTimeLoss, InverterFed, InverterFedWinding, dead_time};
 pub use machine::{Machine, MachineParameters, MachineState, VoltageAndLoad};

@@ -46,6 +46,11 @@ impl Autocorrelation {
         self.values.drain(..next.first.len());
     }
 
+    /// Sums of products at lags `0, 1, ...`.
+    pub fn sums(&self) -> &[f64] {
+        &self.sums
+    }
+
     /// Adds the sums of another record.
     pub fn append(&mut self, other: &Autocorrelation) {
         self.sums.iter_mut().zip(&other.sums).for_each(|(sum, other)| *sum += other);

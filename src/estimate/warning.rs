@@ -94,4 +94,6 @@ pub enum WarningCode {
     CheckpointNotWritten,
     /// The errors are autocorrelated.
     ColoredErrors,
+    /// The errors of two outputs are correlated with each other.
+    CorrelatedOutputs,
 }

@@ -45,8 +45,9 @@ impl Judgement<'_> {
 
     fn for_colored_errors(&self, unit: &Covariance) -> Option<CoordinateCovariance> {
         let hac = hac(self.objective, &self.end.coordinates, self.linear, (&self.exact, unit))?;
-        let covariance = Some(hac.sandwich.covariance(&self.exact)?);
-        let degrees = hac.degrees(self.objective, unit).into_iter().map(|degrees| degrees.min(self.degrees));
+        let degrees = hac.degrees(self.objective, unit);
+        let covariance = Some(hac.covariance(&self.exact, &degrees, self.coupled().is_some())?);
+        let degrees = degrees.into_iter().map(|degrees| degrees.min(self.degrees));
         let method = CovarianceMethod::Hac { lags: hac.lags as u64 };
         Some(CoordinateCovariance { covariance, method, factor: 1.0, degrees: degrees.collect() })
     }
@@ -55,7 +56,7 @@ impl Judgement<'_> {
         let (objective, x) = (self.objective, &self.end.coordinates);
         let (weights, degrees) = self.estimated_weights();
         let degrees = vec![degrees; self.slopes.len()];
-        if sandwich::is_needed(objective) {
+        if sandwich::is_needed(objective) || self.coupled().is_some() {
             let filtered = objective.problem.settings.prefilter.is_some();
             let method = if filtered { CovarianceMethod::FilteredSandwich } else { CovarianceMethod::Sandwich };
             let covariance = sandwich::sandwich(objective, x, &self.exact).ok().flatten();

@@ -13,6 +13,7 @@
 //! degrees of freedom that the errors of the autoregression and of the sums leave.
 
 mod scores;
+mod stationary;
 
 use super::sandwich::{self, Sandwich};
 use crate::information::{Covariance, Information};
@@ -25,12 +26,16 @@ use scores::{EachScore, Lagged, MovingSums};
 const LARGEST: f64 = 0.97;
 /// Longest window by the rule for long records.
 const LONGEST: f64 = 500.0;
+/// Standard deviations by which a variance by moving sums must be above that of stationary errors to be taken instead.
+const CERTAIN: f64 = 2.0;
 /// Rows that are absorbed together.
 const ROWS: usize = 256;
 
 /// The sandwich for autocorrelated errors, and over how many samples they are correlated beyond the autoregression.
 pub(crate) struct Hac {
-    pub sandwich: Sandwich,
+    sandwich: Sandwich,
+    /// The same with the scores of stationary errors, if they have such.
+    stationary: Option<Sandwich>,
     pub lags: usize,
     runs: Vec<LongRun>,
 }
@@ -42,7 +47,7 @@ pub(crate) fn hac(
     linear: &Linearization,
     (held, inverse): (&[bool], &Covariance),
 ) -> Option<Hac> {
-    let mut found = match sandwich::is_needed(objective) {
+    let found = match sandwich::is_needed(objective) {
         true => sandwich::curvature(objective, coordinates).ok()?,
         false => Sandwich::plain(linear),
     };
@@ -55,18 +60,39 @@ pub(crate) fn hac(
         LongRun::of(objective, e, coordinates, (kept(e), sandwich::of_experiment(objective, inverse, e)))
     });
     let runs: Vec<LongRun> = runs.into_iter().collect::<Option<_>>()?;
-    let mut scores: Vec<Information> =
-        runs.iter().enumerate().map(|(e, run)| run.triangle(unknowns.columns(e).count())).collect();
-    for (i, slope, _) in unknowns.priors(coordinates) {
-        let e = unknowns.row[i].experiment.unwrap_or(0);
-        scores[e].absorb_row(&sandwich::prior_row(objective, e, i, slope), 0.0);
-    }
-    (found.scores, found.scale) = (scores, 1.0);
+    let with_priors = |mut scores: Vec<Information>| {
+        for (i, slope, _) in unknowns.priors(coordinates) {
+            let e = unknowns.row[i].experiment.unwrap_or(0);
+            scores[e].absorb_row(&sandwich::prior_row(objective, e, i, slope), 0.0);
+        }
+        scores
+    };
+    let stationary = stationary::scores(objective, coordinates, inverse).ok()?;
+    let stationary = stationary.map(|scores| found.with(with_priors(scores)));
+    let scores = runs.iter().enumerate().map(|(e, run)| run.triangle(unknowns.columns(e).count())).collect();
     let lags = runs.iter().map(|run| run.window.saturating_sub(1)).max().unwrap_or(0);
-    Some(Hac { sandwich: found, lags, runs })
+    Some(Hac { sandwich: found.with(with_priors(scores)), stationary, lags, runs })
 }
 
 impl Hac {
+    /// The covariance of all unknowns that are not held. The standard errors are those of stationary errors, but where the moving
+    /// sums say more by over [`CERTAIN`] standard deviations of what they say (`degrees` of freedom), as they do for errors
+    /// whose size follows the slopes; or by anything at all, where the errors of several outputs are `coupled`.
+    pub fn covariance(&self, held: &[bool], degrees: &[f64], coupled: bool) -> Option<Covariance> {
+        let found = self.sandwich.covariance(held)?;
+        let Some(stationary) = self.stationary.as_ref().and_then(|sandwich| sandwich.covariance(held)) else {
+            return Some(found);
+        };
+        let factor = |i: usize| {
+            let ratio = stationary.standard_error(i) / found.standard_error(i);
+            let certain = if coupled { 0.0 } else { CERTAIN * (2.0 / degrees[i]).sqrt() };
+            let taken = ratio.is_finite() && (1.0 + certain) * ratio * ratio >= 1.0;
+            if taken { ratio } else { 1.0 }
+        };
+        let factors: Vec<f64> = (0..held.len()).map(factor).collect();
+        Some(found.scaled(&factors))
+    }
+
     /// Degrees of freedom of the variance of each unknown, by Satterthwaite's rule over the experiments; `inverse` is
     /// the inverse of the curvature. Infinite for unknowns that are held.
     pub fn degrees(&self, objective: &Objective<'_>, inverse: &Covariance) -> Vec<f64> {

@@ -18,7 +18,7 @@ const DECIDE: f64 = 0.5;
 const LITTLE: f64 = 0.1;
 
 impl Judgement<'_> {
-    /// Outputs whose errors have outliers, of a fit by their squares.
+    /// Outputs whose errors have outliers, or measurements that were held, of a fit by their squares.
     pub(super) fn outliers(&self) -> Vec<Warning> {
         let objective = self.objective;
         let squares = objective.loss().is_none() && !objective.is_weighted() && !objective.sweep.predicts_variance();
@@ -35,11 +35,13 @@ impl Judgement<'_> {
         }
         let mut errors = vec![vec![]; objective.outputs()];
         for e in 0..objective.experiments().min(super::shape::RECORDS) {
-            for (all, own) in errors.iter_mut().zip(self.first_errors(e)) {
-                all.extend(own.into_iter().flatten());
-            }
+            errors.iter_mut().zip(self.first_errors(e)).for_each(|(all, own)| all.push(own));
         }
-        heavy.into_iter().filter_map(|j| self.outliers_of(j, &errors[j])).collect()
+        let of = |j: usize| {
+            let all: Vec<f64> = errors[j].iter().flatten().flatten().copied().collect();
+            self.dropouts_of(j, &errors[j]).or_else(|| self.outliers_of(j, &all))
+        };
+        heavy.into_iter().filter_map(of).collect()
     }
 
     fn outliers_of(&self, j: usize, errors: &[f64]) -> Option<Warning> {

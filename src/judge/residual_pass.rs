@@ -1,5 +1,6 @@
 //! One pass over the data without slopes: the residuals at the estimate.
 
+use super::coupling::{Coupled, Coupling};
 use super::output_sums::OutputSums;
 use super::whiteness::{LAGS, Whiteness};
 use crate::error::Error;
@@ -28,6 +29,8 @@ pub(crate) struct Residuals {
     pub step_error: f64,
     /// The whiteness of each output's errors.
     pub whiteness: Vec<Whiteness>,
+    /// Outputs whose errors are correlated at the same sample, if there are such.
+    pub coupled: Option<Coupled>,
     /// Mean and standard deviation of each output's measurements.
     pub levels: Vec<(f64, f64)>,
     /// Mean fourth power of each output's errors, relative to the square of their mean square: 3 of normal ones.
@@ -46,6 +49,7 @@ struct Sums<'s> {
     /// That of the covariance of a sample with all outputs, and of all measurements so far.
     log_determinants: (f64, f64),
     portmanteaus: Vec<Portmanteau>,
+    coupling: Coupling,
     least_sigma: Vec<f64>,
     /// The windows to be simulated again.
     again: Vec<Sampled>,
@@ -70,6 +74,7 @@ impl<'s> Sums<'s> {
             measured: 0,
             log_determinants: (objective.whitening.log_determinant(&all), 0.0),
             portmanteaus: vec![Portmanteau::new(LAGS.max(horizon(objective))); outputs],
+            coupling: Coupling::new(outputs),
             least_sigma: vec![f64::INFINITY; outputs],
             again: vec![],
             run: vec![],
@@ -116,6 +121,7 @@ impl Accumulate for Sums<'_> {
     fn add(&mut self, window: &Window, lane: usize) {
         let (outputs, samples, begin) = (window.outputs(), window.samples[lane], window.begin[lane]);
         self.count(window, lane);
+        self.coupling.add(window, lane);
         let record = &self.objective.problem.records[self.experiment];
         for j in 0..outputs {
             self.run.clear();
@@ -153,6 +159,7 @@ impl Accumulate for Sums<'_> {
         self.log_determinants.1 += later.log_determinants.1;
         self.outputs.iter_mut().zip(&later.outputs).for_each(|(sums, later)| sums.append(later));
         self.portmanteaus.iter_mut().zip(&later.portmanteaus).for_each(|(sums, later)| sums.follow(later));
+        self.coupling.append(&later.coupling);
         self.least_sigma.iter_mut().zip(&later.least_sigma).for_each(|(least, later)| *least = least.min(*later));
         self.again.extend(later.again);
     }
@@ -194,6 +201,8 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
         log_determinant += one.log_determinants.1;
         sums.iter_mut().zip(&one.outputs).for_each(|(sum, one)| sum.append(one));
     }
+    let mut coupling = all[0].coupling.clone();
+    all[1..].iter().for_each(|one| coupling.append(&one.coupling));
     let whiteness = |j: usize| {
         let mut total = all[0].portmanteaus[j].clone();
         all[1..].iter().for_each(|one| total.append(&one.portmanteaus[j]));
@@ -210,6 +219,7 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
         measured,
         log_determinant,
         step_error,
+        coupled: coupling.strongest(outputs),
         whiteness: (0..outputs).map(whiteness).collect(),
         least_sigma: (0..outputs)
             .map(|j| all.iter().map(|one| one.least_sigma[j]).fold(f64::INFINITY, f64::min))

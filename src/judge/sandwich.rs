@@ -23,19 +23,25 @@ pub(super) const ALONE: f64 = 1e-6;
 const ROWS: usize = 256;
 
 /// Curvature of the cost and triangles of the scores, a pair per experiment.
+#[derive(Clone)]
 pub(crate) struct Sandwich {
     bread: Linearization,
-    pub scores: Vec<Information>,
+    scores: Vec<Information>,
     /// Mean of `psi'`, by which the curvature is to be multiplied.
     curvature: f64,
     /// By which the squares of the scores are to be multiplied.
-    pub scale: f64,
+    scale: f64,
 }
 
 impl Sandwich {
     /// The curvature of plain least squares, still without scores.
     pub fn plain(linear: &Linearization) -> Self {
         Sandwich { bread: linear.clone(), scores: vec![], curvature: 1.0, scale: 1.0 }
+    }
+
+    /// The same curvature, with these scores.
+    pub fn with(&self, scores: Vec<Information>) -> Self {
+        Sandwich { scores, scale: 1.0, ..self.clone() }
     }
 
     /// `A^-1 B A^-1` over all unknowns that are not held.

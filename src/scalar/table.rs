@@ -135,6 +135,11 @@ impl<'a> Grid<'a> {
         Ok(Grid { x, y, values, interpolation, extrapolation })
     }
 
+    /// The points of both arguments; none of a second that it has not.
+    pub fn axes(&self) -> [&'a [f64]; 2] {
+        [self.x, self.y]
+    }
+
     /// Whether it has two arguments.
     pub fn is_surface(&self) -> bool {
         !self.y.is_empty()

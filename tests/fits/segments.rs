@@ -1,6 +1,6 @@
 //! Records cut into segments give what they give as a whole.
 
-use greybox::{Estimate, ExperimentOf, Fit, Model, Of, Rk4, Scalar, Simulator, Time, fixed, free, signals};
+use greybox::{Estimate, ExperimentOf, Fit, Horizon, Model, Of, Rk4, Scalar, Simulator, Time, fixed, free, signals};
 
 signals! {
     pub struct State { a: "", b: "" }
@@ -159,5 +159,51 @@ fn the_first_slopes_are_those_of_the_whole_record() {
             // What the guesses are off by may change the squared errors by a millionth, and the slopes by its root.
             assert!((a - b).abs() <= 1e-3 * size, "plant {kind}, p = {p}: {a} {b} of {size}");
         }
+    }
+}
+
+/// `da/dt = (u - p a) q`, measured; `whole` as for [`Plant`].
+struct Measured {
+    whole: bool,
+}
+
+signals! { pub struct Rates { p: "", q: "" } }
+
+impl Model for Measured {
+    type State = Output;
+    type Input = Input;
+    type Output = Output;
+    type Parameters = Rates;
+
+    fn derivative<S: Scalar>(&self, _t: S, x: &Output<S>, u: &Input<S>, c: &Rates<S>) -> Output<S> {
+        if self.whole {
+            let _ = x.y.value();
+        }
+        Output { y: (u.u - c.p * x.y) * c.q }
+    }
+
+    fn output<S: Scalar>(&self, _t: S, x: &Output<S>, _u: &Input<S>, _c: &Rates<S>) -> Output<S> {
+        *x
+    }
+}
+
+/// Predictions further ahead than a segment is long: each measurement counts once, in the cut record as in the whole.
+#[test]
+fn a_horizon_beyond_a_segment_counts_each_measurement_once() {
+    let inputs: Vec<_> = record(0, 0.0, 1_000).inputs().collect();
+    let fit = |whole: bool| {
+        let (model, time) = (Measured { whole }, Time::Uniform { start: 0.0, step: 0.05 });
+        let run = Simulator::new(&model).run(&Rates { p: 1.1, q: 0.7 }, &Output { y: 0.0 }, time, &inputs).unwrap();
+        let record = run.with_noise(Output { y: 0.05 }, 3).experiment(&model).unwrap();
+        let fit = Fit::new(&model, &record).parameters(Rates { p: free(1.2), q: free(0.6) });
+        fit.integrator(Rk4::default()).predictor(Horizon::new(300)).run().unwrap().into_summary()
+    };
+    let (cut, whole) = (fit(false), fit(true));
+    assert_eq!((cut.measurements, whole.measurements), (1_000, 1_000));
+    for (a, b) in cut.unknowns.iter().zip(&whole.unknowns) {
+        let error = b.knowledge.standard_error().unwrap();
+        // What the search leaves: a relative step of 1e-8.
+        assert!((a.value - b.value).abs() < 1e-3 * error, "{a:?} {b:?}");
+        assert!((a.knowledge.standard_error().unwrap() / error - 1.0).abs() < 1e-3, "{a:?} {b:?}");
     }
 }

@@ -73,6 +73,19 @@ fn noises() -> Vec<Good> {
             let sigma = record.y.iter().map(|y| 0.02 * deviation(y)).collect();
             plant.fit(&record.noisy(0.02, 0.0, s), &How { noise: Some(sigma), ..How::default() }, s)
         }),
+        good("two outputs with one noise", |s| {
+            let plant = plant_of_two(s);
+            let mut record = plant.record(s, SAMPLES);
+            let mut random = Random(s);
+            let sizes: Vec<f64> = record.y.iter().map(|y| 0.03 * deviation(y)).collect();
+            for k in 0..SAMPLES {
+                let both = random.normal();
+                for (y, size) in record.y.iter_mut().zip(&sizes) {
+                    y[k] += size * (0.9 * both + 0.19f64.sqrt() * random.normal());
+                }
+            }
+            plant.fit(&record, &How::default(), s)
+        }),
         good("noise that grows with the output", |s| {
             let plant = plant(s);
             let mut record = plant.record(s, SAMPLES);

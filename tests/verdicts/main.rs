@@ -4,17 +4,21 @@ mod extremes;
 mod good;
 mod good_processes;
 mod junk;
+mod junk_inputs;
+mod junk_models;
 mod junk_processes;
+mod junk_sensors;
 mod levels;
 mod plants;
 mod processes;
 #[path = "../common/random.rs"]
 mod random;
+mod records;
 mod stiff;
 
 use greybox::optimize::Severity;
-use plants::Found;
 use rayon::prelude::*;
+use records::Found;
 use std::collections::BTreeMap;
 
 /// Records of each kind; in a debug build fewer, for its time (`.ci/run` takes the optimized one, too).
@@ -60,7 +64,10 @@ fn print(title: &str, rows: &[Row]) {
 
 #[test]
 fn junk_is_never_usable() {
-    let kinds: Vec<_> = junk::all().into_iter().chain(junk_processes::all()).collect();
+    let kinds: Vec<_> = [junk_sensors::all(), junk_inputs::all(), junk_models::all(), junk_processes::all()]
+        .into_iter()
+        .flatten()
+        .collect();
     assert!(kinds.len() >= 30, "{}", kinds.len());
     let wrong = |kind: &junk::Junk, found: &Found| {
         let named = kind.named.is_none_or(|code| found.codes.contains(&code));

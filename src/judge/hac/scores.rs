@@ -43,7 +43,9 @@ impl<'s, T> EachScore<'s, T> {
 impl<T: AccumulateScores> Accumulate for EachScore<'_, T> {
     fn add(&mut self, window: &Window, lane: usize) {
         let loss = self.objective.loss();
-        for k in 0..window.samples[lane] {
+        // Samples without a measurement have no score, and do not stand between those that have.
+        let any = |k: &usize| (0..window.outputs()).any(|j| window.is_measured(*k, j, lane));
+        for k in (0..window.samples[lane]).filter(any) {
             let weight = self.objective.weight(self.experiment, window.begin[lane] + k);
             self.score.fill(0.0);
             for j in 0..window.outputs() {

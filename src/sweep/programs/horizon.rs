@@ -17,10 +17,12 @@ pub(super) fn run(compiled: &Compiled, piece: &Piece<'_>, steps: usize, visit: V
         let from_begin = Piece { samples: 0..simulated.end, ..piece.clone() };
         let mut go_on = true;
         Run::new(compiled, vec![from_begin]).all(&mut |many| {
-            (window.begin[0], window.samples[0]) = (many.begin[0], many.samples[0]);
-            let rows = (0..many.samples[0]).flat_map(|k| (0..outputs).map(move |j| (k, j)));
-            rows.for_each(|(k, j)| copy(many, (k, 0), &mut window, k, j));
-            go_on = visit(&mut window);
+            // Those before this piece belong to others.
+            let before = simulated.start.saturating_sub(many.begin[0]).min(many.samples[0]);
+            (window.begin[0], window.samples[0]) = (many.begin[0] + before, many.samples[0] - before);
+            let rows = (0..window.samples[0]).flat_map(|k| (0..outputs).map(move |j| (k, j)));
+            rows.for_each(|(k, j)| copy(many, (before + k, 0), &mut window, k, j));
+            go_on = window.samples[0] == 0 || visit(&mut window);
             go_on
         });
         if !go_on {

@@ -1,0 +1,88 @@
+//! Whether single measurements are missing and the one before stands in their place.
+
+use super::conclude::Judgement;
+use super::warnings::care;
+use crate::estimate::{Warning, WarningCode};
+use crate::numeral::{number, percent};
+
+/// The fewest measurements that are equal to the one before, and the part of them all, that are looked at.
+const FEWEST: usize = 4;
+const PART: f64 = 0.005;
+/// Rounded measurements are equal to the last but one as well, nearly as often.
+const ROUNDED: usize = 8;
+/// Mean squared errors of such measurements beyond so many times those of the others confirm it.
+const LARGER: f64 = 2.0;
+
+/// Sums over measurements.
+#[derive(Clone, Copy, Default)]
+struct Errors {
+    squares: f64,
+    count: usize,
+}
+
+impl Errors {
+    fn mean(&self) -> f64 {
+        self.squares / self.count.max(1) as f64
+    }
+}
+
+/// Measurements with their errors, in order of time, of those that are equal to the one before and of the others; `None`
+/// where the former are few, or rounded.
+fn split(runs: &[Vec<(f64, f64)>]) -> Option<[Errors; 2]> {
+    let (mut split, mut again) = ([Errors::default(); 2], 0);
+    for run in runs {
+        for (k, (y, error)) in run.iter().enumerate() {
+            let equals = |back: usize| k >= back && run[k - back].0 == *y;
+            let kind = &mut split[usize::from(!equals(1))];
+            kind.squares += error * error;
+            kind.count += 1;
+            again += usize::from(equals(2) && !equals(1));
+        }
+    }
+    let [held, others] = split;
+    let few = held.count < FEWEST || (held.count as f64) < PART * (held.count + others.count) as f64;
+    (!few && again * ROUNDED <= held.count).then_some(split)
+}
+
+impl Judgement<'_> {
+    /// What is said of an output with these errors, one run per experiment, `None` where nothing was measured.
+    pub(super) fn dropouts_of(&self, j: usize, errors: &[Vec<Option<f64>>]) -> Option<Warning> {
+        let problem = self.objective.problem;
+        let run = |(record, errors): (&crate::record::Record, &Vec<Option<f64>>)| {
+            let values = record.outputs()[j].values.iter().zip(errors);
+            values.filter_map(|(y, error)| Some((*y, (*error)?))).collect()
+        };
+        let runs: Vec<Vec<(f64, f64)>> = problem.records.iter().zip(errors).map(run).collect();
+        let [held, others] = split(&runs)?;
+        (held.mean() > LARGER * others.mean()).then(|| {
+            let output = &problem.layout().outputs[j];
+            let text = format!(
+                "{} of the measurements of `{}` are equal to the one before, and the model differs there by {} {unit}, elsewhere by \
+                 {} {unit}: the last value was held where none arrived; mark these samples as missing",
+                percent(held.count as f64 / (held.count + others.count) as f64, 2),
+                output.name,
+                number(held.mean().sqrt(), 2),
+                number(others.mean().sqrt(), 2),
+                unit = output.unit
+            );
+            care(WarningCode::Frozen, text)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of nine measurements the last of each three is the one before, with an error of three instead of one.
+    #[test]
+    fn values_that_are_held() {
+        let y = |k: usize| if k % 3 == 2 { k - 1 } else { k } as f64;
+        let run: Vec<(f64, f64)> = (0..15).map(|k| (y(k), if k % 3 == 2 { 3.0 } else { 1.0 })).collect();
+        let [held, others] = split(&[run]).unwrap();
+        assert_eq!((held.count, held.mean(), others.count, others.mean()), (5, 9.0, 10, 1.0));
+        // Three are few, and of a rounded sensor each second value is the last but one.
+        assert!(split(&[(0..9).map(|k| (y(k), 1.0)).collect()]).is_none());
+        assert!(split(&[(0..40).map(|k| (f64::from([0, 0, 1, 0, 1, 1, 0, 1][k % 8]), 1.0)).collect()]).is_none());
+    }
+}

@@ -1,0 +1,281 @@
+//! The covariance of the scores where the errors are stationary and unrelated to the slopes, whatever the slopes are.
+//!
+//! Sums of scores over moving windows need many independent stretches of a record. An unknown of which only a part of it
+//! tells, such as an initial state, has one: its scores sum to zero there, and so do the windows that hold that part. The
+//! errors' own autocorrelation, of which the whole record tells, serves instead: the errors of each output are an
+//! autoregression (Yule and Walker's equations, order by Akaike's criterion), and the variance of `sum g[t] e[t]` is that of
+//! the innovations times the sum of squares of the slopes `g`, passed through the autoregression and beyond the end of the
+//! record. (In which direction does not matter: a stationary sequence has the same covariances backward.)
+
+use super::ROWS;
+use crate::information::{Block, Covariance, Information};
+use crate::judge::sandwich::{ALONE, form, of_experiment};
+use crate::optimize::Infeasible;
+use crate::problem::{Accumulate, Objective, each};
+use crate::sweep::Window;
+use crate::whiteness::Autocorrelation;
+use nalgebra::DMatrix;
+use std::collections::VecDeque;
+
+/// Highest order.
+const ORDER: usize = 20;
+/// The part of an impulse response's sum of squares that is left out, and its greatest length.
+const REST: f64 = 1e-8;
+const LONGEST: usize = 1000;
+/// An experiment with fewer measurements of an output takes the autoregression of all experiments together.
+const OWN: u64 = 100;
+
+/// Triangles of such scores, one per experiment over its columns, by the inverse of the curvature; `None` where variances are
+/// predicted.
+pub(super) fn scores(
+    objective: &Objective<'_>,
+    coordinates: &[f64],
+    inverse: &Covariance,
+) -> Result<Option<Vec<Information>>, Infeasible> {
+    if objective.sweep.predicts_variance() {
+        return Ok(None);
+    }
+    let outputs = objective.outputs();
+    let make = |experiment: usize| Errors {
+        objective,
+        experiment,
+        inverse: of_experiment(objective, inverse, experiment),
+        sums: vec![(Autocorrelation::new(ORDER), 0); outputs],
+        run: vec![],
+    };
+    let all = objective.gather(coordinates, true, make)?;
+    let mut together = vec![(Autocorrelation::new(ORDER), 0); outputs];
+    for one in &all {
+        for ((sums, count), (own, more)) in together.iter_mut().zip(&one.sums) {
+            sums.append(own);
+            *count += more;
+        }
+    }
+    let one = |e: usize| {
+        let own = all[e].sums.iter().zip(&together);
+        let models: Vec<Autoregression> = own
+            .map(|(own, together)| if own.1 < OWN { together } else { own })
+            .map(|(sums, count)| Autoregression::of(sums, *count))
+            .collect();
+        let make = || Passed::new(objective, e, &models);
+        Some(objective.gather_one(coordinates, e, true, make).ok()?.triangle())
+    };
+    Ok(each(all.len(), one).into_iter().collect())
+}
+
+/// `e[t] = sum over k of a[k] e[t - 1 - k]`, and an innovation.
+struct Autoregression {
+    coefficients: Vec<f64>,
+    /// Standard deviation of the innovations.
+    fresh: f64,
+    /// Samples after which nothing is left of an innovation.
+    length: usize,
+}
+
+impl Autoregression {
+    /// By the recursion of Levinson and Durbin.
+    fn of(sums: &Autocorrelation, count: u64) -> Self {
+        let (sums, n) = (sums.sums(), count as f64);
+        let variance = sums[0] / n.max(1.0);
+        let (mut left, mut a) = (1.0, Vec::<f64>::new());
+        let mut best = (0.0, vec![], 1.0);
+        for k in 1..sums.len().min(count as usize / 4) {
+            let known: f64 = a.iter().enumerate().map(|(i, a)| a * sums[k - 1 - i]).sum();
+            let next = (sums[k] - known) / (left * sums[0]);
+            if next.is_nan() || next.abs() >= 1.0 {
+                break;
+            }
+            let turned: Vec<f64> = a.iter().rev().map(|a| next * a).collect();
+            a.iter_mut().zip(turned).for_each(|(a, by)| *a -= by);
+            a.push(next);
+            left *= 1.0 - next * next;
+            let criterion = n * left.ln() + 2.0 * k as f64;
+            if criterion < best.0 {
+                best = (criterion, a.clone(), left);
+            }
+        }
+        let (_, coefficients, left) = best;
+        Autoregression { length: length(&coefficients), coefficients, fresh: (variance * left).sqrt() }
+    }
+}
+
+/// The samples that hold an impulse response but for a small rest.
+fn length(coefficients: &[f64]) -> usize {
+    let mut response = vec![1.0];
+    for t in 1..LONGEST {
+        response.push(coefficients.iter().zip(response[..t].iter().rev()).map(|(a, before)| a * before).sum());
+    }
+    let whole: f64 = response.iter().map(|r| r * r).sum();
+    let mut rest = 0.0;
+    let short = |r: &&f64| {
+        rest += **r * **r;
+        rest <= REST * whole
+    };
+    LONGEST - response.iter().rev().take_while(short).count()
+}
+
+/// Autocorrelations of the influences of each output's measurements, one after the other, and their number. Errors of a fit
+/// are smaller than the noise, their variance by one less their leverage, by whose root each is divided.
+struct Errors<'e> {
+    objective: &'e Objective<'e>,
+    experiment: usize,
+    /// The inverse of the curvature in all columns of the experiment.
+    inverse: DMatrix<f64>,
+    sums: Vec<(Autocorrelation, u64)>,
+    run: Vec<f64>,
+}
+
+impl Accumulate for Errors<'_> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        let (objective, loss) = (self.objective, self.objective.loss());
+        let mut slopes = vec![0.0; self.inverse.nrows()];
+        for (j, (sums, count)) in self.sums.iter_mut().enumerate() {
+            let mut influence = |k: usize| {
+                let (z, weight) = (window.error(k, j, lane), objective.weight(self.experiment, window.begin[lane] + k));
+                slopes.iter_mut().enumerate().for_each(|(c, slope)| *slope = window.at(k, j, c, lane));
+                let less = (1.0 - weight * form(&self.inverse, &slopes)).max(ALONE);
+                (weight / less).sqrt() * loss.map_or(z, |loss| loss.psi(z))
+            };
+            self.run.clear();
+            let measured = (0..window.samples[lane]).filter(|&k| window.is_measured(k, j, lane));
+            self.run.extend(measured.map(&mut influence));
+            *count += self.run.len() as u64;
+            sums.add(&self.run);
+        }
+    }
+
+    fn append(&mut self, later: Self) {
+        for ((sums, count), (later, more)) in self.sums.iter_mut().zip(&later.sums) {
+            sums.follow(later);
+            *count += more;
+        }
+    }
+}
+
+/// The triangle of the slopes, passed through the autoregressions of their outputs.
+struct Passed<'p> {
+    objective: &'p Objective<'p>,
+    experiment: usize,
+    models: &'p [Autoregression],
+    outputs: Vec<Recent>,
+    row: Vec<f64>,
+    triangle: Information,
+    block: Block,
+}
+
+/// The slopes of an output.
+#[derive(Clone)]
+struct Recent {
+    /// The first rows, which those before this piece still act on; they are absorbed when these are known.
+    first: Vec<Vec<f64>>,
+    /// The last rows that came out, the last one first.
+    passed: VecDeque<Vec<f64>>,
+}
+
+impl<'p> Passed<'p> {
+    fn new(objective: &'p Objective<'p>, experiment: usize, models: &'p [Autoregression]) -> Self {
+        let columns = objective.problem.unknowns.columns(experiment).count();
+        let rows = |model: &Autoregression| Recent {
+            first: vec![],
+            passed: model.coefficients.iter().map(|_| vec![0.0; columns]).collect(),
+        };
+        Passed {
+            objective,
+            experiment,
+            models,
+            outputs: models.iter().map(rows).collect(),
+            row: vec![0.0; columns],
+            triangle: Information::new(columns),
+            block: Block::new(columns, ROWS),
+        }
+    }
+
+    /// The next row of an output, in `row`.
+    fn take(&mut self, j: usize) {
+        let (model, Recent { first, passed }) = (&self.models[j], &mut self.outputs[j]);
+        let counts = first.len() == model.length;
+        if !counts {
+            first.push(self.row.clone());
+        }
+        for (a, before) in model.coefficients.iter().zip(&*passed) {
+            self.row.iter_mut().zip(before).for_each(|(row, before)| *row += a * before);
+        }
+        if let Some(mut oldest) = passed.pop_back() {
+            oldest.copy_from_slice(&self.row);
+            passed.push_front(oldest);
+        }
+        if counts {
+            self.row.iter_mut().for_each(|row| *row *= model.fresh);
+            self.triangle.gather(&mut self.block, &self.row, 0.0);
+        }
+    }
+
+    /// The triangle, from rest before the first row until the last one has passed.
+    fn triangle(self) -> Information {
+        let mut whole = Passed::new(self.objective, self.experiment, self.models);
+        whole.outputs.iter_mut().zip(self.models).for_each(|(rows, model)| rows.first = vec![vec![]; model.length]);
+        whole.append(self);
+        for j in 0..whole.models.len() {
+            for _ in 1..whole.models[j].length {
+                whole.row.fill(0.0);
+                whole.take(j);
+            }
+        }
+        whole.triangle.absorb(&mut whole.block);
+        whole.triangle
+    }
+}
+
+impl Accumulate for Passed<'_> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        for k in 0..window.samples[lane] {
+            let weight = self.objective.weight(self.experiment, window.begin[lane] + k).sqrt();
+            for j in (0..window.outputs()).filter(|&j| window.is_measured(k, j, lane)) {
+                self.row.iter_mut().enumerate().for_each(|(c, row)| *row = weight * window.at(k, j, c, lane));
+                self.take(j);
+            }
+        }
+    }
+
+    fn append(&mut self, mut later: Self) {
+        for (j, rows) in later.outputs.iter().enumerate() {
+            for row in &rows.first {
+                self.row.copy_from_slice(row);
+                self.take(j);
+            }
+        }
+        for ((rows, later), model) in self.outputs.iter_mut().zip(later.outputs).zip(self.models) {
+            // After so many rows of its own, nothing is left of those before.
+            if later.first.len() == model.length {
+                rows.passed = later.passed;
+            }
+        }
+        self.triangle.absorb(&mut self.block);
+        later.triangle.absorb(&mut later.block);
+        self.triangle.merge(&later.triangle);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `e[t] = 0.8 e[t - 1] + w[t]` with innovations of unit variance; the impulse response `0.8^t`, whose squares are
+    /// `0.64^t`, has 1e-8 of them left after `ln 1e-8 / ln 0.64 = 41.3` samples.
+    #[test]
+    fn an_autoregression_by_its_autocorrelations() {
+        let mut e = vec![0.0; 20_000];
+        let mut random = crate::random::Random::stream(1, 2);
+        for t in 1..e.len() {
+            e[t] = 0.8 * e[t - 1] + random.normal();
+        }
+        let mut sums = Autocorrelation::new(ORDER);
+        sums.add(&e);
+        let found = Autoregression::of(&sums, e.len() as u64);
+        // Standard deviation of the coefficient: sqrt((1 - 0.64) / 20,000) = 0.0042; of the innovations' 0.005.
+        assert!((found.coefficients[0] - 0.8).abs() < 0.02, "{:?}", found.coefficients);
+        assert!((found.fresh - 1.0).abs() < 0.02, "{}", found.fresh);
+        assert_eq!(length(&[0.8]), 42);
+        assert_eq!(length(&[]), 1);
+    }
+}
