@@ -100,16 +100,17 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
     let all: Vec<From<'_>> = problems.iter().map(|problem| (problem, problem.unknowns.start())).collect();
     let mut attempts: Vec<Attempt> = by_one_method(&all, &control).into_iter().map(Attempt::new).collect();
     for number in 0.. {
-        let finer = attempts.iter().zip(problems).map(|(attempt, problem)| {
-            let finer = if attempt.is_coarse() { problem.finer(number)? } else { return None };
-            Some((finer, attempt.start(finer)))
-        });
-        let finer: Vec<Option<From<'_>>> = finer.collect();
-        let coarse: Vec<bool> = finer.iter().map(Option::is_some).collect();
-        let finer: Vec<From<'_>> = finer.into_iter().flatten().collect();
-        if finer.is_empty() || control.stops() {
+        let coarse: Vec<bool> = attempts.iter().map(Attempt::is_coarse).collect();
+        let finer =
+            coarse.iter().zip(problems).map(|(coarse, problem)| if *coarse { problem.finer(number) } else { None });
+        let finer: Vec<Option<&Problem<'_>>> = finer.collect();
+        if finer.iter().all(Option::is_none) || control.stops() {
             break;
         }
+        let from = attempts.iter().zip(finer).map(|(attempt, finer)| Some((finer?, attempt.start(finer?, &control)?)));
+        let finer: Vec<Option<From<'_>>> = from.collect();
+        let coarse: Vec<bool> = finer.iter().map(Option::is_some).collect();
+        let finer: Vec<From<'_>> = finer.into_iter().flatten().collect();
         let mut found = by_one_method(&finer, &control).into_iter();
         let next = |(attempt, coarse): (Attempt, bool)| match if coarse { found.next() } else { None } {
             Some(again) => attempt.or(again),

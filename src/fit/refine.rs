@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::estimate::{Summary, Warning, WarningCode};
 use crate::optimize::Severity;
-use crate::problem::Problem;
+use crate::problem::{Control, Problem};
 
 /// The best answer by the methods tried so far.
 pub(super) struct Attempt {
@@ -27,16 +27,20 @@ impl Attempt {
     }
 
     /// Where the search by a finer method begins: at the end of this one if the step is all that is wrong with it, else at the
-    /// start of the problem.
-    pub fn start(&self, problem: &Problem<'_>) -> Vec<f64> {
+    /// start of the problem; `None` if that method's step would decide the cost there, too.
+    pub fn start(&self, finer: &Problem<'_>, control: &Control) -> Option<Vec<f64>> {
         let wrong =
             |warning: &Warning| warning.severity == Severity::NotUsable && warning.code != WarningCode::CoarseStep;
         match &self.found {
             Ok(found) if found.outcome.converged() && !found.warnings.iter().any(wrong) => {
                 let within = |(x, (lower, upper)): (f64, (f64, f64))| x.max(lower).min(upper);
-                found.coordinates().into_iter().zip(problem.unknowns.bounds()).map(within).collect()
+                Some(found.coordinates().into_iter().zip(finer.unknowns.bounds()).map(within).collect())
             }
-            _ => problem.unknowns.start(),
+            _ => {
+                let start = finer.unknowns.start();
+                let steps = finer.in_units(control);
+                (finer.sweep.is_adaptive() || !steps.step_decides(&start).unwrap_or(true)).then_some(start)
+            }
         }
     }
 

@@ -32,8 +32,9 @@ impl Problem<'_> {
             if !attempt.is_coarse() || control.stops() {
                 break;
             }
-            let start = attempt.start(finer);
-            attempt = attempt.or(finer.run_within(begin, &control, start));
+            if let Some(start) = attempt.start(finer, &control) {
+                attempt = attempt.or(finer.run_within(begin, &control, start));
+            }
         }
         attempt.found
     }

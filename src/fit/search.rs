@@ -166,18 +166,20 @@ impl<'r> Rounds<'r> {
 }
 
 /// How a search ended that found no step to lower the cost of an adaptive integrator, whose number of steps changes from point
-/// to point; `None` if a finer tolerance promises more than the costs of the two differ.
+/// to point; `None` if slopes promise more than the costs of this tolerance and a finer one differ.
 fn within_finer_tolerance(objective: &Objective<'_>, coordinates: &[f64]) -> Option<Outcome> {
     let finer = if objective.sweep.is_adaptive() { objective.sweep.refined()? } else { return None };
     let finer = objective.of(objective.problem, &*finer);
-    let linear = finer.linearize(coordinates).ok()?;
-    let differ = |x: &[f64], finer: f64| Some(finer - objective.cost_at(x).ok()?);
-    let here = differ(coordinates, linear.cost)?;
+    let (linear, again) = (objective.linearize(coordinates).ok()?, finer.linearize(coordinates).ok()?);
+    let here = again.cost - linear.cost;
     let noise = |x: &[f64]| {
-        let there = finer.cost_at(x).ok().and_then(|finer| differ(x, finer));
-        there.map_or(0.0, |there| (there - here).abs()).max(here.abs())
+        let there = finer.cost_at(x).ok().zip(objective.cost_at(x).ok());
+        there.map_or(0.0, |(finer, this)| (finer - this - here).abs()).max(here.abs())
     };
-    within_tolerance(coordinates, linear, &Domain::of(objective), noise)
+    let domain = Domain::of(objective);
+    // A minimum of this tolerance, though that of a finer one lies elsewhere, of which a warning tells.
+    within_tolerance(coordinates, linear, &domain, noise)
+        .or_else(|| within_tolerance(coordinates, again, &domain, noise))
 }
 
 /// Why the start could not be evaluated.

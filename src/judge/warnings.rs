@@ -12,8 +12,6 @@ use crate::problem::Objective;
 /// with one of the library's choice (beyond the former it makes the estimate unusable).
 const STEP_SHIFT: f64 = 0.5;
 const REFINED_SHIFT: f64 = 0.1;
-/// A search that does not converge is blamed on the step where a finer one changes the cost by this part.
-const ASTRAY: f64 = 0.1;
 /// A predicted standard deviation below this fraction of the errors counts as zero.
 const ZERO_DEVIATION: f64 = 1e-6;
 /// Smallest part of an unknown's value that a finer step must move it by for a warning.
@@ -205,22 +203,19 @@ impl Judgement<'_> {
 
     /// Of a search that ended without a minimum: whether the cost, at its start or at its end, is that of the step.
     fn led_astray(&self) -> Option<Warning> {
-        let finer = self.objective.sweep.refined()?;
-        let objective = self.objective.of(self.objective.problem, &*finer);
         let start = self.objective.problem.unknowns.start();
-        let differ = |x: &[f64]| {
-            let (this, finer) = (self.objective.cost_at(x).ok()?, objective.cost_at(x).ok()?);
-            Some((this - finer).abs() > ASTRAY * this.abs().min(finer.abs()))
-        };
-        let place = match (differ(&start), differ(&self.end.coordinates)) {
-            (Some(true), _) => "start",
-            (_, Some(true)) => "end",
-            _ => return None,
+        let decides = |x: &[f64]| self.objective.step_decides(x) == Some(true);
+        let place = if decides(&start) {
+            "start"
+        } else if decides(&self.end.coordinates) {
+            "end"
+        } else {
+            return None;
         };
         let text = format!(
             "the step may have kept the search from a minimum: with {} the cost at its {place} is another; use a finer step, or \
              smooth the model",
-            finer.integrator()
+            self.objective.sweep.refined()?.integrator()
         );
         Some(Warning { code: WarningCode::CoarseStep, severity: Severity::NotUsable, text })
     }
