@@ -89,6 +89,11 @@ impl Summary {
         self.measurements as f64 - estimated
     }
 
+    /// The unknowns as an optimizer sees them: logarithms where these were estimated.
+    pub(crate) fn coordinates(&self) -> Vec<f64> {
+        self.unknowns.iter().map(|unknown| unknown.transform.to_coordinate(unknown.value)).collect()
+    }
+
     /// The worst that is said of this estimate.
     pub fn severity(&self) -> Severity {
         let outcome = if self.outcome.converged() { Severity::Usable } else { Severity::NotUsable };

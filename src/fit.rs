@@ -16,7 +16,7 @@ use crate::error::Error;
 use crate::estimate::Estimate;
 use crate::experiment::{ExperimentOf, Sample};
 use crate::functions::Handle;
-use crate::integrate::{Automatic, Integrator, Method, Rk4};
+use crate::integrate::{Automatic, Esdirk, Integrator, Method, Rk4, Stiff};
 use crate::layout::{Kind, Layout};
 use crate::loss::Loss;
 use crate::model::Model;
@@ -27,7 +27,7 @@ use crate::prefilter::Butterworth;
 use crate::problem::{FinerSweeps, MakeSweep, Problem, Search, Settings, Weights};
 use crate::record::Record;
 use crate::signals::{Of, Signals};
-use crate::sweep::{DualSweep, Loops, ProgramSweep, Sweep};
+use crate::sweep::{DualSweep, Loops, Narrow, ProgramSweep, Sweep};
 use crate::weighting::Weighting;
 use argmin::core::observers::{Observe, ObserverMode};
 use core::marker::PhantomData;
@@ -118,10 +118,10 @@ impl<'a, M: Model> Fit<'a, M> {
     /// Sets the integrator. It is kept, with a warning if its step moves the answer.
     ///
     /// Without it, a fit of a continuous model begins with [`Rk4`], one step per sample. While a finer step would move an
-    /// unknown by more than a tenth of its standard error, or where the start cannot be simulated, it takes 4, 16 and 64 steps
-    /// per sample; the estimate names the method ([`Method::integrator`](crate::Method)), and is not usable if none is fine
-    /// enough. Stiff models then need [`Esdirk`](crate::Esdirk), which is not tried by itself: where a start explodes, it
-    /// would follow for hours.
+    /// unknown by more than a tenth of its standard error, where the start cannot be simulated, or where a search that did not
+    /// converge had a cost that a finer step changes, it takes 4, 16 and 64 steps per sample, then [`Esdirk`]; the estimate
+    /// names the method ([`Method::integrator`](crate::Method)), and is not usable if none is fine enough. `Esdirk` is given up
+    /// where it needs 3,000 steps for a sample, or 1,000 for each: such a model is not stiff, but fast, or explodes.
     pub fn integrator(self, integrator: impl Integrator) -> Self {
         Fit { stepping: Stepping::new(integrator), is_default: false, ..self }
     }
@@ -319,8 +319,10 @@ fn finer<'a, M: Model + 'a>(
         let (model, predictor) = (model.clone(), predictor.clone());
         Arc::new(move || sweep(model.clone(), &stepping, &predictor))
     };
-    let finer = [4, 16, 64].map(|substeps| by(Stepping::new(Automatic { continuous: Rk4 { substeps } })));
-    FinerSweeps::new(finer.into())
+    let steps = [4, 16, 64].map(|substeps| by(Stepping::new(Automatic { continuous: Rk4 { substeps } })));
+    let stiff = Stiff(Esdirk::default());
+    let stiff = by(Stepping { loops: Arc::new(Narrow(stiff)), method: Arc::new(stiff) });
+    FinerSweeps::new(steps.into_iter().chain([stiff]).collect())
 }
 
 /// A typed weighting as untyped [`Weights`].

@@ -7,6 +7,8 @@ mod esdirk;
 mod method;
 mod rk4;
 mod rk45;
+#[cfg(feature = "std")]
+mod stiff;
 mod system;
 mod tolerance;
 
@@ -19,6 +21,8 @@ pub use method::Rate;
 pub(crate) use method::{Duals, Field, Method, Slopes, SymbolicField};
 pub use rk4::Rk4;
 pub use rk45::Rk45;
+#[cfg(feature = "std")]
+pub(crate) use stiff::Stiff;
 pub use system::{ModelSystem, Square, System};
 use tolerance::Tolerance;
 

@@ -10,7 +10,7 @@ mod programs;
 mod window;
 
 pub(crate) use duals::{DualSweep, OVERFLOW};
-pub(crate) use loops::Loops;
+pub(crate) use loops::{Loops, Narrow};
 pub(crate) use programs::{Derived, Interleaved, ProgramSweep};
 pub use window::Window;
 

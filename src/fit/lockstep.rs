@@ -97,22 +97,26 @@ impl<'p> Search<'p> {
 /// fit of each alone.
 pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Error>> {
     let Some(control) = problems.first().map(|first| control(first, problems.len())) else { return vec![] };
-    let all: Vec<&Problem<'_>> = problems.iter().collect();
+    let all: Vec<From<'_>> = problems.iter().map(|problem| (problem, problem.unknowns.start())).collect();
     let mut attempts: Vec<Attempt> = by_one_method(&all, &control).into_iter().map(Attempt::new).collect();
     for number in 0.. {
-        let coarse = attempts.iter().map(Attempt::is_coarse);
-        let finer: Vec<Option<&Problem<'_>>> =
-            coarse.zip(&all).map(|(coarse, problem)| if coarse { problem.finer(number) } else { None }).collect();
-        let problems: Vec<&Problem<'_>> = finer.iter().flatten().copied().collect();
-        if problems.is_empty() || control.stops() {
+        let coarse: Vec<bool> = attempts.iter().map(Attempt::is_coarse).collect();
+        let finer =
+            coarse.iter().zip(problems).map(|(coarse, problem)| if *coarse { problem.finer(number) } else { None });
+        let finer: Vec<Option<&Problem<'_>>> = finer.collect();
+        if finer.iter().all(Option::is_none) || control.stops() {
             break;
         }
-        let mut found = by_one_method(&problems, &control).into_iter();
-        let next = |(attempt, finer): (Attempt, &Option<_>)| match finer.and_then(|_| found.next()) {
+        let from = attempts.iter().zip(finer).map(|(attempt, finer)| Some((finer?, attempt.start(finer?, &control)?)));
+        let finer: Vec<Option<From<'_>>> = from.collect();
+        let coarse: Vec<bool> = finer.iter().map(Option::is_some).collect();
+        let finer: Vec<From<'_>> = finer.into_iter().flatten().collect();
+        let mut found = by_one_method(&finer, &control).into_iter();
+        let next = |(attempt, coarse): (Attempt, bool)| match if coarse { found.next() } else { None } {
             Some(again) => attempt.or(again),
             None => attempt,
         };
-        attempts = attempts.into_iter().zip(&finer).map(next).collect();
+        attempts = attempts.into_iter().zip(coarse).map(next).collect();
     }
     attempts.into_iter().map(|attempt| attempt.found).collect()
 }
@@ -124,15 +128,22 @@ fn control(problem: &Problem<'_>, together: usize) -> Control {
     Control { deadline: limit.and_then(|limit| begin.checked_add(limit)), ..problem.control(begin) }
 }
 
+/// A problem and the start of its search.
+type From<'p> = (&'p Problem<'p>, Vec<f64>);
+
 /// The estimate of each problem, by its own method.
-fn by_one_method(problems: &[&Problem<'_>], control: &Control) -> Vec<Result<Summary, Error>> {
+fn by_one_method(problems: &[From<'_>], control: &Control) -> Vec<Result<Summary, Error>> {
     let begin = Instant::now();
-    let plain: Vec<Objective<'_>> = problems.iter().map(|problem| problem.in_units(control)).collect();
-    let first = |plain| match Rounds::new(plain, &plain.problem.settings.optimizer, plain.problem.unknowns.start()) {
+    let plain: Vec<Objective<'_>> = problems.iter().map(|(problem, _)| problem.in_units(control)).collect();
+    let first = |(plain, (problem, start)): (_, &From<'_>)| match Rounds::new(
+        plain,
+        &problem.settings.optimizer,
+        start.clone(),
+    ) {
         Ok(rounds) => Stage::Searching(Box::new(Search::new(rounds))),
         Err(_) => Stage::Alone,
     };
-    let mut stages: Vec<Stage<'_>> = plain.iter().map(first).collect();
+    let mut stages: Vec<Stage<'_>> = plain.iter().zip(problems).map(first).collect();
     loop {
         let requesting = stages.iter().enumerate().filter_map(|(i, stage)| match stage {
             Stage::Searching(search) => Some((i, search.requested()?)),
@@ -148,12 +159,14 @@ fn by_one_method(problems: &[&Problem<'_>], control: &Control) -> Vec<Result<Sum
             }
         }
     }
-    conclude_together(&plain, stages, control, begin)
+    let starts: Vec<&[f64]> = problems.iter().map(|(_, start)| &start[..]).collect();
+    conclude_together(&plain, stages, &starts, control, begin)
 }
 
 fn conclude_together(
     plain: &[Objective<'_>],
     stages: Vec<Stage<'_>>,
+    starts: &[&[f64]],
     control: &Control,
     begin: Instant,
 ) -> Vec<Result<Summary, Error>> {
@@ -168,16 +181,14 @@ fn conclude_together(
     });
     let mut residuals = residuals_together(&points.collect::<Vec<_>>()).into_iter();
     let seconds = begin.elapsed().as_secs_f64() / plain.len() as f64;
-    let finish = |((stage, objective), plain): ((&Stage<'_>, &Option<Objective<'_>>), &Objective<'_>)| match (
-        stage, objective,
-    ) {
+    let finish = |i: usize| match (&stages[i], &objectives[i]) {
         (Stage::Ended(end), Some(objective)) => match residuals.next().flatten() {
             Some(residuals) => conclude_from(objective, end, residuals, seconds),
             None => conclude(objective, end, seconds),
         },
-        _ => plain.problem.run_within(Instant::now(), control),
+        _ => plain[i].problem.run_within(Instant::now(), control, starts[i].to_vec()),
     };
-    stages.iter().zip(&objectives).zip(plain).map(finish).collect()
+    (0..plain.len()).map(finish).collect()
 }
 
 /// The objective that a search ended with. The time limit does not apply to the conclusion.

@@ -27,7 +27,7 @@ pub(super) fn predict<'a>(sweep: Arc<dyn Sweep + 'a>, record: &Record, estimate:
         true => vec![],
         false => {
             problem.check_measured()?;
-            search(&objective, &problem.settings.optimizer)?.coordinates
+            search(&objective, &problem.settings.optimizer, problem.unknowns.start())?.coordinates
         }
     };
     objective.predict(0, &coordinates)

@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::estimate::{Summary, Warning, WarningCode};
 use crate::optimize::Severity;
+use crate::problem::{Control, Problem};
 
 /// The best answer by the methods tried so far.
 pub(super) struct Attempt {
@@ -25,13 +26,34 @@ impl Attempt {
         coarse && !self.ended
     }
 
+    /// Where the search by a finer method begins: at the end of this one if the step is all that is wrong with it, else at the
+    /// start of the problem; `None` if that method's step would decide the cost there, too.
+    pub fn start(&self, finer: &Problem<'_>, control: &Control) -> Option<Vec<f64>> {
+        let wrong =
+            |warning: &Warning| warning.severity == Severity::NotUsable && warning.code != WarningCode::CoarseStep;
+        match &self.found {
+            Ok(found) if found.outcome.converged() && !found.warnings.iter().any(wrong) => {
+                let within = |(x, (lower, upper)): (f64, (f64, f64))| x.max(lower).min(upper);
+                Some(found.coordinates().into_iter().zip(finer.unknowns.bounds()).map(within).collect())
+            }
+            _ => {
+                let start = finer.unknowns.start();
+                let steps = finer.in_units(control);
+                (finer.sweep.is_adaptive() || !steps.step_decides(&start).unwrap_or(true)).then_some(start)
+            }
+        }
+    }
+
     /// This answer or that of a finer method.
     pub fn or(self, again: Result<Summary, Error>) -> Self {
         let (found, ended) = match (self.found, again) {
-            (Ok(before), Ok(again)) if is_better(&before, &again) => (Ok(after(&before, again)), false),
-            (Ok(before), Ok(again)) => (Ok(kept(before, &again)), true),
+            (Ok(before), Ok(again)) if !before.outcome.converged() => (Ok(after(&before, again)), false),
+            (Ok(before), Ok(again)) if again.outcome.converged() => match explains(&before, &again) {
+                true => (Ok(after(&before, again)), false),
+                false => (Ok(kept(before, &again)), true),
+            },
             (Err(_), again @ Ok(_)) => (again, false),
-            (before, Err(_)) => (before, false),
+            (before, _) => (before, false),
         };
         Attempt { found, ended }
     }
@@ -44,10 +66,9 @@ fn coarse_step(found: &Summary) -> Option<&Warning> {
 
 /// Whether a finer method explains the data no worse than a coarser one: records that were simulated with the coarser step
 /// are explained by that alone.
-fn is_better(before: &Summary, again: &Summary) -> bool {
+fn explains(before: &Summary, again: &Summary) -> bool {
     const INDISTINGUISHABLE: f64 = 4.0;
-    let explains = before.deviance.zip(again.deviance).is_none_or(|(before, again)| again < before + INDISTINGUISHABLE);
-    again.outcome.converged() && explains || !before.outcome.converged()
+    before.deviance.zip(again.deviance).is_none_or(|(before, again)| again < before + INDISTINGUISHABLE)
 }
 
 /// The estimate of a finer method, with the work of both.

@@ -27,23 +27,25 @@ impl Problem<'_> {
     /// cannot be simulated, gives way to a finer one.
     pub(super) fn run_since(&self, begin: Instant) -> Result<Summary, Error> {
         let control = self.control(begin);
-        let mut attempt = Attempt::new(self.run_within(begin, &control));
+        let mut attempt = Attempt::new(self.run_within(begin, &control, self.unknowns.start()));
         for finer in self.by_method().skip(1) {
             if !attempt.is_coarse() || control.stops() {
                 break;
             }
-            attempt = attempt.or(finer.run_within(begin, &control));
+            if let Some(start) = attempt.start(finer, &control) {
+                attempt = attempt.or(finer.run_within(begin, &control, start));
+            }
         }
         attempt.found
     }
 
-    /// The same by this method alone.
-    pub(super) fn run_within(&self, begin: Instant, control: &Control) -> Result<Summary, Error> {
+    /// The same by this method alone, a single search from this start.
+    pub(super) fn run_within(&self, begin: Instant, control: &Control, start: Vec<f64>) -> Result<Summary, Error> {
         let settings = &self.settings;
         settings.optimizer.check()?;
         let plain = self.in_units(control);
         let end = match settings.starts {
-            1 => search(&plain, &settings.optimizer)?,
+            1 => search(&plain, &settings.optimizer, start)?,
             count => search_from_many(&plain, &settings.optimizer, count)?,
         };
         // The time limit does not apply to the conclusion.
@@ -133,8 +135,7 @@ impl Problem<'_> {
             _ if noisy => full.unwrap_or(Whitening::Diagonal(sigma)),
             _ => problem.objective()?.whitening,
         };
-        let coordinates = estimate.unknowns.iter().map(|u| u.transform.to_coordinate(u.value)).collect();
-        Ok((problem.in_units(control).with(whitening), coordinates))
+        Ok((problem.in_units(control).with(whitening), estimate.coordinates()))
     }
 
     fn check_estimate(&self, estimate: &Summary) -> Result<(), Error> {

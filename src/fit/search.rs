@@ -11,20 +11,22 @@ use std::sync::Arc;
 const NOISE_TOLERANCE: f64 = 1e-6;
 const NOISE_ROUNDS: u32 = 100;
 
-/// Searches from the start, or from a checkpoint. `plain` leaves errors in the units of the outputs.
-pub(super) fn search(plain: &Objective<'_>, optimizer: &Arc<dyn Optimizer>) -> Result<SearchEnd, Error> {
-    let problem = plain.problem;
+/// Searches from a start, or from a checkpoint. `plain` leaves errors in the units of the outputs.
+pub(super) fn search(
+    plain: &Objective<'_>,
+    optimizer: &Arc<dyn Optimizer>,
+    start: Vec<f64>,
+) -> Result<SearchEnd, Error> {
     let Some(mut checkpoint) = checkpoint(plain, optimizer)? else {
-        return Rounds::new(plain, optimizer, problem.unknowns.start())?.run(None);
+        return Rounds::new(plain, optimizer, start)?.run(None);
     };
     let mut rounds = match optimizer.resume(&checkpoint)? {
-        Some((place, iterations, saved)) if place.len() == problem.unknowns.start().len() => {
+        Some((place, iterations, saved)) if place.len() == start.len() => {
             checkpoint.before = iterations;
             Rounds::from(plain, optimizer, place, saved)?
         }
         // Written at once, so that a path that cannot be written is reported before the search.
         _ => {
-            let start = problem.unknowns.start();
             optimizer.begin(&checkpoint, &start)?;
             Rounds::from(plain, optimizer, start, None)?
         }
@@ -164,12 +166,20 @@ impl<'r> Rounds<'r> {
 }
 
 /// How a search ended that found no step to lower the cost of an adaptive integrator, whose number of steps changes from point
-/// to point; `None` if a finer tolerance promises more than the cost is off.
+/// to point; `None` if slopes promise more than the costs of this tolerance and a finer one differ.
 fn within_finer_tolerance(objective: &Objective<'_>, coordinates: &[f64]) -> Option<Outcome> {
     let finer = if objective.sweep.is_adaptive() { objective.sweep.refined()? } else { return None };
-    let cost = objective.cost_at(coordinates).ok()?;
-    let finer = objective.of(objective.problem, &*finer).linearize(coordinates).ok()?;
-    within_tolerance(coordinates, cost, finer, &Domain::of(objective))
+    let finer = objective.of(objective.problem, &*finer);
+    let (linear, again) = (objective.linearize(coordinates).ok()?, finer.linearize(coordinates).ok()?);
+    let here = again.cost - linear.cost;
+    let noise = |x: &[f64]| {
+        let there = finer.cost_at(x).ok().zip(objective.cost_at(x).ok());
+        there.map_or(0.0, |(finer, this)| (finer - this - here).abs()).max(here.abs())
+    };
+    let domain = Domain::of(objective);
+    // A minimum of this tolerance, though that of a finer one lies elsewhere, of which a warning tells.
+    within_tolerance(coordinates, linear, &domain, noise)
+        .or_else(|| within_tolerance(coordinates, again, &domain, noise))
 }
 
 /// Why the start could not be evaluated.

@@ -13,7 +13,7 @@
 //! explicit method gives up after 100,000 steps; a circuit with a stray time constant of 10 ns, sampled every 1 ms, takes
 //! 33 us per sample against 6.1 ms.
 
-use super::tolerance::{combined, values};
+use super::tolerance::{MAX_STEPS, combined, values};
 use super::{Integrator, Square, Stuck, System, Tolerance};
 use crate::layout::Kind;
 use crate::scalar::Scalar;
@@ -111,9 +111,53 @@ impl Integrator for Esdirk {
         x: Y::Vector<Y::Scalar>,
         step: &mut f64,
     ) -> Result<Y::Vector<Y::Scalar>, Stuck> {
+        self.advance_within(MAX_STEPS, system, x, step)
+    }
+
+    fn serves(&self, kind: Kind) -> bool {
+        kind == Kind::Continuous
+    }
+
+    fn refined(&self, _kind: Kind) -> Option<Self> {
+        Some(Esdirk { relative: self.relative * 1e-2, absolute: self.absolute * 1e-2 })
+    }
+
+    #[cfg(feature = "std")]
+    fn check(&self) -> Result<(), crate::error::Error> {
+        self.tolerance(MAX_STEPS).check("Esdirk")
+    }
+
+    #[cfg(feature = "std")]
+    fn describe(&self, _kind: Kind) -> String {
+        format!("implicit Runge-Kutta 4(3), adaptive, relative {:e}, absolute {:e}", self.relative, self.absolute)
+    }
+}
+
+/// `x + a * k`, entry by entry.
+#[inline(always)]
+fn axpy<Y: System, S: Scalar>(system: &Y, x: &Y::Vector<S>, a: f64, k: &Y::Vector<S>) -> Y::Vector<S> {
+    system.vector(|i| x.as_ref()[i].plus_times(k.as_ref()[i], a))
+}
+
+impl Esdirk {
+    fn tolerance(&self, steps: u32) -> Tolerance {
+        Tolerance { relative: self.relative, absolute: self.absolute, steps }
+    }
+
+    /// Crosses an interval with at most this many steps, tried or taken.
+    ///
+    /// # Errors
+    /// `Stuck`, where that is not enough.
+    #[inline(always)]
+    pub(super) fn advance_within<Y: System>(
+        &self,
+        steps: u32,
+        system: &Y,
+        x: Y::Vector<Y::Scalar>,
+        step: &mut f64,
+    ) -> Result<Y::Vector<Y::Scalar>, Stuck> {
         let (_, length) = system.interval();
-        let tolerance = Tolerance { relative: self.relative, absolute: self.absolute };
-        tolerance.cross_in_stages((4.0, &ERROR), system, x, step, |x, tau, h, first, k| {
+        self.tolerance(steps).cross_in_stages((4.0, &ERROR), system, x, step, |x, tau, h, first, k| {
             let mut stage = x.clone();
             for i in first..STAGES {
                 let base = combined(system, x, h, &A[i][..i], k);
@@ -144,32 +188,6 @@ impl Integrator for Esdirk {
         })
     }
 
-    fn serves(&self, kind: Kind) -> bool {
-        kind == Kind::Continuous
-    }
-
-    fn refined(&self, _kind: Kind) -> Option<Self> {
-        Some(Esdirk { relative: self.relative * 1e-2, absolute: self.absolute * 1e-2 })
-    }
-
-    #[cfg(feature = "std")]
-    fn check(&self) -> Result<(), crate::error::Error> {
-        Tolerance { relative: self.relative, absolute: self.absolute }.check("Esdirk")
-    }
-
-    #[cfg(feature = "std")]
-    fn describe(&self, _kind: Kind) -> String {
-        format!("implicit Runge-Kutta 4(3), adaptive, relative {:e}, absolute {:e}", self.relative, self.absolute)
-    }
-}
-
-/// `x + a * k`, entry by entry.
-#[inline(always)]
-fn axpy<Y: System, S: Scalar>(system: &Y, x: &Y::Vector<S>, a: f64, k: &Y::Vector<S>) -> Y::Vector<S> {
-    system.vector(|i| x.as_ref()[i].plus_times(k.as_ref()[i], a))
-}
-
-impl Esdirk {
     /// The equation of a stage by Newton's method, but for the last step, which is left to arithmetic with slopes. `None`
     /// where it does not converge.
     fn solve<Y: System>(
@@ -181,7 +199,7 @@ impl Esdirk {
         gamma_h: f64,
     ) -> Option<Linearization<Y>> {
         // What is left is squared by the last step, so that 1e-10 is as good as it gets.
-        let allowed = Tolerance { relative: self.relative.max(1e-10), absolute: self.absolute };
+        let allowed = Tolerance { relative: self.relative.max(1e-10), ..self.tolerance(MAX_STEPS) };
         let mut k = system.vector(|i| (guess.as_ref()[i] - base.as_ref()[i]) / gamma_h);
         let mut before = f64::INFINITY;
         for _ in 0..ITERATIONS {

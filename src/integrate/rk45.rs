@@ -1,7 +1,7 @@
 //! [`Rk45`]: the explicit Runge-Kutta pair of orders 5 and 4 of Dormand and Prince (J. R. Dormand, P. J. Prince, "A family
 //! of embedded Runge-Kutta formulae", Journal of Computational and Applied Mathematics 6, 1980, 19-26, table 2).
 
-use super::tolerance::combined;
+use super::tolerance::{MAX_STEPS, combined};
 use super::{Integrator, Stuck, System, Tolerance};
 use crate::layout::Kind;
 use serde::{Deserialize, Serialize};
@@ -78,7 +78,7 @@ impl Integrator for Rk45 {
         step: &mut f64,
     ) -> Result<Y::Vector<Y::Scalar>, Stuck> {
         let (_, length) = system.interval();
-        let tolerance = Tolerance { relative: self.relative, absolute: self.absolute };
+        let tolerance = Tolerance { relative: self.relative, absolute: self.absolute, steps: MAX_STEPS };
         tolerance.cross_in_stages((5.0, &ERROR), system, x, step, |x, tau, h, first, k| {
             let mut stage = x.clone();
             for i in first..STAGES {
@@ -99,7 +99,7 @@ impl Integrator for Rk45 {
 
     #[cfg(feature = "std")]
     fn check(&self) -> Result<(), crate::error::Error> {
-        Tolerance { relative: self.relative, absolute: self.absolute }.check("Rk45")
+        Tolerance { relative: self.relative, absolute: self.absolute, steps: MAX_STEPS }.check("Rk45")
     }
 
     #[cfg(feature = "std")]

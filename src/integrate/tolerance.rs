@@ -10,10 +10,12 @@ pub(crate) struct Tolerance {
     pub relative: f64,
     /// On top of that, in the unit of each state.
     pub absolute: f64,
+    /// Steps per interval, tried or taken, after which the method is stuck.
+    pub steps: u32,
 }
 
-/// Steps per interval, tried or taken, after which a method is stuck.
-const MAX_STEPS: u32 = 100_000;
+/// The steps per interval of methods that were chosen.
+pub(crate) const MAX_STEPS: u32 = 100_000;
 
 /// The end of a step and the error of the values there.
 pub(crate) type Trial<Y> = (<Y as System>::Vector<<Y as System>::Scalar>, <Y as System>::Vector<f64>);
@@ -22,7 +24,7 @@ impl Tolerance {
     /// Refuses what is no tolerance: a relative one that is not positive, an absolute one that is negative.
     #[cfg(feature = "std")]
     pub fn check(&self, method: &str) -> Result<(), crate::error::Error> {
-        let Tolerance { relative, absolute } = *self;
+        let Tolerance { relative, absolute, .. } = *self;
         if !(relative > 0.0 && relative.is_finite()) {
             let what = format!("the relative tolerance of {method}");
             return Err(crate::error::Error::NotPositive { what, value: relative });
@@ -68,7 +70,7 @@ impl Tolerance {
         let (mut tau, mut growth) = (0.0, 5.0);
         // The first step is a cautious guess; a few steps later it is forgotten.
         let mut proposed = if *memory > 0.0 { *memory } else { 1e-3 * length };
-        for _ in 0..MAX_STEPS {
+        for _ in 0..self.steps {
             let left = length - tau;
             let resolution = 4.0 * f64::EPSILON * tau.max((t0 + tau).abs());
             // The last two steps share what is left, so that none is tiny.

@@ -177,7 +177,13 @@ impl Judgement<'_> {
         let refines = self.objective.problem.refines;
         let most = if refines { REFINED_SHIFT } else { STEP_SHIFT };
         // Data that are reproduced to their rounding were made with this step.
-        if self.end.outcome == Outcome::Exact || self.residuals.step_error / self.widening <= most {
+        if self.end.outcome == Outcome::Exact {
+            return None;
+        }
+        if refines && !self.end.outcome.converged() {
+            return self.led_astray();
+        }
+        if self.residuals.step_error / self.widening <= most {
             return None;
         }
         let finer = self.objective.sweep.refined()?;
@@ -194,6 +200,25 @@ impl Judgement<'_> {
             );
             Warning { code: WarningCode::CoarseStep, severity, text }
         })
+    }
+
+    /// Of a search that ended without a minimum: whether the cost, at its start or at its end, is that of the step.
+    fn led_astray(&self) -> Option<Warning> {
+        let start = self.objective.problem.unknowns.start();
+        let decides = |x: &[f64]| self.objective.step_decides(x) == Some(true);
+        let place = if decides(&start) {
+            "start"
+        } else if decides(&self.end.coordinates) {
+            "end"
+        } else {
+            return None;
+        };
+        let text = format!(
+            "the step may have kept the search from a minimum: with {} the cost at its {place} is another; use a finer step, or \
+             smooth the model",
+            self.objective.sweep.refined()?.integrator()
+        );
+        Some(Warning { code: WarningCode::CoarseStep, severity: Severity::NotUsable, text })
     }
 }
 

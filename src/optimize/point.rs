@@ -209,12 +209,18 @@ impl Point {
     }
 }
 
-/// The outcome of a search that stopped at a point because no step lowers its cost, from cost and slopes of a finer tolerance
-/// at that point: [`Outcome::Rough`] if the full step would lower the cost by less than the two costs differ, else `None`.
-pub(crate) fn within_tolerance(x: &[f64], cost: f64, finer: Linearization, domain: &Domain) -> Option<Outcome> {
-    let point = Point::new(x.to_vec(), finer, domain)?;
-    let noise = (point.cost() - cost).abs();
+/// The outcome of a search that stopped at a point because no step lowers its cost, from cost and slopes there:
+/// [`Outcome::Rough`] if the full step is negligible, or would lower the cost by less than `noise`, which is asked for where it
+/// leads; else `None`.
+pub(crate) fn within_tolerance(
+    x: &[f64],
+    linear: Linearization,
+    domain: &Domain,
+    noise: impl Fn(&[f64]) -> f64,
+) -> Option<Outcome> {
+    let point = Point::new(x.to_vec(), linear, domain)?;
+    let noise = noise(&point.towards(point.full.as_ref()?));
     // The relative difference is not finite where the cost is zero.
-    let part = noise / point.cost_size();
-    (point.potential <= noise && part.is_finite()).then(|| point.rough(part))
+    let rough = Some(noise / point.cost_size()).filter(|part| part.is_finite()).map(|part| point.rough(part))?;
+    (point.potential <= noise || rough.converged()).then_some(rough)
 }

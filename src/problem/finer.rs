@@ -1,6 +1,6 @@
 //! [`Finer`]: the same problem by ever finer methods, for fits whose integrator was not chosen.
 
-use super::{Cuts, Problem, Settings};
+use super::{Cuts, Objective, Problem, Settings};
 use crate::error::Error;
 use crate::sweep::Sweep;
 use std::sync::{Arc, OnceLock};
@@ -84,5 +84,17 @@ impl<'a> Problem<'a> {
     pub(crate) fn by_name(&self, integrator: &str) -> &Problem<'_> {
         let is = |problem: &&Problem<'_>| problem.sweep.integrator() == integrator;
         self.by_method().find(is).unwrap_or(self)
+    }
+}
+
+impl Objective<'_> {
+    /// Whether a finer step changes the cost at a point by a tenth; `None` if either cannot be evaluated there, or if there is
+    /// none.
+    pub(crate) fn step_decides(&self, coordinates: &[f64]) -> Option<bool> {
+        const CHANGED: f64 = 0.1;
+        let finer = self.sweep.refined()?;
+        let finer = self.of(self.problem, &*finer).cost_at(coordinates).ok()?;
+        let this = self.cost_at(coordinates).ok()?;
+        Some((this - finer).abs() > CHANGED * this.abs().min(finer.abs()))
     }
 }

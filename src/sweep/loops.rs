@@ -195,6 +195,32 @@ impl<M: Model, I: Integrator> Loops<M> for I {
     }
 }
 
+/// An integrator whose loop is compiled in one variant only: for a method that few fits come to, compile time counts more
+/// than speed.
+pub(crate) struct Narrow<I>(pub I);
+
+impl<M: Model, I: Integrator> Loops<M> for Narrow<I> {
+    fn run(
+        &self,
+        model: &M,
+        piece: &Piece<'_>,
+        seeds: &[Seed],
+        restart: Option<usize>,
+        visit: Visit<'_>,
+    ) -> Result<Reached, RunError> {
+        let task = Task { model, integrator: &self.0, piece, seeds, restart };
+        match seeds.len() {
+            0 => task.run_windows::<f64>(visit),
+            _ => task.run_windows::<Dual<4>>(visit),
+        }
+    }
+
+    fn refined(&self, kind: Kind) -> Option<Refined<M>> {
+        let refined = Integrator::refined(&self.0, kind)?;
+        Some((Arc::new(Narrow(refined.clone())), Arc::new(refined)))
+    }
+}
+
 /// A piece and how it is to be run.
 struct Task<'t, M: Model, I> {
     model: &'t M,

@@ -28,4 +28,5 @@ mod segments;
 #[path = "../common/shared.rs"]
 mod shared;
 mod starts;
+mod stiff;
 mod user_code;

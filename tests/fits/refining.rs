@@ -93,3 +93,21 @@ fn a_cost_as_rough_as_its_tolerance_is_no_stall() {
     assert!((1e-5..1e-2).contains(&noise) && (0.1..10.0).contains(&errors), "{}", fit.outcome);
     assert!(!fit.outcome.converged() && fit.severity() == Severity::NotUsable, "{fit}");
 }
+
+/// A search that creeps at a minimum of its own tolerance, from which that of a finer one is standard errors away (the errors of
+/// its steps add up in an oscillation that hardly decays), has converged.
+#[test]
+fn a_minimum_of_a_tolerance_is_no_stall() {
+    let (truth, record) = record(6e4, 0.5);
+    let coarse = Esdirk { relative: 1e-6, absolute: 1e-9 };
+    for off in [1.001, 1.05] {
+        let start = Coupling { c: free(off * truth.c), ..near(truth) };
+        let fit = Fit::new(&Coupled, &record).parameters(start).integrator(coarse).run().unwrap();
+        assert!(fit.outcome.converged() && fit.severity() < Severity::NotUsable, "{fit}");
+        // Five: three for the noise of this record, and the bias.
+        for (unknown, truth) in fit.unknowns.iter().zip(Coupling::into_array(truth)) {
+            let error = unknown.knowledge.standard_error().unwrap();
+            assert!((unknown.value - truth).abs() < 5.0 * error, "{fit}");
+        }
+    }
+}

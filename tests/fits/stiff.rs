@@ -1,0 +1,197 @@
+//! Plants with a mode far faster than their samples, by default settings: a fit takes the implicit method by itself, and gives
+//! it up soon where a model explodes.
+
+use greybox::optimize::Severity;
+use greybox::*;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+const EXACT: Esdirk = Esdirk { relative: 1e-11, absolute: 1e-14 };
+
+signals! { pub struct Volt { u: "V" } }
+signals! { pub struct Drive { i: "A", w: "rad/s" } }
+signals! { pub struct Motor { r: "ohm", l: "H", k: "V s/rad", j: "kg m2", d: "N m s" } }
+
+/// A direct-current motor.
+#[derive(Clone)]
+struct Direct;
+
+impl Model for Direct {
+    type State = Drive;
+    type Input = Volt;
+    type Output = Drive;
+    type Parameters = Motor;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Drive<S>, u: &Volt<S>, p: &Motor<S>) -> Drive<S> {
+        Drive { i: (u.u - p.r * x.i - p.k * x.w) / p.l, w: (p.k * x.i - p.d * x.w) / p.j }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Drive<S>, _u: &Volt<S>, _p: &Motor<S>) -> Drive<S> {
+        *x
+    }
+}
+
+/// The motor whose current settles with this rate per sample of 10 ms, and a record of 300 samples with noise.
+fn motor(rate: f64) -> (Motor, ExperimentOf<Direct>) {
+    let p = Motor { r: 1.0, l: 1e-2 / rate, k: 0.1, j: 1e-2, d: 1e-3 };
+    let voltage = |k: usize| 10.0 * (0.03 * k as f64).sin() + if (k / 25).is_multiple_of(2) { 12.0 } else { 6.0 };
+    let input: Vec<Volt> = (0..300).map(|k| Volt { u: voltage(k) }).collect();
+    let time = Time::Uniform { start: 0.0, step: 1e-2 };
+    let run = Simulator::new(&Direct).integrator(EXACT).run(&p, &Drive::default(), time, &input).unwrap();
+    let record = run.with_noise(Drive { i: 0.1, w: 1.0 }, 3).experiment(&Direct).unwrap();
+    (p, record.initial(Drive::map(Drive::default(), fixed)))
+}
+
+fn off(p: Motor) -> Motor<Parameter> {
+    Motor { r: free(2.0), l: fixed(p.l), k: free(0.05), j: free(2e-2), d: free(5e-4) }
+}
+
+/// Each unknown is known, and within three standard errors of the truth; the method is this.
+fn is_right<M: Model>(fit: &Estimate<M>, truth: &[f64], method: &str) {
+    assert!(fit.outcome.converged() && fit.severity() == Severity::Usable, "{fit}");
+    assert!(fit.method.integrator.contains(method), "{fit}");
+    for (unknown, truth) in fit.unknowns.iter().zip(truth) {
+        let error = unknown.knowledge.standard_error().unwrap();
+        assert!((unknown.value - truth).abs() < 3.0 * error, "{fit}");
+    }
+}
+
+/// Runge-Kutta's method with 64 steps per sample is stable up to rates of 178.
+#[test]
+fn a_motor_with_a_fast_current_is_fitted() {
+    for (rate, method) in [(3.0, "steps per sample"), (30.0, "steps per sample"), (1e4, "implicit"), (1e7, "implicit")]
+    {
+        let (p, record) = motor(rate);
+        let fit = Fit::new(&Direct, &record).parameters(off(p)).run().unwrap();
+        is_right(&fit, &[p.r, p.k, p.j, p.d], method);
+        let fleet = Fleet::new(&Direct).parameters(off(p)).fleet().unwrap();
+        for answer in fleet.run(vec![record.clone(); 3]) {
+            let answer = answer.unwrap();
+            assert_eq!(answer.method.integrator, fit.method.integrator);
+            for (a, b) in answer.unknowns.iter().zip(&fit.unknowns) {
+                // Two orders of the same sums; unknowns are found to 1e-8 of a standard error or so.
+                let error = b.knowledge.standard_error().unwrap();
+                assert!((a.value - b.value).abs() < 1e-5 * error, "{rate}: {} {} {}", a.name, a.value, b.value);
+            }
+        }
+    }
+}
+
+signals! { pub struct Species { a: "", b: "", c: "" } }
+signals! { pub struct Measured { a: "", c: "" } }
+signals! { pub struct Rates { k1: "1/s", k2: "1/s", k3: "1/s" } }
+
+/// H. H. Robertson's autocatalytic reaction (1966), in the constants of Hairer and Wanner, section IV.1.
+#[derive(Clone)]
+struct Robertson;
+
+impl Model for Robertson {
+    type State = Species;
+    type Input = Nothing;
+    type Output = Measured;
+    type Parameters = Rates;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Species<S>, _u: &Nothing, p: &Rates<S>) -> Species<S> {
+        let (one, two, three) = (p.k1 * x.a, p.k2 * x.b * x.b, p.k3 * x.b * x.c);
+        Species { a: three - one, b: one - two - three, c: two }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Species<S>, _u: &Nothing, _p: &Rates<S>) -> Measured<S> {
+        Measured { a: x.a, c: x.c }
+    }
+}
+
+#[test]
+fn robertsons_kinetics_are_fitted() {
+    let (p, start) = (Rates { k1: 0.04, k2: 3e7, k3: 1e4 }, Species { a: 1.0, ..Species::default() });
+    // From 0.1 s to 7,500 s, eight in a decade.
+    let times: Vec<f64> = std::iter::once(0.0).chain((0..40).map(|k| 10f64.powf(f64::from(k) / 8.0 - 1.0))).collect();
+    let input = vec![Nothing; times.len()];
+    let run = Simulator::new(&Robertson).integrator(EXACT).run(&p, &start, Time::Stamps(times), &input).unwrap();
+    let record = run.with_noise(Measured { a: 3e-3, c: 3e-3 }, 3).experiment(&Robertson).unwrap();
+    let record = record.initial(Species::map(start, fixed));
+    for factor in [0.2, 1.5, 5.0] {
+        // The slow part of the reaction tells the ratio of k2 and k3 alone.
+        let start = Rates { k1: free(p.k1 * factor).log(), k2: fixed(p.k2), k3: free(p.k3 / factor).log() };
+        let fit = Fit::new(&Robertson, &record).parameters(start).run().unwrap();
+        is_right(&fit, &[p.k1, p.k3], "implicit");
+    }
+}
+
+signals! { pub struct Swing { x: "", v: "1/s" } }
+signals! { pub struct Position { x: "" } }
+signals! { pub struct Damping { mu: "1/s" } }
+
+/// Van der Pol's relaxation oscillator.
+#[derive(Clone)]
+struct Relaxation;
+
+impl Model for Relaxation {
+    type State = Swing;
+    type Input = Nothing;
+    type Output = Position;
+    type Parameters = Damping;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Swing<S>, _u: &Nothing, p: &Damping<S>) -> Swing<S> {
+        Swing { x: x.v, v: p.mu * (-x.x * x.x + 1.0) * x.v - x.x }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Swing<S>, _u: &Nothing, _p: &Damping<S>) -> Position<S> {
+        Position { x: x.x }
+    }
+}
+
+/// Four turns within 100 samples of 40 s, each in some milliseconds.
+#[test]
+fn a_relaxation_oscillator_is_fitted() {
+    let (time, start) = (Time::Uniform { start: 0.0, step: 40.0 }, Swing { x: 2.0, v: 0.0 });
+    let run = Simulator::new(&Relaxation).integrator(EXACT).run(&Damping { mu: 1e3 }, &start, time, &[Nothing; 100]);
+    let record = run.unwrap().with_noise(Position { x: 0.01 }, 3).experiment(&Relaxation).unwrap();
+    let record = record.initial(Swing::map(start, fixed));
+    for factor in [1.02, 1.1] {
+        let fit = Fit::new(&Relaxation, &record).parameters(Damping { mu: free(1e3 * factor).log() }).run().unwrap();
+        is_right(&fit, &[1e3], "implicit");
+    }
+}
+
+/// A rate that is stable neither in the plant nor in a step of its length: the search by the first step is led to where the
+/// fast mode has no effect, which is no minimum of what a finer step makes of the model.
+#[test]
+fn a_step_at_its_limit_does_not_lead_astray() {
+    let (p, record) = motor(2.9);
+    let fit = Fit::new(&Direct, &record).parameters(off(p)).run().unwrap();
+    is_right(&fit, &[p.r, p.k, p.j, p.d], "steps per sample");
+}
+
+signals! { pub struct Growth { gain: "1/s", turn: "rad/s" } }
+
+/// Grows beyond all bounds within a finite time, and turns; counts how often its equations are evaluated.
+#[derive(Clone)]
+struct Exploding(Arc<AtomicU64>);
+
+impl Model for Exploding {
+    type State = Swing;
+    type Input = Nothing;
+    type Output = Position;
+    type Parameters = Growth;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Swing<S>, _u: &Nothing, p: &Growth<S>) -> Swing<S> {
+        self.0.fetch_add(1, Ordering::Relaxed);
+        let square = x.x * x.x + x.v * x.v;
+        Swing { x: p.gain * square * x.x - p.turn * x.v, v: p.gain * square * x.v + p.turn * x.x }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Swing<S>, _u: &Nothing, _p: &Growth<S>) -> Position<S> {
+        Position { x: x.x }
+    }
+}
+
+/// From the start on, within the search, or turning 500 times in each of the 200 samples.
+#[test]
+fn what_explodes_or_is_fast_is_given_up_soon() {
+    for (gain, turn) in [(1e3, 1.0), (1e-3, 1.0), (0.3, 3e3), (-1e-4, 3e3)] {
+        let model = Exploding(Arc::default());
+        let junk = |k: usize| if (k / 7).is_multiple_of(2) { 30.0 + k as f64 } else { -40.0 };
+        let outputs = (0..200).map(|k| Position { x: junk(k) }).collect();
+        let time = Time::Uniform { start: 0.0, step: 1.0 };
+        let record = Experiment::new(&model, time, vec![Nothing; 200], outputs).unwrap();
+        let record = record.initial(Swing { x: fixed(1.0), v: fixed(0.0) });
+        let found = Fit::new(&model, &record).parameters(Growth { gain: free(gain), turn: free(turn) }).run();
+        let count = model.0.load(Ordering::Relaxed);
+        println!("{gain} {turn}: {count}");
+        assert!(found.is_err() || found.is_ok_and(|fit| fit.severity() == Severity::NotUsable), "{gain} {turn}");
+        assert!(count < 2_000_000, "{gain} {turn}: {count}");
+    }
+}
