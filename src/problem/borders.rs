@@ -129,7 +129,7 @@ impl Objective<'_> {
         best: f64,
     ) -> Result<Triangulation, Infeasible> {
         let (repairs, falls) = REPAIRS;
-        let mut last = f64::INFINITY;
+        let mut last = None;
         for _ in 0..=repairs {
             let found = match self.triangles(coordinates, values, Some(&borders)) {
                 Ok(found) => found,
@@ -140,11 +140,13 @@ impl Objective<'_> {
             if found.moved <= (MOVED_NONLINEAR * difference).max(MOVED_ROUNDING * found.cost) {
                 return Ok(found);
             }
+            // A guess that changes the errors by more than they are is none.
+            let limit = last.map_or(found.cost, |last: f64| falls * last);
             match found.borders {
-                Some(corrected) if found.moved <= falls * last.min(found.cost / falls) => borders = corrected,
+                Some(corrected) if found.moved <= limit => borders = corrected,
                 _ => break,
             }
-            last = found.moved;
+            last = Some(found.moved);
         }
         let borders = self.simulated_borders(coordinates, values)?;
         self.triangles(coordinates, values, Some(&borders))

@@ -1,7 +1,7 @@
 //! Blocks that occur twice: buffers that were written again.
 
 use super::Suspicion;
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxBuildHasher, FxHashMap};
 
 /// The shortest block that is reported.
 const SHORTEST: usize = 20;
@@ -12,7 +12,7 @@ const KEPT: usize = 64;
 /// that both occurrences of a block offer the same ones.
 pub(super) fn repeated(values: &[f64]) -> Option<Suspicion> {
     let mask = (values.len() / KEPT).next_power_of_two() as u64 - 1;
-    let mut first: FxHashMap<u64, usize> = FxHashMap::default();
+    let mut first: FxHashMap<u64, usize> = FxHashMap::with_capacity_and_hasher(2 * KEPT, FxBuildHasher);
     let mut longest: Option<(usize, usize, usize)> = None;
     let mut known = 0;
     for (k, value) in values.iter().enumerate() {
