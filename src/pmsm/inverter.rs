@@ -97,10 +97,12 @@ impl DeadTime {
 
 /// The time from a measurement to the middle of the interval in which the voltage computed from it acts, in sample times:
 /// one for the computation, half of the hold.
+#[cfg(feature = "std")]
 const DELAY: f64 = 1.5;
 
 /// The stationary voltage vector for a command (V, rotor frame) computed at electrical angle `theta_e` (rad) and speed `w`
 /// (rad/s, mechanical), aimed at the rotor's angle in the middle of the interval in which it will act.
+#[cfg(feature = "std")]
 #[inline]
 pub(super) fn aim(command: (f64, f64), theta_e: f64, w: f64, pole_pairs: PolePairs, ts: f64) -> Stator {
     let (alpha, beta) = rotate_out_of(command, theta_e + DELAY * pole_pairs.electrical(w) * ts);
