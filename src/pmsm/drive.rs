@@ -6,14 +6,14 @@
 
 use super::control::{Command, CurrentControl, SpeedControl};
 use super::frames::{Stator, rotate_into, rotate_out_of};
-use super::inverter::{Carrier, DeadTime, Inverter, aim};
+use super::inverter::{Carrier, DeadTime, Inverter};
 pub use super::log::{Log, Row, Warning};
 use super::plant::Plant;
 use super::program::Program;
 use super::robot::{RobotAxis, V_MAX};
 use super::sensors::{CurrentSensors, Resolver};
 use super::temperature::Celsius;
-use super::{Currents, Injection, MachineState, MotorError, SQRT_3_2, SwitchingInverter};
+use super::{Currents, Injection, MachineState, MotorError, PolePairs, SQRT_3_2, SwitchingInverter};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
@@ -236,6 +236,18 @@ impl Simulation {
         }
         log
     }
+}
+
+/// The time from a measurement to the middle of the interval in which the voltage computed from it acts, in sample times:
+/// one for the computation, half of the hold.
+const DELAY: f64 = 1.5;
+
+/// The stationary voltage vector for a command (V, rotor frame) computed at electrical angle `theta_e` (rad) and speed `w`
+/// (rad/s, mechanical), aimed at the rotor's angle in the middle of the interval in which it will act.
+#[inline]
+fn aim(command: (f64, f64), theta_e: f64, w: f64, pole_pairs: PolePairs, ts: f64) -> Stator {
+    let (alpha, beta) = rotate_out_of(command, theta_e + DELAY * pole_pairs.electrical(w) * ts);
+    Stator { alpha, beta }
 }
 
 #[cfg(test)]

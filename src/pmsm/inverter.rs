@@ -1,7 +1,7 @@
 //! The voltage-source inverter: how much voltage there is, when it acts, and what dead time takes from it.
 
-use super::frames::{Phases, Stator, clarke, inverse_clarke, rotate_out_of};
-use super::{MotorError, PolePairs};
+use super::MotorError;
+use super::frames::{Phases, Stator, clarke, inverse_clarke};
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
@@ -93,18 +93,6 @@ impl DeadTime {
         let loss = |i: f64| self.vdt * Scalar::tanh(i / self.i0);
         clarke(Phases { a: loss(phases.a), b: loss(phases.b), c: loss(phases.c) })
     }
-}
-
-/// The time from a measurement to the middle of the interval in which the voltage computed from it acts, in sample times:
-/// one for the computation, half of the hold.
-const DELAY: f64 = 1.5;
-
-/// The stationary voltage vector for a command (V, rotor frame) computed at electrical angle `theta_e` (rad) and speed `w`
-/// (rad/s, mechanical), aimed at the rotor's angle in the middle of the interval in which it will act.
-#[inline]
-pub(super) fn aim(command: (f64, f64), theta_e: f64, w: f64, pole_pairs: PolePairs, ts: f64) -> Stator {
-    let (alpha, beta) = rotate_out_of(command, theta_e + DELAY * pole_pairs.electrical(w) * ts);
-    Stator { alpha, beta }
 }
 
 /// Share of the period `0..1` for which each upper valve is on, for a stationary vector `u` (V) out of `vdc` (V): the
