@@ -180,7 +180,8 @@ impl Judgement<'_> {
         if self.end.outcome == Outcome::Exact {
             return None;
         }
-        if refines && !self.end.outcome.converged() {
+        let stopped = matches!(self.end.outcome, Outcome::TimeLimit | Outcome::Cancelled);
+        if refines && !stopped && !self.end.outcome.converged() {
             return self.led_astray();
         }
         if self.residuals.step_error / self.widening <= most {

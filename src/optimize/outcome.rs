@@ -35,8 +35,8 @@ pub enum Outcome {
     /// Nothing was left to explain: the model reproduces the data to their rounding.
     Exact,
     /// No step lowers the cost, which is rough: what the next step would gain is below what the cost jumps from point to
-    /// point (of an adaptive integrator: changes with a finer tolerance), or steps do not gain what slopes predict, however
-    /// short.
+    /// point (of an adaptive integrator: changes with a finer tolerance, or negligible), or steps do not gain what slopes
+    /// predict, however short.
     Rough {
         /// By how much the cost jumps, as a part of it.
         #[serde(with = "crate::real")]
