@@ -37,11 +37,11 @@ pub enum CovarianceMethod {
     /// From the curvature of the cost, for white errors.
     #[default]
     Classical,
-    /// The sandwich, for errors that are independent from sample to sample.
+    /// The sandwich, for errors that are independent from sample to sample; those of several outputs may be correlated.
     Sandwich,
     /// The sandwich, for errors that are white before the pre-filter.
     FilteredSandwich,
-    /// Newey and West's, prewhitened, for autocorrelated errors.
+    /// For autocorrelated errors: of stationary ones, or, where it certainly says more, Newey and West's, prewhitened.
     Hac {
         /// Lags over which correlation is allowed for.
         lags: u64,

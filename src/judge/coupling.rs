@@ -48,7 +48,6 @@ impl Coupling {
 
     pub fn add(&mut self, window: &Window, lane: usize) {
         for ((i, j), pair) in pairs(window.outputs()).zip(&mut self.pairs) {
-            // Where one was not measured, its error is zero.
             for k in
                 (0..window.samples[lane]).filter(|&k| window.is_measured(k, i, lane) && window.is_measured(k, j, lane))
             {

@@ -11,6 +11,8 @@
 //! depend on the choice of units or parameters. Its coefficients are corrected for the bias of least squares. The variance
 //! that comes out is an estimate from few independent stretches of the record, so intervals take Student's t with the
 //! degrees of freedom that the errors of the autoregression and of the sums leave.
+//!
+//! Where these sums do not certainly say more, the standard errors are those of stationary errors ([`stationary`]).
 
 mod scores;
 mod stationary;

@@ -70,15 +70,14 @@ fn coverage(samples: usize, rho: f64, repetitions: u64) -> ([f64; 3], f64) {
     (covered, allowed)
 }
 
-/// At 5,000 samples 93 %, and at 500, worth some 170 and 25 independent ones, 92 % (1,000 repetitions: binomial spread 0.7 %),
-/// whatever the correlation. Classical intervals cover a third to a half of the time (see `intervals`). At most 98.5 %: wider
-/// ones would say less than is known.
+/// 93 to 98 % (1,000 repetitions: binomial spread 0.7 %) at 5,000 samples and at 500, worth some 170 and 25 independent ones,
+/// whatever the correlation. Classical intervals cover a third to a half of the time (see `intervals`).
 #[test]
 fn another_design_is_covered_too() {
-    for (samples, rho, least) in [(5000, 0.5, 0.93), (5000, 0.9, 0.93), (500, 0.5, 0.92), (500, 0.9, 0.92)] {
+    for (samples, rho) in [(5000, 0.5), (5000, 0.9), (500, 0.5), (500, 0.9)] {
         let (covered, allowed) = coverage(samples, rho, 1000);
         println!("oscillator, AR(1) {rho}, {samples} samples: {covered:?}, allowed for in {allowed}");
-        assert!(covered.iter().all(|part| (least..=0.985).contains(part)), "{samples} {rho}: {covered:?}");
+        assert!(covered.iter().all(|part| (0.93..=0.98).contains(part)), "{samples} {rho}: {covered:?}");
         assert!(allowed > 0.99, "{samples} {rho}: {allowed}");
     }
 }
