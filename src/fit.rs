@@ -16,7 +16,7 @@ use crate::error::Error;
 use crate::estimate::Estimate;
 use crate::experiment::{ExperimentOf, Sample};
 use crate::functions::Handle;
-use crate::integrate::{Automatic, Esdirk, Integrator, Method, Rk4, Stiff};
+use crate::integrate::{Automatic, Integrator, Method, Rk4, Stiff};
 use crate::layout::{Kind, Layout};
 use crate::loss::Loss;
 use crate::model::Model;
@@ -320,7 +320,7 @@ fn finer<'a, M: Model + 'a>(
         Arc::new(move || sweep(model.clone(), &stepping, &predictor))
     };
     let steps = [4, 16, 64].map(|substeps| by(Stepping::new(Automatic { continuous: Rk4 { substeps } })));
-    let stiff = Stiff(Esdirk::default());
+    let stiff = Stiff::default();
     let stiff = by(Stepping { loops: Arc::new(Narrow(stiff)), method: Arc::new(stiff) });
     FinerSweeps::new(steps.into_iter().chain([stiff]).collect())
 }

@@ -10,7 +10,7 @@ use greybox::pmsm::offline::{Axes, Form, Spans, Validation, plain, voltages};
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::{RobotAxis, TS};
 use greybox::pmsm::*;
-use greybox::{Fit, fixed, free, signals};
+use greybox::{Fit, fixed, free, signals, simulate};
 
 signals! {
     /// A salient motor behind cable and inverter, and how its record is aligned.
@@ -131,6 +131,13 @@ fn flux_linkage_may_be_given_and_found() {
     let surface = Surface::new(4).unwrap();
     let log = Simulation::new(axis).unwrap().undisturbed().run(&Program::speed_cycles(&axis, 2, 1.0).unwrap());
     let record = log.experiment(&surface).unwrap();
+    // The same voltages on the model itself: errors are white, and their intervals no matter of rounding.
+    let columns = record.record().inputs();
+    let drive = |k: usize| Drive { ud: columns[0].values[k], uq: columns[1].values[k], w: columns[2].values[k] };
+    let (inputs, time) = ((0..record.len()).map(drive).collect::<Vec<_>>(), record.record().times().clone());
+    let truth = Winding { rs: 0.4, ls: 4e-3, ke: 0.95 };
+    let run = simulate(&surface, &truth, &Currents::default(), time, &inputs).unwrap();
+    let record = run.with_noise(Currents { id: 0.05, iq: 0.05 }, 1).experiment(&surface).unwrap();
     let start = Winding { rs: free(0.5), ls: free(5e-3), ke: free(0.8) };
     let by_ke = Fit::new(&surface, &record).parameters(start).run().unwrap();
     let np = surface.pole_pairs();
