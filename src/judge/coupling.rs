@@ -21,6 +21,14 @@ struct Pair {
     fourth: f64,
 }
 
+impl Pair {
+    fn append(&mut self, other: &Pair) {
+        self.product += other.product;
+        self.squares.iter_mut().zip(other.squares).for_each(|(sum, other)| *sum += other);
+        self.fourth += other.fourth;
+    }
+}
+
 /// The sums of all pairs.
 #[derive(Clone, Debug)]
 pub(super) struct Coupling {
@@ -48,24 +56,21 @@ impl Coupling {
 
     pub fn add(&mut self, window: &Window, lane: usize) {
         for ((i, j), pair) in pairs(window.outputs()).zip(&mut self.pairs) {
-            for k in
-                (0..window.samples[lane]).filter(|&k| window.is_measured(k, i, lane) && window.is_measured(k, j, lane))
-            {
-                let (a, b) = (window.error(k, i, lane), window.error(k, j, lane));
-                pair.product += a * b;
-                pair.squares[0] += a * a;
-                pair.squares[1] += b * b;
-                pair.fourth += a * a * b * b;
+            let both = window.errors(i, lane).zip(window.errors(j, lane)).enumerate();
+            let measured = |k| window.whole || window.is_measured(k, i, lane) && window.is_measured(k, j, lane);
+            let mut sums = Pair::default();
+            for (_, (a, b)) in both.filter(|(k, _)| measured(*k)) {
+                sums.product += a * b;
+                sums.squares[0] += a * a;
+                sums.squares[1] += b * b;
+                sums.fourth += a * a * b * b;
             }
+            pair.append(&sums);
         }
     }
 
     pub fn append(&mut self, other: &Coupling) {
-        for (pair, other) in self.pairs.iter_mut().zip(&other.pairs) {
-            pair.product += other.product;
-            pair.squares.iter_mut().zip(other.squares).for_each(|(sum, other)| *sum += other);
-            pair.fourth += other.fourth;
-        }
+        self.pairs.iter_mut().zip(&other.pairs).for_each(|(pair, other)| pair.append(other));
     }
 
     pub fn strongest(&self, outputs: usize) -> Option<Coupled> {
