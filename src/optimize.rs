@@ -113,6 +113,11 @@ impl Stop {
         Stop { step: self.step.max(1e-3), gradient: self.gradient.max(1e-3), ..self }
     }
 
+    /// At most so many trial steps.
+    pub(crate) fn limited(self, iterations: u64) -> Self {
+        Stop { iterations: self.iterations.min(iterations), ..self }
+    }
+
     /// Refuses tolerances that are no numbers or negative.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let tolerances = [("step", self.step), ("gradient", self.gradient), ("cost", self.cost)];

@@ -37,6 +37,10 @@ impl<'a> FinerSweeps<'a> {
     }
 }
 
+/// Trial steps of a search by a finer method. A search that begins near its minimum takes some ten; of a record that no
+/// parameters explain a thousand steps by an expensive method tell no more.
+const TRIALS: u64 = 100;
+
 /// The problem by each method is made when it is first needed.
 struct ByMethods<'a> {
     base: Problem<'a>,
@@ -58,7 +62,8 @@ impl<'a> Problem<'a> {
             return self;
         }
         // What is prepared of the records is another for each method, and so is a checkpoint.
-        let settings = Settings { checkpoint: None, ..self.settings.clone() };
+        let optimizer = self.settings.optimizer.limited(TRIALS);
+        let settings = Settings { checkpoint: None, optimizer, ..self.settings.clone() };
         let base = Problem { prepared: vec![], refines: true, settings, ..self.clone() };
         let made = sweeps.make.iter().map(|_| OnceLock::new()).collect();
         Problem { refines: true, finer: Some(Arc::new(ByMethods { base, sweeps, made })), ..self }

@@ -27,6 +27,12 @@ pub trait Search:
     /// The same search with loose tolerances (three digits), for a cost that changes in the next round.
     fn rough(&self) -> Self;
 
+    /// The same search with at most so many trial steps, or the search itself if it has no such limit.
+    fn limited(&self, iterations: u64) -> Self {
+        let _ = iterations;
+        self.clone()
+    }
+
     /// Checks the settings.
     ///
     /// # Errors
@@ -41,6 +47,10 @@ impl<S: Scaling + Serialize + DeserializeOwned + 'static> Search for LevenbergMa
         LevenbergMarquardt::new(self.stop.rough(), self.scaling.clone())
     }
 
+    fn limited(&self, iterations: u64) -> Self {
+        LevenbergMarquardt::new(self.stop.limited(iterations), self.scaling.clone())
+    }
+
     fn check(&self) -> Result<(), Error> {
         self.stop.check()
     }
@@ -49,6 +59,10 @@ impl<S: Scaling + Serialize + DeserializeOwned + 'static> Search for LevenbergMa
 impl Search for GaussNewton {
     fn rough(&self) -> Self {
         GaussNewton::new(self.stop.rough())
+    }
+
+    fn limited(&self, iterations: u64) -> Self {
+        GaussNewton::new(self.stop.limited(iterations))
     }
 
     fn check(&self) -> Result<(), Error> {
@@ -79,6 +93,8 @@ pub(crate) trait Optimizer: Send + Sync {
     fn check(&self) -> Result<(), Error>;
 
     fn rough(&self) -> Arc<dyn Optimizer>;
+
+    fn limited(&self, iterations: u64) -> Arc<dyn Optimizer>;
 
     /// Its settings, as text.
     fn settings(&self) -> Result<String, Error>;
@@ -114,6 +130,10 @@ impl<S: Search> Optimizer for S {
 
     fn rough(&self) -> Arc<dyn Optimizer> {
         Arc::new(Search::rough(self))
+    }
+
+    fn limited(&self, iterations: u64) -> Arc<dyn Optimizer> {
+        Arc::new(Search::limited(self, iterations))
     }
 
     fn settings(&self) -> Result<String, Error> {
