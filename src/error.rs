@@ -194,7 +194,7 @@ pub enum Error {
         remedy: &'static str,
     },
     /// A simulation that fails where the search was to start.
-    #[error("{NO_START}: {0}")]
+    #[error("the start cannot be evaluated: {0}")]
     Start(Failure),
     /// A simulation, asked for by itself, that fails.
     #[error("the simulation fails: {0}")]
@@ -245,9 +245,6 @@ pub struct Failure {
 
 /// Columns of a file that are listed; of more, those whose names are nearest to the one wanted.
 const LISTED: usize = 10;
-
-/// How the error of a start that cannot be simulated begins.
-pub(crate) const NO_START: &str = "the start cannot be evaluated";
 
 /// The columns that a file has, and what the list gives away.
 fn listed(columns: &[String], wanted: &str, signal: &str) -> String {

@@ -51,6 +51,8 @@ pub struct FailedStart {
     /// Names and values of the unknowns where it began.
     #[serde(with = "crate::real")]
     pub start: Vec<(String, f64)>,
+    /// Whether the model could be evaluated there.
+    pub evaluated: bool,
     /// Why it found none.
     pub reason: String,
 }

@@ -6,12 +6,13 @@ mod progress;
 
 use super::lockstep::{Search, Stage};
 use super::search::{Rounds, checkpoint, start_error};
-use crate::error::Error;
+use crate::error::{Error, Failure};
 use crate::judge::SearchEnd;
 use crate::optimize::{Infeasible, LeastSquares, Linearization};
 use crate::problem::{At, CheckpointFile, Objective, Optimizer, each, linearize_together};
 use minima::{Comparison, End};
 use progress::{Places, Progress};
+use serde::{Deserialize, Serialize};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// So many searches of a single record are run in lanes; fewer have more of the lanes with each record cut into segments.
@@ -28,7 +29,30 @@ type Answer = Result<Linearization, Infeasible>;
 enum Run<'p> {
     Searching(Box<Search<'p>>),
     Ended { end: Box<SearchEnd>, level: f64 },
-    Failed(String),
+    Failed(NoEnd),
+}
+
+/// Why a search came to no end.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct NoEnd {
+    /// Whether the model could be evaluated where the search began.
+    evaluated: bool,
+    reason: String,
+}
+
+impl NoEnd {
+    fn new(evaluated: bool, reason: impl Into<String>) -> Self {
+        NoEnd { evaluated, reason: reason.into() }
+    }
+
+    /// The model could not be evaluated at the start. What it usually means is left out: it is the same for all starts.
+    fn at_start(error: Error) -> Self {
+        let error = match error {
+            Error::Start(failure) => Error::Start(Failure { hint: "", ..failure }),
+            other => other,
+        };
+        NoEnd::new(false, error.to_string())
+    }
 }
 
 /// Searches from the declared start and others; the best end, with what all of them found.
@@ -52,7 +76,7 @@ pub(super) fn search_from_many(
         progress::write(&searches, file)?;
     }
     searches.run(file.as_ref());
-    let ends: Vec<Result<SearchEnd, String>> = searches.runs.into_iter().map(Run::end).collect();
+    let ends: Vec<Result<SearchEnd, NoEnd>> = searches.runs.into_iter().map(Run::end).collect();
     let Some((best, found)) = minima::found(plain, &starts, &ends) else {
         return Err(declared_error(plain, &starts[0]));
     };
@@ -66,14 +90,14 @@ fn declared_error(plain: &Objective<'_>, declared: &[f64]) -> Error {
     start_error(plain, declared, error.unwrap_or(Infeasible::Failed(String::new())))
 }
 
-fn begin<'p>(plain: &'p Objective<'p>, optimizer: &Arc<dyn Optimizer>, place: &Result<Vec<f64>, String>) -> Run<'p> {
+fn begin<'p>(plain: &'p Objective<'p>, optimizer: &Arc<dyn Optimizer>, place: &Result<Vec<f64>, NoEnd>) -> Run<'p> {
     let place = match place {
         Ok(place) => place.clone(),
-        Err(reason) => return Run::Failed(reason.clone()),
+        Err(none) => return Run::Failed(none.clone()),
     };
     match Rounds::new(plain, optimizer, place) {
         Ok(rounds) => Run::Searching(Box::new(Search::new(rounds))),
-        Err(error) => Run::Failed(error.to_string()),
+        Err(error) => Run::Failed(NoEnd::at_start(error)),
     }
 }
 
@@ -89,15 +113,15 @@ impl<'p> Run<'p> {
     fn told(self, answer: Answer, plain: &Objective<'_>, comparison: &Comparison) -> Run<'p> {
         let Run::Searching(search) = self else { return self };
         if let (None, Err(error)) = (search.machine.linearization(), &answer) {
-            return Run::Failed(start_error(plain, search.machine.place(), error.clone()).to_string());
+            return Run::Failed(NoEnd::at_start(start_error(plain, search.machine.place(), error.clone())));
         }
         match search.tell(answer) {
             Stage::Searching(search) => Run::Searching(search),
             Stage::Ended(end) => match End::new(plain, comparison, &end) {
                 Some(End { level, .. }) => Run::Ended { level, end },
-                None => Run::Failed("its end cannot be evaluated".to_owned()),
+                None => Run::Failed(NoEnd::new(true, "its end cannot be evaluated")),
             },
-            Stage::Alone => Run::Failed("its start cannot be evaluated".to_owned()),
+            Stage::Alone => Run::Failed(NoEnd::new(false, "its start cannot be evaluated")),
         }
     }
 
@@ -113,11 +137,11 @@ impl<'p> Run<'p> {
         }
     }
 
-    fn end(self) -> Result<SearchEnd, String> {
+    fn end(self) -> Result<SearchEnd, NoEnd> {
         match self {
             Run::Ended { end, .. } => Ok(*end),
-            Run::Failed(reason) => Err(reason),
-            Run::Searching(_) => Err("it was not run to its end".to_owned()),
+            Run::Failed(none) => Err(none),
+            Run::Searching(_) => Err(NoEnd::new(true, "it was not run to its end")),
         }
     }
 }
@@ -160,8 +184,9 @@ impl<'p> Searches<'p> {
             true => linearize_together(&points),
             false => each(points.len(), |i| points[i].0.linearize(points[i].1)),
         };
+        let lost = || Run::Failed(NoEnd::new(true, ""));
         let taken = requesting.iter().zip(answers).map(|(&i, answer)| {
-            let run = std::mem::replace(&mut self.runs[i], Run::Failed(String::new()));
+            let run = std::mem::replace(&mut self.runs[i], lost());
             Mutex::new(Some((run, answer)))
         });
         let taken: Vec<_> = taken.collect();
@@ -171,7 +196,7 @@ impl<'p> Searches<'p> {
             Some(run.told(answer, plain, comparison))
         });
         for (&i, run) in requesting.iter().zip(told) {
-            self.runs[i] = run.unwrap_or(Run::Failed(String::new()));
+            self.runs[i] = run.unwrap_or_else(lost);
         }
         !requesting.is_empty()
     }
@@ -194,10 +219,11 @@ impl<'p> Searches<'p> {
             let level = self.comparison.level(&search.objective, linear.cost);
             if search.trials() > most && level > best {
                 let ratio = crate::numeral::number(self.comparison.ratio(level, best), 3);
-                *run = Run::Failed(format!(
+                let reason = format!(
                     "given up after {} steps at {ratio} times the best cost: the median search that found a minimum took {typical}",
                     search.trials()
-                ));
+                );
+                *run = Run::Failed(NoEnd::new(true, reason));
             }
         }
     }

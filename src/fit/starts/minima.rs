@@ -1,5 +1,6 @@
 //! Which ends of searches are the same minimum, and which is the best.
 
+use super::NoEnd;
 use crate::estimate::{FailedStart, Minimum, Starts};
 use crate::judge::{SearchEnd, in_null_directions, noise};
 use crate::optimize::{LeastSquares, Linearization, Outcome};
@@ -150,7 +151,7 @@ fn kinds<'e>(comparison: &Comparison, ends: impl Iterator<Item = (usize, &'e End
             None => kinds.push(Kind { searches: vec![i], first: end, undetermined: in_null_directions(&end.linear) }),
         }
     }
-    // The first start's end stands for all: the declared one's, wherever it is one of them.
+    // A minimum is reported by the end of its first start: the declared one's, where that led to it.
     kinds.iter_mut().for_each(|kind| kind.searches.sort_unstable());
     kinds
 }
@@ -159,7 +160,7 @@ fn kinds<'e>(comparison: &Comparison, ends: impl Iterator<Item = (usize, &'e End
 pub(super) fn found(
     plain: &Objective<'_>,
     starts: &[Vec<f64>],
-    ends: &[Result<SearchEnd, String>],
+    ends: &[Result<SearchEnd, NoEnd>],
 ) -> Option<(usize, Starts)> {
     let comparison = Comparison::new(plain);
     let ended = |i: usize| End::new(plain, &comparison, ends[i].as_ref().ok()?);
@@ -190,12 +191,12 @@ pub(super) fn found(
         })
     });
     let failed = starts.iter().zip(ends).filter_map(|(start, end)| {
-        let reason = match end {
+        let NoEnd { evaluated, reason } = match end {
             Ok(end) if end.outcome.converged() => return None,
-            Ok(end) => end.outcome.to_string(),
-            Err(reason) => reason.clone(),
+            Ok(end) => NoEnd::new(true, end.outcome.to_string()),
+            Err(none) => none.clone(),
         };
-        Some(FailedStart { start: named(start), reason })
+        Some(FailedStart { start: named(start), evaluated, reason })
     });
     let evaluations = ends.iter().flatten().map(|end| end.evaluations).sum();
     let declared = kinds.iter().position(|kind| kind.searches.contains(&0));

@@ -1,6 +1,6 @@
 //! Observers and the checkpoint of searches from several starts.
 
-use super::{Run, Searches};
+use super::{NoEnd, Run, Searches};
 use crate::error::Error;
 use crate::optimize::LeastSquaresState;
 use crate::problem::{CheckpointFile, Observer};
@@ -11,14 +11,14 @@ use std::sync::PoisonError;
 
 /// What a checkpoint keeps: the point of each search, or why there is none.
 #[derive(Serialize, Deserialize)]
-pub(super) struct Places(pub Vec<Result<Vec<f64>, String>>);
+pub(super) struct Places(pub Vec<Result<Vec<f64>, NoEnd>>);
 
 /// Writes the checkpoint.
 pub(super) fn write(searches: &Searches<'_>, file: &CheckpointFile) -> Result<(), Error> {
     let place = |run: &Run<'_>| match run {
         Run::Searching(search) => Ok(search.machine.place().to_vec()),
         Run::Ended { end, .. } => Ok(end.coordinates.clone()),
-        Run::Failed(reason) => Err(reason.clone()),
+        Run::Failed(none) => Err(none.clone()),
     };
     let places = Places(searches.runs.iter().map(place).collect());
     let best = best(searches).map_or(vec![], |(place, _)| place.to_vec());

@@ -1,6 +1,5 @@
 //! The minima that searches from several starts found.
 
-use crate::error::NO_START;
 use crate::estimate::{FailedStart, Minimum, Starts};
 use crate::numeral::number;
 use crate::report::facts::Facts;
@@ -22,12 +21,11 @@ pub(super) fn section(facts: &Facts) -> Option<Section> {
         Some(_) => section,
         None => section.says("The search from the declared start found no minimum.".to_owned()),
     };
-    let refused = |failed: &FailedStart| failed.reason.starts_with(NO_START);
-    let section = match starts.failed.iter().any(refused) {
-        true => {
+    let section = match starts.failed.iter().all(|failed| failed.evaluated) {
+        true => section,
+        false => {
             section.says("Narrower bounds keep the starts away from where the model cannot be simulated.".to_owned())
         }
-        false => section,
     };
     let section = section.table(minima(starts)).table(places(starts));
     Some(section.table(failed(starts)).plot(waterfall(&starts.minima)))
@@ -62,8 +60,8 @@ fn places(starts: &Starts) -> Table {
 }
 
 fn failed(starts: &Starts) -> Table {
-    let why = |reason: &str| reason.split("; ").next().unwrap_or(reason).replace('`', "'");
-    let rows = starts.failed.iter().map(|failed| [at(&failed.start), why(&failed.reason).as_str().into()]);
+    let why = |failed: &FailedStart| failed.reason.replace('`', "'");
+    let rows = starts.failed.iter().map(|failed| [at(&failed.start), why(failed).as_str().into()]);
     Table::new("Searches that found no minimum", ["began at", "why"]).rows(rows).at_most(LISTED)
 }
 

@@ -76,10 +76,10 @@ fn rows(sweep: &dyn Sweep, pieces: &[Piece<'_>], seeds: &[Seed]) -> (Vec<Vec<f64
     (all, reached.into_iter().map(Result::unwrap).collect())
 }
 
-fn sweeps(model: &Pendulum, predictor: impl Predictor) -> (Arc<dyn Sweep + '_>, ProgramSweep<'_>) {
+fn sweeps<M: Model>(model: &M, predictor: impl Predictor) -> (Arc<dyn Sweep + '_>, ProgramSweep<'_>) {
     let (method, predictor): (Arc<dyn Method>, Arc<dyn Prediction>) = (Arc::new(Rk4::default()), Arc::new(predictor));
     let plain: Arc<dyn Sweep> = Arc::new(DualSweep {
-        layout: Arc::new(Layout::of::<Pendulum>()),
+        layout: Arc::new(Layout::of::<M>()),
         model: Handle::Borrowed(model),
         loops: Arc::new(Rk4::default()),
         method: method.clone(),
@@ -169,18 +169,7 @@ impl Model for Cart {
 /// without any memory, whatever ran before.
 #[test]
 fn kept_columns_are_those_of_the_records_at_hand() {
-    let model = Cart;
-    let (method, predictor): (Arc<dyn Method>, Arc<dyn Prediction>) = (Arc::new(Rk4::default()), Arc::new(FreeRun));
-    let plain: Arc<dyn Sweep> = Arc::new(DualSweep {
-        layout: Arc::new(Layout::of::<Cart>()),
-        model: Handle::Borrowed(&model),
-        loops: Arc::new(Rk4::default()),
-        method: method.clone(),
-        predictor: predictor.clone(),
-        reason: String::new(),
-    });
-    let equations = Arc::new(Equations::trace(&model).unwrap());
-    let programs = ProgramSweep::new(equations, method, predictor, plain).unwrap();
+    let (_, programs) = sweeps(&Cart, FreeRun);
     let first = record(300, 1.0, true);
     let with_other_output = {
         let outputs = record(300, 4.0, true).outputs().to_vec();
