@@ -11,8 +11,10 @@ pub(super) struct Broken {
     pub error: RunError,
 }
 
-/// Samples times columns from which on a batch is large enough for a thread of its own.
-const WORTH_A_THREAD: usize = 50_000;
+/// Samples times columns from which on a batch is large enough for a thread of its own. A pass does as much for a sample beside
+/// its slopes as for [`BESIDE`] of them.
+const WORTH_A_THREAD: usize = 80_000;
+const BESIDE: usize = 4;
 
 /// Runs jobs of one sweep in batches of compatible ones; the results are in the order of the jobs.
 ///
@@ -27,7 +29,7 @@ pub(super) fn in_batches<T: Send>(
         let members: Vec<&Job<'_>> = batches[b].iter().map(|&i| &jobs[i]).collect();
         batch(&batches[b], &members)
     };
-    let work = jobs.iter().map(|job| job.piece.samples.len() * (job.seeds.len() + 1)).sum::<usize>();
+    let work = jobs.iter().map(|job| job.piece.samples.len() * (job.seeds.len() + BESIDE)).sum::<usize>();
     let results = match work / batches.len().max(1) > WORTH_A_THREAD || work > 8 * WORTH_A_THREAD {
         true => each(batches.len(), one),
         false => (0..batches.len()).map(one).collect(),
