@@ -1,13 +1,13 @@
-//! Time per row of least squares rows absorbed into triangles: one triangle by [`Information`], and 8 and 32 in lanes by
+//! Time per row of least squares rows absorbed into triangles: one triangle by [`Information`], and 8 and 16 in lanes by
 //! [`Triangles`], where the items are rows times lanes: `cargo bench --bench triangles`.
 
 use divan::{Bencher, counter::ItemsCount};
 use greybox::information::{Block, Information, Triangles};
 
 /// Columns of a row, `y` included.
-const COLUMNS: [usize; 11] = [2, 3, 4, 5, 6, 7, 8, 9, 12, 15, 16];
-/// Rows of a block: two outputs of 32 samples.
-const ROWS: usize = 64;
+const COLUMNS: [usize; 9] = [2, 3, 4, 5, 6, 8, 9, 12, 16];
+/// Rows of a block: two outputs of 64 samples.
+const ROWS: usize = 128;
 /// Numbers in a cache line.
 const LINE: usize = 8;
 
@@ -53,8 +53,8 @@ fn lanes_8(bencher: Bencher, columns: usize) {
 }
 
 #[divan::bench(args = COLUMNS)]
-fn lanes_32(bencher: Bencher, columns: usize) {
-    in_lanes(bencher, columns, 32);
+fn lanes_16(bencher: Bencher, columns: usize) {
+    in_lanes(bencher, columns, 16);
 }
 
 #[divan::bench(args = COLUMNS)]

@@ -6,8 +6,9 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 /// Running sums of products of a sequence with its own past, which need no memory but that of the longest lag.
 #[derive(Clone, Debug)]
 pub(crate) struct Autocorrelation {
-    /// Sum of `e[t] e[t - k]` for `k = 0..=lags`.
+    /// Sum of `e[t] e[t - k]` for `k = 0..=lags`, and of the squares of these products.
     sums: Vec<f64>,
+    squares: Vec<f64>,
     /// The first values.
     first: Vec<f64>,
     /// The last values, then those of the run at hand.
@@ -18,7 +19,8 @@ impl Autocorrelation {
     pub fn new(lags: usize) -> Self {
         let mut values = Vec::with_capacity(lags + RUN + LAGS);
         values.resize(lags, 0.0);
-        Autocorrelation { sums: vec![0.0; lags + 1], first: Vec::with_capacity(lags), values }
+        let [sums, squares] = [vec![0.0; lags + 1], vec![0.0; lags + 1]];
+        Autocorrelation { sums, squares, first: Vec::with_capacity(lags), values }
     }
 
     /// The next values in order of time, zero where missing.
@@ -28,7 +30,8 @@ impl Autocorrelation {
         self.first.extend_from_slice(&run[..missing]);
         self.values.extend_from_slice(run);
         self.values.resize(lags + run.len() + LAGS, 0.0);
-        wide::run(Width::widest(), Products { run, values: &self.values, sums: &mut self.sums });
+        let Autocorrelation { sums, squares, values, .. } = self;
+        wide::run(Width::widest(), Products { run, values, sums, squares });
         self.values.truncate(lags + run.len());
         self.values.drain(..run.len());
     }
@@ -37,7 +40,11 @@ impl Autocorrelation {
     pub fn follow(&mut self, next: &Autocorrelation) {
         let lags = self.sums.len() - 1;
         for k in 1..=lags {
-            self.sums[k] += dot(&next.first[..k.min(next.first.len())], &self.values[lags - k..]);
+            for (e, before) in next.first.iter().zip(&self.values[lags - k..lags]) {
+                let product = e * before;
+                self.sums[k] += product;
+                self.squares[k] += product * product;
+            }
         }
         self.append(next);
         let missing = (lags - self.first.len()).min(next.first.len());
@@ -54,6 +61,7 @@ impl Autocorrelation {
     /// Adds the sums of another record.
     pub fn append(&mut self, other: &Autocorrelation) {
         self.sums.iter_mut().zip(&other.sums).for_each(|(sum, other)| *sum += other);
+        self.squares.iter_mut().zip(&other.squares).for_each(|(sum, other)| *sum += other);
     }
 }
 
@@ -67,9 +75,7 @@ impl Autocorrelation {
 #[derive(Clone, Debug)]
 pub(crate) struct Portmanteau {
     errors: Autocorrelation,
-    squares: Autocorrelation,
     neighbors: Neighbors,
-    run: Vec<f64>,
 }
 
 /// How often errors agree in sign with the one before.
@@ -119,23 +125,18 @@ impl Neighbors {
 
 impl Portmanteau {
     pub fn new(lags: usize) -> Self {
-        let [errors, squares] = [lags; 2].map(Autocorrelation::new);
-        Portmanteau { errors, squares, neighbors: Neighbors::default(), run: vec![] }
+        Portmanteau { errors: Autocorrelation::new(lags), neighbors: Neighbors::default() }
     }
 
     /// The next errors in order of time, zero where missing.
     pub fn add(&mut self, run: &[f64]) {
         self.errors.add(run);
-        self.run.clear();
-        self.run.extend(run.iter().map(|e| e * e));
-        self.squares.add(&self.run);
         self.neighbors.add(run);
     }
 
     /// As if the errors of the other had followed.
     pub fn follow(&mut self, next: &Portmanteau) {
         self.errors.follow(&next.errors);
-        self.squares.follow(&next.squares);
         self.neighbors.follow(&next.neighbors);
     }
 
@@ -150,20 +151,19 @@ impl Portmanteau {
     /// Adds the sums of another record.
     pub fn append(&mut self, other: &Portmanteau) {
         self.errors.append(&other.errors);
-        self.squares.append(&other.squares);
         self.neighbors.append(&other.neighbors);
     }
 
     /// The sum of products at a lag over its standard deviation without correlation, and the autocorrelation.
     pub fn at(&self, lag: usize) -> (f64, f64) {
-        let (sum, squares) = (self.errors.sums[lag], self.squares.sums[lag]);
+        let (sum, squares) = (self.errors.sums[lag], self.errors.squares[lag]);
         let over = |part: f64, whole: f64| if whole > 0.0 { part / whole } else { 0.0 };
         (over(sum, squares.sqrt()), over(sum, self.errors.sums[0]))
     }
 
     /// The probability that errors without correlation show as much of it at lags `1..=lags`.
     pub fn p_value(&self, lags: usize) -> f64 {
-        let sums = self.errors.sums.iter().zip(&self.squares.sums).skip(1).take(lags);
+        let sums = self.errors.sums.iter().zip(&self.errors.squares).skip(1).take(lags);
         let terms: Vec<f64> = sums.filter(|(_, squares)| **squares > 0.0).map(|(sum, q)| sum * sum / q).collect();
         chi_squared_tail(terms.iter().sum(), terms.len() as f64)
     }
@@ -184,12 +184,13 @@ const RUN: usize = 64;
 /// Lags whose sums are kept in registers together.
 const LAGS: usize = 24;
 
-/// Adds the products of a run with itself and with what came before to the sums of all lags.
+/// Adds the products of a run with itself and with what came before, and their squares, to the sums of all lags.
 struct Products<'p> {
     run: &'p [f64],
     /// As many values as there are lags, then those of the run, then [`LAGS`] zeros.
     values: &'p [f64],
     sums: &'p mut [f64],
+    squares: &'p mut [f64],
 }
 
 impl Task for Products<'_> {
@@ -197,16 +198,27 @@ impl Task for Products<'_> {
 
     #[inline(always)]
     fn run<W: Wide>(self) {
+        let registers = LAGS / W::LANES;
         // The longest lag comes first: its values are the earliest.
-        for (block, sums) in self.sums.rchunks_mut(LAGS).enumerate() {
+        let blocks = self.sums.rchunks_mut(LAGS).zip(self.squares.rchunks_mut(LAGS));
+        for (block, (sums, squares)) in blocks.enumerate() {
             let values = &self.values[block * LAGS..];
-            let mut totals = [0.0; LAGS];
+            let mut totals = [[W::splat(0.0); LAGS]; 2];
             for (e, before) in self.run.iter().zip(values.windows(LAGS)) {
-                for (total, before) in totals.iter_mut().zip(before) {
-                    *total += e * before;
+                let e = W::splat(*e);
+                let mut at = 0;
+                while at < registers {
+                    let product = e.mul(W::load(&before[at * W::LANES..]));
+                    totals[0][at] = totals[0][at].add(product);
+                    totals[1][at] = product.mul_add(product, totals[1][at]);
+                    at += 1;
                 }
             }
-            sums.iter_mut().rev().zip(totals).for_each(|(sum, total)| *sum += total);
+            for (totals, sums) in totals.iter().zip([sums, squares]) {
+                let mut numbers = [0.0; LAGS];
+                totals.iter().zip(numbers.chunks_exact_mut(W::LANES)).for_each(|(total, to)| total.store(to));
+                sums.iter_mut().rev().zip(numbers).for_each(|(sum, total)| *sum += total);
+            }
         }
     }
 }

@@ -10,13 +10,13 @@ use crate::wide::{self, Width};
 const REGISTER: usize = 8;
 
 /// The square-root triangles of `lanes` independent pieces (records, or segments of one), all with the same columns. Rows
-/// of all lanes are absorbed together by Householder reflections in vector registers (six columns: 1.5 ns per row and lane,
+/// of all lanes are absorbed together by Householder reflections in vector registers (six columns: 1.2 ns per row and lane,
 /// where [`Information::absorb`] takes 2).
 ///
 /// A lane's triangle depends on its own rows only, to the last bit, and on their number; not on the other lanes and not on
 /// the vector registers of the processor, but for whether it fuses a product with a sum. A lane with a NaN leaves the
 /// others alone. Nothing is rescaled: entries beyond 1e150 overflow, which the lane's triangle then shows by a number
-/// that is not finite, and a column whose norm over 64 rows is below 1e-140 counts as zeros.
+/// that is not finite, and a column whose norm over 128 rows is below 1e-140 counts as zeros.
 #[derive(Clone, Debug)]
 pub struct Triangles {
     columns: usize,
