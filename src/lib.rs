@@ -98,8 +98,6 @@
 //! there are numbers, signals, models, integrators and [`online`] observers, without `alloc` too.
 #![cfg_attr(not(feature = "std"), no_std)]
 
-#[cfg(feature = "std")]
-mod dispatch;
 mod dual;
 pub mod integrate;
 mod interval;

@@ -110,6 +110,12 @@ impl Window {
         &mut self.variances[..used]
     }
 
+    /// The rows of a window of one lane, and whether each holds a measurement.
+    #[inline(always)]
+    pub(crate) fn only_lane_mut(&mut self) -> (&mut [f64], &mut [u32]) {
+        (&mut self.values, &mut self.measured)
+    }
+
     /// All rows, used or not.
     pub fn all_rows_mut(&mut self) -> &mut [f64] {
         &mut self.values
