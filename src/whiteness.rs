@@ -337,7 +337,8 @@ mod tests {
         assert_eq!(orders.len(), 4);
         let expected = 1.0 - 0.5 * rho[1] - 0.3 * rho[2];
         for (a, variance) in &orders[1..] {
-            let wrong = a.iter().zip([0.5, 0.3, 0.0, 0.0]).map(|(a, expected)| (a - expected).abs()).fold(0.0, f64::max);
+            let wrong =
+                a.iter().zip([0.5, 0.3, 0.0, 0.0]).map(|(a, expected)| (a - expected).abs()).fold(0.0, f64::max);
             // A dozen roundings.
             assert!(wrong < 1e-14 && (variance - expected).abs() < 1e-14, "{a:?} {variance}");
         }

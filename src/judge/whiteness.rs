@@ -11,8 +11,8 @@ const FEW: usize = 3;
 pub(crate) struct Whiteness {
     /// Three times the least p-value of three tests: over 3 lags, over 20, and of neighbors.
     pub p_value: f64,
-    /// Autocorrelation at lag one.
-    pub first: f64,
+    /// Autocorrelations at lags `1, 2, ...`.
+    pub correlations: [f64; LAGS],
     /// The part of the errors' variance that follows from the errors before, by an autoregression over all lags, less
     /// what white errors show by chance.
     pub predicted: f64,
@@ -26,12 +26,12 @@ pub(crate) struct Whiteness {
 impl Whiteness {
     /// Of so many errors, with predictions that restart after so many samples (zero: never, or from too far).
     pub fn of(errors: &Portmanteau, count: u64, restart: usize) -> Self {
-        let coefficients: Vec<f64> = (1..=LAGS).map(|lag| errors.at(lag).1).collect();
-        let (predicted, dependence) = color(&coefficients, count);
+        let correlations = std::array::from_fn(|k| errors.at(k + 1).1);
+        let (predicted, dependence) = color(&correlations, count);
         let over = |lags: usize| errors.p_value(lags.min(count as usize / 4).max(1));
         Whiteness {
             p_value: (3.0 * over(FEW).min(over(LAGS)).min(errors.neighbors_p_value())).min(1.0),
-            first: coefficients[0],
+            correlations,
             predicted,
             dependence,
             at_restart: if restart == 0 { (0.0, 0.0) } else { errors.at(restart) },
