@@ -16,6 +16,7 @@ mod known;
 pub(crate) mod noise;
 mod outliers;
 mod output_sums;
+mod predicted;
 mod residual_pass;
 mod sandwich;
 mod shape;

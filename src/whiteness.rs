@@ -238,6 +238,26 @@ pub(crate) fn chi_squared_tail(statistic: f64, degrees: f64) -> f64 {
     ChiSquared::new(degrees).map_or(1.0, |distribution| distribution.sf(statistic.max(0.0)))
 }
 
+/// Levinson and Durbin's recursion: of each order in turn, the coefficients `a` of the autoregression
+/// `e[t] = sum over k of a[k] e[t - 1 - k]` and the variance of its innovations relative to that of the errors, from the
+/// autocorrelations at lags `1, 2, ...` (Durbin, Review of the International Statistical Institute 28 (1960) 233). Ends before
+/// the first order that is not stationary.
+pub(crate) fn levinson_durbin(correlations: &[f64], mut order: impl FnMut(&[f64], f64)) {
+    let (mut variance, mut a) = (1.0, Vec::with_capacity(correlations.len()));
+    for (k, rho) in correlations.iter().enumerate() {
+        let known: f64 = a.iter().zip(correlations[..k].iter().rev()).map(|(a, rho): (&f64, _)| a * rho).sum();
+        let reflection = (rho - known) / variance;
+        if reflection.is_nan() || reflection.abs() >= 1.0 {
+            return;
+        }
+        let reversed: Vec<f64> = a.iter().rev().map(|a| reflection * a).collect();
+        a.iter_mut().zip(reversed).for_each(|(a, by)| *a -= by);
+        a.push(reflection);
+        variance *= 1.0 - reflection * reflection;
+        order(&a, variance);
+    }
+}
+
 /// Sum of products over the shorter, in accumulators that the compiler may keep in vector lanes.
 #[inline(always)]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -316,6 +336,25 @@ mod tests {
         other.add(&[3.0, -1.0]);
         one.append(&other);
         assert_eq!([one.errors, one.pairs, one.agreements], [4, 2, 0]);
+    }
+
+    /// `e[t] = 0.5 e[t - 1] + 0.3 e[t - 2] + w[t]`: correlations `0.5 / 0.7` and `0.5 rho + 0.3`, and the variance of the
+    /// innovations `1 - 0.5 rho[1] - 0.3 rho[2]`; higher orders add nothing.
+    #[test]
+    fn recursion_finds_an_autoregression_of_second_order() {
+        let mut rho = vec![1.0, 0.5 / 0.7];
+        (2..5).for_each(|k| rho.push(0.5 * rho[k - 1] + 0.3 * rho[k - 2]));
+        let mut orders = vec![];
+        levinson_durbin(&rho[1..], |a, variance| orders.push((a.to_vec(), variance)));
+        assert_eq!(orders.len(), 4);
+        let expected = 1.0 - 0.5 * rho[1] - 0.3 * rho[2];
+        for (a, variance) in &orders[1..] {
+            let wrong =
+                a.iter().zip([0.5, 0.3, 0.0, 0.0]).map(|(a, expected)| (a - expected).abs()).fold(0.0, f64::max);
+            // A dozen roundings.
+            assert!(wrong < 1e-14 && (variance - expected).abs() < 1e-14, "{a:?} {variance}");
+        }
+        levinson_durbin(&[1.0], |_, _| panic!("a correlation of one has no innovations"));
     }
 
     /// By hand: n = 10, rho = (0.5, -0.2) gives 10 * 12 * (0.25 / 9 + 0.04 / 8); two degrees of freedom have the tail

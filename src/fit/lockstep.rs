@@ -118,7 +118,7 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
         };
         attempts = attempts.into_iter().zip(coarse).map(next).collect();
     }
-    attempts.into_iter().map(|attempt| attempt.found).collect()
+    attempts.into_iter().map(Attempt::answer).collect()
 }
 
 /// The stop conditions of fits together: the sum of their time limits is left to all.

@@ -2,28 +2,33 @@
 
 use crate::error::Error;
 use crate::estimate::{Summary, Warning, WarningCode};
+use crate::numeral::number;
 use crate::optimize::Severity;
 use crate::problem::{Control, Problem};
 
-/// The best answer by the methods tried so far.
+/// A finer method whose deviance is larger by this explains the data worse; by the second, records of a continuous plant do so
+/// in one of some thousand (the likelihood ratio of two models is above `k` by chance in less than `1 / k` of all records).
+const WORSE: f64 = 4.0;
+const CERTAINLY_WORSE: f64 = 15.0;
+
+/// The answer by the finest method tried so far.
 pub(super) struct Attempt {
-    pub found: Result<Summary, Error>,
-    /// Whether a finer method was tried and is no better.
-    ended: bool,
+    found: Result<Summary, Error>,
+    /// The least deviance of coarser methods, and which one has it.
+    coarser: Option<(f64, String)>,
 }
 
 impl Attempt {
     pub fn new(found: Result<Summary, Error>) -> Self {
-        Attempt { found, ended: false }
+        Attempt { found, coarser: None }
     }
 
     /// Whether a finer method is to be tried: a finer step would move an unknown, or the start cannot be simulated.
     pub fn is_coarse(&self) -> bool {
-        let coarse = match &self.found {
-            Ok(found) => coarse_step(found).is_some(),
+        match &self.found {
+            Ok(found) => found.warnings.iter().any(|warning| warning.code == WarningCode::CoarseStep),
             Err(error) => matches!(error, Error::Start(_)),
-        };
-        coarse && !self.ended
+        }
     }
 
     /// Where the search by a finer method begins: at the end of this one if the step is all that is wrong with it, else at the
@@ -44,31 +49,39 @@ impl Attempt {
         }
     }
 
-    /// This answer or that of a finer method.
+    /// This answer or that of a finer method, which takes its place where it converged: the model is that of a continuous plant,
+    /// also where a coarser step happens to explain the data better.
     pub fn or(self, again: Result<Summary, Error>) -> Self {
-        let (found, ended) = match (self.found, again) {
-            (Ok(before), Ok(again)) if !before.outcome.converged() => (Ok(after(&before, again)), false),
-            (Ok(before), Ok(again)) if again.outcome.converged() => match explains(&before, &again) {
-                true => (Ok(after(&before, again)), false),
-                false => (Ok(kept(before, &again)), true),
-            },
-            (Err(_), again @ Ok(_)) => (again, false),
-            (before, _) => (before, false),
+        let (before, again) = match (self.found, again) {
+            (Err(_), again @ Ok(_)) => return Attempt { found: again, coarser: self.coarser },
+            (Ok(before), Ok(again)) if again.outcome.converged() || !before.outcome.converged() => (before, again),
+            (before, _) => return Attempt { found: before, coarser: self.coarser },
         };
-        Attempt { found, ended }
+        let deviance = before.deviance.filter(|_| before.outcome.converged());
+        let this = deviance.map(|deviance| (deviance, before.method.integrator.clone()));
+        let coarser = self.coarser.into_iter().chain(this).min_by(|a, b| a.0.total_cmp(&b.0));
+        Attempt { found: Ok(after(&before, again)), coarser }
     }
-}
 
-/// The warning that a finer step would move an unknown.
-fn coarse_step(found: &Summary) -> Option<&Warning> {
-    found.warnings.iter().find(|warning| warning.code == WarningCode::CoarseStep)
-}
-
-/// Whether a finer method explains the data no worse than a coarser one: records that were simulated with the coarser step
-/// are explained by that alone.
-fn explains(before: &Summary, again: &Summary) -> bool {
-    const INDISTINGUISHABLE: f64 = 4.0;
-    before.deviance.zip(again.deviance).is_none_or(|(before, again)| again < before + INDISTINGUISHABLE)
+    /// The answer, with a note where a coarser step explains the data better.
+    pub fn answer(self) -> Result<Summary, Error> {
+        let mut found = self.found?;
+        if let (Some((least, coarser)), Some(deviance)) = (self.coarser, found.deviance)
+            && deviance > least + WORSE
+        {
+            let certain = deviance > least + CERTAINLY_WORSE;
+            let why = if certain { "the record may have been simulated with it" } else { "which may be chance" };
+            let text = format!(
+                "{coarser} explains the data better than {}, by {} in -2 ln of the likelihood ({why}); the estimate is that of the \
+                 finer step, which is closer to the equations; choose one with Fit::integrator",
+                found.method.integrator,
+                number(deviance - least, 2)
+            );
+            let severity = if certain { Severity::UsableWithCare } else { Severity::Usable };
+            found.warnings.push(Warning { code: WarningCode::CoarseStep, severity, text });
+        }
+        Ok(found)
+    }
 }
 
 /// The estimate of a finer method, with the work of both.
@@ -78,14 +91,4 @@ fn after(before: &Summary, again: Summary) -> Summary {
         evaluations: before.evaluations + again.evaluations,
         ..again
     }
-}
-
-/// The estimate of a coarser method, which explains the data better than a finer one.
-fn kept(mut before: Summary, again: &Summary) -> Summary {
-    if let Some(warning) = before.warnings.iter_mut().find(|warning| warning.code == WarningCode::CoarseStep) {
-        warning.severity = warning.severity.min(Severity::UsableWithCare);
-        warning.text +=
-            &format!("; {} explains the data worse, so that the coarser step was kept", again.method.integrator);
-    }
-    before
 }

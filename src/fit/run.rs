@@ -36,7 +36,7 @@ impl Problem<'_> {
                 attempt = attempt.or(finer.run_within(begin, &control, start));
             }
         }
-        attempt.found
+        attempt.answer()
     }
 
     /// The same by this method alone, a single search from this start.

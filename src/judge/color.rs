@@ -47,7 +47,7 @@ impl Judgement<'_> {
         let part = self.colored_part();
         let severity = severity(part);
         let output = &self.objective.problem.layout().outputs[output].name;
-        let (probability, first) = (p_value(white.p_value.min(1.0)), number(white.first, 2));
+        let (probability, first) = (p_value(white.p_value.min(1.0)), number(white.correlations[0], 2));
         let mut text = format!(
             "the errors of `{output}` are not white ({probability}, correlation with the error before \
              {first}): the model misses a part, or the noise is colored"

@@ -2,6 +2,7 @@
 
 use super::conclude::Judgement;
 use super::covariances::Covariances;
+use super::whiteness::Whiteness;
 use crate::estimate::{CovarianceMethod, Warning, WarningCode};
 use crate::numeral::{number, p_value};
 use crate::optimize::Severity;
@@ -49,6 +50,15 @@ fn pairs(outputs: usize) -> impl Iterator<Item = (usize, usize)> {
     (1..outputs).flat_map(|j| (0..j).map(move |i| (i, j)))
 }
 
+/// By how much the variance of the sum of products of two independent sequences is larger than if they were white: by
+/// `1 + 2 sum over k of rho_i(k) rho_j(k)` (Bartlett, J. Royal Statistical Society 98 (1935) 536), from their autocorrelations
+/// at lags `1, 2, ...`; or, where that is more, by the same of autoregressions with these correlations at lag one.
+fn inflation(a: &[f64], b: &[f64]) -> f64 {
+    let products = || a.iter().zip(b).map(|(a, b)| a * b);
+    let phi = products().next().unwrap_or(0.0).min(1.0 - f64::EPSILON);
+    (1.0 + 2.0 * products().sum::<f64>()).max((1.0 + phi) / (1.0 - phi)).max(1.0)
+}
+
 impl Coupling {
     pub fn new(outputs: usize) -> Self {
         Coupling { pairs: vec![Pair::default(); pairs(outputs).count()] }
@@ -73,14 +83,16 @@ impl Coupling {
         self.pairs.iter_mut().zip(&other.pairs).for_each(|(pair, other)| pair.append(other));
     }
 
-    pub fn strongest(&self, outputs: usize) -> Option<Coupled> {
+    /// The most certain correlation between outputs whose errors are autocorrelated like this, if any is certain.
+    pub fn strongest(&self, whiteness: &[Whiteness]) -> Option<Coupled> {
         let of = |(outputs, pair): ((usize, usize), &Pair)| {
             let size = (pair.squares[0] * pair.squares[1]).sqrt();
-            let chance = chi_squared_tail(pair.product * pair.product / pair.fourth, 1.0);
+            let more = inflation(&whiteness[outputs.0].correlations, &whiteness[outputs.1].correlations);
+            let chance = chi_squared_tail(pair.product * pair.product / (more * pair.fourth), 1.0);
             let p_value = (chance * self.pairs.len() as f64).min(1.0);
             (size > 0.0 && pair.fourth > 0.0).then(|| Coupled { outputs, correlation: pair.product / size, p_value })
         };
-        let found = pairs(outputs).zip(&self.pairs).filter_map(of);
+        let found = pairs(whiteness.len()).zip(&self.pairs).filter_map(of);
         found.min_by(|a, b| a.p_value.total_cmp(&b.p_value)).filter(|found| found.p_value < LEVEL)
     }
 }
@@ -115,7 +127,11 @@ impl Judgement<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::whiteness::LAGS;
     use super::*;
+
+    const WHITE: Whiteness =
+        Whiteness { p_value: 1.0, correlations: [0.0; LAGS], predicted: 0.0, dependence: 1.0, at_restart: (0.0, 0.0) };
 
     /// By hand, two outputs with errors (1, 2), (1, 1), (-1, -1): products 2, 1, 1; squares 3 and 6; a sum of squared products
     /// of 6. The statistic is 16/6, whose tail with one degree of freedom is 0.102470; not below the level. Four times the
@@ -123,12 +139,24 @@ mod tests {
     #[test]
     fn correlation_by_hand() {
         let once = Coupling { pairs: vec![Pair { product: 4.0, squares: [3.0, 6.0], fourth: 6.0 }] };
-        assert!(once.strongest(2).is_none());
+        assert!(once.strongest(&[WHITE; 2]).is_none());
         let mut four = once.clone();
         (0..3).for_each(|_| four.append(&once));
-        let found = four.strongest(2).unwrap();
+        let found = four.strongest(&[WHITE; 2]).unwrap();
         assert_eq!(found.outputs, (0, 1));
         assert!((found.correlation - 4.0 / 18f64.sqrt()).abs() < 1e-15, "{found:?}");
         assert!((found.p_value - 0.001_091).abs() < 1e-6, "{found:?}");
+    }
+
+    /// By hand: `1 + 2 (1/4 + 1/4)`; `(1 + 1/4)/(1 - 1/4)`, which is more than `1 + 2/4`; and never less than for white errors.
+    #[test]
+    fn autocorrelation_inflates_the_variance() {
+        assert!((inflation(&[0.5, 0.5], &[0.5, 0.5]) - 2.0).abs() < 1e-15);
+        assert!((inflation(&[0.5, 0.0], &[0.5, 0.9]) - 5.0 / 3.0).abs() < 1e-15);
+        assert_eq!(inflation(&[0.5, 0.1], &[-0.5, 0.1]), 1.0);
+        let colored = Whiteness { correlations: [0.9; LAGS], ..WHITE };
+        let pair = Pair { product: 16.0, squares: [12.0, 24.0], fourth: 24.0 };
+        assert!(Coupling { pairs: vec![pair] }.strongest(&[WHITE, colored]).is_some());
+        assert!(Coupling { pairs: vec![pair] }.strongest(&[colored; 2]).is_none());
     }
 }

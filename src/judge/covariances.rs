@@ -2,6 +2,7 @@
 
 use super::conclude::Judgement;
 use super::hac::hac;
+use super::predicted::Dependence;
 use super::sandwich;
 use crate::estimate::CovarianceMethod;
 use crate::information::Covariance;
@@ -18,6 +19,8 @@ pub(super) struct Covariances {
     pub unit: Option<Covariance>,
     /// Degrees of freedom of the variance of each unknown.
     pub degrees: Vec<f64>,
+    /// Where variances are predicted: by how much the logarithm of that of each unknown grows along one of its standard errors.
+    pub own: Vec<f64>,
 }
 
 /// A covariance in coordinates.
@@ -40,7 +43,12 @@ impl Judgement<'_> {
         let seen = self.seen().into_iter().zip(&self.slopes);
         let in_units: Vec<f64> = seen.map(|(seen, slope)| if seen { *slope } else { 0.0 }).collect();
         let unknowns = covariance.map(|covariance| covariance.times(factor).scaled(&in_units));
-        Covariances { unknowns, method, unit, degrees }
+        let dependence = unit.as_ref().and_then(|unit| self.dependence_of_variances(unit));
+        let Some(Dependence { degrees: most, own }) = dependence else {
+            return Covariances { unknowns, method, unit, degrees, own: vec![] };
+        };
+        let degrees = degrees.iter().zip(most).map(|(degrees, most)| degrees.min(most)).collect();
+        Covariances { unknowns, method, unit, degrees, own }
     }
 
     fn for_colored_errors(&self, unit: &Covariance) -> Option<CoordinateCovariance> {

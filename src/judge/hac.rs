@@ -127,7 +127,7 @@ struct LongRun {
     /// `(I - a)^-1` for the autoregression `a`.
     recolor: DMatrix<f64>,
     /// Covariance of the prewhitened `z`.
-    fresh: DMatrix<f64>,
+    innovations: DMatrix<f64>,
 }
 
 impl LongRun {
@@ -160,10 +160,10 @@ impl LongRun {
         let part = window as f64 / length;
         let sums = DMatrix::from_fn(n, n, |i, j| sums.at(i, j)) / (1.0 - part + part * part / 3.0).sqrt();
         let recolor = (DMatrix::identity(n, n) - &a).try_inverse()?;
-        let fresh = DMatrix::identity(n, n) - &a * one.transpose() - &one * a.transpose() + &a * a.transpose();
+        let innovations = DMatrix::identity(n, n) - &a * one.transpose() - &one * a.transpose() + &a * a.transpose();
         let finite = |m: &DMatrix<f64>| m.iter().all(|value| value.is_finite());
         let sound = finite(&sums) && finite(&recolor);
-        sound.then_some(LongRun { kept, count: length, window, root, sums, recolor, fresh })
+        sound.then_some(LongRun { kept, count: length, window, root, sums, recolor, innovations })
     }
 
     /// Its rows among all columns of the experiment.
@@ -185,7 +185,7 @@ impl LongRun {
         let spectrum = self.sums.transpose() * (&self.sums * &d);
         let variance = d.dot(&spectrum);
         let moved = &self.recolor * &spectrum;
-        let autoregression = 4.0 * d.dot(&(&self.fresh * &d)) * moved.norm_squared() / self.count;
+        let autoregression = 4.0 * d.dot(&(&self.innovations * &d)) * moved.norm_squared() / self.count;
         let sums = 4.0 / 3.0 * self.window as f64 / self.count * variance * variance;
         (variance, autoregression + sums)
     }
@@ -272,7 +272,7 @@ mod tests {
             root: of(1.0),
             sums: of((n * (1.0 - a * a)).sqrt()),
             recolor: of(1.0 / (1.0 - a)),
-            fresh: of(1.0 - a * a),
+            innovations: of(1.0 - a * a),
         };
         let (variance, spread) = run.variance(&[2.0]);
         assert!((variance / (4.0 * n * (1.0 + a) / (1.0 - a)) - 1.0).abs() < 1e-12, "{variance}");

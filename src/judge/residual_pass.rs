@@ -212,6 +212,7 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
         let count = sums[j].count;
         Whiteness::of(&total.without(own as f64 / count.max(1) as f64), count, horizon(objective))
     };
+    let whiteness: Vec<Whiteness> = (0..outputs).map(whiteness).collect();
     Residuals {
         outputs: sums.iter().map(OutputSums::fit).collect(),
         levels: sums.iter().map(OutputSums::level).collect(),
@@ -219,8 +220,8 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
         measured,
         log_determinant,
         step_error,
-        coupled: coupling.strongest(outputs),
-        whiteness: (0..outputs).map(whiteness).collect(),
+        coupled: coupling.strongest(&whiteness),
+        whiteness,
         least_sigma: (0..outputs)
             .map(|j| all.iter().map(|one| one.least_sigma[j]).fold(f64::INFINITY, f64::min))
             .collect(),
@@ -303,8 +304,9 @@ impl Residuals {
         let count = self.whiteness.len() as f64;
         let tested = self.whiteness.iter().enumerate();
         let tested = tested.map(|(j, white)| (j, Whiteness { p_value: white.p_value * count, ..*white }));
-        let strongest =
-            |a: &Whiteness, b: &Whiteness| a.p_value.total_cmp(&b.p_value).then(b.first.total_cmp(&a.first));
+        let strongest = |a: &Whiteness, b: &Whiteness| {
+            a.p_value.total_cmp(&b.p_value).then(b.correlations[0].total_cmp(&a.correlations[0]))
+        };
         tested.min_by(|a, b| strongest(&a.1, &b.1))
     }
 }

@@ -74,6 +74,7 @@ impl Judgement<'_> {
             warnings.push(Warning { code: WarningCode::CheckpointNotWritten, severity: Severity::Usable, text });
         }
         warnings.extend(self.curved(unknowns, covariances));
+        warnings.extend(self.uneven(unknowns, covariances));
         warnings.extend(self.restart_noise(unknowns));
         warnings.extend(self.input_noise(unknowns));
         warnings.extend(self.autocorrelation(covariances));

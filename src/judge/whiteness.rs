@@ -1,6 +1,6 @@
 //! [`Whiteness`]: how much the errors of an output are correlated over time.
 
-use crate::whiteness::Portmanteau;
+use crate::whiteness::{Portmanteau, levinson_durbin};
 
 /// Lags of the portmanteau test, and of one that sees more of what only neighbors share.
 pub(super) const LAGS: usize = 20;
@@ -11,8 +11,8 @@ const FEW: usize = 3;
 pub(crate) struct Whiteness {
     /// Three times the least p-value of three tests: over 3 lags, over 20, and of neighbors.
     pub p_value: f64,
-    /// Autocorrelation at lag one.
-    pub first: f64,
+    /// Autocorrelations at lags `1, 2, ...`.
+    pub correlations: [f64; LAGS],
     /// The part of the errors' variance that follows from the errors before, by an autoregression over all lags, less
     /// what white errors show by chance.
     pub predicted: f64,
@@ -26,12 +26,12 @@ pub(crate) struct Whiteness {
 impl Whiteness {
     /// Of so many errors, with predictions that restart after so many samples (zero: never, or from too far).
     pub fn of(errors: &Portmanteau, count: u64, restart: usize) -> Self {
-        let coefficients: Vec<f64> = (1..=LAGS).map(|lag| errors.at(lag).1).collect();
-        let (predicted, dependence) = color(&coefficients, count);
+        let correlations = std::array::from_fn(|k| errors.at(k + 1).1);
+        let (predicted, dependence) = color(&correlations, count);
         let over = |lags: usize| errors.p_value(lags.min(count as usize / 4).max(1));
         Whiteness {
             p_value: (3.0 * over(FEW).min(over(LAGS)).min(errors.neighbors_p_value())).min(1.0),
-            first: coefficients[0],
+            correlations,
             predicted,
             dependence,
             at_restart: if restart == 0 { (0.0, 0.0) } else { errors.at(restart) },
@@ -43,31 +43,14 @@ impl Whiteness {
 /// so many errors.
 fn color(coefficients: &[f64], count: u64) -> (f64, f64) {
     let (first, lags) = (coefficients[0], coefficients.len() as f64);
+    let mut innovation = 1.0;
+    levinson_durbin(coefficients, |_, variance| innovation = variance);
     // What chance leaves, as in an adjusted coefficient of determination.
     let free = (count as f64 - lags).max(1.0) / (count as f64).max(1.0);
-    let predicted = (1.0 - innovation(coefficients) / free).clamp(0.0, 1.0);
+    let predicted = (1.0 - innovation / free).clamp(0.0, 1.0);
     let positive: f64 = coefficients.iter().take_while(|rho| **rho > 0.0).sum();
     let autoregression = (1.0 + first) / (1.0 - first).max(f64::EPSILON);
     (predicted, (1.0 + 2.0 * positive).max(autoregression).max(1.0))
-}
-
-/// Variance of the errors less what follows from those before, as a part of it (Levinson and Durbin's recursion).
-fn innovation(coefficients: &[f64]) -> f64 {
-    let (mut variance, mut model) = (1.0, Vec::with_capacity(coefficients.len()));
-    for (k, rho) in coefficients.iter().enumerate() {
-        let known: f64 = model.iter().zip(coefficients[..k].iter().rev()).map(|(a, rho): (&f64, _)| a * rho).sum();
-        let next = (rho - known) / variance;
-        if next.is_nan() || next.abs() >= 1.0 {
-            return variance;
-        }
-        for i in 0..k.div_ceil(2) {
-            let (a, b) = (model[i], model[k - 1 - i]);
-            (model[i], model[k - 1 - i]) = (a - next * b, b - next * a);
-        }
-        model.push(next);
-        variance *= 1.0 - next * next;
-    }
-    variance
 }
 
 #[cfg(test)]

@@ -57,12 +57,29 @@ struct Parts {
     map_q: Table,
 }
 
+/// The part of the map's range below which what it is at zero current is an error of its measurement.
+const WITHOUT_MAGNETS: f64 = 0.01;
+
+/// Whether the points of a surface surround zero current, so that its value there is not extrapolated.
+fn includes_zero(table: Grid<'_>) -> bool {
+    table.axes().iter().all(|axis| axis[0] <= 0.0 && axis[axis.len() - 1] >= 0.0)
+}
+
+/// The largest value of a table less its smallest.
+fn range(table: Grid<'_>) -> f64 {
+    let [x, y] = table.axes();
+    let values = x.iter().flat_map(|x| y.iter().map(|y| table.at2(*x, *y)));
+    let ends = |(low, high): (f64, f64), value: f64| (low.min(value), high.max(value));
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), ends);
+    high - low
+}
+
 impl FluxMapped {
     /// A motor with this many pole pairs and these maps (Wb over `id`, `iq` in A).
     ///
     /// # Errors
-    /// Zero pole pairs; a table of one argument; incremental inductances that are not positive definite at a point of the
-    /// tables, between two or beyond the last.
+    /// Zero pole pairs; a table of one argument; a `map_d` that is not zero at zero current, by more than a hundredth of its
+    /// range; incremental inductances that are not positive definite at a point of the tables, between two or beyond the last.
     pub fn new(pole_pairs: u32, map_d: Table, map_q: Table) -> Result<Self, MotorError> {
         FluxMapped { pole_pairs: PolePairs::new(pole_pairs)?, map_d, map_q }.checked()
     }
@@ -73,6 +90,13 @@ impl FluxMapped {
             let (quantity, unit, must) =
                 ("number of arguments of a flux map", "", "be two, id and iq (Table::surface)");
             return Err(MotorError::OutOfRange { quantity, value: 1.0, unit, must });
+        }
+        let magnets = self.map_d.grid().at2(0.0, 0.0);
+        if includes_zero(self.map_d.grid()) && magnets.abs() > WITHOUT_MAGNETS * range(self.map_d.grid()) {
+            let (quantity, unit) = ("map_d at zero current", "Wb");
+            let must =
+                "be zero: subtract the flux of the magnets from the map, and give it as ke (units::ke_from_psi_m)";
+            return Err(MotorError::OutOfRange { quantity, value: magnets, unit, must });
         }
         let places = |axis: usize| -> Vec<f64> {
             let mut all: Vec<f64> = tables.iter().flat_map(|table| table.axes()[axis].iter().copied()).collect();
@@ -288,6 +312,17 @@ mod tests {
         assert!(refused(falling).starts_with("incremental inductance dmap_q/diq is -0.004 H"));
         assert!(refused(held).starts_with("incremental inductance dmap_q/diq is 0 H"));
         assert!(refused(curve).starts_with("number of arguments of a flux map is 1"));
+        // A map that includes the magnets; of one that does not reach zero current the flux there is not known.
+        let shifted = |from: f64, more: f64| {
+            let axis = [from, from + 20.0, from + 40.0];
+            let values: Vec<f64> = axis.iter().flat_map(|id| [4e-3 * id + more; 3]).collect();
+            Table::surface(&axis, &[-20.0, 0.0, 20.0], &values, Interpolation::Smooth, Extrapolation::Linear).unwrap()
+        };
+        let q = || table(4, |_, iq| 4e-3 * iq, Extrapolation::Linear);
+        let error = FluxMapped::new(4, shifted(-20.0, 0.194), q()).unwrap_err().to_string();
+        assert!(error.starts_with("map_d at zero current is 0.194 Wb"), "{error}");
+        assert!(FluxMapped::new(4, shifted(-20.0, 1e-3), q()).is_ok());
+        assert!(FluxMapped::new(4, shifted(10.0, 0.194), q()).is_ok());
         assert_eq!(FluxMapped::new(0, d(), d()).unwrap_err(), MotorError::NoPolePairs);
         // Both depend on the sum of the currents: a determinant of zero or less.
         let both = table(4, |id, iq| 4e-3 * id + 5e-3 * iq, Extrapolation::Linear);

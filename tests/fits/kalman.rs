@@ -368,3 +368,33 @@ fn what_cannot_be_filtered_is_refused() {
     let why = refused(&Stateless, Nothing);
     assert!(why.contains("no state to filter"), "{why}");
 }
+
+/// Of 20 errors the standard deviation has a variance with 20 degrees of freedom (Satterthwaite: `2 v^2 / var(v)` with
+/// `v = sigma^2 / 40`); by logarithm the variance does not depend on it, and those of the fit are left, 39.
+#[test]
+fn a_noise_level_has_the_degrees_of_freedom_of_its_own_variance() {
+    let mut noise = Noise(8);
+    let outputs = (0..20).map(|_| Sensors { y: 0.3 * noise.gauss(), z: 0.1 * noise.gauss() }).collect();
+    let time = Time::Uniform { start: 0.0, step: 1.0 };
+    let record = Experiment::new(&RandomWalk, time, vec![Push { u: 0.0 }; 20], outputs).unwrap();
+    let record = record.initial(Position { x: fixed(0.0) });
+    let width = |y: Parameter| {
+        let parameters = Levels { drift: fixed(0.0), y, z: fixed(0.1) };
+        let fit = Fit::new(&RandomWalk, &record).parameters(parameters).predictor(Kalman::default()).run().unwrap();
+        let Knowledge::Known { standard_error, lower, upper } = fit.unknowns[0].knowledge else { panic!("{fit}") };
+        let uneven = fit.warnings.iter().any(|warning| warning.code == WarningCode::CurvedInterval);
+        // A part of 1 / sqrt(40) of the value, just above the 15 % that are warned of.
+        (
+            standard_error / fit.unknowns[0].value,
+            (upper - lower) / 2.0 / standard_error,
+            (upper / lower).ln() / 2.0,
+            uneven,
+        )
+    };
+    let (relative, half, _, uneven) = width(free(0.2));
+    assert!((relative - 40f64.sqrt().recip()).abs() < 1e-6, "{relative}");
+    // Student's t at 97.5 % with 20 degrees of freedom; differences over a standard error are good to 0.4 %.
+    assert!((half / 2.085_963 - 1.0).abs() < 2e-3 && uneven, "{half}");
+    let (relative, _, half, uneven) = width(free(0.2).log());
+    assert!((half / relative / 2.022_691 - 1.0).abs() < 1e-6 && !uneven, "{half} {relative}");
+}

@@ -182,9 +182,9 @@ impl<'m> MovingSums<'m> {
         let n = score.len();
         let z: Vec<f64> = (0..n).map(|j| (0..=j).map(|i| score[i] * self.w[(i, j)]).sum()).collect();
         let rest = |i: usize| z[i] - (0..n).map(|j| self.a[(i, j)] * self.before[j]).sum::<f64>();
-        let fresh = (0..n).map(rest).collect();
+        let rest = (0..n).map(rest).collect();
         self.before = z;
-        fresh
+        rest
     }
 
     fn slide(&mut self, new: &[f64], counts: bool) {
@@ -220,8 +220,8 @@ impl AccumulateScores for MovingSums<'_> {
         if !counts {
             self.first.push(score.to_vec());
         }
-        let fresh = self.prewhitened(score);
-        self.slide(&fresh, counts);
+        let prewhitened = self.prewhitened(score);
+        self.slide(&prewhitened, counts);
     }
 
     fn append(&mut self, mut later: Self) {

@@ -4,7 +4,7 @@
 //! tells, such as an initial state, has one: its scores sum to zero there, and so do the windows that hold that part. The
 //! errors' own autocorrelation, of which the whole record tells, serves instead: the errors of each output are an
 //! autoregression (Yule and Walker's equations, order by Akaike's criterion), and the variance of `sum g[t] e[t]` is that of
-//! the innovations times the sum of squares of the slopes `g`, passed through the autoregression and beyond the end of the
+//! the innovations times the sum of squares of the slopes `g`, filtered by the autoregression and beyond the end of the
 //! record. (In which direction does not matter: a stationary sequence has the same covariances backward.)
 
 use super::ROWS;
@@ -13,7 +13,7 @@ use crate::judge::sandwich::{ALONE, form, of_experiment};
 use crate::optimize::Infeasible;
 use crate::problem::{Accumulate, Objective, each};
 use crate::sweep::Window;
-use crate::whiteness::Autocorrelation;
+use crate::whiteness::{Autocorrelation, levinson_durbin};
 use nalgebra::DMatrix;
 use std::collections::VecDeque;
 
@@ -57,7 +57,7 @@ pub(super) fn scores(
             .map(|(own, together)| if own.1 < OWN { together } else { own })
             .map(|(sums, count)| Autoregression::of(sums, *count))
             .collect();
-        let make = || Passed::new(objective, e, &models);
+        let make = || FilteredSlopes::new(objective, e, &models);
         Some(objective.gather_one(coordinates, e, true, make).ok()?.triangle())
     };
     Ok(each(all.len(), one).into_iter().collect())
@@ -67,35 +67,26 @@ pub(super) fn scores(
 struct Autoregression {
     coefficients: Vec<f64>,
     /// Standard deviation of the innovations.
-    fresh: f64,
+    innovation: f64,
     /// Samples after which nothing is left of an innovation.
     length: usize,
 }
 
 impl Autoregression {
-    /// By the recursion of Levinson and Durbin.
+    /// Of the order that Akaike's criterion prefers.
     fn of(sums: &Autocorrelation, count: u64) -> Self {
         let (sums, n) = (sums.sums(), count as f64);
-        let variance = sums[0] / n.max(1.0);
-        let (mut left, mut a) = (1.0, Vec::<f64>::new());
-        let mut best = (0.0, vec![], 1.0);
-        for k in 1..sums.len().min(count as usize / 4) {
-            let known: f64 = a.iter().enumerate().map(|(i, a)| a * sums[k - 1 - i]).sum();
-            let next = (sums[k] - known) / (left * sums[0]);
-            if next.is_nan() || next.abs() >= 1.0 {
-                break;
+        let orders = (sums.len() - 1).min((count as usize / 4).saturating_sub(1));
+        let correlations: Vec<f64> = sums[1..=orders].iter().map(|sum| sum / sums[0]).collect();
+        let (mut least, mut coefficients, mut relative) = (0.0, vec![], 1.0);
+        levinson_durbin(&correlations, |a, variance| {
+            let criterion = n * variance.ln() + 2.0 * a.len() as f64;
+            if criterion < least {
+                (least, coefficients, relative) = (criterion, a.to_vec(), variance);
             }
-            let turned: Vec<f64> = a.iter().rev().map(|a| next * a).collect();
-            a.iter_mut().zip(turned).for_each(|(a, by)| *a -= by);
-            a.push(next);
-            left *= 1.0 - next * next;
-            let criterion = n * left.ln() + 2.0 * k as f64;
-            if criterion < best.0 {
-                best = (criterion, a.clone(), left);
-            }
-        }
-        let (_, coefficients, left) = best;
-        Autoregression { length: length(&coefficients), coefficients, fresh: (variance * left).sqrt() }
+        });
+        let innovation = (sums[0] / n.max(1.0) * relative).sqrt();
+        Autoregression { length: length(&coefficients), coefficients, innovation }
     }
 }
 
@@ -152,8 +143,8 @@ impl Accumulate for Errors<'_> {
     }
 }
 
-/// The triangle of the slopes, passed through the autoregressions of their outputs.
-struct Passed<'p> {
+/// The triangle of the slopes, filtered by the autoregressions of their outputs.
+struct FilteredSlopes<'p> {
     objective: &'p Objective<'p>,
     experiment: usize,
     models: &'p [Autoregression],
@@ -168,18 +159,18 @@ struct Passed<'p> {
 struct Recent {
     /// The first rows, which those before this piece still act on; they are absorbed when these are known.
     first: Vec<Vec<f64>>,
-    /// The last rows that came out, the last one first.
-    passed: VecDeque<Vec<f64>>,
+    /// The last filtered rows, the last one first.
+    filtered: VecDeque<Vec<f64>>,
 }
 
-impl<'p> Passed<'p> {
+impl<'p> FilteredSlopes<'p> {
     fn new(objective: &'p Objective<'p>, experiment: usize, models: &'p [Autoregression]) -> Self {
         let columns = objective.problem.unknowns.columns(experiment).count();
         let rows = |model: &Autoregression| Recent {
             first: vec![],
-            passed: model.coefficients.iter().map(|_| vec![0.0; columns]).collect(),
+            filtered: model.coefficients.iter().map(|_| vec![0.0; columns]).collect(),
         };
-        Passed {
+        FilteredSlopes {
             objective,
             experiment,
             models,
@@ -192,27 +183,27 @@ impl<'p> Passed<'p> {
 
     /// The next row of an output, in `row`.
     fn take(&mut self, j: usize) {
-        let (model, Recent { first, passed }) = (&self.models[j], &mut self.outputs[j]);
+        let (model, Recent { first, filtered }) = (&self.models[j], &mut self.outputs[j]);
         let counts = first.len() == model.length;
         if !counts {
             first.push(self.row.clone());
         }
-        for (a, before) in model.coefficients.iter().zip(&*passed) {
+        for (a, before) in model.coefficients.iter().zip(&*filtered) {
             self.row.iter_mut().zip(before).for_each(|(row, before)| *row += a * before);
         }
-        if let Some(mut oldest) = passed.pop_back() {
+        if let Some(mut oldest) = filtered.pop_back() {
             oldest.copy_from_slice(&self.row);
-            passed.push_front(oldest);
+            filtered.push_front(oldest);
         }
         if counts {
-            self.row.iter_mut().for_each(|row| *row *= model.fresh);
+            self.row.iter_mut().for_each(|row| *row *= model.innovation);
             self.triangle.gather(&mut self.block, &self.row, 0.0);
         }
     }
 
-    /// The triangle, from rest before the first row until the last one has passed.
+    /// The triangle, from rest before the first row until nothing is left of the last one.
     fn triangle(self) -> Information {
-        let mut whole = Passed::new(self.objective, self.experiment, self.models);
+        let mut whole = FilteredSlopes::new(self.objective, self.experiment, self.models);
         whole.outputs.iter_mut().zip(self.models).for_each(|(rows, model)| rows.first = vec![vec![]; model.length]);
         whole.append(self);
         for j in 0..whole.models.len() {
@@ -226,7 +217,7 @@ impl<'p> Passed<'p> {
     }
 }
 
-impl Accumulate for Passed<'_> {
+impl Accumulate for FilteredSlopes<'_> {
     fn add(&mut self, window: &Window, lane: usize) {
         for k in 0..window.samples[lane] {
             let weight = self.objective.weight(self.experiment, window.begin[lane] + k).sqrt();
@@ -247,7 +238,7 @@ impl Accumulate for Passed<'_> {
         for ((rows, later), model) in self.outputs.iter_mut().zip(later.outputs).zip(self.models) {
             // After so many rows of its own, nothing is left of those before.
             if later.first.len() == model.length {
-                rows.passed = later.passed;
+                rows.filtered = later.filtered;
             }
         }
         self.triangle.absorb(&mut self.block);
@@ -274,7 +265,7 @@ mod tests {
         let found = Autoregression::of(&sums, e.len() as u64);
         // Standard deviation of the coefficient: sqrt((1 - 0.64) / 20,000) = 0.0042; of the innovations' 0.005.
         assert!((found.coefficients[0] - 0.8).abs() < 0.02, "{:?}", found.coefficients);
-        assert!((found.fresh - 1.0).abs() < 0.02, "{}", found.fresh);
+        assert!((found.innovation - 1.0).abs() < 0.02, "{}", found.innovation);
         assert_eq!(length(&[0.8]), 42);
         assert_eq!(length(&[]), 1);
     }

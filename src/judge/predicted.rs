@@ -1,0 +1,92 @@
+//! Degrees of freedom where noise levels are among the unknowns.
+//!
+//! The variance of an unknown then depends on levels that the record tells no better than its number of independent stretches
+//! allows. By Satterthwaite's rule (Biometrics Bulletin 2 (1946) 110) the variance `v` has `2 v^2 / var(v)` degrees of freedom,
+//! with `var(v)` by the slopes of `v` along the unknowns, weighed by their covariance (Fai and Cornelius, J. Statistical
+//! Computation and Simulation 54 (1996) 363).
+
+use super::conclude::Judgement;
+use super::covariances::Covariances;
+use super::warnings::care;
+use crate::estimate::{Unknown, Warning, WarningCode};
+use crate::information::Covariance;
+use crate::numeral::percent;
+use crate::parameter::Transform;
+use nalgebra::{Cholesky, DMatrix};
+
+/// More unknowns are not examined: two passes over the data each.
+const MOST: usize = 12;
+/// Standard errors from the estimate at which the variances are compared, to either side.
+const APART: f64 = 0.5;
+/// Fewest degrees of freedom; what is left is the approximation's error.
+const FEWEST: f64 = 2.0;
+/// Growth of a variance, in its logarithm along one standard error, from which on its interval is uneven: the variance of a
+/// noise level grows by twice the relative standard error, of which 15 % are much (see docs/intervals.md).
+const UNEVEN: f64 = 0.3;
+
+/// How the variances of the unknowns depend on the unknowns.
+pub(super) struct Dependence {
+    /// Degrees of freedom of the variance of each unknown.
+    pub degrees: Vec<f64>,
+    /// By how much the logarithm of the variance of each unknown grows along one of its own standard errors.
+    pub own: Vec<f64>,
+}
+
+impl Judgement<'_> {
+    /// That of variances that are predicted; `unit` is the covariance of the unknowns in coordinates.
+    pub(super) fn dependence_of_variances(&self, unit: &Covariance) -> Option<Dependence> {
+        let n = self.slopes.len();
+        let kept: Vec<usize> = (0..n).filter(|&i| !self.exact[i]).collect();
+        if !self.objective.sweep.predicts_variance() || kept.len() > MOST {
+            return None;
+        }
+        let covariance = unit.dense(&kept);
+        let covariance = DMatrix::from_fn(kept.len(), kept.len(), |i, j| covariance[(i, j)]);
+        let directions = Cholesky::new(covariance)?.unpack();
+        let (mut squares, mut own) = (vec![0.0; n], vec![0.0; n]);
+        for direction in directions.column_iter() {
+            let beside = |sign: f64| {
+                let mut place = self.end.coordinates.clone();
+                kept.iter().zip(direction.iter()).for_each(|(&i, along)| place[i] += sign * APART * along);
+                self.logarithms_of_variances(&place)
+            };
+            // Beyond where a noise level is zero there is nothing to compare with.
+            let (Some(above), Some(below)) = (beside(1.0), beside(-1.0)) else { continue };
+            for (row, &i) in kept.iter().enumerate() {
+                let slope = (above[i] - below[i]) / (2.0 * APART);
+                squares[i] += slope * slope;
+                own[i] += slope * direction[row] / unit.standard_error(i);
+            }
+        }
+        let most = self.degrees.max(FEWEST);
+        let degrees = |square: f64| if square.is_finite() { (2.0 / square).clamp(FEWEST, most) } else { FEWEST };
+        Some(Dependence { degrees: squares.into_iter().map(degrees).collect(), own })
+    }
+
+    fn logarithms_of_variances(&self, place: &[f64]) -> Option<Vec<f64>> {
+        let covariance = self.objective.evaluate(place).ok()?.covariance(&self.exact)?;
+        Some((0..place.len()).map(|i| 2.0 * covariance.standard_error(i).ln()).collect())
+    }
+
+    /// A noise level whose interval is symmetrical where that of its logarithm would be.
+    pub(super) fn uneven(&self, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
+        let own = covariances
+            .own
+            .iter()
+            .enumerate()
+            .filter(|(i, own)| own.is_finite() && unknowns[*i].transform == Transform::Identity);
+        let (i, own) = own.max_by(|a, b| a.1.total_cmp(b.1))?;
+        if *own <= UNEVEN {
+            return None;
+        }
+        let unknown = &unknowns[i];
+        unknown.knowledge.standard_error()?;
+        let text = format!(
+            "the standard error of `{}` grows with its value, by {} per standard error, as that of a noise level does, so that its interval \
+             is too short above: estimate its logarithm (.log())",
+            unknown.name,
+            percent(0.5 * own, 2)
+        );
+        Some(care(WarningCode::CurvedInterval, text))
+    }
+}
