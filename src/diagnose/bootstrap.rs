@@ -146,11 +146,7 @@ fn spread(estimate: &Summary, found: &[Vec<f64>], tried: usize, seed: u64) -> Bo
         let mean = column.iter().sum::<f64>() / n;
         let variance = column.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
         let at = |part: f64| {
-            let place = part * (n + 1.0) - 1.0;
-            let below = place.floor().clamp(0.0, n - 1.0);
-            let above = (below + 1.0).min(n - 1.0);
-            let (low, high) = (column[below as usize], column[above as usize]);
-            let value = low + (high - low) * (place - below).clamp(0.0, 1.0);
+            let value = quantile(&column, part);
             transform.to_value(center + stretch * (transform.to_coordinate(value) - center))
         };
         result.standard_errors.push(stretch * variance.sqrt());
@@ -158,6 +154,17 @@ fn spread(estimate: &Summary, found: &[Vec<f64>], tried: usize, seed: u64) -> Bo
         result.intervals.push((at(0.025), at(0.975)));
     }
     result
+}
+
+/// The quantile of numbers in order: number `part (n + 1)` of them, on the line between neighbors (Hyndman and Fan, The American
+/// Statistician 50 (1996) 361, definition 6).
+fn quantile(ordered: &[f64], part: f64) -> f64 {
+    let n = ordered.len() as f64;
+    let place = part * (n + 1.0) - 1.0;
+    let below = place.floor().clamp(0.0, n - 1.0);
+    let above = (below + 1.0).min(n - 1.0);
+    let (low, high) = (ordered[below as usize], ordered[above as usize]);
+    low + (high - low) * (place - below).clamp(0.0, 1.0)
 }
 
 /// Refuses blocks longer than half of an experiment's residuals: its resamples would hardly differ, and with them the refits.
@@ -238,5 +245,39 @@ impl From<&Bootstrap> for Section {
 impl From<Bootstrap> for Section {
     fn from(found: Bootstrap) -> Section {
         Section::from(&found)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of 1, 4, 9, ..., 361 (19 squares) the quantile `part` is at number `20 part`.
+    #[test]
+    fn quantiles_are_between_neighbors() {
+        let squares: Vec<f64> = (1..20).map(|k| f64::from(k * k)).collect();
+        for (part, expected) in
+            [(0.5, 100.0), (0.05, 1.0), (0.95, 361.0), (0.13, 4.0 + 0.6 * 5.0), (0.01, 1.0), (0.99, 361.0)]
+        {
+            assert!((quantile(&squares, part) - expected).abs() < 1e-9, "{part}: {}", quantile(&squares, part));
+        }
+    }
+
+    /// Blocks stand together, each place of a block in the record is drawn, the first and the last as often as others, and
+    /// samples keep all their outputs.
+    #[test]
+    fn blocks_are_drawn_evenly() {
+        let rows: Vec<Vec<f64>> = (0..10).map(|k| vec![f64::from(k), -f64::from(k)]).collect();
+        let drawn = draw(&rows, 24_000, Resampling::Blocks(3), &mut Random::stream(1, 1));
+        assert_eq!(drawn.len(), 24_000);
+        let mut begins = [0u32; 8];
+        for block in drawn.chunks(3) {
+            let first = block[0][0];
+            begins[first as usize] += 1;
+            assert!((0..3).all(|k| block[k][0] == first + k as f64 && block[k][1] == -block[k][0]), "{block:?}");
+        }
+        // 1000 each, four deviations of 30.
+        assert!(begins.iter().all(|count| count.abs_diff(1000) < 120), "{begins:?}");
+        assert_eq!(draw(&rows, 7, Resampling::Residuals, &mut Random::stream(1, 2)).len(), 7);
     }
 }

@@ -202,3 +202,24 @@ impl Compared {
         Plot::new(name, caption, title, Drawing::Timeline(timeline))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Over the samples that are measured and predicted, by hand: measured 1 and 5 about 3, errors 1 and -1.
+    #[test]
+    fn fit_of_what_is_there() {
+        let nan = f64::NAN;
+        let output = ComparedOutput {
+            name: "y".to_owned(),
+            unit: "V".to_owned(),
+            measured: vec![1.0, nan, 5.0, 7.0],
+            predicted: vec![
+                ("one".to_owned(), vec![0.0, 2.0, 6.0, nan]),
+                ("none".to_owned(), vec![1.0, 2.0, nan, nan]),
+            ],
+        };
+        assert_eq!(output.fit_percent(), [Some(50.0), None]);
+    }
+}

@@ -279,4 +279,29 @@ mod tests {
         let expected = 4.0 * (1.0 + a) / ((1.0 - a) * n) + 4.0 / (3.0 * n);
         assert!((spread / (variance * variance) / expected - 1.0).abs() < 1e-12, "{spread}");
     }
+
+    /// Andrews' rule for series that are autoregressions of order one after prewhitening (1991, eq. 6.4), with weights one: of
+    /// one series `1.1447 (4 r^2 n / ((1 - r)^2 (1 + r)^2))^(1/3)`; of two by their variances. Where it gives less, the rule for
+    /// longer lags; never more than half of the scores.
+    #[test]
+    fn bandwidth_by_hand() {
+        let a = [0.3, -0.2];
+        let (one, prewhitened) = ([0.5, 0.1], [0.9, 0.7]);
+        let zero = |i: usize| 1.0 - 2.0 * a[i] * one[i] + a[i] * a[i];
+        // The correlation at lag two that leaves these after prewhitening.
+        let two = |i: usize| (one[i] - a[i] + a[i] * a[i] * one[i] - prewhitened[i] * zero(i)) / a[i];
+        let diagonal =
+            |of: &dyn Fn(usize) -> f64, n: usize| DMatrix::from_diagonal(&DVector::from_iterator(n, (0..n).map(of)));
+        let window = |n: usize, count: usize| {
+            bandwidth(&diagonal(&|i| one[i], n), &diagonal(&two, n), &diagonal(&|i| a[i], n), count)
+        };
+        let ratio = |r: f64| 4.0 * r * r / ((1.0 - r).powi(2) * (1.0 + r).powi(2));
+        let rule = |alpha: f64, count: f64| (1.1447 * (alpha * count).cbrt()).ceil() as usize + 1;
+        assert_eq!(window(1, 10_000_000), rule(ratio(0.9), 1e7));
+        let weight = |i: usize| (zero(i) / (1.0 - prewhitened[i]).powi(2)).powi(2);
+        let mean = (0..2).map(|i| ratio(prewhitened[i]) * weight(i)).sum::<f64>() / (weight(0) + weight(1));
+        assert_eq!(window(2, 10_000_000), rule(mean, 1e7));
+        assert_eq!(window(1, 10_000), 131);
+        assert_eq!(window(1, 12), 6);
+    }
 }

@@ -149,3 +149,42 @@ pub(crate) fn output_fit(measured: &[f64], residuals: &[f64]) -> OutputFit {
     }
     sums.fit()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One by one, all at once and in pieces: mean, deviation, kurtosis `n sum e^4 / (sum e^2)^2`, rms and fit of the definitions.
+    #[test]
+    fn sums_are_the_definitions() {
+        let values: Vec<f64> = (0..21).map(|k| 1000.0 + f64::from(k * k % 13)).collect();
+        let errors: Vec<f64> = (0..21).map(|k| f64::from(k * 7 % 5) - 1.5).collect();
+        let mut one_by_one = OutputSums::default();
+        values.iter().zip(&errors).for_each(|(y, e)| one_by_one.add(*y, *e));
+        let all = |from: usize, to: usize| {
+            let mut sums = OutputSums::default();
+            sums.add_all(&values[from..to], &errors[from..to]);
+            sums
+        };
+        let mut pieces = OutputSums::default();
+        for piece in [all(0, 0), all(0, 2), all(2, 12), all(12, 21)] {
+            pieces.append(&piece);
+        }
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / 21.0;
+        let power = |by: i32, from: f64, values: &[f64]| values.iter().map(|v| (v - from).powi(by)).sum::<f64>();
+        let (level, squares) = (mean(&values), power(2, 0.0, &errors));
+        let spread = power(2, level, &values);
+        for sums in [one_by_one, all(0, 21), pieces] {
+            // Values of 1000 leave 13 digits of differences of 1.
+            let (found, deviation) = sums.level();
+            assert!((found - level).abs() < 1e-9 && (deviation - (spread / 21.0).sqrt()).abs() < 1e-9, "{sums:?}");
+            assert!((sums.kurtosis() - 21.0 * power(4, 0.0, &errors) / squares.powi(2)).abs() < 1e-12, "{sums:?}");
+            let fit = sums.fit();
+            assert_eq!(fit.samples, 21);
+            assert!((fit.rmse - (squares / 21.0).sqrt()).abs() < 1e-12, "{fit:?}");
+            assert!((fit.fit_percent.unwrap() - 100.0 * (1.0 - (squares / spread).sqrt())).abs() < 1e-9, "{fit:?}");
+        }
+        let still = output_fit(&[5.0; 4], &[1.0, -1.0, f64::NAN, 1.0]);
+        assert_eq!((still.samples, still.rmse, still.fit_percent), (3, 1.0, None));
+    }
+}

@@ -43,3 +43,28 @@ pub(super) fn warnings(starts: &Starts, measurements: u64) -> Vec<Warning> {
     }
     warnings
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn codes(tried: u64, agreed: u64, rival: f64, declared: usize) -> Vec<WarningCode> {
+        let minimum = |cost_ratio| Minimum { cost_ratio, searches: 1, undetermined: vec![], unknowns: vec![] };
+        let minima = vec![minimum(1.0), minimum(rival)];
+        let starts = Starts { tried, agreed, minima, declared: Some(declared), failed: vec![], evaluations: 1 };
+        warnings(&starts, 100).iter().map(|warning| warning.code).collect()
+    }
+
+    /// A deviance of `100 ln(ratio)` above 3.84 is another: at a ratio of 1.0391. A minimum found by one of several searches, and
+    /// a declared start that leads elsewhere, are said.
+    #[test]
+    fn what_is_said_of_searches() {
+        use WarningCode::{DeclaredStartElsewhere, MinimumFoundOnce, RivalMinimum};
+        assert_eq!(codes(8, 3, 1.04, 0), []);
+        assert_eq!(codes(8, 3, 1.038, 0), [RivalMinimum]);
+        assert_eq!(codes(8, 1, 1.04, 0), [MinimumFoundOnce]);
+        assert_eq!(codes(1, 1, 1.04, 0), []);
+        assert_eq!(codes(8, 3, 1.04, 1), [DeclaredStartElsewhere]);
+        assert_eq!(codes(8, 0, 1.038, 0), []);
+    }
+}

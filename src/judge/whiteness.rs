@@ -69,4 +69,36 @@ mod tests {
             assert!((dependence - (1.0 + r) / (1.0 - r)).abs() < 1e-9, "{r}: {dependence}");
         }
     }
+
+    /// An autoregression of order four leaves the product of `1 - r^2` over its partial autocorrelations `r` (Durbin, Review of
+    /// the International Statistical Institute 28 (1960) 233); its autocorrelations follow from them.
+    #[test]
+    fn partial_autocorrelations_make_the_innovation() {
+        let partial = [0.5, -0.4, 0.3, 0.2f64];
+        let (mut a, mut rho, mut left) = (Vec::<f64>::new(), Vec::<f64>::new(), 1.0);
+        for k in 0..LAGS {
+            let next = partial.get(k).copied().unwrap_or(0.0);
+            let known: f64 = a.iter().zip(rho.iter().rev()).map(|(a, rho)| a * rho).sum();
+            rho.push(known + next * left);
+            let turned: Vec<f64> = a.iter().rev().map(|a| next * a).collect();
+            a.iter_mut().zip(turned).for_each(|(a, by)| *a -= by);
+            a.push(next);
+            left *= 1.0 - next * next;
+        }
+        assert!((innovation(&rho) - left).abs() < 1e-12, "{} {left}", innovation(&rho));
+        // Of 100 errors, 20 lags take as many degrees of freedom.
+        let (predicted, _) = color(&rho, 100);
+        assert!((predicted - (1.0 - left / 0.8)).abs() < 1e-12, "{predicted}");
+    }
+
+    /// The sum over the lags up to the first that is not positive, where it is more than an autoregression's.
+    #[test]
+    fn dependence_counts_positive_lags() {
+        for coefficients in [[0.1, 0.3, 0.2, -0.5, 0.4], [0.1, 0.3, 0.2, 0.0, 0.4]] {
+            let (_, dependence) = color(&coefficients, 1000);
+            assert!((dependence - 2.2).abs() < 1e-12, "{dependence}");
+        }
+        let (_, dependence) = color(&[-0.3, 0.2], 1000);
+        assert_eq!(dependence, 1.0);
+    }
 }

@@ -202,3 +202,39 @@ impl fmt::Display for Outcome {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is a minimum, and that words and advice go with it.
+    #[test]
+    fn outcomes_and_their_words() {
+        let precision = |gradient: f64, step: f64| Outcome::LimitOfPrecision { gradient, step };
+        let rough = |errors: f64| Outcome::Rough { noise: 1e-9, errors };
+        let stalled = |failed: u64| Outcome::Stalled { gradient: 0.5, step: 0.25, failed };
+        let cases = [
+            (Outcome::Converged { step: 1e-9, gradient: 1e-12 }, true, "converged (", "Nothing to do."),
+            (Outcome::CostUnchanged { decrease: 1e-9 }, true, "converged (", "Drop the cost tolerance"),
+            (Outcome::Exact, true, "converged (", "Nothing to do."),
+            (precision(0.5 * PRECISION, 5e-4), true, "converged to the precision", "Nothing to do"),
+            (precision(0.5 * PRECISION, 2e-3), false, "not converged: this is the precision", "The cost is flat"),
+            (precision(2.0 * PRECISION, 5e-4), false, "not converged: this is the precision", "The cost is flat"),
+            (rough(0.05), true, "converged within the roughness", "Tighten the integrator's tolerance if"),
+            (rough(0.2), false, "not converged within the roughness", "The cost is too rough"),
+            (stalled(0), false, "not converged: no step lowers", "The cost is not smooth"),
+            (stalled(2), false, "not converged: no step lowers", "The simulation fails"),
+            (Outcome::Plateau { lost: 1, gradient: 0.5 }, false, "not converged: 1 unknown", "Start elsewhere"),
+            (Outcome::Creeping { trials: 9, promised: 0.5 }, false, "not converged: 9 steps", "Look for parameters"),
+            (Outcome::IterationLimit { iterations: 7 }, false, "not converged after 7", "Allow more iterations"),
+            (Outcome::TimeLimit, false, "not converged within the time", "Allow more time"),
+            (Outcome::Cancelled, false, "cancelled", "Resume"),
+        ];
+        for (outcome, converged, words, advice) in cases {
+            assert_eq!(outcome.converged(), converged, "{outcome:?}");
+            assert!(outcome.to_string().starts_with(words), "{outcome}");
+            assert!(outcome.advice().starts_with(advice), "{outcome:?}: {}", outcome.advice());
+        }
+        assert!(!stalled(0).to_string().contains("simulated") && stalled(2).to_string().contains("; 2 trial step(s)"));
+    }
+}

@@ -144,3 +144,21 @@ fn numbers(record: &Record, hash: &mut Sha256) {
         channel.values.iter().for_each(|value| hash.update(value.to_le_bytes()));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::of;
+
+    /// Values in another order are others, so is each value, and what is not finite does not count.
+    #[test]
+    fn probes_tell_values_and_their_order() {
+        let probe = |values: &[f64]| of(values.iter().copied());
+        let values = probe(&[1.0, 2.0, 5.0, f64::NAN]);
+        assert!(values.agrees(&probe(&[1.0, 2.0, 5.0])));
+        for other in [[2.0, 1.0, 5.0], [1.0, 5.0, 2.0], [3.0, 2.0, 5.0], [1.0, 2.0, 5.001]] {
+            assert!(!values.agrees(&probe(&other)), "{other:?}");
+        }
+        // By its definition: factors 1, 98/97 and 99/97.
+        assert!((values.sum - (1.0 + 2.0 * 98.0 / 97.0 + 5.0 * 99.0 / 97.0)).abs() < 1e-12);
+    }
+}

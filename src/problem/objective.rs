@@ -225,3 +225,47 @@ impl LeastSquares for Objective<'_> {
         self.problem.unknowns.bounds()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::{Experiment, Fit, Kind, Model, Nothing, Sample, Scalar, Time, free, signals};
+
+    signals! { struct Input { u: "V" } }
+    signals! { struct Output { y: "V", z: "V" } }
+    signals! { struct Gain { a: "1" } }
+
+    #[derive(Clone)]
+    struct Amplifier;
+
+    impl Model for Amplifier {
+        type State = Nothing;
+        type Input = Input;
+        type Output = Output;
+        type Parameters = Gain;
+        const KIND: Kind = Kind::Static;
+
+        fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Input<S>, p: &Gain<S>) -> Output<S> {
+            Output { y: p.a * u.u, z: p.a + u.u }
+        }
+    }
+
+    /// `sum of w y^2 / sigma^2` over what was measured.
+    #[test]
+    fn norm_of_the_data_by_hand() {
+        let inputs: Vec<Input> = (0..11).map(|k| Input { u: 1.0 + f64::from(k) }).collect();
+        let missing = |k: usize, y: f64| if k == 6 { f64::NAN } else { y };
+        let outputs: Vec<Output> =
+            (0..11).map(|k| Output { y: 3.0 + k as f64, z: missing(k, 7.0 - k as f64) }).collect();
+        let time = Time::Uniform { start: 0.0, step: 1.0 };
+        let record = Experiment::new(&Amplifier, time, inputs.clone(), outputs.clone()).unwrap();
+        let fit = Fit::new(&Amplifier, &record).parameters(Gain { a: free(1.0) }).noise(Output { y: 0.5, z: 4.0 });
+        let problem = fit.weighting(|s: &Sample<Amplifier>| s.u.u).problem().unwrap();
+        let found = problem.objective().unwrap().data_norm().unwrap();
+        let squares = |k: usize| {
+            let Output { y, z } = outputs[k];
+            inputs[k].u * (y * y / 0.25 + if z.is_nan() { 0.0 } else { z * z / 16.0 })
+        };
+        let expected = (0..11).map(squares).sum::<f64>().sqrt();
+        assert!((found / expected - 1.0).abs() < 1e-14, "{found} {expected}");
+    }
+}

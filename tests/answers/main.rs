@@ -16,3 +16,4 @@ mod residuals;
 mod shared;
 mod silent_failures;
 mod stops;
+mod told_apart;

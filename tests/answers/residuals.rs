@@ -83,6 +83,10 @@ fn jarque_bera_is_that_of_scipy() {
     // SciPy prints 17 digits; the residuals carry the rounding of the outputs they come from.
     assert!((found.statistic / 0.318_450_228_757_759_7 - 1.0).abs() < 1e-9, "{found:?}");
     assert!((found.p_value / 0.852_804_358_835_401_7 - 1.0).abs() < 1e-9, "{found:?}");
+    let residuals = examined(30, 1, |k, _, _| white[k]);
+    // SciPy's `skew` and `kurtosis`.
+    assert!((residuals.skewness / 0.209_815_786_117_013_96 - 1.0).abs() < 1e-9, "{}", residuals.skewness);
+    assert!((residuals.excess_kurtosis / 0.280_480_884_536_906_67 - 1.0).abs() < 1e-9, "{}", residuals.excess_kurtosis);
 
     let mut sum = 0.0;
     let colored = examined(30, 1, |k, _, _| {
@@ -196,4 +200,133 @@ fn an_infinite_prediction_is_refused() {
     assert!(named && error.to_string().contains("0.08"), "{error}");
     prediction.residuals[0].pop();
     assert!(matches!(examine(&prediction, record), Err(Error::Lengths { found: 59, expected: 60, .. })));
+}
+
+/// Standardized: less the mean, over the root of the mean square; missing ones are zero.
+fn standardized(values: &[f64]) -> Vec<f64> {
+    let present: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    let mean = present.iter().sum::<f64>() / present.len() as f64;
+    let deviation = (present.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / present.len() as f64).sqrt();
+    values.iter().map(|v| if v.is_finite() { (v - mean) / deviation } else { 0.0 }).collect()
+}
+
+/// Part of the variance of `y` that a polynomial in `x` of this degree explains, by a regression of its own.
+fn explained(x: &[f64], y: &[f64], degree: i32) -> f64 {
+    let columns = degree as usize + 1;
+    let x = nalgebra::DMatrix::from_fn(x.len(), columns, |i, j| x[i].powi(j as i32));
+    let y = nalgebra::DVector::from_column_slice(y);
+    let rest = &y - &x * x.clone().svd(true, true).solve(&y, 1e-12).unwrap();
+    1.0 - rest.norm_squared() / y.add_scalar(-y.mean()).norm_squared()
+}
+
+/// The test of Breusch, Pagan and Koenker is the effective number of residuals times the part of the variance of their squares
+/// that signal and square explain: chi-square with two degrees of freedom, `exp(-x / 2)`; with one for a signal of two levels.
+/// The spread is that of twelve parts of the range.
+#[test]
+fn spread_is_that_of_a_regression() {
+    let (mut errors, mut speeds) = (vec![], vec![]);
+    let residuals = examined(90, 7, |_, u, e| {
+        let error = 0.1 * e * (0.6 + u.w / 100.0) + 0.03;
+        errors.push(error);
+        speeds.push(u.w);
+        error
+    });
+    let squares: Vec<f64> = standardized(&errors).iter().map(|e| e * e).collect();
+    let found = |residuals: &Residuals, name: &str| residuals.tests.iter().find(|t| t.name == name).unwrap().clone();
+    let test = found(&residuals, "Breusch-Pagan-Koenker, input `w`");
+    let share = explained(&standardized(&speeds), &squares, 2);
+    let spread = residuals.spreads.iter().find(|spread| spread.signal == "w").unwrap();
+    // Outputs are read less predictions of the size one: residuals to 1e-15 of 0.1.
+    assert!((spread.share / share - 1.0).abs() < 1e-9, "{spread:?} {share}");
+    let expected = residuals.effective_samples * share;
+    assert!((test.statistic / expected - 1.0).abs() < 1e-9, "{test:?}");
+    assert!((test.p_value / (-expected / 2.0).exp() - 1.0).abs() < 1e-8, "{test:?}");
+
+    let (low, high) = speeds.iter().fold((f64::MAX, f64::MIN), |(low, high), w| (low.min(*w), high.max(*w)));
+    let width = (high - low) / 12.0;
+    let mean = errors.iter().sum::<f64>() / 90.0;
+    let parts: Vec<(f64, f64, u64)> = (0..12)
+        .filter_map(|part| {
+            let here = |w: f64| ((w - low) / width).floor().min(11.0) == f64::from(part);
+            let own: Vec<f64> = (0..90).filter(|&k| here(speeds[k])).map(|k| (errors[k] - mean).powi(2)).collect();
+            let root = (own.iter().sum::<f64>() / own.len() as f64).sqrt();
+            (!own.is_empty()).then(|| (low + width * (f64::from(part) + 0.5), root, own.len() as u64))
+        })
+        .collect();
+    assert_eq!(spread.count, parts.iter().map(|part| part.2).collect::<Vec<_>>());
+    for ((at, deviation), part) in spread.at.iter().zip(&spread.deviation).zip(&parts) {
+        assert!((at / part.0 - 1.0).abs() < 1e-9 && (deviation / part.1 - 1.0).abs() < 1e-9, "{spread:?} {parts:?}");
+    }
+
+    let (mut errors, mut levels) = (vec![], vec![]);
+    let inputs = (0..60).map(|k| Drive { u: (k as f64).sin(), w: if k % 3 == 0 { -40.0 } else { 60.0 } });
+    let inputs: Vec<Drive> = inputs.collect();
+    let mut random = Random(99);
+    let outputs = inputs.iter().map(|u| {
+        errors.push(random.normal() * (1.0 + u.w / 200.0));
+        levels.push(u.w);
+        Reading { y: 2.0 * u.u + errors.last().unwrap() }
+    });
+    let outputs = outputs.collect();
+    let record = Experiment::new(&Amplifier, Time::Uniform { start: 0.0, step: STEP }, inputs, outputs).unwrap();
+    let residuals = examine(&predicted(&record), record.record()).unwrap().remove(0);
+    let test = found(&residuals, "Breusch-Pagan-Koenker, input `w`");
+    let squares: Vec<f64> = standardized(&errors).iter().map(|e| e * e).collect();
+    let expected = residuals.effective_samples * explained(&levels, &squares, 1);
+    assert!((test.statistic / expected - 1.0).abs() < 1e-8, "{test:?} {expected}");
+    let p_value = statrs::function::erf::erfc((expected / 2.0f64).sqrt());
+    assert!((test.p_value / p_value - 1.0).abs() < 1e-7, "{test:?} {p_value}");
+}
+
+/// A weighting sees inputs and time; of a predicted output it is not advised.
+#[test]
+fn the_remedy_for_a_spread_is_one_that_can_be_taken() {
+    let by_input = examined(1000, 1, |_, u, e| 0.1 * e * (0.5 + u.w / 50.0));
+    let by_output = examined(1000, 1, |_, u, e| 0.1 * e * (1.2 + u.u));
+    let meaning = |residuals: &Residuals, signal: &str| {
+        let test = residuals.tests.iter().find(|t| t.name.contains("Koenker") && t.name.contains(signal)).unwrap();
+        test.meaning.clone()
+    };
+    assert!(meaning(&by_input, "input `w`").contains("a weighting by `w`"));
+    assert!(meaning(&by_output, "predicted output `y`").contains("fit a part of the record"));
+}
+
+/// Correlations with what went in and was measured: the definition, sample by sample, where some are missing, with the band of
+/// Bartlett from both autocorrelations at 25 lags.
+#[test]
+fn correlations_are_the_definition() {
+    let (mut errors, mut inputs, mut noise) = (vec![], vec![], 0.0);
+    let residuals = examined(300, 5, |k, u, e| {
+        noise = 0.6 * noise + 0.1 * e;
+        errors.push(if k % 7 == 3 { f64::NAN } else { noise + 0.02 * u.u });
+        inputs.push(u.u);
+        errors[k]
+    });
+    let measured: Vec<f64> = errors.iter().zip(&inputs).map(|(e, u)| 2.0 * u + e).collect();
+    let e = standardized(&errors);
+    let present = errors.iter().filter(|e| e.is_finite()).count() as f64;
+    let lagged = |a: &[f64], b: &[f64], lag: i64| -> f64 {
+        let at = |t: i64| usize::try_from(t - lag).ok().and_then(|before| b.get(before)).copied().unwrap_or(0.0);
+        a.iter().enumerate().map(|(t, a)| a * at(t as i64)).sum()
+    };
+    for (name, signal, first) in [("u", &inputs, 0), ("y", &measured, 1)] {
+        let s = standardized(signal);
+        let found = residuals.correlations.iter().find(|c| c.signal == name).unwrap();
+        assert_eq!((found.first_lag, found.values.len(), found.tested_from), (-25, 51, first));
+        for (lag, value) in (-25..=25).zip(&found.values) {
+            assert!((value - lagged(&e, &s, lag) / present).abs() < 1e-9, "{name} {lag} {value}");
+        }
+        let own = |x: &[f64], lag: i64| lagged(x, x, lag) / lagged(x, x, 0);
+        let both: f64 = (1..=25).map(|lag| own(&e, lag) * own(&s, lag)).sum();
+        let deviation = ((1.0 + 2.0 * both) / present).sqrt();
+        let largest = (first..=25).map(|lag| (lagged(&e, &s, lag) / present).abs()).fold(0.0, f64::max) / deviation;
+        let test = residuals.tests.iter().find(|t| t.name.contains("cross") && t.name.ends_with(&format!("`{name}`")));
+        let test = test.unwrap();
+        assert!((test.statistic / largest - 1.0).abs() < 1e-9, "{test:?} {largest}");
+        // The largest of `count` independent normal numbers; at the band it has the probability 0.01.
+        let count = (26 - first) as i32;
+        let none_beyond = |z: f64| statrs::function::erf::erf(z / std::f64::consts::SQRT_2).powi(count);
+        assert!((test.p_value - (1.0 - none_beyond(largest))).abs() < 1e-9, "{test:?}");
+        assert!((none_beyond(found.band / deviation) - 0.99).abs() < 1e-9, "{}", found.band);
+    }
 }

@@ -120,6 +120,8 @@ fn a_checkpoint_goes_on() {
     let resumed = fit(&record).checkpoint(&path, 1).run().unwrap();
     assert!(resumed.outcome.converged(), "{resumed}");
     assert!(resumed.iterations > 3, "those before count: {}", resumed.iterations);
+    // Three trial steps need not be taken again.
+    assert!(resumed.evaluations < whole.evaluations, "{} {}", resumed.evaluations, whole.evaluations);
     let error = whole.unknowns[0].knowledge.standard_error().unwrap();
     assert!((resumed.parameters.gain - whole.parameters.gain).abs() < 1e-6 * error);
     // A finished search looks again before it says so.

@@ -15,6 +15,7 @@ mod far_starts;
 mod fleet;
 mod guessed_states;
 mod interval_limits;
+mod judgements;
 mod kalman;
 mod models;
 mod nist;
@@ -24,6 +25,7 @@ mod recovery;
 mod refining;
 #[path = "../common/refused.rs"]
 mod refused;
+mod sandwiches;
 mod segments;
 #[path = "../common/shared.rs"]
 mod shared;

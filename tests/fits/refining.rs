@@ -32,6 +32,8 @@ fn the_default_method_is_as_fine_as_the_plant_asks_for() {
         assert!(fit.method.integrator.contains(method), "{c}: {}", fit.method.integrator);
         assert!(fit.severity() < Severity::NotUsable, "{fit}");
         assert!(fit.warnings.iter().all(|warning| warning.code != WarningCode::CoarseStep), "{fit}");
+        // Each trial step is an evaluation, and so is the start of each method.
+        assert!(fit.evaluations > fit.iterations, "{} {}", fit.evaluations, fit.iterations);
         // The stiffest plant turns by 12 rad in a sample: its stiffness has aliases, its inertias have none.
         let told = if c < 1e6 { 4 } else { 2 };
         for (unknown, truth) in fit.unknowns.iter().zip(Coupling::into_array(truth)).take(told) {
@@ -59,6 +61,12 @@ fn a_method_that_was_chosen_stays() {
     assert!(fit.method.integrator.contains("1 step per sample"), "{fit}");
     let warning = fit.warnings.iter().find(|warning| warning.code == WarningCode::CoarseStep).unwrap();
     assert!(warning.severity == Severity::UsableWithCare && warning.text.contains("2 steps per sample"), "{fit}");
+    // By how much of itself the stiffness would move: what half the step moves it by, but for the second order.
+    let finer = Fit::new(&Coupled, &record).parameters(near(truth)).integrator(Rk4 { substeps: 2 }).run().unwrap();
+    let moved = 100.0 * (finer.parameters.c / fit.parameters.c - 1.0).abs();
+    let said = warning.text.split("`c` would move by ").nth(1).and_then(|text| text.split(' ').next()).unwrap();
+    let said: f64 = said.parse().unwrap();
+    assert!((said / moved - 1.0).abs() < 0.2, "{moved} {}", warning.text);
 }
 
 /// A fleet takes records to the method that single fits take them to, also where the start overflows with the default step.

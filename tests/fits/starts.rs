@@ -73,6 +73,43 @@ fn the_best_of_many_minima_is_found_and_the_others_are_listed() {
     );
 }
 
+signals! { pub struct Swings { y: "V", z: "V" } }
+
+/// `y = a sin(omega t)`, `z = a cos(omega t)`.
+#[derive(Clone)]
+struct Turning;
+
+impl Model for Turning {
+    type State = Nothing;
+    type Input = Clock;
+    type Output = Swings;
+    type Parameters = Wave;
+    const KIND: Kind = Kind::Static;
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Clock<S>, p: &Wave<S>) -> Swings<S> {
+        let angle = p.omega * u.now;
+        Swings { y: p.amplitude * angle.sin(), z: p.amplitude * angle.cos() }
+    }
+}
+
+/// Where the noise of two outputs is estimated, minima compare by the geometric mean of the ratios of their variances.
+#[test]
+fn minima_of_two_outputs_compare_by_their_variances() {
+    let input: Vec<Clock> = (0..200).map(|k| Clock { now: 0.02 * f64::from(k) }).collect();
+    let time = Time::Uniform { start: 0.0, step: 0.02 };
+    let run = Simulator::new(&Turning).run(&TRUTH, &Nothing {}, time, &input).unwrap();
+    let record = run.with_noise(Swings { y: 0.1, z: 0.3 }, 7).experiment(&Turning).unwrap();
+    let start = Wave { omega: free(2.5).within(0.3, 20.0), amplitude: free(1.0) };
+    let alone = Fit::new(&Turning, &record).parameters(start).run().unwrap();
+    let many = Fit::new(&Turning, &record).parameters(start).starts(30).run().unwrap();
+    let starts = many.starts.as_ref().unwrap();
+    let declared = &starts.minima[starts.declared.unwrap()];
+    assert!(starts.declared > Some(0) && (many.parameters.omega - 7.0).abs() < 0.02, "{many}");
+    let (worse, better) = (alone.quality, many.quality);
+    let expected = (worse.y.rmse * worse.z.rmse) / (better.y.rmse * better.z.rmse);
+    // Noise levels settle to 1e-6.
+    assert_relative_eq!(declared.cost_ratio, expected, max_relative = 1e-5);
+}
+
 /// A single record runs in lanes, several with their searches on threads.
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {

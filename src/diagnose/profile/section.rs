@@ -98,3 +98,60 @@ impl Profile {
         Some((0..=POINTS).map(point).filter(|(_, rise)| *rise <= height).collect())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::optimize::Severity;
+    use crate::parameter::Transform;
+
+    /// Of a parabola, both curves are that parabola, from end to end and as far as the drawing is high; the interval's ends and the
+    /// levels stand beside it.
+    #[test]
+    fn a_parabola_is_drawn_as_one() {
+        let rise = |value: f64| ((value - 1.0) / 0.1).powi(2);
+        let point = |k: i32| ProfilePoint {
+            value: 1.0 + 0.05 * f64::from(k),
+            rise: rise(1.0 + 0.05 * f64::from(k)),
+            unknowns: vec![],
+        };
+        let profile = Profile {
+            name: "rs".to_owned(),
+            unit: "ohm".to_owned(),
+            value: 1.0,
+            probability: 0.95,
+            lower: End::At(0.804),
+            upper: End::Bound(1.196),
+            standard_error: Some(0.1),
+            transform: Transform::Identity,
+            points: (-5..=5).map(point).collect(),
+            threshold: 3.84,
+            inflation: 1.0,
+            severity: Severity::Usable,
+            remark: String::new(),
+        };
+        assert_eq!(profile.ends(), "0.80 … 1.196 (bound)");
+        let Some(Drawing::Curves(curves)) = profile.plot().drawing else { panic!() };
+        let lines: Vec<&Vec<(f64, f64)>> = curves
+            .layers
+            .iter()
+            .filter_map(|layer| match layer {
+                Layer::Line { points, .. } => Some(points),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(lines.len(), 2);
+        for line in lines {
+            assert!(
+                line.len() > 60 && line.iter().all(|(value, drawn)| (drawn - rise(*value)).abs() < 1e-9),
+                "{line:?}"
+            );
+            let (first, last) = (line[0].0, line[line.len() - 1].0);
+            // The drawing is 1.5 times 3.84 high, which is at 0.24 to either side; points of the curve are 0.00625 apart.
+            assert!((0.76..0.767).contains(&first) && (1.233..1.24).contains(&last), "{first} {last}");
+        }
+        let quadratic = Profile { standard_error: Some(0.2), ..profile };
+        let drawn = quadratic.quadratic(&[(0.8, 4.0), (1.2, 4.0)]).unwrap();
+        assert!(drawn.iter().all(|(value, drawn)| (drawn - rise(*value) / 4.0).abs() < 1e-9), "{drawn:?}");
+    }
+}

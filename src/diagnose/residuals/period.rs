@@ -197,4 +197,66 @@ mod tests {
             assert!((found - expected).norm() < 1e-12, "{f}: {found} {expected}");
         }
     }
+
+    /// White noise of deviation 1.
+    fn noise(samples: usize) -> impl Iterator<Item = f64> {
+        let mut random = crate::random::Random::stream(5, 0);
+        (0..samples).map(move |_| random.normal())
+    }
+
+    /// A line far above the low frequencies, in noise whose spectrum falls by a factor of a thousand before: it is held against
+    /// its own neighborhood, and its probability is that of F with 2 and twice 120 degrees of freedom (the tail is
+    /// `(1 + x / 120)^-120`), the largest of all lines tried.
+    #[test]
+    fn a_line_is_held_against_its_neighborhood() {
+        let (samples, line) = (4096, 1000);
+        let (mut low, mut raw) = (0.0, vec![]);
+        for (k, e) in noise(samples).enumerate() {
+            low = 0.98 * low + e;
+            raw.push(low + 0.11 * (TAU * (k * line) as f64 / samples as f64).sin());
+        }
+        let series = Series::new("residual", "y", "V", &raw);
+        let (_, _, test) = find(&series, 0.01);
+        let power = |f: usize| {
+            let term =
+                |k: usize| Complex::from_polar(series.values[k], -TAU * (f * k % samples) as f64 / samples as f64);
+            (0..samples).map(term).sum::<Complex<f64>>().norm_sqr()
+        };
+        let mut neighbors: Vec<f64> = (line - 60..=line + 60).map(power).collect();
+        neighbors.sort_unstable_by(f64::total_cmp);
+        let expected = power(line) / (neighbors[60] / std::f64::consts::LN_2);
+        // The line is a multiple of eight, where the median is taken anew.
+        assert!((test.statistic / expected - 1.0).abs() < 1e-9, "{} {expected}", test.statistic);
+        let single = (1.0 + expected / 120.0).powf(-120.0);
+        let p_value = 1.0 - (1.0 - single).powf((2048 - 4) as f64);
+        assert!((1e-9..0.5).contains(&p_value) && (test.p_value / p_value - 1.0).abs() < 1e-6, "{test:?} {p_value}");
+    }
+
+    /// A sine between two lines, in no noise to speak of: frequency, period, amplitude and share are its own. The bands stand at
+    /// the middles of their lines.
+    #[test]
+    fn a_sine_is_measured() {
+        let (samples, step, frequency) = (1024, 0.01, 12.3);
+        let sine = |k: usize| 0.5 * (TAU * frequency * k as f64 * step + 0.4).sin();
+        let raw: Vec<f64> = noise(samples).enumerate().map(|(k, e)| sine(k) + 1e-3 * e).collect();
+        let (spectrum, period, _) = find(&Series::new("residual", "y", "V", &raw), step);
+        let period = period.unwrap();
+        // Lines are 0.098 Hz apart; the top of the parabola is within a tenth of that. 12.3 Hz is 0.05 lines off one, which
+        // takes sinc(0.05)^2, less than a hundredth.
+        assert!((period.frequency - frequency).abs() < 0.01, "{period:?}");
+        assert!(
+            (period.seconds * frequency - 1.0).abs() < 1e-3 && (period.samples * 0.123 - 1.0).abs() < 1e-3,
+            "{period:?}"
+        );
+        assert!((period.amplitude / 0.5 - 1.0).abs() < 0.01 && (period.share - 1.0).abs() < 0.02, "{period:?}");
+        // 512 lines without the mean's are 127 bands of four and one of three.
+        assert_eq!(spectrum.frequency.len(), 128);
+        let line = |middle: f64| middle / (samples as f64 * step);
+        assert!(
+            (spectrum.frequency[0] - line(2.5)).abs() < 1e-12 && (spectrum.frequency[127] - line(510.0)).abs() < 1e-12
+        );
+        let strongest = (0..128).max_by(|&a, &b| spectrum.greatest[a].total_cmp(&spectrum.greatest[b])).unwrap();
+        assert!((spectrum.frequency[strongest] - frequency).abs() < 2.0 * line(1.0));
+        assert!(spectrum.greatest[strongest] > 3.0 * spectrum.density[strongest]);
+    }
 }

@@ -237,3 +237,64 @@ impl AccumulateScores for MovingSums<'_> {
         self.triangle.merge(&later.triangle);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scores(count: usize) -> Vec<Vec<f64>> {
+        (0..count).map(|k| vec![(1.3 * k as f64).sin(), (0.7 * k as f64).cos() + 0.1]).collect()
+    }
+
+    /// Pieces of no, one, two and more scores, gathered one after the other.
+    fn in_pieces<T: AccumulateScores>(make: impl Fn() -> T) -> T {
+        let (all, mut whole) = (scores(17), make());
+        for (from, to) in [(0, 1), (1, 1), (1, 3), (3, 9), (9, 10), (10, 17)] {
+            let mut piece = make();
+            all[from..to].iter().for_each(|score| piece.take(score));
+            whole.append(piece);
+        }
+        whole
+    }
+
+    /// `sum s[t] s[t - k]'` and the triangle of the scores.
+    #[test]
+    fn products_are_those_of_the_whole() {
+        let (all, mut found) = (scores(17), in_pieces(|| Lagged::new(2)));
+        found.triangle.absorb(&mut found.block);
+        assert_eq!(found.count, 17);
+        let product = |lag: usize, i: usize, j: usize| (lag..17).map(|t| all[t][i] * all[t - lag][j]).sum::<f64>();
+        for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            for lag in [1, 2] {
+                assert!((found.products[lag - 1][(i, j)] - product(lag, i, j)).abs() < 1e-12, "{lag}: {i} {j}");
+            }
+            let squares: f64 = (0..=i.min(j)).map(|k| found.triangle.at(k, i) * found.triangle.at(k, j)).sum();
+            assert!((squares - product(0, i, j)).abs() < 1e-12, "{i} {j}");
+        }
+    }
+
+    /// The squares of the moving sums are Newey and West's: `sum over lags of (1 - k / window) sum v[t] v[t - k]'`, of scores
+    /// `v[t] = z[t] - a z[t - 1]`, `z = s w`.
+    #[test]
+    fn moving_sums_are_weighted_lags() {
+        let w = DMatrix::from_row_slice(2, 2, &[2.0, 0.5, 0.0, 1.5]);
+        let a = DMatrix::from_row_slice(2, 2, &[0.6, 0.1, -0.2, 0.3]);
+        for window in [1, 2, 4] {
+            let found = in_pieces(|| MovingSums::new(&w, &a, window)).triangle();
+            let z: Vec<Vec<f64>> = scores(17).iter().map(|s| vec![2.0 * s[0], 0.5 * s[0] + 1.5 * s[1]]).collect();
+            let fresh = |t: usize, i: usize| {
+                let before = |j: usize| if t > 0 { z[t - 1][j] } else { 0.0 };
+                z[t][i] - a[(i, 0)] * before(0) - a[(i, 1)] * before(1)
+            };
+            for (i, j) in [(0, 0), (0, 1), (1, 1)] {
+                let sum = |t: usize, s: usize| {
+                    let weight = 1.0 - t.abs_diff(s) as f64 / window as f64;
+                    if weight > 0.0 { weight * fresh(t, i) * fresh(s, j) } else { 0.0 }
+                };
+                let expected: f64 = (0..17).flat_map(|t| (0..17).map(move |s| (t, s))).map(|(t, s)| sum(t, s)).sum();
+                let squares: f64 = (0..=i.min(j)).map(|k| found.at(k, i) * found.at(k, j)).sum();
+                assert!((squares - expected).abs() < 1e-11, "{window}: {i} {j}: {squares} {expected}");
+            }
+        }
+    }
+}

@@ -269,4 +269,36 @@ mod tests {
         assert_eq!(length(&[0.8]), 42);
         assert_eq!(length(&[]), 1);
     }
+
+    /// The order is the first of the least `n ln(v) + 2 k`, where `v` is the part of the variance that the best of `k`
+    /// coefficients leave, here by solving Yule and Walker's equations of each order.
+    #[test]
+    fn the_order_is_that_of_the_least_criterion() {
+        let mut orders = vec![];
+        for seed in 0..30 {
+            let mut random = crate::random::Random::stream(seed, 5);
+            let mut e = vec![0.0; 300];
+            for t in 3..e.len() {
+                e[t] = 0.1 * e[t - 1] + 0.12 * e[t - 3] + random.normal();
+            }
+            let mut sums = Autocorrelation::new(ORDER);
+            sums.add(&e);
+            let rho: Vec<f64> = sums.sums().iter().map(|sum| sum / sums.sums()[0]).collect();
+            let solved = |k: usize| {
+                let matrix = DMatrix::from_fn(k, k, |i, j| rho[i.abs_diff(j)]);
+                let right = nalgebra::DVector::from_column_slice(&rho[1..=k]);
+                let a = matrix.lu().solve(&right).unwrap();
+                (a.iter().copied().collect::<Vec<f64>>(), 1.0 - a.dot(&right))
+            };
+            let criterion = |k: usize| if k == 0 { 0.0 } else { 300.0 * solved(k).1.ln() + 2.0 * k as f64 };
+            let best = (0..=ORDER).min_by(|&a, &b| criterion(a).total_cmp(&criterion(b))).unwrap();
+            let found = Autoregression::of(&sums, 300);
+            let (expected, left) = if best == 0 { (vec![], 1.0) } else { solved(best) };
+            assert_eq!(found.coefficients.len(), best, "{seed}");
+            assert!(found.coefficients.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-10), "{seed}");
+            assert!((found.fresh - (sums.sums()[0] / 300.0 * left).sqrt()).abs() < 1e-10, "{seed}: {}", found.fresh);
+            orders.push(best);
+        }
+        assert!(orders.contains(&0) && orders.contains(&3), "{orders:?}");
+    }
 }

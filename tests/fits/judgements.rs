@@ -1,0 +1,196 @@
+#![cfg(feature = "std")]
+//! Where a verdict turns: errors, noise levels, sensors and records on either side of what is said of them.
+
+use crate::common::*;
+use greybox::optimize::Severity;
+use greybox::*;
+
+signals! { struct Factor { a: "1" } }
+signals! { struct Drive { u: "V", w: "V" } }
+
+/// `y = a u`, `z = a w`.
+#[derive(Clone)]
+struct Twice;
+
+impl Model for Twice {
+    type State = Nothing;
+    type Input = Drive;
+    type Output = Pair;
+    type Parameters = Factor;
+    const KIND: Kind = Kind::Static;
+
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Drive<S>, p: &Factor<S>) -> Pair<S> {
+        Pair { y: p.a * u.u, z: p.a * u.w }
+    }
+}
+
+/// Samples of inputs, and outputs of these gains with white errors of this size.
+fn record(samples: usize, gains: (f64, f64), size: f64, drive: impl Fn(usize) -> Drive) -> ExperimentOf<Twice> {
+    let mut noise = Noise(21);
+    let inputs: Vec<Drive> = (0..samples).map(drive).collect();
+    let outputs = inputs
+        .iter()
+        .map(|u| Pair { y: gains.0 * u.u + size * noise.gauss(), z: gains.1 * u.w + size * noise.gauss() });
+    let outputs = outputs.collect();
+    Experiment::new(&Twice, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap()
+}
+
+fn moving(k: usize) -> Drive {
+    Drive { u: (0.7 * k as f64).sin(), w: (1.9 * k as f64).cos() }
+}
+
+fn edited(record: &ExperimentOf<Twice>, edit: impl Fn(usize, Pair) -> Pair) -> ExperimentOf<Twice> {
+    with_outputs(&Twice, record, record.outputs().enumerate().map(|(k, y)| edit(k, y)).collect())
+}
+
+fn fit(records: &[ExperimentOf<Twice>]) -> Fit<'_, Twice> {
+    Fit::new(&Twice, records).parameters(Factor { a: free(1.0) })
+}
+
+fn said(estimate: &Estimate<Twice>, code: WarningCode) -> Option<&Warning> {
+    estimate.warnings.iter().find(|warning| warning.code == code)
+}
+
+fn severity(estimate: &Estimate<Twice>, code: WarningCode) -> Option<Severity> {
+    said(estimate, code).map(|warning| warning.severity)
+}
+
+/// Fifty errors about nothing: no larger than the given noise by three standard deviations of a standard deviation, which is
+/// `1 + 3 / sqrt(2 * 50) = 1.3`, they are that noise; above it they are what the model does not explain. No parameter is known.
+#[test]
+fn errors_as_large_as_their_noise_are_explained() {
+    let mut noise = Noise(8);
+    let inputs: Vec<f64> = (0..50).map(|k| (0.7 * k as f64).sin()).collect();
+    let errors: Vec<f64> = (0..50).map(|_| noise.gauss()).collect();
+    let along = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let gain = along(&inputs, &errors) / along(&inputs, &inputs);
+    let left: Vec<f64> = inputs.iter().zip(&errors).map(|(u, e)| e - gain * u).collect();
+    let rms = (along(&left, &left) / 50.0).sqrt();
+    // The rest is 1 rms; of the gain, 0.1 is left.
+    let outputs: Vec<Current> = inputs.iter().zip(&left).map(|(u, e)| Current { i: 0.1 * u + e / rms }).collect();
+    #[derive(Clone)]
+    struct Gain;
+    impl Model for Gain {
+        type State = Nothing;
+        type Input = Voltage;
+        type Output = Current;
+        type Parameters = Factor;
+        const KIND: Kind = Kind::Static;
+        fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Factor<S>) -> Current<S> {
+            Current { i: p.a * u.u }
+        }
+    }
+    let inputs = inputs.into_iter().map(|u| Voltage { u }).collect();
+    let record = Experiment::new(&Gain, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+    let found = |sigma: f64, code: WarningCode| {
+        let fit = Fit::new(&Gain, &record).parameters(Factor { a: free(1.0) }).noise(Current { i: sigma });
+        let estimate = fit.run().unwrap();
+        estimate.warnings.iter().find(|warning| warning.code == code).map(|warning| warning.severity)
+    };
+    assert_eq!(found(1.0 / 1.2, WarningCode::Unexplained), None);
+    assert_eq!(found(1.0 / 1.35, WarningCode::Unexplained), Some(Severity::NotUsable));
+    assert_eq!(found(1.0, WarningCode::HoldsZero), Some(Severity::NotUsable));
+    // Errors of twice and ten times the noise, and noise beyond all that the output moves.
+    assert_eq!(found(1.0, WarningCode::GivenNoise), None);
+    assert_eq!(found(1.0 / 1.6, WarningCode::GivenNoise), Some(Severity::Usable));
+    assert_eq!(found(1.0 / 3.0, WarningCode::GivenNoise), Some(Severity::UsableWithCare));
+    assert_eq!(found(1.0 / 20.0, WarningCode::GivenNoise), Some(Severity::NotUsable));
+    assert_eq!(found(3.0, WarningCode::GivenNoise), Some(Severity::UsableWithCare));
+    assert_eq!(found(200.0, WarningCode::GivenNoise), Some(Severity::NotUsable));
+}
+
+/// A constant input is said, with care where its effect may be taken for an offset; one that moves in a second record is none.
+#[test]
+fn constant_inputs_are_said() {
+    let with = |w: f64| record(40, (2.0, 2.0), 0.01, move |k| Drive { w, ..moving(k) });
+    let of = |records: &[ExperimentOf<Twice>]| severity(&fit(records).run().unwrap(), WarningCode::ConstantInput);
+    assert_eq!(of(&[with(1.5)]), Some(Severity::UsableWithCare));
+    assert_eq!(of(&[with(1.5), with(1.5).named("again")]), Some(Severity::UsableWithCare));
+    assert_eq!(of(&[with(1.5), with(2.5).named("other")]), None);
+    assert_eq!(of(&[record(40, (2.0, 2.0), 0.01, moving)]), None);
+}
+
+/// A value that stands for a missing measurement: said with the size of the errors there, of the record if there are several.
+#[test]
+fn sentinels_are_said_of_their_record() {
+    let good = record(400, (2.0, 2.0), 0.01, moving);
+    let bad = edited(&good, |k, y| Pair { y: if k % 80 == 7 { -999.0 } else { y.y }, ..y });
+    let sample = |k: usize| 80 * k + 7;
+    let alone = fit(std::slice::from_ref(&bad)).run().unwrap();
+    let warning = said(&alone, WarningCode::Sentinel).unwrap();
+    assert_eq!(warning.severity, Severity::NotUsable);
+    let squares = (0..5).map(|k| (999.0 + alone.parameters.a * moving(sample(k)).u).powi(2)).sum::<f64>();
+    let rms = (squares / 5.0).sqrt();
+    assert!(
+        warning.text.contains(&format!("differs there by {} V", (rms / 100.0).round() * 100.0)),
+        "{rms} {warning:?}"
+    );
+    assert!(!warning.text.contains("of experiment"), "{warning:?}");
+    let both = fit(&[good.named("good"), bad.named("bad")]).run().unwrap();
+    let warning = said(&both, WarningCode::Sentinel).unwrap();
+    assert!(warning.text.contains("`y` of experiment `bad`"), "{warning:?}");
+}
+
+/// Outputs with gains that differ by 30 %: the parameter of each alone is named, by its regression, and how far they are apart.
+#[test]
+fn outputs_that_contradict_each_other_are_named() {
+    let record = record(300, (2.0, 2.6), 0.05, moving);
+    let (mut y, mut z, mut uu, mut ww) = (0.0, 0.0, 0.0, 0.0);
+    for (u, out) in record.inputs().zip(record.outputs()) {
+        (y, z, uu, ww) = (y + u.u * out.y, z + u.w * out.z, uu + u.u * u.u, ww + u.w * u.w);
+    }
+    let estimate = fit(std::slice::from_ref(&record)).run().unwrap();
+    let warning = said(&estimate, WarningCode::OutputsContradict).unwrap();
+    assert_eq!(warning.severity, Severity::NotUsable);
+    let (one, two) = (y / uu, z / ww);
+    println!("{}", warning.text);
+    assert!(warning.text.starts_with(&format!("`a` is {one:.3} +- ")), "{one} {}", warning.text);
+    assert!(warning.text.contains("by `y` alone and") && warning.text.contains("by `z` alone ("), "{}", warning.text);
+    assert!(warning.text.contains(&format!("and {two:.3} +- ")), "{two} {}", warning.text);
+    let apart = 100.0 * (two - one) / estimate.parameters.a;
+    assert!(warning.text.contains(&format!("({apart:.0} % apart;")), "{apart} {}", warning.text);
+    let agreed = self::record(300, (2.0, 2.0), 0.05, moving);
+    assert!(said(&fit(&[agreed]).run().unwrap(), WarningCode::OutputsContradict).is_none());
+}
+
+/// As many unknowns as measurements leave nothing to judge them by.
+#[test]
+fn nothing_is_known_without_degrees_of_freedom() {
+    let exact = simulated(&Line, 1.0, vec![Voltage { u: 0.5 }], Nothing, Affine { slope: 1.5, offset: -0.7 });
+    let record = with_outputs(&Line, &exact, exact.outputs().map(|y| Pair { y: y.y + 0.1, ..y }).collect());
+    let parameters = Affine { slope: free(1.0), offset: free(0.5) };
+    if let Ok(estimate) = Fit::new(&Line, &record).parameters(parameters).noise(Pair { y: 0.1, z: 0.1 }).run() {
+        for unknown in &estimate.unknowns {
+            assert_eq!(unknown.knowledge, Knowledge::Unidentified, "{unknown:?}");
+        }
+    }
+}
+
+/// A gain that changes in the middle of the record is named with its value in each half.
+#[test]
+fn halves_that_contradict_each_other_are_named() {
+    let inputs: Vec<Voltage> = levels(800, 20, 3).into_iter().map(|u| Voltage { u }).collect();
+    let run = |gain: f64, start: f64, half: std::ops::Range<usize>| {
+        simulated(&Lag, 5e-3, inputs[half].to_vec(), Current { i: start }, Branch { gain, tau: 0.05 })
+    };
+    let first = run(2.0, 0.0, 0..401);
+    let border = first.outputs().last().unwrap().i;
+    let second = run(2.4, border, 400..800);
+    let mut noise = Noise(5);
+    let outputs = first.outputs().take(400).chain(second.outputs());
+    let outputs = outputs.map(|y| Current { i: y.i + 0.01 * noise.gauss() }).collect();
+    let record = Experiment::new(&Lag, Time::Uniform { start: 0.0, step: 5e-3 }, inputs.clone(), outputs).unwrap();
+    let parameters = Branch { gain: free(1.5), tau: free(0.08) };
+    let estimate = Fit::new(&Lag, &record).parameters(parameters).run().unwrap();
+    let warning = estimate.warnings.iter().find(|warning| warning.code == WarningCode::HalvesContradict);
+    let warning = warning.unwrap_or_else(|| panic!("{estimate}"));
+    let value = |by: &str| -> f64 {
+        let before = warning.text.split(by).next().unwrap();
+        let number = before.rsplit(" +- ").nth(1).unwrap().rsplit(' ').next().unwrap();
+        number.parse().unwrap()
+    };
+    // Of 400 samples with errors of 0.01 each: far below a hundredth; the other half's initial state is the model's.
+    assert!((value(" by the first half") - 2.0).abs() < 0.05, "{}", warning.text);
+    assert!((value(" by the second half") - 2.4).abs() < 0.05, "{}", warning.text);
+    assert_eq!(warning.severity, Severity::UsableWithCare, "{}", warning.text);
+}

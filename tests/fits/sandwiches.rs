@@ -1,0 +1,162 @@
+#![cfg(feature = "std")]
+//! Covariances that allow for weights, losses, correlated outputs and autocorrelated errors, of one unknown by hand.
+
+use crate::common::*;
+use greybox::*;
+
+signals! { struct Factor { a: "1" } }
+
+/// `y = a u`.
+#[derive(Clone)]
+struct Gain;
+
+impl Model for Gain {
+    type State = Nothing;
+    type Input = Voltage;
+    type Output = Current;
+    type Parameters = Factor;
+    const KIND: Kind = Kind::Static;
+
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Factor<S>) -> Current<S> {
+        Current { i: p.a * u.u }
+    }
+}
+
+fn record(inputs: &[f64], error: impl Fn(usize) -> f64) -> ExperimentOf<Gain> {
+    let outputs = inputs.iter().enumerate().map(|(k, u)| Current { i: 2.0 * u + error(k) }).collect();
+    let inputs = inputs.iter().map(|u| Voltage { u: *u }).collect();
+    Experiment::new(&Gain, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap()
+}
+
+fn fit(record: &ExperimentOf<Gain>) -> Fit<'_, Gain> {
+    Fit::new(&Gain, record).parameters(Factor { a: free(1.0) })
+}
+
+fn errors(estimate: &Estimate<Gain>, record: &ExperimentOf<Gain>) -> Vec<f64> {
+    record.outputs().zip(record.inputs()).map(|(y, u)| y.i - estimate.parameters.a * u.u).collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// `sum (w psi(z) u / (1 - h))^2 / (c sum w u^2)^2` in units of the noise, with the leverage `h` of the weights and the mean
+/// slope `c` of psi.
+#[test]
+fn a_sandwich_by_hand() {
+    let mut noise = Noise(3);
+    let inputs: Vec<f64> = (0..60).map(|_| 0.5 + noise.uniform()).collect();
+    let spikes: Vec<f64> = (0..60).map(|k| if k % 9 == 4 { 0.8 } else { 0.1 } * noise.gauss()).collect();
+    let record = record(&inputs, |k| spikes[k]);
+    let sigma = 0.1;
+    let weighted = fit(&record).noise(Current { i: sigma }).weighting(|s: &Sample<Gain>| s.u.u * s.u.u);
+    let robust = fit(&record).noise(Current { i: sigma }).loss(Huber(1.345));
+    let clipped = |z: f64| z.clamp(-1.345, 1.345);
+    let plain = |z: f64| z;
+    for (fit, weight, psi) in [
+        (weighted, (|u| u * u) as fn(f64) -> f64, &plain as &dyn Fn(f64) -> f64),
+        (robust, |_| 1.0, &clipped as &dyn Fn(f64) -> f64),
+    ] {
+        let estimate = fit.run().unwrap();
+        assert_eq!(estimate.method.covariance, CovarianceMethod::Sandwich);
+        let z: Vec<f64> = errors(&estimate, &record).iter().map(|e| e / sigma).collect();
+        let w: Vec<f64> = inputs.iter().map(|u| weight(*u)).collect();
+        let bread: f64 = inputs.iter().zip(&w).map(|(u, w)| w * u * u / (sigma * sigma)).sum();
+        let score = |k: usize| {
+            let slope = inputs[k] / sigma;
+            w[k] * psi(z[k]) * slope / (1.0 - w[k] * slope * slope / bread)
+        };
+        let meat: f64 = (0..60).map(|k| score(k).powi(2)).sum();
+        let inside = |k: &usize| psi(z[*k]) == z[*k];
+        let curvature = (0..60).filter(inside).map(|k| w[k]).sum::<f64>() / w.iter().sum::<f64>();
+        let expected = meat.sqrt() / (curvature * bread);
+        let found = estimate.unknowns[0].knowledge.standard_error().unwrap();
+        // The estimate is a minimum to 1e-8 of a standard error.
+        assert!((found / expected - 1.0).abs() < 1e-7, "{found} {expected}");
+    }
+}
+
+/// Errors that are autocorrelated and follow the input: prewhitened by an autoregression, with its bias corrected, summed with
+/// Bartlett's weights over 1.3 roots of the number of scores, and recolored (Andrews and Monahan 1992). The degrees of freedom
+/// follow from the errors of autoregression and sums.
+#[test]
+fn autocorrelated_scores_by_hand() {
+    const COUNT: usize = 3000;
+    let mut noise = Noise(11);
+    let inputs: Vec<f64> = (0..COUNT).map(|k| if k % 40 < 4 { 3.0 } else { 0.3 }).collect();
+    let mut before = 0.0;
+    let colored: Vec<f64> = (0..COUNT)
+        .map(|k| {
+            before = 0.9 * before + 0.1 * noise.gauss();
+            before * inputs[k]
+        })
+        .collect();
+    let record = record(&inputs, |k| colored[k]);
+    let estimate = fit(&record).run().unwrap();
+    let bread = dot(&inputs, &inputs);
+    let e = errors(&estimate, &record);
+    let scores: Vec<f64> = (0..COUNT).map(|k| inputs[k] * e[k] / (1.0 - inputs[k].powi(2) / bread)).collect();
+    let n = COUNT as f64;
+    let size = (dot(&scores, &scores) / n).sqrt();
+    let z: Vec<f64> = scores.iter().map(|s| s / size).collect();
+    let (one, two) = (dot(&z[1..], &z) / n, dot(&z[2..], &z) / n);
+    let a = one + (1.0 + 3.0 * one) / n;
+    let variance = 1.0 - 2.0 * a * one + a * a;
+    let left = (one - two * a - a + a * a * one) / variance;
+    let andrews = 1.1447 * (4.0 * left * left / (1.0 - left * left).powi(2) * n).cbrt();
+    let window = andrews.max(1.3 * n.sqrt()).ceil() as usize + 1;
+    assert_eq!(estimate.method.covariance, CovarianceMethod::Hac { lags: window as u64 - 1 });
+    let fresh: Vec<f64> = (0..COUNT).map(|t| z[t] - if t > 0 { a * z[t - 1] } else { 0.0 }).collect();
+    let part = window as f64 / n;
+    let lag = |k: usize| if k == 0 { 1.0 } else { 2.0 * (1.0 - k as f64 / window as f64) } * dot(&fresh[k..], &fresh);
+    let sums = (0..window).map(lag).sum::<f64>() / (1.0 - part + part * part / 3.0);
+    let expected = size * sums.sqrt() / (1.0 - a) / bread;
+    let found = estimate.unknowns[0].knowledge.standard_error().unwrap();
+    // Sums of 3,000 products, and an estimate that is a minimum to 1e-8.
+    assert!((found / expected - 1.0).abs() < 1e-7, "{found} {expected}");
+    let degrees = 2.0 / (4.0 * variance / ((1.0 - a).powi(2) * n) + 4.0 / 3.0 * part);
+    let found = estimate.unknowns[0].degrees_of_freedom;
+    assert!((found / degrees - 1.0).abs() < 1e-7, "{found} {degrees}");
+}
+
+/// Two outputs of which the errors are one: white over time, so that scores are summed sample by sample; the correlation is said.
+#[test]
+fn correlated_outputs_have_a_sandwich() {
+    let inputs: Vec<Voltage> = levels(200, 1, 5).into_iter().map(|u| Voltage { u }).collect();
+    let exact = simulated(&Line, 1.0, inputs, Nothing, Affine { slope: 1.5, offset: -0.7 });
+    let mut noise = Noise(4);
+    let disturbed = |y: Pair| {
+        let (one, two) = (noise.gauss(), noise.gauss());
+        Pair { y: y.y + 0.1 * one, z: y.z + 0.1 * (one + two) }
+    };
+    let record = with_outputs(&Line, &exact, exact.outputs().map(disturbed).collect());
+    let fit = Fit::new(&Line, &record).parameters(Affine { slope: free(1.0), offset: free(0.5) });
+    let estimate = fit.run().unwrap();
+    assert_eq!(estimate.method.covariance, CovarianceMethod::Sandwich);
+    let Affine { slope, offset } = estimate.parameters;
+    let pairs = record.inputs().zip(record.outputs());
+    let (y, z): (Vec<f64>, Vec<f64>) =
+        pairs.map(|(u, y)| (y.y - slope * u.u - offset, y.z - offset * u.u + slope)).unzip();
+    let correlation = dot(&y, &z) / (dot(&y, &y) * dot(&z, &z)).sqrt();
+    let said = estimate.warnings.iter().find(|warning| warning.code == WarningCode::CorrelatedOutputs).unwrap();
+    assert!(said.text.contains(&format!("({correlation:.2}, ")), "{correlation} {}", said.text);
+    // Scores of each sample by hand, against the reported covariance.
+    let (sy, sz) = (estimate.quality.y.sigma, estimate.quality.z.sigma);
+    let (mut bread, mut meat) = (nalgebra::Matrix2::<f64>::zeros(), nalgebra::Matrix2::<f64>::zeros());
+    let rows: Vec<[nalgebra::Vector2<f64>; 2]> = record
+        .inputs()
+        .map(|u| [nalgebra::Vector2::new(u.u, 1.0) / sy, nalgebra::Vector2::new(-1.0, u.u) / sz])
+        .collect();
+    rows.iter().flatten().for_each(|row| bread += row * row.transpose());
+    let inverse = bread.try_inverse().unwrap();
+    for (k, [one, two]) in rows.iter().enumerate() {
+        let less = |row: &nalgebra::Vector2<f64>| 1.0 - (row.transpose() * inverse * row)[(0, 0)];
+        let score = one * (y[k] / sy / less(one)) + two * (z[k] / sz / less(two));
+        meat += score * score.transpose();
+    }
+    let expected = inverse * meat * inverse;
+    for i in 0..2 {
+        let found = estimate.unknowns[i].knowledge.standard_error().unwrap();
+        assert!((found / expected[(i, i)].sqrt() - 1.0).abs() < 1e-6, "{i}: {found} {expected}");
+    }
+}
