@@ -150,7 +150,7 @@ fn kinds<'e>(comparison: &Comparison, ends: impl Iterator<Item = (usize, &'e End
             None => kinds.push(Kind { searches: vec![i], first: end, undetermined: in_null_directions(&end.linear) }),
         }
     }
-    // The first start's end stands for all: the declared one's, wherever it is one of them.
+    // The end reported for a minimum is that of its lowest numbered start, so that of the declared start where it ended there.
     kinds.iter_mut().for_each(|kind| kind.searches.sort_unstable());
     kinds
 }
