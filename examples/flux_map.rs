@@ -3,10 +3,13 @@
 //! `cargo run --release --example flux_map`
 
 use greybox::pmsm::{Currents, Drive, FluxMapped, MappedWinding};
-use greybox::{Extrapolation, Fit, Interpolation, Rk45, Simulator, Table, Time, fixed, free};
+use greybox::{
+    Fit, Rk45, Simulator, Table, Time, fixed, free,
+    scalar::{Extrapolation, Interpolation},
+};
 
 /// A flux linkage (Wb) at points of `id` and `iq` (A), as a test bench or a finite element program gives it.
-fn map(psi: impl Fn(f64, f64) -> f64) -> Result<Table, greybox::TableError> {
+fn map(psi: impl Fn(f64, f64) -> f64) -> Result<Table, greybox::scalar::TableError> {
     let axis: Vec<f64> = (-12..=12).map(|k| 5.0 * f64::from(k)).collect();
     let values: Vec<f64> = axis.iter().flat_map(|id| axis.iter().map(|iq| psi(*id, *iq))).collect();
     Table::surface(&axis, &axis, &values, Interpolation::Smooth, Extrapolation::Linear)

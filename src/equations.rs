@@ -67,19 +67,6 @@ pub enum InvalidEquations {
     },
 }
 
-/// What a node depends on.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Dependence {
-    /// Whether on time.
-    pub time: bool,
-    /// On which states.
-    pub states: Vec<usize>,
-    /// On which inputs.
-    pub inputs: Vec<usize>,
-    /// On which parameters.
-    pub parameters: Vec<usize>,
-}
-
 impl Equations {
     /// The equations `dx/dt`, or the next state, as `state`, and the outputs.
     ///
@@ -170,15 +157,20 @@ impl Equations {
             let noise = M::Output::into_array(model.noise(&p));
             diffusion.as_ref().iter().chain(noise.as_ref()).copied().collect()
         })?;
-        let (diffusion, noise) = levels.split_at(M::State::LEN);
+        Equations::traced(layout, &graph, [&state, &output, &levels])
+    }
+
+    /// The equations of roots that were read: states, outputs, and the noise of both.
+    fn traced(layout: Layout, graph: &Graph, [state, output, levels]: [&[Id]; 3]) -> Result<Self, Untraceable> {
+        let (diffusion, noise) = levels.split_at(layout.states.len());
         // What was not written is no noise.
         let said = |levels: &[Id], unsaid: fn(f64) -> bool| {
             let unsaid = |id: &Id| graph.known(*id).is_some_and(unsaid);
             if levels.iter().all(unsaid) { vec![] } else { levels.to_vec() }
         };
         let (diffusion, noise) = (said(diffusion, |level| level == 0.0), said(noise, f64::is_nan));
-        let roots: [&[Id]; 4] = [&state, &output, &diffusion, &noise];
-        Equations::with_noise(layout, &graph, roots).map_err(|wrong| Untraceable { reason: wrong.to_string() })
+        let roots: [&[Id]; 4] = [state, output, &diffusion, &noise];
+        Equations::with_noise(layout, graph, roots).map_err(|wrong| Untraceable { reason: wrong.to_string() })
     }
 
     /// The quantities.
@@ -205,25 +197,6 @@ impl Equations {
     pub fn is_affine(&self) -> bool {
         let degrees = degrees(&self.graph);
         self.state.iter().chain(&self.output).all(|root| degrees[root.index()] <= Degree::One)
-    }
-
-    /// What a state's equation or an output depends on.
-    pub fn dependence(&self, root: Id) -> Dependence {
-        let mut on = Dependence::default();
-        let reached = self.graph.reached(&[root]);
-        for (node, _) in self.graph.nodes().iter().zip(reached).filter(|(_, reached)| *reached) {
-            match *node {
-                Node::Leaf(Leaf::Time) => on.time = true,
-                Node::Leaf(Leaf::State(i)) => on.states.push(i as usize),
-                Node::Leaf(Leaf::Input(i)) => on.inputs.push(i as usize),
-                Node::Leaf(Leaf::Parameter(i)) => on.parameters.push(i as usize),
-                _ => {}
-            }
-        }
-        for list in [&mut on.states, &mut on.inputs, &mut on.parameters] {
-            list.sort_unstable();
-        }
-        on
     }
 
     /// The values of roots; without time, states and inputs for what depends on parameters alone.

@@ -13,13 +13,13 @@ mod typed;
 mod warning;
 
 pub(crate) use display::held;
-pub use format::{Format, Version};
+pub(crate) use format::{Format, Version};
 pub use method::{CovarianceMethod, Method, NoiseModel};
 pub use prediction::Prediction;
 pub use quantities::{Direction, ExperimentEstimate, Knowledge, OutputEstimate, OutputFit, ParameterEstimate, Unknown};
 pub(crate) use starts::times_the_cost;
 pub use starts::{FailedStart, Minimum, Starts};
-pub use typed::Estimate;
+pub use typed::{Estimate, Values};
 pub use warning::{Warning, WarningCode};
 
 use crate::information::{Covariance, SquareMatrix};

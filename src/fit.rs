@@ -8,7 +8,7 @@ mod run;
 mod search;
 mod starts;
 
-pub use fleet::{Answers, Fleet};
+pub use fleet::Fleet;
 
 use crate::engine::only_duals;
 use crate::equations::Equations;
@@ -16,13 +16,14 @@ use crate::error::Error;
 use crate::estimate::Estimate;
 use crate::experiment::{ExperimentOf, Sample};
 use crate::functions::Handle;
-use crate::integrate::{Automatic, Integrator, Method, Rk4, Stiff};
+use crate::graph::Untraceable;
+use crate::integrate::{Automatic, Integrator, Method, Rk4, Stiff, automatic, stiff};
 use crate::layout::{Kind, Layout};
 use crate::loss::Loss;
 use crate::model::Model;
 use crate::optimize::LeastSquaresState;
 use crate::parameter::Parameter;
-use crate::predict::{FreeRun, Prediction, Predictor};
+use crate::predict::{Prediction, Predictor, simulation};
 use crate::prefilter::Butterworth;
 use crate::problem::{FinerSweeps, MakeSweep, Problem, Search, Settings, Weights};
 use crate::record::Record;
@@ -50,9 +51,9 @@ impl<'a, M: Model> Records<'a, M> {
             model: self.model,
             experiments: self.experiments,
             parameters,
-            stepping: Stepping::new(Automatic::default()),
+            stepping: Stepping::automatic(1),
             is_default: true,
-            predictor: Arc::new(FreeRun),
+            predictor: simulation(),
             settings: Settings::default(),
         }
     }
@@ -67,6 +68,11 @@ pub(crate) struct Stepping<M: Model> {
 impl<M: Model> Stepping<M> {
     pub fn new(integrator: impl Integrator) -> Self {
         Stepping { loops: Arc::new(integrator.clone()), method: Arc::new(integrator) }
+    }
+
+    /// The default, with this number of steps per sample.
+    fn automatic(substeps: u32) -> Self {
+        Stepping { loops: Arc::new(Automatic { continuous: Rk4 { substeps } }), method: automatic(substeps) }
     }
 }
 
@@ -120,7 +126,7 @@ impl<'a, M: Model> Fit<'a, M> {
     /// Without it, a fit of a continuous model begins with [`Rk4`], one step per sample. While a finer step would move an
     /// unknown by more than a tenth of its standard error, where the start cannot be simulated, or where a search that did not
     /// converge had a cost that a finer step changes, it takes 4, 16 and 64 steps per sample, then [`Esdirk`](crate::Esdirk); the estimate
-    /// names the method ([`Method::integrator`](crate::Method)), and is not usable if none is fine enough. `Esdirk` is left
+    /// names the method ([`Method::integrator`](crate::estimate::Method)), and is not usable if none is fine enough. `Esdirk` is left
     /// where it needs 3,000 steps for a sample, or 1,000 for each: such a model is not stiff, but fast, or explodes. A search
     /// by one of these methods has at most 100 trial steps.
     pub fn integrator(self, integrator: impl Integrator) -> Self {
@@ -248,9 +254,9 @@ impl<'a, M: Model> Fit<'a, M> {
         let begin = std::time::Instant::now();
         let sweep = sweep(Handle::Borrowed(self.model), &self.stepping, &self.predictor)?;
         let (records, parameters) = (records::<M>(self.experiments), declared::<M>(self.parameters));
-        let problem = Problem::new(sweep, records, &parameters, self.settings)?;
         let finer = finer(Handle::Borrowed(self.model), self.is_default, &self.predictor);
-        Estimate::of(problem.refining(finer).run_since(begin)?)
+        let problem = Problem::new(sweep, records, &parameters, self.settings)?.refining(finer);
+        Estimate::of(problem.run_since(begin)?)
     }
 }
 
@@ -286,25 +292,34 @@ pub(crate) fn sweep<'a, M: Model + 'a>(
     predictor: &Arc<dyn Prediction>,
 ) -> Result<Arc<dyn Sweep + 'a>, Error> {
     let Stepping { loops, method } = stepping.clone();
-    method.check(M::KIND)?;
     let layout = Arc::new(Layout::of::<M>());
+    method.check(layout.kind)?;
     predictor.check(&layout)?;
-    let traced = match only_duals() {
-        true => Err("dual numbers are asked for".to_owned()),
-        false => Equations::trace(&*model).map_err(|untraceable| untraceable.reason),
-    };
-    let plain = |reason: String| {
+    let traced = if only_duals() { None } else { Some(Equations::trace(&*model)) };
+    let plain = |reason: String| -> Arc<dyn Sweep + 'a> {
         let (layout, model, loops) = (layout.clone(), model.clone(), loops.clone());
         Arc::new(DualSweep { layout, model, loops, method: method.clone(), predictor: predictor.clone(), reason })
     };
-    let equations = match traced {
-        Ok(equations) => Arc::new(equations),
-        Err(reason) => return Ok(plain(reason)),
+    Ok(compiled(traced, &method, predictor, &plain))
+}
+
+/// A compiled program of the traced equations, if there can be one, else what `plain` makes of the reason.
+fn compiled<'a>(
+    traced: Option<Result<Equations, Untraceable>>,
+    method: &Arc<dyn Method>,
+    predictor: &Arc<dyn Prediction>,
+    plain: &dyn Fn(String) -> Arc<dyn Sweep + 'a>,
+) -> Arc<dyn Sweep + 'a> {
+    let program = match traced {
+        None => return plain("dual numbers are asked for".to_owned()),
+        Some(traced) => traced.and_then(|equations| {
+            ProgramSweep::new(Arc::new(equations), method.clone(), predictor.clone(), plain(String::new()))
+        }),
     };
-    Ok(match ProgramSweep::new(equations, method.clone(), predictor.clone(), plain(String::new())) {
+    match program {
         Ok(sweep) => Arc::new(sweep),
         Err(untraceable) => plain(untraceable.reason),
-    })
+    }
 }
 
 /// The sweeps by the methods that follow a default one that is too coarse.
@@ -320,9 +335,8 @@ fn finer<'a, M: Model + 'a>(
         let (model, predictor) = (model.clone(), predictor.clone());
         Arc::new(move || sweep(model.clone(), &stepping, &predictor))
     };
-    let steps = [4, 16, 64].map(|substeps| by(Stepping::new(Automatic { continuous: Rk4 { substeps } })));
-    let stiff = Stiff::default();
-    let stiff = by(Stepping { loops: Arc::new(Narrow(stiff)), method: Arc::new(stiff) });
+    let steps = [4, 16, 64].map(|substeps| by(Stepping::automatic(substeps)));
+    let stiff = by(Stepping { loops: Arc::new(Narrow(Stiff::default())), method: stiff() });
     FinerSweeps::new(steps.into_iter().chain([stiff]).collect())
 }
 

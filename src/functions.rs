@@ -7,7 +7,7 @@ use crate::signals::Signals;
 use core::ops::Deref;
 use std::sync::Arc;
 
-/// A model's equations in numbers of type `S`, each vector in the order of the model's [`Layout`](crate::Layout).
+/// A model's equations in numbers of type `S`, each vector in the order of the model's [`Layout`](crate::layout::Layout).
 pub trait Functions<S>: Send + Sync {
     /// `dx/dt` of a continuous model, the next state of a discrete one; not called for a static one.
     fn state(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]);

@@ -5,15 +5,22 @@ use crate::scalar::{Grid, Scalar};
 use core::iter::Sum;
 use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
-/// Whether this machine has AVX-512 and FMA.
-pub(crate) fn has_wide() -> bool {
-    #[cfg(target_arch = "x86_64")]
-    return std::arch::is_x86_feature_detected!("avx512f")
-        && std::arch::is_x86_feature_detected!("avx512vl")
-        && std::arch::is_x86_feature_detected!("avx512dq")
-        && std::arch::is_x86_feature_detected!("fma");
-    #[cfg(not(target_arch = "x86_64"))]
-    return false;
+/// AVX-512 and FMA, which this machine has: [`detected`](Wide::detected) alone makes one.
+#[derive(Clone, Copy)]
+pub(crate) struct Wide(());
+
+impl Wide {
+    /// `None` if the machine lacks them.
+    pub fn detected() -> Option<Self> {
+        #[cfg(target_arch = "x86_64")]
+        let found = std::arch::is_x86_feature_detected!("avx512f")
+            && std::arch::is_x86_feature_detected!("avx512vl")
+            && std::arch::is_x86_feature_detected!("avx512dq")
+            && std::arch::is_x86_feature_detected!("fma");
+        #[cfg(not(target_arch = "x86_64"))]
+        let found = false;
+        found.then_some(Wide(()))
+    }
 }
 
 /// An `f64` in the loops that have found FMA on the machine at hand; nothing else makes one. Values are those of `f64`.

@@ -56,21 +56,16 @@ impl Layout {
             parameters: quantities::<P>(),
         }
     }
-
-    /// Whether it is that of a model with these signals.
-    pub(crate) fn is<X: Signals, U: Signals, Y: Signals, P: Signals>(&self, kind: Kind) -> bool {
-        fn are<S: Signals>(quantities: &[Quantity]) -> bool {
-            let named = S::NAMES.iter().zip(S::UNITS).map(|(name, unit)| (*name, *unit));
-            named.eq(quantities.iter().map(|Quantity { name, unit }| (name.as_str(), unit.as_str())))
-        }
-        let of_states = self.kind == kind && are::<X>(&self.states);
-        of_states && are::<U>(&self.inputs) && are::<Y>(&self.outputs) && are::<P>(&self.parameters)
-    }
 }
 
 /// The quantities of a vector of signals.
 #[cfg(feature = "std")]
 pub(crate) fn quantities<X: Signals>() -> Vec<Quantity> {
-    let named = X::NAMES.iter().zip(X::UNITS);
-    named.map(|(name, unit)| Quantity { name: (*name).to_owned(), unit: (*unit).to_owned() }).collect()
+    named(X::NAMES, X::UNITS)
+}
+
+#[cfg(feature = "std")]
+fn named(names: &[&str], units: &[&str]) -> Vec<Quantity> {
+    let quantity = |(name, unit): (&&str, &&str)| Quantity { name: (*name).to_owned(), unit: (*unit).to_owned() };
+    names.iter().zip(units).map(quantity).collect()
 }

@@ -74,17 +74,17 @@
 //!
 //! | to | see |
 //! |---|---|
-//! | write a model | [`Model`], [`signals!`], [`Scalar`]; [`Numeric`] for functions over `f64`; [`models`] and [`pmsm`] for those that ship |
+//! | write a model | [`Model`], [`signals!`], [`Scalar`], [`Table`]; [`Numeric`] for functions over `f64`; [`models`] and [`pmsm`] for those that ship |
 //! | read a record | [`Experiment`], [`CsvFile`], [`Time`], [`Hold`], [`units`] |
 //! | simulate | [`simulate()`], [`Simulator`] |
 //! | declare parameters | [`free`], [`fixed`], [`Parameter`], [`Prior`] |
 //! | fit one record or several together | [`Fit`] |
 //! | fit many records, each by itself | [`Fleet`] |
 //! | choose an integrator | [`Automatic`], [`Rk4`], [`Rk45`], [`Esdirk`], [`Discrete`] |
-//! | choose what is predicted | [`FreeRun`], [`Horizon`], [`Kalman`] |
-//! | weigh or filter errors, limit outliers | [`Weighting`], [`Loss`], [`Butterworth`] |
+//! | choose what is predicted | [`FreeRun`], [`Horizon`], [`Kalman`], [`predict`] |
+//! | weigh or filter errors, limit outliers | [`weighting`], [`loss`], [`Butterworth`] |
 //! | choose a search | [`optimize`]; argmin's solvers by [`Problem::objective`] |
-//! | read the result | [`Estimate`], [`Knowledge`], [`Warning`], [`WarningCode`], [`Summary`] |
+//! | read the result | [`Estimate`], [`Knowledge`], [`Warning`], [`WarningCode`], [`Summary`], [`estimate`] |
 //! | judge it | [`diagnose`], [`Report`] |
 //! | test a model | [`check`] |
 //! | estimate online | [`online`] |
@@ -102,14 +102,14 @@ mod dual;
 pub mod integrate;
 mod interval;
 mod lanes;
-mod layout;
+pub mod layout;
 mod model;
 pub mod models;
 pub mod online;
 mod parameter;
 pub mod pmsm;
 mod real;
-mod scalar;
+pub mod scalar;
 mod signals;
 pub mod units;
 
@@ -129,7 +129,7 @@ pub mod equations;
 #[cfg(feature = "std")]
 mod error;
 #[cfg(feature = "std")]
-mod estimate;
+pub mod estimate;
 #[cfg(feature = "std")]
 mod experiment;
 #[cfg(feature = "std")]
@@ -153,13 +153,13 @@ pub mod loss;
 #[cfg(feature = "std")]
 mod numeral;
 #[cfg(feature = "std")]
-pub mod numeric;
+mod numeric;
 #[cfg(feature = "std")]
 pub mod optimize;
 #[cfg(feature = "std")]
 mod outliers;
 #[cfg(feature = "std")]
-mod predict;
+pub mod predict;
 #[cfg(feature = "std")]
 pub mod prefilter;
 #[cfg(feature = "std")]
@@ -183,7 +183,7 @@ mod simulate;
 #[cfg(feature = "std")]
 pub mod sweep;
 #[cfg(feature = "std")]
-mod weighting;
+pub mod weighting;
 #[cfg(feature = "std")]
 mod whiteness;
 #[cfg(feature = "std")]
@@ -198,7 +198,7 @@ pub use interval::{Hold, Interval};
 pub use layout::Kind;
 pub use model::Model;
 pub use parameter::{Parameter, Prior, Transform, fixed, free};
-pub use scalar::{Comparison, Extrapolation, Grid, Interpolation, Scalar, TableError};
+pub use scalar::Scalar;
 pub use signals::{Entry, Nothing, Of, Signals};
 
 #[cfg(feature = "csv")]
@@ -206,25 +206,20 @@ pub use record::CsvFile;
 #[cfg(feature = "std")]
 pub use {
     error::{Error, Failure},
-    estimate::{
-        CovarianceMethod, Direction, Estimate, FailedStart, Knowledge, Method, Minimum, NoiseModel, OutputFit,
-        Prediction, Starts, Summary, Unknown, Warning, WarningCode,
-    },
+    estimate::{Estimate, Knowledge, Summary, Warning, WarningCode},
     experiment::{Experiment, ExperimentOf, Sample},
-    fit::{Answers, Fit, Fleet, Records},
-    layout::{Layout, Quantity},
-    loss::{Cauchy, Huber, Loss, SoftL1, Squared, Tukey},
+    fit::{Fit, Fleet, Records},
+    loss::{Huber, Loss},
     numeric::Numeric,
     outliers::hampel,
-    predict::{FreeRun, Horizon, Kalman, Plant, Predictor},
-    prefilter::{Butterworth, zero_phase},
-    problem::{Objective, Problem, Search},
-    record::{ChannelInspection, Gap, Initial, Inspection, Suspicion, Time},
-    regress::{LinearEstimate, Regression},
+    predict::{FreeRun, Horizon, Kalman},
+    prefilter::Butterworth,
+    problem::{Problem, Search},
+    record::{Initial, Time},
     report::Report,
     scalar::Table,
     simulate::{Simulation, Simulator, simulate},
-    weighting::{BySignal, WeightFunction, Weighting},
+    weighting::Weighting,
 };
 
 /// The README's code, compiled and run.

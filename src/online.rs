@@ -18,7 +18,7 @@ mod ud_factors;
 pub use ekf::{Ekf, EkfStart};
 pub use mras::{AdaptationLaw, Gradient, Moment, Mras, MrasStart, Order, Rate, Stepping};
 pub use rls::{Forgetting, Rls};
-pub use ud_factors::{MeasurementGain, UdFactors};
+use ud_factors::UdFactors;
 
 use crate::parameter::{Parameter, Transform};
 use crate::scalar::Scalar;

@@ -29,7 +29,6 @@
 //! | [`control`], [`inverter`], [`sensors`] | the parts of a drive | frames |
 //! | [`robot`] | the axes of the reference robot | temperature |
 //! | [`Plant`] | a motor and its load as they really are | inverter, robot |
-//! | [`SwitchingInverter`] | an inverter that switches, with the plant behind it | plant |
 //! | `program`, `drive` | motion programs; the whole drive in simulation, and its log (with `std`) | all of these |
 //! | `adaptive` | a drive that uses its observer (with `std`) | control, `Machine` |
 //! | `offline` | least squares on a record (with `std`) | drive |
@@ -79,26 +78,27 @@ mod switching;
 
 pub use adaptation::{
     Adaptation, AdaptationInput, DeadZone, DirectCurrent, KeConstantGain, KeLyapunov, MotorLaw, Normalized, NotAdapted,
-    RsDirect, RsLyapunov, lyapunov_margin, lyapunov_rate,
+    RsDirect, RsLyapunov,
 };
-pub use cabled::{CableResistance, Cabled};
-pub use compensated::{Compensated, CompensatedDrive, CompensatedSalientWinding, CompensatedWinding, DeadTimeSize};
-pub use emf_harmonic::{EmfHarmonic, SixthHarmonic};
+pub use cabled::Cabled;
+pub use compensated::{Compensated, CompensatedDrive, CompensatedSalientWinding, CompensatedWinding};
+pub use emf_harmonic::EmfHarmonic;
 pub use exact::{ExactSalient, ExactStep, ExactSurface, HeldIn};
 pub use flux_linkage::{FluxLinkage, FluxWinding};
 #[cfg(feature = "std")]
 pub use flux_mapped::{FluxMapped, MappedWinding};
 pub use injection::{Injection, InjectionStep};
-pub use inverter_fed::{AngledDrive, DeadTimeLoss, InverterFed, InverterFedWinding, dead_time};
+pub use inverter_fed::{AngledDrive, InverterFed, InverterFedWinding, dead_time};
 pub use machine::{Machine, MachineParameters, MachineState, VoltageAndLoad};
-pub use misaligned::{Misaligned, Misalignment};
+pub use misaligned::Misaligned;
 pub use motor_model::MotorModel;
 pub use plant::Plant;
 pub use salient::{Salient, SalientWinding};
 pub use saturated::{Saturated, SaturatedWinding};
-pub use shaft::{COULOMB_WIDTH, Load, Mechanics, Shaft, ShaftMotion, Torque};
+use shaft::COULOMB_WIDTH;
+pub use shaft::{Load, Mechanics, Shaft, ShaftMotion, Torque};
 pub use surface::Surface;
-pub use switching::SwitchingInverter;
+use switching::SwitchingInverter;
 
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};

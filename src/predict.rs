@@ -22,6 +22,7 @@ use crate::integrate::{Duals, Stuck};
 use crate::layout::Layout;
 use crate::scalar::Scalar;
 use core::fmt::Debug;
+use std::sync::Arc;
 
 /// Predicts the outputs sample by sample. The numbers that it passes from one sample to the next, the carry, begin with
 /// the state; a filter adds the state's covariance.
@@ -167,4 +168,10 @@ impl<P: Predictor> Prediction for P {
     fn symbols(&self) -> &dyn Steps<Symbol> {
         self
     }
+}
+
+/// The default. It is not generic, nor inlined, so that it is compiled with the library and not with each model.
+#[inline(never)]
+pub(crate) fn simulation() -> Arc<dyn Prediction> {
+    Arc::new(FreeRun)
 }

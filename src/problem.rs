@@ -44,7 +44,7 @@ pub(crate) use whitening::{Noise, Whitening};
 
 use crate::error::Error;
 use crate::layout::Layout;
-use crate::loss::expectations;
+use crate::loss::expected_slope;
 use crate::parameter::Parameter;
 use crate::record::Record;
 use crate::sweep::{Prepared, Sweep};
@@ -105,7 +105,7 @@ impl<'a> Problem<'a> {
         let prepared = Problem::prepared(&*sweep, &records, parameters)?;
         let settings = settings.of(&*sweep);
         let kappa = match &settings.loss {
-            Some(loss) if sweep.predicts_variance() => expectations(&**loss).slope,
+            Some(loss) if sweep.predicts_variance() => expected_slope(&**loss),
             _ => 1.0,
         };
         let cuts = Cuts::new(&*sweep, &records, settings.prefilter.is_some());

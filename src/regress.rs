@@ -24,7 +24,7 @@ const ALONE: f64 = 1e-6;
 /// Rows `(phi, y)` of a model that is linear in the parameters `P`.
 ///
 /// ```
-/// use greybox::{Regression, signals};
+/// use greybox::{signals, regress::Regression};
 /// signals! {
 ///     /// A coil: `u = r i + l di/dt`.
 ///     pub struct Coil { r: "ohm", l: "H" }

@@ -54,11 +54,7 @@ mod sections;
 mod text;
 mod words;
 
-pub use crate::section::{
-    Axis, Cell, Curves, Drawing, Forest, Heat, Interval, Layer, Line, Panel, PanelKind, Plot, Reason, Section, Stretch,
-    Style, Table, Timeline, Trace,
-};
-pub use format::{Format, Version};
+pub use crate::section::{Axis, Cell, Curves, Drawing, Layer, Plot, Reason, Section, Style, Table};
 pub use origin::Origin;
 
 use crate::error::Error;
@@ -66,6 +62,7 @@ use crate::estimate::Summary;
 use crate::optimize::Severity;
 use core::fmt;
 use facts::Facts;
+use format::{Format, Version};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

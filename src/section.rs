@@ -6,10 +6,10 @@ mod table;
 mod timeline;
 
 pub(crate) use plain::{WIDTH, visible, wrapped};
-pub use plot::{Axis, Curves, Drawing, Forest, Heat, Interval, Layer, Plot, Style};
+pub use plot::{Axis, Curves, Drawing, Layer, Plot, Style};
+pub(crate) use plot::{Forest, Heat, Interval};
 pub use table::{Cell, Table};
-pub(crate) use timeline::{Keep, Samples};
-pub use timeline::{Line, Panel, PanelKind, Stretch, Timeline, Trace};
+pub(crate) use timeline::{Keep, Line, Panel, PanelKind, Samples, Stretch, Timeline, Trace};
 
 use crate::optimize::Severity;
 use serde::{Deserialize, Serialize};

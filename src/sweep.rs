@@ -155,18 +155,7 @@ pub trait Sweep: Send + Sync {
     /// # Errors
     /// The sample that could not be reached.
     fn follow(&self, piece: &Piece<'_>, at: &[usize]) -> Result<Vec<Vec<f64>>, RunError> {
-        let mut from = Piece { slopes: vec![], ..piece.clone() };
-        let mut found = Vec::with_capacity(at.len());
-        for &sample in at {
-            from.samples.end = sample;
-            if !from.samples.is_empty() {
-                let reached = self.run(std::slice::from_ref(&from), &[], &mut |_| true);
-                from.carry = reached.into_iter().next().ok_or(RunError::Stopped)??.carry;
-            }
-            from.samples.start = sample;
-            found.push(from.carry.clone());
-        }
-        Ok(found)
+        follow(&mut |from| self.run(std::slice::from_ref(from), &[], &mut |_| true), piece, at)
     }
 
     /// The state that follows from the outputs of a sample, whatever the parameters.
@@ -224,4 +213,23 @@ pub trait Sweep: Send + Sync {
 
     /// Text that identifies the equations; part of a checkpoint's fingerprint.
     fn identity(&self) -> String;
+}
+
+/// The carry at some samples, by runs from one to the next. Not a part of the trait, so that it is compiled once.
+fn follow(
+    run: &mut dyn FnMut(&Piece<'_>) -> Vec<Result<Reached, RunError>>,
+    piece: &Piece<'_>,
+    at: &[usize],
+) -> Result<Vec<Vec<f64>>, RunError> {
+    let mut from = Piece { slopes: vec![], ..piece.clone() };
+    let mut found = Vec::with_capacity(at.len());
+    for &sample in at {
+        from.samples.end = sample;
+        if !from.samples.is_empty() {
+            from.carry = run(&from).into_iter().next().ok_or(RunError::Stopped)??.carry;
+        }
+        from.samples.start = sample;
+        found.push(from.carry.clone());
+    }
+    Ok(found)
 }

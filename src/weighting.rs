@@ -39,7 +39,7 @@ impl<M: Model, F: Fn(&Sample<M>) -> f64 + Send + Sync> Weighting<M> for F {
 /// A weight by one input, such as the speed (M. Tenerz, LiTH-ISY-EX--11/4495--SE, 2011, eq. 5.9).
 ///
 /// ```
-/// use greybox::{BySignal, WeightFunction};
+/// use greybox::weighting::{BySignal, WeightFunction};
 /// let weighting = BySignal::new("w", WeightFunction::Square { scale: 100.0 }); // (w / 100)^2
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -29,7 +29,7 @@ pub fn acceleration() -> Result<Report> {
         let title = format!("Axis {number}: full and low acceleration");
         report.table(title, &columns, rows.into_iter().step_by(3).collect());
         for (quantity, which, truth) in [("R / motor's R", 0, 1.0), ("error of L (%)", 1, 0.0)] {
-            let of = |found: &[(f64, greybox::LinearEstimate<Winding>)]| {
+            let of = |found: &[(f64, greybox::regress::LinearEstimate<Winding>)]| {
                 found.iter().map(|(w, e)| (*w, errors(&e.parameters)[which])).collect()
             };
             panels.push(Panel {

@@ -5,7 +5,7 @@ use crate::methods::*;
 use crate::report::Report;
 use crate::speeds::by_speed;
 use greybox::pmsm::drive::Simulation;
-use greybox::pmsm::offline::{Form, Validation, voltages};
+use greybox::pmsm::offline::{Form, Validation};
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::{KeLyapunov, Winding};
@@ -122,7 +122,7 @@ fn observed(title: &str, trace: Vec<(f64, f64)>) -> Panel {
 fn validation(report: &mut Report, run: &Run) {
     let axis = &run.axis;
     let nominal = Winding { rs: axis.rs + axis.r_cable, ls: axis.ls, ke: axis.ke };
-    let pairs = voltages(&run.spans, &nominal, Form::Sinc);
+    let pairs = run.spans.voltages(&nominal, Form::Sinc);
     let relative = |slow: bool| {
         let chosen = pairs.iter().filter(|(u, _)| (u[1].abs() < 10.0) == slow && u[1].abs() > 1.0);
         let (error, size) =

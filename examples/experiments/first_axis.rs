@@ -4,8 +4,8 @@ use crate::figure::{Figure, Panel, Series, curve, level, thin};
 use crate::methods::*;
 use crate::report::Report;
 use crate::speeds::{Found, by_speed};
-use greybox::LinearEstimate;
 use greybox::pmsm::{DeadZone, KeConstantGain, KeLyapunov, Winding};
+use greybox::regress::LinearEstimate;
 
 pub fn first_axis(report: &mut Report, run: &Run, q: &Found, both: &Found) -> Result<()> {
     let axis = &run.axis;

@@ -2,11 +2,11 @@
 
 use greybox::online::{AdaptationLaw, Mras, MrasStart, Order, Stepping, Watch};
 use greybox::pmsm::drive::Simulation;
-use greybox::pmsm::offline::{Axes, Equations, Extended, Form, Spans, extended, plain, search_i0};
+use greybox::pmsm::offline::{Axes, Equations, Extended, Form, Spans, search_i0};
 use greybox::pmsm::program::{Cycle, Program};
 use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::{Currents, Drive, ExactStep, ExactSurface, HeldIn, MotorLaw, NotAdapted, Surface, Winding};
-use greybox::{Butterworth, Experiment, Fit, LinearEstimate, Time, fixed, free};
+use greybox::{Butterworth, Experiment, Fit, Time, fixed, free, regress::LinearEstimate};
 
 pub type Result<T> = core::result::Result<T, Box<dyn std::error::Error>>;
 
@@ -33,7 +33,7 @@ pub fn low_pass(ts: f64) -> Result<Butterworth> {
 
 /// The thesis' least squares (5.2.1): both voltage equations, pre-filtered.
 pub fn equations(spans: &Spans) -> Result<Equations<Winding>> {
-    Ok(plain(spans, Axes::Both, Form::Rotor).prefiltered(&low_pass(spans.ts)?))
+    Ok(spans.plain(Axes::Both, Form::Rotor).prefiltered(&low_pass(spans.ts)?))
 }
 
 /// Least squares on each cycle.
@@ -41,7 +41,7 @@ pub fn per_cycle(run: &Run, axes: Axes) -> Result<Vec<(f64, LinearEstimate<Windi
     let filter = low_pass(run.spans.ts)?;
     let solve = |cycle: &Cycle| {
         let spans = run.spans.cut(cycle.samples.clone());
-        Ok((cycle.speed, plain(&spans, axes, Form::Rotor).prefiltered(&filter).solve()?))
+        Ok((cycle.speed, spans.plain(axes, Form::Rotor).prefiltered(&filter).solve()?))
     };
     run.cycles.iter().map(solve).collect()
 }
@@ -65,8 +65,8 @@ pub fn grey_box_per_cycle(run: &Run) -> Result<Vec<(f64, Winding)>> {
 /// Extended least squares on a whole record.
 pub fn solve_extended(spans: &Spans) -> Result<LinearEstimate<Extended>> {
     let filter = low_pass(spans.ts)?;
-    let i0 = search_i0(0.03, 1.0, |i0| extended(spans, i0).prefiltered(&filter).least_squares())?;
-    Ok(extended(spans, i0).prefiltered(&filter).solve()?)
+    let i0 = search_i0(0.03, 1.0, |i0| spans.extended(i0).prefiltered(&filter).least_squares())?;
+    Ok(spans.extended(i0).prefiltered(&filter).solve()?)
 }
 
 /// Error of Ke (%) over time of the observer with this resistance and inductance, fed with the voltage less the dead time

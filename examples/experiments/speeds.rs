@@ -6,12 +6,12 @@ use crate::first_axis::first_axis;
 use crate::methods::*;
 use crate::report::Report;
 use crate::tracks::tracks;
-use greybox::LinearEstimate;
 use greybox::pmsm::Winding;
 use greybox::pmsm::drive::Simulation;
 use greybox::pmsm::offline::{Axes, Spans};
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::RobotAxis;
+use greybox::regress::LinearEstimate;
 
 pub const CYCLE_SPEED: &str = "largest speed of the cycle (rad/s)";
 

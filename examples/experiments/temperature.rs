@@ -4,13 +4,13 @@ use crate::figure::{Figure, Panel, curve, dots, level};
 use crate::methods::*;
 use crate::report::Report;
 use crate::speeds::CYCLE_SPEED;
-use greybox::LinearEstimate;
 use greybox::pmsm::Winding;
 use greybox::pmsm::drive::Simulation;
 use greybox::pmsm::offline::Axes;
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::temperature::{Celsius, Estimated, magnet_rise, winding_rise};
+use greybox::regress::LinearEstimate;
 
 /// Motor and cable resistance, and Ke, of a whole record.
 fn whole(run: &Run) -> Result<(Estimated, Estimated)> {

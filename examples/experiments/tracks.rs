@@ -4,7 +4,7 @@ use crate::figure::{Figure, Panel, curve, thin};
 use crate::methods::*;
 use crate::report::Report;
 use greybox::pmsm::Winding;
-use greybox::pmsm::offline::{Axes, Form, Spans, plain};
+use greybox::pmsm::offline::{Axes, Form, Spans};
 
 /// The record, how it is cut into cycles, and what the pre-filter does to it.
 pub fn tracks(report: &mut Report, run: &Run) -> Result<()> {
@@ -65,7 +65,7 @@ fn filtered(run: &Run, figure: impl Fn(&str, &str, &str, &'static str, Vec<Panel
     let spans: Spans = run.spans.cut(run.cycles[9].samples.start..begin + (0.25 / run.spans.ts) as usize);
     let seen = |winding: Winding| -> Result<[Vec<(f64, f64)>; 2]> {
         let filter = low_pass(spans.ts)?;
-        let raw = plain(&spans, Axes::Q, Form::Rotor);
+        let raw = spans.plain(Axes::Q, Form::Rotor);
         let filtered = raw.clone().prefiltered(&filter);
         let last = |pairs: Vec<Vec<(f64, f64)>>| {
             let rows = pairs.into_iter().next().unwrap_or_default();

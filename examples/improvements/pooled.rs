@@ -1,11 +1,14 @@
 //! The cycles of a motor solved together.
 
 use crate::methods::*;
-use greybox::pmsm::offline::{Extended, Spans, extended, search_i0};
+use greybox::pmsm::offline::{Extended, Spans, search_i0};
 use greybox::pmsm::program::Cycle;
 use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::{Compensated, CompensatedSalientWinding, EmfHarmonic, ExactSalient, ExactStep, HeldIn};
-use greybox::{Fit, Regression, free, regress::PooledRegression};
+use greybox::{
+    Fit, free,
+    regress::{PooledRegression, Regression},
+};
 
 /// What all cycles of a motor have in common: what belongs to the motor. How dead time acts on the mean voltage depends on how
 /// fast the currents pass through zero.
@@ -23,7 +26,7 @@ pub fn cycles(run: &Run) -> Result<Vec<CycleSpans>> {
     let filter = low_pass(run.spans.ts)?;
     let cycle = |cycle: &Cycle| {
         let spans = run.spans.cut(cycle.samples.clone());
-        let i0 = search_i0(0.03, 1.0, |i0| extended(&spans, i0).prefiltered(&filter).least_squares())?;
+        let i0 = search_i0(0.03, 1.0, |i0| spans.extended(i0).prefiltered(&filter).least_squares())?;
         Ok(CycleSpans { speed: cycle.speed, spans, i0 })
     };
     run.cycles.iter().map(cycle).collect()
@@ -44,7 +47,7 @@ pub fn pooled(cycles: &[CycleSpans]) -> Result<Vec<(f64, Extended)>> {
 
 impl CycleSpans {
     fn regression(&self) -> Result<Regression<Extended>> {
-        Ok(extended(&self.spans, self.i0).prefiltered(&low_pass(self.spans.ts)?).regression())
+        Ok(self.spans.extended(self.i0).prefiltered(&low_pass(self.spans.ts)?).regression())
     }
 }
 

@@ -16,7 +16,7 @@ mod terminal;
 
 use file::File;
 use greybox::optimize::{Domain, LeastSquares, LevenbergMarquardt, Machine, Request};
-use greybox::{Error, Fit, Model, Nothing, Objective, Signals, WarningCode, free};
+use greybox::{Error, Fit, Model, Nothing, Signals, WarningCode, free, problem::Objective};
 use problems::{Predictors, Response, Task};
 use std::path::Path;
 use std::sync::atomic::Ordering;

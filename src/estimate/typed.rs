@@ -57,13 +57,7 @@ impl<M: Model> Estimate<M> {
     /// # Errors
     /// A summary of other quantities than the model has.
     pub fn of(summary: Summary) -> Result<Self, Error> {
-        if !summary.layout.is::<M::State, M::Input, M::Output, M::Parameters>(M::KIND) {
-            let layout = Layout::of::<M>();
-            return Err(Error::Option(format!(
-                "the estimate is of another model: it has the quantities {:?}, the model has {layout:?}",
-                summary.layout
-            )));
-        }
+        summary.check_layout(&Layout::of::<M>())?;
         let values = |one: &ExperimentEstimate| Values {
             parameters: M::Parameters::from_fn(|j| one.parameters[j]),
             initial_state: M::State::from_fn(|i| one.initial_state[i]),
@@ -86,6 +80,19 @@ impl<M: Model> Estimate<M> {
     /// The same, without the model's names.
     pub fn into_summary(self) -> Summary {
         self.summary
+    }
+}
+
+impl Summary {
+    /// Refuses a model of other quantities.
+    fn check_layout(&self, layout: &Layout) -> Result<(), Error> {
+        if self.layout == *layout {
+            return Ok(());
+        }
+        Err(Error::Option(format!(
+            "the estimate is of another model: it has the quantities {:?}, the model has {layout:?}",
+            self.layout
+        )))
     }
 }
 

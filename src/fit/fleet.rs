@@ -80,7 +80,7 @@ impl<'a, M: Model> Fleet<'a, M> {
 
     /// Fits the records and returns an iterator of the answers in their order. It is lazy: some hundred records per
     /// thread are read ahead, whatever their number.
-    pub fn run<R>(&self, records: R) -> Answers<'_, 'a, M, R::IntoIter>
+    pub fn run<R>(&self, records: R) -> impl Iterator<Item = Result<Estimate<M>, Error>>
     where
         R: IntoIterator<Item = ExperimentOf<M>>,
     {
@@ -129,7 +129,7 @@ impl<'a, M: Model> Fleet<'a, M> {
 }
 
 /// Iterator of the answers of a fleet, in the order of its records.
-pub struct Answers<'f, 'a, M: Model, R> {
+struct Answers<'f, 'a, M: Model, R> {
     fleet: &'f Fleet<'a, M>,
     records: R,
     ready: VecDeque<Result<Summary, Error>>,

@@ -166,7 +166,7 @@ impl<'r> Rounds<'r> {
 }
 
 /// How a search ended that found no step to lower the cost of an adaptive integrator, whose number of steps changes from point
-/// to point; `None` if slopes promise more than the costs of this tolerance and a finer one differ.
+/// to point; `None` if the slopes predict a decrease larger than the difference of the costs by this tolerance and a finer one.
 fn within_finer_tolerance(objective: &Objective<'_>, coordinates: &[f64]) -> Option<Outcome> {
     let finer = if objective.sweep.is_adaptive() { objective.sweep.refined()? } else { return None };
     let finer = objective.of(objective.problem, &*finer);

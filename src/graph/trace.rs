@@ -171,6 +171,10 @@ impl Graph {
     /// assert_eq!(graph.evaluate(&roots.unwrap(), |_| 3.0), [9.0]);
     /// ```
     pub fn trace(&mut self, mut code: impl FnMut() -> Vec<Symbol>) -> Result<Vec<Id>, Untraceable> {
+        self.trace_all_paths(&mut code)
+    }
+
+    fn trace_all_paths(&mut self, code: &mut dyn FnMut() -> Vec<Symbol>) -> Result<Vec<Id>, Untraceable> {
         let number = TRACES.with(|traces| {
             *traces.borrow_mut() += 1;
             *traces.borrow()
@@ -189,7 +193,7 @@ impl Graph {
                 failure: None,
             };
             ARENA.with(|arena| *arena.borrow_mut() = Some(fresh));
-            let outcome = catch_unwind(AssertUnwindSafe(&mut code));
+            let outcome = catch_unwind(AssertUnwindSafe(&mut *code));
             let Some(arena) = ARENA.with(|arena| arena.borrow_mut().take()) else {
                 return Err(Untraceable::new("it ends the trace that it is read by"));
             };

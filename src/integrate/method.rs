@@ -1,6 +1,6 @@
 //! [`Method`]: an integrator whose type is not known, for systems whose number of states is known at run time only.
 
-use super::{Integrator, Square, Stuck, System};
+use super::{Automatic, Integrator, Rk4, Square, Stiff, Stuck, System};
 use crate::dual::Dual;
 use crate::error::Error;
 use crate::graph::{Leaf, Symbol};
@@ -8,6 +8,7 @@ use crate::layout::Kind;
 use crate::scalar::Scalar;
 use crate::signals::Entry;
 use core::fmt::Debug;
+use std::sync::Arc;
 
 /// Eight slopes at a time.
 pub(crate) type Duals = Dual<8>;
@@ -129,6 +130,8 @@ pub(crate) trait Method: Debug + Send + Sync {
     fn advance_duals(&self, field: &Field<'_, Duals>, x: Vec<Duals>, step: &mut f64) -> Result<Vec<Duals>, Stuck>;
     fn advance_symbols(&self, field: &SymbolicField<'_>, x: Vec<Symbol>) -> Result<Vec<Symbol>, Stuck>;
     fn is_fixed(&self) -> bool;
+    /// The same with a finer step, if there is one.
+    fn refined(&self, kind: Kind) -> Option<Arc<dyn Method>>;
     /// Refuses models of a kind that the method does not serve, and settings that make no sense.
     fn check(&self, kind: Kind) -> Result<(), Error>;
     fn describe(&self, kind: Kind) -> String;
@@ -151,6 +154,10 @@ impl<I: Integrator> Method for I {
         I::FIXED
     }
 
+    fn refined(&self, kind: Kind) -> Option<Arc<dyn Method>> {
+        Some(Arc::new(Integrator::refined(self, kind)?))
+    }
+
     fn check(&self, kind: Kind) -> Result<(), Error> {
         if self.serves(kind) {
             return Integrator::check(self);
@@ -168,4 +175,17 @@ impl<I: Integrator> Method for I {
     fn describe(&self, kind: Kind) -> String {
         Integrator::describe(self, kind)
     }
+}
+
+/// The default method with this number of steps per sample. It is not generic, nor inlined, so that it is compiled with the
+/// library and not with each model; nor is [`stiff`].
+#[inline(never)]
+pub(crate) fn automatic(substeps: u32) -> Arc<dyn Method> {
+    Arc::new(Automatic { continuous: Rk4 { substeps } })
+}
+
+/// The last of the default methods.
+#[inline(never)]
+pub(crate) fn stiff() -> Arc<dyn Method> {
+    Arc::new(Stiff::default())
 }

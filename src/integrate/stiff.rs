@@ -3,7 +3,8 @@
 use super::{Esdirk, Integrator, Stuck, System};
 use crate::layout::Kind;
 
-/// [`Esdirk`] with a limit to its steps: what is not stiff but fast, or explodes, is given up soon.
+/// [`Esdirk`] with a limit to the number of its steps, so that a fit does not spend long on a model that is not stiff but fast,
+/// or whose states diverge.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stiff {
     method: Esdirk,
@@ -11,12 +12,14 @@ pub(crate) struct Stiff {
     more: u32,
 }
 
-/// Steps per interval, tried or taken, of a solution that is smooth at the begin of the interval: a jump of the input takes 50
-/// to 100 at a tolerance of 1e-8, whatever the rates; a turn of a relaxation oscillator a thousand.
+/// Most steps per interval, accepted or rejected, where the step with which the interval begins is not shorter than its `FAST`th
+/// part. At a tolerance of 1e-8 a jump of the input takes 50 to 100, whatever the rates; a period of a relaxation oscillator
+/// takes a thousand.
 const STEPS: u32 = 3_000;
-/// The same of a solution that asks for more steps than that from the begin on.
+/// Most steps per interval where the step with which it begins is shorter than this part of it.
 const FAST: u32 = 1_000;
-/// Steps that a method of order four takes for one where its tolerance is a hundredth: the fourth root, rounded up.
+/// How many times as many steps a method of order four takes when its tolerance is a hundredth: the fourth root of 100,
+/// rounded up.
 const FINER: u32 = 4;
 
 impl Default for Stiff {

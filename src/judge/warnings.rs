@@ -183,7 +183,7 @@ impl Judgement<'_> {
         }
         let stopped = matches!(self.end.outcome, Outcome::TimeLimit | Outcome::Cancelled);
         if refines && !stopped && !self.end.outcome.converged() {
-            return self.led_astray();
+            return self.step_decides_the_search();
         }
         if self.residuals.step_error / self.widening <= most {
             return None;
@@ -204,8 +204,9 @@ impl Judgement<'_> {
         })
     }
 
-    /// Of a search that ended without a minimum: whether the cost, at its start or at its end, is that of the step.
-    fn led_astray(&self) -> Option<Warning> {
+    /// Of a search that ended without a minimum: whether a finer step changes the cost at its start or at its end, so that the
+    /// search may have failed by the step.
+    fn step_decides_the_search(&self) -> Option<Warning> {
         let start = self.objective.problem.unknowns.start();
         let decides = |x: &[f64]| self.objective.step_decides(x) == Some(true);
         let place = if decides(&start) {

@@ -11,6 +11,7 @@ use crate::model::Model;
 use crate::parameter::{Parameter, Transform};
 use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
+use nalgebra::SMatrix;
 
 /// What an [`Ekf`] knows at the start and expects of the noise; standard deviations, each in its signal's unit.
 #[derive(Clone, Copy)]
@@ -298,8 +299,8 @@ impl<M: Model, const N: usize, I: Integrator> Ekf<M, N, I> {
     }
 
     /// Covariance of states, then free parameters in order of declaration (in logarithms where those are filtered).
-    pub fn covariance(&self) -> &UdFactors<N> {
-        &self.covariance
+    pub fn covariance(&self) -> SMatrix<f64, N, N> {
+        self.covariance.matrix()
     }
 
     /// Normalized square of the last innovation: chi-squared, with one degree of freedom per output used, if the model

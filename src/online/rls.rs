@@ -6,10 +6,11 @@ use super::{
 };
 use crate::parameter::Parameter;
 use crate::signals::{Of, Signals};
+use nalgebra::SMatrix;
 
 /// Recursive least squares with forgetting: follows the `N` parameters `P` of equations `y = phi p + noise`.
 ///
-/// The covariance is kept factored ([`UdFactors`]), so that it stays positive however long it runs. A parameter is
+/// The covariance is kept as factors `U D U^T` (Bierman 1977), so that it stays positive however long it runs. A parameter is
 /// known to its prior's mean and standard deviation at the start; one that is fixed stays.
 ///
 /// ```
@@ -158,8 +159,8 @@ impl<P: Signals, const N: usize> Rls<P, N> {
     }
 
     /// Their covariance.
-    pub fn covariance(&self) -> &UdFactors<N> {
-        &self.covariance
+    pub fn covariance(&self) -> SMatrix<f64, N, N> {
+        self.covariance.matrix()
     }
 
     /// Their standard deviations.

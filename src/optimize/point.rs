@@ -210,8 +210,8 @@ impl Point {
 }
 
 /// The outcome of a search that stopped at a point because no step lowers its cost, from cost and slopes there:
-/// [`Outcome::Rough`] if the full step is negligible, or would lower the cost by less than `noise`, which is asked for where it
-/// leads; else `None`.
+/// [`Outcome::Rough`] if the full step is negligible, or would lower the cost by less than `noise` at the
+/// point it leads to; else `None`.
 pub(crate) fn within_tolerance(
     x: &[f64],
     linear: Linearization,

@@ -2,7 +2,7 @@
 //!
 //! With `e` measured less predicted current, `V = e^T e + (Ke error)^2/g + (R error)^2/gR` falls at the rate
 //! `-e^T (2 rs/ls I + F + F^T) e` under both Lyapunov laws, at any speed: the part of the equation that turns with the
-//! speed does no work ([`lyapunov_rate`]). The currents' error goes to zero; the parameters' only where they are
+//! speed does no work (its unit test has the formula). The currents' error goes to zero; the parameters' only where they are
 //! excited: `ke` by speed, `rs` by current. The proof is of continuous time, and covers neither [`KeConstantGain`] nor
 //! gains that vary; [`Mras::check`](crate::online::Mras::check) looks at the sampled loop.
 //!
@@ -14,7 +14,6 @@ use super::{Currents, SQRT_2_3};
 use crate::model::Model;
 use crate::online::{AdaptationLaw, Moment, Rate};
 use crate::signals::{Of, Signals, holds, place_of};
-use nalgebra::{Matrix2, Vector2};
 
 /// The input of a motor's adaptation law at one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -220,26 +219,27 @@ where
     }
 }
 
-/// `dV/dt = -e^T (2 rs/ls I + F + F^T) e` (A^2/s) of the motor's observer under the Lyapunov laws (thesis, appendix A,
-/// derived anew): `f` is the observer's feedback matrix (1/s).
-pub fn lyapunov_rate(rs: f64, ls: f64, f: &Matrix2<f64>, e: &Currents) -> f64 {
-    let e = Vector2::from(*e);
-    -(2.0 * rs / ls * e.norm_squared() + 2.0 * e.dot(&(f * e)))
-}
-
-/// How fast `V` falls at least, per second and per `e^T e`: `2 rs/ls + lambda_min(F + F^T)`. The continuous observer is
-/// stable where this is positive; no feedback at all is enough.
-pub fn lyapunov_margin(rs: f64, ls: f64, f: &Matrix2<f64>) -> f64 {
-    let s = f + f.transpose();
-    let (mean, half) = (0.5 * (s.m11 + s.m22), 0.5 * (s.m11 - s.m22));
-    2.0 * rs / ls + mean - crate::Scalar::hypot(half, s.m12)
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::{Drive, Surface, Winding};
     use super::*;
+    use nalgebra::{Matrix2, Vector2};
     use proptest::prelude::*;
+
+    // `dV/dt = -e^T (2 rs/ls I + F + F^T) e` (A^2/s) of the motor's observer under the Lyapunov laws (thesis, appendix A,
+    // derived anew): `f` is the observer's feedback matrix (1/s).
+    fn lyapunov_rate(rs: f64, ls: f64, f: &Matrix2<f64>, e: &Currents) -> f64 {
+        let e = Vector2::from(*e);
+        -(2.0 * rs / ls * e.norm_squared() + 2.0 * e.dot(&(f * e)))
+    }
+
+    // How fast `V` falls at least, per second and per `e^T e`: `2 rs/ls + lambda_min(F + F^T)`. The continuous observer is
+    // stable where this is positive; no feedback at all is enough.
+    fn lyapunov_margin(rs: f64, ls: f64, f: &Matrix2<f64>) -> f64 {
+        let s = f + f.transpose();
+        let (mean, half) = (0.5 * (s.m11 + s.m22), 0.5 * (s.m11 - s.m22));
+        2.0 * rs / ls + mean - crate::Scalar::hypot(half, s.m12)
+    }
 
     fn number(rate: Rate) -> f64 {
         match rate {

@@ -5,15 +5,15 @@ use crate::{Of, Scalar, Signals};
 
 crate::signals! {
     /// A motor cable.
-    pub struct CableResistance {
+    struct CableResistance {
         /// Resistance per phase.
         r_cable: "ohm",
     }
 }
 
 wraps_motor! {
-    /// A motor at the end of a cable: its resistance `rs` and the cable's `r_cable` in series. The parameters `P` hold
-    /// those of the motor `M` and of [`CableResistance`], by name.
+    /// A motor at the end of a cable: its resistance `rs` and the cable's `r_cable` in series. The parameters `P` hold,
+    /// by name, those of the motor `M` and `r_cable` (ohm).
     ///
     /// The data determine only the sum of both resistances: one of them is to be fixed, or known beforehand.
     Cabled, M::Input, |_wrapper, x, u, p, motor| {

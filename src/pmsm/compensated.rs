@@ -19,7 +19,7 @@ crate::signals! {
         lost_q: "1",
     }
     /// Size of a dead time whose shape is known.
-    pub struct DeadTimeSize {
+    struct DeadTimeSize {
         /// Voltage that dead time takes from each phase.
         vdt: "V",
     }
@@ -54,7 +54,7 @@ crate::signals! {
 wraps_motor! {
     /// A motor behind an inverter, for offline fits: the shape of the dead time's voltage comes from the measured currents,
     /// mean of the interval, at the angle of its middle. Only its size is a parameter, in which the model is then linear.
-    /// The parameters `P` hold those of the motor `M` and of [`DeadTimeSize`], by name.
+    /// The parameters `P` hold, by name, those of the motor `M` and `vdt` (V), the voltage that dead time takes from each phase.
     ///
     /// [`InverterFed`](super::InverterFed) takes the simulated current instead: near zero current, where the sign decides,
     /// what the motor's harmonics do to the measured current then goes into the parameters (0.3 % of Ke at 15 rad/s on a

@@ -4,7 +4,7 @@ use crate::{Of, Scalar, Signals};
 
 crate::signals! {
     /// The lowest harmonic that the EMF of a symmetric winding has.
-    pub struct SixthHarmonic {
+    struct SixthHarmonic {
         /// Amplitude of the sixth harmonic of `ke`: line-to-line rms, `ke + ke6 cos(6 theta_e)`.
         ke6: "V s/rad",
     }
@@ -12,7 +12,7 @@ crate::signals! {
 
 wraps_motor! {
     /// A motor whose back-EMF has a sixth harmonic, in phase with the magnet: `ke + ke6 cos(6 theta_e)` in place of `ke`,
-    /// in EMF and torque. The parameters `P` hold those of the motor `M` and of [`SixthHarmonic`], by name.
+    /// in EMF and torque. The parameters `P` hold, by name, those of the motor `M` and `ke6` (V s/rad, line-to-line rms).
     ///
     /// It is the fifth and seventh harmonic of the phases. At low speed, where a controller follows it, a
     /// model without it attributes it to `ke`: 0.2 % on the small axes of the reference robot. For a motor in

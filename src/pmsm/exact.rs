@@ -9,7 +9,8 @@ mod salient;
 
 pub use salient::ExactSalient;
 
-use super::{AngledDrive, Currents, Drive, MotorError, MotorModel, PolePairs, SQRT_2_3, Winding, dead_time, units};
+use super::units::Constant;
+use super::{AngledDrive, Currents, Drive, MotorError, MotorModel, PolePairs, SQRT_2_3, Winding, dead_time};
 use crate::online::{AdaptationLaw, Mras, MrasStart, ObserverError};
 use crate::{Kind, Model, Parameter, Scalar};
 use serde::{Deserialize, Serialize};
@@ -123,7 +124,7 @@ impl MotorModel for ExactSurface {
     /// `kt iq` (N m).
     #[inline]
     fn torque<S: Scalar>(&self, x: &Currents<S>, _theta: S, p: &Winding<S>) -> S {
-        units::kt_from_ke(p.ke) * x.iq
+        Constant::TorquePerPeak.from_ke(p.ke) * x.iq
     }
 }
 

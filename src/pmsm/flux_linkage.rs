@@ -1,5 +1,6 @@
 use super::motor_model::{MotorModel, passes_on, wraps_motor};
-use super::{Currents, PolePairs, units};
+use super::units::Constant;
+use super::{Currents, PolePairs};
 use crate::signals::place_of;
 use crate::{Of, Scalar, Signals};
 
@@ -20,7 +21,7 @@ wraps_motor! {
     /// `P` hold `psi_m` and those of the motor `M` but for `ke`, by name.
     ///
     /// Bounds, priors and intervals are then of `psi_m` itself. `ke = sqrt(3/2) np psi_m`
-    /// ([`ke_from_psi_m`](units::ke_from_psi_m)).
+    /// ([`Constant::FluxLinkage`]).
     ///
     /// ```
     /// use greybox::pmsm::{FluxLinkage, FluxWinding, Surface};
@@ -52,7 +53,7 @@ impl<M: MotorModel, P: Signals> FluxLinkage<M, P> {
         let (entries, np) = (P::into_array(*p), self.motor.pole_pairs());
         M::Parameters::from_fn(|i| {
             let value = entries.as_ref()[Self::PLACES[i]];
-            if i == Self::KE { units::ke_from_psi_m(value, np) } else { value }
+            if i == Self::KE { Constant::FluxLinkage(np).to_ke(value) } else { value }
         })
     }
 }

@@ -1,5 +1,6 @@
-use super::{Currents, Drive, MotorError, MotorModel, PolePairs, units};
-use crate::{Grid, Model, Scalar, Table};
+use super::units::Constant;
+use super::{Currents, Drive, MotorError, MotorModel, PolePairs};
+use crate::{Model, Scalar, Table, scalar::Grid};
 use serde::{Deserialize, Serialize};
 
 crate::signals! {
@@ -23,9 +24,9 @@ crate::signals! {
 ///
 /// `map_d` and `map_q` are in Wb over `id` and `iq` in A (phase peak), the first argument being `id`. They hold what the
 /// currents add to the magnets' flux, so `map_d` is zero at zero current: of a map that includes the magnets, subtract
-/// `psi_d(0, 0)`, and start `ke` from it ([`units::ke_from_psi_m`]). The incremental inductances are the slopes of the
-/// tables; take [`Interpolation::Smooth`](crate::Interpolation::Smooth), by which they do not jump, and
-/// [`Extrapolation::Linear`](crate::Extrapolation::Linear). A map of a lossless motor is reciprocal
+/// `psi_d(0, 0)`, and start `ke` from it ([`Constant::FluxLinkage`]). The incremental inductances are the slopes of the
+/// tables; take [`Interpolation::Smooth`](crate::scalar::Interpolation::Smooth), by which they do not jump, and
+/// [`Extrapolation::Linear`](crate::scalar::Extrapolation::Linear). A map of a lossless motor is reciprocal
 /// (`dpsi_d/diq = dpsi_q/did`), which is not examined: measured ones are not quite.
 ///
 /// ```
@@ -127,7 +128,7 @@ impl FluxMapped {
     #[inline]
     pub fn flux<S: Scalar>(&self, x: &Currents<S>, p: &MappedWinding<S>) -> (S, S) {
         let map = |table: Grid<'_>| p.flux * table.at2(x.id, x.iq);
-        (units::psi_m_from_ke(p.ke, self.pole_pairs) + map(self.map_d.grid()), map(self.map_q.grid()))
+        (Constant::FluxLinkage(self.pole_pairs).from_ke(p.ke) + map(self.map_d.grid()), map(self.map_q.grid()))
     }
 
     /// Slopes of the tables (H): of `map_d` over `id` and `iq`, and of `map_q`.
@@ -189,7 +190,11 @@ impl Model for FluxMapped {
 mod tests {
     use super::super::{AngledDrive, InverterFed, Salient, SalientWinding, Saturated, SaturatedWinding};
     use super::*;
-    use crate::{Dual, Extrapolation, Fit, Interpolation, Time, fixed, free, simulate};
+    use crate::{
+        Dual, Fit, Time, fixed, free,
+        scalar::{Extrapolation, Interpolation},
+        simulate,
+    };
 
     const Q: SalientWinding = SalientWinding { rs: 0.4, ld: 3.8e-3, lq: 5.2e-3, ke: 0.95 };
     const SATURATED: SaturatedWinding = SaturatedWinding {

@@ -40,27 +40,27 @@ crate::signals! {
 /// The amplitude-invariant vector of three phases: `alpha = (2a - b - c)/3`, `beta = (b - c)/sqrt(3)`. Their common part
 /// is lost.
 #[inline(always)]
-pub fn clarke<S: Scalar>(phases: Phases<S>) -> Stator<S> {
+pub(super) fn clarke<S: Scalar>(phases: Phases<S>) -> Stator<S> {
     Stator { alpha: (phases.a * 2.0 - phases.b - phases.c) / 3.0, beta: (phases.b - phases.c) * INV_SQRT_3 }
 }
 
 /// The three phases, without a common part, of a vector in the stator's frame.
 #[inline(always)]
-pub fn inverse_clarke<S: Scalar>(stator: Stator<S>) -> Phases<S> {
+pub(super) fn inverse_clarke<S: Scalar>(stator: Stator<S>) -> Phases<S> {
     let (half, side) = (stator.alpha * 0.5, stator.beta * (SQRT_3 / 2.0));
     Phases { a: stator.alpha, b: side - half, c: -side - half }
 }
 
 /// `(x, y)` seen from axes that stand at `angle` (electrical rad): from the stator to the rotor.
 #[inline(always)]
-pub fn rotate_into<S: Scalar>((x, y): (S, S), angle: S) -> (S, S) {
+pub(super) fn rotate_into<S: Scalar>((x, y): (S, S), angle: S) -> (S, S) {
     let (sin, cos) = angle.sin_cos();
     (x * cos + y * sin, y * cos - x * sin)
 }
 
 /// `(x, y)` given in axes that stand at `angle` (electrical rad), seen from axes at zero: from the rotor to the stator.
 #[inline(always)]
-pub fn rotate_out_of<S: Scalar>((x, y): (S, S), angle: S) -> (S, S) {
+pub(super) fn rotate_out_of<S: Scalar>((x, y): (S, S), angle: S) -> (S, S) {
     let (sin, cos) = angle.sin_cos();
     (x * cos - y * sin, y * cos + x * sin)
 }

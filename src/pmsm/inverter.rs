@@ -35,7 +35,7 @@ pub enum Inverter {
     /// As its mean over the sample: no ripple, and dead time as a voltage.
     #[default]
     Averaged,
-    /// By pulses of the direct voltage `vdc` (V, positive); see [`SwitchingInverter`](super::SwitchingInverter).
+    /// By pulses of the direct voltage `vdc` (V, positive).
     Switching {
         /// Direct voltage (V).
         vdc: f64,

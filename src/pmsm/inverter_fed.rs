@@ -17,7 +17,7 @@ crate::signals! {
         theta: "rad",
     }
     /// Voltage loss of an inverter by dead time.
-    pub struct DeadTimeLoss {
+    struct DeadTimeLoss {
         /// Voltage lost in each phase.
         vdt: "V",
         /// Current at which that error turns over; must be positive.
@@ -41,7 +41,7 @@ crate::signals! {
 wraps_motor! {
     /// A motor behind an inverter that loses `vdt tanh(i/i0)` per phase to dead time.
     ///
-    /// The parameters `P` hold those of the motor `M` and of [`DeadTimeLoss`], by name. The voltage lost is that of the
+    /// The parameters `P` hold, by name, those of the motor `M`, `vdt` (V), and `i0` (A), which must be positive. The voltage lost is that of the
     /// model's own current at the input's angle; for motors in exact steps, that of the current at the begin of the
     /// interval, held as the command is. For offline fits [`Compensated`](super::Compensated) is more exact.
     ///

@@ -5,7 +5,7 @@ use crate::{Of, Scalar, Signals};
 
 crate::signals! {
     /// Delay and angle offset between a record and the motor.
-    pub struct Misalignment {
+    struct Misalignment {
         /// By how much later the voltage acts than recorded.
         tau: "s",
         /// By how much the recorded electrical angle is ahead of the magnet.
@@ -14,8 +14,8 @@ crate::signals! {
 }
 
 wraps_motor! {
-    /// A motor whose record has its voltage `tau` early and its angle `delta` ahead. The parameters `P` hold those of the
-    /// motor `M` and of [`Misalignment`], by name.
+    /// A motor whose record has its voltage `tau` early and its angle `delta` ahead. The parameters `P` hold, by name,
+    /// those of the motor `M`, `tau` (s), and `delta` (rad, electrical).
     ///
     /// A voltage that acts `tau` late has turned back by `we tau` seen from the rotor, while a resolver that is `delta`
     /// ahead turns voltages, currents and EMF alike: at one speed the two are hardly distinguishable, over several they are.

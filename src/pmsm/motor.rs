@@ -1,11 +1,12 @@
 //! Motor constants from geometry (thesis (3.2) to (3.11)).
 
-use super::{MotorError, PolePairs, units};
+use super::units::Constant;
+use super::{MotorError, PolePairs};
 use core::f64::consts::PI;
 use serde::{Deserialize, Serialize};
 
 /// Permeability of vacuum (V s/(A m)).
-pub const MU_0: f64 = 1.256_637_062_12e-6;
+const MU_0: f64 = 1.256_637_062_12e-6;
 
 /// The dimensions that decide a surface-magnet motor's constants: sine-distributed windings, iron without saturation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -55,7 +56,7 @@ impl Geometry {
             psi_m,
             phase_inductance,
             ls: 1.5 * phase_inductance,
-            ke: units::ke_from_psi_m(psi_m, self.pole_pairs),
+            ke: Constant::FluxLinkage(self.pole_pairs).to_ke(psi_m),
         })
     }
 }

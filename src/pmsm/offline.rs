@@ -2,7 +2,7 @@
 //!
 //! A record becomes [`Spans`]: per sample interval the currents at both ends, the voltage commanded in between, and the
 //! *mean* speed. Misaligned by half a sample, a record at 350 rad/s is wrong by degrees of electrical angle. From spans,
-//! [`plain`] and [`extended`] make [`Equations`]; these are filtered, weighted and solved.
+//! [`Spans::plain`] and [`Spans::extended`] make [`Equations`]; these are filtered, weighted and solved.
 
 mod equations;
 mod extended;
@@ -11,11 +11,10 @@ mod mechanics;
 mod plain;
 mod validate;
 
-pub use equations::{Equations, hardly_seen};
-pub use extended::{Extended, extended, search_i0};
-pub use mechanics::mechanics;
-pub use plain::{Axes, Form, plain};
-pub use validate::{Validation, voltages};
+pub use equations::Equations;
+pub use extended::{Extended, search_i0};
+pub use plain::{Axes, Form};
+pub use validate::Validation;
 
 use super::drive::Log;
 use super::{AngledDrive, Currents, Drive, PolePairs};

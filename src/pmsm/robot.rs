@@ -1,6 +1,6 @@
 //! The reference robot: six axes of a medium-sized arm, and what each of them does.
 
-use super::temperature::{Celsius, Reading, magnet, winding};
+use super::temperature::{Celsius, Reading};
 use super::{MotorError, PolePairs, SQRT_3_2};
 use serde::{Deserialize, Serialize};
 
@@ -48,7 +48,7 @@ pub const TS: f64 = 0.126e-3;
 pub const V_DC: f64 = 600.0;
 
 /// Phase peak voltage limit of the reference drive: [`V_DC`] through space-vector modulation (V).
-pub const V_MAX: f64 = 346.410_161_513_775_44;
+pub(super) const V_MAX: f64 = 346.410_161_513_775_44;
 
 impl RobotAxis {
     /// Axis 1 to 6 of the reference robot.
@@ -106,7 +106,11 @@ impl RobotAxis {
 
     /// The axis with winding and magnet at these temperatures.
     pub fn heated(&self, winding_at: Celsius, magnet_at: Celsius) -> RobotAxis {
-        RobotAxis { rs: self.rs * winding(winding_at), ke: self.ke * magnet(magnet_at, Reading::Local), ..*self }
+        RobotAxis {
+            rs: self.rs * winding_at.winding_factor(),
+            ke: self.ke * magnet_at.magnet_factor(Reading::Local),
+            ..*self
+        }
     }
 
     /// Refuses an axis that no motor is like.

@@ -1,4 +1,5 @@
-use super::{Currents, Drive, MotorError, MotorModel, PolePairs, units};
+use super::units::Constant;
+use super::{Currents, Drive, MotorError, MotorModel, PolePairs};
 use crate::{Model, Scalar};
 use serde::{Deserialize, Serialize};
 
@@ -56,7 +57,7 @@ impl Saturated {
     pub fn flux<S: Scalar>(&self, x: &Currents<S>, p: &SaturatedWinding<S>) -> (S, S) {
         let z = x.iq / p.i_saturation;
         let r = (z * z + 1.0).sqrt();
-        let psi_m = units::psi_m_from_ke(p.ke, self.pole_pairs);
+        let psi_m = Constant::FluxLinkage(self.pole_pairs).from_ke(p.ke);
         let saturating = p.lq - p.lq_saturated + p.lq_cross * x.id;
         (
             psi_m + p.ld * x.id + p.lq_cross * p.i_saturation * p.i_saturation * (r - 1.0),

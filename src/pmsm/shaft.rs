@@ -1,4 +1,5 @@
-use super::{MotorError, units};
+use super::MotorError;
+use super::units::Constant;
 use crate::{Model, Scalar, Signals};
 use serde::{Deserialize, Serialize};
 
@@ -42,7 +43,7 @@ crate::signals! {
 }
 
 /// Speed within which Coulomb friction turns over (rad/s): `tc tanh(w / 0.5)`.
-pub const COULOMB_WIDTH: f64 = 0.5;
+pub(super) const COULOMB_WIDTH: f64 = 0.5;
 
 /// The rotor and its load (thesis (3.17), (3.18)):
 ///
@@ -92,7 +93,7 @@ impl Model for Shaft {
 
     #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &ShaftMotion<S>, u: &Torque<S>, p: &Mechanics<S>) -> ShaftMotion<S> {
-        self.accelerated(units::kt_from_ke(p.ke) * u.iq, x, &Mechanics::part::<Load, S>(*p))
+        self.accelerated(Constant::TorquePerPeak.from_ke(p.ke) * u.iq, x, &Mechanics::part::<Load, S>(*p))
     }
 
     #[inline]

@@ -1,4 +1,5 @@
-use super::{Currents, Drive, MotorError, MotorModel, PolePairs, SQRT_2_3, Winding, units};
+use super::units::Constant;
+use super::{Currents, Drive, MotorError, MotorModel, PolePairs, SQRT_2_3, Winding};
 use crate::{Model, Scalar};
 use serde::{Deserialize, Serialize};
 
@@ -35,7 +36,7 @@ impl MotorModel for Surface {
     /// `kt iq` (N m).
     #[inline]
     fn torque<S: Scalar>(&self, x: &Currents<S>, _theta: S, p: &Winding<S>) -> S {
-        units::kt_from_ke(p.ke) * x.iq
+        Constant::TorquePerPeak.from_ke(p.ke) * x.iq
     }
 }
 

@@ -17,7 +17,7 @@ use crate::scalar::Scalar;
 /// `1/2 (1 +- tanh(i/i0))`, so that the mean voltage lost in a carrier period is the `vdt tanh(i/i0)` of [`DeadTime`].
 /// Pulses shorter than the delay are swallowed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SwitchingInverter {
+pub(super) struct SwitchingInverter {
     plant: Plant,
     vdc: f64,
     carrier: Carrier,

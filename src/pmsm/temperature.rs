@@ -9,15 +9,15 @@ use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
 /// Temperature coefficient of copper's resistance (1/K), relative to 20 C.
-pub const COPPER: f64 = 0.003_93;
-/// Reversible loss of magnet flux (1/K), relative to 20 C, up to [`KNEE`].
-pub const MAGNET: f64 = 0.001_1;
-/// By how much that loss grows with each kelvin above [`KNEE`] (1/K^2).
-pub const MAGNET_GROWTH: f64 = 1.6e-5;
+const COPPER: f64 = 0.003_93;
+/// Reversible loss of magnet flux (1/K), relative to 20 C, up to `KNEE`.
+const MAGNET: f64 = 0.001_1;
+/// By how much that loss grows with each kelvin above `KNEE` (1/K^2).
+const MAGNET_GROWTH: f64 = 1.6e-5;
 /// Above this temperature (C) what a magnet loses does not come back.
-pub const KNEE: f64 = 150.0;
+const KNEE: f64 = 150.0;
 /// Reference temperature of the laws (C).
-pub const REFERENCE: f64 = 20.0;
+const REFERENCE: f64 = 20.0;
 
 /// A temperature (C) not below absolute zero.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Serialize, Deserialize)]
@@ -43,7 +43,21 @@ impl Celsius {
         self.0
     }
 
-    /// How far above [`KNEE`] (K); zero below it.
+    /// `R(t) / R(20 C) = 1 + 0.00393 (t - 20)` of a copper winding.
+    pub fn winding_factor(self) -> f64 {
+        1.0 + COPPER * (self.0 - REFERENCE)
+    }
+
+    /// `Ke(t) / Ke(20 C)` of a magnet that is at its hottest so far; for one that has been hotter, see [`Magnet`].
+    pub fn magnet_factor(self, reading: Reading) -> f64 {
+        let (rise, above) = (self.0 - REFERENCE, self.above_knee());
+        match reading {
+            Reading::Local => 1.0 - MAGNET * rise - 0.5 * MAGNET_GROWTH * above * above,
+            Reading::Secant => 1.0 - (MAGNET + MAGNET_GROWTH * above) * rise,
+        }
+    }
+
+    /// How far above 150 C (K); zero below it.
     fn above_knee(self) -> f64 {
         Scalar::max(self.0 - KNEE, 0.0)
     }
@@ -62,12 +76,7 @@ impl From<Celsius> for f64 {
     }
 }
 
-/// `R(t) / R(20 C) = 1 + 0.00393 (t - 20)` of a copper winding.
-pub fn winding(t: Celsius) -> f64 {
-    1.0 + COPPER * (t.0 - REFERENCE)
-}
-
-/// How the growth of the magnet's coefficient above [`KNEE`] is read.
+/// How the growth of the magnet's coefficient above 150 C is read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Reading {
     /// As a local slope: flux is its integral, `1 - 0.0011 (t - 20) - 0.8e-5 (t - 150)^2` (175 C: 0.8245).
@@ -77,16 +86,7 @@ pub enum Reading {
     Secant,
 }
 
-/// `Ke(t) / Ke(20 C)` of a magnet that is at its hottest so far; for one that has been hotter, see [`Magnet`].
-pub fn magnet(t: Celsius, reading: Reading) -> f64 {
-    let (rise, above) = (t.0 - REFERENCE, t.above_knee());
-    match reading {
-        Reading::Local => 1.0 - MAGNET * rise - 0.5 * MAGNET_GROWTH * above * above,
-        Reading::Secant => 1.0 - (MAGNET + MAGNET_GROWTH * above) * rise,
-    }
-}
-
-/// A magnet that remembers: what it lost above [`KNEE`] stays lost.
+/// A magnet that remembers: what it lost above 150 C stays lost.
 ///
 /// `Ke/Ke0 = (1 - ageing) [1 - 0.0011 (t - 20) - 0.8e-5 max(peak - 150, 0)^2]`
 ///
@@ -185,7 +185,7 @@ pub fn winding_rise(cold: Estimated, warm: Estimated, r20: Estimated) -> Result<
     propagate([cold, warm, r20], |[cold, warm, r20]| (warm - cold) / (r20 * COPPER))
 }
 
-/// Rise (K) of the magnet between a cold and a warm estimate of Ke, below [`KNEE`]; `cold_at` is the temperature of the
+/// Rise (K) of the magnet between a cold and a warm estimate of Ke, below 150 C; `cold_at` is the temperature of the
 /// cold one. The two errors are taken as independent.
 ///
 /// # Errors
@@ -193,7 +193,7 @@ pub fn winding_rise(cold: Estimated, warm: Estimated, r20: Estimated) -> Result<
 pub fn magnet_rise(cold: Estimated, warm: Estimated, cold_at: Celsius) -> Result<Estimated, MotorError> {
     MotorError::positive("Ke of the cold motor", cold.value, "V s/rad")?;
     let cold_factor =
-        MotorError::positive("magnet factor at the cold temperature", magnet(cold_at, Reading::Local), "of 1")?;
+        MotorError::positive("magnet factor at the cold temperature", cold_at.magnet_factor(Reading::Local), "of 1")?;
     propagate([cold, warm], |[cold, warm]| (cold - warm) / (cold * (MAGNET / cold_factor)))
 }
 
@@ -219,22 +219,22 @@ mod tests {
 
     #[test]
     fn published_values() {
-        assert_relative_eq!(winding(at(55.0)), 1.137_55, max_relative = 1e-15);
-        assert_relative_eq!(magnet(at(175.0), Reading::Local), 0.8245, max_relative = 1e-14);
-        assert_relative_eq!(magnet(at(175.0), Reading::Secant), 0.7675, max_relative = 1e-14);
-        assert_relative_eq!(magnet(at(55.0), Reading::Local), 0.9615, max_relative = 1e-14);
+        assert_relative_eq!(at(55.0).winding_factor(), 1.137_55, max_relative = 1e-15);
+        assert_relative_eq!(at(175.0).magnet_factor(Reading::Local), 0.8245, max_relative = 1e-14);
+        assert_relative_eq!(at(175.0).magnet_factor(Reading::Secant), 0.7675, max_relative = 1e-14);
+        assert_relative_eq!(at(55.0).magnet_factor(Reading::Local), 0.9615, max_relative = 1e-14);
     }
 
     proptest! {
         #[test]
         fn both_readings_agree_up_to_the_knee(t in -40.0..=150.0) {
-            prop_assert_eq!(magnet(at(t), Reading::Local), magnet(at(t), Reading::Secant));
+            prop_assert_eq!(at(t).magnet_factor(Reading::Local), at(t).magnet_factor(Reading::Secant));
         }
 
         // Local: the slope is 0.0011 + 1.6e-5 (t - 150), by a central difference of a parabola (exact but for rounding).
         #[test]
         fn local_slope_grows_by_the_rate(t in 152.0..250.0f64) {
-            let slope = (magnet(at(t + 1.0), Reading::Local) - magnet(at(t - 1.0), Reading::Local)) / 2.0;
+            let slope = (at(t + 1.0).magnet_factor(Reading::Local) - at(t - 1.0).magnet_factor(Reading::Local)) / 2.0;
             prop_assert!((slope + MAGNET + MAGNET_GROWTH * (t - KNEE)).abs() < 1e-14);
         }
 
@@ -242,7 +242,7 @@ mod tests {
         fn a_magnet_on_its_way_up_follows_the_law_and_on_its_way_down_does_not_return(t in 20.0..250.0f64) {
             let mut magnet_ = Magnet::default();
             magnet_.reach(at(t));
-            prop_assert!((magnet_.factor(at(t)) - magnet(at(t), Reading::Local)).abs() < 1e-14);
+            prop_assert!((magnet_.factor(at(t)) - at(t).magnet_factor(Reading::Local)).abs() < 1e-14);
             let cooled = magnet_.factor(at(REFERENCE));
             prop_assert!((1.0 - cooled - magnet_.lost()).abs() < 1e-14);
             prop_assert_eq!(magnet_.reach(at(100.0)), Heating::Reversible);
@@ -253,9 +253,9 @@ mod tests {
             let known = |value| Estimated { value, std: 0.0 };
             let (cold, warm) = (at(25.0), at(25.0 + rise));
             let winding_read = winding_rise(
-                known(r20 * winding(cold) + cable), known(r20 * winding(warm) + cable), known(r20)).unwrap();
+                known(r20 * cold.winding_factor() + cable), known(r20 * warm.winding_factor() + cable), known(r20)).unwrap();
             prop_assert!((winding_read.value - rise).abs() < 1e-9);
-            let factor = |t| magnet(t, Reading::Local);
+            let factor = |t: Celsius| t.magnet_factor(Reading::Local);
             let magnet_read = magnet_rise(known(ke * factor(cold)), known(ke * factor(warm)), cold).unwrap();
             prop_assert!((magnet_read.value - rise).abs() < 1e-9);
         }

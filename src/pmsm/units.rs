@@ -4,45 +4,92 @@
 
 use super::{MotorError, PolePairs, SQRT_2_3, SQRT_3_2};
 use crate::scalar::Scalar;
-use core::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
+use core::f64::consts::{FRAC_1_SQRT_2, PI};
 use serde::{Deserialize, Serialize};
 
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
 
-/// Line-to-line voltage or EMF from the phase value: times `sqrt(3)` (both rms or both peak).
-#[inline]
-pub fn line_from_phase<S: Scalar>(phase: S) -> S {
-    phase * SQRT_3
+/// How the amplitude of a voltage, EMF or current is given where it is not the phase peak.
+///
+/// ```
+/// use greybox::pmsm::units::Amplitude;
+/// assert!((Amplitude::LineRms.to_phase_peak(400.0_f64) - 326.6).abs() < 0.01);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Amplitude {
+    /// Phase, rms.
+    PhaseRms,
+    /// Line to line, peak.
+    LinePeak,
+    /// Line to line, rms.
+    LineRms,
 }
 
-/// Phase voltage or EMF from the line-to-line value.
-#[inline]
-pub fn phase_from_line<S: Scalar>(line: S) -> S {
-    line / SQRT_3
+impl Amplitude {
+    /// This amplitude of a phase peak of one.
+    const fn of_one(self) -> f64 {
+        match self {
+            Amplitude::PhaseRms => FRAC_1_SQRT_2,
+            Amplitude::LinePeak => SQRT_3,
+            Amplitude::LineRms => SQRT_3_2,
+        }
+    }
+
+    /// The phase peak of what is given so, in the same unit.
+    #[inline]
+    pub fn to_phase_peak<S: Scalar>(self, amplitude: S) -> S {
+        amplitude / self.of_one()
+    }
+
+    /// This amplitude of a phase peak, in the same unit.
+    #[inline]
+    pub fn from_phase_peak<S: Scalar>(self, phase_peak: S) -> S {
+        phase_peak * self.of_one()
+    }
 }
 
-/// Rms of a sine from its peak.
-#[inline]
-pub fn rms_from_peak<S: Scalar>(peak: S) -> S {
-    peak * FRAC_1_SQRT_2
+/// How a motor's constant of EMF or torque is given where it is not `Ke` (V s/rad, line-to-line rms).
+///
+/// ```
+/// use greybox::pmsm::{PolePairs, units::Constant};
+/// let ke = Constant::FluxLinkage(PolePairs::new(3)?).to_ke(0.545_f64);
+/// assert!((ke - 2.002_46).abs() < 5e-6);
+/// # Ok::<(), greybox::pmsm::MotorError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Constant {
+    /// `Kt` in N m per ampere of *peak* iq: `sqrt(3/2) Ke`.
+    TorquePerPeak,
+    /// `Kt` in N m per ampere *rms*: `sqrt(3) Ke`.
+    TorquePerRms,
+    /// The magnet flux linkage `psi_m` (Wb, peak) of a motor with so many pole pairs: `Ke = sqrt(3/2) np psi_m`.
+    FluxLinkage(PolePairs),
+    /// Volts (line-to-line rms) per 1000 revolutions per minute.
+    VoltsPerKrpm,
 }
 
-/// Peak of a sine from its rms.
-#[inline]
-pub fn peak_from_rms<S: Scalar>(rms: S) -> S {
-    rms * SQRT_2
-}
+impl Constant {
+    /// `Ke` (V s/rad, line-to-line rms) of what is given so.
+    #[inline]
+    pub fn to_ke<S: Scalar>(self, constant: S) -> S {
+        match self {
+            Constant::TorquePerPeak => constant * SQRT_2_3,
+            Constant::TorquePerRms => constant / SQRT_3,
+            Constant::FluxLinkage(np) => constant * (SQRT_3_2 * np.get()),
+            Constant::VoltsPerKrpm => constant * (60.0 / (2000.0 * PI)),
+        }
+    }
 
-/// Phase peak from line-to-line rms: times `sqrt(2/3)`.
-#[inline]
-pub fn phase_peak_from_line_rms<S: Scalar>(line_rms: S) -> S {
-    line_rms * SQRT_2_3
-}
-
-/// Line-to-line rms from phase peak: times `sqrt(3/2)`.
-#[inline]
-pub fn line_rms_from_phase_peak<S: Scalar>(phase_peak: S) -> S {
-    phase_peak * SQRT_3_2
+    /// This constant of a motor with `Ke` (V s/rad, line-to-line rms).
+    #[inline]
+    pub fn from_ke<S: Scalar>(self, ke: S) -> S {
+        match self {
+            Constant::TorquePerPeak => ke * SQRT_3_2,
+            Constant::TorquePerRms => ke * SQRT_3,
+            Constant::FluxLinkage(np) => ke * SQRT_2_3 / np.get(),
+            Constant::VoltsPerKrpm => ke * (2000.0 * PI / 60.0),
+        }
+    }
 }
 
 /// Phase resistance (ohm) or synchronous inductance (H) from the one measured between two terminals, the third open:
@@ -50,78 +97,6 @@ pub fn line_rms_from_phase_peak<S: Scalar>(phase_peak: S) -> S {
 #[inline]
 pub fn phase_from_terminals<S: Scalar>(between_terminals: S) -> S {
     between_terminals * 0.5
-}
-
-/// Resistance or inductance between two terminals from the phase value: twice.
-#[inline]
-pub fn terminals_from_phase<S: Scalar>(phase: S) -> S {
-    phase * 2.0
-}
-
-/// `Kt` (N m per ampere of peak iq) from `Ke` (V s/rad, line-to-line rms): `sqrt(3/2) Ke`.
-#[inline]
-pub fn kt_from_ke<S: Scalar>(ke: S) -> S {
-    ke * SQRT_3_2
-}
-
-/// `Kt` in N m per ampere *rms* from `Ke`: `sqrt(3) Ke`.
-#[inline]
-pub fn kt_per_rms_from_ke<S: Scalar>(ke: S) -> S {
-    ke * SQRT_3
-}
-
-/// `Ke` (V s/rad, line-to-line rms) from `Kt` (N m per ampere of peak iq).
-#[inline]
-pub fn ke_from_kt<S: Scalar>(kt: S) -> S {
-    kt * SQRT_2_3
-}
-
-/// `Ke` (V s/rad, line-to-line rms) from `Kt` in N m per ampere *rms*.
-#[inline]
-pub fn ke_from_kt_per_rms<S: Scalar>(kt: S) -> S {
-    kt / SQRT_3
-}
-
-/// `Ke` (V s/rad, line-to-line rms) from the magnet flux linkage `psi_m` (Wb, peak): `sqrt(3/2) np psi_m`.
-#[inline]
-pub fn ke_from_psi_m<S: Scalar>(psi_m: S, np: PolePairs) -> S {
-    psi_m * (SQRT_3_2 * np.get())
-}
-
-/// Magnet flux linkage `psi_m` (Wb, peak) from `Ke`.
-#[inline]
-pub fn psi_m_from_ke<S: Scalar>(ke: S, np: PolePairs) -> S {
-    ke * SQRT_2_3 / np.get()
-}
-
-/// `Kt` (N m per ampere of peak iq) from `psi_m`: `3/2 np psi_m`.
-#[inline]
-pub fn kt_from_psi_m<S: Scalar>(psi_m: S, np: PolePairs) -> S {
-    psi_m * (1.5 * np.get())
-}
-
-/// `Ke` (V s/rad) from the data sheets' volts (line-to-line rms) per 1000 revolutions per minute.
-#[inline]
-pub fn ke_from_volts_per_krpm<S: Scalar>(volts: S) -> S {
-    volts * (60.0 / (2000.0 * PI))
-}
-
-/// Volts (line-to-line rms) per 1000 revolutions per minute from `Ke`.
-#[inline]
-pub fn volts_per_krpm_from_ke<S: Scalar>(ke: S) -> S {
-    ke * (2000.0 * PI / 60.0)
-}
-
-/// rad/s from revolutions per minute.
-#[inline]
-pub fn rad_per_s_from_rpm<S: Scalar>(rpm: S) -> S {
-    rpm * (PI / 30.0)
-}
-
-/// Revolutions per minute from rad/s.
-#[inline]
-pub fn rpm_from_rad_per_s<S: Scalar>(w: S) -> S {
-    w * (30.0 / PI)
 }
 
 /// A motor cable with copper conductors, one per phase.
@@ -166,13 +141,12 @@ mod tests {
         #[test]
         fn pairs_undo_each_other(x in 1e-6..1e6, count in 1u32..50) {
             let np = PolePairs::new(count).unwrap();
-            for back in [
-                phase_from_line(line_from_phase(x)), peak_from_rms(rms_from_peak(x)),
-                phase_peak_from_line_rms(line_rms_from_phase_peak(x)), phase_from_terminals(terminals_from_phase(x)),
-                ke_from_kt(kt_from_ke(x)), ke_from_kt_per_rms(kt_per_rms_from_ke(x)),
-                psi_m_from_ke(ke_from_psi_m(x, np), np), ke_from_volts_per_krpm(volts_per_krpm_from_ke(x)),
-                rpm_from_rad_per_s(rad_per_s_from_rpm(x)), np.mechanical(np.electrical(x)),
-            ] {
+            let amplitudes = [Amplitude::PhaseRms, Amplitude::LinePeak, Amplitude::LineRms];
+            let constants =
+                [Constant::TorquePerPeak, Constant::TorquePerRms, Constant::FluxLinkage(np), Constant::VoltsPerKrpm];
+            let amplitudes = amplitudes.map(|unit| unit.to_phase_peak(unit.from_phase_peak(x)));
+            let constants = constants.map(|unit| unit.to_ke(unit.from_ke(x)));
+            for back in amplitudes.into_iter().chain(constants).chain([np.mechanical(np.electrical(x))]) {
                 assert_relative_eq!(back, x, max_relative = 1e-15 * 4.0);
             }
         }
@@ -180,26 +154,34 @@ mod tests {
         // One chain of definitions: torque times speed is the power that the EMF takes from the phases.
         #[test]
         fn torque_constant_is_that_of_the_power(ke in 1e-3..10.0, w in -500.0..500.0, iq in -100.0..100.0) {
-            let emf = phase_peak_from_line_rms(ke) * w;
-            assert_relative_eq!(kt_from_ke(ke) * iq * w, 1.5 * emf * iq, max_relative = 1e-14);
-            let (iq_rms, emf_rms) = (rms_from_peak(iq), rms_from_peak(emf));
-            assert_relative_eq!(kt_per_rms_from_ke(ke) * iq_rms * w, 3.0 * emf_rms * iq_rms, max_relative = 1e-14);
+            let emf = Amplitude::LineRms.to_phase_peak(ke) * w;
+            assert_relative_eq!(Constant::TorquePerPeak.from_ke(ke) * iq * w, 1.5 * emf * iq, max_relative = 1e-14);
+            let (iq_rms, emf_rms) = (Amplitude::PhaseRms.from_phase_peak(iq), Amplitude::PhaseRms.from_phase_peak(emf));
+            assert_relative_eq!(Constant::TorquePerRms.from_ke(ke) * iq_rms * w, 3.0 * emf_rms * iq_rms, max_relative = 1e-14);
         }
 
         #[test]
         fn flux_emf_and_torque_agree(psi_m in 1e-4..2.0, count in 1u32..50) {
             let np = PolePairs::new(count).unwrap();
-            let ke = ke_from_psi_m(psi_m, np);
-            assert_relative_eq!(kt_from_ke(ke), kt_from_psi_m(psi_m, np), max_relative = 1e-14);
+            let ke = Constant::FluxLinkage(np).to_ke(psi_m);
+            // Torque per ampere of peak iq is 3/2 np psi_m.
+            let kt = Constant::TorquePerPeak.from_ke(ke);
+            assert_relative_eq!(kt, 1.5 * np.get() * psi_m, max_relative = 1e-14);
             // (3.7): peak phase EMF per mechanical rad/s is np psi_m.
-            assert_relative_eq!(phase_peak_from_line_rms(ke), np.get() * psi_m, max_relative = 1e-14);
+            assert_relative_eq!(Amplitude::LineRms.to_phase_peak(ke), np.get() * psi_m, max_relative = 1e-14);
         }
+    }
+
+    // 2000 pi / 60 = 104.7198.
+    #[test]
+    fn volts_per_thousand_revolutions() {
+        assert_relative_eq!(Constant::VoltsPerKrpm.from_ke(0.95), 99.4838, epsilon = 5e-5);
     }
 
     // The independent drive of the motulator records: np 3, 0.545 Wb.
     #[test]
     fn ke_of_a_known_motor() {
-        let ke = ke_from_psi_m(0.545, PolePairs::new(3).unwrap());
+        let ke = Constant::FluxLinkage(PolePairs::new(3).unwrap()).to_ke(0.545);
         assert_relative_eq!(ke, 2.002_46, epsilon = 5e-6);
     }
 

@@ -9,20 +9,20 @@ use crate::optimize::Infeasible;
 use crate::sweep::{Piece, Reached, RunError, Seed};
 use std::sync::Arc;
 
-/// Part of the squared errors that the correction of guessed borders may change before the slopes are computed anew.
+/// Part of the squared errors that the correction of guessed borders may change without the slopes being computed again.
 /// The corrected errors are exact; slopes with respect to parameters are off by as much, relatively, as the guesses
 /// are.
 const MOVED: f64 = 0.1;
 /// The same at the first point, where no slopes exist to extrapolate borders from: slopes are then right to the root of it,
 /// 1e-3, which leaves the first step of a search as it is.
 const MOVED_FIRST: f64 = 1e-6;
-/// Of a nonlinear model the correction is exact to the first order only: it is enough where it changes the squared errors by
-/// no more than this part of the difference of cost that the search has to judge,
+/// The correction for a nonlinear model is exact to the first order only. No further pass is made where it changes the squared
+/// errors by no more than this part of the difference from the best cost, which is what the search compares,
 const MOVED_NONLINEAR: f64 = 1e-6;
-/// or by no more than rounding.
+/// or by no more than this part of the cost, which is rounding.
 const MOVED_ROUNDING: f64 = 1e-15;
-/// So often corrected borders are simulated from anew, if each time the correction falls to this part; then they are
-/// simulated from the begin of the record.
+/// Most passes from corrected borders of a nonlinear model, and the part of the last correction to which each must reduce it.
+/// Where they do not suffice, the borders are simulated from the begin of the record.
 const REPAIRS: (usize, f64) = (2, 0.01);
 /// The first guess of a border is simulated from this many samples before it: in fast plants the effect of the state
 /// there has decayed by then.
@@ -30,12 +30,13 @@ const RUN_IN: usize = 128;
 
 /// The borders at a point, before it is evaluated.
 pub(super) enum Guess {
-    /// Simulated, or not needed.
+    /// No further pass is needed: simulated, or left by an earlier evaluation at this point; `None` where segments are not
+    /// chained.
     Right(Option<Borders>),
-    /// To be corrected, which is exact but for the slopes; those are computed anew where the correction changes more than this
-    /// part of the squared errors.
+    /// Guessed, for a model that is affine in its carry. The correction of the errors is exact; slopes are computed again where it
+    /// changes more than this part of the squared errors.
     Affine(Borders, f64),
-    /// To be corrected, which is exact to the first order; with the best cost so far.
+    /// Guessed, for a nonlinear model, with the best cost so far. The correction is exact to the first order.
     Nonlinear(Borders, f64),
 }
 
@@ -140,7 +141,7 @@ impl Objective<'_> {
             if found.moved <= (MOVED_NONLINEAR * difference).max(MOVED_ROUNDING * found.cost) {
                 return Ok(found);
             }
-            // A guess that changes the errors by more than they are is none.
+            // A correction that is larger than the errors themselves is of no use.
             let limit = last.map_or(found.cost, |last: f64| falls * last);
             match found.borders {
                 Some(corrected) if found.moved <= limit => borders = corrected,

@@ -54,7 +54,7 @@ fn cut(samples: usize, whole: bool) -> Vec<Range<usize>> {
         return std::iter::once(0..samples).collect();
     }
     let grains = samples.div_ceil(GRAIN);
-    // Rounded up: the last segment, which hands nothing on, is a shortest one.
+    // Rounded up: the last segment, from which nothing is carried on, is a shortest one.
     let begin = |s: usize| ((s * grains).div_ceil(segments) * GRAIN).min(samples);
     (0..segments).map(|s| begin(s)..begin(s + 1)).collect()
 }
@@ -74,7 +74,7 @@ pub(crate) struct Borders {
     pub cost: f64,
     pub values: Vec<Values>,
     pub of: Vec<Vec<Border>>,
-    /// Whether they are the simulated ones.
+    /// Whether they need no correction: simulated ones, and those of a point that was evaluated, corrected.
     pub right: bool,
 }
 

@@ -32,6 +32,10 @@ impl Assumption {
     }
 }
 
+/// Index (%) above which a parameter is hardly determined: a change by two fifths of its value does no more than double the
+/// squared residual.
+const WEAK: f64 = 40.0;
+
 /// The solution of a [`Regression`](super::Regression). It borrows nothing.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(bound(serialize = "Of<P, f64>: Serialize", deserialize = "Of<P, f64>: Deserialize<'de>"))]
@@ -89,6 +93,14 @@ impl<P: Signals> LinearEstimate<P> {
             let (center, half) = (center.as_ref()[i], quantile * error.as_ref()[i]);
             [center - half, center + half]
         })
+    }
+
+    /// Names of the parameters that the rows hardly determine, by an index above 40 %: what is left out of the equations may
+    /// move them far more than their standard errors say.
+    pub fn hardly_seen(&self) -> Vec<&'static str> {
+        let index = P::into_array(self.index);
+        let seen = |index: f64| index <= WEAK;
+        P::NAMES.iter().zip(index.as_ref()).filter(|(_, index)| !seen(**index)).map(|(name, _)| *name).collect()
     }
 }
 

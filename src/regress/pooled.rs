@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 /// are linear in the number of sets.
 ///
 /// ```
-/// use greybox::{Regression, signals, regress::PooledRegression};
+/// use greybox::{signals, regress::{PooledRegression, Regression}};
 /// signals! {
 ///     /// A straight line.
 ///     pub struct Line { slope: "V/s", offset: "V" }

@@ -64,7 +64,7 @@ pub enum TableError {
 /// At a point the slope is that of the interval above it, at the last that of the interval below.
 ///
 /// ```
-/// use greybox::{Dual, Extrapolation, Grid, Interpolation};
+/// use greybox::{Dual, scalar::{Extrapolation, Grid, Interpolation}};
 /// let flux = Grid::curve(&[0.0, 1.0, 3.0], &[0.0, 0.8, 1.2], Interpolation::Linear, Extrapolation::Hold).unwrap();
 /// let psi = flux.at(Dual::<1>::variable(2.0, 0));
 /// assert_eq!(psi.value, 1.0);

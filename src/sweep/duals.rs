@@ -66,12 +66,10 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
 
     fn run(&self, pieces: &[Piece<'_>], seeds: &[Seed], visit: Visit<'_>) -> Vec<Result<Reached, RunError>> {
         let one = |piece: &Piece<'_>| {
-            if self.predictor.is_simulation() {
-                return self.loops.run(&self.model, piece, seeds, None, visit);
-            }
-            match self.predictor.restarts() {
-                Some(horizon) => self.loops.run(&self.model, piece, seeds, Some(horizon.steps), visit),
-                None => self.filter().run(piece, seeds, visit),
+            let restart = self.predictor.restarts().map(|horizon| horizon.steps);
+            match restart.is_some() || self.predictor.is_simulation() {
+                true => self.loops.run(&self.model, piece, seeds, restart, visit),
+                false => self.filter().run(piece, seeds, visit),
             }
         };
         pieces.iter().map(one).collect()
@@ -112,7 +110,7 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
     }
 
     fn refined<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
-        let (loops, method) = self.loops.refined(M::KIND)?;
+        let (loops, method) = (self.loops.refined(M::KIND)?, self.method.refined(M::KIND)?);
         let (layout, model, predictor) = (self.layout.clone(), self.model.clone(), self.predictor.clone());
         let reason = self.reason.clone();
         Some(Arc::new(DualSweep { layout, model, loops, method, predictor, reason }))

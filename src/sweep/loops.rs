@@ -6,8 +6,8 @@
 
 use super::{Piece, Reached, RunError, Seed, Visit, Window};
 use crate::dual::Dual;
-use crate::fused::{Fused, has_wide};
-use crate::integrate::{Integrator, Method, ModelSystem, Stuck};
+use crate::fused::{Fused, Wide};
+use crate::integrate::{Integrator, ModelSystem, Stuck};
 use crate::interval::{Hold, Interval};
 use crate::lanes;
 use crate::layout::Kind;
@@ -25,10 +25,48 @@ const ADAPTIVE_WINDOW: usize = 8;
 /// Slopes below this are set to zero: their squares are denormal.
 const NEGLIGIBLE: f64 = 1e-150;
 
+/// The type of a slope.
+trait Slope: lanes::Number {
+    /// The instructions that loops over such numbers are compiled for.
+    type Unit: Unit;
+}
+
+/// The instructions that a loop is compiled for.
+trait Unit: Copy {
+    fn run<M: Model, I: Integrator, D: Number>(self, fill: Fill<'_, '_, M, I, D>) -> Result<(), RunError>;
+}
+
+/// Those that every machine has.
+#[derive(Clone, Copy)]
+struct Portable;
+
+impl Unit for Portable {
+    fn run<M: Model, I: Integrator, D: Number>(self, fill: Fill<'_, '_, M, I, D>) -> Result<(), RunError> {
+        M::fill(fill)
+    }
+}
+
+impl Unit for Wide {
+    fn run<M: Model, I: Integrator, D: Number>(self, fill: Fill<'_, '_, M, I, D>) -> Result<(), RunError> {
+        // SAFETY: the features were found on this machine, or there would be no `Wide`.
+        #[cfg(target_arch = "x86_64")]
+        return unsafe { M::fill_wide(fill) };
+        #[cfg(not(target_arch = "x86_64"))]
+        M::fill(fill)
+    }
+}
+
+impl Slope for f64 {
+    type Unit = Portable;
+}
+
+impl Slope for Fused {
+    type Unit = Wide;
+}
+
 /// A number with a fixed count of slopes.
 trait Number: Scalar {
-    /// The type of a slope.
-    type Slope: lanes::Number;
+    type Slope: Slope;
     const SLOPES: usize;
     fn with(value: f64, slope: impl Fn(usize) -> f64) -> Self;
     fn slope(&self, i: usize) -> f64;
@@ -52,7 +90,7 @@ impl Number for f64 {
     }
 }
 
-impl<const N: usize, T: Scalar + lanes::Number> Number for Dual<N, T> {
+impl<const N: usize, T: Scalar + Slope> Number for Dual<N, T> {
     type Slope = T;
     const SLOPES: usize = N;
     #[inline(always)]
@@ -115,8 +153,12 @@ impl<'p, M: Model> Rows<'p, M> {
     }
 }
 
+/// The instructions for numbers of a type.
+type UnitOf<D> = <<D as Number>::Slope as Slope>::Unit;
+
 /// States and parameters with a part of the slopes.
 struct Pass<M: Model, D: Number> {
+    unit: UnitOf<D>,
     x: Of<M::State, D>,
     start: Of<M::State, D>,
     p: Of<M::Parameters, D>,
@@ -126,7 +168,7 @@ struct Pass<M: Model, D: Number> {
 }
 
 impl<M: Model, D: Number> Pass<M, D> {
-    fn new(piece: &Piece<'_>, seeds: &[Seed], first: usize) -> Self {
+    fn new(unit: UnitOf<D>, piece: &Piece<'_>, seeds: &[Seed], first: usize) -> Self {
         let used = seeds.len().saturating_sub(first).min(D::SLOPES);
         let slope = |entry: usize, i: usize| {
             if i < used { piece.slopes[entry * seeds.len() + first + i] } else { 0.0 }
@@ -134,7 +176,33 @@ impl<M: Model, D: Number> Pass<M, D> {
         let moves = |j: usize, i: usize| i < used && seeds[first + i] == Seed::Parameter(j);
         let x = M::State::from_fn(|entry| D::with(piece.carry[entry], |i| slope(entry, i)));
         let p = M::Parameters::from_fn(|j| D::with(piece.parameters[j], |i| f64::from(u8::from(moves(j, i)))));
-        Pass { x, start: x, p, step: 0.0, first, used }
+        Pass { unit, x, start: x, p, step: 0.0, first, used }
+    }
+}
+
+/// A pass with the type of its numbers erased: what is around the loop over the samples is compiled once for all of them.
+trait AnyPass<M: Model, I> {
+    /// Runs the samples of a window.
+    fn fill(&mut self, task: &Task<'_, M, I>, rows: &Rows<'_, M>, window: &mut Window) -> Result<(), RunError>;
+    /// Writes the values of the state.
+    fn write_carry(&self, to: &mut [f64]);
+    /// Writes its slopes into rows of this length.
+    fn write_slopes(&self, to: &mut [f64], columns: usize);
+}
+
+impl<M: Model, I: Integrator, D: Number> AnyPass<M, I> for Pass<M, D> {
+    fn fill(&mut self, task: &Task<'_, M, I>, rows: &Rows<'_, M>, window: &mut Window) -> Result<(), RunError> {
+        self.unit.run(Fill { task, pass: self, rows, window })
+    }
+
+    fn write_carry(&self, to: &mut [f64]) {
+        to.iter_mut().zip(M::State::into_array(self.x)).for_each(|(to, x)| *to = x.value());
+    }
+
+    fn write_slopes(&self, to: &mut [f64], columns: usize) {
+        for (row, x) in to.chunks_exact_mut(columns).zip(M::State::into_array(self.x)) {
+            row[self.first..].iter_mut().take(self.used).enumerate().for_each(|(i, to)| *to = x.slope(i));
+        }
     }
 }
 
@@ -151,11 +219,8 @@ pub(crate) trait Loops<M: Model>: Send + Sync {
     ) -> Result<Reached, RunError>;
 
     /// The same with a finer step, if there is one.
-    fn refined(&self, kind: Kind) -> Option<Refined<M>>;
+    fn refined(&self, kind: Kind) -> Option<Arc<dyn Loops<M>>>;
 }
-
-/// A loop with a finer step, and its method.
-pub(crate) type Refined<M> = (Arc<dyn Loops<M>>, Arc<dyn Method>);
 
 impl<M: Model, I: Integrator> Loops<M> for I {
     fn run(
@@ -168,34 +233,34 @@ impl<M: Model, I: Integrator> Loops<M> for I {
     ) -> Result<Reached, RunError> {
         let task = Task { model, integrator: self, piece, seeds, restart };
         // The AVX-512 loop is compiled for the zero-order hold only, which nearly all records have.
-        let wide = has_wide() && piece.record.input_hold() == Hold::Zero;
+        let wide = if piece.record.input_hold() == Hold::Zero { Wide::detected() } else { None };
         // Debug builds compile fewer variants, to save compile time: same numbers, more passes.
         #[cfg(debug_assertions)]
-        return match (seeds.len(), wide) {
-            (0, _) => task.run_windows::<f64>(visit),
-            (_, false) => task.run_windows::<Dual<4>>(visit),
-            (_, true) => task.run_windows::<Dual<4, Fused>>(visit),
+        let passes = match (seeds.len(), wide) {
+            (0, _) => task.passes::<f64>(Portable),
+            (_, None) => task.passes::<Dual<4>>(Portable),
+            (_, Some(wide)) => task.passes::<Dual<4, Fused>>(wide),
         };
         #[cfg(not(debug_assertions))]
-        match (seeds.len(), wide) {
-            (0, _) => task.run_windows::<f64>(visit),
-            (1..=4, false) => task.run_windows::<Dual<4>>(visit),
-            (5 | 6 | 9..=12, false) => task.run_windows::<Dual<6>>(visit),
-            (_, false) => task.run_windows::<Dual<8>>(visit),
-            (1..=4, true) => task.run_windows::<Dual<4, Fused>>(visit),
-            (5 | 6 | 9..=12, true) => task.run_windows::<Dual<6, Fused>>(visit),
-            (_, true) => task.run_windows::<Dual<8, Fused>>(visit),
-        }
+        let passes = match (seeds.len(), wide) {
+            (0, _) => task.passes::<f64>(Portable),
+            (1..=4, None) => task.passes::<Dual<4>>(Portable),
+            (5 | 6 | 9..=12, None) => task.passes::<Dual<6>>(Portable),
+            (_, None) => task.passes::<Dual<8>>(Portable),
+            (1..=4, Some(wide)) => task.passes::<Dual<4, Fused>>(wide),
+            (5 | 6 | 9..=12, Some(wide)) => task.passes::<Dual<6, Fused>>(wide),
+            (_, Some(wide)) => task.passes::<Dual<8, Fused>>(wide),
+        };
+        task.run_windows(passes, visit)
     }
 
-    fn refined(&self, kind: Kind) -> Option<Refined<M>> {
-        let refined = Integrator::refined(self, kind)?;
-        Some((Arc::new(refined.clone()), Arc::new(refined)))
+    fn refined(&self, kind: Kind) -> Option<Arc<dyn Loops<M>>> {
+        Some(Arc::new(Integrator::refined(self, kind)?))
     }
 }
 
-/// An integrator whose loop is compiled in one variant only: for a method that few fits come to, compile time counts more
-/// than speed.
+/// An integrator whose loop is compiled for values and for four slopes only, portably: for a method that few fits use, compile
+/// time counts more than speed.
 pub(crate) struct Narrow<I>(pub I);
 
 impl<M: Model, I: Integrator> Loops<M> for Narrow<I> {
@@ -208,15 +273,15 @@ impl<M: Model, I: Integrator> Loops<M> for Narrow<I> {
         visit: Visit<'_>,
     ) -> Result<Reached, RunError> {
         let task = Task { model, integrator: &self.0, piece, seeds, restart };
-        match seeds.len() {
-            0 => task.run_windows::<f64>(visit),
-            _ => task.run_windows::<Dual<4>>(visit),
-        }
+        let passes = match seeds.len() {
+            0 => task.passes::<f64>(Portable),
+            _ => task.passes::<Dual<4>>(Portable),
+        };
+        task.run_windows(passes, visit)
     }
 
-    fn refined(&self, kind: Kind) -> Option<Refined<M>> {
-        let refined = Integrator::refined(&self.0, kind)?;
-        Some((Arc::new(Narrow(refined.clone())), Arc::new(refined)))
+    fn refined(&self, kind: Kind) -> Option<Arc<dyn Loops<M>>> {
+        Some(Arc::new(Narrow(Integrator::refined(&self.0, kind)?)))
     }
 }
 
@@ -229,13 +294,24 @@ struct Task<'t, M: Model, I> {
     restart: Option<usize>,
 }
 
+/// The passes of a piece.
+type Passes<'p, M, I> = Vec<Box<dyn AnyPass<M, I> + 'p>>;
+
 impl<M: Model, I: Integrator> Task<'_, M, I> {
-    fn run_windows<D: Number>(&self, visit: Visit<'_>) -> Result<Reached, RunError> {
-        let (piece, seeds) = (self.piece, self.seeds);
-        let count = seeds.len().div_ceil(D::SLOPES.max(1)).max(1);
-        let mut passes: Vec<Pass<M, D>> = (0..count).map(|i| Pass::new(piece, seeds, i * D::SLOPES)).collect();
+    fn passes<'p, D: Number + 'p>(&self, unit: UnitOf<D>) -> Passes<'p, M, I>
+    where
+        M: 'p,
+        UnitOf<D>: 'p,
+    {
+        let count = self.seeds.len().div_ceil(D::SLOPES.max(1)).max(1);
+        let pass = |i: usize| Pass::<M, D>::new(unit, self.piece, self.seeds, i * D::SLOPES);
+        (0..count).map(|i| Box::new(pass(i)) as Box<dyn AnyPass<M, I> + 'p>).collect()
+    }
+
+    fn run_windows(&self, mut passes: Passes<'_, M, I>, visit: Visit<'_>) -> Result<Reached, RunError> {
+        let (piece, columns) = (self.piece, self.seeds.len());
         let capacity = if I::FIXED { WINDOW } else { ADAPTIVE_WINDOW };
-        let mut window = Window::new(1, M::Output::LEN, seeds.len(), capacity, false);
+        let mut window = Window::new(1, M::Output::LEN, columns, capacity, false);
         window.carry = vec![0.0; M::State::LEN];
         let mut rows = Rows::<M>::new(piece.record);
         let mut begin = piece.samples.start;
@@ -243,26 +319,19 @@ impl<M: Model, I: Integrator> Task<'_, M, I> {
             let samples = capacity.min(piece.samples.end - begin);
             (window.begin[0], window.samples[0]) = (begin, samples);
             rows.read(begin, samples, self.restart.unwrap_or(0));
-            for (entry, x) in window.carry.iter_mut().zip(M::State::into_array(passes[0].x)) {
-                *entry = x.value();
-            }
+            passes[0].write_carry(&mut window.carry);
             for pass in &mut passes {
-                M::fill(Fill { task: self, pass, rows: &rows, window: &mut window })?;
+                pass.fill(self, &rows, &mut window)?;
             }
             if !visit(&mut window) {
                 return Err(RunError::Stopped);
             }
             begin += samples;
         }
-        let values = M::State::into_array(passes[0].x);
-        let mut reached = Reached { carry: values.into_iter().map(|x| x.value()).collect(), slopes: vec![] };
-        reached.slopes = vec![0.0; M::State::LEN * seeds.len()];
-        for pass in &passes {
-            for (entry, x) in M::State::into_array(pass.x).into_iter().enumerate() {
-                for i in 0..pass.used {
-                    reached.slopes[entry * seeds.len() + pass.first + i] = x.slope(i);
-                }
-            }
+        let mut reached = Reached { carry: vec![0.0; M::State::LEN], slopes: vec![0.0; M::State::LEN * columns] };
+        passes[0].write_carry(&mut reached.carry);
+        if columns > 0 {
+            passes.iter().for_each(|pass| pass.write_slopes(&mut reached.slopes, columns));
         }
         Ok(reached)
     }
@@ -286,11 +355,6 @@ trait Compiled<I, D: Number>: Model + Sized {
 
 impl<M: Model, I: Integrator, D: Number> Compiled<I, D> for M {
     fn fill(fill: Fill<'_, '_, M, I, D>) -> Result<(), RunError> {
-        #[cfg(target_arch = "x86_64")]
-        if <D::Slope as lanes::Number>::FUSED && has_wide() {
-            // SAFETY: the features were just found on this machine.
-            return unsafe { M::fill_wide(fill) };
-        }
         fill.run()
     }
 

@@ -4,7 +4,7 @@ use crate::random::Random;
 use crate::shared::shared;
 use greybox::diagnose::{End, identifiability, profile};
 use greybox::optimize::Severity;
-use greybox::{Butterworth, Horizon, zero_phase};
+use greybox::{Butterworth, Horizon, prefilter::zero_phase};
 use greybox::{Estimate, Experiment, Fit, Kind, Knowledge, Model, Nothing, Scalar, Time, fixed, free, signals};
 
 signals! { struct Drive { u: "V", w: "V" } }

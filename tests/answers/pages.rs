@@ -4,7 +4,7 @@ use crate::random::Random;
 use greybox::diagnose::residuals::examine;
 use greybox::diagnose::{Compared, Convergence, DataUse, Iteration, bands, profile};
 use greybox::optimize::Severity;
-use greybox::report::{Drawing, Layer, Plot, Section, Style, Timeline};
+use greybox::report::{Drawing, Layer, Plot, Section, Style};
 use greybox::{Error, Experiment, ExperimentOf, Fit, Model, Report, Scalar, Time, free, signals};
 
 signals! { pub struct Drive { u: "V" } }
@@ -65,9 +65,13 @@ fn plot<'a>(report: &'a Report, begin: &str) -> &'a Plot {
     report.plots().into_iter().find(|plot| plot.name.starts_with(begin)).unwrap()
 }
 
-fn timeline(plot: &Plot) -> &Timeline {
-    let Some(Drawing::Timeline(timeline)) = &plot.drawing else { panic!("no timeline: {}", plot.name) };
-    timeline
+macro_rules! timeline {
+    ($plot:expr) => {
+        match &$plot.drawing {
+            Some(Drawing::Timeline(timeline)) => timeline,
+            _ => panic!("no timeline: {}", $plot.name),
+        }
+    };
 }
 
 fn layers(plot: &Plot) -> &[Layer] {
@@ -139,7 +143,7 @@ fn time_counts_from_the_start() {
 #[test]
 fn samples_are_kept_for_zooming() {
     let report = report(&[record(even(5000), 0.01, 3)]).unwrap();
-    let timeline = timeline(plot(&report, "record"));
+    let timeline = timeline!(plot(&report, "record"));
     assert_eq!((timeline.stretches[0].samples_per_column, timeline.stretches[0].t.len()), (1, 5000));
     // Their drawing before anyone zooms has columns, and the page holds the samples as bytes: 4 for each value.
     let numbers = timeline.stretches[0].traces.len() * 5000;
@@ -299,7 +303,7 @@ fn what_was_missing_is_there() {
     let spectrum = plot(&report, "spectrum");
     let Layer::Line { points, .. } = &layers(spectrum)[1] else { panic!() };
     assert!(points.len() == 128 && points.iter().all(|(frequency, _)| (0.0..50.0).contains(frequency)));
-    let panels: Vec<&str> = timeline(plot(&report, "record")).panels.iter().map(|panel| panel.name.as_str()).collect();
+    let panels: Vec<&str> = timeline!(plot(&report, "record")).panels.iter().map(|panel| panel.name.as_str()).collect();
     assert_eq!(panels, ["y", "residual of y", "u"]);
     let parameters = section(&report, "parameters");
     let names: Vec<&str> = parameters.tables[0].rows.iter().map(|row| row[0].text()).collect();
@@ -336,7 +340,7 @@ fn models_are_compared_on_both_kinds_of_data() {
     let expected = good.predict(&Lag, &other).unwrap().quality.y.fit_percent.unwrap();
     assert!((table.rows[1][3].value().unwrap() - expected).abs() < 1e-9);
     assert!(table.rows[1][4].value().unwrap() < expected - 10.0);
-    assert_eq!(timeline(&section.plots[0]).panels[0].lines.len(), 3, "measured and two models");
+    assert_eq!(timeline!(&section.plots[0]).panels[0].lines.len(), 3, "measured and two models");
     let short = Compared::new(other.record(), DataUse::Validation).with("good", &good.predict(&Lag, &fitted).unwrap());
     assert!(matches!(short, Err(Error::Lengths { found: 500, expected: 300, .. })));
 }

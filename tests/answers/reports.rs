@@ -3,12 +3,23 @@
 use greybox::diagnose::{Resampling, Test, bootstrap, profile, tested};
 use greybox::optimize::Severity;
 use greybox::pmsm::{Surface, Winding};
-use greybox::report::{Cell, Drawing, Origin, Section, Table, Timeline};
+use greybox::report::{Cell, Drawing, Origin, Section, Table};
 use greybox::{
     Error, Experiment, ExperimentOf, Fit, Kind, Model, Nothing, Report, Scalar, Signals, Time, fixed, free, signals,
 };
 use std::fs;
 use std::path::PathBuf;
+
+/// The drawing of the first record.
+macro_rules! timeline {
+    ($report:expr) => {{
+        let drawn = $report.plots().into_iter().find_map(|plot| match &plot.drawing {
+            Some(Drawing::Timeline(timeline)) => Some(timeline),
+            _ => None,
+        });
+        drawn.unwrap()
+    }};
+}
 
 signals! {
     pub struct Drive { u: "V" }
@@ -265,7 +276,7 @@ fn missing_outputs_are_gaps() {
     let report = report(&record, line());
     let missing = report.sections.iter().find(|section| section.id == "data").unwrap();
     assert_eq!(missing.tables[0].rows[1][6].text(), "100");
-    let timeline = timeline(&report);
+    let timeline = timeline!(&report);
     // Of the lines prediction, confidence, measured, predicted, residual.
     let [_, _, measured, predicted, residual, _] = &timeline.stretches[0].traces[..] else { panic!("six lines") };
     assert!(measured.low[100..200].iter().all(Option::is_none) && residual.low[150].is_none());
@@ -274,15 +285,6 @@ fn missing_outputs_are_gaps() {
         // The scripts of the page ask for it.
         assert!(!form.replace("Number.isNaN", "").contains("NaN"));
     }
-}
-
-/// The drawing of the first record.
-fn timeline(report: &Report) -> &Timeline {
-    let drawn = report.plots().into_iter().find_map(|plot| match &plot.drawing {
-        Some(Drawing::Timeline(timeline)) => Some(timeline),
-        _ => None,
-    });
-    drawn.unwrap()
 }
 
 #[test]
@@ -362,7 +364,7 @@ fn a_long_record_makes_a_small_page() {
     outputs[7_654_321].y += 100.0;
     let record = Experiment::new(&Friction, long.times().clone(), long.inputs().collect(), outputs).unwrap();
     let report = report(&record, line());
-    let timeline = timeline(&report);
+    let timeline = timeline!(&report);
     let residual = &timeline.stretches[0].traces[4];
     let highest = residual.high.iter().flatten().copied().fold(0.0, f64::max);
     assert!((highest - 100.0).abs() < 0.1, "{highest}");

@@ -6,7 +6,12 @@ use crate::tables::Mapped;
 use greybox::engine::{Program, Sampling, Trajectories};
 use greybox::graph::{Graph, Id, Leaf, Seed};
 use greybox::pmsm::{Machine, Salient};
-use greybox::{Extrapolation, Hold, Interpolation, Model, Rk4, equations::Equations, recurrence::Recurrence};
+use greybox::{
+    Hold, Model, Rk4,
+    equations::Equations,
+    recurrence::Recurrence,
+    scalar::{Extrapolation, Interpolation},
+};
 use std::process::Command;
 
 /// A number made of all bits of all rows (FNV-1a); all numbers that are none count as one.

@@ -5,7 +5,7 @@
 
 use greybox::engine::{Program, Sampling, Trajectories};
 use greybox::graph::{Function, Function2, Graph, Id, Leaf, Node, Seed};
-use greybox::{Comparison, Dual, recurrence::Recurrence};
+use greybox::{Dual, recurrence::Recurrence, scalar::Comparison};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 

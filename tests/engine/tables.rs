@@ -2,7 +2,9 @@
 
 use crate::steps::agrees;
 use greybox::{
-    Dual, Extrapolation, Grid, Hold, Interpolation, Model, Rk4, Scalar, Table, TableError, equations::Equations,
+    Dual, Hold, Model, Rk4, Scalar, Table,
+    equations::Equations,
+    scalar::{Extrapolation, Grid, Interpolation, TableError},
     signals,
 };
 

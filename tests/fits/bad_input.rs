@@ -7,6 +7,10 @@ use approx::assert_relative_eq;
 use greybox::optimize::{GaussNewton, LevenbergMarquardt, Outcome, Severity, Stop};
 use greybox::optimize::{JacobianColumns, Scaling, Seen};
 use greybox::*;
+use greybox::{
+    loss::{Cauchy, SoftL1, Tukey},
+    weighting::{BySignal, WeightFunction},
+};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;

@@ -6,6 +6,7 @@ use argmin::core::{CostFunction, Gradient, Hessian, Jacobian, Operator};
 use greybox::information::Covariance;
 use greybox::prefilter::FilterState;
 use greybox::*;
+use greybox::{estimate::Unknown, loss::SoftL1, regress::Regression};
 use nalgebra::{DMatrix, DVector};
 
 #[track_caller]

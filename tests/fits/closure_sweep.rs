@@ -3,6 +3,7 @@
 
 use approx::assert_relative_eq;
 use greybox::diagnose::{identifiability, profile};
+use greybox::layout::{Layout, Quantity};
 use greybox::optimize::Severity;
 use greybox::problem::Settings;
 use greybox::record::{Channel, Initial, Record};

@@ -4,6 +4,7 @@
 use crate::common::Noise;
 use argmin::core::{CostFunction, Gradient};
 use core::f64::consts::TAU;
+use greybox::estimate::NoiseModel;
 use greybox::optimize::JacobianColumns;
 use greybox::optimize::{LevenbergMarquardt, Stop};
 use greybox::*;

@@ -2,6 +2,7 @@
 //! The noise that a fit reports, and what autocorrelated noise does to the standard errors.
 
 use crate::common::*;
+use greybox::estimate::{CovarianceMethod, Unknown};
 use greybox::*;
 
 const STEP: f64 = 5e-3;

@@ -2,6 +2,7 @@
 //! Covariances that allow for weights, losses, correlated outputs and autocorrelated errors, of one unknown by hand.
 
 use crate::common::*;
+use greybox::estimate::CovarianceMethod;
 use greybox::*;
 
 signals! { struct Factor { a: "1" } }

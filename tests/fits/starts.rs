@@ -1,6 +1,7 @@
 //! Fits from several starts: which minima they report, and that the answer is the same however they are run.
 
 use approx::assert_relative_eq;
+use greybox::estimate::FailedStart;
 use greybox::optimize::Severity;
 use greybox::*;
 use std::sync::Arc;

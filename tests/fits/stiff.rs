@@ -172,7 +172,7 @@ impl Model for Stray {
 /// Runge-Kutta's method with one step per sample makes the stray current grow by 1.4 in each: the search is led to a resistance of
 /// zero, where it has no effect, which is no minimum of what a finer step makes of the model.
 #[test]
-fn a_step_beyond_its_limit_does_not_lead_astray() {
+fn a_search_that_fails_by_its_step_is_repeated_with_a_finer_one() {
     let input: Vec<Volt> = (0..300).map(|k| Volt { u: if k % 18 < 9 { 1.0 } else { -0.4 } }).collect();
     let (truth, time) = (Coil { r: 0.7, l: 5e-3 }, Time::Uniform { start: 0.0, step: 1e-3 });
     let run = Simulator::new(&Stray).integrator(EXACT).run(&truth, &Currents::default(), time, &input).unwrap();

@@ -7,8 +7,9 @@ use greybox::diagnose::{Resampling, bootstrap, profile, validate};
 use greybox::optimize::{GaussNewton, LevenbergMarquardt, Outcome, Severity, Stop};
 use greybox::pmsm::Surface;
 use greybox::{
-    Automatic, Butterworth, Cauchy, Error, Esdirk, Estimate, ExperimentOf, Fit, Fleet, Horizon, Huber, Kind, Knowledge,
-    Model, Problem, Report, Rk4, Rk45, Sample, Signals, SoftL1, Summary, Tukey,
+    Automatic, Butterworth, Error, Esdirk, Estimate, ExperimentOf, Fit, Fleet, Horizon, Huber, Kind, Knowledge, Model,
+    Problem, Report, Rk4, Rk45, Sample, Signals, Summary,
+    loss::{Cauchy, SoftL1, Tukey},
     optimize::{JacobianColumns, OwnSize},
 };
 use std::time::Duration;

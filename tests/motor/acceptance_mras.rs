@@ -8,7 +8,6 @@
 use crate::acceptance_records::{Record, cycles, percent, record};
 use greybox::online::{AdaptationLaw, MrasStart, Order, Stepping, Watch};
 use greybox::pmsm::drive::{Disturbance, Simulation};
-use greybox::pmsm::offline::extended;
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::{RobotAxis, TS};
 use greybox::pmsm::{
@@ -71,7 +70,7 @@ fn each_improvement_of_the_observer_counts() {
         let record = cycles(number);
         let axis = &record.axis;
         let total = (axis.rs + axis.r_cable, axis.ls);
-        let lq = extended(&record.spans, 0.15).prefiltered(&filter).solve().unwrap().parameters.lq;
+        let lq = record.spans.extended(0.15).prefiltered(&filter).solve().unwrap().parameters.lq;
         let zone = only(DeadZone { law: normalized(1e-5), speed: 20.0 });
         let found = [
             rms(record, (axis.rs, axis.ls), 0.0, STILL, only(lyapunov(1e-5))),

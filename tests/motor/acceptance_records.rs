@@ -4,14 +4,14 @@
 
 use greybox::online::{Ekf, EkfStart, UpdateOutcome, Watch};
 use greybox::pmsm::drive::{Log, Simulation};
-use greybox::pmsm::offline::{Axes, Form, Spans, extended, hardly_seen, plain, search_i0};
+use greybox::pmsm::offline::{Axes, Form, Spans, search_i0};
 use greybox::pmsm::program::{Cycle, Program};
 use greybox::pmsm::robot::{RobotAxis, TS};
 use greybox::pmsm::{
     AngledDrive, Compensated, CompensatedWinding, Currents, ExactStep, ExactSurface, HeldIn, InverterFed,
     InverterFedWinding, Winding,
 };
-use greybox::{Butterworth, Fit, Hold, LinearEstimate, fixed, free};
+use greybox::{Butterworth, Fit, Hold, fixed, free, regress::LinearEstimate};
 use std::sync::OnceLock;
 
 pub struct Record {
@@ -42,7 +42,7 @@ pub fn filter() -> Butterworth {
 }
 
 fn ls(spans: &Spans, form: Form) -> LinearEstimate<Winding> {
-    plain(spans, Axes::Both, form).prefiltered(&filter()).solve().unwrap()
+    spans.plain(Axes::Both, form).prefiltered(&filter()).solve().unwrap()
 }
 
 /// Step through what a test is to look at: one in release, `n` in a debug build.
@@ -125,7 +125,7 @@ fn the_index_ranks_ke_best_everywhere() {
 fn water_cutting_least_squares_and_weighted() {
     let axis = RobotAxis::reference(1).unwrap();
     let record = record(Simulation::new(axis).unwrap(), Program::water_cutting(&axis, 4).unwrap());
-    let equations = plain(&record.spans, Axes::Both, Form::Rotor).prefiltered(&filter());
+    let equations = record.spans.plain(Axes::Both, Form::Rotor).prefiltered(&filter());
     let weighted = equations.clone().weighted(|k| (record.spans.spans[k].w / 100.0).powi(2));
     let ke = percent(equations.solve().unwrap().parameters.ke, axis.ke);
     let by_speed = percent(weighted.solve().unwrap().parameters.ke, axis.ke);
@@ -142,7 +142,7 @@ fn extended_least_squares_at_every_speed() {
         let mut worst = Worst([0.0; 2]);
         for cycle in cycles.iter().step_by(every(6)) {
             let spans = spans.cut(cycle.samples.clone());
-            let equations = |i0| extended(&spans, i0).prefiltered(&filter());
+            let equations = |i0| spans.extended(i0).prefiltered(&filter());
             let i0 = search_i0(0.03, 1.0, |i0| equations(i0).least_squares()).unwrap();
             let found = equations(i0).solve().unwrap();
             let p = found.parameters;
@@ -150,7 +150,7 @@ fn extended_least_squares_at_every_speed() {
             assert!(ke.abs() < 0.1 && r.abs() < 1.0, "axis {number}, {}: Ke {ke} %, R {r} %", cycle.speed);
             // Without d current to speak of, Ld is hardly seen, and that is said; where it is seen after all (the slowest
             // cycles of the axes with gravity) it is right. Ke is seen everywhere.
-            let (weak, ld) = (hardly_seen(&found), percent(p.ld, 0.96 * axis.ls));
+            let (weak, ld) = (found.hardly_seen(), percent(p.ld, 0.96 * axis.ls));
             assert!(weak.contains(&"ld") || ld.abs() < 5.0, "axis {number}, {}: Ld {ld} %", cycle.speed);
             assert!(!weak.contains(&"ke"), "axis {number}, {}: {weak:?}", cycle.speed);
             worst.see([ke, r]);
@@ -166,7 +166,7 @@ fn without_d_current_ld_is_not_identifiable() {
     for span in &mut spans.spans {
         (span.i0.id, span.i1.id) = (0.0, 0.0);
     }
-    let error = extended(&spans, 0.15).prefiltered(&filter()).solve().unwrap_err().to_string();
+    let error = spans.extended(0.15).prefiltered(&filter()).solve().unwrap_err().to_string();
     assert!(error.contains("`ld`") && error.contains("not identifiable"), "{error}");
 }
 

@@ -5,7 +5,7 @@
 //! resistance, inductances and harmonic do not change from cycle to cycle.
 
 use crate::acceptance_records::{Worst, cycles, every, filter, percent};
-use greybox::pmsm::offline::{Equations, Extended, Spans, extended, search_i0};
+use greybox::pmsm::offline::{Equations, Extended, Spans, search_i0};
 use greybox::pmsm::program::Cycle;
 use greybox::pmsm::robot::TS;
 use greybox::pmsm::{Compensated, CompensatedSalientWinding, EmfHarmonic, ExactSalient, ExactStep, HeldIn};
@@ -24,7 +24,7 @@ struct CycleSpans {
 
 impl CycleSpans {
     fn equations(&self, i0: f64) -> Equations<Extended> {
-        extended(&self.spans, i0).prefiltered(&filter())
+        self.spans.extended(i0).prefiltered(&filter())
     }
 }
 

@@ -2,7 +2,7 @@
 #![cfg(feature = "csv")]
 
 use crate::shared::shared;
-use greybox::pmsm::offline::{Axes, Form, Spans, Speed, extended, plain, search_i0};
+use greybox::pmsm::offline::{Axes, Form, Spans, Speed, search_i0};
 use greybox::pmsm::{Compensated, CompensatedWinding, ExactStep, ExactSurface, HeldIn, PolePairs, Surface, Winding};
 use greybox::{CsvFile, Fit, fixed, free};
 
@@ -32,17 +32,17 @@ fn assert_within(name: &str, found: Winding, most: f64) {
 fn plain_least_squares_within_two_hundredths_of_a_percent() {
     for (name, spans) in records() {
         for form in [Form::Rotor, Form::Sinc, Form::Stationary] {
-            assert_within(name, plain(&spans, Axes::Both, form).solve().unwrap().parameters, 0.02);
+            assert_within(name, spans.plain(Axes::Both, form).solve().unwrap().parameters, 0.02);
         }
-        assert_within(name, plain(&spans, Axes::Q, Form::Stationary).solve().unwrap().parameters, 0.02);
+        assert_within(name, spans.plain(Axes::Q, Form::Stationary).solve().unwrap().parameters, 0.02);
     }
 }
 
 #[test]
 fn extended_least_squares_within_a_tenth_of_a_percent() {
     for (name, spans) in records() {
-        let i0 = search_i0(0.03, 1.0, |i0| extended(&spans, i0).least_squares()).unwrap();
-        let p = extended(&spans, i0).solve().unwrap().parameters;
+        let i0 = search_i0(0.03, 1.0, |i0| spans.extended(i0).least_squares()).unwrap();
+        let p = spans.extended(i0).solve().unwrap().parameters;
         for ls in [p.ld, p.lq] {
             assert_within(name, Winding { rs: p.r, ls, ke: p.ke }, 0.1);
         }

@@ -1,15 +1,17 @@
 //! Offline methods beyond the plain regression, on records of the simulated robot.
 
 use greybox::pmsm::drive::{Disturbance, Log, Row, Simulation};
-use greybox::pmsm::frames::rotate_out_of;
-use greybox::pmsm::offline::{Axes, Form, Spans, extended, hardly_seen, mechanics, plain};
+use greybox::pmsm::offline::{Axes, Form, Spans};
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::{RobotAxis, TS};
 use greybox::pmsm::{
     AngledDrive, Cabled, Currents, Injection, InverterFed, Mechanics, Misaligned, Salient, Shaft, ShaftMotion, Surface,
     Torque, Winding,
 };
-use greybox::{Butterworth, BySignal, Experiment, Fit, Horizon, Time, WeightFunction, fixed, free, hampel, signals};
+use greybox::{
+    Butterworth, Experiment, Fit, Horizon, Time, fixed, free, hampel, signals,
+    weighting::{BySignal, WeightFunction},
+};
 
 signals! {
     /// A salient motor behind cable and inverter, and how its record is aligned.
@@ -46,7 +48,8 @@ fn alignment_delay_and_angle_offset_are_found_together() {
             let we = axis.pole_pairs.electrical(span.w);
             let x = 0.5 * we * TS;
             let sinc = if x == 0.0 { 1.0 } else { x.sin() / x };
-            let (ud, uq) = rotate_out_of((span.ud / sinc, span.uq / sinc), we * tau);
+            let (d, q, (sin, cos)) = (span.ud / sinc, span.uq / sinc, (we * tau).sin_cos());
+            let (ud, uq) = (d * cos - q * sin, q * cos + d * sin);
             (AngledDrive { ud, uq, w: span.w, theta: span.theta }, span.i0)
         })
         .unzip();
@@ -80,7 +83,7 @@ fn inertia_friction_and_gravity_by_regression_and_by_fit() {
     let shaft = Shaft::new(axis.gear).unwrap();
     let filter = Butterworth::low_pass(4, 10.0, TS).unwrap();
     let spans = Spans::from_log(&log, axis.pole_pairs);
-    let p = mechanics(&spans, &shaft, axis.ke).prefiltered(&filter).solve().unwrap().parameters;
+    let p = spans.mechanics(&shaft, axis.ke).prefiltered(&filter).solve().unwrap().parameters;
     let check = |j: f64, bv: f64, tc: f64, tg: f64, by: &str| {
         assert!(percent(j, axis.j).abs() < 1.0, "{by}: J {j}");
         // Viscous friction is 1.7 N m at the highest speed, next to 1.5 N m of Coulomb's.
@@ -124,7 +127,7 @@ fn outliers_are_taken_out_before_the_filter() {
     let filter = Butterworth::low_pass(4, 100.0, TS).unwrap();
     let ls = |log: &Log| {
         let spans = Spans::from_log(log, axis.pole_pairs);
-        plain(&spans, Axes::Both, Form::Sinc).prefiltered(&filter).solve().unwrap().parameters
+        spans.plain(Axes::Both, Form::Sinc).prefiltered(&filter).solve().unwrap().parameters
     };
     let clean = ls(&log);
     for k in (100..log.rows.len()).step_by(50) {
@@ -154,12 +157,12 @@ fn injected_d_current_makes_ld_visible() {
     let simulation = Simulation::new(axis).unwrap();
     let solve = |simulation| {
         let spans = Spans::from_log(&cycles(simulation, 4), axis.pole_pairs);
-        extended(&spans, 0.15).prefiltered(&filter).solve().unwrap()
+        spans.extended(0.15).prefiltered(&filter).solve().unwrap()
     };
     let without = solve(simulation);
-    assert!(hardly_seen(&without).contains(&"ld"));
+    assert!(without.hardly_seen().contains(&"ld"));
     let with = solve(simulation.injecting(Injection::new(-12.0, 0.1, 0.01, 0.5).unwrap()));
-    assert!(!hardly_seen(&with).contains(&"ld"), "{with}");
+    assert!(!with.hardly_seen().contains(&"ld"), "{with}");
     assert!(percent(with.parameters.ld, 0.96 * axis.ls).abs() < 1.0, "{with}");
     assert!(with.index.r < without.index.r, "{with}");
 }
@@ -192,13 +195,13 @@ fn bad_records_are_told() {
     // A cycle without motion says nothing of Ke.
     let mut still = spans.cut(0..2000);
     still.spans.iter_mut().for_each(|span| span.w = 0.0);
-    let error = plain(&still, Axes::Both, Form::Rotor).solve().unwrap_err().to_string();
+    let error = still.plain(Axes::Both, Form::Rotor).solve().unwrap_err().to_string();
     assert!(error.contains("`ke`"), "{error}");
     // Nor does one at rest whose resolver makes noise: Ke is hardly seen, and that is said.
-    let rest = plain(&spans.cut(0..1000), Axes::Both, Form::Rotor).solve().unwrap();
-    assert!(hardly_seen(&rest).contains(&"ke"), "{rest}");
+    let rest = spans.cut(0..1000).plain(Axes::Both, Form::Rotor).solve().unwrap();
+    assert!(rest.hardly_seen().contains(&"ke"), "{rest}");
     // An empty cut.
-    assert!(plain(&spans.cut(10..11), Axes::Both, Form::Rotor).solve().is_err());
+    assert!(spans.cut(10..11).plain(Axes::Both, Form::Rotor).solve().is_err());
     // A sensor that says NaN.
     let model = Surface::new(4).unwrap();
     let mut rows = log.clone();
@@ -229,7 +232,7 @@ fn any_sample_time_will_do() {
         assert_eq!((log.ts, log.voltage_limited), (ts, 0));
         let spans = Spans::from_log(&log, axis.pole_pairs);
         let filter = Butterworth::low_pass(4, 100.0, ts).unwrap();
-        let p = plain(&spans, Axes::Both, Form::Stationary).prefiltered(&filter).solve().unwrap().parameters;
+        let p = spans.plain(Axes::Both, Form::Stationary).prefiltered(&filter).solve().unwrap().parameters;
         let errors = [percent(p.rs, axis.rs), percent(p.ls, axis.ls), percent(p.ke, axis.ke)];
         println!("{ts} s: R, L, Ke off by {errors:.4?} %");
         assert!(

@@ -5,8 +5,8 @@ use greybox::Model;
 use greybox::check::derivatives;
 use greybox::online::{MrasStart, Order, Stepping, Watch};
 use greybox::pmsm::drive::{Disturbance, Simulation};
-use greybox::pmsm::frames::{Stator, rotate_out_of};
-use greybox::pmsm::offline::{Axes, Form, Spans, Validation, plain, voltages};
+use greybox::pmsm::frames::Stator;
+use greybox::pmsm::offline::{Axes, Form, Spans, Validation};
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::{RobotAxis, TS};
 use greybox::pmsm::*;
@@ -113,7 +113,8 @@ fn a_composed_model_is_the_simulated_axis() {
             theta: 0.37 * k,
         };
         let (ud, uq) = (20.0 * k.cos(), 250.0 * (0.3 * k).sin());
-        let (alpha, beta) = rotate_out_of((ud, uq), 4.0 * x.theta);
+        let (sin, cos) = (4.0 * x.theta).sin_cos();
+        let (alpha, beta) = (ud * cos - uq * sin, uq * cos + ud * sin);
         let truth = plant.derivative(&x, Stator { alpha, beta });
         let found = machine.derivative(0.0, &x, &VoltageAndLoad { ud, uq, tau_l: 0.0 }, &p);
         // Slopes of up to 1e5 A/s; the angle of 300 rad electrical costs two digits.
@@ -140,16 +141,16 @@ fn flux_linkage_may_be_given_and_found() {
     let record = run.with_noise(Currents { id: 0.05, iq: 0.05 }, 1).experiment(&surface).unwrap();
     let start = Winding { rs: free(0.5), ls: free(5e-3), ke: free(0.8) };
     let by_ke = Fit::new(&surface, &record).parameters(start).run().unwrap();
-    let np = surface.pole_pairs();
-    let start = FluxWinding { rs: free(0.5), ls: free(5e-3), psi_m: free(units::psi_m_from_ke(0.8, np)) };
+    let psi = units::Constant::FluxLinkage(surface.pole_pairs());
+    let start = FluxWinding { rs: free(0.5), ls: free(5e-3), psi_m: free(psi.from_ke(0.8)) };
     let model = FluxLinkage::<_, FluxWinding>::new(surface);
     let by_flux = Fit::new(&model, &record).parameters(start).run().unwrap();
     // Both searches stop within a thousandth of a standard error.
     let (psi_m, ke) = (by_flux.parameters.psi_m, by_ke.parameters.ke);
-    assert_relative_eq!(units::ke_from_psi_m(psi_m, np), ke, max_relative = 1e-7);
+    assert_relative_eq!(psi.to_ke(psi_m), ke, max_relative = 1e-7);
     let error = |known: &greybox::Knowledge| known.standard_error().unwrap();
     let (of_psi, of_ke) = (error(&by_flux.knowledge.psi_m), error(&by_ke.knowledge.ke));
-    assert_relative_eq!(units::ke_from_psi_m(of_psi, np), of_ke, max_relative = 1e-3);
+    assert_relative_eq!(psi.to_ke(of_psi), of_ke, max_relative = 1e-3);
 }
 
 // An observer that knows Ld and Lq has nothing left to adapt to on a salient motor, and finds Ke from 10 % below; one with a
@@ -199,10 +200,10 @@ fn validation_both_ways() {
     let axis = RobotAxis::reference(1).unwrap();
     let log = Simulation::new(axis).unwrap().undisturbed().run(&Program::speed_cycles(&axis, 3, 1.0).unwrap());
     let spans = Spans::from_log(&log, axis.pole_pairs);
-    let found = plain(&spans, Axes::Both, Form::Stationary).solve().unwrap().parameters;
+    let found = spans.plain(Axes::Both, Form::Stationary).solve().unwrap().parameters;
     let wrong = Winding { ke: 1.05 * found.ke, ..found };
 
-    let fit = |winding| Validation::of(voltages(&spans, &winding, Form::Stationary).into_iter()).fit;
+    let fit = |winding| Validation::of(spans.voltages(&winding, Form::Stationary).into_iter()).fit;
     assert!(fit(found).iter().all(|percent| *percent > 99.5), "{:?}", fit(found));
     assert!(fit(wrong)[1] < 97.0, "{:?}", fit(wrong));
 

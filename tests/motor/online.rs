@@ -4,7 +4,7 @@ use approx::assert_relative_eq;
 use greybox::nalgebra::{SMatrix, SVector};
 use greybox::online::{
     AdaptationLaw, Divergence, Ekf, EkfStart, Forgetting, Gradient, Moment, Mras, MrasStart, ObserverError, Order,
-    Rate, Rls, Stepping, UdFactors, UpdateOutcome, Watch,
+    Rate, Rls, Stepping, UpdateOutcome, Watch,
 };
 use greybox::pmsm::{
     AngledDrive, Currents, DirectCurrent, Drive, ExactStep, ExactSurface, HeldIn, Injection, InverterFed,
@@ -28,75 +28,6 @@ impl Noise {
             .sum::<f64>()
             - 6.0
     }
-}
-
-// Covariance: the factored form against the same formulas on dense matrices.
-
-proptest! {
-    #[test]
-    fn covariance_measures_and_predicts_as_the_dense_formulas(
-        d in prop::array::uniform4(0.01..10.0), f in prop::array::uniform8(-2.0..2.0), h in prop::array::uniform4(-2.0..2.0),
-        q in prop::array::uniform4(0.0..1.0), r in 0.01..5.0,
-    ) {
-        let mut factored = UdFactors::diagonal(d);
-        let mut p = SMatrix::<f64, 4, 4>::from_diagonal(&SVector::from(d));
-        let rows = [[f[0], f[1], f[2], f[3]], [f[4], f[5], f[6], f[7]]];
-        let mut big_f = SMatrix::<f64, 4, 4>::identity();
-        for i in 0..2 { for j in 0..4 { big_f[(i, j)] = rows[i][j]; } }
-        let hv = SVector::from(h);
-        for _ in 0..3 {
-            factored.predict(&rows, &q);
-            p = big_f * p * big_f.transpose() + SMatrix::from_diagonal(&SVector::from(q));
-            let gain = factored.absorb(&h, r);
-            let s = (hv.transpose() * p * hv)[0] + r;
-            let k = p * hv / s;
-            p -= k * k.transpose() * s;
-            assert_relative_eq!(gain.variance, s, max_relative = 1e-9);
-            assert_relative_eq!(SVector::from(gain.gain), k, epsilon = 1e-9, max_relative = 1e-9);
-            // Rounding of the dense form, which cancels, grows with the size of P.
-            assert_relative_eq!(factored.matrix(), p, epsilon = 1e-10 * (1.0 + p.norm()), max_relative = 1e-9);
-            for i in 0..4 {
-                assert_relative_eq!(factored.variance(i), factored.matrix()[(i, i)], max_relative = 1e-12);
-            }
-        }
-    }
-
-    #[test]
-    fn renewed_quantities_leave_the_others_alone(d in prop::array::uniform4(0.01..10.0), h in prop::array::uniform4(-2.0..2.0)) {
-        let mut p = UdFactors::diagonal(d);
-        p.absorb(&h, 0.1);
-        let before = p.matrix();
-        p.renew(&[7.0, 9.0]);
-        let after = p.matrix();
-        let expected = SMatrix::<f64, 2, 2>::from_diagonal(&SVector::from([7.0, 9.0]));
-        assert_relative_eq!(after.fixed_view::<2, 2>(0, 0).into_owned(), expected, epsilon = 1e-14);
-        assert_eq!(after.fixed_view::<2, 2>(2, 2), before.fixed_view::<2, 2>(2, 2));
-        assert_eq!(after.fixed_view::<2, 2>(0, 2).norm(), 0.0);
-    }
-}
-
-// A million exact measurements of one direction: the dense form P - K h^T P turns indefinite here.
-#[test]
-fn covariance_never_turns_negative() {
-    let mut p = UdFactors::diagonal([1e12, 1.0, 1e-12]);
-    for k in 0..1_000_000 {
-        let x = (k % 10) as f64 * 1e-7;
-        p.absorb(&[1.0, 1.0 + x, 1.0], 1e-10);
-        p.predict(&[], &[0.0, 1e-14, 0.0]);
-    }
-    for i in 0..3 {
-        let variance = p.variance(i);
-        assert!(variance > 0.0 && variance.is_finite(), "{variance}");
-    }
-}
-
-#[test]
-fn what_is_known_exactly_stays() {
-    let mut p = UdFactors::diagonal([4.0, 0.0]);
-    let gain = p.absorb(&[1.0, 1.0], 1.0);
-    assert_eq!((gain.gain, gain.variance), ([0.8, 0.0], 5.0));
-    p.predict(&[[1.0, 0.5]], &[0.0, 0.0]);
-    assert_eq!((p.variance(1), p.variance(2)), (0.0, 0.0));
 }
 
 // Recursive least squares.
@@ -130,7 +61,7 @@ fn rls_is_least_squares() {
     }
     let inverse = normal.try_inverse().unwrap();
     assert_relative_eq!(SVector::from(rls.parameters()), inverse * right, max_relative = 1e-11);
-    assert_relative_eq!(rls.covariance().matrix(), inverse, max_relative = 1e-11);
+    assert_relative_eq!(rls.covariance(), inverse, max_relative = 1e-11);
     assert_relative_eq!(rls.deviations().slope, inverse[(0, 0)].sqrt(), max_relative = 1e-11);
 }
 

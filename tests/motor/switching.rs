@@ -4,7 +4,7 @@ use crate::acceptance_records::percent;
 use greybox::Butterworth;
 use greybox::pmsm::drive::{Log, Simulation};
 use greybox::pmsm::inverter::Carrier;
-use greybox::pmsm::offline::{Axes, Form, Spans, extended, plain};
+use greybox::pmsm::offline::{Axes, Form, Spans};
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::{RobotAxis, TS, V_DC};
 
@@ -44,8 +44,8 @@ fn estimates_are_those_of_the_mean_voltage() {
     let filter = Butterworth::low_pass(4, 100.0, TS).unwrap();
     let estimates = |simulation| {
         let spans = Spans::from_log(&run(simulation), axis.pole_pairs);
-        let ls = plain(&spans, Axes::Both, Form::Sinc).prefiltered(&filter).solve().unwrap().parameters;
-        (ls, extended(&spans, 0.15).prefiltered(&filter).solve().unwrap().parameters)
+        let ls = spans.plain(Axes::Both, Form::Sinc).prefiltered(&filter).solve().unwrap().parameters;
+        (ls, spans.extended(0.15).prefiltered(&filter).solve().unwrap().parameters)
     };
     let (mean, mean_extended) = estimates(simulation);
     for carrier in CARRIERS {

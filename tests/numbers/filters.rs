@@ -1,6 +1,7 @@
 //! Butterworth filters against their defining equations, and zero-phase filtering against what it promises.
 
 use approx::assert_relative_eq;
+use greybox::prefilter::zero_phase;
 use greybox::prefilter::{FilterState, Pass};
 use greybox::*;
 use std::f64::consts::PI;

@@ -1,8 +1,8 @@
 #![cfg(feature = "std")]
 //! Linear least squares against certified numbers, identities, and the scatter of repeated experiments.
 use greybox::{
-    LinearEstimate, Regression, Signals,
-    regress::{Assumption, PooledRegression, RegressionError},
+    Signals,
+    regress::{Assumption, LinearEstimate, PooledRegression, Regression, RegressionError},
     signals,
 };
 

@@ -2,7 +2,9 @@
 
 use crate::refused::says;
 use approx::assert_relative_eq;
-use greybox::{Error, Experiment, ExperimentOf, Gap, Hold, Initial, Model, Sample, Scalar, Time, fixed, free, signals};
+use greybox::{
+    Error, Experiment, ExperimentOf, Hold, Initial, Model, Sample, Scalar, Time, fixed, free, record::Gap, signals,
+};
 
 signals! {
     pub struct Level { x: "m" }

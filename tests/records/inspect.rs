@@ -1,6 +1,10 @@
 //! What the columns of a record show before any model.
 
-use greybox::{Experiment, Gap, Inspection, Kind, Model, Nothing, Scalar, Suspicion, Time, signals};
+use greybox::{
+    Experiment, Kind, Model, Nothing, Scalar, Time,
+    record::{Gap, Inspection, Suspicion},
+    signals,
+};
 
 signals! { pub struct Drive { u: "V" } }
 signals! { pub struct Sensor { y: "V" } }

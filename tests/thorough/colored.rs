@@ -3,7 +3,8 @@
 
 use crate::random::Random;
 use greybox::{
-    CovarianceMethod, Experiment, Fit, Knowledge, Model, Scalar, Signals, Time, fixed, free, signals, simulate,
+    Experiment, Fit, Knowledge, Model, Scalar, Signals, Time, estimate::CovarianceMethod, fixed, free, signals,
+    simulate,
 };
 
 signals! { struct Motion { q: "m", v: "m/s" } }

@@ -91,7 +91,8 @@ fn examine(case: &Case, records: u64, seed: u64) -> Findings {
         unknown.knowledge.standard_error().map_or(0.0, |error| (unknown.value - trial.truth[i]) / error)
     };
     let bias = |i: usize| trials.iter().map(|trial| error(trial, i)).sum::<f64>() / trials.len() as f64;
-    let is_hac = |trial: &&Trial| matches!(trial.summary.method.covariance, greybox::CovarianceMethod::Hac { .. });
+    let is_hac =
+        |trial: &&Trial| matches!(trial.summary.method.covariance, greybox::estimate::CovarianceMethod::Hac { .. });
     Findings {
         name: case.name,
         wanted: case.wanted,

@@ -3,7 +3,9 @@
 use crate::common::{Branch, Current, Lag, Voltage};
 use crate::random::Random;
 use greybox::diagnose::{Resampling, bands, bootstrap};
-use greybox::{Butterworth, CovarianceMethod, Estimate, Experiment, Fit, Knowledge, Sample, Signals, Time, free};
+use greybox::{
+    Butterworth, Estimate, Experiment, Fit, Knowledge, Sample, Signals, Time, estimate::CovarianceMethod, free,
+};
 
 const TRUTH: Branch = Branch { gain: 2.0, tau: 0.05 };
 const STEP: f64 = 0.01;

@@ -4,7 +4,7 @@
 use crate::random::Random;
 use greybox::Butterworth;
 use greybox::pmsm::drive::Simulation;
-use greybox::pmsm::offline::{Extended, Spans, extended, search_i0};
+use greybox::pmsm::offline::{Extended, Spans, search_i0};
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::temperature::{Celsius, Estimated, winding_rise};
@@ -14,8 +14,8 @@ fn resistance(axis: &RobotAxis, simulation: Simulation) -> Estimated {
     let program = Program::speed_cycles(axis, 8, 1.0).unwrap();
     let spans = Spans::from_log(&simulation.run(&program), axis.pole_pairs);
     let filter = Butterworth::low_pass(4, 100.0, spans.ts).unwrap();
-    let i0 = search_i0(0.03, 1.0, |i0| extended(&spans, i0).prefiltered(&filter).least_squares()).unwrap();
-    let found = extended(&spans, i0).prefiltered(&filter).solve().unwrap();
+    let i0 = search_i0(0.03, 1.0, |i0| spans.extended(i0).prefiltered(&filter).least_squares()).unwrap();
+    let found = spans.extended(i0).prefiltered(&filter).solve().unwrap();
     let (p, s): (Extended, Extended) = (found.parameters, found.standard_errors);
     Estimated { value: p.r, std: s.r }
 }

@@ -3,7 +3,7 @@
 use crate::plants::*;
 use greybox::optimize::Severity;
 use greybox::{
-    Experiment, ExperimentOf, Fit, Knowledge, Report, Signals, Summary, Time, Tukey, WarningCode, fixed, free,
+    Experiment, ExperimentOf, Fit, Knowledge, Report, Signals, Summary, Time, WarningCode, fixed, free, loss::Tukey,
 };
 
 fn record() -> ExperimentOf<FirstOrder> {

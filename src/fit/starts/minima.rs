@@ -151,7 +151,7 @@ fn kinds<'e>(comparison: &Comparison, ends: impl Iterator<Item = (usize, &'e End
             None => kinds.push(Kind { searches: vec![i], first: end, undetermined: in_null_directions(&end.linear) }),
         }
     }
-    // A minimum is reported by the end of its first start: the declared one's, where that led to it.
+    // The end reported for a minimum is that of its lowest numbered start, so that of the declared start where it ended there.
     kinds.iter_mut().for_each(|kind| kind.searches.sort_unstable());
     kinds
 }

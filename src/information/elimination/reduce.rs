@@ -118,7 +118,7 @@ impl Elimination {
 
     /// The minimizer, counted from the origin.
     pub(super) fn solve(&self, terms: Terms<'_>) -> Option<Vec<f64>> {
-        if let Some(alone) = self.alone(terms) {
+        if let Some(alone) = self.single_piece(terms) {
             let mut step = vec![0.0; self.unknowns()];
             alone.is_determined(&self.norms, terms.damping).then(|| alone.substitute(&mut step))?;
             return step.iter().all(|d| d.is_finite()).then_some(step);
@@ -131,8 +131,8 @@ impl Elimination {
         step.iter().all(|d| d.is_finite()).then_some(step)
     }
 
-    /// The damped triangle of all unknowns, where there is one piece alone, none of them is held, and no pivot is rounding.
-    fn alone(&self, terms: Terms<'_>) -> Option<Reduced<'_>> {
+    /// The damped triangle of all unknowns; `None` where there is more than one piece, an unknown is held, or a pivot is rounding.
+    fn single_piece(&self, terms: Terms<'_>) -> Option<Reduced<'_>> {
         let [piece] = self.pieces.as_slice() else { return None };
         let (triangle, n) = (&piece.triangle, piece.columns.len());
         let free = |&i: &usize| !terms.holds(i) && entry(terms.origin, i) == 0.0;

@@ -296,7 +296,11 @@ mod tests {
             let (expected, left) = if best == 0 { (vec![], 1.0) } else { solved(best) };
             assert_eq!(found.coefficients.len(), best, "{seed}");
             assert!(found.coefficients.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-10), "{seed}");
-            assert!((found.fresh - (sums.sums()[0] / 300.0 * left).sqrt()).abs() < 1e-10, "{seed}: {}", found.fresh);
+            assert!(
+                (found.innovation - (sums.sums()[0] / 300.0 * left).sqrt()).abs() < 1e-10,
+                "{seed}: {}",
+                found.innovation
+            );
             orders.push(best);
         }
         assert!(orders.contains(&0) && orders.contains(&3), "{orders:?}");

@@ -103,15 +103,3 @@ impl<P: Signals> Equations<P> {
         self.streams.iter().map(|stream| stream.rows.iter().map(|(phi, y)| (*y, dot(phi))).collect()).collect()
     }
 }
-
-/// Index (%) above which a parameter counts as hardly seen: a change by two fifths of its value does no more than double
-/// the squared residual.
-const WEAK: f64 = 40.0;
-
-/// Names of the parameters that the equations hardly see, by an index above 40 %: what is left out of the equations may move them far
-/// more than their standard errors say.
-pub fn hardly_seen<P: Signals>(estimate: &LinearEstimate<P>) -> Vec<&'static str> {
-    let index = P::into_array(estimate.index);
-    let seen = |index: f64| index <= WEAK;
-    P::NAMES.iter().zip(index.as_ref()).filter(|(_, index)| !seen(**index)).map(|(name, _)| *name).collect()
-}

@@ -25,37 +25,39 @@ crate::signals! {
     }
 }
 
-/// The voltage equations with unequal inductances, saturation, dead time and a harmonic of the back-EMF, of the voltage
-/// over `sinc(we Ts/2)`.
-///
-/// The dead time's voltage, the Park transform of `tanh(i_abc/i0)`, is taken at the angle of mid-interval and the mean
-/// current; `i0` (A) enters it nonlinearly, see [`search_i0`]. The harmonic is that of mid-interval times
-/// `sinc(3 we Ts)`, its mean; the angle must be that of the magnet.
-///
-/// The resistance and the harmonic are the same in all cycles of a motor: solved together by [`PooledRegression`], with
-/// the other parameters for each cycle, they are determined by the fast cycles, and known in the slow ones, which do not determine them.
-///
-/// [`PooledRegression`]: crate::regress::PooledRegression
-pub fn extended(spans: &Spans, i0: f64) -> Equations<Extended> {
-    let (q, d): (Vec<_>, Vec<_>) = spans
-        .spans
-        .iter()
-        .map(|span| {
-            let we = spans.pole_pairs.electrical(span.w);
-            let i = span.mean();
-            let (did, diq) = ((span.i1.id - span.i0.id) / spans.ts, (span.i1.iq - span.i0.iq) / spans.ts);
-            let theta_e = spans.pole_pairs.electrical(span.theta);
-            let lost = dead_time(&i, i0, theta_e);
-            let whole = sinc(0.5 * we * spans.ts);
-            let (lq, square) = (-we * i.iq, i.iq * i.iq);
-            let emf = SQRT_2_3 * span.w;
-            let ke6 = emf * (6.0 * theta_e).cos() * sinc(3.0 * we * spans.ts);
-            let q = Extended { r: i.iq, ld: we * i.id, lq: diq, lq2: square * diq, ke: emf, ke6, vdt: lost.1 };
-            let d = Extended { r: i.id, ld: did, lq, lq2: square * lq, ke: 0.0, ke6: 0.0, vdt: lost.0 };
-            ((q, span.uq / whole), (d, span.ud / whole))
-        })
-        .unzip();
-    Equations::new().stream(q).stream(d)
+impl Spans {
+    /// The voltage equations with unequal inductances, saturation, dead time and a harmonic of the back-EMF, of the voltage
+    /// over `sinc(we Ts/2)`.
+    ///
+    /// The dead time's voltage, the Park transform of `tanh(i_abc/i0)`, is taken at the angle of mid-interval and the mean
+    /// current; `i0` (A) enters it nonlinearly, see [`search_i0`]. The harmonic is that of mid-interval times
+    /// `sinc(3 we Ts)`, its mean; the angle must be that of the magnet.
+    ///
+    /// The resistance and the harmonic are the same in all cycles of a motor: solved together by [`PooledRegression`], with
+    /// the other parameters for each cycle, they are determined by the fast cycles, and known in the slow ones, which do not determine them.
+    ///
+    /// [`PooledRegression`]: crate::regress::PooledRegression
+    pub fn extended(&self, i0: f64) -> Equations<Extended> {
+        let (q, d): (Vec<_>, Vec<_>) = self
+            .spans
+            .iter()
+            .map(|span| {
+                let we = self.pole_pairs.electrical(span.w);
+                let i = span.mean();
+                let (did, diq) = ((span.i1.id - span.i0.id) / self.ts, (span.i1.iq - span.i0.iq) / self.ts);
+                let theta_e = self.pole_pairs.electrical(span.theta);
+                let lost = dead_time(&i, i0, theta_e);
+                let whole = sinc(0.5 * we * self.ts);
+                let (lq, square) = (-we * i.iq, i.iq * i.iq);
+                let emf = SQRT_2_3 * span.w;
+                let ke6 = emf * (6.0 * theta_e).cos() * sinc(3.0 * we * self.ts);
+                let q = Extended { r: i.iq, ld: we * i.id, lq: diq, lq2: square * diq, ke: emf, ke6, vdt: lost.1 };
+                let d = Extended { r: i.id, ld: did, lq, lq2: square * lq, ke: 0.0, ke6: 0.0, vdt: lost.0 };
+                ((q, span.uq / whole), (d, span.ud / whole))
+            })
+            .unzip();
+        Equations::new().stream(q).stream(d)
+    }
 }
 
 struct OverI0<F>(F);
@@ -73,7 +75,7 @@ impl<F: Fn(f64) -> f64> CostFunction for OverI0<F> {
 /// 0.1 % of Ke at 15 rad/s on a small axis.
 ///
 /// The cost is the least squared residual of the equations for a given `i0`, such as
-/// `|i0| extended(&spans, i0).prefiltered(&filter).least_squares()`.
+/// `|i0| spans.extended(i0).prefiltered(&filter).least_squares()`.
 ///
 /// # Errors
 /// Limits that are not positive or not in order.

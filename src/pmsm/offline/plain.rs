@@ -30,13 +30,15 @@ pub(super) fn sinc(x: f64) -> f64 {
     if x.abs() < 1e-4 { 1.0 - x * x / 6.0 } else { x.sin() / x }
 }
 
-/// The voltage equations of a surface-magnet motor (thesis 5.2.1), rows `[iq, diq/dt + we id, sqrt(2/3) w]` and
-/// `[id, did/dt - we iq, 0]` for `[rs, ls, ke]`.
-pub fn plain(spans: &Spans, axes: Axes, form: Form) -> Equations<Winding> {
-    let q = Equations::new().stream(spans.spans.iter().map(|span| rows(spans, span, form).1));
-    match axes {
-        Axes::Q => q,
-        Axes::Both => q.stream(spans.spans.iter().map(|span| rows(spans, span, form).0)),
+impl Spans {
+    /// The voltage equations of a surface-magnet motor (thesis 5.2.1), rows `[iq, diq/dt + we id, sqrt(2/3) w]` and
+    /// `[id, did/dt - we iq, 0]` for `[rs, ls, ke]`.
+    pub fn plain(&self, axes: Axes, form: Form) -> Equations<Winding> {
+        let q = Equations::new().stream(self.spans.iter().map(|span| rows(self, span, form).1));
+        match axes {
+            Axes::Q => q,
+            Axes::Both => q.stream(self.spans.iter().map(|span| rows(self, span, form).0)),
+        }
     }
 }
 

@@ -1,5 +1,5 @@
 use super::Spans;
-use super::plain::{Axes, Form, plain};
+use super::plain::{Axes, Form};
 use crate::pmsm::Winding;
 
 /// How well a model's prediction meets what was measured, per axis.
@@ -27,11 +27,13 @@ impl Validation {
     }
 }
 
-/// Voltages `[ud, uq]` (V) that a motor with these parameters needs for the measured currents, interval by interval
-/// (thesis 7.1), each with the commanded one before it. The other way, currents from voltages, is a simulation of
-/// [`Surface`](crate::pmsm::Surface).
-pub fn voltages(spans: &Spans, winding: &Winding, form: Form) -> Vec<([f64; 2], [f64; 2])> {
-    let predicted = plain(spans, Axes::Both, form).predictions(winding);
-    let [Some(q), Some(d)] = [predicted.first(), predicted.get(1)] else { return Vec::new() };
-    d.iter().zip(q).map(|(&(ud, ud_hat), &(uq, uq_hat))| ([ud, uq], [ud_hat, uq_hat])).collect()
+impl Spans {
+    /// Voltages `[ud, uq]` (V) that a motor with these parameters needs for the measured currents, interval by interval
+    /// (thesis 7.1), each with the commanded one before it. The other way, currents from voltages, is a simulation of
+    /// [`Surface`](crate::pmsm::Surface).
+    pub fn voltages(&self, winding: &Winding, form: Form) -> Vec<([f64; 2], [f64; 2])> {
+        let predicted = self.plain(Axes::Both, form).predictions(winding);
+        let [Some(q), Some(d)] = [predicted.first(), predicted.get(1)] else { return Vec::new() };
+        d.iter().zip(q).map(|(&(ud, ud_hat), &(uq, uq_hat))| ([ud, uq], [ud_hat, uq_hat])).collect()
+    }
 }

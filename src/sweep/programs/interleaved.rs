@@ -36,8 +36,9 @@ impl fmt::Debug for Interleaved {
 }
 
 impl Interleaved {
-    /// The columns of pieces, one for each lane. `None` where they are not worth their memory: programs without slopes run
-    /// once or twice a fit, and use what those with slopes have left; nor are time and step kept.
+    /// The columns of pieces, one piece in each lane. `None` where they are not kept: for programs that read time or step, for
+    /// long records, and for programs without slopes, which run once or twice a fit, unless a program with slopes has kept the
+    /// same columns.
     pub(super) fn of(&self, program: &Program, pieces: &[&Piece<'_>], columns: &Columns<'_>) -> Option<Arc<Kept>> {
         let read = program.columns();
         let of_time = read.iter().any(|column| matches!(column, Column::Time | Column::Step));
@@ -70,7 +71,7 @@ impl Interleaved {
         let from = channels().map(|channel| channel.values.clone()).collect();
         let kept = Arc::new(Kept::new(program, begins().collect(), samples, from, columns));
         let mut all = all();
-        // The same place with other records beside it: a lane of a fleet has ended.
+        // Columns of the same samples with another record in one of the lanes: a search of a fleet has ended.
         all.retain(|kept| !stands_alike(kept));
         all.push(kept.clone());
         Some(kept)

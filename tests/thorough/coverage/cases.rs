@@ -6,8 +6,8 @@ use crate::common::{Affine, Branch, Current, Lag, Line, Pair, Voltage};
 use crate::random::Random;
 use greybox::pmsm::{self, Currents, Drive, Surface};
 use greybox::{
-    Butterworth, Experiment, ExperimentOf, Fit, Horizon, Huber, Model, Of, Sample, Signals, Time, Tukey, WarningCode,
-    fixed, free, simulate,
+    Butterworth, Experiment, ExperimentOf, Fit, Horizon, Huber, Model, Of, Sample, Signals, Time, WarningCode, fixed,
+    free, loss::Tukey, simulate,
 };
 
 pub fn all() -> Vec<Case> {
