@@ -34,7 +34,6 @@ pub use differentiate::Seed;
 pub(crate) use differentiate::{Pattern, Tangent, Variables, Way, slopes};
 pub use function::{Function, Function2};
 pub use node::{Constant, Id, Leaf, Node};
-pub use serial::InvalidGraph;
 pub use symbol::Symbol;
 pub(crate) use tape::Tape;
 pub use trace::Untraceable;

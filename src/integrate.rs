@@ -16,9 +16,7 @@ pub use automatic::Automatic;
 pub use discrete::Discrete;
 pub use esdirk::Esdirk;
 #[cfg(feature = "std")]
-pub use method::Rate;
-#[cfg(feature = "std")]
-pub(crate) use method::{Duals, Field, Method, Slopes, SymbolicField, automatic, stiff};
+pub(crate) use method::{Duals, Field, Method, Rate, Slopes, SymbolicField, automatic, stiff};
 pub use rk4::Rk4;
 pub use rk45::Rk45;
 #[cfg(feature = "std")]

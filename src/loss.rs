@@ -43,6 +43,12 @@ pub trait Loss: Debug + Send + Sync {
         (self.psi(z + h) - self.psi(z - h)) / ((z + h) - (z - h))
     }
 
+    /// Variance of the least squares estimate over that of this loss, with Gaussian noise: `E[psi']^2 / E[psi^2]`, right to
+    /// 1e-10.
+    fn efficiency(&self) -> f64 {
+        expectation(&|z| z * self.psi(z)).powi(2) / expectation(&|z| self.psi(z).powi(2))
+    }
+
     /// Whether the tuning constants make sense.
     ///
     /// # Errors
@@ -112,7 +118,7 @@ impl Loss for Huber {
 pub struct SoftL1(pub f64);
 
 impl Default for SoftL1 {
-    /// 1.287: 95 % efficiency, by [`efficiency`].
+    /// 1.287: 95 % efficiency, by [`efficiency`](Loss::efficiency).
     fn default() -> Self {
         SoftL1(1.287)
     }
@@ -208,11 +214,6 @@ pub(crate) fn expected_slope(loss: &dyn Loss) -> f64 {
     expectation(&|z| z * loss.psi(z))
 }
 
-/// Variance of the least squares estimate over that of a loss, with Gaussian noise: `E[psi']^2 / E[psi^2]`, right to 1e-10.
-pub fn efficiency(loss: &dyn Loss) -> f64 {
-    expected_slope(loss).powi(2) / expectation(&|z| loss.psi(z).powi(2))
-}
-
 /// The expectation of a function of a standard normal number.
 fn expectation(f: &dyn Fn(f64) -> f64) -> f64 {
     let density = |z: f64| (-z * z / 2.0).exp() / core::f64::consts::TAU.sqrt();
@@ -249,7 +250,7 @@ mod tests {
             Box::new(Tukey::default()),
         ];
         for loss in losses {
-            let efficiency = efficiency(&*loss);
+            let efficiency = loss.efficiency();
             assert!((efficiency - 0.95).abs() < 1e-4, "{loss:?}: {efficiency}");
         }
     }

@@ -3,11 +3,11 @@
 /// Ratio of the standard deviation of a normal distribution to the median absolute deviation.
 const NORMAL_SPREAD: f64 = 1.4826;
 
-/// Replaces by their neighbourhood's median the values that lie further than `sigmas` robust standard deviations from it,
-/// the neighbourhood being `reach` samples to each side (F. R. Hampel, J. Am. Stat. Assoc. 69 (1974) 383-393; the
+/// Replaces by their neighborhood's median the values that lie further than `sigmas` robust standard deviations from it,
+/// the neighborhood being `reach` samples to each side (F. R. Hampel, J. Am. Stat. Assoc. 69 (1974) 383-393; the
 /// deviation is 1.4826 times the median absolute one). Returns the positions replaced.
 ///
-/// Where more than half of a neighbourhood are equal, the deviation is zero: there, a value is left alone unless it
+/// Where more than half of a neighborhood are equal, the deviation is zero: there, a value is left alone unless it
 /// differs by more than `floor` (a sensor's step is a good one). What is not a number is never replaced, nor counted.
 pub fn hampel(values: &mut [f64], reach: usize, sigmas: f64, floor: f64) -> Vec<usize> {
     let reach = reach.min(values.len());

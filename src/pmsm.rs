@@ -88,7 +88,7 @@ pub use flux_linkage::{FluxLinkage, FluxWinding};
 #[cfg(feature = "std")]
 pub use flux_mapped::{FluxMapped, MappedWinding};
 pub use injection::{Injection, InjectionStep};
-pub use inverter_fed::{AngledDrive, InverterFed, InverterFedWinding, dead_time};
+pub use inverter_fed::{AngledDrive, InverterFed, InverterFedWinding};
 pub use machine::{Machine, MachineParameters, MachineState, VoltageAndLoad};
 pub use misaligned::Misaligned;
 pub use motor_model::MotorModel;

@@ -2,7 +2,7 @@
 
 use greybox::online::{AdaptationLaw, Mras, MrasStart, Order, Stepping, Watch};
 use greybox::pmsm::drive::Simulation;
-use greybox::pmsm::offline::{Axes, Equations, Extended, Form, Spans, search_i0};
+use greybox::pmsm::offline::{Axes, Equations, Extended, Form, Spans};
 use greybox::pmsm::program::{Cycle, Program};
 use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::{Currents, Drive, ExactStep, ExactSurface, HeldIn, MotorLaw, NotAdapted, Surface, Winding};
@@ -65,7 +65,7 @@ pub fn grey_box_per_cycle(run: &Run) -> Result<Vec<(f64, Winding)>> {
 /// Extended least squares on a whole record.
 pub fn solve_extended(spans: &Spans) -> Result<LinearEstimate<Extended>> {
     let filter = low_pass(spans.ts)?;
-    let i0 = search_i0(0.03, 1.0, |i0| spans.extended(i0).prefiltered(&filter).least_squares())?;
+    let i0 = Extended::search_i0(0.03, 1.0, |i0| spans.extended(i0).prefiltered(&filter).least_squares())?;
     Ok(spans.extended(i0).prefiltered(&filter).solve()?)
 }
 

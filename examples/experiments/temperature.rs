@@ -9,7 +9,7 @@ use greybox::pmsm::drive::Simulation;
 use greybox::pmsm::offline::Axes;
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::RobotAxis;
-use greybox::pmsm::temperature::{Celsius, Estimated, magnet_rise, winding_rise};
+use greybox::pmsm::temperature::{Celsius, Estimated};
 use greybox::regress::LinearEstimate;
 
 /// Motor and cable resistance, and Ke, of a whole record.
@@ -32,8 +32,8 @@ pub fn temperature() -> Result<Report> {
         let warm = run(Simulation::new(axis)?.heated(warm_at, warm_at), program()?);
         let (plain_cold, plain_warm) = (per_cycle(&cold, Axes::Both)?, per_cycle(&warm, Axes::Both)?);
         let ((r0, ke0), (r1, ke1)) = (whole(&cold)?, whole(&warm)?);
-        let winding = winding_rise(r0, r1, Estimated { value: axis.rs, std: 0.0 })?;
-        let magnet = magnet_rise(ke0, ke1, Celsius::new(20.0)?)?;
+        let winding = Estimated::winding_rise(r0, r1, Estimated { value: axis.rs, std: 0.0 })?;
+        let magnet = Estimated::magnet_rise(ke0, ke1, Celsius::new(20.0)?)?;
         if let (Some((_, c)), Some((_, w))) = (plain_cold.last(), plain_warm.last()) {
             let (ke, ls) = (w.parameters.ke / c.parameters.ke, w.parameters.ls / c.parameters.ls);
             rows.push((

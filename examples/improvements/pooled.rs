@@ -1,7 +1,7 @@
 //! The cycles of a motor solved together.
 
 use crate::methods::*;
-use greybox::pmsm::offline::{Extended, Spans, search_i0};
+use greybox::pmsm::offline::{Extended, Spans};
 use greybox::pmsm::program::Cycle;
 use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::{Compensated, CompensatedSalientWinding, EmfHarmonic, ExactSalient, ExactStep, HeldIn};
@@ -26,7 +26,7 @@ pub fn cycles(run: &Run) -> Result<Vec<CycleSpans>> {
     let filter = low_pass(run.spans.ts)?;
     let cycle = |cycle: &Cycle| {
         let spans = run.spans.cut(cycle.samples.clone());
-        let i0 = search_i0(0.03, 1.0, |i0| spans.extended(i0).prefiltered(&filter).least_squares())?;
+        let i0 = Extended::search_i0(0.03, 1.0, |i0| spans.extended(i0).prefiltered(&filter).least_squares())?;
         Ok(CycleSpans { speed: cycle.speed, spans, i0 })
     };
     run.cycles.iter().map(cycle).collect()

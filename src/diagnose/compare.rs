@@ -170,8 +170,11 @@ pub struct Validation {
     /// Name of the record.
     pub experiment: String,
     /// Samples predicted ahead, `None` for a simulation; and names and quality of the outputs.
-    pub qualities: Vec<(Option<u64>, Vec<(String, OutputFit)>)>,
+    pub qualities: Vec<(Option<u64>, NamedQualities)>,
 }
+
+/// Name and quality of each output.
+type NamedQualities = Vec<(String, OutputFit)>;
 
 /// Simulates a record with the estimate's parameters, and predicts it each number of samples of `steps` ahead. What the
 /// record leaves open of its initial state is estimated from it.
@@ -200,7 +203,7 @@ pub fn validate<M: Model>(
     steps: &[usize],
 ) -> Result<Validation, Error> {
     let fit = || Fit::new(model, record).parameters(M::Parameters::map(estimate.parameters, fixed));
-    let quality = |fit: Fit<'_, M>| -> Result<Vec<(String, OutputFit)>, Error> {
+    let quality = |fit: Fit<'_, M>| -> Result<NamedQualities, Error> {
         let found = M::Output::into_array(fit.predict(estimate, record)?.quality);
         Ok(M::Output::NAMES.iter().map(|name| (*name).to_owned()).zip(found).collect())
     };

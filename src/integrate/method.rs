@@ -14,7 +14,7 @@ use std::sync::Arc;
 pub(crate) type Duals = Dual<8>;
 
 /// `f(position, x, to)`: writes a derivative, or the next state.
-pub type Rate<'a, S> = &'a dyn Fn(f64, &[S], &mut [S]);
+pub(crate) type Rate<'a, S> = &'a dyn Fn(f64, &[S], &mut [S]);
 
 /// Value and Jacobian (by rows) of a derivative, at a position and values of the states.
 pub(crate) type Slopes<'a> = &'a dyn Fn(f64, &[f64]) -> (Vec<f64>, Vec<Vec<f64>>);

@@ -145,8 +145,8 @@ impl Outcome {
                 "Look for parameters that only appear together, and fix one of them or give it a prior; or start closer."
             }
             Outcome::IterationLimit { .. } => {
-                "Start closer, or allow more iterations; a search by a method that the fit chose itself has 100 steps: name the \
-                 integrator. If the cost hardly falls any more, look for parameters that only appear together."
+                "Allow more iterations (where the fit chose the method of integration it has 100 trial steps: name the integrator), \
+                 or start closer; if the cost hardly falls any more, look for parameters that only appear together."
             }
             Outcome::TimeLimit => "Allow more time, or resume from the checkpoint.",
             Outcome::Cancelled => "Resume from the checkpoint to go on.",

@@ -13,7 +13,7 @@ crate::signals! {
         w: "rad/s",
         /// Mechanical angle in the middle of the sample interval.
         theta: "rad",
-        /// Dead time's voltage per volt of `vdt`, along the flux: [`dead_time`](super::dead_time) of *measured* currents.
+        /// Dead time's voltage per volt of `vdt`, along the flux: [`Currents::dead_time`] of *measured* currents.
         lost_d: "1",
         /// The same, 90 electrical degrees ahead.
         lost_q: "1",

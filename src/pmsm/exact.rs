@@ -10,7 +10,7 @@ mod salient;
 pub use salient::ExactSalient;
 
 use super::units::Constant;
-use super::{AngledDrive, Currents, Drive, MotorError, MotorModel, PolePairs, SQRT_2_3, Winding, dead_time};
+use super::{AngledDrive, Currents, Drive, MotorError, MotorModel, PolePairs, SQRT_2_3, Winding};
 use crate::online::{AdaptationLaw, Mras, MrasStart, ObserverError};
 use crate::{Kind, Model, Parameter, Scalar};
 use serde::{Deserialize, Serialize};
@@ -51,7 +51,7 @@ impl ExactStep {
     /// It is the input for an observer of the motor alone, with measured currents for `i`.
     #[inline(always)]
     pub fn less_dead_time<S: Scalar>(&self, i: &Currents<S>, u: &AngledDrive<S>, vdt: S, i0: f64) -> Drive<S> {
-        let lost = dead_time(i, S::from(i0), self.pole_pairs.electrical(u.theta));
+        let lost = i.dead_time(S::from(i0), self.pole_pairs.electrical(u.theta));
         Drive { ud: u.ud - vdt * lost.0, uq: u.uq - vdt * lost.1, w: u.w }
     }
 

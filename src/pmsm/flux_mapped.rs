@@ -31,7 +31,7 @@ crate::signals! {
 ///
 /// ```
 /// use greybox::pmsm::FluxMapped;
-/// use greybox::{Extrapolation::Linear, Interpolation::Smooth, Table};
+/// use greybox::{Table, scalar::{Extrapolation::Linear, Interpolation::Smooth}};
 /// let (id, iq) = ([-40.0, 0.0, 40.0], [-40.0, -20.0, 0.0, 20.0, 40.0]);
 /// let over = |psi: fn(f64, f64) -> f64| -> Vec<f64> {
 ///     id.iter().flat_map(|d| iq.iter().map(move |q| psi(*d, *q))).collect()

@@ -1,33 +1,8 @@
-//! The voltage-source inverter: how much voltage there is, when it acts, and what dead time takes from it.
+//! The voltage-source inverter: when its voltage acts, and what dead time takes from it.
 
-use super::MotorError;
 use super::frames::{Phases, Stator, clarke, inverse_clarke};
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
-
-/// How the voltage vector is made of switching states.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Modulation {
-    /// Space vector: phase peak up to `vdc / sqrt(3)`.
-    #[default]
-    SpaceVector,
-    /// Sine against triangle: phase peak up to `vdc / 2`.
-    Sine,
-}
-
-impl Modulation {
-    /// Longest voltage vector (V, phase peak) from a direct voltage `vdc` (V).
-    ///
-    /// # Errors
-    /// A voltage that is not positive.
-    pub fn v_max(self, vdc: f64) -> Result<f64, MotorError> {
-        let vdc = MotorError::positive("direct voltage", vdc, "V")?;
-        Ok(match self {
-            Modulation::SpaceVector => vdc / Scalar::sqrt(3.0),
-            Modulation::Sine => vdc / 2.0,
-        })
-    }
-}
 
 /// How the voltage that a drive asks for comes about.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -61,15 +36,6 @@ impl Carrier {
             Carrier::HalfPerSample => 2.0 * ts,
         }
     }
-}
-
-/// Speed (rad/s, mechanical) at which the EMF alone uses up `v_max` (V, phase peak): no current can be driven beyond it.
-///
-/// # Errors
-/// A back-EMF or voltage that is not positive.
-pub fn top_speed(ke: f64, v_max: f64) -> Result<f64, MotorError> {
-    Ok(MotorError::positive("voltage limit", v_max, "V")?
-        / (super::SQRT_2_3 * MotorError::positive("Ke", ke, "V s/rad")?))
 }
 
 /// Voltage lost to dead time and to the valves: `vdt tanh(i/i0)` in each phase; 2 V and 0.15 A for a well-compensated
@@ -116,7 +82,7 @@ mod tests {
         #[test]
         fn duties_make_the_vector(angle in 0.0..6.3f64, share in 0.0..1.0f64) {
             let vdc = 600.0;
-            let v = share * Modulation::SpaceVector.v_max(vdc).unwrap();
+            let v = share * vdc / 3f64.sqrt();
             let u = Stator { alpha: v * angle.cos(), beta: v * angle.sin() };
             let d = duties(u, vdc);
             for duty in [d.a, d.b, d.c] {
@@ -125,14 +91,5 @@ mod tests {
             let made = clarke(Phases { a: d.a * vdc, b: d.b * vdc, c: d.c * vdc });
             prop_assert!((made.alpha - u.alpha).abs() + (made.beta - u.beta).abs() < 1e-10);
         }
-    }
-
-    #[test]
-    fn limits() {
-        assert!((Modulation::SpaceVector.v_max(600.0).unwrap() - 346.410_161_5).abs() < 1e-6);
-        assert_eq!(Modulation::Sine.v_max(600.0), Ok(300.0));
-        assert!(Modulation::Sine.v_max(-1.0).is_err());
-        // Axis 1: 346 V over 0.776 V per rad/s.
-        assert!((top_speed(0.95, 346.41).unwrap() - 446.6).abs() < 0.1);
     }
 }

@@ -59,7 +59,7 @@ wraps_motor! {
     /// ```
     InverterFed, AngledDrive, |wrapper, x, u, p, motor| {
         let loss = P::part::<DeadTimeLoss, S>(*p);
-        let lost = dead_time(x, loss.i0, wrapper.motor.pole_pairs().electrical(u.theta));
+        let lost = x.dead_time(loss.i0, wrapper.motor.pole_pairs().electrical(u.theta));
         let u = AngledDrive { ud: u.ud - loss.vdt * lost.0, uq: u.uq - loss.vdt * lost.1, ..*u };
         motor(x, &AngledDrive::part::<M::Input, S>(u), &P::part::<M::Parameters, S>(*p))
     }
@@ -82,16 +82,18 @@ impl InverterFed<ExactSurface, InverterFedWinding> {
     }
 }
 
-/// The dead time's voltage (V), `1 V * tanh(i/i0)` in each phase, seen from the rotor at electrical angle `theta_e`.
-#[inline]
-pub fn dead_time<S: Scalar>(x: &Currents<S>, i0: S, theta_e: S) -> (S, S) {
-    let park = Park::amplitude_invariant();
-    let mut phases = park.inverse(Dq0 { d: x.id, q: x.iq, zero: S::from(0.0) }, theta_e);
-    for i in [&mut phases.a, &mut phases.b, &mut phases.c] {
-        *i = (*i / i0).tanh();
+impl<S: Scalar> Currents<S> {
+    /// The dead time's voltage (V), `1 V * tanh(i/i0)` in each phase, seen from the rotor at electrical angle `theta_e`.
+    #[inline]
+    pub fn dead_time(&self, i0: S, theta_e: S) -> (S, S) {
+        let park = Park::amplitude_invariant();
+        let mut phases = park.inverse(Dq0 { d: self.id, q: self.iq, zero: S::from(0.0) }, theta_e);
+        for i in [&mut phases.a, &mut phases.b, &mut phases.c] {
+            *i = (*i / i0).tanh();
+        }
+        let lost = park.forward(phases, theta_e);
+        (lost.d, lost.q)
     }
-    let lost = park.forward(phases, theta_e);
-    (lost.d, lost.q)
 }
 
 #[cfg(test)]
@@ -118,7 +120,7 @@ mod tests {
         fn any_motor_gets_what_dead_time_leaves(id in -60.0..60.0, iq in -60.0..60.0, ud in -300.0..300.0,
                                                 w in -400.0..400.0, theta in -9.0..9.0) {
             let (x, u) = (Currents { id, iq }, AngledDrive { ud, uq: 50.0, w, theta });
-            let lost = dead_time(&x, 0.15, 4.0 * theta);
+            let lost = x.dead_time(0.15, 4.0 * theta);
             let left = Drive { ud: ud - 2.0 * lost.0, uq: 50.0 - 2.0 * lost.1, w };
             let fed = InverterFed::<_, Line>::new(Salient::new(4).unwrap());
             let p = Line { rs: Q.rs, ld: Q.ld, lq: Q.lq, ke: Q.ke, vdt: 2.0, i0: 0.15 };
@@ -134,7 +136,7 @@ mod tests {
         // Dead time takes power from the motor whatever the angle.
         #[test]
         fn dead_time_is_a_loss(id in -60.0..60.0, iq in -60.0..60.0, theta_e in -9.0..9.0) {
-            let (d, q) = dead_time(&Currents { id, iq }, 0.15, theta_e);
+            let (d, q) = Currents { id, iq }.dead_time(0.15, theta_e);
             prop_assert!(d * id + q * iq >= 0.0);
         }
     }
@@ -143,7 +145,7 @@ mod tests {
     fn an_exact_step_gets_it_too() {
         let step = ExactStep::new(4, 0.126e-3, HeldIn::Stationary).unwrap();
         let (i, theta) = (Currents { id: 3.0, iq: -8.0 }, 0.3);
-        let lost = dead_time(&i, 0.15, 4.0 * theta);
+        let lost = i.dead_time(0.15, 4.0 * theta);
         let p = InverterFedWinding { rs: 0.4, ls: 4e-3, ke: 0.95, vdt: 2.0, i0: 0.15 };
         let fed = InverterFed::<_, InverterFedWinding>::new(ExactSurface(step));
         let a = fed.next(0.0, &i, &AngledDrive { ud: 9.0, uq: 40.0, w: 60.0, theta }, &p);
@@ -154,7 +156,7 @@ mod tests {
     // Far from zero crossings a phase set of signs (+, -, -) is a vector of length 4/3 along phase a.
     #[test]
     fn dead_time_of_a_large_current() {
-        let (d, q) = dead_time(&Currents { id: 30.0, iq: 0.0 }, 0.15, 0.0);
+        let (d, q) = Currents { id: 30.0, iq: 0.0 }.dead_time(0.15, 0.0);
         approx::assert_relative_eq!(d, 4.0 / 3.0, max_relative = 1e-12);
         assert!(q.abs() < 1e-12);
     }

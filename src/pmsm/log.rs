@@ -75,7 +75,7 @@ impl Log {
 pub enum Warning {
     /// The voltage.
     #[error(
-        "the voltage was at its limit in {samples} of {of} samples: the EMF leaves too little for the current asked for; go slower (see inverter::top_speed), weaken the field or raise the direct voltage"
+        "the voltage was at its limit in {samples} of {of} samples: the EMF leaves too little for the current asked for; go slower, weaken the field or raise the direct voltage"
     )]
     Voltage {
         /// Samples at the limit.

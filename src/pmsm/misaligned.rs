@@ -45,7 +45,7 @@ impl<M: MotorModel, P: Signals> MotorModel for Misaligned<M, P> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Drive, InverterFed, Salient, SalientWinding, dead_time};
+    use super::super::{Drive, InverterFed, Salient, SalientWinding};
     use super::*;
     use crate::Model;
     use proptest::prelude::*;
@@ -72,7 +72,7 @@ mod tests {
             let (md, mq) = rotate_into((id, iq), delta);
             let u = AngledDrive { ud, uq, w, theta: theta + delta / 4.0 };
             let recorded = model().derivative(0.0, &Currents { id: md, iq: mq }, &u, &Line { delta, vdt: 2.0, ..P });
-            let lost = dead_time(&Currents { id, iq }, 0.15, 4.0 * theta);
+            let lost = Currents { id, iq }.dead_time(0.15, 4.0 * theta);
             let left = Drive { ud: 20.0 - 2.0 * lost.0, uq: 50.0 - 2.0 * lost.1, w };
             let b = Salient::new(4).unwrap().derivative(0.0, &Currents { id, iq }, &left, &Q);
             let (bd, bq) = rotate_into((b.id, b.iq), delta);

@@ -12,7 +12,7 @@ mod plain;
 mod validate;
 
 pub use equations::Equations;
-pub use extended::{Extended, search_i0};
+pub use extended::Extended;
 pub use plain::{Axes, Form};
 pub use validate::Validation;
 

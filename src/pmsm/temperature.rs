@@ -172,29 +172,34 @@ pub struct Estimated {
     pub std: f64,
 }
 
-/// Rise (K) of the winding between a cold and a warm estimate of the resistance, `dT = (R_warm - R_cold) / (0.00393
-/// R20)`.
-///
-/// `cold` and `warm` may contain the cable (it cancels); `r20` is the *motor's* phase resistance at 20 C alone: with the
-/// cable in it, 35 K read 22 K on the reference robot. The three errors are taken as independent.
-///
-/// # Errors
-/// An `r20` that is not positive; a result that is not finite.
-pub fn winding_rise(cold: Estimated, warm: Estimated, r20: Estimated) -> Result<Estimated, MotorError> {
-    MotorError::positive("resistance of the motor at 20 C", r20.value, "ohm")?;
-    propagate([cold, warm, r20], |[cold, warm, r20]| (warm - cold) / (r20 * COPPER))
-}
+impl Estimated {
+    /// Rise (K) of the winding between a cold and a warm estimate of the resistance, `dT = (R_warm - R_cold) / (0.00393
+    /// R20)`.
+    ///
+    /// `cold` and `warm` may contain the cable (it cancels); `r20` is the *motor's* phase resistance at 20 C alone: with the
+    /// cable in it, 35 K read 22 K on the reference robot. The three errors are taken as independent.
+    ///
+    /// # Errors
+    /// An `r20` that is not positive; a result that is not finite.
+    pub fn winding_rise(cold: Estimated, warm: Estimated, r20: Estimated) -> Result<Estimated, MotorError> {
+        MotorError::positive("resistance of the motor at 20 C", r20.value, "ohm")?;
+        propagate([cold, warm, r20], |[cold, warm, r20]| (warm - cold) / (r20 * COPPER))
+    }
 
-/// Rise (K) of the magnet between a cold and a warm estimate of Ke, below 150 C; `cold_at` is the temperature of the
-/// cold one. The two errors are taken as independent.
-///
-/// # Errors
-/// A cold Ke that is not positive, a `cold_at` at which no flux is left; a result that is not finite.
-pub fn magnet_rise(cold: Estimated, warm: Estimated, cold_at: Celsius) -> Result<Estimated, MotorError> {
-    MotorError::positive("Ke of the cold motor", cold.value, "V s/rad")?;
-    let cold_factor =
-        MotorError::positive("magnet factor at the cold temperature", cold_at.magnet_factor(Reading::Local), "of 1")?;
-    propagate([cold, warm], |[cold, warm]| (cold - warm) / (cold * (MAGNET / cold_factor)))
+    /// Rise (K) of the magnet between a cold and a warm estimate of Ke, below 150 C; `cold_at` is the temperature of the
+    /// cold one. The two errors are taken as independent.
+    ///
+    /// # Errors
+    /// A cold Ke that is not positive, a `cold_at` at which no flux is left; a result that is not finite.
+    pub fn magnet_rise(cold: Estimated, warm: Estimated, cold_at: Celsius) -> Result<Estimated, MotorError> {
+        MotorError::positive("Ke of the cold motor", cold.value, "V s/rad")?;
+        let cold_factor = MotorError::positive(
+            "magnet factor at the cold temperature",
+            cold_at.magnet_factor(Reading::Local),
+            "of 1",
+        )?;
+        propagate([cold, warm], |[cold, warm]| (cold - warm) / (cold * (MAGNET / cold_factor)))
+    }
 }
 
 /// First-order propagation of independent errors.
@@ -252,11 +257,11 @@ mod tests {
         fn rises_are_read_back(rise in 1.0..100.0f64, r20 in 0.1..2.0, cable in 0.0..2.0, ke in 0.1..2.0) {
             let known = |value| Estimated { value, std: 0.0 };
             let (cold, warm) = (at(25.0), at(25.0 + rise));
-            let winding_read = winding_rise(
+            let winding_read = Estimated::winding_rise(
                 known(r20 * cold.winding_factor() + cable), known(r20 * warm.winding_factor() + cable), known(r20)).unwrap();
             prop_assert!((winding_read.value - rise).abs() < 1e-9);
             let factor = |t: Celsius| t.magnet_factor(Reading::Local);
-            let magnet_read = magnet_rise(known(ke * factor(cold)), known(ke * factor(warm)), cold).unwrap();
+            let magnet_read = Estimated::magnet_rise(known(ke * factor(cold)), known(ke * factor(warm)), cold).unwrap();
             prop_assert!((magnet_read.value - rise).abs() < 1e-9);
         }
     }
@@ -265,10 +270,11 @@ mod tests {
     #[test]
     fn uncertainty_is_propagated() {
         let e = |value, std| Estimated { value, std };
-        let read = winding_rise(e(0.63, 1e-3), e(0.685, 1e-3), e(0.4, 0.0)).unwrap();
+        let read = Estimated::winding_rise(e(0.63, 1e-3), e(0.685, 1e-3), e(0.4, 0.0)).unwrap();
         assert_relative_eq!(read.std, 2f64.sqrt() * 1e-3 / (COPPER * 0.4), max_relative = 1e-12);
         // SPEC: with the cable in the denominator, 35 K read 22 K.
-        let with_cable = winding_rise(e(0.63, 0.0), e(0.63 + 35.0 * COPPER * 0.4, 0.0), e(0.63, 0.0)).unwrap();
+        let with_cable =
+            Estimated::winding_rise(e(0.63, 0.0), e(0.63 + 35.0 * COPPER * 0.4, 0.0), e(0.63, 0.0)).unwrap();
         assert_relative_eq!(with_cable.value, 22.2, epsilon = 0.1);
     }
 

@@ -59,18 +59,17 @@ impl Butterworth {
     }
 }
 
-/// The record with every input and output filtered by [`Butterworth::zero_phase`].
-///
-/// The same filter on both sides leaves a linear model with constant coefficients as it is, but for what the input does
-/// between samples; where coefficients vary (with speed, say), keep the cut-off well above the variation.
-///
-/// # Errors
-/// A record whose samples are not the filter's sample time apart (to 1 %).
-pub fn zero_phase<X: Signals, U: Signals, Y: Signals>(
-    experiment: &Experiment<X, U, Y>,
-    filter: &Butterworth,
-) -> Result<Experiment<X, U, Y>, Error> {
-    filtered(experiment.record(), filter).map(Experiment::of)
+impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
+    /// The record with every input and output filtered by [`Butterworth::zero_phase`].
+    ///
+    /// The same filter on both sides leaves a linear model with constant coefficients as it is, but for what the input does
+    /// between samples; where coefficients vary (with speed, say), keep the cut-off well above the variation.
+    ///
+    /// # Errors
+    /// A record whose samples are not the filter's sample time apart (to 1 %).
+    pub fn filtered(&self, filter: &Butterworth) -> Result<Self, Error> {
+        filtered(self.record(), filter).map(Self::of)
+    }
 }
 
 /// The same of a record whose signals are known by name.

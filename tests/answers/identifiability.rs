@@ -4,7 +4,7 @@ use crate::random::Random;
 use crate::shared::shared;
 use greybox::diagnose::{End, identifiability, profile};
 use greybox::optimize::Severity;
-use greybox::{Butterworth, Horizon, prefilter::zero_phase};
+use greybox::{Butterworth, Horizon};
 use greybox::{Estimate, Experiment, Fit, Kind, Knowledge, Model, Nothing, Scalar, Time, fixed, free, signals};
 
 signals! { struct Drive { u: "V", w: "V" } }
@@ -211,7 +211,7 @@ fn emps() -> Option<Experiment<Motion, Command, Motion>> {
     let outputs = (0..rows.len()).map(|k| Motion { q: position(k), v: speed[k] }).collect();
     let record = Experiment::new(&Emps, Time::Uniform { start: 0.0, step }, inputs, outputs).unwrap();
     let filter = Butterworth::low_pass(4, 100.0, step).unwrap();
-    Some(zero_phase(&record, &filter).unwrap())
+    Some(record.filtered(&filter).unwrap())
 }
 
 /// Friction forward, friction backward and the offset are known only up to a common shift.

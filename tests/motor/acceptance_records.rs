@@ -4,7 +4,7 @@
 
 use greybox::online::{Ekf, EkfStart, UpdateOutcome, Watch};
 use greybox::pmsm::drive::{Log, Simulation};
-use greybox::pmsm::offline::{Axes, Form, Spans, search_i0};
+use greybox::pmsm::offline::{Axes, Extended, Form, Spans};
 use greybox::pmsm::program::{Cycle, Program};
 use greybox::pmsm::robot::{RobotAxis, TS};
 use greybox::pmsm::{
@@ -143,7 +143,7 @@ fn extended_least_squares_at_every_speed() {
         for cycle in cycles.iter().step_by(every(6)) {
             let spans = spans.cut(cycle.samples.clone());
             let equations = |i0| spans.extended(i0).prefiltered(&filter());
-            let i0 = search_i0(0.03, 1.0, |i0| equations(i0).least_squares()).unwrap();
+            let i0 = Extended::search_i0(0.03, 1.0, |i0| equations(i0).least_squares()).unwrap();
             let found = equations(i0).solve().unwrap();
             let p = found.parameters;
             let (ke, r) = (percent(p.ke, axis.ke), percent(p.r, axis.rs + axis.r_cable));

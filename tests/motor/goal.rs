@@ -5,7 +5,7 @@
 //! resistance, inductances and harmonic do not change from cycle to cycle.
 
 use crate::acceptance_records::{Worst, cycles, every, filter, percent};
-use greybox::pmsm::offline::{Equations, Extended, Spans, search_i0};
+use greybox::pmsm::offline::{Equations, Extended, Spans};
 use greybox::pmsm::program::Cycle;
 use greybox::pmsm::robot::TS;
 use greybox::pmsm::{Compensated, CompensatedSalientWinding, EmfHarmonic, ExactSalient, ExactStep, HeldIn};
@@ -35,7 +35,7 @@ fn each_cycle(number: u8) -> &'static [CycleSpans] {
         let record = cycles(number);
         let cycle = |cycle: &Cycle| {
             let mut found = CycleSpans { spans: record.spans.cut(cycle.samples.clone()), i0: 0.0 };
-            found.i0 = search_i0(0.03, 1.0, |i0| found.equations(i0).least_squares()).unwrap();
+            found.i0 = Extended::search_i0(0.03, 1.0, |i0| found.equations(i0).least_squares()).unwrap();
             found
         };
         record.cycles.iter().step_by(every(3)).map(cycle).collect()

@@ -2,7 +2,7 @@
 #![cfg(feature = "csv")]
 
 use crate::shared::shared;
-use greybox::pmsm::offline::{Axes, Form, Spans, Speed, search_i0};
+use greybox::pmsm::offline::{Axes, Extended, Form, Spans, Speed};
 use greybox::pmsm::{Compensated, CompensatedWinding, ExactStep, ExactSurface, HeldIn, PolePairs, Surface, Winding};
 use greybox::{CsvFile, Fit, fixed, free};
 
@@ -41,7 +41,7 @@ fn plain_least_squares_within_two_hundredths_of_a_percent() {
 #[test]
 fn extended_least_squares_within_a_tenth_of_a_percent() {
     for (name, spans) in records() {
-        let i0 = search_i0(0.03, 1.0, |i0| spans.extended(i0).least_squares()).unwrap();
+        let i0 = Extended::search_i0(0.03, 1.0, |i0| spans.extended(i0).least_squares()).unwrap();
         let p = spans.extended(i0).solve().unwrap().parameters;
         for ls in [p.ld, p.lq] {
             assert_within(name, Winding { rs: p.r, ls, ke: p.ke }, 0.1);

@@ -1,7 +1,6 @@
 //! Butterworth filters against their defining equations, and zero-phase filtering against what it promises.
 
 use approx::assert_relative_eq;
-use greybox::prefilter::zero_phase;
 use greybox::prefilter::{FilterState, Pass};
 use greybox::*;
 use std::f64::consts::PI;
@@ -263,7 +262,7 @@ fn a_record_is_filtered_on_both_sides() {
         Time::Stamps((0..400).map(|k| 0.01 * k as f64 + 4e-5 * (k % 2) as f64).collect()),
     ] {
         let experiment = record(time);
-        let filtered = zero_phase(&experiment, &filter).unwrap();
+        let filtered = experiment.filtered(&filter).unwrap();
         let mut expected: Vec<f64> = experiment.inputs().map(|u| u.u).collect();
         filter.zero_phase(&mut expected);
         for (k, expected) in expected.iter().enumerate() {
@@ -278,10 +277,10 @@ fn a_record_is_filtered_on_both_sides() {
 #[test]
 fn a_record_with_another_sample_time_or_a_gap_in_time_is_refused() {
     let filter = Butterworth::low_pass(2, 5.0, 0.01).unwrap();
-    let why = zero_phase(&record(Time::Uniform { start: 0.0, step: 0.02 }), &filter).unwrap_err().to_string();
+    let why = record(Time::Uniform { start: 0.0, step: 0.02 }).filtered(&filter).unwrap_err().to_string();
     assert!(why.contains("every 0.01 s") && why.contains("`arm`") && why.contains("0.02 s later"), "{why}");
     let gap = (0..400).map(|k| if k > 9 { 0.01 * k as f64 + 1.0 } else { 0.01 * k as f64 }).collect();
-    let why = zero_phase(&record(Time::Stamps(gap)), &filter).unwrap_err().to_string();
+    let why = record(Time::Stamps(gap)).filtered(&filter).unwrap_err().to_string();
     assert!(why.contains("number 9"), "{why}");
 }
 

@@ -180,10 +180,10 @@ fn the_sandwich_of_a_weighted_mean() {
     assert_close(estimate.parameters.mean, mean, 1e-14);
     assert_close(estimate.standard_errors.mean, squares.sqrt() / total, 1e-14);
 
-    // Correlated over one lag: products of neighbours count by half, twice.
-    let neighbours: f64 = scores.windows(2).map(|s| s[0] * s[1]).sum();
+    // Correlated over one lag: products of neighbors count by half, twice.
+    let neighbors: f64 = scores.windows(2).map(|s| s[0] * s[1]).sum();
     let estimate = regression.correlated(1).solve().unwrap();
-    assert_close(estimate.standard_errors.mean, (squares + neighbours).sqrt() / total, 1e-13);
+    assert_close(estimate.standard_errors.mean, (squares + neighbors).sqrt() / total, 1e-13);
     assert_eq!(estimate.assumption, Assumption::Correlated { lags: 1 });
 }
 

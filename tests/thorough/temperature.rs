@@ -4,17 +4,17 @@
 use crate::random::Random;
 use greybox::Butterworth;
 use greybox::pmsm::drive::Simulation;
-use greybox::pmsm::offline::{Extended, Spans, search_i0};
+use greybox::pmsm::offline::{Extended, Spans};
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::RobotAxis;
-use greybox::pmsm::temperature::{Celsius, Estimated, winding_rise};
+use greybox::pmsm::temperature::{Celsius, Estimated};
 use rayon::prelude::*;
 
 fn resistance(axis: &RobotAxis, simulation: Simulation) -> Estimated {
     let program = Program::speed_cycles(axis, 8, 1.0).unwrap();
     let spans = Spans::from_log(&simulation.run(&program), axis.pole_pairs);
     let filter = Butterworth::low_pass(4, 100.0, spans.ts).unwrap();
-    let i0 = search_i0(0.03, 1.0, |i0| spans.extended(i0).prefiltered(&filter).least_squares()).unwrap();
+    let i0 = Extended::search_i0(0.03, 1.0, |i0| spans.extended(i0).prefiltered(&filter).least_squares()).unwrap();
     let found = spans.extended(i0).prefiltered(&filter).solve().unwrap();
     let (p, s): (Extended, Extended) = (found.parameters, found.standard_errors);
     Estimated { value: p.r, std: s.r }
@@ -38,7 +38,7 @@ fn winding_temperature() {
         let warm = Celsius::new(20.0 + rise).unwrap();
         let cold = resistance(&axis, Simulation::new(axis).unwrap().seeded(2 * seed));
         let hot = resistance(&axis, Simulation::new(axis).unwrap().heated(warm, warm).seeded(2 * seed + 1));
-        let found = winding_rise(cold, hot, Estimated { value: axis.rs, std: 0.0 }).unwrap();
+        let found = Estimated::winding_rise(cold, hot, Estimated { value: axis.rs, std: 0.0 }).unwrap();
         Estimated { value: found.value - rise, ..found }
     };
     let found: Vec<Estimated> = (0..records).into_par_iter().map(read).collect();

@@ -1,7 +1,7 @@
 use super::plain::sinc;
 use super::{Equations, Spans};
 use crate::error::Error;
-use crate::pmsm::{SQRT_2_3, dead_time};
+use crate::pmsm::SQRT_2_3;
 use argmin::core::{CostFunction, Executor};
 use argmin::solver::brent::BrentOpt;
 
@@ -30,7 +30,7 @@ impl Spans {
     /// over `sinc(we Ts/2)`.
     ///
     /// The dead time's voltage, the Park transform of `tanh(i_abc/i0)`, is taken at the angle of mid-interval and the mean
-    /// current; `i0` (A) enters it nonlinearly, see [`search_i0`]. The harmonic is that of mid-interval times
+    /// current; `i0` (A) enters it nonlinearly, see [`Extended::search_i0`]. The harmonic is that of mid-interval times
     /// `sinc(3 we Ts)`, its mean; the angle must be that of the magnet.
     ///
     /// The resistance and the harmonic are the same in all cycles of a motor: solved together by [`PooledRegression`], with
@@ -46,7 +46,7 @@ impl Spans {
                 let i = span.mean();
                 let (did, diq) = ((span.i1.id - span.i0.id) / self.ts, (span.i1.iq - span.i0.iq) / self.ts);
                 let theta_e = self.pole_pairs.electrical(span.theta);
-                let lost = dead_time(&i, i0, theta_e);
+                let lost = i.dead_time(i0, theta_e);
                 let whole = sinc(0.5 * we * self.ts);
                 let (lq, square) = (-we * i.iq, i.iq * i.iq);
                 let emf = SQRT_2_3 * span.w;
@@ -70,23 +70,29 @@ impl<F: Fn(f64) -> f64> CostFunction for OverI0<F> {
     }
 }
 
-/// The current `i0` (A) within `low..high` at which a cost is least: a continuous one-dimensional search (R. P. Brent,
-/// *Algorithms for Minimization without Derivatives*, 1973, ch. 5) over its logarithm, to 0.1 %. One percent of `i0` is
-/// 0.1 % of Ke at 15 rad/s on a small axis.
-///
-/// The cost is the least squared residual of the equations for a given `i0`, such as
-/// `|i0| spans.extended(i0).prefiltered(&filter).least_squares()`.
-///
-/// # Errors
-/// Limits that are not positive or not in order.
-pub fn search_i0(low: f64, high: f64, cost: impl Fn(f64) -> f64) -> Result<f64, Error> {
-    if !(low > 0.0 && high > low && high.is_finite()) {
-        return Err(Error::Option(format!("the search of i0 needs 0 < low < high; got {low} A and {high} A")));
+impl Extended {
+    /// The current `i0` (A) within `low..high` at which a cost is least: a continuous one-dimensional search (R. P. Brent,
+    /// *Algorithms for Minimization without Derivatives*, 1973, ch. 5) over its logarithm, to 0.1 %. One percent of `i0` is
+    /// 0.1 % of Ke at 15 rad/s on a small axis.
+    ///
+    /// The cost is the least squared residual of the equations for a given `i0`, such as
+    /// `|i0| spans.extended(i0).prefiltered(&filter).least_squares()`.
+    ///
+    /// # Errors
+    /// Limits that are not positive or not in order.
+    pub fn search_i0(low: f64, high: f64, cost: impl Fn(f64) -> f64) -> Result<f64, Error> {
+        if !(low > 0.0 && high > low && high.is_finite()) {
+            return Err(Error::Option(format!("the search of i0 needs 0 < low < high; got {low} A and {high} A")));
+        }
+        let solver = BrentOpt::new(low.ln(), high.ln()).set_tolerance(1e-4, 1e-3);
+        let found = Executor::new(OverI0(cost), solver)
+            .configure(|state| state.max_iters(60))
+            .run()
+            .map_err(|e| Error::Optimizer(e.to_string()))?;
+        found
+            .state
+            .best_param
+            .map(f64::exp)
+            .ok_or_else(|| Error::Optimizer("the search of i0 found nothing".to_owned()))
     }
-    let solver = BrentOpt::new(low.ln(), high.ln()).set_tolerance(1e-4, 1e-3);
-    let found = Executor::new(OverI0(cost), solver)
-        .configure(|state| state.max_iters(60))
-        .run()
-        .map_err(|e| Error::Optimizer(e.to_string()))?;
-    found.state.best_param.map(f64::exp).ok_or_else(|| Error::Optimizer("the search of i0 found nothing".to_owned()))
 }

@@ -2,7 +2,7 @@ use super::Spans;
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::model::Model;
-use crate::pmsm::{CompensatedDrive, Currents, dead_time};
+use crate::pmsm::{CompensatedDrive, Currents};
 use crate::record::Time;
 
 impl Spans {
@@ -19,7 +19,7 @@ impl Spans {
             .spans
             .iter()
             .map(|span| {
-                let (lost_d, lost_q) = dead_time(&span.mean(), i0, self.pole_pairs.electrical(span.theta));
+                let (lost_d, lost_q) = span.mean().dead_time(i0, self.pole_pairs.electrical(span.theta));
                 let u = CompensatedDrive { ud: span.ud, uq: span.uq, w: span.w, theta: span.theta, lost_d, lost_q };
                 (u, span.i0)
             })
