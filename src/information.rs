@@ -108,7 +108,7 @@ impl Information {
             if let Some((diagonal, above)) = above.split_first_mut()
                 && pivot != 0.0
             {
-                let norm = diagonal.hypot(pivot);
+                let norm = norm([*diagonal, pivot].into_iter());
                 let (c, s) = (*diagonal / norm, pivot / norm);
                 *diagonal = norm;
                 for (r, v) in above.iter_mut().zip(tail.iter_mut()) {
@@ -269,8 +269,8 @@ impl Information {
     }
 }
 
-// Euclidean norm without overflow or underflow.
-fn norm(entries: impl Iterator<Item = f64> + Clone) -> f64 {
+/// Euclidean norm without overflow or underflow.
+pub(crate) fn norm(entries: impl Iterator<Item = f64> + Clone) -> f64 {
     let squares: f64 = entries.clone().map(|entry| entry * entry).sum();
     if (1e-200..1e200).contains(&squares) { squares.sqrt() } else { entries.fold(0.0, f64::hypot) }
 }

@@ -1,6 +1,7 @@
 //! [`Descent`]: one way down from a start, by damped steps of limited length.
 
 use super::point::Point;
+use crate::information::norm;
 use crate::scaling::Seen;
 use serde::{Deserialize, Serialize};
 
@@ -212,7 +213,7 @@ impl Descent {
 
 /// `|diag(scales) step|`.
 pub(super) fn length(scales: &[f64], step: &[f64]) -> f64 {
-    scales.iter().zip(step).map(|(scale, step)| scale * step).fold(0.0, f64::hypot)
+    norm(scales.iter().zip(step).map(|(scale, step)| scale * step))
 }
 
 fn damping(scales: &[f64], lambda: f64) -> Vec<f64> {
@@ -233,7 +234,7 @@ fn limited(point: &Point, scales: &[f64], lambda: f64, longest: f64) -> Option<(
     }
     // The length falls with the damping, and is at most |gradient / scales| / lambda.
     let free = (0..scales.len()).filter(|&i| !point.held[i]);
-    let steepest = free.map(|i| point.gradient[i] / scales[i]).fold(0.0, f64::hypot);
+    let steepest = norm(free.map(|i| point.gradient[i] / scales[i]));
     let (mut low, mut high) = (lambda, steepest / longest);
     // Its inverse is nearly linear in the damping (Hebden 1973; More 1978): the secant of the last two.
     let mut last = first.map(|(length, _)| (lambda, 1.0 / length));

@@ -1,7 +1,7 @@
 //! The elimination itself: from the leaves to the shared unknowns, and the solution back down.
 
 use super::{Elimination, entry};
-use crate::information::{Block, Information};
+use crate::information::{Block, Information, norm};
 use std::borrow::Cow;
 
 /// Rows gathered for one absorption.
@@ -174,7 +174,7 @@ impl Reduced<'_> {
     /// Whether each own unknown has more of its column for itself than rounding.
     fn is_determined(&self, norms: &[f64], damping: &[f64]) -> bool {
         let usable = |(i, &unknown): (usize, &usize)| {
-            let norm = norms[unknown].hypot(entry(damping, unknown));
+            let norm = norm([norms[unknown], entry(damping, unknown)].into_iter());
             // Also false for NaN.
             norm.is_finite() && self.triangle.at(i, i) / norm > self.triangle.tolerance()
         };
