@@ -35,7 +35,7 @@ use crate::section::{Cell, Section, Table};
 use argmin::core::{Executor, State};
 use serde::{Deserialize, Serialize};
 
-/// The probability of error below which a hypothesis is given up.
+/// The probability of error below which a hypothesis is rejected.
 pub(crate) const LEVEL: f64 = 0.01;
 
 /// A hypothesis and whether the data are against it.

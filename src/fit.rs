@@ -126,9 +126,14 @@ impl<'a, M: Model> Fit<'a, M> {
     /// Without it, a fit of a continuous model begins with [`Rk4`], one step per sample. While a finer step would move an
     /// unknown by more than a tenth of its standard error, where the start cannot be simulated, or where a search that did not
     /// converge had a cost that a finer step changes, it takes 4, 16 and 64 steps per sample, then [`Esdirk`](crate::Esdirk); the estimate
+<<<<<<< HEAD
     /// names the method ([`Method::integrator`](crate::estimate::Method)), and is not usable if none is fine enough. `Esdirk` is left
     /// where it needs 3,000 steps for a sample, or 1,000 for each: such a model is not stiff, but fast, or explodes. A search
     /// by one of these methods has at most 100 trial steps.
+=======
+    /// names the method ([`Method::integrator`](crate::estimate::Method)), and is not usable if none is fine enough. `Esdirk` is stopped
+    /// where it needs 3,000 steps for a sample, or 1,000 for each: such a model is not stiff, but fast, or explodes.
+>>>>>>> public
     pub fn integrator(self, integrator: impl Integrator) -> Self {
         Fit { stepping: Stepping::new(integrator), is_default: false, ..self }
     }
@@ -192,7 +197,7 @@ impl<'a, M: Model> Fit<'a, M> {
     ///   initial state keeps its start.
     ///
     /// The searches advance together, in parallel lanes where the model is compiled and in threads; the result is the same
-    /// for any number of threads. A search is given up when it is still above the best minimum found after many times the
+    /// for any number of threads. A search is stopped when it is still above the best minimum found after many times the
     /// steps that those which found a minimum took.
     /// A time limit, a flag and a checkpoint hold for all searches together; an observer sees the best point so far.
     ///

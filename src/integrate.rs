@@ -83,6 +83,7 @@ pub(crate) fn axpy<X: Signals, S: Scalar>(x: Of<X, S>, a: f64, k: Of<X, S>) -> O
 }
 
 /// `x + h (a[0] k[0] + a[1] k[1] + ...)`, signal by signal.
+#[cfg(feature = "std")]
 #[inline(always)]
 pub(crate) fn combined<X: Signals, S: Scalar>(x: &Of<X, S>, h: f64, a: &[f64], k: &[Of<X, S>]) -> Of<X, S> {
     let mut sum = X::splat(S::from(0.0));

@@ -43,7 +43,7 @@ pub enum UpdateOutcome {
     /// The estimates were corrected.
     #[error("corrected")]
     Corrected,
-    /// Corrected, but for a parameter that this sample tells nothing reliable of.
+    /// Corrected, but for a parameter that this sample does not determine reliably.
     #[error("`{parameter}` held: {quantity} is {}, and tells nothing below {limit}", Short(*value))]
     Held {
         /// The parameter; the first, where there are several.

@@ -1,8 +1,8 @@
 //! Nonlinear least squares: [`LevenbergMarquardt`] and [`GaussNewton`], on the information triangle.
 //!
-//! A problem hands over one [`Linearization`] per point: cost and triangle from a single pass over the data. The searches
-//! never see a residual vector and never form normal equations. Each is a [`Machine`], which says what it wants to know next
-//! and is told; as a solver of argmin it evaluates its problem itself.
+//! A problem returns one [`Linearization`] per point: cost and triangle from a single pass over the data. The searches
+//! use no residual vector and never form normal equations. Each is a [`Machine`], which returns the evaluation that it needs next
+//! and is given the result; as a solver of argmin it evaluates its problem itself.
 
 mod descent;
 mod gauss_newton;

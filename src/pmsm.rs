@@ -74,6 +74,7 @@ mod salient;
 mod saturated;
 mod shaft;
 mod surface;
+#[cfg(feature = "std")]
 mod switching;
 
 pub use adaptation::{
@@ -98,6 +99,7 @@ pub use saturated::{Saturated, SaturatedWinding};
 use shaft::COULOMB_WIDTH;
 pub use shaft::{Load, Mechanics, Shaft, ShaftMotion, Torque};
 pub use surface::Surface;
+#[cfg(feature = "std")]
 use switching::SwitchingInverter;
 
 use crate::scalar::Scalar;

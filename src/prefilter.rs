@@ -72,7 +72,7 @@ struct Section {
     k: f64,
 }
 
-/// What a filter remembers from sample to sample; at rest by default.
+/// The state of a filter between two samples; zero by default.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FilterState<V = f64>([[V; 2]; SECTIONS]);
 

@@ -61,7 +61,7 @@ mod tests {
             (0.975, 1e12, 1.959_963_984_540_05),
         ] {
             let found = quantile(probability, degrees);
-            // Nine digits: what the library's inversion promises at few degrees.
+            // Nine digits: what the library's inversion guarantees at few degrees.
             assert!((found / expected - 1.0).abs() < 1e-9, "{probability} {degrees}: {found} {expected}");
         }
         let step = quantile(0.975, 1000.0 * (1.0 + 1e-12)) / quantile(0.975, 1000.0) - 1.0;

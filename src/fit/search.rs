@@ -177,7 +177,7 @@ fn within_finer_tolerance(objective: &Objective<'_>, coordinates: &[f64]) -> Opt
         there.map_or(0.0, |(finer, this)| (finer - this - here).abs()).max(here.abs())
     };
     let domain = Domain::of(objective);
-    // A minimum of this tolerance, though that of a finer one lies elsewhere, of which a warning tells.
+    // A minimum of this tolerance, though that of a finer one lies elsewhere, which a warning names.
     within_tolerance(coordinates, linear, &domain, noise)
         .or_else(|| within_tolerance(coordinates, again, &domain, noise))
 }

@@ -17,7 +17,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// So many searches of a single record are run in lanes; fewer have more of the lanes with each record cut into segments.
 const TOGETHER: usize = 4;
-/// A search that is above the best minimum is given up after so many times the trial steps of the median search that found a
+/// A search that is above the best minimum is stopped after so many times the trial steps of the median search that found a
 /// minimum, if a quarter of the searches have found one, and after so many at the least.
 const PATIENCE: u64 = 10;
 const LEAST_TRIALS: u64 = 100;

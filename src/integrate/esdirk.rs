@@ -10,7 +10,7 @@
 //!
 //! Measured at a tolerance of 1e-8, against the explicit [`Rk45`](super::Rk45): Robertson's kinetics to 40 s take 0.57 ms
 //! (three slopes included: 0.58 ms) against 4.0 ms; van der Pol's oscillator with mu = 1000 takes 1.7 ms over 2000 s, where the
-//! explicit method gives up after 100,000 steps; a circuit with a stray time constant of 10 ns, sampled every 1 ms, takes
+//! explicit method fails after 100,000 steps; a circuit with a stray time constant of 10 ns, sampled every 1 ms, takes
 //! 33 us per sample against 6.1 ms.
 
 use super::tolerance::{MAX_STEPS, combined, values};
@@ -86,7 +86,7 @@ const ERROR: [f64; STAGES] = [
     -5247.0 / 225920.0,
 ];
 
-/// Newton steps per stage before the step is given up.
+/// Newton steps per stage, after which the step is rejected.
 const ITERATIONS: usize = 10;
 
 /// The equation `k = f(base + h gamma k)` of a stage, made linear at a guess.

@@ -55,7 +55,7 @@ impl Tolerance {
     }
 
     /// Crosses the system's interval from `x` with the step kept in `memory` (s; zero: none yet). `step(x, tau, h)` goes
-    /// from the time `t0 + tau` to `t0 + tau + h` and tells the state there and its error, which goes with this `power` of
+    /// from the time `t0 + tau` to `t0 + tau + h` and returns the state there and its error, which goes with this `power` of
     /// the step; `None`, where it cannot.
     #[inline(always)]
     pub fn cross<Y: System>(

@@ -101,7 +101,7 @@ enum Stage {
 
 const FIRST: Reach = Reach { first: 0.1, later: 1.0 };
 const SECOND: Reach = Reach { first: 30.0, later: 30.0 };
-/// A first try that has not ended after so many trials is given up.
+/// A first try that has not ended after so many trials is stopped.
 const FIRST_TRIALS: u64 = 2500;
 /// So often a search goes on that found a lower cost beside its end.
 const LEAPS: u64 = 5;

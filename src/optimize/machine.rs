@@ -3,7 +3,7 @@
 use super::{Infeasible, LeastSquares, LeastSquaresState, Linearization, Outcome};
 use argmin::core::{Error, KV, Problem, TerminationReason, TerminationStatus};
 
-/// What a search wants to know next.
+/// The evaluation that a search needs next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request<'a> {
     /// Cost and slopes at this point: [`LeastSquares::linearize`]; the answer goes to [`Machine::tell`].
@@ -36,7 +36,7 @@ impl Domain {
     }
 }
 
-/// A search that does not call its problem: it says what it wants to know next and is told. So many searches can go
+/// A search that does not call its problem: it returns the evaluation that it needs next, and is given the result. So many searches can go
 /// step by step together, each evaluation of all of them in one sweep.
 ///
 /// ```
@@ -63,7 +63,7 @@ pub trait Machine {
     /// Goes on where it stood, after it was read back.
     fn resume(&mut self, domain: Domain);
 
-    /// What it wants to know next.
+    /// The evaluation that it needs next.
     fn request(&self) -> Request<'_>;
 
     /// Answers [`Request::Linearize`]. A point without a cost is answered by a shorter step, a cancelled evaluation ends the

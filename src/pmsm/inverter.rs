@@ -63,6 +63,7 @@ impl DeadTime {
 
 /// Share of the period `0..1` for which each upper valve is on, for a stationary vector `u` (V) out of `vdc` (V): the
 /// common part is placed so that the largest and smallest duty are equally far from their ends (space vector).
+#[cfg(feature = "std")]
 #[inline]
 pub(super) fn duties(u: Stator, vdc: f64) -> Phases {
     let p = inverse_clarke(u);

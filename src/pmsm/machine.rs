@@ -1,4 +1,5 @@
 use super::{AngledDrive, Currents, Load, MotorError, MotorModel, PolePairs, Salient, Shaft, ShaftMotion};
+#[cfg(feature = "std")]
 use crate::integrate::{axpy, combined};
 use crate::{Kind, Model, Of, Scalar, Signals};
 use core::marker::PhantomData;
@@ -112,6 +113,7 @@ impl<M: MotorModel, P: Signals> Model for Machine<M, P> {
 }
 
 /// One step of the classical Runge-Kutta method (Kutta 1901) over `h` (s), for a slope that does not depend on time.
+#[cfg(feature = "std")]
 #[inline]
 pub(super) fn runge_kutta(x: MachineState, h: f64, f: impl Fn(&MachineState) -> MachineState) -> MachineState {
     let ahead = |h: f64, k: MachineState| axpy::<MachineState, f64>(x, h, k);

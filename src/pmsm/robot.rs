@@ -48,6 +48,7 @@ pub const TS: f64 = 0.126e-3;
 pub const V_DC: f64 = 600.0;
 
 /// Phase peak voltage limit of the reference drive: [`V_DC`] through space-vector modulation (V).
+#[cfg(feature = "std")]
 pub(super) const V_MAX: f64 = 346.410_161_513_775_44;
 
 impl RobotAxis {

@@ -86,7 +86,7 @@ pub enum Reading {
     Secant,
 }
 
-/// A magnet that remembers: what it lost above 150 C stays lost.
+/// A magnet with its history: the flux that it lost above 150 C stays lost.
 ///
 /// `Ke/Ke0 = (1 - ageing) [1 - 0.0011 (t - 20) - 0.8e-5 max(peak - 150, 0)^2]`
 ///

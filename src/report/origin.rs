@@ -1,4 +1,4 @@
-//! [`Origin`]: where the numbers of a report come from, for who wants to make it again.
+//! [`Origin`]: where the numbers of a report come from, so that it can be made again.
 
 use super::Report;
 use crate::error::Error;

@@ -7,7 +7,7 @@ use crate::numeral::{counted, exact, number, percent};
 use crate::problem::Role;
 use crate::record::Record;
 
-/// An output that holds so much of an unknown's information is the only one that tells it.
+/// An output that holds so much of an unknown's information is the only one that determines it.
 const ONLY: f64 = 0.99;
 /// More than this is not told from all.
 const ALL: f64 = 0.999;
@@ -66,7 +66,7 @@ pub(super) fn advice(found: &Identifiability, unknowns: &[Unknown], records: &[R
     advice
 }
 
-/// Which parameters only one of several outputs tells, output by output.
+/// Which parameters only one of several outputs determines, output by output.
 fn one_output(parameters: &[&Excitation]) -> Vec<String> {
     let outputs = parameters.first().map_or(&[][..], |excited| &excited.outputs);
     let sentence = |j: usize| {

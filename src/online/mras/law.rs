@@ -5,7 +5,7 @@ use crate::layout::Kind;
 use crate::model::Model;
 use crate::signals::{Of, Signals};
 
-/// What an adaptation law sees of one sample.
+/// The input of an adaptation law at one sample.
 pub struct Moment<'a, M: Model> {
     /// The observer's model.
     pub model: &'a M,
@@ -28,7 +28,7 @@ pub struct Moment<'a, M: Model> {
 pub enum Rate {
     /// By so much per second, in its unit.
     Adapt(f64),
-    /// Not at all: this sample tells nothing reliable of it.
+    /// Not at all: this sample does not determine it reliably.
     Hold {
         /// What is too small, in words and with its unit.
         quantity: &'static str,

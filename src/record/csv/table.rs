@@ -110,7 +110,7 @@ impl Table {
     }
 }
 
-/// Whether a line above the names tells a spreadsheet what stands between the cells, as in `sep=;`.
+/// Whether a line above the names gives the separator of the cells, as in `sep=;`.
 fn names_separator(text: &[u8]) -> bool {
     text.len() <= 5 && text.get(..4).is_some_and(|begin| begin.eq_ignore_ascii_case(b"sep="))
 }

@@ -147,7 +147,7 @@ fn histogram(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
 
 const HISTOGRAM: &str = "Histogram, beside a normal distribution of the same mean and deviation";
 
-/// How far a residual tells the next ones.
+/// Autocorrelation of the residuals.
 fn autocorrelation(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
     let of = &fit.residuals;
     let verdict = of.tests.iter().find(|test| test.name.starts_with("Ljung-Box"));
