@@ -2,24 +2,18 @@
 
 use crate::lanes::{Number, Sums, slopes_in_pairs};
 use crate::scalar::{Grid, Scalar};
+use crate::wide::Width;
 use core::iter::Sum;
 use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
-/// AVX-512 and FMA, which this machine has: [`detected`](Wide::detected) alone makes one.
+/// AVX-512 and FMA, which this machine has: [`detected`](Avx512::detected) alone makes one.
 #[derive(Clone, Copy)]
-pub(crate) struct Wide(());
+pub(crate) struct Avx512(());
 
-impl Wide {
+impl Avx512 {
     /// `None` if the machine lacks them.
     pub fn detected() -> Option<Self> {
-        #[cfg(target_arch = "x86_64")]
-        let found = std::arch::is_x86_feature_detected!("avx512f")
-            && std::arch::is_x86_feature_detected!("avx512vl")
-            && std::arch::is_x86_feature_detected!("avx512dq")
-            && std::arch::is_x86_feature_detected!("fma");
-        #[cfg(not(target_arch = "x86_64"))]
-        let found = false;
-        found.then_some(Wide(()))
+        Width::avx512().map(|_| Avx512(()))
     }
 }
 

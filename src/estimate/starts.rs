@@ -51,7 +51,7 @@ pub struct FailedStart {
     /// Names and values of the unknowns where it began.
     #[serde(with = "crate::real")]
     pub start: Vec<(String, f64)>,
-    /// Whether the model could be evaluated there.
+    /// False where the model could not be evaluated there; true also where a limit of time came first.
     pub evaluated: bool,
     /// Why it found none.
     pub reason: String,

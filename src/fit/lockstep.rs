@@ -111,7 +111,9 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
         let finer: Vec<Option<From<'_>>> = from.collect();
         let coarse: Vec<bool> = finer.iter().map(Option::is_some).collect();
         let finer: Vec<From<'_>> = finer.into_iter().flatten().collect();
-        let mut found = by_one_method(&finer, &control).into_iter();
+        let begin = Instant::now();
+        let found = by_one_method(&finer, &control).into_iter().zip(&finer);
+        let mut found = found.map(|(found, (finer, _))| finer.run_on(found, begin, &control));
         let next = |(attempt, coarse): (Attempt, bool)| match if coarse { found.next() } else { None } {
             Some(again) => attempt.or(again),
             None => attempt,

@@ -3,8 +3,9 @@
 use crate::error::Error;
 use crate::estimate::{Summary, Warning, WarningCode};
 use crate::numeral::number;
-use crate::optimize::Severity;
-use crate::problem::{Control, Problem};
+use crate::optimize::{Outcome, Severity};
+use crate::problem::{Control, PARTS, Problem};
+use std::time::Instant;
 
 /// A finer method whose deviance is larger by this explains the data worse; by the second, records of a continuous plant do so
 /// in one of some thousand (the likelihood ratio of two models is above `k` by chance in less than `1 / k` of all records).
@@ -79,6 +80,29 @@ impl Attempt {
             );
             let severity = if certain { Severity::UsableWithCare } else { Severity::Usable };
             found.warnings.push(Warning { code: WarningCode::CoarseStep, severity, text });
+        }
+        Ok(found)
+    }
+}
+
+impl Problem<'_> {
+    /// Takes a search by this finer method on from where it was limited, as long as it explains something.
+    pub(super) fn run_on(
+        &self,
+        found: Result<Summary, Error>,
+        begin: Instant,
+        control: &Control,
+    ) -> Result<Summary, Error> {
+        let mut found = found?;
+        for _ in 1..PARTS {
+            let nothing =
+                |warning: &Warning| warning.severity == Severity::NotUsable && warning.code == WarningCode::Unexplained;
+            let limited = matches!(found.outcome, Outcome::IterationLimit { .. });
+            if !limited || found.warnings.iter().any(nothing) || control.stops() {
+                break;
+            }
+            let again = self.run_within(begin, control, found.coordinates())?;
+            found = after(&found, again);
         }
         Ok(found)
     }

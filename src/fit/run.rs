@@ -33,7 +33,8 @@ impl Problem<'_> {
                 break;
             }
             if let Some(start) = attempt.start(finer, &control) {
-                attempt = attempt.or(finer.run_within(begin, &control, start));
+                let again = finer.run_within(begin, &control, start);
+                attempt = attempt.or(finer.run_on(again, begin, &control));
             }
         }
         attempt.answer()

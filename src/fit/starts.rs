@@ -35,7 +35,7 @@ enum Run<'p> {
 /// Why a search came to no end.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct NoEnd {
-    /// Whether the model could be evaluated where the search began.
+    /// False where the model failed where the search began.
     evaluated: bool,
     reason: String,
 }
@@ -45,13 +45,13 @@ impl NoEnd {
         NoEnd { evaluated, reason: reason.into() }
     }
 
-    /// The model could not be evaluated at the start. What it usually means is left out: it is the same for all starts.
+    /// By the error of the start. What a failure of the model usually means is left out: it is the same for all starts.
     fn at_start(error: Error) -> Self {
-        let error = match error {
-            Error::Start(failure) => Error::Start(Failure { hint: "", ..failure }),
-            other => other,
-        };
-        NoEnd::new(false, error.to_string())
+        match error {
+            Error::Start(failure) => NoEnd::new(false, Error::Start(Failure { hint: "", ..failure }).to_string()),
+            // A time limit, or a flag.
+            other => NoEnd::new(true, other.to_string()),
+        }
     }
 }
 

@@ -7,10 +7,10 @@
 
 use super::conclude::Judgement;
 use super::covariances::Covariances;
-use super::warnings::care;
 use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::information::Covariance;
 use crate::numeral::percent;
+use crate::optimize::Severity;
 use crate::parameter::Transform;
 use nalgebra::{Cholesky, DMatrix};
 
@@ -68,7 +68,7 @@ impl Judgement<'_> {
         Some((0..place.len()).map(|i| 2.0 * covariance.standard_error(i).ln()).collect())
     }
 
-    /// A noise level whose interval is symmetrical where that of its logarithm would be.
+    /// An unknown, such as a noise level, whose interval should reach further above than below.
     pub(super) fn uneven(&self, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
         let own = covariances
             .own
@@ -82,11 +82,11 @@ impl Judgement<'_> {
         let unknown = &unknowns[i];
         unknown.knowledge.standard_error()?;
         let text = format!(
-            "the standard error of `{}` grows with its value, by {} per standard error, as that of a noise level does, so that its interval \
-             is too short above: estimate its logarithm (.log())",
+            "the standard error of `{}` grows with its value, by {} per standard error: its interval is too short above; \
+             estimate its logarithm (.log())",
             unknown.name,
             percent(0.5 * own, 2)
         );
-        Some(care(WarningCode::CurvedInterval, text))
+        Some(Warning { code: WarningCode::CurvedInterval, severity: Severity::Usable, text })
     }
 }

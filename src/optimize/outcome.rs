@@ -145,7 +145,7 @@ impl Outcome {
                 "Look for parameters that only appear together, and fix one of them or give it a prior; or start closer."
             }
             Outcome::IterationLimit { .. } => {
-                "Allow more iterations (where the fit chose the method of integration it has 100 trial steps: name the integrator), \
+                "Allow more iterations (by a finer method that the fit took by itself a search has at most 100: name the integrator), \
                  or start closer; if the cost hardly falls any more, look for parameters that only appear together."
             }
             Outcome::TimeLimit => "Allow more time, or resume from the checkpoint.",

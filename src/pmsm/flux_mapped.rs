@@ -95,8 +95,7 @@ impl FluxMapped {
         let magnets = self.map_d.grid().at2(0.0, 0.0);
         if includes_zero(self.map_d.grid()) && magnets.abs() > WITHOUT_MAGNETS * range(self.map_d.grid()) {
             let (quantity, unit) = ("map_d at zero current", "Wb");
-            let must =
-                "be zero: subtract the flux of the magnets from the map, and give it as ke (units::ke_from_psi_m)";
+            let must = "be zero: subtract the flux of the magnets from the map, and give it as ke (units::Constant::FluxLinkage)";
             return Err(MotorError::OutOfRange { quantity, value: magnets, unit, must });
         }
         let places = |axis: usize| -> Vec<f64> {

@@ -37,9 +37,11 @@ impl<'a> FinerSweeps<'a> {
     }
 }
 
-/// Trial steps of a search by a finer method. A search that begins near its minimum takes some ten; of a record that no
-/// parameters explain a thousand steps by an expensive method tell no more.
-const TRIALS: u64 = 100;
+/// Trial steps of each part of a search by a finer method, and the most parts. A search that begins near its minimum takes some
+/// ten. One that explains nothing after the first part ends there: of a record that no parameters explain a thousand steps by an
+/// expensive method tell no more.
+const TRIALS: u64 = 20;
+pub(crate) const PARTS: usize = 5;
 
 /// The problem by each method is made when it is first needed.
 struct ByMethods<'a> {

@@ -4,26 +4,26 @@
 //! some ten thousand samples they are denormal numbers, on which processors are up to 60 times slower; so slopes below
 //! 1e-150 are set to zero between windows.
 
+mod number;
+mod rows;
+
 use super::{Piece, Reached, RunError, Seed, Visit, Window};
 use crate::dual::Dual;
-use crate::fused::{Fused, Wide};
+use crate::fused::{Avx512, Fused};
 use crate::integrate::{Integrator, ModelSystem, Stuck};
 use crate::interval::{Hold, Interval};
 use crate::lanes;
 use crate::layout::Kind;
 use crate::model::Model;
-use crate::record::Record;
-use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
+use number::Number;
+use rows::Rows;
 use std::sync::Arc;
 
 /// Samples per window: two outputs with eight slopes fit into the first-level cache.
 const WINDOW: usize = 128;
 /// The same where a single sample may take many steps: after each window a fit looks at its time limit.
 const ADAPTIVE_WINDOW: usize = 8;
-
-/// Slopes below this are set to zero: their squares are denormal.
-const NEGLIGIBLE: f64 = 1e-150;
 
 /// The type of a slope.
 trait Slope: lanes::Number {
@@ -46,9 +46,9 @@ impl Unit for Portable {
     }
 }
 
-impl Unit for Wide {
+impl Unit for Avx512 {
     fn run<M: Model, I: Integrator, D: Number>(self, fill: Fill<'_, '_, M, I, D>) -> Result<(), RunError> {
-        // SAFETY: the features were found on this machine, or there would be no `Wide`.
+        // SAFETY: the features were found on this machine, or there would be no `Avx512`.
         #[cfg(target_arch = "x86_64")]
         return unsafe { M::fill_wide(fill) };
         #[cfg(not(target_arch = "x86_64"))]
@@ -61,96 +61,7 @@ impl Slope for f64 {
 }
 
 impl Slope for Fused {
-    type Unit = Wide;
-}
-
-/// A number with a fixed count of slopes.
-trait Number: Scalar {
-    type Slope: Slope;
-    const SLOPES: usize;
-    fn with(value: f64, slope: impl Fn(usize) -> f64) -> Self;
-    fn slope(&self, i: usize) -> f64;
-    fn flushed(self) -> Self;
-}
-
-impl Number for f64 {
-    type Slope = f64;
-    const SLOPES: usize = 0;
-    #[inline(always)]
-    fn with(value: f64, _slope: impl Fn(usize) -> f64) -> Self {
-        value
-    }
-    #[inline(always)]
-    fn slope(&self, _i: usize) -> f64 {
-        0.0
-    }
-    #[inline(always)]
-    fn flushed(self) -> Self {
-        self
-    }
-}
-
-impl<const N: usize, T: Scalar + Slope> Number for Dual<N, T> {
-    type Slope = T;
-    const SLOPES: usize = N;
-    #[inline(always)]
-    fn with(value: f64, slope: impl Fn(usize) -> f64) -> Self {
-        let mut dual = Self::from(value);
-        dual.slopes.iter_mut().enumerate().for_each(|(i, s)| *s = T::from(slope(i)));
-        dual
-    }
-    #[inline(always)]
-    fn slope(&self, i: usize) -> f64 {
-        self.slopes[i].value()
-    }
-    #[inline(always)]
-    fn flushed(mut self) -> Self {
-        for slope in &mut self.slopes {
-            if slope.value().abs() < NEGLIGIBLE {
-                *slope = T::from(0.0);
-            }
-        }
-        self
-    }
-}
-
-/// The rows of one window, with the sample after its last one, and the samples before from which it is predicted; made
-/// once, and filled for each window.
-struct Rows<'p, M: Model> {
-    record: &'p Record,
-    input_columns: Vec<&'p [f64]>,
-    output_columns: Vec<&'p [f64]>,
-    /// How many samples there are before the window's first.
-    before: usize,
-    times: Vec<f64>,
-    inputs: Vec<Of<M::Input, f64>>,
-    outputs: Vec<Of<M::Output, f64>>,
-}
-
-impl<'p, M: Model> Rows<'p, M> {
-    fn new(record: &'p Record) -> Self {
-        Rows {
-            record,
-            input_columns: record.inputs().iter().map(|channel| &*channel.values).collect(),
-            output_columns: record.outputs().iter().map(|channel| &*channel.values).collect(),
-            before: 0,
-            times: Vec::with_capacity(WINDOW + 1),
-            inputs: Vec::with_capacity(WINDOW + 1),
-            outputs: Vec::with_capacity(WINDOW),
-        }
-    }
-
-    fn read(&mut self, begin: usize, samples: usize, before: usize) {
-        let (record, inputs, outputs) = (self.record, &self.input_columns, &self.output_columns);
-        self.before = before.min(begin);
-        let all = begin - self.before..record.len().min(begin + samples + 1);
-        self.times.clear();
-        self.times.extend(all.clone().map(|k| record.time(k)));
-        self.inputs.clear();
-        self.inputs.extend(all.map(|k| M::Input::from_fn(|i| inputs[i][k])));
-        self.outputs.clear();
-        self.outputs.extend((begin..begin + samples).map(|k| M::Output::from_fn(|j| outputs[j][k])));
-    }
+    type Unit = Avx512;
 }
 
 /// The instructions for numbers of a type.
@@ -233,7 +144,7 @@ impl<M: Model, I: Integrator> Loops<M> for I {
     ) -> Result<Reached, RunError> {
         let task = Task { model, integrator: self, piece, seeds, restart };
         // The AVX-512 loop is compiled for the zero-order hold only, which nearly all records have.
-        let wide = if piece.record.input_hold() == Hold::Zero { Wide::detected() } else { None };
+        let wide = if piece.record.input_hold() == Hold::Zero { Avx512::detected() } else { None };
         // Debug builds compile fewer variants, to save compile time: same numbers, more passes.
         #[cfg(debug_assertions)]
         let passes = match (seeds.len(), wide) {
