@@ -13,6 +13,7 @@ mod dropouts;
 mod explained;
 mod hac;
 mod known;
+mod largest;
 pub(crate) mod noise;
 mod outliers;
 mod output_sums;

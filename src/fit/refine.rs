@@ -27,7 +27,11 @@ impl Attempt {
     /// Whether a finer method is to be tried: a finer step would move an unknown, or the start cannot be simulated.
     pub fn is_coarse(&self) -> bool {
         match &self.found {
-            Ok(found) => found.warnings.iter().any(|warning| warning.code == WarningCode::CoarseStep),
+            // An output that never moves says nothing by any method.
+            Ok(found) => {
+                let coarse = found.warnings.iter().any(|warning| warning.code == WarningCode::CoarseStep);
+                coarse && !is_useless(found, WarningCode::ConstantOutput)
+            }
             Err(error) => matches!(error, Error::Start(_)),
         }
     }
@@ -86,7 +90,8 @@ impl Attempt {
 }
 
 impl Problem<'_> {
-    /// Takes a search by this finer method on from where it was limited, as long as it explains something.
+    /// Takes a search by this finer method on from where it was limited, as long as it explains something; searches from
+    /// several starts are not limited to a part.
     pub(super) fn run_on(
         &self,
         found: Result<Summary, Error>,
@@ -95,10 +100,8 @@ impl Problem<'_> {
     ) -> Result<Summary, Error> {
         let mut found = found?;
         for _ in 1..PARTS {
-            let nothing =
-                |warning: &Warning| warning.severity == Severity::NotUsable && warning.code == WarningCode::Unexplained;
             let limited = matches!(found.outcome, Outcome::IterationLimit { .. });
-            if !limited || found.warnings.iter().any(nothing) || control.stops() {
+            if self.settings.starts > 1 || !limited || is_useless(&found, WarningCode::Unexplained) || control.stops() {
                 break;
             }
             let again = self.run_within(begin, control, found.coordinates())?;
@@ -106,6 +109,11 @@ impl Problem<'_> {
         }
         Ok(found)
     }
+}
+
+/// Whether an estimate is not usable for this reason.
+fn is_useless(found: &Summary, code: WarningCode) -> bool {
+    found.warnings.iter().any(|warning| warning.code == code && warning.severity == Severity::NotUsable)
 }
 
 /// The estimate of a finer method, with the work of both.

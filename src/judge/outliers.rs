@@ -25,13 +25,13 @@ impl Judgement<'_> {
         if !squares || self.rounding || self.end.outcome == Outcome::Exact {
             return vec![];
         }
-        let heavy = |j: &usize| {
-            let count = self.residuals.outputs[*j].samples.max(1) as f64;
-            self.residuals.kurtosis[*j] > 3.0 + HEAVY * (24.0 / count).sqrt()
+        let heavy = |j: usize| {
+            let count = self.residuals.outputs[j].samples.max(1) as f64;
+            self.residuals.kurtosis[j] > 3.0 + HEAVY * (24.0 / count).sqrt()
         };
-        let heavy: Vec<usize> = (0..objective.outputs()).filter(heavy).collect();
-        if heavy.is_empty() {
-            return vec![];
+        let heavy: Vec<bool> = (0..objective.outputs()).map(heavy).collect();
+        if !heavy.contains(&true) {
+            return (0..objective.outputs()).filter_map(|j| self.extreme(j)).collect();
         }
         let mut errors = vec![vec![]; objective.outputs()];
         for e in 0..objective.experiments().min(super::shape::RECORDS) {
@@ -41,7 +41,8 @@ impl Judgement<'_> {
             let all: Vec<f64> = errors[j].iter().flatten().flatten().copied().collect();
             self.dropouts_of(j, &errors[j]).or_else(|| self.outliers_of(j, &all))
         };
-        heavy.into_iter().filter_map(of).collect()
+        let of = |j: usize| if heavy[j] { of(j) } else { None };
+        (0..objective.outputs()).filter_map(|j| of(j).or_else(|| self.extreme(j))).collect()
     }
 
     fn outliers_of(&self, j: usize, errors: &[f64]) -> Option<Warning> {

@@ -1,6 +1,7 @@
 //! One pass over the data without slopes: the residuals at the estimate.
 
 use super::coupling::{Coupled, Coupling};
+use super::largest::Largest;
 use super::output_sums::OutputSums;
 use super::whiteness::{LAGS, Whiteness};
 use crate::error::Error;
@@ -35,6 +36,8 @@ pub(crate) struct Residuals {
     pub levels: Vec<(f64, f64)>,
     /// Mean fourth power of each output's errors, relative to the square of their mean square: 3 of normal ones.
     pub kurtosis: Vec<f64>,
+    /// The largest error of each output, standardized where variances are predicted.
+    pub largest: Vec<Largest>,
     /// The smallest standard deviation that was predicted for a measurement of each output; infinite without
     /// predictions.
     pub least_sigma: Vec<f64>,
@@ -50,6 +53,7 @@ struct Sums<'s> {
     log_determinants: (f64, f64),
     portmanteaus: Vec<Portmanteau>,
     coupling: Coupling,
+    largest: Vec<Largest>,
     least_sigma: Vec<f64>,
     /// The windows to be simulated again.
     again: Vec<Sampled>,
@@ -75,6 +79,7 @@ impl<'s> Sums<'s> {
             log_determinants: (objective.whitening.log_determinant(&all), 0.0),
             portmanteaus: vec![Portmanteau::new(LAGS.max(horizon(objective))); outputs],
             coupling: Coupling::new(outputs),
+            largest: vec![Largest::default(); outputs],
             least_sigma: vec![f64::INFINITY; outputs],
             again: vec![],
             run: vec![],
@@ -126,6 +131,7 @@ impl Accumulate for Sums<'_> {
         for j in 0..outputs {
             self.run.clear();
             self.run.extend(window.errors(j, lane));
+            self.largest[j].add(&self.run, self.experiment, begin);
             let values = &record.outputs()[j].values[begin..begin + samples];
             if window.whole && !window.has_variances() {
                 self.outputs[j].add_all(values, &self.run);
@@ -160,6 +166,7 @@ impl Accumulate for Sums<'_> {
         self.outputs.iter_mut().zip(&later.outputs).for_each(|(sums, later)| sums.append(later));
         self.portmanteaus.iter_mut().zip(&later.portmanteaus).for_each(|(sums, later)| sums.follow(later));
         self.coupling.append(&later.coupling);
+        self.largest.iter_mut().zip(&later.largest).for_each(|(largest, later)| *largest = largest.or(*later));
         self.least_sigma.iter_mut().zip(&later.least_sigma).for_each(|(least, later)| *least = least.min(*later));
         self.again.extend(later.again);
     }
@@ -222,6 +229,9 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
         step_error,
         coupled: coupling.strongest(&whiteness),
         whiteness,
+        largest: (0..outputs)
+            .map(|j| all.iter().map(|one| one.largest[j]).fold(Largest::default(), Largest::or))
+            .collect(),
         least_sigma: (0..outputs)
             .map(|j| all.iter().map(|one| one.least_sigma[j]).fold(f64::INFINITY, f64::min))
             .collect(),

@@ -41,7 +41,7 @@ impl<'a> FinerSweeps<'a> {
 /// ten. One that explains nothing after the first part ends there: of a record that no parameters explain a thousand steps by an
 /// expensive method tell no more.
 const TRIALS: u64 = 20;
-pub(crate) const PARTS: usize = 5;
+pub(crate) const PARTS: u64 = 5;
 
 /// The problem by each method is made when it is first needed.
 struct ByMethods<'a> {
@@ -64,7 +64,8 @@ impl<'a> Problem<'a> {
             return self;
         }
         // What is prepared of the records is another for each method, and so is a checkpoint.
-        let optimizer = self.settings.optimizer.limited(TRIALS);
+        let trials = if self.settings.starts > 1 { TRIALS * PARTS } else { TRIALS };
+        let optimizer = self.settings.optimizer.limited(trials);
         let settings = Settings { checkpoint: None, optimizer, ..self.settings.clone() };
         let base = Problem { prepared: vec![], refines: true, settings, ..self.clone() };
         let made = sweeps.make.iter().map(|_| OnceLock::new()).collect();

@@ -381,7 +381,7 @@ fn a_noise_level_has_the_degrees_of_freedom_of_its_own_variance() {
     let record = record.initial(Position { x: fixed(0.0) });
     let width = |y: Parameter| {
         let parameters = Levels { drift: fixed(0.0), y, z: fixed(0.1) };
-        let fit = Fit::new(&RandomWalk, &record).parameters(parameters).predictor(Kalman::default()).run().unwrap();
+        let fit = Fit::new(&RandomWalk, &record).parameters(parameters).predictor(Kalman).run().unwrap();
         let Knowledge::Known { standard_error, lower, upper } = fit.unknowns[0].knowledge else { panic!("{fit}") };
         let uneven = fit.warnings.iter().any(|warning| warning.code == WarningCode::CurvedInterval);
         // A part of 1 / sqrt(40) of the value, just above the 15 % that are warned of.

@@ -130,3 +130,27 @@ fn autocorrelated_outputs_are_correlated_only_if_they_share_noise() {
     assert_eq!(called(0.0, 0.5, 500), 40);
     assert_eq!(called(0.95, 0.5, 3000), 40);
 }
+
+/// One error of eight standard deviations among 20,000, of which the largest normal one is above five in one record of hundred:
+/// the sample is named, and nothing without it.
+#[test]
+fn a_single_outlier_is_named_by_its_time() {
+    let inputs = levels(20_000, 5, 3).into_iter().map(|u| Voltage { u }).collect();
+    let exact = simulated(&Line, 0.5, inputs, Nothing, Affine { slope: 1.5, offset: -0.7 });
+    let named = |outlier: f64| {
+        let mut random = Noise(12);
+        let disturbed = |(k, y): (usize, Pair)| {
+            let more = if k == 12_346 { outlier } else { 0.0 };
+            Pair { y: y.y + 0.1 * random.gauss(), z: y.z + 0.1 * random.gauss() + more }
+        };
+        let outputs = exact.outputs().enumerate().map(disturbed).collect();
+        let record = with_outputs(&Line, &exact, outputs).named("bench");
+        let estimate =
+            Fit::new(&Line, &record).parameters(Affine { slope: free(1.0), offset: free(0.5) }).run().unwrap();
+        let outliers = estimate.warnings.iter().filter(|warning| warning.code == WarningCode::Outliers);
+        outliers.map(|warning| warning.text.clone()).collect::<Vec<_>>()
+    };
+    assert_eq!(named(0.0), Vec::<String>::new());
+    let found = named(0.8);
+    assert!(found.len() == 1 && found[0].contains("`z` at t = 6173 s of `bench`"), "{found:?}");
+}

@@ -40,6 +40,13 @@ fn models() -> Vec<Good> {
         good("house, walls not measured", |s| plain(house(), 0.02, s)),
         good("logistic growth", |s| plain(logistic(), 0.02, s)),
         good("two tanks, upper level not measured", |s| plain(two_tanks(), 0.02, s)),
+        // From one start in ten a search ends where the cells are washed out.
+        good("chemostat, from eight starts", |s| {
+            let how = How { starts: 8, ..How::default() };
+            chemostat().fit(&chemostat().record(s, SAMPLES).noisy(0.02, 0.0, s), &how, s)
+        }),
+        good("drug in three compartments, one measured", |s| plain(compartments(), 0.02, s)),
+        good("hydraulic piston", |s| plain(hydraulic(), 0.02, s)),
     ]
 }
 

@@ -40,6 +40,15 @@ fn curve<M: Model + 'static>(
     plant.fit(&columns, &How::default(), seed)
 }
 
+/// Plants of flows.
+fn flow(number: u64) -> Box<dyn Plant> {
+    match number % 3 {
+        0 => Box::new(chemostat()),
+        1 => Box::new(compartments()),
+        _ => Box::new(hydraulic()),
+    }
+}
+
 fn sensors() -> Vec<Junk> {
     vec![
         seen("processes: outputs are white noise", |s| {
@@ -138,6 +147,20 @@ fn inputs() -> Vec<Junk> {
         seen("processes: inputs thirty samples late", |s| spoil(&*driven(s), s, |c, _| delayed(&mut c.u, 30))),
         seen("battery: current in milliampere", |s| {
             spoil(&battery(), s, |c, _| c.u[0].iter_mut().for_each(|u| *u *= 1e3))
+        }),
+        seen("chemostat, drug, piston: inputs twelve samples late", |s| {
+            spoil(&*flow(s), s, |c, _| delayed(&mut c.u, 12))
+        }),
+        seen("chemostat, drug, piston: sensor behind a slow filter", |s| {
+            spoil(&*flow(s), s, |c, _| {
+                for y in &mut c.y {
+                    let mut at = y[0];
+                    y.iter_mut().for_each(|y| {
+                        at += 0.1 * (*y - at);
+                        *y = at;
+                    });
+                }
+            })
         }),
         seen("bicycle: steering angle in degrees", |s| {
             spoil(&bicycle(), s, |c, _| c.u[0].iter_mut().for_each(|u| *u = u.to_degrees()))

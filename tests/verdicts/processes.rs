@@ -30,6 +30,15 @@ signals! { pub struct Decay { a: "1", tau: "s", c: "1" } }
 signals! { pub struct Levels { h1: "m", h2: "m" } }
 signals! { pub struct Lower { h2: "m" } }
 signals! { pub struct Outlets { c1: "m^2/s", c2: "m^2/s" } }
+signals! { pub struct Broth { cells: "g/l", sugar: "g/l" } }
+signals! { pub struct Flow { dilution: "1/h", sugar: "g/l" } }
+signals! { pub struct Monod { rate: "1/h", half: "g/l", gained: "1" } }
+signals! { pub struct Drug { gut: "mg", blood: "mg", tissue: "mg" } }
+signals! { pub struct Dose { rate: "mg/h" } }
+signals! { pub struct Blood { blood: "mg" } }
+signals! { pub struct Transfer { absorbed: "1/h", lost: "1/h", to: "1/h", back: "1/h" } }
+signals! { pub struct Piston { pressure: "MPa", speed: "m/s" } }
+signals! { pub struct Oil { flow: "1/s", leak: "1/s", area: "m/s^2/MPa", friction: "1/s" } }
 
 /// A model by its kind, its signals and two expressions.
 macro_rules! process {
@@ -125,6 +134,34 @@ process!(
     Lower { h2: x.h2 }
 );
 process!(
+    /// Monod's growth in a chemostat.
+    Chemostat, Continuous, [Broth, Flow, Broth, Monod],
+    |x, u, p, t| {
+        let growth = p.rate * x.sugar / (p.half + x.sugar);
+        Broth { cells: (growth - u.dilution) * x.cells, sugar: u.dilution * (u.sugar - x.sugar) - growth * x.cells / p.gained }
+    },
+    *x
+);
+process!(
+    /// A drug in gut, blood and tissue, measured in the blood.
+    Compartments, Continuous, [Drug, Dose, Blood, Transfer],
+    |x, u, p, t| {
+        let exchanged = p.to * x.blood - p.back * x.tissue;
+        let absorbed = p.absorbed * x.gut;
+        Drug { gut: u.rate - absorbed, blood: absorbed - p.lost * x.blood - exchanged, tissue: exchanged }
+    },
+    Blood { blood: x.blood }
+);
+process!(
+    /// A hydraulic piston behind a valve: a flow by the root of the pressure that is left.
+    Hydraulic, Continuous, [Piston, Force, Piston, Oil],
+    |x, u, p, t| {
+        let left = -(x.pressure * (u.u * 20.0).tanh()) + 2.0;
+        Piston { pressure: p.flow * u.u * left.sqrt() - p.leak * x.pressure, speed: p.area * x.pressure - p.friction * x.speed }
+    },
+    *x
+);
+process!(
     /// Michaelis and Menten's rate of a reaction.
     MichaelisMenten, Static, [Nothing, Force, Level, Enzyme],
     |x, u, p, t| *x,
@@ -177,6 +214,18 @@ pub fn logistic() -> Bench<Logistic> {
 
 pub fn two_tanks() -> Bench<TwoTanks> {
     bench(TwoTanks, &[0.3, 0.25], 0.5, &[(0.3, 0.2, 20)], &[1.0, 1.3])
+}
+
+pub fn chemostat() -> Bench<Chemostat> {
+    bench(Chemostat, &[0.5, 0.3, 0.5], 0.5, &[(0.2, 0.12, 25), (4.0, 1.0, 40)], &[1.0, 1.0])
+}
+
+pub fn compartments() -> Bench<Compartments> {
+    bench(Compartments, &[0.8, 0.25, 0.3, 0.2], 0.25, &[(1.0, 1.0, 30)], &[0.0; 3])
+}
+
+pub fn hydraulic() -> Bench<Hydraulic> {
+    bench(Hydraulic, &[8.0, 5.0, 6.0, 2.0], 0.02, &[(0.0, 0.8, 20)], &[0.0, 0.0])
 }
 
 pub fn michaelis_menten() -> Bench<MichaelisMenten> {
