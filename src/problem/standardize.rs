@@ -117,8 +117,8 @@ impl Task for Multiply<'_> {
     }
 }
 
-/// Standardizes errors by their predicted variances `v`: rows `dy / sqrt(v), z = e / sqrt(v)`, and in the place of the
-/// variances the rows `dv / (sqrt(2) v), (z^2 - 1) / sqrt(2)`, whose least-squares gradient is that of the likelihood.
+/// Standardizes errors by their predicted variances `v`: rows `dy / sqrt(v), z = e / sqrt(v)`, and the slopes of the variances as
+/// `dv / (sqrt(2) v)`, so that with `(z^2 - 1) / sqrt(2)` beside them the least-squares gradient is that of the likelihood.
 fn by_variance(window: &mut Window) -> Result<(), (usize, usize)> {
     let (lanes, last) = (window.lanes(), window.columns() - 1);
     for k in 0..window.len() {
@@ -137,10 +137,8 @@ fn by_variance(window: &mut Window) -> Result<(), (usize, usize)> {
                 let at = |column: usize| column * lanes + lane;
                 let row = window.row_mut(k, j);
                 (0..=last).for_each(|column| row[at(column)] /= root);
-                let z = row[at(last)];
                 let second = window.variance_row_mut(k, j);
                 (0..last).for_each(|column| second[at(column)] *= half / v);
-                second[at(last)] = (z * z - 1.0) * half;
             }
         }
     }

@@ -225,8 +225,12 @@ fn explained(x: &[f64], y: &[f64], degree: i32) -> f64 {
 #[test]
 fn spread_is_that_of_a_regression() {
     let (mut errors, mut speeds) = (vec![], vec![]);
-    let residuals = examined(90, 7, |_, u, e| {
+    // What is missing counts nowhere.
+    let residuals = examined(105, 7, |k, u, e| {
         let error = 0.1 * e * (0.6 + u.w / 100.0) + 0.03;
+        if k % 7 == 3 {
+            return f64::NAN;
+        }
         errors.push(error);
         speeds.push(u.w);
         error

@@ -21,6 +21,8 @@ enum Form {
     Shift,
     /// `y = (a + b) u`, `z = (d - a) w`.
     Turned,
+    /// `y = (a - 2 c) u`, `z = b w`.
+    Mixed,
     /// `y = a u + b (u + w / 100)`.
     Alike,
     /// `y = a u + b w`, `z = b`.
@@ -44,6 +46,7 @@ impl Model for Joined {
             Form::Ratio => Reading { y: p.a / p.c * u.u, z: p.b * u.w },
             Form::Shift => Reading { y: (p.a + p.b) * u.u, z: (p.a + p.d) * u.w },
             Form::Turned => Reading { y: (p.a + p.b) * u.u, z: (p.d - p.a) * u.w },
+            Form::Mixed => Reading { y: (p.a - p.c * 2.0) * u.u, z: p.b * u.w },
             Form::Alike => Reading { y: p.a * u.u + p.b * (u.u + u.w * 0.01), z: p.c * u.w },
             Form::Moment => Reading { y: p.a * u.u + p.b * u.w, z: p.b + u.u * 0.0 },
         }
@@ -122,6 +125,9 @@ fn what_is_known_together_is_named() {
     assert!(together.advice[0].contains("fix 1 of them"), "{:?}", together.advice);
     let ratio = Four { a: free(2.0), c: free(2.0), ..held() };
     says(Form::Ratio, ratio, &["are known only as their ratio: ", "`a` +1 %", "`c` +1 %"]);
+    // Both rise, by unequal parts of themselves: no ratio.
+    let mixed = Four { a: free(2.0), c: free(2.0), ..held() };
+    says(Form::Mixed, mixed, &["are known only together: ", "`a` +1 %", "`c` +0.5 %"]);
     let shift = Four { a: free(2.2), b: free(1.1), d: free(3.9), ..held() };
     for form in [Form::Shift, Form::Turned] {
         says(form, shift, &["`a`", "`b`", "`d`", "are known only up to a common shift: "]);

@@ -24,6 +24,22 @@ impl Model for Twice {
     }
 }
 
+/// `y = a u`.
+#[derive(Clone)]
+struct Gain;
+
+impl Model for Gain {
+    type State = Nothing;
+    type Input = Voltage;
+    type Output = Current;
+    type Parameters = Factor;
+    const KIND: Kind = Kind::Static;
+
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Factor<S>) -> Current<S> {
+        Current { i: p.a * u.u }
+    }
+}
+
 /// Samples of inputs, and outputs of these gains with white errors of this size.
 fn record(samples: usize, gains: (f64, f64), size: f64, drive: impl Fn(usize) -> Drive) -> ExperimentOf<Twice> {
     let mut noise = Noise(21);
@@ -68,18 +84,6 @@ fn errors_as_large_as_their_noise_are_explained() {
     let rms = (along(&left, &left) / 50.0).sqrt();
     // The rest is 1 rms; of the gain, 0.1 is left.
     let outputs: Vec<Current> = inputs.iter().zip(&left).map(|(u, e)| Current { i: 0.1 * u + e / rms }).collect();
-    #[derive(Clone)]
-    struct Gain;
-    impl Model for Gain {
-        type State = Nothing;
-        type Input = Voltage;
-        type Output = Current;
-        type Parameters = Factor;
-        const KIND: Kind = Kind::Static;
-        fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Factor<S>) -> Current<S> {
-            Current { i: p.a * u.u }
-        }
-    }
     let inputs = inputs.into_iter().map(|u| Voltage { u }).collect();
     let record = Experiment::new(&Gain, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
     let found = |sigma: f64, code: WarningCode| {
@@ -121,10 +125,7 @@ fn sentinels_are_said_of_their_record() {
     assert_eq!(warning.severity, Severity::NotUsable);
     let squares = (0..5).map(|k| (999.0 + alone.parameters.a * moving(sample(k)).u).powi(2)).sum::<f64>();
     let rms = (squares / 5.0).sqrt();
-    assert!(
-        warning.text.contains(&format!("differs there by {} V", (rms / 100.0).round() * 100.0)),
-        "{rms} {warning:?}"
-    );
+    assert!(warning.text.contains(&format!("differs there by {rms:.0} V")), "{rms} {warning:?}");
     assert!(!warning.text.contains("of experiment"), "{warning:?}");
     let both = fit(&[good.named("good"), bad.named("bad")]).run().unwrap();
     let warning = said(&both, WarningCode::Sentinel).unwrap();
@@ -193,4 +194,114 @@ fn halves_that_contradict_each_other_are_named() {
     assert!((value(" by the first half") - 2.0).abs() < 0.05, "{}", warning.text);
     assert!((value(" by the second half") - 2.4).abs() < 0.05, "{}", warning.text);
     assert_eq!(warning.severity, Severity::UsableWithCare, "{}", warning.text);
+}
+
+/// An effect that is certain and next to nothing: 2 % of the variance of 2,000 measurements, 1 % of the fit.
+#[test]
+fn an_effect_of_next_to_nothing_explains_nothing() {
+    let mut noise = Noise(2);
+    let inputs: Vec<Voltage> = (0..2000).map(|k| Voltage { u: (0.7 * f64::from(k)).sin() }).collect();
+    let outputs = inputs.iter().map(|u| Current { i: 0.2 * u.u + noise.gauss() }).collect();
+    let record = Experiment::new(&Gain, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+    let fit = || Fit::new(&Gain, &record).parameters(Factor { a: free(1.0) });
+    let of = |fit: Fit<'_, Gain>| {
+        let estimate = fit.run().unwrap();
+        let unknown = &estimate.unknowns[0];
+        assert!(unknown.value > 5.0 * unknown.knowledge.standard_error().unwrap(), "{estimate}");
+        let found = estimate.warnings.iter().find(|warning| warning.code == WarningCode::Unexplained);
+        found.map(|warning| warning.severity)
+    };
+    assert_eq!(of(fit()), Some(Severity::NotUsable));
+    // What is weighted or cut off is not what the fit was to explain.
+    assert_eq!(of(fit().loss(Huber::default())), Some(Severity::UsableWithCare));
+    assert_eq!(of(fit().weighting(|s: &Sample<Gain>| 1.0 + s.u.u * s.u.u)), Some(Severity::UsableWithCare));
+}
+
+/// A sensor that is stuck for a tenth of a record of millivolts.
+#[test]
+fn a_stuck_sensor_is_said() {
+    let small = |k: usize| Drive { u: 1e-3 * moving(k).u, w: 1e-3 * moving(k).w };
+    let good = record(400, (2.0, 2.0), 1e-6, small);
+    let held = good.outputs().nth(200).unwrap().y;
+    let stuck = edited(&good, |k, y| Pair { y: if (200..240).contains(&k) { held } else { y.y }, ..y });
+    let of = |record: ExperimentOf<Twice>| severity(&fit(&[record]).run().unwrap(), WarningCode::Frozen);
+    assert_eq!((of(good), of(stuck)), (None, Some(Severity::NotUsable)));
+}
+
+/// Single errors far out, with how many they are and what part of the sum of squares: a warning above half of it, else a note.
+#[test]
+fn outliers_are_said_with_their_share() {
+    let good = record(400, (2.0, 2.0), 0.01, moving);
+    for (by, every, part, expected) in
+        [(0.5, 80, "1.2 %", Severity::UsableWithCare), (0.085, 160, "0.75 %", Severity::Usable)]
+    {
+        let is_far = |k: usize| k % every == 7;
+        let record = edited(&good, |k, y| Pair { y: if is_far(k) { y.y + by } else { y.y }, ..y });
+        let estimate = fit(std::slice::from_ref(&record)).run().unwrap();
+        let pairs = record.outputs().zip(record.inputs());
+        let squares: Vec<f64> = pairs.map(|(y, u)| (y.y - estimate.parameters.a * u.u).powi(2)).collect();
+        let far: f64 = (0..400).filter(|k| is_far(*k)).map(|k| squares[k]).sum();
+        let share = far / squares.iter().sum::<f64>();
+        let warning = said(&estimate, WarningCode::Outliers).unwrap();
+        assert_eq!((warning.severity, share > 0.5), (expected, expected == Severity::UsableWithCare), "{warning:?}");
+        assert!(warning.text.contains(&format!("make {:.0} % of", 100.0 * share)), "{share} {warning:?}");
+        assert!(warning.text.starts_with(part), "{warning:?}");
+    }
+    assert_eq!(said(&fit(&[good]).run().unwrap(), WarningCode::Outliers), None);
+}
+
+/// Five values of an output are coarse if each stands there four times on average.
+#[test]
+fn coarse_outputs_are_said() {
+    let of = |samples: usize| {
+        let rounded = edited(&record(samples, (2.0, 2.0), 1e-3, moving), |_, y| Pair { y: y.y.round(), ..y });
+        severity(&fit(&[rounded]).run().unwrap(), WarningCode::CoarseOutput)
+    };
+    assert_eq!((of(15), of(40)), (None, Some(Severity::UsableWithCare)));
+}
+
+/// The deviance is that of the measurements: `sum of ln(2 pi s^2) + e^2 / s^2`, without what a prior adds to the cost.
+#[test]
+fn a_prior_is_no_part_of_the_deviance() {
+    let record = record(30, (2.0, 2.0), 0.1, moving);
+    let fit = Fit::new(&Twice, &record).parameters(Factor { a: free(1.0).prior(1.5, 0.02) });
+    let estimate = fit.noise(Pair { y: 0.1, z: 0.2 }).run().unwrap();
+    let a = estimate.parameters.a;
+    let term = |error: f64, sigma: f64| (core::f64::consts::TAU * sigma * sigma).ln() + (error / sigma).powi(2);
+    let pairs = record.outputs().zip(record.inputs());
+    let expected: f64 = pairs.map(|(y, u)| term(y.y - a * u.u, 0.1) + term(y.z - a * u.w, 0.2)).sum();
+    assert!((estimate.deviance.unwrap() / expected - 1.0).abs() < 1e-10, "{:?} {expected}", estimate.deviance);
+}
+
+/// With a full covariance, an output that is missing takes its row and column of it along: the estimate solves the normal
+/// equations of what was measured.
+#[test]
+fn a_full_covariance_of_what_was_measured() {
+    let mut noise = Noise(6);
+    let good = record(200, (2.0, 2.0), 0.0, moving);
+    let errors: Vec<(f64, f64)> = (0..200).map(|_| (0.1 * noise.gauss(), 0.2 * noise.gauss())).collect();
+    let record = edited(&good, |k, y| Pair {
+        y: if k % 5 == 0 { f64::NAN } else { y.y + errors[k].0 },
+        z: if k % 7 == 1 { f64::NAN } else { y.z + errors[k].1 + errors[k].0 },
+    });
+    let estimate = fit(std::slice::from_ref(&record)).noise_covariance().run().unwrap();
+    let covariance = estimate.noise_covariance.as_ref().unwrap();
+    let inverse = |here: &[usize]| {
+        nalgebra::DMatrix::from_fn(here.len(), here.len(), |i, j| covariance[(here[i], here[j])]).try_inverse().unwrap()
+    };
+    let (mut slope, mut size) = (0.0, 0.0f64);
+    for (y, u) in record.outputs().zip(record.inputs()) {
+        let all = [(y.y, u.u), (y.z, u.w)];
+        let here: Vec<usize> = (0..2).filter(|&j| !all[j].0.is_nan()).collect();
+        let e = nalgebra::DVector::from_iterator(
+            here.len(),
+            here.iter().map(|&j| all[j].0 - estimate.parameters.a * all[j].1),
+        );
+        let g = nalgebra::DVector::from_iterator(here.len(), here.iter().map(|&j| all[j].1));
+        let weighted = inverse(&here) * &e;
+        slope += g.dot(&weighted);
+        size += g.dot(&(inverse(&here) * &g));
+    }
+    // In standard errors. Noise levels settle to 1e-6.
+    assert!((slope / size.sqrt()).abs() < 1e-3, "{slope} {size}");
 }

@@ -61,11 +61,13 @@ fn a_method_that_was_chosen_stays() {
     assert!(fit.method.integrator.contains("1 step per sample"), "{fit}");
     let warning = fit.warnings.iter().find(|warning| warning.code == WarningCode::CoarseStep).unwrap();
     assert!(warning.severity == Severity::UsableWithCare && warning.text.contains("2 steps per sample"), "{fit}");
-    // By how much of itself the stiffness would move: what half the step moves it by, but for the second order.
+    // By how much of itself which unknown would move: what half the step moves it by, but for the second order.
     let finer = Fit::new(&Coupled, &record).parameters(near(truth)).integrator(Rk4 { substeps: 2 }).run().unwrap();
-    let moved = 100.0 * (finer.parameters.c / fit.parameters.c - 1.0).abs();
-    let said = warning.text.split("`c` would move by ").nth(1).and_then(|text| text.split(' ').next()).unwrap();
-    let said: f64 = said.parse().unwrap();
+    let (before, after) = warning.text.split_once("` would move by ").unwrap();
+    let name = before.rsplit('`').next().unwrap();
+    let value = |fit: &Estimate<Coupled>| fit.unknowns.iter().find(|unknown| unknown.name == name).unwrap().value;
+    let moved = 100.0 * (value(&finer) / value(&fit) - 1.0).abs();
+    let said: f64 = after.split(' ').next().unwrap().parse().unwrap();
     assert!((said / moved - 1.0).abs() < 0.2, "{moved} {}", warning.text);
 }
 

@@ -16,7 +16,8 @@ impl Model for Gain {
     type Input = Voltage;
     type Output = Current;
     type Parameters = Factor;
-    const KIND: Kind = Kind::Static;
+    // Not static: the order of the samples matters.
+    const KIND: Kind = Kind::Discrete;
 
     fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Factor<S>) -> Current<S> {
         Current { i: p.a * u.u }
@@ -41,39 +42,43 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// `sum (w psi(z) u / (1 - h))^2 / (c sum w u^2)^2` in units of the noise, with the leverage `h` of the weights and the mean
-/// slope `c` of psi.
+/// `(sum (w psi(z) u / (1 - h))^2 + q^2) / (c sum w u^2 + q^2)^2` in units of the noise, with the leverage `h` of the weights, the
+/// mean slope `c` of psi and the precision `q^2` of a prior.
 #[test]
 fn a_sandwich_by_hand() {
+    const COUNT: usize = 700;
     let mut noise = Noise(3);
-    let inputs: Vec<f64> = (0..60).map(|_| 0.5 + noise.uniform()).collect();
-    let spikes: Vec<f64> = (0..60).map(|k| if k % 9 == 4 { 0.8 } else { 0.1 } * noise.gauss()).collect();
+    let inputs: Vec<f64> = (0..COUNT).map(|_| 0.5 + noise.uniform()).collect();
+    let spikes: Vec<f64> = (0..COUNT).map(|k| if k % 9 == 4 { 0.8 } else { 0.1 } * noise.gauss()).collect();
     let record = record(&inputs, |k| spikes[k]);
     let sigma = 0.1;
-    let weighted = fit(&record).noise(Current { i: sigma }).weighting(|s: &Sample<Gain>| s.u.u * s.u.u);
-    let robust = fit(&record).noise(Current { i: sigma }).loss(Huber(1.345));
+    let with = |a: Parameter| Fit::new(&Gain, &record).parameters(Factor { a }).noise(Current { i: sigma });
     let clipped = |z: f64| z.clamp(-1.345, 1.345);
     let plain = |z: f64| z;
-    for (fit, weight, psi) in [
-        (weighted, (|u| u * u) as fn(f64) -> f64, &plain as &dyn Fn(f64) -> f64),
-        (robust, |_| 1.0, &clipped as &dyn Fn(f64) -> f64),
+    let squares = (|u| u * u) as fn(f64) -> f64;
+    let prior = 0.004;
+    for (fit, weight, psi, q) in [
+        (with(free(1.0)).weighting(|s: &Sample<Gain>| s.u.u * s.u.u), squares, &plain as &dyn Fn(f64) -> f64, 0.0),
+        (with(free(1.0)).loss(Huber(1.345)), |_| 1.0, &clipped, 0.0),
+        (with(free(1.0).prior(2.0, prior)).loss(Huber(1.345)), |_| 1.0, &clipped, 1.0 / prior),
     ] {
         let estimate = fit.run().unwrap();
         assert_eq!(estimate.method.covariance, CovarianceMethod::Sandwich);
         let z: Vec<f64> = errors(&estimate, &record).iter().map(|e| e / sigma).collect();
         let w: Vec<f64> = inputs.iter().map(|u| weight(*u)).collect();
-        let bread: f64 = inputs.iter().zip(&w).map(|(u, w)| w * u * u / (sigma * sigma)).sum();
+        let inside = |k: &usize| psi(z[*k]) == z[*k];
+        let curvature = (0..COUNT).filter(inside).map(|k| w[k]).sum::<f64>() / w.iter().sum::<f64>();
+        let squares = inputs.iter().zip(&w).map(|(u, w)| w * u * u / (sigma * sigma)).sum::<f64>();
+        let bread = squares + q * q / curvature;
         let score = |k: usize| {
             let slope = inputs[k] / sigma;
             w[k] * psi(z[k]) * slope / (1.0 - w[k] * slope * slope / bread)
         };
-        let meat: f64 = (0..60).map(|k| score(k).powi(2)).sum();
-        let inside = |k: &usize| psi(z[*k]) == z[*k];
-        let curvature = (0..60).filter(inside).map(|k| w[k]).sum::<f64>() / w.iter().sum::<f64>();
+        let meat: f64 = (0..COUNT).map(|k| score(k).powi(2)).sum::<f64>() + q * q;
         let expected = meat.sqrt() / (curvature * bread);
         let found = estimate.unknowns[0].knowledge.standard_error().unwrap();
         // The estimate is a minimum to 1e-8 of a standard error.
-        assert!((found / expected - 1.0).abs() < 1e-7, "{found} {expected}");
+        assert!((found / expected - 1.0).abs() < 1e-7, "{q}: {found} {expected}");
     }
 }
 

@@ -107,7 +107,7 @@ mod tests {
             (free(2.0).within(1.0, 9.0), 3.0),
             (free(2.0).within(1.0, 16.0), 2.0),
             (free(2.0).within(1.0, 9.0).log(), 3f64.sqrt()),
-            (free(-2.0).within(-16.0, -1.0), -2.0),
+            (free(-2.0).within(-16.0, -1.0), -8.0),
             (free(2.0), 2.0 / 10f64.sqrt()),
             (free(-2.0), -2.0 / 10f64.sqrt()),
             (free(2.0).within(2.0, f64::INFINITY), 2.0 * 10f64.powf(0.25)),

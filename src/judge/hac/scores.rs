@@ -5,6 +5,7 @@ use crate::information::{Block, Information};
 use crate::judge::sandwich::{ALONE, form};
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
+use core::f64::consts::FRAC_1_SQRT_2;
 use nalgebra::DMatrix;
 use std::collections::VecDeque;
 
@@ -15,7 +16,8 @@ pub(super) trait AccumulateScores: Send {
     fn append(&mut self, later: Self);
 }
 
-/// The score of each sample, `sum over the outputs of w psi(z) g`, in the columns kept; each error divided by one less its
+/// The score of each sample, `sum over the outputs of w psi(z) g`, in the columns kept, where variances `v` are predicted with
+/// `w (psi(z) z - kappa) dv / (2 v)`; each error divided by one less its
 /// leverage, as in the sandwich for independent errors.
 pub(super) struct EachScore<'s, T> {
     objective: &'s Objective<'s>,
@@ -52,14 +54,16 @@ impl<T: AccumulateScores> Accumulate for EachScore<'_, T> {
                 let z = window.error(k, j, lane);
                 self.slopes.iter_mut().enumerate().for_each(|(c, slope)| *slope = window.at(k, j, c, lane));
                 let less = (1.0 - weight * form(self.inverse, &self.slopes)).max(ALONE);
-                let psi = weight * loss.map_or(z, |loss| loss.psi(z)) / less;
+                let influence = loss.map_or(z, |loss| loss.psi(z));
+                let psi = weight * influence / less;
                 for (score, &c) in self.score.iter_mut().zip(self.kept) {
                     *score += psi * self.slopes[c];
                 }
                 if window.has_variances() {
                     let variance = window.variance_row(k, j);
                     let at = |column: usize| variance[column * window.lanes() + lane];
-                    let second = weight * at(window.columns() - 1);
+                    // Of `rho(z) + kappa/2 ln v` with slopes `dv / (sqrt(2) v)`.
+                    let second = weight * (influence * z - self.objective.problem.kappa) * FRAC_1_SQRT_2;
                     for (score, &c) in self.score.iter_mut().zip(self.kept) {
                         *score += second * at(c);
                     }
@@ -241,6 +245,7 @@ impl AccumulateScores for MovingSums<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Experiment, Fit, Huber, Kalman, Kind, Model, Nothing, Scalar, Time, free, signals};
 
     fn scores(count: usize) -> Vec<Vec<f64>> {
         (0..count).map(|k| vec![(1.3 * k as f64).sin(), (0.7 * k as f64).cos() + 0.1]).collect()
@@ -294,6 +299,80 @@ mod tests {
                 let expected: f64 = (0..17).flat_map(|t| (0..17).map(move |s| (t, s))).map(|(t, s)| sum(t, s)).sum();
                 let squares: f64 = (0..=i.min(j)).map(|k| found.at(k, i) * found.at(k, j)).sum();
                 assert!((squares - expected).abs() < 1e-11, "{window}: {i} {j}: {squares} {expected}");
+            }
+        }
+    }
+
+    signals! { struct Position { x: "m" } }
+    signals! { struct Levels { drift: "m", noise: "m" } }
+
+    /// `x[k+1] = x[k] + w`, seen with noise.
+    #[derive(Clone)]
+    struct Walk;
+
+    impl Model for Walk {
+        type State = Position;
+        type Input = Nothing;
+        type Output = Position;
+        type Parameters = Levels;
+        const KIND: Kind = Kind::Discrete;
+
+        fn next<S: Scalar>(&self, _t: S, x: &Position<S>, _u: &Nothing, _p: &Levels<S>) -> Position<S> {
+            *x
+        }
+
+        fn diffusion<S: Scalar>(&self, p: &Levels<S>) -> Position<S> {
+            Position { x: p.drift }
+        }
+
+        fn noise<S: Scalar>(&self, p: &Levels<S>) -> Position<S> {
+            Position { x: p.noise }
+        }
+
+        fn output<S: Scalar>(&self, _t: S, x: &Position<S>, _u: &Nothing, _p: &Levels<S>) -> Position<S> {
+            *x
+        }
+    }
+
+    /// Sums of scores, and of their squares.
+    struct Sums(Vec<f64>, Vec<f64>);
+
+    impl AccumulateScores for Sums {
+        fn take(&mut self, score: &[f64]) {
+            self.0.iter_mut().zip(score).for_each(|(sum, s)| *sum += s);
+            self.1.iter_mut().zip(score).for_each(|(sum, s)| *sum += s * s);
+        }
+
+        fn append(&mut self, later: Self) {
+            self.0.iter_mut().zip(later.0).for_each(|(sum, s)| *sum += s);
+            self.1.iter_mut().zip(later.1).for_each(|(sum, s)| *sum += s);
+        }
+    }
+
+    /// At a minimum the scores sum to zero, also those of predicted variances, of squared and of robust losses: with one
+    /// measurement in twelve far out, a tenth of a root of their number would show. Without leverage, which is left out here.
+    #[test]
+    fn scores_of_a_minimum_sum_to_zero() {
+        let (mut random, mut x) = (crate::random::Random::stream(3, 1), 0.0);
+        let outputs = (0..600).map(|k| {
+            x += 0.1 * random.normal();
+            let size = if k % 12 == 5 { 2.0 } else { 0.3 };
+            Position { x: x + size * random.normal() }
+        });
+        let outputs: Vec<Position> = outputs.collect();
+        let time = Time::Uniform { start: 0.0, step: 1.0 };
+        let record = Experiment::new(&Walk, time, vec![Nothing {}; 600], outputs).unwrap();
+        let parameters = Levels { drift: free(0.2).log(), noise: free(0.2).log() };
+        let fit = || Fit::new(&Walk, &record).parameters(parameters).predictor(Kalman);
+        for problem in [fit().problem().unwrap(), fit().loss(Huber(1.345)).problem().unwrap()] {
+            let coordinates = problem.run().unwrap().coordinates();
+            let objective = problem.objective().unwrap();
+            let n = coordinates.len();
+            let (kept, inverse) = ((0..n).collect::<Vec<usize>>(), DMatrix::zeros(n, n));
+            let make = || EachScore::new(&objective, 0, (&kept, &inverse), Sums(vec![0.0; n], vec![0.0; n]));
+            let Sums(sums, squares) = objective.gather_one(&coordinates, 0, true, make).ok().unwrap().into;
+            for (sum, square) in sums.iter().zip(&squares) {
+                assert!(sum.abs() < 1e-3 * square.sqrt(), "{sums:?} {squares:?}");
             }
         }
     }
