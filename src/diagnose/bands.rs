@@ -1,7 +1,7 @@
 //! Predictions with bands: how far the truth, and how far a measurement, may be from what the model says.
 
 use crate::error::Error;
-use crate::estimate::{Summary, student};
+use crate::estimate::{Summary, Unknown, student};
 use crate::problem::{Accumulate, Objective, Problem, Simulated};
 use crate::sweep::Window;
 
@@ -65,8 +65,11 @@ pub(crate) fn widths(
     experiment: usize,
     probability: f64,
 ) -> Result<Widths, Error> {
-    let known = estimate.unknowns.iter().filter(|unknown| unknown.knowledge.standard_error().is_some());
-    let degrees = known.map(|unknown| unknown.degrees_of_freedom).fold(estimate.degrees_of_freedom(), f64::min);
+    // Those of a variance that is predicted belong to one unknown, and most of the band is noise.
+    let counts =
+        |unknown: &&Unknown| unknown.knowledge.standard_error().is_some() && !objective.sweep.predicts_variance();
+    let degrees = estimate.unknowns.iter().filter(counts);
+    let degrees = degrees.map(|unknown| unknown.degrees_of_freedom).fold(estimate.degrees_of_freedom(), f64::min);
     let quantile = student::quantile(0.5 + probability / 2.0, degrees);
     // Slopes in the outputs' own units, and the covariance in the optimizer's coordinates.
     let objective = objective.in_units();

@@ -50,13 +50,21 @@ fn pairs(outputs: usize) -> impl Iterator<Item = (usize, usize)> {
     (1..outputs).flat_map(|j| (0..j).map(move |i| (i, j)))
 }
 
+/// By how much the sum over later lags may at most decrease from one half of the known lags to the next.
+const SLOWEST: f64 = 0.99;
+
 /// By how much the variance of the sum of products of two independent sequences is larger than if they were white: by
 /// `1 + 2 sum over k of rho_i(k) rho_j(k)` (Bartlett, J. Royal Statistical Society 98 (1935) 536), from their autocorrelations
-/// at lags `1, 2, ...`; or, where that is more, by the same of autoregressions with these correlations at lag one.
+/// at lags `1, 2, ...`, those of later lags falling as from the first half of these to the second; or, where that is more, by
+/// the same of autoregressions with these correlations at lag one.
 fn inflation(a: &[f64], b: &[f64]) -> f64 {
-    let products = || a.iter().zip(b).map(|(a, b)| a * b);
-    let phi = products().next().unwrap_or(0.0).min(1.0 - f64::EPSILON);
-    (1.0 + 2.0 * products().sum::<f64>()).max((1.0 + phi) / (1.0 - phi)).max(1.0)
+    let products: Vec<f64> = a.iter().zip(b).map(|(a, b)| a * b).collect();
+    let phi = products.first().map_or(0.0, |first| first.min(1.0 - f64::EPSILON));
+    let (early, late) = products.split_at(products.len() / 2);
+    let (early, late): (f64, f64) = (early.iter().sum(), late.iter().sum());
+    let falls = if early > 0.0 && late > 0.0 { (late / early).min(SLOWEST) } else { 0.0 };
+    let later = late * falls / (1.0 - falls);
+    (1.0 + 2.0 * (early + late + later)).max((1.0 + phi) / (1.0 - phi)).max(1.0)
 }
 
 impl Coupling {

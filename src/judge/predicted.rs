@@ -45,15 +45,22 @@ impl Judgement<'_> {
         let directions = Cholesky::new(covariance)?.unpack();
         let (mut squares, mut own) = (vec![0.0; n], vec![0.0; n]);
         for direction in directions.column_iter() {
+            let apart = self.apart(&kept, direction.iter().copied());
             let beside = |sign: f64| {
                 let mut place = self.end.coordinates.clone();
-                kept.iter().zip(direction.iter()).for_each(|(&i, along)| place[i] += sign * APART * along);
+                kept.iter().zip(direction.iter()).for_each(|(&i, along)| place[i] += sign * apart * along);
                 self.logarithms_of_variances(&place)
             };
-            // Beyond where a noise level is zero there is nothing to compare with.
-            let (Some(above), Some(below)) = (beside(1.0), beside(-1.0)) else { continue };
+            let here = |i: usize| 2.0 * unit.standard_error(i).ln();
+            let (above, below) = (beside(1.0), beside(-1.0));
             for (row, &i) in kept.iter().enumerate() {
-                let slope = (above[i] - below[i]) / (2.0 * APART);
+                let slope = match (&above, &below) {
+                    (Some(above), Some(below)) => (above[i] - below[i]) / (2.0 * apart),
+                    (Some(above), None) => (above[i] - here(i)) / apart,
+                    (None, Some(below)) => (here(i) - below[i]) / apart,
+                    // Nothing is known along this direction: the fewest degrees of freedom.
+                    (None, None) => f64::INFINITY,
+                };
                 squares[i] += slope * slope;
                 own[i] += slope * direction[row] / unit.standard_error(i);
             }
@@ -63,6 +70,22 @@ impl Judgement<'_> {
         Some(Dependence { degrees: squares.into_iter().map(degrees).collect(), own })
     }
 
+    /// How far to go along a direction: nine tenths of the way to the nearest bound at most.
+    fn apart(&self, kept: &[usize], direction: impl Iterator<Item = f64>) -> f64 {
+        const PART: f64 = 0.9;
+        let least = |apart: f64, (&i, along): (&usize, f64)| {
+            let parameter = &self.objective.problem.unknowns.row[i].parameter;
+            if parameter.transform != Transform::Identity {
+                return apart;
+            }
+            let lower = if parameter.positive { parameter.lower.max(0.0) } else { parameter.lower };
+            let place = self.end.coordinates[i];
+            let room = (place - lower).min(parameter.upper - place);
+            if room > 0.0 { apart.min(PART * room / along.abs()) } else { apart }
+        };
+        kept.iter().zip(direction).fold(APART, least)
+    }
+
     fn logarithms_of_variances(&self, place: &[f64]) -> Option<Vec<f64>> {
         let covariance = self.objective.evaluate(place).ok()?.covariance(&self.exact)?;
         Some((0..place.len()).map(|i| 2.0 * covariance.standard_error(i).ln()).collect())
@@ -70,17 +93,14 @@ impl Judgement<'_> {
 
     /// An unknown, such as a noise level, whose interval should reach further above than below.
     pub(super) fn uneven(&self, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
-        let own = covariances
-            .own
-            .iter()
-            .enumerate()
-            .filter(|(i, own)| own.is_finite() && unknowns[*i].transform == Transform::Identity);
+        let eligible =
+            |i: usize| unknowns[i].transform == Transform::Identity && unknowns[i].knowledge.standard_error().is_some();
+        let own = covariances.own.iter().enumerate().filter(|(i, own)| own.is_finite() && eligible(*i));
         let (i, own) = own.max_by(|a, b| a.1.total_cmp(b.1))?;
         if *own <= UNEVEN {
             return None;
         }
         let unknown = &unknowns[i];
-        unknown.knowledge.standard_error()?;
         let text = format!(
             "the standard error of `{}` grows with its value, by {} per standard error: its interval is too short above; \
              estimate its logarithm (.log())",
