@@ -218,7 +218,7 @@ mod tests {
                 raw.push(low + amplitude * (TAU * (k * line) as f64 / samples as f64).sin());
             }
             let series = Series::new("residual", "y", "V", &raw);
-            let (_, _, test) = find(&series, 0.01);
+            let (_, period, test) = find(&series, 0.01);
             let power = |f: usize| {
                 let turn = |k: usize| -TAU * (f * k % samples) as f64 / samples as f64;
                 let term = |k: usize| Complex::from_polar(series.values[k], turn(k));
@@ -229,6 +229,9 @@ mod tests {
             let expected = power(line) / (neighbors[reach] / std::f64::consts::LN_2);
             // Both lines are multiples of eight, where the median is taken anew.
             assert!((test.statistic / expected - 1.0).abs() < 1e-9, "{} {expected}", test.statistic);
+            let energy: f64 = series.values.iter().map(|e| e * e).sum();
+            let share = 2.0 * power(line) / (energy * samples as f64);
+            assert!((period.unwrap().share / share - 1.0).abs() < 1e-9 && share < 0.9, "{period:?} {share}");
             let count = 2.0 * reach as f64;
             let single = (1.0 + expected / count).powf(-count);
             let p_value = 1.0 - (1.0 - single).powf((2048 - 4) as f64);
