@@ -156,10 +156,14 @@ mod tests {
         assert!((found.p_value - 0.001_091).abs() < 1e-6, "{found:?}");
     }
 
-    /// By hand: `1 + 2 (1/4 + 1/4)`; `(1 + 1/4)/(1 - 1/4)`, which is more than `1 + 2/4`; and never less than for white errors.
+    /// By hand: an autoregression of 1/2 beside as much white noise has `1 + 2 (1/16 + 1/64 + ...) = 7/6`; `1 + 2 (1/4 + 1/8)`
+    /// where what falls by a half goes on as `1/16 + ...`; `(1 + 1/4)/(1 - 1/4)`, which is more than `1 + 2/4`; and never less than
+    /// for white errors.
     #[test]
     fn autocorrelation_inflates_the_variance() {
-        assert!((inflation(&[0.5, 0.5], &[0.5, 0.5]) - 2.0).abs() < 1e-15);
+        let beside_white = [0.25, 0.125, 0.0625, 0.03125];
+        assert!((inflation(&beside_white, &beside_white) - 7.0 / 6.0).abs() < 1e-15);
+        assert!((inflation(&[0.5, 0.25], &[0.5, 0.5]) - 2.0).abs() < 1e-15);
         assert!((inflation(&[0.5, 0.0], &[0.5, 0.9]) - 5.0 / 3.0).abs() < 1e-15);
         assert_eq!(inflation(&[0.5, 0.1], &[-0.5, 0.1]), 1.0);
         let colored = Whiteness { correlations: [0.9; LAGS], ..WHITE };
