@@ -4,11 +4,12 @@ use crate::error::Error;
 use crate::estimate::{Summary, Warning, WarningCode};
 use crate::numeral::number;
 use crate::optimize::{Outcome, Severity};
-use crate::problem::{Control, PARTS, Problem};
+use crate::problem::{Control, PARTS, Problem, TRIALS};
 use std::time::Instant;
 
-/// A finer method whose deviance is larger by this explains the data worse; by the second, records of a continuous plant do so
-/// in one of some thousand (the likelihood ratio of two models is above `k` by chance in less than `1 / k` of all records).
+/// A deviance that is larger by this is worth a note; by the second, a warning. If both methods had the same fixed parameters, a
+/// record of the finer model would favor the coarser one by 15 in less than `exp(-15 / 2)`, one of 1,800 records; with estimated
+/// parameters that is about right only.
 const WORSE: f64 = 4.0;
 const CERTAINLY_WORSE: f64 = 15.0;
 
@@ -27,7 +28,7 @@ impl Attempt {
     /// Whether a finer method is to be tried: a finer step would move an unknown, or the start cannot be simulated.
     pub fn is_coarse(&self) -> bool {
         match &self.found {
-            // An output that never moves says nothing by any method.
+            // An output that is constant determines no parameter by any method.
             Ok(found) => {
                 let coarse = found.warnings.iter().any(|warning| warning.code == WarningCode::CoarseStep);
                 coarse && !is_useless(found, WarningCode::ConstantOutput)
@@ -54,8 +55,8 @@ impl Attempt {
         }
     }
 
-    /// This answer or that of a finer method, which takes its place where it converged: the model is that of a continuous plant,
-    /// also where a coarser step happens to explain the data better.
+    /// The answer of a finer method if it converged, else this one. A finer step is closer to the model's equations, so that it
+    /// is preferred also where a coarser one has a smaller deviance.
     pub fn or(self, again: Result<Summary, Error>) -> Self {
         let (before, again) = match (self.found, again) {
             (Err(_), again @ Ok(_)) => return Attempt { found: again, coarser: self.coarser },
@@ -90,8 +91,9 @@ impl Attempt {
 }
 
 impl Problem<'_> {
-    /// Takes a search by this finer method on from where it was limited, as long as it explains something; searches from
-    /// several starts are not limited to a part.
+    /// Continues a search by this finer method that ended at the limit of a part, as long as the model explains the data better
+    /// than a constant. Not for searches from several starts, which are not run in parts, nor where the user's own limit is
+    /// below that of a part.
     pub(super) fn run_on(
         &self,
         found: Result<Summary, Error>,
@@ -99,12 +101,14 @@ impl Problem<'_> {
         control: &Control,
     ) -> Result<Summary, Error> {
         let mut found = found?;
+        let mut trials = found.iterations;
         for _ in 1..PARTS {
-            let limited = matches!(found.outcome, Outcome::IterationLimit { .. });
+            let limited = matches!(found.outcome, Outcome::IterationLimit { .. }) && trials >= TRIALS;
             if self.settings.starts > 1 || !limited || is_useless(&found, WarningCode::Unexplained) || control.stops() {
                 break;
             }
             let again = self.run_within(begin, control, found.coordinates())?;
+            trials = again.iterations;
             found = after(&found, again);
         }
         Ok(found)

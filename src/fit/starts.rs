@@ -45,7 +45,7 @@ impl NoEnd {
         NoEnd { evaluated, reason: reason.into() }
     }
 
-    /// By the error of the start. What a failure of the model usually means is left out: it is the same for all starts.
+    /// From the error at the start, without its hint, which would be repeated for each start.
     fn at_start(error: Error) -> Self {
         match error {
             Error::Start(failure) => NoEnd::new(false, Error::Start(Failure { hint: "", ..failure }).to_string()),

@@ -50,13 +50,13 @@ fn pairs(outputs: usize) -> impl Iterator<Item = (usize, usize)> {
     (1..outputs).flat_map(|j| (0..j).map(move |i| (i, j)))
 }
 
-/// By how much the sum over later lags may at most decrease from one half of the known lags to the next.
+/// The largest ratio of the sums over the second and the first half of the known lags that is extrapolated.
 const SLOWEST: f64 = 0.99;
 
 /// By how much the variance of the sum of products of two independent sequences is larger than if they were white: by
 /// `1 + 2 sum over k of rho_i(k) rho_j(k)` (Bartlett, J. Royal Statistical Society 98 (1935) 536), from their autocorrelations
-/// at lags `1, 2, ...`, those of later lags falling as from the first half of these to the second; or, where that is more, by
-/// the same of autoregressions with these correlations at lag one.
+/// at lags `1, 2, ...`. Beyond the known lags the sum is continued as a geometric series with the ratio of the known halves. Where
+/// that is less than the value of autoregressions of order one with these correlations at lag one, theirs is taken.
 fn inflation(a: &[f64], b: &[f64]) -> f64 {
     let products: Vec<f64> = a.iter().zip(b).map(|(a, b)| a * b).collect();
     let phi = products.first().map_or(0.0, |first| first.min(1.0 - f64::EPSILON));

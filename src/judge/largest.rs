@@ -18,7 +18,7 @@ pub(crate) struct Largest {
 }
 
 impl Largest {
-    /// Takes account of the errors of an experiment from this sample on, zero where missing.
+    /// Adds errors of an experiment from this sample on, zero where missing.
     pub fn add(&mut self, errors: &[f64], experiment: usize, begin: usize) {
         let most = errors.iter().fold(0.0f64, |most, error| most.max(error.abs()));
         if most > self.error.abs()
@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     /// Of ten million normal errors the largest is above 6.3 standard deviations with probability 3e-3, above 7 with 2.6e-5 (twice
-    /// the normal tail, 1.280e-12, times their number). An error that is all there is has none to be compared with.
+    /// the normal tail, 1.280e-12, times their number). An error beside zeros only has a probability of zero.
     #[test]
     fn the_largest_of_many_errors() {
         let n = 1e7;

@@ -14,14 +14,14 @@ use crate::optimize::Severity;
 use crate::parameter::Transform;
 use nalgebra::{Cholesky, DMatrix};
 
-/// More unknowns are not examined: two passes over the data each.
+/// With more unknowns than this the degrees of freedom are those of the measurements: each unknown takes two passes over the data.
 const MOST: usize = 12;
 /// Standard errors from the estimate at which the variances are compared, to either side.
 const APART: f64 = 0.5;
-/// Fewest degrees of freedom; what is left is the approximation's error.
+/// The fewest degrees of freedom: below this the approximation is too rough.
 const FEWEST: f64 = 2.0;
-/// Growth of a variance, in its logarithm along one standard error, from which on its interval is uneven: the variance of a
-/// noise level grows by twice the relative standard error, of which 15 % are much (see docs/intervals.md).
+/// Change of the logarithm of an unknown's variance over one standard error of the unknown, from which on a symmetric interval is
+/// named. For a noise level the change is twice its relative standard error, so that 0.3 is 15 % (see docs/intervals.md).
 const UNEVEN: f64 = 0.3;
 
 /// How the variances of the unknowns depend on the unknowns.
@@ -58,7 +58,7 @@ impl Judgement<'_> {
                     (Some(above), Some(below)) => (above[i] - below[i]) / (2.0 * apart),
                     (Some(above), None) => (above[i] - here(i)) / apart,
                     (None, Some(below)) => (here(i) - below[i]) / apart,
-                    // Nothing is known along this direction: the fewest degrees of freedom.
+                    // The filter fails on both sides of this direction: the fewest degrees of freedom.
                     (None, None) => f64::INFINITY,
                 };
                 squares[i] += slope * slope;

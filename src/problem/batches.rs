@@ -11,8 +11,8 @@ pub(super) struct Broken {
     pub error: RunError,
 }
 
-/// Samples times columns from which on a batch is large enough for a thread of its own. A pass does as much for a sample beside
-/// its slopes as for [`BESIDE`] of them.
+/// The number of samples times columns from which on a batch is run on a thread of its own. What a pass does for a sample without
+/// its slopes takes about as long as [`BESIDE`] slopes, and counts as so many columns.
 const WORTH_A_THREAD: usize = 80_000;
 const BESIDE: usize = 4;
 
