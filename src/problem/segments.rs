@@ -15,8 +15,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Least number of samples, number of segments.
 const SEGMENTS: [(usize, usize); 6] =
     [(512, 8), (4_096, 16), (16_384, 32), (131_072, 64), (1_048_576, 128), (8_388_608, 256)];
-/// Segments begin at multiples of this number of samples.
-const GRAIN: usize = 32;
 /// From this number of records on, uncut records fill the lanes.
 const MANY: usize = 8;
 /// Longest carry for which cutting saves time: a segment has a slope for each of its entries.
@@ -53,9 +51,8 @@ fn cut(samples: usize, whole: bool) -> Vec<Range<usize>> {
     if whole || segments == 1 {
         return std::iter::once(0..samples).collect();
     }
-    let grains = samples.div_ceil(GRAIN);
     // Rounded up: the last segment, from which nothing is carried on, is a shortest one.
-    let begin = |s: usize| ((s * grains).div_ceil(segments) * GRAIN).min(samples);
+    let begin = |s: usize| (s * samples).div_ceil(segments);
     (0..segments).map(|s| begin(s)..begin(s + 1)).collect()
 }
 
