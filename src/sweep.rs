@@ -20,6 +20,7 @@ pub use crate::predict::Guess;
 use crate::error::{Error, Failure};
 use crate::layout::Layout;
 use crate::record::Record;
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -44,11 +45,19 @@ pub struct Piece<'a> {
     /// Its samples.
     pub samples: Range<usize>,
     /// The carry at the first of them.
-    pub carry: Vec<f64>,
+    pub carry: Cow<'a, [f64]>,
     /// Slopes of the carry there with respect to the seeds, row by row.
-    pub slopes: Vec<f64>,
+    pub slopes: Cow<'a, [f64]>,
     /// The parameters.
     pub parameters: &'a [f64],
+}
+
+impl Piece<'_> {
+    /// The same piece, its carry lent.
+    pub(crate) fn lent(&self) -> Piece<'_> {
+        let (carry, slopes) = (Cow::Borrowed(&*self.carry), Cow::Borrowed(&*self.slopes));
+        Piece { samples: self.samples.clone(), carry, slopes, ..*self }
+    }
 }
 
 /// The carry at the end of a piece: at the sample after its last one, where there is one.
@@ -221,15 +230,15 @@ fn follow(
     piece: &Piece<'_>,
     at: &[usize],
 ) -> Result<Vec<Vec<f64>>, RunError> {
-    let mut from = Piece { slopes: vec![], ..piece.clone() };
+    let mut from = Piece { slopes: Cow::default(), ..piece.lent() };
     let mut found = Vec::with_capacity(at.len());
     for &sample in at {
         from.samples.end = sample;
         if !from.samples.is_empty() {
-            from.carry = run(&from).into_iter().next().ok_or(RunError::Stopped)??.carry;
+            from.carry = run(&from).into_iter().next().ok_or(RunError::Stopped)??.carry.into();
         }
         from.samples.start = sample;
-        found.push(from.carry.clone());
+        found.push(from.carry.to_vec());
     }
     Ok(found)
 }

@@ -2,6 +2,9 @@
 
 use super::{Block, Information};
 
+/// Rows of segments that are absorbed together.
+const ROWS: usize = 64;
+
 /// Eliminates the initial values of a record's segments by what the segments before say of them.
 ///
 /// A segment was simulated from a guess of its initial value, with slopes of its rows and of its end with respect to that
@@ -20,8 +23,10 @@ pub(crate) struct Chain<'c> {
     /// `S` by rows, with respect to the quantities of the unknowns.
     slopes: Vec<f64>,
     defect: Vec<f64>,
+    /// Both of the segment before.
+    before: (Vec<f64>, Vec<f64>),
     information: Information,
-    /// The rows of a segment, and one of them.
+    /// Rows of segments that are not in the triangle yet, and one of them.
     block: Block,
     row: Vec<f64>,
     rows: u64,
@@ -35,10 +40,11 @@ impl<'c> Chain<'c> {
     /// From the slopes of the first segment's initial value with respect to the unknowns, row by row.
     pub fn new(carried: usize, slopes: Vec<f64>, parameters: &'c [usize], scales: &'c [f64]) -> Self {
         let (n, information) = (scales.len(), Information::new(scales.len()));
-        let (block, row) = (Block::new(n, carried + parameters.len() + 1), vec![0.0; n]);
+        let (block, row) = (Block::new(n, ROWS.max(carried + parameters.len() + 1)), vec![0.0; n]);
         let defect = vec![0.0; carried];
+        let before = (vec![0.0; slopes.len()], defect.clone());
         let (moved, squares) = (0.0, 0.0);
-        Chain { carried, parameters, scales, slopes, defect, information, block, row, rows: 0, moved, squares }
+        Chain { carried, parameters, scales, slopes, defect, before, information, block, row, rows: 0, moved, squares }
     }
 
     /// What is known of the initial value that the next segment has: by how much its guess is off, and its slopes.
@@ -68,7 +74,6 @@ impl<'c> Chain<'c> {
             self.squares += (y - moved) * (y - moved);
             self.information.gather(&mut self.block, row, y - moved);
         }
-        self.information.absorb(&mut self.block);
         self.rows += segment.rows();
     }
 
@@ -76,8 +81,10 @@ impl<'c> Chain<'c> {
     /// parameters, row by row, and the guess from which the next one was simulated.
     pub fn go_on(&mut self, end: &[f64], slopes: &[f64], guess: &[f64]) {
         let (n, c, m) = (self.scales.len(), self.carried, self.parameters.len());
-        let before = (std::mem::take(&mut self.slopes), std::mem::take(&mut self.defect));
-        (self.slopes, self.defect) = (vec![0.0; c * n], vec![0.0; c]);
+        std::mem::swap(&mut self.slopes, &mut self.before.0);
+        std::mem::swap(&mut self.defect, &mut self.before.1);
+        let before = &self.before;
+        self.slopes.fill(0.0);
         for i in 0..c {
             let (phi, psi) = slopes[i * (c + m)..][..c + m].split_at(c);
             let to = &mut self.slopes[i * n..][..n];
@@ -96,6 +103,7 @@ impl<'c> Chain<'c> {
 
     /// The triangle of the record's unknowns.
     pub fn triangle(mut self) -> Information {
+        self.information.absorb(&mut self.block);
         self.information.rows = self.rows;
         self.information
     }

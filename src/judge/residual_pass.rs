@@ -10,6 +10,7 @@ use crate::optimize::Infeasible;
 use crate::problem::{Accumulate, At, Objective, each, gather_together};
 use crate::sweep::{Piece, Prepared, Sweep, Window};
 use crate::whiteness::Portmanteau;
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// Longest horizon over which errors are correlated.
@@ -286,8 +287,8 @@ fn changed(
             record,
             prepared: &prepared,
             samples: sampled.begin..sampled.begin + samples,
-            carry: sampled.carry.clone(),
-            slopes: vec![],
+            carry: Cow::Borrowed(&sampled.carry),
+            slopes: Cow::default(),
             parameters: &values.p,
         };
         let mut found = 0.0;

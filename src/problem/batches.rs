@@ -70,7 +70,7 @@ fn batches(jobs: &[Job<'_>]) -> Vec<Vec<usize>> {
 
 /// Runs the jobs of a batch and calls `show` with their windows of standardized errors.
 pub(super) fn run(jobs: &[&Job<'_>], show: &mut dyn FnMut(&mut Window)) -> Result<Vec<Reached>, Broken> {
-    let pieces: Vec<Piece<'_>> = jobs.iter().map(|job| job.piece.clone()).collect();
+    let pieces: Vec<Piece<'_>> = jobs.iter().map(|job| job.piece.lent()).collect();
     let mut standardize: Option<Standardize<'_>> = None;
     let mut failed = None;
     let visit = &mut |window: &mut Window| {

@@ -104,8 +104,7 @@ impl Objective<'_> {
 
     /// The borders as the slopes at another point tell.
     fn extrapolated(&self, coordinates: &[f64], values: &[Values], from: &Borders) -> Borders {
-        let mut guess = Borders { point: coordinates.to_vec(), values: values.to_vec(), right: false, ..from.clone() };
-        for (e, borders) in guess.of.iter_mut().enumerate() {
+        let one = |(e, borders): (usize, &Vec<Border>)| {
             let quantity = |values: &Values, seed: &Seed| match *seed {
                 Seed::Carry(i) => values.x[i],
                 Seed::Parameter(j) => values.p[j],
@@ -113,11 +112,10 @@ impl Objective<'_> {
             let seeds = self.problem.unknowns.seeds(e);
             let change = |seed| quantity(&values[e], seed) - quantity(&from.values[e], seed);
             let change: Vec<f64> = seeds.iter().map(change).collect();
-            for (s, border) in borders.iter_mut().enumerate() {
-                *border = Border { carry: from.moved(e, s + 1, &change), slopes: vec![] };
-            }
-        }
-        guess
+            (1..=borders.len()).map(|s| Border { carry: from.moved(e, s, &change), slopes: vec![] }).collect()
+        };
+        let of = from.of.iter().enumerate().map(one).collect();
+        Borders { point: coordinates.to_vec(), cost: from.cost, values: values.to_vec(), of, right: false }
     }
 
     /// Triangles of a nonlinear model from guessed borders, which are corrected and simulated from anew until the correction
@@ -168,10 +166,10 @@ impl Objective<'_> {
         let jobs: Vec<Job<'_>> = (0..self.experiments()).flat_map(run_in).collect();
         // A run that fails leaves its begin as the guess.
         let end = |_: &[usize], jobs: &[&Job<'_>]| {
-            let pieces: Vec<Piece<'_>> = jobs.iter().map(|job| job.piece.clone()).collect();
+            let pieces: Vec<Piece<'_>> = jobs.iter().map(|job| job.piece.lent()).collect();
             let reached = self.sweep.run(&pieces, &[], &mut |_| !self.control.stops());
             let carry = |(reached, piece): (Result<Reached, RunError>, Piece<'_>)| {
-                reached.map_or(piece.carry, |reached| reached.carry)
+                reached.map_or_else(|_| piece.carry.into_owned(), |reached| reached.carry)
             };
             Ok(reached.into_iter().zip(pieces).map(carry).collect())
         };

@@ -9,6 +9,8 @@ use super::{Objective, Values, Weighing};
 use crate::information::{Chain, Information};
 use crate::optimize::{Infeasible, Linearization};
 use crate::sweep::{Piece, Reached, RunError, Seed};
+use std::borrow::Cow;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Cost, triangle and final carry of one segment.
@@ -130,7 +132,7 @@ impl Objective<'_> {
         let is_parameter = |i: &usize| matches!(whole.seeds[*i], Seed::Parameter(_));
         let parameters: Vec<usize> = (0..whole.seeds.len()).filter(is_parameter).collect();
         let Piece { carry, slopes, .. } = whole.piece;
-        let mut chain = Chain::new(carry.len(), slopes, &parameters, &whole.scales);
+        let mut chain = Chain::new(carry.len(), slopes.into_owned(), &parameters, &whole.scales);
         let simulated_from = guess.map_or(&[][..], |guess| &guess.of[e]);
         let mut borders = Vec::with_capacity(simulated_from.len());
         let simulated = parts.iter().map(|part| part.cost).sum::<f64>();
@@ -159,33 +161,46 @@ impl Objective<'_> {
         e: usize,
         values: &'p Values,
         coordinates: &[f64],
-        guess: Option<&Borders>,
+        guess: Option<&'p Borders>,
     ) -> Vec<Job<'p>> {
+        if self.problem.cuts.is_chained(e) {
+            return self.chained_jobs(e, values, coordinates, guess);
+        }
         let mut jobs = self.segments(e, values, coordinates, true, guess);
-        let chained = self.problem.cuts.is_chained(e);
         for job in &mut jobs {
             // A scale of zero marks a column that is left out; it stays zero.
             job.scales.iter_mut().filter(|scale| **scale != 0.0).for_each(|scale| *scale = 1.0);
-            if chained {
-                let moves = self.carry_moves(job);
-                job.scales.clear();
-                let carried = job.piece.carry.len();
-                job.seeds.retain(|seed| matches!(seed, Seed::Parameter(_)));
-                job.seeds.splice(0..0, (0..carried).map(Seed::Carry));
-                let width = job.seeds.len();
-                let slope = |at| f64::from(u8::from(at % width == at / width && moves[at / width]));
-                job.piece.slopes = (0..carried * width).map(slope).collect();
-            }
         }
         jobs
     }
 
-    /// Which entries of the carry that a segment begins with depend on the unknowns: at the begin of a record those
-    /// that are given do not, and slopes with respect to them may be infinite.
-    fn carry_moves(&self, job: &Job<'_>) -> Vec<bool> {
-        let Piece { carry, slopes, samples, .. } = &job.piece;
-        let row = |i: usize| &slopes[i * job.seeds.len()..][..job.seeds.len()];
-        (0..carry.len()).map(|i| samples.start > 0 || row(i).iter().any(|slope| *slope != 0.0)).collect()
+    /// The chained segments of an experiment, with slopes with respect to all that each begins with and the parameters.
+    fn chained_jobs<'p>(
+        &'p self,
+        e: usize,
+        values: &'p Values,
+        coordinates: &[f64],
+        guess: Option<&'p Borders>,
+    ) -> Vec<Job<'p>> {
+        let Job { seeds: unknowns, piece: whole, .. } = self.job(e, values, coordinates, true);
+        let carried = whole.carry.len();
+        let is_parameter = |seed: &&Seed| matches!(seed, Seed::Parameter(_));
+        let seeds: Vec<Seed> =
+            (0..carried).map(Seed::Carry).chain(unknowns.iter().filter(is_parameter).copied()).collect();
+        // What a record begins with does not move where it is given, and slopes with respect to it may be infinite.
+        let row = |i: usize| &whole.slopes[i * unknowns.len()..][..unknowns.len()];
+        let moves = |s: usize, i: usize| s > 0 || row(i).iter().any(|slope| *slope != 0.0);
+        let job = |(s, samples): (usize, &Range<usize>)| {
+            let border = guess.filter(|_| s > 0).and_then(|guess| guess.of[e].get(s - 1));
+            let mut slopes = vec![0.0; carried * seeds.len()];
+            for i in (0..carried).filter(|&i| moves(s, i)) {
+                slopes[i * seeds.len() + i] = 1.0;
+            }
+            let carry = border.map_or_else(|| whole.carry.clone(), |border| Cow::Borrowed(&*border.carry));
+            let piece = Piece { samples: samples.clone(), carry, slopes: slopes.into(), ..whole };
+            Job { objective: self, experiment: e, seeds: seeds.clone(), scales: vec![], piece }
+        };
+        self.problem.cuts.segments[e].iter().enumerate().map(job).collect()
     }
 
     /// The cost of one experiment alone, priors left out.

@@ -49,7 +49,7 @@ impl Objective<'_> {
             (0..carry.len()).flat_map(|row| known.clone().map(move |(seed, scale)| (row, column(seed), *scale)));
         let slope =
             |(row, column, scale): (usize, usize, f64)| if scale == 0.0 { 0.0 } else { all[row * width + column] };
-        let slopes = slopes.map(slope).collect();
+        let (carry, slopes) = (carry.into(), slopes.map(slope).collect());
         let (prepared, samples) = (&problem.prepared[e], 0..record.len());
         Job {
             objective: self,
@@ -73,7 +73,7 @@ impl Objective<'_> {
         let segments = self.problem.cuts.segments[e].iter().enumerate();
         let job = |(s, samples): (usize, &std::ops::Range<usize>)| {
             let border = borders.filter(|_| s > 0).and_then(|borders| borders.of[e].get(s - 1));
-            let from = |own: &Vec<f64>, border: Option<&Vec<f64>>| border.unwrap_or(own).clone();
+            let from = |own: &[f64], border: Option<&Vec<f64>>| border.map_or(own, |border| border).to_vec().into();
             let carry = from(&whole.piece.carry, border.map(|border| &border.carry));
             let slopes = from(&whole.piece.slopes, border.map(|border| &border.slopes).filter(|_| slopes));
             let (seeds, scales) = (whole.seeds.clone(), whole.scales.clone());
@@ -82,7 +82,7 @@ impl Objective<'_> {
                 experiment: e,
                 seeds,
                 scales,
-                piece: Piece { samples: samples.clone(), carry, slopes, ..whole.piece.clone() },
+                piece: Piece { samples: samples.clone(), carry, slopes, ..whole.piece },
             }
         };
         segments.map(job).collect()

@@ -46,7 +46,7 @@ fn chained(found: &Value, slopes: &[f64], seeds: &[Seed], n: usize, m: usize) ->
 impl Closures {
     fn run_one(&self, piece: &Piece<'_>, seeds: &[Seed], visit: Visit<'_>) -> Result<Reached, RunError> {
         let (n, m) = (self.layout.states.len(), self.layout.parameters.len());
-        let mut reached = Reached { carry: piece.carry.clone(), slopes: piece.slopes.clone() };
+        let mut reached = Reached { carry: piece.carry.to_vec(), slopes: piece.slopes.to_vec() };
         let mut window = Window::new(1, self.layout.outputs.len(), seeds.len(), 50, false);
         for first in piece.samples.clone().step_by(window.capacity()) {
             window.clear();

@@ -31,13 +31,11 @@ enum ColumnSource<'r> {
 }
 
 impl<'r> Columns<'r> {
-    /// Of the pieces of all lanes.
-    pub fn new<'p>(program: &Program, pieces: impl Iterator<Item = &'p Piece<'r>>) -> Self
-    where
-        'r: 'p,
-    {
+    /// Of pieces in so many lanes; those without a piece repeat the first.
+    pub fn new(program: &Program, pieces: &[Piece<'r>], lanes: usize) -> Self {
+        let piece = |lane: usize| pieces.get(lane).unwrap_or(&pieces[0]);
         let of = |piece: &Piece<'r>| (piece.record, piece.prepared.derived.of(program, piece.record));
-        let (records, derived): (Vec<&'r Record>, Vec<_>) = pieces.map(of).unzip();
+        let (records, derived): (Vec<&'r Record>, Vec<_>) = (0..lanes).map(piece).map(of).unzip();
         let source = |record: &'r Record, column: &Column| match *column {
             Column::Time => ColumnSource::Time,
             Column::Step => ColumnSource::Step,

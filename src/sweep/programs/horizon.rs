@@ -4,6 +4,7 @@
 use super::run::{Run, WINDOW};
 use super::workspace::Compiled;
 use crate::sweep::{Piece, Reached, RunError, Visit, Window};
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// Runs a piece; its windows have one lane.
@@ -53,7 +54,7 @@ struct Restarts<'r> {
 impl<'r> Restarts<'r> {
     fn new(compiled: &'r Compiled, piece: &Piece<'r>, steps: usize) -> Self {
         let (states, seeds) = (compiled.program.carried(), compiled.program.seeds().len());
-        let one = Piece { samples: 0..steps + 1, slopes: vec![0.0; states * seeds], ..piece.clone() };
+        let one = Piece { samples: 0..steps + 1, slopes: vec![0.0; states * seeds].into(), ..piece.clone() };
         let lanes = compiled.program.lanes();
         let run = Run::new(compiled, vec![one; lanes]);
         Restarts { run, lanes, steps, states, measured: &piece.prepared.restarts }
@@ -69,7 +70,7 @@ impl<'r> Restarts<'r> {
                 for (lane, piece) in pieces.iter_mut().enumerate() {
                     let from = group + lane.min(there - 1) - *steps;
                     piece.samples = from..from + *steps + 1;
-                    piece.carry.copy_from_slice(&measured[from * *states..][..*states]);
+                    piece.carry = Cow::Borrowed(&measured[from * *states..][..*states]);
                 }
             });
             let mut last = 0;

@@ -39,7 +39,12 @@ impl Interleaved {
     /// The columns of pieces, one piece in each lane. `None` where they are not kept: for programs that read time or step, for
     /// long records, and for programs without slopes, which run once or twice a fit, unless a program with slopes has kept the
     /// same columns.
-    pub(super) fn of(&self, program: &Program, pieces: &[&Piece<'_>], columns: &Columns<'_>) -> Option<Arc<Kept>> {
+    pub(super) fn of<'p>(
+        &self,
+        program: &Program,
+        pieces: &[&Piece<'_>],
+        columns: impl FnOnce() -> Columns<'p>,
+    ) -> Option<Arc<Kept>> {
         let read = program.columns();
         let of_time = read.iter().any(|column| matches!(column, Column::Time | Column::Step));
         let numbers = pieces[0].record.len() * (read.len() + program.outputs());
@@ -69,7 +74,7 @@ impl Interleaved {
             return None;
         }
         let from = channels().map(|channel| channel.values.clone()).collect();
-        let kept = Arc::new(Kept::new(program, begins().collect(), samples, from, columns));
+        let kept = Arc::new(Kept::new(program, begins().collect(), samples, from, &columns()));
         let mut all = all();
         // Columns of the same samples with another record in one of the lanes: a search of a fleet has ended.
         all.retain(|kept| !stands_alike(kept));

@@ -16,7 +16,8 @@ pub(super) const WINDOW: usize = 64;
 pub(super) struct Run<'r> {
     compiled: &'r Compiled,
     pieces: Vec<Piece<'r>>,
-    columns: Columns<'r>,
+    /// Where windows are read from that are not kept.
+    columns: Option<Columns<'r>>,
     /// What the columns are, from the first sample of each piece on, if it is kept.
     kept: Option<Arc<Kept>>,
     space: Workspace,
@@ -35,8 +36,7 @@ impl<'r> Run<'r> {
             }
         }
         group.prepare();
-        let columns = Columns::new(&compiled.program, (0..lanes).map(piece));
-        let mut run = Run { compiled, pieces, columns, kept: None, space };
+        let mut run = Run { compiled, pieces, columns: None, kept: None, space };
         run.start();
         run
     }
@@ -100,14 +100,19 @@ impl<'r> Run<'r> {
         for (lane, to) in begins.iter_mut().enumerate() {
             *to = self.pieces.get(lane).unwrap_or(&self.pieces[0]).samples.start + begin;
         }
-        self.columns.read(&self.compiled.program, begins, samples, inputs);
+        let columns =
+            self.columns.get_or_insert_with(|| Columns::new(&self.compiled.program, &self.pieces, begins.len()));
+        columns.read(&self.compiled.program, begins, samples, inputs);
     }
 
     /// Runs all pieces to their ends.
     pub fn all(mut self, visit: Visit<'_>) -> Vec<Result<Reached, RunError>> {
         let lanes = (0..self.space.group.lanes()).map(|lane| self.pieces.get(lane).unwrap_or(&self.pieces[0]));
         let lanes: Vec<&Piece<'_>> = lanes.collect();
-        self.kept = lanes[0].prepared.interleaved.of(&self.compiled.program, &lanes, &self.columns);
+        self.kept = lanes[0]
+            .prepared
+            .interleaved
+            .of(&self.compiled.program, &lanes, || Columns::new(&self.compiled.program, &self.pieces, lanes.len()));
         let mut reached = vec![Reached::default(); self.pieces.len()];
         for begin in (0..self.longest()).step_by(WINDOW) {
             self.next(begin, &mut reached);
@@ -191,7 +196,7 @@ impl<'r> Run<'r> {
         let measured: &[f64] = match &self.kept {
             Some(kept) => &kept.measured[begin * outputs * lanes..],
             None => {
-                self.columns.read_measured(begins, samples, measured);
+                self.columns.iter().for_each(|columns| columns.read_measured(begins, samples, measured));
                 measured
             }
         };

@@ -108,7 +108,7 @@ fn compare(model: &Pendulum, predictor: impl Predictor, uniform: bool, hold: Hol
                 Seed::Parameter(j) => 2 + j,
             };
             let row = |row: usize| seeds.iter().map(|seed| all[row * 7 + column(seed)]).collect::<Vec<f64>>();
-            let slopes = (0..carry.len()).flat_map(row).collect();
+            let (slopes, carry) = ((0..carry.len()).flat_map(row).collect(), carry.into());
             let (record, prepared, parameters) = (&records[i], &prepared[i], &all_p[i][..]);
             Piece { record, prepared, samples: 0..lengths[i], carry, slopes, parameters }
         };
@@ -185,8 +185,8 @@ fn kept_columns_are_those_of_the_records_at_hand() {
             record,
             prepared,
             samples: samples.clone(),
-            carry: vec![0.3, -0.2],
-            slopes: vec![0.5; 2 * seeds.len()],
+            carry: vec![0.3, -0.2].into(),
+            slopes: vec![0.5; 2 * seeds.len()].into(),
             parameters: &p,
         };
         rows(&programs, &[(records[0], first), (records[1], &other)].map(piece), seeds)
