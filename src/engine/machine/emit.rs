@@ -57,6 +57,9 @@ impl<'a> Emitter<'a> {
     /// The code of the whole loop.
     pub fn emit(mut self) -> Result<Vec<u8>, IcedError> {
         use iced_x86::Code as Op;
+        // Nothing is encoded the first time: it shows the registers in which a sample leaves what is carried.
+        self.sample(&[])?;
+        let carried = self.registers.first(self.code.carried);
         self.encoder = Some(Encoder::try_new(64)?);
         let saved = [SLOTS, INPUTS, ROWS, LEFT];
         for register in saved {
@@ -67,14 +70,21 @@ impl<'a> Emitter<'a> {
         for (to, from) in saved.into_iter().zip([Register::RDI, Register::RSI, Register::RDX, Register::RCX]) {
             self.put(Machine::with2(Op::Mov_rm64_r64, to, from))?;
         }
+        for (slot, register) in &carried {
+            self.put(Machine::with2(self.unit.load, self.unit.register(*register), self.home(*slot)))?;
+        }
         let top = self.length;
-        self.sample()?;
+        self.sample(&carried)?;
+        self.carry_on(&carried)?;
         let advance = |count: usize| (count * self.unit.bytes) as i32;
         let (inputs, rows) = (advance(self.code.columns.len()), advance(self.code.rows.len()));
         self.put(Machine::with2(Op::Add_rm64_imm32, INPUTS, inputs))?;
         self.put(Machine::with2(Op::Add_rm64_imm32, ROWS, rows))?;
         self.put(Machine::with2(Op::Sub_rm64_imm8, LEFT, 1))?;
         self.put(Machine::with_branch(Op::Jne_rel32_64, top))?;
+        for (slot, register) in &carried {
+            self.put(Machine::with2(self.unit.store, self.home(*slot), self.unit.register(*register)))?;
+        }
         self.put(Ok(Machine::with(Op::VEX_Vzeroupper)))?;
         self.put(Machine::with2(Op::Add_rm64_imm8, Register::RSP, 8))?;
         for register in saved.into_iter().rev() {
@@ -112,8 +122,9 @@ impl<'a> Emitter<'a> {
         events
     }
 
-    /// One sample; the numbers that are carried stand in their slots before and after.
-    fn sample(&mut self) -> Emitted {
+    /// One sample, before which these carried numbers stand in registers alone. After it they stand in any registers, or in
+    /// their slots; the other carried ones in their slots, before and after.
+    fn sample(&mut self, carried: &[(Slot, u8)]) -> Emitted {
         let events = self.events();
         let reads = |event: &Event<'_>| -> Vec<Slot> {
             match event {
@@ -138,6 +149,7 @@ impl<'a> Emitter<'a> {
         after.reverse();
         self.registers.clear();
         self.registers.next = next;
+        carried.iter().for_each(|(slot, register)| self.registers.bind(*slot, *register, true));
         for (event, after) in events.iter().zip(after) {
             let to = match event {
                 Event::Instruction(instruction) => Some(instruction.to),
@@ -159,7 +171,34 @@ impl<'a> Emitter<'a> {
             }
             self.registers.release();
         }
-        self.write_back()
+        self.write_back(carried)
+    }
+
+    /// Moves what is carried to where the next sample begins with it.
+    fn carry_on(&mut self, carried: &[(Slot, u8)]) -> Emitted {
+        let at = |(slot, to): &(Slot, u8)| self.registers.of(*slot).map(|from| (from, *to));
+        let mut moves: Vec<(u8, u8)> = carried.iter().filter_map(at).filter(|(from, to)| from != to).collect();
+        let missing: Vec<(Slot, u8)> =
+            carried.iter().copied().filter(|(slot, _)| self.registers.of(*slot).is_none()).collect();
+        while !moves.is_empty() {
+            // One whose target no other reads; if they go around in a circle, that of the first one is freed.
+            let (from, to) = match moves.iter().position(|(_, to)| moves.iter().all(|(from, _)| from != to)) {
+                Some(free) => moves.swap_remove(free),
+                None => {
+                    let used = |register: &u8| {
+                        carried.iter().any(|(_, to)| to == register) || moves.iter().any(|(from, _)| from == register)
+                    };
+                    let spare = (0..self.unit.registers).find(|register| !used(register)).unwrap_or(0);
+                    let from = std::mem::replace(&mut moves[0].0, spare);
+                    (from, spare)
+                }
+            };
+            self.put(Machine::with2(self.unit.copy, self.unit.register(to), self.unit.register(from)))?;
+        }
+        for (slot, register) in missing {
+            self.put(Machine::with2(self.unit.load, self.unit.register(register), self.home(slot)))?;
+        }
+        Ok(())
     }
 
     /// The slots that an instruction reads here: a factor of one is not.
@@ -181,8 +220,11 @@ impl<'a> Emitter<'a> {
         }
     }
 
-    fn write_back(&mut self) -> Emitted {
+    fn write_back(&mut self, but: &[(Slot, u8)]) -> Emitted {
         for (register, slot) in self.registers.unwritten() {
+            if but.iter().any(|(kept, _)| *kept == slot) {
+                continue;
+            }
             self.put(Machine::with2(self.unit.store, self.home(slot), self.unit.register(register)))?;
         }
         Ok(())

@@ -42,21 +42,23 @@ impl Registers {
         found
     }
 
-    /// Whether a number read again at `next` is worth a register.
+    /// Whether a number in memory that is read again at `next` is worth a register: a free one, or that of another that is in
+    /// memory, too, and is read later.
     pub fn is_worth_loading(&self, next: usize) -> bool {
-        next != NEVER
-            && self
-                .slot_in
-                .iter()
-                .zip(&self.held)
-                .any(|(slot, held)| !held && slot.is_none_or(|slot| self.next[usize::from(slot)] > next))
+        let later = |slot: Slot| !self.dirty[usize::from(slot)] && self.next[usize::from(slot)] > next;
+        let mut open = self.slot_in.iter().zip(&self.held).filter(|(_, held)| !**held);
+        next != NEVER && open.any(|(slot, _)| slot.is_none_or(later))
     }
 
-    /// A register for something new, held: a free one, or that of the number that is read last.
+    /// A register for something new, held: a free one, or that of the number in memory that is read last, or of that of all
+    /// numbers. A number that is in memory is read from there at next to no cost, a store costs as much as an operation.
     pub fn take(&mut self) -> Option<Freed> {
         let last_read = |(_, slot): &(usize, &Option<Slot>)| match slot {
-            None => (NEVER, true, true),
-            Some(slot) => (self.next[usize::from(*slot)], false, !self.dirty[usize::from(*slot)]),
+            None => (true, NEVER, true),
+            Some(slot) => {
+                let (next, dirty) = (self.next[usize::from(*slot)], self.dirty[usize::from(*slot)]);
+                (!dirty || next == NEVER, next, false)
+            }
         };
         let open = self.slot_in.iter().enumerate().filter(|(register, _)| !self.held[*register]);
         let (register, slot) = open.max_by_key(last_read)?;
@@ -95,6 +97,17 @@ impl Registers {
     /// The end of an instruction: its registers may be taken again.
     pub fn release(&mut self) {
         self.held.fill(false);
+    }
+
+    /// The register of a slot's number.
+    pub fn of(&self, slot: Slot) -> Option<u8> {
+        self.register_of[usize::from(slot)]
+    }
+
+    /// The first slots that stand in registers, no more than leave half of these free.
+    pub fn first(&self, slots: usize) -> Vec<(Slot, u8)> {
+        let there = (0..).zip(&self.register_of[..slots]).filter_map(|(slot, register)| register.map(|r| (slot, r)));
+        there.take(self.slot_in.len() / 2).collect()
     }
 
     /// The numbers that must be written to their slots, for whoever reads these; all that is read again is then in both.

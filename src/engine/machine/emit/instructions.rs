@@ -211,7 +211,7 @@ impl Emitter<'_> {
             let next = &mut self.registers.next[usize::from(*slot)];
             *next = (*next).min(NEVER - 1);
         }
-        self.write_back()?;
+        self.write_back(&[])?;
         self.registers.clear();
         self.put(Ok(Machine::with(Op::VEX_Vzeroupper)))?;
         self.put(Machine::with2(Op::Mov_r32_imm32, Register::EDI, number as u32))?;
