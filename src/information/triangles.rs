@@ -10,7 +10,7 @@ use crate::wide::{self, Width};
 const REGISTER: usize = 8;
 
 /// The square-root triangles of `lanes` independent pieces (records, or segments of one), all with the same columns. Rows
-/// of all lanes are absorbed together by Householder reflections in vector registers (six columns: 1.2 ns per row and lane,
+/// of all lanes are absorbed together by Householder reflections in vector registers (six columns: 1.1 ns per row and lane,
 /// where [`Information::absorb`] takes 2).
 ///
 /// A lane's triangle depends on its own rows only, to the last bit, and on their number; not on the other lanes and not on
@@ -25,7 +25,7 @@ pub struct Triangles {
     width: Width,
     /// Row after row of the triangle, each from its diagonal on, `[entry][lane]`.
     entries: Vec<f64>,
-    /// One number per column and lane of a register.
+    /// Two numbers per column and lane of a register.
     factors: Vec<f64>,
     /// The rows of one register's lanes.
     scratch: Aligned,
@@ -48,7 +48,7 @@ impl Triangles {
             rows: 0,
             width,
             entries: vec![0.0; all * (all + 1) / 2 * lanes.next_multiple_of(REGISTER)],
-            factors: vec![0.0; all * REGISTER],
+            factors: vec![0.0; 2 * all * REGISTER],
             scratch: Aligned::zeros(copied),
         }
     }
