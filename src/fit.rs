@@ -127,7 +127,7 @@ impl<'a, M: Model> Fit<'a, M> {
     /// unknown by more than a tenth of its standard error, where the start cannot be simulated, or where a search that did not
     /// converge had a cost that a finer step changes, it takes 4, 16 and 64 steps per sample, then [`Esdirk`](crate::Esdirk); the estimate
     /// names the method ([`Method::integrator`](crate::estimate::Method)), and is not usable if none is fine enough. A finer step
-    /// stays where a coarser one explains the data better, which is said. `Esdirk` is stopped where it needs 3,000 steps for a
+    /// stays where a coarser one explains the data better, or as well with other values, which is said. `Esdirk` is stopped where it needs 3,000 steps for a
     /// sample, or 1,000 for each: such a model is not stiff, but fast, or explodes. A search by one of the finer methods has at
     /// most 100 trial steps.
     pub fn integrator(self, integrator: impl Integrator) -> Self {

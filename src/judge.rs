@@ -1,5 +1,6 @@
 //! Evaluation of the result of a search: noise, covariance, null directions, warnings.
 
+mod aliases;
 mod bounds;
 mod color;
 mod conclude;
@@ -22,6 +23,7 @@ mod residual_pass;
 mod sandwich;
 mod shape;
 mod starts;
+mod step_error;
 mod suspects;
 mod together;
 mod warnings;

@@ -186,6 +186,13 @@ pub trait Sweep: Send + Sync {
         Ok(Guess { state: vec![0.0; n], open: vec![true; n] })
     }
 
+    /// The slopes of the derivative of a continuous model's state with respect to the state, row by row, at a state and the
+    /// inputs of a sample; `None` of other models, and where a sweep does not give them.
+    fn state_slopes(&self, record: &Record, sample: usize, state: &[f64], parameters: &[f64]) -> Option<Vec<f64>> {
+        let _ = (record, sample, state, parameters);
+        None
+    }
+
     /// The exact cause of a failure that was noticed at `sample`. Where nothing fails, the error that is largest
     /// relative to the noise levels. `None` if `stops` returns true.
     fn locate(

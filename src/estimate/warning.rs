@@ -82,6 +82,8 @@ pub enum WarningCode {
     Unidentified,
     /// A finer step would move an unknown.
     CoarseStep,
+    /// An oscillation with fewer than 2.5 samples a period, so that one of another frequency gives the same samples.
+    Aliased,
     /// Intervals of a search that did not end at a minimum.
     NotAtMinimum,
     /// One of several starts led to the estimate.

@@ -1,7 +1,7 @@
 //! Fits whose integrator was not chosen: finer methods, as long as a finer step would move an unknown.
 
 use crate::error::Error;
-use crate::estimate::{Summary, Warning, WarningCode};
+use crate::estimate::{Summary, Unknown, Warning, WarningCode};
 use crate::numeral::number;
 use crate::optimize::{Outcome, Severity};
 use crate::problem::{Control, PARTS, Problem, TRIALS};
@@ -13,16 +13,39 @@ use std::time::Instant;
 const WORSE: f64 = 4.0;
 const CERTAINLY_WORSE: f64 = 15.0;
 
+/// An unknown that a finer step moved by more than so many standard errors is worth a note, where the data do not tell the two
+/// apart.
+const MOVED: f64 = 1.0;
+
 /// The answer by the finest method tried so far.
 pub(super) struct Attempt {
     found: Result<Summary, Error>,
-    /// The least deviance of coarser methods, and which one has it.
-    coarser: Option<(f64, String)>,
+    /// The minima of coarser methods.
+    coarser: Vec<Coarser>,
+}
+
+/// The minimum of a coarser method.
+struct Coarser {
+    deviance: f64,
+    integrator: String,
+    values: Vec<f64>,
+}
+
+impl Coarser {
+    /// The unknown that is farthest from that of an estimate: its number, and how many standard errors.
+    fn farthest(&self, found: &Summary) -> Option<(usize, f64)> {
+        let errors = |(i, (unknown, value)): (usize, (&Unknown, &f64))| {
+            let error = unknown.knowledge.standard_error().filter(|error| *error > 0.0)?;
+            Some((i, (unknown.value - value).abs() / error))
+        };
+        let all = found.unknowns.iter().zip(&self.values).enumerate().filter_map(errors);
+        all.max_by(|a, b| a.1.total_cmp(&b.1))
+    }
 }
 
 impl Attempt {
     pub fn new(found: Result<Summary, Error>) -> Self {
-        Attempt { found, coarser: None }
+        Attempt { found, coarser: vec![] }
     }
 
     /// Whether a finer method is to be tried: a finer step would move an unknown, or the start cannot be simulated.
@@ -63,31 +86,64 @@ impl Attempt {
             (Ok(before), Ok(again)) if again.outcome.converged() || !before.outcome.converged() => (before, again),
             (before, _) => return Attempt { found: before, coarser: self.coarser },
         };
-        let deviance = before.deviance.filter(|_| before.outcome.converged());
-        let this = deviance.map(|deviance| (deviance, before.method.integrator.clone()));
-        let coarser = self.coarser.into_iter().chain(this).min_by(|a, b| a.0.total_cmp(&b.0));
+        let mut coarser = self.coarser;
+        if let Some(deviance) = before.deviance.filter(|_| before.outcome.converged()) {
+            let values = before.unknowns.iter().map(|unknown| unknown.value).collect();
+            coarser.push(Coarser { deviance, integrator: before.method.integrator.clone(), values });
+        }
         Attempt { found: Ok(after(&before, again)), coarser }
     }
 
-    /// The answer, with a note where a coarser step explains the data better.
+    /// The answer, with a note where a coarser step explains the data better, or as well with other values.
     pub fn answer(self) -> Result<Summary, Error> {
-        let mut found = self.found?;
-        if let (Some((least, coarser)), Some(deviance)) = (self.coarser, found.deviance)
-            && deviance > least + WORSE
-        {
-            let certain = deviance > least + CERTAINLY_WORSE;
-            let why = if certain { "the record may have been simulated with it" } else { "which may be chance" };
-            let text = format!(
-                "{coarser} explains the data better than {}, by {} in -2 ln of the likelihood ({why}); the estimate is that of the \
-                 finer step, which is closer to the equations; choose one with Fit::integrator",
-                found.method.integrator,
-                number(deviance - least, 2)
-            );
-            let severity = if certain { Severity::UsableWithCare } else { Severity::Usable };
-            found.warnings.push(Warning { code: WarningCode::CoarseStep, severity, text });
-        }
+        let Attempt { found, coarser } = self;
+        let mut found = found?;
+        let warning = found.deviance.and_then(|deviance| {
+            let least = coarser.iter().min_by(|a, b| a.deviance.total_cmp(&b.deviance))?;
+            let better = deviance - least.deviance;
+            if better > WORSE {
+                Some(explains_better(least, better, &found))
+            } else {
+                explains_as_well(&coarser, deviance, &found)
+            }
+        });
+        found.warnings.extend(warning);
         Ok(found)
     }
+}
+
+/// What is said where the data do not tell the estimate from that of a coarser step.
+fn explains_as_well(coarser: &[Coarser], deviance: f64, found: &Summary) -> Option<Warning> {
+    let close = coarser.iter().filter(|coarser| coarser.deviance - deviance < WORSE);
+    let moved = close.filter_map(|coarser| Some((coarser, coarser.farthest(found)?)));
+    let (coarser, (i, errors)) = moved.max_by(|a, b| a.1.1.total_cmp(&b.1.1)).filter(|(_, (_, e))| *e > MOVED)?;
+    let text = format!(
+        "the step decides `{}`, and the data do not tell which one is right: {} gives {} {}, {} standard errors away, and explains \
+             them as well (-2 ln of the likelihood differs by {}); the estimate is that of the finer step, which is closer to the \
+             equations; for a record that was simulated, choose its step with Fit::integrator",
+        found.unknowns[i].name,
+        coarser.integrator,
+        number(coarser.values[i], 5),
+        found.unknowns[i].unit,
+        number(errors, 2),
+        number((coarser.deviance - deviance).abs(), 2)
+    );
+    Some(Warning { code: WarningCode::CoarseStep, severity: Severity::Usable, text })
+}
+
+/// What is said where a coarser step explains the data better than that of the estimate, by so much.
+fn explains_better(coarser: &Coarser, better: f64, found: &Summary) -> Warning {
+    let certain = better > CERTAINLY_WORSE;
+    let why = if certain { "the record may have been simulated with it" } else { "which may be chance" };
+    let text = format!(
+        "{} explains the data better than {}, by {} in -2 ln of the likelihood ({why}); the estimate is that of the finer step, \
+         which is closer to the equations; choose one with Fit::integrator",
+        coarser.integrator,
+        found.method.integrator,
+        number(better, 2)
+    );
+    let severity = if certain { Severity::UsableWithCare } else { Severity::Usable };
+    Warning { code: WarningCode::CoarseStep, severity, text }
 }
 
 impl Problem<'_> {

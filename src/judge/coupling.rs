@@ -72,16 +72,18 @@ impl Coupling {
         Coupling { pairs: vec![Pair::default(); pairs(outputs).count()] }
     }
 
-    pub fn add(&mut self, window: &Window, lane: usize) {
+    /// Adds the products of a window, each sample with its weight, if there are weights.
+    pub fn add(&mut self, window: &Window, lane: usize, weight: Option<&dyn Fn(usize) -> f64>) {
         for ((i, j), pair) in pairs(window.outputs()).zip(&mut self.pairs) {
             let both = window.errors(i, lane).zip(window.errors(j, lane)).enumerate();
             let measured = |k| window.whole || window.is_measured(k, i, lane) && window.is_measured(k, j, lane);
             let mut sums = Pair::default();
-            for (_, (a, b)) in both.filter(|(k, _)| measured(*k)) {
-                sums.product += a * b;
-                sums.squares[0] += a * a;
-                sums.squares[1] += b * b;
-                sums.fourth += a * a * b * b;
+            for (k, (a, b)) in both.filter(|(k, _)| measured(*k)) {
+                let weight = weight.map_or(1.0, |of| of(k));
+                sums.product += weight * (a * b);
+                sums.squares[0] += weight * (a * a);
+                sums.squares[1] += weight * (b * b);
+                sums.fourth += (weight * a * b).powi(2);
             }
             pair.append(&sums);
         }

@@ -1,17 +1,17 @@
 //! One pass over the data without slopes: the residuals at the estimate.
 
+use super::aliases::Point;
 use super::coupling::{Coupled, Coupling};
 use super::largest::Largest;
 use super::output_sums::OutputSums;
+use super::step_error::{Sampled, step_error};
 use super::whiteness::{LAGS, Whiteness};
 use crate::error::Error;
 use crate::estimate::OutputFit;
 use crate::optimize::Infeasible;
-use crate::problem::{Accumulate, At, Objective, each, gather_together};
-use crate::sweep::{Piece, Prepared, Sweep, Window};
+use crate::problem::{Accumulate, At, Objective, gather_together};
+use crate::sweep::Window;
 use crate::whiteness::Portmanteau;
-use std::borrow::Cow;
-use std::sync::Arc;
 
 /// Longest horizon over which errors are correlated.
 const HORIZON: usize = 100;
@@ -29,6 +29,8 @@ pub(crate) struct Residuals {
     /// A bound on how far (in standard errors) a finer step could move the unknowns: the norm of the change of all
     /// standardized predictions, extrapolated from the windows that were simulated again.
     pub step_error: f64,
+    /// Some points along the records, their begins first.
+    pub points: Vec<Point>,
     /// The whiteness of each output's errors.
     pub whiteness: Vec<Whiteness>,
     /// Outputs whose errors are correlated at the same sample, if there are such.
@@ -56,16 +58,11 @@ struct Sums<'s> {
     coupling: Coupling,
     largest: Vec<Largest>,
     least_sigma: Vec<f64>,
+    /// Whether autocorrelations count samples, instead of measurements.
+    by_sample: bool,
     /// The windows to be simulated again.
     again: Vec<Sampled>,
     run: Vec<f64>,
-}
-
-/// A window that is to be compared with a finer simulation.
-struct Sampled {
-    begin: usize,
-    errors: Vec<f64>,
-    carry: Vec<f64>,
 }
 
 impl<'s> Sums<'s> {
@@ -82,17 +79,28 @@ impl<'s> Sums<'s> {
             coupling: Coupling::new(outputs),
             largest: vec![Largest::default(); outputs],
             least_sigma: vec![f64::INFINITY; outputs],
+            by_sample: horizon(objective) > 0,
             again: vec![],
             run: vec![],
         }
     }
 
-    /// Multiplies the errors in `run` by the roots of their weights.
-    fn standardize(&mut self, begin: usize) {
-        if self.objective.is_weighted() {
-            let weight = |k: usize| self.objective.weight(self.experiment, begin + k);
+    /// Appends the errors in `run`, multiplied by the roots of their weights, to the sequence of their output. Measurements that
+    /// count are neighbors however many samples lie between them, except where predictions restart so many samples before.
+    fn follow(&mut self, window: &Window, j: usize, lane: usize) {
+        let weighted = self.objective.is_weighted();
+        if weighted {
+            let weight = |k: usize| self.objective.weight(self.experiment, window.begin[lane] + k);
             self.run.iter_mut().enumerate().for_each(|(k, error)| *error *= weight(k).sqrt());
         }
+        if !self.by_sample && (weighted || !window.whole) {
+            let mut k = 0;
+            self.run.retain(|error| {
+                k += 1;
+                window.is_measured(k - 1, j, lane) && !(weighted && *error == 0.0)
+            });
+        }
+        self.portmanteaus[j].add(&self.run);
     }
 
     /// Counts the measurements of a window.
@@ -127,7 +135,9 @@ impl Accumulate for Sums<'_> {
     fn add(&mut self, window: &Window, lane: usize) {
         let (outputs, samples, begin) = (window.outputs(), window.samples[lane], window.begin[lane]);
         self.count(window, lane);
-        self.coupling.add(window, lane);
+        let (objective, experiment) = (self.objective, self.experiment);
+        let weight = |k: usize| objective.weight(experiment, begin + k);
+        self.coupling.add(window, lane, objective.is_weighted().then_some(&weight));
         let record = &self.objective.problem.records[self.experiment];
         for j in 0..outputs {
             self.run.clear();
@@ -136,8 +146,7 @@ impl Accumulate for Sums<'_> {
             let values = &record.outputs()[j].values[begin..begin + samples];
             if window.whole && !window.has_variances() {
                 self.outputs[j].add_all(values, &self.run);
-                self.standardize(begin);
-                self.portmanteaus[j].add(&self.run);
+                self.follow(window, j, lane);
                 continue;
             }
             for (k, (&y, &error)) in values.iter().zip(&self.run).enumerate() {
@@ -149,8 +158,7 @@ impl Accumulate for Sums<'_> {
                     }
                 }
             }
-            self.standardize(begin);
-            self.portmanteaus[j].add(&self.run);
+            self.follow(window, j, lane);
         }
         // Those in which a multiple of the distance lies.
         let distance = (EVERY * window.capacity()).max(record.len() / AGAIN);
@@ -201,7 +209,8 @@ pub(crate) fn residuals_together(points: &[At<'_>]) -> Vec<Option<Residuals>> {
 /// Results from the sums of all experiments.
 fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -> Residuals {
     let outputs = objective.outputs();
-    let step_error = step_error(objective, coordinates, all);
+    let again: Vec<&[Sampled]> = all.iter().map(|one| &one.again[..]).collect();
+    let step_error = step_error(objective, coordinates, &again);
     let mut sums = vec![OutputSums::default(); outputs];
     let (mut measured, mut log_determinant) = (0, 0.0);
     for one in all {
@@ -228,6 +237,7 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
         measured,
         log_determinant,
         step_error,
+        points: points(objective, coordinates, all),
         coupled: coupling.strongest(&whiteness),
         whiteness,
         largest: (0..outputs)
@@ -237,6 +247,16 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
             .map(|j| all.iter().map(|one| one.least_sigma[j]).fold(f64::INFINITY, f64::min))
             .collect(),
     }
+}
+
+/// The begins of the records, then where windows are simulated again.
+fn points(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -> Vec<Point> {
+    let begin = |e: usize| (e, 0, objective.problem.unknowns.of_experiment(e, coordinates).x);
+    let states = objective.problem.layout().states.len();
+    let later = |(e, one): (usize, &Sums<'_>)| -> Vec<Point> {
+        one.again.iter().map(|sampled| (e, sampled.begin, sampled.carry[..states].to_vec())).collect()
+    };
+    (0..all.len()).map(begin).chain(all.iter().enumerate().flat_map(later)).collect()
 }
 
 /// The horizon of predictions that restart; zero where they do not, or from too far.
@@ -257,57 +277,6 @@ fn failed(objective: &Objective<'_>, coordinates: &[f64]) -> Error {
     Error::Simulation(objective.locate(0, coordinates, 0))
 }
 
-/// The norm of the change of all standardized predictions with a finer step, extrapolated from some windows.
-fn step_error(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -> f64 {
-    let Some(finer) = objective.sweep.refined() else { return 0.0 };
-    if objective.sweep.predicts_variance() {
-        return 0.0;
-    }
-    let sigma = objective.whitening.sigma();
-    let change = |e: usize| changed(objective, coordinates, e, &finer, &sigma, &all[e].again);
-    each(all.len(), change).into_iter().sum::<f64>().sqrt()
-}
-
-/// Sum of the squared standardized changes in some windows, extrapolated to the whole experiment.
-fn changed(
-    objective: &Objective<'_>,
-    x: &[f64],
-    e: usize,
-    finer: &Arc<dyn Sweep + '_>,
-    sigma: &[f64],
-    again: &[Sampled],
-) -> f64 {
-    let record = &objective.problem.records[e];
-    let values = objective.problem.unknowns.of_experiment(e, x);
-    let prepared = Prepared { restarts: objective.problem.prepared[e].restarts.clone(), ..Prepared::default() };
-    let (mut change, mut seen) = (0.0, 0usize);
-    for sampled in again {
-        let samples = sampled.errors.len() / sigma.len();
-        let piece = Piece {
-            record,
-            prepared: &prepared,
-            samples: sampled.begin..sampled.begin + samples,
-            carry: Cow::Borrowed(&sampled.carry),
-            slopes: Cow::default(),
-            parameters: &values.p,
-        };
-        let mut found = 0.0;
-        let reached = finer.run(std::slice::from_ref(&piece), &[], &mut |window| {
-            for k in 0..window.samples[0] {
-                for (j, sigma) in sigma.iter().enumerate() {
-                    let before = sampled.errors[(window.begin[0] + k - sampled.begin) * window.outputs() + j];
-                    found += ((before - window.error(k, j, 0)) / sigma).powi(2);
-                }
-            }
-            true
-        });
-        if reached.iter().all(Result::is_ok) && found.is_finite() {
-            change += found;
-            seen += samples;
-        }
-    }
-    if seen > 0 { change * record.len() as f64 / seen as f64 } else { 0.0 }
-}
 impl Residuals {
     /// The output whose errors are least white, and how white they are; the probability counts all outputs that were
     /// tested.

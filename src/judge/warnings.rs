@@ -61,6 +61,7 @@ impl Judgement<'_> {
             care(WarningCode::Unidentified, format!("{d}; fix one, add a prior, or excite the system differently"))
         }));
         warnings.extend(self.step(unknowns));
+        warnings.extend(self.aliased());
         if !self.end.outcome.converged() && unknowns.iter().any(|row| row.knowledge.standard_error().is_some()) {
             let text =
                 "standard errors and intervals are those of a minimum, where the search did not arrive".to_owned();

@@ -153,6 +153,20 @@ impl Place<'_> {
             })
     }
 
+    /// The slopes of the derivative (of the next state of a discrete model) with respect to the states, row by row.
+    pub fn state_slopes(&self, x: &[f64]) -> Vec<f64> {
+        let (n, u, p) = (x.len(), constants(self.u), constants(self.p));
+        let (mut slopes, mut to) = (vec![0.0; n * n], vec![Dual::constant(0.0); n]);
+        for first in (0..n).step_by(LANES) {
+            self.functions.state(Dual::constant(self.t), &Self::seeded(x, first), &u, &p, &mut to);
+            for (row, to) in slopes.chunks_mut(n).zip(&to) {
+                let lanes = LANES.min(n - first);
+                row[first..first + lanes].copy_from_slice(&to.slopes[..lanes]);
+            }
+        }
+        slopes
+    }
+
     /// The state in words: `x = 0, v = 0`.
     fn at(&self, x: &[f64]) -> String {
         let states = self.layout.states.iter().zip(x).map(|(state, x)| format!("{} = {}", state.name, exact(*x)));

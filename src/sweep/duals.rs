@@ -5,7 +5,7 @@ use super::{Located, Loops, Piece, Prepared, Reached, RunError, Seed, Sweep, Vis
 use crate::error::{Error, Failure};
 use crate::functions::{Functions, Handle};
 use crate::integrate::{Duals, Method, Stuck};
-use crate::layout::Layout;
+use crate::layout::{Kind, Layout};
 use crate::model::Model;
 use crate::predict::{Between, Guess, Place, Plant, Prediction, SlicePlant};
 use crate::record::{Channel, Record};
@@ -89,6 +89,12 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
         let first = |channel: &Channel| channel.values.iter().copied().find(|y| y.is_finite()).unwrap_or(f64::NAN);
         let y: Vec<f64> = record.outputs().iter().map(first).collect();
         Place { layout: &self.layout, functions: &self.model, t: record.time(0), u: &record.input(0), p }.guess(&y)
+    }
+
+    fn state_slopes(&self, record: &Record, sample: usize, state: &[f64], p: &[f64]) -> Option<Vec<f64>> {
+        let (t, u) = (record.time(sample), record.input(sample));
+        let place = Place { layout: &self.layout, functions: &self.model, t, u: &u, p };
+        (self.layout.kind == Kind::Continuous).then(|| place.state_slopes(state))
     }
 
     fn locate(

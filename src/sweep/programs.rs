@@ -181,6 +181,10 @@ impl Sweep for ProgramSweep<'_> {
         self.plain.guessed_state(record, p)
     }
 
+    fn state_slopes(&self, record: &Record, sample: usize, state: &[f64], p: &[f64]) -> Option<Vec<f64>> {
+        self.plain.state_slopes(record, sample, state, p)
+    }
+
     fn locate(
         &self,
         record: &Record,

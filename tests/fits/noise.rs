@@ -101,9 +101,9 @@ fn autocorrelated_errors_of_a_record_do_not_depend_on_another() {
     }
 }
 
-/// Whether the errors of both outputs are called correlated: of autoregressions with this correlation from sample to sample,
-/// which share this part of their variance, beside white noise that is another part of it.
-fn called_correlated(rho: f64, [shared, white]: [f64; 2], samples: usize, seed: u64) -> bool {
+/// What is said of two outputs: their errors are autoregressions with this correlation from sample to sample, which share this
+/// part of their variance, beside white noise that is another part of it; measured are multiples of `every` samples.
+fn said(rho: f64, [shared, white]: [f64; 2], samples: usize, every: [usize; 2], seed: u64) -> Vec<WarningCode> {
     let inputs = levels(samples, 5, seed).into_iter().map(|u| Voltage { u }).collect();
     let exact = simulated(&Line, 1.0, inputs, Nothing, Affine { slope: 1.5, offset: -0.7 });
     let mut random = Noise(1000 + seed);
@@ -116,10 +116,19 @@ fn called_correlated(rho: f64, [shared, white]: [f64; 2], samples: usize, seed: 
         };
         Pair { y: y.y + with(errors[0]), z: y.z + with(errors[1]) }
     };
-    let outputs = exact.outputs().map(disturbed).collect();
+    let measured = |(k, y): (usize, Pair)| {
+        let at = |j: usize, y: f64| if k % every[j] == 0 { y } else { f64::NAN };
+        Pair { y: at(0, y.y), z: at(1, y.z) }
+    };
+    let outputs = exact.outputs().map(disturbed).enumerate().map(measured).collect();
     let record = with_outputs(&Line, &exact, outputs);
     let estimate = Fit::new(&Line, &record).parameters(Affine { slope: free(1.0), offset: free(0.5) }).run().unwrap();
-    estimate.warnings.iter().any(|warning| warning.code == WarningCode::CorrelatedOutputs)
+    estimate.warnings.iter().map(|warning| warning.code).collect()
+}
+
+/// Of 40 records, how many are called so.
+fn called(code: WarningCode, said: impl Fn(u64) -> Vec<WarningCode>) -> usize {
+    (0..40).filter(|seed| said(*seed).contains(&code)).count()
 }
 
 /// Outputs whose errors are independent of each other but correlated over time are not called correlated: the level is 1 %, so
@@ -128,13 +137,32 @@ fn called_correlated(rho: f64, [shared, white]: [f64; 2], samples: usize, seed: 
 /// ones, and of 3,000 that are worth 150, by some six standard deviations.
 #[test]
 fn autocorrelated_outputs_are_correlated_only_if_they_share_noise() {
-    let called = |rho, shared, samples| (0..40).filter(|seed| called_correlated(rho, shared, samples, *seed)).count();
+    let called =
+        |rho, shared, samples| called(WarningCode::CorrelatedOutputs, |seed| said(rho, shared, samples, [1, 1], seed));
     assert!(called(0.95, [0.0, 0.0], 500) <= 2);
     assert!(called(0.7, [0.0, 0.0], 500) <= 2);
     let drifts = called(0.99, [0.0, 0.5], 5000);
     assert!(drifts <= 2, "{drifts}");
     assert_eq!(called(0.0, [0.5, 0.0], 500), 40);
     assert_eq!(called(0.95, [0.5, 0.0], 3000), 40);
+}
+
+/// Measurements that lie more samples apart than lags are known are neighbors, too: of 80 errors with a correlation of
+/// `0.99^25 = 0.78` from one to the next all are called colored (white ones not: the level is 1 %), and independent ones not
+/// correlated (before, all were taken for white and a sixth for correlated).
+#[test]
+fn slow_measurements_are_neighbors() {
+    for every in [[25, 25], [1, 25]] {
+        let slow = |seed| said(0.99, [0.0, 0.0], 2000, every, seed);
+        let (colored, correlated) =
+            (called(WarningCode::ColoredErrors, slow), called(WarningCode::CorrelatedOutputs, slow));
+        assert!(colored == 40 && correlated <= 2, "{every:?}: {colored} {correlated}");
+        let white = called(WarningCode::ColoredErrors, |seed| said(0.0, [0.0, 0.0], 2000, every, seed));
+        assert!(white <= 2, "{every:?}: {white}");
+    }
+    let shared = called(WarningCode::CorrelatedOutputs, |seed| said(0.0, [0.5, 0.0], 10_000, [5, 25], seed));
+    // 400 pairs with a correlation of a half: eight standard deviations, of which the level takes less than three.
+    assert_eq!(shared, 40);
 }
 
 /// One error of eight standard deviations among 20,000, of which the largest normal one is above five in one record of hundred:

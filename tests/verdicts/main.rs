@@ -14,6 +14,7 @@ mod processes;
 #[path = "../common/random.rs"]
 mod random;
 mod records;
+mod sampling;
 mod stiff;
 
 use greybox::optimize::Severity;
