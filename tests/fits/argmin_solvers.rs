@@ -94,6 +94,18 @@ impl Observe<LeastSquaresState> for Count {
     }
 }
 
+/// The course of a search: the start, and each iteration down to the last cost.
+#[test]
+fn the_course_of_a_search_is_kept() {
+    let (record, course) = (record(1), diagnose::Convergence::default());
+    let estimate = fit(&record).observe(course.clone(), ObserverMode::Always).run().unwrap();
+    let kept = course.iterations();
+    let numbers: Vec<u64> = kept.iter().map(|iteration| iteration.iteration).collect();
+    assert_eq!(numbers, (0..=estimate.iterations).collect::<Vec<u64>>());
+    assert_eq!(kept[kept.len() - 1].cost, estimate.cost);
+    assert!(kept[0].cost > 10.0 * estimate.cost, "{} {}", kept[0].cost, estimate.cost);
+}
+
 #[test]
 fn observers_see_every_iteration() {
     let (record, count) = (record(1), Arc::new(AtomicU64::new(0)));

@@ -2,7 +2,7 @@
 //! Where a verdict turns: errors, noise levels, sensors and records on either side of what is said of them.
 
 use crate::common::*;
-use greybox::optimize::Severity;
+use greybox::optimize::{Outcome, Severity};
 use greybox::*;
 
 signals! { struct Factor { a: "1" } }
@@ -303,4 +303,17 @@ fn a_full_covariance_of_what_was_measured() {
     }
     // In standard errors. Noise levels settle to 1e-6.
     assert!((slope / size.sqrt()).abs() < 1e-3, "{slope} {size}");
+}
+
+/// Data without noise: the start, the minimum, and slopes once more with the noise levels found there; not if they are given.
+#[test]
+fn evaluations_are_counted() {
+    let record = record(40, (2.0, 2.0), 0.0, moving);
+    let evaluations = |fit: Fit<'_, Twice>| {
+        let estimate = fit.run().unwrap();
+        assert_eq!(estimate.outcome, Outcome::Exact, "{estimate}");
+        estimate.evaluations
+    };
+    let fit = || fit(std::slice::from_ref(&record));
+    assert_eq!(evaluations(fit()), evaluations(fit().noise(Pair { y: 1.0, z: 1.0 })) + 1);
 }
