@@ -22,6 +22,7 @@ mod residual_pass;
 mod sandwich;
 mod shape;
 mod starts;
+mod step_error;
 mod suspects;
 mod together;
 mod warnings;

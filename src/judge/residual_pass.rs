@@ -3,14 +3,14 @@
 use super::coupling::{Coupled, Coupling};
 use super::largest::Largest;
 use super::output_sums::OutputSums;
+use super::step_error::{Sampled, step_error};
 use super::whiteness::{LAGS, Whiteness};
 use crate::error::Error;
 use crate::estimate::OutputFit;
 use crate::optimize::Infeasible;
-use crate::problem::{Accumulate, At, Objective, each, gather_together};
-use crate::sweep::{Piece, Prepared, Sweep, Window};
+use crate::problem::{Accumulate, At, Objective, gather_together};
+use crate::sweep::Window;
 use crate::whiteness::Portmanteau;
-use std::sync::Arc;
 
 /// Longest horizon over which errors are correlated.
 const HORIZON: usize = 100;
@@ -58,13 +58,6 @@ struct Sums<'s> {
     /// The windows to be simulated again.
     again: Vec<Sampled>,
     run: Vec<f64>,
-}
-
-/// A window that is to be compared with a finer simulation.
-struct Sampled {
-    begin: usize,
-    errors: Vec<f64>,
-    carry: Vec<f64>,
 }
 
 impl<'s> Sums<'s> {
@@ -197,7 +190,8 @@ pub(crate) fn residuals_together(points: &[At<'_>]) -> Vec<Option<Residuals>> {
 /// Results from the sums of all experiments.
 fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -> Residuals {
     let outputs = objective.outputs();
-    let step_error = step_error(objective, coordinates, all);
+    let again: Vec<&[Sampled]> = all.iter().map(|one| &one.again[..]).collect();
+    let step_error = step_error(objective, coordinates, &again);
     let mut sums = vec![OutputSums::default(); outputs];
     let (mut measured, mut log_determinant) = (0, 0.0);
     for one in all {
@@ -253,57 +247,6 @@ fn failed(objective: &Objective<'_>, coordinates: &[f64]) -> Error {
     Error::Simulation(objective.locate(0, coordinates, 0))
 }
 
-/// The norm of the change of all standardized predictions with a finer step, extrapolated from some windows.
-fn step_error(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -> f64 {
-    let Some(finer) = objective.sweep.refined() else { return 0.0 };
-    if objective.sweep.predicts_variance() {
-        return 0.0;
-    }
-    let sigma = objective.whitening.sigma();
-    let change = |e: usize| changed(objective, coordinates, e, &finer, &sigma, &all[e].again);
-    each(all.len(), change).into_iter().sum::<f64>().sqrt()
-}
-
-/// Sum of the squared standardized changes in some windows, extrapolated to the whole experiment.
-fn changed(
-    objective: &Objective<'_>,
-    x: &[f64],
-    e: usize,
-    finer: &Arc<dyn Sweep + '_>,
-    sigma: &[f64],
-    again: &[Sampled],
-) -> f64 {
-    let record = &objective.problem.records[e];
-    let values = objective.problem.unknowns.of_experiment(e, x);
-    let prepared = Prepared { restarts: objective.problem.prepared[e].restarts.clone(), ..Prepared::default() };
-    let (mut change, mut seen) = (0.0, 0usize);
-    for sampled in again {
-        let samples = sampled.errors.len() / sigma.len();
-        let piece = Piece {
-            record,
-            prepared: &prepared,
-            samples: sampled.begin..sampled.begin + samples,
-            carry: sampled.carry.clone(),
-            slopes: vec![],
-            parameters: &values.p,
-        };
-        let mut found = 0.0;
-        let reached = finer.run(std::slice::from_ref(&piece), &[], &mut |window| {
-            for k in 0..window.samples[0] {
-                for (j, sigma) in sigma.iter().enumerate() {
-                    let before = sampled.errors[(window.begin[0] + k - sampled.begin) * window.outputs() + j];
-                    found += ((before - window.error(k, j, 0)) / sigma).powi(2);
-                }
-            }
-            true
-        });
-        if reached.iter().all(Result::is_ok) && found.is_finite() {
-            change += found;
-            seen += samples;
-        }
-    }
-    if seen > 0 { change * record.len() as f64 / seen as f64 } else { 0.0 }
-}
 impl Residuals {
     /// The output whose errors are least white, and how white they are; the probability counts all outputs that were
     /// tested.

@@ -251,6 +251,18 @@ pub(super) mod tests {
         linear(&[(1.0, 1e-3), (0.0, 4.0)])
     }
 
+    /// Sums of place and limit miss these bounds in the last digit.
+    #[test]
+    fn steps_end_on_their_bounds() {
+        for (x, bound) in [(0.2, 0.9), (-2.3, 2.4), (0.7, 0.1), (2.0, -0.4)] {
+            assert_ne!(x + (bound - x), bound);
+            let domain = Domain { bounds: vec![if bound > x { (-9.0, bound) } else { (bound, 9.0) }], sizes: vec![] };
+            let point = Point::new(vec![x], linear(&[(1.0, 1.0)]), &domain).unwrap();
+            assert_eq!([point.towards(&[bound - x]), point.towards(&[3.0 * (bound - x)])], [vec![bound], vec![bound]]);
+            assert_eq!(point.towards(&[0.5 * (bound - x)]), [x + 0.5 * (bound - x)]);
+        }
+    }
+
     #[test]
     fn what_the_cost_resolves() {
         assert_eq!(at(0.0, far()).resolution(), 12.5 * 1e-13);

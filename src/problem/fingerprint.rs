@@ -158,6 +158,11 @@ mod tests {
         for other in [[2.0, 1.0, 5.0], [1.0, 5.0, 2.0], [3.0, 2.0, 5.0], [1.0, 2.0, 5.001]] {
             assert!(!values.agrees(&probe(&other)), "{other:?}");
         }
+        // Relative to their size, up to what another processor rounds.
+        for size in [1e-3, 1e3] {
+            let of = |part: f64| probe(&[size, -size * (1.0 + part)]);
+            assert!(of(0.0).agrees(&of(1e-10)) && !of(0.0).agrees(&of(1e-7)), "{size}");
+        }
         // By its definition: factors 1, 98/97 and 99/97.
         assert!((values.sum - (1.0 + 2.0 * 98.0 / 97.0 + 5.0 * 99.0 / 97.0)).abs() < 1e-12);
     }

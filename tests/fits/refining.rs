@@ -48,6 +48,9 @@ fn the_default_method_is_as_fine_as_the_plant_asks_for() {
         assert_eq!((found.cost, &found.method), (fit.cost, &fit.method));
         let again = fit.predict(&Coupled, &record).unwrap().quality.first.rmse;
         assert_relative_eq!(again, fit.quality.first.rmse, max_relative = 1e-9);
+        let again =
+            Fit::new(&Coupled, &record).parameters(near(truth)).predict(&fit, &record).unwrap().quality.first.rmse;
+        assert_relative_eq!(again, fit.quality.first.rmse, max_relative = 1e-9);
         let report = Report::new(&problem, &found).unwrap();
         assert_eq!(report.estimate.method.integrator, fit.method.integrator);
     }
