@@ -339,14 +339,14 @@ fn what_chance_explains_is_not_explained() {
 /// An output that never moves is that of a dead sensor, unless the model gives the same value beside an output that moves.
 #[test]
 fn a_constant_output_is_said() {
-    let of = |z: f64, w: f64| {
-        let constant = record(100, (2.0, 2.0), 0.01, |k| Drive { w, ..moving(k) });
+    let of = |z: f64, w: f64, size: f64| {
+        let constant = record(100, (2.0, 2.0), size, |k| Drive { w, ..moving(k) });
         let constant = edited(&constant, |_, y| Pair { z, ..y });
         let fit = fit(std::slice::from_ref(&constant)).noise(Pair { y: 0.01, z: 0.01 });
         severity(&fit.run().unwrap(), WarningCode::ConstantOutput)
     };
-    // The model gives 0.2 or so instead of 3; and 3.
-    assert_eq!((of(3.0, 0.1), of(3.0, 1.5)), (Some(Severity::NotUsable), Some(Severity::Usable)));
+    // The model gives 0.2 or so instead of 3; and 3, to 1e-9.
+    assert_eq!((of(3.0, 0.1, 0.01), of(3.0, 1.5, 1e-9)), (Some(Severity::NotUsable), Some(Severity::Usable)));
     let plain = record(100, (2.0, 2.0), 0.01, moving);
     assert_eq!(severity(&fit(&[plain]).run().unwrap(), WarningCode::ConstantOutput), None);
 }
