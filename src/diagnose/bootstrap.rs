@@ -252,6 +252,11 @@ impl From<Bootstrap> for Section {
 mod tests {
     use super::*;
 
+    #[test]
+    fn means_are_of_what_is_finite() {
+        assert_eq!([mean(&[1.0, 3.0, f64::NAN, 8.0]), mean(&[f64::INFINITY, 2.0]), mean(&[f64::NAN])], [4.0, 2.0, 0.0]);
+    }
+
     /// Of 1, 4, 9, ..., 361 (19 squares) the quantile `part` is at number `20 part`.
     #[test]
     fn quantiles_are_between_neighbors() {

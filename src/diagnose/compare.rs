@@ -126,8 +126,9 @@ pub fn f_test(restricted: &Candidate, full: &Candidate) -> Result<Test, Error> {
     };
     let n = other.fit.samples as f64;
     let degrees = n - full.estimate.unknowns.len() as f64;
-    let squares = |fit: &OutputFit| fit.rmse * fit.rmse * n;
-    let statistic = (squares(&one.fit) - squares(&other.fit)) / more / (squares(&other.fit) / degrees);
+    // Mean squares, of the same number of errors.
+    let square = |fit: &OutputFit| fit.rmse * fit.rmse;
+    let statistic = (square(&one.fit) - square(&other.fit)) / more / (square(&other.fit) / degrees);
     let p_value = FisherSnedecor::new(more, degrees)
         .map_err(|_| Error::Option(format!("{n} measurements leave the F test no degree of freedom")))?
         .sf(statistic.max(0.0));

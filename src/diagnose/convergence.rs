@@ -58,20 +58,21 @@ impl Convergence {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    fn note(&self, state: &LeastSquaresState) {
+    fn note(&self, iteration: u64, state: &LeastSquaresState) {
         let mut iterations = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        iterations.push(Iteration { iteration: state.get_iter(), cost: state.get_cost() });
+        iterations.push(Iteration { iteration, cost: state.get_cost() });
     }
 }
 
 impl Observe<LeastSquaresState> for Convergence {
     fn observe_init(&mut self, _: &str, state: &LeastSquaresState, _: &KV) -> Result<(), argmin::core::Error> {
-        self.note(state);
+        self.note(state.get_iter(), state);
         Ok(())
     }
 
+    // argmin counts an iteration after it was observed.
     fn observe_iter(&mut self, state: &LeastSquaresState, _: &KV) -> Result<(), argmin::core::Error> {
-        self.note(state);
+        self.note(state.get_iter() + 1, state);
         Ok(())
     }
 }

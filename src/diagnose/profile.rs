@@ -156,7 +156,7 @@ pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probabilit
     let along: Vec<f64> = (0..best.len())
         .map(|j| match (&covariance, error) {
             (Some(c), Some(error)) if !held[j] => c.get(j, index) / (error * error),
-            _ => f64::from(u8::from(j == index)),
+            _ => 0.0,
         })
         .collect();
     let said = unknown.knowledge.standard_error().map(|s| s / unknown.transform.slope(unknown.value).abs());

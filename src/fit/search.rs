@@ -174,12 +174,18 @@ fn within_finer_tolerance(objective: &Objective<'_>, coordinates: &[f64]) -> Opt
     let here = again.cost - linear.cost;
     let noise = |x: &[f64]| {
         let there = finer.cost_at(x).ok().zip(objective.cost_at(x).ok());
-        there.map_or(0.0, |(finer, this)| (finer - this - here).abs()).max(here.abs())
+        roughness(here, there.map(|(finer, this)| finer - this))
     };
     let domain = Domain::of(objective);
     // A minimum of this tolerance, though that of a finer one lies elsewhere, which a warning names.
     within_tolerance(coordinates, linear, &domain, noise)
         .or_else(|| within_tolerance(coordinates, again, &domain, noise))
+}
+
+/// How far the cost may be off what the slopes at a point say of another: from how much a finer tolerance changes it at both, the
+/// second unknown where it cannot be evaluated.
+fn roughness(here: f64, there: Option<f64>) -> f64 {
+    there.map_or(0.0, |there| (there - here).abs()).max(here.abs())
 }
 
 /// Why the start could not be evaluated.
@@ -224,4 +230,14 @@ fn stopped(objective: &Objective<'_>) -> Error {
         ),
         _ => "the fit was cancelled before its start had been evaluated; lower the flag to run it".to_owned(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::roughness;
+
+    #[test]
+    fn roughness_is_the_larger_change() {
+        assert_eq!([roughness(-3.0, None), roughness(-3.0, Some(4.0)), roughness(3.0, Some(4.0))], [3.0, 7.0, 3.0]);
+    }
 }

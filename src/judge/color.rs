@@ -30,7 +30,7 @@ impl Judgement<'_> {
         let count = whiteness.len() as f64;
         let parts = whiteness.filter_map(|(j, white)| {
             let (chance, part) = (white.p_value * count, self.colored(j, white));
-            (chance < CERTAIN || chance < LIKELY && part > MUCH).then_some(part)
+            is_certain(chance, part).then_some(part)
         });
         parts.fold(0.0, f64::max)
     }
@@ -76,11 +76,32 @@ impl Judgement<'_> {
     }
 }
 
+/// Whether errors that are as far from white by such a chance, and whose colored part is such a part of the output, are taken
+/// as colored.
+fn is_certain(chance: f64, part: f64) -> bool {
+    chance < CERTAIN || chance < LIKELY && part > MUCH
+}
+
 /// How severe it is that such a part of an output's movement is an error that follows from others.
 pub(super) fn severity(part: f64) -> Severity {
     match part {
         part if part > LARGE => Severity::NotUsable,
         part if part > SMALL => Severity::UsableWithCare,
         _ => Severity::Usable,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// On both sides of each level, and on the level.
+    #[test]
+    fn color_is_certain_at_its_levels() {
+        assert!(is_certain(0.99e-4, 0.0) && !is_certain(1e-4, 0.0));
+        assert!(is_certain(4.9e-4, 0.051) && !is_certain(5e-4, 0.051) && !is_certain(4.9e-4, 0.05));
+        let levels = [0.501, 0.5, 1.01e-3, 1e-3].map(severity);
+        use Severity::{NotUsable, Usable, UsableWithCare};
+        assert_eq!(levels, [NotUsable, UsableWithCare, UsableWithCare, Usable]);
     }
 }

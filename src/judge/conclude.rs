@@ -219,13 +219,14 @@ impl<'j> Judgement<'j> {
     }
 
     fn unknowns(&self, covariances: &Covariances) -> Vec<Unknown> {
-        let (free, seen) = (&self.objective.problem.unknowns.row, self.seen());
+        let free = &self.objective.problem.unknowns.row;
         let root = self.linear.sum_of_squares().sqrt();
         let one = |i: usize| {
             let (unknown, value) = (&free[i], self.values[i]);
             let transform = unknown.parameter.transform;
-            let covariance = covariances.unknowns.as_ref().filter(|_| seen[i] && self.degrees > 0.0);
-            let covariance = covariance.filter(|covariance| is_error(covariance.standard_error(i)));
+            // The standard errors of unknowns that are not seen are zero.
+            let is_known = |covariance: &&Covariance| self.degrees > 0.0 && is_error(covariance.standard_error(i));
+            let covariance = covariances.unknowns.as_ref().filter(is_known);
             let degrees_of_freedom = covariances.degrees[i];
             let knowledge = match (self.held_at[i], covariance) {
                 (Some(bound), None) => Knowledge::Held { bound, end: None },

@@ -50,3 +50,18 @@ pub(crate) fn named(
     moves.iter_mut().for_each(|(_, by)| *by /= unit);
     Direction { moves }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::taking_part;
+
+    /// A thousandth of the largest entry, whatever its size.
+    #[test]
+    fn small_entries_take_no_part() {
+        for size in [1e-3, 1.0, 1e3] {
+            let direction = [(0, 0.99e-3 * size), (1, -size), (2, 1.01e-3 * size), (3, 0.0)];
+            let found: Vec<(usize, f64)> = taking_part(&direction).collect();
+            assert_eq!(found, [(1, -size), (2, 1.01e-3 * size)]);
+        }
+    }
+}

@@ -83,6 +83,10 @@ mod tests {
         assert_eq!((held.count, held.mean(), others.count, others.mean()), (5, 9.0, 10, 1.0));
         // Three are few, and of a rounded sensor each second value is the last but one.
         assert!(split(&[(0..9).map(|k| (y(k), 1.0)).collect()]).is_none());
+        let six_of = |count: usize| -> Vec<(f64, f64)> {
+            (0..count).map(|k| (if k % 2 == 1 && k < 12 { k - 1 } else { k } as f64, 1.0)).collect()
+        };
+        assert!(split(&[six_of(1_200)]).is_some() && split(&[six_of(1_201)]).is_none());
         assert!(split(&[(0..40).map(|k| (f64::from([0, 0, 1, 0, 1, 1, 0, 1][k % 8]), 1.0)).collect()]).is_none());
     }
 }

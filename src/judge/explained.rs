@@ -43,12 +43,7 @@ impl Judgement<'_> {
     /// Probability that noise about a mean is explained as well: Fisher's test with as many measurements as are
     /// independent.
     fn by_chance(&self, j: usize, relative: f64) -> f64 {
-        let unknowns = self.values.len().max(1) as f64;
-        let independent = self.residuals.outputs[j].samples as f64 / self.dependence(j);
-        let free = (independent - unknowns - 1.0).max(1.0);
-        let statistic = (1.0 - relative) / unknowns / (relative / free).max(f64::MIN_POSITIVE);
-        let distribution = FisherSnedecor::new(unknowns, free);
-        if relative < 1.0 { distribution.map_or(1.0, |distribution| distribution.sf(statistic)) } else { 1.0 }
+        by_chance(self.residuals.outputs[j].samples as f64 / self.dependence(j), self.values.len(), relative)
     }
 
     /// Whether the errors are no larger than the noise that was given.
@@ -80,13 +75,7 @@ impl Judgement<'_> {
             let worse = relative > 1.02 + 3.0 * (2.0 * self.dependence(j) / samples).sqrt();
             let rmse = self.residuals.outputs[j].rmse;
             let at_level = moves.max(rmse) < LEVEL_PART * level.abs();
-            let severity = match another(j) {
-                // Held by a controller, and given by the model.
-                true if at_level && !worse => continue,
-                true if at_level || !worse => Severity::UsableWithCare,
-                _ if partly => Severity::UsableWithCare,
-                _ => Severity::NotUsable,
-            };
+            let Some(severity) = unexplained(another(j), at_level, worse, partly) else { continue };
             let output = &self.objective.problem.layout().outputs[j].name;
             let than = if worse { "worse than" } else { "no better than" };
             let text = format!(
@@ -109,17 +98,11 @@ impl Judgement<'_> {
         let one = |(j, output): (usize, &crate::layout::Quantity)| {
             let found = &self.residuals.outputs[j];
             let (ratio, samples) = (found.rmse / sigma[j], found.samples as f64 / self.dependence(j));
-            let degrees = (samples - self.values.len() as f64).max(1.0);
-            let above = chi_squared_tail(samples * ratio * ratio, degrees);
-            if above.min(1.0 - above) > LEVEL / 2.0 || ratio > 1.0 && self.objective.is_robust() {
+            if !contradicts(ratio, samples, self.values.len()) || ratio > 1.0 && self.objective.is_robust() {
                 return None;
             }
             let (_, moves) = self.residuals.levels[j];
-            let severity = match ratio {
-                ratio if ratio > FAR || ratio < FAR_BELOW.recip() && sigma[j] > moves => Severity::NotUsable,
-                ratio if ratio > DIFFERENT || ratio < DIFFERENT.recip() => Severity::UsableWithCare,
-                _ => Severity::Usable,
-            };
+            let severity = off(ratio, sigma[j] > moves);
             let wide = if ratio > 1.0 { "narrow" } else { "wide" };
             let text = format!(
                 "the noise of `{}` was given as {} {unit}, but the errors are {} {unit} (rms): intervals are too {wide}; leave \
@@ -132,5 +115,104 @@ impl Judgement<'_> {
             Some(Warning { code: WarningCode::GivenNoise, severity, text })
         };
         outputs.filter_map(one).collect()
+    }
+}
+
+/// Probability that so many unknowns leave at most this part of the squares of as many independent errors about their mean
+/// (Fisher's distribution).
+fn by_chance(independent: f64, unknowns: usize, relative: f64) -> f64 {
+    let unknowns = unknowns.max(1) as f64;
+    let free = (independent - unknowns - 1.0).max(1.0);
+    let statistic = (1.0 - relative) / unknowns / (relative / free).max(f64::MIN_POSITIVE);
+    let distribution = FisherSnedecor::new(unknowns, free);
+    if relative < 1.0 { distribution.map_or(1.0, |distribution| distribution.sf(statistic)) } else { 1.0 }
+}
+
+/// How severe it is that an output is not explained: whether another is, whether this one stands at a level that the model
+/// gives, whether its mean is better than the model, and whether the fit was to explain only a part of it.
+fn unexplained(another: bool, at_level: bool, worse: bool, partly: bool) -> Option<Severity> {
+    match another {
+        // Held by a controller, and given by the model.
+        true if at_level && !worse => None,
+        true if at_level || !worse => Some(Severity::UsableWithCare),
+        _ if partly => Some(Severity::UsableWithCare),
+        _ => Some(Severity::NotUsable),
+    }
+}
+
+/// Whether errors of this size, relative to the noise given, are no chance with so many independent ones (chi-squared).
+fn contradicts(ratio: f64, independent: f64, unknowns: usize) -> bool {
+    let degrees = (independent - unknowns as f64).max(1.0);
+    let above = chi_squared_tail(independent * ratio * ratio, degrees);
+    above.min(1.0 - above) <= LEVEL / 2.0
+}
+
+/// How severe it is that errors are off the noise given by this ratio; `beyond` says that the noise is larger than all that the
+/// output moves.
+fn off(ratio: f64, beyond: bool) -> Severity {
+    match ratio {
+        ratio if ratio > FAR || ratio < FAR_BELOW.recip() && beyond => Severity::NotUsable,
+        ratio if ratio > DIFFERENT || ratio < DIFFERENT.recip() => Severity::UsableWithCare,
+        _ => Severity::Usable,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use Severity::{NotUsable, Usable, UsableWithCare};
+
+    /// The 95 % points of Fisher's distribution: 4.9646 for (1, 10), 4.1028 for (2, 10) degrees of freedom; what is left is
+    /// `1 / (1 + F m / n)`. Tables have five digits.
+    #[test]
+    fn explained_by_chance_as_tables_say() {
+        assert!((by_chance(12.0, 1, 1.0 / (1.0 + 4.9646 / 10.0)) - 0.05).abs() < 1e-5);
+        assert!((by_chance(13.0, 2, 1.0 / (1.0 + 4.1028 * 2.0 / 10.0)) - 0.05).abs() < 1e-5);
+        // Without unknowns as with one; without degrees of freedom as with one: F(1, 1) = 161.45.
+        assert!((by_chance(12.0, 0, 1.0 / (1.0 + 4.9646 / 10.0)) - 0.05).abs() < 1e-5);
+        assert!((by_chance(1.0, 1, 1.0 / (1.0 + 161.45)) - 0.05).abs() < 1e-5);
+        assert_eq!([by_chance(12.0, 1, 0.0), by_chance(12.0, 1, 1.0), by_chance(12.0, 1, 2.0)], [0.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn outputs_that_nothing_explains() {
+        // (another is explained, at its level, worse than the mean, fitted in part)
+        let cases = [
+            ((true, true, false, false), None),
+            ((true, true, false, true), None),
+            ((true, true, true, false), Some(UsableWithCare)),
+            ((true, false, false, false), Some(UsableWithCare)),
+            ((true, false, true, false), Some(NotUsable)),
+            ((true, false, true, true), Some(UsableWithCare)),
+            ((false, true, false, false), Some(NotUsable)),
+            ((false, true, false, true), Some(UsableWithCare)),
+            ((false, false, true, false), Some(NotUsable)),
+        ];
+        for ((another, at_level, worse, partly), severity) in cases {
+            assert_eq!(
+                unexplained(another, at_level, worse, partly),
+                severity,
+                "{another} {at_level} {worse} {partly}"
+            );
+        }
+    }
+
+    /// The 0.05 % and 99.95 % points of chi-squared with 10 degrees of freedom are 1.2650 and 31.420 (tables; five digits), here
+    /// of twelve errors and two unknowns.
+    #[test]
+    fn a_noise_is_contradicted_beyond_its_points() {
+        let ratio = |squares: f64| (squares / 12.0f64).sqrt();
+        assert!(contradicts(ratio(31.43), 12.0, 2) && !contradicts(ratio(31.41), 12.0, 2));
+        assert!(contradicts(ratio(1.2645), 12.0, 2) && !contradicts(ratio(1.2655), 12.0, 2));
+        // 12.116 with one degree of freedom, which is the least.
+        assert!(contradicts(12.12f64.sqrt(), 1.0, 1) && !contradicts(12.11f64.sqrt(), 1.0, 1));
+    }
+
+    #[test]
+    fn how_far_errors_are_off_their_noise() {
+        let severities = [10.1, 10.0, 2.01, 2.0, 0.5, 0.49, 0.0101, 0.0099].map(|ratio| off(ratio, true));
+        let care = UsableWithCare;
+        assert_eq!(severities, [NotUsable, care, care, Usable, Usable, care, care, NotUsable]);
+        assert_eq!([off(0.0099, false), off(10.1, false)], [care, NotUsable]);
     }
 }

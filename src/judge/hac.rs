@@ -86,10 +86,8 @@ impl Hac {
             return Some(found);
         };
         let factor = |i: usize| {
-            let ratio = stationary.standard_error(i) / found.standard_error(i);
             let certain = if coupled { 0.0 } else { CERTAIN * (2.0 / degrees[i]).sqrt() };
-            let taken = ratio.is_finite() && (1.0 + certain) * ratio * ratio >= 1.0;
-            if taken { ratio } else { 1.0 }
+            factor(stationary.standard_error(i), found.standard_error(i), certain)
         };
         let factors: Vec<f64> = (0..held.len()).map(factor).collect();
         Some(found.scaled(&factors))
@@ -246,9 +244,25 @@ fn bandwidth(one: &DMatrix<f64>, two: &DMatrix<f64>, a: &DMatrix<f64>, count: us
     (andrews.max(longer).ceil() as usize + 1).clamp(1, (count / 2).max(1))
 }
 
+/// By which factor a standard error by moving sums becomes that of stationary errors; one where its variance is larger by more than
+/// this part, or where either is none.
+fn factor(stationary: f64, moving: f64, certain: f64) -> f64 {
+    let ratio = stationary / moving;
+    let taken = ratio.is_finite() && (1.0 + certain) * ratio * ratio >= 1.0;
+    if taken { ratio } else { 1.0 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn stationary_errors_are_taken_but_for_a_certain_difference() {
+        assert_eq!([factor(3.0, 2.0, 0.0), factor(2.0, 2.0, 0.0), factor(1.9, 2.0, 0.0)], [1.5, 1.0, 1.0]);
+        // A variance larger by less than half, and by more.
+        assert_eq!([factor(1.7, 2.0, 0.5), factor(1.6, 2.0, 0.5)], [0.85, 1.0]);
+        assert_eq!([factor(1.0, 0.0, 0.5), factor(0.0, 0.0, 0.5), factor(f64::NAN, 1.0, 0.5)], [1.0; 3]);
+    }
 
     /// One series: `1 + 3 a` (Kendall, Biometrika 41 (1954) 403). Two alike: `1 + 2 a + 2 a`, by the eigenvalues' sum.
     #[test]

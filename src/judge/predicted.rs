@@ -72,16 +72,13 @@ impl Judgement<'_> {
 
     /// How far to go along a direction: nine tenths of the way to the nearest bound at most.
     fn apart(&self, kept: &[usize], direction: impl Iterator<Item = f64>) -> f64 {
-        const PART: f64 = 0.9;
         let least = |apart: f64, (&i, along): (&usize, f64)| {
             let parameter = &self.objective.problem.unknowns.row[i].parameter;
             if parameter.transform != Transform::Identity {
                 return apart;
             }
             let lower = if parameter.positive { parameter.lower.max(0.0) } else { parameter.lower };
-            let place = self.end.coordinates[i];
-            let room = (place - lower).min(parameter.upper - place);
-            if room > 0.0 { apart.min(PART * room / along.abs()) } else { apart }
+            shortened(apart, (lower, parameter.upper), self.end.coordinates[i], along)
         };
         kept.iter().zip(direction).fold(APART, least)
     }
@@ -108,5 +105,25 @@ impl Judgement<'_> {
             percent(0.5 * own, 2)
         );
         Some(Warning { code: WarningCode::CurvedInterval, severity: Severity::Usable, text })
+    }
+}
+
+/// A distance along which an unknown at this place moves by `along`, so short that it comes no further than nine tenths of the way
+/// to its bounds; as it is where the place is on one of them.
+fn shortened(apart: f64, (lower, upper): (f64, f64), place: f64, along: f64) -> f64 {
+    const PART: f64 = 0.9;
+    let room = (place - lower).min(upper - place);
+    if room > 0.0 { apart.min(PART * room / along.abs()) } else { apart }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shortened;
+
+    #[test]
+    fn a_distance_ends_inside_the_bounds() {
+        assert_eq!(shortened(0.5, (1.0, 9.0), 3.0, -18.0), 0.1);
+        assert_eq!(shortened(0.5, (1.0, 9.0), 7.0, 18.0), 0.1);
+        assert_eq!([shortened(0.5, (1.0, 9.0), 3.0, 1.0), shortened(0.5, (1.0, 9.0), 1.0, 18.0)], [0.5, 0.5]);
     }
 }

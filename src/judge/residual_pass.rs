@@ -117,10 +117,7 @@ impl<'s> Sums<'s> {
             here.clear();
             here.extend((0..outputs).filter(|&j| window.is_measured(k, j, lane)));
             *log_determinant += match here.len() == outputs {
-                _ if window.has_variances() => {
-                    let number = |j: usize| (k * outputs + j) * window.lanes() + lane;
-                    here.iter().map(|&j| window.log_variances[number(j)]).sum()
-                }
+                _ if window.has_variances() => here.iter().map(|&j| window.log_variance(k, j, lane)).sum(),
                 true => whole,
                 false => self.objective.whitening.log_determinant(&here),
             };

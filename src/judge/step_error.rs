@@ -1,4 +1,4 @@
-//! How far a finer step would move the predictions, from windows that are simulated again.
+//! How far a finer step would move the predictions, from some windows that are simulated again.
 
 use crate::problem::{Objective, each};
 use crate::sweep::{Piece, Prepared, Sweep};
@@ -62,4 +62,58 @@ fn changed(
         }
     }
     if seen > 0 { change * record.len() as f64 / seen as f64 } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::residual_pass::residual_pass;
+    use crate::{Experiment, Fit, Model, Rk4, Scalar, Time, free, signals, simulate};
+
+    signals! { struct Voltage { u: "V" } }
+    signals! { struct Current { i: "A" } }
+    signals! { struct Rate { a: "1/s" } }
+
+    #[derive(Clone)]
+    struct Decay;
+
+    impl Model for Decay {
+        type State = Current;
+        type Input = Voltage;
+        type Output = Current;
+        type Parameters = Rate;
+
+        fn derivative<S: Scalar>(&self, _t: S, x: &Current<S>, u: &Voltage<S>, p: &Rate<S>) -> Current<S> {
+            Current { i: (u.u - x.i) * p.a }
+        }
+        fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, _p: &Rate<S>) -> Current<S> {
+            *x
+        }
+    }
+
+    /// Records of one window each: the root of the sum of all squared differences between one step per sample and two, by the noise.
+    #[test]
+    fn all_of_short_records_is_compared() {
+        let inputs =
+            |from: usize| -> Vec<Voltage> { (from..from + 20).map(|k| Voltage { u: (k as f64).sin() }).collect() };
+        let time = Time::Uniform { start: 0.0, step: 1.0 };
+        let simulated = |inputs: &[Voltage], a: f64| {
+            simulate(&Decay, &Rate { a }, &Current { i: 0.5 }, time.clone(), inputs).unwrap().outputs
+        };
+        let record = |from: usize| Experiment::new(&Decay, time.clone(), inputs(from), simulated(&inputs(from), 0.9));
+        let records = [record(0).unwrap().named("0"), record(7).unwrap().named("7")];
+        let fit = |substeps: u32| {
+            let fit = Fit::new(&Decay, &records).parameters(Rate { a: free(1.0) }).noise(Current { i: 0.1 });
+            fit.integrator(Rk4 { substeps }).problem().unwrap()
+        };
+        let (coarse, fine) = (fit(1), fit(2));
+        let (coarse, fine) = (coarse.objective().unwrap(), fine.objective().unwrap());
+        let start = coarse.start();
+        let found = residual_pass(&coarse, &start).unwrap().step_error;
+        let errors =
+            |objective: &crate::problem::Objective<'_>| argmin::core::Operator::apply(objective, &start).unwrap();
+        let (coarse, fine) = (errors(&coarse), errors(&fine));
+        assert_eq!(coarse.len(), 40);
+        let expected = coarse.iter().zip(&fine).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+        assert!(expected > 1e-3 && (found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+    }
 }

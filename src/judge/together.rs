@@ -190,10 +190,7 @@ impl Judgement<'_> {
         let free = |piece: &Piece| piece.held.iter().filter(|held| !**held).count() as f64;
         let degrees = pieces.iter().map(free).sum::<f64>() - free(&whole);
         let gain = pieces.iter().map(|piece| piece.gain).sum::<f64>() - whole.gain;
-        let chance = chi_squared_tail(gain / dependence, degrees);
-        if degrees < 1.0 || chance > LEVEL {
-            return None;
-        }
+        let chance = no_chance(gain / dependence, degrees)?;
         let (i, a, b, _) = self.furthest(&pieces, unknowns)?;
         let (unknown, slope) = (&unknowns[i], self.slopes[i]);
         let value = |piece: &Piece| unknown.value + slope * piece.step[i];
@@ -259,4 +256,22 @@ fn scaled(triangle: &Information, factor: f64) -> Information {
         scaled.absorb_row(&row, factor * triangle.at(i, n));
     }
     scaled
+}
+
+/// Probability that pieces of one plant gain as much by steps of their own, if it is below the level.
+fn no_chance(gain: f64, degrees: f64) -> Option<f64> {
+    let chance = chi_squared_tail(gain, degrees);
+    (degrees >= 1.0 && chance <= LEVEL).then_some(chance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::no_chance;
+
+    /// The 0.01 % points of chi-squared with 1 and 2 degrees of freedom are 15.137 and `-2 ln 1e-4 = 18.421`.
+    #[test]
+    fn contradictions_begin_at_their_level() {
+        assert!(no_chance(15.14, 1.0).is_some() && no_chance(15.13, 1.0).is_none());
+        assert!(no_chance(18.43, 2.0).is_some() && no_chance(18.41, 2.0).is_none() && no_chance(99.0, 0.0).is_none());
+    }
 }

@@ -104,7 +104,7 @@ impl Judgement<'_> {
     /// Whether a predicted variance goes to zero: there the likelihood has no maximum.
     fn unbounded(&self) -> Option<Warning> {
         let of = |j: usize| (self.residuals.least_sigma[j], self.residuals.outputs[j].rmse);
-        let j = (0..self.residuals.least_sigma.len()).find(|&j| of(j).0 < ZERO_DEVIATION * of(j).1)?;
+        let j = (0..self.residuals.least_sigma.len()).find(|&j| is_nothing(of(j)))?;
         let (output, (least_sigma, rmse)) = (&self.objective.problem.layout().outputs[j], of(j));
         let text = format!(
             "a measurement of `{}` is predicted with a standard deviation of {} {unit}, beside errors of {} {unit}: the \
@@ -239,4 +239,23 @@ fn shift(objective: &Objective<'_>, coordinates: &[f64], unknowns: &[Unknown]) -
         Some((unknown.name.clone(), change / error, change / unknown.value.abs()))
     };
     (0..unknowns.len()).filter_map(shift).max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Whether a predicted standard deviation is nothing beside the root mean square of the errors.
+fn is_nothing((sigma, rmse): (f64, f64)) -> bool {
+    sigma < ZERO_DEVIATION * rmse
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_nothing;
+
+    /// A millionth, of large errors and of small ones.
+    #[test]
+    fn deviations_of_nothing() {
+        for rmse in [1e-3, 1e3] {
+            assert!(is_nothing((0.99e-6 * rmse, rmse)) && !is_nothing((1.01e-6 * rmse, rmse)));
+        }
+        assert!(!is_nothing((0.0, 0.0)) && !is_nothing((f64::INFINITY, 1.0)));
+    }
 }

@@ -187,3 +187,49 @@ impl Machine for GaussNewton {
 machine::solver!([] GaussNewton, "Gauss-Newton", |search| {
     argmin::kv!("gradient" => search.point.as_ref().map_or(0.0, Point::cosine);)
 });
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::optimize::point::tests::{at, linear};
+
+    /// The minimum of `(x - 3)^2` below a bound at 2: a search that was read back asks for its start again, and keeps the bound.
+    #[test]
+    fn a_search_goes_on_in_its_bounds() {
+        let domain = Domain { bounds: vec![(f64::NEG_INFINITY, 2.0)], sizes: vec![] };
+        let mut search = GaussNewton::default();
+        search.begin(vec![0.0], domain.clone());
+        search.tell(Ok(linear(&[(1.0, 3.0), (0.0, 4.0)])));
+        assert_eq!(search.request(), Request::Linearize(&[2.0]));
+        let stored = serde_json::to_string(&search).unwrap();
+        for mut search in [serde_json::from_str(&stored).unwrap(), search] {
+            GaussNewton::resume(&mut search, domain.clone());
+            assert_eq!(search.request(), Request::Linearize(&[0.0]));
+            search.tell(Ok(linear(&[(1.0, 3.0), (0.0, 4.0)])));
+            assert_eq!(search.request(), Request::Linearize(&[2.0]));
+        }
+    }
+
+    /// From the cost 12.5 along a step of 3 whose slope is -9: enough is 9e-4, and a column that vanishes went too far.
+    #[test]
+    fn a_trial_is_accepted_for_what_it_gains() {
+        let point = at(0.0, linear(&[(1.0, 3.0), (0.0, 4.0)]));
+        let mut search = GaussNewton::default();
+        search.line.step = vec![3.0];
+        let mut accepts = |decrease: f64, norm: f64| {
+            let residual = (25.0f64 - 2.0 * decrease).sqrt();
+            search.accepts(&point, &at(3.0, linear(&[(norm, 0.0), (0.0, residual)])))
+        };
+        assert!(accepts(9.1e-4, 1.0) && !accepts(8.9e-4, 1.0) && !accepts(-1.0, 1.0));
+        assert!(accepts(1.0, 1.1e-10) && !accepts(1.0, 0.9e-10) && !accepts(1.0, 0.0));
+        // How far the decrease was off the predicted one, as a part of 12.5, decays by an eighth from trial to trial.
+        accepts(5.0, 1.0);
+        assert!((search.line.noise - 4.0 / 12.5).abs() < 1e-12, "{}", search.line.noise);
+        let mut exactly = |decrease: f64| {
+            let residual = (25.0f64 - 2.0 * decrease).sqrt();
+            search.accepts(&point, &at(3.0, linear(&[(1.0, 0.0), (0.0, residual)])));
+            search.line.noise
+        };
+        assert!((exactly(9.0) - 0.125 * 4.0 / 12.5).abs() < 1e-12);
+    }
+}

@@ -224,3 +224,90 @@ pub(crate) fn within_tolerance(
     let rough = Some(noise / point.cost_size()).filter(|part| part.is_finite()).map(|part| point.rough(part))?;
     (point.potential <= noise || rough.converged()).then_some(rough)
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::information::Information;
+
+    /// Rows `(slope, residual)` of one unknown.
+    pub fn linear(rows: &[(f64, f64)]) -> Linearization {
+        let mut information = Information::new(1);
+        rows.iter().for_each(|&(slope, residual)| information.absorb_row(&[slope], residual));
+        Linearization::new(0.5 * information.residual_at_zero(), 1, vec![information])
+    }
+
+    pub fn at(x: f64, linear: Linearization) -> Point {
+        Point::new(vec![x], linear, &Domain::default()).unwrap()
+    }
+
+    /// Residuals 3, which a step of 3 takes away, and 4: the cost 12.5 would fall by 4.5.
+    fn far() -> Linearization {
+        linear(&[(1.0, 3.0), (0.0, 4.0)])
+    }
+
+    /// One thousandth of a residual of 4: of the cost 8, a step would gain 5e-7.
+    fn near() -> Linearization {
+        linear(&[(1.0, 1e-3), (0.0, 4.0)])
+    }
+
+    /// Sums of place and limit miss these bounds in the last digit.
+    #[test]
+    fn steps_end_on_their_bounds() {
+        for (x, bound) in [(0.2, 0.9), (-2.3, 2.4), (0.7, 0.1), (2.0, -0.4)] {
+            assert_ne!(x + (bound - x), bound);
+            let domain = Domain { bounds: vec![if bound > x { (-9.0, bound) } else { (bound, 9.0) }], sizes: vec![] };
+            let point = Point::new(vec![x], linear(&[(1.0, 1.0)]), &domain).unwrap();
+            assert_eq!([point.towards(&[bound - x]), point.towards(&[3.0 * (bound - x)])], [vec![bound], vec![bound]]);
+            assert_eq!(point.towards(&[0.5 * (bound - x)]), [x + 0.5 * (bound - x)]);
+        }
+    }
+
+    #[test]
+    fn what_the_cost_resolves() {
+        assert_eq!(at(0.0, far()).resolution(), 12.5 * 1e-13);
+        assert_eq!(at(0.0, far().with_roughness(0.5)).resolution(), 6.25);
+        // Data of norm 1e6, rounded to 2^-52 of themselves; ten roundings, of a residual whose norm is 5.
+        let rounding = at(0.0, far().with_data_norm(1e6)).rounding();
+        assert!((rounding / (10.0 * f64::EPSILON * 1e6 / 5.0) - 1.0).abs() < 1e-14, "{rounding}");
+        assert_eq!(at(0.0, far()).rounding(), 0.0);
+        assert_eq!(at(0.0, linear(&[(1.0, 0.0)]).with_data_norm(1e6)).rounding(), 0.0);
+    }
+
+    /// The full step is `sqrt(2 * 4.5 / 25 * 2)` standard errors long, of two rows.
+    #[test]
+    fn a_search_without_a_lower_cost() {
+        let stuck = |linear: Linearization, noise: f64, rough: bool| at(6.0, linear).stuck(2, noise, rough);
+        let Outcome::Stalled { gradient, step, failed: 2 } = stuck(far(), 0.35, false) else { panic!() };
+        // The cosine of 3 : 4 : 5; 3 of 6 and of a standard error `sqrt(25 / 2)`.
+        assert!((gradient - 0.6).abs() < 1e-14 && (step - 3.0 / (6.0 + 12.5f64.sqrt())).abs() < 1e-14);
+        let Outcome::Rough { noise, errors } = stuck(far(), 0.37, false) else { panic!() };
+        assert!(noise == 0.37 && (errors - 0.72f64.sqrt()).abs() < 1e-14, "{noise} {errors}");
+        let Outcome::Rough { noise, .. } = stuck(far(), 0.0, true) else { panic!() };
+        assert!((noise - 0.36).abs() < 1e-14, "{noise}");
+        assert!(matches!(stuck(far().with_roughness(0.37), 0.0, false), Outcome::Rough { noise: 0.37, .. }));
+        // The gain 5e-7 / 8 is below ten roundings of data of norm 1.2e8 in a residual of 4, and above those of 1e8.
+        assert!(matches!(stuck(near().with_data_norm(1.2e8), 0.0, false), Outcome::Rough { .. }));
+        assert!(matches!(stuck(near().with_data_norm(1e8), 0.0, false), Outcome::Stalled { .. }));
+        assert_eq!(stuck(near().with_data_norm(1e11), 0.0, false), Outcome::Exact);
+        // A gradient cosine of 2.5e-7.
+        assert!(matches!(stuck(linear(&[(1.0, 1e-6), (0.0, 4.0)]), 0.0, false), Outcome::LimitOfPrecision { .. }));
+    }
+
+    #[test]
+    fn a_full_step_within_the_tolerance() {
+        let end = |linear: Linearization, noise: f64| {
+            within_tolerance(&[6.0], linear, &Domain::default(), |x| {
+                assert!((x[0] - 9.0).abs() < 1e-12 || (x[0] - 6.001).abs() < 1e-12, "{x:?}");
+                noise
+            })
+        };
+        let Some(Outcome::Rough { noise, errors }) = end(far(), 4.5) else { panic!() };
+        assert!((noise - 0.36).abs() < 1e-14 && (errors - 0.72f64.sqrt()).abs() < 1e-14, "{noise} {errors}");
+        assert_eq!(end(far(), 4.4), None);
+        // A step of 3.5e-4 standard errors is negligible whatever it gains.
+        assert!(matches!(end(near(), 0.0), Some(Outcome::Rough { noise: 0.0, errors }) if errors < 4e-4));
+        // A cost of zero has no part.
+        assert_eq!(within_tolerance(&[6.0], linear(&[(1.0, 0.0)]), &Domain::default(), |_| 1.0), None);
+    }
+}

@@ -99,10 +99,27 @@ impl Objective<'_> {
     /// Whether a finer step changes the cost at a point by a tenth; `None` if either cannot be evaluated there, or if there is
     /// none.
     pub(crate) fn step_decides(&self, coordinates: &[f64]) -> Option<bool> {
-        const CHANGED: f64 = 0.1;
         let finer = self.sweep.refined()?;
         let finer = self.of(self.problem, &*finer).cost_at(coordinates).ok()?;
         let this = self.cost_at(coordinates).ok()?;
-        Some((this - finer).abs() > CHANGED * this.abs().min(finer.abs()))
+        Some(differ(this, finer))
+    }
+}
+
+/// Whether costs differ by a tenth of the smaller one.
+fn differ(this: f64, finer: f64) -> bool {
+    const CHANGED: f64 = 0.1;
+    (this - finer).abs() > CHANGED * this.abs().min(finer.abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::differ;
+
+    #[test]
+    fn costs_differ_by_a_tenth_of_the_smaller_one() {
+        assert!(differ(1.11, 1.0) && differ(1.0, 1.11) && !differ(1.09, 1.0) && !differ(1.0, 1.09));
+        // Those of likelihoods may be negative; two that are zero do not differ.
+        assert!(differ(-1.11, -1.0) && !differ(-1.09, -1.0) && differ(1e-3, -1e-3) && !differ(0.0, 0.0));
     }
 }

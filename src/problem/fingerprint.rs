@@ -91,16 +91,16 @@ fn of(values: impl IntoIterator<Item = f64>) -> Probe {
 
 /// Prediction errors and variances of an experiment; not a number if the search was stopped meanwhile.
 fn errors(plain: &Objective<'_>, e: usize, coordinates: &[f64]) -> Probe {
-    let (mut probe, mut at, mut samples) = (Probe::default(), 0, 0);
+    let (mut probe, mut number, mut samples) = (Probe::default(), 0, 0);
     // How far a simulation comes before it fails is part of the answer.
     let _ = plain.run_alone(e, coordinates, false, &mut |window| {
         for k in 0..window.samples[0] {
             for j in 0..window.outputs() {
                 if window.is_measured(k, j, 0) {
-                    probe.add(at, window.error(k, j, 0));
-                    probe.add(at + 1, window.variance(k, j, 0));
+                    probe.add(number, window.error(k, j, 0));
+                    probe.add(number, window.variance(k, j, 0));
                 }
-                at += 2;
+                number += 1;
             }
         }
         samples += window.samples[0];
@@ -157,6 +157,11 @@ mod tests {
         assert!(values.agrees(&probe(&[1.0, 2.0, 5.0])));
         for other in [[2.0, 1.0, 5.0], [1.0, 5.0, 2.0], [3.0, 2.0, 5.0], [1.0, 2.0, 5.001]] {
             assert!(!values.agrees(&probe(&other)), "{other:?}");
+        }
+        // Relative to their size, up to what another processor rounds.
+        for size in [1e-3, 1e3] {
+            let of = |part: f64| probe(&[size, -size * (1.0 + part)]);
+            assert!(of(0.0).agrees(&of(1e-10)) && !of(0.0).agrees(&of(1e-7)), "{size}");
         }
         // By its definition: factors 1, 98/97 and 99/97.
         assert!((values.sum - (1.0 + 2.0 * 98.0 / 97.0 + 5.0 * 99.0 / 97.0)).abs() < 1e-12);

@@ -228,7 +228,8 @@ impl LeastSquares for Objective<'_> {
 
 #[cfg(test)]
 mod tests {
-    use crate::{Experiment, Fit, Kind, Model, Nothing, Sample, Scalar, Time, free, signals};
+    use crate::optimize::LeastSquares;
+    use crate::{Experiment, ExperimentOf, Fit, Kind, Model, Nothing, Sample, Scalar, Time, free, signals};
 
     signals! { struct Input { u: "V" } }
     signals! { struct Output { y: "V", z: "V" } }
@@ -249,15 +250,34 @@ mod tests {
         }
     }
 
+    /// Eleven samples of two outputs, one of them perhaps missing.
+    fn data(missing: Option<usize>) -> (Vec<Input>, Vec<Output>, ExperimentOf<Amplifier>) {
+        let inputs: Vec<Input> = (0..11).map(|k| Input { u: 1.0 + f64::from(k) }).collect();
+        let z = |k: usize| if missing == Some(k) { f64::NAN } else { 7.0 - k as f64 };
+        let outputs: Vec<Output> = (0..11).map(|k| Output { y: 3.0 + k as f64, z: z(k) }).collect();
+        let time = Time::Uniform { start: 0.0, step: 1.0 };
+        let record = Experiment::new(&Amplifier, time, inputs.clone(), outputs.clone()).unwrap();
+        (inputs, outputs, record)
+    }
+
+    /// A row for each measurement, with a weight or without.
+    #[test]
+    fn rows_are_measurements() {
+        for (missing, rows) in [(None, 22), (Some(6), 21)] {
+            let (_, _, record) = data(missing);
+            let fit = || Fit::new(&Amplifier, &record).parameters(Gain { a: free(1.0) });
+            let weighted = fit().weighting(|s: &Sample<Amplifier>| s.u.u);
+            for problem in [fit().problem().unwrap(), weighted.problem().unwrap()] {
+                let objective = problem.objective().unwrap();
+                assert_eq!(objective.linearize(&objective.start()).unwrap().rows(), rows);
+            }
+        }
+    }
+
     /// `sum of w y^2 / sigma^2` over what was measured.
     #[test]
     fn norm_of_the_data_by_hand() {
-        let inputs: Vec<Input> = (0..11).map(|k| Input { u: 1.0 + f64::from(k) }).collect();
-        let missing = |k: usize, y: f64| if k == 6 { f64::NAN } else { y };
-        let outputs: Vec<Output> =
-            (0..11).map(|k| Output { y: 3.0 + k as f64, z: missing(k, 7.0 - k as f64) }).collect();
-        let time = Time::Uniform { start: 0.0, step: 1.0 };
-        let record = Experiment::new(&Amplifier, time, inputs.clone(), outputs.clone()).unwrap();
+        let (inputs, outputs, record) = data(Some(6));
         let fit = Fit::new(&Amplifier, &record).parameters(Gain { a: free(1.0) }).noise(Output { y: 0.5, z: 4.0 });
         let problem = fit.weighting(|s: &Sample<Amplifier>| s.u.u).problem().unwrap();
         let found = problem.objective().unwrap().data_norm().unwrap();

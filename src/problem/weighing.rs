@@ -34,8 +34,7 @@ impl<'o> Weighing<'o> {
         if !window.has_variances() {
             return [(root, root * z), (0.0, 0.0)];
         }
-        let number = (k * window.outputs() + j) * window.lanes() + lane;
-        self.cost += weight * 0.5 * self.kappa * window.log_variances[number];
+        self.cost += weight * 0.5 * self.kappa * window.log_variance(k, j, lane);
         let influence = self.loss.map_or(z * z, |loss| loss.psi(z) * z);
         let second = (weight * self.kappa).sqrt();
         [(root, root * z), (second, (influence - self.kappa) * (weight / (2.0 * self.kappa)).sqrt())]

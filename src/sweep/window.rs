@@ -182,8 +182,14 @@ impl Window {
     /// Standard deviation that the error was divided by, where variances are predicted and the window is standardized.
     #[inline(always)]
     pub(crate) fn variance_root(&self, sample: usize, output: usize, lane: usize) -> f64 {
+        (0.5 * self.log_variance(sample, output, lane)).exp()
+    }
+
+    /// Logarithm of the variance that the error was divided by; zero where variances are not predicted.
+    #[inline(always)]
+    pub(crate) fn log_variance(&self, sample: usize, output: usize, lane: usize) -> f64 {
         let at = (sample * self.outputs + output) * self.lanes + lane;
-        self.log_variances.get(at).map_or(1.0, |log| (0.5 * log).exp())
+        self.log_variances.get(at).copied().unwrap_or(0.0)
     }
 
     /// Whether an output was measured at a sample of a lane.

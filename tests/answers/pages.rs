@@ -121,6 +121,23 @@ fn a_band_is_drawn_as_wide_as_it_is() {
     }
 }
 
+/// The band is that of the predictions, whatever the transform of the parameters.
+#[test]
+fn a_band_does_not_depend_on_logarithms() {
+    let record = [record(even(400), 0.01, 1)];
+    let widths = |transform: fn(greybox::Parameter) -> greybox::Parameter| {
+        let Branch { gain, tau } = branch();
+        let parameters = Branch { gain: transform(gain), tau: transform(tau) };
+        let problem = Fit::new(&Lag, &record).parameters(parameters).problem().unwrap();
+        bands(&problem, &problem.run().unwrap(), 0, 0.95).unwrap().confidence[0].clone()
+    };
+    let (plain, logarithms) = (widths(|parameter| parameter), widths(greybox::Parameter::log));
+    for (a, b) in plain.iter().zip(&logarithms).skip(1) {
+        // The search ends within 1e-6 of a standard error or so.
+        assert!((a / b - 1.0).abs() < 1e-4, "{a} {b}");
+    }
+}
+
 /// Time stamps of a clock that counts from 1970 are drawn over the whole width, count from the start, and name it.
 #[test]
 fn time_counts_from_the_start() {

@@ -3,18 +3,18 @@
 
 use crate::common::*;
 use argmin::core::observers::{Observe, ObserverMode};
-use argmin::core::{Executor, KV, State};
+use argmin::core::{CostFunction, Executor, KV, State};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::neldermead::NelderMead;
 use argmin::solver::particleswarm::ParticleSwarm;
 use argmin::solver::quasinewton::LBFGS;
-use greybox::optimize::{GaussNewton, LeastSquaresState, LevenbergMarquardt, Outcome, Stop};
+use greybox::optimize::{GaussNewton, LeastSquares, LeastSquaresState, LevenbergMarquardt, Outcome, Stop};
 use greybox::optimize::{JacobianColumns, Nominal, Unscaled};
 use greybox::*;
 use rand::SeedableRng;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 const SIGMA: Current = Current { i: 0.1 };
@@ -94,12 +94,66 @@ impl Observe<LeastSquaresState> for Count {
     }
 }
 
+/// The course of a search: the start, and each iteration down to the last cost.
+#[test]
+fn the_course_of_a_search_is_kept() {
+    let (record, course) = (record(1), diagnose::Convergence::default());
+    let estimate = fit(&record).observe(course.clone(), ObserverMode::Always).run().unwrap();
+    let kept = course.iterations();
+    let numbers: Vec<u64> = kept.iter().map(|iteration| iteration.iteration).collect();
+    assert_eq!(numbers, (0..=estimate.iterations).collect::<Vec<u64>>());
+    assert_eq!(kept[kept.len() - 1].cost, estimate.cost);
+    assert!(kept[0].cost > 10.0 * estimate.cost, "{} {}", kept[0].cost, estimate.cost);
+}
+
 #[test]
 fn observers_see_every_iteration() {
     let (record, count) = (record(1), Arc::new(AtomicU64::new(0)));
     let estimate = fit(&record).observe(Count(count.clone()), ObserverMode::Always).run().unwrap();
     assert!(estimate.iterations > 2);
     assert_eq!(count.load(Ordering::Relaxed), estimate.iterations);
+}
+
+/// The costs that an observer was shown.
+struct Costs(Arc<Mutex<Vec<f64>>>);
+
+impl Observe<LeastSquaresState> for Costs {
+    fn observe_iter(&mut self, state: &LeastSquaresState, _: &KV) -> Result<(), argmin::core::Error> {
+        self.0.lock().unwrap().push(state.get_cost());
+        Ok(())
+    }
+}
+
+/// Of searches from several starts, an observer of new best points sees the lowest cost fall to that of the estimate.
+#[test]
+fn observers_see_each_new_best() {
+    let (record, costs) = (record(1), Arc::new(Mutex::new(vec![])));
+    let estimate = fit(&record).starts(6).observe(Costs(costs.clone()), ObserverMode::NewBest).run().unwrap();
+    let costs = costs.lock().unwrap();
+    assert!(costs.len() > 2 && costs.windows(2).all(|pair| pair[1] < pair[0]), "{costs:?}");
+    assert!((costs[costs.len() - 1] / estimate.cost - 1.0).abs() < 1e-9, "{costs:?} {}", estimate.cost);
+}
+
+/// The cost alone and that with slopes, of a record in segments with a loss; and second derivatives with the slopes of the errors and
+/// of a prior.
+#[test]
+fn costs_and_slopes_are_of_one_problem() {
+    let inputs = levels(2_000, 12, 7).into_iter().map(|u| Voltage { u }).collect();
+    let exact = simulated(&Lag, 5e-3, inputs, Current { i: 0.5 }, Branch { gain: 2.0, tau: 0.05 });
+    let record = noisy(&Lag, &exact, SIGMA, &mut Noise(3));
+    let tau = free(0.1).within(0.01, 1.0);
+    let fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.0).prior(3.0, 1e-3), tau });
+    let problem = fit.noise(SIGMA).loss(Huber::default()).problem().unwrap();
+    let objective = problem.objective().unwrap();
+    let start = objective.start();
+    let linear = objective.linearize(&start).unwrap();
+    assert!((objective.cost(&start).unwrap() / linear.cost - 1.0).abs() < 1e-12);
+    let costs = [0.009, 0.01, 1.0, 1.1].map(|tau| objective.cost(&vec![1.0, tau]).unwrap());
+    assert_eq!(costs.map(f64::is_finite), [false, true, true, false], "in the bounds: {costs:?}");
+    let second = objective.curvature(&start, &[0.1, 0.0]).unwrap().unwrap();
+    for (second, first) in second.column_norms().iter().zip(linear.column_norms()) {
+        assert!((second / first - 1.0).abs() < 1e-12, "{second} {first}");
+    }
 }
 
 fn place(name: &str) -> PathBuf {
@@ -133,6 +187,32 @@ fn a_checkpoint_goes_on() {
     std::fs::write(&path, "{}").unwrap();
     let refused = fit(&record).checkpoint(&path, 1).run().unwrap_err().to_string();
     assert!(refused.contains("delete it"), "{refused}");
+}
+
+/// Looks whether a file is there.
+struct Look(PathBuf, Arc<AtomicU64>);
+
+impl Observe<LeastSquaresState> for Look {
+    fn observe_iter(&mut self, _: &LeastSquaresState, _: &KV) -> Result<(), argmin::core::Error> {
+        self.1.fetch_add(u64::from(self.0.exists()), Ordering::Relaxed);
+        Ok(())
+    }
+}
+
+/// A checkpoint is there while the search goes on; it belongs to all records, also those beyond the eight that are simulated to tell
+/// problems apart.
+#[test]
+fn a_checkpoint_is_written_on_the_way() {
+    let (path, seen) = (place("on_the_way.json"), Arc::new(AtomicU64::new(0)));
+    let records: Vec<ExperimentOf<Lag>> = (0..9).map(|k| record(k).named(format!("{k}"))).collect();
+    let others: Vec<ExperimentOf<Lag>> = records.iter().take(8).cloned().chain([record(100).named("8")]).collect();
+    let fit =
+        |records| Fit::new(&Lag, records).parameters(Branch { gain: free(1.0), tau: free(0.1).log() }).noise(SIGMA);
+    let look = Look(path.clone(), seen.clone());
+    let estimate = fit(&records).checkpoint(&path, 1).observe(look, ObserverMode::Always).run().unwrap();
+    assert!(seen.load(Ordering::Relaxed) + 1 >= estimate.iterations && estimate.iterations > 2, "{seen:?} {estimate}");
+    let refused = fit(&others).checkpoint(&path, 1).run().unwrap_err().to_string();
+    assert!(refused.contains("another problem"), "{refused}");
 }
 
 #[test]

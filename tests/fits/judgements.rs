@@ -2,7 +2,7 @@
 //! Where a verdict turns: errors, noise levels, sensors and records on either side of what is said of them.
 
 use crate::common::*;
-use greybox::optimize::Severity;
+use greybox::optimize::{Outcome, Severity};
 use greybox::*;
 
 signals! { struct Factor { a: "1" } }
@@ -303,4 +303,81 @@ fn a_full_covariance_of_what_was_measured() {
     }
     // In standard errors. Noise levels settle to 1e-6.
     assert!((slope / size.sqrt()).abs() < 1e-3, "{slope} {size}");
+}
+
+/// Data without noise: the start, the minimum, and slopes once more with the noise levels found there; not if they are given.
+#[test]
+fn evaluations_are_counted() {
+    let record = record(40, (2.0, 2.0), 0.0, moving);
+    let evaluations = |fit: Fit<'_, Twice>| {
+        let estimate = fit.run().unwrap();
+        assert_eq!(estimate.outcome, Outcome::Exact, "{estimate}");
+        estimate.evaluations
+    };
+    let fit = || fit(std::slice::from_ref(&record));
+    assert_eq!(evaluations(fit()), evaluations(fit().noise(Pair { y: 1.0, z: 1.0 })) + 1);
+}
+
+/// An input and errors across it, eight samples again and again, of which the input explains three tenths: chance with 16 samples
+/// (F of 1 and 14 degrees of freedom is 6, at a level of 3 %), and none with 80 (F of 1 and 78 is 33).
+#[test]
+fn what_chance_explains_is_not_explained() {
+    let u = [1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0];
+    let e = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0];
+    let of = |samples: usize| {
+        let inputs: Vec<Voltage> = (0..samples).map(|k| Voltage { u: u[k % 8] }).collect();
+        let y = |k: usize| Current { i: 0.3f64.sqrt() * u[k % 8] + 0.7f64.sqrt() * e[k % 8] };
+        let time = Time::Uniform { start: 0.0, step: 1.0 };
+        let record = Experiment::new(&Gain, time, inputs, (0..samples).map(y).collect()).unwrap();
+        let estimate = Fit::new(&Gain, &record).parameters(Factor { a: free(1.0) }).run().unwrap();
+        assert!((estimate.parameters.a - 0.3f64.sqrt()).abs() < 1e-9, "{estimate}");
+        estimate.warnings.iter().find(|warning| warning.code == WarningCode::Unexplained).map(|one| one.severity)
+    };
+    assert_eq!((of(16), of(80)), (Some(Severity::NotUsable), None));
+}
+
+/// An output that never moves is that of a dead sensor, unless the model gives the same value beside an output that moves.
+#[test]
+fn a_constant_output_is_said() {
+    let of = |z: f64, w: f64, size: f64| {
+        let constant = record(100, (2.0, 2.0), size, |k| Drive { w, ..moving(k) });
+        let constant = edited(&constant, |_, y| Pair { z, ..y });
+        let fit = fit(std::slice::from_ref(&constant)).noise(Pair { y: 0.01, z: 0.01 });
+        severity(&fit.run().unwrap(), WarningCode::ConstantOutput)
+    };
+    // The model gives 0.2 or so instead of 3; and 3, to 1e-9.
+    assert_eq!((of(3.0, 0.1, 0.01), of(3.0, 1.5, 1e-9)), (Some(Severity::NotUsable), Some(Severity::Usable)));
+    let plain = record(100, (2.0, 2.0), 0.01, moving);
+    assert_eq!(severity(&fit(&[plain]).run().unwrap(), WarningCode::ConstantOutput), None);
+}
+
+/// The errors of a record that is cut into segments, each with the logarithm of its noise.
+#[test]
+fn the_deviance_of_a_long_record() {
+    let inputs = levels(2_000, 12, 7).into_iter().map(|u| Voltage { u }).collect();
+    let exact = simulated(&Lag, 5e-3, inputs, Current { i: 0.5 }, Branch { gain: 2.0, tau: 0.05 });
+    let record = noisy(&Lag, &exact, Current { i: 0.1 }, &mut Noise(3));
+    let parameters = Branch { gain: free(1.0), tau: free(0.1) };
+    let estimate = Fit::new(&Lag, &record).parameters(parameters).noise(Current { i: 0.1 }).run().unwrap();
+    let ratio = estimate.quality.i.rmse / 0.1;
+    let expected = 2_000.0 * ((core::f64::consts::TAU * 0.01).ln() + ratio * ratio);
+    assert!((estimate.deviance.unwrap() / expected - 1.0).abs() < 1e-9, "{:?} {expected}", estimate.deviance);
+}
+
+/// Two outputs, each known by eighty errors of 0.1 across its input of one: their gains differ by five standard errors of the
+/// difference, `0.1 sqrt(2 / 79)`. The chance of as much, chi-squared of 25 with one degree of freedom, is 5.7e-7.
+#[test]
+fn outputs_contradict_by_their_difference() {
+    let (u, e) = ([1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0], [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0]);
+    let apart = 5.0 * 0.1 * (2.0f64 / 79.0).sqrt();
+    let inputs = (0..80).map(|k| Drive { u: u[k % 8], w: u[k % 8] }).collect();
+    let output = |k: usize| {
+        let (u, e) = (u[k % 8], 0.1 * e[k % 8]);
+        Pair { y: 2.0 * u + e, z: (2.0 + apart) * u - e }
+    };
+    let time = Time::Uniform { start: 0.0, step: 1.0 };
+    let record = Experiment::new(&Twice, time, inputs, (0..80).map(output).collect()).unwrap();
+    let estimate = fit(std::slice::from_ref(&record)).run().unwrap();
+    let warning = said(&estimate, WarningCode::OutputsContradict).unwrap();
+    assert!(warning.text.contains("chi-square p = 5.7e-7"), "{}", warning.text);
 }

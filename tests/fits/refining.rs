@@ -3,7 +3,7 @@
 use crate::common::levels;
 use crate::far_starts::{Coupled, Coupling, coupled};
 use approx::assert_relative_eq;
-use greybox::optimize::{Outcome, Severity};
+use greybox::optimize::{JacobianColumns, LevenbergMarquardt, Outcome, Severity, Stop};
 use greybox::*;
 
 /// Steps of 1 ms; a stiffness of `c` turns by `sqrt(150 c) / 1000` rad in one. Without friction.
@@ -52,6 +52,9 @@ fn the_default_method_is_as_fine_as_the_plant_asks_for() {
         assert_eq!((found.cost, &found.method), (fit.cost, &fit.method));
         let again = fit.predict(&Coupled, &record).unwrap().quality.first.rmse;
         assert_relative_eq!(again, fit.quality.first.rmse, max_relative = 1e-9);
+        let again =
+            Fit::new(&Coupled, &record).parameters(near(truth)).predict(&fit, &record).unwrap().quality.first.rmse;
+        assert_relative_eq!(again, fit.quality.first.rmse, max_relative = 1e-9);
         let report = Report::new(&problem, &found).unwrap();
         assert_eq!(report.estimate.method.integrator, fit.method.integrator);
     }
@@ -73,6 +76,12 @@ fn a_method_that_was_chosen_stays() {
     let moved = 100.0 * (value(&finer) / value(&fit) - 1.0).abs();
     let said: f64 = after.split(' ').next().unwrap().parse().unwrap();
     assert!((said / moved - 1.0).abs() < 0.2, "{moved} {}", warning.text);
+    // A search by it that was not done says nothing of finer steps: nobody asked whether they would have helped.
+    let short = LevenbergMarquardt::new(Stop { iterations: 1, ..Stop::default() }, JacobianColumns);
+    let fit = Fit::new(&Coupled, &record).parameters(near(truth)).integrator(Rk4 { substeps: 1 });
+    let cut = fit.optimizer(short).run().unwrap();
+    assert_eq!(cut.outcome, Outcome::IterationLimit { iterations: 1 });
+    assert!(cut.warnings.iter().all(|warning| !warning.text.contains("may have kept the search")), "{cut}");
 }
 
 /// A fleet takes records to the method that single fits take them to, also where the start overflows with the default step.

@@ -108,8 +108,20 @@ impl<'s> End<'s> {
         let change = (-2.0 * (slope + self.linear.predicted_reduction(&step))).max(0.0).sqrt();
         let sigma = (self.linear.sum_of_squares() / self.linear.rows().max(1) as f64).sqrt();
         let digits: f64 = self.linear.column_norms().iter().zip(x).map(|(norm, x)| norm * x.abs()).sum();
-        change <= SAME_ERRORS * sigma + SAME_DIGITS * digits
+        is_small(change, sigma, digits)
     }
+}
+
+/// Whether a change of the predictions is no more than the same place found twice: against a standard deviation of the errors,
+/// and against what the digits of the unknowns move the predictions by.
+fn is_small(change: f64, sigma: f64, digits: f64) -> bool {
+    change <= SAME_ERRORS * sigma + SAME_DIGITS * digits
+}
+
+/// Whether values differ by more than their last digits.
+fn differ(values: impl Iterator<Item = f64>) -> bool {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    high - low > SAME_DIGITS * low.abs().max(high.abs())
 }
 
 /// Ends that are one minimum.
@@ -132,12 +144,7 @@ impl Kind<'_> {
     fn differing(&self, found: &[Option<End<'_>>], values: impl Fn(&[f64]) -> Vec<f64>) -> Vec<usize> {
         let ends = self.searches.iter().filter_map(|&i| found[i].as_ref());
         let values: Vec<Vec<f64>> = ends.map(|end| values(&end.search.coordinates)).collect();
-        let differs = |j: &usize| {
-            let (low, high) = values
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x[*j]), high.max(x[*j])));
-            high - low > SAME_DIGITS * low.abs().max(high.abs())
-        };
+        let differs = |j: &usize| differ(values.iter().map(|values| values[*j]));
         self.undetermined.iter().copied().filter(differs).collect()
     }
 }
@@ -209,4 +216,24 @@ pub(super) fn found(
         evaluations,
     };
     Some((best, starts))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{differ, is_small};
+
+    /// A tenth of a standard deviation, and a millionth of the unknowns' effect.
+    #[test]
+    fn a_place_found_twice() {
+        assert!(is_small(0.19, 2.0, 0.0) && !is_small(0.21, 2.0, 0.0));
+        assert!(is_small(2.9e-6, 0.0, 3.0) && !is_small(3.1e-6, 0.0, 3.0));
+        assert!(is_small(0.0, 0.0, 0.0));
+    }
+
+    #[test]
+    fn values_differ_by_more_than_their_last_digits() {
+        let differ = |values: [f64; 3]| differ(values.into_iter());
+        assert!(!differ([2.0, 2.0, 2.0]) && !differ([0.0; 3]) && !differ([2.0, 2.0 * (1.0 + 0.9e-6), 2.0]));
+        assert!(differ([2.0, 2.0 * (1.0 + 1.1e-6), 2.0]) && differ([-1.0, 1.0, 1.0]) && differ([0.0, 0.0, 1e-300]));
+    }
 }

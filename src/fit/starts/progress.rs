@@ -73,7 +73,8 @@ impl Progress {
     }
 
     fn update(&mut self, searches: &Searches<'_>) {
-        self.state.iter = searches.cycle;
+        // argmin counts an iteration after it was observed.
+        self.state.iter = searches.cycle.saturating_sub(1);
         if let Some((place, level)) = best(searches) {
             (self.state.param, self.state.cost) = (Some(place.to_vec()), level);
             if level < self.state.best_cost {

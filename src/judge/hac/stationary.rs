@@ -124,8 +124,7 @@ impl Accumulate for Errors<'_> {
             let mut influence = |k: usize| {
                 let (z, weight) = (window.error(k, j, lane), objective.weight(self.experiment, window.begin[lane] + k));
                 slopes.iter_mut().enumerate().for_each(|(c, slope)| *slope = window.at(k, j, c, lane));
-                let less = (1.0 - weight * form(&self.inverse, &slopes)).max(ALONE);
-                (weight / less).sqrt() * loss.map_or(z, |loss| loss.psi(z))
+                raised(weight, form(&self.inverse, &slopes)) * loss.map_or(z, |loss| loss.psi(z))
             };
             self.run.clear();
             let measured = (0..window.samples[lane]).filter(|&k| window.is_measured(k, j, lane));
@@ -188,13 +187,7 @@ impl<'p> FilteredSlopes<'p> {
         if !counts {
             first.push(self.row.clone());
         }
-        for (a, before) in model.coefficients.iter().zip(&*filtered) {
-            self.row.iter_mut().zip(before).for_each(|(row, before)| *row += a * before);
-        }
-        if let Some(mut oldest) = filtered.pop_back() {
-            oldest.copy_from_slice(&self.row);
-            filtered.push_front(oldest);
-        }
+        filter(&model.coefficients, filtered, &mut self.row);
         if counts {
             self.row.iter_mut().for_each(|row| *row *= model.innovation);
             self.triangle.gather(&mut self.block, &self.row, 0.0);
@@ -247,9 +240,39 @@ impl Accumulate for FilteredSlopes<'_> {
     }
 }
 
+/// The root of a weight, raised by what the fit to this measurement took off its error: `h` is its leverage without the weight.
+fn raised(weight: f64, h: f64) -> f64 {
+    (weight / (1.0 - weight * h).max(ALONE)).sqrt()
+}
+
+/// Adds the filtered rows before, the newest first, times these coefficients to a row, and takes it among them.
+fn filter(coefficients: &[f64], filtered: &mut VecDeque<Vec<f64>>, row: &mut [f64]) {
+    for (a, before) in coefficients.iter().zip(&*filtered) {
+        row.iter_mut().zip(before).for_each(|(row, before)| *row += a * before);
+    }
+    if let Some(mut oldest) = filtered.pop_back() {
+        oldest.copy_from_slice(row);
+        filtered.push_front(oldest);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The impulse response of `y[t] = u[t] + 0.5 y[t - 1] - 0.25 y[t - 2]`.
+    #[test]
+    fn rows_are_filtered() {
+        let mut filtered: VecDeque<Vec<f64>> = vec![vec![0.0, 0.0]; 2].into();
+        let response = [1.0, 0.0, 0.0, 0.0].map(|u| {
+            let mut row = [u, -2.0 * u];
+            filter(&[0.5, -0.25], &mut filtered, &mut row);
+            assert_eq!(row[1], -2.0 * row[0]);
+            row[0]
+        });
+        assert_eq!(response, [1.0, 0.5, 0.0, -0.125]);
+        assert_eq!([raised(4.0, 0.1), raised(4.0, 0.0)], [(4.0f64 / 0.6).sqrt(), 2.0]);
+    }
 
     /// `e[t] = 0.8 e[t - 1] + w[t]` with innovations of unit variance; the impulse response `0.8^t`, whose squares are
     /// `0.64^t`, has 1e-8 of them left after `ln 1e-8 / ln 0.64 = 41.3` samples.

@@ -75,3 +75,45 @@ impl Exploration {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::optimize::point::tests::{at, linear};
+
+    /// Costs of 2 and a little more or less.
+    fn cost(more: f64) -> Point {
+        at(1.0, linear(&[(0.0, (4.0f64 + 2.0 * more).sqrt())]))
+    }
+
+    /// Only points along lost directions tell of a plateau, and only a cost below what it resolves is lower.
+    #[test]
+    fn flat_and_lower_points() {
+        let points = vec![vec![1.0], vec![2.0], vec![3.0]];
+        let mut exploration = Exploration { outcome: None, points, beside: 2, lost: 1, flat: 0 };
+        // The cost resolves 2e-13, and is flat within 2e-9.
+        for (more, lower, flat) in [(-1e-10, true, 0), (1e-9, false, 1), (3e-9, false, 1)] {
+            exploration.take();
+            assert_eq!(exploration.is_lower(&cost(0.0), &cost(more)), lower, "{more}");
+            assert_eq!(exploration.flat, flat, "{more}");
+        }
+        assert!(!exploration.is_lower(&cost(0.0), &cost(0.0)) && exploration.flat == 2);
+    }
+
+    #[test]
+    fn a_plateau_is_flat_or_has_lost_directions() {
+        let end = Outcome::Converged { step: 0.0, gradient: 0.0 };
+        let ends = |lost: usize, flat: usize, spent: bool| {
+            let exploration = Exploration { outcome: Some(end), points: vec![], beside: 0, lost, flat };
+            exploration.outcome(&cost(0.0), spent).unwrap()
+        };
+        for (lost, flat, spent) in [(0, 1, false), (2, 0, false), (1, 0, true)] {
+            assert!(matches!(ends(lost, flat, spent), Outcome::Plateau { .. }), "{lost} {flat} {spent}");
+        }
+        for (lost, flat, spent) in [(0, 0, false), (1, 0, false), (0, 0, true)] {
+            assert_eq!(ends(lost, flat, spent), end, "{lost} {flat} {spent}");
+        }
+        let begun = Exploration { outcome: None, points: vec![], beside: 0, lost: 2, flat: 0 };
+        assert_eq!(begun.outcome(&cost(0.0), true), None);
+    }
+}
