@@ -1,7 +1,6 @@
-//! Numbers, the triangle, filters, losses, integrators: each against analytic cases.
+//! Numbers, the triangle, losses, integrators: each against analytic cases.
 
 mod duals;
-mod filters;
 mod information;
 mod integrators;
 mod linearization;
