@@ -6,4 +6,6 @@ mod integrators;
 mod linearization;
 mod losses;
 mod regress;
+#[path = "../common/spiral.rs"]
+mod spiral;
 mod trees;
