@@ -164,7 +164,7 @@ mod outliers;
 #[cfg(feature = "std")]
 pub mod predict;
 #[cfg(feature = "std")]
-pub mod prefilter;
+mod prefilter;
 #[cfg(feature = "std")]
 pub mod problem;
 #[cfg(feature = "std")]
