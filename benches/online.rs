@@ -5,7 +5,7 @@ use greybox::online::{EkfStart, Forgetting, MrasStart, Order, Rls, Stepping, Wat
 use greybox::pmsm::drive::Simulation;
 use greybox::pmsm::inverter::Carrier;
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::{RobotAxis, V_DC};
+use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::{
     AngledDrive, Currents, Drive, ExactStep, ExactSurface, HeldIn, InverterFed, InverterFedWinding, KeLyapunov,
     MotorLaw, RsLyapunov, SQRT_2_3, Winding,
@@ -63,7 +63,7 @@ fn drive_averaged(bencher: Bencher) {
 
 #[divan::bench(sample_count = 20)]
 fn drive_switching(bencher: Bencher) {
-    drive(bencher, axis_1().switching(V_DC, Carrier::PerSample).unwrap());
+    drive(bencher, axis_1().switching(RobotAxis::V_DC, Carrier::PerSample).unwrap());
 }
 
 #[divan::bench]

@@ -172,17 +172,17 @@ fn seeded<X: Signals, const N: usize>(
 
 signals! {
     /// A point of the plane.
-    pub struct Plane { x: "1", y: "1" }
+    struct Plane { x: "1", y: "1" }
 }
 signals! {
     /// How fast [`Spiral`] grows and turns.
-    pub struct Rates { growth: "1/s", turn: "rad/s" }
+    struct Rates { growth: "1/s", turn: "rad/s" }
 }
 
 /// A problem with a known solution: a point that spirals to the unit circle, at rates that vary with time. In polar
 /// coordinates `dr/dt = growth cos(t) r (1 - r^2)` and `d angle/dt = turn (1 + sin t)`.
 #[derive(Clone, Copy, Debug)]
-pub struct Spiral;
+struct Spiral;
 
 impl Model for Spiral {
     type State = Plane;
@@ -205,7 +205,7 @@ impl Model for Spiral {
 
 impl Spiral {
     /// Where the point is at time `t` (s) if it starts at `x` at time zero.
-    pub fn solution<S: Scalar>(&self, t: f64, x: &Plane<S>, p: &Rates<S>) -> Plane<S> {
+    fn solution<S: Scalar>(&self, t: f64, x: &Plane<S>, p: &Rates<S>) -> Plane<S> {
         let start = (x.x * x.x + x.y * x.y).recip() - 1.0;
         let radius = (start * (p.growth * (-2.0 * t.sin())).exp() + 1.0).sqrt().recip();
         let (sin, cos) = (x.y.atan2(x.x) + p.turn * (t + 1.0 - t.cos())).sin_cos();
@@ -222,7 +222,7 @@ pub struct Order {
     pub slopes: f64,
 }
 
-/// The order of an integrator with fixed steps, by solving [`Spiral`] over one second in 32 and in 64 intervals.
+/// The order of an integrator with fixed steps, on a point that spirals to the unit circle at rates that vary with time, over one second in 32 and in 64 intervals.
 ///
 /// The answer lies within some 0.2 of the order. It says nothing about an adaptive method (its tolerance does not follow
 /// the interval), unless its tolerance is so large that each interval is one step. `None` where the method is stuck.

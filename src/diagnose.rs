@@ -17,13 +17,13 @@ pub use bands::{Bands, bands};
 pub(crate) use bands::{Widths, widths};
 pub use bootstrap::{Bootstrap, Resampling, bootstrap};
 pub use compare::{Candidate, Comparison, Validation, cross_validate, f_test, likelihood_ratio, validate};
-pub use convergence::{Convergence, Iteration};
+pub use convergence::Convergence;
 pub use derived::{Derived, derived};
 pub use drift::{Drift, drift};
 pub(crate) use identifiability::reworded;
 pub use identifiability::{Collinear, Excitation, Identifiability, Segment, identifiability};
 pub use profile::{End, Profile, ProfilePoint, profile};
-pub use side_by_side::{Compared, ComparedOutput, DataUse};
+pub use side_by_side::Compared;
 
 use crate::error::Error;
 use crate::numeral::p_value;

@@ -18,6 +18,8 @@ mod interpret;
 mod machine;
 mod schedule;
 mod step;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use choice::only_duals;
 pub use code::Column;
@@ -169,11 +171,6 @@ impl Program {
     /// Entries of what is carried, without slopes.
     pub fn carried(&self) -> usize {
         self.0.pattern.rows.len()
-    }
-
-    /// Instructions at each sample, and once a pass.
-    pub fn instructions(&self) -> (usize, usize) {
-        (self.0.code.output.len() + self.0.code.advance.len(), self.0.code.once.len())
     }
 
     /// Bytes of machine code; zero, where instructions are interpreted.

@@ -98,6 +98,10 @@
 //! there are numbers, signals, models, integrators and [`online`] observers, without `alloc` too.
 #![cfg_attr(not(feature = "std"), no_std)]
 
+// Tests beside the code name the public list as users do.
+#[cfg(test)]
+extern crate self as greybox;
+
 mod dual;
 pub mod integrate;
 mod interval;
@@ -122,8 +126,7 @@ pub mod check;
 #[cfg(feature = "std")]
 pub mod diagnose;
 #[cfg(feature = "std")]
-#[doc(hidden)]
-pub mod engine;
+mod engine;
 #[cfg(feature = "std")]
 pub mod equations;
 #[cfg(feature = "std")]
@@ -161,7 +164,7 @@ mod outliers;
 #[cfg(feature = "std")]
 pub mod predict;
 #[cfg(feature = "std")]
-pub mod prefilter;
+mod prefilter;
 #[cfg(feature = "std")]
 pub mod problem;
 #[cfg(feature = "std")]
@@ -169,7 +172,7 @@ mod random;
 #[cfg(feature = "std")]
 pub mod record;
 #[cfg(feature = "std")]
-pub mod recurrence;
+mod recurrence;
 #[cfg(feature = "std")]
 pub mod regress;
 #[cfg(feature = "std")]

@@ -7,27 +7,27 @@
 //! the same transfer function as a direct-form section, but its gain at zero frequency is one by structure and its poles
 //! do not move with rounding, where a direct form loses digits as the square of cut-off over sampling rate.
 
-mod linear;
+#[cfg(test)]
+mod tests;
 mod zero_phase;
 
 pub(crate) use zero_phase::filtered;
 
 use crate::error::Error;
-use linear::{Lanes, Linear};
 use serde::{Deserialize, Serialize};
 
 /// Sections of the highest order, 20.
 const SECTIONS: usize = 10;
 
-/// Rows filtered between two looks for states that have decayed.
-const TILE: usize = 16;
+/// Below this a decaying state is set to zero; left alone it would reach numbers that the hardware handles 100 times slower.
+const NEGLIGIBLE: f64 = 1e-290;
 
-/// Columns filtered side by side.
-const LANES: usize = 4;
+/// Rows filtered between two looks for states that have decayed.
+const PART: usize = 128;
 
 /// Which frequencies pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Pass {
+enum Pass {
     /// Those below the cut-off; the gain at zero frequency is one.
     Low,
     /// Those above the cut-off; the gain at half the sampling rate is one.
@@ -37,11 +37,10 @@ pub enum Pass {
 /// A Butterworth filter: flat in its pass band, `1/sqrt(2)` (-3 dB) at the cut-off, falling with `order * 20` dB per decade.
 ///
 /// ```
-/// use greybox::{Butterworth, prefilter::FilterState};
-/// let filter = Butterworth::low_pass(4, 100.0, 0.126e-3)?; // 100 Hz, sampled every 0.126 ms
-/// let mut state = FilterState::default(); // at rest
-/// let y = filter.step(&mut state, 1.0);
-/// assert!(y > 0.0 && y < 1e-5);
+/// let filter = greybox::Butterworth::low_pass(4, 100.0, 0.126e-3)?; // 100 Hz, sampled every 0.126 ms
+/// let mut values = vec![1.0; 50];
+/// filter.zero_phase(&mut values); // what does not change passes
+/// assert!(values.iter().all(|y| (y - 1.0).abs() < 1e-12));
 /// # Ok::<(), greybox::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -72,13 +71,9 @@ struct Section {
     k: f64,
 }
 
-/// The state of a filter between two samples; zero by default.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct FilterState<V = f64>([[V; 2]; SECTIONS]);
-
 impl Section {
     #[inline(always)]
-    fn step<V: Linear>(&self, high: bool, [s1, s2]: &mut [V; 2], x: V) -> V {
+    fn step(&self, high: bool, [s1, s2]: &mut [f64; 2], x: f64) -> f64 {
         let v = x - *s2;
         let next = [*s1 * self.c1 + v * self.c2, *s2 + (*s1 * self.c2 + v * self.c3)];
         let (band, low) = ((*s1 + next[0]) * 0.5, (*s2 + next[1]) * 0.5);
@@ -103,11 +98,6 @@ impl Butterworth {
     /// As [`low_pass`](Self::low_pass).
     pub fn high_pass(order: u32, cutoff: f64, sample_time: f64) -> Result<Self, Error> {
         Design { pass: Pass::High, order, cutoff, sample_time }.try_into()
-    }
-
-    /// Which frequencies pass.
-    pub fn pass(&self) -> Pass {
-        self.design.pass
     }
 
     /// The order.
@@ -136,47 +126,10 @@ impl Butterworth {
         self.sections.get(..self.design.order.div_ceil(2) as usize).unwrap_or(&self.sections)
     }
 
-    /// The state in which the filter stays if its input stays at `x`.
-    pub fn settled<V: Linear>(&self, x: V) -> FilterState<V> {
-        let mut state = FilterState::default();
+    /// The state, of rows of one number, in which the filter stays if its input stays at `x`.
+    fn settled(&self, x: f64) -> Vec<f64> {
         let low = self.design.pass == Pass::Low;
-        for (i, section) in state.0.iter_mut().enumerate() {
-            if low || i == 0 {
-                section[1] = x;
-            }
-        }
-        state
-    }
-
-    /// The next output. What is not a number stays in the state.
-    #[inline]
-    pub fn step<V: Linear>(&self, state: &mut FilterState<V>, mut x: V) -> V {
-        let high = self.design.pass == Pass::High;
-        for (section, state) in self.sections().iter().zip(&mut state.0) {
-            x = section.step(high, state, x);
-            *state = state.map(V::flushed);
-        }
-        x
-    }
-
-    /// Filters the first `rows` rows of a column-major block in place, each column from its own state, which moves on to
-    /// the next block. A column starts every `stride` numbers; there are as many as there are states (or as fit into the
-    /// block). Does not allocate.
-    pub fn filter(&self, block: &mut [f64], stride: usize, rows: usize, states: &mut [FilterState]) {
-        let rows = rows.min(stride);
-        if rows == 0 {
-            return;
-        }
-        let columns = states.len().min(block.len().saturating_add(stride - rows) / stride);
-        let (mut block, mut states) = (block, states.get_mut(..columns).unwrap_or_default());
-        while states.len() >= LANES {
-            let (first, rest) = states.split_at_mut(LANES);
-            self.lanes::<LANES>(block, stride, rows, first);
-            (block, states) = (block.get_mut(LANES * stride..).unwrap_or_default(), rest);
-        }
-        for (column, state) in block.chunks_mut(stride).zip(states.chunks_mut(1)) {
-            self.lanes::<1>(column, stride, rows, state);
-        }
+        (0..self.sections().len()).flat_map(|i| [0.0, if low || i == 0 { x } else { 0.0 }]).collect()
     }
 
     /// Filters rows of `width` numbers in place, sample by sample and each place in the row from its own state, which moves
@@ -187,50 +140,18 @@ impl Butterworth {
             return;
         }
         states.resize(2 * width * sections.len(), 0.0);
-        for row in rows.chunks_exact_mut(width) {
-            for (section, states) in sections.iter().zip(states.chunks_exact_mut(2 * width)) {
-                let (first, second) = states.split_at_mut(width);
-                for ((x, s1), s2) in row.iter_mut().zip(first).zip(second) {
-                    let mut state = [*s1, *s2];
-                    *x = section.step(high, &mut state, *x);
-                    [*s1, *s2] = state;
+        for part in rows.chunks_mut(PART * width) {
+            for row in part.chunks_exact_mut(width) {
+                for (section, states) in sections.iter().zip(states.chunks_exact_mut(2 * width)) {
+                    let (first, second) = states.split_at_mut(width);
+                    for ((x, s1), s2) in row.iter_mut().zip(first).zip(second) {
+                        let mut state = [*s1, *s2];
+                        *x = section.step(high, &mut state, *x);
+                        [*s1, *s2] = state;
+                    }
                 }
             }
-        }
-        states.iter_mut().for_each(|state| *state = state.flushed());
-    }
-
-    /// Filters `L` columns side by side: one alone would wait for its own last sample most of the time.
-    fn lanes<const L: usize>(&self, block: &mut [f64], stride: usize, rows: usize, states: &mut [FilterState]) {
-        let high = self.design.pass == Pass::High;
-        let mut memory = FilterState::<Lanes<L>>::default();
-        for (i, section) in memory.0.iter_mut().enumerate() {
-            *section = [0, 1].map(|j| Lanes(core::array::from_fn(|l| states[l].0[i][j])));
-        }
-        let mut tile = [Lanes::<L>::default(); TILE];
-        for from in (0..rows).step_by(TILE) {
-            let height = TILE.min(rows - from);
-            let tile = &mut tile[..height];
-            for (l, column) in block.chunks(stride).take(L).enumerate() {
-                for (lanes, x) in tile.iter_mut().zip(&column[from..]) {
-                    lanes.0[l] = *x;
-                }
-            }
-            for (section, state) in self.sections().iter().zip(&mut memory.0) {
-                let mut local = *state;
-                for x in tile.iter_mut() {
-                    *x = section.step(high, &mut local, *x);
-                }
-                *state = local.map(Lanes::flushed);
-            }
-            for (l, column) in block.chunks_mut(stride).take(L).enumerate() {
-                for (lanes, x) in tile.iter().zip(&mut column[from..]) {
-                    *x = lanes.0[l];
-                }
-            }
-        }
-        for (l, state) in states.iter_mut().enumerate() {
-            state.0 = memory.0.map(|section| section.map(|s| s.0[l]));
+            states.iter_mut().filter(|state| state.abs() < NEGLIGIBLE).for_each(|state| *state = 0.0);
         }
     }
 }

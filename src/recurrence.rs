@@ -1,8 +1,8 @@
 //! [`Recurrence`]: what happens from one sample to the next, as one graph.
 
 use crate::equations::Equations;
-use crate::graph::{Graph, Id, Leaf, Node, Symbol, Untraceable};
-use crate::integrate::{Integrator, Method, Rate, SymbolicField};
+use crate::graph::{Graph, Id, Leaf, Node, Symbol};
+use crate::integrate::{Method, Rate, SymbolicField};
 use crate::interval::Hold;
 use crate::layout::Kind;
 
@@ -42,23 +42,6 @@ pub enum InvalidRecurrence {
 }
 
 impl Recurrence {
-    /// The simulation of equations by a method of fixed steps: the state is carried.
-    ///
-    /// # Errors
-    /// If the method looks at the numbers that it steps.
-    pub fn new<I: Integrator>(equations: &Equations, integrator: &I, hold: Hold) -> Result<Self, Untraceable> {
-        let mut graph = Graph::default();
-        let mean = graph.import(equations.graph(), equations.output(), Graph::leaf);
-        let states = u32::try_from(equations.layout().states.len()).unwrap_or(u32::MAX);
-        let between = SymbolicInterval { equations, method: integrator, hold };
-        let next = graph.trace(|| {
-            let mut x: Vec<Symbol> = (0..states).map(|i| Symbol::leaf(Leaf::State(i))).collect();
-            between.next(&mut x);
-            x
-        })?;
-        Recurrence::from_roots(&graph, &next, &mean, &[]).map_err(|wrong| Untraceable { reason: wrong.to_string() })
-    }
-
     /// The same that carries no outputs.
     pub(crate) fn without_outputs(&self) -> Self {
         let (graph, next) = self.graph.pruned(&self.next);

@@ -8,7 +8,7 @@ mod error;
 mod estimate;
 mod pooled;
 
-pub use error::{Direction, RegressionError};
+pub use error::RegressionError;
 pub use estimate::{Assumption, LinearEstimate};
 pub use pooled::PooledRegression;
 

@@ -8,7 +8,7 @@ use greybox::pmsm::drive::{Log, Simulation};
 use greybox::pmsm::inverter::Carrier;
 use greybox::pmsm::offline::Spans;
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::{RobotAxis, V_DC};
+use greybox::pmsm::robot::RobotAxis;
 
 fn axis_1() -> Result<(RobotAxis, Simulation, Program)> {
     let axis = RobotAxis::reference(1)?;
@@ -37,8 +37,8 @@ pub fn switching(report: &mut Report) -> Result<()> {
     };
     let rows = [
         ("mean voltage", simulation),
-        ("switching at 7.9 kHz", simulation.switching(V_DC, Carrier::PerSample)?),
-        ("switching at 4.0 kHz", simulation.switching(V_DC, Carrier::HalfPerSample)?),
+        ("switching at 7.9 kHz", simulation.switching(RobotAxis::V_DC, Carrier::PerSample)?),
+        ("switching at 4.0 kHz", simulation.switching(RobotAxis::V_DC, Carrier::HalfPerSample)?),
     ];
     let rows = rows.into_iter().map(row).collect::<Result<_>>()?;
     report.table("Axis 1, inverter that switches", &["Ke LS %", "Ke ext. %", "R ext. %", "Vdt V"], rows);

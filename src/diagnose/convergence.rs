@@ -4,19 +4,7 @@ use crate::optimize::LeastSquaresState;
 use crate::section::{Axis, Cell, Curves, Drawing, Layer, Plot, Section, Style, Table};
 use argmin::core::observers::Observe;
 use argmin::core::{KV, State};
-use serde::{Deserialize, Serialize};
 use std::sync::{Arc, Mutex, PoisonError};
-
-/// One iteration of a search.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Iteration {
-    /// Its number; zero is the start.
-    pub iteration: u64,
-    /// The cost after it.
-    #[serde(with = "crate::real")]
-    pub cost: f64,
-}
 
 /// The course of a search. It is an observer that a fit is given a clone of, and a section of a report:
 ///
@@ -41,26 +29,26 @@ pub struct Iteration {
 /// let convergence = Convergence::default();
 /// let fit = Fit::new(&model, &record).parameters(Spring { k: free(10.0) });
 /// let estimate = fit.observe(convergence.clone(), ObserverMode::Always).run()?;
-/// assert!(convergence.iterations().windows(2).all(|pair| pair[1].cost <= pair[0].cost));
+/// assert!(convergence.iterations().windows(2).all(|pair| pair[1].1 <= pair[0].1));
 /// # Ok::<(), greybox::Error>(())
 /// ```
 #[derive(Clone, Debug, Default)]
-pub struct Convergence(Arc<Mutex<Vec<Iteration>>>);
+pub struct Convergence(Arc<Mutex<Vec<(u64, f64)>>>);
 
 impl Convergence {
-    /// The course of a search that was kept elsewhere.
-    pub fn new(iterations: Vec<Iteration>) -> Convergence {
+    /// The course of a search that was kept elsewhere: number of each iteration, zero for the start, and the cost after it.
+    pub fn new(iterations: Vec<(u64, f64)>) -> Convergence {
         Convergence(Arc::new(Mutex::new(iterations)))
     }
 
-    /// The iterations so far.
-    pub fn iterations(&self) -> Vec<Iteration> {
+    /// The iterations so far: number, and cost after it.
+    pub fn iterations(&self) -> Vec<(u64, f64)> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     fn note(&self, iteration: u64, state: &LeastSquaresState) {
         let mut iterations = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        iterations.push(Iteration { iteration, cost: state.get_cost() });
+        iterations.push((iteration, state.get_cost()));
     }
 }
 
@@ -82,17 +70,17 @@ impl From<&Convergence> for Section {
     fn from(convergence: &Convergence) -> Section {
         const LISTED: usize = 50;
         let iterations = convergence.iterations();
-        let (Some(first), Some(last)) = (iterations.first(), iterations.last()) else {
+        let (Some((first, _)), Some((_, last))) = (iterations.first(), iterations.last()) else {
             return Section::new("convergence", "Course of the search").says("No iteration was kept.");
         };
-        let above = |cost: f64| cost - last.cost;
-        let points = iterations.iter().map(|i| (i.iteration as f64, above(i.cost))).filter(|(_, y)| *y > 0.0).collect();
+        let above = |cost: f64| cost - last;
+        let points = iterations.iter().map(|(i, cost)| (*i as f64, above(*cost))).filter(|(_, y)| *y > 0.0).collect();
         let drawing = Curves {
-            x: Axis::new("iteration", "").from(first.iteration as f64),
+            x: Axis::new("iteration", "").from(*first as f64),
             y: Axis::new("cost above the last", "").logarithmic(),
             layers: vec![Layer::Line { style: Style::Main, points }],
         };
-        let row = |i: &Iteration| [i.iteration.into(), Cell::number(i.cost, 8), Cell::number(above(i.cost), 3)];
+        let row = |(i, cost): &(u64, f64)| [(*i).into(), Cell::number(*cost, 8), Cell::number(above(*cost), 3)];
         let table = Table::new("Iterations", ["iteration", "cost", "above the last"]).rows(iterations.iter().map(row));
         let title = "Cost of each iteration above that of the last one";
         let plot = Plot::new("convergence", "How the cost fell", title, Drawing::Curves(drawing));

@@ -4,17 +4,19 @@
 //! 1923).
 
 mod section;
+mod trace;
 
-use super::{Pinned, check_complete, linearize, minimize};
+use super::{check_complete, linearize};
 use crate::error::Error;
 use crate::estimate::{Knowledge, Summary, student};
 use crate::judge::undetermined;
 use crate::numeral::number;
-use crate::optimize::{LeastSquares, Severity};
+use crate::optimize::Severity;
 use crate::parameter::Transform;
 use crate::problem::Problem;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
+use trace::Trace;
 
 /// The profile of one unknown.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -105,15 +107,6 @@ impl Profile {
     }
 }
 
-/// Most points on each side.
-const POINTS: usize = 40;
-/// After so many points that a root of the rise below this part of the threshold's shows no end.
-const FLAT: (usize, f64) = (8, 1e-3);
-/// The curve goes on to this many times the threshold.
-const HEIGHT: f64 = 1.5;
-/// The ends are found to this part of the root of the threshold.
-const CLOSE: f64 = 1e-3;
-
 /// The profile of an unknown of this name.
 ///
 /// # Errors
@@ -151,123 +144,34 @@ pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probabilit
     let at_bound = |i: usize| i != index && matches!(estimate.unknowns[i].knowledge, Knowledge::Held { end: None, .. });
     let held = undetermined(&linear, &(0..best.len()).map(at_bound).collect::<Vec<bool>>()).held;
     let covariance = linear.covariance(&held);
-    // How far one standard error is, and how the others go along.
     let error = covariance.as_ref().map(|c| c.standard_error(index)).filter(|e| e.is_finite() && *e > 0.0);
-    let along: Vec<f64> = (0..best.len())
-        .map(|j| match (&covariance, error) {
-            (Some(c), Some(error)) if !held[j] => c.get(j, index) / (error * error),
-            _ => 0.0,
-        })
-        .collect();
-    let said = unknown.knowledge.standard_error().map(|s| s / unknown.transform.slope(unknown.value).abs());
-    let inflation = match (said, error) {
-        (Some(said), Some(error)) => (said / error).powi(2),
-        _ => 1.0,
+    let along = |j: usize| match (&covariance, error) {
+        (Some(c), Some(error)) if !held[j] => c.get(j, index) / (error * error),
+        _ => 0.0,
     };
-    let scale = error.unwrap_or((0.1 * best[index]).abs().max(1e-6)) * inflation.sqrt();
+    let known = unknown.knowledge.standard_error().map(|s| s / unknown.transform.slope(unknown.value).abs());
+    let inflation = known.zip(error).map_or(1.0, |(known, error)| (known / error).powi(2));
     let quantile = student::quantile(0.5 + probability / 2.0, unknown.degrees_of_freedom);
-    let bounds = objective.bounds();
-    let values = |coordinates: &[f64]| -> Vec<f64> {
-        estimate.unknowns.iter().zip(coordinates).map(|(u, &c)| u.transform.to_value(c)).collect()
+    let mut trace = Trace {
+        objective: &objective,
+        estimate,
+        index,
+        along: (0..best.len()).map(along).collect(),
+        scale: error.unwrap_or((0.1 * best[index]).abs().max(1e-6)) * inflation.sqrt(),
+        best,
+        cost: linear.cost,
+        quantile,
+        inflation,
+        points: vec![],
+        failed: false,
+        lowest: 0.0,
     };
-    let value = |coordinate: f64| unknown.transform.to_value(coordinate);
-
-    let mut points = vec![ProfilePoint { value: unknown.value, rise: 0.0, unknowns: values(&best) }];
-    let (mut failed, mut lowest) = (false, 0.0f64);
-    let mut side = |sign: f64, bound: f64| -> End {
-        // The root of the rise at a coordinate, starting from a point of the profile.
-        let mut root = |coordinate: f64, from: &[f64]| -> Option<(f64, Vec<f64>)> {
-            let mut start = from.to_vec();
-            for (j, start) in start.iter_mut().enumerate() {
-                let (lower, upper) = bounds[j];
-                *start = (*start + along[j] * (coordinate - from[index])).clamp(lower, upper);
-            }
-            start[index] = coordinate;
-            let mut pinned = bounds.clone();
-            pinned[index] = (coordinate, coordinate);
-            let (place, cost) = minimize(Pinned { problem: &objective, bounds: pinned }, start)?;
-            let rise = 2.0 * (cost - linear.cost) / inflation;
-            lowest = lowest.min(rise);
-            points.push(ProfilePoint { value: value(coordinate), rise: rise.max(0.0), unknowns: values(&place) });
-            Some((rise.max(0.0).sqrt(), place))
-        };
-        let (mut inside, mut place) = ((best[index], 0.0), best.clone());
-        let mut step = sign * scale * quantile / 2.0;
-        for number in 0..POINTS {
-            // Flat so far: the interval is open on this side.
-            if number >= FLAT.0 && bound.is_infinite() && inside.1 < FLAT.1 * quantile {
-                break;
-            }
-            let mut next = inside.0 + step;
-            let at_bound = sign * (next - bound) >= 0.0;
-            if at_bound {
-                next = bound;
-            }
-            if next == inside.0 {
-                return End::Bound(value(bound));
-            }
-            let Some((reached, there)) = root(next, &place) else {
-                failed = true;
-                step /= 2.0;
-                continue;
-            };
-            if reached < quantile {
-                if at_bound {
-                    return End::Bound(value(bound));
-                }
-                // Half a quantile further by the slope so far, at most twice as far.
-                let slope = (reached - inside.1) / (next - inside.0).abs();
-                let wanted = (0.5 * quantile / slope.max(f64::MIN_POSITIVE)).clamp(0.5 * step.abs(), 2.0 * step.abs());
-                (inside, place, step) = ((next, reached), there, sign * wanted);
-                continue;
-            }
-            // Between what is inside and what is outside.
-            let (mut outside, mut end, highest) = ((next, reached), None, reached);
-            for _ in 0..30 {
-                let part = ((quantile - inside.1) / (outside.1 - inside.1)).clamp(0.05, 0.95);
-                let middle = inside.0 + part * (outside.0 - inside.0);
-                let Some((reached, there)) = root(middle, &place) else {
-                    failed = true;
-                    break;
-                };
-                if (reached - quantile).abs() <= CLOSE * quantile {
-                    end = Some(middle);
-                    break;
-                }
-                match reached < quantile {
-                    true => (inside, place) = ((middle, reached), there),
-                    false => outside = (middle, reached),
-                }
-            }
-            let end = end.unwrap_or(inside.0 + (outside.0 - inside.0) / 2.0);
-            // Both sides are drawn to one height; a failure there costs a part of the drawing only.
-            let beyond = end + (HEIGHT.sqrt() - 1.0) * (end - best[index]);
-            if highest < HEIGHT.sqrt() * quantile && sign * (beyond - bound) < 0.0 {
-                let _ = root(beyond, &place);
-            }
-            return End::At(value(end));
-        }
-        End::Open(value(inside.0))
-    };
-    let lower = side(-1.0, bounds[index].0);
-    let upper = side(1.0, bounds[index].1);
+    trace.add(&trace.best.clone(), 0.0);
+    let (lower, upper) = (trace.side(-1.0), trace.side(1.0));
+    let Trace { mut points, failed, lowest, .. } = trace;
     check_complete(problem, &control, "the profile")?;
     points.sort_by(|a, b| a.value.total_cmp(&b.value));
-
-    let (mut severity, mut remark) = (Severity::Usable, String::new());
-    if failed {
-        severity = Severity::UsableWithCare;
-        remark = format!(
-            "the profile of `{name}` could not be computed everywhere: the simulation fails beside the estimate"
-        );
-    }
-    if -lowest > 1e-3 {
-        severity = Severity::NotUsable;
-        remark = format!(
-            "a better minimum than the estimate was met on the profile of `{name}` (deviance lower by {}): start there",
-            number(-lowest, 3)
-        );
-    }
+    let (severity, remark) = remark(name, failed, lowest);
     Ok(Profile {
         name: unknown.name.clone(),
         unit: unknown.unit.clone(),
@@ -283,4 +187,22 @@ pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probabilit
         severity,
         remark,
     })
+}
+
+/// What a profile says of its estimate beyond the interval, and how bad it is.
+fn remark(name: &str, failed: bool, lowest: f64) -> (Severity, String) {
+    if -lowest > 1e-3 {
+        let lower = number(-lowest, 3);
+        let text = format!(
+            "a better minimum than the estimate was met on the profile of `{name}` (deviance lower by {lower}): start there"
+        );
+        return (Severity::NotUsable, text);
+    }
+    if failed {
+        let text = format!(
+            "the profile of `{name}` could not be computed everywhere: the simulation fails beside the estimate"
+        );
+        return (Severity::UsableWithCare, text);
+    }
+    (Severity::Usable, String::new())
 }

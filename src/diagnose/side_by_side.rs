@@ -7,30 +7,11 @@ use crate::record::{Channel, Record};
 use crate::section::{Cell, Keep, Line, Panel, PanelKind, Samples, Section, Style, Table, Timeline, identifier};
 use crate::section::{Drawing, Plot};
 use crate::signals::Signals;
-use serde::{Deserialize, Serialize};
-
-/// What a record was used for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum DataUse {
-    /// The parameters were estimated from it.
-    Estimation,
-    /// They were not.
-    Validation,
-}
-
-impl DataUse {
-    fn word(self) -> &'static str {
-        match self {
-            DataUse::Estimation => "estimation",
-            DataUse::Validation => "validation",
-        }
-    }
-}
 
 /// One record, and what each of several models predicts of it.
 ///
 /// ```
-/// # use greybox::diagnose::{Compared, DataUse};
+/// # use greybox::diagnose::Compared;
 /// # use greybox::{Estimate, Experiment, ExperimentOf, Fit, Report, fixed, free, pmsm::{Surface, Winding}};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # let model = Surface::new(4)?;
@@ -39,12 +20,13 @@ impl DataUse {
 /// let problem = Fit::new(&model, &fitted).parameters(start).problem()?;
 /// let free = Estimate::of(problem.run()?)?;
 /// let given = Fit::new(&model, &fitted).parameters(Winding { ls: fixed(2e-3), ..start }).run()?;
-/// let compared = |record: &ExperimentOf<Surface>, part| {
+/// let predicted = |compared: Compared, record: &ExperimentOf<Surface>| {
 ///     let (free, given) = (free.predict(&model, record)?, given.predict(&model, record)?);
-///     Compared::new(record.record(), part).with("all free", &free)?.with("ls given", &given)
+///     compared.with("all free", &free)?.with("ls given", &given)
 /// };
-/// let both = vec![compared(&fitted, DataUse::Estimation)?, compared(&other, DataUse::Validation)?];
-/// # let fits = both[1].outputs[0].fit_percent();
+/// let (estimation, validation) = (Compared::estimation(fitted.record()), Compared::validation(other.record()));
+/// let both = vec![predicted(estimation, &fitted)?, predicted(validation, &other)?];
+/// # let fits = &both[1].fit_percent()[0].1;
 /// # assert!(fits[0] > Some(98.0) && fits[1] < Some(95.0), "{fits:?}");
 /// let report = Report::new(&problem, &free)?.with(both); // a table of all fits, and all curves over time
 /// # assert!(report.to_markdown().contains("ls given"));
@@ -54,34 +36,39 @@ impl DataUse {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compared {
     /// Name of the record.
-    pub record: String,
+    record: String,
     /// What it was used for.
-    pub part: DataUse,
+    data: &'static str,
     /// Time of each sample (s).
-    pub t: Vec<f64>,
+    t: Vec<f64>,
     /// Samples before which time jumps.
-    pub gaps: Vec<usize>,
-    /// The outputs.
-    pub outputs: Vec<ComparedOutput>,
+    gaps: Vec<usize>,
+    outputs: Vec<Output>,
 }
 
 /// One output of a record, measured and predicted; not a number where missing.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ComparedOutput {
-    /// Name.
-    pub name: String,
-    /// Unit.
-    pub unit: String,
-    /// Measured values.
-    pub measured: Vec<f64>,
+struct Output {
+    name: String,
+    unit: String,
+    measured: Vec<f64>,
     /// Name of each model, and what it predicts.
-    pub predicted: Vec<(String, Vec<f64>)>,
+    predicted: Vec<(String, Vec<f64>)>,
 }
 
 impl Compared {
-    /// A record that no model has predicted yet.
-    pub fn new(record: &Record, part: DataUse) -> Compared {
-        let output = |channel: &Channel| ComparedOutput {
+    /// A record that the parameters were estimated from; no model has predicted it yet.
+    pub fn estimation(record: &Record) -> Compared {
+        Compared::new(record, "estimation")
+    }
+
+    /// A record that they were not estimated from.
+    pub fn validation(record: &Record) -> Compared {
+        Compared::new(record, "validation")
+    }
+
+    fn new(record: &Record, data: &'static str) -> Compared {
+        let output = |channel: &Channel| Output {
             name: channel.name.clone(),
             unit: channel.unit.clone(),
             measured: channel.values.to_vec(),
@@ -89,7 +76,7 @@ impl Compared {
         };
         Compared {
             record: record.name().to_owned(),
-            part,
+            data,
             t: (0..record.len()).map(|k| record.time(k)).collect(),
             gaps: record.gaps().iter().map(|gap| gap.sample).collect(),
             outputs: record.outputs().iter().map(output).collect(),
@@ -119,12 +106,16 @@ impl Compared {
         }
         Ok(self)
     }
+
+    /// Name of each output, and the fit (%) of each model: `100 (1 - |y - y_hat| / |y - mean y|)` over the samples that
+    /// are measured and predicted; `None` if the measurement is constant there.
+    pub fn fit_percent(&self) -> Vec<(&str, Vec<Option<f64>>)> {
+        self.outputs.iter().map(|output| (output.name.as_str(), output.fit_percent())).collect()
+    }
 }
 
-impl ComparedOutput {
-    /// Fit (%) of each model: `100 (1 - |y - y_hat| / |y - mean y|)` over the samples that are measured and predicted;
-    /// `None` if the measurement is constant there.
-    pub fn fit_percent(&self) -> Vec<Option<f64>> {
+impl Output {
+    fn fit_percent(&self) -> Vec<Option<f64>> {
         let fit = |predicted: &Vec<f64>| {
             let pairs = || self.measured.iter().zip(predicted).filter(|(y, p)| y.is_finite() && p.is_finite());
             let count = pairs().count() as f64;
@@ -153,14 +144,13 @@ impl From<&[Compared]> for Section {
         let columns = ["record", "data", "output"].into_iter().chain(models.iter().copied()).map(str::to_owned);
         let mut table = Table { columns: columns.collect(), ..Table::new("Fit of each model", []) };
         for record in records {
-            let data = record.part.word();
             for output in &record.outputs {
                 let fits = output.fit_percent();
                 let of = |model: &&str| {
                     let at = output.predicted.iter().position(|(name, _)| name == model);
                     at.and_then(|at| fits[at]).map_or("-".into(), |fit| Cell::fit(Some(fit)))
                 };
-                let head: [Cell; 3] = [record.record.as_str().into(), data.into(), output.name.as_str().into()];
+                let head: [Cell; 3] = [record.record.as_str().into(), record.data.into(), output.name.as_str().into()];
                 table = table.row(head.into_iter().chain(models.iter().map(of)));
             }
         }
@@ -184,7 +174,7 @@ impl From<Compared> for Section {
 impl Compared {
     fn plot(&self) -> Plot {
         let styles = [Style::Predicted, Style::Reference].into_iter().chain(core::iter::repeat(Style::Quiet));
-        let panel = |output: &ComparedOutput| {
+        let panel = |output: &Output| {
             let models = output.predicted.iter().map(|(model, _)| model.clone()).zip(styles.clone());
             let lines = [("measured".to_owned(), Style::Measured)].into_iter().chain(models);
             let lines = lines.map(|(name, style)| Line { style, name, held: false }).collect();
@@ -198,7 +188,7 @@ impl Compared {
         let timeline = Timeline::new(self.outputs.iter().map(panel).collect(), &samples, NUMBERS, &[]);
         let title = format!("Measured and predicted outputs of {} over time, model by model", self.record);
         let name = identifier(&format!("compare-{}", self.record));
-        let caption = format!("{} ({})", self.record, self.part.word());
+        let caption = format!("{} ({})", self.record, self.data);
         Plot::new(name, caption, title, Drawing::Timeline(timeline))
     }
 }
@@ -211,7 +201,7 @@ mod tests {
     #[test]
     fn fit_of_what_is_there() {
         let nan = f64::NAN;
-        let output = ComparedOutput {
+        let output = Output {
             name: "y".to_owned(),
             unit: "V".to_owned(),
             measured: vec![1.0, nan, 5.0, 7.0],

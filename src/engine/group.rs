@@ -1,7 +1,7 @@
 //! [`Group`]: the lanes of a program.
 
+use super::Compiled;
 use super::interpret::{Once, Run};
-use super::{Compiled, Seed};
 use crate::aligned::Aligned;
 use crate::wide::run;
 use std::sync::Arc;
@@ -72,19 +72,6 @@ impl Group {
             1 => run(width, Once::<1> { code, slots, width }),
             2 => run(width, Once::<2> { code, slots, width }),
             _ => run(width, Once::<4> { code, slots, width }),
-        }
-    }
-
-    /// A lane's start: what it carries, with a slope of one for each seed that is an entry of it.
-    pub fn start(&mut self, lane: usize, carry: &[f64]) {
-        let program = Arc::clone(&self.program);
-        for (i, row) in program.pattern.rows.iter().enumerate() {
-            self.slot(i)[lane] = carry[i];
-            for (seed, at) in program.seeds.iter().zip(row) {
-                if let Some(at) = at {
-                    self.slot(*at)[lane] = f64::from(u8::from(*seed == Seed::Carry(i)));
-                }
-            }
         }
     }
 

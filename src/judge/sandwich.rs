@@ -12,7 +12,7 @@
 
 use crate::information::{Block, Covariance, Information};
 use crate::optimize::{Infeasible, Linearization};
-use crate::prefilter::{Butterworth, FilterState};
+use crate::prefilter::Butterworth;
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
 use nalgebra::DMatrix;
@@ -295,7 +295,7 @@ impl Accumulate for Scores<'_> {
     }
 }
 
-/// The weighted slopes of an experiment backward in time: column by column, output by output.
+/// The weighted slopes of an experiment backward in time: sample by sample, column by column, output by output.
 struct Backward<'b> {
     objective: &'b Objective<'b>,
     experiment: usize,
@@ -314,7 +314,7 @@ impl Accumulate for Backward<'_> {
             for j in 0..outputs {
                 self.measured[j * samples + back] = window.is_measured(k, j, lane);
                 for c in 0..self.columns {
-                    self.slopes[(c * outputs + j) * samples + back] = weight * window.at(k, j, c, lane);
+                    self.slopes[(back * self.columns + c) * outputs + j] = weight * window.at(k, j, c, lane);
                 }
             }
         }
@@ -337,12 +337,12 @@ impl Backward<'_> {
     ) -> (Information, f64) {
         let Backward { columns, samples, slopes, measured, .. } = self;
         let (columns, samples) = (*columns, *samples);
-        filter.filter(slopes, samples, samples, &mut vec![FilterState::default(); columns * outputs]);
+        filter.filter_rows(slopes, columns * outputs, &mut vec![]);
         let (mut scores, mut block) = (Information::new(columns), Block::new(columns, ROWS));
         let (mut score, mut taken) = (vec![0.0; columns], 0.0);
         for k in 0..samples {
             let at = |c: usize, j: usize| {
-                if measured[j * samples + k] { slopes[(c * outputs + j) * samples + k] } else { 0.0 }
+                if measured[j * samples + k] { slopes[(k * columns + c) * outputs + j] } else { 0.0 }
             };
             for j in 0..outputs {
                 score.iter_mut().enumerate().for_each(|(c, score)| *score = at(c, j));
@@ -369,19 +369,20 @@ pub(super) fn form(m: &DMatrix<f64>, v: &[f64]) -> f64 {
 /// response so far.
 struct ImpulseResponse<'f> {
     filter: &'f Butterworth,
-    state: FilterState,
+    state: Vec<f64>,
     impulse: f64,
     total: f64,
 }
 
 impl<'f> ImpulseResponse<'f> {
     fn new(filter: &'f Butterworth) -> Self {
-        ImpulseResponse { filter, state: FilterState::default(), impulse: 1.0, total: 0.0 }
+        ImpulseResponse { filter, state: vec![], impulse: 1.0, total: 0.0 }
     }
 
     fn next(&mut self) -> f64 {
-        let response = self.filter.step(&mut self.state, std::mem::take(&mut self.impulse));
-        self.total += response * response;
+        let mut response = [std::mem::take(&mut self.impulse)];
+        self.filter.filter_rows(&mut response, 1, &mut self.state);
+        self.total += response[0] * response[0];
         self.total
     }
 }

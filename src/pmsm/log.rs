@@ -59,38 +59,25 @@ impl Log {
         Experiment::new(model, Time::Uniform { start: 0.0, step: self.ts }, inputs, outputs)
     }
 
-    /// What kept the drive from doing as it was asked.
-    pub fn warnings(&self) -> impl Iterator<Item = Warning> {
+    /// What kept the drive from doing as it was asked, a sentence each. The record stays good for identification: it holds
+    /// what acted.
+    pub fn warnings(&self) -> Vec<String> {
         let of = self.rows.len();
-        let voltage = Warning::Voltage { samples: self.voltage_limited, of };
-        let current = Warning::Current { samples: self.current_limited, of };
-        [(self.voltage_limited, voltage), (self.current_limited, current)]
-            .into_iter()
-            .filter_map(|(samples, warning)| (samples > 0).then_some(warning))
+        let mut warnings = vec![];
+        if self.voltage_limited > 0 {
+            warnings.push(format!(
+                "the voltage was at its limit in {} of {of} samples: the EMF leaves too little for the current asked for; \
+                 go slower, weaken the field or raise the direct voltage",
+                self.voltage_limited
+            ));
+        }
+        if self.current_limited > 0 {
+            warnings.push(format!(
+                "the current reference was at its limit in {} of {of} samples: the torque asked for cannot be made; \
+                 accelerate less",
+                self.current_limited
+            ));
+        }
+        warnings
     }
-}
-
-/// What kept a drive from doing as it was asked. Its record stays good for identification: it holds what acted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
-pub enum Warning {
-    /// The voltage.
-    #[error(
-        "the voltage was at its limit in {samples} of {of} samples: the EMF leaves too little for the current asked for; go slower, weaken the field or raise the direct voltage"
-    )]
-    Voltage {
-        /// Samples at the limit.
-        samples: usize,
-        /// Of so many.
-        of: usize,
-    },
-    /// The current.
-    #[error(
-        "the current reference was at its limit in {samples} of {of} samples: the torque asked for cannot be made; accelerate less"
-    )]
-    Current {
-        /// Samples at the limit.
-        samples: usize,
-        /// Of so many.
-        of: usize,
-    },
 }

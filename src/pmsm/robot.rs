@@ -41,17 +41,17 @@ pub struct RobotAxis {
     pub ts: f64,
 }
 
-/// Sample time of the reference drive (s).
-pub const TS: f64 = 0.126e-3;
-
-/// Direct voltage of the reference drive (V).
-pub const V_DC: f64 = 600.0;
-
-/// Phase peak voltage limit of the reference drive: [`V_DC`] through space-vector modulation (V).
+/// Phase peak voltage limit of the reference drive: [`RobotAxis::V_DC`] through space-vector modulation (V).
 #[cfg(feature = "std")]
 pub(super) const V_MAX: f64 = 346.410_161_513_775_44;
 
 impl RobotAxis {
+    /// Sample time of the reference drive (s).
+    pub const TS: f64 = 0.126e-3;
+
+    /// Direct voltage of the reference drive (V).
+    pub const V_DC: f64 = 600.0;
+
     /// Axis 1 to 6 of the reference robot.
     ///
     /// # Errors
@@ -96,7 +96,7 @@ impl RobotAxis {
             bv,
             gear,
             cogging,
-            ts: TS,
+            ts: Self::TS,
         })
     }
 

@@ -148,7 +148,7 @@ fn phase_currents(x: &MachineState, pole_pairs: PolePairs) -> Phases {
 #[cfg(test)]
 mod tests {
     use super::super::frames::rotate_into;
-    use super::super::robot::{RobotAxis, TS, V_DC};
+    use super::super::robot::RobotAxis;
     use super::super::{Currents, Drive, ExactStep, HeldIn, Winding};
     use super::*;
 
@@ -173,13 +173,13 @@ mod tests {
         let (plant, w) = (round(), 350.0);
         let winding = Winding { rs: 0.4, ls: 4e-3, ke: 0.95 };
         for carrier in CARRIERS {
-            let mut inverter = SwitchingInverter::new(&plant, V_DC, carrier);
+            let mut inverter = SwitchingInverter::new(&plant, RobotAxis::V_DC, carrier);
             let mut x = MachineState { id: 2.0, iq: 10.0, w, theta: 0.3 };
             let mut i = Currents { id: x.id, iq: x.iq };
             for k in 0..100 {
-                let begin = 4.0 * (0.3 + w * TS * k as f64);
-                let u = turned((-50.0, 280.0), begin + 2.0 * w * TS);
-                let d = duties(u, V_DC);
+                let begin = 4.0 * (0.3 + w * RobotAxis::TS * k as f64);
+                let u = turned((-50.0, 280.0), begin + 2.0 * w * RobotAxis::TS);
+                let d = duties(u, RobotAxis::V_DC);
                 let mut edges = Vec::new();
                 for (leg, d) in [d.a, d.b, d.c].into_iter().enumerate() {
                     match carrier {
@@ -193,11 +193,11 @@ mod tests {
                 let mut upper = [carrier == Carrier::HalfPerSample && k % 2 == 1; 3];
                 let mut now = 0.0;
                 for (at, leg) in edges {
-                    let [a, b, c] = upper.map(|up| if up { V_DC } else { 0.0 });
+                    let [a, b, c] = upper.map(|up| if up { RobotAxis::V_DC } else { 0.0 });
                     let Stator { alpha, beta } = clarke(Phases { a, b, c });
-                    let (ud, uq) = rotate_into((alpha, beta), begin + 4.0 * w * 0.5 * (now + at) * TS);
+                    let (ud, uq) = rotate_into((alpha, beta), begin + 4.0 * w * 0.5 * (now + at) * RobotAxis::TS);
                     if at > now {
-                        let step = ExactStep::new(4, (at - now) * TS, HeldIn::Stationary).unwrap();
+                        let step = ExactStep::new(4, (at - now) * RobotAxis::TS, HeldIn::Stationary).unwrap();
                         i = step.advance(&i, &Drive { ud, uq, w }, &winding);
                     }
                     now = at;
@@ -205,7 +205,7 @@ mod tests {
                         *upper = !*upper;
                     }
                 }
-                x = inverter.advance(x, u, TS, 6, |_, _| {});
+                x = inverter.advance(x, u, RobotAxis::TS, 6, |_, _| {});
                 let error = (x.id - i.id).hypot(x.iq - i.iq);
                 assert!(error < 1e-6, "{carrier:?}, sample {k}: {error}");
             }
@@ -218,7 +218,7 @@ mod tests {
     fn the_ripple_vanishes_at_the_samples() {
         let (plant, w) = (round(), 150.0);
         for carrier in CARRIERS {
-            let mut inverter = SwitchingInverter::new(&plant, V_DC, carrier);
+            let mut inverter = SwitchingInverter::new(&plant, RobotAxis::V_DC, carrier);
             let start = MachineState { id: 0.0, iq: 10.0, w, theta: 0.0 };
             let (mut x, mut mean) = (start, start);
             let (mut at_samples, mut between) = (0f64, 0f64);
@@ -226,16 +226,16 @@ mod tests {
                 // The voltage of a steady 10 A.
                 let u = turned(
                     (-4.0 * w * 4e-3 * 10.0, 4.0 + super::super::SQRT_2_3 * 0.95 * w),
-                    4.0 * w * TS * (k as f64 + 0.5),
+                    4.0 * w * RobotAxis::TS * (k as f64 + 0.5),
                 );
                 let begin = mean;
                 let fine = |t: f64| plant.advance(begin, u, t, 12);
                 let mut swing = 0f64;
-                x = inverter.advance(x, u, TS, 6, |t, x| {
+                x = inverter.advance(x, u, RobotAxis::TS, 6, |t, x| {
                     let mean = fine(t);
                     swing = swing.max((x.id - mean.id).hypot(x.iq - mean.iq));
                 });
-                mean = fine(TS);
+                mean = fine(RobotAxis::TS);
                 // Once the start has died away.
                 if k > 1000 {
                     at_samples = at_samples.max((x.id - mean.id).hypot(x.iq - mean.iq));
@@ -257,14 +257,14 @@ mod tests {
             for (id, iq) in [(8.0, 3.0), (-8.0, 3.0), (0.05, 0.02), (0.2, -0.1)] {
                 let start = MachineState { id, iq, w: 0.0, theta: 0.2 };
                 let u = Stator { alpha: 40.0, beta: -25.0 };
-                let mut inverter = SwitchingInverter::new(&lossy, V_DC, carrier);
+                let mut inverter = SwitchingInverter::new(&lossy, RobotAxis::V_DC, carrier);
                 let (mut x, mut mean) = (start, start);
                 for _ in 0..2 {
-                    x = inverter.advance(x, u, TS, 1, |_, _| {});
-                    mean = lossy.advance(mean, u, TS, 6);
+                    x = inverter.advance(x, u, RobotAxis::TS, 1, |_, _| {});
+                    mean = lossy.advance(mean, u, RobotAxis::TS, 6);
                 }
                 // In volts; the current's own change by 1e-4 A moves the loss by 1e-3 of it.
-                let volts = |a: f64, b: f64| (a - b) * 100.0 / (2.0 * TS);
+                let volts = |a: f64, b: f64| (a - b) * 100.0 / (2.0 * RobotAxis::TS);
                 let off = volts(x.id, mean.id).hypot(volts(x.iq, mean.iq));
                 assert!(off < 4e-3, "{carrier:?}, {id} A, {iq} A: {off} V");
             }
@@ -277,12 +277,12 @@ mod tests {
         let axis = RobotAxis { ls: 100.0, rs: 1e-9, ..round().axis };
         let lossy = Plant { axis, dead_time: DeadTime { vdt: 120.0, i0: 0.15 }, ..round() };
         let start = MachineState { id: 5.0, iq: 0.0, w: 0.0, theta: 0.0 };
-        let mut inverter = SwitchingInverter::new(&lossy, V_DC, Carrier::PerSample);
+        let mut inverter = SwitchingInverter::new(&lossy, RobotAxis::V_DC, Carrier::PerSample);
         // Duties 0.1 (a) and 0.9: below the dead time, and so long that the edges down come late.
         let u = Stator { alpha: -320.0, beta: 0.0 };
         let mut up = 0;
         for _ in 0..5 {
-            inverter.advance(start, u, TS, 6, |_, _| {});
+            inverter.advance(start, u, RobotAxis::TS, 6, |_, _| {});
             up += usize::from(inverter.upper[0]);
         }
         assert_eq!(up, 0);

@@ -123,19 +123,14 @@ impl Magnet {
         }
     }
 
-    /// Sets the magnet to temperature `t`; gives the kind of change.
-    pub fn reach(&mut self, t: Celsius) -> Heating {
+    /// Sets the magnet to temperature `t`; gives the share of the new magnet's flux at 20 C that this loses irreversibly, zero
+    /// where all comes back on cooling.
+    pub fn reach(&mut self, t: Celsius) -> f64 {
         let before = self.lost();
         if t > self.peak {
             self.peak = t;
         }
-        if self.factor(t) <= 0.0 {
-            Heating::Demagnetized
-        } else if self.lost() > before {
-            Heating::Irreversible { lost: self.lost() - before }
-        } else {
-            Heating::Reversible
-        }
+        self.lost() - before
     }
 
     /// Share of the flux that is lost irreversibly to heat: `0.8e-5 max(peak - 150, 0)^2`.
@@ -147,20 +142,6 @@ impl Magnet {
     pub fn factor(&self, t: Celsius) -> f64 {
         Scalar::max((1.0 - self.ageing) * (1.0 - MAGNET * (t.0 - REFERENCE) - self.lost()), 0.0)
     }
-}
-
-/// What a temperature did to a [`Magnet`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Heating {
-    /// The flux comes back on cooling.
-    Reversible,
-    /// A share `lost` of the flux is gone: the magnet was above its range.
-    Irreversible {
-        /// Of the flux at 20 C when new.
-        lost: f64,
-    },
-    /// The law leaves no flux: far outside the range in which it was measured.
-    Demagnetized,
 }
 
 /// A number and how well it is known.
@@ -250,7 +231,7 @@ mod tests {
             prop_assert!((magnet_.factor(at(t)) - at(t).magnet_factor(Reading::Local)).abs() < 1e-14);
             let cooled = magnet_.factor(at(REFERENCE));
             prop_assert!((1.0 - cooled - magnet_.lost()).abs() < 1e-14);
-            prop_assert_eq!(magnet_.reach(at(100.0)), Heating::Reversible);
+            prop_assert_eq!(magnet_.reach(at(t.min(100.0))), 0.0);
         }
 
         #[test]
@@ -283,8 +264,9 @@ mod tests {
         assert!(Celsius::new(-300.0).unwrap_err().to_string().contains("absolute zero"));
         assert!(Celsius::new(f64::NAN).is_err());
         let mut magnet = Magnet::default();
-        assert!(matches!(magnet.reach(at(180.0)), Heating::Irreversible { .. }));
-        assert_eq!(magnet.reach(at(900.0)), Heating::Demagnetized);
+        assert!((magnet.reach(at(180.0)) - 0.8e-5 * 30.0 * 30.0).abs() < 1e-15);
+        magnet.reach(at(900.0));
+        assert_eq!(magnet.factor(at(900.0)), 0.0, "no flux is left");
         assert!(magnet.aged(1.5).is_err());
     }
 }

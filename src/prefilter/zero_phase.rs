@@ -22,9 +22,8 @@ impl Butterworth {
             let after = piece.iter().rev().skip(1).take(padding).map(|v| 2.0 * last - v);
             let mut extended: Vec<f64> = before.chain(piece.iter().copied()).chain(after).collect();
             for _direction in ["forward", "backward"] {
-                let mut state = [self.settled(extended.first().copied().unwrap_or(first))];
-                let rows = extended.len();
-                self.filter(&mut extended, rows, rows, &mut state);
+                let mut state = self.settled(extended.first().copied().unwrap_or(first));
+                self.filter_rows(&mut extended, 1, &mut state);
                 extended.reverse();
             }
             for (value, filtered) in piece.iter_mut().zip(extended.iter().skip(padding)) {

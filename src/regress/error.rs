@@ -2,7 +2,6 @@
 
 use crate::information::Information;
 use crate::signals::Signals;
-use core::fmt;
 
 /// Why there is no solution.
 #[derive(Clone, PartialEq, thiserror::Error)]
@@ -43,8 +42,8 @@ pub enum RegressionError {
         listed(directions)
     )]
     NotIdentifiable {
-        /// One per missing piece of information.
-        directions: Vec<Direction>,
+        /// One per missing piece of information: parameters and their changes, each in its own unit, the first by one.
+        directions: Vec<Vec<(&'static str, f64)>>,
     },
     /// Numbers beyond the range of floating point.
     #[error("a parameter or its variance is beyond the range of floating point; scale its regressor, nearer to y")]
@@ -58,32 +57,24 @@ impl core::fmt::Debug for RegressionError {
     }
 }
 
-/// A change of parameters that no row notices.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Direction {
-    /// Parameters and their changes, each in its own unit, the first by one.
-    pub changes: Vec<(&'static str, f64)>,
-}
+/// A change of parameters that no row notices, by name, the first by one.
+type Change = Vec<(&'static str, f64)>;
 
-impl fmt::Display for Direction {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.changes.split_last() {
-            None => Ok(()),
-            Some(((name, _), [])) => write!(f, "`{name}` is not identifiable, its column is zero"),
-            Some((last, first)) => {
-                let names: Vec<String> = first.iter().map(|(name, _)| format!("`{name}`")).collect();
-                write!(f, "{} and `{}` are known only in combination (", names.join(", "), last.0)?;
-                for (i, (name, change)) in self.changes.iter().enumerate() {
-                    write!(f, "{}{name} {change:+.4e}", if i == 0 { "" } else { ", " })?;
-                }
-                f.write_str(" changes nothing)")
-            }
+fn sentence(change: &Change) -> String {
+    match change.split_last() {
+        None => String::new(),
+        Some(((name, _), [])) => format!("`{name}` is not identifiable, its column is zero"),
+        Some((last, first)) => {
+            let names: Vec<String> = first.iter().map(|(name, _)| format!("`{name}`")).collect();
+            let changes: Vec<String> = change.iter().map(|(name, change)| format!("{name} {change:+.4e}")).collect();
+            let (names, changes) = (names.join(", "), changes.join(", "));
+            format!("{names} and `{}` are known only in combination ({changes} changes nothing)", last.0)
         }
     }
 }
 
-fn listed(directions: &[Direction]) -> String {
-    directions.iter().map(Direction::to_string).collect::<Vec<_>>().join("; ")
+fn listed(directions: &[Change]) -> String {
+    directions.iter().map(sentence).collect::<Vec<_>>().join("; ")
 }
 
 /// Parts of a null direction below this are rounding (of the singular vectors, whose gap is wide).
@@ -103,11 +94,11 @@ pub(super) fn identifiable<P: Signals>(information: &Information) -> Result<f64,
 }
 
 /// Directions from vectors of unknowns that are scaled by `scales`.
-pub(super) fn directions(null: Vec<Vec<f64>>, scales: &[f64], name: impl Fn(usize) -> &'static str) -> Vec<Direction> {
+pub(super) fn directions(null: Vec<Vec<f64>>, scales: &[f64], name: impl Fn(usize) -> &'static str) -> Vec<Change> {
     let direction = |(pivot, vector): (usize, Vec<f64>)| {
         let change = |i: usize| vector[i] * scales[i] / scales[pivot];
         let others = (0..vector.len()).filter(|&i| i != pivot && vector[i].abs() > PART);
-        Direction { changes: [pivot].into_iter().chain(others).map(|i| (name(i), change(i))).collect() }
+        [pivot].into_iter().chain(others).map(|i| (name(i), change(i))).collect()
     };
     echelon(null).into_iter().map(direction).collect()
 }

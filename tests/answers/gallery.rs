@@ -3,7 +3,7 @@
 
 use crate::pages::{Lag, Response, record, report};
 use crate::random::Random;
-use greybox::diagnose::{Compared, DataUse, profile};
+use greybox::diagnose::{Compared, profile};
 use greybox::{
     Error, Experiment, ExperimentOf, Fit, Kind, Model, Nothing, Report, Scalar, Signals, Time, WarningCode, free,
     signals,
@@ -93,10 +93,13 @@ fn pages_are_written() {
         .parameters(crate::pages::Branch { gain: free(1.0), tau: free(0.1).within(1e-3, 10.0) })
         .run()
         .unwrap();
-    let compared = |record: &ExperimentOf<Lag>, part| {
-        Compared::new(record.record(), part).with("the lag", &estimate.predict(&Lag, record).unwrap()).unwrap()
+    let predicted = |compared: Compared, record: &ExperimentOf<Lag>| {
+        compared.with("the lag", &estimate.predict(&Lag, record).unwrap()).unwrap()
     };
-    let both = vec![compared(&fitted, DataUse::Estimation), compared(&other, DataUse::Validation)];
+    let both = vec![
+        predicted(Compared::estimation(fitted.record()), &fitted),
+        predicted(Compared::validation(other.record()), &other),
+    ];
     report(&[fitted]).unwrap().titled("A lag").with(both).save(folder.join("compared.html")).unwrap();
     if cfg!(not(debug_assertions)) {
         let mut outputs: Vec<_> = record(even(10_000_000), 0.01, 5).outputs().collect();

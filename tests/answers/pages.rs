@@ -2,7 +2,7 @@
 
 use crate::random::Random;
 use greybox::diagnose::residuals::examine;
-use greybox::diagnose::{Compared, Convergence, DataUse, Iteration, bands, profile};
+use greybox::diagnose::{Compared, Convergence, bands, profile};
 use greybox::optimize::Severity;
 use greybox::report::{Drawing, Layer, Plot, Section, Style};
 use greybox::{Error, Experiment, ExperimentOf, Fit, Model, Report, Scalar, Time, free, signals};
@@ -344,12 +344,14 @@ fn models_are_compared_on_both_kinds_of_data() {
     let good = Fit::new(&Lag, &fitted).parameters(branch()).run().unwrap();
     let fixed_gain = Branch { gain: greybox::fixed(1.5), ..branch() };
     let poor = Fit::new(&Lag, &fitted).parameters(fixed_gain).run().unwrap();
-    let both = |record: &ExperimentOf<Lag>, part| {
-        let compared = Compared::new(record.record(), part);
+    let both = |compared: Compared, record: &ExperimentOf<Lag>| {
         let compared = compared.with("good", &good.predict(&Lag, record).unwrap()).unwrap();
         compared.with("poor", &poor.predict(&Lag, record).unwrap()).unwrap()
     };
-    let section = Section::from(vec![both(&fitted, DataUse::Estimation), both(&other, DataUse::Validation)]);
+    let section = Section::from(vec![
+        both(Compared::estimation(fitted.record()), &fitted),
+        both(Compared::validation(other.record()), &other),
+    ]);
     let table = &section.tables[0];
     assert_eq!(table.columns, ["record", "data", "output", "good", "poor"]);
     let kinds: Vec<&str> = table.rows.iter().map(|row| row[1].text()).collect();
@@ -358,7 +360,7 @@ fn models_are_compared_on_both_kinds_of_data() {
     assert!((table.rows[1][3].value().unwrap() - expected).abs() < 1e-9);
     assert!(table.rows[1][4].value().unwrap() < expected - 10.0);
     assert_eq!(timeline!(&section.plots[0]).panels[0].lines.len(), 3, "measured and two models");
-    let short = Compared::new(other.record(), DataUse::Validation).with("good", &good.predict(&Lag, &fitted).unwrap());
+    let short = Compared::validation(other.record()).with("good", &good.predict(&Lag, &fitted).unwrap());
     assert!(matches!(short, Err(Error::Lengths { found: 500, expected: 300, .. })));
 }
 
@@ -377,7 +379,7 @@ fn starts_and_iterations_are_drawn() {
     assert_eq!(points.last().unwrap().0, ended as f64);
     assert!(points.windows(2).all(|pair| pair[0].1 <= pair[1].1));
     let costs = [100.0, 10.0, 1.5, 1.0];
-    let iterations = costs.iter().enumerate().map(|(k, &cost)| Iteration { iteration: k as u64, cost }).collect();
+    let iterations = costs.iter().enumerate().map(|(k, &cost)| (k as u64, cost)).collect();
     let course = Section::from(Convergence::new(iterations));
     let Layer::Line { points, .. } = &layers(&course.plots[0])[0] else { panic!() };
     assert_eq!(points, &[(0.0, 99.0), (1.0, 9.0), (2.0, 0.5)]);

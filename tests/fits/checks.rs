@@ -1,5 +1,6 @@
 //! `Numeric` models against the same equations with exact slopes, and the checks for users' own tests.
 
+use crate::spiral::{Plane, Rates, Spiral};
 use approx::assert_relative_eq;
 use greybox::check::Disagreement;
 use greybox::integrate::ModelSystem;
@@ -147,8 +148,8 @@ fn right_slopes_are_confirmed() {
     }
     let rest = State { x: 0.0, v: 0.0 };
     check::derivatives(&Exact, 0.4, &rest, &Force { u: 0.0 }, &Spring { m: 1.0, k: 1.0, d: 0.0 }).unwrap();
-    let (x, p) = (check::Plane { x: 0.4, y: 0.2 }, check::Rates { growth: 1.0, turn: 2.0 });
-    check::derivatives(&check::Spiral, 0.4, &x, &Nothing, &p).unwrap();
+    let (x, p) = (Plane { x: 0.4, y: 0.2 }, Rates { growth: 1.0, turn: 2.0 });
+    check::derivatives(&Spiral, 0.4, &x, &Nothing, &p).unwrap();
 }
 
 /// A value taken out of its scalar loses its slopes; the check names the function, the quantity and the variable.

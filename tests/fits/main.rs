@@ -29,6 +29,8 @@ mod sandwiches;
 mod segments;
 #[path = "../common/shared.rs"]
 mod shared;
+#[path = "../common/spiral.rs"]
+mod spiral;
 mod starts;
 mod stiff;
 mod user_code;

@@ -7,7 +7,7 @@
 mod models;
 
 use base64::{Engine, engine::general_purpose::STANDARD};
-use greybox::diagnose::{self, Compared, DataUse};
+use greybox::diagnose::{self, Compared};
 use greybox::pmsm::{Currents, Drive, Surface, Winding};
 use greybox::report::{Axis, Curves, Drawing, Layer, Plot, Section, Style};
 use greybox::{Estimate, Experiment, ExperimentOf, Fit, Model, Report, Time, fixed, free, simulate};
@@ -157,8 +157,8 @@ fn chapter_9_validation() -> Outcome {
     let (estimation, validation) = record.split(0.6)?;
     let estimate = Fit::new(&model, &estimation).parameters(start).run()?;
     let prediction = estimate.predict(&model, &validation)?;
-    let compared = Compared::new(validation.record(), DataUse::Validation).with("fitted", &prediction)?;
-    assert!((compared.outputs[1].fit_percent()[0].ok_or("no fit")? - 96.7).abs() < 0.05, "the number in the chapter");
+    let compared = Compared::validation(validation.record()).with("fitted", &prediction)?;
+    assert!((compared.fit_percent()[1].1[0].ok_or("no fit")? - 96.7).abs() < 0.05, "the number in the chapter");
     let caption =
         "Current iq of the record that was not fitted: measured (dots), predicted, and the residual about zero";
     check("validation", &over_time(("iq", "A"), caption, &estimate, &model, &validation, (0..250, 4, 1))?)

@@ -6,3 +6,5 @@ mod common;
 mod long_record;
 mod many_records;
 mod no_alloc;
+#[path = "../common/spiral.rs"]
+mod spiral;

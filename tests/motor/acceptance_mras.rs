@@ -9,7 +9,7 @@ use crate::acceptance_records::{Record, cycles, percent, record};
 use greybox::online::{AdaptationLaw, MrasStart, Order, Stepping, Watch};
 use greybox::pmsm::drive::{Disturbance, Simulation};
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::{RobotAxis, TS};
+use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::{
     AngledDrive, Currents, DeadZone, ExactStep, ExactSurface, HeldIn, KeLyapunov, MotorLaw, Normalized, NotAdapted,
     Winding,
@@ -25,7 +25,7 @@ fn rms<L: AdaptationLaw<ExactSurface>>(
     law: L,
 ) -> f64 {
     let ke = record.axis.ke;
-    let step = ExactStep::new(4, TS, held_in).unwrap();
+    let step = ExactStep::new(4, RobotAxis::TS, held_in).unwrap();
     let start = MrasStart {
         parameters: Winding { rs: fixed(rs), ls: fixed(ls), ke: free(0.9 * ke).within(0.0, 10.0 * ke) },
         pull: Currents { id: 1000.0, iq: 1000.0 },
@@ -36,7 +36,7 @@ fn rms<L: AdaptationLaw<ExactSurface>>(
     let mut observer = ExactSurface(step).mras(law, start).unwrap();
     let errors = record.spans.spans.iter().enumerate().map(|(k, span)| {
         let u = AngledDrive { ud: span.ud, uq: span.uq, w: span.w, theta: span.theta };
-        observer.update(k as f64 * TS, &step.less_dead_time(&span.i0, &u, vdt, 0.15), &span.i0);
+        observer.update(k as f64 * RobotAxis::TS, &step.less_dead_time(&span.i0, &u, vdt, 0.15), &span.i0);
         percent(observer.parameters().ke, ke)
     });
     let half = record.spans.spans.len() / 2;
@@ -64,7 +64,7 @@ fn each_improvement_of_the_observer_counts() {
         println!("skipped: run `cargo test --release --test motor acceptance_mras`");
         return;
     }
-    let filter = Butterworth::low_pass(4, 100.0, TS).unwrap();
+    let filter = Butterworth::low_pass(4, 100.0, RobotAxis::TS).unwrap();
     let mut mean = [0.0; 6];
     for number in 1..=6 {
         let record = cycles(number);

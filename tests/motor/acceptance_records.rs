@@ -6,7 +6,7 @@ use greybox::online::{Ekf, EkfStart, UpdateOutcome, Watch};
 use greybox::pmsm::drive::{Log, Simulation};
 use greybox::pmsm::offline::{Axes, Extended, Form, Spans};
 use greybox::pmsm::program::{Cycle, Program};
-use greybox::pmsm::robot::{RobotAxis, TS};
+use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::{
     AngledDrive, Compensated, CompensatedWinding, Currents, ExactStep, ExactSurface, HeldIn, InverterFed,
     InverterFedWinding, Winding,
@@ -38,7 +38,7 @@ pub fn cycles(number: u8) -> &'static Record {
 }
 
 pub fn filter() -> Butterworth {
-    Butterworth::low_pass(4, 100.0, TS).unwrap()
+    Butterworth::low_pass(4, 100.0, RobotAxis::TS).unwrap()
 }
 
 fn ls(spans: &Spans, form: Form) -> LinearEstimate<Winding> {
@@ -172,8 +172,9 @@ fn without_d_current_ld_is_not_identifiable() {
 
 fn grey_box(number: u8, every: usize) {
     let Record { axis, spans, cycles, .. } = cycles(number);
-    let model =
-        Compensated::<_, CompensatedWinding>::new(ExactSurface(ExactStep::new(4, TS, HeldIn::Stationary).unwrap()));
+    let model = Compensated::<_, CompensatedWinding>::new(ExactSurface(
+        ExactStep::new(4, RobotAxis::TS, HeldIn::Stationary).unwrap(),
+    ));
     let mut worst = Worst([0.0; 2]);
     for cycle in cycles.iter().step_by(every) {
         let experiment = spans.cut(cycle.samples.clone()).grey_box(&model, 0.15).unwrap();
@@ -206,8 +207,9 @@ fn grey_box_with_dead_time_on_the_other_axes() {
 /// Relative rms error of Ke (%) over the second half of a run of the joint filter on (id, iq, R, Ke, Vdt).
 fn joint_filter(record: &Record) -> f64 {
     let axis = &record.axis;
-    let model =
-        InverterFed::<_, InverterFedWinding>::new(ExactSurface(ExactStep::new(4, TS, HeldIn::Stationary).unwrap()));
+    let model = InverterFed::<_, InverterFedWinding>::new(ExactSurface(
+        ExactStep::new(4, RobotAxis::TS, HeldIn::Stationary).unwrap(),
+    ));
     let current = free(0.0).prior(0.0, 1.0);
     let start = EkfStart {
         state: Currents { id: current, iq: current },
@@ -224,13 +226,13 @@ fn joint_filter(record: &Record) -> f64 {
         hold: Hold::Zero,
         watch: Watch { limit: Currents { id: 1e3, iq: 1e3 }, patience: 1000 },
     };
-    let mut filter = Ekf::<_, 5>::new(model, TS, start).unwrap();
+    let mut filter = Ekf::<_, 5>::new(model, RobotAxis::TS, start).unwrap();
     let half = record.log.rows.len() / 2;
     let (mut sum, mut count) = (0.0, 0);
     for (k, row) in record.log.rows.iter().enumerate() {
         // What is known at the time: the speed of the interval that ends now.
-        let u = AngledDrive { ud: row.ud, uq: row.uq, w: row.w, theta: row.theta + 0.5 * TS * row.w };
-        let update = filter.update(k as f64 * TS, &u, &Currents { id: row.id, iq: row.iq });
+        let u = AngledDrive { ud: row.ud, uq: row.uq, w: row.w, theta: row.theta + 0.5 * RobotAxis::TS * row.w };
+        let update = filter.update(k as f64 * RobotAxis::TS, &u, &Currents { id: row.id, iq: row.iq });
         assert!(!matches!(update.outcome, UpdateOutcome::Diverged(_)), "{}", update.outcome);
         if k > half {
             sum += percent(filter.parameters().ke, axis.ke).powi(2);

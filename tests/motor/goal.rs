@@ -7,7 +7,7 @@
 use crate::acceptance_records::{Worst, cycles, every, filter, percent};
 use greybox::pmsm::offline::{Equations, Extended, Spans};
 use greybox::pmsm::program::Cycle;
-use greybox::pmsm::robot::TS;
+use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::{Compensated, CompensatedSalientWinding, EmfHarmonic, ExactSalient, ExactStep, HeldIn};
 use greybox::{Fit, free, regress::PooledRegression};
 use std::sync::OnceLock;
@@ -63,7 +63,7 @@ fn extended_regression_with_what_is_the_motors_in_common() {
 // Ke at most 0.016 to 0.076 % off, R 0.077 to 0.34 %.
 #[test]
 fn grey_box_with_harmonic_and_common_resistance() {
-    let step = ExactStep::new(4, TS, HeldIn::Stationary).unwrap();
+    let step = ExactStep::new(4, RobotAxis::TS, HeldIn::Stationary).unwrap();
     let motor = EmfHarmonic::<_, CompensatedSalientWinding>::new(ExactSalient(step));
     let model = Compensated::<_, CompensatedSalientWinding>::new(motor);
     for number in 1..=6 {

@@ -3,7 +3,7 @@
 use greybox::pmsm::drive::{Disturbance, Log, Row, Simulation};
 use greybox::pmsm::offline::{Axes, Form, Spans};
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::{RobotAxis, TS};
+use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::{
     AngledDrive, Cabled, Currents, Injection, InverterFed, Mechanics, Misaligned, Salient, Shaft, ShaftMotion, Surface,
     Torque, Winding,
@@ -46,7 +46,7 @@ fn alignment_delay_and_angle_offset_are_found_together() {
             // Recorded early: not yet turned back by what the rotor does in tau. The model holds its voltage in the
             // rotor's frame, where the same effect takes 1/sinc of it.
             let we = axis.pole_pairs.electrical(span.w);
-            let x = 0.5 * we * TS;
+            let x = 0.5 * we * RobotAxis::TS;
             let sinc = if x == 0.0 { 1.0 } else { x.sin() / x };
             let (d, q, (sin, cos)) = (span.ud / sinc, span.uq / sinc, (we * tau).sin_cos());
             let (ud, uq) = (d * cos - q * sin, q * cos + d * sin);
@@ -56,7 +56,7 @@ fn alignment_delay_and_angle_offset_are_found_together() {
     let model = Misaligned::<InverterFed<Cabled<Salient, Line>, Line>, Line>::new(InverterFed::new(Cabled::new(
         Salient::new(4).unwrap(),
     )));
-    let record = Experiment::new(&model, Time::Uniform { start: 0.0, step: TS }, inputs, outputs).unwrap();
+    let record = Experiment::new(&model, Time::Uniform { start: 0.0, step: RobotAxis::TS }, inputs, outputs).unwrap();
     let start = Line {
         rs: free(0.4),
         r_cable: fixed(0.0),
@@ -81,7 +81,7 @@ fn inertia_friction_and_gravity_by_regression_and_by_fit() {
     let axis = RobotAxis::reference(2).unwrap();
     let log = cycles(Simulation::new(axis).unwrap(), 3);
     let shaft = Shaft::new(axis.gear).unwrap();
-    let filter = Butterworth::low_pass(4, 10.0, TS).unwrap();
+    let filter = Butterworth::low_pass(4, 10.0, RobotAxis::TS).unwrap();
     let spans = Spans::from_log(&log, axis.pole_pairs);
     let p = spans.mechanics(&shaft, axis.ke).prefiltered(&filter).solve().unwrap().parameters;
     let check = |j: f64, bv: f64, tc: f64, tg: f64, by: &str| {
@@ -103,7 +103,7 @@ fn inertia_friction_and_gravity_by_regression_and_by_fit() {
             (Torque { iq }, ShaftMotion { w: rows[0].w, theta: rows[0].theta })
         })
         .unzip();
-    let time = Time::Uniform { start: 0.0, step: EVERY as f64 * TS };
+    let time = Time::Uniform { start: 0.0, step: EVERY as f64 * RobotAxis::TS };
     let record = Experiment::new(&shaft, time, inputs, outputs).unwrap();
     let start = Mechanics {
         j: free(1.3 * axis.j),
@@ -124,7 +124,7 @@ fn inertia_friction_and_gravity_by_regression_and_by_fit() {
 fn outliers_are_taken_out_before_the_filter() {
     let axis = RobotAxis::reference(1).unwrap();
     let mut log = cycles(Simulation::new(axis).unwrap().undisturbed(), 4);
-    let filter = Butterworth::low_pass(4, 100.0, TS).unwrap();
+    let filter = Butterworth::low_pass(4, 100.0, RobotAxis::TS).unwrap();
     let ls = |log: &Log| {
         let spans = Spans::from_log(log, axis.pole_pairs);
         spans.plain(Axes::Both, Form::Sinc).prefiltered(&filter).solve().unwrap().parameters
@@ -153,7 +153,7 @@ fn outliers_are_taken_out_before_the_filter() {
 #[test]
 fn injected_d_current_makes_ld_visible() {
     let axis = RobotAxis::reference(1).unwrap();
-    let filter = Butterworth::low_pass(4, 100.0, TS).unwrap();
+    let filter = Butterworth::low_pass(4, 100.0, RobotAxis::TS).unwrap();
     let simulation = Simulation::new(axis).unwrap();
     let solve = |simulation| {
         let spans = Spans::from_log(&cycles(simulation, 4), axis.pole_pairs);
@@ -212,7 +212,7 @@ fn bad_records_are_told() {
     assert!(error.contains("`iq`") && error.contains("77"), "{error}");
     // A sample time that jumps.
     let (inputs, outputs) = (record.inputs().collect(), vec![Currents::default(); record.len()]);
-    let stamps = (0..record.len()).map(|k| k as f64 * TS + if k > 500 { 1e-3 } else { 0.0 }).collect();
+    let stamps = (0..record.len()).map(|k| k as f64 * RobotAxis::TS + if k > 500 { 1e-3 } else { 0.0 }).collect();
     let gap = Experiment::new(&model, Time::Stamps(stamps), inputs, outputs).unwrap();
     let error = Spans::from_experiment(&gap, axis.pole_pairs, speed, 0.0).unwrap_err().to_string();
     assert!(error.contains("jumps") && error.contains("501"), "{error}");
@@ -236,7 +236,7 @@ fn any_sample_time_will_do() {
         let errors = [percent(p.rs, axis.rs), percent(p.ls, axis.ls), percent(p.ke, axis.ke)];
         println!("{ts} s: R, L, Ke off by {errors:.4?} %");
         assert!(
-            errors[0].abs() < 0.2 && errors[1].abs() < 0.3 * ts / TS && errors[2].abs() < 0.03,
+            errors[0].abs() < 0.2 && errors[1].abs() < 0.3 * ts / RobotAxis::TS && errors[2].abs() < 0.03,
             "{ts} s: {errors:?}"
         );
     }

@@ -8,7 +8,7 @@ use greybox::pmsm::drive::{Disturbance, Simulation};
 use greybox::pmsm::frames::Stator;
 use greybox::pmsm::offline::{Axes, Form, Spans, Validation};
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::{RobotAxis, TS};
+use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::*;
 use greybox::{Fit, fixed, free, signals, simulate};
 
@@ -55,7 +55,7 @@ fn slopes_are_those_of_the_values() {
     )
     .unwrap();
     for held_in in [HeldIn::Stationary, HeldIn::Rotor] {
-        let step = ExactStep::new(4, TS, held_in).unwrap();
+        let step = ExactStep::new(4, RobotAxis::TS, held_in).unwrap();
         derivatives(&ExactSurface(step), T, &I, &U, &winding).unwrap();
         let p = InverterFedWinding { rs: 0.4, ls: 4e-3, ke: 0.95, vdt: 2.0, i0: 0.15 };
         derivatives(&InverterFed::<_, InverterFedWinding>::new(ExactSurface(step)), T, &small, &angled, &p).unwrap();
@@ -157,7 +157,7 @@ fn flux_linkage_may_be_given_and_found() {
 // single inductance, the mean of both, takes the difference for EMF.
 #[test]
 fn an_observer_of_a_salient_motor_has_no_error_of_inductance() {
-    let step = ExactStep::new(4, TS, HeldIn::Stationary).unwrap();
+    let step = ExactStep::new(4, RobotAxis::TS, HeldIn::Stationary).unwrap();
     let truth = SalientWinding { rs: 0.4, ld: 3.6e-3, lq: 4.4e-3, ke: 0.95 };
     let law = MotorLaw { rs: NotAdapted, ke: KeLyapunov { gain: 1e-5 } };
     let (pull, watch) = (Currents { id: 1e3, iq: 1e3 }, Watch { limit: Currents { id: 1e3, iq: 1e3 }, patience: 1000 });
@@ -168,7 +168,7 @@ fn an_observer_of_a_salient_motor_has_no_error_of_inductance() {
     let mut round = ExactSurface(step).mras(law, MrasStart { parameters, pull, order, stepping, watch }).unwrap();
     let mut i = Currents::default();
     for k in 0..40_000 {
-        let t = f64::from(k) * TS;
+        let t = f64::from(k) * RobotAxis::TS;
         let w = 200.0 + 100.0 * (3.0 * t).sin();
         // A controller of 20 A in q and -10 A in d.
         let u = Drive {
@@ -207,8 +207,9 @@ fn validation_both_ways() {
     assert!(fit(found).iter().all(|percent| *percent > 99.5), "{:?}", fit(found));
     assert!(fit(wrong)[1] < 97.0, "{:?}", fit(wrong));
 
-    let model =
-        Compensated::<_, CompensatedWinding>::new(ExactSurface(ExactStep::new(4, TS, HeldIn::Stationary).unwrap()));
+    let model = Compensated::<_, CompensatedWinding>::new(ExactSurface(
+        ExactStep::new(4, RobotAxis::TS, HeldIn::Stationary).unwrap(),
+    ));
     let record = spans.grey_box(&model, 0.15).unwrap();
     let simulated = |p: Winding| {
         let held = CompensatedWinding { rs: fixed(p.rs), ls: fixed(p.ls), ke: fixed(p.ke), vdt: fixed(0.0) };

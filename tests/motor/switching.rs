@@ -6,7 +6,7 @@ use greybox::pmsm::drive::{Log, Simulation};
 use greybox::pmsm::inverter::Carrier;
 use greybox::pmsm::offline::{Axes, Form, Spans};
 use greybox::pmsm::program::Program;
-use greybox::pmsm::robot::{RobotAxis, TS, V_DC};
+use greybox::pmsm::robot::RobotAxis;
 
 const CARRIERS: [Carrier; 2] = [Carrier::PerSample, Carrier::HalfPerSample];
 
@@ -21,7 +21,7 @@ fn the_fundamental_is_that_of_the_mean_voltage() {
     let simulation = Simulation::new(RobotAxis::reference(1).unwrap()).unwrap().undisturbed();
     let mean = run(simulation);
     for carrier in CARRIERS {
-        let switching = run(simulation.switching(V_DC, carrier).unwrap());
+        let switching = run(simulation.switching(RobotAxis::V_DC, carrier).unwrap());
         let (mut current, mut voltage, mut speed) = (0f64, 0f64, 0f64);
         for (a, b) in mean.rows.iter().zip(&switching.rows) {
             current = current.max((a.id - b.id).hypot(a.iq - b.iq));
@@ -41,7 +41,7 @@ fn the_fundamental_is_that_of_the_mean_voltage() {
 fn estimates_are_those_of_the_mean_voltage() {
     let axis = RobotAxis::reference(1).unwrap();
     let simulation = Simulation::new(axis).unwrap();
-    let filter = Butterworth::low_pass(4, 100.0, TS).unwrap();
+    let filter = Butterworth::low_pass(4, 100.0, RobotAxis::TS).unwrap();
     let estimates = |simulation| {
         let spans = Spans::from_log(&run(simulation), axis.pole_pairs);
         let ls = spans.plain(Axes::Both, Form::Sinc).prefiltered(&filter).solve().unwrap().parameters;
@@ -49,7 +49,7 @@ fn estimates_are_those_of_the_mean_voltage() {
     };
     let (mean, mean_extended) = estimates(simulation);
     for carrier in CARRIERS {
-        let (found, found_extended) = estimates(simulation.switching(V_DC, carrier).unwrap());
+        let (found, found_extended) = estimates(simulation.switching(RobotAxis::V_DC, carrier).unwrap());
         assert!(percent(found.ke, mean.ke).abs() < 0.06, "{carrier:?}: {found:?} {mean:?}");
         assert!(percent(found.ls, mean.ls).abs() < 0.2, "{carrier:?}: {found:?} {mean:?}");
         assert!(percent(found.rs, mean.rs).abs() < 0.5, "{carrier:?}: {found:?} {mean:?}");
@@ -62,7 +62,7 @@ fn estimates_are_those_of_the_mean_voltage() {
 #[test]
 fn switching_is_deterministic_and_needs_its_voltage() {
     let simulation = Simulation::new(RobotAxis::reference(4).unwrap()).unwrap();
-    let switching = simulation.switching(V_DC, Carrier::PerSample).unwrap();
+    let switching = simulation.switching(RobotAxis::V_DC, Carrier::PerSample).unwrap();
     assert_eq!(run(switching), run(switching));
     for vdc in [500.0, f64::NAN, -600.0] {
         let error = simulation.switching(vdc, Carrier::PerSample).unwrap_err().to_string();

@@ -1,8 +1,9 @@
 //! Every integrator against problems with known solutions: orders of values and slopes, held inputs, tolerances,
 //! stiffness, and what happens when a model fails.
 
+use crate::spiral::{Plane, Rates, Spiral};
 use approx::assert_relative_eq;
-use greybox::check::{Spiral, order};
+use greybox::check::order;
 use greybox::integrate::{Integrator, ModelSystem, Stuck};
 use greybox::*;
 
@@ -132,8 +133,8 @@ fn jumps_at_every_sample_do_not_lower_the_order() {
 #[test]
 fn the_error_is_in_proportion_to_the_tolerance() {
     fn check<I: Integrator>(make: impl Fn(f64) -> I, finest: i32) {
-        let start = check::Plane { x: Dual::<4>::variable(0.4, 0), y: Dual::variable(-0.3, 1) };
-        let p = check::Rates { growth: Dual::variable(1.2, 2), turn: Dual::variable(6.0, 3) };
+        let start = Plane { x: Dual::<4>::variable(0.4, 0), y: Dual::variable(-0.3, 1) };
+        let p = Rates { growth: Dual::variable(1.2, 2), turn: Dual::variable(6.0, 3) };
         let exact = Spiral.solution(4.0, &start, &p);
         for power in 3..=finest {
             let tolerance = 10f64.powi(-power);
@@ -156,13 +157,13 @@ fn the_error_is_in_proportion_to_the_tolerance() {
 fn slopes_are_those_of_the_numbers_computed() {
     fn check<I: Integrator>(integrator: &I, tolerance: f64) {
         let run = |v: [f64; 4]| {
-            let (x, p) = (check::Plane { x: v[0], y: v[1] }, check::Rates { growth: v[2], turn: v[3] });
+            let (x, p) = (Plane { x: v[0], y: v[1] }, Rates { growth: v[2], turn: v[3] });
             let x = simulate(&Spiral, integrator, &grid(1.0, 2), Hold::Zero, |_| Nothing, x, &p).unwrap();
             [x.x, x.y]
         };
         let at = [0.4, -0.3, 1.2, 1.5];
-        let x = check::Plane { x: Dual::<4>::variable(at[0], 0), y: Dual::variable(at[1], 1) };
-        let p = check::Rates { growth: Dual::variable(at[2], 2), turn: Dual::variable(at[3], 3) };
+        let x = Plane { x: Dual::<4>::variable(at[0], 0), y: Dual::variable(at[1], 1) };
+        let p = Rates { growth: Dual::variable(at[2], 2), turn: Dual::variable(at[3], 3) };
         let x = simulate(&Spiral, integrator, &grid(1.0, 2), Hold::Zero, |_| Nothing, x, &p).unwrap();
         assert_eq!([x.x.value, x.y.value].map(|v| (v * 1e12).round()), run(at).map(|v| (v * 1e12).round()));
         for j in 0..4 {

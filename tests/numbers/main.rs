@@ -1,10 +1,11 @@
-//! Numbers, the triangle, filters, losses, integrators: each against analytic cases.
+//! Numbers, the triangle, losses, integrators: each against analytic cases.
 
 mod duals;
-mod filters;
 mod information;
 mod integrators;
 mod linearization;
 mod losses;
 mod regress;
+#[path = "../common/spiral.rs"]
+mod spiral;
 mod trees;

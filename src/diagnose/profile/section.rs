@@ -1,6 +1,7 @@
 //! Profiles as a section of a report.
 
-use super::{End, HEIGHT, Profile, ProfilePoint};
+use super::trace::HEIGHT;
+use super::{End, Profile, ProfilePoint};
 use crate::numeral::{number, percent, resolved};
 use crate::section::{Axis, Cell, Curves, Drawing, Layer, Plot, Section, Style, Table};
 

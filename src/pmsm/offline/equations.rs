@@ -1,4 +1,4 @@
-use crate::prefilter::{Butterworth, FilterState};
+use crate::prefilter::Butterworth;
 use crate::regress::{LinearEstimate, Regression, RegressionError};
 use crate::signals::{Of, Signals};
 
@@ -47,13 +47,14 @@ impl<P: Signals> Equations<P> {
     /// What noise is left is correlated over the filter's memory; the standard errors count this.
     pub fn prefiltered(mut self, filter: &Butterworth) -> Self {
         for stream in &mut self.streams {
-            let mut states = vec![FilterState::default(); P::LEN + 1];
+            let (mut states, mut row) = (vec![], Vec::with_capacity(P::LEN + 1));
             for (phi, y) in &mut stream.rows {
-                let entries = P::into_array(*phi);
-                let mut states = states.iter_mut();
-                let mut pass = |x: f64| states.next().map_or(x, |state| filter.step(state, x));
-                *phi = P::from_fn(|i| pass(entries.as_ref()[i]));
-                *y = pass(*y);
+                row.clear();
+                row.extend(P::into_array(*phi));
+                row.push(*y);
+                filter.filter_rows(&mut row, P::LEN + 1, &mut states);
+                *phi = P::from_fn(|i| row[i]);
+                *y = row[P::LEN];
             }
         }
         // The response is over after some two periods of the cut-off.

@@ -3,6 +3,7 @@
 //! Slopes are compared where every intermediate value and slope is moderate; beyond, both are of no use. How much an expression makes of
 //! rounding is seen by moving its arguments by a few units in the last place: what that changes is allowed.
 
+use super::steps::start;
 use greybox::engine::{Program, Sampling, Trajectories};
 use greybox::graph::{Function, Function2, Graph, Id, Leaf, Node, Seed};
 use greybox::{Dual, recurrence::Recurrence, scalar::Comparison};
@@ -120,7 +121,7 @@ pub fn agrees(graph: &Graph, roots: &[Id], points: &[[f64; SEEDS]], random: bool
         let mut group = program.group(points.len());
         let lanes = group.lanes();
         for (lane, point) in points.iter().enumerate() {
-            group.start(lane, &point[..STATES]);
+            start(&mut group, &program, lane, &point[..STATES]);
             group.set_parameters(lane, &point[STATES..]);
         }
         group.prepare();
@@ -292,7 +293,7 @@ fn values_have_the_bits_of_the_text() {
             let program = Program::compile(&recurrence, seeds, Sampling::Uniform, Trajectories::Many).unwrap();
             let mut group = program.group(1);
             let points: Vec<[f64; 3]> = (0..group.lanes()).map(|_| core::array::from_fn(|_| random.number())).collect();
-            points.iter().enumerate().for_each(|(lane, point)| group.start(lane, point));
+            points.iter().enumerate().for_each(|(lane, point)| start(&mut group, &program, lane, point));
             group.prepare();
             let mut rows = vec![0.0; program.row_length() * group.lanes()];
             group.run(&[], &mut rows, 1);

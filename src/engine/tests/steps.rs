@@ -1,12 +1,12 @@
 //! Whole steps with slopes on lanes, against duals through the same integrator.
 
-use greybox::engine::{Column, Program, Sampling, Trajectories};
-use greybox::graph::Seed;
+use greybox::engine::{Column, Group, Program, Sampling, Trajectories};
+use greybox::graph::{Graph, Leaf, Seed, Symbol};
 use greybox::{
     Dual, Hold, Interval, Model, Of, Rk4, Scalar, Signals,
     equations::Equations,
     integrate::{Integrator, ModelSystem},
-    recurrence::Recurrence,
+    recurrence::{Recurrence, SymbolicInterval},
     signals,
 };
 
@@ -36,6 +36,27 @@ impl Model for Pmsm {
     fn output<S: Scalar>(&self, _t: S, x: &Currents<S>, _u: &Drive<S>, _p: &Winding<S>) -> Currents<S> {
         *x
     }
+}
+
+/// The simulation of equations by a method of fixed steps: the state is carried.
+pub fn simulation(equations: &Equations, integrator: &impl Integrator, hold: Hold) -> Recurrence {
+    let mut graph = Graph::default();
+    let mean = graph.import(equations.graph(), equations.output(), Graph::leaf);
+    let states = equations.layout().states.len() as u32;
+    let between = SymbolicInterval { equations, method: integrator, hold };
+    let next = graph.trace(|| {
+        let mut x: Vec<Symbol> = (0..states).map(|i| Symbol::leaf(Leaf::State(i))).collect();
+        between.next(&mut x);
+        x
+    });
+    Recurrence::from_roots(&graph, &next.unwrap(), &mean, &[]).unwrap()
+}
+
+/// Starts a lane: what it carries, with a slope of one for each seed that is an entry of it.
+pub fn start(group: &mut Group, program: &Program, lane: usize, carry: &[f64]) {
+    let own = |i: usize| program.seeds().iter().map(move |seed| f64::from(u8::from(*seed == Seed::Carry(i))));
+    let slopes: Vec<f64> = (0..carry.len()).flat_map(own).collect();
+    group.resume(lane, carry, &slopes);
 }
 
 /// The columns of `n` samples, the same in all lanes.
@@ -69,17 +90,11 @@ pub fn agrees<M: Model, I: Integrator, const N: usize>(
     step: f64,
 ) {
     let equations = Equations::trace(model).unwrap();
-    let recurrence = Recurrence::new(&equations, integrator, hold).unwrap();
+    let recurrence = simulation(&equations, integrator, hold);
     let (nx, np) = (M::State::LEN, M::Parameters::LEN);
     let seeds: Vec<Seed> = (0..np).map(Seed::Parameter).chain((0..nx).map(Seed::Carry)).collect();
     assert_eq!(N, seeds.len());
     let program = Program::compile(&recurrence, &seeds, Sampling::Uniform, Trajectories::Many).unwrap();
-    println!(
-        "{:?} instructions, columns {:?}, {:?}",
-        program.instructions(),
-        program.columns(),
-        program.derived_from()
-    );
     let samples = inputs.len() - 1;
     for wanted in [1, program.lanes()] {
         let mut group = program.group(wanted);
@@ -88,7 +103,7 @@ pub fn agrees<M: Model, I: Integrator, const N: usize>(
         for lane in 0..lanes {
             group.set_parameters(lane, M::Parameters::into_array(p(lane)).as_ref());
             group.set_step(lane, step);
-            group.start(lane, M::State::into_array(start).as_ref());
+            self::start(&mut group, &program, lane, M::State::into_array(start).as_ref());
         }
         group.prepare();
         let value = |column: &Column, k: usize| match column {
@@ -115,16 +130,7 @@ pub fn agrees<M: Model, I: Integrator, const N: usize>(
                     largest = largest.max(y.value.abs());
                     same_within(row(N), y.value, 1e-12 * largest);
                     let size = y.slopes.iter().fold(0.0f64, |m, s| m.max(s.abs()));
-                    (0..N).for_each(|s| {
-                        if row(s).is_nan() && !y.slopes[s].is_nan() {
-                            println!(
-                                "k {k} j {j} s {s} lane {lane} {:?} {:?}",
-                                (0..=N).map(row).collect::<Vec<_>>(),
-                                y
-                            );
-                        }
-                        same_within(row(s), y.slopes[s], 1e-12 * size + 1e-300)
-                    });
+                    (0..N).for_each(|s| same_within(row(s), y.slopes[s], 1e-12 * size + 1e-300));
                 }
                 let interval =
                     Interval { t0: k as f64 * step, t1: (k + 1) as f64 * step, u0: inputs[k], u1: inputs[k + 1], hold };

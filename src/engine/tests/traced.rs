@@ -1,6 +1,6 @@
 //! Models that are read: branches, loops, kinds, what cannot be read; and the models that the library has.
 
-use crate::steps::agrees;
+use super::steps::agrees;
 use greybox::graph::{Function, Graph, Leaf, Symbol};
 use greybox::models::{
     Armature, AxisMotion, AxisParameters, Command, ControlledAxisMotion, DcMotor, Feed, Positioning, PositioningLoop,

@@ -1,6 +1,6 @@
 //! Look-up tables: between points, at them and beyond, by themselves, on duals and in programs.
 
-use crate::steps::agrees;
+use super::steps::agrees;
 use greybox::{
     Dual, Hold, Model, Rk4, Scalar, Table,
     equations::Equations,

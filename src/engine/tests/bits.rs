@@ -1,8 +1,8 @@
 //! The same bits from every engine: the variable that chooses one is set for runs of this very program.
 
-use crate::random::{FUNCTIONS, FUNCTIONS2, Random, expression};
-use crate::steps::Pmsm;
-use crate::tables::Mapped;
+use super::random::{FUNCTIONS, FUNCTIONS2, Random, expression};
+use super::steps::{Pmsm, simulation, start};
+use super::tables::Mapped;
 use greybox::engine::{Program, Sampling, Trajectories};
 use greybox::graph::{Graph, Id, Leaf, Seed};
 use greybox::pmsm::{Machine, Salient};
@@ -44,7 +44,7 @@ fn rows_of(
                 let trajectory = (next + lane).min(7);
                 group.set_parameters(lane, &p[trajectory]);
                 group.set_step(lane, 1e-3 * (1.0 + trajectory as f64));
-                group.start(lane, &starts[trajectory]);
+                start(&mut group, &program, lane, &starts[trajectory]);
             }
             group.prepare();
             let columns = program.columns().len();
@@ -84,7 +84,7 @@ fn of_expression(digest: &mut Digest, random: &mut Random, mut graph: Graph, roo
 fn of_model<M: Model>(digest: &mut Digest, model: &M, p: &[f64]) {
     let equations = Equations::trace(model).unwrap();
     for hold in [Hold::Zero, Hold::First] {
-        let recurrence = Recurrence::new(&equations, &Rk4 { substeps: 2 }, hold).unwrap();
+        let recurrence = simulation(&equations, &Rk4 { substeps: 2 }, hold);
         let states = equations.layout().states.len();
         let seeds: Vec<Seed> = (0..p.len()).map(Seed::Parameter).chain((0..states).map(Seed::Carry)).collect();
         let starts = core::array::from_fn(|lane| (0..states).map(|i| (lane + i) as f64 - 3.0).collect());
@@ -133,7 +133,7 @@ fn every_engine_gives_the_same_bits() {
     let digest_of = |engine: &str| {
         let mut command = Command::new(std::env::current_exe().unwrap());
         command
-            .args(["--exact", "bits::digest_of_this_engine", "--ignored", "--nocapture"])
+            .args(["--exact", "engine::tests::bits::digest_of_this_engine", "--ignored", "--nocapture"])
             .env("GREYBOX_ENGINE", engine);
         let output = String::from_utf8(command.output().unwrap().stdout).unwrap();
         let at = output.find(MARK).unwrap_or_else(|| panic!("{engine}: {output}"));
@@ -148,7 +148,7 @@ fn every_engine_gives_the_same_bits() {
 #[test]
 fn machine_code_is_made_where_it_can_be() {
     let equations = Equations::trace(&Pmsm { pole_pairs: 4.0 }).unwrap();
-    let recurrence = Recurrence::new(&equations, &Rk4::default(), Hold::Zero).unwrap();
+    let recurrence = simulation(&equations, &Rk4::default(), Hold::Zero);
     let program = Program::compile(&recurrence, &[Seed::Carry(0)], Sampling::Uniform, Trajectories::Many).unwrap();
     let chosen = std::env::var("GREYBOX_ENGINE").unwrap_or_default();
     let expected = cfg!(all(feature = "jit", target_arch = "x86_64", target_os = "linux"))
