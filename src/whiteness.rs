@@ -92,18 +92,26 @@ struct Neighbors {
 
 impl Neighbors {
     fn add(&mut self, run: &[f64]) {
-        let sign = |e: &f64| i64::from(*e > 0.0) - i64::from(*e < 0.0);
+        let sign = |e: &f64| i8::from(*e > 0.0) - i8::from(*e < 0.0);
         let Some(first) = run.first() else { return };
-        self.first.get_or_insert(sign(first));
-        let (mut errors, mut pairs, mut agreements, mut last) = (0, 0, 0, self.last);
-        for sign in run.iter().map(sign) {
-            errors += sign * sign;
-            pairs += sign * sign * last * last;
-            agreements += sign * last;
-            last = sign;
+        self.first.get_or_insert(sign(first).into());
+        for run in run.chunks(RUN) {
+            // The sign before the run, and those of the run: sums over neighbors are then free of any order.
+            let mut signs = [0i8; RUN + 1];
+            signs[0] = self.last as i8;
+            signs[1..].iter_mut().zip(run).for_each(|(to, e)| *to = sign(e));
+            let (mut errors, mut pairs, mut agreements) = (0i32, 0i32, 0i32);
+            for (here, before) in signs[1..].iter().zip(&signs) {
+                let product = i32::from(here * before);
+                errors += i32::from(here * here);
+                pairs += product * product;
+                agreements += product;
+            }
+            self.errors += i64::from(errors);
+            self.pairs += i64::from(pairs);
+            self.agreements += i64::from(agreements);
+            self.last = signs[run.len()].into();
         }
-        (self.errors, self.pairs) = (self.errors + errors, self.pairs + pairs);
-        (self.agreements, self.last) = (self.agreements + agreements, last);
     }
 
     /// As if the errors of the other had followed.
