@@ -100,10 +100,10 @@ fn the_course_of_a_search_is_kept() {
     let (record, course) = (record(1), diagnose::Convergence::default());
     let estimate = fit(&record).observe(course.clone(), ObserverMode::Always).run().unwrap();
     let kept = course.iterations();
-    let numbers: Vec<u64> = kept.iter().map(|iteration| iteration.iteration).collect();
+    let numbers: Vec<u64> = kept.iter().map(|iteration| iteration.0).collect();
     assert_eq!(numbers, (0..=estimate.iterations).collect::<Vec<u64>>());
-    assert_eq!(kept[kept.len() - 1].cost, estimate.cost);
-    assert!(kept[0].cost > 10.0 * estimate.cost, "{} {}", kept[0].cost, estimate.cost);
+    assert_eq!(kept[kept.len() - 1].1, estimate.cost);
+    assert!(kept[0].1 > 10.0 * estimate.cost, "{} {}", kept[0].1, estimate.cost);
 }
 
 #[test]
