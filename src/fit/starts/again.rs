@@ -7,6 +7,9 @@ use crate::judge::SearchEnd;
 use crate::problem::{Objective, Optimizer, each};
 use std::sync::Arc;
 
+/// How a search ended.
+type Ended = Result<SearchEnd, NoEnd>;
+
 /// The best end of one search from each minimum, which counts as often as searches had ended there, and from each start where the
 /// coarser method failed; other searches that had found no minimum are not run again.
 pub(super) fn search_again(
@@ -30,7 +33,7 @@ pub(super) fn search_again(
     let runs = each(begins.len(), |i| begin(plain, optimizer, &Ok(begins[i].0.clone())));
     let mut searches = Searches { plain, comparison: Comparison::new(plain), runs, cycle: 0, wide: is_wide(plain) };
     searches.run(None);
-    let mut groups: Vec<Vec<(Vec<f64>, Result<SearchEnd, NoEnd>)>> = vec![];
+    let mut groups: Vec<Vec<(Vec<f64>, Ended)>> = vec![];
     for (run, (place, count)) in searches.runs.into_iter().map(Run::end).zip(begins) {
         let again = run.as_ref().map(|end| SearchEnd { evaluations: 0, ..end.clone() }).map_err(NoEnd::clone);
         let ends = std::iter::once(run).chain((1..count).map(|_| again.clone()));
