@@ -129,7 +129,8 @@ impl<'a, M: Model> Fit<'a, M> {
     /// names the method ([`Method::integrator`](crate::estimate::Method)), and is not usable if none is fine enough. A finer step
     /// stays where a coarser one explains the data better, or as well with other values, which is said. `Esdirk` is stopped where it needs 3,000 steps for a
     /// sample, or 1,000 for each: such a model is not stiff, but fast, or explodes. A search by one of the finer methods has at
-    /// most 100 trial steps.
+    /// most 100 trial steps, and begins at the minima found, where there are several starts; a limit of the search's own holds for
+    /// all methods together.
     pub fn integrator(self, integrator: impl Integrator) -> Self {
         Fit { stepping: Stepping::new(integrator), is_default: false, ..self }
     }

@@ -25,7 +25,7 @@ mod whitening;
 pub(crate) use batches::each;
 pub(crate) use checkpoint::CheckpointFile;
 pub(crate) use control::Control;
-pub(crate) use finer::{Finer, FinerSweeps, MakeSweep, PARTS, TRIALS};
+pub(crate) use finer::{Finer, FinerSweeps, MakeSweep, PARTS};
 pub(crate) use fingerprint::Fingerprint;
 pub use objective::Objective;
 pub(crate) use pass::Accumulate;

@@ -1,6 +1,6 @@
 //! Fits of single records in lockstep: one evaluation of all of them is one pass over lanes.
 
-use super::refine::Attempt;
+use super::refine::{Attempt, Start};
 use super::search::Rounds;
 use crate::error::Error;
 use crate::estimate::Summary;
@@ -97,7 +97,7 @@ impl<'p> Search<'p> {
 /// fit of each alone.
 pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Error>> {
     let Some(control) = problems.first().map(|first| control(first, problems.len())) else { return vec![] };
-    let all: Vec<From<'_>> = problems.iter().map(|problem| (problem, problem.unknowns.start())).collect();
+    let all: Vec<From<'_>> = problems.iter().map(|problem| (problem, Start::declared(problem))).collect();
     let mut attempts: Vec<Attempt> = by_one_method(&all, &control).into_iter().map(Attempt::new).collect();
     for number in 0.. {
         let coarse: Vec<bool> = attempts.iter().map(Attempt::is_coarse).collect();
@@ -107,13 +107,18 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
         if finer.iter().all(Option::is_none) || control.stops() {
             break;
         }
-        let from = attempts.iter().zip(finer).map(|(attempt, finer)| Some((finer?, attempt.start(finer?, &control)?)));
+        let most = |problem: &Problem<'_>| problem.settings.optimizer.most();
+        let from = attempts
+            .iter()
+            .zip(problems)
+            .zip(finer)
+            .map(|((attempt, problem), finer)| Some((finer?, attempt.start(finer?, most(problem), &control)?)));
         let finer: Vec<Option<From<'_>>> = from.collect();
         let coarse: Vec<bool> = finer.iter().map(Option::is_some).collect();
         let finer: Vec<From<'_>> = finer.into_iter().flatten().collect();
         let begin = Instant::now();
         let found = by_one_method(&finer, &control).into_iter().zip(&finer);
-        let mut found = found.map(|(found, (finer, _))| finer.run_on(found, begin, &control));
+        let mut found = found.map(|(found, (finer, start))| finer.run_on(found, start.trials, begin, &control));
         let next = |(attempt, coarse): (Attempt, bool)| match if coarse { found.next() } else { None } {
             Some(again) => attempt.or(again),
             None => attempt,
@@ -131,7 +136,7 @@ fn control(problem: &Problem<'_>, together: usize) -> Control {
 }
 
 /// A problem and the start of its search.
-type From<'p> = (&'p Problem<'p>, Vec<f64>);
+type From<'p> = (&'p Problem<'p>, Start);
 
 /// The estimate of each problem, by its own method.
 fn by_one_method(problems: &[From<'_>], control: &Control) -> Vec<Result<Summary, Error>> {
@@ -139,8 +144,8 @@ fn by_one_method(problems: &[From<'_>], control: &Control) -> Vec<Result<Summary
     let plain: Vec<Objective<'_>> = problems.iter().map(|(problem, _)| problem.in_units(control)).collect();
     let first = |(plain, (problem, start)): (_, &From<'_>)| match Rounds::new(
         plain,
-        &problem.settings.optimizer,
-        start.clone(),
+        &problem.settings.optimizer.limited(start.trials),
+        start.coordinates.clone(),
     ) {
         Ok(rounds) => Stage::Searching(Box::new(Search::new(rounds))),
         Err(_) => Stage::Alone,
@@ -161,14 +166,14 @@ fn by_one_method(problems: &[From<'_>], control: &Control) -> Vec<Result<Summary
             }
         }
     }
-    let starts: Vec<&[f64]> = problems.iter().map(|(_, start)| &start[..]).collect();
+    let starts: Vec<&Start> = problems.iter().map(|(_, start)| start).collect();
     conclude_together(&plain, stages, &starts, control, begin)
 }
 
 fn conclude_together(
     plain: &[Objective<'_>],
     stages: Vec<Stage<'_>>,
-    starts: &[&[f64]],
+    starts: &[&Start],
     control: &Control,
     begin: Instant,
 ) -> Vec<Result<Summary, Error>> {
@@ -188,7 +193,7 @@ fn conclude_together(
             Some(residuals) => conclude_from(objective, end, residuals, seconds),
             None => conclude(objective, end, seconds),
         },
-        _ => plain[i].problem.run_within(Instant::now(), control, starts[i].to_vec()),
+        _ => plain[i].problem.run_within(Instant::now(), control, starts[i].clone()),
     };
     (0..plain.len()).map(finish).collect()
 }

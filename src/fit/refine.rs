@@ -1,10 +1,10 @@
 //! Fits whose integrator was not chosen: finer methods, as long as a finer step would move an unknown.
 
 use crate::error::Error;
-use crate::estimate::{Summary, Unknown, Warning, WarningCode};
+use crate::estimate::{Starts, Summary, Unknown, Warning, WarningCode};
 use crate::numeral::number;
 use crate::optimize::{Outcome, Severity};
-use crate::problem::{Control, PARTS, Problem, TRIALS};
+use crate::problem::{Control, PARTS, Problem};
 use std::time::Instant;
 
 /// A deviance that is larger by this is worth a note; by the second, a warning. If both methods had the same fixed parameters, a
@@ -16,6 +16,23 @@ const CERTAINLY_WORSE: f64 = 15.0;
 /// An unknown that a finer step moved by more than so many standard errors is worth a note, where the data do not tell the two
 /// apart.
 const MOVED: f64 = 1.0;
+
+/// Where a search begins.
+#[derive(Clone)]
+pub(super) struct Start {
+    pub coordinates: Vec<f64>,
+    /// The most trial steps, if fewer than the settings allow.
+    pub trials: u64,
+    /// Where earlier searches from several starts ended; those of this method begin there.
+    pub ends: Option<Starts>,
+}
+
+impl Start {
+    /// That of a problem.
+    pub fn declared(problem: &Problem<'_>) -> Self {
+        Start { coordinates: problem.unknowns.start(), trials: u64::MAX, ends: None }
+    }
+}
 
 /// The answer by the finest method tried so far.
 pub(super) struct Attempt {
@@ -61,19 +78,26 @@ impl Attempt {
     }
 
     /// Where the search by a finer method begins: at the end of this one if the step is all that is wrong with it, else at the
-    /// start of the problem; `None` if that method's step would decide the cost there, too.
-    pub fn start(&self, finer: &Problem<'_>, control: &Control) -> Option<Vec<f64>> {
+    /// start of the problem; `None` if that method's step would decide the cost there, too, and where no trial step is left of so
+    /// many for all methods.
+    pub fn start(&self, finer: &Problem<'_>, most: u64, control: &Control) -> Option<Start> {
+        let trials = most - self.found.as_ref().map_or(0, |found| found.iterations).min(most);
+        if trials == 0 {
+            return None;
+        }
         let wrong =
             |warning: &Warning| warning.severity == Severity::NotUsable && warning.code != WarningCode::CoarseStep;
         match &self.found {
             Ok(found) if found.outcome.converged() && !found.warnings.iter().any(wrong) => {
                 let within = |(x, (lower, upper)): (f64, (f64, f64))| x.max(lower).min(upper);
-                Some(found.coordinates().into_iter().zip(finer.unknowns.bounds()).map(within).collect())
+                let coordinates = found.coordinates().into_iter().zip(finer.unknowns.bounds()).map(within).collect();
+                Some(Start { coordinates, trials, ends: found.starts.clone() })
             }
             _ => {
                 let start = finer.unknowns.start();
                 let steps = finer.in_units(control);
-                (finer.sweep.is_adaptive() || !steps.step_decides(&start).unwrap_or(true)).then_some(start)
+                let fine = finer.sweep.is_adaptive() || !steps.step_decides(&start).unwrap_or(true);
+                fine.then_some(Start { coordinates: start, trials, ends: None })
             }
         }
     }
@@ -148,24 +172,23 @@ fn explains_better(coarser: &Coarser, better: f64, found: &Summary) -> Warning {
 
 impl Problem<'_> {
     /// Continues a search by this finer method that ended at the limit of a part, as long as the model explains the data better
-    /// than a constant. Not for searches from several starts, which are not run in parts, nor where the user's own limit is
-    /// below that of a part.
+    /// than a constant, up to so many trial steps. Not for searches from several starts, which are not run in parts.
     pub(super) fn run_on(
         &self,
         found: Result<Summary, Error>,
+        most: u64,
         begin: Instant,
         control: &Control,
     ) -> Result<Summary, Error> {
         let mut found = found?;
-        let mut trials = found.iterations;
         for _ in 1..PARTS {
-            let limited = matches!(found.outcome, Outcome::IterationLimit { .. }) && trials >= TRIALS;
+            let trials = most.saturating_sub(found.iterations);
+            let limited = matches!(found.outcome, Outcome::IterationLimit { .. }) && trials > 0;
             if self.settings.starts > 1 || !limited || is_useless(&found, WarningCode::Unexplained) || control.stops() {
                 break;
             }
-            let again = self.run_within(begin, control, found.coordinates())?;
-            trials = again.iterations;
-            found = after(&found, again);
+            let start = Start { coordinates: found.coordinates(), trials, ends: None };
+            found = after(&found, self.run_within(begin, control, start)?);
         }
         Ok(found)
     }

@@ -1,6 +1,6 @@
 //! Running a problem: search, estimate at a given point, objective, prediction.
 
-use super::refine::Attempt;
+use super::refine::{Attempt, Start};
 use super::search::{search, start_error};
 use super::starts::search_from_many;
 use crate::error::Error;
@@ -27,27 +27,28 @@ impl Problem<'_> {
     /// cannot be simulated, gives way to a finer one.
     pub(super) fn run_since(&self, begin: Instant) -> Result<Summary, Error> {
         let control = self.control(begin);
-        let mut attempt = Attempt::new(self.run_within(begin, &control, self.unknowns.start()));
+        let mut attempt = Attempt::new(self.run_within(begin, &control, Start::declared(self)));
         for finer in self.by_method().skip(1) {
             if !attempt.is_coarse() || control.stops() {
                 break;
             }
-            if let Some(start) = attempt.start(finer, &control) {
+            if let Some(start) = attempt.start(finer, self.settings.optimizer.most(), &control) {
+                let trials = start.trials;
                 let again = finer.run_within(begin, &control, start);
-                attempt = attempt.or(finer.run_on(again, begin, &control));
+                attempt = attempt.or(finer.run_on(again, trials, begin, &control));
             }
         }
         attempt.answer()
     }
 
-    /// The same by this method alone, a single search from this start.
-    pub(super) fn run_within(&self, begin: Instant, control: &Control, start: Vec<f64>) -> Result<Summary, Error> {
+    /// The same by this method alone, from this start.
+    pub(super) fn run_within(&self, begin: Instant, control: &Control, start: Start) -> Result<Summary, Error> {
         let settings = &self.settings;
         settings.optimizer.check()?;
-        let plain = self.in_units(control);
+        let (plain, optimizer) = (self.in_units(control), settings.optimizer.limited(start.trials));
         let end = match settings.starts {
-            1 => search(&plain, &settings.optimizer, start)?,
-            count => search_from_many(&plain, &settings.optimizer, count)?,
+            1 => search(&plain, &optimizer, start.coordinates)?,
+            count => search_from_many(&plain, &optimizer, count, start.ends.as_ref())?,
         };
         // The time limit does not apply to the conclusion.
         let objective = plain.with(end.whitening.clone());

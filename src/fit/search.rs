@@ -59,6 +59,8 @@ pub(super) struct Rounds<'r> {
     known: bool,
     round: u32,
     iterations: u64,
+    /// Trial steps that are left of the limit.
+    left: u64,
     evaluations: u64,
 }
 
@@ -88,6 +90,7 @@ impl<'r> Rounds<'r> {
             known: !noise::is_estimated(plain),
             round: 0,
             iterations: 0,
+            left: optimizer.most(),
             evaluations: 0,
         })
     }
@@ -121,6 +124,7 @@ impl<'r> Rounds<'r> {
     pub fn take(&mut self, objective: Objective<'r>, result: Round) -> Option<SearchEnd> {
         self.round += 1;
         self.iterations += result.iterations;
+        self.left = self.left.saturating_sub(result.iterations);
         self.evaluations += result.evaluations;
         self.coordinates = result.coordinates;
         let (mut outcome, mut linear) = (result.outcome, result.linear);
@@ -143,12 +147,12 @@ impl<'r> Rounds<'r> {
             }
             // Rounding errors differ from point to point: the noise would never settle.
             settled |= outcome == Outcome::Exact;
-            if !settled && self.round == NOISE_ROUNDS {
+            if !settled && (self.round == NOISE_ROUNDS || self.left == 0) {
                 outcome = Outcome::IterationLimit { iterations: self.iterations };
                 settled = true;
             }
         }
-        self.next = self.optimizer.clone();
+        self.next = self.optimizer.limited(self.left);
         self.memory = objective.memory;
         settled.then(|| SearchEnd {
             coordinates: self.coordinates.clone(),

@@ -1,5 +1,6 @@
 //! Searches from several starts, side by side: [`Fit::starts`](super::Fit::starts).
 
+mod again;
 mod draw;
 mod minima;
 mod progress;
@@ -7,6 +8,7 @@ mod progress;
 use super::lockstep::{Search, Stage};
 use super::search::{Rounds, checkpoint, start_error};
 use crate::error::{Error, Failure};
+use crate::estimate::Starts;
 use crate::judge::SearchEnd;
 use crate::optimize::{Infeasible, LeastSquares, Linearization};
 use crate::problem::{At, CheckpointFile, Objective, Optimizer, each, linearize_together};
@@ -55,12 +57,17 @@ impl NoEnd {
     }
 }
 
-/// Searches from the declared start and others; the best end, with what all of them found.
+/// Searches from the declared start and others, or from where earlier ones ended by a coarser method; the best end, with what
+/// all of them found.
 pub(super) fn search_from_many(
     plain: &Objective<'_>,
     optimizer: &Arc<dyn Optimizer>,
     count: usize,
+    earlier: Option<&Starts>,
 ) -> Result<SearchEnd, Error> {
+    if let Some(earlier) = earlier {
+        return again::search_again(plain, optimizer, earlier);
+    }
     let starts = draw::starts(plain, count);
     let file = checkpoint(plain, optimizer)?;
     let resumed = file.as_ref().map(CheckpointFile::load::<Places>).transpose()?.flatten();

@@ -23,6 +23,7 @@ const ROUNDING: f64 = 0.1;
 const WHITENESS_LEVEL: f64 = 0.01;
 
 /// The end of a search.
+#[derive(Clone)]
 pub(crate) struct SearchEnd {
     pub coordinates: Vec<f64>,
     pub whitening: Whitening,

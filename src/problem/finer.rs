@@ -40,7 +40,7 @@ impl<'a> FinerSweeps<'a> {
 /// Trial steps of each part of a search by a finer method, and the most parts. A search that begins near its minimum takes some
 /// ten. A search after whose first part the model is no better than a constant is not continued: finer methods are expensive,
 /// and more steps were not seen to help there.
-pub(crate) const TRIALS: u64 = 20;
+const TRIALS: u64 = 20;
 pub(crate) const PARTS: u64 = 5;
 
 /// The problem by each method is made when it is first needed.

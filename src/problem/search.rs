@@ -33,6 +33,11 @@ pub trait Search:
         self.clone()
     }
 
+    /// The most trial steps; the largest number of a search that has no such limit.
+    fn most(&self) -> u64 {
+        u64::MAX
+    }
+
     /// Checks the settings.
     ///
     /// # Errors
@@ -51,6 +56,10 @@ impl<S: Scaling + Serialize + DeserializeOwned + 'static> Search for LevenbergMa
         LevenbergMarquardt::new(self.stop.limited(iterations), self.scaling.clone())
     }
 
+    fn most(&self) -> u64 {
+        self.stop.iterations
+    }
+
     fn check(&self) -> Result<(), Error> {
         self.stop.check()
     }
@@ -63,6 +72,10 @@ impl Search for GaussNewton {
 
     fn limited(&self, iterations: u64) -> Self {
         GaussNewton::new(self.stop.limited(iterations))
+    }
+
+    fn most(&self) -> u64 {
+        self.stop.iterations
     }
 
     fn check(&self) -> Result<(), Error> {
@@ -95,6 +108,8 @@ pub(crate) trait Optimizer: Send + Sync {
     fn rough(&self) -> Arc<dyn Optimizer>;
 
     fn limited(&self, iterations: u64) -> Arc<dyn Optimizer>;
+
+    fn most(&self) -> u64;
 
     /// Its settings, as text.
     fn settings(&self) -> Result<String, Error>;
@@ -134,6 +149,10 @@ impl<S: Search> Optimizer for S {
 
     fn limited(&self, iterations: u64) -> Arc<dyn Optimizer> {
         Arc::new(Search::limited(self, iterations))
+    }
+
+    fn most(&self) -> u64 {
+        Search::most(self)
     }
 
     fn settings(&self) -> Result<String, Error> {
