@@ -136,3 +136,18 @@ impl Default for Stop {
         Stop { step: 1e-10, gradient: 1e-8, cost: 0.0, iterations: 5000 }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Stop;
+
+    #[test]
+    fn a_rough_search_stops_at_three_digits() {
+        let Stop { step, gradient, cost, iterations } = Stop::default().rough();
+        assert_eq!((step, gradient), (1e-3, 1e-3));
+        assert_eq!((cost, iterations), (Stop::default().cost, Stop::default().iterations));
+        let rougher = Stop { step: 0.1, gradient: 0.2, ..Stop::default() };
+        assert_eq!((rougher.rough().step, rougher.rough().gradient), (0.1, 0.2));
+        assert_eq!([rougher.limited(7).iterations, Stop { iterations: 5, ..rougher }.limited(7).iterations], [7, 5]);
+    }
+}

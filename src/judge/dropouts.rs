@@ -54,7 +54,7 @@ impl Judgement<'_> {
         };
         let runs: Vec<Vec<(f64, f64)>> = problem.records.iter().zip(errors).map(run).collect();
         let [held, others] = split(&runs)?;
-        (held.mean() > LARGER * others.mean()).then(|| {
+        are_larger(held, others).then(|| {
             let output = &problem.layout().outputs[j];
             let text = format!(
                 "{} of the measurements of `{}` are equal to the one before, and the model differs there by {} {unit}, elsewhere by \
@@ -70,9 +70,23 @@ impl Judgement<'_> {
     }
 }
 
+/// Whether the errors of measurements that are equal to the one before are so much larger than the others that the last value was held.
+fn are_larger(held: Errors, others: Errors) -> bool {
+    held.mean() > LARGER * others.mean()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Twice the mean square, whatever the unit.
+    #[test]
+    fn held_values_have_larger_errors() {
+        for size in [1e-6, 1.0, 1e6] {
+            let of = |mean: f64, count: usize| Errors { squares: mean * size * count as f64, count };
+            assert!(are_larger(of(2.01, 3), of(1.0, 7)) && !are_larger(of(1.99, 3), of(1.0, 7)));
+        }
+    }
 
     /// Of nine measurements the last of each three is the one before, with an error of three instead of one.
     #[test]

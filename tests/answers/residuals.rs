@@ -334,3 +334,13 @@ fn correlations_are_the_definition() {
         assert!((none_beyond(found.band / deviation) - 0.99).abs() < 1e-9, "{}", found.band);
     }
 }
+
+/// A quarter as many lags as residuals, 25 at most; a few thousand of many residuals for the test of Anderson and Darling.
+#[test]
+fn lags_and_samples_are_enough() {
+    let normal = |samples: usize| examined(samples, 3, |_, _, e| 0.1 * e);
+    assert_eq!([24, 2_000].map(|samples| normal(samples).autocorrelation.len()), [6, 25]);
+    for samples in [4_000, 12_000] {
+        assert!(normal(samples).tests.iter().any(|test| test.name == "Anderson-Darling"), "{samples}");
+    }
+}

@@ -381,3 +381,25 @@ fn outputs_contradict_by_their_difference() {
     let warning = said(&estimate, WarningCode::OutputsContradict).unwrap();
     assert!(warning.text.contains("chi-square p = 5.7e-7"), "{}", warning.text);
 }
+
+/// Intervals by a noise that was given too small are too narrow, by one that was given too large too wide.
+#[test]
+fn intervals_of_a_wrong_noise() {
+    let record = record(200, (2.0, 2.0), 0.1, moving);
+    for (sigma, word) in [(0.03, "too narrow"), (0.3, "too wide")] {
+        let estimate = fit(std::slice::from_ref(&record)).noise(Pair { y: sigma, z: sigma }).run().unwrap();
+        let warning = said(&estimate, WarningCode::GivenNoise).unwrap();
+        assert!(warning.text.contains(word), "{warning:?}");
+    }
+}
+
+/// The output whose errors follow an input, and that input.
+#[test]
+fn a_wrong_shape_is_named() {
+    let good = record(400, (2.0, 2.0), 0.05, moving);
+    let bent = |k: usize, y: Pair| Pair { z: y.z + 0.3 * moving(k).u * moving(k).u, ..y };
+    let estimate = fit(&[edited(&good, bent)]).run().unwrap();
+    let warning = said(&estimate, WarningCode::WrongShape).unwrap();
+    assert!(warning.text.starts_with("the errors of `z` follow from the input `u`"), "{warning:?}");
+    assert_eq!(said(&fit(&[good]).run().unwrap(), WarningCode::WrongShape), None);
+}

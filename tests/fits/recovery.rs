@@ -2,6 +2,7 @@
 //! Known parameters are found again, on random models, with and without noise.
 
 use crate::common::*;
+use greybox::optimize::LeastSquares;
 use greybox::pmsm::{Currents, Drive, Surface, Winding};
 use greybox::*;
 use proptest::prelude::*;
@@ -275,4 +276,21 @@ fn priors_are_measurements() {
     assert!((estimate.parameters.offset - expected).abs() < 1e-12);
     let error = estimate.knowledge.offset.standard_error().unwrap();
     assert!((error / (data + prior).sqrt().recip() - 1.0).abs() < 1e-12);
+}
+
+/// Records with inputs that are held and with inputs between straight lines are simulated each in its own way, in one fit: its cost is
+/// the sum of theirs.
+#[test]
+fn each_record_keeps_its_hold() {
+    let inputs = levels(200, 12, 7).into_iter().map(|u| Voltage { u }).collect();
+    let held = simulated(&Lag, 5e-3, inputs, Current { i: 0.5 }, LAG).named("held");
+    let lines = held.clone().hold(Hold::First).named("lines");
+    let cost = |records: &[ExperimentOf<Lag>]| {
+        let problem = Fit::new(&Lag, records).parameters(lag_free()).noise(Current { i: 0.1 }).problem().unwrap();
+        let objective = problem.objective().unwrap();
+        objective.linearize(&objective.start()).unwrap().cost
+    };
+    let (one, other) = (cost(std::slice::from_ref(&held)), cost(std::slice::from_ref(&lines)));
+    assert!((one / other - 1.0).abs() > 1e-3, "the holds differ: {one} {other}");
+    assert!((cost(&[held, lines]) / (one + other) - 1.0).abs() < 1e-12);
 }

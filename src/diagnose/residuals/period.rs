@@ -185,6 +185,17 @@ mod tests {
         assert!(spectrum.density.iter().all(|density| (0.25..3.0).contains(&(density / mean))));
     }
 
+    /// The logarithms of a bell are a parabola: its top is found between the lines, and at most half a line away.
+    #[test]
+    fn the_top_of_a_bell() {
+        let bell =
+            |top: f64| -> Vec<f64> { (0..9).map(|k| 3.0 * (-0.2 * (f64::from(k) - top).powi(2)).exp()).collect() };
+        for top in [4.0, 4.3, 3.8] {
+            assert!((center(&bell(top), 4) - top).abs() < 1e-12, "{top}: {}", center(&bell(top), 4));
+        }
+        assert_eq!([center(&bell(6.0), 4), center(&[1.0; 9], 4)], [4.5, 4.0]);
+    }
+
     /// The definition, sum by sum.
     #[test]
     fn transform_is_fourier() {
