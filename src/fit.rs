@@ -127,10 +127,10 @@ impl<'a, M: Model> Fit<'a, M> {
     /// unknown by more than a tenth of its standard error, where the start cannot be simulated, or where a search that did not
     /// converge had a cost that a finer step changes, it takes 4, 16 and 64 steps per sample, then [`Esdirk`](crate::Esdirk); the estimate
     /// names the method ([`Method::integrator`](crate::estimate::Method)), and is not usable if none is fine enough. A finer step
-    /// stays where a coarser one explains the data better, or as well with other values, which is said. `Esdirk` is stopped where it needs 3,000 steps for a
-    /// sample, or 1,000 for each: such a model is not stiff, but fast, or explodes. A search by one of the finer methods has at
-    /// most 100 trial steps, and begins at the minima found, where there are several starts; a limit of the search's own holds for
-    /// all methods together.
+    /// stays where a coarser one explains the data better, or as well with other values, which is said. `Esdirk` is stopped where it
+    /// needs 3,000 steps for a sample, or 1,000 for each: such a model is not stiff, but fast, or its state grows without bound. A
+    /// search by one of the finer methods has at most 100 trial steps, and begins at the minima found, where there are several
+    /// starts; a limit of the search's own holds for all methods together.
     pub fn integrator(self, integrator: impl Integrator) -> Self {
         Fit { stepping: Stepping::new(integrator), is_default: false, ..self }
     }
@@ -241,8 +241,8 @@ impl<'a, M: Model> Fit<'a, M> {
         self.set(|settings| settings.checkpoint(path, every))
     }
 
-    fn set(self, say: impl FnOnce(Settings<'a>) -> Settings<'a>) -> Self {
-        Fit { settings: say(self.settings), ..self }
+    fn set(self, change: impl FnOnce(Settings<'a>) -> Settings<'a>) -> Self {
+        Fit { settings: change(self.settings), ..self }
     }
 
     /// Estimates the parameters and their uncertainty.

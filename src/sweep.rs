@@ -95,7 +95,7 @@ pub enum Coupling {
 }
 
 /// Called with each window; returns false to stop.
-pub type Visit<'v> = &'v mut dyn FnMut(&mut Window) -> bool;
+pub(crate) type Visit<'v> = &'v mut dyn FnMut(&mut Window) -> bool;
 
 /// The cause of a failure in an experiment.
 pub enum Located {

@@ -24,7 +24,7 @@ impl Problem<'_> {
     }
 
     /// The same; the time limit counts from `begin`. A default method whose step moves the answer, or with which the start
-    /// cannot be simulated, gives way to a finer one.
+    /// cannot be simulated, is followed by finer ones.
     pub(super) fn run_since(&self, begin: Instant) -> Result<Summary, Error> {
         let control = self.control(begin);
         let mut attempt = Attempt::new(self.run_within(begin, &control, Start::declared(self)));

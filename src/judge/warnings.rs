@@ -52,7 +52,7 @@ impl Judgement<'_> {
                 };
                 warnings.push(care(
                     WarningCode::HeldAtBound,
-                    format!("`{name}` is held at its bound {bound} {unit}: the data want it beyond{reaches}"),
+                    format!("`{name}` is held at its bound {bound} {unit}: the cost falls beyond it{reaches}"),
                 ));
             }
         }

@@ -1,4 +1,4 @@
-//! From an estimate and its problem to the plain values of a report. Nothing else of the report knows their types.
+//! From an estimate and its problem to the plain values of a report. No other file of the report uses their types.
 
 use super::Report;
 use super::facts::{Facts, Histogram, OutputFit, Record, Signal};

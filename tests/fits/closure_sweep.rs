@@ -7,7 +7,7 @@ use greybox::layout::{Layout, Quantity};
 use greybox::optimize::Severity;
 use greybox::problem::Settings;
 use greybox::record::{Channel, Initial, Record};
-use greybox::sweep::{Coupling, Piece, Reached, RunError, Seed, Sweep, Visit, Window};
+use greybox::sweep::{Coupling, Piece, Reached, RunError, Seed, Sweep, Window};
 use greybox::*;
 use std::sync::Arc;
 
@@ -44,7 +44,12 @@ fn chained(found: &Value, slopes: &[f64], seeds: &[Seed], n: usize, m: usize) ->
 }
 
 impl Closures {
-    fn run_one(&self, piece: &Piece<'_>, seeds: &[Seed], visit: Visit<'_>) -> Result<Reached, RunError> {
+    fn run_one(
+        &self,
+        piece: &Piece<'_>,
+        seeds: &[Seed],
+        visit: &mut dyn FnMut(&mut Window) -> bool,
+    ) -> Result<Reached, RunError> {
         let (n, m) = (self.layout.states.len(), self.layout.parameters.len());
         let mut reached = Reached { carry: piece.carry.to_vec(), slopes: piece.slopes.to_vec() };
         let mut window = Window::new(1, self.layout.outputs.len(), seeds.len(), 50, false);
@@ -86,7 +91,12 @@ impl Sweep for Closures {
     fn coupling(&self) -> Coupling {
         Coupling::Uncut
     }
-    fn run(&self, pieces: &[Piece<'_>], seeds: &[Seed], visit: Visit<'_>) -> Vec<Result<Reached, RunError>> {
+    fn run(
+        &self,
+        pieces: &[Piece<'_>],
+        seeds: &[Seed],
+        visit: &mut dyn FnMut(&mut Window) -> bool,
+    ) -> Vec<Result<Reached, RunError>> {
         pieces.iter().map(|piece| self.run_one(piece, seeds, visit)).collect()
     }
     fn integrator(&self) -> String {

@@ -30,7 +30,7 @@ fn ready(program: &Program, lanes: usize) -> Group {
     for lane in 0..group.lanes() {
         group.set_parameters(lane, &P);
         group.set_step(lane, 1e-4);
-        start(&mut group, &program, lane, &[1.0 + lane as f64, -2.0]);
+        start(&mut group, program, lane, &[1.0 + lane as f64, -2.0]);
     }
     group.prepare();
     group

@@ -84,7 +84,7 @@ pub(super) fn extent(record: &Record) -> String {
     format!("{} over {duration} s{start}, every {step} s; {gaps}", counted(*samples, "sample"))
 }
 
-/// The day that a time stands for, if it counts from 1970 (POSIX time) and lies in this half of the century.
+/// The day of a time that counts from 1970 (POSIX time), if it is in this half of the century.
 fn date(time: f64) -> String {
     /// From 2001 to 2049.
     const LIKELY: core::ops::Range<f64> = 1e9..2.5e9;

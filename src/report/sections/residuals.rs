@@ -62,7 +62,7 @@ fn meanings(failed: &[(String, &Test)]) -> Vec<String> {
     said.chain((left > 0).then(|| format!("{left} more meanings stand with the records."))).collect()
 }
 
-/// The residuals of an output of a record; `id` tells the record from others. Of the plots against signals so many are
+/// The residuals of an output of a record; `id` identifies the record. Of the plots against signals so many are
 /// shown, those with the least probable tests first.
 pub(super) fn of_output(id: &str, record: &Record, fit: &OutputFit, shown: usize) -> Section {
     let of = &fit.residuals;
