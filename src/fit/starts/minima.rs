@@ -92,9 +92,13 @@ impl<'s> End<'s> {
 
     /// Whether another end, not a better one, has the same cost.
     fn costs_as_much_as(&self, other: &End<'_>, comparison: &Comparison) -> bool {
-        let both_exact = [self, other].iter().all(|end| end.search.outcome == Outcome::Exact);
-        let tolerance = self.tolerance().max(other.tolerance());
-        both_exact || comparison.ratio(other.level, self.level) <= 1.0 + tolerance
+        other.cost_ratio(self, comparison) <= 1.0 + self.tolerance().max(other.tolerance())
+    }
+
+    /// How large its cost is relative to that of another end; costs that are both rounding say nothing.
+    fn cost_ratio(&self, to: &End<'_>, comparison: &Comparison) -> f64 {
+        let are_rounding = [self, to].iter().all(|end| end.search.outcome == Outcome::Exact);
+        if are_rounding { 1.0 } else { comparison.ratio(self.level, to.level) }
     }
 
     /// Whether another end of the same cost is at the same place, along what the data determine to first order; the unknowns
@@ -191,7 +195,7 @@ pub(super) fn found(
     let minima = kinds.iter().filter_map(|kind| {
         let end = found[kind.searches[0]].as_ref()?;
         Some(Minimum {
-            cost_ratio: comparison.ratio(end.level, level(best)),
+            cost_ratio: end.cost_ratio(found[best].as_ref()?, &comparison),
             searches: kind.searches.len() as u64,
             undetermined: kind.differing(&found, values).into_iter().map(|j| names[j].clone()).collect(),
             unknowns: named(&end.search.coordinates),
