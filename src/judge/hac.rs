@@ -86,7 +86,7 @@ impl Hac {
             return Some(found);
         };
         let factor = |i: usize| {
-            let certain = if coupled { 0.0 } else { CERTAIN * (2.0 / degrees[i]).sqrt() };
+            let certain = if coupled { 0.0 } else { certain(degrees[i]) };
             factor(stationary.standard_error(i), found.standard_error(i), certain)
         };
         let factors: Vec<f64> = (0..held.len()).map(factor).collect();
@@ -244,6 +244,11 @@ fn bandwidth(one: &DMatrix<f64>, two: &DMatrix<f64>, a: &DMatrix<f64>, count: us
     (andrews.max(longer).ceil() as usize + 1).clamp(1, (count / 2).max(1))
 }
 
+/// By which part a variance with these degrees of freedom is certainly larger than another.
+fn certain(degrees: f64) -> f64 {
+    CERTAIN * (2.0 / degrees).sqrt()
+}
+
 /// By which factor a standard error by moving sums becomes that of stationary errors; one where its variance is larger by more than
 /// this part, or where either is none.
 fn factor(stationary: f64, moving: f64, certain: f64) -> f64 {
@@ -261,6 +266,8 @@ mod tests {
         assert_eq!([factor(3.0, 2.0, 0.0), factor(2.0, 2.0, 0.0), factor(1.9, 2.0, 0.0)], [1.5, 1.0, 1.0]);
         // A variance larger by less than half, and by more.
         assert_eq!([factor(1.7, 2.0, 0.5), factor(1.6, 2.0, 0.5)], [0.85, 1.0]);
+        // The relative standard deviation of a variance is the root of two over its degrees of freedom.
+        assert!((certain(200.0) / (0.1 * CERTAIN) - 1.0).abs() < 1e-12, "{}", certain(200.0));
         assert_eq!([factor(1.0, 0.0, 0.5), factor(0.0, 0.0, 0.5), factor(f64::NAN, 1.0, 0.5)], [1.0; 3]);
     }
 

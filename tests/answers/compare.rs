@@ -2,8 +2,10 @@
 
 use crate::random::Random;
 use greybox::diagnose::{
-    Candidate, Comparison, Resampling, bootstrap, cross_validate, derived, drift, f_test, likelihood_ratio, validate,
+    Candidate, Comparison, Resampling, Test, bootstrap, cross_validate, derived, drift, f_test, likelihood_ratio,
+    tested, validate,
 };
+use greybox::optimize::Severity;
 use greybox::{
     Error, Estimate, Experiment, Fit, Kind, Model, Nothing, Parameter, Scalar, Summary, Time, fixed, free, signals,
 };
@@ -216,4 +218,20 @@ fn prediction_ahead_by_hand() {
     }
     let refused = validate(&estimate, &FirstOrder, &record(2), &[samples]).unwrap_err().to_string();
     assert!(refused.contains("20000 sample(s) ahead makes no sense"), "{refused}");
+}
+
+/// A test that failed is a reason for care, with its meaning; one that passed is none.
+#[test]
+fn failed_tests_are_reasons() {
+    let test = |passed: bool| Test {
+        name: "F test".to_owned(),
+        statistic: 1.0,
+        p_value: 0.5,
+        passed,
+        meaning: format!("passed: {passed}"),
+    };
+    let section = tested("models", [&test(true), &test(false), &test(true)]);
+    let reasons: Vec<_> = section.parts.iter().flat_map(|part| &part.reasons).collect();
+    assert_eq!(reasons.len(), 1, "{reasons:?}");
+    assert!(reasons[0].text.contains("passed: false") && reasons[0].severity == Severity::UsableWithCare);
 }

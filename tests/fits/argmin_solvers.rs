@@ -189,12 +189,12 @@ fn a_checkpoint_goes_on() {
     assert!(refused.contains("delete it"), "{refused}");
 }
 
-/// Looks whether a file is there.
-struct Look(PathBuf, Arc<AtomicU64>);
+/// Takes a file away, and counts how often it was there.
+struct Take(PathBuf, Arc<AtomicU64>);
 
-impl Observe<LeastSquaresState> for Look {
+impl Observe<LeastSquaresState> for Take {
     fn observe_iter(&mut self, _: &LeastSquaresState, _: &KV) -> Result<(), argmin::core::Error> {
-        self.1.fetch_add(u64::from(self.0.exists()), Ordering::Relaxed);
+        self.1.fetch_add(u64::from(std::fs::remove_file(&self.0).is_ok()), Ordering::Relaxed);
         Ok(())
     }
 }
@@ -208,11 +208,17 @@ fn a_checkpoint_is_written_on_the_way() {
     let others: Vec<ExperimentOf<Lag>> = records.iter().take(8).cloned().chain([record(100).named("8")]).collect();
     let fit =
         |records| Fit::new(&Lag, records).parameters(Branch { gain: free(1.0), tau: free(0.1).log() }).noise(SIGMA);
-    let look = Look(path.clone(), seen.clone());
-    let estimate = fit(&records).checkpoint(&path, 1).observe(look, ObserverMode::Always).run().unwrap();
+    let take = Take(path.clone(), seen.clone());
+    let estimate = fit(&records).checkpoint(&path, 1).observe(take, ObserverMode::Always).run().unwrap();
     assert!(seen.load(Ordering::Relaxed) + 1 >= estimate.iterations && estimate.iterations > 2, "{seen:?} {estimate}");
     let refused = fit(&others).checkpoint(&path, 1).run().unwrap_err().to_string();
     assert!(refused.contains("another problem"), "{refused}");
+    // Every thousandth iteration: the first one, and at the end.
+    let (path, seen) = (place("at_the_end.json"), Arc::new(AtomicU64::new(0)));
+    let take = Take(path.clone(), seen.clone());
+    let estimate = fit(&others).checkpoint(&path, 1000).observe(take, ObserverMode::Always).run().unwrap();
+    assert!(path.exists() && seen.load(Ordering::Relaxed) <= 1 && estimate.iterations > 2, "{seen:?} {estimate}");
+    assert_eq!(estimate.method.optimizer, "Levenberg-Marquardt");
 }
 
 #[test]

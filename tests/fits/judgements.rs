@@ -403,3 +403,16 @@ fn a_wrong_shape_is_named() {
     assert!(warning.text.starts_with("the errors of `z` follow from the input `u`"), "{warning:?}");
     assert_eq!(said(&fit(&[good]).run().unwrap(), WarningCode::WrongShape), None);
 }
+
+/// A constant that the model does not have: its errors are larger than those of the mean, and said to be.
+#[test]
+fn worse_than_the_mean() {
+    let mut noise = Noise(4);
+    let inputs: Vec<Voltage> = (0..100).map(|k| Voltage { u: (0.7 * k as f64).sin() }).collect();
+    let outputs = inputs.iter().map(|u| Current { i: 5.0 + 2.0 * u.u + noise.gauss() }).collect();
+    let record = Experiment::new(&Gain, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+    let estimate = Fit::new(&Gain, &record).parameters(Factor { a: free(1.0) }).run().unwrap();
+    let warning = estimate.warnings.iter().find(|warning| warning.code == WarningCode::Unexplained).unwrap();
+    assert!(warning.text.contains("worse than its mean"), "{warning:?}");
+    assert_eq!(warning.severity, Severity::NotUsable);
+}
