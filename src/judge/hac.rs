@@ -14,6 +14,7 @@
 //!
 //! Where these sums do not certainly say more, the standard errors are those of stationary errors ([`stationary`]).
 
+mod joined;
 mod scores;
 mod stationary;
 
@@ -21,6 +22,7 @@ use super::sandwich::{self, Sandwich};
 use crate::information::{Covariance, Information};
 use crate::optimize::Linearization;
 use crate::problem::{Objective, each};
+use joined::joined;
 use nalgebra::{Complex, DMatrix, DVector};
 use scores::{EachScore, Lagged, MovingSums};
 
@@ -86,10 +88,8 @@ impl Hac {
             return Some(found);
         };
         let factor = |i: usize| {
-            let ratio = stationary.standard_error(i) / found.standard_error(i);
             let certain = if coupled { 0.0 } else { CERTAIN * (2.0 / degrees[i]).sqrt() };
-            let taken = ratio.is_finite() && (1.0 + certain) * ratio * ratio >= 1.0;
-            if taken { ratio } else { 1.0 }
+            joined(stationary.standard_error(i) / found.standard_error(i), certain)
         };
         let factors: Vec<f64> = (0..held.len()).map(factor).collect();
         Some(found.scaled(&factors))
