@@ -14,6 +14,7 @@
 //!
 //! Where these sums do not certainly say more, the standard errors are those of stationary errors ([`stationary`]).
 
+mod joined;
 mod scores;
 mod stationary;
 
@@ -21,6 +22,7 @@ use super::sandwich::{self, Sandwich};
 use crate::information::{Covariance, Information};
 use crate::optimize::Linearization;
 use crate::problem::{Objective, each};
+use joined::joined;
 use nalgebra::{Complex, DMatrix, DVector};
 use scores::{EachScore, Lagged, MovingSums};
 
@@ -87,7 +89,7 @@ impl Hac {
         };
         let factor = |i: usize| {
             let certain = if coupled { 0.0 } else { certain(degrees[i]) };
-            factor(stationary.standard_error(i), found.standard_error(i), certain)
+            joined(stationary.standard_error(i) / found.standard_error(i), certain)
         };
         let factors: Vec<f64> = (0..held.len()).map(factor).collect();
         Some(found.scaled(&factors))
@@ -249,26 +251,14 @@ fn certain(degrees: f64) -> f64 {
     CERTAIN * (2.0 / degrees).sqrt()
 }
 
-/// By which factor a standard error by moving sums becomes that of stationary errors; one where its variance is larger by more than
-/// this part, or where either is none.
-fn factor(stationary: f64, moving: f64, certain: f64) -> f64 {
-    let ratio = stationary / moving;
-    let taken = ratio.is_finite() && (1.0 + certain) * ratio * ratio >= 1.0;
-    if taken { ratio } else { 1.0 }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// The relative standard deviation of a variance is the root of two over its degrees of freedom.
     #[test]
-    fn stationary_errors_are_taken_but_for_a_certain_difference() {
-        assert_eq!([factor(3.0, 2.0, 0.0), factor(2.0, 2.0, 0.0), factor(1.9, 2.0, 0.0)], [1.5, 1.0, 1.0]);
-        // A variance larger by less than half, and by more.
-        assert_eq!([factor(1.7, 2.0, 0.5), factor(1.6, 2.0, 0.5)], [0.85, 1.0]);
-        // The relative standard deviation of a variance is the root of two over its degrees of freedom.
+    fn a_certain_difference_of_variances() {
         assert!((certain(200.0) / (0.1 * CERTAIN) - 1.0).abs() < 1e-12, "{}", certain(200.0));
-        assert_eq!([factor(1.0, 0.0, 0.5), factor(0.0, 0.0, 0.5), factor(f64::NAN, 1.0, 0.5)], [1.0; 3]);
     }
 
     /// One series: `1 + 3 a` (Kendall, Biometrika 41 (1954) 403). Two alike: `1 + 2 a + 2 a`, by the eigenvalues' sum.

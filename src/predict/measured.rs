@@ -13,6 +13,8 @@ const ITERATIONS: usize = 50;
 const HALVINGS: usize = 30;
 /// Damping of states that the outputs do not give, relative to the largest column of slopes.
 const DAMPING: f64 = 1e-6;
+/// Outputs that differ from the measured ones by less than this part are as measured.
+const MET: f64 = 1e-6;
 /// A state of which a larger part than this comes from the damping is not given.
 const GIVEN: f64 = 0.01;
 
@@ -101,11 +103,14 @@ impl Place<'_> {
             (x, at) = next?;
             let size = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
             if iteration > 0 && size(&step) <= 1e-12 * size(&x).max(f64::MIN_POSITIVE) {
-                return Ok(Guess { state: x, open });
+                // Where the outputs cannot be as measured (noise beyond where they saturate), steps led to where nothing moves them.
+                let met = at.errors.iter().zip(y).all(|(error, y)| error.is_nan() || error.abs() <= MET * y.abs());
+                let kept = |(x, open): (f64, &bool)| if met || !open { x } else { from };
+                return Ok(Guess { state: x.into_iter().zip(&open).map(kept).collect(), open });
             }
         }
-        // A start near the measurements, which determine nothing for certain.
-        Ok(Guess { state: x, open: vec![true; n] })
+        // The steps may have led anywhere.
+        Ok(Guess { state: vec![from; n], open: vec![true; n] })
     }
 
     fn moved(&self, x: &[f64], step: &[f64], y: &[f64]) -> Result<(Vec<f64>, Slopes), String> {

@@ -45,6 +45,46 @@ impl Model for Together {
     }
 }
 
+signals! { pub struct Acid { x: "mol/l" } }
+signals! { pub struct Meter { ph: "1" } }
+signals! { pub struct Titration { rate: "1/s", height: "1", width: "l/mol" } }
+
+/// A stirred vessel with a meter that saturates at 4 and at 10.
+struct Vessel;
+
+impl Model for Vessel {
+    type State = Acid;
+    type Input = Force;
+    type Output = Meter;
+    type Parameters = Titration;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Acid<S>, u: &Force<S>, p: &Titration<S>) -> Acid<S> {
+        Acid { x: (u.f - x.x) * p.rate }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Acid<S>, _u: &Force<S>, p: &Titration<S>) -> Meter<S> {
+        Meter { ph: p.height * ((x.x - 1.0) * p.width).tanh() + 7.0 }
+    }
+}
+
+/// A first measurement beyond where the output saturates, by its noise, leaves the state at zero: Newton's steps towards it led to
+/// -1e9 and farther, where nothing has an influence on the output.
+#[test]
+fn a_measurement_beyond_saturation_leads_nowhere() {
+    let inputs: Vec<Force> = (0..300).map(|k| Force { f: [0.4, 1.5, 0.9, 1.9, 1.1][k / 12 % 5] }).collect();
+    let (truth, time) = (Titration { rate: 0.3, height: 3.0, width: 2.0 }, Time::Uniform { start: 0.0, step: 0.2 });
+    let run =
+        simulate(&Vessel, &truth, &Acid { x: 0.3 }, time.clone(), &inputs).unwrap().with_noise(Meter { ph: 0.1 }, 3);
+    let mut outputs: Vec<Meter> = run.outputs.clone();
+    outputs[0].ph = 3.9;
+    let record = Experiment::new(&Vessel, time, inputs, outputs).unwrap();
+    let start = Titration { rate: free(0.4), height: free(2.5), width: free(1.6) };
+    let fit = Fit::new(&Vessel, &record).parameters(start).run().unwrap();
+    assert!(fit.unknowns[3].start == 0.0 && fit.severity() < Severity::NotUsable, "{fit}");
+    // Four standard errors for three parameters.
+    for (unknown, truth) in fit.unknowns.iter().zip(Titration::into_array(truth)) {
+        assert!((unknown.value - truth).abs() < 4.0 * unknown.knowledge.standard_error().unwrap(), "{fit}");
+    }
+}
+
 /// Two tanks, one above the other, the lower level measured.
 struct Tanks;
 
