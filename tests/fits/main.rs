@@ -9,6 +9,7 @@ mod closed_forms;
 mod closure_sweep;
 #[path = "../common/mod.rs"]
 mod common;
+mod contradictions;
 mod declared;
 mod extremes;
 mod far_starts;

@@ -1,0 +1,129 @@
+#![cfg(feature = "std")]
+//! What contradicts the model, and what it does not explain: outputs, halves and shapes that differ, noise of another size.
+
+use crate::common::*;
+use crate::judgements::{Drive, Factor, Gain, Twice, edited, fit, moving, record, said};
+use greybox::optimize::Severity;
+use greybox::*;
+
+/// Outputs with gains that differ by 30 %: the parameter of each alone is named, by its regression, and how far they are apart.
+#[test]
+fn outputs_that_contradict_each_other_are_named() {
+    let record = record(300, (2.0, 2.6), 0.05, moving);
+    let (mut y, mut z, mut uu, mut ww) = (0.0, 0.0, 0.0, 0.0);
+    for (u, out) in record.inputs().zip(record.outputs()) {
+        (y, z, uu, ww) = (y + u.u * out.y, z + u.w * out.z, uu + u.u * u.u, ww + u.w * u.w);
+    }
+    let estimate = fit(std::slice::from_ref(&record)).run().unwrap();
+    let warning = said(&estimate, WarningCode::OutputsContradict).unwrap();
+    assert_eq!(warning.severity, Severity::NotUsable);
+    let (one, two) = (y / uu, z / ww);
+    println!("{}", warning.text);
+    assert!(warning.text.starts_with(&format!("`a` is {one:.3} +- ")), "{one} {}", warning.text);
+    assert!(warning.text.contains("by `y` alone and") && warning.text.contains("by `z` alone ("), "{}", warning.text);
+    assert!(warning.text.contains(&format!("and {two:.3} +- ")), "{two} {}", warning.text);
+    let apart = 100.0 * (two - one) / estimate.parameters.a;
+    assert!(warning.text.contains(&format!("({apart:.0} % apart;")), "{apart} {}", warning.text);
+    let agreed = self::record(300, (2.0, 2.0), 0.05, moving);
+    assert!(said(&fit(&[agreed]).run().unwrap(), WarningCode::OutputsContradict).is_none());
+}
+
+/// A gain that changes in the middle of the record is named with its value in each half.
+#[test]
+fn halves_that_contradict_each_other_are_named() {
+    let inputs: Vec<Voltage> = levels(800, 20, 3).into_iter().map(|u| Voltage { u }).collect();
+    let run = |gain: f64, start: f64, half: std::ops::Range<usize>| {
+        simulated(&Lag, 5e-3, inputs[half].to_vec(), Current { i: start }, Branch { gain, tau: 0.05 })
+    };
+    let first = run(2.0, 0.0, 0..401);
+    let border = first.outputs().last().unwrap().i;
+    let second = run(2.4, border, 400..800);
+    let mut noise = Noise(5);
+    let outputs = first.outputs().take(400).chain(second.outputs());
+    let outputs = outputs.map(|y| Current { i: y.i + 0.01 * noise.gauss() }).collect();
+    let record = Experiment::new(&Lag, Time::Uniform { start: 0.0, step: 5e-3 }, inputs.clone(), outputs).unwrap();
+    let parameters = Branch { gain: free(1.5), tau: free(0.08) };
+    let estimate = Fit::new(&Lag, &record).parameters(parameters).run().unwrap();
+    let warning = estimate.warnings.iter().find(|warning| warning.code == WarningCode::HalvesContradict);
+    let warning = warning.unwrap_or_else(|| panic!("{estimate}"));
+    let value = |by: &str| -> f64 {
+        let before = warning.text.split(by).next().unwrap();
+        let number = before.rsplit(" +- ").nth(1).unwrap().rsplit(' ').next().unwrap();
+        number.parse().unwrap()
+    };
+    // Of 400 samples with errors of 0.01 each: far below a hundredth; the other half's initial state is the model's.
+    assert!((value(" by the first half") - 2.0).abs() < 0.05, "{}", warning.text);
+    assert!((value(" by the second half") - 2.4).abs() < 0.05, "{}", warning.text);
+    assert_eq!(warning.severity, Severity::UsableWithCare, "{}", warning.text);
+}
+
+/// Two outputs, each known by eighty errors of 0.1 across its input of one: their gains differ by five standard errors of the
+/// difference, `0.1 sqrt(2 / 79)`. The chance of as much, chi-squared of 25 with one degree of freedom, is 5.7e-7.
+#[test]
+fn outputs_contradict_by_their_difference() {
+    let (u, e) = ([1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0], [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0]);
+    let apart = 5.0 * 0.1 * (2.0f64 / 79.0).sqrt();
+    let inputs = (0..80).map(|k| Drive { u: u[k % 8], w: u[k % 8] }).collect();
+    let output = |k: usize| {
+        let (u, e) = (u[k % 8], 0.1 * e[k % 8]);
+        Pair { y: 2.0 * u + e, z: (2.0 + apart) * u - e }
+    };
+    let time = Time::Uniform { start: 0.0, step: 1.0 };
+    let record = Experiment::new(&Twice, time, inputs, (0..80).map(output).collect()).unwrap();
+    let estimate = fit(std::slice::from_ref(&record)).run().unwrap();
+    let warning = said(&estimate, WarningCode::OutputsContradict).unwrap();
+    assert!(warning.text.contains("chi-square p = 5.7e-7"), "{}", warning.text);
+}
+
+/// Intervals by a noise that was given too small are too narrow, by one that was given too large too wide.
+#[test]
+fn intervals_of_a_wrong_noise() {
+    let record = record(200, (2.0, 2.0), 0.1, moving);
+    for (sigma, word) in [(0.03, "too narrow"), (0.3, "too wide")] {
+        let estimate = fit(std::slice::from_ref(&record)).noise(Pair { y: sigma, z: sigma }).run().unwrap();
+        let warning = said(&estimate, WarningCode::GivenNoise).unwrap();
+        assert!(warning.text.contains(word), "{warning:?}");
+    }
+}
+
+/// The output whose errors follow an input, and that input.
+#[test]
+fn a_wrong_shape_is_named() {
+    let good = record(400, (2.0, 2.0), 0.05, moving);
+    let bent = |k: usize, y: Pair| Pair { z: y.z + 0.3 * moving(k).u * moving(k).u, ..y };
+    let estimate = fit(&[edited(&good, bent)]).run().unwrap();
+    let warning = said(&estimate, WarningCode::WrongShape).unwrap();
+    assert!(warning.text.starts_with("the errors of `z` follow from the input `u`"), "{warning:?}");
+    assert_eq!(said(&fit(&[good]).run().unwrap(), WarningCode::WrongShape), None);
+}
+
+/// A constant that the model does not have: its errors are larger than those of the mean, and said to be.
+#[test]
+fn worse_than_the_mean() {
+    let mut noise = Noise(4);
+    let inputs: Vec<Voltage> = (0..100).map(|k| Voltage { u: (0.7 * k as f64).sin() }).collect();
+    let outputs = inputs.iter().map(|u| Current { i: 5.0 + 2.0 * u.u + noise.gauss() }).collect();
+    let record = Experiment::new(&Gain, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+    let estimate = Fit::new(&Gain, &record).parameters(Factor { a: free(1.0) }).run().unwrap();
+    let warning = estimate.warnings.iter().find(|warning| warning.code == WarningCode::Unexplained).unwrap();
+    assert!(warning.text.contains("worse than its mean"), "{warning:?}");
+    assert_eq!(warning.severity, Severity::NotUsable);
+}
+
+/// An input and errors across it, eight samples again and again, of which the input explains three tenths: chance with 16 samples
+/// (F of 1 and 14 degrees of freedom is 6, at a level of 3 %), and none with 80 (F of 1 and 78 is 33).
+#[test]
+fn what_chance_explains_is_not_explained() {
+    let u = [1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0];
+    let e = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0];
+    let of = |samples: usize| {
+        let inputs: Vec<Voltage> = (0..samples).map(|k| Voltage { u: u[k % 8] }).collect();
+        let y = |k: usize| Current { i: 0.3f64.sqrt() * u[k % 8] + 0.7f64.sqrt() * e[k % 8] };
+        let time = Time::Uniform { start: 0.0, step: 1.0 };
+        let record = Experiment::new(&Gain, time, inputs, (0..samples).map(y).collect()).unwrap();
+        let estimate = Fit::new(&Gain, &record).parameters(Factor { a: free(1.0) }).run().unwrap();
+        assert!((estimate.parameters.a - 0.3f64.sqrt()).abs() < 1e-9, "{estimate}");
+        estimate.warnings.iter().find(|warning| warning.code == WarningCode::Unexplained).map(|one| one.severity)
+    };
+    assert_eq!((of(16), of(80)), (Some(Severity::NotUsable), None));
+}
