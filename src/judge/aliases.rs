@@ -168,7 +168,7 @@ mod tests {
         assert_eq!(interval(&[even.clone(), record(uniform(0.3), &[0, 3, 6])]), Some(3.0 * 0.3));
         assert_eq!(interval(&[record(uniform(0.5), &[3])]), None);
         let stamps = |part: f64| (0..40).map(|k| f64::from(k) + part * f64::from(k * k % 3)).collect::<Vec<f64>>();
-        assert_eq!(interval(&[record(Time::Stamps(stamps(0.0).into()), &[0, 5, 15])]), Some(5.0));
-        assert_eq!(interval(&[even, record(Time::Stamps(stamps(0.3).into()), &[0, 5])]), None);
+        assert_eq!(interval(&[record(Time::Stamps(stamps(0.0)), &[0, 5, 15])]), Some(5.0));
+        assert_eq!(interval(&[even, record(Time::Stamps(stamps(0.3)), &[0, 5])]), None);
     }
 }
