@@ -39,11 +39,13 @@ impl Autocorrelation {
     /// As if the values of the other had followed.
     pub fn follow(&mut self, next: &Autocorrelation) {
         let lags = self.sums.len() - 1;
-        for k in 1..=lags {
-            for (e, before) in next.first.iter().zip(&self.values[lags - k..lags]) {
+        for (j, e) in next.first.iter().enumerate() {
+            // From the lag that reaches the last value of these.
+            let sums = self.sums[j + 1..].iter_mut().zip(&mut self.squares[j + 1..]);
+            for ((sum, square), before) in sums.zip(self.values[j..lags].iter().rev()) {
                 let product = e * before;
-                self.sums[k] += product;
-                self.squares[k] += product * product;
+                *sum += product;
+                *square += product * product;
             }
         }
         self.append(next);

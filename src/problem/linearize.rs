@@ -84,8 +84,8 @@ impl Objective<'_> {
         values: &[Values],
         guess: Option<&Borders>,
     ) -> Result<Triangulation, Infeasible> {
-        let jobs: Vec<Job<'_>> =
-            (0..self.experiments()).flat_map(|e| self.linear_jobs(e, &values[e], coordinates, guess)).collect();
+        let mut jobs: Vec<Job<'_>> = Vec::with_capacity(self.problem.cuts.segments.iter().map(Vec::len).sum());
+        (0..self.experiments()).for_each(|e| jobs.extend(self.linear_jobs(e, &values[e], coordinates, guess)));
         let parts = in_batches(&jobs, |_, jobs| parts(jobs))
             .map_err(|(job, error)| self.infeasible(jobs[job].experiment, error))?;
         let mut parts = parts.into_iter();
