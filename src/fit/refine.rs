@@ -81,7 +81,7 @@ impl Attempt {
     /// start of the problem; `None` if that method's step would decide the cost there, too, and where no trial step is left of so
     /// many for all methods.
     pub fn start(&self, finer: &Problem<'_>, most: u64, control: &Control) -> Option<Start> {
-        let trials = most - self.found.as_ref().map_or(0, |found| found.iterations).min(most);
+        let trials = most.saturating_sub(self.found.as_ref().map_or(0, |found| found.iterations));
         if trials == 0 {
             return None;
         }
@@ -143,8 +143,8 @@ fn explains_as_well(coarser: &[Coarser], deviance: f64, found: &Summary) -> Opti
     let (coarser, (i, errors)) = moved.max_by(|a, b| a.1.1.total_cmp(&b.1.1)).filter(|(_, (_, e))| *e > MOVED)?;
     let text = format!(
         "the step decides `{}`, and the data do not tell which one is right: {} gives {} {}, {} standard errors away, and explains \
-             them as well (-2 ln of the likelihood differs by {}); the estimate is that of the finer step, which is closer to the \
-             equations; for a record that was simulated, choose its step with Fit::integrator",
+         them as well (-2 ln of the likelihood differs by {}); the estimate is that of the finer step, which is closer to the \
+         equations; for a record that was simulated, choose its step with Fit::integrator",
         found.unknowns[i].name,
         coarser.integrator,
         number(coarser.values[i], 5),

@@ -39,7 +39,7 @@ pub enum Function {
 
 impl Function {
     /// All of them; machine code calls them by number.
-    #[cfg(feature = "jit")]
+    #[cfg(any(test, feature = "jit"))]
     pub(crate) const ALL: [Function; 28] = [
         Function::Recip,
         Function::Sqrt,

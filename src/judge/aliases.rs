@@ -12,18 +12,18 @@ use crate::record::{Record, Time};
 use nalgebra::{DMatrix, Schur};
 use std::f64::consts::{PI, TAU};
 
-/// Fewer samples a period than this are few: the other frequency is less than 1.5 times this one, or above two thirds of it.
+/// An oscillation with fewer samples a period than this can be taken for its alias, whose frequency is then within a factor of 1.5.
 const SAMPLES: f64 = 2.5;
 /// What is left of an oscillation after an interval, at the least, for the next sample to show it.
 const LEFT: f64 = 0.1;
-/// An unknown may be off by this factor, as far as bounds leave it: as far as searches from several starts go.
+/// Factor within which unknowns may be off where no bound is nearer: that within which `Fit::starts` draws.
 const REACH: f64 = 10.0;
 /// Relative change of a parameter for the slope of a frequency.
 const CHANGE: f64 = 1e-4;
 /// So many points along the records are examined, and so many steps of time.
 const POINTS: usize = 8;
 const STEPS: usize = 1000;
-/// Steps of time whose middle half spreads by a larger part are uneven.
+/// Sampling is uneven where the quartiles of its steps of time differ by more than this part of the median.
 const EVEN: f64 = 0.1;
 const ITERATIONS: usize = 10_000;
 

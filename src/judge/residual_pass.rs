@@ -85,8 +85,9 @@ impl<'s> Sums<'s> {
         }
     }
 
-    /// Appends the errors in `run`, multiplied by the roots of their weights, to the sequence of their output. Measurements that
-    /// count are neighbors however many samples lie between them, except where predictions restart so many samples before.
+    /// Appends the errors in `run`, multiplied by the roots of their weights, to the sequence of their output. Lags count
+    /// measurements of weight above zero, however many samples lie between them; they count samples where predictions restart a
+    /// number of samples before, which correlates errors over so many samples.
     fn follow(&mut self, window: &Window, j: usize, lane: usize) {
         let weighted = self.objective.is_weighted();
         if weighted {

@@ -2,7 +2,7 @@
 
 use crate::dual::Dual;
 use crate::functions::Functions;
-use crate::information::Information;
+use crate::information::{Information, norm};
 use crate::integrate::Duals;
 use crate::layout::{Kind, Layout, Quantity};
 use crate::numeral::exact;
@@ -13,8 +13,8 @@ const ITERATIONS: usize = 50;
 const HALVINGS: usize = 30;
 /// Damping of states that the outputs do not give, relative to the largest column of slopes.
 const DAMPING: f64 = 1e-6;
-/// Outputs that differ from the measured ones by less than this part are as measured.
-const MET: f64 = 1e-6;
+/// A state whose slopes are below this part of those at the start moves the outputs no more.
+const LOST: f64 = 1e-6;
 /// A state of which a larger part than this comes from the damping is not given.
 const GIVEN: f64 = 0.01;
 
@@ -86,6 +86,10 @@ impl Place<'_> {
             return Ok(Guess { state: x, open: vec![] });
         }
         let mut at = self.slopes(&x, y)?;
+        let influence = |at: &Slopes, j: usize| {
+            norm(at.rows.iter().zip(&at.errors).filter(|(_, error)| error.is_finite()).map(|(row, _)| row[j]))
+        };
+        let first: Vec<f64> = (0..n).map(|j| influence(&at, j)).collect();
         for iteration in 0..ITERATIONS {
             let mut information = Information::new(n);
             for (row, &error) in at.rows.iter().zip(&at.errors).filter(|(_, error)| error.is_finite()) {
@@ -101,12 +105,12 @@ impl Place<'_> {
                 next = self.moved(&x, &step, y);
             }
             (x, at) = next?;
-            let size = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
+            let size = |v: &[f64]| norm(v.iter().copied());
             if iteration > 0 && size(&step) <= 1e-12 * size(&x).max(f64::MIN_POSITIVE) {
-                // Where the outputs cannot be as measured (noise beyond where they saturate), steps led to where nothing moves them.
-                let met = at.errors.iter().zip(y).all(|(error, y)| error.is_nan() || error.abs() <= MET * y.abs());
-                let kept = |(x, open): (f64, &bool)| if met || !open { x } else { from };
-                return Ok(Guess { state: x.into_iter().zip(&open).map(kept).collect(), open });
+                // Towards a measurement that no state gives (noise beyond where an output saturates), steps lead to where the
+                // state moves nothing any more.
+                let lost = |j: usize| open[j] && influence(&at, j) < LOST * first[j];
+                return Ok(Guess { state: (0..n).map(|j| if lost(j) { from } else { x[j] }).collect(), open });
             }
         }
         // The steps may have led anywhere.

@@ -45,6 +45,36 @@ impl Model for Together {
     }
 }
 
+/// The same with two sensors of the sum.
+struct Twice;
+
+impl Model for Twice {
+    type State = Motion;
+    type Input = Force;
+    type Output = Speeds;
+    type Parameters = Spring;
+    fn derivative<S: Scalar>(&self, t: S, x: &Motion<S>, u: &Force<S>, p: &Spring<S>) -> Motion<S> {
+        Oscillator.derivative(t, x, u, p)
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, _u: &Force<S>, _p: &Spring<S>) -> Speeds<S> {
+        Speeds { a: x.x + x.v, b: x.x + x.v }
+    }
+}
+
+/// Two sensors that differ by their noise give the sum of two states to their mean, which both states share.
+#[test]
+fn sensors_that_differ_give_their_mean() {
+    let inputs: Vec<Force> = (0..200).map(|k| Force { f: f64::from(k / 20 % 3) }).collect();
+    let (truth, time) = (Spring { c: 2.0, d: 0.4 }, Time::Uniform { start: 0.0, step: 0.1 });
+    let run = simulate(&Twice, &truth, &Motion { x: 0.5, v: 0.6 }, time.clone(), &inputs).unwrap();
+    let mut outputs = run.with_noise(Speeds { a: 0.1, b: 0.1 }, 5).outputs;
+    outputs[0] = Speeds { a: 1.0, b: 1.2 };
+    let record = Experiment::new(&Twice, time, inputs, outputs).unwrap();
+    let fit = Fit::new(&Twice, &record).parameters(Spring { c: free(1.5), d: free(0.5) }).run().unwrap();
+    // The damping of states that are not given, a millionth, leaves its square.
+    assert!(fit.unknowns[2..].iter().all(|state| (state.start - 0.55).abs() < 1e-9), "{fit}");
+}
+
 signals! { pub struct Acid { x: "mol/l" } }
 signals! { pub struct Meter { ph: "1" } }
 signals! { pub struct Titration { rate: "1/s", height: "1", width: "l/mol" } }

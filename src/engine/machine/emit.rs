@@ -122,8 +122,8 @@ impl<'a> Emitter<'a> {
         events
     }
 
-    /// One sample, before which these carried numbers stand in registers alone. After it they stand in any registers, or in
-    /// their slots; the other carried ones in their slots, before and after.
+    /// One sample. Before it, each carried number of this list stands in its register and not in its slot; after it, each stands
+    /// in some register or in its slot. All other carried numbers stand in their slots, before and after.
     fn sample(&mut self, carried: &[(Slot, u8)]) -> Emitted {
         let events = self.events();
         let reads = |event: &Event<'_>| -> Vec<Slot> {
@@ -181,13 +181,15 @@ impl<'a> Emitter<'a> {
         let missing: Vec<(Slot, u8)> =
             carried.iter().copied().filter(|(slot, _)| self.registers.of(*slot).is_none()).collect();
         while !moves.is_empty() {
-            // One whose target no other reads; if they go around in a circle, that of the first one is freed.
+            // A move into a register that no other move reads from. Where all are read from, the moves form circles: one is opened
+            // by a copy of what its first move reads.
             let (from, to) = match moves.iter().position(|(_, to)| moves.iter().all(|(from, _)| from != to)) {
                 Some(free) => moves.swap_remove(free),
                 None => {
                     let used = |register: &u8| {
                         carried.iter().any(|(_, to)| to == register) || moves.iter().any(|(from, _)| from == register)
                     };
+                    // There is one: those of a circle are targets, which are half of the registers at most.
                     let spare = (0..self.unit.registers).find(|register| !used(register)).unwrap_or(0);
                     let from = std::mem::replace(&mut moves[0].0, spare);
                     (from, spare)

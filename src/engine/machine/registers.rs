@@ -50,8 +50,9 @@ impl Registers {
         next != NEVER && open.any(|(slot, _)| slot.is_none_or(later))
     }
 
-    /// A register for something new, held: a free one, or that of the number in memory that is read last, or of that of all
-    /// numbers. A number that is in memory is read from there at next to no cost, a store costs as much as an operation.
+    /// A register for something new, held: a free one; else that of a number which is in memory, too, the one that is read last; else
+    /// that of the number which is read last, which is to be stored. A store costs as much as an operation, an operand in memory
+    /// next to nothing.
     pub fn take(&mut self) -> Option<Freed> {
         let last_read = |(_, slot): &(usize, &Option<Slot>)| match slot {
             None => (true, NEVER, true),
@@ -104,7 +105,7 @@ impl Registers {
         self.register_of[usize::from(slot)]
     }
 
-    /// The first slots that stand in registers, no more than leave half of these free.
+    /// Of the slots below this number those that stand in registers, with their registers; no more than half of the registers.
     pub fn first(&self, slots: usize) -> Vec<(Slot, u8)> {
         let there = (0..).zip(&self.register_of[..slots]).filter_map(|(slot, register)| register.map(|r| (slot, r)));
         there.take(self.slot_in.len() / 2).collect()

@@ -1,10 +1,10 @@
 //! The same bits from every engine: the variable that chooses one is set for runs of this very program.
 
-use super::random::{FUNCTIONS, FUNCTIONS2, Random, expression};
+use super::random::{FUNCTIONS2, Random, expression};
 use super::steps::{Pmsm, simulation, start};
 use super::tables::Mapped;
 use greybox::engine::{Program, Sampling, Trajectories};
-use greybox::graph::{Graph, Id, Leaf, Seed};
+use greybox::graph::{Function, Graph, Id, Leaf, Seed};
 use greybox::pmsm::{Machine, Salient};
 use greybox::{
     Hold, Model, Rk4,
@@ -115,7 +115,7 @@ fn digest() -> u64 {
             of_expression(&mut digest, &mut random, graph, &[root]);
         }
     };
-    FUNCTIONS.iter().for_each(|function| each(&|graph, x, _| graph.function(*function, x)));
+    Function::ALL.iter().for_each(|function| each(&|graph, x, _| graph.function(*function, x)));
     FUNCTIONS2.iter().for_each(|function| each(&|graph, x, y| graph.function2(*function, x, y)));
     digest.0
 }

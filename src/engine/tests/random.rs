@@ -10,36 +10,6 @@ use greybox::{Dual, recurrence::Recurrence, scalar::Comparison};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-pub const FUNCTIONS: [Function; 28] = [
-    Function::Recip,
-    Function::Sqrt,
-    Function::Cbrt,
-    Function::Exp,
-    Function::Exp2,
-    Function::ExpM1,
-    Function::Ln,
-    Function::Ln1p,
-    Function::Log2,
-    Function::Log10,
-    Function::Sin,
-    Function::Cos,
-    Function::Tan,
-    Function::Asin,
-    Function::Acos,
-    Function::Atan,
-    Function::Sinh,
-    Function::Cosh,
-    Function::Tanh,
-    Function::Asinh,
-    Function::Acosh,
-    Function::Atanh,
-    Function::Abs,
-    Function::Signum,
-    Function::Floor,
-    Function::Ceil,
-    Function::Round,
-    Function::Trunc,
-];
 pub const FUNCTIONS2: [Function2; 6] =
     [Function2::Pow, Function2::Atan2, Function2::Hypot, Function2::Max, Function2::Min, Function2::Copysign];
 const COMPARISONS: [Comparison; 3] = [Comparison::Less, Comparison::LessOrEqual, Comparison::Equal];
@@ -91,7 +61,7 @@ pub fn expression(random: &mut Random, size: usize) -> (Graph, Vec<Id>) {
             9 => graph.div(a, b),
             10 => graph.neg(a),
             11 => graph.power(a, random.below(9) as i32 - 4),
-            12 | 13 => graph.function(FUNCTIONS[random.below(28)], a),
+            12 | 13 => graph.function(Function::ALL[random.below(28)], a),
             14 => graph.function2(FUNCTIONS2[random.below(6)], a, b),
             _ => graph.select(COMPARISONS[random.below(3)], a, b, c, d),
         };
@@ -240,7 +210,7 @@ fn every_function_has_the_slopes_of_duals() {
             compared += agrees(&graph, &[root], &points, false);
         }
     };
-    for function in FUNCTIONS {
+    for function in Function::ALL {
         each(&|graph, x, _| graph.function(function, x));
     }
     for function in FUNCTIONS2 {

@@ -10,8 +10,9 @@ use std::sync::Arc;
 /// How a search ended.
 type Ended = Result<SearchEnd, NoEnd>;
 
-/// The best end of one search from each minimum, which counts as often as searches had ended there, and from each start where the
-/// coarser method failed; other searches that had found no minimum are not run again.
+/// Searches once from each minimum that the coarser method found, and from each start that it could not evaluate; returns the best
+/// end. The end of a search from a minimum counts for all searches that had ended in it. Searches that had been run without finding
+/// a minimum stay as they were.
 pub(super) fn search_again(
     plain: &Objective<'_>,
     optimizer: &Arc<dyn Optimizer>,
@@ -19,11 +20,12 @@ pub(super) fn search_again(
 ) -> Result<SearchEnd, Error> {
     let rows = &plain.problem.unknowns.row;
     let place = |named: &[(String, f64)]| -> Vec<f64> {
-        let coordinate = |((_, value), (row, (lower, upper))): (&(String, f64), (_, (f64, f64)))| {
-            let row: &crate::problem::Free = row;
-            row.parameter.transform.to_coordinate(*value).max(lower).min(upper)
-        };
-        named.iter().zip(rows.iter().zip(plain.problem.unknowns.bounds())).map(coordinate).collect()
+        let coordinates = named.iter().zip(rows.iter().zip(plain.problem.unknowns.bounds()));
+        coordinates
+            .map(|((_, value), (row, (lower, upper)))| {
+                row.parameter.transform.to_coordinate(*value).max(lower).min(upper)
+            })
+            .collect()
     };
     // In the order of the starts as far as it is known: what comes first is that of the declared one.
     let (broken, lost): (Vec<&FailedStart>, Vec<_>) = earlier.failed.iter().partition(|failed| !failed.evaluated);

@@ -1,8 +1,8 @@
 //! Standard errors where moving sums and stationary errors differ.
 
 /// The standard error to report relative to that of the moving sums, from that of stationary errors relative to the same: the
-/// latter, unless the variance of the moving sums exceeds it by more than the part `certain`. About there it goes from one to the
-/// other over half of that part, so that rounding decides nothing.
+/// latter, unless the variance of the moving sums exceeds it by more than the part `certain`. Between three quarters and five
+/// quarters of that part the variance is interpolated, so that no jump makes rounding decide.
 pub(super) fn joined(ratio: f64, certain: f64) -> f64 {
     let square = ratio * ratio;
     match 1.0 / square - 1.0 {
