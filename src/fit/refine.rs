@@ -52,7 +52,7 @@ impl Coarser {
     /// The unknown that is farthest from that of an estimate: its number, and how many standard errors.
     fn farthest(&self, found: &Summary) -> Option<(usize, f64)> {
         let errors = |(i, (unknown, value)): (usize, (&Unknown, &f64))| {
-            let error = unknown.knowledge.standard_error().filter(|error| *error > 0.0)?;
+            let error = unknown.knowledge.standard_error()?;
             Some((i, (unknown.value - value).abs() / error))
         };
         let all = found.unknowns.iter().zip(&self.values).enumerate().filter_map(errors);

@@ -101,7 +101,7 @@ fn started(unknowns: &[Unknown]) -> impl Iterator<Item = (&Unknown, f64)> {
 
 /// Parameters of the opposite sign than their start.
 fn opposite(unknowns: &[Unknown]) -> Vec<Warning> {
-    let turned = started(unknowns).filter(|(unknown, ratio)| *ratio < 0.0 && !holds_zero(unknown));
+    let turned = started(unknowns).filter(|(unknown, ratio)| ratio.is_sign_negative() && !holds_zero(unknown));
     let one = |(unknown, _): (&Unknown, f64)| {
         let Unknown { name, value, start, unit, .. } = unknown;
         let text = format!(

@@ -390,12 +390,16 @@ fn a_noise_level_has_the_degrees_of_freedom_of_its_own_variance() {
             (upper - lower) / 2.0 / standard_error,
             (upper / lower).ln() / 2.0,
             uneven,
+            fit.unknowns[0].degrees_of_freedom,
         )
     };
-    let (relative, half, _, uneven) = width(free(0.2));
+    let (relative, half, _, uneven, degrees) = width(free(0.2));
     assert!((relative - 40f64.sqrt().recip()).abs() < 1e-6, "{relative}");
+    // By the logarithms of the variance half a standard error to either side, `2 ln(1 + d) - 2 ln(1 - d) = 4 atanh d`.
+    let expected = 2.0 / (4.0 * (0.5 * relative).atanh()).powi(2);
+    assert!((degrees / expected - 1.0).abs() < 1e-6, "{degrees} {expected}");
     // Student's t at 97.5 % with 20 degrees of freedom; differences over a standard error are good to 0.4 %.
     assert!((half / 2.085_963 - 1.0).abs() < 2e-3 && uneven, "{half}");
-    let (relative, _, half, uneven) = width(free(0.2).log());
+    let (relative, _, half, uneven, _) = width(free(0.2).log());
     assert!((half / relative / 2.022_691 - 1.0).abs() < 1e-6 && !uneven, "{half} {relative}");
 }

@@ -2,6 +2,7 @@
 //! The noise that a fit reports, and what autocorrelated noise does to the standard errors.
 
 use crate::common::*;
+use crate::judgements::{Drive, Factor, Twice, moving};
 use greybox::estimate::{CovarianceMethod, Unknown};
 use greybox::*;
 
@@ -187,4 +188,20 @@ fn a_single_outlier_is_named_by_its_time() {
     assert_eq!(named(0.0), Vec::<String>::new());
     let found = named(0.8);
     assert!(found.len() == 1 && found[0].contains("`z` at t = 6173 s of `bench`"), "{found:?}");
+}
+
+/// The unit of the outputs changes no weight of one against the other: in tens of teravolts the noise is far smaller than the
+/// rounding of a number near one.
+#[test]
+fn noise_is_as_small_as_the_outputs_let_it_be() {
+    let fit = |unit: f64| {
+        let mut noise = Noise(21);
+        let inputs: Vec<Drive> = (0..100).map(moving).map(|u| Drive { u: u.u * unit, w: u.w * unit }).collect();
+        let measured =
+            |u: &Drive| Pair { y: u.u + unit * 1e-4 * noise.gauss(), z: 1.1 * u.w + unit * 1e-2 * noise.gauss() };
+        let outputs = inputs.iter().map(measured).collect();
+        let record = Experiment::new(&Twice, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        Fit::new(&Twice, &record).parameters(Factor { a: free(1.0) }).run().unwrap().parameters.a
+    };
+    assert!((fit(1e-13) / fit(1.0) - 1.0).abs() < 1e-9, "{} {}", fit(1e-13), fit(1.0));
 }
