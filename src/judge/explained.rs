@@ -72,7 +72,7 @@ impl Judgement<'_> {
             }
             let fit_percent = self.residuals.outputs[j].fit_percent.unwrap_or(0.0);
             let samples = self.residuals.outputs[j].samples.max(1) as f64;
-            let worse = relative > 1.02 + 3.0 * (2.0 * self.dependence(j) / samples).sqrt();
+            let worse = is_worse(relative, samples / self.dependence(j));
             let rmse = self.residuals.outputs[j].rmse;
             let at_level = moves.max(rmse) < LEVEL_PART * level.abs();
             let Some(severity) = unexplained(another(j), at_level, worse, partly) else { continue };
@@ -128,6 +128,12 @@ fn by_chance(independent: f64, unknowns: usize, relative: f64) -> f64 {
     if relative < 1.0 { distribution.map_or(1.0, |distribution| distribution.sf(statistic)) } else { 1.0 }
 }
 
+/// Whether squares of errors, relative to those about the mean, are more than rounding and three standard deviations of as many
+/// independent ones above one.
+fn is_worse(relative: f64, independent: f64) -> bool {
+    relative > 1.02 + 3.0 * (2.0 / independent).sqrt()
+}
+
 /// How severe it is that an output is not explained: whether another is, whether this one stands at a level that the model
 /// gives, whether its mean is better than the model, and whether the fit was to explain only a part of it.
 fn unexplained(another: bool, at_level: bool, worse: bool, partly: bool) -> Option<Severity> {
@@ -172,6 +178,12 @@ mod tests {
         assert!((by_chance(12.0, 0, 1.0 / (1.0 + 4.9646 / 10.0)) - 0.05).abs() < 1e-5);
         assert!((by_chance(1.0, 1, 1.0 / (1.0 + 161.45)) - 0.05).abs() < 1e-5);
         assert_eq!([by_chance(12.0, 1, 0.0), by_chance(12.0, 1, 1.0), by_chance(12.0, 1, 2.0)], [0.0, 1.0, 1.0]);
+    }
+
+    /// A variance of 50 errors has a standard deviation of a fifth of itself.
+    #[test]
+    fn errors_worse_than_the_mean() {
+        assert!(is_worse(1.63, 50.0) && !is_worse(1.61, 50.0) && !is_worse(1.02, f64::INFINITY));
     }
 
     #[test]

@@ -139,13 +139,18 @@ mod tests {
     /// of the range wide, and only the outermost were met.
     #[test]
     fn the_spread_at_two_levels() {
-        let level = |k: usize| if k < 16 { 0.0 } else { 6.0 };
-        let size = |k: usize| if k < 16 { 1.0 } else { 2.0 };
-        let (spread, test) = over(&residuals(size), 36.0, &series("input", (0..40).map(level))).unwrap();
-        assert!((spread.share - 1.0).abs() < 1e-12 && spread.count == [16, 24], "{spread:?}");
-        let close = |found: &[f64], expected: [f64; 2]| found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12);
-        assert!(close(&spread.at, [0.25, 5.75]) && close(&spread.deviation, [1.0, 2.0]), "{spread:?}");
-        // A normal number beyond six standard deviations to either side.
-        assert!((test.p_value / 1.973_175e-9 - 1.0).abs() < 1e-5 && !test.passed, "{test:?}");
+        // The squares of squares of the units are no numbers.
+        for unit in [1e-90, 1.0, 1e90] {
+            let level = |k: usize| if k < 16 { 0.0 } else { 6.0 * unit };
+            let size = |k: usize| unit * if k < 16 { 1.0 } else { 2.0 };
+            let (spread, test) = over(&residuals(size), 36.0, &series("input", (0..40).map(level))).unwrap();
+            assert!((spread.share - 1.0).abs() < 1e-12 && spread.count == [16, 24], "{spread:?}");
+            let close = |found: &[f64], expected: [f64; 2]| {
+                found.iter().zip(expected).all(|(a, b)| (a / unit - b).abs() < 1e-12)
+            };
+            assert!(close(&spread.at, [0.25, 5.75]) && close(&spread.deviation, [1.0, 2.0]), "{spread:?}");
+            // A normal number beyond six standard deviations to either side.
+            assert!((test.p_value / 1.973_175e-9 - 1.0).abs() < 1e-5 && !test.passed, "{test:?}");
+        }
     }
 }
