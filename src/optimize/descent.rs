@@ -289,7 +289,7 @@ mod tests {
         at(3.0, linear(&[(1.0, residual), (0.0, (2.0 * cost - residual * residual).sqrt())]))
     }
 
-    /// The damping falls to 4 % after a good first step, to a tenth of that part after the next, and otherwise by Nielsen's
+    /// The damping falls to a part after a good first step, to a tenth of that part after the next, and otherwise by Nielsen's
     /// `1 - (2 g - 1)^3` for the part `g` of the predicted decrease, which is at most two.
     #[test]
     fn the_damping_follows_the_gain() {
@@ -301,10 +301,10 @@ mod tests {
             descent.lambda()
         };
         let cases: [(&[f64], f64); 8] = [
-            (&[1.0], 0.04),
-            (&[0.91], 0.04),
+            (&[1.0], FIRST_FALL),
+            (&[0.91], FIRST_FALL),
             (&[0.89], 1.0 - 0.78f64.powi(3)),
-            (&[1.0, 1.0], 0.04 * 0.004),
+            (&[1.0, 1.0], FIRST_FALL * 0.1 * FIRST_FALL),
             (&[0.5], 1.0),
             (&[0.5, 1.0], 0.1),
             (&[0.75], 0.875),
