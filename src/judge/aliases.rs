@@ -178,7 +178,6 @@ mod tests {
         };
         assert_eq!(of(&[0.0, 1.0, 2.0, 3.0, 9.0]), Some(1.0));
         assert_eq!(of(&[0.0, 1.0, 2.0, 5.0, 9.0]), None);
-        assert_eq!(of(&[0.0, 1.0, 2.1]), None);
         assert_eq!(of(&[0.0, 2.0]), Some(2.0));
     }
 

@@ -186,7 +186,7 @@ mod tests {
         let state = Unknown { role: Role::InitialState(0), ..unknown(-401.0, 1.0, 1.0) };
         assert!(far_from_start(std::slice::from_ref(&state)).is_empty() && opposite(&[state]).is_empty());
         let text = &far_from_start(&[unknown(500.0, 1.0, 1.0)])[0].text;
-        assert_eq!(text, "`a` is 500.0 V, 500 times its start 1: check the units of signals and time");
+        assert_eq!(text, "`a` is 500 V, 500 times its start 1: check the units of signals and time");
     }
 
     #[test]
@@ -197,7 +197,7 @@ mod tests {
             [0, 1, 1, 0, 0]
         );
         let text = &opposite(&[unknown(-2.0, 1.0, 1.0)])[0].text;
-        assert!(text.starts_with("`a` is -2.000 V, but its start was 1: the sign has changed"), "{text}");
+        assert!(text.starts_with("`a` is -2 V, but its start was 1: the sign has changed"), "{text}");
     }
 
     #[test]

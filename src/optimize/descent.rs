@@ -349,6 +349,25 @@ mod tests {
         assert_eq!([gain(12.5 * (1.0 + 5e-11), 1.0), gain(12.5 * (1.0 + 2e-10), 1.0)], [1.0, 0.0]);
     }
 
+    /// Where the cost resolves nothing, five rejected steps are enough, and sixty of any kind.
+    #[test]
+    fn trials_that_resolve_nothing_end() {
+        let seen = Seen::new(&[6.0], &[None]);
+        let near = || at(6.0, linear(&[(1.0, 1e-7), (0.0, 4.0)]));
+        let goes_on = |descent: &Descent| descent.clone().propose(&near(), &[1.0], &seen).is_some();
+        let mut rejected = descent();
+        for count in 1..=5 {
+            assert!(!rejected.judge(&here(), &trial(false), Some(&there(13.0, 1.0))));
+            assert_eq!(goes_on(&rejected), count < 5);
+        }
+        let mut accepted = descent();
+        for count in 1..=60 {
+            assert!(accepted.judge(&here(), &trial(false), Some(&there(12.5, 1.0))));
+            assert_eq!(goes_on(&accepted), count < 60);
+        }
+        assert!(accepted.judge(&here(), &trial(true), Some(&there(8.0, 1.0))) && goes_on(&accepted));
+    }
+
     /// Steps in a row that each lower the cost by less than a tenth.
     #[test]
     fn twenty_short_steps_are_slow() {

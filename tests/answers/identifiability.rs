@@ -46,6 +46,8 @@ fn a_product_is_named_and_so_is_a_constant_input() {
     let problem = Fit::new(&Amplifier, &record).parameters(parameters).problem().unwrap();
     let estimate = Estimate::<Amplifier>::of(problem.run().unwrap()).unwrap();
     assert_eq!(estimate.knowledge.a, Knowledge::Unidentified);
+    assert_eq!((estimate.unknowns[0].error_index, estimate.unknowns[1].error_index), (None, None));
+    assert!(estimate.unknowns[2].error_index.is_some());
     let found = identifiability(&problem, &estimate).unwrap();
     assert_eq!((found.rank, found.generic_rank, found.condition), (2, 2, None));
     let set = &found.collinear[0];
@@ -67,17 +69,17 @@ fn a_product_is_named_and_so_is_a_constant_input() {
     assert!(says("`a`, `b` are seen only through `y`"));
 }
 
-/// At zero a product has no slopes; beside it there is one direction.
+/// At zero a product has no slopes, and only the offset is seen; beside it there is a second direction.
 #[test]
 fn the_rank_beside_zero() {
     let inputs: Vec<Drive> = (0..30).map(|k| Drive { u: (0.7 * f64::from(k)).sin(), w: 0.0 }).collect();
     let outputs = vec![Reading { y: 0.0, z: 0.0 }; 30];
     let record = Experiment::new(&Amplifier, Time::Uniform { start: 0.0, step: 0.1 }, inputs, outputs).unwrap();
-    let parameters = Product { a: free(0.0), b: free(0.0), c: fixed(0.0) };
+    let parameters = Product { a: free(0.0), b: free(0.0), c: free(0.0) };
     let problem = Fit::new(&Amplifier, &record).parameters(parameters).problem().unwrap();
     let estimate = problem.run().unwrap();
     let found = identifiability(&problem, &estimate).unwrap();
-    assert_eq!((found.rank, found.generic_rank), (0, 1));
+    assert_eq!((found.rank, found.generic_rank), (1, 2));
 }
 
 signals! { struct Dose { u: "1" } }

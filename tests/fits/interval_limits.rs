@@ -8,7 +8,8 @@ use greybox::*;
 signals! { pub struct Gains { u: "A/V", w: "A/V" } }
 
 /// `i = a u + b w`.
-struct Mixer;
+#[derive(Clone)]
+pub struct Mixer;
 
 impl Model for Mixer {
     type State = Nothing;
