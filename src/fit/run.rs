@@ -38,7 +38,7 @@ impl Problem<'_> {
                 attempt = attempt.or(finer.run_on(again, trials, begin, &control));
             }
         }
-        attempt.answer()
+        Ok(self.on_both_sides(attempt.answer()?, begin, &control))
     }
 
     /// The same by this method alone, from this start.
