@@ -126,9 +126,8 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
         attempts = attempts.into_iter().zip(coarse).map(next).collect();
     }
     let begin = Instant::now();
-    let answer = |(attempt, problem): (Attempt, &Problem<'_>)| {
-        Ok(problem.on_both_sides(attempt.answer()?, begin, &control))
-    };
+    let answer =
+        |(attempt, problem): (Attempt, &Problem<'_>)| Ok(problem.on_both_sides(attempt.answer()?, begin, &control));
     attempts.into_iter().zip(problems).map(answer).collect()
 }
 

@@ -60,16 +60,25 @@ pub(crate) struct Aliases {
 }
 
 impl Aliases {
-    /// Those at a point; `None` where all oscillations are resolved.
+    /// Those at a point; `None` where all oscillations are resolved. The other points are near this one and near the declared start,
+    /// with all unknowns changed that move the frequency, or that alone which moves it most.
     pub fn at(objective: &Objective<'_>, coordinates: &[f64]) -> Option<Self> {
         let points = residual_pass(objective, coordinates).ok()?.points;
         let Unresolved { point, mode, interval, .. } = unresolved(objective, coordinates, &points)?;
         let folds = mode.1 * interval / PI;
-        let other = |fold: f64| {
+        let slopes = slopes(objective, coordinates, point, mode)?;
+        let moving: Vec<usize> = (0..slopes.len()).filter(|&i| slopes[i] != 0.0).collect();
+        let most = moving.iter().copied().max_by(|&a, &b| slopes[a].abs().total_cmp(&slopes[b].abs()))?;
+        let mut others = vec![];
+        for fold in [folds.floor(), folds.ceil()] {
             let frequency = TAU / interval * fold - mode.1;
-            Some((frequency, moved(objective, coordinates, (point, mode), frequency)?))
-        };
-        let others = [folds.floor(), folds.ceil()].into_iter().filter_map(other).collect();
+            for from in [coordinates, &objective.problem.unknowns.start()[..]] {
+                for moving in [&moving[..], &[most]] {
+                    let other = moved(objective, from, (point, mode), frequency, moving);
+                    others.extend(other.map(|other| (frequency, other)));
+                }
+            }
+        }
         Some(Aliases { frequency: mode.1, others })
     }
 }
@@ -148,26 +157,28 @@ fn slopes(objective: &Objective<'_>, coordinates: &[f64], point: &Point, mode: M
     unknowns.values(coordinates).into_iter().enumerate().map(slope).collect()
 }
 
-/// Changes unknowns, each by the part of itself that moves an oscillation most, until it has another frequency; `None` if they
-/// come to their bounds.
+/// Changes some unknowns, all by the least parts of themselves, until an oscillation has another frequency; `None` if they come to
+/// their bounds.
 fn moved(
     objective: &Objective<'_>,
     coordinates: &[f64],
-    (point, mut mode): (&Point, Mode),
+    (point, mode): (&Point, Mode),
     frequency: f64,
+    moving: &[usize],
 ) -> Option<Vec<f64>> {
     let (unknowns, mut x) = (&objective.problem.unknowns, coordinates.to_vec());
+    let bounds = unknowns.bounds();
+    let mut mode = nearest(&modes(objective, &x, point)?, mode);
     for _ in 0..STEPS_TO_ALIAS {
         let needed = (frequency / mode.1).ln();
         if needed.abs() < ARRIVED {
             return Some(x);
         }
         let slopes = slopes(objective, &x, point, mode)?;
-        let needed = needed.clamp(-LARGEST_STEP, LARGEST_STEP) / slopes.iter().map(|slope| slope * slope).sum::<f64>();
-        for (i, ((slope, value), (lower, upper))) in
-            slopes.into_iter().zip(unknowns.values(&x)).zip(unknowns.bounds()).enumerate()
-        {
-            let changed = value * (slope * needed).exp();
+        let squares: f64 = moving.iter().map(|&i| slopes[i] * slopes[i]).sum();
+        let (needed, values) = (needed.clamp(-LARGEST_STEP, LARGEST_STEP) / squares, unknowns.values(&x));
+        for &i in moving {
+            let (changed, (lower, upper)) = (values[i] * (slopes[i] * needed).exp(), bounds[i]);
             x[i] = unknowns.row[i].parameter.transform.to_coordinate(changed).max(lower).min(upper);
         }
         mode = nearest(&modes(objective, &x, point)?, mode);
