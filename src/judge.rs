@@ -24,6 +24,7 @@ mod sandwich;
 mod shape;
 mod starts;
 mod step_error;
+mod sums;
 mod suspects;
 mod together;
 mod warnings;

@@ -260,8 +260,11 @@ pub(crate) fn levinson_durbin(correlations: &[f64], mut order: impl FnMut(&[f64]
         if reflection.is_nan() || reflection.abs() >= 1.0 {
             return;
         }
-        let reversed: Vec<f64> = a.iter().rev().map(|a| reflection * a).collect();
-        a.iter_mut().zip(reversed).for_each(|(a, by)| *a -= by);
+        // From both ends at once: each coefficient less the reflection times the one at its mirrored place.
+        for i in 0..k.div_ceil(2) {
+            let (first, last) = (a[i], a[k - 1 - i]);
+            (a[i], a[k - 1 - i]) = (first - reflection * last, last - reflection * first);
+        }
         a.push(reflection);
         variance *= 1.0 - reflection * reflection;
         order(&a, variance);

@@ -124,7 +124,7 @@ impl<'a, M: Model> Fleet<'a, M> {
 
     /// Whether such records run in more than one lane.
     fn is_wide(&self, problems: &[Problem<'_>]) -> bool {
-        problems.first().is_some_and(|problem| self.sweep.lanes(&problem.records[0], &problem.unknowns.seeds(0)) > 1)
+        problems.first().is_some_and(|problem| self.sweep.lanes(&problem.records[0], problem.unknowns.seeds(0)) > 1)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{Block, Information};
 
-/// Rows of segments that are absorbed together.
+/// Most rows of segments that are absorbed together.
 const ROWS: usize = 64;
 
 /// Eliminates the initial values of a record's segments by what the segments before say of them.
@@ -37,10 +37,11 @@ pub(crate) struct Chain<'c> {
 }
 
 impl<'c> Chain<'c> {
-    /// From the slopes of the first segment's initial value with respect to the unknowns, row by row.
-    pub fn new(carried: usize, slopes: Vec<f64>, parameters: &'c [usize], scales: &'c [f64]) -> Self {
+    /// For so many segments, from the slopes of the first one's initial value with respect to the unknowns, row by row.
+    pub fn new(carried: usize, segments: usize, slopes: Vec<f64>, parameters: &'c [usize], scales: &'c [f64]) -> Self {
         let (n, information) = (scales.len(), Information::new(scales.len()));
-        let (block, row) = (Block::new(n, ROWS.max(carried + parameters.len() + 1)), vec![0.0; n]);
+        let rows = carried + parameters.len() + 1;
+        let (block, row) = (Block::new(n, ROWS.min(segments * rows).max(rows)), vec![0.0; n]);
         let defect = vec![0.0; carried];
         let before = (vec![0.0; slopes.len()], defect.clone());
         let (moved, squares) = (0.0, 0.0);
@@ -174,7 +175,7 @@ mod tests {
 
     fn condensed(guesses: &[Vec<f64>], p: &[f64; PARAMETERS], bend: f64) -> Condensed {
         let identity = (0..STATES * N).map(|at| f64::from(u8::from(at / N == at % N))).collect();
-        let mut chain = Chain::new(STATES, identity, &[3, 4], &[1.0; N]);
+        let mut chain = Chain::new(STATES, 4, identity, &[3, 4], &[1.0; N]);
         let mut borders = vec![];
         for (s, border) in BORDERS.windows(2).enumerate() {
             let (triangle, end) = simulate(&guesses[s], p, bend, border[0], border[1]);
@@ -253,7 +254,7 @@ mod tests {
         let (triangle, _) = simulate(&x0, &p, 0.5, 0, 20);
         // Unknowns: p[1], x0[2], p[0]; the other two initial values are fixed.
         let slopes = vec![0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
-        let mut chain = Chain::new(STATES, slopes, &[2, 0], &[2.0, 3.0, 5.0]);
+        let mut chain = Chain::new(STATES, 1, slopes, &[2, 0], &[2.0, 3.0, 5.0]);
         chain.add(&triangle);
         let found = chain.triangle();
         let product =

@@ -2,6 +2,7 @@
 
 use super::conclude::Judgement;
 use super::covariances::Covariances;
+use super::sums::{Terms, sums};
 use super::whiteness::Whiteness;
 use crate::estimate::{CovarianceMethod, Warning, WarningCode};
 use crate::numeral::{number, p_value};
@@ -9,6 +10,7 @@ use crate::optimize::Severity;
 use crate::problem::{Noise, Whitening};
 use crate::sweep::Window;
 use crate::whiteness::chi_squared_tail;
+use crate::wide::Wide;
 
 /// Level of the test, over all pairs of outputs.
 const LEVEL: f64 = 0.01;
@@ -27,6 +29,18 @@ impl Pair {
         self.product += other.product;
         self.squares.iter_mut().zip(other.squares).for_each(|(sum, other)| *sum += other);
         self.fourth += other.fourth;
+    }
+}
+
+/// `a b`, `a^2`, `b^2` and `(a b)^2` of two errors.
+#[derive(Clone, Copy)]
+struct Products;
+
+impl Terms for Products {
+    #[inline(always)]
+    fn of<W: Wide>(self, a: W, b: W) -> [W; 4] {
+        let product = a.mul(b);
+        [product, a.mul(a), b.mul(b), product.mul(product)]
     }
 }
 
@@ -86,6 +100,15 @@ impl Coupling {
                 sums.fourth += (weight * a * b).powi(2);
             }
             pair.append(&sums);
+        }
+    }
+
+    /// Adds the products of so many samples, all of them measured, from their errors, output by output.
+    pub fn add_all(&mut self, errors: &[f64], samples: usize) {
+        let of = |j: usize| &errors[j * samples..][..samples];
+        for ((i, j), pair) in pairs(errors.len().checked_div(samples).unwrap_or(0)).zip(&mut self.pairs) {
+            let [product, a, b, fourth] = sums(of(i), of(j), Products);
+            pair.append(&Pair { product, squares: [a, b], fourth });
         }
     }
 
@@ -156,6 +179,19 @@ mod tests {
         assert_eq!(found.outputs, (0, 1));
         assert!((found.correlation - 4.0 / 18f64.sqrt()).abs() < 1e-15, "{found:?}");
         assert!((found.p_value - 0.001_091).abs() < 1e-6, "{found:?}");
+    }
+
+    /// The same errors seven times, side by side, and a third output twice the first: sums of integers are exact.
+    #[test]
+    fn products_of_whole_windows_by_hand() {
+        let errors = |of: [f64; 3]| of.into_iter().cycle().take(21);
+        let all: Vec<f64> =
+            [[1.0, 1.0, -1.0], [2.0, 1.0, -1.0], [2.0, 2.0, -2.0]].into_iter().flat_map(errors).collect();
+        let mut found = Coupling::new(3);
+        found.add_all(&all, 21);
+        let pairs = found.pairs.iter().map(|pair| [pair.product, pair.squares[0], pair.squares[1], pair.fourth]);
+        let expected = [[28.0, 21.0, 42.0, 42.0], [42.0, 21.0, 84.0, 84.0], [56.0, 42.0, 84.0, 168.0]];
+        assert_eq!(pairs.collect::<Vec<_>>(), expected);
     }
 
     /// By hand: an autoregression of 1/2 beside as much white noise has `1 + 2 (1/16 + 1/64 + ...) = 7/6`; `1 + 2 (1/4 + 1/8)`

@@ -1,7 +1,8 @@
 //! Running sums of an output and its errors.
 
+use super::sums::{Terms, sums};
 use crate::estimate::OutputFit;
-use crate::wide::{self, Task, Wide, Width};
+use crate::wide::Wide;
 
 /// Sums over the measurements of an output.
 #[derive(Clone, Copy, Debug, Default)]
@@ -36,7 +37,7 @@ impl OutputSums {
         }
         let first = self.first;
         self.count += values.len() as u64;
-        let [sum, squares, of_errors, fourth] = wide::run(Width::widest(), Moments { values, errors, first });
+        let [sum, squares, of_errors, fourth] = sums(values, errors, Moments { first });
         self.sum += sum;
         self.squares += squares;
         self.errors += of_errors;
@@ -86,58 +87,17 @@ impl OutputSums {
     }
 }
 
-/// Numbers of a block of the sums below, so that their bits do not depend on the registers.
-const BLOCK: usize = 8;
-
-/// Sums of the values relative to `first`, of their squares, and of the second and the fourth powers of as many errors.
-struct Moments<'m> {
-    values: &'m [f64],
-    errors: &'m [f64],
+/// A value relative to `first`, its square, and the second and the fourth power of its error.
+#[derive(Clone, Copy)]
+struct Moments {
     first: f64,
 }
 
-impl Task for Moments<'_> {
-    type Output = [f64; 4];
-
+impl Terms for Moments {
     #[inline(always)]
-    fn run<W: Wide>(self) -> [f64; 4] {
-        let Moments { values, errors, first } = self;
-        let whole = values.len() - values.len() % BLOCK;
-        let mut totals = [[0.0; BLOCK]; 4];
-        let mut begin = 0;
-        while begin < BLOCK {
-            let mut sums = [W::splat(0.0); 4];
-            let mut k = begin;
-            while k < whole {
-                let (y, error) = (W::load(&values[k..]).sub(W::splat(first)), W::load(&errors[k..]));
-                let square = error.mul(error);
-                let terms = [y, y.mul(y), square, square.mul(square)];
-                let mut i = 0;
-                while i < 4 {
-                    sums[i] = sums[i].add(terms[i]);
-                    i += 1;
-                }
-                k += BLOCK;
-            }
-            let mut i = 0;
-            while i < 4 {
-                sums[i].store(&mut totals[i][begin..]);
-                i += 1;
-            }
-            begin += W::LANES;
-        }
-        let mut k = whole;
-        while k < values.len() {
-            let (y, square) = (values[k] - first, errors[k] * errors[k]);
-            let terms = [y, y * y, square, square * square];
-            let mut i = 0;
-            while i < 4 {
-                totals[i][k - whole] += terms[i];
-                i += 1;
-            }
-            k += 1;
-        }
-        totals.map(|parts| parts.iter().sum())
+    fn of<W: Wide>(self, y: W, error: W) -> [W; 4] {
+        let (y, square) = (y.sub(W::splat(self.first)), error.mul(error));
+        [y, y.mul(y), square, square.mul(square)]
     }
 }
 

@@ -62,7 +62,9 @@ struct Sums<'s> {
     by_sample: bool,
     /// The windows to be simulated again.
     again: Vec<Sampled>,
-    run: Vec<f64>,
+    /// The errors of a window, output by output, and those of one output that are tested for whiteness.
+    errors: Vec<f64>,
+    tested: Vec<f64>,
 }
 
 impl<'s> Sums<'s> {
@@ -81,27 +83,26 @@ impl<'s> Sums<'s> {
             least_sigma: vec![f64::INFINITY; outputs],
             by_sample: horizon(objective) > 0,
             again: vec![],
-            run: vec![],
+            errors: vec![],
+            tested: vec![],
         }
     }
 
-    /// Appends the errors in `run`, multiplied by the roots of their weights, to the sequence of their output. Lags count
-    /// measurements of weight above zero, however many samples lie between them; they count samples where predictions restart a
-    /// number of samples before, which correlates errors over so many samples.
+    /// Appends the errors of an output, multiplied by the roots of their weights, to its sequence. Lags count measurements of weight
+    /// above zero, however many samples lie between them; they count samples where predictions restart a number of samples
+    /// before, which correlates errors over so many samples.
     fn follow(&mut self, window: &Window, j: usize, lane: usize) {
-        let weighted = self.objective.is_weighted();
-        if weighted {
-            let weight = |k: usize| self.objective.weight(self.experiment, window.begin[lane] + k);
-            self.run.iter_mut().enumerate().for_each(|(k, error)| *error *= weight(k).sqrt());
+        let (weighted, samples) = (self.objective.is_weighted(), window.samples[lane]);
+        let errors = &self.errors[j * samples..][..samples];
+        if !weighted && (self.by_sample || window.whole) {
+            return self.portmanteaus[j].add(errors);
         }
-        if !self.by_sample && (weighted || !window.whole) {
-            let mut k = 0;
-            self.run.retain(|error| {
-                k += 1;
-                window.is_measured(k - 1, j, lane) && !(weighted && *error == 0.0)
-            });
-        }
-        self.portmanteaus[j].add(&self.run);
+        let weight = |k: usize| self.objective.weight(self.experiment, window.begin[lane] + k);
+        let counts = |k: usize| self.by_sample || window.is_measured(k, j, lane) && !(weighted && weight(k) == 0.0);
+        let weigh = |(k, error): (usize, &f64)| if weighted { error * weight(k).sqrt() } else { *error };
+        self.tested.clear();
+        self.tested.extend(errors.iter().enumerate().filter(|(k, _)| counts(*k)).map(weigh));
+        self.portmanteaus[j].add(&self.tested);
     }
 
     /// Counts the measurements of a window.
@@ -135,19 +136,23 @@ impl Accumulate for Sums<'_> {
         self.count(window, lane);
         let (objective, experiment) = (self.objective, self.experiment);
         let weight = |k: usize| objective.weight(experiment, begin + k);
-        self.coupling.add(window, lane, objective.is_weighted().then_some(&weight));
+        self.errors.clear();
+        (0..outputs).for_each(|j| self.errors.extend(window.errors(j, lane)));
+        match window.whole && !objective.is_weighted() {
+            true => self.coupling.add_all(&self.errors, samples),
+            false => self.coupling.add(window, lane, objective.is_weighted().then_some(&weight)),
+        }
         let record = &self.objective.problem.records[self.experiment];
         for j in 0..outputs {
-            self.run.clear();
-            self.run.extend(window.errors(j, lane));
-            self.largest[j].add(&self.run, self.experiment, begin);
+            let errors = &self.errors[j * samples..][..samples];
+            self.largest[j].add(errors, self.experiment, begin);
             let values = &record.outputs()[j].values[begin..begin + samples];
             if window.whole && !window.has_variances() {
-                self.outputs[j].add_all(values, &self.run);
+                self.outputs[j].add_all(values, errors);
                 self.follow(window, j, lane);
                 continue;
             }
-            for (k, (&y, &error)) in values.iter().zip(&self.run).enumerate() {
+            for (k, (&y, &error)) in values.iter().zip(errors).enumerate() {
                 if window.is_measured(k, j, lane) {
                     let unit = window.variance_root(k, j, lane);
                     self.outputs[j].add(y, error * unit);

@@ -69,7 +69,7 @@ pub(super) struct Trial {
 
 const FALL: f64 = 0.1;
 /// The part to which `lambda` falls after a first step that was good: a tenth would hold back the second one.
-const FIRST_FALL: f64 = 0.04;
+const FIRST_FALL: f64 = 0.03;
 /// A step that gains so much of the predicted decrease is a good one.
 const GOOD: f64 = 0.9;
 const ACCEPT: f64 = 1e-4;

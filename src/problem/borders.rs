@@ -3,7 +3,7 @@
 use super::batches::{each, in_batches};
 use super::linearize::Triangulation;
 use super::pass::Job;
-use super::segments::{Border, Borders};
+use super::segments::{Borders, Carries};
 use super::{Objective, Values};
 use crate::optimize::Infeasible;
 use crate::sweep::{Piece, Reached, RunError, Seed};
@@ -73,16 +73,14 @@ impl Objective<'_> {
         let one = |e: usize| {
             let segments = &self.problem.cuts.segments[e];
             if !self.problem.cuts.is_chained(e) {
-                return Ok(vec![]);
+                return Ok(Carries::default());
             }
             let job = self.job(e, &values[e], coordinates, false);
             let at: Vec<usize> = segments[1..].iter().map(|samples| samples.start).collect();
-            self.sweep.follow(&job.piece, &at).map_err(|error| self.infeasible(e, error))
+            let found = self.sweep.follow(&job.piece, &at).map_err(|error| self.infeasible(e, error))?;
+            Ok(Carries { values: found.concat(), slopes: vec![] })
         };
-        let borders =
-            |carries: Vec<Vec<f64>>| carries.into_iter().map(|carry| Border { carry, slopes: vec![] }).collect();
-        let of: Result<Vec<_>, Infeasible> =
-            each(self.experiments(), one).into_iter().map(|e| e.map(borders)).collect();
+        let of: Result<Vec<_>, Infeasible> = each(self.experiments(), one).into_iter().collect();
         let (point, cost, values) = (coordinates.to_vec(), f64::INFINITY, values.to_vec());
         Ok(Borders { point, cost, values, of: of?, right: true })
     }
@@ -104,15 +102,14 @@ impl Objective<'_> {
 
     /// The borders as the slopes at another point tell.
     fn extrapolated(&self, coordinates: &[f64], values: &[Values], from: &Borders) -> Borders {
-        let one = |(e, borders): (usize, &Vec<Border>)| {
+        let one = |(e, carries): (usize, &Carries)| {
             let quantity = |values: &Values, seed: &Seed| match *seed {
                 Seed::Carry(i) => values.x[i],
                 Seed::Parameter(j) => values.p[j],
             };
-            let seeds = self.problem.unknowns.seeds(e);
             let change = |seed| quantity(&values[e], seed) - quantity(&from.values[e], seed);
-            let change: Vec<f64> = seeds.iter().map(change).collect();
-            (1..=borders.len()).map(|s| Border { carry: from.moved(e, s, &change), slopes: vec![] }).collect()
+            let change: Vec<f64> = self.problem.unknowns.seeds(e).iter().map(change).collect();
+            carries.moved(&change)
         };
         let of = from.of.iter().enumerate().map(one).collect();
         Borders { point: coordinates.to_vec(), cost: from.cost, values: values.to_vec(), of, right: false }
@@ -159,7 +156,7 @@ impl Objective<'_> {
             let job = move |samples: &std::ops::Range<usize>| {
                 let from = samples.end.saturating_sub(RUN_IN).max(samples.start);
                 let piece = Piece { samples: from..samples.end, ..whole.piece.clone() };
-                Job { objective: self, experiment: e, seeds: vec![], scales: vec![], piece }
+                Job { objective: self, experiment: e, seeds: Arc::default(), scales: vec![], piece }
             };
             before.iter().map(job)
         };
@@ -173,11 +170,12 @@ impl Objective<'_> {
             };
             Ok(reached.into_iter().zip(pieces).map(carry).collect())
         };
-        let mut carries = in_batches(&jobs, end).unwrap_or_default().into_iter();
-        let mut border =
-            |_: &std::ops::Range<usize>| Border { carry: carries.next().unwrap_or_default(), slopes: vec![] };
-        let of =
-            self.problem.cuts.segments.iter().map(|segments| segments[1..].iter().map(&mut border).collect()).collect();
+        let mut ends = in_batches(&jobs, end).unwrap_or_default().into_iter();
+        let carries = |segments: &Vec<_>| {
+            let values = segments[1..].iter().flat_map(|_| ends.next().unwrap_or_default()).collect();
+            Carries { values, slopes: vec![] }
+        };
+        let of = self.problem.cuts.segments.iter().map(carries).collect();
         Borders { point: coordinates.to_vec(), cost: f64::INFINITY, values: values.to_vec(), of, right: false }
     }
 }

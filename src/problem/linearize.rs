@@ -4,7 +4,7 @@ use super::absorb::Absorber;
 use super::batches::{Broken, in_batches, run};
 use super::borders::Guess;
 use super::pass::Job;
-use super::segments::{Border, Borders};
+use super::segments::{Borders, Carries};
 use super::{Objective, Values, Weighing};
 use crate::information::{Chain, Information};
 use crate::optimize::{Infeasible, Linearization};
@@ -84,29 +84,37 @@ impl Objective<'_> {
         values: &[Values],
         guess: Option<&Borders>,
     ) -> Result<Triangulation, Infeasible> {
-        let mut jobs: Vec<Job<'_>> = Vec::with_capacity(self.problem.cuts.segments.iter().map(Vec::len).sum());
-        (0..self.experiments()).for_each(|e| jobs.extend(self.linear_jobs(e, &values[e], coordinates, guess)));
+        let cuts = &self.problem.cuts;
+        let chained = |e: usize| cuts.is_chained(e).then(|| Chained::new(self.job(e, &values[e], coordinates, true)));
+        let chained: Vec<Option<Chained<'_>>> = (0..self.experiments()).map(chained).collect();
+        let mut jobs: Vec<Job<'_>> = Vec::with_capacity(cuts.segments.iter().map(Vec::len).sum());
+        for (e, chained) in chained.iter().enumerate() {
+            match chained {
+                Some(chained) => jobs.extend(chained.jobs(&cuts.segments[e], guess)),
+                None => jobs.extend(self.independent_jobs(e, &values[e], coordinates, guess)),
+            }
+        }
         let parts = in_batches(&jobs, |_, jobs| parts(jobs))
             .map_err(|(job, error)| self.infeasible(jobs[job].experiment, error))?;
+        drop(jobs);
         let mut parts = parts.into_iter();
         let mut found = Triangulation { cost: 0.0, moved: 0.0, blocks: vec![], borders: None };
-        let mut of = vec![];
-        for (e, segments) in self.problem.cuts.segments.iter().enumerate() {
-            let parts: Vec<Part> = parts.by_ref().take(segments.len()).collect();
-            if self.problem.cuts.is_chained(e) {
-                of.push(self.chain(e, &values[e], coordinates, parts, guess, &mut found));
-            } else {
-                let mut parts = parts.into_iter();
-                let Some(Part { cost, triangle: mut whole, .. }) = parts.next() else { continue };
-                found.cost += cost;
-                for part in parts {
-                    found.cost += part.cost;
-                    whole.merge(&part.triangle);
-                }
-                whole.scale_columns(&self.problem.unknowns.scales(e, coordinates));
-                found.blocks.push(whole);
-                of.push(vec![]);
+        let mut of = Vec::with_capacity(chained.len());
+        for (e, (chained, segments)) in chained.into_iter().zip(&cuts.segments).enumerate() {
+            let mut parts = parts.by_ref().take(segments.len());
+            if let Some(chained) = chained {
+                of.push(found.chain(chained, segments.len(), parts, guess, cuts.affine));
+                continue;
             }
+            let Some(Part { cost, triangle: mut whole, .. }) = parts.next() else { continue };
+            found.cost += cost;
+            for part in parts {
+                found.cost += part.cost;
+                whole.merge(&part.triangle);
+            }
+            whole.scale_columns(&self.problem.unknowns.scales(e, coordinates));
+            found.blocks.push(whole);
+            of.push(Carries::default());
         }
         if !found.cost.is_finite() || found.blocks.iter().any(|block| !block.is_finite()) {
             return Err(self.infeasible(0, RunError::Failed { sample: 0 }));
@@ -118,89 +126,20 @@ impl Objective<'_> {
         Ok(found)
     }
 
-    /// Joins the triangles of an experiment's segments into `found`, and returns the corrected borders.
-    fn chain(
-        &self,
-        e: usize,
-        values: &Values,
-        coordinates: &[f64],
-        parts: Vec<Part>,
-        guess: Option<&Borders>,
-        found: &mut Triangulation,
-    ) -> Vec<Border> {
-        let whole = self.job(e, values, coordinates, true);
-        let is_parameter = |i: &usize| matches!(whole.seeds[*i], Seed::Parameter(_));
-        let parameters: Vec<usize> = (0..whole.seeds.len()).filter(is_parameter).collect();
-        let Piece { carry, slopes, .. } = whole.piece;
-        let mut chain = Chain::new(carry.len(), slopes.into_owned(), &parameters, &whole.scales);
-        let simulated_from = guess.map_or(&[][..], |guess| &guess.of[e]);
-        let mut borders = Vec::with_capacity(simulated_from.len());
-        let simulated = parts.iter().map(|part| part.cost).sum::<f64>();
-        for (s, part) in parts.iter().enumerate() {
-            chain.add(&part.triangle);
-            if let Some(Border { carry, .. }) = simulated_from.get(s) {
-                chain.go_on(&part.reached.carry, &part.reached.slopes, carry);
-                if guess.is_some_and(|guess| guess.right) && !self.problem.cuts.affine {
-                    chain.without_defect();
-                }
-                let (defect, slopes) = chain.begin();
-                let carry = carry.iter().zip(defect).map(|(carry, defect)| carry + defect).collect();
-                borders.push(Border { carry, slopes: slopes.to_vec() });
-            }
-        }
-        found.moved += chain.moved;
-        found.cost += if chain.moved > 0.0 { 0.5 * chain.squares } else { simulated };
-        found.blocks.push(chain.triangle());
-        borders
-    }
-
-    /// The segments of an experiment with slopes in the quantities themselves; chained ones with respect to all that
-    /// they begin with.
-    fn linear_jobs<'p>(
+    /// The segments of an experiment between which nothing is carried, with slopes in the quantities themselves.
+    fn independent_jobs<'p>(
         &'p self,
         e: usize,
         values: &'p Values,
         coordinates: &[f64],
         guess: Option<&'p Borders>,
     ) -> Vec<Job<'p>> {
-        if self.problem.cuts.is_chained(e) {
-            return self.chained_jobs(e, values, coordinates, guess);
-        }
         let mut jobs = self.segments(e, values, coordinates, true, guess);
         for job in &mut jobs {
             // A scale of zero marks a column that is left out; it stays zero.
             job.scales.iter_mut().filter(|scale| **scale != 0.0).for_each(|scale| *scale = 1.0);
         }
         jobs
-    }
-
-    /// The chained segments of an experiment, with slopes with respect to all that each begins with and the parameters.
-    fn chained_jobs<'p>(
-        &'p self,
-        e: usize,
-        values: &'p Values,
-        coordinates: &[f64],
-        guess: Option<&'p Borders>,
-    ) -> Vec<Job<'p>> {
-        let Job { seeds: unknowns, piece: whole, .. } = self.job(e, values, coordinates, true);
-        let carried = whole.carry.len();
-        let is_parameter = |seed: &&Seed| matches!(seed, Seed::Parameter(_));
-        let seeds: Vec<Seed> =
-            (0..carried).map(Seed::Carry).chain(unknowns.iter().filter(is_parameter).copied()).collect();
-        // What a record begins with does not move where it is given, and slopes with respect to it may be infinite.
-        let row = |i: usize| &whole.slopes[i * unknowns.len()..][..unknowns.len()];
-        let moves = |s: usize, i: usize| s > 0 || row(i).iter().any(|slope| *slope != 0.0);
-        let job = |(s, samples): (usize, &Range<usize>)| {
-            let border = guess.filter(|_| s > 0).and_then(|guess| guess.of[e].get(s - 1));
-            let mut slopes = vec![0.0; carried * seeds.len()];
-            for i in (0..carried).filter(|&i| moves(s, i)) {
-                slopes[i * seeds.len() + i] = 1.0;
-            }
-            let carry = border.map_or_else(|| whole.carry.clone(), |border| Cow::Borrowed(&*border.carry));
-            let piece = Piece { samples: samples.clone(), carry, slopes: slopes.into(), ..whole };
-            Job { objective: self, experiment: e, seeds: seeds.clone(), scales: vec![], piece }
-        };
-        self.problem.cuts.segments[e].iter().enumerate().map(job).collect()
     }
 
     /// The cost of one experiment alone, priors left out.
@@ -229,6 +168,51 @@ pub(super) fn parts(jobs: &[&Job<'_>]) -> Result<Vec<Part>, Broken> {
         .collect()
 }
 
+/// A record in segments, each with slopes with respect to all that it begins with and the parameters.
+struct Chained<'p> {
+    whole: Job<'p>,
+    seeds: Arc<[Seed]>,
+    /// The unknown behind each parameter.
+    parameters: Vec<usize>,
+    /// Slopes of what a segment begins with: each with respect to itself.
+    slopes: Vec<f64>,
+}
+
+impl<'p> Chained<'p> {
+    fn new(whole: Job<'p>) -> Self {
+        let carried = whole.piece.carry.len();
+        let is_parameter = |i: &usize| matches!(whole.seeds[*i], Seed::Parameter(_));
+        let parameters: Vec<usize> = (0..whole.seeds.len()).filter(is_parameter).collect();
+        let seeds: Vec<Seed> =
+            (0..carried).map(Seed::Carry).chain(parameters.iter().map(|&i| whole.seeds[i])).collect();
+        let mut slopes = vec![0.0; carried * seeds.len()];
+        slopes.iter_mut().step_by(seeds.len() + 1).for_each(|slope| *slope = 1.0);
+        Chained { whole, seeds: seeds.into(), parameters, slopes }
+    }
+
+    fn jobs<'s>(&'s self, segments: &'s [Range<usize>], guess: Option<&'s Borders>) -> impl Iterator<Item = Job<'s>> {
+        let Job { objective, experiment, piece: whole, seeds: unknowns, .. } = &self.whole;
+        let job = move |(s, samples): (usize, &Range<usize>)| {
+            let border = guess.and_then(|guess| guess.of[*experiment].at(s, whole.carry.len()));
+            let mut slopes = Cow::Borrowed(&self.slopes[..]);
+            if s == 0 {
+                // What a record begins with does not move where it is given, and slopes with respect to it may be infinite.
+                let rows = slopes.to_mut().chunks_exact_mut(self.seeds.len());
+                let given = |of: &[f64]| of.iter().all(|slope| *slope == 0.0);
+                for (i, row) in rows.enumerate() {
+                    if given(&whole.slopes[i * unknowns.len()..][..unknowns.len()]) {
+                        row.fill(0.0);
+                    }
+                }
+            }
+            let piece =
+                Piece { samples: samples.clone(), carry: border.unwrap_or(&whole.carry).into(), slopes, ..*whole };
+            Job { objective, experiment: *experiment, seeds: self.seeds.clone(), scales: vec![], piece }
+        };
+        segments.iter().enumerate().map(job)
+    }
+}
+
 /// Costs and triangles of all experiments at a point.
 pub(super) struct Triangulation {
     pub cost: f64,
@@ -236,4 +220,41 @@ pub(super) struct Triangulation {
     pub moved: f64,
     blocks: Vec<Information>,
     pub borders: Option<Borders>,
+}
+
+impl Triangulation {
+    /// Joins the triangles of an experiment's segments, and returns the corrected borders.
+    fn chain(
+        &mut self,
+        of: Chained<'_>,
+        segments: usize,
+        parts: impl Iterator<Item = Part>,
+        guess: Option<&Borders>,
+        affine: bool,
+    ) -> Carries {
+        let Job { experiment, scales, piece: Piece { carry, slopes, .. }, .. } = of.whole;
+        let carried = carry.len();
+        let mut chain = Chain::new(carried, segments, slopes.into_owned(), &of.parameters, &scales);
+        let simulated_from = guess.map(|guess| (&guess.of[experiment], guess.right && !affine));
+        let mut carries = Carries::default();
+        let mut simulated = 0.0;
+        for (s, part) in parts.enumerate() {
+            simulated += part.cost;
+            chain.add(&part.triangle);
+            let Some((from, right)) = simulated_from else { continue };
+            if let Some(carry) = from.at(s + 1, carried) {
+                chain.go_on(&part.reached.carry, &part.reached.slopes, carry);
+                if right {
+                    chain.without_defect();
+                }
+                let (defect, slopes) = chain.begin();
+                carries.values.extend(carry.iter().zip(defect).map(|(carry, defect)| carry + defect));
+                carries.slopes.extend_from_slice(slopes);
+            }
+        }
+        self.moved += chain.moved;
+        self.cost += if chain.moved > 0.0 { 0.5 * chain.squares } else { simulated };
+        self.blocks.push(chain.triangle());
+        carries
+    }
 }

@@ -6,6 +6,7 @@ use super::segments::Borders;
 use super::{Objective, Values};
 use crate::optimize::Infeasible;
 use crate::sweep::{Piece, Reached, RunError, Seed, Visit, Window};
+use std::sync::Arc;
 
 /// An accumulator of the windows of a segment of an experiment.
 pub(crate) trait Accumulate: Send + Sized {
@@ -20,7 +21,7 @@ pub(crate) trait Accumulate: Send + Sized {
 pub(crate) struct Job<'p> {
     pub objective: &'p Objective<'p>,
     pub experiment: usize,
-    pub seeds: Vec<Seed>,
+    pub seeds: Arc<[Seed]>,
     /// Derivative of the quantity of each seed with respect to its coordinate; zero where its slopes are left out.
     pub scales: Vec<f64>,
     pub piece: Piece<'p>,
@@ -31,7 +32,7 @@ impl Objective<'_> {
     pub(super) fn job<'p>(&'p self, e: usize, values: &'p Values, coordinates: &[f64], slopes: bool) -> Job<'p> {
         let (problem, unknowns) = (self.problem, &self.problem.unknowns);
         let record = &problem.records[e];
-        let seeds = if slopes { unknowns.seeds(e) } else { vec![] };
+        let seeds = if slopes { unknowns.seeds(e).clone() } else { Arc::default() };
         let mut scales = if slopes { unknowns.scales(e, coordinates) } else { vec![] };
         for (scale, i) in scales.iter_mut().zip(unknowns.columns(e)) {
             if self.left_out.get(i) == Some(&true) {
@@ -72,10 +73,11 @@ impl Objective<'_> {
         let whole = self.job(e, values, coordinates, slopes);
         let segments = self.problem.cuts.segments[e].iter().enumerate();
         let job = |(s, samples): (usize, &std::ops::Range<usize>)| {
-            let border = borders.filter(|_| s > 0).and_then(|borders| borders.of[e].get(s - 1));
-            let from = |own: &[f64], border: Option<&Vec<f64>>| border.map_or(own, |border| border).to_vec().into();
-            let carry = from(&whole.piece.carry, border.map(|border| &border.carry));
-            let slopes = from(&whole.piece.slopes, border.map(|border| &border.slopes).filter(|_| slopes));
+            let Piece { carry, slopes: own, .. } = &whole.piece;
+            let carries = borders.map(|borders| &borders.of[e]);
+            let slopes = carries.filter(|_| slopes).and_then(|carries| carries.slopes_at(s, own.len())).unwrap_or(own);
+            let carry = carries.and_then(|carries| carries.at(s, carry.len())).unwrap_or(carry).to_vec().into();
+            let slopes = slopes.to_vec().into();
             let (seeds, scales) = (whole.seeds.clone(), whole.scales.clone());
             Job {
                 objective: self,

@@ -56,36 +56,47 @@ fn cut(samples: usize, whole: bool) -> Vec<Range<usize>> {
     (0..segments).map(|s| begin(s)..begin(s + 1)).collect()
 }
 
-/// What is carried into a segment, and its slopes with respect to the quantities of the record's unknowns, row by row;
-/// none, where only values were simulated.
+/// What is carried into the segments of a record, one after the other, the first left out; and the slopes of these numbers with
+/// respect to the quantities of the record's unknowns, row by row: none, where only values were simulated.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Border {
-    pub carry: Vec<f64>,
+pub(crate) struct Carries {
+    pub values: Vec<f64>,
     pub slopes: Vec<f64>,
 }
 
-/// The borders between the segments of all records at a point: of each record one for each segment but the first.
+impl Carries {
+    /// What is carried into a segment, its length given; `None` into one that is not known of.
+    pub fn at(&self, segment: usize, carried: usize) -> Option<&[f64]> {
+        self.values.chunks_exact(carried.max(1)).nth(segment.checked_sub(1)?)
+    }
+
+    /// Its slopes, as many numbers as given.
+    pub fn slopes_at(&self, segment: usize, count: usize) -> Option<&[f64]> {
+        self.slopes.chunks_exact(count.max(1)).nth(segment.checked_sub(1)?)
+    }
+
+    /// The carries as they would be after changes of the quantities of the record's unknowns.
+    pub fn moved(&self, change: &[f64]) -> Self {
+        let moved = |row: &[f64]| row.iter().zip(change).map(|(s, d)| s * d).sum::<f64>();
+        let rows = self.slopes.chunks_exact(change.len().max(1)).map(moved).chain(std::iter::repeat(0.0));
+        Carries { values: self.values.iter().zip(rows).map(|(x, moved)| x + moved).collect(), slopes: vec![] }
+    }
+}
+
+/// The borders between the segments of all records at a point.
 #[derive(Clone, Debug)]
 pub(crate) struct Borders {
     pub point: Vec<f64>,
     pub cost: f64,
     pub values: Vec<Values>,
-    pub of: Vec<Vec<Border>>,
+    pub of: Vec<Carries>,
     /// Whether they need no correction: simulated ones, and those of a point that was evaluated, corrected.
     pub right: bool,
 }
 
 impl Borders {
     pub fn has_slopes(&self) -> bool {
-        self.of.iter().flatten().all(|border| !border.slopes.is_empty())
-    }
-
-    /// The carry into a segment, as it would be after changes of the quantities of the record's unknowns.
-    pub fn moved(&self, experiment: usize, segment: usize, change: &[f64]) -> Vec<f64> {
-        let Border { carry, slopes } = &self.of[experiment][segment - 1];
-        let row = |i: usize| &slopes[i * change.len()..][..change.len()];
-        let moved = |i: usize| row(i).iter().zip(change).map(|(s, d)| s * d).sum::<f64>();
-        carry.iter().enumerate().map(|(i, x)| x + moved(i)).collect()
+        self.of.iter().all(|carries| carries.values.is_empty() || !carries.slopes.is_empty())
     }
 }
 

@@ -10,6 +10,7 @@ use crate::parameter::{Parameter, Transform, fixed, free};
 use crate::record::{Initial, Record};
 use crate::sweep::{Guess, Seed, Sweep};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// What an unknown is in the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -52,6 +53,8 @@ pub(crate) struct Unknowns {
     pub row: Vec<Free>,
     /// Index of the first local unknown of each experiment, then the number of unknowns.
     begins: Vec<usize>,
+    /// What each column of an experiment's slopes is taken with respect to.
+    seeds: Vec<Arc<[Seed]>>,
 }
 
 impl Unknowns {
@@ -95,7 +98,9 @@ impl Unknowns {
             initial.push(state);
         }
         begins.push(row.len());
-        Ok(Unknowns { labels, parameters: parameters.to_vec(), initial, row, begins })
+        let mut unknowns = Unknowns { labels, parameters: parameters.to_vec(), initial, row, begins, seeds: vec![] };
+        unknowns.seeds = unknowns.all_seeds();
+        Ok(unknowns)
     }
 
     /// How many unknowns all experiments share; they come first.
@@ -142,12 +147,25 @@ impl Unknowns {
     }
 
     /// What each column of one experiment's slopes is taken with respect to.
-    pub fn seeds(&self, experiment: usize) -> Vec<Seed> {
+    pub fn seeds(&self, experiment: usize) -> &Arc<[Seed]> {
+        &self.seeds[experiment]
+    }
+
+    /// Those of all experiments; one allocation for consecutive ones with the same.
+    fn all_seeds(&self) -> Vec<Arc<[Seed]>> {
         let seed = |i: usize| match self.row[i].role {
             Role::InitialState(s) => Seed::Carry(s),
             Role::Parameter(j) => Seed::Parameter(j),
         };
-        self.columns(experiment).map(seed).collect()
+        let mut all: Vec<Arc<[Seed]>> = Vec::with_capacity(self.initial.len());
+        for e in 0..self.initial.len() {
+            let seeds = self.columns(e).map(seed);
+            match all.last().filter(|last| last.iter().copied().eq(seeds.clone())) {
+                Some(same) => all.push(same.clone()),
+                None => all.push(seeds.collect()),
+            }
+        }
+        all
     }
 
     /// Derivative of the quantity of each column with respect to its coordinate.

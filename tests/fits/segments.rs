@@ -92,7 +92,15 @@ fn fit(kind: usize, whole: bool, record: &ExperimentOf<Plant>, start: [f64; 3]) 
 /// Near starts, and starts a factor of three to five off, each way.
 const STARTS: [[f64; 3]; 5] = [[1.0, 1.0, 1.0], [3.0, 0.3, 2.0], [0.3, 2.0, 0.3], [0.25, 0.2, 4.0], [5.0, 3.0, 0.2]];
 
-/// Where the whole record leads to a minimum, so do its segments, and to the same; how many did.
+/// Whether a search of the whole record ends in the same minimum from starts that differ in the last digits. The search of a pendulum
+/// from far may pass hundreds of minima, and rounding decides in which it ends.
+fn is_reproducible(kind: usize, record: &ExperimentOf<Plant>, start: [f64; 3], cost: f64) -> bool {
+    let ends =
+        [1.0 + 1e-15, 1.0 - 1e-14].map(|factor| fit(kind, true, record, [start[0] * factor, start[1], start[2]]));
+    ends.iter().flatten().all(|end| (end.cost - cost).abs() <= 1e-8 * cost)
+}
+
+/// Where the whole record leads to a minimum, whatever the last digits of the start, so do its segments, and to the same; how many did.
 fn compare(kinds: std::ops::Range<usize>, noise: f64, samples: usize) -> (usize, usize) {
     let (mut found, mut tried) = (0, 0);
     for kind in kinds {
@@ -105,7 +113,10 @@ fn compare(kinds: std::ops::Range<usize>, noise: f64, samples: usize) -> (usize,
             assert!(whole.method.engine.contains("dual") && cut.method.engine.contains("graph"));
             let what = format!("kind {kind} from {start:?}: {} {} {}", cut.cost, whole.cost, cut.outcome);
             // Costs of the same minimum differ by rounding and by what the search leaves: a relative step of 1e-8.
-            assert!(cut.outcome.converged() && (cut.cost - whole.cost).abs() <= 1e-8 * whole.cost, "{what}");
+            if !(cut.outcome.converged() && (cut.cost - whole.cost).abs() <= 1e-8 * whole.cost) {
+                assert!(!is_reproducible(kind, &record, start, whole.cost), "{what}");
+                continue;
+            }
             for (a, b) in cut.unknowns.iter().zip(&whole.unknowns) {
                 let Some(error) = b.knowledge.standard_error() else { continue };
                 assert!((a.value - b.value).abs() <= 1e-3 * error, "{what}: {} {} {}", a.name, a.value, b.value);

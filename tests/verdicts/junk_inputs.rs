@@ -23,7 +23,8 @@ fn inputs() -> Vec<Junk> {
             let y = (0..2).map(noise).collect();
             plant.fit(&Columns { y, ..rest }, &How::default(), s)
         }),
-        named("constant input, plant at rest", HoldsZero, |s| {
+        // The interval of a gain that is truly zero holds zero in 95 % of records only.
+        named("constant input, plant at rest", ConstantInput, |s| {
             let plant = lag();
             let mut random = Random(s);
             let y = vec![(0..SAMPLES).map(|_| 0.1 * random.normal()).collect()];
