@@ -6,6 +6,7 @@ mod predict;
 mod refine;
 mod run;
 mod search;
+mod sides;
 mod starts;
 
 pub use fleet::Fleet;

@@ -30,7 +30,9 @@ mod together;
 mod warnings;
 mod whiteness;
 
+pub(crate) use aliases::Aliases;
 pub(crate) use conclude::{SearchEnd, conclude, conclude_from};
 pub(crate) use directions::{in_null_directions, undetermined};
 pub(crate) use output_sums::output_fit;
 pub(crate) use residual_pass::residuals_together;
+pub(crate) use starts::INDISTINGUISHABLE;

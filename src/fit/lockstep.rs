@@ -125,7 +125,10 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
         };
         attempts = attempts.into_iter().zip(coarse).map(next).collect();
     }
-    attempts.into_iter().map(Attempt::answer).collect()
+    let begin = Instant::now();
+    let answer =
+        |(attempt, problem): (Attempt, &Problem<'_>)| Ok(problem.on_both_sides(attempt.answer()?, begin, &control));
+    attempts.into_iter().zip(problems).map(answer).collect()
 }
 
 /// The stop conditions of fits together: the sum of their time limits is left to all.

@@ -48,16 +48,13 @@ struct Coarser {
     values: Vec<f64>,
 }
 
-impl Coarser {
-    /// The unknown that is farthest from that of an estimate: its number, and how many standard errors.
-    fn farthest(&self, found: &Summary) -> Option<(usize, f64)> {
-        let errors = |(i, (unknown, value)): (usize, (&Unknown, &f64))| {
-            let error = unknown.knowledge.standard_error()?;
-            Some((i, (unknown.value - value).abs() / error))
-        };
-        let all = found.unknowns.iter().zip(&self.values).enumerate().filter_map(errors);
-        all.max_by(|a, b| a.1.total_cmp(&b.1))
-    }
+/// The unknown that is farthest from one of these values: its number, and how many standard errors.
+pub(super) fn farthest(found: &Summary, values: impl Iterator<Item = f64>) -> Option<(usize, f64)> {
+    let errors = |(i, (unknown, value)): (usize, (&Unknown, f64))| {
+        let error = unknown.knowledge.standard_error()?;
+        Some((i, (unknown.value - value).abs() / error))
+    };
+    found.unknowns.iter().zip(values).enumerate().filter_map(errors).max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 impl Attempt {
@@ -139,7 +136,7 @@ impl Attempt {
 /// What is said where the data do not tell the estimate from that of a coarser step.
 fn explains_as_well(coarser: &[Coarser], deviance: f64, found: &Summary) -> Option<Warning> {
     let close = coarser.iter().filter(|coarser| coarser.deviance - deviance < WORSE);
-    let moved = close.filter_map(|coarser| Some((coarser, coarser.farthest(found)?)));
+    let moved = close.filter_map(|coarser| Some((coarser, farthest(found, coarser.values.iter().copied())?)));
     let (coarser, (i, errors)) = moved.max_by(|a, b| a.1.1.total_cmp(&b.1.1)).filter(|(_, (_, e))| *e > MOVED)?;
     let text = format!(
         "the step decides `{}`, and the data do not tell which one is right: {} gives {} {}, {} standard errors away, and explains \

@@ -27,15 +27,27 @@ impl Problem<'_> {
     /// cannot be simulated, is followed by finer ones.
     pub(super) fn run_since(&self, begin: Instant) -> Result<Summary, Error> {
         let control = self.control(begin);
-        let mut attempt = Attempt::new(self.run_within(begin, &control, Start::declared(self)));
-        for finer in self.by_method().skip(1) {
+        let found = self.run_within(begin, &control, Start::declared(self));
+        Ok(self.on_both_sides(self.refined(found, 0, begin, &control)?, begin, &control))
+    }
+
+    /// What methods finer than this one of them make of what it found, as long as a finer step would move an unknown.
+    pub(super) fn refined(
+        &self,
+        found: Result<Summary, Error>,
+        method: usize,
+        begin: Instant,
+        control: &Control,
+    ) -> Result<Summary, Error> {
+        let mut attempt = Attempt::new(found);
+        for finer in self.by_method().skip(method + 1) {
             if !attempt.is_coarse() || control.stops() {
                 break;
             }
-            if let Some(start) = attempt.start(finer, self.settings.optimizer.most(), &control) {
+            if let Some(start) = attempt.start(finer, self.settings.optimizer.most(), control) {
                 let trials = start.trials;
-                let again = finer.run_within(begin, &control, start);
-                attempt = attempt.or(finer.run_on(again, trials, begin, &control));
+                let again = finer.run_within(begin, control, start);
+                attempt = attempt.or(finer.run_on(again, trials, begin, control));
             }
         }
         attempt.answer()

@@ -4,10 +4,11 @@
 //! samples tells the two apart, but each of them has a minimum of its own, and a search ends in that on its side of `pi/h`.
 
 use super::conclude::Judgement;
+use super::residual_pass::residual_pass;
 use crate::estimate::{Warning, WarningCode};
 use crate::numeral::number;
 use crate::optimize::Severity;
-use crate::problem::Role;
+use crate::problem::{Objective, Role};
 use crate::record::{Record, Time};
 use nalgebra::{DMatrix, Schur};
 use std::f64::consts::{PI, TAU};
@@ -27,17 +28,66 @@ const STEPS: usize = 1000;
 const EVEN: f64 = 0.1;
 const ITERATIONS: usize = 10_000;
 
+/// Steps of the change of unknowns towards another frequency, the largest of each, and how far off they may end (all relative).
+const STEPS_TO_ALIAS: usize = 50;
+const LARGEST_STEP: f64 = 0.1;
+const ARRIVED: f64 = 1e-3;
+
 /// A point of a record: experiment, sample and state.
 pub(super) type Point = (usize, usize, Vec<f64>);
+
+/// Decay (negative, 1/s) and frequency (rad/s).
+type Mode = (f64, f64);
+
+/// An oscillation of which there are too few samples.
+struct Unresolved<'p> {
+    point: &'p Point,
+    mode: Mode,
+    /// Between samples (s).
+    interval: f64,
+    /// The other frequency with the same samples (rad/s).
+    alias: f64,
+    /// The unknown that moves it most.
+    name: String,
+}
+
+/// The frequency of an oscillation of which there are too few samples (rad/s), and the points where it has another frequency with
+/// the same samples.
+pub(crate) struct Aliases {
+    pub frequency: f64,
+    /// Frequencies (rad/s) and coordinates of the unknowns.
+    pub others: Vec<(f64, Vec<f64>)>,
+}
+
+impl Aliases {
+    /// Those at a point; `None` where all oscillations are resolved. The other points are near this one and near the declared start,
+    /// with all unknowns changed that move the frequency, or that alone which moves it most.
+    pub fn at(objective: &Objective<'_>, coordinates: &[f64]) -> Option<Self> {
+        let points = residual_pass(objective, coordinates).ok()?.points;
+        let Unresolved { point, mode, interval, .. } = unresolved(objective, coordinates, &points)?;
+        let folds = mode.1 * interval / PI;
+        let slopes = slopes(objective, coordinates, point, mode)?;
+        let moving: Vec<usize> = (0..slopes.len()).filter(|&i| slopes[i] != 0.0).collect();
+        let most = moving.iter().copied().max_by(|&a, &b| slopes[a].abs().total_cmp(&slopes[b].abs()))?;
+        let mut others = vec![];
+        for fold in [folds.floor(), folds.ceil()] {
+            let frequency = TAU / interval * fold - mode.1;
+            for from in [coordinates, &objective.problem.unknowns.start()[..]] {
+                for moving in [&moving[..], &[most]] {
+                    let other = moved(objective, from, (point, mode), frequency, moving);
+                    others.extend(other.map(|other| (frequency, other)));
+                }
+            }
+        }
+        Some(Aliases { frequency: mode.1, others })
+    }
+}
 
 impl Judgement<'_> {
     /// An oscillation of which there are too few samples, with parameters that may make it another one.
     pub(super) fn aliased(&self) -> Option<Warning> {
-        let interval = interval(&self.objective.problem.records)?;
-        let points = &self.residuals.points;
-        let some = points.iter().step_by(points.len().div_ceil(POINTS).max(1));
-        let found = some.filter_map(|point| self.unresolved(point, interval));
-        let (frequency, alias, name) = found.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let found = unresolved(self.objective, &self.end.coordinates, &self.residuals.points)?;
+        let Unresolved { mode: (_, frequency), interval, alias, name, .. } = found;
         // Ends of other searches have been compared.
         let compared = self.end.starts.as_ref().is_some_and(|starts| starts.tried > 1);
         let severity = if compared { Severity::Usable } else { Severity::UsableWithCare };
@@ -53,57 +103,106 @@ impl Judgement<'_> {
         );
         Some(Warning { code: WarningCode::Aliased, severity, text })
     }
-
-    /// The fastest oscillation at a point of which there are too few samples: its frequency, the other one with the same samples
-    /// (both in rad/s), and the parameter that moves it most; `None` where parameters within their bounds do not reach the other.
-    fn unresolved(&self, point: &Point, interval: f64) -> Option<(f64, f64, String)> {
-        let p = self.objective.problem.unknowns.of_experiment(point.0, &self.end.coordinates).p;
-        let modes = self.modes(point, &p)?;
-        let few =
-            |(decay, frequency): &&(f64, f64)| frequency * interval * SAMPLES > TAU && (decay * interval).exp() > LEFT;
-        let &mode = modes.iter().filter(few).max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let frequency = mode.1;
-        let alias = 2.0 * PI / interval * (frequency * interval / PI).round() - frequency;
-        let needed = (alias / frequency).ln();
-        let (mut reach, mut most) = (0.0, (0.0, String::new()));
-        for unknown in &self.objective.problem.unknowns.row {
-            let Role::Parameter(j) = unknown.role else { continue };
-            if unknown.experiment.is_some_and(|e| e != point.0) {
-                continue;
-            }
-            let mut changed = p.clone();
-            changed[j] *= 1.0 + CHANGE;
-            let slope = (nearest(&self.modes(point, &changed)?, mode) / frequency).ln() / CHANGE;
-            let (grows, parameter) = ((slope > 0.0) == (needed > 0.0), unknown.parameter);
-            let bound = if grows == (p[j] > 0.0) { parameter.upper } else { parameter.lower };
-            // Not a number, where the bound has another sign.
-            let moves = slope.abs() * (bound / p[j]).ln().abs().min(REACH.ln());
-            reach += moves;
-            if moves > most.0 {
-                most = (moves, unknown.name.clone());
-            }
-        }
-        (reach > needed.abs()).then_some((frequency, alias, most.1))
-    }
-
-    /// Decay (negative) and frequency of each oscillation about a point, in 1/s and rad/s.
-    fn modes(&self, (e, sample, state): &Point, p: &[f64]) -> Option<Vec<(f64, f64)>> {
-        let record = &self.objective.problem.records[*e];
-        let slopes = self.objective.sweep.state_slopes(record, *sample, state, p)?;
-        let n = state.len();
-        if !slopes.iter().all(|slope| slope.is_finite()) {
-            return None;
-        }
-        let schur = Schur::try_new(DMatrix::from_row_slice(n, n, &slopes), f64::EPSILON, ITERATIONS)?;
-        let values = schur.complex_eigenvalues();
-        Some(values.iter().filter(|value| value.im > 0.0).map(|value| (value.re, value.im)).collect())
-    }
 }
 
-/// The frequency of the oscillation that is nearest to one.
-fn nearest(modes: &[(f64, f64)], (decay, frequency): (f64, f64)) -> f64 {
-    let distance = |mode: &&(f64, f64)| (mode.0 - decay).hypot(mode.1 - frequency);
-    modes.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).map_or(frequency, |mode| mode.1)
+/// The fastest oscillation of which there are too few samples, where parameters within their bounds reach another one with the
+/// same samples.
+fn unresolved<'p>(objective: &Objective<'_>, coordinates: &[f64], points: &'p [Point]) -> Option<Unresolved<'p>> {
+    let interval = interval(&objective.problem.records)?;
+    let some = points.iter().step_by(points.len().div_ceil(POINTS).max(1));
+    let found = some.filter_map(|point| unresolved_at(objective, coordinates, point, interval));
+    found.max_by(|a, b| a.mode.1.total_cmp(&b.mode.1))
+}
+
+/// The same at a point.
+fn unresolved_at<'p>(
+    objective: &Objective<'_>,
+    coordinates: &[f64],
+    point: &'p Point,
+    interval: f64,
+) -> Option<Unresolved<'p>> {
+    let few = |(decay, frequency): &&Mode| frequency * interval * SAMPLES > TAU && (decay * interval).exp() > LEFT;
+    let modes = modes(objective, coordinates, point)?;
+    let &mode = modes.iter().filter(few).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let alias = TAU / interval * (mode.1 * interval / PI).round() - mode.1;
+    let needed = (alias / mode.1).ln();
+    let unknowns = &objective.problem.unknowns;
+    let (mut reach, mut most) = (0.0, (0.0, 0));
+    let slopes = slopes(objective, coordinates, point, mode)?;
+    for (i, (slope, value)) in slopes.into_iter().zip(unknowns.values(coordinates)).enumerate() {
+        let (grows, parameter) = ((slope > 0.0) == (needed > 0.0), unknowns.row[i].parameter);
+        let bound = if grows == (value > 0.0) { parameter.upper } else { parameter.lower };
+        // Not a number, where the bound has another sign.
+        let moves = slope.abs() * (bound / value).ln().abs().min(REACH.ln());
+        reach += moves;
+        if moves > most.0 {
+            most = (moves, i);
+        }
+    }
+    (reach > needed.abs()).then(|| Unresolved { point, mode, interval, alias, name: unknowns.row[most.1].name.clone() })
+}
+
+/// By which part of itself the frequency of an oscillation grows where an unknown grows by a part of itself, for each.
+fn slopes(objective: &Objective<'_>, coordinates: &[f64], point: &Point, mode: Mode) -> Option<Vec<f64>> {
+    let unknowns = &objective.problem.unknowns;
+    let slope = |(i, value): (usize, f64)| {
+        let unknown = &unknowns.row[i];
+        if matches!(unknown.role, Role::InitialState(_)) || unknown.experiment.is_some_and(|e| e != point.0) {
+            return Some(0.0);
+        }
+        let mut changed = coordinates.to_vec();
+        changed[i] = unknown.parameter.transform.to_coordinate(value * (1.0 + CHANGE));
+        Some((nearest(&modes(objective, &changed, point)?, mode).1 / mode.1).ln() / CHANGE)
+    };
+    unknowns.values(coordinates).into_iter().enumerate().map(slope).collect()
+}
+
+/// Changes some unknowns, all by the least parts of themselves, until an oscillation has another frequency; `None` if they come to
+/// their bounds.
+fn moved(
+    objective: &Objective<'_>,
+    coordinates: &[f64],
+    (point, mode): (&Point, Mode),
+    frequency: f64,
+    moving: &[usize],
+) -> Option<Vec<f64>> {
+    let (unknowns, mut x) = (&objective.problem.unknowns, coordinates.to_vec());
+    let bounds = unknowns.bounds();
+    let mut mode = nearest(&modes(objective, &x, point)?, mode);
+    for _ in 0..STEPS_TO_ALIAS {
+        let needed = (frequency / mode.1).ln();
+        if needed.abs() < ARRIVED {
+            return Some(x);
+        }
+        let slopes = slopes(objective, &x, point, mode)?;
+        let squares: f64 = moving.iter().map(|&i| slopes[i] * slopes[i]).sum();
+        let (needed, values) = (needed.clamp(-LARGEST_STEP, LARGEST_STEP) / squares, unknowns.values(&x));
+        for &i in moving {
+            let (changed, (lower, upper)) = (values[i] * (slopes[i] * needed).exp(), bounds[i]);
+            x[i] = unknowns.row[i].parameter.transform.to_coordinate(changed).max(lower).min(upper);
+        }
+        mode = nearest(&modes(objective, &x, point)?, mode);
+    }
+    None
+}
+
+/// Each oscillation about a point.
+fn modes(objective: &Objective<'_>, coordinates: &[f64], (e, sample, state): &Point) -> Option<Vec<Mode>> {
+    let (record, n) = (&objective.problem.records[*e], state.len());
+    let parameters = objective.problem.unknowns.of_experiment(*e, coordinates).p;
+    let slopes = objective.sweep.state_slopes(record, *sample, state, &parameters)?;
+    if !slopes.iter().all(|slope| slope.is_finite()) {
+        return None;
+    }
+    let schur = Schur::try_new(DMatrix::from_row_slice(n, n, &slopes), f64::EPSILON, ITERATIONS)?;
+    let values = schur.complex_eigenvalues();
+    Some(values.iter().filter(|value| value.im > 0.0).map(|value| (value.re, value.im)).collect())
+}
+
+/// The oscillation that is nearest to one.
+fn nearest(modes: &[Mode], mode: Mode) -> Mode {
+    let distance = |other: &&Mode| (other.0 - mode.0).hypot(other.1 - mode.1);
+    modes.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).copied().unwrap_or(mode)
 }
 
 /// The time of which all distances between measurements of an output are multiples (s), that of the output and record which has
@@ -161,12 +260,10 @@ mod tests {
     #[test]
     fn the_nearest_oscillation() {
         let modes = [(-1.0, 5.0), (-3.0, 8.0), (-20.0, 7.0)];
-        assert_eq!(
-            [nearest(&modes, (-3.0, 7.0)), nearest(&modes, (-1.0, 6.0)), nearest(&[], (-1.0, 6.0))],
-            [8.0, 5.0, 6.0]
-        );
+        assert_eq!([nearest(&modes, (-3.0, 7.0)), nearest(&modes, (-1.0, 6.0))], [modes[1], modes[0]]);
+        assert_eq!(nearest(&[], (-1.0, 6.0)), (-1.0, 6.0));
         // Of decays of the other sign the nearest is that of the smaller difference, not of the smaller sum.
-        assert_eq!(nearest(&[(-4.0, 5.0), (4.0, 6.0)], (-4.0, 5.5)), 5.0);
+        assert_eq!(nearest(&[(-4.0, 5.0), (4.0, 6.0)], (-4.0, 5.5)), (-4.0, 5.0));
     }
 
     /// The quartiles of four steps are the first, the second and the third of them in order of size.

@@ -3,6 +3,7 @@
 mod extremes;
 mod good;
 mod good_processes;
+mod initial;
 mod junk;
 mod junk_inputs;
 mod junk_models;

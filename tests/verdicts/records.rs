@@ -118,7 +118,7 @@ pub struct Bench<M: Model> {
 }
 
 impl<M: Model> Bench<M> {
-    fn experiment(&self, columns: &Columns) -> ExperimentOf<M> {
+    pub fn experiment(&self, columns: &Columns) -> ExperimentOf<M> {
         let inputs = (0..columns.len()).map(|k| M::Input::from_fn(|i| columns.u[i][k])).collect();
         let outputs = (0..columns.len()).map(|k| M::Output::from_fn(|j| columns.y[j][k])).collect();
         let record = Experiment::new(&self.model, columns.time(), inputs, outputs).unwrap().hold(self.hold);

@@ -1,10 +1,11 @@
 //! Plants that oscillate faster than the samples show.
 
 use crate::records::*;
+use approx::assert_relative_eq;
 use greybox::estimate::WarningCode;
 use greybox::optimize::Severity;
 use greybox::pmsm::Surface;
-use greybox::{Model, Parameter, Scalar, signals};
+use greybox::{Estimate, Fit, Fleet, Model, Parameter, Scalar, free, signals};
 
 signals! { pub struct Car { xs: "m", vs: "m/s", xu: "m", vu: "m/s" } }
 signals! { pub struct Road { z: "m" } }
@@ -37,16 +38,46 @@ fn judged(step: f64, how: &How, seed: u64) -> Found {
     car.fit(&car.record(seed, 400).noisy(0.02, 0.0, seed), how, seed)
 }
 
-/// At 20 samples a second the wheel is beyond half the frequency of sampling, and has a second minimum on the other side:
-/// 31 of 200 starts end there, as these three do, 8 to 10 standard errors off.
+/// At 20 samples a second the wheel is beyond half the frequency of sampling, and has a second minimum on the other side: of 200
+/// starts 31 end there, as these do without a search from the other side, 6 to 10 standard errors off. That search finds the
+/// better of the two (seeds 3 and 19), or that the data do not tell them apart.
 #[test]
-fn an_oscillation_beyond_half_the_frequency_of_sampling_is_named() {
-    for seed in [14, 15, 19] {
+fn the_other_side_of_half_the_frequency_of_sampling_is_searched() {
+    for seed in [0, 3, 9, 14, 15, 19, 54] {
         let found = judged(0.05, &How::default(), seed);
-        assert!(found.errors > 5.0, "seed {seed}: {}", found.text);
-        assert_eq!(found.severity, Severity::UsableWithCare, "{}", found.text);
-        assert_eq!(found.codes, [WarningCode::Aliased], "{}", found.text);
-        assert!(found.text.contains("take 2.1 a period"), "{}", found.text);
+        let told = found.codes.contains(&WarningCode::Aliased) && found.text.contains("bounds or a prior must tell");
+        assert_eq!(told, ![3, 19].contains(&seed), "seed {seed}: {}", found.text);
+        assert!(told || found.severity == Severity::Usable && found.errors < 4.0, "seed {seed}: {}", found.text);
+    }
+}
+
+/// At 1.24 and 1.5 times half the frequency of sampling the other minimum is far worse: the fit is usable, and says so.
+#[test]
+fn an_oscillation_far_beyond_is_usable() {
+    for (step, seed) in [(0.06, 0), (0.06, 1), (0.0725, 0), (0.0725, 1)] {
+        let found = judged(step, &How::default(), seed);
+        assert_eq!(found.severity, Severity::Usable, "{}", found.text);
+        assert!(found.errors < 4.0 && found.text.contains("in -2 ln of the"), "{}", found.text);
+    }
+}
+
+/// The fits of a fleet search there, too.
+#[test]
+fn fleets_search_the_other_side() {
+    let car = car(0.05);
+    let records = [3, 14].map(|seed| car.experiment(&car.record(seed, 400).noisy(0.02, 0.0, seed)));
+    let parameters = Suspension { ks: free(15_000.0), cs: free(1100.0), kt: free(150_000.0), mu: free(45.0) };
+    let fleet = Fleet::new(&car.model).parameters(parameters).fleet().unwrap();
+    for (together, record) in fleet.run(records.clone()).zip(&records) {
+        let (together, alone) = (together.unwrap(), Fit::new(&car.model, record).parameters(parameters).run().unwrap());
+        let texts = |fit: &Estimate<QuarterCar>| {
+            let texts = fit.warnings.iter().filter(|warning| warning.code == WarningCode::Aliased);
+            texts.map(|warning| warning.text.clone()).collect::<Vec<_>>()
+        };
+        assert!(texts(&alone).len() == 1 && texts(&alone)[0].contains("rad/s"), "{alone}");
+        assert_eq!(texts(&together), texts(&alone));
+        // Lanes add in another order.
+        assert_relative_eq!(together.parameters.mu, alone.parameters.mu, max_relative = 1e-6);
     }
 }
 

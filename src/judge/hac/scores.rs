@@ -17,8 +17,9 @@ pub(super) trait AccumulateScores: Send {
 }
 
 /// The score of each sample, `sum over the outputs of w psi(z) g`, in the columns kept, where variances `v` are predicted with
-/// `w (psi(z) z - kappa) dv / (2 v)`; each error divided by one less its
-/// leverage, as in the sandwich for independent errors.
+/// `w (psi(z) z - kappa) dv / (2 v)`; each error divided by the root of one less its leverage, with which the variance of independent
+/// errors is right (HC2). Without the root, as in the sandwich for independent errors, the error of an initial state that a single
+/// measurement determines is several times too large.
 pub(super) struct EachScore<'s, T> {
     objective: &'s Objective<'s>,
     experiment: usize,
@@ -55,7 +56,7 @@ impl<T: AccumulateScores> Accumulate for EachScore<'_, T> {
                 self.slopes.iter_mut().enumerate().for_each(|(c, slope)| *slope = window.at(k, j, c, lane));
                 let less = (1.0 - weight * form(self.inverse, &self.slopes)).max(ALONE);
                 let influence = loss.map_or(z, |loss| loss.psi(z));
-                let psi = weight * influence / less;
+                let psi = weight * influence / less.sqrt();
                 for (score, &c) in self.score.iter_mut().zip(self.kept) {
                     *score += psi * self.slopes[c];
                 }
