@@ -206,7 +206,6 @@ impl Judgement<'_> {
         let same = |a: &Record, b: &Record| {
             let columns = || a.outputs().iter().zip(b.outputs()).map(|(a, b)| (&a.values[..], &b.values[..]));
             let equal = |(a, b): (&f64, &f64)| a == b || a.is_nan() && b.is_nan();
-            let moves = |a: &[f64]| a.iter().any(|y| !y.is_nan() && *y != a[0]);
             a.len() == b.len() && columns().all(|(a, b)| a.iter().zip(b).all(equal)) && columns().any(|(a, _)| moves(a))
         };
         let pairs = (1..records.len().min(COMPARED)).flat_map(|b| (0..b).map(move |a| (a, b)));
@@ -236,5 +235,24 @@ impl Judgement<'_> {
             })
         };
         outputs.filter_map(one).collect()
+    }
+}
+
+/// Whether measurements are not all the same.
+fn moves(values: &[f64]) -> bool {
+    let mut measured = values.iter().filter(|y| !y.is_nan());
+    let first = measured.next();
+    measured.any(|y| Some(y) != first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::moves;
+
+    #[test]
+    fn a_missing_measurement_is_no_movement() {
+        let nan = f64::NAN;
+        assert_eq!([&[][..], &[nan], &[3.0, nan, 3.0], &[nan, 3.0, 3.0]].map(moves), [false; 4]);
+        assert_eq!([&[3.0, 4.0][..], &[nan, 3.0, nan, 4.0], &[0.0, 0.0, 1.0]].map(moves), [true; 3]);
     }
 }

@@ -107,3 +107,29 @@ pub(super) fn splits(objective: &Objective<'_>, coordinates: &[f64], suspects: &
     // In the order of the experiments, which is that of the suspects.
     found.into_iter().flat_map(|sums| sums.splits).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Time;
+    use crate::record::Channel;
+
+    /// Errors of 1 and 3 inside, of 1, 1, 0 and 0 outside, in two pieces of a record: mean squares of 5 and of a half.
+    #[test]
+    fn errors_of_pieces_add_up() {
+        let channel = Channel::new("y", "", vec![1.0; 6]);
+        let record = Record::new(vec![], Time::Uniform { start: 0.0, step: 1.0 }, vec![], vec![channel]).unwrap();
+        let sums = |inside: (f64, u64), outside: (f64, u64)| {
+            let errors = |(squares, count)| Errors { squares, count };
+            let split = Split { inside: errors(inside), outside: errors(outside) };
+            Sums { record: &record, suspects: vec![], splits: vec![split] }
+        };
+        let mut whole = sums((1.0, 1), (1.0, 1));
+        whole.append(sums((9.0, 1), (1.0, 3)));
+        let split = whole.splits[0];
+        assert_eq!((split.inside.count, split.outside.count), (2, 4));
+        assert_eq!((split.rms(), split.ratio(), split.share()), (5f64.sqrt(), 10.0, 10.0 / 12.0));
+        let none = Split::default();
+        assert_eq!((none.rms(), none.ratio(), none.share()), (0.0, 0.0, 0.0));
+    }
+}

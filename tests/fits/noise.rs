@@ -223,34 +223,3 @@ fn units_change_no_verdict() {
     assert!(plain.text.contains("the colored part is ") && plain.text.contains("times as wide"), "{}", plain.text);
     assert_eq!([said(1e-4), said(1e4)], [said(1.0), said(1.0)]);
 }
-
-signals! { pub struct Root { a: "A^2/V" } }
-
-/// `i = sqrt(a u)`, whose slope is infinite where the input is zero.
-struct Diode;
-
-impl Model for Diode {
-    type State = Nothing;
-    type Input = Voltage;
-    type Output = Current;
-    type Parameters = Root;
-    const KIND: Kind = Kind::Static;
-
-    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Root<S>) -> Current<S> {
-        Current { i: (p.a * u.u).sqrt() }
-    }
-}
-
-/// A weight of zero leaves a sample out, also where its slopes are no numbers.
-#[test]
-fn a_weight_of_zero_leaves_infinite_slopes_out() {
-    let fit = |first: usize| {
-        let mut noise = Noise(3);
-        let inputs: Vec<Voltage> = (first..20).map(|k| Voltage { u: 0.5 * k as f64 }).collect();
-        let outputs = (0..20).map(|k| Current { i: k as f64 + 0.1 * noise.gauss() }).skip(first).collect();
-        let record = Experiment::new(&Diode, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
-        let fit = Fit::new(&Diode, &record).parameters(Root { a: free(1.0) });
-        fit.weighting(|s: &Sample<Diode>| if s.u.u == 0.0 { 0.0 } else { 1.0 }).run().unwrap().parameters.a
-    };
-    assert!((fit(0) / fit(1) - 1.0).abs() < 1e-9, "{} {}", fit(0), fit(1));
-}
