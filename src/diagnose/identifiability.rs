@@ -180,7 +180,7 @@ fn generic(objective: &Objective<'_>, best: &[f64], transforms: impl Iterator<It
                 let factor = 1.5f64.powf(2.0 * random.uniform() - 1.0);
                 let place = match transform {
                     Transform::Log => c + factor.ln(),
-                    Transform::Identity if c == 0.0 => 2.0 * random.uniform() - 1.0,
+                    Transform::Identity if c == 0.0 => factor,
                     Transform::Identity => c * factor,
                 };
                 place.clamp(lower, upper)

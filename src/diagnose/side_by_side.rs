@@ -211,5 +211,8 @@ mod tests {
             ],
         };
         assert_eq!(output.fit_percent(), [Some(50.0), None]);
+        let all =
+            Compared { record: String::new(), data: "validation", t: vec![], gaps: vec![], outputs: vec![output] };
+        assert_eq!(all.fit_percent(), [("y", vec![Some(50.0), None])]);
     }
 }

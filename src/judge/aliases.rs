@@ -257,6 +257,29 @@ mod tests {
         Record::new(vec![], time, vec![], vec![channel]).unwrap()
     }
 
+    #[test]
+    fn the_nearest_oscillation() {
+        let modes = [(-1.0, 5.0), (-3.0, 8.0), (-20.0, 7.0)];
+        assert_eq!(
+            [nearest(&modes, (-3.0, 7.0)).1, nearest(&modes, (-1.0, 6.0)).1, nearest(&[], (-1.0, 6.0)).1],
+            [8.0, 5.0, 6.0]
+        );
+        // Of decays of the other sign the nearest is that of the smaller difference, not of the smaller sum.
+        assert_eq!(nearest(&[(-4.0, 5.0), (4.0, 6.0)], (-4.0, 5.5)).1, 5.0);
+    }
+
+    /// The quartiles of four steps are the first, the second and the third of them in order of size.
+    #[test]
+    fn steps_by_their_quartiles() {
+        let of = |stamps: &[f64]| {
+            let channel = Channel::new("y", "", vec![1.0; stamps.len()]);
+            step(&Record::new(vec![], Time::Stamps(stamps.to_vec()), vec![], vec![channel]).unwrap())
+        };
+        assert_eq!(of(&[0.0, 1.0, 2.0, 3.0, 9.0]), Some(1.0));
+        assert_eq!(of(&[0.0, 1.0, 2.0, 5.0, 9.0]), None);
+        assert_eq!(of(&[0.0, 2.0]), Some(2.0));
+    }
+
     /// By hand: measured at samples 3, 7, 17 and 21, all distances are multiples of 2; the shortest of two records counts; a step
     /// that scatters by more than a tenth leaves no other frequency.
     #[test]

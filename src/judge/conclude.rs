@@ -216,7 +216,8 @@ impl<'j> Judgement<'j> {
 
     /// The errors' autocorrelation; not computed where residuals are round-off.
     pub(super) fn autocorrelated(&self) -> Option<(usize, super::whiteness::Whiteness)> {
-        self.residuals.least_white().filter(|(_, white)| white.p_value < WHITENESS_LEVEL && !self.rounding)
+        super::whiteness::least_white(&self.residuals.whiteness)
+            .filter(|(_, white)| white.p_value < WHITENESS_LEVEL && !self.rounding)
     }
 
     fn unknowns(&self, covariances: &Covariances) -> Vec<Unknown> {

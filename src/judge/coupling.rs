@@ -204,6 +204,8 @@ mod tests {
         assert!((inflation(&[0.5, 0.25], &[0.5, 0.5]) - 2.0).abs() < 1e-15);
         assert!((inflation(&[0.5, 0.0], &[0.5, 0.9]) - 5.0 / 3.0).abs() < 1e-15);
         assert_eq!(inflation(&[0.5, 0.1], &[-0.5, 0.1]), 1.0);
+        // A sum that turns negative is not continued: 1 + 2 (0.01 + 0.64 - 0.18).
+        assert!((inflation(&[0.1, 0.8, 0.3, 0.3], &[0.1, 0.8, -0.3, -0.3]) - 1.94).abs() < 1e-14);
         let colored = Whiteness { correlations: [0.9; LAGS], ..WHITE };
         let pair = Pair { product: 16.0, squares: [12.0, 24.0], fourth: 24.0 };
         assert!(Coupling { pairs: vec![pair] }.strongest(&[WHITE, colored]).is_some());

@@ -54,7 +54,7 @@ impl Judgement<'_> {
         }
         let bias = |(unknown, step): (&'u Unknown, &f64)| {
             let change = step * unknown.transform.slope(unknown.value);
-            let error = unknown.knowledge.standard_error().filter(|error| *error > 0.0)?;
+            let error = unknown.knowledge.standard_error()?;
             Some(Bias { unknown, errors: change.abs() / error, change })
         };
         unknowns.iter().zip(&mean).filter_map(bias).max_by(|a, b| a.errors.total_cmp(&b.errors))

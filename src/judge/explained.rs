@@ -40,17 +40,21 @@ impl Judgement<'_> {
         (moves > 0.0 && self.residuals.outputs[j].fit_percent.is_some()).then(|| (rmse / moves).powi(2))
     }
 
+    /// How many independent errors an output has the information of, one at least.
+    fn independent(&self, j: usize) -> f64 {
+        self.residuals.outputs[j].samples.max(1) as f64 / self.dependence(j)
+    }
+
     /// Probability that noise about a mean is explained as well: Fisher's test with as many measurements as are
     /// independent.
     fn by_chance(&self, j: usize, relative: f64) -> f64 {
-        by_chance(self.residuals.outputs[j].samples as f64 / self.dependence(j), self.values.len(), relative)
+        by_chance(self.independent(j), self.values.len(), relative)
     }
 
     /// Whether the errors are no larger than the noise that was given.
     fn is_noise(&self, j: usize) -> bool {
         let Noise::Given(sigma) = &self.objective.problem.settings.noise else { return false };
-        let (fit, dependence) = (&self.residuals.outputs[j], self.dependence(j));
-        fit.rmse <= sigma[j] * (1.0 + 3.0 * (dependence / (2.0 * fit.samples.max(1) as f64)).sqrt())
+        self.residuals.outputs[j].rmse <= sigma[j] * (1.0 + 3.0 / (2.0 * self.independent(j)).sqrt())
     }
 
     /// Outputs that the model explains no better than their mean does.
@@ -71,8 +75,7 @@ impl Judgement<'_> {
                 continue;
             }
             let fit_percent = self.residuals.outputs[j].fit_percent.unwrap_or(0.0);
-            let samples = self.residuals.outputs[j].samples.max(1) as f64;
-            let worse = relative > 1.02 + 3.0 * (2.0 * self.dependence(j) / samples).sqrt();
+            let worse = is_worse(relative, self.independent(j));
             let rmse = self.residuals.outputs[j].rmse;
             let at_level = moves.max(rmse) < LEVEL_PART * level.abs();
             let Some(severity) = unexplained(another(j), at_level, worse, partly) else { continue };
@@ -97,8 +100,9 @@ impl Judgement<'_> {
         let outputs = self.objective.problem.layout().outputs.iter().enumerate();
         let one = |(j, output): (usize, &crate::layout::Quantity)| {
             let found = &self.residuals.outputs[j];
-            let (ratio, samples) = (found.rmse / sigma[j], found.samples as f64 / self.dependence(j));
-            if !contradicts(ratio, samples, self.values.len()) || ratio > 1.0 && self.objective.is_robust() {
+            let ratio = found.rmse / sigma[j];
+            if !contradicts(ratio, self.independent(j), self.values.len()) || ratio > 1.0 && self.objective.is_robust()
+            {
                 return None;
             }
             let (_, moves) = self.residuals.levels[j];
@@ -126,6 +130,12 @@ fn by_chance(independent: f64, unknowns: usize, relative: f64) -> f64 {
     let statistic = (1.0 - relative) / unknowns / (relative / free).max(f64::MIN_POSITIVE);
     let distribution = FisherSnedecor::new(unknowns, free);
     if relative < 1.0 { distribution.map_or(1.0, |distribution| distribution.sf(statistic)) } else { 1.0 }
+}
+
+/// Whether squares of errors, relative to those about the mean, are more than rounding and three standard deviations of as many
+/// independent ones above one.
+fn is_worse(relative: f64, independent: f64) -> bool {
+    relative > 1.02 + 3.0 * (2.0 / independent).sqrt()
 }
 
 /// How severe it is that an output is not explained: whether another is, whether this one stands at a level that the model
@@ -172,6 +182,12 @@ mod tests {
         assert!((by_chance(12.0, 0, 1.0 / (1.0 + 4.9646 / 10.0)) - 0.05).abs() < 1e-5);
         assert!((by_chance(1.0, 1, 1.0 / (1.0 + 161.45)) - 0.05).abs() < 1e-5);
         assert_eq!([by_chance(12.0, 1, 0.0), by_chance(12.0, 1, 1.0), by_chance(12.0, 1, 2.0)], [0.0, 1.0, 1.0]);
+    }
+
+    /// A variance of 50 errors has a standard deviation of a fifth of itself.
+    #[test]
+    fn errors_worse_than_the_mean() {
+        assert!(is_worse(1.63, 50.0) && !is_worse(1.61, 50.0) && !is_worse(1.02, f64::INFINITY));
     }
 
     #[test]

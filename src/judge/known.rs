@@ -101,7 +101,7 @@ fn started(unknowns: &[Unknown]) -> impl Iterator<Item = (&Unknown, f64)> {
 
 /// Parameters of the opposite sign than their start.
 fn opposite(unknowns: &[Unknown]) -> Vec<Warning> {
-    let turned = started(unknowns).filter(|(unknown, ratio)| *ratio < 0.0 && !holds_zero(unknown));
+    let turned = started(unknowns).filter(|(unknown, ratio)| ratio.is_sign_negative() && !holds_zero(unknown));
     let one = |(unknown, _): (&Unknown, f64)| {
         let Unknown { name, value, start, unit, .. } = unknown;
         let text = format!(
@@ -132,4 +132,77 @@ fn far_from_start(unknowns: &[Unknown]) -> Vec<Warning> {
         care(WarningCode::FarFromStart, text)
     };
     far.map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parameter::Transform;
+
+    fn unknown(value: f64, start: f64, width: f64) -> Unknown {
+        Unknown {
+            name: "a".to_owned(),
+            unit: "V".to_owned(),
+            role: Role::Parameter(0),
+            experiment: None,
+            value,
+            start,
+            knowledge: Knowledge::Known {
+                standard_error: width / 4.0,
+                lower: value - width / 2.0,
+                upper: value + width / 2.0,
+            },
+            error_index: None,
+            error_index_held: None,
+            transform: Transform::Identity,
+            degrees_of_freedom: 10.0,
+        }
+    }
+
+    /// An interval of twice the value's size reaches zero, and then nothing is said of the start.
+    #[test]
+    fn intervals_that_hold_zero() {
+        for sign in [-1.0, 1.0] {
+            assert!(holds_zero(&unknown(sign * 2.0, 1.0, 4.0)) && !holds_zero(&unknown(sign * 2.0, 1.0, 3.9)));
+        }
+        assert!(!holds_zero(&Unknown { knowledge: Knowledge::Unidentified, ..unknown(2.0, 1.0, 4.0) }));
+        assert!(
+            opposite(&[unknown(-2.0, 1.0, 4.0)]).is_empty() && far_from_start(&[unknown(2e3, 1.0, 4e3)]).is_empty()
+        );
+    }
+
+    /// More than 400 times the start or less than a 400th of it; a start of zero says nothing, nor does a value not known.
+    #[test]
+    fn values_far_from_their_start() {
+        let said = |value: f64, start: f64| far_from_start(&[unknown(value, start, 1e-3 * value.abs())]).len();
+        assert_eq!(
+            [said(400.0, 1.0), said(401.0, 1.0), said(-401.0, 1.0), said(1.0, 400.0), said(1.0, 401.0)],
+            [0, 1, 1, 0, 1]
+        );
+        assert_eq!([said(401.0, 0.0), said(1.0, -500.0)], [0, 1]);
+        assert!(
+            far_from_start(&[Unknown { knowledge: Knowledge::Unidentified, ..unknown(401.0, 1.0, 1.0) }]).is_empty()
+        );
+        let state = Unknown { role: Role::InitialState(0), ..unknown(-401.0, 1.0, 1.0) };
+        assert!(far_from_start(std::slice::from_ref(&state)).is_empty() && opposite(&[state]).is_empty());
+        let text = &far_from_start(&[unknown(500.0, 1.0, 1.0)])[0].text;
+        assert_eq!(text, "`a` is 500 V, 500 times its start 1: check the units of signals and time");
+    }
+
+    #[test]
+    fn values_of_the_other_sign() {
+        let said = |value: f64, start: f64| opposite(&[unknown(value, start, 1e-3)]).len();
+        assert_eq!(
+            [said(1.0, 1.0), said(-1.0, 1.0), said(1.0, -1.0), said(-1.0, -1.0), said(-1.0, 0.0)],
+            [0, 1, 1, 0, 0]
+        );
+        let text = &opposite(&[unknown(-2.0, 1.0, 1.0)])[0].text;
+        assert!(text.starts_with("`a` is -2 V, but its start was 1: the sign has changed"), "{text}");
+    }
+
+    #[test]
+    fn standard_errors_are_positive_numbers() {
+        let errors = [0.0, f64::MIN_POSITIVE, 1.0, -1.0, f64::INFINITY, f64::NAN];
+        assert_eq!(errors.map(is_error), [false, true, true, false, false, false]);
+    }
 }

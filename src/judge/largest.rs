@@ -82,6 +82,9 @@ mod tests {
         assert!((ratio - 7.0).abs() < 1e-4 && (p / (2.0 * n * 1.2798e-12) - 1.0).abs() < 1e-3, "{ratio} {p}");
         assert!(chance(6.3, 1.0, n).1 > LEVEL);
         assert_eq!(chance(2.0, 1.0, 4.0).1, 0.0);
+        // Three times the others, of four: beyond 3 and -3 is 2 (1/2 - (sqrt(3)/4 + pi/3) / pi) of Student's t with three degrees.
+        let (ratio, p) = chance(-3.0, 3f64.sqrt(), 4.0);
+        assert!((ratio - 3.0).abs() < 1e-14 && (p - 4.0 * 0.057_668_9).abs() < 1e-6, "{ratio} {p}");
         let mut largest = Largest::default();
         largest.add(&[0.0, -2.0, 1.0], 0, 10);
         largest.add(&[2.0, 0.5], 1, 0);

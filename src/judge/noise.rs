@@ -162,3 +162,45 @@ fn magnitudes(objective: &Objective<'_>) -> Vec<f64> {
     };
     (0..objective.outputs()).map(of).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Experiment, Fit, Kind, Model, Nothing, Scalar, Time, free, signals};
+
+    signals! { struct Voltage { u: "V" } }
+    signals! { struct Current { i: "A" } }
+    signals! { struct Gain { a: "A/V" } }
+
+    /// `i = a u`.
+    #[derive(Clone)]
+    struct Line;
+
+    impl Model for Line {
+        type State = Nothing;
+        type Input = Voltage;
+        type Output = Current;
+        type Parameters = Gain;
+        const KIND: Kind = Kind::Static;
+
+        fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Gain<S>) -> Current<S> {
+            Current { i: p.a * u.u }
+        }
+    }
+
+    /// Errors about a gain of two, every seventh an outlier: Huber's scale `s` solves `mean of min(|e / s|, c)^2 = kappa`.
+    #[test]
+    fn a_robust_scale_solves_its_equation() {
+        let error = |k: usize| ((k * 37 % 21) as f64 - 10.0) * if k % 7 == 0 { 30.0 } else { 0.1 };
+        let inputs: Vec<Voltage> = (0..42).map(|k| Voltage { u: k as f64 }).collect();
+        let outputs = (0..42).map(|k| Current { i: 2.0 * k as f64 + error(k) }).collect();
+        let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        let fit = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).loss(Huber::default());
+        let problem = fit.problem().unwrap();
+        let found = estimate(&problem.objective().unwrap(), &[2.0]).unwrap().sigma()[0];
+        let Huber(c) = Huber::default();
+        let mean = (0..42).map(|k| (error(k).abs() / found).min(c).powi(2)).sum::<f64>() / 42.0;
+        // The scale is found to 1e-9 from step to step, which shrink by a half or more.
+        assert!((mean / clipped_variance(&Huber(c)) - 1.0).abs() < 1e-7, "{mean} {found}");
+    }
+}

@@ -144,6 +144,7 @@ mod tests {
             assert!((fit.rmse - (squares / 21.0).sqrt()).abs() < 1e-12, "{fit:?}");
             assert!((fit.fit_percent.unwrap() - 100.0 * (1.0 - (squares / spread).sqrt())).abs() < 1e-9, "{fit:?}");
         }
+        assert_eq!(all(0, 0).kurtosis(), 0.0);
         let still = output_fit(&[5.0; 4], &[1.0, -1.0, f64::NAN, 1.0]);
         assert_eq!((still.samples, still.rmse, still.fit_percent), (3, 1.0, None));
     }

@@ -280,20 +280,6 @@ fn failed(objective: &Objective<'_>, coordinates: &[f64]) -> Error {
     Error::Simulation(objective.locate(0, coordinates, 0))
 }
 
-impl Residuals {
-    /// The output whose errors are least white, and how white they are; the probability counts all outputs that were
-    /// tested.
-    pub fn least_white(&self) -> Option<(usize, Whiteness)> {
-        let count = self.whiteness.len() as f64;
-        let tested = self.whiteness.iter().enumerate();
-        let tested = tested.map(|(j, white)| (j, Whiteness { p_value: white.p_value * count, ..*white }));
-        let strongest = |a: &Whiteness, b: &Whiteness| {
-            a.p_value.total_cmp(&b.p_value).then(b.correlations[0].total_cmp(&a.correlations[0]))
-        };
-        tested.min_by(|a, b| strongest(&a.1, &b.1))
-    }
-}
-
 /// The error of an infeasible point.
 pub(crate) fn reason(error: Infeasible) -> Error {
     Error::Optimizer(error.to_string())

@@ -266,7 +266,25 @@ fn no_chance(gain: f64, degrees: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::no_chance;
+    use super::*;
+
+    /// The same solution and three times the rows, so a ninth of the covariance.
+    #[test]
+    fn scaled_triangles() {
+        let mut triangle = Information::new(2);
+        for (row, right) in [([1.0, 2.0], 3.0), ([0.5, -1.0], 1.0), ([2.0, 0.3], -1.0)] {
+            triangle.absorb_row(&row, right);
+        }
+        let scaled = scaled(&triangle, 3.0);
+        for (i, c) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)] {
+            let (found, expected) = (scaled.at(i, c).abs(), 3.0 * triangle.at(i, c).abs());
+            assert!((found - expected).abs() < 1e-14, "{i} {c}: {found} {expected}");
+        }
+        // Signs of whole rows mean nothing, those within a row do.
+        let sign = |of: &Information| (of.at(0, 0) * of.at(0, 1), of.at(0, 0) * of.at(0, 2), of.at(1, 1) * of.at(1, 2));
+        let ((a, b, c), (d, e, f)) = (sign(&scaled), sign(&triangle));
+        assert!((a - 9.0 * d).abs() < 1e-13 && (b - 9.0 * e).abs() < 1e-13 && (c - 9.0 * f).abs() < 1e-13);
+    }
 
     /// The 0.01 % points of chi-squared with 1 and 2 degrees of freedom are 15.137 and `-2 ln 1e-4 = 18.421`.
     #[test]

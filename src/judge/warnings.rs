@@ -235,7 +235,7 @@ fn shift(objective: &Objective<'_>, coordinates: &[f64], unknowns: &[Unknown]) -
     let shift = |i: usize| {
         let unknown = &unknowns[i];
         let change = (step[i] * unknown.transform.slope(unknown.value)).abs();
-        let error = unknown.knowledge.standard_error().filter(|error| *error > 0.0)?;
+        let error = unknown.knowledge.standard_error()?;
         Some((unknown.name.clone(), change / error, change / unknown.value.abs()))
     };
     (0..unknowns.len()).filter_map(shift).max_by(|a, b| a.1.total_cmp(&b.1))

@@ -53,6 +53,17 @@ fn color(coefficients: &[f64], count: u64) -> (f64, f64) {
     (predicted, (1.0 + 2.0 * positive).max(autoregression).max(1.0))
 }
 
+/// The output whose errors are least white, and how white they are; the probability counts all outputs that were tested.
+pub(super) fn least_white(whiteness: &[Whiteness]) -> Option<(usize, Whiteness)> {
+    let count = whiteness.len() as f64;
+    let tested = whiteness.iter().enumerate();
+    let tested = tested.map(|(j, white)| (j, Whiteness { p_value: white.p_value * count, ..*white }));
+    let strongest = |a: &Whiteness, b: &Whiteness| {
+        a.p_value.total_cmp(&b.p_value).then(b.correlations[0].total_cmp(&a.correlations[0]))
+    };
+    tested.min_by(|a, b| strongest(&a.1, &b.1))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -68,6 +79,20 @@ mod tests {
             assert!((predicted - r * r).abs() < 1e-7, "{r}: {predicted}");
             assert!((dependence - (1.0 + r) / (1.0 - r)).abs() < 1e-9, "{r}: {dependence}");
         }
+    }
+
+    /// The least probability, times the number of outputs; of equal ones that with the larger correlation.
+    #[test]
+    fn the_least_white_of_outputs() {
+        let of = |p_value: f64, first: f64| {
+            let mut correlations = [0.0; LAGS];
+            correlations[0] = first;
+            Whiteness { p_value, correlations, predicted: 0.0, dependence: 1.0, at_restart: (0.0, 0.0) }
+        };
+        let found = |all: &[Whiteness]| least_white(all).map(|(j, white)| (j, white.p_value));
+        assert_eq!(found(&[]), None);
+        assert_eq!(found(&[of(0.5, 0.9), of(0.125, 0.1), of(0.25, 0.9)]), Some((1, 0.375)));
+        assert_eq!(found(&[of(0.0, 0.3), of(0.0, 0.9), of(0.0, 0.6)]), Some((1, 0.0)));
     }
 
     /// An autoregression of order four leaves the product of `1 - r^2` over its partial autocorrelations `r` (Durbin, Review of

@@ -294,6 +294,42 @@ pub(super) mod tests {
         assert!(matches!(stuck(linear(&[(1.0, 1e-6), (0.0, 4.0)]), 0.0, false), Outcome::LimitOfPrecision { .. }));
     }
 
+    /// A thousandth of its size off the bound, and of the distance to the other bound or of one where that is less.
+    #[test]
+    fn points_inside_of_a_bound() {
+        let inside = |x: f64, bounds: (f64, f64), size: Option<f64>, slope: f64| {
+            let domain = Domain { bounds: vec![bounds], sizes: vec![] };
+            Point::new(vec![x], linear(&[(slope, 1.0)]), &domain).unwrap().inside(&Seen::new(&[x], &[size])).concat()
+        };
+        assert_eq!(inside(0.0, (0.0, 9.0), None, 0.0), [1e-3]);
+        assert_eq!(inside(0.0, (-9.0, 0.0), None, 0.0), [-1e-3]);
+        assert_eq!(inside(0.0, (0.0, 0.5), None, 0.0), [0.5e-3]);
+        assert_eq!(inside(0.0, (0.0, 9.0), Some(0.25), 0.0), [0.25e-3]);
+        assert_eq!(inside(0.0, (-9.0, 0.0), Some(0.25), 0.0), [-0.25e-3]);
+        assert!(inside(0.0, (0.0, 9.0), None, 1.0).is_empty() && inside(1.0, (0.0, 9.0), None, 0.0).is_empty());
+    }
+
+    /// A hundredth of the size to either side.
+    #[test]
+    fn points_beside() {
+        let beside = |x: f64, size: Option<f64>| at(x, far()).beside(&[-4.0], &Seen::new(&[x], &[size]));
+        assert_eq!(beside(6.0, None), [vec![6.0 - 0.06], vec![6.0 + 0.06]]);
+        assert_eq!(beside(0.0, Some(2.0)), [vec![-0.02], vec![0.02]]);
+        assert!(beside(0.0, None).is_empty());
+    }
+
+    /// A step would gain 5e-7 of the cost 8.
+    #[test]
+    fn a_cost_that_no_step_lowers() {
+        let ended = |cost: f64| at(6.0, near()).ended(&Stop { step: 0.0, gradient: 0.0, cost, ..Stop::default() });
+        assert_eq!(ended(6.25e-8 * 0.999), None);
+        assert!(matches!(ended(6.25e-8 * 1.001), Some(Outcome::CostUnchanged { decrease }) if decrease < 6.2501e-8));
+        assert_eq!(ended(0.0), None);
+        // Nothing left to gain, and no tolerance given.
+        let done = at(6.0, linear(&[(1.0, 0.0), (0.0, 4.0)]));
+        assert!(matches!(done.ended(&Stop::default()), Some(Outcome::Converged { .. })));
+    }
+
     #[test]
     fn a_full_step_within_the_tolerance() {
         let end = |linear: Linearization, noise: f64| {

@@ -65,6 +65,13 @@ fn nested_models_are_told_apart() {
     let parabola = Candidate::new("parabola", &fit(&record, free(0.1)).unwrap());
     let test = f_test(&line, &parabola).unwrap();
     assert!(!test.passed && test.meaning.contains("`line` misses something"), "{test:?}");
+    // Two unknowns more than a constant: (S0 - S1) / 2 over S1 / (40 - 3).
+    let parameters = Cubic { a: free(0.0), b: fixed(0.0), c: fixed(0.0) };
+    let constant = Candidate::new("constant", &Fit::new(&Polynomial, &record).parameters(parameters).run().unwrap());
+    let squares = |candidate: &Candidate| candidate.estimate.outputs[0].fit.rmse.powi(2);
+    let expected = (squares(&constant) / squares(&parabola) - 1.0) / 2.0 * 37.0;
+    let statistic = f_test(&constant, &parabola).unwrap().statistic;
+    assert!((statistic / expected - 1.0).abs() < 1e-12, "{statistic} {expected}");
     let (few, many) = (&line.estimate, &parabola.estimate);
     assert!(many.aicc() < few.aicc() && many.bic() < few.bic());
     let table = Comparison(vec![line, parabola]).to_string();
@@ -119,6 +126,7 @@ fn unseen_data_and_drift() {
         // 40 samples: the deviation of a standard deviation is 11 %.
         assert!((outputs[0].1.rmse / 0.1 - 1.0).abs() < 0.4, "{validation:?}");
     }
+    assert_eq!(cross_validate(&Polynomial, &records[..2], |records| fit(records, free(0.0))).unwrap().len(), 2);
     assert!(cross_validate(&Polynomial, &records[..1], |records| fit(records, free(0.0))).is_err());
     let estimate = fit(&records[..1], free(0.0)).unwrap();
     assert_eq!(validate(&estimate, &Polynomial, &records[1], &[]).unwrap().experiment, "record 1");

@@ -2,10 +2,13 @@
 
 use crate::random::Random;
 use crate::shared::shared;
-use greybox::diagnose::{End, identifiability, profile};
+use greybox::diagnose::{End, derived, identifiability, profile};
 use greybox::optimize::Severity;
 use greybox::{Butterworth, Horizon};
-use greybox::{Estimate, Experiment, Fit, Kind, Knowledge, Model, Nothing, Scalar, Time, fixed, free, signals};
+use greybox::{
+    Estimate, Experiment, Fit, Kind, Knowledge, Model, Nothing, Parameter, Sample, Scalar, Time, Transform, fixed,
+    free, signals,
+};
 
 signals! { struct Drive { u: "V", w: "V" } }
 signals! { struct Reading { y: "V", z: "V" } }
@@ -43,6 +46,8 @@ fn a_product_is_named_and_so_is_a_constant_input() {
     let problem = Fit::new(&Amplifier, &record).parameters(parameters).problem().unwrap();
     let estimate = Estimate::<Amplifier>::of(problem.run().unwrap()).unwrap();
     assert_eq!(estimate.knowledge.a, Knowledge::Unidentified);
+    assert_eq!((estimate.unknowns[0].error_index, estimate.unknowns[1].error_index), (None, None));
+    assert!(estimate.unknowns[2].error_index.is_some());
     let found = identifiability(&problem, &estimate).unwrap();
     assert_eq!((found.rank, found.generic_rank, found.condition), (2, 2, None));
     let set = &found.collinear[0];
@@ -54,11 +59,27 @@ fn a_product_is_named_and_so_is_a_constant_input() {
     let relative = |name: &str, value: f64| set.moves.iter().find(|(n, _)| n == name).unwrap().1 / value;
     let ratio = relative("a", estimate.parameters.a) / relative("b", estimate.parameters.b);
     assert!((ratio + 1.0).abs() < 1e-6, "{ratio}");
+    // Nothing is known of a sum with one of them, and the product is.
+    assert_eq!(derived(&estimate, "a + c", |p| p.a + p.c).standard_error, None);
+    assert!(derived(&estimate, "c", |p| p.c * p.c).standard_error.is_some());
     println!("{:#?}", found.advice);
     let says = |what: &str| found.advice.iter().any(|advice| advice.contains(what));
     assert!(says("`a` and `b` are known only as their product") || says("`b` and `a` are known only as their product"));
     assert!(says("the input `w` is 1.5 throughout"));
     assert!(says("`a`, `b` are seen only through `y`"));
+}
+
+/// At zero a product has no slopes, and only the offset is seen; beside it there is a second direction.
+#[test]
+fn the_rank_beside_zero() {
+    let inputs: Vec<Drive> = (0..30).map(|k| Drive { u: (0.7 * f64::from(k)).sin(), w: 0.0 }).collect();
+    let outputs = vec![Reading { y: 0.0, z: 0.0 }; 30];
+    let record = Experiment::new(&Amplifier, Time::Uniform { start: 0.0, step: 0.1 }, inputs, outputs).unwrap();
+    let parameters = Product { a: free(0.0), b: free(0.0), c: free(0.0) };
+    let problem = Fit::new(&Amplifier, &record).parameters(parameters).problem().unwrap();
+    let estimate = problem.run().unwrap();
+    let found = identifiability(&problem, &estimate).unwrap();
+    assert_eq!((found.rank, found.generic_rank), (1, 2));
 }
 
 signals! { struct Dose { u: "1" } }
@@ -86,6 +107,40 @@ fn binding(seed: u64, half: f64) -> Experiment<Nothing, Dose, Answer> {
     let inputs: Vec<Dose> = (0..60).map(|k| Dose { u: 1.0 + (k % 6) as f64 }).collect();
     let outputs = inputs.iter().map(|u| Answer { y: 5.0 * u.u / (half + u.u) + 0.2 * random.normal() }).collect();
     Experiment::new(&Binding, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap()
+}
+
+/// The strength of an unknown is what its whole value moves in the output, in standard deviations of the noise, whatever coordinate
+/// the fit works in; and the standard error of a profile is that of the fit, also with a weighting.
+#[test]
+fn strengths_and_errors_in_each_coordinate() {
+    let record = binding(1, 2.0);
+    let of = |top: Parameter, power: i32| {
+        let parameters = Saturation { top, half: fixed(2.0) };
+        let fit = Fit::new(&Binding, &record).parameters(parameters).noise(Answer { y: 0.2 });
+        let problem = fit.weighting(move |s: &Sample<Binding>| s.u.u.powi(power)).problem().unwrap();
+        let estimate = problem.run().unwrap();
+        let strength = identifiability(&problem, &estimate).unwrap().excitation[0].strength;
+        let found = profile(&problem, &estimate, "top", 0.95).unwrap();
+        let ratio = found.standard_error.unwrap() / estimate.unknowns[0].knowledge.standard_error().unwrap();
+        assert!((ratio - 1.0).abs() < 1e-9, "{ratio}");
+        let inside = |value: f64| (found.covers(value), estimate.unknowns[0].value);
+        let (End::At(lower), End::At(upper)) = (found.lower, found.upper) else { panic!("{found:?}") };
+        let width = upper - lower;
+        assert!(inside(lower + 0.01 * width).0 && inside(upper - 0.01 * width).0);
+        assert!(!inside(lower - 0.01 * width).0 && !inside(upper + 0.01 * width).0);
+        // The profile of a factor is a parabola: its interval is the linear one, to a part of 1e-3 of the root of the threshold.
+        let (low, high) = estimate.interval("top", 0.95).unwrap();
+        let near = |a: f64, b: f64| (a - b).abs() < 2e-3 * width;
+        assert!(found.transform == Transform::Log || near(lower, low) && near(upper, high), "{found:?} {low} {high}");
+        (strength, estimate.unknowns[0].value)
+    };
+    for power in [0, 1] {
+        let moved = record.inputs().map(|u| u.u.powi(power) * (u.u / (2.0 + u.u) / 0.2).powi(2)).sum::<f64>().sqrt();
+        for top in [free(4.0), free(4.0).log()] {
+            let (strength, value) = of(top, power);
+            assert!((strength / (value * moved) - 1.0).abs() < 1e-9, "{strength} {value} {moved}");
+        }
+    }
 }
 
 /// A parameter known on one side only: its interval ends at the bound below and at a value above.

@@ -2,8 +2,8 @@
 
 use greybox::optimize::Outcome;
 use greybox::{
-    Estimate, Experiment, ExperimentOf, Fit, Knowledge, Loss, Model, Sample, Scalar, Summary, Time, fixed, free,
-    signals, simulate,
+    Estimate, Experiment, ExperimentOf, Fit, Kind, Knowledge, Loss, Model, Nothing, Sample, Scalar, Summary, Time,
+    fixed, free, signals, simulate,
 };
 use jsonschema::{Registry, Validator};
 use serde_json::Value;
@@ -208,5 +208,41 @@ fn a_checkpoint_knows_constants_and_closures() {
         let refused = run(gain, power, loss).unwrap_err().to_string();
         assert!(refused.contains("another problem") && refused.contains("constants"), "{refused}");
     }
+    std::fs::remove_file(&path).unwrap();
+}
+
+signals! { pub struct Gain { a: "A/V" } }
+
+/// `i = a u`, from the last second on times a constant.
+struct Late {
+    factor: f64,
+}
+
+impl Model for Late {
+    type State = Nothing;
+    type Input = Voltage;
+    type Output = Current;
+    type Parameters = Gain;
+    const KIND: Kind = Kind::Static;
+
+    fn output<S: Scalar>(&self, t: S, _x: &Nothing, u: &Voltage<S>, p: &Gain<S>) -> Current<S> {
+        Current { i: if t < S::from(19.0) { p.a * u.u } else { p.a * u.u * self.factor } }
+    }
+}
+
+/// The whole of a long record tells one model from another, not its first samples.
+#[test]
+fn a_checkpoint_knows_the_end_of_a_record() {
+    let path = std::env::temp_dir().join(format!("greybox_checkpoint_late_{}.json", std::process::id()));
+    let time = Time::Uniform { start: 0.0, step: 1e-3 };
+    let inputs: Vec<Voltage> = (0..20_000).map(|k| Voltage { u: (0.1 * k as f64).sin() }).collect();
+    let outputs = inputs.iter().map(|u| Current { i: 2.0 * u.u }).collect();
+    let record = Experiment::new(&Late { factor: 1.0 }, time, inputs, outputs).unwrap();
+    let run =
+        |factor: f64| Fit::new(&Late { factor }, &record).parameters(Gain { a: free(1.0) }).checkpoint(&path, 1).run();
+    let _ = std::fs::remove_file(&path);
+    run(1.0).unwrap();
+    let refused = run(1.5).unwrap_err().to_string();
+    assert!(refused.contains("another problem"), "{refused}");
     std::fs::remove_file(&path).unwrap();
 }

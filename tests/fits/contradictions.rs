@@ -2,6 +2,7 @@
 //! What contradicts the model, and what it does not explain: outputs, halves and shapes that differ, noise of another size.
 
 use crate::common::*;
+use crate::interval_limits::{Gains, Mixer};
 use crate::judgements::{Drive, Factor, Gain, Twice, edited, fit, moving, record, said};
 use greybox::optimize::Severity;
 use greybox::*;
@@ -26,6 +27,23 @@ fn outputs_that_contradict_each_other_are_named() {
     assert!(warning.text.contains(&format!("({apart:.0} % apart;")), "{apart} {}", warning.text);
     let agreed = self::record(300, (2.0, 2.0), 0.05, moving);
     assert!(said(&fit(&[agreed]).run().unwrap(), WarningCode::OutputsContradict).is_none());
+}
+
+/// Of two gains and three records, the gain and the records that differ most are named.
+#[test]
+fn the_gain_that_contradicts_is_named() {
+    let of = |w: f64, seed: u64| {
+        let inputs: Vec<Drive> = (0..100).map(moving).collect();
+        let outputs = inputs.iter().map(|u| Current { i: u.u + w * u.w }).collect();
+        let clean = Experiment::new(&Mixer, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        noisy(&Mixer, &clean, Current { i: 0.1 }, &mut Noise(seed)).named(format!("record {seed}"))
+    };
+    let records = [of(2.0, 1), of(2.2, 2), of(3.0, 3)];
+    let parameters = Gains { u: free(0.5), w: free(0.5) };
+    let estimate = Fit::new(&Mixer, &records).parameters(parameters).run().unwrap();
+    let found = estimate.warnings.iter().find(|warning| warning.code == WarningCode::RecordsContradict);
+    let text = &found.unwrap_or_else(|| panic!("{estimate}")).text;
+    assert!(text.starts_with("`w` is ") && text.contains("record 1") && text.contains("record 3"), "{text}");
 }
 
 /// A gain that changes in the middle of the record is named with its value in each half.

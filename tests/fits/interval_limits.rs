@@ -2,7 +2,45 @@
 //! restarts.
 
 use crate::common::*;
+use crate::judgements::{Drive, moving};
 use greybox::*;
+
+signals! { pub struct Gains { u: "A/V", w: "A/V" } }
+
+/// `i = a u + b w`.
+#[derive(Clone)]
+pub struct Mixer;
+
+impl Model for Mixer {
+    type State = Nothing;
+    type Input = Drive;
+    type Output = Current;
+    type Parameters = Gains;
+    const KIND: Kind = Kind::Static;
+
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Drive<S>, p: &Gains<S>) -> Current<S> {
+        Current { i: p.u * u.u + p.w * u.w }
+    }
+}
+
+signals! { pub struct Rate { b: "A/(V s)" } }
+
+/// `di/dt = b u`.
+struct Integrator;
+
+impl Model for Integrator {
+    type State = Current;
+    type Input = Voltage;
+    type Output = Current;
+    type Parameters = Rate;
+
+    fn derivative<S: Scalar>(&self, _t: S, _x: &Current<S>, u: &Voltage<S>, p: &Rate<S>) -> Current<S> {
+        Current { i: p.b * u.u }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, _p: &Rate<S>) -> Current<S> {
+        *x
+    }
+}
 
 fn line(noise: &mut Noise) -> ExperimentOf<Line> {
     let inputs: Vec<Voltage> = levels(40, 1, 9).into_iter().map(|u| Voltage { u: u + 0.5 }).collect();
@@ -44,6 +82,11 @@ fn a_bound_within_the_interval_leaves_the_intervals_of_the_free_fit() {
     assert!(matches!(far.knowledge.slope, Knowledge::Held { end: None, .. }), "{far}");
     let (lower, upper) = ends(far.knowledge.offset);
     assert!((0.5 * (lower + upper) - far.parameters.offset).abs() < 1e-12, "{far}");
+    // Its profile is that of the free fit, cut off at the bound.
+    let parameters = Affine { slope: free(3.0).within(bound + 2.0 * error, 10.0), offset: free(0.0) };
+    let problem = Fit::new(&Line, &record).parameters(parameters).noise(Pair { y: 0.3, z: 0.2 }).problem().unwrap();
+    let found = diagnose::profile(&problem, &problem.run().unwrap(), "slope", 0.95).unwrap();
+    assert!(found.standard_error.is_some_and(|own| close(own, error)), "{:?}", found.standard_error);
 }
 
 /// For `N` samples of `m` outputs with an estimated covariance and `p` unknowns, with `d = N - p/m`: the variance is
@@ -106,6 +149,23 @@ fn noise_of_inputs_is_declared_and_its_bias_said() {
     }
 }
 
+/// Noise of two inputs is not the same: it draws each gain to zero by `s^2 / (s^2 + mean u^2)`, a fifth here, though the same
+/// noise on both would leave the output `u - w` as it is. Four draws of 400 samples give that to a tenth.
+#[test]
+fn noise_of_two_inputs_is_independent() {
+    let inputs: Vec<Drive> = (0..400).map(moving).collect();
+    let outputs = inputs.iter().map(|u| Current { i: u.u - u.w }).collect();
+    let clean = Experiment::new(&Mixer, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+    let record = noisy(&Mixer, &clean, Current { i: 0.1 }, &mut Noise(4));
+    let parameters = Gains { u: free(1.0), w: free(1.0) };
+    let fit = Fit::new(&Mixer, &record).parameters(parameters);
+    let biased = fit.input_noise(Drive { u: 0.125f64.sqrt(), w: 0.125f64.sqrt() }).run().unwrap();
+    let warning = biased.warnings.iter().find(|warning| warning.code == WarningCode::InputNoise).unwrap();
+    let by = warning.text.split(" by about ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
+    let by: f64 = by.trim_start_matches(['-', '\u{2212}']).parse().unwrap();
+    assert!((by - 0.2).abs() < 0.03, "{}", warning.text);
+}
+
 /// Restarts from noisy states bias a prediction one sample ahead; from clean ones they do not.
 #[test]
 fn noise_in_restarts_is_named() {
@@ -128,4 +188,15 @@ fn noise_in_restarts_is_named() {
     };
     let outputs = clean.inputs().map(next).collect();
     assert!(!has(&fit(&with_outputs(&Lag, &clean, outputs)), WarningCode::RestartNoise));
+}
+
+/// The slope of an integral along its gain does not depend on where it begins: the errors at both ends of a prediction are
+/// correlated, and nothing is biased.
+#[test]
+fn noise_in_restarts_that_biases_nothing_is_not_named() {
+    let inputs = levels(2000, 20, 4).into_iter().map(|u| Voltage { u }).collect();
+    let clean = simulated(&Integrator, 5e-3, inputs, Current { i: 0.0 }, Rate { b: 3.0 });
+    let record = noisy(&Integrator, &clean, Current { i: 0.1 }, &mut Noise(8));
+    let fit = Fit::new(&Integrator, &record).parameters(Rate { b: free(2.0) }).predictor(Horizon::new(1));
+    assert!(!has(&fit.run().unwrap(), WarningCode::RestartNoise));
 }

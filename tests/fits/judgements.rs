@@ -221,6 +221,24 @@ fn a_prior_is_no_part_of_the_deviance() {
     assert!((estimate.deviance.unwrap() / expected - 1.0).abs() < 1e-10, "{:?} {expected}", estimate.deviance);
 }
 
+/// Of one output, whose noise only scales the cost: `n (ln(2 pi s^2) + 1)` with `s^2` the mean square of the errors. A weighting
+/// or a loss has no likelihood.
+#[test]
+fn the_deviance_of_one_output() {
+    let mut noise = Noise(3);
+    let inputs: Vec<Voltage> = levels(30, 1, 2).into_iter().map(|u| Voltage { u }).collect();
+    let outputs = inputs.iter().map(|u| Current { i: 2.0 * u.u + 0.03 * noise.gauss() }).collect();
+    let record = Experiment::new(&Gain, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+    let fit = || Fit::new(&Gain, &record).parameters(Factor { a: free(1.0) });
+    let estimate = fit().run().unwrap();
+    let error = |(y, u): (Current, Voltage)| (y.i - estimate.parameters.a * u.u).powi(2);
+    let square = record.outputs().zip(record.inputs()).map(error).sum::<f64>() / 30.0;
+    let expected = 30.0 * ((core::f64::consts::TAU * square).ln() + 1.0);
+    assert!((estimate.deviance.unwrap() / expected - 1.0).abs() < 1e-12, "{:?} {expected}", estimate.deviance);
+    let weighted = fit().weighting(|s: &Sample<Gain>| 1.0 + s.u.u * s.u.u).run().unwrap();
+    assert_eq!((weighted.deviance, fit().loss(Huber(1.345)).run().unwrap().deviance), (None, None));
+}
+
 /// With a full covariance, an output that is missing takes its row and column of it along: the estimate solves the normal
 /// equations of what was measured.
 #[test]

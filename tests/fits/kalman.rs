@@ -370,6 +370,30 @@ fn what_cannot_be_filtered_is_refused() {
     assert!(why.contains("no state to filter"), "{why}");
 }
 
+/// Of 20 errors of size `s` the deviance rises by `20 (ln(s'^2 / s^2) + s^2 / s'^2 - 1)` where the level is `s'`: by the square of
+/// Student's t at 97.5 % at both ends of the profile, whose roots are found to a thousandth.
+#[test]
+fn the_profile_of_a_noise_level() {
+    let mut noise = Noise(8);
+    let outputs = (0..20).map(|_| Sensors { y: 0.3 * noise.gauss(), z: 0.1 * noise.gauss() }).collect();
+    let time = Time::Uniform { start: 0.0, step: 1.0 };
+    let record = Experiment::new(&RandomWalk, time, vec![Push { u: 0.0 }; 20], outputs).unwrap();
+    let record = record.initial(Position { x: fixed(0.0) });
+    let parameters = Levels { drift: fixed(0.0), y: free(0.2), z: fixed(0.1) };
+    let problem = Fit::new(&RandomWalk, &record).parameters(parameters).predictor(Kalman).problem().unwrap();
+    let estimate = problem.run().unwrap();
+    let found = diagnose::profile(&problem, &estimate, "y", 0.95).unwrap();
+    let square = record.outputs().map(|y| y.y * y.y).sum::<f64>() / 20.0;
+    assert!((found.value / square.sqrt() - 1.0).abs() < 1e-6, "{} {square}", found.value);
+    for end in [found.lower, found.upper] {
+        let diagnose::End::At(end) = end else { panic!("{end:?}") };
+        let part = square / (end * end);
+        let rise = 20.0 * (part - part.ln() - 1.0);
+        assert!(((rise / (found.threshold * found.inflation)).sqrt() - 1.0).abs() < 2e-3, "{rise} {}", found.threshold);
+    }
+    assert!(found.remark.is_empty(), "{}", found.remark);
+}
+
 /// Of 20 errors the standard deviation has a variance with 20 degrees of freedom (Satterthwaite: `2 v^2 / var(v)` with
 /// `v = sigma^2 / 40`); by logarithm the variance does not depend on it, and those of the fit are left, 39.
 #[test]
@@ -390,12 +414,16 @@ fn a_noise_level_has_the_degrees_of_freedom_of_its_own_variance() {
             (upper - lower) / 2.0 / standard_error,
             (upper / lower).ln() / 2.0,
             uneven,
+            fit.unknowns[0].degrees_of_freedom,
         )
     };
-    let (relative, half, _, uneven) = width(free(0.2));
+    let (relative, half, _, uneven, degrees) = width(free(0.2));
     assert!((relative - 40f64.sqrt().recip()).abs() < 1e-6, "{relative}");
+    // By the logarithms of the variance half a standard error to either side, `2 ln(1 + d) - 2 ln(1 - d) = 4 atanh d`.
+    let expected = 2.0 / (4.0 * (0.5 * relative).atanh()).powi(2);
+    assert!((degrees / expected - 1.0).abs() < 1e-6, "{degrees} {expected}");
     // Student's t at 97.5 % with 20 degrees of freedom; differences over a standard error are good to 0.4 %.
     assert!((half / 2.085_963 - 1.0).abs() < 2e-3 && uneven, "{half}");
-    let (relative, _, half, uneven) = width(free(0.2).log());
+    let (relative, _, half, uneven, _) = width(free(0.2).log());
     assert!((half / relative / 2.022_691 - 1.0).abs() < 1e-6 && !uneven, "{half} {relative}");
 }

@@ -2,6 +2,7 @@
 //! The noise that a fit reports, and what autocorrelated noise does to the standard errors.
 
 use crate::common::*;
+use crate::judgements::{Drive, Factor, Twice, moving};
 use greybox::estimate::{CovarianceMethod, Unknown};
 use greybox::*;
 
@@ -187,4 +188,69 @@ fn a_single_outlier_is_named_by_its_time() {
     assert_eq!(named(0.0), Vec::<String>::new());
     let found = named(0.8);
     assert!(found.len() == 1 && found[0].contains("`z` at t = 6173 s of `bench`"), "{found:?}");
+}
+
+/// The unit of the outputs changes no weight of one against the other: in tens of teravolts the noise is far smaller than the
+/// rounding of a number near one.
+#[test]
+fn noise_is_as_small_as_the_outputs_let_it_be() {
+    let fit = |unit: f64| {
+        let mut noise = Noise(21);
+        let inputs: Vec<Drive> = (0..100).map(moving).map(|u| Drive { u: u.u * unit, w: u.w * unit }).collect();
+        let measured =
+            |u: &Drive| Pair { y: u.u + unit * 1e-4 * noise.gauss(), z: 1.1 * u.w + unit * 1e-2 * noise.gauss() };
+        let outputs = inputs.iter().map(measured).collect();
+        let record = Experiment::new(&Twice, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        Fit::new(&Twice, &record).parameters(Factor { a: free(1.0) }).run().unwrap().parameters.a
+    };
+    assert!((fit(1e-13) / fit(1.0) - 1.0).abs() < 1e-9, "{} {}", fit(1e-13), fit(1.0));
+}
+
+/// What is said of errors does not depend on the unit of the output.
+#[test]
+fn units_change_no_verdict() {
+    let said = |unit: f64| {
+        let record = lag(600, 0.2, 0.7, 5);
+        let outputs = record.outputs().map(|y| Current { i: unit * y.i }).collect();
+        let record = with_outputs(&Lag, &record, outputs);
+        let parameters = Branch { gain: free(1.5 * unit), tau: free(0.08) };
+        let estimate = Fit::new(&Lag, &record).parameters(parameters).run().unwrap();
+        let of = |code: WarningCode| estimate.warnings.iter().find(|warning| warning.code == code).cloned();
+        (of(WarningCode::ColoredErrors).unwrap(), estimate.warnings.len(), estimate.severity())
+    };
+    let (plain, _, _) = said(1.0);
+    // 0.7 of errors of 0.2 in an output whose steps of -1 to 1 come out twice as large.
+    assert!(plain.text.contains("the colored part is ") && plain.text.contains("times as wide"), "{}", plain.text);
+    assert_eq!([said(1e-4), said(1e4)], [said(1.0), said(1.0)]);
+}
+
+signals! { pub struct Root { a: "A^2/V" } }
+
+/// `i = sqrt(a u)`, whose slope is infinite where the input is zero.
+struct Diode;
+
+impl Model for Diode {
+    type State = Nothing;
+    type Input = Voltage;
+    type Output = Current;
+    type Parameters = Root;
+    const KIND: Kind = Kind::Static;
+
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Root<S>) -> Current<S> {
+        Current { i: (p.a * u.u).sqrt() }
+    }
+}
+
+/// A weight of zero leaves a sample out, also where its slopes are no numbers.
+#[test]
+fn a_weight_of_zero_leaves_infinite_slopes_out() {
+    let fit = |first: usize| {
+        let mut noise = Noise(3);
+        let inputs: Vec<Voltage> = (first..20).map(|k| Voltage { u: 0.5 * k as f64 }).collect();
+        let outputs = (0..20).map(|k| Current { i: k as f64 + 0.1 * noise.gauss() }).skip(first).collect();
+        let record = Experiment::new(&Diode, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        let fit = Fit::new(&Diode, &record).parameters(Root { a: free(1.0) });
+        fit.weighting(|s: &Sample<Diode>| if s.u.u == 0.0 { 0.0 } else { 1.0 }).run().unwrap().parameters.a
+    };
+    assert!((fit(0) / fit(1) - 1.0).abs() < 1e-9, "{} {}", fit(0), fit(1));
 }

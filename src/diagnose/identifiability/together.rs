@@ -77,3 +77,21 @@ fn absolute(direction: &Direction, unknowns: &[Unknown]) -> Vec<(String, f64)> {
     let scaled = |(name, by): &(String, f64)| (name.clone(), if value(name) == 0.0 { *by } else { by * value(name) });
     direction.moves.iter().map(scaled).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_in_words() {
+        let of = |names: &[&str]| listed(names.iter().map(|name| (*name).to_owned()).collect());
+        assert_eq!([of(&[]), of(&["a"]), of(&["a", "b"]), of(&["a", "b", "c"])], ["", "a", "a and b", "a, b and c"]);
+    }
+
+    /// Two hundredths of the larger.
+    #[test]
+    fn moves_of_one_size() {
+        let of = |sizes: &[f64]| same(sizes.iter().copied());
+        assert!(of(&[1.0, -0.981]) && !of(&[1.0, -0.979]) && !of(&[0.0, 0.0]) && of(&[-2.0, 1.99, 2.0]));
+    }
+}

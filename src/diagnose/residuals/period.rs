@@ -102,7 +102,7 @@ pub(super) fn find(residuals: &Series, step: f64) -> (Spectrum, Option<Period>, 
     // The median of some twenty neighbors is itself uncertain: as F with 2 and 2 * 20 degrees of freedom.
     let neighbors = (2 * (k / 2).clamp(REACH.1, REACH.0)) as f64;
     let single = (1.0 + excess / neighbors).powf(-neighbors);
-    let p_value = -(tried * (-single.min(1.0 - 1e-16)).ln_1p()).exp_m1();
+    let p_value = of_any(single, tried);
     let energy: f64 = residuals.values.iter().map(|e| e * e).sum();
     let frequency = center(&power, k) / (grid as f64 * step);
     let period = Period {
@@ -123,6 +123,11 @@ pub(super) fn find(residuals: &Series, step: f64) -> (Spectrum, Option<Period>, 
     );
     let test = Test::new("periodogram", excess, p_value, "no period stands out", &failed);
     (gathered(&power, grid, n, step), (!test.passed && k > 0).then_some(period), test)
+}
+
+/// The probability of any of so many independent events, `1 - (1 - p)^n`, without loss of digits where it is small.
+fn of_any(single: f64, tried: f64) -> f64 {
+    -(tried * (-single.min(1.0 - 1e-16)).ln_1p()).exp_m1()
 }
 
 /// Where between the lines of the grid the strongest is: the top of the parabola through the logarithms.
@@ -194,6 +199,15 @@ mod tests {
             assert!((center(&bell(top), 4) - top).abs() < 1e-12, "{top}: {}", center(&bell(top), 4));
         }
         assert_eq!([center(&bell(6.0), 4), center(&[1.0; 9], 4)], [4.5, 4.0]);
+    }
+
+    #[test]
+    fn any_of_many() {
+        for (single, tried, expected) in [(0.5, 2.0, 0.75), (1e-20, 1e3, 1e-17), (1e-3, 1e3, 1.0 - 0.999f64.powi(1000))]
+        {
+            assert!((of_any(single, tried) / expected - 1.0).abs() < 1e-12, "{single} {tried}");
+        }
+        assert_eq!([of_any(0.0, 10.0), of_any(1.0, 10.0)], [0.0, 1.0]);
     }
 
     /// The definition, sum by sum.

@@ -112,3 +112,45 @@ pub(super) fn over(residuals: &Series, effective: f64, signal: &Series) -> Optio
     let name = format!("Breusch-Pagan-Koenker, {} `{}`", signal.role, signal.name);
     Some((spread, Test::new(name, statistic, p_value, "the residuals are of one size over its range", &failed)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn series(role: &'static str, values: impl Iterator<Item = f64>) -> Series {
+        Series::new(role, "u", "V", &values.collect::<Vec<f64>>())
+    }
+
+    fn residuals(size: impl Fn(usize) -> f64) -> Series {
+        series("residual", (0..40).map(|k| if k % 2 == 0 { size(k) } else { -size(k) }))
+    }
+
+    /// Errors of one size have no variance of their squares to explain, and a constant explains none.
+    #[test]
+    fn no_spread_without_change() {
+        let moving = series("input", (0..40).map(|k| k as f64));
+        let levels = |k: usize| if k < 20 { 1.0 } else { 2.0 };
+        assert!(over(&residuals(|_| 1.0), 40.0, &moving).is_none());
+        assert!(over(&residuals(levels), 40.0, &series("input", (0..40).map(|_| 3.0))).is_none());
+        assert!(over(&residuals(levels), 40.0, &moving).is_some());
+    }
+
+    /// Errors of one size at each of two levels: the level explains all of it, with one degree of freedom. The parts are a twelfth
+    /// of the range wide, and only the outermost were met.
+    #[test]
+    fn the_spread_at_two_levels() {
+        // The squares of squares of the units are no numbers.
+        for unit in [1e-90, 1.0, 1e90] {
+            let level = |k: usize| if k < 16 { 0.0 } else { 6.0 * unit };
+            let size = |k: usize| unit * if k < 16 { 1.0 } else { 2.0 };
+            let (spread, test) = over(&residuals(size), 36.0, &series("input", (0..40).map(level))).unwrap();
+            assert!((spread.share - 1.0).abs() < 1e-12 && spread.count == [16, 24], "{spread:?}");
+            let close = |found: &[f64], expected: [f64; 2]| {
+                found.iter().zip(expected).all(|(a, b)| (a / unit - b).abs() < 1e-12)
+            };
+            assert!(close(&spread.at, [0.25, 5.75]) && close(&spread.deviation, [1.0, 2.0]), "{spread:?}");
+            // A normal number beyond six standard deviations to either side.
+            assert!((test.p_value / 1.973_175e-9 - 1.0).abs() < 1e-5 && !test.passed, "{test:?}");
+        }
+    }
+}
