@@ -12,7 +12,7 @@ use std::sync::atomic::AtomicBool;
 use std::{error::Error, path::Path, sync::Arc};
 
 #[derive(clap::Args)]
-pub struct Arguments {
+pub struct Settings {
     /// Pole pairs of the motor; found from the record, if it tells them.
     #[arg(long)]
     pole_pairs: Option<u32>,
@@ -69,7 +69,7 @@ struct Tried {
     error: f64,
 }
 
-pub fn found(path: &Path, columns: &[&str], said: &Arguments, stop: &Arc<AtomicBool>) -> Result<Found, Box<dyn Error>> {
+pub fn found(path: &Path, columns: &[&str], said: &Settings, stop: &Arc<AtomicBool>) -> Result<Found, Box<dyn Error>> {
     let file = NAMES.iter().fold(CsvFile::new(path), |file, (signal, names)| {
         let there = names.iter().find(|name| columns.contains(name));
         there.map_or(file.clone(), |name| file.column(signal, name))

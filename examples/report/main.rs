@@ -26,7 +26,7 @@ struct Arguments {
     #[arg(long)]
     out: Option<PathBuf>,
     #[command(flatten)]
-    drive: drive::Arguments,
+    drive: drive::Settings,
     /// Adds likelihood profiles, which take many fits.
     #[arg(long)]
     profiles: bool,

@@ -22,7 +22,9 @@ impl Problem<'_> {
             let cured = matches!(warning.code, WarningCode::NotAtMinimum | WarningCode::CoarseStep);
             warning.severity == Severity::NotUsable && !cured
         };
-        if !found.warnings.iter().any(is_open) || found.warnings.iter().any(useless) || control.stops() {
+        let warned = found.warnings.iter().any(is_open) && !found.warnings.iter().any(useless);
+        // Without a likelihood minima cannot be compared.
+        if !warned || found.deviance.is_none() || control.stops() {
             return found;
         }
         let number_of_method =

@@ -260,10 +260,12 @@ mod tests {
     #[test]
     fn the_nearest_oscillation() {
         let modes = [(-1.0, 5.0), (-3.0, 8.0), (-20.0, 7.0)];
-        assert_eq!([nearest(&modes, (-3.0, 7.0)), nearest(&modes, (-1.0, 6.0))], [modes[1], modes[0]]);
-        assert_eq!(nearest(&[], (-1.0, 6.0)), (-1.0, 6.0));
+        assert_eq!(
+            [nearest(&modes, (-3.0, 7.0)).1, nearest(&modes, (-1.0, 6.0)).1, nearest(&[], (-1.0, 6.0)).1],
+            [8.0, 5.0, 6.0]
+        );
         // Of decays of the other sign the nearest is that of the smaller difference, not of the smaller sum.
-        assert_eq!(nearest(&[(-4.0, 5.0), (4.0, 6.0)], (-4.0, 5.5)), (-4.0, 5.0));
+        assert_eq!(nearest(&[(-4.0, 5.0), (4.0, 6.0)], (-4.0, 5.5)).1, 5.0);
     }
 
     /// The quartiles of four steps are the first, the second and the third of them in order of size.
