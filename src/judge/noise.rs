@@ -191,7 +191,7 @@ mod tests {
     /// Errors about a gain of two, every seventh an outlier: Huber's scale `s` solves `mean of min(|e / s|, c)^2 = kappa`.
     #[test]
     fn a_robust_scale_solves_its_equation() {
-        let error = |k: usize| ((k * 37 % 21) as f64 - 10.0) * if k % 7 == 0 { 30.0 } else { 0.1 };
+        let error = |k: usize| ((k * 37 % 21) as f64 - 10.0) * if k.is_multiple_of(7) { 30.0 } else { 0.1 };
         let inputs: Vec<Voltage> = (0..42).map(|k| Voltage { u: k as f64 }).collect();
         let outputs = (0..42).map(|k| Current { i: 2.0 * k as f64 + error(k) }).collect();
         let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();

@@ -254,7 +254,7 @@ mod tests {
     /// the noise.
     fn ended(ends: &[Option<(f64, Outcome)>]) -> (usize, Starts) {
         let inputs: Vec<Voltage> = (0..8).map(|k| Voltage { u: f64::from(1 - 2 * (k % 2)) }).collect();
-        let error = |k: usize| if k / 2 % 2 == 0 { 0.1 } else { -0.1 };
+        let error = |k: usize| if (k / 2).is_multiple_of(2) { 0.1 } else { -0.1 };
         let outputs = inputs.iter().enumerate().map(|(k, u)| Current { i: 2.0 * u.u + error(k) }).collect();
         let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
         let fit = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).noise(Current { i: 0.1 });
@@ -264,7 +264,7 @@ mod tests {
             coordinates: vec![*a],
             whitening: plain.whitening.clone(),
             linear: None,
-            outcome: outcome.clone(),
+            outcome: *outcome,
             iterations: 3,
             evaluations: 5,
             name: String::new(),
