@@ -4,27 +4,31 @@ use super::refine::{Start, farthest};
 use crate::estimate::{Summary, Unknown, Warning, WarningCode};
 use crate::judge::{Aliases, INDISTINGUISHABLE};
 use crate::numeral::number;
-use crate::optimize::Severity;
+use crate::optimize::{Outcome, Severity};
 use crate::problem::{Control, Problem, Settings};
 use std::time::Instant;
 
 /// Ends whose unknowns differ by less than this part of a standard error are the same.
 const SAME: f64 = 0.1;
+/// Most trial steps of a search: so many, or so many times those of the search before.
+const LEAST_TRIALS: u64 = 100;
+const PATIENCE: u64 = 3;
 
 /// An estimate, after its deviance.
 type End = (f64, Summary);
 
 impl Problem<'_> {
-    /// The best of an estimate and those of searches that begin where its oscillation has another frequency with the same samples,
-    /// if it is warned of one; with what is known of the others.
+    /// The best of an estimate and those of searches that begin where its oscillation has another frequency with the same samples, if
+    /// it is warned of one; with what is known of the others. Of minima that explain the data as well it is the one given.
     pub(super) fn on_both_sides(&self, found: Summary, begin: Instant, control: &Control) -> Summary {
         let useless = |warning: &Warning| {
             let cured = matches!(warning.code, WarningCode::NotAtMinimum | WarningCode::CoarseStep);
             warning.severity == Severity::NotUsable && !cured
         };
         let warned = found.warnings.iter().any(is_open) && !found.warnings.iter().any(useless);
-        // Without a likelihood minima cannot be compared.
-        if !warned || found.deviance.is_none() || control.stops() {
+        // Minima cannot be compared without a likelihood, nor where the cost is too rough for one of them.
+        let rough = matches!(found.outcome, Outcome::Rough { .. }) && !found.outcome.converged();
+        if !warned || rough || found.deviance.is_none() || control.stops() {
             return found;
         }
         let number_of_method =
@@ -34,7 +38,8 @@ impl Problem<'_> {
         let problem = Problem { settings, ..finest.clone() };
         let aliases = problem.at_within(&found, control).ok().and_then(|(objective, x)| Aliases::at(&objective, &x));
         let Some(Aliases { frequency, others }) = aliases else { return found };
-        let trials = self.settings.optimizer.most().saturating_sub(found.iterations);
+        let most = self.settings.optimizer.most().saturating_sub(found.iterations);
+        let trials = most.min(LEAST_TRIALS.max(PATIENCE * found.iterations));
         let mut frequencies = vec![number(frequency, 3)];
         frequencies.extend(others.iter().map(|(frequency, _)| number(*frequency, 3)));
         frequencies.dedup();
@@ -54,15 +59,17 @@ fn is_open(warning: &Warning) -> bool {
     warning.code == WarningCode::Aliased && warning.severity > Severity::Usable
 }
 
-/// The best of ends, of searches begun where the model has these frequencies (rad/s); `None` where there is no other end.
+/// The best of ends, of searches begun where the model has these frequencies (rad/s), and the first of those that explain the data as
+/// well; `None` where there is no other end.
 fn best(mut ends: Vec<End>, frequencies: &str) -> Option<Summary> {
     let (iterations, evaluations) =
         ends.iter().fold((0, 0), |(i, e), (_, end)| (i + end.iterations, e + end.evaluations));
     let distance = |one: &Summary, other: &End| farthest(one, other.1.unknowns.iter().map(|unknown| unknown.value));
     let is_at = |one: &Summary, other: &End| distance(one, other).is_none_or(|(_, errors)| errors <= SAME);
     let minima = ends.iter().filter(|(_, end)| end.outcome.converged());
-    let least = &minima.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|_| ends.len() > 1)?.1;
-    let kept = ends.iter().position(|end| end.1.outcome.converged() && is_at(least, end))?;
+    let least = minima.map(|(deviance, _)| *deviance).min_by(f64::total_cmp).filter(|_| ends.len() > 1)?;
+    let is_best = |(deviance, end): &End| end.outcome.converged() && *deviance <= least + INDISTINGUISHABLE;
+    let kept = ends.iter().position(is_best)?;
     let (deviance, mut best) = ends.remove(kept);
     let rival = ends.iter().filter(|end| !is_at(&best, end)).min_by(|a, b| a.0.total_cmp(&b.0));
     let rival = rival.and_then(|rival| Some((rival, distance(&best, rival)?.0)));

@@ -161,7 +161,9 @@ fn a_cost_as_rough_as_its_tolerance_is_minimized_within_it() {
     for relative in [1e-4, 1e-6] {
         let off = Coupling { j1: 1.05 * p.j1, j2: p.j2 / 1.05, c: 1.05 * p.c, ..p };
         let method = Esdirk { relative, absolute: 1e-3 * relative };
-        let fit = Fit::new(&Coupled, &record).parameters(Coupling::map(off, free)).integrator(method).run().unwrap();
+        // The plant turns by 3.9 rad in a sample; the other frequency with the same samples has 0.39 times the stiffness.
+        let near = Coupling::map(off, |start| free(start).within(0.8 * start, 1.25 * start));
+        let fit = Fit::new(&Coupled, &record).parameters(near).integrator(method).run().unwrap();
         println!("{relative}: {:?} {} {}", fit.parameters, fit.iterations, fit.outcome);
         assert!(fit.outcome.converged() && fit.iterations < 100, "{} {}", fit.iterations, fit.outcome);
         // The inertias together are known to 0.1 % whatever the tolerance.

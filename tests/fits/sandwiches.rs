@@ -101,7 +101,7 @@ fn autocorrelated_scores_by_hand() {
     let estimate = fit(&record).run().unwrap();
     let bread = dot(&inputs, &inputs);
     let e = errors(&estimate, &record);
-    let scores: Vec<f64> = (0..COUNT).map(|k| inputs[k] * e[k] / (1.0 - inputs[k].powi(2) / bread)).collect();
+    let scores: Vec<f64> = (0..COUNT).map(|k| inputs[k] * e[k] / (1.0 - inputs[k].powi(2) / bread).sqrt()).collect();
     let n = COUNT as f64;
     let size = (dot(&scores, &scores) / n).sqrt();
     let z: Vec<f64> = scores.iter().map(|s| s / size).collect();
