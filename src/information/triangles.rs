@@ -205,6 +205,7 @@ mod tests {
         // More rows asked for than there are, and a lane that there is not.
         triangles.absorb(&mut rows.clone()[..3 * stride + 1], 4);
         assert_eq!((triangles.triangle(0).rows(), triangles.triangle(8).rows()), (3, 0));
+        assert_eq!((triangles.columns(), triangles.lanes()), (4, 8));
     }
 
     /// A column so small that its squares vanish is no more than zeros, and what the others say is kept.

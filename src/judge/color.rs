@@ -21,7 +21,7 @@ const LARGE: f64 = 0.5;
 impl Judgement<'_> {
     /// Whether the errors of an output are correlated over time, beyond chance and rounding.
     pub(super) fn is_colored(&self) -> bool {
-        self.autocorrelated().is_some() && self.colored_part() > SMALL
+        !self.rounding && self.colored_part() > SMALL
     }
 
     /// The largest part of an output's movement that is an error and follows from the errors before.

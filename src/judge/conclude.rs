@@ -243,12 +243,7 @@ impl<'j> Judgement<'j> {
                             let end = if bound == unknown.parameter.lower { upper } else { lower };
                             Knowledge::Held { bound, end: Some(end).filter(|end| end.is_finite()) }
                         }
-                        // Beyond the largest or below the smallest number: nothing is known of a logarithm.
-                        None if !(lower.is_finite() && upper.is_finite())
-                            || transform == Transform::Log && upper == 0.0 =>
-                        {
-                            Knowledge::Unidentified
-                        }
+                        None if !has_ends((lower, upper), transform) => Knowledge::Unidentified,
                         None => Knowledge::Known { standard_error, lower, upper },
                     }
                 }
@@ -353,5 +348,23 @@ impl<'j> Judgement<'j> {
             n * (std::f64::consts::TAU.ln() + variance.ln()) + log_determinant + (squares - priors) / variance;
         // Without any error the likelihood is unbounded.
         deviance.is_finite().then_some(deviance)
+    }
+}
+
+/// Whether an interval ends at numbers. Beyond the largest or below the smallest number nothing is known of a logarithm.
+fn has_ends((lower, upper): (f64, f64), transform: Transform) -> bool {
+    lower.is_finite() && upper.is_finite() && !(transform == Transform::Log && upper == 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interval_ends_at_numbers() {
+        use Transform::{Identity, Log};
+        assert!(has_ends((-1.0, 0.0), Identity) && has_ends((0.0, 1.0), Log) && has_ends((-1.0, 1.0), Identity));
+        assert!(!has_ends((0.0, 0.0), Log) && !has_ends((0.0, f64::INFINITY), Log));
+        assert!(!has_ends((f64::NEG_INFINITY, 1.0), Identity) && !has_ends((f64::NAN, 1.0), Identity));
     }
 }

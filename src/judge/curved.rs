@@ -46,7 +46,7 @@ impl Judgement<'_> {
             Transform::Identity if unknown.value > 0.0 => "estimate its logarithm (.log()), or ",
             _ => "",
         };
-        let side = if asymmetry > 0.0 { "below" } else { "above" };
+        let side = side(asymmetry);
         let text = format!(
             "the interval of `{}` is linear where the model is not: by its curvature it should reach {} further {side} than \
              it says ({} standard errors of curvature); {by_logarithm}take diagnose::profile",
@@ -69,5 +69,20 @@ impl Judgement<'_> {
         // The errors are bent against the predictions.
         let bend = -second.step(&vec![0.0; along.len()], &self.exact)?[i] * self.slopes[i];
         Some(0.5 * QUANTILE * bend / error).filter(|asymmetry| asymmetry.is_finite())
+    }
+}
+
+/// The side on which an interval should reach further by its asymmetry.
+fn side(asymmetry: f64) -> &'static str {
+    if asymmetry > 0.0 { "below" } else { "above" }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::side;
+
+    #[test]
+    fn an_interval_reaches_further_to_the_side_of_its_asymmetry() {
+        assert_eq!([side(0.3), side(-0.3)], ["below", "above"]);
     }
 }

@@ -139,3 +139,27 @@ fn noisy(channels: &[Channel], sigma: &[f64], sign: f64, draw: u64, experiment: 
     };
     channels.iter().zip(sigma).enumerate().map(one).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each channel of each experiment has noise of its own, which adding and subtracting cancels.
+    #[test]
+    fn noise_differs_by_channel_and_experiment() {
+        let channels = ["a", "b"].map(|name| Channel::new(name, "V", vec![10.0; 3]));
+        let values = |sign: f64, experiment: usize| -> Vec<Vec<f64>> {
+            noisy(&channels, &[0.5, 2.0], sign, 7, experiment).iter().map(|channel| channel.values.to_vec()).collect()
+        };
+        for experiment in [0, 1, 3] {
+            let (above, below) = (values(1.0, experiment), values(-1.0, experiment));
+            for (j, sigma) in [0.5, 2.0].into_iter().enumerate() {
+                let mut random = Random::stream(7, (2 * experiment + j) as u64);
+                for k in 0..3 {
+                    assert_eq!(above[j][k], 10.0 + sigma * random.normal());
+                    assert!((above[j][k] + below[j][k] - 20.0).abs() < 1e-14);
+                }
+            }
+        }
+    }
+}

@@ -11,7 +11,7 @@ use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::information::Covariance;
 use crate::numeral::percent;
 use crate::optimize::Severity;
-use crate::parameter::Transform;
+use crate::parameter::{Parameter, Transform};
 use nalgebra::{Cholesky, DMatrix};
 
 /// With more unknowns than this the degrees of freedom are those of the measurements: each unknown takes two passes over the data.
@@ -54,13 +54,8 @@ impl Judgement<'_> {
             let here = |i: usize| 2.0 * unit.standard_error(i).ln();
             let (above, below) = (beside(1.0), beside(-1.0));
             for (row, &i) in kept.iter().enumerate() {
-                let slope = match (&above, &below) {
-                    (Some(above), Some(below)) => (above[i] - below[i]) / (2.0 * apart),
-                    (Some(above), None) => (above[i] - here(i)) / apart,
-                    (None, Some(below)) => (here(i) - below[i]) / apart,
-                    // The filter fails on both sides of this direction: the fewest degrees of freedom.
-                    (None, None) => f64::INFINITY,
-                };
+                let of = |place: &Option<Vec<f64>>| place.as_ref().map(|logarithms| logarithms[i]);
+                let slope = slope(of(&above), here(i), of(&below), apart);
                 squares[i] += slope * slope;
                 own[i] += slope * direction[row] / unit.standard_error(i);
             }
@@ -74,11 +69,7 @@ impl Judgement<'_> {
     fn apart(&self, kept: &[usize], direction: impl Iterator<Item = f64>) -> f64 {
         let least = |apart: f64, (&i, along): (&usize, f64)| {
             let parameter = &self.objective.problem.unknowns.row[i].parameter;
-            if parameter.transform != Transform::Identity {
-                return apart;
-            }
-            let lower = if parameter.positive { parameter.lower.max(0.0) } else { parameter.lower };
-            shortened(apart, (lower, parameter.upper), self.end.coordinates[i], along)
+            shortened(apart, bounds(parameter), self.end.coordinates[i], along)
         };
         kept.iter().zip(direction).fold(APART, least)
     }
@@ -108,6 +99,26 @@ impl Judgement<'_> {
     }
 }
 
+/// The bounds of the coordinate of a parameter: a logarithm has none that matter, its variances can be evaluated beyond them.
+fn bounds(parameter: &Parameter) -> (f64, f64) {
+    match parameter.transform {
+        Transform::Log => (f64::NEG_INFINITY, f64::INFINITY),
+        Transform::Identity if parameter.positive => (parameter.lower.max(0.0), parameter.upper),
+        Transform::Identity => (parameter.lower, parameter.upper),
+    }
+}
+
+/// The slope of a number along a direction by what it is at a distance above, here, and at the same distance below, where the
+/// filter may fail; infinite where it fails on both sides: the fewest degrees of freedom.
+fn slope(above: Option<f64>, here: f64, below: Option<f64>, apart: f64) -> f64 {
+    match (above, below) {
+        (Some(above), Some(below)) => (above - below) / (2.0 * apart),
+        (Some(above), None) => (above - here) / apart,
+        (None, Some(below)) => (here - below) / apart,
+        (None, None) => f64::INFINITY,
+    }
+}
+
 /// A distance along which an unknown at this place moves by `along`, so short that it comes no further than nine tenths of the way
 /// to its bounds; as it is where the place is on one of them.
 fn shortened(apart: f64, (lower, upper): (f64, f64), place: f64, along: f64) -> f64 {
@@ -118,7 +129,25 @@ fn shortened(apart: f64, (lower, upper): (f64, f64), place: f64, along: f64) -> 
 
 #[cfg(test)]
 mod tests {
-    use super::shortened;
+    use super::{bounds, shortened, slope};
+    use crate::free;
+
+    /// Of `3 x` at 1: 3 by either side, and by both.
+    #[test]
+    fn slopes_by_one_side_and_by_both() {
+        let found = [(Some(6.0), Some(0.0)), (Some(6.0), None), (None, Some(0.0))].map(|(a, b)| slope(a, 3.0, b, 1.0));
+        assert_eq!(found, [3.0; 3]);
+        let half = [(Some(4.5), Some(1.5)), (Some(4.5), None), (None, Some(1.5))].map(|(a, b)| slope(a, 3.0, b, 0.5));
+        assert_eq!(half, [3.0; 3]);
+        assert_eq!(slope(None, 3.0, None, 0.5), f64::INFINITY);
+    }
+
+    #[test]
+    fn bounds_of_coordinates() {
+        let free = free(2.0).within(-1.0, 9.0);
+        assert_eq!([bounds(&free), bounds(&free.positive())], [(-1.0, 9.0), (0.0, 9.0)]);
+        assert_eq!(bounds(&free.log()), (f64::NEG_INFINITY, f64::INFINITY));
+    }
 
     #[test]
     fn a_distance_ends_inside_the_bounds() {

@@ -136,3 +136,19 @@ impl Clone for Memory {
         Memory(Mutex::new(self.points().clone()))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Carries;
+
+    /// To the first order: `x + sum s d`; without slopes, and without unknowns, they stay.
+    #[test]
+    fn carries_move_along_their_slopes() {
+        let values = vec![1.0, 2.0];
+        let carries = Carries { values: values.clone(), slopes: vec![1.0, -2.0, 3.0, 0.5] };
+        let moved = carries.moved(&[10.0, 4.0]);
+        assert_eq!((moved.values, moved.slopes.len()), (vec![3.0, 34.0], 0));
+        assert_eq!(Carries { slopes: vec![], ..carries.clone() }.moved(&[10.0, 4.0]).values, values);
+        assert_eq!(Carries { slopes: vec![], ..carries }.moved(&[]).values, values);
+    }
+}

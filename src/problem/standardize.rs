@@ -144,3 +144,35 @@ fn by_variance(window: &mut Window) -> Result<(), (usize, usize)> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A slope that a factor of zero would make NaN is zero; its error, and all others, stay.
+    #[test]
+    fn infinite_slopes_are_left_out() {
+        let mut rows = [f64::INFINITY, 2.0, 3.0, f64::NAN, 5.0, f64::INFINITY];
+        leave_out(&mut rows, &[0.0, 1.0, 2.0]);
+        assert_eq!(rows, [0.0, 2.0, 3.0, 0.0, 5.0, f64::INFINITY]);
+    }
+
+    /// Errors of 3 with a variance of 4 and slopes of 6 and 5: `z = 3 / 2`, `dy = 6 / 2`, `dv = 5 / (4 sqrt(2))`. A variance that is none is
+    /// named by its sample, counted from the begin of the record.
+    #[test]
+    fn errors_are_divided_by_their_deviation() {
+        for (variance, failed) in [(4.0, None), (0.0, Some((0, 102))), (f64::INFINITY, Some((0, 102)))] {
+            let mut window = Window::new(1, 1, 1, 4, true);
+            (window.begin[0], window.samples[0]) = (100, 3);
+            for k in 0..3 {
+                window.set_measured(k, 0, 1);
+                window.row_mut(k, 0).copy_from_slice(&[6.0, 3.0]);
+                window.variance_row_mut(k, 0).copy_from_slice(&[5.0, if k == 2 { variance } else { 4.0 }]);
+            }
+            assert_eq!(by_variance(&mut window).err(), failed);
+            assert_eq!(window.row(1, 0), [3.0, 1.5]);
+            assert!((window.variance_row(1, 0)[0] - 5.0 / 32f64.sqrt()).abs() < 1e-15);
+            assert_eq!(window.log_variance(1, 0, 0), 4f64.ln());
+        }
+    }
+}

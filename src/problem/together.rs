@@ -56,3 +56,60 @@ fn together<T: Send>(
     }
     vec![]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sweep::Window;
+    use crate::{Experiment, Fit, Kind, Model, Nothing, Scalar, Time, free, signals};
+
+    signals! { struct Position { x: "m" } }
+
+    /// `x = p`, of which there is no number below zero.
+    #[derive(Clone)]
+    struct Level;
+
+    impl Model for Level {
+        type State = Nothing;
+        type Input = Nothing;
+        type Output = Position;
+        type Parameters = Position;
+        const KIND: Kind = Kind::Static;
+
+        fn output<S: Scalar>(&self, _t: S, _x: &Nothing, _u: &Nothing, p: &Position<S>) -> Position<S> {
+            Position { x: p.x.sqrt() * p.x.sqrt() }
+        }
+    }
+
+    /// A number that says for which of the points it is, and the sum of the errors.
+    struct Sum(usize, f64);
+
+    impl Accumulate for Sum {
+        fn add(&mut self, window: &Window, lane: usize) {
+            self.1 += (0..window.samples[lane]).map(|k| window.error(k, 0, lane)).sum::<f64>();
+        }
+
+        fn append(&mut self, later: Self) {
+            self.1 += later.1;
+        }
+    }
+
+    /// Ten measurements of `i` metres each at the level 1: errors of `i - 1`. One point where the model fails has no sum.
+    #[test]
+    fn each_point_has_the_sums_of_its_record() {
+        let record = |i: usize| {
+            let outputs = vec![Position { x: i as f64 }; 10];
+            Experiment::new(&Level, Time::Uniform { start: 0.0, step: 1.0 }, vec![Nothing {}; 10], outputs).unwrap()
+        };
+        let records: Vec<_> = (0..5).map(record).collect();
+        let fit = |record| Fit::new(&Level, record).parameters(Position { x: free(1.0) }).noise(Position { x: 1.0 });
+        let problems: Vec<_> = records.iter().map(|record| fit(record).problem().unwrap()).collect();
+        let objectives: Vec<_> = problems.iter().map(|problem| problem.objective().unwrap()).collect();
+        let at = |i: usize| [if i == 3 { -1.0 } else { 1.0 }];
+        let places: Vec<_> = (0..5).map(at).collect();
+        let points: Vec<At<'_>> = objectives.iter().zip(&places).map(|(one, place)| (one, &place[..])).collect();
+        let found = gather_together(&points, |i| Sum(i, 0.0));
+        let found: Vec<_> = found.into_iter().map(|sum| sum.map(|Sum(i, sum)| (i, sum.abs()))).collect();
+        assert_eq!(found, [Some((0, 10.0)), Some((1, 0.0)), Some((2, 10.0)), None, Some((4, 30.0))]);
+    }
+}

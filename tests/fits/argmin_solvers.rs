@@ -221,6 +221,33 @@ fn a_checkpoint_is_written_on_the_way() {
     assert_eq!(estimate.method.optimizer, "Levenberg-Marquardt");
 }
 
+/// Puts a folder where a file is to be written.
+struct Obstruct(PathBuf);
+
+impl Observe<LeastSquaresState> for Obstruct {
+    fn observe_iter(&mut self, _: &LeastSquaresState, _: &KV) -> Result<(), argmin::core::Error> {
+        let _ = std::fs::remove_file(&self.0);
+        let _ = std::fs::create_dir_all(self.0.join("folder"));
+        Ok(())
+    }
+}
+
+/// A search goes on without its checkpoint, and says so; from one start and from several.
+#[test]
+fn a_checkpoint_that_cannot_be_written_later_is_a_warning() {
+    for starts in [1, 4] {
+        let path = place(&format!("obstructed_{starts}.json"));
+        let _ = std::fs::remove_dir_all(&path);
+        let record = record(1);
+        let fit =
+            fit(&record).starts(starts).checkpoint(&path, 1).observe(Obstruct(path.clone()), ObserverMode::Always);
+        let estimate = fit.run().unwrap();
+        std::fs::remove_dir_all(&path).unwrap();
+        let warned = estimate.warnings.iter().any(|one| one.code == WarningCode::CheckpointNotWritten);
+        assert!(warned && estimate.outcome.converged(), "{starts}: {estimate}");
+    }
+}
+
 #[test]
 fn a_place_that_cannot_be_written_is_an_error_at_once() {
     let path = place("absent_folder").join("checkpoint.json");

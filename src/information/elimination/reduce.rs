@@ -290,3 +290,28 @@ impl<'s> Gather<'s> {
         (self.information, self.space)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The second of two columns that are the same but for rounding: what is left of its row beside a pivot that is rounding is
+    /// taken as zero where it is as small; the same numbers beside a pivot that is none, or is zero, stay.
+    #[test]
+    fn rows_of_rounding_are_cleaned() {
+        let passed = |pivot: f64| {
+            let mut triangle = Information::new(3);
+            triangle.triangle = vec![1.0, 1.0, 1.0, 2.0, pivot, 1e-18, 3.0, 0.5, 4.0, 0.0];
+            let mut space = Space::new(3);
+            let mut gather = Gather::new(&[0, 1, 2], &[0, 1, 2], 1, &mut space);
+            gather.take(&triangle, 1, &[0, 1, 2], &[]);
+            let row = gather.triangle();
+            // One row of slopes: its square over the first column that is not zero.
+            let first = (0..3).find(|&c| row.at(c, c) != 0.0);
+            (first, (0..=3).map(|c| first.map_or(0.0, |i| row.at(i, c))).collect::<Vec<f64>>())
+        };
+        assert_eq!(passed(1e-17), (None, vec![0.0; 4]));
+        assert_eq!(passed(0.5), (Some(1), vec![0.0, 0.5, 1e-18, 3.0]));
+        assert_eq!(passed(0.0), (Some(2), vec![0.0, 0.0, 1e-18, 3.0]));
+    }
+}

@@ -279,6 +279,32 @@ mod tests {
         }
     }
 
+    /// However they are put together: pieces of one score are put behind each other before they follow others.
+    #[test]
+    fn products_do_not_depend_on_the_order_of_putting_together() {
+        let (all, whole) = (scores(7), in_order(&scores(7), &[7]));
+        let mut late = in_order(&all[2..], &[1, 1, 1, 2]);
+        let mut found = in_order(&all[..2], &[1, 1]);
+        assert_eq!(late.first, all[2..4]);
+        late.append(Lagged::new(2));
+        found.append(late);
+        for (found, whole) in found.products.iter().zip(&whole.products) {
+            assert!((found - whole).abs().max() < 1e-14, "{found} {whole}");
+        }
+    }
+
+    /// Scores in pieces of these lengths.
+    fn in_order(all: &[Vec<f64>], lengths: &[usize]) -> Lagged {
+        let (mut whole, mut from) = (Lagged::new(2), 0);
+        for length in lengths {
+            let mut piece = Lagged::new(2);
+            all[from..from + length].iter().for_each(|score| piece.take(score));
+            whole.append(piece);
+            from += length;
+        }
+        whole
+    }
+
     /// The squares of the moving sums are Newey and West's: `sum over lags of (1 - k / window) sum v[t] v[t - k]'`, of scores
     /// `v[t] = z[t] - a z[t - 1]`, `z = s w`.
     #[test]

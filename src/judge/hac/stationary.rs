@@ -44,13 +44,7 @@ pub(super) fn scores(
         run: vec![],
     };
     let all = objective.gather(coordinates, true, make)?;
-    let mut together = vec![(Autocorrelation::new(ORDER), 0); outputs];
-    for one in &all {
-        for ((sums, count), (own, more)) in together.iter_mut().zip(&one.sums) {
-            sums.append(own);
-            *count += more;
-        }
-    }
+    let together = joined(all.iter().map(|one| &one.sums[..]), outputs);
     let one = |e: usize| {
         let own = all[e].sums.iter().zip(&together);
         let models: Vec<Autoregression> = own
@@ -61,6 +55,18 @@ pub(super) fn scores(
         Some(objective.gather_one(coordinates, e, true, make).ok()?.triangle())
     };
     Ok(each(all.len(), one).into_iter().collect())
+}
+
+/// The sums and counts of all experiments, output by output.
+fn joined<'s>(all: impl Iterator<Item = &'s [(Autocorrelation, u64)]>, outputs: usize) -> Vec<(Autocorrelation, u64)> {
+    let mut joined = vec![(Autocorrelation::new(ORDER), 0); outputs];
+    for one in all {
+        for ((sums, count), (own, more)) in joined.iter_mut().zip(one) {
+            sums.append(own);
+            *count += more;
+        }
+    }
+    joined
 }
 
 /// `e[t] = sum over k of a[k] e[t - 1 - k]`, and an innovation.
@@ -272,6 +278,20 @@ mod tests {
         });
         assert_eq!(response, [1.0, 0.5, 0.0, -0.125]);
         assert_eq!([raised(4.0, 0.1), raised(4.0, 0.0)], [(4.0f64 / 0.6).sqrt(), 2.0]);
+    }
+
+    /// Two outputs of two experiments: sums of squares of 1 + 4 and 9, then of 4 and 16 + 1, of so many errors.
+    #[test]
+    fn experiments_add_up() {
+        let of = |errors: &[f64]| {
+            let mut sums = Autocorrelation::new(ORDER);
+            sums.add(errors);
+            (sums, errors.len() as u64)
+        };
+        let all = [[of(&[1.0, 2.0]), of(&[3.0])], [of(&[2.0]), of(&[4.0, 1.0, 0.0])]];
+        let found = joined(all.iter().map(|one| &one[..]), 2);
+        let found: Vec<_> = found.iter().map(|(sums, count)| (sums.sums()[0], *count)).collect();
+        assert_eq!(found, [(9.0, 3), (26.0, 4)]);
     }
 
     /// `e[t] = 0.8 e[t - 1] + w[t]` with innovations of unit variance; the impulse response `0.8^t`, whose squares are
