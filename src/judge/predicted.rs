@@ -99,7 +99,7 @@ impl Judgement<'_> {
     }
 }
 
-/// The bounds of the coordinate of a parameter: a logarithm has none that matter, its variances can be evaluated beyond them.
+/// The bounds of the coordinate of a parameter, as far as a distance is shortened by them: those of logarithms do not count.
 fn bounds(parameter: &Parameter) -> (f64, f64) {
     match parameter.transform {
         Transform::Log => (f64::NEG_INFINITY, f64::INFINITY),

@@ -94,7 +94,7 @@ mod tests {
         }
     }
 
-    /// Ten measurements of `i` metres each at the level 1: errors of `i - 1`. One point where the model fails has no sum.
+    /// Ten measurements of `i` meters each at the level 1: errors of `i - 1`. One point where the model fails has no sum.
     #[test]
     fn each_point_has_the_sums_of_its_record() {
         let record = |i: usize| {
