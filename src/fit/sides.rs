@@ -85,13 +85,14 @@ fn best(mut ends: Vec<End>, frequencies: &str, stopped: bool) -> Option<Summary>
             let better = number((other.0 - deviance).abs(), 2);
             if other.0 - deviance > INDISTINGUISHABLE {
                 let text = format!(
-                    "{begun}: of the minima that searches begun at each of them found, this is the best by {better} in -2 ln of the \
-                     likelihood; the next is at {place}"
+                    "{begun}: of the ends of searches begun at each of them, this minimum is the best by {better} in -2 ln of the \
+                     likelihood; the next end is at {place}"
                 );
                 (Severity::Usable, text)
             } else {
+                let rival = if other.1.outcome.converged() { "minimum" } else { "end of a search, no minimum," };
                 let text = format!(
-                    "{begun}, and another minimum explains the data as well, at {place} (-2 ln of the likelihood differs by \
+                    "{begun}, and another {rival} explains the data as well, at {place} (-2 ln of the likelihood differs by \
                      {better}): bounds or a prior must tell which one is meant; or sample faster"
                 );
                 (Severity::UsableWithCare, text)
@@ -150,6 +151,11 @@ mod tests {
         assert_eq!(judged(&[(100.0, 1.0, false), (90.0, 1.0, false)], false), None);
         let (deviance, severity, _) = judged(&[(100.0, 1.0, false), (150.0, 7.0, true)], false).unwrap();
         assert_eq!((deviance, severity), (150.0, Severity::UsableWithCare));
+        let (_, _, text) = judged(&[(105.0, 1.0, true), (100.0, 7.0, false)], false).unwrap();
+        assert!(
+            text.contains("another end of a search, no minimum, explains the data as well, at `a` = 7 A/V"),
+            "{text}"
+        );
         let (deviance, severity, text) = judged(&[(100.0, 1.0, true), (150.0, 7.0, false)], true).unwrap();
         assert_eq!((deviance, severity), (100.0, Severity::UsableWithCare));
         assert!(text.ends_with("limits of the fit stopped searches before their end"), "{text}");
