@@ -33,9 +33,11 @@ fn car(step: f64) -> Bench<QuarterCar> {
     bench(QuarterCar, &[16000.0, 1000.0, 160_000.0, 40.0], step, &[(0.0, 0.05, 13)], &[0.0; 4])
 }
 
+/// What is said has no line breaks here.
 fn judged(step: f64, how: &How, seed: u64) -> Found {
     let car = car(step);
-    car.fit(&car.record(seed, 400).noisy(0.02, 0.0, seed), how, seed)
+    let found = car.fit(&car.record(seed, 400).noisy(0.02, 0.0, seed), how, seed);
+    Found { text: found.text.split_whitespace().collect::<Vec<_>>().join(" "), ..found }
 }
 
 /// At 20 samples a second the wheel is beyond half the frequency of sampling, and has a second minimum on the other side: of 200
