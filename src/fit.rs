@@ -248,7 +248,9 @@ impl<'a, M: Model> Fit<'a, M> {
 
     /// Estimates the parameters and their uncertainty.
     ///
-    /// A search that does not converge is an outcome of the estimate, not an error.
+    /// A search that does not converge is an outcome of the estimate, not an error. Where samples leave open at which of two
+    /// frequencies the model oscillates ([`WarningCode::Aliased`](crate::WarningCode::Aliased)), further searches begin at the other
+    /// one: each with the trial steps that the first one left of its limit, all of them within the time limit.
     ///
     /// # Errors
     /// Invalid settings or records ([`Error`] names them), a start that cannot be simulated, a checkpoint that cannot

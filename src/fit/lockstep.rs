@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::estimate::Summary;
 use crate::judge::{SearchEnd, conclude, conclude_from, residuals_together};
 use crate::optimize::{Domain, Infeasible, LeastSquares, Linearization, Machine, Outcome, Request};
-use crate::problem::{At, Control, Objective, Problem, Round, linearize_together};
+use crate::problem::{At, Control, Objective, Problem, Round, each, linearize_together};
 use std::time::Instant;
 
 static NEVER: Control = Control::NEVER;
@@ -125,10 +125,9 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
         };
         attempts = attempts.into_iter().zip(coarse).map(next).collect();
     }
-    let begin = Instant::now();
-    let answer =
-        |(attempt, problem): (Attempt, &Problem<'_>)| Ok(problem.on_both_sides(attempt.answer()?, begin, &control));
-    attempts.into_iter().zip(problems).map(answer).collect()
+    let found: Vec<Result<Summary, Error>> = attempts.into_iter().map(Attempt::answer).collect();
+    let searched = each(found.len(), |i| problems[i].on_both_sides(found[i].as_ref().ok()?, &control));
+    found.into_iter().zip(searched).map(|(found, searched)| searched.map_or(found, Ok)).collect()
 }
 
 /// The stop conditions of fits together: the sum of their time limits is left to all.

@@ -28,10 +28,12 @@ impl Problem<'_> {
     pub(super) fn run_since(&self, begin: Instant) -> Result<Summary, Error> {
         let control = self.control(begin);
         let found = self.run_within(begin, &control, Start::declared(self));
-        Ok(self.on_both_sides(self.refined(found, 0, begin, &control)?, begin, &control))
+        let found = self.refined(found, 0, begin, &control)?;
+        Ok(self.on_both_sides(&found, &control).unwrap_or(found))
     }
 
-    /// What methods finer than this one of them make of what it found, as long as a finer step would move an unknown.
+    /// What a method found, numbered as in [`by_method`](Self::by_method), or methods finer than it, as long as a finer step would
+    /// move an unknown.
     pub(super) fn refined(
         &self,
         found: Result<Summary, Error>,

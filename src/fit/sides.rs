@@ -19,8 +19,9 @@ type End = (f64, Summary);
 
 impl Problem<'_> {
     /// The best of an estimate and those of searches that begin where its oscillation has another frequency with the same samples, if
-    /// it is warned of one; with what is known of the others. Of minima that explain the data as well it is the one given.
-    pub(super) fn on_both_sides(&self, found: Summary, begin: Instant, control: &Control) -> Summary {
+    /// it is warned of one; with what is known of the others, and the work of all. Of minima that explain the data as well it is the
+    /// one given. Each search has the trial steps that the estimate left of the user's limit; `None` where there is nothing to compare.
+    pub(super) fn on_both_sides(&self, found: &Summary, control: &Control) -> Option<Summary> {
         let useless = |warning: &Warning| {
             let cured = matches!(warning.code, WarningCode::NotAtMinimum | WarningCode::CoarseStep);
             warning.severity == Severity::NotUsable && !cured
@@ -28,29 +29,31 @@ impl Problem<'_> {
         let warned = found.warnings.iter().any(is_open) && !found.warnings.iter().any(useless);
         // Minima cannot be compared without a likelihood, nor where the cost is too rough for one of them.
         let rough = matches!(found.outcome, Outcome::Rough { .. }) && !found.outcome.converged();
-        if !warned || rough || found.deviance.is_none() || control.stops() {
-            return found;
+        let patience = LEAST_TRIALS.max(PATIENCE * found.iterations);
+        let trials = patience.min(self.settings.optimizer.most().saturating_sub(found.iterations));
+        if !warned || rough || found.deviance.is_none() || trials == 0 || control.stops() {
+            return None;
         }
-        let number_of_method =
-            self.by_method().position(|one| one.sweep.integrator() == found.method.integrator).unwrap_or(0);
-        let Some(finest) = self.by_method().nth(number_of_method) else { return found };
+        let begin = Instant::now();
+        let method = self.by_method().position(|one| one.sweep.integrator() == found.method.integrator).unwrap_or(0);
+        let finest = self.by_method().nth(method)?;
         let settings = Settings { checkpoint: None, ..finest.settings.clone() };
         let problem = Problem { settings, ..finest.clone() };
-        let aliases = problem.at_within(&found, control).ok().and_then(|(objective, x)| Aliases::at(&objective, &x));
-        let Some(Aliases { frequency, others }) = aliases else { return found };
-        let most = self.settings.optimizer.most().saturating_sub(found.iterations);
-        let trials = most.min(LEAST_TRIALS.max(PATIENCE * found.iterations));
+        let (objective, x) = problem.at_within(found, control).ok()?;
+        let Aliases { frequency, others } = Aliases::at(&objective, &x)?;
         let mut frequencies = vec![number(frequency, 3)];
         frequencies.extend(others.iter().map(|(frequency, _)| number(*frequency, 3)));
         frequencies.dedup();
         let search = |(_, coordinates): (f64, Vec<f64>)| {
             let start = Start { coordinates, trials, ends: None };
             let end = problem.run_on(problem.run_within(begin, control, start), trials, begin, control);
-            self.refined(end, number_of_method, begin, control).ok()
+            self.refined(end, method, begin, control).ok()
         };
         let ends = std::iter::once(found.clone()).chain(others.into_iter().filter_map(search));
-        let ends = ends.filter_map(|end| Some((end.deviance?, end))).collect();
-        best(ends, &frequencies.join(" or ")).unwrap_or(found)
+        let ends: Vec<End> = ends.filter_map(|end| Some((end.deviance?, end))).collect();
+        let short = trials < patience && ends.iter().any(|(_, end)| !end.outcome.converged());
+        let best = best(ends, &frequencies.join(" or "), short || control.stops())?;
+        Some(Summary { seconds: found.seconds + begin.elapsed().as_secs_f64(), ..best })
     }
 }
 
@@ -60,8 +63,8 @@ fn is_open(warning: &Warning) -> bool {
 }
 
 /// The best of ends, of searches begun where the model has these frequencies (rad/s), and the first of those that explain the data as
-/// well; `None` where there is no other end.
-fn best(mut ends: Vec<End>, frequencies: &str) -> Option<Summary> {
+/// well; `None` where there is no other end. Searches that the user's limits stopped early leave the question open.
+fn best(mut ends: Vec<End>, frequencies: &str, stopped: bool) -> Option<Summary> {
     let (iterations, evaluations) =
         ends.iter().fold((0, 0), |(i, e), (_, end)| (i + end.iterations, e + end.evaluations));
     let distance = |one: &Summary, other: &End| farthest(one, other.1.unknowns.iter().map(|unknown| unknown.value));
@@ -78,23 +81,83 @@ fn best(mut ends: Vec<End>, frequencies: &str) -> Option<Summary> {
         None => (Severity::Usable, format!("{begun}: searches begun at each of them ended in one minimum")),
         Some((other, i)) => {
             let Unknown { name, unit, value, .. } = &other.1.unknowns[i];
-            let (place, better) = (format!("`{name}` = {} {unit}", number(*value, 5)), number(other.0 - deviance, 2));
+            let place = format!("`{name}` = {} {unit}", number(*value, 5));
+            let better = number((other.0 - deviance).abs(), 2);
             if other.0 - deviance > INDISTINGUISHABLE {
                 let text = format!(
-                    "{begun}: of the minima that searches begun at each of them found, this is the best by {better} in -2 ln of the \
-                     likelihood; the next is at {place}"
+                    "{begun}: of the ends of searches begun at each of them, this minimum is the best by {better} in -2 ln of the \
+                     likelihood; the next end is at {place}"
                 );
                 (Severity::Usable, text)
             } else {
+                let rival = if other.1.outcome.converged() { "minimum" } else { "end of a search, no minimum," };
                 let text = format!(
-                    "{begun}, and another minimum explains the data as well, at {place} (-2 ln of the likelihood differs by \
+                    "{begun}, and another {rival} explains the data as well, at {place} (-2 ln of the likelihood differs by \
                      {better}): bounds or a prior must tell which one is meant; or sample faster"
                 );
                 (Severity::UsableWithCare, text)
             }
         }
     };
+    let (severity, text) = match stopped {
+        true => (Severity::UsableWithCare, format!("{text}; limits of the fit stopped searches before their end")),
+        false => (severity, text),
+    };
     best.warnings.retain(|warning| !is_open(warning));
     best.warnings.push(Warning { code: WarningCode::Aliased, severity, text });
     Some(Summary { iterations, evaluations, ..best })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::refine::tests::answer;
+    use super::*;
+
+    /// Ends of these deviances, values (of a standard error of one) and convergence: the deviance of the best, with what is said.
+    fn judged(ends: &[(f64, f64, bool)], stopped: bool) -> Option<(f64, Severity, String)> {
+        let open = Warning { code: WarningCode::Aliased, severity: Severity::UsableWithCare, text: String::new() };
+        let end = |&(deviance, value, converged): &(f64, f64, bool)| {
+            let end = answer("fine", deviance, value, converged);
+            (deviance, Summary { warnings: vec![open.clone()], ..end })
+        };
+        let best = best(ends.iter().map(end).collect(), "5 or 6", stopped)?;
+        let count = ends.len() as u64;
+        assert_eq!((best.iterations, best.evaluations, best.warnings.len()), (3 * count, 5 * count, 1));
+        let Warning { severity, text, .. } = best.warnings[0].clone();
+        Some((best.deviance?, severity, text))
+    }
+
+    /// A minimum that is better by more than 10 in deviance is told from the others; of those within 10 the first is taken, and the
+    /// difference is said without a sign.
+    #[test]
+    fn minima_on_both_sides() {
+        use Severity::{Usable, UsableWithCare};
+        let verdict =
+            |ends: &[(f64, f64, bool)]| judged(ends, false).map(|(deviance, severity, _)| (deviance, severity));
+        assert_eq!(verdict(&[(100.0, 1.0, true), (110.1, 7.0, true)]), Some((100.0, Usable)));
+        assert_eq!(verdict(&[(110.1, 1.0, true), (100.0, 7.0, true)]), Some((100.0, Usable)));
+        assert_eq!(verdict(&[(109.9, 1.0, true), (100.0, 7.0, true)]), Some((109.9, UsableWithCare)));
+        let (_, _, text) = judged(&[(105.0, 1.0, true), (100.0, 7.0, true)], false).unwrap();
+        assert!(text.contains("at `a` = 7 A/V (-2 ln of the likelihood differs by 5)"), "{text}");
+        let (_, severity, text) = judged(&[(100.0, 1.0, true), (100.0, 1.09, true)], false).unwrap();
+        assert!(severity == Usable && text.ends_with("at each of them ended in one minimum"), "{text}");
+        assert_eq!(verdict(&[(100.0, 1.0, true), (100.0, 1.11, true)]), Some((100.0, UsableWithCare)));
+    }
+
+    /// An end that is no minimum is never the best, and searches that were stopped tell nothing for certain.
+    #[test]
+    fn ends_that_are_no_minima() {
+        assert_eq!(judged(&[(100.0, 1.0, true)], false), None);
+        assert_eq!(judged(&[(100.0, 1.0, false), (90.0, 1.0, false)], false), None);
+        let (deviance, severity, _) = judged(&[(100.0, 1.0, false), (150.0, 7.0, true)], false).unwrap();
+        assert_eq!((deviance, severity), (150.0, Severity::UsableWithCare));
+        let (_, _, text) = judged(&[(105.0, 1.0, true), (100.0, 7.0, false)], false).unwrap();
+        assert!(
+            text.contains("another end of a search, no minimum, explains the data as well, at `a` = 7 A/V"),
+            "{text}"
+        );
+        let (deviance, severity, text) = judged(&[(100.0, 1.0, true), (150.0, 7.0, false)], true).unwrap();
+        assert_eq!((deviance, severity), (100.0, Severity::UsableWithCare));
+        assert!(text.ends_with("limits of the fit stopped searches before their end"), "{text}");
+    }
 }

@@ -72,10 +72,14 @@ impl Aliases {
         let mut others = vec![];
         for fold in [folds.floor(), folds.ceil()] {
             let frequency = TAU / interval * fold - mode.1;
+            if frequency <= 0.0 {
+                continue;
+            }
             for from in [coordinates, &objective.problem.unknowns.start()[..]] {
                 for moving in [&moving[..], &[most]] {
                     let other = moved(objective, from, (point, mode), frequency, moving);
-                    others.extend(other.map(|other| (frequency, other)));
+                    let other = other.map(|other| (frequency, other)).filter(|other| !others.contains(other));
+                    others.extend(other);
                 }
             }
         }
@@ -158,7 +162,7 @@ fn slopes(objective: &Objective<'_>, coordinates: &[f64], point: &Point, mode: M
 }
 
 /// Changes some unknowns, all by the least parts of themselves, until an oscillation has another frequency; `None` if they come to
-/// their bounds.
+/// their bounds, or to where they do not move it.
 fn moved(
     objective: &Objective<'_>,
     coordinates: &[f64],
@@ -176,6 +180,9 @@ fn moved(
         }
         let slopes = slopes(objective, &x, point, mode)?;
         let squares: f64 = moving.iter().map(|&i| slopes[i] * slopes[i]).sum();
+        if squares == 0.0 {
+            return None;
+        }
         let (needed, values) = (needed.clamp(-LARGEST_STEP, LARGEST_STEP) / squares, unknowns.values(&x));
         for &i in moving {
             let (changed, (lower, upper)) = (values[i] * (slopes[i] * needed).exp(), bounds[i]);

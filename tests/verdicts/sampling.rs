@@ -3,7 +3,7 @@
 use crate::records::*;
 use approx::assert_relative_eq;
 use greybox::estimate::WarningCode;
-use greybox::optimize::Severity;
+use greybox::optimize::{LevenbergMarquardt, OwnSize, Severity, Stop};
 use greybox::pmsm::Surface;
 use greybox::{Estimate, Fit, Fleet, Model, Parameter, Scalar, free, signals};
 
@@ -33,9 +33,11 @@ fn car(step: f64) -> Bench<QuarterCar> {
     bench(QuarterCar, &[16000.0, 1000.0, 160_000.0, 40.0], step, &[(0.0, 0.05, 13)], &[0.0; 4])
 }
 
+/// What is said has no line breaks here.
 fn judged(step: f64, how: &How, seed: u64) -> Found {
     let car = car(step);
-    car.fit(&car.record(seed, 400).noisy(0.02, 0.0, seed), how, seed)
+    let found = car.fit(&car.record(seed, 400).noisy(0.02, 0.0, seed), how, seed);
+    Found { text: found.text.split_whitespace().collect::<Vec<_>>().join(" "), ..found }
 }
 
 /// At 20 samples a second the wheel is beyond half the frequency of sampling, and has a second minimum on the other side: of 200
@@ -58,6 +60,27 @@ fn an_oscillation_far_beyond_is_usable() {
         let found = judged(step, &How::default(), seed);
         assert_eq!(found.severity, Severity::Usable, "{}", found.text);
         assert!(found.errors < 4.0 && found.text.contains("in -2 ln of the"), "{}", found.text);
+    }
+}
+
+/// Searches that the limit of trial steps stops before their end tell nothing for certain.
+#[test]
+fn a_limit_leaves_the_question_open() {
+    let car = car(0.06);
+    let record = car.experiment(&car.record(0, 400).noisy(0.02, 0.0, 0));
+    let parameters = Suspension { ks: free(15_000.0), cs: free(1100.0), kt: free(150_000.0), mu: free(45.0) };
+    let limited = |iterations: u64| {
+        let optimizer = LevenbergMarquardt::new(Stop { iterations, ..Stop::default() }, OwnSize);
+        Fit::new(&car.model, &record).parameters(parameters).optimizer(optimizer).run().unwrap()
+    };
+    let free = limited(1000);
+    assert_eq!(free.severity(), Severity::Usable, "{free}");
+    let least = (1..100).find(|&iterations| limited(iterations).outcome.converged()).unwrap();
+    for (more, words) in [(0, "no search was started there"), (1, "limits of the fit stopped searches")] {
+        let found = limited(least + more);
+        let warning = found.warnings.iter().find(|warning| warning.code == WarningCode::Aliased).unwrap();
+        assert!(warning.text.contains(words) && warning.severity == Severity::UsableWithCare, "{more}: {found}");
+        assert!(found.outcome.converged() && found.iterations < free.iterations, "{found}");
     }
 }
 

@@ -1,0 +1,96 @@
+//! Which of two answers is given, and what is said of the other.
+
+use super::*;
+use crate::estimate::Knowledge;
+use crate::{Experiment, Fit, Kind, Model, Nothing, Scalar, Time, free, signals};
+
+signals! { struct Voltage { u: "V" } }
+signals! { struct Current { i: "A" } }
+signals! { struct Gain { a: "A/V" } }
+
+/// `i = a u`.
+#[derive(Clone)]
+struct Line;
+
+impl Model for Line {
+    type State = Nothing;
+    type Input = Voltage;
+    type Output = Current;
+    type Parameters = Gain;
+    const KIND: Kind = Kind::Static;
+
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Gain<S>) -> Current<S> {
+        Current { i: p.a * u.u }
+    }
+}
+
+/// An answer of this deviance, with a value that has a standard error of one.
+pub fn answer(integrator: &str, deviance: f64, value: f64, converged: bool) -> Summary {
+    let inputs: Vec<Voltage> = (0..8).map(|k| Voltage { u: f64::from(k) }).collect();
+    let outputs = (0..8).map(|k| Current { i: f64::from(k % 3) }).collect();
+    let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 0.1 }, inputs, outputs).unwrap();
+    let mut found = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).run().unwrap().into_summary();
+    (found.deviance, found.iterations, found.evaluations, found.warnings) = (Some(deviance), 3, 5, vec![]);
+    found.method.integrator = integrator.to_owned();
+    found.unknowns[0].value = value;
+    found.unknowns[0].knowledge = Knowledge::Known { standard_error: 1.0, lower: value - 2.0, upper: value + 2.0 };
+    if !converged {
+        found.outcome = Outcome::TimeLimit;
+    }
+    found
+}
+
+fn failure() -> Error {
+    Error::Option("no answer".to_owned())
+}
+
+/// Of two answers that of the finer method, unless only the coarser one converged; the work of both is counted.
+#[test]
+fn the_finer_answer_is_preferred() {
+    let coarse = |converged: bool| Attempt::new(Ok(answer("coarse", 10.0, 1.0, converged)));
+    let fine = |converged: bool| Ok(answer("fine", 12.0, 1.0, converged));
+    let name = |attempt: Attempt| attempt.answer().unwrap().method.integrator;
+    for (before, again, expected) in
+        [(true, true, "fine"), (true, false, "coarse"), (false, true, "fine"), (false, false, "fine")]
+    {
+        assert_eq!(name(coarse(before).or(fine(again))), expected, "{before} {again}");
+    }
+    assert_eq!(name(Attempt::new(Err(failure())).or(fine(false))), "fine");
+    assert_eq!(name(coarse(false).or(Err(failure()))), "coarse");
+    assert!(Attempt::new(Err(failure())).or(Err(failure())).answer().is_err());
+    let both = coarse(true).or(fine(true)).answer().unwrap();
+    assert_eq!((both.iterations, both.evaluations), (6, 10));
+}
+
+/// What is said of a coarser minimum: more than 15 lower in deviance is a warning, more than 4 a note; otherwise a note where
+/// its value is more than a standard error away and it does not explain the data worse by 4. One that did not converge says
+/// nothing.
+#[test]
+fn coarser_minima_are_said() {
+    let said = |deviance: f64, value: f64, converged: bool| {
+        let attempt = Attempt::new(Ok(answer("coarse", deviance, value, converged)));
+        let found = attempt.or(Ok(answer("fine", 100.0, 7.0, true))).answer().unwrap();
+        found.warnings.iter().map(|warning| (warning.severity, warning.text.clone())).next()
+    };
+    let severity = |deviance: f64, value: f64| said(deviance, value, true).map(|(severity, _)| severity);
+    assert_eq!([severity(84.9, 7.0), severity(85.1, 7.0)], [Some(Severity::UsableWithCare), Some(Severity::Usable)]);
+    assert_eq!([severity(95.9, 7.0), severity(96.1, 7.0)], [Some(Severity::Usable), None]);
+    assert_eq!([severity(103.9, 8.1), severity(104.1, 8.1)], [Some(Severity::Usable), None]);
+    assert_eq!([severity(100.0, 8.1), severity(100.0, 5.9)], [Some(Severity::Usable); 2]);
+    assert_eq!([severity(100.0, 7.9), severity(100.0, 6.1)], [None; 2]);
+    assert_eq!(said(80.0, 9.0, false), None);
+    let (_, better) = said(80.0, 7.0, true).unwrap();
+    assert!(better.starts_with("coarse explains the data better than fine, by 20 in"), "{better}");
+    let (_, moved) = said(101.5, 9.5, true).unwrap();
+    let words = ["the step decides `a`", "coarse gives 9.5 A/V, 2.5 standard errors away", "differs by 1.5)"];
+    assert!(words.iter().all(|word| moved.contains(word)), "{moved}");
+}
+
+/// Methods are compared with the farthest of several coarser ones.
+#[test]
+fn the_farthest_of_several_is_said() {
+    let attempt = Attempt::new(Ok(answer("first", 100.0, 9.0, true)));
+    let attempt = attempt.or(Ok(answer("second", 101.0, 3.0, true))).or(Ok(answer("third", 102.0, 7.0, true)));
+    let found = attempt.answer().unwrap();
+    assert!(found.warnings[0].text.contains("second gives 3 A/V"), "{}", found.warnings[0].text);
+}
