@@ -125,7 +125,14 @@ fn a_minimum_of_a_tolerance_is_no_stall() {
     let (truth, record) = record(6e4, 0.5);
     let coarse = Esdirk { relative: 1e-6, absolute: 1e-9 };
     for off in [1.001, 1.05] {
-        let start = Coupling { c: free(off * truth.c), ..near(truth) };
+        // The plant turns by 3 rad in a sample; within these bounds it has no other frequency with the same samples.
+        let start = near(truth);
+        let start = Coupling {
+            j1: start.j1.within(0.9 * truth.j1, 1.12 * truth.j1),
+            j2: start.j2.within(0.9 * truth.j2, 1.12 * truth.j2),
+            c: free(off * truth.c).within(0.94 * truth.c, 1.06 * truth.c),
+            ..start
+        };
         let fit = Fit::new(&Coupled, &record).parameters(start).integrator(coarse).run().unwrap();
         assert!(fit.outcome.converged() && fit.severity() < Severity::NotUsable, "{fit}");
         // Five: three for the noise of this record, and the bias.
