@@ -101,6 +101,8 @@
 // Tests beside the code name the public list as users do.
 #[cfg(test)]
 extern crate self as greybox;
+#[cfg(test)]
+mod tests;
 
 mod dual;
 pub mod integrate;

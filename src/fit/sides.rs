@@ -18,9 +18,10 @@ const PATIENCE: u64 = 3;
 type End = (f64, Summary);
 
 impl Problem<'_> {
-    /// The best of an estimate and those of searches that begin where its oscillation has another frequency with the same samples, if
-    /// it is warned of one; with what is known of the others, and the work of all. Of minima that explain the data as well it is the
-    /// one given. Each search has the trial steps that the estimate left of the user's limit; `None` where there is nothing to compare.
+    /// Compares an estimate that is warned of an alias with the ends of searches that begin where its oscillation has another frequency
+    /// with the same samples. Returns the best end, with a note or a warning about the others and the evaluations of all searches; the
+    /// estimate itself if it explains the data as well as the best. Each search may take as many trial steps as the estimate left of the
+    /// user's limit. `None` where there is nothing to compare.
     pub(super) fn on_both_sides(&self, found: &Summary, control: &Control) -> Option<Summary> {
         let useless = |warning: &Warning| {
             let cured = matches!(warning.code, WarningCode::NotAtMinimum | WarningCode::CoarseStep);
@@ -62,8 +63,9 @@ fn is_open(warning: &Warning) -> bool {
     warning.code == WarningCode::Aliased && warning.severity > Severity::Usable
 }
 
-/// The best of ends, of searches begun where the model has these frequencies (rad/s), and the first of those that explain the data as
-/// well; `None` where there is no other end. Searches that the user's limits stopped early leave the question open.
+/// Chooses among the ends of searches that began where the model has these frequencies (rad/s): the first minimum whose deviance is
+/// within [`INDISTINGUISHABLE`] of the least. `None` if there is one end only, or no minimum. `stopped` says that limits of the fit
+/// ended searches early, so that a better minimum may have been missed.
 fn best(mut ends: Vec<End>, frequencies: &str, stopped: bool) -> Option<Summary> {
     let (iterations, evaluations) =
         ends.iter().fold((0, 0), |(i, e), (_, end)| (i + end.iterations, e + end.evaluations));

@@ -166,27 +166,8 @@ fn magnitudes(objective: &Objective<'_>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Experiment, Fit, Kind, Model, Nothing, Scalar, Time, free, signals};
-
-    signals! { struct Voltage { u: "V" } }
-    signals! { struct Current { i: "A" } }
-    signals! { struct Gain { a: "A/V" } }
-
-    /// `i = a u`.
-    #[derive(Clone)]
-    struct Line;
-
-    impl Model for Line {
-        type State = Nothing;
-        type Input = Voltage;
-        type Output = Current;
-        type Parameters = Gain;
-        const KIND: Kind = Kind::Static;
-
-        fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Gain<S>) -> Current<S> {
-            Current { i: p.a * u.u }
-        }
-    }
+    use crate::tests::{Current, Gain, Line, Voltage};
+    use crate::{Experiment, Fit, Time, free};
 
     /// Errors about a gain of two, every seventh an outlier: Huber's scale `s` solves `mean of min(|e / s|, c)^2 = kappa`.
     #[test]

@@ -2,15 +2,15 @@
 
 use crate::wide::{self, Task, Wide, Width};
 
-/// Numbers of a block, so that the bits of a sum do not depend on the registers.
+/// Number of partial sums, the same for registers of any width, so that the bits of a result do not depend on the processor.
 const BLOCK: usize = 8;
 
-/// What is summed up for each pair.
+/// The four numbers that are summed over pairs.
 pub(super) trait Terms: Copy {
     fn of<W: Wide>(self, a: W, b: W) -> [W; 4];
 }
 
-/// The sums of the terms of all pairs of a number of `a` and the one of `b` at the same place; `b` is as long.
+/// Sums the terms of all pairs `(a[k], b[k])`. `b` must be as long as `a`.
 pub(super) fn sums(a: &[f64], b: &[f64], terms: impl Terms) -> [f64; 4] {
     wide::run(Width::widest(), Sums { a, b, terms })
 }

@@ -168,13 +168,13 @@ pub(super) fn parts(jobs: &[&Job<'_>]) -> Result<Vec<Part>, Broken> {
         .collect()
 }
 
-/// A record in segments, each with slopes with respect to all that it begins with and the parameters.
+/// A record cut into segments, each of which is run with slopes with respect to its initial carry and the parameters.
 struct Chained<'p> {
     whole: Job<'p>,
     seeds: Arc<[Seed]>,
     /// The unknown behind each parameter.
     parameters: Vec<usize>,
-    /// Slopes of what a segment begins with: each with respect to itself.
+    /// Slopes of the initial carry with respect to `seeds`: ones for each entry with respect to itself, else zeros.
     slopes: Vec<f64>,
 }
 
@@ -196,7 +196,7 @@ impl<'p> Chained<'p> {
             let border = guess.and_then(|guess| guess.of[*experiment].at(s, whole.carry.len()));
             let mut slopes = Cow::Borrowed(&self.slopes[..]);
             if s == 0 {
-                // What a record begins with does not move where it is given, and slopes with respect to it may be infinite.
+                // A given initial state is constant: slopes with respect to it are not needed, and may be infinite.
                 let rows = slopes.to_mut().chunks_exact_mut(self.seeds.len());
                 let given = |of: &[f64]| of.iter().all(|slope| *slope == 0.0);
                 for (i, row) in rows.enumerate() {

@@ -56,8 +56,8 @@ fn cut(samples: usize, whole: bool) -> Vec<Range<usize>> {
     (0..segments).map(|s| begin(s)..begin(s + 1)).collect()
 }
 
-/// What is carried into the segments of a record, one after the other, the first left out; and the slopes of these numbers with
-/// respect to the quantities of the record's unknowns, row by row: none, where only values were simulated.
+/// The carries at the begins of a record's segments, from the second segment on, one after the other; and their slopes with respect to
+/// the quantities of the record's unknowns, row by row. There are no slopes where only values were simulated.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Carries {
     pub values: Vec<f64>,
@@ -65,12 +65,12 @@ pub(crate) struct Carries {
 }
 
 impl Carries {
-    /// What is carried into a segment, its length given; `None` into one that is not known of.
+    /// The carry at the begin of a segment, of `carried` numbers; `None` for the first segment and for one without a known carry.
     pub fn at(&self, segment: usize, carried: usize) -> Option<&[f64]> {
         self.values.chunks_exact(carried.max(1)).nth(segment.checked_sub(1)?)
     }
 
-    /// Its slopes, as many numbers as given.
+    /// The slopes of that carry, row by row, `count` numbers.
     pub fn slopes_at(&self, segment: usize, count: usize) -> Option<&[f64]> {
         self.slopes.chunks_exact(count.max(1)).nth(segment.checked_sub(1)?)
     }

@@ -151,7 +151,7 @@ impl Unknowns {
         &self.seeds[experiment]
     }
 
-    /// Those of all experiments; one allocation for consecutive ones with the same.
+    /// The seeds of all experiments. Consecutive experiments with the same seeds share an allocation.
     fn all_seeds(&self) -> Vec<Arc<[Seed]>> {
         let seed = |i: usize| match self.row[i].role {
             Role::InitialState(s) => Seed::Carry(s),

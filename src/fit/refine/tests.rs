@@ -2,27 +2,8 @@
 
 use super::*;
 use crate::estimate::Knowledge;
-use crate::{Experiment, Fit, Kind, Model, Nothing, Scalar, Time, free, signals};
-
-signals! { struct Voltage { u: "V" } }
-signals! { struct Current { i: "A" } }
-signals! { struct Gain { a: "A/V" } }
-
-/// `i = a u`.
-#[derive(Clone)]
-struct Line;
-
-impl Model for Line {
-    type State = Nothing;
-    type Input = Voltage;
-    type Output = Current;
-    type Parameters = Gain;
-    const KIND: Kind = Kind::Static;
-
-    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Gain<S>) -> Current<S> {
-        Current { i: p.a * u.u }
-    }
-}
+use crate::tests::{Current, Gain, Line, Voltage};
+use crate::{Experiment, Fit, Time, free};
 
 /// An answer of this deviance, with a value that has a standard error of one.
 pub fn answer(integrator: &str, deviance: f64, value: f64, converged: bool) -> Summary {

@@ -1,27 +1,8 @@
 //! Ends that are one minimum, and the best of them.
 
 use super::*;
-use crate::{Experiment, Fit, Kind as ModelKind, Model, Nothing, Scalar, Time, free, signals};
-
-signals! { struct Voltage { u: "V" } }
-signals! { struct Current { i: "A" } }
-signals! { struct Gain { a: "A/V" } }
-
-/// `i = a u`.
-#[derive(Clone)]
-struct Line;
-
-impl Model for Line {
-    type State = Nothing;
-    type Input = Voltage;
-    type Output = Current;
-    type Parameters = Gain;
-    const KIND: ModelKind = ModelKind::Static;
-
-    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Gain<S>) -> Current<S> {
-        Current { i: p.a * u.u }
-    }
-}
+use crate::tests::{Current, Gain, Line, Voltage};
+use crate::{Experiment, Fit, Time, free};
 
 const MINIMUM: Outcome = Outcome::Converged { step: 0.0, gradient: 0.0 };
 const LIMIT: Outcome = Outcome::IterationLimit { iterations: 9 };
