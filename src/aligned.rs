@@ -18,7 +18,19 @@ impl Aligned {
         if count == 0 {
             return Aligned::default();
         }
-        let numbers = vec![0.0; count + LINE];
+        Aligned::within(vec![0.0; count + LINE], count)
+    }
+
+    /// So many numbers of any values, in the same memory if it is large enough.
+    pub fn resized(self, count: usize) -> Self {
+        if count > 0 && self.numbers.len() >= count + LINE {
+            Aligned::within(self.numbers, count)
+        } else {
+            Aligned::zeros(count)
+        }
+    }
+
+    fn within(numbers: Vec<f64>, count: usize) -> Self {
         // Where the system cannot tell the offset, the numbers begin anywhere.
         let first = numbers.as_ptr().align_offset(LINE * size_of::<f64>()).min(LINE);
         Aligned { numbers, range: first..first + count }

@@ -200,7 +200,9 @@ impl Compiled {
             _ if self.trajectories == Trajectories::One || self.machine.is_some() => 1,
             0 | 1 => 1,
             2 => 2,
-            _ => 4,
+            3 | 4 => 4,
+            _ if self.width.lanes() > 4 => 4,
+            _ => 8,
         }
     }
 }

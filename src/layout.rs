@@ -64,6 +64,13 @@ pub(crate) fn quantities<X: Signals>() -> Vec<Quantity> {
     named(X::NAMES, X::UNITS)
 }
 
+/// Whether quantities are those of a vector of signals.
+#[cfg(feature = "std")]
+pub(crate) fn are_of<X: Signals>(quantities: &[Quantity]) -> bool {
+    let known = quantities.iter().map(|quantity| (quantity.name.as_str(), quantity.unit.as_str()));
+    known.eq(X::NAMES.iter().copied().zip(X::UNITS.iter().copied()))
+}
+
 #[cfg(feature = "std")]
 fn named(names: &[&str], units: &[&str]) -> Vec<Quantity> {
     let quantity = |(name, unit): (&&str, &&str)| Quantity { name: (*name).to_owned(), unit: (*unit).to_owned() };

@@ -2,7 +2,7 @@
 
 use crate::layout::Kind;
 #[cfg(feature = "std")]
-use crate::layout::Layout;
+use crate::layout::{Layout, are_of};
 use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
 
@@ -107,5 +107,14 @@ impl Layout {
     /// The layout of a model's signals.
     pub fn of<M: Model>() -> Self {
         Layout::new::<M::State, M::Input, M::Output, M::Parameters>(M::KIND)
+    }
+
+    /// Whether it is that of a model.
+    pub(crate) fn is_of<M: Model>(&self) -> bool {
+        self.kind == M::KIND
+            && are_of::<M::State>(&self.states)
+            && are_of::<M::Input>(&self.inputs)
+            && are_of::<M::Output>(&self.outputs)
+            && are_of::<M::Parameters>(&self.parameters)
     }
 }

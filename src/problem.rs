@@ -146,6 +146,11 @@ impl<'a> Problem<'a> {
         &self.records
     }
 
+    /// The samples of all records.
+    pub(crate) fn samples(&self) -> usize {
+        self.records.iter().map(Record::len).sum()
+    }
+
     /// What was declared of each parameter.
     pub fn parameters(&self) -> &[Parameter] {
         &self.unknowns.parameters

@@ -25,6 +25,7 @@ use crate::error::Error;
 use crate::interval::Hold;
 use crate::layout::Quantity;
 use crate::parameter::Parameter;
+use std::sync::Arc;
 
 /// What is known of the state at the first sample.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -46,10 +47,10 @@ pub enum Initial {
 #[derive(Clone, Debug)]
 pub struct Record {
     pub(crate) name: String,
-    pub(crate) states: Vec<Quantity>,
+    pub(crate) states: Arc<[Quantity]>,
     pub(crate) time: Time,
-    pub(crate) inputs: Vec<Channel>,
-    pub(crate) outputs: Vec<Channel>,
+    pub(crate) inputs: Arc<[Channel]>,
+    pub(crate) outputs: Arc<[Channel]>,
     pub(crate) hold: Hold,
     pub(crate) initial: Initial,
 }
@@ -62,7 +63,8 @@ impl Record {
     /// time or input that is not finite, an infinite output.
     pub fn new(states: Vec<Quantity>, time: Time, inputs: Vec<Channel>, outputs: Vec<Channel>) -> Result<Self, Error> {
         let (name, hold, initial) = ("record".to_owned(), Hold::default(), Initial::default());
-        Record { name, states, time, inputs, outputs, hold, initial }.checked()
+        Record { name, states: states.into(), time, inputs: inputs.into(), outputs: outputs.into(), hold, initial }
+            .checked()
     }
 
     /// Names the record in reports and errors.
@@ -96,7 +98,7 @@ impl Record {
     /// # Errors
     /// As [`new`](Self::new).
     pub(crate) fn with_channels(self, inputs: Vec<Channel>, outputs: Vec<Channel>) -> Result<Self, Error> {
-        Record { inputs, outputs, ..self }.checked()
+        Record { inputs: inputs.into(), outputs: outputs.into(), ..self }.checked()
     }
 
     /// Name in reports and errors.
@@ -106,7 +108,7 @@ impl Record {
 
     /// Number of samples.
     pub fn len(&self) -> usize {
-        self.inputs.iter().chain(&self.outputs).map(|channel| channel.values.len()).next().unwrap_or(0)
+        self.inputs.iter().chain(self.outputs.iter()).map(|channel| channel.values.len()).next().unwrap_or(0)
     }
 
     /// Whether there is no sample; never so for a record that was made.
@@ -167,7 +169,7 @@ impl Record {
 
     /// The record, if it is valid.
     pub(crate) fn checked(self) -> Result<Self, Error> {
-        let mut channels = self.inputs.iter().chain(&self.outputs);
+        let mut channels = self.inputs.iter().chain(self.outputs.iter());
         let Some(first) = channels.next() else {
             return Err(Error::Option(format!("experiment `{}` has neither an input nor an output", self.name)));
         };

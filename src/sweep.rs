@@ -151,9 +151,7 @@ pub trait Sweep: Send + Sync {
     /// row by row.
     fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Reached {
         let _ = record;
-        let (n, width) = (state.len(), state.len() + parameters.len());
-        let slopes = (0..n * width).map(|at| if at % width == at / width { 1.0 } else { 0.0 }).collect();
-        Reached { carry: state.to_vec(), slopes }
+        unmoved(state, parameters)
     }
 
     /// Runs pieces in parallel lanes and calls `visit` with each window.
@@ -213,8 +211,10 @@ pub trait Sweep: Send + Sync {
         false
     }
 
-    /// The same with a finer step, if there is one.
-    fn refined<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
+    /// The same with a finer step, if there is one, to run so many samples: whether its equations are worth compiling depends on
+    /// their number.
+    fn refined<'s>(&'s self, samples: usize) -> Option<Arc<dyn Sweep + 's>> {
+        let _ = samples;
         None
     }
 
@@ -229,6 +229,14 @@ pub trait Sweep: Send + Sync {
 
     /// Text that identifies the equations; part of a checkpoint's fingerprint.
     fn identity(&self) -> String;
+}
+
+/// The state as the carry at the first sample, with its slopes with respect to states, then parameters.
+fn unmoved(state: &[f64], parameters: &[f64]) -> Reached {
+    let width = state.len() + parameters.len();
+    let mut slopes = vec![0.0; state.len() * width];
+    slopes.iter_mut().step_by(width + 1).for_each(|slope| *slope = 1.0);
+    Reached { carry: state.to_vec(), slopes }
 }
 
 /// The carry at some samples, by runs from one to the next. Not a part of the trait, so that it is compiled once.

@@ -71,7 +71,8 @@ impl Group {
         match self.registers {
             1 => run(width, Once::<1> { code, slots, width }),
             2 => run(width, Once::<2> { code, slots, width }),
-            _ => run(width, Once::<4> { code, slots, width }),
+            4 => run(width, Once::<4> { code, slots, width }),
+            _ => run(width, Once::<8> { code, slots, width }),
         }
     }
 
@@ -126,7 +127,8 @@ impl Group {
         match self.registers {
             1 => run(width, Run::<1> { code, slots, inputs, rows, samples, width }),
             2 => run(width, Run::<2> { code, slots, inputs, rows, samples, width }),
-            _ => run(width, Run::<4> { code, slots, inputs, rows, samples, width }),
+            4 => run(width, Run::<4> { code, slots, inputs, rows, samples, width }),
+            _ => run(width, Run::<8> { code, slots, inputs, rows, samples, width }),
         }
     }
 

@@ -96,7 +96,8 @@ unsafe fn interpret<W: Wide, const K: usize>(
     width: Width,
 ) {
     for instruction in code {
-        // SAFETY: as the caller says.
+        // A copy, or it would be read anew after each write to the slots.
+        let instruction = *instruction;
         let of = Operands::<W, K> { slots, instruction, lanes: core::marker::PhantomData };
         // SAFETY: as the caller says.
         unsafe {
@@ -135,63 +136,66 @@ pub(super) fn signum<W: Wide>(a: W) -> W {
 }
 
 /// An instruction and the slots that it works on.
-struct Operands<'a, W, const K: usize> {
+struct Operands<W, const K: usize> {
     slots: *mut f64,
-    instruction: &'a Instruction,
+    instruction: Instruction,
     lanes: core::marker::PhantomData<W>,
 }
 
-impl<W: Wide, const K: usize> Operands<'_, W, K> {
-    /// Register `k` of a slot.
+impl<W: Wide, const K: usize> Operands<W, K> {
+    /// The first register of a slot.
     #[inline(always)]
-    unsafe fn at(&self, slot: u16, k: usize) -> W {
-        // SAFETY: the slot is there, as `interpret` demands.
-        unsafe { W::read(self.slots.add((usize::from(slot) * K + k) * W::LANES)) }
-    }
-
-    #[inline(always)]
-    unsafe fn put(&self, k: usize, value: W) {
-        // SAFETY: the slot is there, as `interpret` demands.
-        unsafe { value.write(self.slots.add((usize::from(self.instruction.to) * K + k) * W::LANES)) }
+    fn at(&self, slot: u16) -> *mut f64 {
+        self.slots.wrapping_add(usize::from(slot) * K * W::LANES)
     }
 
     #[inline(always)]
     unsafe fn each(&self, f: impl Fn([[W; 2]; 2]) -> W) {
-        let [[a, b], [c, d], ..] = self.instruction.pairs;
+        let [[a, b], [c, d], ..] = self.instruction.pairs.map(|pair| pair.map(|slot| self.at(slot)));
+        let to = self.at(self.instruction.to);
         let mut k = 0;
         while k < K {
-            // SAFETY: as above; unused operands are slot zero.
-            unsafe { self.put(k, f([[self.at(a, k), self.at(b, k)], [self.at(c, k), self.at(d, k)]])) };
+            // SAFETY: the slots are there, as `interpret` demands; unused operands are slot zero.
+            unsafe {
+                let at = |slot: *mut f64| W::read(slot.add(k * W::LANES));
+                f([[at(a), at(b)], [at(c), at(d)]]).write(to.add(k * W::LANES));
+            }
             k += 1;
         }
     }
 
     #[inline(always)]
     unsafe fn function(&self, width: Width, of: Function) {
-        let at = |slot: u16| self.slots.wrapping_add(usize::from(slot) * K * W::LANES);
         // SAFETY: the slots are there, as `interpret` demands, and the width is that of `W`.
-        unsafe { apply(width, of, at(self.instruction.pairs[0][0]), at(self.instruction.to), K) };
+        unsafe { apply(width, of, self.at(self.instruction.pairs[0][0]), self.at(self.instruction.to), K) };
     }
 
     /// A sum of `N` pairs: from `init`, or from the first product; each operation rounded, or each product with its sum.
     #[inline(always)]
     unsafe fn sum_of<const N: usize, const INIT: bool, const ROUNDED: bool>(&self) {
+        let pairs = self.instruction.pairs.map(|pair| pair.map(|slot| self.at(slot)));
+        let (init, to) = (self.at(self.instruction.init), self.at(self.instruction.to));
+        let mut signs = [W::splat(0.0); N];
+        let mut j = 0;
+        while j < N {
+            signs[j] = W::splat(SIGNS[usize::from(self.instruction.signs >> j & 1)]);
+            j += 1;
+        }
         let mut k = 0;
         while k < K {
-            // SAFETY: as above.
-            let pair = |j: usize| unsafe { self.instruction.pairs[j].map(|slot| self.at(slot, k)) };
-            // SAFETY: as above.
-            let mut sum = if INIT { unsafe { self.at(self.instruction.init, k) } } else { pair(0)[0].mul(pair(0)[1]) };
-            let mut j = usize::from(!INIT);
-            while j < N {
-                let [a, b] = pair(j);
-                // Rounding is symmetric, so that a turned sign is as good as a subtraction.
-                let a = a.xor(W::splat(SIGNS[usize::from(self.instruction.signs >> j & 1)]));
-                sum = if ROUNDED { sum.add(a.mul(b)) } else { a.mul_add(b, sum) };
-                j += 1;
+            // SAFETY: the slots are there, as `interpret` demands.
+            unsafe {
+                let at = |slot: *mut f64| W::read(slot.add(k * W::LANES));
+                let mut sum = if INIT { at(init) } else { at(pairs[0][0]).mul(at(pairs[0][1])) };
+                let mut j = usize::from(!INIT);
+                while j < N {
+                    // Rounding is symmetric, so that a turned sign is as good as a subtraction.
+                    let (a, b) = (at(pairs[j][0]).xor(signs[j]), at(pairs[j][1]));
+                    sum = if ROUNDED { sum.add(a.mul(b)) } else { a.mul_add(b, sum) };
+                    j += 1;
+                }
+                sum.write(to.add(k * W::LANES));
             }
-            // SAFETY: as above.
-            unsafe { self.put(k, sum) };
             k += 1;
         }
     }

@@ -57,7 +57,7 @@ impl<M: Model> Estimate<M> {
     /// # Errors
     /// A summary of other quantities than the model has.
     pub fn of(summary: Summary) -> Result<Self, Error> {
-        summary.check_layout(&Layout::of::<M>())?;
+        summary.check_layout::<M>()?;
         let values = |one: &ExperimentEstimate| Values {
             parameters: M::Parameters::from_fn(|j| one.parameters[j]),
             initial_state: M::State::from_fn(|i| one.initial_state[i]),
@@ -85,10 +85,11 @@ impl<M: Model> Estimate<M> {
 
 impl Summary {
     /// Refuses a model of other quantities.
-    fn check_layout(&self, layout: &Layout) -> Result<(), Error> {
-        if self.layout == *layout {
+    fn check_layout<M: Model>(&self) -> Result<(), Error> {
+        if self.layout.is_of::<M>() {
             return Ok(());
         }
+        let layout = Layout::of::<M>();
         Err(Error::Option(format!(
             "the estimate is of another model: it has the quantities {:?}, the model has {layout:?}",
             self.layout

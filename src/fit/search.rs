@@ -172,7 +172,11 @@ impl<'r> Rounds<'r> {
 /// How a search ended that found no step to lower the cost of an adaptive integrator, whose number of steps changes from point
 /// to point; `None` if the slopes predict a decrease larger than the difference of the costs by this tolerance and a finer one.
 fn within_finer_tolerance(objective: &Objective<'_>, coordinates: &[f64]) -> Option<Outcome> {
-    let finer = if objective.sweep.is_adaptive() { objective.sweep.refined()? } else { return None };
+    let finer = if objective.sweep.is_adaptive() {
+        objective.sweep.refined(objective.problem.samples())?
+    } else {
+        return None;
+    };
     let finer = objective.of(objective.problem, &*finer);
     let (linear, again) = (objective.linearize(coordinates).ok()?, finer.linearize(coordinates).ok()?);
     let here = again.cost - linear.cost;

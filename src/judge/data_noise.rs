@@ -78,7 +78,7 @@ impl Judgement<'_> {
             let records = problem.records.iter().enumerate();
             let noisy = records.map(|(e, record)| {
                 let outputs = noisy(&record.outputs, &sigma, sign, draw, e);
-                Record { outputs, ..record.clone() }
+                Record { outputs: outputs.into(), ..record.clone() }
             });
             // The measurements that predictions are compared with stay as they are.
             let restarted = problem.with_records(noisy.collect())?;
@@ -109,7 +109,7 @@ impl Judgement<'_> {
             let records = problem.records.iter().enumerate();
             let noisy = records.map(|(e, record)| {
                 let inputs = noisy(&record.inputs, sigma, sign, draw, e);
-                Record { inputs, ..record.clone() }
+                Record { inputs: inputs.into(), ..record.clone() }
             });
             problem.with_records(noisy.collect())
         })?;

@@ -4,7 +4,7 @@ use super::aliases::Point;
 use super::coupling::{Coupled, Coupling};
 use super::largest::Largest;
 use super::output_sums::OutputSums;
-use super::step_error::{Sampled, step_error};
+use super::step_error::{Compared, Sampled, step_errors};
 use super::whiteness::{LAGS, Whiteness};
 use crate::error::Error;
 use crate::estimate::OutputFit;
@@ -105,6 +105,11 @@ impl<'s> Sums<'s> {
         self.portmanteaus[j].add(&self.tested);
     }
 
+    /// The windows to be simulated again.
+    fn compared<'c>(&'c self, coordinates: &'c [f64]) -> Compared<'c> {
+        Compared { objective: self.objective, coordinates, experiment: self.experiment, windows: &self.again }
+    }
+
     /// Counts the measurements of a window.
     fn count(&mut self, window: &Window, lane: usize) {
         let (outputs, samples) = (window.outputs(), window.samples[lane]);
@@ -197,7 +202,9 @@ pub(crate) fn residual_pass(objective: &Objective<'_>, coordinates: &[f64]) -> R
     }
     let make = |experiment: usize| Sums::new(objective, experiment);
     let all = plain.gather(coordinates, false, make).map_err(|_| failed(objective, coordinates))?;
-    Ok(residuals(objective, coordinates, &all))
+    let windows: Vec<Compared<'_>> = all.iter().map(|one| one.compared(coordinates)).collect();
+    let step_error = step_errors(&windows).into_iter().sum::<f64>();
+    Ok(residuals(objective, coordinates, &all, step_error))
 }
 
 /// The same of several objectives of one record each, at points of their own; `None` for one that fails.
@@ -205,15 +212,19 @@ pub(crate) fn residuals_together(points: &[At<'_>]) -> Vec<Option<Residuals>> {
     let plain: Vec<Objective<'_>> = points.iter().map(|(objective, _)| objective.in_units()).collect();
     let in_units: Vec<At<'_>> = plain.iter().zip(points).map(|(plain, (_, x))| (plain, *x)).collect();
     let all = gather_together(&in_units, |i| Sums::new(points[i].0, 0));
-    let finish = |(sums, (objective, x)): (Option<Sums<'_>>, &At<'_>)| Some(residuals(objective, x, &[sums?]));
-    all.into_iter().zip(points).map(finish).collect()
+    let present = all.iter().zip(points).filter_map(|(sums, (_, x))| Some(sums.as_ref()?.compared(x)));
+    let windows: Vec<Compared<'_>> = present.collect();
+    let mut step_errors = step_errors(&windows).into_iter();
+    let finish = |(sums, (objective, x)): (&Option<Sums<'_>>, &At<'_>)| {
+        let sums = std::slice::from_ref(sums.as_ref()?);
+        Some(residuals(objective, x, sums, step_errors.next()?))
+    };
+    all.iter().zip(points).map(finish).collect()
 }
 
-/// Results from the sums of all experiments.
-fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -> Residuals {
+/// Results from the sums of all experiments, and the sum of the squared changes with a finer step.
+fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>], step_error: f64) -> Residuals {
     let outputs = objective.outputs();
-    let again: Vec<&[Sampled]> = all.iter().map(|one| &one.again[..]).collect();
-    let step_error = step_error(objective, coordinates, &again);
     let mut sums = vec![OutputSums::default(); outputs];
     let (mut measured, mut log_determinant) = (0, 0.0);
     for one in all {
@@ -239,7 +250,7 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -
         kurtosis: sums.iter().map(OutputSums::kurtosis).collect(),
         measured,
         log_determinant,
-        step_error,
+        step_error: step_error.sqrt(),
         points: points(objective, coordinates, all),
         coupled: coupling.strongest(&whiteness),
         whiteness,

@@ -1,67 +1,101 @@
 //! How far a finer step would move the predictions, from some windows that are simulated again.
 
-use crate::problem::{Objective, each};
+use crate::problem::{Objective, Values, each};
+use crate::record::{Record, Time};
 use crate::sweep::{Piece, Prepared, Sweep};
 use std::borrow::Cow;
-use std::sync::Arc;
 
 /// A window that is to be compared with a finer simulation.
 pub(super) struct Sampled {
     pub begin: usize,
+    /// Its errors, sample by sample, output by output.
     pub errors: Vec<f64>,
     pub carry: Vec<f64>,
 }
 
-/// The norm of the change of all standardized predictions with a finer step, extrapolated from some windows.
-pub(super) fn step_error(objective: &Objective<'_>, coordinates: &[f64], again: &[&[Sampled]]) -> f64 {
-    let Some(finer) = objective.sweep.refined() else { return 0.0 };
-    if objective.sweep.predicts_variance() {
-        return 0.0;
-    }
-    let sigma = objective.whitening.sigma();
-    let change = |e: usize| changed(objective, coordinates, e, &finer, &sigma, again[e]);
-    each(again.len(), change).into_iter().sum::<f64>().sqrt()
+/// Windows of an experiment, at a point.
+#[derive(Clone, Copy)]
+pub(super) struct Compared<'s> {
+    pub objective: &'s Objective<'s>,
+    pub coordinates: &'s [f64],
+    pub experiment: usize,
+    pub windows: &'s [Sampled],
 }
 
-/// Sum of the squared standardized changes in some windows, extrapolated to the whole experiment.
-fn changed(
-    objective: &Objective<'_>,
-    x: &[f64],
-    e: usize,
-    finer: &Arc<dyn Sweep + '_>,
-    sigma: &[f64],
-    again: &[Sampled],
-) -> f64 {
-    let record = &objective.problem.records[e];
-    let values = objective.problem.unknowns.of_experiment(e, x);
-    let prepared = Prepared { restarts: objective.problem.prepared[e].restarts.clone(), ..Prepared::default() };
-    let (mut change, mut seen) = (0.0, 0usize);
-    for sampled in again {
-        let samples = sampled.errors.len() / sigma.len();
-        let piece = Piece {
-            record,
-            prepared: &prepared,
-            samples: sampled.begin..sampled.begin + samples,
-            carry: Cow::Borrowed(&sampled.carry),
-            slopes: Cow::default(),
-            parameters: &values.p,
-        };
-        let mut found = 0.0;
-        let reached = finer.run(std::slice::from_ref(&piece), &[], &mut |window| {
-            for k in 0..window.samples[0] {
-                for (j, sigma) in sigma.iter().enumerate() {
-                    let before = sampled.errors[(window.begin[0] + k - sampled.begin) * window.outputs() + j];
-                    found += ((before - window.error(k, j, 0)) / sigma).powi(2);
-                }
-            }
-            true
-        });
-        if reached.iter().all(Result::is_ok) && found.is_finite() {
-            change += found;
-            seen += samples;
+impl Compared<'_> {
+    fn record(&self) -> &Record {
+        &self.objective.problem.records[self.experiment]
+    }
+}
+
+/// The sum of the squared changes of all standardized predictions of each experiment with a finer step, extrapolated from its
+/// windows. All experiments are those of one sweep.
+pub(super) fn step_errors(all: &[Compared<'_>]) -> Vec<f64> {
+    let windows: Vec<(usize, &Sampled)> =
+        all.iter().enumerate().flat_map(|(i, one)| one.windows.iter().map(move |window| (i, window))).collect();
+    let mut sums = vec![(0.0, 0usize); all.len()];
+    let samples = windows.iter().map(|(i, window)| window.errors.len() / all[*i].objective.outputs()).sum();
+    let finer = all.first().filter(|one| !one.objective.sweep.predicts_variance());
+    if let Some(finer) = finer.and_then(|one| one.objective.sweep.refined(samples)) {
+        let batches = batches(&*finer, all, &windows);
+        let found = each(batches.len(), |b| changes(&*finer, all, batches[b]));
+        for ((i, _), (change, samples)) in windows.iter().zip(found.into_iter().flatten()) {
+            sums[*i] = (sums[*i].0 + change, sums[*i].1 + samples);
         }
     }
-    if seen > 0 { change * record.len() as f64 / seen as f64 } else { 0.0 }
+    let whole = |(one, (change, seen)): (&Compared<'_>, (f64, usize))| {
+        if seen > 0 { change * one.record().len() as f64 / seen as f64 } else { 0.0 }
+    };
+    all.iter().zip(sums).map(whole).collect()
+}
+
+/// Windows that can run in parallel lanes, in their order.
+fn batches<'w>(
+    finer: &dyn Sweep,
+    all: &[Compared<'_>],
+    windows: &'w [(usize, &'w Sampled)],
+) -> Vec<&'w [(usize, &'w Sampled)]> {
+    let kind = |(i, _): &(usize, &Sampled)| {
+        let record = all[*i].record();
+        (record.input_hold(), matches!(record.times(), Time::Uniform { .. }))
+    };
+    let alike = windows.chunk_by(|a, b| kind(a) == kind(b));
+    alike.flat_map(|alike| alike.chunks(finer.lanes(all[alike[0].0].record(), &[]).max(1))).collect()
+}
+
+/// The sum of squared standardized changes in each window of a batch, and its samples; zeros where it cannot be simulated.
+fn changes(finer: &dyn Sweep, all: &[Compared<'_>], windows: &[(usize, &Sampled)]) -> Vec<(f64, usize)> {
+    let at = |i: &usize| {
+        let Compared { objective, coordinates, experiment, .. } = all[*i];
+        let values = objective.problem.unknowns.of_experiment(experiment, coordinates);
+        let restarts = objective.problem.prepared[experiment].restarts.clone();
+        (values, Prepared { restarts, ..Prepared::default() }, objective.whitening.sigma())
+    };
+    let points: Vec<(Values, Prepared, Vec<f64>)> = windows.iter().map(|(i, _)| at(i)).collect();
+    let mut pieces: Vec<Piece<'_>> = Vec::with_capacity(windows.len());
+    for ((i, window), (values, prepared, sigma)) in windows.iter().zip(&points) {
+        let samples = window.begin..window.begin + window.errors.len() / sigma.len();
+        let (record, carry, slopes) = (all[*i].record(), Cow::Borrowed(&window.carry[..]), Cow::default());
+        pieces.push(Piece { record, prepared, samples, carry, slopes, parameters: &values.p });
+    }
+    let mut found = vec![0.0; windows.len()];
+    let reached = finer.run(&pieces, &[], &mut |window| {
+        for (lane, (found, ((_, sampled), (.., sigma)))) in
+            found.iter_mut().zip(windows.iter().zip(&points)).enumerate()
+        {
+            for k in 0..window.samples[lane] {
+                let row = window.begin[lane] + k - sampled.begin;
+                for (j, (before, sigma)) in sampled.errors[row * sigma.len()..].iter().zip(sigma).enumerate() {
+                    *found += ((before - window.error(k, j, lane)) / sigma).powi(2);
+                }
+            }
+        }
+        true
+    });
+    let seen = |(piece, (found, reached)): (&Piece<'_>, (f64, &Result<_, _>))| {
+        if reached.is_ok() && found.is_finite() { (found, piece.samples.len()) } else { (0.0, 0) }
+    };
+    pieces.iter().zip(found.into_iter().zip(&reached)).map(seen).collect()
 }
 
 #[cfg(test)]
@@ -115,5 +149,28 @@ mod tests {
         assert_eq!(coarse.len(), 40);
         let expected = coarse.iter().zip(&fine).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
         assert!(expected > 1e-3 && (found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+    }
+
+    /// So many records that the finer step is compiled and runs in lanes: the sum of what each record alone gives, in dual numbers.
+    /// Both are sums of the same differences, of which the largest is a thousandth of the predictions: 13 digits less 3.
+    #[test]
+    fn many_records_are_compared_in_lanes() {
+        let time = Time::Uniform { start: 0.0, step: 1.0 };
+        let record = |e: usize| {
+            let inputs: Vec<Voltage> = (0..40 + e % 3).map(|k| Voltage { u: ((k + e) as f64).sin() }).collect();
+            let initial = Current { i: 0.5 };
+            let outputs = simulate(&Decay, &Rate { a: 0.9 }, &initial, time.clone(), &inputs).unwrap().outputs;
+            Experiment::new(&Decay, time.clone(), inputs, outputs).unwrap().named(format!("{e}"))
+        };
+        let records: Vec<_> = (0..110).map(record).collect();
+        let step_error = |records: &[crate::ExperimentOf<Decay>]| {
+            let fit = Fit::new(&Decay, records).parameters(Rate { a: free(1.0) }).noise(Current { i: 0.1 });
+            let problem = fit.integrator(Rk4 { substeps: 1 }).problem().unwrap();
+            let objective = problem.objective().unwrap();
+            residual_pass(&objective, &objective.start()).unwrap().step_error
+        };
+        let squares: f64 = records.iter().map(|one| step_error(std::slice::from_ref(one)).powi(2)).sum();
+        let together = step_error(&records);
+        assert!(together > 1e-2 && (together / squares.sqrt() - 1.0).abs() < 1e-10, "{together} {squares}");
     }
 }

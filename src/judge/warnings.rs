@@ -189,7 +189,7 @@ impl Judgement<'_> {
         if self.residuals.step_error / self.widening <= most {
             return None;
         }
-        let finer = self.objective.sweep.refined()?;
+        let finer = self.objective.sweep.refined(self.objective.problem.samples())?;
         let objective = self.objective.of(self.objective.problem, &*finer);
         let (name, shift, part) = shift(&objective, &self.end.coordinates, unknowns)?;
         let finer = finer.integrator();
@@ -220,7 +220,7 @@ impl Judgement<'_> {
         let text = format!(
             "the step may have kept the search from a minimum: with {} the cost at its {place} is another; use a finer step, or \
              smooth the model",
-            self.objective.sweep.refined()?.integrator()
+            self.objective.sweep.refined(self.objective.problem.samples())?.integrator()
         );
         Some(Warning { code: WarningCode::CoarseStep, severity: Severity::NotUsable, text })
     }

@@ -99,7 +99,7 @@ impl Objective<'_> {
     /// Whether a finer step changes the cost at a point by a tenth; `None` if either cannot be evaluated there, or if there is
     /// none.
     pub(crate) fn step_decides(&self, coordinates: &[f64]) -> Option<bool> {
-        let finer = self.sweep.refined()?;
+        let finer = self.sweep.refined(self.problem.samples())?;
         let finer = self.of(self.problem, &*finer).cost_at(coordinates).ok()?;
         let this = self.cost_at(coordinates).ok()?;
         Some(differ(this, finer))

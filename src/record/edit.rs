@@ -92,8 +92,8 @@ impl Record {
         let stamps = (0..self.len()).map(|k| self.time(k)).chain((0..later.len()).map(|k| later.time(k)));
         let time = Time::from_stamps(stamps.collect());
         let joined = |(a, b): (&Channel, &Channel)| a.with([&*a.values, &*b.values].concat());
-        let inputs = self.inputs.iter().zip(&later.inputs).map(joined).collect();
-        let outputs = self.outputs.iter().zip(&later.outputs).map(joined).collect();
+        let inputs = self.inputs.iter().zip(later.inputs.iter()).map(joined).collect();
+        let outputs = self.outputs.iter().zip(later.outputs.iter()).map(joined).collect();
         Record { time, inputs, outputs, ..self }.checked()
     }
 

@@ -106,6 +106,8 @@ impl Stored {
         };
         let (inputs, outputs) = (channels(self.inputs, inputs)?, channels(self.outputs, outputs)?);
         let Stored { name, hold, time, .. } = self;
-        Record { name, states, time, inputs, outputs, hold, initial }.checked().map_err(|error| error.to_string())
+        Record { name, states: states.into(), time, inputs: inputs.into(), outputs: outputs.into(), hold, initial }
+            .checked()
+            .map_err(|error| error.to_string())
     }
 }

@@ -1,7 +1,7 @@
 //! [`DualSweep`]: models run in numbers with slopes, one piece at a time.
 
 use super::filtered::Filter;
-use super::{Located, Loops, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
+use super::{Located, Loops, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit, unmoved};
 use crate::error::{Error, Failure};
 use crate::functions::{Functions, Handle};
 use crate::integrate::{Duals, Method, Stuck};
@@ -61,7 +61,10 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
     }
 
     fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Reached {
-        self.filter().start(record, state, parameters)
+        match self.predictor.is_simulation() {
+            true => unmoved(state, parameters),
+            false => self.filter().start(record, state, parameters),
+        }
     }
 
     fn run(&self, pieces: &[Piece<'_>], seeds: &[Seed], visit: Visit<'_>) -> Vec<Result<Reached, RunError>> {
@@ -115,7 +118,7 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
         !self.method.is_fixed()
     }
 
-    fn refined<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
+    fn refined<'s>(&'s self, _samples: usize) -> Option<Arc<dyn Sweep + 's>> {
         let (loops, method) = (self.loops.refined(M::KIND)?, self.method.refined(M::KIND)?);
         let (layout, model, predictor) = (self.layout.clone(), self.model.clone(), self.predictor.clone());
         let reason = self.reason.clone();

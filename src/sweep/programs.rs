@@ -26,16 +26,26 @@ use workspace::Compiled;
 
 /// Equations run by compiled programs.
 pub(crate) struct ProgramSweep<'a> {
+    programs: Arc<Programs>,
+    /// The same equations in dual numbers, for all that is not a pass over many samples.
+    plain: Arc<dyn Sweep + 'a>,
+}
+
+/// Equations by a method, and the programs that were made of them.
+struct Programs {
     equations: Arc<Equations>,
     method: Arc<dyn Method>,
     predictor: Arc<dyn Prediction>,
-    /// The same equations in dual numbers, for all that is not a pass over many samples.
-    plain: Arc<dyn Sweep + 'a>,
     coupling: Coupling,
     /// By hold: zero, first.
     recurrences: [OnceLock<Arc<Recurrence>>; 2],
-    programs: Mutex<Vec<(Key, Arc<Compiled>)>>,
+    compiled: Mutex<Vec<(Key, Arc<Compiled>)>>,
+    /// The same with a finer step, if there is one.
+    refined: OnceLock<Option<Arc<Programs>>>,
 }
+
+/// So many samples take about as long in dual numbers as a program takes to be compiled.
+const WORTH_COMPILING: usize = 4_000;
 
 /// What a program depends on besides the recurrence.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,23 +76,37 @@ impl<'a> ProgramSweep<'a> {
         predictor: Arc<dyn Prediction>,
         plain: Arc<dyn Sweep + 'a>,
     ) -> Result<Self, Untraceable> {
+        let programs = Arc::new(Programs::new(equations, method, predictor)?);
+        Ok(ProgramSweep { programs, plain })
+    }
+}
+
+impl Programs {
+    fn new(
+        equations: Arc<Equations>,
+        method: Arc<dyn Method>,
+        predictor: Arc<dyn Prediction>,
+    ) -> Result<Self, Untraceable> {
         let coupling = match predictor.restarts() {
             Some(_) => Coupling::Restarted,
             None if equations.layout().kind == Kind::Static => Coupling::Restarted,
             None if predictor.is_simulation() && equations.is_affine() => Coupling::Affine,
             None => Coupling::Nonlinear,
         };
-        let sweep = ProgramSweep {
-            equations,
-            method,
-            predictor,
-            plain,
-            coupling,
-            recurrences: [OnceLock::new(), OnceLock::new()],
-            programs: Mutex::new(vec![]),
+        let recurrences = [OnceLock::new(), OnceLock::new()];
+        let (compiled, refined) = (Mutex::new(vec![]), OnceLock::new());
+        let programs = Programs { equations, method, predictor, coupling, recurrences, compiled, refined };
+        programs.recurrence(Hold::Zero)?;
+        Ok(programs)
+    }
+
+    /// Those with a finer step, made when they are first needed.
+    fn refined(&self) -> Option<Arc<Programs>> {
+        let make = || {
+            let method = self.method.refined(self.equations.layout().kind)?;
+            Programs::new(self.equations.clone(), method, self.predictor.clone()).ok().map(Arc::new)
         };
-        sweep.recurrence(Hold::Zero)?;
-        Ok(sweep)
+        self.refined.get_or_init(make).clone()
     }
 
     fn recurrence(&self, hold: Hold) -> Result<Arc<Recurrence>, Untraceable> {
@@ -101,8 +125,8 @@ impl<'a> ProgramSweep<'a> {
             Time::Stamps(_) => Sampling::Irregular,
         };
         let key = Key { hold: record.input_hold(), sampling, seeds: seeds.to_vec(), purpose };
-        let mut programs = self.programs.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, program)) = programs.iter().find(|(known, _)| *known == key) {
+        let mut compiled = self.compiled.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, program)) = compiled.iter().find(|(known, _)| *known == key) {
             return Some(program.clone());
         }
         let recurrence = self.recurrence(key.hold).ok()?;
@@ -111,14 +135,14 @@ impl<'a> ProgramSweep<'a> {
             Purpose::Carry => Program::compile(&recurrence.without_outputs(), &[], sampling, Trajectories::One),
         };
         let program = Arc::new(Compiled::new(program.ok()?));
-        programs.push((key, program.clone()));
+        compiled.push((key, program.clone()));
         Some(program)
     }
 }
 
 impl Sweep for ProgramSweep<'_> {
     fn layout(&self) -> &Layout {
-        self.equations.layout()
+        self.programs.equations.layout()
     }
 
     fn carry(&self) -> usize {
@@ -126,7 +150,7 @@ impl Sweep for ProgramSweep<'_> {
     }
 
     fn predicts_variance(&self) -> bool {
-        self.predictor.predicts_variance()
+        self.programs.predictor.predicts_variance()
     }
 
     fn restarts(&self) -> Option<usize> {
@@ -134,14 +158,14 @@ impl Sweep for ProgramSweep<'_> {
     }
 
     fn lanes(&self, record: &Record, seeds: &[Seed]) -> usize {
-        match self.predictor.restarts() {
+        match self.programs.predictor.restarts() {
             Some(_) => 1,
-            None => self.program(record, seeds, Purpose::Rows).map_or(1, |compiled| compiled.program.lanes()),
+            None => self.programs.program(record, seeds, Purpose::Rows).map_or(1, |compiled| compiled.program.lanes()),
         }
     }
 
     fn coupling(&self) -> Coupling {
-        self.coupling
+        self.programs.coupling
     }
 
     fn prepare(&self, record: &Record, parameters: &[f64]) -> Result<Prepared, Error> {
@@ -154,10 +178,10 @@ impl Sweep for ProgramSweep<'_> {
 
     fn run(&self, pieces: &[Piece<'_>], seeds: &[Seed], visit: Visit<'_>) -> Vec<Result<Reached, RunError>> {
         let Some(first) = pieces.first() else { return vec![] };
-        let Some(program) = self.program(first.record, seeds, Purpose::Rows) else {
+        let Some(program) = self.programs.program(first.record, seeds, Purpose::Rows) else {
             return self.plain.run(pieces, seeds, visit);
         };
-        match self.predictor.restarts() {
+        match self.programs.predictor.restarts() {
             Some(horizon) => {
                 let one = |piece| horizon::run(&program, piece, horizon.steps, visit);
                 pieces.iter().map(one).collect()
@@ -167,7 +191,7 @@ impl Sweep for ProgramSweep<'_> {
     }
 
     fn follow(&self, piece: &Piece<'_>, at: &[usize]) -> Result<Vec<Vec<f64>>, RunError> {
-        match self.program(piece.record, &[], Purpose::Carry) {
+        match self.programs.program(piece.record, &[], Purpose::Carry) {
             Some(program) => Run::new(&program, vec![piece.clone()]).follow(at),
             None => self.plain.follow(piece, at),
         }
@@ -197,8 +221,13 @@ impl Sweep for ProgramSweep<'_> {
         self.plain.locate(record, state, parameters, sample, sigma, stops)
     }
 
-    fn refined<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
-        self.plain.refined()
+    fn refined<'s>(&'s self, samples: usize) -> Option<Arc<dyn Sweep + 's>> {
+        let plain = self.plain.refined(samples)?;
+        let programs = if samples >= WORTH_COMPILING { self.programs.refined() } else { None };
+        Some(match programs {
+            Some(programs) => Arc::new(ProgramSweep { programs, plain }),
+            None => plain,
+        })
     }
 
     fn integrator(&self) -> String {
@@ -210,8 +239,8 @@ impl Sweep for ProgramSweep<'_> {
     }
 
     fn engine(&self) -> String {
-        let programs = self.programs.lock().unwrap_or_else(PoisonError::into_inner);
-        match programs.iter().any(|(_, compiled)| compiled.program.machine_code() > 0) {
+        let compiled = self.programs.compiled.lock().unwrap_or_else(PoisonError::into_inner);
+        match compiled.iter().any(|(_, compiled)| compiled.program.machine_code() > 0) {
             true => "read as a graph, run as machine code".to_owned(),
             false => "read as a graph, run by the interpreter".to_owned(),
         }

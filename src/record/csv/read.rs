@@ -84,7 +84,8 @@ impl CsvFile {
         let mut inputs: Vec<Channel> = columns.into_iter().zip(&signals).map(named).collect();
         let outputs = inputs.split_off(layout.inputs.len());
         let (states, hold, initial) = (layout.states.clone(), Hold::default(), Initial::default());
-        Record { name, states, time, inputs, outputs, hold, initial }.checked()
+        Record { name, states: states.into(), time, inputs: inputs.into(), outputs: outputs.into(), hold, initial }
+            .checked()
     }
 
     /// The time stamps of the first rows, for a clock that turned out uneven.

@@ -8,7 +8,7 @@ use std::path::Path;
 
 /// Writes the record to `path`: beside it first, so that there is never half a file.
 pub(super) fn write(record: &Record, path: &Path) -> Result<(), Error> {
-    let channels: Vec<&Channel> = record.inputs.iter().chain(&record.outputs).collect();
+    let channels: Vec<&Channel> = record.inputs.iter().chain(record.outputs.iter()).collect();
     let names: Vec<&str> = ["t"].into_iter().chain(channels.iter().map(|channel| channel.name.as_str())).collect();
     for (second, name) in names.iter().enumerate() {
         if let Some(first) = names[..second].iter().position(|earlier| earlier == name) {
@@ -35,7 +35,8 @@ fn rows(record: &Record, names: &[&str], path: &Path) -> Result<(), csv::Error> 
     let mut file =
         csv::WriterBuilder::new().has_headers(false).buffer_capacity(1 << 16).from_writer(File::create(path)?);
     file.write_record(names)?;
-    let columns: Vec<&[f64]> = record.inputs.iter().chain(&record.outputs).map(|channel| &*channel.values).collect();
+    let columns: Vec<&[f64]> =
+        record.inputs.iter().chain(record.outputs.iter()).map(|channel| &*channel.values).collect();
     for k in 0..record.len() {
         let row = columns.iter().map(|column| Some(column[k]).filter(|value| !value.is_nan()));
         file.serialize([Some(record.time(k))].into_iter().chain(row).collect::<Vec<Option<f64>>>())?;

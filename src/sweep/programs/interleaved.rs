@@ -2,6 +2,7 @@
 
 use super::columns::Columns;
 use super::run::WINDOW;
+use super::workspace::Compiled;
 use crate::aligned::Aligned;
 use crate::engine::{Column, Program};
 use crate::record;
@@ -16,9 +17,15 @@ const KEPT: usize = 4_000_000;
 #[derive(Clone, Default)]
 pub(crate) struct Interleaved(Arc<Mutex<Vec<Arc<Kept>>>>);
 
+/// Memory of columns that are not kept any more, which the next ones use again: the system takes as long to give such blocks as
+/// it takes to fill them.
+#[derive(Default)]
+pub(super) struct Idle(Mutex<Vec<[Aligned; 2]>>);
+
 /// Columns of records side by side.
 pub(super) struct Kept {
     program: Program,
+    idle: Arc<Idle>,
     /// First sample of each lane.
     begins: Vec<usize>,
     samples: usize,
@@ -41,10 +48,11 @@ impl Interleaved {
     /// same columns.
     pub(super) fn of<'p>(
         &self,
-        program: &Program,
+        compiled: &Compiled,
         pieces: &[&Piece<'_>],
         columns: impl FnOnce() -> Columns<'p>,
     ) -> Option<Arc<Kept>> {
+        let program = &compiled.program;
         let read = program.columns();
         let of_time = read.iter().any(|column| matches!(column, Column::Time | Column::Step));
         let numbers = pieces[0].record.len() * (read.len() + program.outputs());
@@ -74,7 +82,7 @@ impl Interleaved {
             return None;
         }
         let from = channels().map(|channel| channel.values.clone()).collect();
-        let kept = Arc::new(Kept::new(program, begins().collect(), samples, from, &columns()));
+        let kept = Arc::new(Kept::new(compiled, begins().collect(), samples, from, &columns()));
         let mut all = all();
         // Columns of the same samples with another record in one of the lanes: a search of a fleet has ended.
         all.retain(|kept| !stands_alike(kept));
@@ -85,21 +93,39 @@ impl Interleaved {
 
 impl Kept {
     fn new(
-        program: &Program,
+        compiled: &Compiled,
         begins: Vec<usize>,
         samples: usize,
         from: Vec<record::Column>,
         columns: &Columns<'_>,
     ) -> Self {
-        let (lanes, rows) = (begins.len(), columns.rows(samples));
+        let (program, lanes, rows) = (&compiled.program, begins.len(), columns.rows(samples));
         let (stride, outputs) = (program.columns().len() * lanes, program.outputs() * lanes);
-        let (mut inputs, mut measured) = (Aligned::zeros(rows * stride), Aligned::zeros(samples * outputs));
+        let [inputs, measured] = compiled.columns.take();
+        let (mut inputs, mut measured) = (inputs.resized(rows * stride), measured.resized(samples * outputs));
         for first in (0..samples).step_by(WINDOW) {
             let at: Vec<usize> = begins.iter().map(|begin| begin + first).collect();
             let here = WINDOW.min(samples - first);
             columns.read(program, &at, here, &mut inputs[first * stride..]);
             columns.read_measured(&at, here, &mut measured[first * outputs..]);
         }
-        Kept { program: program.clone(), begins, samples, from, inputs, measured }
+        let (program, idle) = (program.clone(), compiled.columns.clone());
+        Kept { program, idle, begins, samples, from, inputs, measured }
+    }
+}
+
+impl Drop for Kept {
+    fn drop(&mut self) {
+        self.idle.put([std::mem::take(&mut self.inputs), std::mem::take(&mut self.measured)]);
+    }
+}
+
+impl Idle {
+    fn take(&self) -> [Aligned; 2] {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default()
+    }
+
+    fn put(&self, columns: [Aligned; 2]) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(columns);
     }
 }

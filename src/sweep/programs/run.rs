@@ -112,7 +112,7 @@ impl<'r> Run<'r> {
         self.kept = lanes[0]
             .prepared
             .interleaved
-            .of(&self.compiled.program, &lanes, || Columns::new(&self.compiled.program, &self.pieces, lanes.len()));
+            .of(self.compiled, &lanes, || Columns::new(&self.compiled.program, &self.pieces, lanes.len()));
         let mut reached = vec![Reached::default(); self.pieces.len()];
         for begin in (0..self.longest()).step_by(WINDOW) {
             self.next(begin, &mut reached);

@@ -126,7 +126,7 @@ fn compare(model: &Pendulum, predictor: impl Predictor, uniform: bool, hold: Hol
                 // A hundred steps, each of some dozens of roundings of numbers up to ten.
                 assert!((a - b).abs() < 1e-11, "{} seeds, lane {lane}, entry {at}: {a} {b}", seeds.len());
             }
-            if pieces[lane].samples.end < pieces[lane].record.len() && programs.predictor.restarts().is_none() {
+            if pieces[lane].samples.end < pieces[lane].record.len() && programs.restarts().is_none() {
                 let (a, b) = (&ends[lane], &reached[lane]);
                 let pairs = a.carry.iter().zip(&b.carry).chain(a.slopes.iter().zip(&b.slopes));
                 for (a, b) in pairs {

@@ -1,15 +1,17 @@
 //! [`Compiled`]: a program with memory for its runs, which the next run uses again.
 
+use super::interleaved::Idle;
 use super::run::WINDOW;
 use crate::aligned::Aligned;
 use crate::engine::{Group, Program};
 use crate::sweep::Window;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// A program, and the memory of the runs that have ended: a fit runs it some ten times, a fleet thousands of times.
 pub(super) struct Compiled {
     pub program: Program,
     idle: Mutex<Vec<Workspace>>,
+    pub columns: Arc<Idle>,
 }
 
 /// Memory of a run.
@@ -28,7 +30,7 @@ pub(super) struct Workspace {
 
 impl Compiled {
     pub fn new(program: Program) -> Self {
-        Compiled { program, idle: Mutex::new(vec![]) }
+        Compiled { program, idle: Mutex::new(vec![]), columns: Arc::default() }
     }
 
     /// Memory for a run of so many pieces. Lanes, steps and samples are to be set.
