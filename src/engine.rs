@@ -201,7 +201,7 @@ impl Compiled {
             0 | 1 => 1,
             2 => 2,
             3 | 4 => 4,
-            _ if self.width.lanes() > 4 => 4,
+            _ if self.width.lanes() != 4 => 4,
             _ => 8,
         }
     }

@@ -229,6 +229,19 @@ pub(crate) fn run<T: Task>(width: Width, task: T) -> T::Output {
     }
 }
 
+/// Runs a task with instructions of four lanes: it is compiled for no others.
+pub(crate) fn run_narrow<T: Task>(width: Width, task: T) -> T::Output {
+    match width.0 {
+        // SAFETY: a `Width` of this kind is made only where the processor has the features.
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx2 => unsafe { with_avx2(task) },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Fma => unsafe { with_fma(task) },
+        _ => task.run::<Array<{ cfg!(not(target_arch = "x86_64")) }>>(),
+    }
+}
+
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,fma")]
 unsafe fn with_avx512<T: Task>(task: T) -> T::Output {

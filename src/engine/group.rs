@@ -3,7 +3,7 @@
 use super::Compiled;
 use super::interpret::{Once, Run};
 use crate::aligned::Aligned;
-use crate::wide::run;
+use crate::wide::{run, run_narrow};
 use std::sync::Arc;
 
 /// Slopes below this are set to zero between blocks: squared they are denormal, which slows processors down up to 60 times.
@@ -72,7 +72,7 @@ impl Group {
             1 => run(width, Once::<1> { code, slots, width }),
             2 => run(width, Once::<2> { code, slots, width }),
             4 => run(width, Once::<4> { code, slots, width }),
-            _ => run(width, Once::<8> { code, slots, width }),
+            _ => run_narrow(width, Once::<8> { code, slots, width }),
         }
     }
 
@@ -128,7 +128,7 @@ impl Group {
             1 => run(width, Run::<1> { code, slots, inputs, rows, samples, width }),
             2 => run(width, Run::<2> { code, slots, inputs, rows, samples, width }),
             4 => run(width, Run::<4> { code, slots, inputs, rows, samples, width }),
-            _ => run(width, Run::<8> { code, slots, inputs, rows, samples, width }),
+            _ => run_narrow(width, Run::<8> { code, slots, inputs, rows, samples, width }),
         }
     }
 

@@ -1,6 +1,7 @@
 //! The interpreter: one instruction after the other, each on several registers side by side.
 //!
-//! An instruction costs a jump that is hard to foresee, so that it pays to do much in each: four registers of eight lanes.
+//! An instruction costs a jump that is hard to foresee, so that it pays to do much in each: four registers of eight lanes,
+//! or eight of four.
 
 use super::code::{Instruction, Operation, Sound};
 use super::functions::apply;

@@ -8,12 +8,13 @@ use crate::engine::{Column, Program};
 use crate::record;
 use crate::sweep::Piece;
 use std::fmt;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Most numbers of a record that are kept; longer ones are read anew at every pass.
 const KEPT: usize = 4_000_000;
 
-/// The columns of the records in the lanes of programs, by what was put side by side. Copies share them.
+/// The columns of the records in the lanes of programs, by what was put side by side, those of all records first. Copies share
+/// them.
 #[derive(Clone, Default)]
 pub(crate) struct Interleaved(Arc<Mutex<Vec<Arc<Kept>>>>);
 
@@ -74,24 +75,50 @@ impl Interleaved {
             let mut from = kept.from.iter();
             stands_alike(kept) && channels().all(|channel| from.next().is_some_and(|from| from.is(&channel.values)))
         };
-        let all = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(found) = all().iter().find(|kept| is(kept)) {
-            return Some(found.clone());
+        let known = self.lock().iter().find(|kept| is(kept)).cloned();
+        if let Some(kept) = known.as_ref().filter(|kept| kept.is_filled()) {
+            return Some(kept.clone());
         }
         if program.seeds().is_empty() {
             return None;
         }
         let from = channels().map(|channel| channel.values.clone()).collect();
-        let kept = Arc::new(Kept::new(compiled, begins().collect(), samples, from, &columns()));
-        let mut all = all();
-        // Columns of the same samples with another record in one of the lanes: a search of a fleet has ended.
-        all.retain(|kept| !stands_alike(kept));
-        all.push(kept.clone());
+        let (begins, others) = (begins().collect(), self.lock().iter().any(|kept| stands_alike(kept)));
+        // Beside other records these were side by side before: a search of a fleet has ended. It may be the last one but these.
+        if known.is_none() && others {
+            self.lock().push(Arc::new(Kept::asked(compiled, begins, samples, from)));
+            return None;
+        }
+        let kept = Arc::new(Kept::new(compiled, begins, samples, from, &columns()));
+        for piece in pieces {
+            let mut all = piece.prepared.interleaved.lock();
+            if all.iter().any(|other| Arc::ptr_eq(other, &kept)) {
+                continue;
+            }
+            // Those of all records are asked for again after the search.
+            let first = all.iter().find(|kept| stands_alike(kept)).cloned();
+            all.retain(|kept| !stands_alike(kept) || first.as_ref().is_some_and(|first| Arc::ptr_eq(first, kept)));
+            all.push(kept.clone());
+        }
         Some(kept)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Vec<Arc<Kept>>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Kept {
+    /// Columns that were asked for, but not read.
+    fn asked(compiled: &Compiled, begins: Vec<usize>, samples: usize, from: Vec<record::Column>) -> Self {
+        let (program, idle) = (compiled.program.clone(), compiled.columns.clone());
+        Kept { program, idle, begins, samples, from, inputs: Aligned::default(), measured: Aligned::default() }
+    }
+
+    fn is_filled(&self) -> bool {
+        !self.inputs.is_empty() || !self.measured.is_empty()
+    }
+
     fn new(
         compiled: &Compiled,
         begins: Vec<usize>,
@@ -99,7 +126,9 @@ impl Kept {
         from: Vec<record::Column>,
         columns: &Columns<'_>,
     ) -> Self {
-        let (program, lanes, rows) = (&compiled.program, begins.len(), columns.rows(samples));
+        let mut kept = Kept::asked(compiled, begins, samples, from);
+        let (program, begins) = (&compiled.program, &kept.begins);
+        let (lanes, rows) = (begins.len(), columns.rows(samples));
         let (stride, outputs) = (program.columns().len() * lanes, program.outputs() * lanes);
         let [inputs, measured] = compiled.columns.take();
         let (mut inputs, mut measured) = (inputs.resized(rows * stride), measured.resized(samples * outputs));
@@ -109,14 +138,16 @@ impl Kept {
             columns.read(program, &at, here, &mut inputs[first * stride..]);
             columns.read_measured(&at, here, &mut measured[first * outputs..]);
         }
-        let (program, idle) = (program.clone(), compiled.columns.clone());
-        Kept { program, idle, begins, samples, from, inputs, measured }
+        (kept.inputs, kept.measured) = (inputs, measured);
+        kept
     }
 }
 
 impl Drop for Kept {
     fn drop(&mut self) {
-        self.idle.put([std::mem::take(&mut self.inputs), std::mem::take(&mut self.measured)]);
+        if self.is_filled() {
+            self.idle.put([std::mem::take(&mut self.inputs), std::mem::take(&mut self.measured)]);
+        }
     }
 }
 
