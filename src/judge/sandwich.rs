@@ -386,3 +386,6 @@ impl<'f> ImpulseResponse<'f> {
         self.total
     }
 }
+
+#[cfg(test)]
+mod tests;
