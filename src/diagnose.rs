@@ -168,3 +168,20 @@ fn minimize(problem: impl LeastSquares, start: Vec<f64>) -> Option<(Vec<f64>, f6
     let place = result.state().get_param()?.clone();
     ended.then(|| (place, result.state().get_cost()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A hypothesis stands from its level on.
+    #[test]
+    fn a_test_says_its_probability() {
+        let of = |p_value: f64| Test::new("test", 2.0, p_value, "it may stand", "it falls");
+        let (stands, falls) = (of(LEVEL), of(0.0099));
+        assert_eq!(
+            (stands.passed, &stands.meaning[..], falls.passed, &falls.meaning[..]),
+            (true, "it may stand", false, "it falls")
+        );
+        assert_eq!(falls.probability(), "p = 0.0099");
+    }
+}

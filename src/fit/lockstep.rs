@@ -74,10 +74,7 @@ impl<'p> Search<'p> {
 
     fn end(self: Box<Self>, outcome: Outcome) -> Stage<'p> {
         let Search { mut rounds, objective, machine, name, iterations, evaluations } = *self;
-        let outcome = match outcome {
-            Outcome::Cancelled if objective.control.expired() => Outcome::TimeLimit,
-            outcome => outcome,
-        };
+        let outcome = objective.control.named(outcome);
         let round = Round {
             coordinates: machine.place().to_vec(),
             linear: machine.linearization().cloned(),

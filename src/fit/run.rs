@@ -4,7 +4,7 @@ use super::refine::{Attempt, Start};
 use super::search::{search, start_error};
 use super::starts::search_from_many;
 use crate::error::Error;
-use crate::estimate::{NoiseModel, Summary};
+use crate::estimate::Summary;
 use crate::judge::{SearchEnd, conclude, noise};
 use crate::optimize::{LeastSquares, LevenbergMarquardt};
 use crate::problem::{Control, Objective, Problem, Whitening};
@@ -146,10 +146,10 @@ impl Problem<'_> {
         let full = estimate.noise_covariance.clone().and_then(Whitening::full);
         // An output without any error gives no noise level.
         let noisy = sigma.iter().all(|sigma| *sigma > 0.0);
-        let whitening = match estimate.method.noise {
-            NoiseModel::Predicted => Whitening::none(sigma.len()),
-            _ if noisy => full.unwrap_or(Whitening::Diagonal(sigma)),
-            _ => problem.objective()?.whitening,
+        // Errors of predicted variance are divided by that, whatever these are.
+        let whitening = match noisy {
+            true => full.unwrap_or(Whitening::Diagonal(sigma)),
+            false => problem.objective()?.whitening,
         };
         Ok((problem.in_units(control).with(whitening), estimate.coordinates()))
     }

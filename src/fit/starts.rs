@@ -213,18 +213,14 @@ impl<'p> Searches<'p> {
             Run::Ended { end, level } if end.outcome.converged() => Some((*level, end.iterations)),
             _ => None,
         });
-        let (levels, mut trials): (Vec<f64>, Vec<u64>) = minima.unzip();
-        if trials.len() * QUARTER < self.runs.len() {
-            return;
-        }
-        trials.sort_unstable();
-        let (best, typical) = (levels.into_iter().fold(f64::INFINITY, f64::min), trials[trials.len() / 2]);
-        let most = LEAST_TRIALS.max(PATIENCE * typical);
+        let (levels, trials): (Vec<f64>, Vec<u64>) = minima.unzip();
+        let Some(typical) = typical(trials, self.runs.len()) else { return };
+        let best = levels.into_iter().fold(f64::INFINITY, f64::min);
         for run in &mut self.runs {
             let Run::Searching(search) = run else { continue };
             let Some(linear) = search.machine.linearization() else { continue };
             let level = self.comparison.level(&search.objective, linear.cost);
-            if search.trials() > most && level > best {
+            if search.trials() > most(typical) && level > best {
                 let ratio = crate::numeral::number(self.comparison.ratio(level, best), 3);
                 let reason = format!(
                     "given up after {} steps at {ratio} times the best cost: the median search that found a minimum took {typical}",
@@ -233,5 +229,30 @@ impl<'p> Searches<'p> {
                 *run = Run::Failed(NoEnd::new(true, reason));
             }
         }
+    }
+}
+
+/// The trial steps of the median search that found a minimum, out of those of all that did; `None` where less than a quarter of the
+/// searches did.
+fn typical(mut trials: Vec<u64>, searches: usize) -> Option<u64> {
+    trials.sort_unstable();
+    trials.get(trials.len() / 2).copied().filter(|_| trials.len() * QUARTER >= searches)
+}
+
+/// The most trial steps of a search above the best minimum, by those of a typical one.
+fn most(typical: u64) -> u64 {
+    LEAST_TRIALS.max(PATIENCE * typical)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{most, typical};
+
+    /// The median needs a quarter of the searches: two of eight, three of nine.
+    #[test]
+    fn patience_with_a_search() {
+        assert_eq!([typical(vec![9, 3, 5], 9), typical(vec![9, 3], 8)], [Some(5), Some(9)]);
+        assert_eq!([typical(vec![9, 3], 9), typical(vec![], 1)], [None, None]);
+        assert_eq!([most(9), most(10), most(11)], [100, 100, 110]);
     }
 }

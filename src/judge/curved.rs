@@ -42,11 +42,7 @@ impl Judgement<'_> {
             return None;
         }
         let unknown = &unknowns[i];
-        let by_logarithm = match unknown.transform {
-            Transform::Identity if unknown.value > 0.0 => "estimate its logarithm (.log()), or ",
-            _ => "",
-        };
-        let side = side(asymmetry);
+        let (by_logarithm, side) = (by_logarithm(unknown.transform, unknown.value), side(asymmetry));
         let text = format!(
             "the interval of `{}` is linear where the model is not: by its curvature it should reach {} further {side} than \
              it says ({} standard errors of curvature); {by_logarithm}take diagnose::profile",
@@ -72,6 +68,14 @@ impl Judgement<'_> {
     }
 }
 
+/// A remedy for an unknown of this value, if it has one.
+fn by_logarithm(transform: Transform, value: f64) -> &'static str {
+    match transform {
+        Transform::Identity if value > 0.0 => "estimate its logarithm (.log()), or ",
+        _ => "",
+    }
+}
+
 /// The side on which an interval should reach further by its asymmetry.
 fn side(asymmetry: f64) -> &'static str {
     if asymmetry > 0.0 { "below" } else { "above" }
@@ -79,10 +83,17 @@ fn side(asymmetry: f64) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use super::side;
+    use super::{by_logarithm, side};
+    use crate::parameter::Transform::{Identity, Log};
 
     #[test]
     fn an_interval_reaches_further_to_the_side_of_its_asymmetry() {
         assert_eq!([side(0.3), side(-0.3)], ["below", "above"]);
+    }
+
+    #[test]
+    fn a_logarithm_that_exists_and_is_not_taken_yet() {
+        assert!(by_logarithm(Identity, 2.0).contains("logarithm"));
+        assert_eq!([(Identity, 0.0), (Identity, -2.0), (Log, 2.0)].map(|(of, value)| by_logarithm(of, value)), [""; 3]);
     }
 }

@@ -169,6 +169,30 @@ mod tests {
     use crate::tests::{Current, Gain, Line, Voltage};
     use crate::{Experiment, Fit, Time, free};
 
+    /// Errors are reproduced to a part of 1e-12 of the largest measurement of all records, and are rounding to 1e-15.
+    #[test]
+    fn rounding_is_that_of_the_largest_measurement() {
+        let record = |outputs: [f64; 3]| {
+            let outputs = outputs.map(|i| Current { i }).to_vec();
+            let time = Time::Uniform { start: 0.0, step: 1.0 };
+            Experiment::new(&Line, time, vec![Voltage { u: 1.0 }; 3], outputs).unwrap()
+        };
+        let of = |size: f64, offset: f64| {
+            let records = [record([2.0, -8.0, 2.0].map(|y| size * (y + offset))), record([size * (2.0 + offset); 3])];
+            let problem = Fit::new(&Line, &records).parameters(Gain { a: free(1.0) }).problem().unwrap();
+            let objective = problem.objective().unwrap();
+            (rounding(&objective), reproduces(&objective, &[2.0 * size]))
+        };
+        assert_eq!([of(1.0, 0.0).0, of(4.0, 0.0).0, of(1e-270, 0.0).0], [8e-15, 3.2e-14, 0.0]);
+        let level = |outputs: [f64; 3]| {
+            let records = [record(outputs)];
+            let problem = Fit::new(&Line, &records).parameters(Gain { a: free(1.0) }).problem().unwrap();
+            reproduces(&problem.objective().unwrap(), &[2.0])
+        };
+        // Errors of about 1e-13 and 1e-11 of the largest.
+        assert!(level([2.0; 3]) && level([2.0 + 2e-13; 3]) && !level([2.0 + 2e-11; 3]) && !of(1.0, 0.0).1);
+    }
+
     /// Errors about a gain of two, every seventh an outlier: Huber's scale `s` solves `mean of min(|e / s|, c)^2 = kappa`.
     #[test]
     fn a_robust_scale_solves_its_equation() {

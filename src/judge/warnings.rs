@@ -248,7 +248,26 @@ fn is_nothing((sigma, rmse): (f64, f64)) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::is_nothing;
+    use super::{is_nothing, shift};
+    use crate::estimate::Knowledge;
+    use crate::tests::{Current, Gain, Line, Voltage};
+    use crate::{Experiment, Fit, Time, free};
+
+    /// At a gain of two, where a record has three: the whole way in the gain itself; in its logarithm half of it by the slope,
+    /// which is one of the gain. Errors of 0.5.
+    #[test]
+    fn an_unknown_moves_in_its_own_unit() {
+        let time = Time::Uniform { start: 0.0, step: 1.0 };
+        let record = Experiment::new(&Line, time, vec![Voltage { u: 1.0 }; 4], vec![Current { i: 3.0 }; 4]).unwrap();
+        for (a, coordinate) in [(free(2.0), 2.0), (free(2.0).log(), 2f64.ln())] {
+            let fit = Fit::new(&Line, &record).parameters(Gain { a }).noise(Current { i: 1.0 });
+            let problem = fit.problem().unwrap();
+            let mut unknowns = problem.estimate(&[coordinate]).unwrap().unknowns;
+            unknowns[0].knowledge = Knowledge::Known { standard_error: 0.5, lower: 1.0, upper: 3.0 };
+            let (_, errors, part) = shift(&problem.objective().unwrap(), &[coordinate], &unknowns).unwrap();
+            assert!((errors - 2.0).abs() < 1e-12 && (part - 0.5).abs() < 1e-12, "{errors} {part}");
+        }
+    }
 
     /// A millionth, of large errors and of small ones.
     #[test]

@@ -81,6 +81,19 @@ mod tests {
         }
     }
 
+    /// Three tests of one series, over no more lags than a quarter of its errors.
+    #[test]
+    fn three_tests_of_whiteness() {
+        let mut random = crate::random::Random::stream(3, 0);
+        for (count, lags) in [(402, [FEW, LAGS]), (23, [FEW, 5])] {
+            let run: Vec<f64> = (0..count).map(|_| random.normal()).collect();
+            let mut errors = Portmanteau::new(LAGS);
+            errors.add(&run);
+            let least = lags.map(|lags| errors.p_value(lags)).into_iter().fold(errors.neighbors_p_value(), f64::min);
+            assert_eq!(Whiteness::of(&errors, count, 0).p_value, (3.0 * least).min(1.0));
+        }
+    }
+
     /// The least probability, times the number of outputs; of equal ones that with the larger correlation.
     #[test]
     fn the_least_white_of_outputs() {

@@ -1,5 +1,6 @@
 //! [`Control`]: what may stop an evaluation.
 
+use crate::optimize::Outcome;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -21,5 +22,27 @@ impl Control {
 
     pub fn expired(&self) -> bool {
         self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
+    }
+
+    /// The outcome of a search, with the time limit named where that is what stopped it.
+    pub fn named(&self, outcome: Outcome) -> Outcome {
+        if outcome == Outcome::Cancelled && self.expired() { Outcome::TimeLimit } else { outcome }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    #[test]
+    fn a_time_limit_is_named() {
+        let until = |deadline: Instant| Control { cancel: None, deadline: Some(deadline) };
+        let (past, later) = (until(Instant::now()), until(Instant::now() + Duration::from_secs(1000)));
+        let flag = Control { cancel: Some(Arc::new(AtomicBool::new(true))), deadline: None };
+        assert_eq!([&past, &later, &flag, &Control::NEVER].map(Control::stops), [true, false, true, false]);
+        let named = [&past, &later, &flag].map(|control| control.named(Outcome::Cancelled));
+        assert_eq!(named, [Outcome::TimeLimit, Outcome::Cancelled, Outcome::Cancelled]);
+        assert_eq!(past.named(Outcome::Exact), Outcome::Exact);
     }
 }

@@ -192,10 +192,7 @@ impl<S: Search> Optimizer for S {
             }
             _ => Outcome::Cancelled,
         });
-        let outcome = match outcome {
-            Outcome::Cancelled if objective.control.expired() => Outcome::TimeLimit,
-            outcome => outcome,
-        };
+        let outcome = objective.control.named(outcome);
         if let Some(file) = file
             && let Some(place) = state.get_param()
         {

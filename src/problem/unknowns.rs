@@ -249,7 +249,8 @@ fn check(name: &str, parameter: &Parameter) -> Result<(), Error> {
             exact(upper)
         ));
     }
-    if positive && (start <= 0.0 || upper <= 0.0) {
+    // The start is no higher than the upper bound.
+    if positive && start <= 0.0 {
         return wrong(format!(
             "it is declared positive, but its start is {} and its upper bound {}; start above zero, or leave .positive() out",
             exact(start),

@@ -2,7 +2,7 @@
 
 use crate::pages::{Branch, Lag, Response, record};
 use crate::random::Random;
-use greybox::diagnose::bands;
+use greybox::diagnose::{bands, identifiability};
 use greybox::optimize::Severity;
 use greybox::{
     Experiment, ExperimentOf, Fit, Kalman, Kind, Model, Parameter, Report, Scalar, Time, fixed, free, signals,
@@ -99,6 +99,22 @@ fn the_band_of_a_filter_is_its_own() {
     assert!(widths[1] > 1.3 * widths[0], "less is known where less is measured: {widths:?}");
     let said = Report::new(&problem, &estimate).unwrap().to_markdown();
     assert!(!said.contains("moves no output"), "{said}");
+}
+
+/// What a parameter moves in two equal records is the root of two times what it moves in one, also through the variance.
+#[test]
+fn records_add_up_in_what_a_parameter_moves() {
+    let record = drifting().initial(Level { x: fixed(0.0) });
+    let records = [record.clone(), record.named("again")];
+    let strengths = |records: &[ExperimentOf<Drifting>]| {
+        let problem = Fit::new(&Drifting, records).parameters(start()).predictor(Kalman).problem().unwrap();
+        let estimate = problem.estimate(&[0.9, 0.3f64.ln(), 0.2f64.ln()]).unwrap();
+        let found = identifiability(&problem, &estimate).unwrap().excitation;
+        found.iter().map(|one| one.strength).collect::<Vec<_>>()
+    };
+    for (two, one) in strengths(&records).into_iter().zip(strengths(&records[..1])) {
+        assert!(one > 0.0 && (two / one - 2f64.sqrt()).abs() < 1e-9, "{one} {two}");
+    }
 }
 
 /// Where an output was not measured, the band of a simulation is as wide as beside it.

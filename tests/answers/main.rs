@@ -12,6 +12,7 @@ mod pages;
 mod random;
 mod reports;
 mod residuals;
+mod scales;
 #[path = "../common/shared.rs"]
 mod shared;
 mod silent_failures;

@@ -84,6 +84,8 @@ fn jarque_bera_is_that_of_scipy() {
     assert!((found.statistic / 0.318_450_228_757_759_7 - 1.0).abs() < 1e-9, "{found:?}");
     assert!((found.p_value / 0.852_804_358_835_401_7 - 1.0).abs() < 1e-9, "{found:?}");
     let residuals = examined(30, 1, |k, _, _| white[k]);
+    // 99 % of the correlations of so many white errors are within this.
+    assert!((residuals.autocorrelation_band - 2.576 / 30f64.sqrt()).abs() < 1e-12);
     // SciPy's `skew` and `kurtosis`.
     assert!((residuals.skewness / 0.209_815_786_117_013_96 - 1.0).abs() < 1e-9, "{}", residuals.skewness);
     assert!((residuals.excess_kurtosis / 0.280_480_884_536_906_67 - 1.0).abs() < 1e-9, "{}", residuals.excess_kurtosis);

@@ -4,7 +4,7 @@
 use crate::common::*;
 use crate::interval_limits::{Gains, Mixer};
 use crate::judgements::{Drive, Factor, Gain, Twice, edited, fit, moving, record, said};
-use greybox::optimize::Severity;
+use greybox::optimize::{JacobianColumns, LevenbergMarquardt, Severity, Stop};
 use greybox::*;
 
 /// Outputs with gains that differ by 30 %: the parameter of each alone is named, by its regression, and how far they are apart.
@@ -27,6 +27,19 @@ fn outputs_that_contradict_each_other_are_named() {
     assert!(warning.text.contains(&format!("({apart:.0} % apart;")), "{apart} {}", warning.text);
     let agreed = self::record(300, (2.0, 2.0), 0.05, moving);
     assert!(said(&fit(&[agreed]).run().unwrap(), WarningCode::OutputsContradict).is_none());
+    // The chances hold for squared errors, each counted once.
+    let records = [record];
+    let filter = Butterworth::low_pass(1, 0.4, 1.0).unwrap();
+    let other = [
+        fit(&records).loss(Huber(9.0)),
+        fit(&records).weighting(|_: &Sample<Twice>| 1.0),
+        fit(&records).prefilter(filter),
+        // Parts are compared at a minimum.
+        fit(&records).optimizer(LevenbergMarquardt::new(Stop { iterations: 0, ..Stop::default() }, JacobianColumns)),
+    ];
+    for fit in other {
+        assert!(said(&fit.run().unwrap(), WarningCode::OutputsContradict).is_none());
+    }
 }
 
 /// Of two gains and three records, the gain and the records that differ most are named.
@@ -90,6 +103,55 @@ fn outputs_contradict_by_their_difference() {
     let record = Experiment::new(&Twice, time, inputs, (0..80).map(output).collect()).unwrap();
     let estimate = fit(std::slice::from_ref(&record)).run().unwrap();
     let warning = said(&estimate, WarningCode::OutputsContradict).unwrap();
+    assert!(warning.text.contains("chi-square p = 5.7e-7"), "{}", warning.text);
+}
+
+/// `y = a u`, `z = a w`, of samples in an order.
+#[derive(Clone)]
+struct Ordered;
+
+impl Model for Ordered {
+    type State = Nothing;
+    type Input = Drive;
+    type Output = Pair;
+    type Parameters = Factor;
+    const KIND: Kind = Kind::Discrete;
+
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Drive<S>, p: &Factor<S>) -> Pair<S> {
+        Pair { y: p.a * u.u, z: p.a * u.w }
+    }
+}
+
+/// Where samples have an order, a contradiction between parts is one of correlated errors; inputs without correlation leave none.
+#[test]
+fn white_errors_contradict_nothing() {
+    let contradicts = |hold: usize| {
+        let (u, w) = (levels(400, hold, 1), levels(400, hold, 2));
+        let mut noise = Noise(3);
+        let mut output = |k: usize| Pair { y: 2.0 * u[k] + 0.05 * noise.gauss(), z: 2.6 * w[k] + 0.05 * noise.gauss() };
+        let outputs = (0..400).map(&mut output).collect();
+        let inputs = (0..400).map(|k| Drive { u: u[k], w: w[k] }).collect();
+        let record = Experiment::new(&Ordered, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        let estimate = Fit::new(&Ordered, &record).parameters(Factor { a: free(1.0) }).run().unwrap();
+        estimate.warnings.iter().any(|warning| warning.code == WarningCode::OutputsContradict)
+    };
+    assert!(contradicts(20) && !contradicts(1));
+}
+
+/// The same of two records, one of which is noisier: each counts by its own noise, `(0.1^2 + 0.3^2) / 79` for the difference.
+#[test]
+fn records_contradict_by_their_own_noise() {
+    let (u, e) = ([1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0], [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0]);
+    let apart = 5.0 * (0.1f64 / 79.0).sqrt();
+    let record = |gain: f64, size: f64| {
+        let inputs = (0..80).map(|k| Voltage { u: u[k % 8] }).collect();
+        let outputs = (0..80).map(|k| Current { i: gain * u[k % 8] + size * e[k % 8] }).collect();
+        Experiment::new(&Gain, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap()
+    };
+    let records = [record(2.0, 0.1).named("one"), record(2.0 + apart, 0.3).named("two")];
+    let estimate = Fit::new(&Gain, &records).parameters(Factor { a: free(1.0) }).run().unwrap();
+    let warning = estimate.warnings.iter().find(|warning| warning.code == WarningCode::RecordsContradict);
+    let warning = warning.unwrap_or_else(|| panic!("{estimate}"));
     assert!(warning.text.contains("chi-square p = 5.7e-7"), "{}", warning.text);
 }
 

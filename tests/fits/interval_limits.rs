@@ -127,6 +127,10 @@ fn bent_intervals_are_named() {
     };
     assert!(has(&fit(0.15, free(0.4)), WarningCode::CurvedInterval));
     assert!(!has(&fit(0.01, free(0.4)), WarningCode::CurvedInterval));
+    // Errors that are rounding are not those of the given noise, and an interval by it is none.
+    let exact = Fit::new(&Lag, &clean).parameters(Branch { gain: free(1.5), tau: free(0.4) });
+    let estimate = exact.noise(Current { i: 0.15 }).run().unwrap().into_summary();
+    assert!(!has(&estimate, WarningCode::CurvedInterval), "{estimate}");
 }
 
 /// A slope through noisy inputs is drawn to zero by `slope s^2 / (s^2 + mean u^2)`; half of the inputs' power is noise here.

@@ -427,3 +427,23 @@ fn a_noise_level_has_the_degrees_of_freedom_of_its_own_variance() {
     let (relative, _, half, uneven, _) = width(free(0.2).log());
     assert!((half / relative / 2.022_691 - 1.0).abs() < 1e-6 && !uneven, "{half} {relative}");
 }
+
+/// With up to twelve unknowns each has degrees of freedom of its own; with more all have those of the measurements.
+#[test]
+fn degrees_of_freedom_of_many_unknowns() {
+    let of = |records: u64| {
+        let record = |seed: u64| {
+            let mut noise = Noise(seed);
+            let outputs = (0..12).map(|_| Sensors { y: 0.3 * noise.gauss(), z: 0.1 * noise.gauss() }).collect();
+            let time = Time::Uniform { start: 0.0, step: 1.0 };
+            Experiment::new(&RandomWalk, time, vec![Push { u: 0.0 }; 12], outputs).unwrap()
+        };
+        let records: Vec<_> = (1..=records).map(record).collect();
+        let parameters = Levels { drift: fixed(0.0), y: free(0.2), z: free(0.2) };
+        let fit = Fit::new(&RandomWalk, &records).parameters(parameters).predictor(Kalman).run().unwrap();
+        let left = fit.measurements as f64 - fit.unknowns.len() as f64;
+        (fit.unknowns.len(), fit.unknowns.iter().filter(|unknown| unknown.degrees_of_freedom != left).count())
+    };
+    // Those of the two levels; the variance of an initial state depends on both.
+    assert_eq!([of(10), of(11)], [(12, 12), (13, 0)]);
+}

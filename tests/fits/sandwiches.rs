@@ -95,6 +95,31 @@ fn a_sandwich_by_hand() {
     }
 }
 
+/// After a filter, which looks back only, samples of weight zero at the end of a record are as if they were not there.
+#[test]
+fn samples_without_weight_at_the_end_do_not_count() {
+    const COUNT: usize = 300;
+    let mut noise = Noise(5);
+    let inputs: Vec<f64> = (0..400).map(|_| 0.5 + noise.uniform()).collect();
+    let errors: Vec<f64> = (0..400).map(|k| if k < COUNT { 0.1 } else { 0.7 } * noise.gauss()).collect();
+    let filter = Butterworth::low_pass(2, 0.1, 1.0).unwrap();
+    let of = |count: usize| {
+        let record = record(&inputs[..count], |k| errors[k]);
+        let weight = |s: &Sample<Gain>| if s.t < COUNT as f64 { 1.0 + s.u.u } else { 0.0 };
+        fit(&record).weighting(weight).prefilter(filter.clone()).noise(Current { i: 0.1 }).run().unwrap().into_summary()
+    };
+    let (whole, cut) = (of(400), of(COUNT));
+    assert_eq!(whole.method.covariance, CovarianceMethod::FilteredSandwich);
+    let numbers = |estimate: &Summary| {
+        let unknown = &estimate.unknowns[0];
+        [unknown.value, unknown.knowledge.standard_error().unwrap(), estimate.cost]
+    };
+    for (found, expected) in numbers(&whole).into_iter().zip(numbers(&cut)) {
+        // Sums of 300 products in another order, and minima to 1e-8 of a standard error.
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+    }
+}
+
 /// Errors that are autocorrelated and follow the input: prewhitened by an autoregression, with its bias corrected, summed with
 /// Bartlett's weights over 1.3 roots of the number of scores, and recolored (Andrews and Monahan 1992). The degrees of freedom
 /// follow from the errors of autoregression and sums.

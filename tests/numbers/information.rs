@@ -409,6 +409,25 @@ fn zero_rows_and_nan_are_no_surprise() {
     }
 }
 
+/// A block of another width is absorbed as its rows are, the narrower of the two filled up by zeros.
+#[test]
+fn blocks_of_another_width() {
+    for (columns, width) in [(1, 3), (3, 1), (2, 3)] {
+        let (mut whole, mut by_rows) = (Information::new(columns), Information::new(columns));
+        let mut block = Block::new(width, 8);
+        for (phi, y) in random_rows(width, 6, 4) {
+            assert!(block.push(&phi, y));
+            by_rows.absorb_row(&phi, y);
+        }
+        whole.absorb(&mut block);
+        assert_eq!((whole.rows(), whole.columns()), (6, columns.max(width)));
+        for (i, j) in (0..=whole.columns()).flat_map(|i| (i..=whole.columns()).map(move |j| (i, j))) {
+            // Rounding of six rows of numbers below one.
+            assert!((whole.at(i, j).abs() - by_rows.at(i, j).abs()).abs() < 1e-14, "{columns} {width} {i} {j}");
+        }
+    }
+}
+
 #[test]
 fn a_triangle_of_constant_slopes_does_not_drift() {
     // Ten thousand blocks of which only the first tells anything about the first unknown.

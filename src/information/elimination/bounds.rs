@@ -150,3 +150,30 @@ impl Stage {
         any
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Half of the way to a minimizer of which two entries exceed their limits: the first one does so on this half.
+    #[test]
+    fn a_path_ends_on_its_limits() {
+        let mut stage = Stage {
+            held: vec![false; 3],
+            put: vec![0.0; 3],
+            on_end: vec![None; 3],
+            at: vec![1.0, 2.0, 3.0],
+            step: vec![5.0, -6.0, 3.0],
+        };
+        let leaving = stage.leaving(&[(0.0, 2.0), (-4.0, 9.0), (0.0, 4.0)]);
+        let found: Vec<_> = leaving.iter().map(|one| (one.unknown, one.part, one.end, one.side)).collect();
+        assert_eq!(found, [(0, 0.25, 2.0, 1.0), (1, 0.75, -4.0, -1.0)]);
+        assert_eq!(stage.along(0.5, &leaving), [2.0, -2.0, 3.0]);
+        stage.advance(0.5, &leaving);
+        assert_eq!((&stage.at[..], &stage.held[..]), (&[2.0, -2.0, 3.0][..], &[true, false, false][..]));
+        assert_eq!((stage.put[0], &stage.on_end[..]), (2.0, &[Some(1.0), None, None][..]));
+        // A slope that falls inward from an upper limit is positive.
+        assert!(!stage.release(&[-1.0, 5.0, 5.0]) && stage.held[0]);
+        assert!(stage.release(&[1.0, 0.0, 0.0]) && !stage.held[0]);
+    }
+}

@@ -135,7 +135,23 @@ fn fix(directions: &[Vec<(usize, f64)>], held: &mut [bool]) {
 
 #[cfg(test)]
 mod tests {
-    use super::fix;
+    use super::{fix, smallest_at_least};
+    use crate::information::Information;
+
+    /// The scaled triangle is `[[1, -0.5, 2], [0, 4, 1], [0, 0, 2]]`; its inverse by hand.
+    #[test]
+    fn a_bound_of_the_smallest_singular_value() {
+        let mut triangle = Information::new(3);
+        for row in [[2.0, -2.0, 0.5], [0.0, 16.0, 0.25], [0.0, 0.0, 0.5]] {
+            triangle.absorb_row(&row, 0.0);
+        }
+        let inverse = [1.0, 0.125, -1.0625, 0.25, -0.125, 0.5f64];
+        let expected = inverse.iter().map(|x| x * x).sum::<f64>().sqrt().recip();
+        let found = smallest_at_least(&triangle, &[0.5, 0.25, 4.0]);
+        assert!((found - expected).abs() < 1e-15, "{found} {expected}");
+        assert_eq!(smallest_at_least(&Information::new(1), &[1.0]), 0.0);
+        assert_eq!(smallest_at_least(&triangle, &[]), f64::INFINITY);
+    }
 
     /// Both directions are largest in the first unknown: after it was held for one, the other moves the second alone.
     #[test]

@@ -131,3 +131,6 @@ impl<'f> ImpulseResponse<'f> {
         self.total
     }
 }
+
+#[cfg(test)]
+mod tests;
