@@ -51,17 +51,17 @@ fn a_sandwich_by_hand() {
     const COUNT: usize = 700;
     let mut noise = Noise(3);
     let mut inputs: Vec<f64> = (0..COUNT).map(|_| 0.5 + noise.uniform()).collect();
-    inputs[350] = 30.0;
+    inputs[350] = 50.0;
     let spikes: Vec<f64> = (0..COUNT).map(|k| if k % 9 == 4 { 0.8 } else { 0.1 } * noise.gauss()).collect();
     let record = record(&inputs, |k| spikes[k]);
     let (sigma, n) = (0.1, COUNT as f64);
     let with = |a: Parameter| Fit::new(&Gain, &record).parameters(Factor { a }).noise(Current { i: sigma });
     let clipped = |z: f64| z.clamp(-1.345, 1.345);
     let plain = |z: f64| z;
-    let root = (|u| 1.0 / u) as fn(f64) -> f64;
+    let root = (|u| 1.0 / u.sqrt()) as fn(f64) -> f64;
     let prior = 0.004;
     for (fit, weight, psi, q) in [
-        (with(free(1.0)).weighting(|s: &Sample<Gain>| 1.0 / s.u.u), root, &plain as &dyn Fn(f64) -> f64, 0.0),
+        (with(free(1.0)).weighting(|s: &Sample<Gain>| 1.0 / s.u.u.sqrt()), root, &plain as &dyn Fn(f64) -> f64, 0.0),
         (with(free(1.0)).loss(Huber(1.345)), |_| 1.0, &clipped, 0.0),
         (with(free(1.0).prior(2.0, prior)).loss(Huber(1.345)), |_| 1.0, &clipped, 1.0 / prior),
     ] {
