@@ -106,7 +106,7 @@ fn samples_without_weight_at_the_end_do_not_count() {
     let of = |count: usize| {
         let record = record(&inputs[..count], |k| errors[k]);
         let weight = |s: &Sample<Gain>| if s.t < COUNT as f64 { 1.0 + s.u.u } else { 0.0 };
-        fit(&record).weighting(weight).prefilter(filter.clone()).noise(Current { i: 0.1 }).run().unwrap().into_summary()
+        fit(&record).weighting(weight).prefilter(filter).noise(Current { i: 0.1 }).run().unwrap().into_summary()
     };
     let (whole, cut) = (of(400), of(COUNT));
     assert_eq!(whole.method.covariance, CovarianceMethod::FilteredSandwich);
