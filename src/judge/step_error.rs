@@ -13,6 +13,9 @@ pub(super) struct Sampled {
     pub carry: Vec<f64>,
 }
 
+/// So many samples are worth waking other threads.
+const WORTH_THREADS: usize = 20_000;
+
 /// Windows of an experiment, at a point.
 #[derive(Clone, Copy)]
 pub(super) struct Compared<'s> {
@@ -38,7 +41,11 @@ pub(super) fn step_errors(all: &[Compared<'_>]) -> Vec<f64> {
     let finer = all.first().filter(|one| !one.objective.sweep.predicts_variance());
     if let Some(finer) = finer.and_then(|one| one.objective.sweep.refined(samples)) {
         let batches = batches(&*finer, all, &windows);
-        let found = each(batches.len(), |b| changes(&*finer, all, batches[b]));
+        let one = |b: usize| changes(&*finer, all, batches[b]);
+        let found: Vec<Vec<(f64, usize)>> = match samples >= WORTH_THREADS {
+            true => each(batches.len(), one),
+            false => (0..batches.len()).map(one).collect(),
+        };
         for ((i, _), (change, samples)) in windows.iter().zip(found.into_iter().flatten()) {
             sums[*i] = (sums[*i].0 + change, sums[*i].1 + samples);
         }
