@@ -78,8 +78,8 @@ pub struct Unknown {
     pub error_index_held: Option<f64>,
     /// The coordinate that the optimizer worked in.
     pub transform: Transform,
-    /// Degrees of freedom of Student's t in its interval: those of the fit, or fewer where the variance is itself an
-    /// estimate from few measurements, or from few independent stretches of colored errors.
+    /// Degrees of freedom of Student's t in its interval: those of the fit, or fewer where the variance of colored errors
+    /// is itself an estimate from few independent stretches.
     #[serde(with = "crate::real")]
     pub degrees_of_freedom: f64,
 }

@@ -67,11 +67,8 @@ impl Judgement<'_> {
         if sandwich::is_needed(objective) || self.coupled().is_some() {
             let filtered = objective.problem.settings.prefilter.is_some();
             let method = if filtered { CovarianceMethod::FilteredSandwich } else { CovarianceMethod::Sandwich };
-            let Some(found) = sandwich::sandwich(objective, x, &self.exact).ok().flatten() else {
-                return CoordinateCovariance { covariance: None, method, factor: weights, degrees };
-            };
-            let degrees = degrees.iter().zip(&found.degrees).map(|(degrees, own)| degrees.min(*own)).collect();
-            return CoordinateCovariance { covariance: Some(found.covariance), method, factor: weights, degrees };
+            let covariance = sandwich::sandwich(objective, x, &self.exact).ok().flatten();
+            return CoordinateCovariance { covariance, method, factor: weights, degrees };
         }
         let method = CovarianceMethod::Classical;
         // The widening applies to the errors, not to the priors.

@@ -2,25 +2,20 @@
 //!
 //! It is `A^-1 B A^-1` (Huber 1967; White 1980). `A` is the curvature of the cost, `E[psi'] sum w g g'`. `B` is the
 //! covariance of the score: the sum of squares of the samples' own scores, `w psi(z) g` added up over the outputs.
-//! What is known of single errors, and of the variance that is made of them, is in [`scores`].
+//! Errors of a fit are smaller than the noise by the part of it that the fit took over, so each is divided by one less
+//! its leverage (HC3: MacKinnon and White, J. Econometrics 29 (1985) 305).
 //!
 //! A pre-filter correlates the errors. Where those before it are white, with covariance `S` between the outputs, the
 //! score is theirs times the weighted slopes passed through the filter backward in time (its adjoint), from rest at the
 //! end of the record to its first sample. A forward pass instead counts what happens at the begin of a record wrongly:
 //! errors of initial states came out several times too large.
 
-mod filtered;
-mod pooled;
-mod scores;
-
 use crate::information::{Block, Covariance, Information};
 use crate::optimize::{Infeasible, Linearization};
+use crate::prefilter::Butterworth;
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
-use filtered::ImpulseResponse;
 use nalgebra::DMatrix;
-use pooled::{Moments, Pooled};
-use scores::Spread;
 
 /// One less the leverage of a measurement that alone determines an unknown: its error is rounding.
 pub(super) const ALONE: f64 = 1e-6;
@@ -64,27 +59,14 @@ pub(crate) struct Tally {
     influence: DMatrix<f64>,
     /// Sums of the variance that white noise of variance one would have.
     expected: Vec<f64>,
-    /// Of each output's influences.
-    moments: Vec<Moments>,
 }
 
 impl Tally {
-    fn new(outputs: usize) -> Self {
-        Tally {
-            weights: 0.0,
-            curvature: 0.0,
-            influence: DMatrix::zeros(outputs, outputs),
-            expected: vec![0.0; outputs],
-            moments: vec![Moments::default(); outputs],
-        }
-    }
-
     fn add(&mut self, other: Tally) {
         self.weights += other.weights;
         self.curvature += other.curvature;
         self.influence += other.influence;
         self.expected.iter_mut().zip(other.expected).for_each(|(sum, other)| *sum += other);
-        self.moments.iter_mut().zip(other.moments).for_each(|(sum, other)| sum.add(other));
     }
 }
 
@@ -93,18 +75,12 @@ pub(crate) fn is_needed(objective: &Objective<'_>) -> bool {
     objective.is_weighted() || objective.problem.settings.prefilter.is_some() || objective.is_robust()
 }
 
-/// A sandwich, and the degrees of freedom of the variance of each unknown as far as they are known: infinite otherwise.
-pub(crate) struct Judged {
-    pub covariance: Covariance,
-    pub degrees: Vec<f64>,
-}
-
 /// The sandwich over all unknowns that are not held, in two more passes with slopes; `None` if it has no number.
 pub(crate) fn sandwich(
     objective: &Objective<'_>,
     coordinates: &[f64],
     held: &[bool],
-) -> Result<Option<Judged>, Infeasible> {
+) -> Result<Option<Covariance>, Infeasible> {
     Passes { objective, coordinates }.sandwich(held)
 }
 
@@ -131,25 +107,18 @@ struct Passes<'p> {
 }
 
 impl Passes<'_> {
-    fn sandwich(&self, held: &[bool]) -> Result<Option<Judged>, Infeasible> {
+    fn sandwich(&self, held: &[bool]) -> Result<Option<Covariance>, Infeasible> {
         let (sandwich, tally) = self.without_scores()?;
         let Some(inverse) = sandwich.bread.covariance(held) else { return Ok(None) };
-        let unknowns = &self.objective.problem.unknowns;
-        let mut spread = vec![Spread::default(); unknowns.row.len()];
         let (mut scores, scale) = match &self.objective.problem.settings.prefilter {
             Some(filter) => self.filtered_scores(&inverse, filter, &tally)?,
-            None => {
-                let estimated = held.iter().filter(|held| !**held).count();
-                (self.scores(&inverse, &Pooled::of(&tally, estimated), &mut spread)?, 1.0)
-            }
+            None => (self.scores(&inverse)?, 1.0),
         };
-        for (i, slope, _) in unknowns.priors(self.coordinates) {
-            let e = unknowns.row[i].experiment.unwrap_or(0);
+        for (i, slope, _) in self.objective.problem.unknowns.priors(self.coordinates) {
+            let e = self.objective.problem.unknowns.row[i].experiment.unwrap_or(0);
             scores[e].absorb_row(&prior_row(self.objective, e, i, slope / scale.sqrt()), 0.0);
         }
-        let covariance = Sandwich { scores, scale, ..sandwich }.covariance(held);
-        let degrees = spread.iter().map(Spread::degrees).collect();
-        Ok(covariance.map(|covariance| Judged { covariance, degrees }))
+        Ok(Sandwich { scores, scale, ..sandwich }.covariance(held))
     }
 
     /// The curvature for the weights and the loss of this fit, in one pass with slopes; its scores are still missing.
@@ -157,13 +126,23 @@ impl Passes<'_> {
         let outputs = self.objective.outputs();
         let make = |experiment: usize| {
             let columns = self.objective.problem.unknowns.columns(experiment).count();
-            let tally = Tally::new(outputs);
+            let tally = Tally {
+                weights: 0.0,
+                curvature: 0.0,
+                influence: DMatrix::zeros(outputs, outputs),
+                expected: vec![0.0; outputs],
+            };
             let (bread, block) = (Information::new(columns), Block::new(columns, ROWS));
             let impulse = self.objective.problem.settings.prefilter.as_ref().map(ImpulseResponse::new);
             Curvature { objective: self.objective, experiment, tally, bread, block, impulse, row: vec![0.0; columns] }
         };
         let all = self.objective.gather(self.coordinates, true, make)?;
-        let mut tally = Tally::new(outputs);
+        let mut tally = Tally {
+            weights: 0.0,
+            curvature: 0.0,
+            influence: DMatrix::zeros(outputs, outputs),
+            expected: vec![0.0; outputs],
+        };
         let mut blocks = Vec::with_capacity(all.len());
         for mut one in all {
             one.bread.absorb(&mut one.block);
@@ -179,6 +158,60 @@ impl Passes<'_> {
         }
         let bread = Linearization::new(0.0, self.objective.problem.unknowns.shared(), blocks);
         Ok((Sandwich { bread, scores: vec![], curvature, scale: 1.0 }, tally))
+    }
+
+    /// The triangle of each experiment's scores, sample by sample.
+    fn scores(&self, inverse: &Covariance) -> Result<Vec<Information>, Infeasible> {
+        let make = |experiment: usize| {
+            let inverse = of_experiment(self.objective, inverse, experiment);
+            let columns = inverse.nrows();
+            let (scores, block) = (Information::new(columns), Block::new(columns, ROWS));
+            Scores { objective: self.objective, experiment, inverse, scores, block, row: vec![0.0; columns] }
+        };
+        let all = self.objective.gather(self.coordinates, true, make)?;
+        let absorbed = |mut one: Scores<'_>| {
+            one.scores.absorb(&mut one.block);
+            one.scores
+        };
+        Ok(all.into_iter().map(absorbed).collect())
+    }
+
+    /// The triangle of each experiment's scores where a filter correlated white errors, and the factor for all of them
+    /// by which the noise is larger than the errors. Holds the slopes of one experiment at a time.
+    fn filtered_scores(
+        &self,
+        inverse: &Covariance,
+        filter: &Butterworth,
+        tally: &Tally,
+    ) -> Result<(Vec<Information>, f64), Infeasible> {
+        let expected = |i: usize| tally.expected[i].max(f64::MIN_POSITIVE);
+        let outputs = self.objective.outputs();
+        let noise =
+            DMatrix::from_fn(outputs, outputs, |i, j| tally.influence[(i, j)] / (expected(i) * expected(j)).sqrt());
+        let deviations = DMatrix::from_diagonal(&noise.diagonal().map(f64::sqrt));
+        let factor = noise.cholesky().map_or(deviations, |cholesky| cholesky.l());
+        let make = |experiment: usize| {
+            let columns = self.objective.problem.unknowns.columns(experiment).count();
+            let samples = self.objective.problem.records[experiment].len();
+            Backward {
+                objective: self.objective,
+                experiment,
+                columns,
+                samples,
+                slopes: vec![0.0; columns * outputs * samples],
+                measured: vec![false; outputs * samples],
+            }
+        };
+        let (mut scores, mut taken) = (vec![], 0.0);
+        for e in 0..self.objective.experiments() {
+            let mut gathered = self.objective.gather_one(self.coordinates, e, true, || make(e))?;
+            let (triangle, part) =
+                gathered.scores(filter, &factor, &of_experiment(self.objective, inverse, e), outputs);
+            scores.push(triangle);
+            taken += part;
+        }
+        let expected: f64 = tally.expected.iter().sum();
+        Ok((scores, expected / (expected - taken).max(f64::MIN_POSITIVE)))
     }
 }
 
@@ -208,7 +241,6 @@ impl Accumulate for Curvature<'_> {
                 self.tally.weights += w;
                 self.tally.curvature += w * loss.map_or(1.0, |loss| loss.slope(z));
                 self.tally.expected[j] += expected;
-                self.tally.moments[j].take(psi[j], w);
                 let values = window.row(k, j).iter().skip(lane).step_by(lanes);
                 self.row.iter_mut().zip(values).for_each(|(to, from)| *to = from * w.sqrt());
                 self.bread.gather(&mut self.block, &self.row, 0.0);
@@ -227,9 +259,133 @@ impl Accumulate for Curvature<'_> {
     }
 }
 
+/// The triangle of the scores.
+struct Scores<'s> {
+    objective: &'s Objective<'s>,
+    experiment: usize,
+    inverse: DMatrix<f64>,
+    scores: Information,
+    block: Block,
+    row: Vec<f64>,
+}
+
+impl Accumulate for Scores<'_> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        let (lanes, loss) = (window.lanes(), self.objective.loss());
+        let mut slopes = vec![0.0; self.row.len()];
+        for k in 0..window.samples[lane] {
+            let weight = self.objective.weight(self.experiment, window.begin[lane] + k);
+            self.row.fill(0.0);
+            for j in (0..window.outputs()).filter(|&j| weight > 0.0 && window.is_measured(k, j, lane)) {
+                let values = window.row(k, j).iter().skip(lane).step_by(lanes);
+                slopes.iter_mut().zip(values).for_each(|(to, from)| *to = *from);
+                let z = window.error(k, j, lane);
+                let less = (1.0 - weight * form(&self.inverse, &slopes)).max(ALONE);
+                let influence = weight * loss.map_or(z, |loss| loss.psi(z)) / less;
+                self.row.iter_mut().zip(&slopes).for_each(|(row, slope)| *row += slope * influence);
+            }
+            self.scores.gather(&mut self.block, &self.row, 0.0);
+        }
+    }
+
+    fn append(&mut self, mut later: Self) {
+        later.scores.absorb(&mut later.block);
+        self.scores.absorb(&mut self.block);
+        self.scores.merge(&later.scores);
+    }
+}
+
+/// The weighted slopes of an experiment backward in time: sample by sample, column by column, output by output.
+struct Backward<'b> {
+    objective: &'b Objective<'b>,
+    experiment: usize,
+    columns: usize,
+    samples: usize,
+    slopes: Vec<f64>,
+    measured: Vec<bool>,
+}
+
+impl Accumulate for Backward<'_> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        let (outputs, samples) = (window.outputs(), self.samples);
+        for k in 0..window.samples[lane] {
+            let sample = window.begin[lane] + k;
+            let (weight, back) = (self.objective.weight(self.experiment, sample), samples - 1 - sample);
+            for j in 0..outputs {
+                self.measured[j * samples + back] = window.is_measured(k, j, lane);
+                for c in 0..self.columns {
+                    self.slopes[(back * self.columns + c) * outputs + j] = weight * window.at(k, j, c, lane);
+                }
+            }
+        }
+    }
+
+    fn append(&mut self, later: Self) {
+        self.slopes.iter_mut().zip(later.slopes).for_each(|(slope, later)| *slope += later);
+        self.measured.iter_mut().zip(later.measured).for_each(|(measured, later)| *measured |= later);
+    }
+}
+
+impl Backward<'_> {
+    /// The triangle of the scores, and the sum of the leverages.
+    fn scores(
+        &mut self,
+        filter: &Butterworth,
+        factor: &DMatrix<f64>,
+        inverse: &DMatrix<f64>,
+        outputs: usize,
+    ) -> (Information, f64) {
+        let Backward { columns, samples, slopes, measured, .. } = self;
+        let (columns, samples) = (*columns, *samples);
+        filter.filter_rows(slopes, columns * outputs, &mut vec![]);
+        let (mut scores, mut block) = (Information::new(columns), Block::new(columns, ROWS));
+        let (mut score, mut taken) = (vec![0.0; columns], 0.0);
+        for k in 0..samples {
+            let at = |c: usize, j: usize| {
+                if measured[j * samples + k] { slopes[(k * columns + c) * outputs + j] } else { 0.0 }
+            };
+            for j in 0..outputs {
+                score.iter_mut().enumerate().for_each(|(c, score)| *score = at(c, j));
+                taken += form(inverse, &score);
+                score.iter_mut().enumerate().for_each(|(c, score)| {
+                    *score = (j..outputs).map(|i| factor[(i, j)] * at(c, i)).sum();
+                });
+                scores.gather(&mut block, &score, 0.0);
+            }
+        }
+        scores.absorb(&mut block);
+        (scores, taken)
+    }
+}
+
 /// `v' m v`.
 pub(super) fn form(m: &DMatrix<f64>, v: &[f64]) -> f64 {
     let product =
         |(column, b): (nalgebra::DVectorView<'_, f64>, &f64)| column.iter().zip(v).map(|(m, a)| m * a).sum::<f64>() * b;
     m.column_iter().zip(v).map(product).sum()
 }
+
+/// Variance that white noise of variance one has after a filter that was at rest: the sum of the squared impulse
+/// response so far.
+struct ImpulseResponse<'f> {
+    filter: &'f Butterworth,
+    state: Vec<f64>,
+    impulse: f64,
+    total: f64,
+}
+
+impl<'f> ImpulseResponse<'f> {
+    fn new(filter: &'f Butterworth) -> Self {
+        ImpulseResponse { filter, state: vec![], impulse: 1.0, total: 0.0 }
+    }
+
+    fn next(&mut self) -> f64 {
+        let mut response = [std::mem::take(&mut self.impulse)];
+        self.filter.filter_rows(&mut response, 1, &mut self.state);
+        self.total += response[0] * response[0];
+        self.total
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -4,8 +4,6 @@
 //! of `docs/intervals.md` with as many records and from another seed; the test takes fewer.
 
 mod cases;
-mod few;
-mod horizons;
 mod models;
 
 use crate::random::Random;
@@ -47,8 +45,6 @@ struct Findings {
     hac: f64,
     /// Mean error of each unknown in standard errors.
     bias: Vec<f64>,
-    /// Mean width of the intervals over that of 1.96 times the errors' root mean square to either side.
-    width: Vec<f64>,
 }
 
 fn number_from(variable: &str, otherwise: u64) -> u64 {
@@ -95,11 +91,6 @@ fn examine(case: &Case, records: u64, seed: u64) -> Findings {
         unknown.knowledge.standard_error().map_or(0.0, |error| (unknown.value - trial.truth[i]) / error)
     };
     let bias = |i: usize| trials.iter().map(|trial| error(trial, i)).sum::<f64>() / trials.len() as f64;
-    let width = |i: usize| {
-        let errors = judged.iter().map(|t| (t.summary.unknowns[i].value - t.truth[i]).powi(2)).sum::<f64>();
-        let said = judged.iter().map(|t| (ends(t, i).1 - ends(t, i).0) / (2.0 * 1.96)).sum::<f64>();
-        said / (errors * judged.len() as f64).sqrt()
-    };
     let is_hac =
         |trial: &&Trial| matches!(trial.summary.method.covariance, greybox::estimate::CovarianceMethod::Hac { .. });
     Findings {
@@ -116,16 +107,15 @@ fn examine(case: &Case, records: u64, seed: u64) -> Findings {
         codes,
         hac: percent(trials.iter().filter(is_hac).count(), trials.len()),
         bias: (0..trials[0].truth.len()).map(bias).collect(),
-        width: (0..trials[0].truth.len()).map(width).collect(),
     }
 }
 
 impl Findings {
     fn print(&self) {
-        let Findings { name, covered, missed, severity: [usable, care, not], codes, hac, bias, width, .. } = self;
+        let Findings { name, covered, missed, severity: [usable, care, not], codes, hac, bias, .. } = self;
         let missed: Vec<String> = missed.iter().map(|[low, high]| format!("{low:.1}/{high:.1}")).collect();
         println!(
-            "{name:50} covered {covered:5.1?} missed {} usable {usable:.0} care {care:.0} not {not:.0} HAC {hac:.0} bias {bias:.1?} width {width:.2?} {codes:.0?}",
+            "{name:50} covered {covered:5.1?} missed {} usable {usable:.0} care {care:.0} not {not:.0} HAC {hac:.0} bias {bias:.1?} {codes:.0?}",
             missed.join(" ")
         );
     }

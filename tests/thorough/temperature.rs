@@ -1,31 +1,18 @@
 //! The winding's rise between a cold and a warm record of axis 5 of the disturbed robot, and how often its interval covers
-//! it: motors that differ by 10 % in each parameter, inverters in their dead time, angles at which the records begin, and rises of
-//! 20 to 50 K.
+//! it: motors that differ by 10 % in each parameter, and rises of 20 to 50 K.
 
 use crate::random::Random;
-use core::f64::consts::TAU;
 use greybox::Butterworth;
-use greybox::pmsm::control::Target;
 use greybox::pmsm::drive::Simulation;
-use greybox::pmsm::inverter::DeadTime;
 use greybox::pmsm::offline::{Extended, Spans};
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::temperature::{Celsius, Estimated};
 use rayon::prelude::*;
 
-/// The resistance from a record that begins at the angle `begin` (rad): the drive moves there first, in 0.6 s.
-fn resistance(axis: &RobotAxis, simulation: Simulation, begin: f64) -> Estimated {
-    let mut program = Program::speed_cycles(axis, 8, 1.0).unwrap();
-    let samples = (0.6 / program.ts) as usize;
-    let time = samples as f64 * program.ts;
-    let moved = |k: usize| {
-        let phase = TAU * k as f64 / samples as f64;
-        Target { w: begin / time * (1.0 - phase.cos()), a: begin / time * TAU / time * phase.sin() }
-    };
-    program.targets.splice(0..0, (0..samples).map(moved));
-    let log = simulation.run(&program);
-    let spans = Spans::from_log(&log, axis.pole_pairs).cut(samples..log.rows.len());
+fn resistance(axis: &RobotAxis, simulation: Simulation) -> Estimated {
+    let program = Program::speed_cycles(axis, 8, 1.0).unwrap();
+    let spans = Spans::from_log(&simulation.run(&program), axis.pole_pairs);
     let filter = Butterworth::low_pass(4, 100.0, spans.ts).unwrap();
     let i0 = Extended::search_i0(0.03, 1.0, |i0| spans.extended(i0).prefiltered(&filter).least_squares()).unwrap();
     let found = spans.extended(i0).prefiltered(&filter).solve().unwrap();
@@ -49,11 +36,8 @@ fn winding_temperature() {
         };
         let rise = part(20.0, 50.0);
         let warm = Celsius::new(20.0 + rise).unwrap();
-        let mut drive = Simulation::new(axis).unwrap();
-        drive.plant.dead_time = DeadTime { vdt: part(1.5, 2.5), i0: part(0.1, 0.2) };
-        let begin = part(0.0, TAU);
-        let cold = resistance(&axis, drive.seeded(2 * seed), begin);
-        let hot = resistance(&axis, drive.heated(warm, warm).seeded(2 * seed + 1), begin);
+        let cold = resistance(&axis, Simulation::new(axis).unwrap().seeded(2 * seed));
+        let hot = resistance(&axis, Simulation::new(axis).unwrap().heated(warm, warm).seeded(2 * seed + 1));
         let found = Estimated::winding_rise(cold, hot, Estimated { value: axis.rs, std: 0.0 }).unwrap();
         Estimated { value: found.value - rise, ..found }
     };

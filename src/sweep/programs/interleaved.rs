@@ -13,13 +13,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// Most numbers of a record that are kept; longer ones are read anew at every pass.
 const KEPT: usize = 4_000_000;
 
-/// The columns of the records in the lanes of programs, by what was put side by side, those of all records first. Copies share
-/// them.
+/// The columns of the records in the lanes of programs, by the records that were run together. Copies share them.
 #[derive(Clone, Default)]
 pub(crate) struct Interleaved(Arc<Mutex<Vec<Arc<Kept>>>>);
 
-/// Memory of columns that are not kept any more, which the next ones use again: the system takes as long to give such blocks as
-/// it takes to fill them.
+/// Memory of columns that are not kept any more, for the next ones: allocating such blocks takes as long as filling them.
 #[derive(Default)]
 pub(super) struct Idle(Mutex<Vec<[Aligned; 2]>>);
 
@@ -45,7 +43,7 @@ impl fmt::Debug for Interleaved {
 
 impl Interleaved {
     /// The columns of pieces, one piece in each lane. `None` where they are not kept: for programs that read time or step, for
-    /// long records, and for programs without slopes, which run once or twice a fit, unless a program with slopes has kept the
+    /// long records, for records that were run together with others before, at first, and for programs without slopes, which run once or twice a fit, unless a program with slopes has kept the
     /// same columns.
     pub(super) fn of<'p>(
         &self,
@@ -84,7 +82,8 @@ impl Interleaved {
         }
         let from = channels().map(|channel| channel.values.clone()).collect();
         let (begins, others) = (begins().collect(), self.lock().iter().any(|kept| stands_alike(kept)));
-        // Beside other records these were side by side before: a search of a fleet has ended. It may be the last one but these.
+        // Some of these records were run together with others before: searches of a fleet have ended. Those that remain may need one
+        // pass only, so that their columns are kept from the second one on.
         if known.is_none() && others {
             self.lock().push(Arc::new(Kept::asked(compiled, begins, samples, from)));
             return None;
@@ -95,7 +94,7 @@ impl Interleaved {
             if all.iter().any(|other| Arc::ptr_eq(other, &kept)) {
                 continue;
             }
-            // Those of all records are asked for again after the search.
+            // The first ones, of all records of a group, are read again by the pass over the residuals.
             let first = all.iter().find(|kept| stands_alike(kept)).cloned();
             all.retain(|kept| !stands_alike(kept) || first.as_ref().is_some_and(|first| Arc::ptr_eq(first, kept)));
             all.push(kept.clone());

@@ -1,7 +1,7 @@
 //! The cases of the table.
 
 use super::models::*;
-use super::{Case, Trial, few, horizons};
+use super::{Case, Trial};
 use crate::common::{Affine, Branch, Current, Lag, Line, Pair, Voltage};
 use crate::random::Random;
 use greybox::pmsm::{self, Currents, Drive, Surface};
@@ -44,33 +44,13 @@ pub fn all() -> Vec<Case> {
         warned(WarningCode::InputNoise, "noise on the speed", |r| noisy_input(r, 0.0, 1.0)),
         case("Huber, 5 % outliers", wide, |r| robust(r, true)),
         case("Tukey, 5 % outliers", wide, |r| robust(r, false)),
-        case("Huber, one measurement in 5", wide, |r| few::robust(r, 5, 0.0, true)),
-        case("Huber, one measurement in 15", wide, |r| few::robust(r, 15, 0.0, true)),
-        case("Huber, 5 % outliers, one measurement in 5", wide, |r| few::robust(r, 5, 5.0, true)),
-        case("Huber, 5 % outliers, one measurement in 15", wide, |r| few::robust(r, 15, 5.0, true)),
-        case("Tukey, one measurement in 15", wide, |r| few::robust(r, 15, 0.0, false)),
-        case("Tukey, 5 % outliers, one measurement in 15", wide, |r| few::robust(r, 15, 5.0, false)),
-        case("weights 1/sigma^2, one measurement in 1", wide, |r| few::weighted(r, 1, 2)),
-        case("weights 1/sigma^2, one measurement in 5", wide, |r| few::weighted(r, 5, 2)),
-        case("weights 1/sigma^2, one measurement in 15", wide, |r| few::weighted(r, 15, 2)),
-        case("weights that are not, one measurement in 1", wide, |r| few::weighted(r, 1, 0)),
-        case("weights that are not, one measurement in 5", wide, |r| few::weighted(r, 5, 0)),
-        case("weights that are not, one measurement in 15", wide, |r| few::weighted(r, 15, 0)),
-        case("weights of one, noise as w^2, one measurement in 1", wide, |r| few::weighted(r, 1, 1)),
-        case("weights of one, noise as w^2, one measurement in 5", wide, |r| few::weighted(r, 5, 1)),
-        case("weights of one, noise as w^2, one measurement in 15", wide, |r| few::weighted(r, 15, 1)),
-        case("line, noise of changing size, 30", wide, |r| few::line(r, 30)),
-        case("line, noise of changing size, 200", wide, |r| few::line(r, 200)),
-        case("horizon 1, white", wide, |r| horizons::disturbed(r, 1, 0.0)),
-        case("horizon 10, white", wide, |r| horizons::disturbed(r, 10, 0.0)),
-        case("horizon 10, AR(1) 0.7", (93.0, 100.0), |r| horizons::disturbed(r, 10, 0.7)),
         case("low-pass, initial state free", exact, filtered),
         case("five records, own gain", exact, several),
     ]
 }
 
 /// A square wave: each level holds `hold` samples and lies in -1..1.
-pub(super) fn levels(random: &mut Random, samples: usize, hold: usize) -> Vec<f64> {
+fn levels(random: &mut Random, samples: usize, hold: usize) -> Vec<f64> {
     let mut level = 0.0;
     let next = |k: usize| {
         if k % hold == 0 {
@@ -82,7 +62,7 @@ pub(super) fn levels(random: &mut Random, samples: usize, hold: usize) -> Vec<f6
 }
 
 /// Noise of unit variance, autoregressive of order one.
-pub(super) fn autoregressive(random: &mut Random, samples: usize, rho: f64) -> Vec<f64> {
+fn autoregressive(random: &mut Random, samples: usize, rho: f64) -> Vec<f64> {
     let mut e = random.normal();
     let fresh = (1.0 - rho * rho).sqrt();
     let mut next = || {
@@ -94,7 +74,7 @@ pub(super) fn autoregressive(random: &mut Random, samples: usize, rho: f64) -> V
 }
 
 /// A record of these outputs, from a state that is given.
-pub(super) fn record<M: Model>(
+fn record<M: Model>(
     model: &M,
     step: f64,
     inputs: Vec<Of<M::Input, f64>>,
@@ -105,7 +85,7 @@ pub(super) fn record<M: Model>(
     Experiment::new(model, time, inputs, outputs).unwrap().initial(M::State::map(start, fixed))
 }
 
-pub(super) fn clean<M: Model>(
+fn clean<M: Model>(
     model: &M,
     step: f64,
     inputs: &[Of<M::Input, f64>],
@@ -137,13 +117,13 @@ fn unstable(random: &mut Random, steps: usize) -> Trial {
     Trial { summary: fit.run().unwrap().into_summary(), truth: vec![9.0, 0.5, 2.0] }
 }
 
-pub(super) const WINDING: Winding = Winding { r: 0.5, l: 5e-3, ke: 0.1 };
+const WINDING: Winding = Winding { r: 0.5, l: 5e-3, ke: 0.1 };
 
-pub(super) fn winding() -> Winding<greybox::Parameter> {
+fn winding() -> Winding<greybox::Parameter> {
     Winding { r: free(0.6), l: free(4e-3), ke: free(0.09) }
 }
 
-pub(super) fn supply(random: &mut Random, samples: usize) -> Vec<Supply> {
+fn supply(random: &mut Random, samples: usize) -> Vec<Supply> {
     let (u, w) = (levels(random, samples, 13), levels(random, samples, 29));
     u.iter().zip(&w).map(|(u, w)| Supply { u: 3.0 * u + 6.0, w: 40.0 * w + 50.0 }).collect()
 }
@@ -169,7 +149,7 @@ fn armature(random: &mut Random, samples: usize, rho: f64) -> Trial {
     Trial { summary: fit.run().unwrap().into_summary(), truth: vec![WINDING.r, WINDING.l, WINDING.ke] }
 }
 
-pub(super) const LAG: Branch = Branch { gain: 2.0, tau: 0.05 };
+const LAG: Branch = Branch { gain: 2.0, tau: 0.05 };
 
 fn lag(random: &mut Random, samples: usize, rho: f64) -> Trial {
     let inputs: Vec<Voltage> = levels(random, samples, 20).into_iter().map(|u| Voltage { u: 1.5 + 0.5 * u }).collect();

@@ -1,6 +1,5 @@
 //! The parts of a filtered sandwich.
 
-use super::super::form;
 use super::*;
 use crate::tests::{Current, Gain, Line, Voltage};
 use crate::{Experiment, Fit, Time, free};
