@@ -20,6 +20,7 @@ mod schedule;
 mod step;
 #[cfg(test)]
 mod tests;
+mod turns;
 
 pub(crate) use choice::only_duals;
 pub use code::Column;

@@ -1,5 +1,7 @@
 //! [`Code`]: a step as a list of instructions on numbered slots, for one lane or many.
 
+use super::fusion::TERMS;
+use super::turns::Turns;
 use crate::graph::{Function, Function2, Leaf};
 use crate::scalar::Table;
 use std::sync::Arc;
@@ -46,24 +48,37 @@ pub(super) struct Instruction {
     pub count: u8,
     /// Which pairs are subtracted, by bits, of a sum.
     pub signs: u8,
+    /// Whether the sum is multiplied by `factor` at last.
+    pub scaled: bool,
     pub to: Slot,
     /// What a sum starts from.
     pub init: Slot,
-    pub pairs: [[Slot; 2]; 4],
+    pub factor: Slot,
+    pub pairs: [[Slot; 2]; TERMS],
 }
 
 impl Instruction {
     pub fn new(operation: Operation, to: Slot, operands: &[Slot]) -> Self {
-        let mut pairs = [[0; 2]; 4];
+        let mut pairs = [[0; 2]; TERMS];
         for (pair, operands) in pairs.iter_mut().zip(operands.chunks(2)) {
             pair[..operands.len()].copy_from_slice(operands);
         }
-        Instruction { operation, count: 0, signs: 0, to, init: 0, pairs }
+        Instruction { operation, count: 0, signs: 0, scaled: false, to, init: 0, factor: 0, pairs }
+    }
+
+    /// The same with other slots in the place of those that it reads and of the one that it writes. Unused operands are slot zero.
+    pub fn renamed(mut self, read: impl Fn(Slot) -> Slot, write: impl Fn(Slot) -> Slot) -> Self {
+        self.pairs.iter_mut().flatten().for_each(|slot| *slot = read(*slot));
+        // A table is named by `init`.
+        if !matches!(self.operation, Operation::Table(_)) {
+            self.init = read(self.init);
+        }
+        (self.factor, self.to) = (read(self.factor), write(self.to));
+        self
     }
 
     /// The slots that it reads.
     pub fn reads(&self) -> impl Iterator<Item = Slot> + use<> {
-        let [[a, b], [c, d], ..] = self.pairs;
         let (first, count) = match self.operation {
             Operation::Fused | Operation::Rounded => (Some(self.init), 2 * self.count),
             Operation::FusedProducts | Operation::RoundedProducts => (None, 2 * self.count),
@@ -72,8 +87,8 @@ impl Instruction {
             Operation::Function2(_) | Operation::Table(_) => (None, 2),
             _ => (None, 1),
         };
-        let [_, _, [e, f], [g, h]] = self.pairs;
-        first.into_iter().chain([a, b, c, d, e, f, g, h].into_iter().take(count.into()))
+        let pairs = self.pairs.into_iter().flatten().take(count.into());
+        first.into_iter().chain(pairs).chain(self.scaled.then_some(self.factor))
     }
 }
 
@@ -142,21 +157,30 @@ pub(super) struct Code {
     pub tables: Vec<Arc<Table>>,
 }
 
-/// A code all of whose slots, columns and tables are there: what reads and writes without looking relies on it.
+/// A code all of whose slots, columns and tables are there, and its turns: what reads and writes without looking relies on it.
 #[derive(Clone, Debug)]
-pub(super) struct Sound(Code);
+pub(super) struct Sound {
+    code: Code,
+    turns: Turns,
+}
 
 impl Sound {
     /// None for a code that is not sound.
-    pub fn new(code: Code) -> Option<Self> {
-        code.is_sound().then_some(Sound(code))
+    pub fn new(mut code: Code) -> Option<Self> {
+        let turns = Turns::of(&mut code);
+        code.is_sound(&turns).then_some(Sound { code, turns })
+    }
+
+    /// What is done at every other sample.
+    pub fn turns(&self) -> &Turns {
+        &self.turns
     }
 }
 
 impl core::ops::Deref for Sound {
     type Target = Code;
     fn deref(&self) -> &Code {
-        &self.0
+        &self.code
     }
 }
 
@@ -167,13 +191,16 @@ impl Code {
     }
 
     /// Slots of every instruction and list lie below `slots`.
-    fn is_sound(&self) -> bool {
-        let instructions = self.once.iter().chain(&self.output).chain(&self.advance);
-        let all = instructions.flat_map(|instruction| instruction.reads().chain([instruction.to]));
+    fn is_sound(&self, turns: &Turns) -> bool {
+        let of_turns = turns.all.iter().flat_map(|turn| turn.output.iter().chain(&turn.advance));
+        let instructions = self.once.iter().chain(&self.output).chain(&self.advance).chain(of_turns);
+        let all = instructions.clone().flat_map(|instruction| instruction.reads().chain([instruction.to]));
         let others = self.constants.iter().map(|(slot, _)| *slot).chain(self.reads.iter().map(|read| read.to));
-        let others = others.chain(self.rows.iter().copied()).chain(self.step).chain([self.one, self.sign]);
+        let rows = self.rows.iter().chain(turns.all.iter().flat_map(|turn| &turn.rows)).copied();
+        let moved = turns.moved.iter().flat_map(|(own, other)| [*own, *other]);
+        let others = others.chain(rows).chain(moved).chain(self.step).chain([self.one, self.sign]);
         let columns = self.reads.iter().all(|read| read.column < self.columns.len());
-        let mut instructions = self.once.iter().chain(&self.output).chain(&self.advance);
+        let mut instructions = instructions;
         let tables = instructions.all(|instruction| match instruction.operation {
             Operation::Table(_) => usize::from(instruction.init) < self.tables.len(),
             _ => true,
@@ -181,6 +208,7 @@ impl Code {
         tables
             && columns
             && self.carried + self.parameters <= self.slots
+            && turns.all.iter().all(|turn| turn.rows.len() == self.rows.len())
             && all.chain(others).all(|slot| usize::from(slot) < self.slots)
     }
 }

@@ -14,23 +14,37 @@ pub(super) struct Term {
     pub minus: bool,
 }
 
+/// `(init +- a b +- ...) factor`; without `init` the first term is a product that is added.
+#[derive(Clone, Debug)]
+pub(super) struct Sum {
+    /// Each operation, not each product with its sum.
+    pub rounded: bool,
+    pub init: Option<Id>,
+    pub terms: Vec<Term>,
+    pub factor: Option<Id>,
+}
+
 /// What computes a node.
 #[derive(Clone, Debug)]
 pub(super) enum Work {
-    /// `init +- a b +- ...`; without `init` the first term is a product that is added. `rounded`: each operation.
-    Sum { rounded: bool, init: Option<Id>, terms: Vec<Term> },
+    Sum(Sum),
     /// Any other operation.
     Operation(Operation, Vec<Id>),
     /// A table's value or derivative.
-    Table { table: u32, order: u8, at: [Id; 2] },
+    Table {
+        table: u32,
+        order: u8,
+        at: [Id; 2],
+    },
 }
 
 impl Work {
     /// What it reads.
     pub fn operands(&self) -> Vec<Id> {
         match self {
-            Work::Sum { init, terms, .. } => {
-                init.iter().copied().chain(terms.iter().flat_map(|term| [Some(term.a), term.b]).flatten()).collect()
+            Work::Sum(Sum { init, terms, factor, .. }) => {
+                let products = terms.iter().flat_map(|term| [Some(term.a), term.b]).flatten();
+                init.iter().copied().chain(products).chain(*factor).collect()
             }
             Work::Operation(_, operands) => operands.clone(),
             Work::Table { at, .. } => at.to_vec(),
@@ -38,8 +52,21 @@ impl Work {
     }
 }
 
+impl Sum {
+    /// As a simpler operation, where it is one.
+    fn work(self) -> Work {
+        match (self.init, &self.terms[..], self.factor) {
+            (Some(a), [Term { a: b, b: None, minus }], None) => {
+                Work::Operation(if *minus { Operation::Sub } else { Operation::Add }, vec![a, *b])
+            }
+            (None, [Term { a, b: None, minus: true }], None) => Work::Operation(Operation::Neg, vec![*a]),
+            _ => Work::Sum(self),
+        }
+    }
+}
+
 /// Terms of one instruction.
-pub(super) const TERMS: usize = 4;
+pub(super) const TERMS: usize = 5;
 
 /// How many instructions the roots take at each sample.
 pub(super) fn instructions(tape: &Tape, roots: &[Id]) -> usize {
@@ -48,7 +75,7 @@ pub(super) fn instructions(tape: &Tape, roots: &[Id]) -> usize {
     varying
         .filter_map(|(_, work)| work.as_ref())
         .map(|work| match work {
-            Work::Sum { terms, .. } => terms.len().div_ceil(TERMS),
+            Work::Sum(sum) => sum.terms.len().div_ceil(TERMS),
             Work::Operation(Operation::Function(_) | Operation::Function2(_), _) | Work::Table { .. } => 10,
             Work::Operation(..) => 1,
         })
@@ -84,10 +111,15 @@ impl Fusion<'_> {
         let operation = |operation: Operation, operands: &[Id]| Some(Work::Operation(operation, operands.to_vec()));
         match self.tape.graph.node(id) {
             Node::Constant(_) | Node::Leaf(_) => None,
-            Node::Add(..) | Node::Sub(..) | Node::Neg(_) if self.tape.relaxed[id.index()] => Some(self.fused(id)),
-            Node::Add(..) | Node::Sub(..) => Some(self.rounded(id)),
+            Node::Add(..) | Node::Sub(..) | Node::Neg(_) if self.tape.relaxed[id.index()] => {
+                Some(self.fused(id).work())
+            }
+            Node::Add(..) | Node::Sub(..) => Some(self.rounded(id).work()),
             Node::Neg(a) => operation(Operation::Neg, &[a]),
-            Node::Mul(a, b) => operation(Operation::Mul, &[a, b]),
+            Node::Mul(a, b) => {
+                let scaled = self.scaled(id, a, b).or_else(|| self.scaled(id, b, a));
+                scaled.or(operation(Operation::Mul, &[a, b]))
+            }
             Node::Function(function, a) => operation(of_function(function), &[a]),
             Node::Function2(Function2::Copysign, a, b) => operation(Operation::Copysign, &[a, b]),
             Node::Function2(function, a, b) => operation(Operation::Function2(function), &[a, b]),
@@ -105,8 +137,19 @@ impl Fusion<'_> {
         self.uses[id.index()] == 1 && self.tape.depends(id).varies() == self.tape.depends(reader).varies()
     }
 
+    /// The product of a sum that nothing else reads with a factor.
+    fn scaled(&mut self, id: Id, sum: Id, factor: Id) -> Option<Work> {
+        let is_sum = matches!(self.tape.graph.node(sum), Node::Add(..) | Node::Sub(..));
+        if !is_sum || !self.belongs(sum, id) {
+            return None;
+        }
+        self.absorbed[sum.index()] = true;
+        let found = if self.tape.relaxed[sum.index()] { self.fused(sum) } else { self.rounded(sum) };
+        Some(Work::Sum(Sum { factor: Some(factor), ..found }))
+    }
+
     /// A relaxed sum, with all relaxed sums and products in it.
-    fn fused(&mut self, id: Id) -> Work {
+    fn fused(&mut self, id: Id) -> Sum {
         let mut terms: Vec<Term> = vec![];
         let mut open = vec![(id, false)];
         while let Some((at, minus)) = open.pop() {
@@ -123,28 +166,14 @@ impl Fusion<'_> {
             }
             self.absorbed[at.index()] |= at != id;
         }
-        self.sum(terms)
-    }
-
-    /// A sum's instruction by its terms in any order.
-    fn sum(&self, mut terms: Vec<Term>) -> Work {
-        if let [Term { a, b: None, minus: true }] = terms[..] {
-            return Work::Operation(Operation::Neg, vec![a]);
-        }
         let init = terms.iter().position(|term| term.b.is_none() && !term.minus).map(|at| terms.remove(at).a);
-        match (init, &terms[..]) {
-            (Some(a), [Term { a: b, b: None, minus }]) => {
-                return Work::Operation(if *minus { Operation::Sub } else { Operation::Add }, vec![a, *b]);
-            }
-            (None, _) => {
-                if let Some(first) = terms.iter().position(|term| term.b.is_some() && !term.minus) {
-                    let first = terms.remove(first);
-                    terms.insert(0, first);
-                }
-            }
-            _ => {}
+        if init.is_none()
+            && let Some(first) = terms.iter().position(|term| term.b.is_some() && !term.minus)
+        {
+            let first = terms.remove(first);
+            terms.insert(0, first);
         }
-        Work::Sum { rounded: false, init, terms }
+        Sum { rounded: false, init, terms, factor: None }
     }
 
     /// The factors of a product that belongs to the reader.
@@ -161,7 +190,7 @@ impl Fusion<'_> {
     }
 
     /// A sum of a value: a chain of additions, in the order of the text.
-    fn rounded(&mut self, id: Id) -> Work {
+    fn rounded(&mut self, id: Id) -> Sum {
         let (mut at, mut terms) = (id, vec![]);
         let init = loop {
             let (l, r, minus) = match self.tape.graph.node(at) {
@@ -193,12 +222,7 @@ impl Fusion<'_> {
             at = before;
         };
         terms.reverse();
-        match (init, &terms[..]) {
-            (Some(a), [Term { a: b, b: None, minus }]) => {
-                Work::Operation(if *minus { Operation::Sub } else { Operation::Add }, vec![a, *b])
-            }
-            _ => Work::Sum { rounded: true, init, terms },
-        }
+        Sum { rounded: true, init, terms, factor: None }
     }
 }
 

@@ -35,7 +35,8 @@ impl<const K: usize> Task for Run<'_, K> {
         assert!(width.lanes() == W::LANES && slots.len() >= code.slots * lanes);
         assert!(inputs.len() >= (samples + usize::from(code.reads_next())) * columns && rows.len() >= samples * height);
         let (slots, inputs, rows) = (slots.as_mut_ptr(), inputs.as_ptr(), rows.as_mut_ptr());
-        for sample in 0..samples {
+        let turns = code.turns();
+        for (sample, turn) in (0..samples).zip(turns.all.iter().cycle()) {
             for read in &code.reads {
                 let from = (sample + usize::from(read.next)) * columns + read.column * lanes;
                 // SAFETY: the column lies within its sample's row of inputs, of which there are enough; the slot within
@@ -43,15 +44,21 @@ impl<const K: usize> Task for Run<'_, K> {
                 unsafe { copy::<W, K>(inputs.add(from), slots.add(usize::from(read.to) * lanes)) };
             }
             // SAFETY: as above.
-            unsafe { interpret::<W, K>(&code.output, &code.tables, slots, width) };
-            for (number, slot) in code.rows.iter().enumerate() {
+            unsafe { interpret::<W, K>(&turn.output, &code.tables, slots, width) };
+            for (number, slot) in turn.rows.iter().enumerate() {
                 // SAFETY: as above; the row lies within its sample's rows, of which there are enough.
                 unsafe {
                     copy::<W, K>(slots.add(usize::from(*slot) * lanes), rows.add(sample * height + number * lanes))
                 };
             }
             // SAFETY: as above.
-            unsafe { interpret::<W, K>(&code.advance, &code.tables, slots, width) };
+            unsafe { interpret::<W, K>(&turn.advance, &code.tables, slots, width) };
+        }
+        if samples % turns.all.len() == 1 {
+            for (own, other) in &turns.moved {
+                // SAFETY: as above.
+                unsafe { copy::<W, K>(slots.add(usize::from(*other) * lanes), slots.add(usize::from(*own) * lanes)) };
+            }
         }
     }
 }
@@ -171,11 +178,13 @@ impl<W: Wide, const K: usize> Operands<W, K> {
         unsafe { apply(width, of, self.at(self.instruction.pairs[0][0]), self.at(self.instruction.to), K) };
     }
 
-    /// A sum of `N` pairs: from `init`, or from the first product; each operation rounded, or each product with its sum.
+    /// A sum of `N` pairs: from `init`, or from the first product; each operation rounded, or each product with its sum; at
+    /// last multiplied by a factor, or not.
     #[inline(always)]
-    unsafe fn sum_of<const N: usize, const INIT: bool, const ROUNDED: bool>(&self) {
+    unsafe fn sum_of<const N: usize, const INIT: bool, const ROUNDED: bool, const SCALED: bool>(&self) {
         let pairs = self.instruction.pairs.map(|pair| pair.map(|slot| self.at(slot)));
-        let (init, to) = (self.at(self.instruction.init), self.at(self.instruction.to));
+        let [init, factor, to] =
+            [self.instruction.init, self.instruction.factor, self.instruction.to].map(|s| self.at(s));
         let mut signs = [W::splat(0.0); N];
         let mut j = 0;
         while j < N {
@@ -195,6 +204,9 @@ impl<W: Wide, const K: usize> Operands<W, K> {
                     sum = if ROUNDED { sum.add(a.mul(b)) } else { a.mul_add(b, sum) };
                     j += 1;
                 }
+                if SCALED {
+                    sum = sum.mul(at(factor));
+                }
                 sum.write(to.add(k * W::LANES));
             }
             k += 1;
@@ -205,11 +217,17 @@ impl<W: Wide, const K: usize> Operands<W, K> {
     unsafe fn sum<const INIT: bool, const ROUNDED: bool>(&self) {
         // SAFETY: as above.
         unsafe {
-            match self.instruction.count {
-                1 => self.sum_of::<1, INIT, ROUNDED>(),
-                2 => self.sum_of::<2, INIT, ROUNDED>(),
-                3 => self.sum_of::<3, INIT, ROUNDED>(),
-                _ => self.sum_of::<4, INIT, ROUNDED>(),
+            match (self.instruction.count, self.instruction.scaled) {
+                (1, false) => self.sum_of::<1, INIT, ROUNDED, false>(),
+                (2, false) => self.sum_of::<2, INIT, ROUNDED, false>(),
+                (3, false) => self.sum_of::<3, INIT, ROUNDED, false>(),
+                (4, false) => self.sum_of::<4, INIT, ROUNDED, false>(),
+                (_, false) => self.sum_of::<5, INIT, ROUNDED, false>(),
+                (1, true) => self.sum_of::<1, INIT, ROUNDED, true>(),
+                (2, true) => self.sum_of::<2, INIT, ROUNDED, true>(),
+                (3, true) => self.sum_of::<3, INIT, ROUNDED, true>(),
+                (4, true) => self.sum_of::<4, INIT, ROUNDED, true>(),
+                (_, true) => self.sum_of::<5, INIT, ROUNDED, true>(),
             }
         }
     }

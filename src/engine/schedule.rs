@@ -6,7 +6,7 @@
 mod slots;
 
 use super::code::{Code, Column, Instruction, Operation, Read, Slot, Sound};
-use super::fusion::{TERMS, Term, Work, works};
+use super::fusion::{Sum, TERMS, Term, Work, works};
 use crate::graph::{Id, Leaf, Node, Tape};
 use rustc_hash::FxHashMap;
 use slots::Slots;
@@ -215,7 +215,7 @@ impl<'a> Scheduler<'a> {
             dying.sort_unstable();
             dying.dedup();
             // An instruction may write where it reads; one of several instructions may not.
-            let single = !matches!(&work, Work::Sum { terms, .. } if terms.len() > TERMS);
+            let single = !matches!(&work, Work::Sum(sum) if sum.terms.len() > TERMS);
             if single {
                 dying.iter().for_each(|slot| self.slots.release(*slot));
             }
@@ -303,7 +303,7 @@ impl<'a> Scheduler<'a> {
                 instruction.init = slots::narrow(*table as usize)?;
                 Ok(vec![instruction])
             }
-            Work::Sum { rounded, init, terms } => {
+            Work::Sum(Sum { rounded, init, terms, factor }) => {
                 let mut init = init.as_ref().map(at);
                 if init.is_none() && terms.first().is_some_and(|term| term.minus || term.b.is_none()) {
                     init = Some(zero);
@@ -326,6 +326,9 @@ impl<'a> Scheduler<'a> {
                     }
                     instructions.push(instruction);
                     init = Some(to);
+                }
+                if let (Some(last), Some(factor)) = (instructions.last_mut(), factor) {
+                    (last.scaled, last.factor) = (true, at(factor));
                 }
                 Ok(instructions)
             }

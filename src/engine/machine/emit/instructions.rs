@@ -170,6 +170,10 @@ impl Emitter<'_> {
                 }
             }
         }
+        if instruction.scaled {
+            let factor = self.place(instruction.factor)?;
+            self.binary(self.unit.mul, sum, sum, factor)?;
+        }
         self.registers.bind(instruction.to, number, true);
         Ok(())
     }
@@ -177,7 +181,8 @@ impl Emitter<'_> {
     /// The register that a sum is made in, with what it starts from.
     fn init(&mut self, instruction: &Instruction) -> Result<(u8, Register, usize), IcedError> {
         let slot = instruction.init;
-        let others = instruction.pairs[..usize::from(instruction.count)].as_flattened().contains(&slot);
+        let others = instruction.pairs[..usize::from(instruction.count)].as_flattened().contains(&slot)
+            || instruction.scaled && instruction.factor == slot;
         let dies = self.registers.next[usize::from(slot)] == NEVER && !others;
         if let Some(number) = self.registers.find(slot) {
             if dies {
