@@ -27,16 +27,15 @@ impl Summary {
 
     /// Whether each quantity of the layout is there.
     pub(crate) fn check(&self) -> Result<(), Error> {
-        let (layout, names) = (&self.layout, |found: Vec<&String>| format!("{found:?}"));
-        let parameters = names(self.parameters.iter().map(|one| &one.name).collect());
-        let outputs = names(self.outputs.iter().map(|one| &one.name).collect());
-        let declared =
-            [&layout.parameters, &layout.outputs].map(|all| names(all.iter().map(|one| &one.name).collect()));
-        for (what, found, declared) in [("parameters", &parameters, &declared[0]), ("outputs", &outputs, &declared[1])]
-        {
-            if found != declared {
+        let layout = &self.layout;
+        let parameters: (Vec<&String>, _) = (self.parameters.iter().map(|one| &one.name).collect(), &layout.parameters);
+        let outputs = (self.outputs.iter().map(|one| &one.name).collect(), &layout.outputs);
+        for (what, (found, declared)) in [("parameters", parameters), ("outputs", outputs)] {
+            let declared = declared.iter().map(|one| &one.name);
+            if !declared.clone().eq(found.iter().copied()) {
+                let declared: Vec<&String> = declared.collect();
                 return Err(Error::Option(format!(
-                    "no estimate: its {what} are {found}, but its layout has {declared}; read the file as it was written"
+                    "no estimate: its {what} are {found:?}, but its layout has {declared:?}; read the file as it was written"
                 )));
             }
         }

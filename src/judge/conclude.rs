@@ -227,14 +227,13 @@ impl<'j> Judgement<'j> {
             let (unknown, value) = (&free[i], self.values[i]);
             let transform = unknown.parameter.transform;
             // The standard errors of unknowns that are not seen are zero.
-            let is_known = |covariance: &&Covariance| self.degrees > 0.0 && is_error(covariance.standard_error(i));
-            let covariance = covariances.unknowns.as_ref().filter(is_known);
+            let known = |covariance: &Covariance| Some(covariance.standard_error(i)).filter(|error| is_error(*error));
+            let error = covariances.unknowns.as_ref().filter(|_| self.degrees > 0.0).and_then(known);
             let degrees_of_freedom = covariances.degrees[i];
-            let knowledge = match (self.held_at[i], covariance) {
+            let knowledge = match (self.held_at[i], error) {
                 (Some(bound), None) => Knowledge::Held { bound, end: None },
                 (None, None) => Knowledge::Unidentified,
-                (held, Some(covariance)) => {
-                    let standard_error = covariance.standard_error(i);
+                (held, Some(standard_error)) => {
                     let spread =
                         Spread { standard_error: standard_error / self.slopes[i], degrees: degrees_of_freedom };
                     let (lower, upper) = spread.interval(self.end.coordinates[i] + self.release[i], transform, 0.95);
@@ -250,7 +249,7 @@ impl<'j> Judgement<'j> {
             };
             let index = |change: f64| {
                 let percent = 100.0 * (root * change * self.slopes[i] / value).abs();
-                (covariance.is_some() && percent.is_finite()).then_some(percent)
+                (error.is_some() && percent.is_finite()).then_some(percent)
             };
             Unknown {
                 name: unknown.name.clone(),
