@@ -2,7 +2,7 @@
 //! instead of at each evaluation, and read like measured columns.
 
 use super::code::{Column, Sound};
-use super::interpret::{Once, Run};
+use super::interpret::{Part, Run};
 use super::schedule::{Roots, TooLarge, schedule};
 use crate::graph::{Id, Node, Tape};
 use crate::wide::{Width, run};
@@ -49,7 +49,7 @@ impl Derivation {
         for (slot, value) in &code.constants {
             slots[usize::from(*slot) * lanes..][..lanes].fill(*value);
         }
-        run(width, Once::<1> { code, slots: &mut slots, width });
+        run(width, Run::<1> { code, slots: &mut slots, part: Part::Once, width });
         let mut inputs = vec![0.0; 2 * columns.len() * lanes];
         let mut rows = vec![0.0; code.rows.len() * lanes];
         for begin in (0..samples).step_by(lanes) {
@@ -61,7 +61,8 @@ impl Derivation {
                     }
                 }
             }
-            run(width, Run::<1> { code, slots: &mut slots, inputs: &inputs, rows: &mut rows, samples: 1, width });
+            let part = Part::Samples { inputs: &inputs, rows: &mut rows, samples: 1 };
+            run(width, Run::<1> { code, slots: &mut slots, part, width });
             for (derived, row) in derived.iter_mut().zip(rows.chunks_exact(lanes)) {
                 derived.extend(&row[..there]);
             }

@@ -1,7 +1,7 @@
 //! [`Group`]: the lanes of a program.
 
 use super::Compiled;
-use super::interpret::{Once, Run};
+use super::interpret::{Part, Run};
 use crate::aligned::Aligned;
 use crate::wide::{run, run_narrow};
 use std::sync::Arc;
@@ -66,13 +66,18 @@ impl Group {
 
     /// Computes what depends on parameters and steps alone: after they have been set, before anything runs.
     pub fn prepare(&mut self) {
+        self.interpret(Part::Once);
+    }
+
+    /// Runs on whatever registers there are.
+    fn interpret(&mut self, part: Part<'_>) {
         let program = Arc::clone(&self.program);
         let (code, slots, width) = (&program.code, &mut self.numbers[..], program.width);
         match self.registers {
-            1 => run(width, Once::<1> { code, slots, width }),
-            2 => run(width, Once::<2> { code, slots, width }),
-            4 => run(width, Once::<4> { code, slots, width }),
-            _ => run_narrow(width, Once::<8> { code, slots, width }),
+            1 => run(width, Run::<1> { code, slots, part, width }),
+            2 => run(width, Run::<2> { code, slots, part, width }),
+            4 => run(width, Run::<4> { code, slots, part, width }),
+            _ => run_narrow(width, Run::<8> { code, slots, part, width }),
         }
     }
 
@@ -120,15 +125,9 @@ impl Group {
     pub(crate) fn go_on(&mut self, inputs: &[f64], rows: &mut [f64], samples: usize) {
         let program = Arc::clone(&self.program);
         let lanes = self.lanes();
-        let (code, slots, width) = (&program.code, &mut self.numbers[..], program.width);
-        if let Some(machine) = &program.machine {
-            return machine.run(code, lanes, slots, inputs, rows, samples);
-        }
-        match self.registers {
-            1 => run(width, Run::<1> { code, slots, inputs, rows, samples, width }),
-            2 => run(width, Run::<2> { code, slots, inputs, rows, samples, width }),
-            4 => run(width, Run::<4> { code, slots, inputs, rows, samples, width }),
-            _ => run_narrow(width, Run::<8> { code, slots, inputs, rows, samples, width }),
+        match &program.machine {
+            Some(machine) => machine.run(&program.code, lanes, &mut self.numbers, inputs, rows, samples),
+            None => self.interpret(Part::Samples { inputs, rows, samples }),
         }
     }
 

@@ -10,16 +10,25 @@ use crate::scalar::Table;
 use crate::wide::{Task, Wide, Width};
 use std::sync::Arc;
 
-/// Numbers per slot and register, sample by sample: what a run reads and writes.
+/// What is to be computed.
+pub(super) enum Part<'a> {
+    /// What does not vary within a pass.
+    Once,
+    /// A block of samples.
+    Samples {
+        /// Sample, column, lane; one sample more if the next inputs are read.
+        inputs: &'a [f64],
+        /// Sample, row, lane.
+        rows: &'a mut [f64],
+        samples: usize,
+    },
+}
+
+/// The instructions of a code on slots of `K` registers each.
 pub(super) struct Run<'a, const K: usize> {
     pub code: &'a Sound,
-    /// Slots of `K` registers each.
     pub slots: &'a mut [f64],
-    /// Sample, column, lane; one sample more if the next inputs are read.
-    pub inputs: &'a [f64],
-    /// Sample, row, lane.
-    pub rows: &'a mut [f64],
-    pub samples: usize,
+    pub part: Part<'a>,
     /// The registers'.
     pub width: Width,
 }
@@ -29,30 +38,43 @@ impl<const K: usize> Task for Run<'_, K> {
 
     #[inline(always)]
     fn run<W: Wide>(self) {
-        let Run { code, slots, inputs, rows, samples, width } = self;
+        let Run { code, slots, part, width } = self;
         let lanes = K * W::LANES;
-        let (columns, height) = (code.columns.len() * lanes, code.rows.len() * lanes);
+        let (columns, height, turns) = (code.columns.len() * lanes, code.rows.len() * lanes, code.turns());
+        let (inputs, rows, samples, once): (&[f64], &mut [f64], _, _) = match part {
+            Part::Once => (&[], &mut [], 0, true),
+            Part::Samples { inputs, rows, samples } => (inputs, rows, samples, false),
+        };
         assert!(width.lanes() == W::LANES && slots.len() >= code.slots * lanes);
-        assert!(inputs.len() >= (samples + usize::from(code.reads_next())) * columns && rows.len() >= samples * height);
+        assert!(once || inputs.len() >= (samples + usize::from(code.reads_next())) * columns);
+        assert!(rows.len() >= samples * height);
         let (slots, inputs, rows) = (slots.as_mut_ptr(), inputs.as_ptr(), rows.as_mut_ptr());
-        let turns = code.turns();
-        for (sample, turn) in (0..samples).zip(turns.all.iter().cycle()) {
-            for read in &code.reads {
-                let from = (sample + usize::from(read.next)) * columns + read.column * lanes;
-                // SAFETY: the column lies within its sample's row of inputs, of which there are enough; the slot within
-                // the slots, since the code is sound. So it is for all that follows.
-                unsafe { copy::<W, K>(inputs.add(from), slots.add(usize::from(read.to) * lanes)) };
-            }
+        // Up to the rows of a sample, then on to the next: the interpreter stands here once, not three times.
+        for half in 0..2 * samples + usize::from(once) {
+            let sample = half / 2;
+            let turn = &turns.all[sample % turns.all.len()];
+            let instructions = match (once, half % 2) {
+                (true, _) => &code.once,
+                (_, 0) => {
+                    for read in &code.reads {
+                        let from = (sample + usize::from(read.next)) * columns + read.column * lanes;
+                        // SAFETY: the column lies within its sample's row of inputs, of which there are enough; the slot
+                        // within the slots, since the code is sound. So it is for all that follows.
+                        unsafe { copy::<W, K>(inputs.add(from), slots.add(usize::from(read.to) * lanes)) };
+                    }
+                    &turn.output
+                }
+                _ => {
+                    for (number, slot) in turn.rows.iter().enumerate() {
+                        let to = sample * height + number * lanes;
+                        // SAFETY: as above; the row lies within its sample's rows, of which there are enough.
+                        unsafe { copy::<W, K>(slots.add(usize::from(*slot) * lanes), rows.add(to)) };
+                    }
+                    &turn.advance
+                }
+            };
             // SAFETY: as above.
-            unsafe { interpret::<W, K>(&turn.output, &code.tables, slots, width) };
-            for (number, slot) in turn.rows.iter().enumerate() {
-                // SAFETY: as above; the row lies within its sample's rows, of which there are enough.
-                unsafe {
-                    copy::<W, K>(slots.add(usize::from(*slot) * lanes), rows.add(sample * height + number * lanes))
-                };
-            }
-            // SAFETY: as above.
-            unsafe { interpret::<W, K>(&turn.advance, &code.tables, slots, width) };
+            unsafe { interpret::<W, K>(instructions, &code.tables, slots, width) };
         }
         if samples % turns.all.len() == 1 {
             for (own, other) in &turns.moved {
@@ -60,25 +82,6 @@ impl<const K: usize> Task for Run<'_, K> {
                 unsafe { copy::<W, K>(slots.add(usize::from(*other) * lanes), slots.add(usize::from(*own) * lanes)) };
             }
         }
-    }
-}
-
-/// What is computed once a pass.
-pub(super) struct Once<'a, const K: usize> {
-    pub code: &'a Sound,
-    pub slots: &'a mut [f64],
-    /// The registers'.
-    pub width: Width,
-}
-
-impl<const K: usize> Task for Once<'_, K> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<W: Wide>(self) {
-        assert!(self.width.lanes() == W::LANES && self.slots.len() >= self.code.slots * K * W::LANES);
-        // SAFETY: all slots of the instructions lie within the slots, since the code is sound and the slots are all there.
-        unsafe { interpret::<W, K>(&self.code.once, &self.code.tables, self.slots.as_mut_ptr(), self.width) };
     }
 }
 
@@ -178,10 +181,9 @@ impl<W: Wide, const K: usize> Operands<W, K> {
         unsafe { apply(width, of, self.at(self.instruction.pairs[0][0]), self.at(self.instruction.to), K) };
     }
 
-    /// A sum of `N` pairs: from `init`, or from the first product; each operation rounded, or each product with its sum; at
-    /// last multiplied by a factor, or not.
+    /// A sum of `N` pairs: from `init`, or from the first product; each operation rounded, or each product with its sum.
     #[inline(always)]
-    unsafe fn sum_of<const N: usize, const INIT: bool, const ROUNDED: bool, const SCALED: bool>(&self) {
+    unsafe fn sum_of<const N: usize, const INIT: bool, const ROUNDED: bool>(&self) {
         let pairs = self.instruction.pairs.map(|pair| pair.map(|slot| self.at(slot)));
         let [init, factor, to] =
             [self.instruction.init, self.instruction.factor, self.instruction.to].map(|s| self.at(s));
@@ -204,7 +206,7 @@ impl<W: Wide, const K: usize> Operands<W, K> {
                     sum = if ROUNDED { sum.add(a.mul(b)) } else { a.mul_add(b, sum) };
                     j += 1;
                 }
-                if SCALED {
+                if self.instruction.scaled {
                     sum = sum.mul(at(factor));
                 }
                 sum.write(to.add(k * W::LANES));
@@ -217,17 +219,12 @@ impl<W: Wide, const K: usize> Operands<W, K> {
     unsafe fn sum<const INIT: bool, const ROUNDED: bool>(&self) {
         // SAFETY: as above.
         unsafe {
-            match (self.instruction.count, self.instruction.scaled) {
-                (1, false) => self.sum_of::<1, INIT, ROUNDED, false>(),
-                (2, false) => self.sum_of::<2, INIT, ROUNDED, false>(),
-                (3, false) => self.sum_of::<3, INIT, ROUNDED, false>(),
-                (4, false) => self.sum_of::<4, INIT, ROUNDED, false>(),
-                (_, false) => self.sum_of::<5, INIT, ROUNDED, false>(),
-                (1, true) => self.sum_of::<1, INIT, ROUNDED, true>(),
-                (2, true) => self.sum_of::<2, INIT, ROUNDED, true>(),
-                (3, true) => self.sum_of::<3, INIT, ROUNDED, true>(),
-                (4, true) => self.sum_of::<4, INIT, ROUNDED, true>(),
-                (_, true) => self.sum_of::<5, INIT, ROUNDED, true>(),
+            match self.instruction.count {
+                1 => self.sum_of::<1, INIT, ROUNDED>(),
+                2 => self.sum_of::<2, INIT, ROUNDED>(),
+                3 => self.sum_of::<3, INIT, ROUNDED>(),
+                4 => self.sum_of::<4, INIT, ROUNDED>(),
+                _ => self.sum_of::<5, INIT, ROUNDED>(),
             }
         }
     }
