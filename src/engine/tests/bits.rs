@@ -54,7 +54,8 @@ fn rows_of(
                 *input = 30.0 * (0.1 * k as f64 + column as f64 + 0.3 * lane as f64).sin();
             }
             let mut rows = vec![0.0; samples * program.row_length() * lanes];
-            let half = samples / 2;
+            // Odd numbers of samples: what is carried stands in other slots then.
+            let half = samples * 9 / 20;
             let (first, second) = rows.split_at_mut(half * program.row_length() * lanes);
             group.run(&inputs, first, half);
             group.run(&inputs[half * columns * lanes..], second, samples - half);
@@ -79,6 +80,10 @@ fn of_expression(digest: &mut Digest, random: &mut Random, mut graph: Graph, roo
     let mut numbers = |n: usize| core::array::from_fn(|_| (0..n).map(|_| random.number()).collect());
     let (starts, p) = (numbers(3), numbers(2));
     rows_of(digest, &recurrence, &seeds, &starts, &p, 1);
+    // Entries that change places, and one that is computed in the place of one that is still read.
+    let changed = [next[1], next[0], *roots.last().unwrap()];
+    let recurrence = Recurrence::from_roots(&graph, &changed, roots, &[]).unwrap();
+    rows_of(digest, &recurrence, &seeds, &starts, &p, 5);
 }
 
 fn of_model<M: Model>(digest: &mut Digest, model: &M, p: &[f64]) {
