@@ -15,6 +15,7 @@ pub use column::{Channel, Column};
 #[cfg(feature = "csv")]
 pub use csv::CsvFile;
 pub use cycles::Gap;
+pub(crate) use inspect::Looked;
 pub use inspect::{ChannelInspection, Inspection, Suspicion};
 pub(crate) use stored::Stored;
 #[cfg(feature = "csv")]
@@ -25,7 +26,7 @@ use crate::error::Error;
 use crate::interval::Hold;
 use crate::layout::Quantity;
 use crate::parameter::Parameter;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// What is known of the state at the first sample.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -53,6 +54,8 @@ pub struct Record {
     pub(crate) outputs: Arc<[Channel]>,
     pub(crate) hold: Hold,
     pub(crate) initial: Initial,
+    /// What its channels showed, once they have been looked at.
+    pub(crate) looked: Arc<OnceLock<Looked>>,
 }
 
 impl Record {
@@ -63,8 +66,8 @@ impl Record {
     /// time or input that is not finite, an infinite output.
     pub fn new(states: Vec<Quantity>, time: Time, inputs: Vec<Channel>, outputs: Vec<Channel>) -> Result<Self, Error> {
         let (name, hold, initial) = ("record".to_owned(), Hold::default(), Initial::default());
-        Record { name, states: states.into(), time, inputs: inputs.into(), outputs: outputs.into(), hold, initial }
-            .checked()
+        let (states, inputs, outputs) = (states.into(), inputs.into(), outputs.into());
+        Record { name, states, time, inputs, outputs, hold, initial, looked: Arc::default() }.checked()
     }
 
     /// Names the record in reports and errors.
@@ -98,7 +101,7 @@ impl Record {
     /// # Errors
     /// As [`new`](Self::new).
     pub(crate) fn with_channels(self, inputs: Vec<Channel>, outputs: Vec<Channel>) -> Result<Self, Error> {
-        Record { inputs: inputs.into(), outputs: outputs.into(), ..self }.checked()
+        Record { inputs: inputs.into(), outputs: outputs.into(), looked: Arc::default(), ..self }.checked()
     }
 
     /// Name in reports and errors.

@@ -6,6 +6,7 @@ use crate::estimate::{Warning, WarningCode};
 use crate::numeral::{counted, exact, number, percent};
 use crate::optimize::Severity;
 use crate::record::{ChannelInspection, Inspection, Record, Suspicion};
+use std::sync::Arc;
 
 /// Errors below this part of an output's range or level are rounding: the model reproduces what is suspicious.
 const REPRODUCED: f64 = 1e-6;
@@ -31,7 +32,7 @@ fn warning(code: WarningCode, severity: Severity, text: String) -> Warning {
 impl Judgement<'_> {
     /// Warnings about the columns of the records.
     pub(super) fn data(&self) -> Vec<Warning> {
-        let found: Vec<Inspection> = self.objective.problem.records.iter().map(|r| r.inspect_some()).collect();
+        let found: Vec<Arc<Inspection>> = self.objective.problem.records.iter().map(|r| r.inspect_some()).collect();
         let mut warnings = self.constant_outputs(&found);
         warnings.extend(self.constant_inputs(&found));
         warnings.extend(self.suspicions(&found));
@@ -49,13 +50,13 @@ impl Judgement<'_> {
     }
 
     /// The value of a channel that is the same in all records.
-    fn constant<'i>(found: &'i [Inspection], of: impl Fn(&'i Inspection) -> &'i ChannelInspection) -> Option<f64> {
+    fn constant<'i>(found: &'i [Arc<Inspection>], of: impl Fn(&'i Inspection) -> &'i ChannelInspection) -> Option<f64> {
         let mut values = found.iter().map(|one| of(one).constant());
         let first = values.next()??;
         values.all(|value| value == Some(first)).then_some(first)
     }
 
-    fn constant_outputs(&self, found: &[Inspection]) -> Vec<Warning> {
+    fn constant_outputs(&self, found: &[Arc<Inspection>]) -> Vec<Warning> {
         let outputs = &self.objective.problem.layout().outputs;
         let still: Vec<Option<f64>> =
             (0..outputs.len()).map(|j| Self::constant(found, |one| &one.outputs[j])).collect();
@@ -76,7 +77,7 @@ impl Judgement<'_> {
         still.iter().enumerate().filter_map(one).collect()
     }
 
-    fn constant_inputs(&self, found: &[Inspection]) -> Vec<Warning> {
+    fn constant_inputs(&self, found: &[Arc<Inspection>]) -> Vec<Warning> {
         let inputs = &self.objective.problem.layout().inputs;
         let one = |(i, input): (usize, &crate::layout::Quantity)| {
             let value = Self::constant(found, |one| &one.inputs[i])?;
@@ -94,7 +95,7 @@ impl Judgement<'_> {
     }
 
     /// What is suspicious of an output, and confirmed by the errors.
-    fn suspicions(&self, found: &[Inspection]) -> Vec<Warning> {
+    fn suspicions(&self, found: &[Arc<Inspection>]) -> Vec<Warning> {
         let mut suspicions: Vec<(Suspect, &ChannelInspection, &Suspicion)> = vec![];
         for (e, inspection) in found.iter().enumerate() {
             for (j, channel) in inspection.outputs.iter().enumerate() {
@@ -164,7 +165,7 @@ impl Judgement<'_> {
     }
 
     /// Outputs of few values, whose errors are not far below the step between them.
-    fn coarse(&self, found: &[Inspection]) -> Vec<Warning> {
+    fn coarse(&self, found: &[Arc<Inspection>]) -> Vec<Warning> {
         let outputs = self.objective.problem.layout().outputs.iter().enumerate();
         let one = |(j, output): (usize, &crate::layout::Quantity)| {
             let levels = found.iter().map(|one| one.outputs[j].levels).try_fold(0, |most, n| Some(most.max(n?)))?;
@@ -185,7 +186,7 @@ impl Judgement<'_> {
         outputs.filter_map(one).collect()
     }
 
-    fn sentinels_of_inputs(&self, found: &[Inspection]) -> Vec<Warning> {
+    fn sentinels_of_inputs(&self, found: &[Arc<Inspection>]) -> Vec<Warning> {
         let channels = found.iter().enumerate().flat_map(|(e, one)| one.inputs.iter().map(move |channel| (e, channel)));
         let one = |(e, channel): (usize, &ChannelInspection)| {
             let suspicion = channel.suspicions.first()?;
@@ -218,7 +219,7 @@ impl Judgement<'_> {
         Some(warning(WarningCode::Repeated, Severity::UsableWithCare, text))
     }
 
-    fn missing(&self, found: &[Inspection]) -> Vec<Warning> {
+    fn missing(&self, found: &[Arc<Inspection>]) -> Vec<Warning> {
         let outputs = self.objective.problem.layout().outputs.iter().enumerate();
         let one = |(j, output): (usize, &crate::layout::Quantity)| {
             let of = |count: fn(&ChannelInspection) -> usize| found.iter().map(|one| count(&one.outputs[j])).sum();

@@ -7,6 +7,7 @@ use super::{Channel, Initial, Record, Time};
 use crate::error::Error;
 use crate::interval::Hold;
 use std::ops::{Bound, Range, RangeBounds};
+use std::sync::Arc;
 
 /// Two times closer than this fraction of an even step are the same: `3 * 0.1` is not `0.3` in binary.
 const SAME: f64 = 1e-6;
@@ -94,7 +95,7 @@ impl Record {
         let joined = |(a, b): (&Channel, &Channel)| a.with([&*a.values, &*b.values].concat());
         let inputs = self.inputs.iter().zip(later.inputs.iter()).map(joined).collect();
         let outputs = self.outputs.iter().zip(later.outputs.iter()).map(joined).collect();
-        Record { time, inputs, outputs, ..self }.checked()
+        Record { time, inputs, outputs, looked: Arc::default(), ..self }.checked()
     }
 
     /// Every `n`-th sample, from the first.
@@ -133,7 +134,7 @@ impl Record {
             Hold::First => self.inputs.iter().map(instants).collect(),
         };
         let outputs = self.outputs.iter().map(instants).collect();
-        Record { time, inputs, outputs, ..self.clone() }.checked()
+        Record { time, inputs, outputs, looked: Arc::default(), ..self.clone() }.checked()
     }
 
     /// The mean of an input, held from sample to sample, over the intervals that begin with these samples. The last sample
@@ -179,6 +180,7 @@ impl Record {
             outputs: self.outputs.iter().map(part).collect(),
             hold: self.hold,
             initial,
+            looked: Arc::default(),
         }
     }
 

@@ -9,6 +9,7 @@ use crate::numeral::exact;
 use core::fmt;
 use core::ops::Range;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// What the columns of a record show. Nothing in it is an error in itself: a commanded voltage is clipped on purpose, and
 /// an encoder at rest repeats its value.
@@ -75,6 +76,14 @@ pub enum Suspicion {
     },
 }
 
+/// What the channels of a record showed. A record with other channels that was made from it does not take that over.
+#[derive(Debug)]
+pub(crate) struct Looked {
+    inputs: Arc<[Channel]>,
+    outputs: Arc<[Channel]>,
+    found: Arc<Inspection>,
+}
+
 /// A record of more samples than these is looked at in pieces, evenly spaced, when it is fitted.
 const WHOLE: usize = 16_384;
 /// Samples of such a piece.
@@ -86,9 +95,18 @@ impl Record {
         self.inspect_within(self.len())
     }
 
-    /// The same at a cost that does not grow beyond some length.
-    pub(crate) fn inspect_some(&self) -> Inspection {
-        self.inspect_within(WHOLE)
+    /// The same at a cost that does not grow beyond some length, once for all copies of the record.
+    pub(crate) fn inspect_some(&self) -> Arc<Inspection> {
+        let is_of_this =
+            |looked: &&Looked| Arc::ptr_eq(&looked.inputs, &self.inputs) && Arc::ptr_eq(&looked.outputs, &self.outputs);
+        if let Some(looked) = self.looked.get().filter(is_of_this) {
+            return looked.found.clone();
+        }
+        let (inputs, outputs, found) =
+            (self.inputs.clone(), self.outputs.clone(), Arc::new(self.inspect_within(WHOLE)));
+        // Another thread may have been first, or another record that this one was made from: their finding stays.
+        let _ = self.looked.set(Looked { inputs, outputs, found: found.clone() });
+        found
     }
 
     fn inspect_within(&self, whole: usize) -> Inspection {
@@ -167,6 +185,28 @@ impl fmt::Display for Suspicion {
             Suspicion::Repeated { samples, again } => {
                 write!(f, "has the same {} values from sample {} and from sample {again}", samples.len(), samples.start)
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::Time;
+
+    /// Copies share what was found; a record with other numbers does not take it over.
+    #[test]
+    fn other_numbers_are_looked_at_anew() {
+        let channels = |values: [f64; 4]| vec![Channel::new("y", "V", values.to_vec())];
+        let time = Time::Uniform { start: 0.0, step: 1.0 };
+        let record = Record::new(vec![], time, vec![], channels([1.0, 2.0, 4.0, 3.0])).unwrap();
+        let found = record.inspect_some();
+        assert!(Arc::ptr_eq(&found, &record.clone().named("copy").inspect_some()));
+        let thinned = record.decimate(2).unwrap();
+        let other = Record { outputs: channels([5.0; 4]).into(), ..record.clone() };
+        for (record, range) in [(record, (1.0, 4.0)), (thinned, (1.0, 4.0)), (other, (5.0, 5.0))] {
+            assert_eq!(record.inspect_some().outputs[0].range, Some(range));
+            assert_eq!(*record.inspect_some(), record.inspect());
         }
     }
 }

@@ -9,6 +9,7 @@ use crate::parameter::Parameter;
 use crate::real::{Read, Written};
 use serde::ser::SerializeStruct;
 use serde::{Deserialize, Serialize, Serializer};
+use std::sync::Arc;
 
 impl Serialize for Record {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -106,7 +107,8 @@ impl Stored {
         };
         let (inputs, outputs) = (channels(self.inputs, inputs)?, channels(self.outputs, outputs)?);
         let Stored { name, hold, time, .. } = self;
-        Record { name, states: states.into(), time, inputs: inputs.into(), outputs: outputs.into(), hold, initial }
+        let (states, inputs, outputs) = (states.into(), inputs.into(), outputs.into());
+        Record { name, states, time, inputs, outputs, hold, initial, looked: Arc::default() }
             .checked()
             .map_err(|error| error.to_string())
     }

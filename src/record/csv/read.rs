@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::interval::Hold;
 use crate::layout::{Kind, Layout, Quantity};
 use crate::record::{Channel, Clock, Initial, Record, Time};
+use std::sync::Arc;
 
 /// Where the number of one signal comes from.
 #[derive(Clone, Copy, Debug, Default)]
@@ -83,9 +84,9 @@ impl CsvFile {
         };
         let mut inputs: Vec<Channel> = columns.into_iter().zip(&signals).map(named).collect();
         let outputs = inputs.split_off(layout.inputs.len());
-        let (states, hold, initial) = (layout.states.clone(), Hold::default(), Initial::default());
-        Record { name, states: states.into(), time, inputs: inputs.into(), outputs: outputs.into(), hold, initial }
-            .checked()
+        let (states, inputs, outputs) = (layout.states.clone().into(), inputs.into(), outputs.into());
+        let (hold, initial) = (Hold::default(), Initial::default());
+        Record { name, states, time, inputs, outputs, hold, initial, looked: Arc::default() }.checked()
     }
 
     /// The time stamps of the first rows, for a clock that turned out uneven.
