@@ -43,8 +43,8 @@ impl fmt::Debug for Interleaved {
 
 impl Interleaved {
     /// The columns of pieces, one piece in each lane. `None` where they are not kept: for programs that read time or step, for
-    /// long records, for records that were run together with others before, at first, and for programs without slopes, which run once or twice a fit, unless a program with slopes has kept the
-    /// same columns.
+    /// long records, at first for records that were run together with others before, and for programs without slopes, which
+    /// run once or twice a fit, unless a program with slopes has kept the same columns.
     pub(super) fn of<'p>(
         &self,
         compiled: &Compiled,
@@ -82,8 +82,8 @@ impl Interleaved {
         }
         let from = channels().map(|channel| channel.values.clone()).collect();
         let (begins, others) = (begins().collect(), self.lock().iter().any(|kept| stands_alike(kept)));
-        // Some of these records were run together with others before: searches of a fleet have ended. Those that remain may need one
-        // pass only, so that their columns are kept from the second one on.
+        // Some of these records were run together with others before: searches of a fleet have ended. Those that remain may
+        // need one pass only, so that their columns are kept from the second one on.
         if known.is_none() && others {
             self.lock().push(Arc::new(Kept::asked(compiled, begins, samples, from)));
             return None;
