@@ -141,7 +141,7 @@ fn extended_least_squares_at_every_speed() {
         let Record { axis, spans, cycles, .. } = cycles(number);
         let mut worst = Worst([0.0; 2]);
         for cycle in cycles.iter().step_by(every(6)) {
-            let spans = spans.cut(cycle.samples.clone());
+            let spans = spans.cut(cycle.samples.clone()).bent(axis.ke, axis.ls).unwrap();
             let equations = |i0| spans.extended(i0).prefiltered(&filter());
             let i0 = Extended::search_i0(0.03, 1.0, |i0| equations(i0).least_squares()).unwrap();
             let found = equations(i0).solve().unwrap();
