@@ -43,7 +43,7 @@ fn each_cycle(number: u8) -> &'static [CycleSpans] {
     })
 }
 
-// Measured on all cycles: Ke at most 0.017 to 0.050 % off, R 0.027 to 0.077 %. With other seeds of the sensors' noise the
+// Measured on all cycles: Ke at most 0.018 to 0.028 % off, R 0.000 to 0.027 %. With other seeds of the sensors' noise the
 // slowest cycle comes to 0.1 % (one of 36 records at 0.105 %).
 #[test]
 fn extended_regression_with_what_is_the_motors_in_common() {

@@ -187,16 +187,16 @@ mod tests {
         spans.extended(0.15).solve().unwrap().parameters
     }
 
-    // What is left out is of the order of (R Ts / L)^2 / 12 = 6e-5 and of x^4 / 45 = 4e-6 of the voltages.
+    // What is left out is of the order of R Ts x / L, the angle by which the voltage of the resistance turns on, squared: 1e-5. Found:
+    // R 1.3e-6 off, lq 6.5e-5; without the bend R is off by 6e-4, without the factor as well by 1.5e-3.
     #[test]
     fn a_held_voltage_and_the_bend_between_samples_are_allowed_for() {
         let spans = spans();
         let bent = found(&spans.clone().bent(TRUTH.ke, TRUTH.ls).unwrap());
-        println!("{bent:?}\n{:?}", found(&spans));
-        assert_relative_eq!(bent.r, TRUTH.rs, max_relative = 2e-4);
+        assert_relative_eq!(bent.r, TRUTH.rs, max_relative = 1e-5);
         assert_relative_eq!(bent.lq, TRUTH.ls, max_relative = 2e-4);
-        assert_relative_eq!(bent.ke, TRUTH.ke, max_relative = 1e-5);
-        assert!(bent.vdt.abs() < 1e-3, "{}", bent.vdt);
+        assert_relative_eq!(bent.ke, TRUTH.ke, max_relative = 1e-6);
+        assert!(bent.vdt.abs() < 1e-4, "{}", bent.vdt);
         assert!(spans.clone().bent(0.6, 0.0).is_err() && spans.bent(f64::NAN, 6e-3).is_err());
     }
 
