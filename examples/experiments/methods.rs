@@ -2,7 +2,7 @@
 
 use greybox::online::{AdaptationLaw, Mras, MrasStart, Order, Stepping, Watch};
 use greybox::pmsm::drive::Simulation;
-use greybox::pmsm::offline::{Axes, Equations, Extended, ExtendedWithI0, Form, Spans};
+use greybox::pmsm::offline::{Axes, Equations, Extended, Form, Spans};
 use greybox::pmsm::program::{Cycle, Program};
 use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::{Currents, Drive, ExactStep, ExactSurface, HeldIn, MotorLaw, NotAdapted, Surface, Winding};
@@ -67,16 +67,6 @@ pub fn solve_extended(spans: &Spans) -> Result<LinearEstimate<Extended>> {
     let filter = low_pass(spans.ts)?;
     let i0 = Extended::search_i0(0.03, 1.0, |i0| spans.extended(i0).prefiltered(&filter).least_squares())?;
     Ok(spans.extended(i0).prefiltered(&filter).solve()?)
-}
-
-/// The extended equations of a whole record with the current at which the dead time turns over among the unknowns, for a motor
-/// of about the data sheet's Ke and inductance.
-pub fn extended_with_i0(run: &Run) -> Result<Equations<ExtendedWithI0>> {
-    let (spans, filter) = (run.spans.clone().bent(run.axis.ke, run.axis.ls)?, low_pass(run.spans.ts)?);
-    let extended = |i0| spans.extended(i0).prefiltered(&filter);
-    let i0 = Extended::search_i0(0.03, 1.0, |i0| extended(i0).least_squares())?;
-    let vdt = extended(i0).solve()?.parameters.vdt;
-    Ok(spans.extended_with_i0(i0, vdt).prefiltered(&filter))
 }
 
 /// Error of Ke (%) over time of the observer with this resistance and inductance, fed with the voltage less the dead time

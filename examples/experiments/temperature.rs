@@ -6,7 +6,7 @@ use crate::report::Report;
 use crate::speeds::CYCLE_SPEED;
 use greybox::pmsm::Winding;
 use greybox::pmsm::drive::Simulation;
-use greybox::pmsm::offline::Axes;
+use greybox::pmsm::offline::{Axes, Equations, Extended, ExtendedWithI0};
 use greybox::pmsm::program::Program;
 use greybox::pmsm::robot::RobotAxis;
 use greybox::pmsm::temperature::{Celsius, Estimated};
@@ -16,6 +16,16 @@ use greybox::regress::LinearEstimate;
 fn ke(run: &Run) -> Result<Estimated> {
     let found = solve_extended(&run.spans)?;
     Ok(Estimated { value: found.parameters.ke, std: found.standard_errors.ke })
+}
+
+/// The extended equations of a whole record with the current at which the dead time turns over among the unknowns, for a motor
+/// of about the data sheet's Ke and inductance.
+fn extended_with_i0(run: &Run) -> Result<Equations<ExtendedWithI0>> {
+    let (spans, filter) = (run.spans.clone().bent(run.axis.ke, run.axis.ls)?, low_pass(run.spans.ts)?);
+    let extended = |i0| spans.extended(i0).prefiltered(&filter);
+    let i0 = Extended::search_i0(0.03, 1.0, |i0| extended(i0).least_squares())?;
+    let vdt = extended(i0).solve()?.parameters.vdt;
+    Ok(spans.extended_with_i0(i0, vdt).prefiltered(&filter))
 }
 
 /// Rise of the winding between two records of the same motion.
