@@ -4,10 +4,12 @@
 //! iteration. The rows are kept, because standard errors that allow for correlation need the residuals in their order; the solution itself
 //! comes from the [`Information`] triangle.
 
+mod change;
 mod error;
 mod estimate;
 mod pooled;
 
+pub use change::Change;
 pub use error::RegressionError;
 pub use estimate::{Assumption, LinearEstimate};
 pub use pooled::PooledRegression;
@@ -180,26 +182,20 @@ impl<P: Signals> Regression<P> {
         scores.and_then(|scores| information.sandwich(&scores).ok()).ok_or(RegressionError::OutOfRange)
     }
 
-    // The triangle of the scores. Newey and West's sum over lags with Bartlett's falling weights is the sum of squares of
-    // moving sums of `lags + 1` scores, which a triangle absorbs like any other rows; without lags it is White's. `leverage`
-    // is that of a row of weight one.
+    // The triangle of the scores. `leverage` is that of a row of weight one.
     fn scores(&self, solution: &[f64], lags: usize, leverage: impl Fn(&[f64]) -> Option<f64>) -> Option<Information> {
-        let mut scores: Vec<P::Array<f64>> = Vec::with_capacity(self.rows.len());
-        for row in self.rows.iter().filter(|row| row.weight > 0.0) {
+        Some(moving_sums::<P>(&self.each_score(solution, leverage)?, lags))
+    }
+
+    // The score of each row that has a weight: its slopes times its residual, divided by one less its leverage.
+    fn each_score(&self, solution: &[f64], leverage: impl Fn(&[f64]) -> Option<f64>) -> Option<Vec<P::Array<f64>>> {
+        let used = self.rows.iter().filter(|row| row.weight > 0.0);
+        used.map(|row| {
             let leverage = row.weight * leverage(P::into_array(row.regressor).as_ref())?;
             let score = row.weight * row.residual(solution) / (1.0 - leverage).max(ALONE);
-            scores.push(P::into_array(P::map(row.regressor, |phi| phi * score)));
-        }
-        let (rows, window) = (scores.len(), lags.min(scores.len()) + 1);
-        let share = (window as f64).sqrt().recip();
-        let mut sums = P::array_from_fn(|_| 0.0);
-        Some(triangle::<P>((0..rows + window - 1).map(|t| {
-            for (i, sum) in sums.as_mut().iter_mut().enumerate() {
-                *sum += if t < rows { scores[t].as_ref()[i] } else { 0.0 };
-                *sum -= if t >= window { scores[t - window].as_ref()[i] } else { 0.0 };
-            }
-            (P::array_from_fn(|i| sums.as_ref()[i] * share), 0.0)
-        })))
+            Some(P::into_array(P::map(row.regressor, |phi| phi * score)))
+        })
+        .collect()
     }
 
     fn check(&self) -> Result<(), RegressionError> {
@@ -224,6 +220,21 @@ impl<P: Signals> Row<P> {
         let regressor = P::into_array(self.regressor);
         self.y - regressor.as_ref().iter().zip(parameters).map(|(phi, theta)| phi * theta).sum::<f64>()
     }
+}
+
+// Newey and West's sum over lags with Bartlett's falling weights is the sum of squares of moving sums of `lags + 1` scores,
+// which a triangle absorbs like any other rows; without lags it is White's.
+fn moving_sums<P: Signals>(scores: &[P::Array<f64>], lags: usize) -> Information {
+    let (rows, window) = (scores.len(), lags.min(scores.len()) + 1);
+    let share = (window as f64).sqrt().recip();
+    let mut sums = P::array_from_fn(|_| 0.0);
+    triangle::<P>((0..rows + window - 1).map(|t| {
+        for (i, sum) in sums.as_mut().iter_mut().enumerate() {
+            *sum += if t < rows { scores[t].as_ref()[i] } else { 0.0 };
+            *sum -= if t >= window { scores[t - window].as_ref()[i] } else { 0.0 };
+        }
+        (P::array_from_fn(|i| sums.as_ref()[i] * share), 0.0)
+    }))
 }
 
 fn triangle<P: Signals>(rows: impl Iterator<Item = (P::Array<f64>, f64)>) -> Information {

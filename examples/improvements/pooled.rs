@@ -25,7 +25,7 @@ pub struct CycleSpans {
 pub fn cycles(run: &Run) -> Result<Vec<CycleSpans>> {
     let filter = low_pass(run.spans.ts)?;
     let cycle = |cycle: &Cycle| {
-        let spans = run.spans.cut(cycle.samples.clone());
+        let spans = run.spans.cut(cycle.samples.clone()).bent(run.axis.ke, run.axis.ls)?;
         let i0 = Extended::search_i0(0.03, 1.0, |i0| spans.extended(i0).prefiltered(&filter).least_squares())?;
         Ok(CycleSpans { speed: cycle.speed, spans, i0 })
     };

@@ -12,12 +12,12 @@ mod plain;
 mod validate;
 
 pub use equations::Equations;
-pub use extended::Extended;
+pub use extended::{Extended, ExtendedWithI0};
 pub use plain::{Axes, Form};
 pub use validate::Validation;
 
 use super::drive::Log;
-use super::{AngledDrive, Currents, Drive, PolePairs};
+use super::{AngledDrive, Currents, Drive, MotorError, PolePairs, SQRT_2_3};
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::signals::Signals;
@@ -38,6 +38,8 @@ pub struct Span {
     pub w: f64,
     /// Angle at mid-interval (rad, mechanical).
     pub theta: f64,
+    /// By how much the mean current along the flux is below that of a straight line between its ends (A); see [`Spans::bent`].
+    pub bend: f64,
 }
 
 impl Span {
@@ -84,6 +86,7 @@ impl Spans {
                 uq: a.uq,
                 w: b.w,
                 theta: 0.5 * (a.theta + b.theta),
+                bend: 0.0,
             }
         });
         Spans { ts: log.ts, pole_pairs, spans: spans.collect() }
@@ -128,9 +131,30 @@ impl Spans {
             let w = if speed == Speed::AtSample { 0.5 * (u.w + next.w) } else { u.w };
             let middle = theta + 0.5 * w * ts;
             theta += w * ts;
-            Span { i0: outputs[k - 1], i1: outputs[k], ud: u.ud, uq: u.uq, w, theta: middle }
+            Span { i0: outputs[k - 1], i1: outputs[k], ud: u.ud, uq: u.uq, w, theta: middle, bend: 0.0 }
         });
         Ok(Spans { ts, pole_pairs, spans: spans.collect() })
+    }
+
+    /// The same with the bend of the currents within an interval, for a motor of about this `ke` (V s/rad) and inductance `l`
+    /// (H), such as those of the data sheet or of a first estimate.
+    ///
+    /// The inverter's voltage stands still for an interval while the EMF turns on with the rotor. Seen from the stator, in axes
+    /// that stand where the rotor's are at mid-interval, the currents therefore have the second derivative `we E / l` along the
+    /// flux, with the EMF's amplitude `E = sqrt(2/3) ke w`: the sample times see a parabola at its ends only, and the mean is below
+    /// theirs by `Ts E sin(x) / (6 l)`, `x = we Ts/2`. Axis 5 of the reference robot at 450 rad/s: 0.09 A, beside 0.15 A at which
+    /// the dead time turns over.
+    ///
+    /// # Errors
+    /// An inductance that is not positive, a `ke` that is not finite.
+    pub fn bent(mut self, ke: f64, l: f64) -> Result<Spans, MotorError> {
+        let emf = SQRT_2_3 * MotorError::finite("Ke", ke, "V s/rad")?;
+        let l = MotorError::positive("inductance", l, "H")?;
+        for span in &mut self.spans {
+            let x = 0.5 * self.pole_pairs.electrical(span.w) * self.ts;
+            span.bend = self.ts * emf * span.w * x.sin() / (6.0 * l);
+        }
+        Ok(self)
     }
 
     /// The intervals whose both ends lie within these samples.

@@ -167,6 +167,18 @@ impl Estimated {
         propagate([cold, warm, r20], |[cold, warm, r20]| (warm - cold) / (r20 * COPPER))
     }
 
+    /// The same from the change of the resistance between a cold and a warm record of one motion, as
+    /// [`Regression::change`](crate::regress::Regression::change) finds it: what the equations miss repeats in both records and
+    /// cancels, which independent errors do not allow for. What multiplies both resistances does not cancel; it acts as an error of
+    /// `r20` does, and so is counted there: one within 0.2 % is a standard error of `0.002 / sqrt(3)` of `r20`.
+    ///
+    /// # Errors
+    /// As [`winding_rise`](Self::winding_rise).
+    pub fn winding_rise_by(change: Estimated, r20: Estimated) -> Result<Estimated, MotorError> {
+        MotorError::positive("resistance of the motor at 20 C", r20.value, "ohm")?;
+        propagate([change, r20], |[change, r20]| change / (r20 * COPPER))
+    }
+
     /// Rise (K) of the magnet between a cold and a warm estimate of Ke, below 150 C; `cold_at` is the temperature of the
     /// cold one. The two errors are taken as independent.
     ///
@@ -253,6 +265,13 @@ mod tests {
         let e = |value, std| Estimated { value, std };
         let read = Estimated::winding_rise(e(0.63, 1e-3), e(0.685, 1e-3), e(0.4, 0.0)).unwrap();
         assert_relative_eq!(read.std, 2f64.sqrt() * 1e-3 / (COPPER * 0.4), max_relative = 1e-12);
+        // The same of a change that is known to so much; half a percent of r20 is half a percent of the rise.
+        let by = Estimated::winding_rise_by(e(0.055, 2f64.sqrt() * 1e-3), e(0.4, 0.0)).unwrap();
+        assert_relative_eq!(by.value, read.value, max_relative = 1e-12);
+        assert_relative_eq!(by.std, read.std, max_relative = 1e-12);
+        let by = Estimated::winding_rise_by(e(0.055, 0.0), e(0.4, 0.002)).unwrap();
+        assert_relative_eq!(by.std, 0.005 * by.value, max_relative = 1e-12);
+        assert!(Estimated::winding_rise_by(e(0.055, 0.0), e(0.0, 0.0)).is_err());
         // SPEC: with the cable in the denominator, 35 K read 22 K.
         let with_cable =
             Estimated::winding_rise(e(0.63, 0.0), e(0.63 + 35.0 * COPPER * 0.4, 0.0), e(0.63, 0.0)).unwrap();

@@ -36,6 +36,16 @@ pub enum RegressionError {
         /// How many parameters there are.
         parameters: usize,
     },
+    /// Two regressions whose rows are not those of the same experiment.
+    #[error(
+        "{rows} and {later} row(s) with a weight do not go together pair by pair; take two records of the same motion, of the same length and with the same rows left out"
+    )]
+    NotPaired {
+        /// Rows of the earlier one whose weight is not zero.
+        rows: usize,
+        /// Those of the later one.
+        later: usize,
+    },
     /// Directions in which the parameters may move without any effect on the rows.
     #[error(
         "the rows do not determine the parameters: {}; take rows that tell them apart or drop one of each",

@@ -1,5 +1,5 @@
 use crate::prefilter::Butterworth;
-use crate::regress::{LinearEstimate, Regression, RegressionError};
+use crate::regress::{Change, LinearEstimate, Regression, RegressionError};
 use crate::signals::{Of, Signals};
 
 /// Voltage equations `y = phi . p` of a record: one stream per axis, one row per sample, to be filtered and weighted
@@ -90,6 +90,14 @@ impl<P: Signals> Equations<P> {
     /// As [`Regression::solve`].
     pub fn solve(&self) -> Result<LinearEstimate<P>, RegressionError> {
         self.regression().solve()
+    }
+
+    /// By how much the parameters changed from this record to `later`, one of the same motion; see [`Regression::change`].
+    ///
+    /// # Errors
+    /// As [`Regression::change`].
+    pub fn change(&self, later: &Self) -> Result<Change<P>, RegressionError> {
+        self.regression().change(&later.regression())
     }
 
     /// The least weighted sum of squared residuals.
