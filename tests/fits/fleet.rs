@@ -1,7 +1,11 @@
 //! Fleets: every answer is that of the single fit.
 
+use crate::common::{Affine, Line, Voltage, levels, simulated};
 use greybox::pmsm::{Currents, Drive, Surface, Winding};
-use greybox::{Error, Estimate, Experiment, ExperimentOf, Fit, Fleet, Hold, Horizon, Huber, Time, free, simulate};
+use greybox::{
+    Error, Estimate, Experiment, ExperimentOf, Fit, Fleet, Hold, Horizon, Huber, Nothing, Time, free, simulate,
+};
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 const TS: f64 = 1e-4;
 
@@ -130,4 +134,22 @@ fn a_time_limit_of_nothing_stops_every_fit_of_a_fleet() {
     let records = [motor(&model, 1, 400), motor(&model, 2, 400), motor(&model, 3, 400)];
     let fleet = Fleet::new(&model).parameters(parameters()).time_limit(std::time::Duration::ZERO).fleet().unwrap();
     assert_eq!(fleet.run(records).filter(Result::is_err).count(), 3);
+}
+
+/// Four groups of 32 records are read ahead for each thread.
+#[test]
+fn a_fleet_reads_ahead() {
+    let inputs: Vec<Voltage> = levels(6, 1, 3).into_iter().map(|u| Voltage { u }).collect();
+    let record = simulated(&Line, 1.0, inputs, Nothing, Affine { slope: 1.5, offset: -0.7 });
+    let read = AtomicUsize::new(0);
+    let records = (0..1000).map(|_| {
+        read.fetch_add(1, Relaxed);
+        record.clone()
+    });
+    let parameters = Affine { slope: free(1.0), offset: free(0.5) };
+    let fleet = Fleet::new(&Line).parameters(parameters).fleet().unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let first = pool.install(|| fleet.run(records).next().unwrap().unwrap());
+    assert!((first.parameters.slope - 1.5).abs() < 1e-6);
+    assert_eq!(read.load(Relaxed), 4 * 32 * 2);
 }

@@ -154,5 +154,8 @@ mod tests {
         let quadratic = Profile { standard_error: Some(0.2), ..profile };
         let drawn = quadratic.quadratic(&[(0.8, 4.0), (1.2, 4.0)]).unwrap();
         assert!(drawn.iter().all(|(value, drawn)| (drawn - rise(*value) / 4.0).abs() < 1e-9), "{drawn:?}");
+        // 65 points, evenly from the first to the last of the curve.
+        let even = |i: usize| (drawn[i].0 - (0.8 + 0.4 * i as f64 / 64.0)).abs() < 1e-12;
+        assert!(drawn.len() == 65 && (0..65).all(even), "{drawn:?}");
     }
 }
