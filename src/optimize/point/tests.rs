@@ -47,6 +47,25 @@ fn what_the_cost_resolves() {
     assert_eq!(at(0.0, linear(&[(1.0, 0.0)]).with_data_norm(1e6)).rounding(), 0.0);
 }
 
+/// A cost that logarithms of variances have made negative is measured by its squares; a residual is rounding within ten roundings of
+/// an unknown of 6, unless the data are so small that it is more than 1e-10 of them.
+#[test]
+fn sizes_and_rounding_of_a_residual() {
+    let mut likelihood = far();
+    likelihood.cost = -3.0;
+    assert_eq!(at(0.0, likelihood.clone()).cost_size(), 12.5);
+    likelihood.cost = -30.0;
+    assert_eq!(at(0.0, likelihood).cost_size(), 30.0);
+    let ended = |linear: Linearization| at(6.0, linear).ended(&Stop::default());
+    let roundings = |count: f64| linear(&[(1.0, count * 6.0 * f64::EPSILON)]);
+    assert_eq!(ended(linear(&[(1.0, 0.0)])), Some(Outcome::Exact));
+    assert_eq!(ended(roundings(9.9)), Some(Outcome::Exact));
+    assert_ne!(ended(roundings(10.1)), Some(Outcome::Exact));
+    let size = 9.9 * 6.0 * f64::EPSILON;
+    assert_eq!(ended(roundings(9.9).with_data_norm(1.1e10 * size)), Some(Outcome::Exact));
+    assert_ne!(ended(roundings(9.9).with_data_norm(0.9e10 * size)), Some(Outcome::Exact));
+}
+
 /// The full step is `sqrt(2 * 4.5 / 25 * 2)` standard errors long, of two rows.
 #[test]
 fn a_search_without_a_lower_cost() {
