@@ -134,10 +134,8 @@ fn check(records: &[ExperimentOf<Bending>], told: Told) {
         let spread: f64 = y.iter().map(|y| (y - mean).powi(2)).sum();
         assert_eq!(output.fit.samples, y.len() as u64);
         let rmse = (squares / y.len() as f64).sqrt();
-        if !told.weights {
-            close(output.fit.rmse, rmse, 1e-12, "rmse");
-            close(output.fit.fit_percent.unwrap(), 100.0 * (1.0 - (squares / spread).sqrt()), 1e-12, "fit");
-        }
+        close(output.fit.rmse, rmse, 1e-12, "rmse");
+        close(output.fit.fit_percent.unwrap(), 100.0 * (1.0 - (squares / spread).sqrt()), 1e-12, "fit");
         if !told.noise {
             ml[j] = rmse;
         }
@@ -149,7 +147,7 @@ fn check(records: &[ExperimentOf<Bending>], told: Told) {
     // Noise is estimated over `n - p`, of each output.
     let wider = if told.noise { 1.0 } else { (n / degrees).sqrt() };
     for (output, ml) in found.outputs.iter().zip(ml) {
-        close(output.fit.sigma, ml * wider, 1e-6, "sigma");
+        close(output.fit.sigma, ml * wider, 1e-5, "sigma");
     }
     for (rows, ml) in rows.iter_mut().zip(ml) {
         rows.iter_mut().for_each(|row| (row.error, row.slopes) = (row.error / ml, &row.slopes / ml));
@@ -194,9 +192,9 @@ fn check(records: &[ExperimentOf<Bending>], told: Told) {
         // A prior is not as uncertain as the noise.
         information(wider * wider).try_inverse().unwrap() * (wider * wider)
     };
-    // At a minimum: to 1e-6 of a standard error.
+    // At a minimum, of the noise of the last round but one.
     let left = (gradient.transpose() * &covariance * &gradient)[(0, 0)].sqrt();
-    assert!(left < 1e-5, "{told:?}: {left}");
+    assert!(left < if told.noise { 1e-5 } else { 1e-3 }, "{told:?}: {left}");
 
     let unit = information(1.0).try_inverse().unwrap();
     let root = (rows.iter().map(|row| row.error * row.error).sum::<f64>() + prior[0] * prior[0]).sqrt();
@@ -216,7 +214,7 @@ fn check(records: &[ExperimentOf<Bending>], told: Told) {
             false => values[i] + by * error,
         };
         for (end, by) in [(lower, -quantile), (upper, quantile)] {
-            assert!((end - moved(by)).abs() < tolerance * standard_error, "{what}: {end} {}", moved(by));
+            assert!((end - moved(by)).abs() < 3.0 * tolerance * standard_error, "{what}: {end} {}", moved(by));
         }
         if !sandwich {
             let index = |error: f64| 100.0 * (root * error * slopes[i] / values[i]).abs();
