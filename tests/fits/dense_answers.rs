@@ -101,7 +101,7 @@ fn check(records: &[ExperimentOf<Bending>], told: Told) {
     let problem = fit.problem().unwrap();
     let found = problem.run().unwrap();
     let names: Vec<&str> = found.unknowns.iter().map(|unknown| unknown.name.as_str()).collect();
-    assert_eq!(names, ["a", "b", "c[record 3]", "c[record 4]"]);
+    assert_eq!(names, ["a", "b", "c [record 3]", "c [record 4]"]);
     let values: Vec<f64> = found.unknowns.iter().map(|unknown| unknown.value).collect();
     let chain = if told.logarithm { values[1] } else { 1.0 };
 
