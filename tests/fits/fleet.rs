@@ -3,7 +3,8 @@
 use crate::common::{Affine, Line, Voltage, levels, simulated};
 use greybox::pmsm::{Currents, Drive, Surface, Winding};
 use greybox::{
-    Error, Estimate, Experiment, ExperimentOf, Fit, Fleet, Hold, Horizon, Huber, Nothing, Time, free, simulate,
+    Butterworth, Error, Estimate, Experiment, ExperimentOf, Fit, Fleet, Hold, Horizon, Huber, Nothing, Time, free,
+    simulate,
 };
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -152,4 +153,26 @@ fn a_fleet_reads_ahead() {
     let first = pool.install(|| fleet.run(records).next().unwrap().unwrap());
     assert!((first.parameters.slope - 1.5).abs() < 1e-6);
     assert_eq!(read.load(Relaxed), 4 * 32 * 2);
+}
+
+/// Fits behind a filter, and from several starts, are not advanced together: their answers are those of the single fits, too.
+#[test]
+fn filtered_fits_and_several_starts_of_a_fleet() {
+    let model = Surface::new(4).unwrap();
+    let records = [motor(&model, 1, 300), motor(&model, 2, 300)];
+    let filter = Butterworth::low_pass(2, 1000.0, TS).unwrap();
+    let fit = |record, filtered: bool| {
+        let fit = Fit::new(&model, record).parameters(parameters());
+        if filtered { fit.prefilter(filter) } else { fit.starts(3) }
+    };
+    for filtered in [true, false] {
+        let fleet = fit(&records[0], filtered).fleet().unwrap();
+        for (together, record) in fleet.run(records.clone()).zip(&records) {
+            let single = fit(record, filtered).run();
+            same(&together, &single, if filtered { "filtered" } else { "starts" });
+            let (together, single) = (together.unwrap(), single.unwrap());
+            assert_eq!((together.starts.is_some(), single.starts.is_some()), (!filtered, !filtered));
+            assert_eq!(together.method.prefilter, single.method.prefilter);
+        }
+    }
 }
