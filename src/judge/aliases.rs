@@ -128,7 +128,7 @@ fn unresolved_at<'p>(
     let few = |(decay, frequency): &&Mode| frequency * interval * SAMPLES > TAU && (decay * interval).exp() > LEFT;
     let modes = modes(objective, coordinates, point)?;
     let &mode = modes.iter().filter(few).max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let alias = TAU / interval * (mode.1 * interval / PI).round() - mode.1;
+    let alias = alias(mode.1, interval);
     let needed = (alias / mode.1).ln();
     let unknowns = &objective.problem.unknowns;
     let slopes = slopes(objective, coordinates, point, mode)?;
@@ -141,6 +141,11 @@ fn unresolved_at<'p>(
     let most = (0..moves.len()).max_by(|&a, &b| moves[a].total_cmp(&moves[b]))?;
     let reached = moves.iter().sum::<f64>() > needed.abs();
     reached.then(|| Unresolved { point, mode, interval, alias, name: unknowns.row[most].name.clone() })
+}
+
+/// The nearest other frequency with the same samples, so far apart: on the other side of the nearest multiple of half that of sampling.
+fn alias(frequency: f64, interval: f64) -> f64 {
+    TAU / interval * (frequency * interval / PI).round() - frequency
 }
 
 /// By how much, in logarithms, an unknown moves a frequency towards another one before it comes to its bound: `slope` is that of
@@ -290,6 +295,15 @@ mod tests {
         let expected = [3.0, 2.0, 2.0, 3.0, 3.0, 2.0, 10.0, 10.0, 10.0];
         for (found, expected) in found.into_iter().zip(expected) {
             assert!((found / expected - 1.0f64).abs() < 1e-14, "{found} {expected}");
+        }
+    }
+
+    /// Of 100 samples a second, in cycles per second: half of that is 50, and 100 a whole cycle a sample.
+    #[test]
+    fn frequencies_with_the_same_samples() {
+        for (frequency, other) in [(40.0, 60.0), (60.0, 40.0), (90.0, 110.0), (130.0, 170.0)] {
+            let found = alias(TAU * frequency, 0.01) / TAU;
+            assert!((found / other - 1.0f64).abs() < 1e-12, "{frequency}: {found}");
         }
     }
 
