@@ -110,6 +110,16 @@ fn points_beside() {
     assert!(beside(0.0, None).is_empty());
 }
 
+/// Columns of lengths 2 and 4 that are one: nothing changes where the first unknown moves twice as far as the second, against it.
+#[test]
+fn a_direction_without_influence() {
+    let mut information = Information::new(2);
+    information.absorb_row(&[2.0, 4.0], 1.0);
+    let linear = Linearization::new(0.5, 2, vec![information]);
+    let found = Point::new(vec![1.0; 2], linear, &Domain::default()).unwrap().without_influence();
+    assert!(found.len() == 1 && (found[0][0] / found[0][1] + 2.0).abs() < 1e-12, "{found:?}");
+}
+
 /// A step would gain 5e-7 of the cost 8.
 #[test]
 fn a_cost_that_no_step_lowers() {
