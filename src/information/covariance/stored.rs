@@ -66,6 +66,8 @@ mod tests {
     use super::super::Scores;
     use super::*;
 
+    type Change = dyn Fn(&mut Vec<Part>);
+
     /// An unknown; two that follow it; one that follows these and the first.
     fn stored() -> Stored {
         let part = |parent, own: &[usize], border: &[usize]| {
@@ -77,18 +79,20 @@ mod tests {
         Stored { scales: vec![1.0; 5], parts, matrix: None }
     }
 
+    fn scores(response: usize, passed: usize) -> Option<Scores> {
+        Some(Scores { response: vec![1.0; response], passed: vec![1.0; passed] })
+    }
+
     #[test]
     fn parts_that_do_not_fit_are_refused() {
         assert_eq!(Covariance::try_from(stored()).unwrap().size(), 5);
-        let scores =
-            |response: usize, passed: usize| Some(Scores { response: vec![1.0; response], passed: vec![1.0; passed] });
-        let refused = |change: &dyn Fn(&mut Vec<Part>)| {
+        let refused = |change: &Change| {
             let mut stored = stored();
             change(&mut stored.parts);
             Covariance::try_from(stored).unwrap_err()
         };
         let below = "must stand below one before it; the first has no border";
-        let wrong: [(&dyn Fn(&mut Vec<Part>), &str); 14] = [
+        let wrong: [(&Change, &str); 14] = [
             (&|parts| parts.clear(), "at least the part of the shared unknowns"),
             (&|parts| parts[0].parent = 1, below),
             (&|parts| (parts[0].border, parts[0].gain) = (vec![0], vec![1.0]), below),
