@@ -93,7 +93,7 @@ impl Judgement<'_> {
         let found = unresolved(self.objective, &self.end.coordinates, &self.residuals.points)?;
         let Unresolved { mode: (_, frequency), interval, alias, name, .. } = found;
         // Ends of other searches have been compared.
-        let compared = self.end.starts.as_ref().is_some_and(|starts| starts.tried > 1);
+        let compared = self.end.starts.is_some();
         let severity = if compared { Severity::Usable } else { Severity::UsableWithCare };
         let tried = if compared { "searches were started on both sides" } else { "no search was started there" };
         let text = format!(
@@ -128,22 +128,33 @@ fn unresolved_at<'p>(
     let few = |(decay, frequency): &&Mode| frequency * interval * SAMPLES > TAU && (decay * interval).exp() > LEFT;
     let modes = modes(objective, coordinates, point)?;
     let &mode = modes.iter().filter(few).max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let alias = TAU / interval * (mode.1 * interval / PI).round() - mode.1;
+    let alias = alias(mode.1, interval);
     let needed = (alias / mode.1).ln();
     let unknowns = &objective.problem.unknowns;
-    let (mut reach, mut most) = (0.0, (0.0, 0));
     let slopes = slopes(objective, coordinates, point, mode)?;
-    for (i, (slope, value)) in slopes.into_iter().zip(unknowns.values(coordinates)).enumerate() {
-        let (grows, parameter) = ((slope > 0.0) == (needed > 0.0), unknowns.row[i].parameter);
-        let bound = if grows == (value > 0.0) { parameter.upper } else { parameter.lower };
-        // Not a number, where the bound has another sign.
-        let moves = slope.abs() * (bound / value).ln().abs().min(REACH.ln());
-        reach += moves;
-        if moves > most.0 {
-            most = (moves, i);
-        }
-    }
-    (reach > needed.abs()).then(|| Unresolved { point, mode, interval, alias, name: unknowns.row[most.1].name.clone() })
+    let values = unknowns.values(coordinates);
+    let moves = (0..slopes.len()).map(|i| {
+        let parameter = unknowns.row[i].parameter;
+        moved_within(slopes[i], values[i], needed, (parameter.lower, parameter.upper))
+    });
+    let moves: Vec<f64> = moves.collect();
+    let most = (0..moves.len()).max_by(|&a, &b| moves[a].total_cmp(&moves[b]))?;
+    let reached = moves.iter().sum::<f64>() > needed.abs();
+    reached.then(|| Unresolved { point, mode, interval, alias, name: unknowns.row[most].name.clone() })
+}
+
+/// The nearest other frequency with the same samples, so far apart: on the other side of the nearest multiple of half that of sampling.
+fn alias(frequency: f64, interval: f64) -> f64 {
+    TAU / interval * (frequency * interval / PI).round() - frequency
+}
+
+/// By how much, in logarithms, an unknown moves a frequency towards another one before it comes to its bound: `slope` is that of
+/// the logarithm of the frequency over the logarithm of the unknown, `needed` has the sign of the change.
+fn moved_within(slope: f64, value: f64, needed: f64, (lower, upper): (f64, f64)) -> f64 {
+    let grows = slope.is_sign_positive() == needed.is_sign_positive();
+    let bound = if grows == value.is_sign_positive() { upper } else { lower };
+    // Not a number, where the bound has another sign.
+    slope.abs() * (bound / value).ln().abs().min(REACH.ln())
 }
 
 /// By which part of itself the frequency of an oscillation grows where an unknown grows by a part of itself, for each.
@@ -262,6 +273,38 @@ mod tests {
         measured.iter().for_each(|&k| values[k] = 1.0);
         let channel = Channel::new("y", "", values);
         Record::new(vec![], time, vec![], vec![channel]).unwrap()
+    }
+
+    /// An unknown of 2 that moves the frequency by half its own part grows to 6 for a higher frequency and falls to 1 for a lower one;
+    /// where it moves the other way it does the other; a negative one grows away from zero. Beyond a factor of ten nothing is looked
+    /// for, and neither bound of another sign nor none is nearer.
+    #[test]
+    fn unknowns_move_up_to_their_bounds() {
+        let moved = |slope: f64, value: f64, needed: f64, bounds| moved_within(slope, value, needed, bounds).exp();
+        let found = [
+            moved(0.5, 2.0, 0.1, (1.0, 6.0)).powi(2),
+            moved(0.5, 2.0, -0.1, (1.0, 6.0)).powi(2),
+            moved(-0.5, 2.0, 0.1, (1.0, 6.0)).powi(2),
+            moved(-0.5, 2.0, -0.1, (1.0, 6.0)).powi(2),
+            moved(1.0, -2.0, 0.1, (-6.0, -1.0)),
+            moved(1.0, -2.0, -0.1, (-6.0, -1.0)),
+            moved(1.0, 2.0, -0.1, (-3.0, 6.0)),
+            moved(1.0, 2.0, 0.1, (1.0, f64::INFINITY)),
+            moved(1.0, 2.0, 0.1, (1.0, 30.0)),
+        ];
+        let expected = [3.0, 2.0, 2.0, 3.0, 3.0, 2.0, 10.0, 10.0, 10.0];
+        for (found, expected) in found.into_iter().zip(expected) {
+            assert!((found / expected - 1.0f64).abs() < 1e-14, "{found} {expected}");
+        }
+    }
+
+    /// Of 100 samples a second, in cycles per second: half of that is 50, and 100 a whole cycle a sample.
+    #[test]
+    fn frequencies_with_the_same_samples() {
+        for (frequency, other) in [(40.0, 60.0), (60.0, 40.0), (90.0, 110.0), (130.0, 170.0)] {
+            let found = alias(TAU * frequency, 0.01) / TAU;
+            assert!((found / other - 1.0f64).abs() < 1e-12, "{frequency}: {found}");
+        }
     }
 
     #[test]

@@ -26,11 +26,10 @@ impl Judgement<'_> {
 
     /// The largest part of an output's movement that is an error and follows from the errors before.
     fn colored_part(&self) -> f64 {
-        let whiteness = self.residuals.whiteness.iter().enumerate();
-        let count = whiteness.len() as f64;
-        let parts = whiteness.filter_map(|(j, white)| {
-            let (chance, part) = (white.p_value * count, self.colored(j, white));
-            is_certain(chance, part).then_some(part)
+        let whiteness = &self.residuals.whiteness;
+        let parts = whiteness.iter().enumerate().filter_map(|(j, white)| {
+            let part = self.colored(j, white);
+            is_certain(white.p_value, whiteness.len(), part).then_some(part)
         });
         parts.fold(0.0, f64::max)
     }
@@ -76,9 +75,10 @@ impl Judgement<'_> {
     }
 }
 
-/// Whether errors that are as far from white by such a chance, and whose colored part is such a part of the output, are taken
-/// as colored.
-fn is_certain(chance: f64, part: f64) -> bool {
+/// Whether the errors of one of so many outputs, which are as far from white by such a chance and whose colored part is such a part
+/// of the output, are taken as colored.
+fn is_certain(p_value: f64, outputs: usize, part: f64) -> bool {
+    let chance = p_value * outputs as f64;
     chance < CERTAIN || chance < LIKELY && part > MUCH
 }
 
@@ -95,11 +95,12 @@ pub(super) fn severity(part: f64) -> Severity {
 mod tests {
     use super::*;
 
-    /// On both sides of each level, and on the level.
+    /// On both sides of each level, and on the level, which several outputs share.
     #[test]
     fn color_is_certain_at_its_levels() {
-        assert!(is_certain(0.99e-4, 0.0) && !is_certain(1e-4, 0.0));
-        assert!(is_certain(4.9e-4, 0.051) && !is_certain(5e-4, 0.051) && !is_certain(4.9e-4, 0.05));
+        assert!(is_certain(0.99e-4, 1, 0.0) && !is_certain(1e-4, 1, 0.0));
+        assert!(is_certain(4.9e-4, 1, 0.051) && !is_certain(5e-4, 1, 0.051) && !is_certain(4.9e-4, 1, 0.05));
+        assert!(is_certain(0.24e-4, 4, 0.0) && !is_certain(0.26e-4, 4, 0.0));
         let levels = [0.501, 0.5, 1.01e-3, 1e-3].map(severity);
         use Severity::{NotUsable, Usable, UsableWithCare};
         assert_eq!(levels, [NotUsable, UsableWithCare, UsableWithCare, Usable]);

@@ -181,6 +181,29 @@ mod tests {
         assert!((found.p_value - 0.001_091).abs() < 1e-6, "{found:?}");
     }
 
+    /// Errors 1, 2, 3 and 2, 5, 7 of two outputs, the second measured at the first two samples only, with the weights 4, 3, 2: products
+    /// `4 * 2 + 3 * 10`, squares `4 + 3 * 4` and `4 * 4 + 3 * 25`, squared products `8^2 + 30^2`. Of the other lane nothing counts.
+    #[test]
+    fn products_of_samples_with_weights_by_hand() {
+        let mut window = Window::new(2, 2, 0, 3, false);
+        window.samples = vec![3, 3];
+        let values = [[1.0, 2.0], [2.0, 5.0], [3.0, 7.0]];
+        for (k, errors) in values.iter().enumerate() {
+            for (j, error) in errors.iter().enumerate() {
+                window.row_mut(k, j).copy_from_slice(&[*error, 100.0]);
+                window.set_measured(k, j, if j == 1 && k == 2 { 0b10 } else { 0b11 });
+            }
+        }
+        let sums = |weight: Option<&dyn Fn(usize) -> f64>| {
+            let mut found = Coupling::new(2);
+            found.add(&window, 0, weight);
+            let Pair { product, squares: [a, b], fourth } = found.pairs[0];
+            [product, a, b, fourth]
+        };
+        assert_eq!(sums(Some(&|k| 4.0 - k as f64)), [38.0, 16.0, 91.0, 964.0]);
+        assert_eq!(sums(None), [12.0, 5.0, 29.0, 104.0]);
+    }
+
     /// The same errors seven times, side by side, and a third output twice the first: sums of integers are exact.
     #[test]
     fn products_of_whole_windows_by_hand() {

@@ -18,7 +18,7 @@ impl Judgement<'_> {
     pub(super) fn shape(&self) -> Option<Warning> {
         let objective = self.objective;
         let (layout, count) = (objective.problem.layout(), objective.outputs());
-        if !self.is_static() || layout.inputs.is_empty() || objective.sweep.predicts_variance() {
+        if !self.is_static() {
             return None;
         }
         let mut sums = vec![(Portmanteau::new(LAGS), 0); count * layout.inputs.len()];

@@ -50,9 +50,8 @@ pub(super) fn step_errors(all: &[Compared<'_>]) -> Vec<f64> {
             sums[*i] = (sums[*i].0 + change, sums[*i].1 + samples);
         }
     }
-    let whole = |(one, (change, seen)): (&Compared<'_>, (f64, usize))| {
-        if seen > 0 { change * one.record().len() as f64 / seen as f64 } else { 0.0 }
-    };
+    let whole =
+        |(one, (change, seen)): (&Compared<'_>, (f64, usize))| change * one.record().len() as f64 / seen.max(1) as f64;
     all.iter().zip(sums).map(whole).collect()
 }
 

@@ -114,6 +114,31 @@ mod tests {
     use crate::Time;
     use crate::record::Channel;
 
+    /// Of a piece that begins at the third of six samples: by its value the fourth is suspicious, by their places the third and the
+    /// last; the fifth is not measured.
+    #[test]
+    fn errors_inside_and_outside() {
+        let channel = Channel::new("y", "", vec![9.0, 1.0, 2.0, 9.0, f64::NAN, 3.0]);
+        let record = Record::new(vec![], Time::Uniform { start: 0.0, step: 1.0 }, vec![], vec![channel]).unwrap();
+        let suspect = |suspicion| Suspect::new(0, 0, &suspicion);
+        let suspects = [
+            suspect(Suspicion::Sentinel { value: 9.0, count: 2 }),
+            suspect(Suspicion::Frozen { value: 2.0, samples: 2..3 }),
+            suspect(Suspicion::Repeated { samples: 1..3, again: 4 }),
+        ];
+        let mut sums = Sums { record: &record, suspects: suspects.iter().collect(), splits: vec![Split::default(); 3] };
+        let mut window = Window::new(1, 1, 0, 4, false);
+        (window.begin, window.samples) = (vec![2], vec![4]);
+        for (k, error) in [2.0, 3.0, 5.0, 7.0].into_iter().enumerate() {
+            window.row_mut(k, 0)[0] = error;
+            window.set_measured(k, 0, u32::from(k != 2));
+        }
+        sums.add(&window, 0);
+        let numbers = |split: &Split| [split.inside, split.outside].map(|errors| (errors.squares, errors.count));
+        let found: Vec<_> = sums.splits.iter().map(numbers).collect();
+        assert_eq!(found, [[(9.0, 1), (53.0, 2)], [(4.0, 1), (58.0, 2)], [(49.0, 1), (13.0, 2)]]);
+    }
+
     /// Errors of 1 and 3 inside, of 1, 1, 0 and 0 outside, in two pieces of a record: mean squares of 5 and of a half.
     #[test]
     fn errors_of_pieces_add_up() {

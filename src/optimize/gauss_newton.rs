@@ -210,6 +210,20 @@ mod tests {
         }
     }
 
+    /// Trials that cannot be evaluated are counted, from the one that halves the step for the first time.
+    #[test]
+    fn trials_that_fail_are_counted() {
+        let mut search = GaussNewton::default();
+        search.begin(vec![6.0], Domain::default());
+        search.tell(Ok(linear(&[(1.0, 3.0), (0.0, 4.0)])));
+        let mut trials = 0;
+        while let Request::Linearize(_) = search.request() {
+            search.tell(Err(Infeasible::Failed(String::new())));
+            trials += 1;
+        }
+        assert!(matches!(search.outcome(), Some(Outcome::Stalled { failed, .. }) if failed == trials && trials > 10));
+    }
+
     /// From the cost 12.5 along a step of 3 whose slope is -9: enough is 9e-4, and a column that vanishes went too far.
     #[test]
     fn a_trial_is_accepted_for_what_it_gains() {

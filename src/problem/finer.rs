@@ -114,7 +114,28 @@ fn differ(this: f64, finer: f64) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::differ;
+    use super::*;
+    use crate::tests::{Current, Gain, Line, Voltage};
+    use crate::{Experiment, Fit, Time, free};
+
+    /// Searches by finer methods have 20 trial steps at a time, five times as many from several starts; a search that is limited more
+    /// keeps its own limit. The sweep of a method is found by its description.
+    #[test]
+    fn finer_methods_search_within_limits() {
+        let outputs = (0..4).map(|k| Current { i: f64::from(k) }).collect();
+        let time = Time::Uniform { start: 0.0, step: 1.0 };
+        let record = Experiment::new(&Line, time, vec![Voltage { u: 1.0 }; 4], outputs).unwrap();
+        let problem = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).problem().unwrap();
+        let made = problem.sweep.clone();
+        let sweeps = || FinerSweeps::new(vec![Arc::new(|| Ok(made.clone())) as MakeSweep<'_>]);
+        for (starts, trials) in [(1, 20), (2, 100)] {
+            let settings = Settings { starts, ..problem.settings.clone() };
+            let refined = Problem { settings, ..problem.clone() }.refining(sweeps());
+            assert_eq!(refined.finer(0).unwrap().settings.optimizer.most(), trials);
+            assert!(refined.finer(1).is_none() && refined.refines && refined.by_method().count() == 2);
+        }
+        assert!(sweeps().by_name(&made.integrator()).is_some() && sweeps().by_name("another").is_none());
+    }
 
     #[test]
     fn costs_differ_by_a_tenth_of_the_smaller_one() {

@@ -91,7 +91,7 @@ fn of(values: impl IntoIterator<Item = f64>) -> Probe {
 
 /// Prediction errors and variances of an experiment; not a number if the search was stopped meanwhile.
 fn errors(plain: &Objective<'_>, e: usize, coordinates: &[f64]) -> Probe {
-    let (mut probe, mut number, mut samples) = (Probe::default(), 0, 0);
+    let (mut probe, mut number) = (Probe::default(), 0);
     // How far a simulation comes before it fails is part of the answer.
     let _ = plain.run_alone(e, coordinates, false, &mut |window| {
         for k in 0..window.samples[0] {
@@ -103,8 +103,7 @@ fn errors(plain: &Objective<'_>, e: usize, coordinates: &[f64]) -> Probe {
                 number += 1;
             }
         }
-        samples += window.samples[0];
-        samples < SAMPLES
+        number < SAMPLES * window.outputs()
     });
     if plain.control.stops() { Probe { sum: f64::NAN, size: f64::NAN } } else { probe }
 }
@@ -147,7 +146,23 @@ fn numbers(record: &Record, hash: &mut Sha256) {
 
 #[cfg(test)]
 mod tests {
-    use super::of;
+    use super::*;
+    use crate::tests::{Current, Gain, Line, Voltage};
+    use crate::{Experiment, Fit, Time, free};
+
+    /// Errors of one, from values of zero, with the factors of their numbers; those beyond the first 100,000 do not count, but for the
+    /// rest of a window of 64 samples. Each is followed by its variance, of one where none is predicted.
+    #[test]
+    fn errors_of_the_first_samples_are_probed() {
+        for (count, probed) in [(50, 50), (100_200, 100_032)] {
+            let (inputs, outputs) = (vec![Voltage { u: 0.0 }; count], vec![Current { i: 1.0 }; count]);
+            let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+            let problem = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).problem().unwrap();
+            let found = errors(&problem.objective().unwrap().in_units(), 0, &[1.0]);
+            let size: f64 = (0..probed).map(|k| 1.0 + f64::from(k % 97) / 97.0).sum();
+            assert!((found.size / (2.0 * size) - 1.0).abs() < 1e-12, "{} {size}", found.size);
+        }
+    }
 
     /// Values in another order are others, so is each value, and what is not finite does not count.
     #[test]

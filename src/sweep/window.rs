@@ -158,6 +158,11 @@ impl Window {
         self.values[((sample * self.outputs + output) * self.columns + column) * self.lanes + lane]
     }
 
+    /// One number of the row of an output's variance.
+    pub(crate) fn variance_at(&self, sample: usize, output: usize, column: usize, lane: usize) -> f64 {
+        self.variances[((sample * self.outputs + output) * self.columns + column) * self.lanes + lane]
+    }
+
     /// The prediction error.
     #[inline(always)]
     pub fn error(&self, sample: usize, output: usize, lane: usize) -> f64 {

@@ -82,6 +82,66 @@ fn the_rank_beside_zero() {
     assert_eq!((found.rank, found.generic_rank), (1, 2));
 }
 
+signals! { struct Blend { a: "1", b: "1" } }
+
+/// `y = a u + (a - 1) b w`.
+#[derive(Clone)]
+struct Blending;
+
+impl Model for Blending {
+    type State = Nothing;
+    type Input = Drive;
+    type Output = Answer;
+    type Parameters = Blend;
+    const KIND: Kind = Kind::Static;
+
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Drive<S>, p: &Blend<S>) -> Answer<S> {
+        Answer { y: p.a * u.u + (p.a - 1.0) * p.b * u.w }
+    }
+}
+
+/// Where `a` is one nothing is seen of `b`; beside it there is, by logarithm, too, which is zero there.
+#[test]
+fn the_rank_beside_one() {
+    for a in [free(1.0), free(1.0).log()] {
+        let inputs: Vec<Drive> =
+            (0..30).map(|k| Drive { u: (0.7 * f64::from(k)).sin(), w: (0.4 * f64::from(k)).cos() }).collect();
+        let outputs = inputs.iter().map(|u| Answer { y: u.u }).collect();
+        let record = Experiment::new(&Blending, Time::Uniform { start: 0.0, step: 0.1 }, inputs, outputs).unwrap();
+        let problem = Fit::new(&Blending, &record).parameters(Blend { a, b: free(2.0) }).problem().unwrap();
+        let estimate = problem.run().unwrap();
+        assert_eq!(estimate.parameters[0].value, 1.0);
+        let found = identifiability(&problem, &estimate).unwrap();
+        assert_eq!((found.rank, found.generic_rank), (1, 2), "{a:?}");
+    }
+}
+
+/// `25 (a - 2)^2` rises by the square of Student's t at the ends. Towards the upper one the logarithm's steps come out 7 % too long; the
+/// curve then goes on to where a parabola in the logarithm is 1.5 times as high.
+#[test]
+fn a_profile_is_drawn_beyond_its_ends() {
+    let inputs = vec![Drive { u: 1.0, w: 0.0 }; 25];
+    let error = |k: usize| if k == 24 { 0.0 } else { 1.0 - 2.0 * (k % 2) as f64 };
+    let outputs = (0..25).map(|k| Reading { y: 2.0 + error(k), z: if k == 24 { 0.0 } else { f64::NAN } }).collect();
+    let record = Experiment::new(&Amplifier, Time::Uniform { start: 0.0, step: 0.1 }, inputs, outputs).unwrap();
+    let parameters = Product { a: free(1.5).log(), b: fixed(1.0), c: fixed(0.0) };
+    let fit = Fit::new(&Amplifier, &record).parameters(parameters).noise(Reading { y: 1.0, z: 1.0 });
+    let problem = fit.problem().unwrap();
+    let found = profile(&problem, &problem.run().unwrap(), "a", 0.95).unwrap();
+    for point in &found.points {
+        assert!((point.rise - 25.0 * (point.value - 2.0).powi(2)).abs() < 1e-6, "{point:?}");
+    }
+    // Student's t at 97.5 % with 25 degrees of freedom (`z` is measured once), squared; the ends are found to a thousandth.
+    assert!((found.threshold - 2.059_539f64.powi(2)).abs() < 1e-4, "{}", found.threshold);
+    let (End::At(lower), End::At(upper)) = (found.lower, found.upper) else { panic!("{found:?}") };
+    for end in [lower, upper] {
+        assert!((5.0 * (end - 2.0).abs() / 2.059_539 - 1.0).abs() < 1.1e-3, "{end}");
+    }
+    let last = found.points[found.points.len() - 1].value;
+    let ratio = (last / 2.0).ln() / (upper / 2.0).ln();
+    assert!((ratio - 1.5f64.sqrt()).abs() < 1e-6, "{ratio}");
+}
+
 signals! { struct Dose { u: "1" } }
 signals! { struct Answer { y: "1" } }
 signals! { struct Saturation { top: "1", half: "1" } }

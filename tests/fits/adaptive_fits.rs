@@ -73,3 +73,39 @@ fn a_numeric_model_is_fitted() {
     assert_relative_eq!(estimate.parameters.r, 0.7, max_relative = 1e-7);
     assert_relative_eq!(estimate.parameters.l, 5e-3, max_relative = 1e-7);
 }
+
+signals! { pub struct Growth { rate: "1/(A s)" } }
+
+/// `i' = rate i^2`, which is infinite at `1 / (rate i(0))`.
+struct Explosive;
+
+impl Model for Explosive {
+    type State = Measured;
+    type Input = Source;
+    type Output = Measured;
+    type Parameters = Growth;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Measured<S>, _u: &Source<S>, p: &Growth<S>) -> Measured<S> {
+        Measured { i: p.rate * x.i * x.i }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Measured<S>, _u: &Source<S>, _p: &Growth<S>) -> Measured<S> {
+        *x
+    }
+}
+
+/// A prediction that an adaptive integrator cannot bring to its end is an error that says when.
+#[test]
+fn a_prediction_that_ends_early_is_refused() {
+    let record = |start: f64| {
+        let time = Time::Uniform { start: 0.0, step: 0.01 };
+        let outputs = (0..50).map(|k| Measured { i: 0.1 / (1.0 - 0.1 * 0.01 * f64::from(k)) }).collect();
+        let record = Experiment::new(&Explosive, time, vec![Source { u: 0.0 }; 50], outputs).unwrap();
+        record.initial(Measured { i: fixed(start) })
+    };
+    let (near, far) = (record(0.1), record(5.0));
+    let fit = |record| Fit::new(&Explosive, record).parameters(Growth { rate: free(1.1) }).integrator(Rk45::default());
+    let estimate = fit(&near).run().unwrap();
+    assert_relative_eq!(estimate.parameters.rate, 1.0, max_relative = 1e-6);
+    let Err(Error::Simulation(failure)) = fit(&far).predict(&estimate, &far) else { panic!("a prediction") };
+    // Infinite at 0.2 s.
+    assert!((19..=21).contains(&failure.sample), "{failure:?}");
+}

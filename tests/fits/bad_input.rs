@@ -136,6 +136,7 @@ fn parameters_without_sense() {
     run(free(0.001).within(0.01, 10.0), &["`r`", "0.001", "outside its bounds 0.01 to 10"]);
     run(free(1.0).within(10.0, 0.1), &["`r`", "10", "0.1", "lower must be below the upper"]);
     run(free(1.0).within(1.0, 1.0), &["`r`", "1 and 1", "use fixed"]);
+    assert!(Fit::new(&Rl, &record).parameters(Coil { r: fixed(1.0).within(1.0, 1.0), l: free(0.03) }).run().is_ok());
     run(free(1.0).within(f64::NAN, 2.0), &["`r`", "not a number and 2"]);
     run(free(1.0).within(0.0, f64::NAN), &["`r`", "0 and not a number"]);
     run(free(f64::NAN), &["`r`", "not a number", "finite start"]);

@@ -1,7 +1,12 @@
 //! Fleets: every answer is that of the single fit.
 
+use crate::common::{Affine, Line, Voltage, levels, simulated};
 use greybox::pmsm::{Currents, Drive, Surface, Winding};
-use greybox::{Error, Estimate, Experiment, ExperimentOf, Fit, Fleet, Hold, Horizon, Huber, Time, free, simulate};
+use greybox::{
+    Butterworth, Error, Estimate, Experiment, ExperimentOf, Fit, Fleet, Hold, Horizon, Huber, Nothing, Time, free,
+    simulate,
+};
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 const TS: f64 = 1e-4;
 
@@ -130,4 +135,44 @@ fn a_time_limit_of_nothing_stops_every_fit_of_a_fleet() {
     let records = [motor(&model, 1, 400), motor(&model, 2, 400), motor(&model, 3, 400)];
     let fleet = Fleet::new(&model).parameters(parameters()).time_limit(std::time::Duration::ZERO).fleet().unwrap();
     assert_eq!(fleet.run(records).filter(Result::is_err).count(), 3);
+}
+
+/// Four groups of 32 records are read ahead for each thread.
+#[test]
+fn a_fleet_reads_ahead() {
+    let inputs: Vec<Voltage> = levels(6, 1, 3).into_iter().map(|u| Voltage { u }).collect();
+    let record = simulated(&Line, 1.0, inputs, Nothing, Affine { slope: 1.5, offset: -0.7 });
+    let read = AtomicUsize::new(0);
+    let records = (0..1000).map(|_| {
+        read.fetch_add(1, Relaxed);
+        record.clone()
+    });
+    let parameters = Affine { slope: free(1.0), offset: free(0.5) };
+    let fleet = Fleet::new(&Line).parameters(parameters).fleet().unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let first = pool.install(|| fleet.run(records).next().unwrap().unwrap());
+    assert!((first.parameters.slope - 1.5).abs() < 1e-6);
+    assert_eq!(read.load(Relaxed), 4 * 32 * 2);
+}
+
+/// Fits behind a filter, and from several starts, are not advanced together: their answers are those of the single fits, too.
+#[test]
+fn filtered_fits_and_several_starts_of_a_fleet() {
+    let model = Surface::new(4).unwrap();
+    let records = [motor(&model, 1, 300), motor(&model, 2, 300)];
+    let filter = Butterworth::low_pass(2, 1000.0, TS).unwrap();
+    let fit = |record, filtered: bool| {
+        let fit = Fit::new(&model, record).parameters(parameters());
+        if filtered { fit.prefilter(filter) } else { fit.starts(3) }
+    };
+    for filtered in [true, false] {
+        let fleet = fit(&records[0], filtered).fleet().unwrap();
+        for (together, record) in fleet.run(records.clone()).zip(&records) {
+            let single = fit(record, filtered).run();
+            same(&together, &single, if filtered { "filtered" } else { "starts" });
+            let (together, single) = (together.unwrap(), single.unwrap());
+            assert_eq!((together.starts.is_some(), single.starts.is_some()), (!filtered, !filtered));
+            assert_eq!(together.method.prefilter, single.method.prefilter);
+        }
+    }
 }

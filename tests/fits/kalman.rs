@@ -428,6 +428,28 @@ fn a_noise_level_has_the_degrees_of_freedom_of_its_own_variance() {
     assert!((half / relative / 2.022_691 - 1.0).abs() < 1e-6 && !uneven, "{half} {relative}");
 }
 
+/// Noise levels are seen through the variance of their own output alone, by each measurement as much as by any other.
+#[test]
+fn noise_levels_are_excited_by_the_measurements_of_their_output() {
+    let mut noise = Noise(8);
+    let measured = |k: usize, every: usize, y: f64| if k.is_multiple_of(every) { y } else { f64::NAN };
+    let outputs = (0..40).map(|k| Sensors { y: measured(k, 2, 0.3 * noise.gauss()), z: 0.1 * noise.gauss() }).collect();
+    let time = Time::Uniform { start: 0.0, step: 1.0 };
+    let record = Experiment::new(&RandomWalk, time, vec![Push { u: 0.0 }; 40], outputs).unwrap();
+    let record = record.initial(Position { x: fixed(0.0) });
+    let parameters = Levels { drift: fixed(0.0), y: free(0.2), z: free(0.2) };
+    let problem = Fit::new(&RandomWalk, &record).parameters(parameters).predictor(Kalman).problem().unwrap();
+    let found = diagnose::identifiability(&problem, &problem.run().unwrap()).unwrap();
+    for (excited, (through, strength)) in found.excitation.iter().zip([([1.0, 0.0], 40f64), ([0.0, 1.0], 80.0)]) {
+        let shares: Vec<f64> = excited.outputs.iter().map(|(_, share)| *share).collect();
+        assert_eq!(shares, through, "{}", excited.name);
+        // The information of `n` errors about the logarithm of their size is `2 n`.
+        assert!((excited.strength / strength.sqrt() - 1.0).abs() < 1e-9, "{} {}", excited.name, excited.strength);
+        assert_eq!(excited.segments.len(), 10);
+        assert!(excited.segments.iter().all(|segment| (segment.share - 0.1).abs() < 1e-12), "{:?}", excited.segments);
+    }
+}
+
 /// With up to twelve unknowns each has degrees of freedom of its own; with more all have those of the measurements.
 #[test]
 fn degrees_of_freedom_of_many_unknowns() {

@@ -11,6 +11,7 @@ mod closure_sweep;
 mod common;
 mod contradictions;
 mod declared;
+mod dense_answers;
 mod extremes;
 mod far_starts;
 mod fleet;

@@ -106,3 +106,103 @@ fn one_moment(excited: &Excitation) -> Option<String> {
         )
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Collinear, Segment};
+    use super::*;
+    use crate::tests::{Current, Gain, Line, Voltage};
+    use crate::{Experiment, Fit, Time, free};
+
+    /// An unknown that is seen by these parts through `y` and the rest through `z`, and so in the tenths of two records.
+    fn excited(name: &str, through: f64, shares: [f64; 4]) -> Excitation {
+        let segment = |(i, share): (usize, f64)| Segment {
+            experiment: if i < 2 { "one" } else { "two" }.to_owned(),
+            from: 10.0 + 5.0 * i as f64,
+            share,
+        };
+        Excitation {
+            name: name.to_owned(),
+            strength: 1.0,
+            outputs: vec![("y".to_owned(), through), ("z".to_owned(), 1.0 - through)],
+            segments: shares.into_iter().enumerate().map(segment).collect(),
+        }
+    }
+
+    /// Advice on these, at full rank or another one there and elsewhere, with so many collinear sets of `a`.
+    fn advised(ranks: (u64, u64), sets: usize, excitation: &[Excitation], inputs: [f64; 2]) -> Vec<String> {
+        let inputs = [inputs, [inputs[0]; 2]];
+        let record = |inputs: [f64; 2]| {
+            let outputs = (0..2).map(|k| Current { i: f64::from(k) }).collect();
+            let time = Time::Uniform { start: 0.0, step: 1.0 };
+            Experiment::new(&Line, time, inputs.map(|u| Voltage { u }).to_vec(), outputs).unwrap()
+        };
+        let records = [record(inputs[1]), record(inputs[0])];
+        let estimate = Fit::new(&Line, &records).parameters(Gain { a: free(1.0) }).run().unwrap();
+        let unknown = |excited: &Excitation| Unknown { name: excited.name.clone(), ..estimate.unknowns[0].clone() };
+        let unknowns: Vec<Unknown> = excitation.iter().map(unknown).collect();
+        let set = Collinear { index: None, moves: vec![("a".to_owned(), 1.0), ("b".to_owned(), 1.0)] };
+        let found = Identifiability {
+            unknowns: vec![],
+            rank: ranks.0,
+            condition: None,
+            generic_rank: ranks.1,
+            collinear: vec![set; sets],
+            excitation: excitation.to_vec(),
+            advice: vec![],
+        };
+        let records: Vec<Record> = records.iter().map(|record| record.record().clone()).collect();
+        advice(&found, &unknowns, &records)
+    }
+
+    const EVEN: [f64; 4] = [0.25; 4];
+
+    #[test]
+    fn ranks_and_sets_are_advised_on() {
+        let two = [excited("a", 0.5, EVEN), excited("b", 0.5, EVEN)];
+        assert_eq!(advised((2, 2), 0, &two, [1.0, 2.0]), Vec::<String>::new());
+        let said = advised((0, 1), 0, &two, [1.0, 2.0]);
+        assert!(
+            said.len() == 1 && said[0].contains("to the 2 unknowns have rank 1: ") && said[0].contains("fix 1 of them")
+        );
+        let said = advised((1, 2), 0, &two, [1.0, 2.0]);
+        assert!(
+            said.len() == 1 && said[0].starts_with("at the estimate") && said[0].contains("have rank 1, elsewhere")
+        );
+        // Three sets are named and the others counted.
+        for (sets, last) in [(3, "`a` and `b`"), (4, "1 more set of unknowns"), (6, "3 more sets of unknowns")] {
+            let said = advised((2, 2), sets, &two, [1.0, 2.0]);
+            assert_eq!(said.len(), sets.min(4));
+            assert!(said[said.len() - 1].starts_with(last), "{said:?}");
+            assert!(said[..3].iter().all(|one| one.ends_with("; fix one, or excite them apart")), "{said:?}");
+        }
+    }
+
+    #[test]
+    fn excitation_is_advised_on() {
+        let said = advised((2, 2), 0, &[excited("a", 0.989, EVEN), excited("b", 0.011, EVEN)], [1.0, 2.0]);
+        assert_eq!(said, Vec::<String>::new());
+        let said = advised((2, 2), 0, &[excited("a", 0.992, EVEN), excited("b", 0.5, EVEN)], [1.0, 2.0]);
+        assert_eq!(
+            said,
+            [
+                "`a` is seen only through `y` (99.2 % of the information): `z` hardly depends on it, and cannot confirm it"
+            ]
+        );
+        let said = advised((2, 2), 0, &[excited("a", 0.993, EVEN), excited("b", 0.9995, EVEN)], [1.0, 2.0]);
+        assert!(
+            said.len() == 1 && said[0].starts_with("`a`, `b` are seen only through `y` (at least 99.3 % of"),
+            "{said:?}"
+        );
+        let said = advised((2, 2), 0, &[excited("a", 0.9992, EVEN), excited("b", 1.0, EVEN)], [1.0, 2.0]);
+        assert!(said.len() == 1 && said[0].contains("`y` (more than 99.9 % of the information)"), "{said:?}");
+        let said = advised((1, 1), 0, &[excited("a", 0.5, [0.02, 0.04, 0.03, 0.91])], [1.0, 2.0]);
+        assert_eq!(said, ["`a` is known from one tenth of `two` alone, 5 s after its start (91 %)"]);
+        assert!(advised((1, 1), 0, &[excited("a", 0.5, [0.04, 0.04, 0.03, 0.89])], [1.0, 2.0]).is_empty());
+        let said = advised((1, 1), 0, &[excited("a", 0.5, [0.0; 4])], [1.0, 2.0]);
+        assert_eq!(said, ["`a` moves no output at all: fix it"]);
+        assert!(advised((1, 1), 0, &[excited("a", 0.5, [0.0, 0.0, 0.0, 0.5])], [1.0, 2.0]).is_empty());
+        let said = advised((1, 1), 0, &[excited("a", 0.5, EVEN)], [1.5, 1.5]);
+        assert!(said.len() == 1 && said[0].starts_with("the input `u` is 1.5 throughout"), "{said:?}");
+    }
+}

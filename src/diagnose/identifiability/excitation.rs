@@ -25,7 +25,7 @@ impl Accumulate for Squares {
                     let mut square = window.at(k, j, c, lane).powi(2);
                     // Through the predicted variance of the output, too.
                     if window.has_variances() && window.is_measured(k, j, lane) {
-                        square += window.variance_row(k, j)[c * window.lanes() + lane].powi(2);
+                        square += window.variance_at(k, j, c, lane).powi(2);
                     }
                     self.by_output[unknown][j] += square;
                     self.by_segment[unknown][segment] += square;

@@ -154,5 +154,13 @@ mod tests {
         let quadratic = Profile { standard_error: Some(0.2), ..profile };
         let drawn = quadratic.quadratic(&[(0.8, 4.0), (1.2, 4.0)]).unwrap();
         assert!(drawn.iter().all(|(value, drawn)| (drawn - rise(*value) / 4.0).abs() < 1e-9), "{drawn:?}");
+        // Of an unknown that was estimated by its logarithm, a parabola in that: a standard error of 0.2 at 2 is one of 0.1 there.
+        let logarithm = Profile { value: 2.0, transform: Transform::Log, ..quadratic.clone() };
+        let in_logarithm = logarithm.quadratic(&[(1.7, 4.0), (2.4, 4.0)]).unwrap();
+        let is_square = |(value, drawn): &(f64, f64)| (drawn - ((value / 2.0).ln() / 0.1).powi(2)).abs() < 1e-9;
+        assert!(in_logarithm.len() == 65 && in_logarithm.iter().all(is_square), "{in_logarithm:?}");
+        // 65 points, evenly from the first to the last of the curve.
+        let even = |i: usize| (drawn[i].0 - (0.8 + 0.4 * i as f64 / 64.0)).abs() < 1e-12;
+        assert!(drawn.len() == 65 && (0..65).all(even), "{drawn:?}");
     }
 }

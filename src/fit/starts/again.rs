@@ -54,3 +54,39 @@ pub(super) fn search_again(
     let found = Starts { evaluations: found.evaluations + earlier.evaluations, ..found };
     Ok(SearchEnd { starts: Some(found), ..end })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimate::Minimum;
+    use crate::tests::{Current, Gain, Line, Voltage};
+    use crate::{Experiment, Fit, Time, free};
+
+    /// Searches go on from the minimum, which two had found, and from the start that could not be evaluated; the one that was given up
+    /// stays as it was.
+    #[test]
+    fn searches_that_had_ended_are_repeated() {
+        let inputs: Vec<Voltage> = (0..8).map(|k| Voltage { u: f64::from(1 - 2 * (k % 2)) }).collect();
+        let outputs = inputs.iter().enumerate().map(|(k, u)| Current { i: 2.0 * u.u + 0.1 * (k % 3) as f64 }).collect();
+        let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        let problem = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).problem().unwrap();
+        let plain = problem.objective().unwrap();
+        let at = |a: f64| vec![("a".to_owned(), a)];
+        let failed =
+            |a: f64, evaluated: bool, reason: &str| FailedStart { start: at(a), evaluated, reason: reason.to_owned() };
+        let minimum = Minimum { cost_ratio: 1.0, searches: 2, undetermined: vec![], unknowns: at(1.9) };
+        let earlier = Starts {
+            tried: 4,
+            agreed: 2,
+            minima: vec![minimum],
+            declared: Some(0),
+            failed: vec![failed(5.0, true, "given up"), failed(7.0, false, "no simulation")],
+            evaluations: 1000,
+        };
+        let end = search_again(&plain, &problem.settings.optimizer, &earlier).unwrap();
+        let found = end.starts.unwrap();
+        assert_eq!((found.tried, found.agreed, found.minima.len(), found.declared), (4, 3, 1, Some(0)));
+        assert_eq!(found.failed, [failed(5.0, true, "given up")]);
+        assert!(found.evaluations > 1000 && found.evaluations < 1100, "{}", found.evaluations);
+    }
+}

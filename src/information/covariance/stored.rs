@@ -60,3 +60,57 @@ impl TryFrom<Stored> for Covariance {
         Ok(Covariance::of_parts(scales, parts))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Scores;
+    use super::*;
+
+    type Change = dyn Fn(&mut Vec<Part>);
+
+    /// An unknown; two that follow it; one that follows these and the first.
+    fn stored() -> Stored {
+        let part = |parent, own: &[usize], border: &[usize]| {
+            let (n, m) = (own.len(), border.len());
+            let (own, border, gain, variance) = (own.to_vec(), border.to_vec(), vec![0.5; n * m], vec![1.0; n * n]);
+            Part { parent, own, border, gain, variance, scores: None }
+        };
+        let parts = vec![part(0, &[1], &[]), part(0, &[0, 2], &[1]), part(1, &[4], &[0, 1])];
+        Stored { scales: vec![1.0; 5], parts, matrix: None }
+    }
+
+    fn scores(response: usize, passed: usize) -> Option<Scores> {
+        Some(Scores { response: vec![1.0; response], passed: vec![1.0; passed] })
+    }
+
+    #[test]
+    fn parts_that_do_not_fit_are_refused() {
+        assert_eq!(Covariance::try_from(stored()).unwrap().size(), 5);
+        let refused = |change: &Change| {
+            let mut stored = stored();
+            change(&mut stored.parts);
+            Covariance::try_from(stored).unwrap_err()
+        };
+        let below = "must stand below one before it; the first has no border";
+        let wrong: [(&Change, &str); 14] = [
+            (&|parts| parts.clear(), "at least the part of the shared unknowns"),
+            (&|parts| parts[0].parent = 1, below),
+            (&|parts| (parts[0].border, parts[0].gain) = (vec![0], vec![1.0]), below),
+            (&|parts| parts[1].parent = 1, below),
+            (&|parts| parts[2].parent = 3, below),
+            (&|parts| parts[1].gain.truncate(1), "matrices that do not fit 2 own unknowns and a border of 1"),
+            (&|parts| parts[1].variance.truncate(2), "matrices that do not fit 2 own unknowns and a border of 1"),
+            (&|parts| parts[1].scores = scores(4, 1), "matrices that do not fit 2 own unknowns and a border of 1"),
+            (&|parts| parts[1].scores = scores(2, 2), "matrices that do not fit 2 own unknowns and a border of 1"),
+            (&|parts| parts[1].scores = scores(4, 2), "has scores where another has none"),
+            (&|parts| parts[1].own = vec![2, 0], "own unknowns out of order"),
+            (&|parts| parts[1].own = vec![0, 5], "own unknowns out of order, out of range"),
+            (&|parts| parts[1].own = vec![0, 1], "own unknowns out of order, out of range, or of another part"),
+            (&|parts| parts[2].border = vec![1, 3], "has a border that its parent does not know"),
+        ];
+        for (change, what) in wrong {
+            let said = refused(change);
+            assert!(said.contains(what), "{said}: {what}");
+        }
+    }
+}

@@ -265,6 +265,33 @@ fn filter(coefficients: &[f64], filtered: &mut VecDeque<Vec<f64>>, row: &mut [f6
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tests::{Current, Gain, Line, Voltage};
+    use crate::{Experiment, Fit, Sample, Time, free};
+
+    /// The sum of squares of the weighted slopes, filtered from rest until nothing is left of them, but for 1e-8 of the squares, which
+    /// is 1e-4 of the slopes.
+    #[test]
+    fn slopes_are_filtered_along_a_record() {
+        let inputs: Vec<Voltage> = (0..700).map(|k| Voltage { u: f64::from(k * k % 17) - 8.0 }).collect();
+        let outputs = inputs.iter().map(|u| Current { i: 2.0 * u.u + 0.1 }).collect();
+        let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs.clone(), outputs).unwrap();
+        let fit = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).noise(Current { i: 0.5 });
+        let problem = fit.weighting(|s: &Sample<Line>| 1.0 + s.t / 100.0).problem().unwrap();
+        let objective = problem.objective().unwrap();
+        let coefficients = [0.9, -0.3];
+        let model =
+            Autoregression { length: length(&coefficients), coefficients: coefficients.to_vec(), innovation: 3.0 };
+        let make = || FilteredSlopes::new(&objective, 0, std::slice::from_ref(&model));
+        let found = objective.gather_one(&[1.0], 0, true, make).ok().unwrap().triangle().column_norms()[0];
+        let mut filtered: Vec<f64> = vec![];
+        for k in 0..1100 {
+            let slope = inputs.get(k).map_or(0.0, |u| (1.0 + k as f64 / 100.0).sqrt() * u.u / 0.5);
+            let before: f64 = coefficients.iter().zip(filtered.iter().rev()).map(|(a, before)| a * before).sum();
+            filtered.push(slope + before);
+        }
+        let expected = 3.0 * filtered.iter().map(|slope| slope * slope).sum::<f64>().sqrt();
+        assert!((found / expected - 1.0).abs() < 1e-4, "{found} {expected}");
+    }
 
     /// The impulse response of `y[t] = u[t] + 0.5 y[t - 1] - 0.25 y[t - 2]`.
     #[test]

@@ -79,7 +79,9 @@ impl Exploration {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::information::Information;
     use crate::optimize::point::tests::{at, linear};
+    use crate::optimize::{Domain, Linearization};
 
     /// Costs of 2 and a little more or less.
     fn cost(more: f64) -> Point {
@@ -98,6 +100,22 @@ mod tests {
             assert_eq!(exploration.flat, flat, "{more}");
         }
         assert!(!exploration.is_lower(&cost(0.0), &cost(0.0)) && exploration.flat == 2);
+    }
+
+    /// Of three unknowns two have no influence, and one of these had none before.
+    #[test]
+    fn directions_lost_on_the_way() {
+        let mut information = Information::new(3);
+        information.absorb_row(&[1.0, 0.0, 0.0], 1.0);
+        let linear = Linearization::new(0.5, 1, vec![information]);
+        let point = Point::new(vec![1.0; 3], linear, &Domain::default()).unwrap();
+        let (end, seen) = (Outcome::Converged { step: 0.0, gradient: 0.0 }, Seen::new(&[1.0; 3], &[None; 3]));
+        let exploration = |outcome, unseen| {
+            let exploration = Exploration::before_end(&point, outcome, &seen, unseen);
+            (exploration.lost, exploration.beside, exploration.points.len())
+        };
+        assert_eq!([exploration(end, 0), exploration(end, 1), exploration(end, 2)], [(2, 4, 4), (1, 4, 4), (0, 0, 0)]);
+        assert_eq!(exploration(Outcome::TimeLimit, 0), (0, 0, 0));
     }
 
     #[test]

@@ -47,6 +47,25 @@ fn what_the_cost_resolves() {
     assert_eq!(at(0.0, linear(&[(1.0, 0.0)]).with_data_norm(1e6)).rounding(), 0.0);
 }
 
+/// A cost that logarithms of variances have made negative is measured by its squares; a residual is rounding within ten roundings of
+/// an unknown of 6, unless the data are so small that it is more than 1e-10 of them.
+#[test]
+fn sizes_and_rounding_of_a_residual() {
+    let mut likelihood = far();
+    likelihood.cost = -3.0;
+    assert!((at(0.0, likelihood.clone()).cost_size() - 12.5).abs() < 1e-12);
+    likelihood.cost = -30.0;
+    assert_eq!(at(0.0, likelihood).cost_size(), 30.0);
+    let ended = |linear: Linearization| at(6.0, linear).ended(&Stop::default());
+    let roundings = |count: f64| linear(&[(1.0, count * 6.0 * f64::EPSILON)]);
+    assert_eq!(ended(linear(&[(1.0, 0.0)])), Some(Outcome::Exact));
+    assert_eq!(ended(roundings(9.9)), Some(Outcome::Exact));
+    assert_ne!(ended(roundings(10.1)), Some(Outcome::Exact));
+    let size = 9.9 * 6.0 * f64::EPSILON;
+    assert_eq!(ended(roundings(9.9).with_data_norm(1.1e10 * size)), Some(Outcome::Exact));
+    assert_ne!(ended(roundings(9.9).with_data_norm(0.9e10 * size)), Some(Outcome::Exact));
+}
+
 /// The full step is `sqrt(2 * 4.5 / 25 * 2)` standard errors long, of two rows.
 #[test]
 fn a_search_without_a_lower_cost() {
@@ -89,6 +108,16 @@ fn points_beside() {
     assert_eq!(beside(6.0, None), [vec![6.0 - 0.06], vec![6.0 + 0.06]]);
     assert_eq!(beside(0.0, Some(2.0)), [vec![-0.02], vec![0.02]]);
     assert!(beside(0.0, None).is_empty());
+}
+
+/// Columns of lengths 2 and 4 that are one: nothing changes where the first unknown moves twice as far as the second, against it.
+#[test]
+fn a_direction_without_influence() {
+    let mut information = Information::new(2);
+    information.absorb_row(&[2.0, 4.0], 1.0);
+    let linear = Linearization::new(0.5, 2, vec![information]);
+    let found = Point::new(vec![1.0; 2], linear, &Domain::default()).unwrap().without_influence();
+    assert!(found.len() == 1 && (found[0][0] / found[0][1] + 2.0).abs() < 1e-12, "{found:?}");
 }
 
 /// A step would gain 5e-7 of the cost 8.
