@@ -1,6 +1,6 @@
 //! Numbers near the ends of what an `f64` can hold: an answer or an error, and nothing known that is not finite.
 
-use greybox::optimize::{GaussNewton, LevenbergMarquardt};
+use greybox::optimize::{GaussNewton, LevenbergMarquardt, Severity};
 use greybox::*;
 
 signals! {
@@ -84,4 +84,45 @@ fn an_interval_without_an_end_is_no_knowledge() {
     assert!(estimate.parameters.a < 1e-4, "{estimate}");
     assert_finite("a logarithm at zero", &estimate);
     assert!(matches!(estimate.knowledge.a, Knowledge::Unidentified | Knowledge::Held { .. }), "{estimate}");
+}
+
+/// Of outputs that are all zero the errors, and so the standard error, are zero: nothing is known, and that is said. With
+/// ordinary numbers it is not.
+#[test]
+fn a_standard_error_of_zero_is_named() {
+    for (output, named) in [(0.0, true), (1.0, false)] {
+        let parameters = Line { a: free(1.0), b: fixed(0.0) };
+        let fit = Fit::new(&Straight, &record(1.0, output)).parameters(parameters).run().unwrap();
+        let found = fit.warnings.iter().find(|warning| warning.code == WarningCode::NoStandardError);
+        assert_eq!(found.is_some(), named, "{fit}");
+        if let Some(warning) = found {
+            assert_eq!(warning.severity, Severity::NotUsable);
+            assert!(warning.text.starts_with("the standard error of `a` is 0: "), "{}", warning.text);
+            assert!(!matches!(fit.unknowns[0].knowledge, Knowledge::Known { .. }), "{fit}");
+        }
+    }
+}
+
+/// Measurements of weight zero have no part in the test of whiteness: errors of the others that are correlated by 0.9 are named,
+/// and those of measurements without weight are not, however correlated.
+#[test]
+fn whiteness_is_that_of_measurements_with_weight() {
+    let colored = record(1.0, 1.0);
+    let white: Vec<Out> = (0..300).map(|k| Out { y: 0.05 * (2.399 * (k * k % 97) as f64).sin() }).collect();
+    for (from, named) in [(0u8, true), (150, false)] {
+        // The first half has colored errors, the second white ones.
+        let outputs = (0..300).map(|k| match k < 150 {
+            true => Out { y: colored.output(k).y },
+            false => Out { y: (0.1 * k as f64).sin() + white[k].y },
+        });
+        let inputs = (0..300).map(|k| In { u: (0.1 * k as f64).sin() }).collect();
+        let time = Time::Uniform { start: 0.0, step: 0.01 };
+        let record = Experiment::new(&Straight, time, inputs, outputs.collect()).unwrap();
+        let weight = move |sample: &Sample<Straight>| {
+            f64::from(u8::from((sample.t / 0.01 - f64::from(from) - 74.5).abs() < 75.0))
+        };
+        let fit = Fit::new(&Straight, &record).parameters(Line { a: free(1.0), b: free(0.0) }).weighting(weight);
+        let fit = fit.run().unwrap();
+        assert_eq!(fit.warnings.iter().any(|warning| warning.code == WarningCode::ColoredErrors), named, "{fit}");
+    }
 }
