@@ -116,7 +116,43 @@ fn differ(this: f64, finer: f64) -> bool {
 mod tests {
     use super::*;
     use crate::tests::{Current, Gain, Line, Voltage};
-    use crate::{Experiment, Fit, Time, free};
+    use crate::{Experiment, Fit, Model, Rk4, Scalar, Time, free};
+
+    /// `di/dt = a u`.
+    #[derive(Clone)]
+    struct Charge;
+
+    impl Model for Charge {
+        type State = Current;
+        type Input = Voltage;
+        type Output = Current;
+        type Parameters = Gain;
+
+        fn derivative<S: Scalar>(&self, _t: S, _x: &Current<S>, u: &Voltage<S>, p: &Gain<S>) -> Current<S> {
+            Current { i: p.a * u.u }
+        }
+
+        fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, _p: &Gain<S>) -> Current<S> {
+            *x
+        }
+    }
+
+    /// Three finer steps and a method for stiff models follow the default method of a continuous model; nothing follows a
+    /// method that was chosen, and a static model has none.
+    #[test]
+    fn what_follows_a_default_method() {
+        let time = Time::Uniform { start: 0.0, step: 1.0 };
+        let inputs = || vec![Voltage { u: 1.0 }; 4];
+        let outputs = || (0..4).map(|k| Current { i: f64::from(k) }).collect::<Vec<_>>();
+        let charge = Experiment::new(&Charge, time.clone(), inputs(), outputs()).unwrap();
+        let line = Experiment::new(&Line, time, inputs(), outputs()).unwrap();
+        let gain = || Gain { a: free(1.0) };
+        let methods = |problem: &Problem<'_>| problem.by_method().count() - 1;
+        assert_eq!(methods(&Fit::new(&Charge, &charge).parameters(gain()).problem().unwrap()), 4);
+        let chosen = Fit::new(&Charge, &charge).parameters(gain()).integrator(Rk4::default());
+        assert_eq!(methods(&chosen.problem().unwrap()), 0);
+        assert_eq!(methods(&Fit::new(&Line, &line).parameters(gain()).problem().unwrap()), 0);
+    }
 
     /// Searches by finer methods have 20 trial steps at a time, five times as many from several starts; a search that is limited more
     /// keeps its own limit. The sweep of a method is found by its description.
