@@ -48,7 +48,7 @@ pub(super) struct Instruction {
     pub count: u8,
     /// Which pairs are subtracted, by bits, of a sum.
     pub signs: u8,
-    /// Whether the sum is multiplied by `factor` at last.
+    /// Whether the sum is multiplied by `factor`, after all its terms.
     pub scaled: bool,
     pub to: Slot,
     /// What a sum starts from.
@@ -171,7 +171,7 @@ impl Sound {
         code.is_sound(&turns).then_some(Sound { code, turns })
     }
 
-    /// What is done at every other sample.
+    /// The instructions of even and of odd samples.
     pub fn turns(&self) -> &Turns {
         &self.turns
     }

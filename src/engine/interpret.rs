@@ -49,7 +49,8 @@ impl<const K: usize> Task for Run<'_, K> {
         assert!(once || inputs.len() >= (samples + usize::from(code.reads_next())) * columns);
         assert!(rows.len() >= samples * height);
         let (slots, inputs, rows) = (slots.as_mut_ptr(), inputs.as_ptr(), rows.as_mut_ptr());
-        // Up to the rows of a sample, then on to the next: the interpreter stands here once, not three times.
+        // Two passes through `interpret` for each sample, before and after its rows. One call, which is inlined, not three: that
+        // keeps the build short.
         for half in 0..2 * samples + usize::from(once) {
             let sample = half / 2;
             let turn = &turns.all[sample % turns.all.len()];

@@ -1,11 +1,11 @@
-//! [`Turns`]: a step for every other sample, so that nothing is moved between samples.
+//! [`Turns`]: the instructions of even and of odd samples, without copies between them.
 //!
-//! In place of moving new values to where the old ones stood, what is carried stands alternately in its own slots and in
-//! others. A move takes the interpreter as long as an operation.
+//! Even samples read what is carried from its own slots and write it to a second set of slots; odd samples read the second set
+//! and write the first. A copy takes the interpreter as long as an operation.
 
 use super::code::{Code, Instruction, Operation, Slot};
 
-/// What is done at a sample: see [`Code`].
+/// Instructions of a sample: see [`Code`].
 #[derive(Clone, Debug)]
 pub(super) struct Turn {
     pub output: Vec<Instruction>,
@@ -13,7 +13,7 @@ pub(super) struct Turn {
     pub advance: Vec<Instruction>,
 }
 
-/// The turns of a code, and what stands elsewhere after the first: its own slot, the other one.
+/// The turns of a code, and for each number that alternates its own slot and its second one.
 #[derive(Clone, Debug)]
 pub(super) struct Turns {
     /// One or two.
@@ -22,7 +22,7 @@ pub(super) struct Turns {
 }
 
 impl Turns {
-    /// One turn where the code moves nothing, else two; these need more slots.
+    /// One turn where the code copies nothing, or where there are no slots left; else two, which need more slots.
     pub fn of(code: &mut Code) -> Self {
         let plain = Turn { output: code.output.clone(), rows: code.rows.clone(), advance: code.advance.clone() };
         let slots = code.slots;
@@ -39,7 +39,7 @@ impl Turns {
         moved.dedup();
         let mut there: Vec<Slot> = (0..=Slot::MAX).take(code.slots).collect();
         moved.iter().for_each(|(own, other)| there.swap(usize::from(*own), usize::from(*other)));
-        let swapped = |slot: Slot| there[usize::from(slot)];
+        let swapped = |slot: Slot| there.get(usize::from(slot)).copied().unwrap_or(slot);
         let renamed = |all: &[Instruction]| all.iter().map(|one| one.renamed(swapped, swapped)).collect();
         let second = Turn {
             output: renamed(&plain.output),
@@ -50,7 +50,7 @@ impl Turns {
     }
 }
 
-/// The same with each new value of what is carried `begin` slots behind its own; `None` if that saves no move.
+/// The same, with each new value of what is carried written `begin` slots beyond its own slot; `None` if that saves no copy.
 fn elsewhere(advance: &[Instruction], carried: usize, begin: Slot) -> Option<Vec<Instruction>> {
     let is_carried = |slot: Slot| usize::from(slot) < carried;
     let mut advance: Vec<Option<Instruction>> = advance.iter().copied().map(Some).collect();
@@ -61,7 +61,7 @@ fn elsewhere(advance: &[Instruction], carried: usize, begin: Slot) -> Option<Vec
         if !is_carried(to) || is_carried(from) || from >= begin {
             continue;
         }
-        // Written there by the instruction that computes it, and read there from then on.
+        // The instruction that computes the value writes it to its second slot; all that read it later read it there.
         let Some(made) = (0..at).rev().find(|i| advance[*i].is_some_and(|before| before.to == from)) else { continue };
         advance[at] = None;
         for (i, instruction) in advance.iter_mut().enumerate().skip(made) {

@@ -76,7 +76,7 @@ pub enum Suspicion {
     },
 }
 
-/// What the channels of a record showed. A record with other channels that was made from it does not take that over.
+/// What these channels of a record showed: it does not hold for a record with others that was made from it.
 #[derive(Debug)]
 pub(crate) struct Looked {
     inputs: Arc<[Channel]>,
@@ -104,7 +104,7 @@ impl Record {
         }
         let (inputs, outputs, found) =
             (self.inputs.clone(), self.outputs.clone(), Arc::new(self.inspect_within(WHOLE)));
-        // Another thread may have been first, or another record that this one was made from: their finding stays.
+        // Kept is what was set first: by another thread, or for the channels of a record that this one was made from.
         let _ = self.looked.set(Looked { inputs, outputs, found: found.clone() });
         found
     }
