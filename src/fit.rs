@@ -1,5 +1,6 @@
 //! [`Fit`]: from a model and its records to an estimate.
 
+mod elsewhere;
 mod fleet;
 mod lockstep;
 mod predict;
@@ -182,8 +183,12 @@ impl<'a, M: Model> Fit<'a, M> {
         self.set(|settings| settings.prefilter(filter))
     }
 
-    /// Searches from `count` starts and keeps the best end; 1, unless set. [`Summary::starts`](crate::Summary::starts)
-    /// reports the minima that were found.
+    /// Searches from `count` starts and keeps the best end. [`Summary::starts`](crate::Summary::starts) reports the minima that were
+    /// found.
+    ///
+    /// Unless set, a fit searches from the declared start. If it ends where the model explains nothing
+    /// ([`WarningCode::Unexplained`](crate::WarningCode::Unexplained), not usable), it goes on to search from 32 starts by itself, and
+    /// says so; with `starts(1)` it does not.
     ///
     /// The first start is the declared one. The others are a Latin hypercube (McKay, Beckman and Conover, Technometrics 21
     /// (1979) 239), the same in every run. Of each unknown they span
@@ -250,7 +255,8 @@ impl<'a, M: Model> Fit<'a, M> {
     ///
     /// A search that does not converge is an outcome of the estimate, not an error. Where samples leave open at which of two
     /// frequencies the model oscillates ([`WarningCode::Aliased`](crate::WarningCode::Aliased)), further searches begin at the other
-    /// one: each with the trial steps that the first one left of its limit, all of them within the time limit.
+    /// one; where the model explains nothing, they begin at further [`starts`](Fit::starts). Each has the
+    /// trial steps that the first one left of its limit, or a few times those it took; all of them end within the time limit.
     ///
     /// # Errors
     /// Invalid settings or records ([`Error`] names them), a start that cannot be simulated, a checkpoint that cannot

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Names written out in a sentence.
 const NAMED: usize = 6;
 
-/// What searches from several starts found ([`Fit::starts`](crate::Fit::starts)).
+/// What searches from several starts found ([`Fit::starts`](crate::Fit::starts)), asked for or not.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Starts {

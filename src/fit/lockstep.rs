@@ -123,7 +123,7 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
         attempts = attempts.into_iter().zip(coarse).map(next).collect();
     }
     let found: Vec<Result<Summary, Error>> = attempts.into_iter().map(Attempt::answer).collect();
-    let searched = each(found.len(), |i| problems[i].on_both_sides(found[i].as_ref().ok()?, &control));
+    let searched = each(found.len(), |i| problems[i].searched_elsewhere(found[i].as_ref().ok()?, &control));
     found.into_iter().zip(searched).map(|(found, searched)| searched.map_or(found, Ok)).collect()
 }
 

@@ -181,7 +181,11 @@ impl Problem<'_> {
         for _ in 1..PARTS {
             let trials = most.saturating_sub(found.iterations);
             let limited = matches!(found.outcome, Outcome::IterationLimit { .. }) && trials > 0;
-            if self.settings.starts > 1 || !limited || is_useless(&found, WarningCode::Unexplained) || control.stops() {
+            if self.settings.searches() > 1
+                || !limited
+                || is_useless(&found, WarningCode::Unexplained)
+                || control.stops()
+            {
                 break;
             }
             let start = Start { coordinates: found.coordinates(), trials, ends: None };
@@ -192,12 +196,12 @@ impl Problem<'_> {
 }
 
 /// Whether an estimate is not usable for this reason.
-fn is_useless(found: &Summary, code: WarningCode) -> bool {
+pub(super) fn is_useless(found: &Summary, code: WarningCode) -> bool {
     found.warnings.iter().any(|warning| warning.code == code && warning.severity == Severity::NotUsable)
 }
 
-/// The estimate of a finer method, with the work of both.
-fn after(before: &Summary, again: Summary) -> Summary {
+/// The estimate of a later search, with the work of both.
+pub(super) fn after(before: &Summary, again: Summary) -> Summary {
     Summary {
         iterations: before.iterations + again.iterations,
         evaluations: before.evaluations + again.evaluations,

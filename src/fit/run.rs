@@ -29,7 +29,7 @@ impl Problem<'_> {
         let control = self.control(begin);
         let found = self.run_within(begin, &control, Start::declared(self));
         let found = self.refined(found, 0, begin, &control)?;
-        Ok(self.on_both_sides(&found, &control).unwrap_or(found))
+        Ok(self.searched_elsewhere(&found, &control).unwrap_or(found))
     }
 
     /// What a method found, numbered as in [`by_method`](Self::by_method), or methods finer than it, as long as a finer step would
@@ -60,7 +60,7 @@ impl Problem<'_> {
         let settings = &self.settings;
         settings.optimizer.check()?;
         let (plain, optimizer) = (self.in_units(control), settings.optimizer.limited(start.trials));
-        let end = match settings.starts {
+        let end = match settings.searches() {
             1 => search(&plain, &optimizer, start.coordinates)?,
             count => search_from_many(&plain, &optimizer, count, start.ends.as_ref())?,
         };

@@ -1,5 +1,6 @@
 //! Fits of plants that oscillate faster than the samples show: a search on the other side of half the frequency of sampling.
 
+use super::elsewhere::Trials;
 use super::refine::{Start, farthest};
 use crate::estimate::{Summary, Unknown, Warning, WarningCode};
 use crate::judge::{Aliases, INDISTINGUISHABLE};
@@ -10,19 +11,20 @@ use std::time::Instant;
 
 /// Ends whose unknowns differ by less than this part of a standard error are the same.
 const SAME: f64 = 0.1;
-/// Most trial steps of a search: so many, or so many times those of the search before.
-const LEAST_TRIALS: u64 = 100;
-const PATIENCE: u64 = 3;
-
 /// An estimate, after its deviance.
 type End = (f64, Summary);
 
 impl Problem<'_> {
     /// Compares an estimate that is warned of an alias with the ends of searches that begin where its oscillation has another frequency
     /// with the same samples. Returns the best end, with a note or a warning about the others and the evaluations of all searches; the
-    /// estimate itself if it explains the data as well as the best. Each search may take as many trial steps as the estimate left of the
-    /// user's limit. `None` where there is nothing to compare.
-    pub(super) fn on_both_sides(&self, found: &Summary, control: &Control) -> Option<Summary> {
+    /// estimate itself if it explains the data as well as the best. `None` where there is nothing to compare.
+    pub(super) fn on_both_sides(
+        &self,
+        found: &Summary,
+        Trials { most: trials, short }: Trials,
+        begin: Instant,
+        control: &Control,
+    ) -> Option<Summary> {
         let useless = |warning: &Warning| {
             let cured = matches!(warning.code, WarningCode::NotAtMinimum | WarningCode::CoarseStep);
             warning.severity == Severity::NotUsable && !cured
@@ -30,12 +32,9 @@ impl Problem<'_> {
         let warned = found.warnings.iter().any(is_open) && !found.warnings.iter().any(useless);
         // Minima cannot be compared without a likelihood, nor where the cost is too rough for one of them.
         let rough = matches!(found.outcome, Outcome::Rough { .. }) && !found.outcome.converged();
-        let patience = LEAST_TRIALS.max(PATIENCE * found.iterations);
-        let trials = patience.min(self.settings.optimizer.most().saturating_sub(found.iterations));
-        if !warned || rough || found.deviance.is_none() || trials == 0 || control.stops() {
+        if !warned || rough || found.deviance.is_none() {
             return None;
         }
-        let begin = Instant::now();
         let method = self.by_method().position(|one| one.sweep.integrator() == found.method.integrator).unwrap_or(0);
         let finest = self.by_method().nth(method)?;
         let settings = Settings { checkpoint: None, ..finest.settings.clone() };
@@ -52,9 +51,8 @@ impl Problem<'_> {
         };
         let ends = std::iter::once(found.clone()).chain(others.into_iter().filter_map(search));
         let ends: Vec<End> = ends.filter_map(|end| Some((end.deviance?, end))).collect();
-        let short = trials < patience && ends.iter().any(|(_, end)| !end.outcome.converged());
-        let best = best(ends, &frequencies.join(" or "), short || control.stops())?;
-        Some(Summary { seconds: found.seconds + begin.elapsed().as_secs_f64(), ..best })
+        let short = short && ends.iter().any(|(_, end)| !end.outcome.converged());
+        best(ends, &frequencies.join(" or "), short || control.stops())
     }
 }
 

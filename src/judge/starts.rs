@@ -1,7 +1,7 @@
 //! What searches from other starts say about an estimate.
 
 use crate::estimate::{Minimum, Starts, Warning, WarningCode, times_the_cost};
-use crate::numeral::{counted, number};
+use crate::numeral::number;
 use crate::optimize::Severity;
 
 /// Minima whose deviances differ by less cannot be told apart: if both had the same number of fixed parameters, the wrong one would
@@ -13,10 +13,10 @@ pub(super) fn warnings(starts: &Starts, measurements: u64) -> Vec<Warning> {
     let Starts { tried, agreed, minima, declared, failed, .. } = starts;
     let mut warnings = vec![];
     if *agreed == 1 && *tried > 1 {
-        let (others, none) = (minima.len() - 1, counted(failed.len() as u64, "search"));
+        let (others, none) = (minima.len() - 1, failed.len());
         let text = format!(
-            "only one of {tried} starts led to this minimum ({none} found no minimum, {others} other(s) found): there may be \
-             a better one; try more starts, or give bounds"
+            "only one of {tried} starts led to this minimum (others found: {others}; searches without one: {none}): there may be a \
+             better one; try more starts, or give bounds"
         );
         warnings.push(Warning { code: WarningCode::MinimumFoundOnce, severity: Severity::UsableWithCare, text });
     }

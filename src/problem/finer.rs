@@ -12,6 +12,8 @@ pub(crate) type MakeSweep<'a> = Arc<dyn Fn() -> Result<Arc<dyn Sweep + 'a>, Erro
 pub(crate) trait Finer: Send + Sync {
     /// The problem by one of the methods; `None` after the last, and for a method that does not serve it.
     fn by(&self, number: usize) -> Option<&Problem<'_>>;
+    /// The same with searches from so many starts.
+    fn from_starts(&self, count: usize) -> Arc<dyn Finer + '_>;
 }
 
 /// Sweeps by finer and finer methods. Each is made when it is first needed, once for all problems that share these.
@@ -43,16 +45,28 @@ impl<'a> FinerSweeps<'a> {
 const TRIALS: u64 = 20;
 pub(crate) const PARTS: u64 = 5;
 
-/// The problem by each method is made when it is first needed.
+/// The problem by each method is made when it is first needed, from that by the default one.
 struct ByMethods<'a> {
     base: Problem<'a>,
     sweeps: Arc<FinerSweeps<'a>>,
     made: Vec<OnceLock<Option<Problem<'a>>>>,
 }
 
+impl<'a> ByMethods<'a> {
+    fn new(base: Problem<'a>, sweeps: Arc<FinerSweeps<'a>>) -> Arc<Self> {
+        let made = sweeps.make.iter().map(|_| OnceLock::new()).collect();
+        Arc::new(ByMethods { base: Problem { finer: None, refines: true, ..base }, sweeps, made })
+    }
+}
+
 impl Finer for ByMethods<'_> {
     fn by(&self, number: usize) -> Option<&Problem<'_>> {
         self.made.get(number)?.get_or_init(|| self.base.with_sweep(self.sweeps.get(number)?).ok()).as_ref()
+    }
+
+    fn from_starts(&self, count: usize) -> Arc<dyn Finer + '_> {
+        let settings = self.base.settings.from_starts(count);
+        ByMethods::new(Problem { settings, ..self.base.clone() }, self.sweeps.clone())
     }
 }
 
@@ -63,19 +77,23 @@ impl<'a> Problem<'a> {
         if sweeps.make.is_empty() {
             return self;
         }
-        // What is prepared of the records is another for each method, and so is a checkpoint.
-        let trials = if self.settings.starts > 1 { TRIALS * PARTS } else { TRIALS };
-        let optimizer = self.settings.optimizer.limited(trials);
-        let settings = Settings { checkpoint: None, optimizer, ..self.settings.clone() };
-        let base = Problem { prepared: vec![], refines: true, settings, ..self.clone() };
-        let made = sweeps.make.iter().map(|_| OnceLock::new()).collect();
-        Problem { refines: true, finer: Some(Arc::new(ByMethods { base, sweeps, made })), ..self }
+        Problem { refines: true, finer: Some(ByMethods::new(self.clone(), sweeps)), ..self }
     }
 
+    /// The same problem by another method. What is prepared of the records is another for each method, and so is a checkpoint.
     fn with_sweep(&self, sweep: Arc<dyn Sweep + 'a>) -> Result<Self, Error> {
         let prepared = Problem::prepared(&*sweep, &self.records, &self.unknowns.parameters)?;
         let cuts = Cuts::new(&*sweep, &self.records, self.settings.prefilter.is_some());
-        Ok(Problem { sweep, prepared, cuts, ..self.clone() })
+        let trials = if self.settings.searches() > 1 { TRIALS * PARTS } else { TRIALS };
+        let optimizer = self.settings.optimizer.limited(trials);
+        let settings = Settings { checkpoint: None, optimizer, ..self.settings.clone() };
+        Ok(Problem { sweep, prepared, cuts, settings, ..self.clone() })
+    }
+
+    /// The same problem, searched from so many starts, by each method.
+    pub(crate) fn from_starts(&self, count: usize) -> Problem<'_> {
+        let finer = self.finer.as_ref().map(|finer| finer.from_starts(count));
+        Problem { settings: self.settings.from_starts(count), finer, ..self.clone() }
     }
 
     /// The problem by a finer method, numbered from the coarsest; `None` after the last.
@@ -165,7 +183,7 @@ mod tests {
         let made = problem.sweep.clone();
         let sweeps = || FinerSweeps::new(vec![Arc::new(|| Ok(made.clone())) as MakeSweep<'_>]);
         for (starts, trials) in [(1, 20), (2, 100)] {
-            let settings = Settings { starts, ..problem.settings.clone() };
+            let settings = problem.settings.clone().starts(starts);
             let refined = Problem { settings, ..problem.clone() }.refining(sweeps());
             assert_eq!(refined.finer(0).unwrap().settings.optimizer.most(), trials);
             assert!(refined.finer(1).is_none() && refined.refines && refined.by_method().count() == 2);

@@ -44,7 +44,8 @@ pub struct Settings<'a> {
     pub(crate) observers: Vec<(Observer, ObserverMode)>,
     pub(crate) checkpoint: Option<(PathBuf, u64)>,
     pub(crate) optimizer: Arc<dyn Optimizer>,
-    pub(crate) starts: usize,
+    /// How many searches were asked for.
+    pub(crate) starts: Option<usize>,
 }
 
 impl Default for Settings<'_> {
@@ -61,7 +62,7 @@ impl Default for Settings<'_> {
             observers: vec![],
             checkpoint: None,
             optimizer: Arc::new(<LevenbergMarquardt>::default()),
-            starts: 1,
+            starts: None,
         }
     }
 }
@@ -109,7 +110,7 @@ impl<'a> Settings<'a> {
     /// Searches from so many starts and keeps the best end; the first is the declared one
     /// ([`Fit::starts`](crate::Fit::starts)).
     pub fn starts(mut self, count: usize) -> Self {
-        self.starts = count;
+        self.starts = Some(count);
         self
     }
 
@@ -144,6 +145,16 @@ impl<'a> Settings<'a> {
         self
     }
 
+    /// How many starts a fit searches from at first.
+    pub(crate) fn searches(&self) -> usize {
+        self.starts.unwrap_or(1)
+    }
+
+    /// These settings, for another fit from so many starts.
+    pub(super) fn from_starts(&self, count: usize) -> Self {
+        Settings { checkpoint: None, ..self.clone() }.starts(count)
+    }
+
     /// These settings, with the noise set to `Predicted` where the sweep predicts variances.
     pub(super) fn of(mut self, sweep: &dyn Sweep) -> Self {
         if sweep.predicts_variance() {
@@ -164,8 +175,8 @@ impl<'a> Settings<'a> {
                 return Err(Error::NotPositive { what, value: sigma[j] });
             }
         }
-        if !(1..=MOST_STARTS).contains(&self.starts) {
-            let count = self.starts;
+        let count = self.searches();
+        if !(1..=MOST_STARTS).contains(&count) {
             return Err(Error::Option(format!("a fit from {count} starts was asked for; take 1 to {MOST_STARTS}")));
         }
         self.check_input_noise(layout)?;

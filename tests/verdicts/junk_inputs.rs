@@ -129,7 +129,7 @@ fn told_wrong() -> Vec<Junk> {
                 }
             })
         }),
-        named("noise a hundred times the signal", HoldsZero, |s| {
+        named("noise a hundred times the signal", Unexplained, |s| {
             let plant = plant(s);
             plant.fit(&plant.record(s, SAMPLES).noisy(100.0, 0.0, s), &How::default(), s)
         }),

@@ -1,6 +1,7 @@
 //! Verdicts on records of many kinds, good and bad: what is junk is never called usable, and what is good is.
 
 mod extremes;
+mod further;
 mod good;
 mod good_processes;
 mod initial;
