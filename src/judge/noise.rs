@@ -20,7 +20,7 @@ fn clipped_variance(&Huber(c): &Huber) -> f64 {
     2.0 * (normal.cdf(c) - 0.5 - c * normal.pdf(c) + c * c * normal.sf(c))
 }
 
-/// Sums of the products of two outputs' errors, and how many there were.
+/// Sums of the products of two outputs' errors, and how many there were: lower triangles.
 struct Moments<'m> {
     objective: &'m Objective<'m>,
     experiment: usize,
@@ -33,21 +33,22 @@ struct Moments<'m> {
 impl Accumulate for Moments<'_> {
     fn add(&mut self, window: &Window, lane: usize) {
         let outputs = window.outputs();
-        let mut errors = vec![0.0; outputs];
+        let mut errors = vec![None; outputs];
         for k in 0..window.samples[lane] {
             if self.objective.weight(self.experiment, window.begin[lane] + k) <= 0.0 {
                 continue;
             }
             for (j, error) in errors.iter_mut().enumerate() {
                 let value = window.error(k, j, lane);
-                *error = self.clip.map_or(value, |clip| clip(value / self.sigma[j]) * self.sigma[j]);
+                let clipped = || self.clip.map_or(value, |clip| clip(value / self.sigma[j]) * self.sigma[j]);
+                *error = window.is_measured(k, j, lane).then(clipped);
             }
             for i in 0..outputs {
-                for j in 0..outputs {
-                    if window.is_measured(k, i, lane) && window.is_measured(k, j, lane) {
-                        self.sums[(i, j)] += errors[i] * errors[j];
-                        self.pairs[(i, j)] += 1.0;
-                    }
+                let Some(error) = errors[i] else { continue };
+                for (j, other) in errors[..=i].iter().enumerate() {
+                    let Some(other) = other else { continue };
+                    self.sums[(i, j)] += error * other;
+                    self.pairs[(i, j)] += 1.0;
                 }
             }
         }
@@ -76,7 +77,8 @@ fn moments(
     let all = plain.gather(coordinates, false, make)?;
     let sum = |part: &dyn Fn(&Moments<'_>) -> f64| all.iter().map(part).sum::<f64>();
     let covariance = SquareMatrix::from_fn(outputs, |i, j| {
-        sum(&|moments| moments.sums[(i, j)]) / sum(&|moments| moments.pairs[(i, j)]).max(1.0)
+        let at = (i.max(j), i.min(j));
+        sum(&|moments| moments.sums[at]) / sum(&|moments| moments.pairs[at]).max(1.0)
     });
     if let Some(variance) = covariance.diagonal().iter().find(|variance| !variance.is_finite()) {
         return Err(Infeasible::Failed(format!("the variance of an output's errors is {variance}")));

@@ -1,6 +1,7 @@
 //! [`Objective`]: the cost of a fit as a function of its unknowns.
 
 use super::segments::Memory;
+use super::unknowns::Free;
 use super::{Control, Problem, Whitening};
 use crate::error::Failure;
 use crate::loss::Loss;
@@ -217,8 +218,11 @@ impl LeastSquares for Objective<'_> {
     }
 
     fn sizes(&self) -> Vec<Option<f64>> {
-        let size = |transform| (transform == Transform::Log).then_some(1.0);
-        self.problem.unknowns.row.iter().map(|unknown| size(unknown.parameter.transform)).collect()
+        let size = |unknown: &Free| match unknown.parameter.transform {
+            Transform::Log => Some(1.0),
+            Transform::Identity => unknown.size,
+        };
+        self.problem.unknowns.row.iter().map(size).collect()
     }
 
     fn bounds(&self) -> Vec<(f64, f64)> {
