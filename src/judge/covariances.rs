@@ -61,7 +61,7 @@ impl Judgement<'_> {
         let covariance = Some(hac.covariance(&self.exact, &degrees, self.coupled().is_some())?);
         let degrees = degrees.into_iter().map(|degrees| degrees.min(self.degrees));
         let method = CovarianceMethod::Hac { lags: hac.lags as u64 };
-        Some(CoordinateCovariance { covariance, method, factor: 1.0, degrees: degrees.collect(), shares: None })
+        Some(CoordinateCovariance { covariance, method, factor: 1.0, degrees: degrees.collect(), shares: hac.shares })
     }
 
     fn for_white_errors(&self, unit: &Option<Covariance>) -> CoordinateCovariance {

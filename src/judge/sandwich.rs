@@ -3,17 +3,14 @@
 //! It is `A^-1 B A^-1` (Huber 1967; White 1980). `A` is the curvature of the cost, `E[psi'] sum w g g'`. `B` is the
 //! covariance of the score: the sum of squares of the samples' own scores, `w psi(z) g` added up over the outputs.
 //! Errors of a fit are smaller than the noise by the part of it that the fit took over, so each is divided by one less
-//! its leverage (HC3: MacKinnon and White, J. Econometrics 29 (1985) 305).
-//!
-//! An error divided so is the noise of the measurement less the error of what all others predict for it, whose variance
-//! is `h / (1 - h)` times that of the noise at leverage `h`. Where a measurement determines an unknown, both are of one
-//! size and may cancel by chance: of straight lines with one far measurement, noisier than the others, 83 % were covered.
-//! [`CANCELED`] times the variance of that prediction, by the noise of all measurements, is therefore added to the square.
+//! its leverage (HC3: MacKinnon and White, J. Econometrics 29 (1985) 305), and what this leaves out is added ([`scores`]).
 //!
 //! A pre-filter correlates the errors. Where those before it are white, with covariance `S` between the outputs, the
 //! score is theirs times the weighted slopes passed through the filter backward in time (its adjoint), from rest at the
 //! end of the record to its first sample. A forward pass instead counts what happens at the begin of a record wrongly:
 //! errors of initial states came out several times too large.
+
+mod scores;
 
 use super::shares::{self, Largest, Shares};
 use crate::information::{Block, Covariance, Information};
@@ -22,13 +19,10 @@ use crate::prefilter::Butterworth;
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
 use nalgebra::DMatrix;
+use scores::Scores;
 
 /// One less the leverage of a measurement that alone determines an unknown: its error is rounding.
 pub(super) const ALONE: f64 = 1e-6;
-/// Part of a prediction's variance that is added to the square of the error. An interval of an unknown that one measurement alone
-/// determines then covers 95.7 % of normal errors where that measurement's deviation is 2.2 times that of the prediction, and more
-/// where it is larger or smaller; with 0.35 it covered 93.8 % of 2,000 lines through 41 measurements.
-const CANCELED: f64 = 0.4;
 /// Rows that are absorbed together.
 const ROWS: usize = 256;
 
@@ -285,50 +279,6 @@ impl Accumulate for Curvature<'_> {
         self.bread.absorb(&mut self.block);
         self.bread.merge(&later.bread);
         self.tally.add(later.tally);
-    }
-}
-
-/// The triangle of the scores.
-struct Scores<'s> {
-    objective: &'s Objective<'s>,
-    experiment: usize,
-    shares: Shares,
-    /// Variance of all errors times the roots of their weights.
-    noise: f64,
-    scores: Information,
-    block: Block,
-    row: Vec<f64>,
-}
-
-impl Accumulate for Scores<'_> {
-    fn add(&mut self, window: &Window, lane: usize) {
-        let (lanes, loss) = (window.lanes(), self.objective.loss());
-        let mut slopes = vec![0.0; self.row.len()];
-        for k in 0..window.samples[lane] {
-            let sample = window.begin[lane] + k;
-            let weight = self.objective.weight(self.experiment, sample);
-            self.row.fill(0.0);
-            for j in (0..window.outputs()).filter(|&j| weight > 0.0 && window.is_measured(k, j, lane)) {
-                let values = window.row(k, j).iter().skip(lane).step_by(lanes);
-                slopes.iter_mut().zip(values).for_each(|(to, from)| *to = *from);
-                let z = window.error(k, j, lane);
-                let leverage = self.shares.take(weight, &slopes, (j, sample));
-                let less = (1.0 - leverage).max(ALONE);
-                let influence = weight * loss.map_or(z, |loss| loss.psi(z)) / less;
-                self.row.iter_mut().zip(&slopes).for_each(|(row, slope)| *row += slope * influence);
-                let canceled = (CANCELED * weight * self.noise * leverage / less).sqrt();
-                slopes.iter_mut().for_each(|slope| *slope *= canceled);
-                self.scores.gather(&mut self.block, &slopes, 0.0);
-            }
-            self.scores.gather(&mut self.block, &self.row, 0.0);
-        }
-    }
-
-    fn append(&mut self, mut later: Self) {
-        self.shares.append(&later.shares);
-        later.scores.absorb(&mut later.block);
-        self.scores.absorb(&mut self.block);
-        self.scores.merge(&later.scores);
     }
 }
 

@@ -18,7 +18,7 @@ use nalgebra::DMatrix;
 /// Part of the variance from which on one measurement, or two together, decide.
 const DECIDES: f64 = 0.9;
 /// Fits of more measurements are not examined if that takes a pass of its own.
-const MOST: u64 = 1000;
+const MOST: u64 = 200;
 
 /// A measurement, and its part in the variance of an unknown.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -67,6 +67,11 @@ impl Shares {
     pub fn new(experiment: usize, inverse: DMatrix<f64>) -> Self {
         let columns = inverse.nrows();
         Shares { experiment, inverse, moved: vec![0.0; columns], largest: vec![Largest::default(); columns] }
+    }
+
+    /// The number of slopes that a measurement has.
+    pub fn columns(&self) -> usize {
+        self.moved.len()
     }
 
     /// Takes a measurement with these slopes, and returns its leverage.
@@ -143,14 +148,12 @@ impl Judgement<'_> {
         let decided = (0..unknowns.len()).filter(counts).filter_map(|i| Some((i, largest[i].decisive()?)));
         let (i, shares) = decided.max_by(|a, b| part(a.1).total_cmp(&part(b.1)))?;
         let noise = match assumed {
-            true => "whose noise is taken to be that of the others; the fit cannot tell, since it goes through there",
-            false => {
-                "and is so wide that it holds whatever the noise is there, which the fit cannot tell, since it goes through \
-                 there"
-            }
+            true => "whose noise is taken to be that of all",
+            false => "and is so wide that it holds whatever the noise is there",
         };
         let text = format!(
-            "the interval of `{}` rests by {} on {}, {noise}: measure more like it",
+            "the interval of `{}` rests by {} on {}, {noise}: errors there do not tell, since the fit passes through them; \
+             measure more of the kind",
             unknowns[i].name,
             percent(part(shares), 2),
             self.places(shares)
@@ -179,7 +182,7 @@ impl Judgement<'_> {
         }
         let make = |e: usize| {
             let shares = Shares::new(e, of_experiment(objective, unit, e));
-            Pass { objective, slopes: vec![0.0; shares.moved.len()], shares }
+            Pass { objective, slopes: vec![0.0; shares.columns()], shares }
         };
         let all = objective.gather(&self.end.coordinates, true, make).ok()?;
         Some(of_all(objective, all.iter().map(|one| &one.shares)))

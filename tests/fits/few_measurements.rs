@@ -2,6 +2,7 @@
 //! Intervals that rest on one or two measurements.
 
 use crate::common::*;
+use greybox::estimate::CovarianceMethod;
 use greybox::optimize::Severity;
 use greybox::*;
 
@@ -16,21 +17,30 @@ impl Model for Gain {
     type Input = Voltage;
     type Output = Current;
     type Parameters = Factor;
-    const KIND: Kind = Kind::Static;
+    // Not static: the order of the samples matters.
+    const KIND: Kind = Kind::Discrete;
 
     fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Factor<S>) -> Current<S> {
         Current { i: p.a * u.u }
     }
 }
 
-/// Inputs of -1 and 1 in turn, but for these.
-fn record(samples: usize, far: &[(usize, f64)]) -> ExperimentOf<Gain> {
-    let mut noise = Noise(8);
+/// Inputs of -1 and 1 in turn, but for these; errors are autoregressive with `rho`.
+fn disturbed(samples: usize, far: &[(usize, f64)], rho: f64) -> ExperimentOf<Gain> {
+    let (mut noise, mut error) = (Noise(8), 0.0);
+    let mut next = || {
+        error = rho * error + 0.1 * noise.gauss();
+        error
+    };
     let plain = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
     let far = |k: usize| far.iter().find(|(sample, _)| *sample == k).map_or(plain(k), |(_, u)| *u);
     let inputs: Vec<Voltage> = (0..samples).map(|k| Voltage { u: far(k) }).collect();
-    let outputs = inputs.iter().map(|u| Current { i: 2.0 * u.u + 0.1 * noise.gauss() }).collect();
+    let outputs = inputs.iter().map(|u| Current { i: 2.0 * u.u + next() }).collect();
     Experiment::new(&Gain, Time::Uniform { start: 0.0, step: 0.5 }, inputs, outputs).unwrap().named("run")
+}
+
+fn record(samples: usize, far: &[(usize, f64)]) -> ExperimentOf<Gain> {
+    disturbed(samples, far, 0.0)
 }
 
 fn said(summary: &Summary) -> Option<&Warning> {
@@ -67,14 +77,19 @@ fn two_measurements_that_decide_are_named() {
     assert_eq!(said(&fitted(&record(51, &[(7, 14.5), (40, -14.5)]), false)), None);
 }
 
-/// Plain fits of more than 1,000 measurements have no pass for it; a sandwich has.
+/// Plain fits of more than 200 measurements have no pass for it; a sandwich and colored errors have.
 #[test]
 fn long_records() {
     let found = |samples: usize, weighted: bool| said(&fitted(&record(samples, &[(7, 200.0)]), weighted)).is_some();
-    assert_eq!([found(1000, false), found(1001, false), found(1001, true)], [true, false, true]);
+    assert_eq!([found(200, false), found(201, false), found(201, true)], [true, false, true]);
+    let colored = fitted(&disturbed(500, &[(7, 200.0)], 0.9), false);
+    assert!(matches!(colored.method.covariance, CovarianceMethod::Hac { .. }), "{:?}", colored.method.covariance);
+    // 200^2 / (200^2 + 499).
+    assert!(said(&colored).unwrap().text.contains("rests by 99 % on `i` at t = 3.5 s of `run`, whose noise is taken"));
 }
 
-/// An initial state that the first measurement determines (three time constants lie between two): with squares it is taken for
+/// An initial state that the first measurement determines (three time constants lie between two, so that the share of the second is
+/// `exp(-6)`, 0.25 % of its own): with squares it is taken for
 /// granted; with a robust loss its interval is wider for it, and the note says so.
 #[test]
 fn initial_states_only_with_a_sandwich() {
@@ -91,6 +106,6 @@ fn initial_states_only_with_a_sandwich() {
     assert_eq!(said(&fit().run().unwrap()), None);
     let robust = fit().loss(Huber(1.345)).run().unwrap();
     let text = &said(&robust).unwrap().text;
-    assert!(text.contains(&format!("the interval of `{}` rests by 9", robust.unknowns[2].name)), "{text}");
+    assert!(text.contains(&format!("the interval of `{}` rests by 100 % ", robust.unknowns[2].name)), "{text}");
     assert!(text.contains("on `i` at t = 0 s"), "{text}");
 }
