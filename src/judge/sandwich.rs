@@ -26,6 +26,9 @@ pub(super) const ALONE: f64 = 1e-6;
 /// Rows that are absorbed together.
 const ROWS: usize = 256;
 
+/// A covariance, and the largest shares in the variances, which a pre-filter has none of.
+pub(super) type WithShares = (Covariance, Option<Vec<Largest>>);
+
 /// Curvature of the cost and triangles of the scores, a pair per experiment.
 #[derive(Clone)]
 pub(crate) struct Sandwich {
@@ -100,13 +103,12 @@ pub(crate) fn is_needed(objective: &Objective<'_>) -> bool {
     objective.is_weighted() || objective.problem.settings.prefilter.is_some() || objective.is_robust()
 }
 
-/// The sandwich over all unknowns that are not held, and without a pre-filter the largest shares in their variances, in two more
-/// passes with slopes; `None` if it has no number.
+/// The sandwich over all unknowns that are not held, in two more passes with slopes; `None` if it has no number.
 pub(super) fn sandwich(
     objective: &Objective<'_>,
     coordinates: &[f64],
     held: &[bool],
-) -> Result<Option<(Covariance, Option<Vec<Largest>>)>, Infeasible> {
+) -> Result<Option<WithShares>, Infeasible> {
     Passes { objective, coordinates }.sandwich(held)
 }
 
@@ -133,7 +135,7 @@ struct Passes<'p> {
 }
 
 impl Passes<'_> {
-    fn sandwich(&self, held: &[bool]) -> Result<Option<(Covariance, Option<Vec<Largest>>)>, Infeasible> {
+    fn sandwich(&self, held: &[bool]) -> Result<Option<WithShares>, Infeasible> {
         let (sandwich, tally) = self.without_scores()?;
         let Some(inverse) = sandwich.bread.covariance(held) else { return Ok(None) };
         let (mut scores, scale, largest) = match &self.objective.problem.settings.prefilter {

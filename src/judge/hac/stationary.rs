@@ -25,13 +25,16 @@ const LONGEST: usize = 1000;
 /// An experiment with fewer measurements of an output takes the autoregression of all experiments together.
 const OWN: u64 = 100;
 
-/// Triangles of such scores, one per experiment over its columns, by the inverse of the curvature, and the largest shares of the
-/// unknowns; `None` where variances are predicted.
+/// Triangles of scores, one per experiment, and the largest shares of the unknowns.
+type WithShares = (Vec<Information>, Vec<Largest>);
+
+/// Triangles of such scores, one per experiment over its columns, by the inverse of the curvature; `None` where variances are
+/// predicted.
 pub(super) fn scores(
     objective: &Objective<'_>,
     coordinates: &[f64],
     inverse: &Covariance,
-) -> Result<Option<(Vec<Information>, Vec<Largest>)>, Infeasible> {
+) -> Result<Option<WithShares>, Infeasible> {
     if objective.sweep.predicts_variance() {
         return Ok(None);
     }
