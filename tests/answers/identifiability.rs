@@ -233,31 +233,20 @@ fn a_profile_is_drawn_below_its_lower_end_within_bounds() {
     assert!((same / lower - 1.0).abs() < 2e-3 && first >= bound, "{same} {first}");
 }
 
-/// Where the curve levels off below the threshold it is followed for 40 points; where it does not rise at all, for eight, or to the
-/// bound.
+/// Where the curve rises, but levels off below the threshold, it is followed beyond the eight points that show it flat.
 #[test]
 fn a_profile_without_an_end_is_open() {
     let inputs = vec![Drive { u: 1.0, w: 0.0 }; 25];
-    let outputs = (0..25).map(|k| Reading { y: 0.3 + 0.5 - f64::from(k % 2), z: f64::NAN }).collect();
+    let z = |k: i32| if k == 24 { 0.0 } else { f64::NAN };
+    let outputs = (0..25).map(|k| Reading { y: 0.3 + 0.5 - f64::from(k % 2), z: z(k) }).collect();
     let record = Experiment::new(&Amplifier, Time::Uniform { start: 0.0, step: 0.1 }, inputs, outputs).unwrap();
-    let of = |a: Parameter, b: f64, c: Parameter| {
-        let parameters = Product { a, b: fixed(b), c };
-        let fit = Fit::new(&Amplifier, &record).parameters(parameters).noise(Reading { y: 1.0, z: 1.0 });
-        let problem = fit.problem().unwrap();
-        let found = profile(&problem, &problem.run().unwrap(), "a", 0.95).unwrap();
-        let below = found.points.iter().filter(|point| point.value < found.value).count();
-        let above = found.points.iter().filter(|point| point.value > found.value).count();
-        (found, below, above)
-    };
     // 1.6 standard errors from zero, which is as far as a logarithm comes.
-    let (found, below, _) = of(free(1.0).log(), 1.0, fixed(0.0));
+    let parameters = Product { a: free(1.0).log(), b: fixed(1.0), c: fixed(0.0) };
+    let fit = Fit::new(&Amplifier, &record).parameters(parameters).noise(Reading { y: 1.0, z: 1.0 });
+    let problem = fit.problem().unwrap();
+    let found = profile(&problem, &problem.run().unwrap(), "a", 0.95).unwrap();
     assert!(matches!(found.lower, End::Open(_)) && matches!(found.upper, End::At(_)), "{found:?}");
-    assert_eq!(below, 40);
-    let (found, below, above) = of(free(1.0), 0.0, free(0.0));
-    assert!(matches!((found.lower, found.upper), (End::Open(_), End::Open(_))), "{found:?}");
-    assert_eq!((below, above), (8, 8));
-    let (found, _, _) = of(free(1.0).within(-500.0, 1000.0), 0.0, free(0.0));
-    assert_eq!((found.lower, found.upper), (End::Bound(-500.0), End::Bound(1000.0)));
+    assert!(found.points.iter().filter(|point| point.value < found.value).count() > 8, "{found:?}");
 }
 
 /// Nothing is known with no probability, and nothing with certainty.
