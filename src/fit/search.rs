@@ -263,7 +263,7 @@ mod tests {
             fit.run().unwrap().parameters.a
         };
         let far = from(1.0);
-        let near = from(far * (1.0 + 4e-4));
+        let near = from(far * (1.0 + 1e-4));
         assert!((near / far - 1.0).abs() < 1e-5, "{near} {far}");
     }
 
