@@ -345,6 +345,11 @@ mod tests {
         assert!((found.innovation - 1.0).abs() < 0.02, "{}", found.innovation);
         assert_eq!(length(&[0.8]), 42);
         assert_eq!(length(&[]), 1);
+        // Four measurements for each coefficient and the variance, at the least.
+        for (count, order) in [(7, 0), (8, 1), (11, 1), (12, 2)] {
+            assert!(Autoregression::of(&sums, count).coefficients.len() <= order, "{count}");
+        }
+        assert_eq!(Autoregression::of(&sums, 8).coefficients.len(), 1);
     }
 
     /// The order is the first of the least `n ln(v) + 2 k`, where `v` is the part of the variance that the best of `k`
