@@ -218,9 +218,12 @@ impl LeastSquares for Objective<'_> {
     }
 
     fn sizes(&self) -> Vec<Option<f64>> {
+        // A filter corrects its state by the measurements, and with short steps of the initial one the noise levels stay away from
+        // zero, where the likelihood of a state that passes through a measurement grows without limit.
+        let filtered = self.sweep.predicts_variance();
         let size = |unknown: &Free| match unknown.parameter.transform {
             Transform::Log => Some(1.0),
-            Transform::Identity => unknown.size,
+            Transform::Identity => unknown.size.filter(|_| !filtered),
         };
         self.problem.unknowns.row.iter().map(size).collect()
     }
