@@ -249,15 +249,20 @@ mod tests {
     use super::roughness;
     use crate::optimize::{JacobianColumns, LevenbergMarquardt, Outcome, Stop};
     use crate::tests::{Current, Gain, Line, Voltage};
-    use crate::{Experiment, Fit, Huber, Time, free};
+    use crate::{Experiment, ExperimentOf, Fit, Huber, Time, free};
+
+    /// A gain of two, and errors that are no line.
+    fn record() -> ExperimentOf<Line> {
+        let inputs: Vec<Voltage> = (0..40).map(|k| Voltage { u: f64::from(k) }).collect();
+        let outputs = (0..40).map(|k| Current { i: 2.0 * f64::from(k) + f64::from(k * 37 % 21) }).collect();
+        Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap()
+    }
 
     /// The first of several rounds finds three digits: from a start that has them the answer is that from afar, to ten times the
     /// tolerance of the noise.
     #[test]
     fn the_first_round_is_not_the_last() {
-        let inputs: Vec<Voltage> = (0..40).map(|k| Voltage { u: f64::from(k) }).collect();
-        let outputs = (0..40).map(|k| Current { i: 2.0 * f64::from(k) + f64::from(k * 37 % 21) }).collect();
-        let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        let record = record();
         let from = |start: f64| {
             let fit = Fit::new(&Line, &record).parameters(Gain { a: free(start) }).loss(Huber::default());
             fit.run().unwrap().parameters.a
@@ -270,9 +275,7 @@ mod tests {
     /// The limit of trial steps is that of all rounds together, also where one ends just there.
     #[test]
     fn a_limit_is_that_of_all_rounds() {
-        let inputs: Vec<Voltage> = (0..40).map(|k| Voltage { u: f64::from(k) }).collect();
-        let outputs = (0..40).map(|k| Current { i: 2.0 * f64::from(k) + f64::from(k * 37 % 21) }).collect();
-        let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        let record = record();
         let within = |iterations: u64| {
             let optimizer = LevenbergMarquardt::new(Stop { iterations, ..Stop::default() }, JacobianColumns);
             let fit = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).loss(Huber::default());

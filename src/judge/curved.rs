@@ -37,8 +37,8 @@ impl Judgement<'_> {
             Some((error / unknowns[i].value.abs(), i)).filter(|(part, _)| *part > SMALL)
         };
         let mut examined: Vec<(f64, usize)> = (0..unknowns.len()).filter_map(relative).collect();
-        // Predictions that are affine in the initial state are bent by the parameters alone, and along the profile of an initial
-        // state these move by no more than their own standard errors.
+        // Where predictions are affine in the initial state, only parameters make them curved. Along the profile of an initial state
+        // no parameter changes by more than its own standard error, which is small for all of them.
         let is_state = |i: usize| matches!(unknowns[i].role, Role::InitialState(_));
         if self.objective.sweep.coupling() == Coupling::Affine && examined.iter().all(|(_, i)| is_state(*i)) {
             return None;

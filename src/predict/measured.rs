@@ -34,8 +34,8 @@ pub struct Guess {
     pub state: Vec<f64>,
     /// Whether the outputs leave the entry open.
     pub open: Vec<bool>,
-    /// How large each entry is, if the outputs give it: its magnitude, or the change that moves an output as far as it moves
-    /// in the record. A measured state that happens to be next to zero is not small.
+    /// The size of each entry that the outputs give, in its unit: its magnitude, or the change that changes an output by half
+    /// its range in the record, whichever is larger. A search limits its steps by it; `None`: by the magnitude alone.
     pub sizes: Vec<Option<f64>>,
 }
 
@@ -68,7 +68,7 @@ impl Place<'_> {
     }
 
     /// The same for entries that the outputs determine; the others are zero, or one where the equations are undefined there.
-    /// `moves`: how far each output moves in the record.
+    /// `moves`: half the range of each output in the record, in its unit.
     ///
     /// # Errors
     /// Outputs that are undefined at both.

@@ -2,28 +2,10 @@
 //! Intervals that rest on one or two measurements.
 
 use crate::common::*;
+use crate::sandwiches::{Factor, Gain};
 use greybox::estimate::CovarianceMethod;
 use greybox::optimize::Severity;
 use greybox::*;
-
-signals! { struct Factor { a: "1" } }
-
-/// `y = a u`.
-#[derive(Clone)]
-struct Gain;
-
-impl Model for Gain {
-    type State = Nothing;
-    type Input = Voltage;
-    type Output = Current;
-    type Parameters = Factor;
-    // Not static: the order of the samples matters.
-    const KIND: Kind = Kind::Discrete;
-
-    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Factor<S>) -> Current<S> {
-        Current { i: p.a * u.u }
-    }
-}
 
 /// Inputs of -1 and 1 in turn, but for these; errors are autoregressive with `rho`.
 fn disturbed(samples: usize, far: &[(usize, f64)], rho: f64) -> ExperimentOf<Gain> {

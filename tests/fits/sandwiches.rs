@@ -5,11 +5,11 @@ use crate::common::*;
 use greybox::estimate::CovarianceMethod;
 use greybox::*;
 
-signals! { struct Factor { a: "1" } }
+signals! { pub struct Factor { a: "1" } }
 
 /// `y = a u`.
 #[derive(Clone)]
-struct Gain;
+pub struct Gain;
 
 impl Model for Gain {
     type State = Nothing;
