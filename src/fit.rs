@@ -1,5 +1,7 @@
 //! [`Fit`]: from a model and its records to an estimate.
 
+#[cfg(feature = "parallel")]
+mod ahead;
 mod elsewhere;
 mod fleet;
 mod lockstep;

@@ -22,6 +22,7 @@ mod predicted;
 mod residual_pass;
 mod sandwich;
 mod shape;
+mod shares;
 mod starts;
 mod step_error;
 mod sums;

@@ -181,7 +181,7 @@ pub trait Sweep: Send + Sync {
     fn guessed_state(&self, record: &Record, parameters: &[f64]) -> Result<Guess, String> {
         let _ = (record, parameters);
         let n = self.layout().states.len();
-        Ok(Guess { state: vec![0.0; n], open: vec![true; n] })
+        Ok(Guess { state: vec![0.0; n], open: vec![true; n], sizes: vec![None; n] })
     }
 
     /// The slopes of the derivative of a continuous model's state with respect to the state, row by row, at a state and the

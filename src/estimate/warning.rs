@@ -74,6 +74,8 @@ pub enum WarningCode {
     NotPositive,
     /// The model bends so much within an interval that it should be asymmetric.
     CurvedInterval,
+    /// One or two measurements decide an interval.
+    DecidedByFew,
     /// Noise in the measured states from which predictions restart.
     RestartNoise,
     /// Noise declared for the inputs, which biases the estimate.

@@ -44,7 +44,7 @@ impl Problem<'_> {
         let best = match is_useless(found, WarningCode::Unexplained) {
             true => {
                 let trials = Trials::of((AGAIN * before).clamp(FEWEST, MOST), before, limit)?;
-                self.from_further_starts(found, trials.most, begin, control)
+                self.search_again(found, trials.most, begin, control)
             }
             false => {
                 let trials = Trials::of(LEAST_TRIALS.max(PATIENCE * before), before, limit)?;
@@ -57,12 +57,12 @@ impl Problem<'_> {
     /// The best minimum of searches from further starts, or the estimate itself if they found none; with a note. They run by the default
     /// method, and go on to finer ones only where the model explains something. `None` where a number of starts was asked for, and
     /// where the measurements tell nothing by any parameters.
-    fn from_further_starts(&self, found: &Summary, trials: u64, begin: Instant, control: &Control) -> Option<Summary> {
+    fn search_again(&self, found: &Summary, trials: u64, begin: Instant, control: &Control) -> Option<Summary> {
         let hopeless = [WarningCode::ConstantOutput, WarningCode::TooFewMeasurements];
         if self.settings.starts.is_some() || hopeless.into_iter().any(|code| is_useless(found, code)) {
             return None;
         }
-        let problem = self.from_starts(STARTS);
+        let problem = self.with_starts(STARTS);
         let start = Start { trials, ..Start::declared(&problem) };
         let mut again = problem.run_within(begin, control, start).ok()?;
         if !is_useless(&again, WarningCode::Unexplained) {

@@ -1,5 +1,7 @@
 //! [`Fleet`]: the same fit of many records, each by itself.
 
+#[cfg(feature = "parallel")]
+use super::ahead::in_order;
 use super::lockstep::fit_together;
 use super::{Fit, Records, declared, finer, sweep};
 use crate::error::Error;
@@ -8,18 +10,17 @@ use crate::experiment::ExperimentOf;
 use crate::functions::Handle;
 use crate::model::Model;
 use crate::parameter::Parameter;
-use crate::problem::{FinerSweeps, Problem, Settings, each};
+use crate::problem::{FinerSweeps, Problem, Settings};
 use crate::record::Record;
 use crate::sweep::Sweep;
 use core::marker::PhantomData;
 use std::collections::VecDeque;
+use std::iter::Fuse;
 use std::sync::Arc;
 
 /// Records whose fits are advanced together: more than there are lanes, so that few lanes are idle when some have
 /// ended.
 const GROUP: usize = 32;
-/// Groups that are read ahead for each thread; their answers are buffered.
-const AHEAD: usize = 4;
 
 /// The same fit of many records, each by itself: motors on a test bench, drives in the field.
 ///
@@ -78,13 +79,13 @@ impl<'a, M: Model> Fleet<'a, M> {
         Records { model, experiments: &[] }
     }
 
-    /// Fits the records and returns an iterator of the answers in their order. It is lazy: some hundred records per
-    /// thread are read ahead, whatever their number.
+    /// Fits the records and returns an iterator of the answers in their order. It is lazy: 128 records per thread are read
+    /// ahead, or up to 512 while the fit of an early one takes long and the others go on.
     pub fn run<R>(&self, records: R) -> impl Iterator<Item = Result<Estimate<M>, Error>>
     where
         R: IntoIterator<Item = ExperimentOf<M>>,
     {
-        Answers { fleet: self, records: records.into_iter(), ready: VecDeque::new() }
+        Answers { fleet: self, records: records.into_iter().fuse(), ready: VecDeque::new() }
     }
 
     /// Fits one record.
@@ -131,7 +132,7 @@ impl<'a, M: Model> Fleet<'a, M> {
 /// Iterator of the answers of a fleet, in the order of its records.
 struct Answers<'f, 'a, M: Model, R> {
     fleet: &'f Fleet<'a, M>,
-    records: R,
+    records: Fuse<R>,
     ready: VecDeque<Result<Summary, Error>>,
 }
 
@@ -140,19 +141,20 @@ impl<M: Model, R: Iterator<Item = ExperimentOf<M>>> Iterator for Answers<'_, '_,
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.ready.is_empty() {
-            let ahead = GROUP * AHEAD * threads();
-            let records: Vec<Record> =
-                self.records.by_ref().take(ahead).map(|experiment| experiment.record().clone()).collect();
-            let groups: Vec<&[Record]> = records.chunks(GROUP).collect();
-            self.ready.extend(each(groups.len(), |g| self.fleet.group(groups[g])).into_iter().flatten());
+            let records = self.records.by_ref();
+            let group = || -> Option<Vec<Record>> {
+                let records = records.take(GROUP).map(|experiment| experiment.record().clone()).collect();
+                Some(records).filter(|records: &Vec<_>| !records.is_empty())
+            };
+            let fleet = self.fleet;
+            self.ready.extend(in_order(group, |group| fleet.group(&group)).into_iter().flatten());
         }
         self.ready.pop_front().map(|answer| Estimate::of(answer?))
     }
 }
 
-fn threads() -> usize {
-    #[cfg(feature = "parallel")]
-    return rayon::current_num_threads();
-    #[cfg(not(feature = "parallel"))]
-    1
+/// The results of the next group.
+#[cfg(not(feature = "parallel"))]
+fn in_order<T, A>(mut next: impl FnMut() -> Option<T>, f: impl Fn(T) -> A) -> Option<A> {
+    next().map(f)
 }

@@ -82,10 +82,8 @@ impl Attempt {
         if trials == 0 {
             return None;
         }
-        let wrong =
-            |warning: &Warning| warning.severity == Severity::NotUsable && warning.code != WarningCode::CoarseStep;
         match &self.found {
-            Ok(found) if found.outcome.converged() && !found.warnings.iter().any(wrong) => {
+            Ok(found) if is_only_coarse(found) => {
                 let within = |(x, (lower, upper)): (f64, (f64, f64))| x.max(lower).min(upper);
                 let coordinates = found.coordinates().into_iter().zip(finer.unknowns.bounds()).map(within).collect();
                 Some(Start { coordinates, trials, ends: found.starts.clone() })
@@ -180,12 +178,7 @@ impl Problem<'_> {
         let mut found = found?;
         for _ in 1..PARTS {
             let trials = most.saturating_sub(found.iterations);
-            let limited = matches!(found.outcome, Outcome::IterationLimit { .. }) && trials > 0;
-            if self.settings.searches() > 1
-                || !limited
-                || is_useless(&found, WarningCode::Unexplained)
-                || control.stops()
-            {
+            if trials == 0 || self.settings.searches() > 1 || !may_go_on(&found) || control.stops() {
                 break;
             }
             let start = Start { coordinates: found.coordinates(), trials, ends: None };
@@ -193,6 +186,17 @@ impl Problem<'_> {
         }
         Ok(found)
     }
+}
+
+/// Whether nothing but the step makes an estimate not usable.
+fn is_only_coarse(found: &Summary) -> bool {
+    let wrong = |warning: &Warning| warning.severity == Severity::NotUsable && warning.code != WarningCode::CoarseStep;
+    found.outcome.converged() && !found.warnings.iter().any(wrong)
+}
+
+/// Whether a search ended at a limit of trial steps where the model explains the data better than a constant.
+fn may_go_on(found: &Summary) -> bool {
+    matches!(found.outcome, Outcome::IterationLimit { .. }) && !is_useless(found, WarningCode::Unexplained)
 }
 
 /// Whether an estimate is not usable for this reason.

@@ -152,6 +152,10 @@ impl<'r> Rounds<'r> {
                 settled = true;
             }
         }
+        // A round's limit is what earlier rounds left.
+        if let Outcome::IterationLimit { iterations } = &mut outcome {
+            *iterations = self.iterations;
+        }
         self.next = self.optimizer.limited(self.left);
         self.memory = objective.memory;
         settled.then(|| SearchEnd {
@@ -243,6 +247,48 @@ fn stopped(objective: &Objective<'_>) -> Error {
 #[cfg(test)]
 mod tests {
     use super::roughness;
+    use crate::optimize::{JacobianColumns, LevenbergMarquardt, Outcome, Stop};
+    use crate::tests::{Current, Gain, Line, Voltage};
+    use crate::{Experiment, ExperimentOf, Fit, Huber, Time, free};
+
+    /// A gain of two, and errors that are no line.
+    fn record() -> ExperimentOf<Line> {
+        let inputs: Vec<Voltage> = (0..40).map(|k| Voltage { u: f64::from(k) }).collect();
+        let outputs = (0..40).map(|k| Current { i: 2.0 * f64::from(k) + f64::from(k * 37 % 21) }).collect();
+        Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap()
+    }
+
+    /// The first of several rounds finds three digits: from a start that has them the answer is that from afar, to ten times the
+    /// tolerance of the noise.
+    #[test]
+    fn the_first_round_is_not_the_last() {
+        let record = record();
+        let from = |start: f64| {
+            let fit = Fit::new(&Line, &record).parameters(Gain { a: free(start) }).loss(Huber::default());
+            fit.run().unwrap().parameters.a
+        };
+        let far = from(1.0);
+        let near = from(far * (1.0 + 1e-4));
+        assert!((near / far - 1.0).abs() < 1e-5, "{near} {far}");
+    }
+
+    /// The limit of trial steps is that of all rounds together, also where one ends just there.
+    #[test]
+    fn a_limit_is_that_of_all_rounds() {
+        let record = record();
+        let within = |iterations: u64| {
+            let optimizer = LevenbergMarquardt::new(Stop { iterations, ..Stop::default() }, JacobianColumns);
+            let fit = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).loss(Huber::default());
+            fit.optimizer(optimizer).run().unwrap()
+        };
+        let needed = within(1000).iterations;
+        for limit in 1..needed {
+            let found = within(limit);
+            assert_eq!(found.outcome, Outcome::IterationLimit { iterations: limit });
+            assert_eq!(found.iterations, limit);
+        }
+        assert!(needed > 3 && within(needed).outcome.converged(), "{needed}");
+    }
 
     #[test]
     fn roughness_is_the_larger_change() {

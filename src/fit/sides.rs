@@ -14,6 +14,15 @@ const SAME: f64 = 0.1;
 /// An estimate, after its deviance.
 type End = (f64, Summary);
 
+/// Limits of the fit that may have ended searches early.
+#[derive(Clone, Copy)]
+struct Limits {
+    /// They had fewer trial steps than they may take: those that ended at a minimum did not need more.
+    fewer: bool,
+    /// The clock or a flag ended them.
+    stop: bool,
+}
+
 impl Problem<'_> {
     /// Compares an estimate that is warned of an alias with the ends of searches that begin where its oscillation has another frequency
     /// with the same samples. Returns the best end, with a note or a warning about the others and the evaluations of all searches; the
@@ -25,14 +34,7 @@ impl Problem<'_> {
         begin: Instant,
         control: &Control,
     ) -> Option<Summary> {
-        let useless = |warning: &Warning| {
-            let cured = matches!(warning.code, WarningCode::NotAtMinimum | WarningCode::CoarseStep);
-            warning.severity == Severity::NotUsable && !cured
-        };
-        let warned = found.warnings.iter().any(is_open) && !found.warnings.iter().any(useless);
-        // Minima cannot be compared without a likelihood, nor where the cost is too rough for one of them.
-        let rough = matches!(found.outcome, Outcome::Rough { .. }) && !found.outcome.converged();
-        if !warned || rough || found.deviance.is_none() {
+        if !has_rivals(found) {
             return None;
         }
         let method = self.by_method().position(|one| one.sweep.integrator() == found.method.integrator).unwrap_or(0);
@@ -51,9 +53,21 @@ impl Problem<'_> {
         };
         let ends = std::iter::once(found.clone()).chain(others.into_iter().filter_map(search));
         let ends: Vec<End> = ends.filter_map(|end| Some((end.deviance?, end))).collect();
-        let short = short && ends.iter().any(|(_, end)| !end.outcome.converged());
-        best(ends, &frequencies.join(" or "), short || control.stops())
+        let limits = Limits { fewer: short, stop: control.stops() };
+        best(ends, &frequencies.join(" or "), limits)
     }
+}
+
+/// Whether an estimate leaves open which of two frequencies is right, and can be compared with others: not without a likelihood,
+/// nor where the cost is too rough for a minimum, nor where another frequency would not make it usable.
+fn has_rivals(found: &Summary) -> bool {
+    let useless = |warning: &Warning| {
+        let cured = matches!(warning.code, WarningCode::NotAtMinimum | WarningCode::CoarseStep);
+        warning.severity == Severity::NotUsable && !cured
+    };
+    let rough = matches!(found.outcome, Outcome::Rough { .. }) && !found.outcome.converged();
+    let warned = found.warnings.iter().any(is_open) && !found.warnings.iter().any(useless);
+    warned && !rough && found.deviance.is_some()
 }
 
 /// Whether a warning leaves open which of two frequencies is right.
@@ -62,9 +76,10 @@ fn is_open(warning: &Warning) -> bool {
 }
 
 /// Chooses among the ends of searches that began where the model has these frequencies (rad/s): the first minimum whose deviance is
-/// within [`INDISTINGUISHABLE`] of the least. `None` if there is one end only, or no minimum. `stopped` says that limits of the fit
-/// ended searches early, so that a better minimum may have been missed.
-fn best(mut ends: Vec<End>, frequencies: &str, stopped: bool) -> Option<Summary> {
+/// within [`INDISTINGUISHABLE`] of the least. `None` if there is one end only, or no minimum. Where limits of the fit ended a
+/// search early, a better minimum may have been missed, which is said.
+fn best(mut ends: Vec<End>, frequencies: &str, limits: Limits) -> Option<Summary> {
+    let stopped = limits.stop || limits.fewer && ends.iter().any(|(_, end)| !end.outcome.converged());
     let (iterations, evaluations) =
         ends.iter().fold((0, 0), |(i, e), (_, end)| (i + end.iterations, e + end.evaluations));
     let distance = |one: &Summary, other: &End| farthest(one, other.1.unknowns.iter().map(|unknown| unknown.value));
@@ -113,18 +128,38 @@ mod tests {
     use super::super::refine::tests::answer;
     use super::*;
 
+    const NONE: Limits = Limits { fewer: false, stop: false };
+
     /// Ends of these deviances, values (of a standard error of one) and convergence: the deviance of the best, with what is said.
-    fn judged(ends: &[(f64, f64, bool)], stopped: bool) -> Option<(f64, Severity, String)> {
+    fn judged(ends: &[(f64, f64, bool)], limits: Limits) -> Option<(f64, Severity, String)> {
         let open = Warning { code: WarningCode::Aliased, severity: Severity::UsableWithCare, text: String::new() };
         let end = |&(deviance, value, converged): &(f64, f64, bool)| {
             let end = answer("fine", deviance, value, converged);
             (deviance, Summary { warnings: vec![open.clone()], ..end })
         };
-        let best = best(ends.iter().map(end).collect(), "5 or 6", stopped)?;
+        let best = best(ends.iter().map(end).collect(), "5 or 6", limits)?;
         let count = ends.len() as u64;
         assert_eq!((best.iterations, best.evaluations, best.warnings.len()), (3 * count, 5 * count, 1));
         let Warning { severity, text, .. } = best.warnings[0].clone();
         Some((best.deviance?, severity, text))
+    }
+
+    #[test]
+    fn what_has_rivals() {
+        let with = |codes: &[(WarningCode, Severity)]| {
+            let warning = |&(code, severity)| Warning { code, severity, text: String::new() };
+            Summary { warnings: codes.iter().map(warning).collect(), ..answer("fine", 100.0, 1.0, true) }
+        };
+        let open = (WarningCode::Aliased, Severity::UsableWithCare);
+        let cured = (WarningCode::CoarseStep, Severity::NotUsable);
+        let useless = (WarningCode::Unexplained, Severity::NotUsable);
+        let harmless = (WarningCode::Unexplained, Severity::UsableWithCare);
+        let found = [&[open][..], &[open, cured], &[open, harmless], &[open, useless], &[cured], &[]].map(with);
+        assert_eq!(found.each_ref().map(has_rivals), [true, true, true, false, false, false]);
+        let [one, ..] = found;
+        assert!(!has_rivals(&Summary { deviance: None, ..one.clone() }));
+        let rough = |errors: f64| Summary { outcome: Outcome::Rough { noise: 1.0, errors }, ..one.clone() };
+        assert_eq!([rough(0.0), rough(10.0)].map(|one| has_rivals(&one)), [true, false]);
     }
 
     /// A minimum that is better by more than 10 in deviance is told from the others; of those within 10 the first is taken, and the
@@ -133,13 +168,13 @@ mod tests {
     fn minima_on_both_sides() {
         use Severity::{Usable, UsableWithCare};
         let verdict =
-            |ends: &[(f64, f64, bool)]| judged(ends, false).map(|(deviance, severity, _)| (deviance, severity));
+            |ends: &[(f64, f64, bool)]| judged(ends, NONE).map(|(deviance, severity, _)| (deviance, severity));
         assert_eq!(verdict(&[(100.0, 1.0, true), (110.1, 7.0, true)]), Some((100.0, Usable)));
         assert_eq!(verdict(&[(110.1, 1.0, true), (100.0, 7.0, true)]), Some((100.0, Usable)));
         assert_eq!(verdict(&[(109.9, 1.0, true), (100.0, 7.0, true)]), Some((109.9, UsableWithCare)));
-        let (_, _, text) = judged(&[(105.0, 1.0, true), (100.0, 7.0, true)], false).unwrap();
+        let (_, _, text) = judged(&[(105.0, 1.0, true), (100.0, 7.0, true)], NONE).unwrap();
         assert!(text.contains("at `a` = 7 A/V (-2 ln of the likelihood differs by 5)"), "{text}");
-        let (_, severity, text) = judged(&[(100.0, 1.0, true), (100.0, 1.09, true)], false).unwrap();
+        let (_, severity, text) = judged(&[(100.0, 1.0, true), (100.0, 1.09, true)], NONE).unwrap();
         assert!(severity == Usable && text.ends_with("at each of them ended in one minimum"), "{text}");
         assert_eq!(verdict(&[(100.0, 1.0, true), (100.0, 1.11, true)]), Some((100.0, UsableWithCare)));
     }
@@ -147,17 +182,24 @@ mod tests {
     /// An end that is no minimum is never the best, and searches that were stopped tell nothing for certain.
     #[test]
     fn ends_that_are_no_minima() {
-        assert_eq!(judged(&[(100.0, 1.0, true)], false), None);
-        assert_eq!(judged(&[(100.0, 1.0, false), (90.0, 1.0, false)], false), None);
-        let (deviance, severity, _) = judged(&[(100.0, 1.0, false), (150.0, 7.0, true)], false).unwrap();
+        assert_eq!(judged(&[(100.0, 1.0, true)], NONE), None);
+        assert_eq!(judged(&[(100.0, 1.0, false), (90.0, 1.0, false)], NONE), None);
+        let (deviance, severity, _) = judged(&[(100.0, 1.0, false), (150.0, 7.0, true)], NONE).unwrap();
         assert_eq!((deviance, severity), (150.0, Severity::UsableWithCare));
-        let (_, _, text) = judged(&[(105.0, 1.0, true), (100.0, 7.0, false)], false).unwrap();
+        let (_, _, text) = judged(&[(105.0, 1.0, true), (100.0, 7.0, false)], NONE).unwrap();
         assert!(
             text.contains("another end of a search, no minimum, explains the data as well, at `a` = 7 A/V"),
             "{text}"
         );
-        let (deviance, severity, text) = judged(&[(100.0, 1.0, true), (150.0, 7.0, false)], true).unwrap();
+        let (deviance, severity, text) =
+            judged(&[(100.0, 1.0, true), (150.0, 7.0, false)], Limits { stop: true, ..NONE }).unwrap();
         assert_eq!((deviance, severity), (100.0, Severity::UsableWithCare));
         assert!(text.ends_with("limits of the fit stopped searches before their end"), "{text}");
+        // Too few trial steps for one of the searches, or enough for all.
+        let few = Limits { fewer: true, ..NONE };
+        let (_, severity, few_text) = judged(&[(100.0, 1.0, true), (150.0, 7.0, false)], few).unwrap();
+        assert_eq!((severity, few_text), (Severity::UsableWithCare, text));
+        let ended = [(100.0, 1.0, true), (150.0, 7.0, true)];
+        assert_eq!(judged(&ended, few), judged(&ended, NONE));
     }
 }

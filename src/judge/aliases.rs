@@ -125,9 +125,8 @@ fn unresolved_at<'p>(
     point: &'p Point,
     interval: f64,
 ) -> Option<Unresolved<'p>> {
-    let few = |(decay, frequency): &&Mode| frequency * interval * SAMPLES > TAU && (decay * interval).exp() > LEFT;
     let modes = modes(objective, coordinates, point)?;
-    let &mode = modes.iter().filter(few).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let &mode = modes.iter().filter(|mode| is_seen_too_seldom(**mode, interval)).max_by(|a, b| a.1.total_cmp(&b.1))?;
     let alias = alias(mode.1, interval);
     let needed = (alias / mode.1).ln();
     let unknowns = &objective.problem.unknowns;
@@ -141,6 +140,11 @@ fn unresolved_at<'p>(
     let most = (0..moves.len()).max_by(|&a, &b| moves[a].total_cmp(&moves[b]))?;
     let reached = moves.iter().sum::<f64>() > needed.abs();
     reached.then(|| Unresolved { point, mode, interval, alias, name: unknowns.row[most].name.clone() })
+}
+
+/// Whether there are too few samples of an oscillation, of which something is left at the next one.
+fn is_seen_too_seldom((decay, frequency): Mode, interval: f64) -> bool {
+    frequency * interval * SAMPLES > TAU && (decay * interval).exp() > LEFT
 }
 
 /// The nearest other frequency with the same samples, so far apart: on the other side of the nearest multiple of half that of sampling.
@@ -190,18 +194,21 @@ fn moved(
             return Some(x);
         }
         let slopes = slopes(objective, &x, point, mode)?;
-        let squares: f64 = moving.iter().map(|&i| slopes[i] * slopes[i]).sum();
-        if squares == 0.0 {
-            return None;
-        }
-        let (needed, values) = (needed.clamp(-LARGEST_STEP, LARGEST_STEP) / squares, unknowns.values(&x));
-        for &i in moving {
-            let (changed, (lower, upper)) = (values[i] * (slopes[i] * needed).exp(), bounds[i]);
+        let slopes: Vec<f64> = moving.iter().map(|&i| slopes[i]).collect();
+        let (steps, values) = (least(&slopes, needed.clamp(-LARGEST_STEP, LARGEST_STEP))?, unknowns.values(&x));
+        for (&i, step) in moving.iter().zip(steps) {
+            let (changed, (lower, upper)) = (values[i] * step.exp(), bounds[i]);
             x[i] = unknowns.row[i].parameter.transform.to_coordinate(changed).max(lower).min(upper);
         }
         mode = nearest(&modes(objective, &x, point)?, mode);
     }
     None
+}
+
+/// The least changes that change by so much what has these slopes; `None` without a slope.
+fn least(slopes: &[f64], needed: f64) -> Option<Vec<f64>> {
+    let squares: f64 = slopes.iter().map(|slope| slope * slope).sum();
+    (squares > 0.0).then(|| slopes.iter().map(|slope| slope * needed / squares).collect())
 }
 
 /// Each oscillation about a point.
@@ -296,6 +303,25 @@ mod tests {
         for (found, expected) in found.into_iter().zip(expected) {
             assert!((found / expected - 1.0f64).abs() < 1e-14, "{found} {expected}");
         }
+    }
+
+    /// The least changes have the direction of the slopes, `3^2 + 4^2 = 5^2`.
+    #[test]
+    fn the_least_changes() {
+        assert_eq!(least(&[3.0, -4.0], 0.5), Some(vec![0.06, -0.08]));
+        assert_eq!([least(&[0.0, 0.0], 0.5), least(&[], 0.5)], [None, None]);
+    }
+
+    /// Of ten samples a second an oscillation of more than 4 cycles a second has fewer than two and a half; a tenth is left of it
+    /// after a sample where it decays at ten times `ln 10`.
+    #[test]
+    fn what_is_seen_too_seldom() {
+        let decay = -10.0 * 10f64.ln();
+        let seldom = |part: f64, cycles: f64| is_seen_too_seldom((part * decay, TAU * cycles), 0.1);
+        assert_eq!(
+            [seldom(0.0, 4.1), seldom(0.0, 3.9), seldom(0.99, 4.1), seldom(1.01, 4.1), seldom(1.01, 3.9)],
+            [true, false, true, false, false]
+        );
     }
 
     /// Of 100 samples a second, in cycles per second: half of that is 50, and 100 a whole cycle a sample.

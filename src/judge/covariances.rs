@@ -4,6 +4,7 @@ use super::conclude::Judgement;
 use super::hac::hac;
 use super::predicted::Dependence;
 use super::sandwich;
+use super::shares::Largest;
 use crate::estimate::CovarianceMethod;
 use crate::information::Covariance;
 use crate::layout::Kind;
@@ -21,6 +22,8 @@ pub(super) struct Covariances {
     pub degrees: Vec<f64>,
     /// Where variances are predicted: by how much the logarithm of that of each unknown grows along one of its standard errors.
     pub own: Vec<f64>,
+    /// The largest shares of measurements in the variances, if they were summed on the way.
+    pub shares: Option<Vec<Largest>>,
 }
 
 /// A covariance in coordinates.
@@ -29,6 +32,7 @@ struct CoordinateCovariance {
     method: CovarianceMethod,
     factor: f64,
     degrees: Vec<f64>,
+    shares: Option<Vec<Largest>>,
 }
 
 impl Judgement<'_> {
@@ -38,17 +42,17 @@ impl Judgement<'_> {
             self.objective.problem.layout().kind != Kind::Static && self.residuals.measured >= CORRELATED_SAMPLES
         });
         let found = autocorrelated.and_then(|_| self.for_colored_errors(unit.as_ref()?));
-        let CoordinateCovariance { covariance, method, factor, degrees } =
+        let CoordinateCovariance { covariance, method, factor, degrees, shares } =
             found.unwrap_or_else(|| self.for_white_errors(&unit));
         let seen = self.seen().into_iter().zip(&self.slopes);
         let in_units: Vec<f64> = seen.map(|(seen, slope)| if seen { *slope } else { 0.0 }).collect();
         let unknowns = covariance.map(|covariance| covariance.times(factor).scaled(&in_units));
         let dependence = unit.as_ref().and_then(|unit| self.dependence_of_variances(unit));
         let Some(Dependence { degrees: most, own }) = dependence else {
-            return Covariances { unknowns, method, unit, degrees, own: vec![] };
+            return Covariances { unknowns, method, unit, degrees, own: vec![], shares };
         };
         let degrees = degrees.iter().zip(most).map(|(degrees, most)| degrees.min(most)).collect();
-        Covariances { unknowns, method, unit, degrees, own }
+        Covariances { unknowns, method, unit, degrees, own, shares }
     }
 
     fn for_colored_errors(&self, unit: &Covariance) -> Option<CoordinateCovariance> {
@@ -57,7 +61,7 @@ impl Judgement<'_> {
         let covariance = Some(hac.covariance(&self.exact, &degrees, self.coupled().is_some())?);
         let degrees = degrees.into_iter().map(|degrees| degrees.min(self.degrees));
         let method = CovarianceMethod::Hac { lags: hac.lags as u64 };
-        Some(CoordinateCovariance { covariance, method, factor: 1.0, degrees: degrees.collect() })
+        Some(CoordinateCovariance { covariance, method, factor: 1.0, degrees: degrees.collect(), shares: hac.shares })
     }
 
     fn for_white_errors(&self, unit: &Option<Covariance>) -> CoordinateCovariance {
@@ -67,21 +71,23 @@ impl Judgement<'_> {
         if sandwich::is_needed(objective) || self.coupled().is_some() {
             let filtered = objective.problem.settings.prefilter.is_some();
             let method = if filtered { CovarianceMethod::FilteredSandwich } else { CovarianceMethod::Sandwich };
-            let covariance = sandwich::sandwich(objective, x, &self.exact).ok().flatten();
-            return CoordinateCovariance { covariance, method, factor: weights, degrees };
+            let found = sandwich::sandwich(objective, x, &self.exact).ok().flatten();
+            let (covariance, shares) = found.map_or((None, None), |(covariance, shares)| (Some(covariance), shares));
+            return CoordinateCovariance { covariance, method, factor: weights, degrees, shares };
         }
         let method = CovarianceMethod::Classical;
         // The widening applies to the errors, not to the priors.
         if self.widening != 1.0 && objective.problem.unknowns.priors(x).next().is_some() {
             let widened = objective.with(objective.whitening.widened(self.widening));
             let covariance = widened.evaluate(x).ok().and_then(|linear| linear.covariance(&self.exact));
-            return CoordinateCovariance { covariance, method, factor: weights, degrees };
+            return CoordinateCovariance { covariance, method, factor: weights, degrees, shares: None };
         }
         CoordinateCovariance {
             covariance: unit.clone(),
             method,
             factor: weights * self.widening * self.widening,
             degrees,
+            shares: None,
         }
     }
 

@@ -11,6 +11,8 @@ use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::numeral::{number, percent};
 use crate::optimize::{Outcome, Severity};
 use crate::parameter::Transform;
+use crate::problem::Role;
+use crate::sweep::Coupling;
 
 /// Standard errors below this part of the value are not examined: two passes over the data each.
 const SMALL: f64 = 0.15;
@@ -35,6 +37,12 @@ impl Judgement<'_> {
             Some((error / unknowns[i].value.abs(), i)).filter(|(part, _)| *part > SMALL)
         };
         let mut examined: Vec<(f64, usize)> = (0..unknowns.len()).filter_map(relative).collect();
+        // Where predictions are affine in the initial state, only parameters make them curved. Along the profile of an initial state
+        // no parameter changes by more than its own standard error, which is small for all of them.
+        let is_state = |i: usize| matches!(unknowns[i].role, Role::InitialState(_));
+        if self.objective.sweep.coupling() == Coupling::Affine && examined.iter().all(|(_, i)| is_state(*i)) {
+            return None;
+        }
         examined.sort_by(|a, b| b.0.total_cmp(&a.0));
         let bent = examined.into_iter().take(MOST).filter_map(|(_, i)| Some((i, self.asymmetry(i, covariances)?)));
         let (i, asymmetry) = bent.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;

@@ -19,6 +19,7 @@ mod scores;
 mod stationary;
 
 use super::sandwich::{self, Sandwich};
+use super::shares::Largest;
 use crate::information::{Covariance, Information};
 use crate::optimize::Linearization;
 use crate::problem::{Objective, each};
@@ -40,6 +41,8 @@ pub(crate) struct Hac {
     sandwich: Sandwich,
     /// The same with the scores of stationary errors, if they have such.
     stationary: Option<Sandwich>,
+    /// The largest shares of measurements in the variances of white errors.
+    pub(super) shares: Option<Vec<Largest>>,
     pub lags: usize,
     runs: Vec<LongRun>,
 }
@@ -72,10 +75,11 @@ pub(crate) fn hac(
         scores
     };
     let stationary = stationary::scores(objective, coordinates, inverse).ok()?;
+    let (stationary, shares) = stationary.map_or((None, None), |(scores, shares)| (Some(scores), Some(shares)));
     let stationary = stationary.map(|scores| found.with(with_priors(scores)));
     let scores = runs.iter().enumerate().map(|(e, run)| run.triangle(unknowns.columns(e).count())).collect();
     let lags = runs.iter().map(|run| run.window.saturating_sub(1)).max().unwrap_or(0);
-    Some(Hac { sandwich: found.with(with_priors(scores)), stationary, lags, runs })
+    Some(Hac { sandwich: found.with(with_priors(scores)), stationary, shares, lags, runs })
 }
 
 impl Hac {

@@ -48,7 +48,7 @@ impl Judgement<'_> {
     pub(super) fn extreme(&self, j: usize) -> Option<Warning> {
         let (fit, largest) = (&self.residuals.outputs[j], self.residuals.largest[j]);
         let count = fit.samples as f64;
-        if count < 3.0 || fit.rmse <= 0.0 || self.end.outcome == Outcome::Exact {
+        if fit.rmse <= 0.0 || self.end.outcome == Outcome::Exact {
             return None;
         }
         let (ratio, chance) = chance(largest.error, fit.rmse, count);

@@ -114,6 +114,14 @@ pub(crate) fn output_fit(measured: &[f64], residuals: &[f64]) -> OutputFit {
 mod tests {
     use super::*;
 
+    /// Without a measurement the errors have no size, and there is nothing to fit.
+    #[test]
+    fn no_measurements() {
+        let OutputFit { samples, rmse, fit_percent, .. } = output_fit(&[f64::NAN; 2], &[f64::NAN; 2]);
+        assert_eq!((samples, rmse, fit_percent), (0, 0.0, None));
+        assert_eq!((OutputSums::default().level(), OutputSums::default().kurtosis()), ((0.0, 0.0), 0.0));
+    }
+
     /// One by one, all at once and in pieces: mean, deviation, kurtosis `n sum e^4 / (sum e^2)^2`, rms and fit of the definitions.
     #[test]
     fn sums_are_the_definitions() {

@@ -44,6 +44,7 @@ impl Judgement<'_> {
         let covariance = DMatrix::from_fn(kept.len(), kept.len(), |i, j| covariance[(i, j)]);
         let directions = Cholesky::new(covariance)?.unpack();
         let (mut squares, mut own) = (vec![0.0; n], vec![0.0; n]);
+        let here = logarithms(unit, n);
         for direction in directions.column_iter() {
             let apart = self.apart(&kept, direction.iter().copied());
             let beside = |sign: f64| {
@@ -51,11 +52,10 @@ impl Judgement<'_> {
                 kept.iter().zip(direction.iter()).for_each(|(&i, along)| place[i] += sign * apart * along);
                 self.logarithms_of_variances(&place)
             };
-            let here = |i: usize| 2.0 * unit.standard_error(i).ln();
             let (above, below) = (beside(1.0), beside(-1.0));
             for (row, &i) in kept.iter().enumerate() {
                 let of = |place: &Option<Vec<f64>>| place.as_ref().map(|logarithms| logarithms[i]);
-                let slope = slope(of(&above), here(i), of(&below), apart);
+                let slope = slope(of(&above), here[i], of(&below), apart);
                 squares[i] += slope * slope;
                 own[i] += slope * direction[row] / unit.standard_error(i);
             }
@@ -76,7 +76,7 @@ impl Judgement<'_> {
 
     fn logarithms_of_variances(&self, place: &[f64]) -> Option<Vec<f64>> {
         let covariance = self.objective.evaluate(place).ok()?.covariance(&self.exact)?;
-        Some((0..place.len()).map(|i| 2.0 * covariance.standard_error(i).ln()).collect())
+        Some(logarithms(&covariance, place.len()))
     }
 
     /// An unknown, such as a noise level, whose interval should reach further above than below.
@@ -97,6 +97,11 @@ impl Judgement<'_> {
         );
         Some(Warning { code: WarningCode::CurvedInterval, severity: Severity::Usable, text })
     }
+}
+
+/// The logarithms of the variances of so many unknowns.
+fn logarithms(covariance: &Covariance, unknowns: usize) -> Vec<f64> {
+    (0..unknowns).map(|i| 2.0 * covariance.standard_error(i).ln()).collect()
 }
 
 /// The bounds of the coordinate of a parameter, as far as a distance is shortened by them: those of logarithms do not count.

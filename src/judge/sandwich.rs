@@ -3,24 +3,31 @@
 //! It is `A^-1 B A^-1` (Huber 1967; White 1980). `A` is the curvature of the cost, `E[psi'] sum w g g'`. `B` is the
 //! covariance of the score: the sum of squares of the samples' own scores, `w psi(z) g` added up over the outputs.
 //! Errors of a fit are smaller than the noise by the part of it that the fit took over, so each is divided by one less
-//! its leverage (HC3: MacKinnon and White, J. Econometrics 29 (1985) 305).
+//! its leverage (HC3: MacKinnon and White, J. Econometrics 29 (1985) 305), and what this leaves out is added ([`scores`]).
 //!
 //! A pre-filter correlates the errors. Where those before it are white, with covariance `S` between the outputs, the
 //! score is theirs times the weighted slopes passed through the filter backward in time (its adjoint), from rest at the
 //! end of the record to its first sample. A forward pass instead counts what happens at the begin of a record wrongly:
 //! errors of initial states came out several times too large.
 
+mod scores;
+
+use super::shares::{self, Largest, Shares};
 use crate::information::{Block, Covariance, Information};
 use crate::optimize::{Infeasible, Linearization};
 use crate::prefilter::Butterworth;
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
 use nalgebra::DMatrix;
+use scores::Scores;
 
 /// One less the leverage of a measurement that alone determines an unknown: its error is rounding.
 pub(super) const ALONE: f64 = 1e-6;
 /// Rows that are absorbed together.
 const ROWS: usize = 256;
+
+/// A covariance, and the largest shares in the variances, which a pre-filter has none of.
+pub(super) type WithShares = (Covariance, Option<Vec<Largest>>);
 
 /// Curvature of the cost and triangles of the scores, a pair per experiment.
 #[derive(Clone)]
@@ -59,14 +66,35 @@ pub(crate) struct Tally {
     influence: DMatrix<f64>,
     /// Sums of the variance that white noise of variance one would have.
     expected: Vec<f64>,
+    /// Sum of the squared influences times their weights, and their number.
+    squares: f64,
+    count: f64,
 }
 
 impl Tally {
+    fn new(outputs: usize) -> Self {
+        Tally {
+            weights: 0.0,
+            curvature: 0.0,
+            influence: DMatrix::zeros(outputs, outputs),
+            expected: vec![0.0; outputs],
+            squares: 0.0,
+            count: 0.0,
+        }
+    }
+
     fn add(&mut self, other: Tally) {
         self.weights += other.weights;
         self.curvature += other.curvature;
         self.influence += other.influence;
         self.expected.iter_mut().zip(other.expected).for_each(|(sum, other)| *sum += other);
+        self.squares += other.squares;
+        self.count += other.count;
+    }
+
+    /// The variance of errors times the roots of their weights, by their influences.
+    fn noise(&self) -> f64 {
+        self.squares / self.count.max(1.0) * (self.weights / self.curvature).powi(2)
     }
 }
 
@@ -76,11 +104,11 @@ pub(crate) fn is_needed(objective: &Objective<'_>) -> bool {
 }
 
 /// The sandwich over all unknowns that are not held, in two more passes with slopes; `None` if it has no number.
-pub(crate) fn sandwich(
+pub(super) fn sandwich(
     objective: &Objective<'_>,
     coordinates: &[f64],
     held: &[bool],
-) -> Result<Option<Covariance>, Infeasible> {
+) -> Result<Option<WithShares>, Infeasible> {
     Passes { objective, coordinates }.sandwich(held)
 }
 
@@ -107,18 +135,24 @@ struct Passes<'p> {
 }
 
 impl Passes<'_> {
-    fn sandwich(&self, held: &[bool]) -> Result<Option<Covariance>, Infeasible> {
+    fn sandwich(&self, held: &[bool]) -> Result<Option<WithShares>, Infeasible> {
         let (sandwich, tally) = self.without_scores()?;
         let Some(inverse) = sandwich.bread.covariance(held) else { return Ok(None) };
-        let (mut scores, scale) = match &self.objective.problem.settings.prefilter {
-            Some(filter) => self.filtered_scores(&inverse, filter, &tally)?,
-            None => (self.scores(&inverse)?, 1.0),
+        let (mut scores, scale, largest) = match &self.objective.problem.settings.prefilter {
+            Some(filter) => {
+                let (scores, scale) = self.filtered_scores(&inverse, filter, &tally)?;
+                (scores, scale, None)
+            }
+            None => {
+                let (scores, largest) = self.scores(&inverse, tally.noise())?;
+                (scores, 1.0, Some(largest))
+            }
         };
         for (i, slope, _) in self.objective.problem.unknowns.priors(self.coordinates) {
             let e = self.objective.problem.unknowns.row[i].experiment.unwrap_or(0);
             scores[e].absorb_row(&prior_row(self.objective, e, i, slope / scale.sqrt()), 0.0);
         }
-        Ok(Sandwich { scores, scale, ..sandwich }.covariance(held))
+        Ok(Sandwich { scores, scale, ..sandwich }.covariance(held).map(|covariance| (covariance, largest)))
     }
 
     /// The curvature for the weights and the loss of this fit, in one pass with slopes; its scores are still missing.
@@ -126,23 +160,13 @@ impl Passes<'_> {
         let outputs = self.objective.outputs();
         let make = |experiment: usize| {
             let columns = self.objective.problem.unknowns.columns(experiment).count();
-            let tally = Tally {
-                weights: 0.0,
-                curvature: 0.0,
-                influence: DMatrix::zeros(outputs, outputs),
-                expected: vec![0.0; outputs],
-            };
+            let tally = Tally::new(outputs);
             let (bread, block) = (Information::new(columns), Block::new(columns, ROWS));
             let impulse = self.objective.problem.settings.prefilter.as_ref().map(ImpulseResponse::new);
             Curvature { objective: self.objective, experiment, tally, bread, block, impulse, row: vec![0.0; columns] }
         };
         let all = self.objective.gather(self.coordinates, true, make)?;
-        let mut tally = Tally {
-            weights: 0.0,
-            curvature: 0.0,
-            influence: DMatrix::zeros(outputs, outputs),
-            expected: vec![0.0; outputs],
-        };
+        let mut tally = Tally::new(outputs);
         let mut blocks = Vec::with_capacity(all.len());
         for mut one in all {
             one.bread.absorb(&mut one.block);
@@ -160,20 +184,19 @@ impl Passes<'_> {
         Ok((Sandwich { bread, scores: vec![], curvature, scale: 1.0 }, tally))
     }
 
-    /// The triangle of each experiment's scores, sample by sample.
-    fn scores(&self, inverse: &Covariance) -> Result<Vec<Information>, Infeasible> {
+    /// The triangle of each experiment's scores, sample by sample, and the largest shares of the unknowns; with the variance of
+    /// all errors.
+    fn scores(&self, inverse: &Covariance, noise: f64) -> Result<(Vec<Information>, Vec<Largest>), Infeasible> {
         let make = |experiment: usize| {
-            let inverse = of_experiment(self.objective, inverse, experiment);
-            let columns = inverse.nrows();
+            let shares = Shares::new(experiment, of_experiment(self.objective, inverse, experiment));
+            let columns = self.objective.problem.unknowns.columns(experiment).count();
             let (scores, block) = (Information::new(columns), Block::new(columns, ROWS));
-            Scores { objective: self.objective, experiment, inverse, scores, block, row: vec![0.0; columns] }
+            Scores { objective: self.objective, experiment, shares, noise, scores, block, row: vec![0.0; columns] }
         };
-        let all = self.objective.gather(self.coordinates, true, make)?;
-        let absorbed = |mut one: Scores<'_>| {
-            one.scores.absorb(&mut one.block);
-            one.scores
-        };
-        Ok(all.into_iter().map(absorbed).collect())
+        let mut all = self.objective.gather(self.coordinates, true, make)?;
+        all.iter_mut().for_each(|one| one.scores.absorb(&mut one.block));
+        let largest = shares::of_all(self.objective, all.iter().map(|one| &one.shares));
+        Ok((all.into_iter().map(|one| one.scores).collect(), largest))
     }
 
     /// The triangle of each experiment's scores where a filter correlated white errors, and the factor for all of them
@@ -241,6 +264,8 @@ impl Accumulate for Curvature<'_> {
                 self.tally.weights += w;
                 self.tally.curvature += w * loss.map_or(1.0, |loss| loss.slope(z));
                 self.tally.expected[j] += expected;
+                self.tally.squares += w * psi[j] * psi[j];
+                self.tally.count += 1.0;
                 let values = window.row(k, j).iter().skip(lane).step_by(lanes);
                 self.row.iter_mut().zip(values).for_each(|(to, from)| *to = from * w.sqrt());
                 self.bread.gather(&mut self.block, &self.row, 0.0);
@@ -256,42 +281,6 @@ impl Accumulate for Curvature<'_> {
         self.bread.absorb(&mut self.block);
         self.bread.merge(&later.bread);
         self.tally.add(later.tally);
-    }
-}
-
-/// The triangle of the scores.
-struct Scores<'s> {
-    objective: &'s Objective<'s>,
-    experiment: usize,
-    inverse: DMatrix<f64>,
-    scores: Information,
-    block: Block,
-    row: Vec<f64>,
-}
-
-impl Accumulate for Scores<'_> {
-    fn add(&mut self, window: &Window, lane: usize) {
-        let (lanes, loss) = (window.lanes(), self.objective.loss());
-        let mut slopes = vec![0.0; self.row.len()];
-        for k in 0..window.samples[lane] {
-            let weight = self.objective.weight(self.experiment, window.begin[lane] + k);
-            self.row.fill(0.0);
-            for j in (0..window.outputs()).filter(|&j| weight > 0.0 && window.is_measured(k, j, lane)) {
-                let values = window.row(k, j).iter().skip(lane).step_by(lanes);
-                slopes.iter_mut().zip(values).for_each(|(to, from)| *to = *from);
-                let z = window.error(k, j, lane);
-                let less = (1.0 - weight * form(&self.inverse, &slopes)).max(ALONE);
-                let influence = weight * loss.map_or(z, |loss| loss.psi(z)) / less;
-                self.row.iter_mut().zip(&slopes).for_each(|(row, slope)| *row += slope * influence);
-            }
-            self.scores.gather(&mut self.block, &self.row, 0.0);
-        }
-    }
-
-    fn append(&mut self, mut later: Self) {
-        later.scores.absorb(&mut later.block);
-        self.scores.absorb(&mut self.block);
-        self.scores.merge(&later.scores);
     }
 }
 

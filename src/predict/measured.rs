@@ -34,6 +34,9 @@ pub struct Guess {
     pub state: Vec<f64>,
     /// Whether the outputs leave the entry open.
     pub open: Vec<bool>,
+    /// The size of each entry that the outputs give, in its unit: its magnitude, or the change that changes an output by half
+    /// its range in the record, whichever is larger. A search limits its steps by it; `None`: by the magnitude alone.
+    pub sizes: Vec<Option<f64>>,
 }
 
 /// Errors of the outputs at a state, and their slopes with respect to the states.
@@ -57,7 +60,7 @@ impl Place<'_> {
                 "{n} state(s), {states}, but {found} measured of the output(s) {outputs} at t = {t} s"
             ));
         }
-        let Guess { state, open } = self.nearest(y, 0.0)?;
+        let Guess { state, open, .. } = self.nearest(y, 0.0)?;
         match open.iter().position(|open| *open) {
             Some(i) => Err(format!("the outputs do not determine `{}`", self.layout.states[i].name)),
             None => Ok(state),
@@ -65,10 +68,23 @@ impl Place<'_> {
     }
 
     /// The same for entries that the outputs determine; the others are zero, or one where the equations are undefined there.
+    /// `moves`: half the range of each output in the record, in its unit.
     ///
     /// # Errors
     /// Outputs that are undefined at both.
-    pub fn guess(&self, y: &[f64]) -> Result<Guess, String> {
+    pub fn guess(&self, y: &[f64], moves: &[f64]) -> Result<Guess, String> {
+        let guess = self.guess_state(y)?;
+        let Ok(slopes) = self.slopes(&guess.state, y) else { return Ok(guess) };
+        let change = |i: usize| {
+            let changes = slopes.rows.iter().zip(moves).map(|(row, moves)| (moves / row[i]).abs());
+            changes.filter(|change| *change > 0.0).fold(f64::INFINITY, f64::min)
+        };
+        let size =
+            |i: usize| Some(change(i).max(guess.state[i].abs())).filter(|size| size.is_finite() && !guess.open[i]);
+        Ok(Guess { sizes: (0..guess.state.len()).map(size).collect(), ..guess })
+    }
+
+    fn guess_state(&self, y: &[f64]) -> Result<Guess, String> {
         let zero = self.nearest(y, 0.0);
         let is_start = |guess: &Guess| !guess.open.contains(&true) || self.moves(&guess.state);
         if zero.as_ref().is_ok_and(is_start) {
@@ -83,7 +99,7 @@ impl Place<'_> {
         let n = self.layout.states.len();
         let mut x = vec![from; n];
         if n == 0 {
-            return Ok(Guess { state: x, open: vec![] });
+            return Ok(Guess { state: x, open: vec![], sizes: vec![] });
         }
         let mut at = self.slopes(&x, y)?;
         let influence = |at: &Slopes, j: usize| {
@@ -110,11 +126,12 @@ impl Place<'_> {
                 // Towards a measurement that no state gives (noise beyond where an output saturates), steps lead to where the
                 // state moves nothing any more.
                 let lost = |j: usize| open[j] && influence(&at, j) < LOST * first[j];
-                return Ok(Guess { state: (0..n).map(|j| if lost(j) { from } else { x[j] }).collect(), open });
+                let state = (0..n).map(|j| if lost(j) { from } else { x[j] }).collect();
+                return Ok(Guess { state, open, sizes: vec![None; n] });
             }
         }
         // The steps may have led anywhere.
-        Ok(Guess { state: vec![from; n], open: vec![true; n] })
+        Ok(Guess { state: vec![from; n], open: vec![true; n], sizes: vec![None; n] })
     }
 
     fn moved(&self, x: &[f64], step: &[f64], y: &[f64]) -> Result<(Vec<f64>, Slopes), String> {

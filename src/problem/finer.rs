@@ -13,7 +13,7 @@ pub(crate) trait Finer: Send + Sync {
     /// The problem by one of the methods; `None` after the last, and for a method that does not serve it.
     fn by(&self, number: usize) -> Option<&Problem<'_>>;
     /// The same with searches from so many starts.
-    fn from_starts(&self, count: usize) -> Arc<dyn Finer + '_>;
+    fn with_starts(&self, count: usize) -> Arc<dyn Finer + '_>;
 }
 
 /// Sweeps by finer and finer methods. Each is made when it is first needed, once for all problems that share these.
@@ -64,8 +64,8 @@ impl Finer for ByMethods<'_> {
         self.made.get(number)?.get_or_init(|| self.base.with_sweep(self.sweeps.get(number)?).ok()).as_ref()
     }
 
-    fn from_starts(&self, count: usize) -> Arc<dyn Finer + '_> {
-        let settings = self.base.settings.from_starts(count);
+    fn with_starts(&self, count: usize) -> Arc<dyn Finer + '_> {
+        let settings = self.base.settings.with_starts(count);
         ByMethods::new(Problem { settings, ..self.base.clone() }, self.sweeps.clone())
     }
 }
@@ -91,9 +91,9 @@ impl<'a> Problem<'a> {
     }
 
     /// The same problem, searched from so many starts, by each method.
-    pub(crate) fn from_starts(&self, count: usize) -> Problem<'_> {
-        let finer = self.finer.as_ref().map(|finer| finer.from_starts(count));
-        Problem { settings: self.settings.from_starts(count), finer, ..self.clone() }
+    pub(crate) fn with_starts(&self, count: usize) -> Problem<'_> {
+        let finer = self.finer.as_ref().map(|finer| finer.with_starts(count));
+        Problem { settings: self.settings.with_starts(count), finer, ..self.clone() }
     }
 
     /// The problem by a finer method, numbered from the coarsest; `None` after the last.

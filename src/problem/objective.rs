@@ -1,6 +1,7 @@
 //! [`Objective`]: the cost of a fit as a function of its unknowns.
 
 use super::segments::Memory;
+use super::unknowns::Free;
 use super::{Control, Problem, Whitening};
 use crate::error::Failure;
 use crate::loss::Loss;
@@ -217,8 +218,14 @@ impl LeastSquares for Objective<'_> {
     }
 
     fn sizes(&self) -> Vec<Option<f64>> {
-        let size = |transform| (transform == Transform::Log).then_some(1.0);
-        self.problem.unknowns.row.iter().map(|unknown| size(unknown.parameter.transform)).collect()
+        // A filter corrects its state by the measurements, and with short steps of the initial one the noise levels stay away from
+        // zero, where the likelihood of a state that passes through a measurement grows without limit.
+        let filtered = self.sweep.predicts_variance();
+        let size = |unknown: &Free| match unknown.parameter.transform {
+            Transform::Log => Some(1.0),
+            Transform::Identity => unknown.size.filter(|_| !filtered),
+        };
+        self.problem.unknowns.row.iter().map(size).collect()
     }
 
     fn bounds(&self) -> Vec<(f64, f64)> {

@@ -151,7 +151,7 @@ impl<'a> Settings<'a> {
     }
 
     /// These settings, for another fit from so many starts.
-    pub(super) fn from_starts(&self, count: usize) -> Self {
+    pub(super) fn with_starts(&self, count: usize) -> Self {
         Settings { checkpoint: None, ..self.clone() }.starts(count)
     }
 

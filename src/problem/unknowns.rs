@@ -34,6 +34,8 @@ pub(crate) struct Free {
     pub parameter: Parameter,
     /// Whether it is an initial state whose start nobody gave: neither the user nor the outputs.
     pub guessed: bool,
+    /// Its size, if that is known otherwise than by its magnitude.
+    pub size: Option<f64>,
 }
 
 /// Initial state and parameters of one experiment.
@@ -71,7 +73,15 @@ impl Unknowns {
         let free_of = |i: usize, experiment: Option<usize>| {
             let Quantity { name, unit } = layout.parameters[i].clone();
             let name = experiment.map_or(name.clone(), |e| format!("{name} [{}]", labels[e]));
-            Free { name, unit, role: Role::Parameter(i), experiment, parameter: parameters[i], guessed: false }
+            Free {
+                name,
+                unit,
+                role: Role::Parameter(i),
+                experiment,
+                parameter: parameters[i],
+                guessed: false,
+                size: None,
+            }
         };
         let chosen = |own: bool| {
             (0..parameters.len()).filter(move |&i| parameters[i].free && parameters[i].per_experiment == own)
@@ -80,7 +90,7 @@ impl Unknowns {
         let (mut begins, mut initial) = (vec![], vec![]);
         for (e, record) in records.iter().enumerate() {
             begins.push(row.len());
-            let (state, open) = initial_state(sweep, record, parameters)?;
+            let InitialState { state, open, sizes } = InitialState::of(sweep, record, parameters)?;
             for (i, (&known, Quantity { name, unit })) in state.iter().zip(&layout.states).enumerate() {
                 let name = labeled(&format!("{name}(0)"), e);
                 check(&name, &known)?;
@@ -91,7 +101,7 @@ impl Unknowns {
                 }
                 if known.free {
                     let (unit, role, experiment) = (unit.clone(), Role::InitialState(i), Some(e));
-                    row.push(Free { name, unit, role, experiment, parameter: known, guessed: open[i] });
+                    row.push(Free { name, unit, role, experiment, parameter: known, guessed: open[i], size: sizes[i] });
                 }
             }
             row.extend(chosen(true).map(|i| free_of(i, Some(e))));
@@ -206,29 +216,38 @@ fn labels(records: &[Record]) -> Vec<String> {
     records.iter().map(label).collect()
 }
 
-/// What is known of the state at an experiment's first sample, and which entries are a start that no output gives.
-fn initial_state(
-    sweep: &dyn Sweep,
-    record: &Record,
-    parameters: &[Parameter],
-) -> Result<(Vec<Parameter>, Vec<bool>), Error> {
-    let p: Vec<f64> = parameters.iter().map(|p| p.start).collect();
-    let unknown = |reason, remedy| Error::StateNotMeasured { experiment: record.name().to_owned(), reason, remedy };
-    let (state, open) = match record.initial_state() {
-        Initial::Given(state) => (state.clone(), vec![false; state.len()]),
-        Initial::FirstSample => {
-            let remedy =
-                "leave initial_from_first_sample out to have it estimated, or give it with Experiment::initial";
-            let x = sweep.measured_state(record, 0, &p).map_err(|reason| unknown(reason, remedy))?;
-            (x.iter().map(|x| fixed(*x)).collect(), vec![false; x.len()])
+/// What is known of the state at an experiment's first sample.
+struct InitialState {
+    state: Vec<Parameter>,
+    /// Which entries are a start that nobody gave: neither the user nor the outputs.
+    open: Vec<bool>,
+    sizes: Vec<Option<f64>>,
+}
+
+impl InitialState {
+    fn of(sweep: &dyn Sweep, record: &Record, parameters: &[Parameter]) -> Result<Self, Error> {
+        let p: Vec<f64> = parameters.iter().map(|p| p.start).collect();
+        let unknown = |reason, remedy| Error::StateNotMeasured { experiment: record.name().to_owned(), reason, remedy };
+        let known = |state: Vec<Parameter>| {
+            let n = state.len();
+            InitialState { state, open: vec![false; n], sizes: vec![None; n] }
+        };
+        match record.initial_state() {
+            Initial::Given(state) => Ok(known(state.clone())),
+            Initial::FirstSample => {
+                let remedy =
+                    "leave initial_from_first_sample out to have it estimated, or give it with Experiment::initial";
+                let x = sweep.measured_state(record, 0, &p).map_err(|reason| unknown(reason, remedy))?;
+                Ok(known(x.into_iter().map(fixed).collect()))
+            }
+            Initial::Estimated => {
+                let remedy = "give a start for it with Experiment::initial";
+                let guess = sweep.guessed_state(record, &p).map_err(|reason| unknown(reason, remedy))?;
+                let Guess { state, open, sizes } = guess;
+                Ok(InitialState { state: state.into_iter().map(free).collect(), open, sizes })
+            }
         }
-        Initial::Estimated => {
-            let remedy = "give a start for it with Experiment::initial";
-            let Guess { state, open } = sweep.guessed_state(record, &p).map_err(|reason| unknown(reason, remedy))?;
-            (state.into_iter().map(free).collect(), open)
-        }
-    };
-    Ok((state, open))
+    }
 }
 
 fn check(name: &str, parameter: &Parameter) -> Result<(), Error> {

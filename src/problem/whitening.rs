@@ -111,6 +111,33 @@ fn factor_of_part(covariance: &SquareMatrix, here: &[usize]) -> SquareMatrix {
 mod tests {
     use super::*;
 
+    /// The rows of one lane, a slope and an error of each output, are multiplied by the inverse of the factor of the covariance:
+    /// `[[4, 2], [2, 10]] = L L'` with `L = [[2, 0], [1, 3]]`. What another lane holds stays.
+    #[test]
+    fn rows_of_a_lane_are_decorrelated() {
+        let full = Whitening::full(SquareMatrix::from_fn(2, |i, j| [[4.0, 2.0], [2.0, 10.0]][i][j])).unwrap();
+        for lane in 0..3 {
+            let mut window = Window::new(3, 2, 1, 2, false);
+            window.samples.fill(2);
+            let before =
+                |k: usize, j: usize, column: usize, lane: usize| (1 + k + 3 * j + 5 * column + 11 * lane) as f64;
+            for (k, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                window.set_measured(k, j, 0b111);
+                let entry = |i: usize| before(k, j, i / 3, i % 3);
+                window.row_mut(k, j).iter_mut().enumerate().for_each(|(i, value)| *value = entry(i));
+            }
+            full.decorrelate(&mut window, lane);
+            for (k, column, other) in (0..12).map(|i| (i % 2, i / 2 % 2, i / 4)) {
+                let (y, z) = (before(k, 0, column, other), before(k, 1, column, other));
+                let expected = if other == lane { [y / 2.0, (z - y / 2.0) / 3.0] } else { [y, z] };
+                for (j, expected) in expected.into_iter().enumerate() {
+                    let found = window.at(k, j, column, other);
+                    assert!((found - expected).abs() < 1e-13, "{lane} {k} {j} {column} {other}: {found} {expected}");
+                }
+            }
+        }
+    }
+
     /// Determinants by hand: 35 of the whole, 4 and 9 of its parts; 36 where the outputs are independent.
     #[test]
     fn determinants_of_parts() {

@@ -91,7 +91,11 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
     fn guessed_state(&self, record: &Record, p: &[f64]) -> Result<Guess, String> {
         let first = |channel: &Channel| channel.values.iter().copied().find(|y| y.is_finite()).unwrap_or(f64::NAN);
         let y: Vec<f64> = record.outputs().iter().map(first).collect();
-        Place { layout: &self.layout, functions: &self.model, t: record.time(0), u: &record.input(0), p }.guess(&y)
+        let half = |range: (f64, f64)| 0.5 * (range.1 - range.0);
+        let moves: Vec<f64> =
+            record.inspect_some().outputs.iter().map(|output| output.range.map_or(0.0, half)).collect();
+        Place { layout: &self.layout, functions: &self.model, t: record.time(0), u: &record.input(0), p }
+            .guess(&y, &moves)
     }
 
     fn state_slopes(&self, record: &Record, sample: usize, state: &[f64], p: &[f64]) -> Option<Vec<f64>> {

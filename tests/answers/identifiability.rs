@@ -2,7 +2,7 @@
 
 use crate::random::Random;
 use crate::shared::shared;
-use greybox::diagnose::{End, derived, identifiability, profile};
+use greybox::diagnose::{End, bands, derived, identifiability, profile};
 use greybox::optimize::Severity;
 use greybox::{Butterworth, Horizon};
 use greybox::{
@@ -200,6 +200,71 @@ fn strengths_and_errors_in_each_coordinate() {
             let (strength, value) = of(top, power);
             assert!((strength / (value * moved) - 1.0).abs() < 1e-9, "{strength} {value} {moved}");
         }
+    }
+}
+
+/// `25 (4 / half - 2)^2`, in the logarithm the mirror image of the one above: the curve goes on below the lower end, unless a bound
+/// is between.
+#[test]
+fn a_profile_is_drawn_below_its_lower_end_within_bounds() {
+    // Of so small doses the half alone is seen, `y = 1e9 top u / half`.
+    let inputs = vec![Dose { u: 1e-9 }; 24];
+    let outputs = (0..24).map(|k| Answer { y: 0.5 + 0.25 * (1.0 - 2.0 * f64::from(k % 2)) }).collect();
+    let record = Experiment::new(&Binding, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+    let of = |half: Parameter| {
+        let fit = Fit::new(&Binding, &record).parameters(Saturation { top: fixed(1e9), half });
+        let problem = fit.noise(Answer { y: 0.25 * 24f64.sqrt() / 5.0 }).problem().unwrap();
+        let found = profile(&problem, &problem.run().unwrap(), "half", 0.95).unwrap();
+        for point in &found.points {
+            assert!((point.rise - 25.0 * (4.0 / point.value - 2.0).powi(2)).abs() < 1e-6, "{point:?}");
+        }
+        let End::At(lower) = found.lower else { panic!("{found:?}") };
+        // The end is found to a thousandth of the root of the threshold.
+        assert!((5.0 * (4.0 / lower - 2.0) / found.threshold.sqrt() - 1.0).abs() < 1.1e-3, "{lower}");
+        (lower, found.points[0].value)
+    };
+    // A bound at zero is none of a logarithm.
+    let (lower, first) = of(free(2.5).log().within(0.0, 10.0));
+    let ratio = (first / 2.0).ln() / (lower / 2.0).ln();
+    assert!((ratio - 1.5f64.sqrt()).abs() < 1e-6, "{ratio}");
+    let bound = 0.5 * (lower + first);
+    let (same, first) = of(free(2.5).log().within(bound, 10.0));
+    // Each is found to a thousandth of a tenth of the value.
+    assert!((same / lower - 1.0).abs() < 2e-3 && first >= bound, "{same} {first}");
+}
+
+/// Where the curve rises, but levels off below the threshold, it is followed beyond the eight points that show it flat.
+#[test]
+fn a_profile_without_an_end_is_open() {
+    let inputs = vec![Drive { u: 1.0, w: 0.0 }; 25];
+    let z = |k: i32| if k == 24 { 0.0 } else { f64::NAN };
+    let outputs = (0..25).map(|k| Reading { y: 0.3 + 0.5 - f64::from(k % 2), z: z(k) }).collect();
+    let record = Experiment::new(&Amplifier, Time::Uniform { start: 0.0, step: 0.1 }, inputs, outputs).unwrap();
+    // 1.6 standard errors from zero, which is as far as a logarithm comes.
+    let parameters = Product { a: free(1.0).log(), b: fixed(1.0), c: fixed(0.0) };
+    let fit = Fit::new(&Amplifier, &record).parameters(parameters).noise(Reading { y: 1.0, z: 1.0 });
+    let problem = fit.problem().unwrap();
+    let found = profile(&problem, &problem.run().unwrap(), "a", 0.95).unwrap();
+    assert!(matches!(found.lower, End::Open(_)) && matches!(found.upper, End::At(_)), "{found:?}");
+    assert!(found.points.iter().filter(|point| point.value < found.value).count() > 8, "{found:?}");
+}
+
+/// Nothing is known with no probability, and nothing with certainty.
+#[test]
+fn a_probability_is_between_0_and_1() {
+    let record = binding(1, 2.0);
+    let fit = Fit::new(&Binding, &record).parameters(Saturation { top: free(4.0), half: fixed(2.0) });
+    let problem = fit.problem().unwrap();
+    let estimate = problem.run().unwrap();
+    for wrong in [-0.1, 0.0, 1.0, 1.1, f64::NAN] {
+        let refused = [
+            profile(&problem, &estimate, "top", wrong).unwrap_err().to_string(),
+            bands(&problem, &estimate, 0, wrong).unwrap_err().to_string(),
+        ];
+        assert!(
+            refused.iter().all(|text| text.contains(&format!("{wrong}; it must be between 0 and 1"))),
+            "{refused:?}"
+        );
     }
 }
 

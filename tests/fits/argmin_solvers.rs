@@ -84,12 +84,19 @@ fn a_particle_swarm_finds_the_minimum_without_a_start() {
     }
 }
 
-struct Count(Arc<AtomicU64>);
+/// Iterations and ends of searches.
+#[derive(Clone, Default)]
+struct Count(Arc<AtomicU64>, Arc<AtomicU64>);
 
 impl Observe<LeastSquaresState> for Count {
     fn observe_iter(&mut self, state: &LeastSquaresState, _kv: &KV) -> Result<(), argmin::core::Error> {
         assert!(state.get_cost().is_finite());
         self.0.fetch_add(1, Ordering::Relaxed);
+        Ok(())
+    }
+
+    fn observe_final(&mut self, _state: &LeastSquaresState) -> Result<(), argmin::core::Error> {
+        self.1.fetch_add(1, Ordering::Relaxed);
         Ok(())
     }
 }
@@ -108,10 +115,10 @@ fn the_course_of_a_search_is_kept() {
 
 #[test]
 fn observers_see_every_iteration() {
-    let (record, count) = (record(1), Arc::new(AtomicU64::new(0)));
-    let estimate = fit(&record).observe(Count(count.clone()), ObserverMode::Always).run().unwrap();
+    let (record, count) = (record(1), Count::default());
+    let estimate = fit(&record).observe(count.clone(), ObserverMode::Always).run().unwrap();
     assert!(estimate.iterations > 2);
-    assert_eq!(count.load(Ordering::Relaxed), estimate.iterations);
+    assert_eq!((count.0.load(Ordering::Relaxed), count.1.load(Ordering::Relaxed)), (estimate.iterations, 1));
 }
 
 /// The costs that an observer was shown.

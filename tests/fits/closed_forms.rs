@@ -152,7 +152,8 @@ fn covariances_of_several_experiments_are_the_dense_ones() {
     let slopes = chain(&estimate.unknowns);
     check(&estimate.covariance, &slopes * &inverse * &slopes);
 
-    // Weighted: each row's score, by one less its leverage.
+    // Weighted: each row's score, by one less its leverage `h`, and 0.4 of the variance that the other rows' prediction has,
+    // `h / (1 - h)` times that of all.
     let weight = |s: &Sample<Lag>| 0.1 + s.u.u.abs();
     let weighted = fit().weighting(weight).run().unwrap();
     let problem = fit().weighting(weight).problem().unwrap();
@@ -161,10 +162,12 @@ fn covariances_of_several_experiments_are_the_dense_ones() {
     let rows = dense(objective.jacobian(&at).unwrap());
     let residuals = DVector::from_vec(objective.apply(&at).unwrap());
     let bread = (rows.transpose() * &rows).try_inverse().unwrap();
+    let noise = residuals.norm_squared() / weighted.measurements as f64;
     let mut meat = DMatrix::zeros(rows.ncols(), rows.ncols());
     for (g, r) in rows.row_iter().zip(residuals.iter()) {
         let leverage = (g * &bread * g.transpose())[(0, 0)];
-        meat += g.transpose() * g * (r / (1.0 - leverage)).powi(2);
+        let predicted = noise * leverage / (1.0 - leverage);
+        meat += g.transpose() * g * ((r / (1.0 - leverage)).powi(2) + 0.4 * predicted);
     }
     let slopes = chain(&weighted.unknowns);
     check(&weighted.covariance, &slopes * &bread * meat * &bread * &slopes);

@@ -175,13 +175,19 @@ fn check(records: &[ExperimentOf<Bending>], told: Told) {
     let covariance = if sandwich {
         assert_eq!(found.method.covariance, CovarianceMethod::Sandwich);
         let inverse = information(1.0 / curvature).try_inverse().unwrap();
-        let mut meat = squares(1.0);
+        let leverage = |row: &Row| (row.slopes.transpose() * &inverse * &row.slopes)[(0, 0)] * row.weight;
+        // What the others predict of a row has `h / (1 - h)` times the noise of all; 0.4 of it counts.
+        let squared: f64 = rows.iter().map(|row| row.weight * psi(row.error).powi(2)).sum();
+        let noise = squared / n / (curvature * curvature);
+        let predicted = |row: &Row| row.weight * noise * leverage(row) / (1.0 - leverage(row));
+        let mut meat = rows
+            .iter()
+            .fold(squares(1.0), |sum, row| sum + &row.slopes * row.slopes.transpose() * (0.4 * predicted(row)));
         for (e, record) in records.iter().enumerate() {
             for k in 0..record.len() {
                 let here = rows.iter().filter(|row| row.sample == (e, k));
                 let score = here.fold(DVector::zeros(4), |sum, row| {
-                    let leverage = (row.slopes.transpose() * &inverse * &row.slopes)[(0, 0)] * row.weight;
-                    sum + &row.slopes * (row.weight * psi(row.error) / (1.0 - leverage))
+                    sum + &row.slopes * (row.weight * psi(row.error) / (1.0 - leverage(row)))
                 });
                 meat += &score * score.transpose();
             }

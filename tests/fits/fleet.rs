@@ -137,7 +137,7 @@ fn a_time_limit_of_nothing_stops_every_fit_of_a_fleet() {
     assert_eq!(fleet.run(records).filter(Result::is_err).count(), 3);
 }
 
-/// Four groups of 32 records are read ahead for each thread.
+/// Four groups of 32 records are read ahead for each thread; while an early one takes long, up to sixteen.
 #[test]
 fn a_fleet_reads_ahead() {
     let inputs: Vec<Voltage> = levels(6, 1, 3).into_iter().map(|u| Voltage { u }).collect();
@@ -152,7 +152,8 @@ fn a_fleet_reads_ahead() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
     let first = pool.install(|| fleet.run(records).next().unwrap().unwrap());
     assert!((first.parameters.slope - 1.5).abs() < 1e-6);
-    assert_eq!(read.load(Relaxed), 4 * 32 * 2);
+    let groups = read.load(Relaxed) / 32;
+    assert!((8..=32).contains(&groups), "{groups}");
 }
 
 /// Fits behind a filter, and from several starts, are not advanced together: their answers are those of the single fits, too.

@@ -1,5 +1,6 @@
 //! Initial states that the outputs do not give, or not at the first sample, start where they can, and the report says so.
 
+use crate::common::{Branch, Current, Lag, Voltage, levels};
 use crate::refused::says;
 use greybox::optimize::Severity;
 use greybox::*;
@@ -274,4 +275,27 @@ fn an_initial_state_per_experiment_is_refused() {
     let record = record(&Oscillator, SPRING, Motion { x: 0.4, v: -0.7 }, Position { x: 0.01 }, 1.0);
     let record = record.initial(Motion { x: free(0.4).per_experiment(), v: free(0.0) });
     says(Fit::new(&Oscillator, &record).parameters(start()).run(), &["`x(0)`", "leave .per_experiment() out"]);
+}
+
+/// A current of 3 A whose first measurement happens to be 10 uA: how far a step may go is judged by how far the current moves in
+/// the record, not by that measurement, of which a step at most doubles the magnitude.
+#[test]
+fn a_first_measurement_next_to_zero_does_not_hold_the_search_back() {
+    let inputs: Vec<Voltage> = levels(400, 20, 5).into_iter().map(|u| Voltage { u }).collect();
+    let (truth, time) = (Branch { gain: 2.0, tau: 0.05 }, Time::Uniform { start: 0.0, step: 5e-3 });
+    let run = simulate(&Lag, &truth, &Current { i: 3.0 }, time.clone(), &inputs).unwrap();
+    let record = run.with_noise(Current { i: 0.02 }, 1).experiment(&Lag).unwrap();
+    let fit = |first: f64| {
+        let mut outputs: Vec<Current> = record.outputs().collect();
+        outputs[0].i = first;
+        let record = Experiment::new(&Lag, time.clone(), inputs.clone(), outputs).unwrap();
+        let parameters = Branch { gain: free(1.0), tau: free(0.1) };
+        Fit::new(&Lag, &record).parameters(parameters).noise(Current { i: 0.02 }).run().unwrap()
+    };
+    let [usual, small] = [3.0, 1e-5].map(fit);
+    // 13 and 9; judged by that measurement, 27.
+    assert!(small.evaluations <= 2 * usual.evaluations, "{} {}", small.evaluations, usual.evaluations);
+    // One of 400 measurements is wrong, by 150 standard deviations, of an exponential that ten measurements tell.
+    let tau = small.parameters.tau;
+    assert!((tau - truth.tau).abs() < 0.1 * truth.tau, "{tau}");
 }

@@ -14,6 +14,7 @@ mod declared;
 mod dense_answers;
 mod extremes;
 mod far_starts;
+mod few_measurements;
 mod fleet;
 mod guessed_states;
 mod interval_limits;

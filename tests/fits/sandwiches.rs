@@ -5,11 +5,11 @@ use crate::common::*;
 use greybox::estimate::CovarianceMethod;
 use greybox::*;
 
-signals! { struct Factor { a: "1" } }
+signals! { pub struct Factor { a: "1" } }
 
 /// `y = a u`.
 #[derive(Clone)]
-struct Gain;
+pub struct Gain;
 
 impl Model for Gain {
     type State = Nothing;
@@ -42,13 +42,15 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// `(sum (w psi(z) u / (1 - h))^2 + q^2) / (c sum w u^2 + q^2)^2` in units of the noise, with the leverage `h` of the weights, the
-/// mean slope `c` of psi and the precision `q^2` of a prior.
+/// `(sum (w u)^2 v + q^2) / (c sum w u^2 + q^2)^2` in units of the noise, with the mean slope `c` of psi and the precision `q^2` of
+/// a prior. `v` is `(psi(z) / (1 - h))^2`, and 0.4 of the variance of what the others predict, `s^2 h / (1 - h)`, with the leverage
+/// `h` of the weights and the noise `s^2 = mean(w psi^2) / (c^2 w)`. One input is ten times as large, with a leverage of a tenth.
 #[test]
 fn a_sandwich_by_hand() {
     const COUNT: usize = 700;
     let mut noise = Noise(3);
-    let inputs: Vec<f64> = (0..COUNT).map(|_| 0.5 + noise.uniform()).collect();
+    let mut inputs: Vec<f64> = (0..COUNT).map(|_| 0.5 + noise.uniform()).collect();
+    inputs[350] = 10.0;
     let spikes: Vec<f64> = (0..COUNT).map(|k| if k % 9 == 4 { 0.8 } else { 0.1 } * noise.gauss()).collect();
     let record = record(&inputs, |k| spikes[k]);
     let sigma = 0.1;
@@ -70,11 +72,14 @@ fn a_sandwich_by_hand() {
         let curvature = (0..COUNT).filter(inside).map(|k| w[k]).sum::<f64>() / w.iter().sum::<f64>();
         let squares = inputs.iter().zip(&w).map(|(u, w)| w * u * u / (sigma * sigma)).sum::<f64>();
         let bread = squares + q * q / curvature;
-        let score = |k: usize| {
+        let mean = (0..COUNT).map(|k| w[k] * psi(z[k]).powi(2)).sum::<f64>() / COUNT as f64;
+        let part = |k: usize| {
             let slope = inputs[k] / sigma;
-            w[k] * psi(z[k]) * slope / (1.0 - w[k] * slope * slope / bread)
+            let h = w[k] * slope * slope / bread;
+            let predicted = mean / (curvature * curvature * w[k]) * h / (1.0 - h);
+            (w[k] * slope).powi(2) * ((psi(z[k]) / (1.0 - h)).powi(2) + 0.4 * predicted)
         };
-        let meat: f64 = (0..COUNT).map(|k| score(k).powi(2)).sum::<f64>() + q * q;
+        let meat: f64 = (0..COUNT).map(part).sum::<f64>() + q * q;
         let expected = meat.sqrt() / (curvature * bread);
         let found = estimate.unknowns[0].knowledge.standard_error().unwrap();
         // The estimate is a minimum to 1e-8 of a standard error.
@@ -180,10 +185,14 @@ fn correlated_outputs_have_a_sandwich() {
         .collect();
     rows.iter().flatten().for_each(|row| bread += row * row.transpose());
     let inverse = bread.try_inverse().unwrap();
+    let noise = (dot(&y, &y) / (sy * sy) + dot(&z, &z) / (sz * sz)) / 400.0;
     for (k, [one, two]) in rows.iter().enumerate() {
         let less = |row: &nalgebra::Vector2<f64>| 1.0 - (row.transpose() * inverse * row)[(0, 0)];
         let score = one * (y[k] / sy / less(one)) + two * (z[k] / sz / less(two));
         meat += score * score.transpose();
+        for row in [one, two] {
+            meat += row * row.transpose() * (0.4 * noise * (1.0 / less(row) - 1.0));
+        }
     }
     let expected = inverse * meat * inverse;
     for i in 0..2 {

@@ -127,7 +127,7 @@ pub(super) fn find(residuals: &Series, step: f64) -> (Spectrum, Option<Period>, 
 
 /// The probability of any of so many independent events, `1 - (1 - p)^n`, without loss of digits where it is small.
 fn of_any(single: f64, tried: f64) -> f64 {
-    -(tried * (-single.min(1.0 - 1e-16)).ln_1p()).exp_m1()
+    -(tried * (-single).ln_1p()).exp_m1()
 }
 
 /// Where between the lines of the grid the strongest is: the top of the parabola through the logarithms.
@@ -232,11 +232,11 @@ mod tests {
     /// A line far above the low frequencies, in noise whose spectrum falls by a factor of a thousand before, and one among them: it
     /// is held against its own neighborhood of as many lines to either side as half of its number, 60 at most, and its probability
     /// is that of F with 2 and twice as many degrees of freedom as there are neighbors (the tail is `(1 + x / n)^-n`), the
-    /// largest of all lines tried.
+    /// largest of all lines tried. With 60 lines to either side one neighborhood serves the eight lines from a multiple of eight on.
     #[test]
     fn a_line_is_held_against_its_neighborhood() {
         let samples = 4096;
-        for (line, amplitude, reach) in [(1000, 0.11, 60), (40, 2.5, 20)] {
+        for (line, middle, amplitude, reach) in [(1003, 1000, 0.085, 60), (43, 43, 2.5, 21)] {
             let (mut low, mut raw) = (0.0, vec![]);
             for (k, e) in noise(samples).enumerate() {
                 low = 0.98 * low + e;
@@ -249,10 +249,9 @@ mod tests {
                 let term = |k: usize| Complex::from_polar(series.values[k], turn(k));
                 (0..samples).map(term).sum::<Complex<f64>>().norm_sqr()
             };
-            let mut neighbors: Vec<f64> = (line - reach..=line + reach).map(power).collect();
+            let mut neighbors: Vec<f64> = (middle - reach..=middle + reach).map(power).collect();
             neighbors.sort_unstable_by(f64::total_cmp);
             let expected = power(line) / (neighbors[reach] / std::f64::consts::LN_2);
-            // Both lines are multiples of eight, where the median is taken anew.
             assert!((test.statistic / expected - 1.0).abs() < 1e-9, "{} {expected}", test.statistic);
             let energy: f64 = series.values.iter().map(|e| e * e).sum();
             let share = 2.0 * power(line) / (energy * samples as f64);

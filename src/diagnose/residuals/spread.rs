@@ -78,7 +78,7 @@ pub(super) fn over(residuals: &Series, effective: f64, signal: &Series) -> Optio
     let (sxq, szq) = (products[1] - mean(1) * products[0], products[2] - mean(2) * products[0]);
     let (slope, rest) = (sxz / sxx, szz - sxz * sxz / sxx);
     // A signal of two levels has no square of its own.
-    let curved = rest > 1e-9 * szz.max(1.0);
+    let curved = rest > 1e-9 * moments[4];
     let own = if curved { (szq - slope * sxq).powi(2) / rest } else { 0.0 };
     let share = ((sxq * sxq / sxx + own) / total).clamp(0.0, 1.0);
     let statistic = effective * share;
@@ -133,6 +133,18 @@ mod tests {
         assert!(over(&residuals(|_| 1.0), 40.0, &moving).is_none());
         assert!(over(&residuals(levels), 40.0, &series("input", (0..40).map(|_| 3.0))).is_none());
         assert!(over(&residuals(levels), 40.0, &moving).is_some());
+    }
+
+    /// The square of a rare pulse is the pulse, but for the rounding of the fourth powers: one degree of freedom.
+    #[test]
+    fn a_pulse_has_no_square_of_its_own() {
+        let errors = series("residual", (0..2000).map(|k| (1.0 - 2.0 * (k % 2) as f64) * (1.0 + (k % 7) as f64)));
+        for period in [500, 1000, 1250] {
+            let pulse = series("input", (0..2000).map(|k| if k % period == 7 { 1.0 } else { 0.0 }));
+            let (spread, test) = over(&errors, 2000.0, &pulse).unwrap();
+            let expected = chi_squared_tail(2000.0 * spread.share, 1.0);
+            assert!((test.p_value / expected - 1.0).abs() < 1e-9, "{period}: {test:?} {expected}");
+        }
     }
 
     /// Errors of one size at each of two levels: the level explains all of it, with one degree of freedom. The parts are a twelfth

@@ -21,6 +21,27 @@ pub fn answer(integrator: &str, deviance: f64, value: f64, converged: bool) -> S
     found
 }
 
+/// A finer method begins at a minimum with which nothing but the step is wrong; a search goes on from the limit of its trial steps,
+/// unless the model explains nothing.
+#[test]
+fn where_a_search_goes_on() {
+    let warned = |converged: bool, code: WarningCode, severity: Severity| {
+        let warning = Warning { code, severity, text: String::new() };
+        Summary { warnings: vec![warning], ..answer("coarse", 10.0, 1.0, converged) }
+    };
+    use WarningCode::{CoarseStep, Unexplained};
+    let cases = [
+        warned(true, CoarseStep, Severity::NotUsable),
+        warned(true, Unexplained, Severity::UsableWithCare),
+        warned(true, Unexplained, Severity::NotUsable),
+        warned(false, CoarseStep, Severity::NotUsable),
+    ];
+    assert_eq!(cases.each_ref().map(is_only_coarse), [true, true, false, false]);
+    assert_eq!(cases.each_ref().map(may_go_on), [false; 4]);
+    let limited = cases.map(|one| Summary { outcome: Outcome::IterationLimit { iterations: 3 }, ..one });
+    assert_eq!(limited.each_ref().map(may_go_on), [true, true, false, true]);
+}
+
 fn failure() -> Error {
     Error::Option("no answer".to_owned())
 }

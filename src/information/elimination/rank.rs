@@ -27,7 +27,7 @@ impl Elimination {
         let mut held: Vec<bool> = (0..self.unknowns()).map(|i| held.get(i).copied().unwrap_or(false)).collect();
         let idle: Vec<usize> = (0..self.unknowns()).filter(|&i| !held[i] && norms[i] == 0.0).collect();
         idle.iter().for_each(|&i| held[i] = true);
-        if self.is_plainly_determined(&held, tolerance) {
+        if self.is_plainly_determined(tolerance) {
             return Undetermined { directions: vec![], held };
         }
         let mut space = Space::new(self.unknowns());
@@ -58,14 +58,12 @@ impl Elimination {
         Undetermined { directions, held }
     }
 
-    /// Whether there is one piece, no unknown is held, and its triangle as a whole is far from singular: so are its parts, then.
-    fn is_plainly_determined(&self, held: &[bool], tolerance: f64) -> bool {
+    /// Whether there is one piece, of all unknowns, and its triangle as a whole is far from singular: so are its parts, then.
+    fn is_plainly_determined(&self, tolerance: f64) -> bool {
         let [piece] = self.pieces.as_slice() else { return false };
         let n = piece.columns.len();
         let scales = || piece.columns.iter().map(|&i| self.norms[i].recip()).collect::<Vec<f64>>();
-        n == self.unknowns()
-            && !held.contains(&true)
-            && smallest_at_least(&piece.triangle, &scales()) > tolerance * (n as f64).sqrt()
+        n == self.unknowns() && smallest_at_least(&piece.triangle, &scales()) > tolerance * (n as f64).sqrt()
     }
 
     /// The direction of a piece's own unknowns with the response of the unknowns below it. `change` is zeros before and

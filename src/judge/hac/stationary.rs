@@ -9,12 +9,12 @@
 
 use super::ROWS;
 use crate::information::{Block, Covariance, Information};
-use crate::judge::sandwich::{ALONE, form, of_experiment};
+use crate::judge::sandwich::{ALONE, of_experiment};
+use crate::judge::shares::{self, Largest, Shares};
 use crate::optimize::Infeasible;
 use crate::problem::{Accumulate, Objective, each};
 use crate::sweep::Window;
 use crate::whiteness::{Autocorrelation, levinson_durbin};
-use nalgebra::DMatrix;
 use std::collections::VecDeque;
 
 /// Highest order.
@@ -25,13 +25,16 @@ const LONGEST: usize = 1000;
 /// An experiment with fewer measurements of an output takes the autoregression of all experiments together.
 const OWN: u64 = 100;
 
+/// Triangles of scores, one per experiment, and the largest shares of the unknowns.
+type WithShares = (Vec<Information>, Vec<Largest>);
+
 /// Triangles of such scores, one per experiment over its columns, by the inverse of the curvature; `None` where variances are
 /// predicted.
 pub(super) fn scores(
     objective: &Objective<'_>,
     coordinates: &[f64],
     inverse: &Covariance,
-) -> Result<Option<Vec<Information>>, Infeasible> {
+) -> Result<Option<WithShares>, Infeasible> {
     if objective.sweep.predicts_variance() {
         return Ok(None);
     }
@@ -39,7 +42,7 @@ pub(super) fn scores(
     let make = |experiment: usize| Errors {
         objective,
         experiment,
-        inverse: of_experiment(objective, inverse, experiment),
+        shares: Shares::new(experiment, of_experiment(objective, inverse, experiment)),
         sums: vec![(Autocorrelation::new(ORDER), 0); outputs],
         run: vec![],
     };
@@ -54,7 +57,9 @@ pub(super) fn scores(
         let make = || FilteredSlopes::new(objective, e, &models);
         Some(objective.gather_one(coordinates, e, true, make).ok()?.triangle())
     };
-    Ok(each(all.len(), one).into_iter().collect())
+    let triangles: Option<Vec<Information>> = each(all.len(), one).into_iter().collect();
+    let largest = shares::of_all(objective, all.iter().map(|one| &one.shares));
+    Ok(triangles.map(|triangles| (triangles, largest)))
 }
 
 /// The sums and counts of all experiments, output by output.
@@ -116,8 +121,7 @@ fn length(coefficients: &[f64]) -> usize {
 struct Errors<'e> {
     objective: &'e Objective<'e>,
     experiment: usize,
-    /// The inverse of the curvature in all columns of the experiment.
-    inverse: DMatrix<f64>,
+    shares: Shares,
     sums: Vec<(Autocorrelation, u64)>,
     run: Vec<f64>,
 }
@@ -125,12 +129,13 @@ struct Errors<'e> {
 impl Accumulate for Errors<'_> {
     fn add(&mut self, window: &Window, lane: usize) {
         let (objective, loss) = (self.objective, self.objective.loss());
-        let mut slopes = vec![0.0; self.inverse.nrows()];
+        let mut slopes = vec![0.0; self.shares.columns()];
         for (j, (sums, count)) in self.sums.iter_mut().enumerate() {
             let mut influence = |k: usize| {
-                let (z, weight) = (window.error(k, j, lane), objective.weight(self.experiment, window.begin[lane] + k));
+                let sample = window.begin[lane] + k;
+                let (z, weight) = (window.error(k, j, lane), objective.weight(self.experiment, sample));
                 slopes.iter_mut().enumerate().for_each(|(c, slope)| *slope = window.at(k, j, c, lane));
-                raised(weight, form(&self.inverse, &slopes)) * loss.map_or(z, |loss| loss.psi(z))
+                raised(weight, self.shares.take(weight, &slopes, (j, sample))) * loss.map_or(z, |loss| loss.psi(z))
             };
             self.run.clear();
             let measured = (0..window.samples[lane]).filter(|&k| window.is_measured(k, j, lane));
@@ -141,6 +146,7 @@ impl Accumulate for Errors<'_> {
     }
 
     fn append(&mut self, later: Self) {
+        self.shares.append(&later.shares);
         for ((sums, count), (later, more)) in self.sums.iter_mut().zip(&later.sums) {
             sums.follow(later);
             *count += more;
@@ -246,9 +252,9 @@ impl Accumulate for FilteredSlopes<'_> {
     }
 }
 
-/// The root of a weight, raised by what the fit to this measurement took off its error: `h` is its leverage without the weight.
-fn raised(weight: f64, h: f64) -> f64 {
-    (weight / (1.0 - weight * h).max(ALONE)).sqrt()
+/// The root of a weight, raised by what the fit to this measurement took off its error.
+fn raised(weight: f64, leverage: f64) -> f64 {
+    (weight / (1.0 - leverage).max(ALONE)).sqrt()
 }
 
 /// Adds the filtered rows before, the newest first, times these coefficients to a row, and takes it among them.
@@ -267,6 +273,7 @@ mod tests {
     use super::*;
     use crate::tests::{Current, Gain, Line, Voltage};
     use crate::{Experiment, Fit, Sample, Time, free};
+    use nalgebra::DMatrix;
 
     /// The sum of squares of the weighted slopes, filtered from rest until nothing is left of them, but for 1e-8 of the squares, which
     /// is 1e-4 of the slopes.
@@ -304,7 +311,7 @@ mod tests {
             row[0]
         });
         assert_eq!(response, [1.0, 0.5, 0.0, -0.125]);
-        assert_eq!([raised(4.0, 0.1), raised(4.0, 0.0)], [(4.0f64 / 0.6).sqrt(), 2.0]);
+        assert_eq!([raised(4.0, 0.4), raised(4.0, 0.0)], [(4.0f64 / 0.6).sqrt(), 2.0]);
     }
 
     /// Two outputs of two experiments: sums of squares of 1 + 4 and 9, then of 4 and 16 + 1, of so many errors.
@@ -338,6 +345,11 @@ mod tests {
         assert!((found.innovation - 1.0).abs() < 0.02, "{}", found.innovation);
         assert_eq!(length(&[0.8]), 42);
         assert_eq!(length(&[]), 1);
+        // Four measurements for each coefficient and the variance, at the least.
+        for (count, order) in [(7, 0), (8, 1), (11, 1), (12, 2)] {
+            assert!(Autoregression::of(&sums, count).coefficients.len() <= order, "{count}");
+        }
+        assert_eq!(Autoregression::of(&sums, 8).coefficients.len(), 1);
     }
 
     /// The order is the first of the least `n ln(v) + 2 k`, where `v` is the part of the variance that the best of `k`

@@ -1,0 +1,249 @@
+//! Unknowns whose intervals rest on one or two measurements.
+//!
+//! If all errors, times the roots of their weights, have one variance, a measurement with slopes `g` and weight `w` makes the
+//! part `w (c g)^2 / c_i` of the variance of unknown `i`, where `c` is its row of the inverse curvature and `c_i` the diagonal
+//! entry. Where this part is close to one, the interval is as right as what is assumed of this measurement's noise: the fit
+//! passes through it, so its error does not tell.
+
+use super::conclude::Judgement;
+use super::covariances::Covariances;
+use super::sandwich::of_experiment;
+use crate::estimate::{CovarianceMethod, Unknown, Warning, WarningCode};
+use crate::numeral::{exact, percent};
+use crate::optimize::{Outcome, Severity};
+use crate::problem::{Accumulate, Objective, Role};
+use crate::sweep::Window;
+use nalgebra::DMatrix;
+
+/// Part of the variance from which on one measurement, or two together, decide.
+const DECIDES: f64 = 0.9;
+/// Fits of more measurements are not examined if that takes a pass of its own.
+const MOST: u64 = 200;
+
+/// A measurement, and its part in the variance of an unknown.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Share {
+    pub part: f64,
+    pub experiment: usize,
+    pub output: usize,
+    pub sample: usize,
+}
+
+/// The two largest shares in the variance of an unknown, the largest first; of equal ones those that were taken first.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Largest([Share; 2]);
+
+impl Largest {
+    pub fn take(&mut self, share: Share) {
+        let Largest([first, second]) = self;
+        if share.part > first.part {
+            *second = std::mem::replace(first, share);
+        } else if share.part > second.part {
+            *second = share;
+        }
+    }
+
+    /// The measurements that decide: one, or two together.
+    fn decisive(&self) -> Option<&[Share]> {
+        let Largest(shares) = self;
+        (1..=shares.len()).map(|count| &shares[..count]).find(|shares| part(shares) >= DECIDES)
+    }
+
+    pub fn append(&mut self, later: Largest) {
+        later.0.into_iter().for_each(|share| self.take(share));
+    }
+}
+
+/// The largest shares of the unknowns of one experiment.
+pub(super) struct Shares {
+    experiment: usize,
+    inverse: DMatrix<f64>,
+    moved: Vec<f64>,
+    largest: Vec<Largest>,
+}
+
+impl Shares {
+    /// With the inverse curvature of the experiment's unknowns.
+    pub fn new(experiment: usize, inverse: DMatrix<f64>) -> Self {
+        let columns = inverse.nrows();
+        Shares { experiment, inverse, moved: vec![0.0; columns], largest: vec![Largest::default(); columns] }
+    }
+
+    /// The number of slopes that a measurement has.
+    pub fn columns(&self) -> usize {
+        self.moved.len()
+    }
+
+    /// Takes a measurement with these slopes, and returns its leverage.
+    pub fn take(&mut self, weight: f64, slopes: &[f64], (output, sample): (usize, usize)) -> f64 {
+        self.moved.fill(0.0);
+        for (column, slope) in self.inverse.column_iter().zip(slopes) {
+            self.moved.iter_mut().zip(&column).for_each(|(moved, entry)| *moved += entry * slope);
+        }
+        for (c, (moved, largest)) in self.moved.iter().zip(&mut self.largest).enumerate() {
+            let part = weight * moved * moved / self.inverse[(c, c)];
+            largest.take(Share { part, experiment: self.experiment, output, sample });
+        }
+        weight * self.moved.iter().zip(slopes).map(|(moved, slope)| moved * slope).sum::<f64>()
+    }
+
+    pub fn append(&mut self, later: &Shares) {
+        self.largest.iter_mut().zip(&later.largest).for_each(|(largest, later)| largest.append(*later));
+    }
+}
+
+/// The largest shares of all unknowns from those of the experiments.
+pub(super) fn of_all<'s>(objective: &Objective<'_>, all: impl Iterator<Item = &'s Shares>) -> Vec<Largest> {
+    let unknowns = &objective.problem.unknowns;
+    let mut largest = vec![Largest::default(); unknowns.row.len()];
+    for (e, one) in all.enumerate() {
+        unknowns.columns(e).zip(&one.largest).for_each(|(i, own)| largest[i].append(*own));
+    }
+    largest
+}
+
+/// A pass over all measurements.
+struct Pass<'p> {
+    objective: &'p Objective<'p>,
+    shares: Shares,
+    slopes: Vec<f64>,
+}
+
+impl Accumulate for Pass<'_> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        for k in 0..window.samples[lane] {
+            let sample = window.begin[lane] + k;
+            let weight = self.objective.weight(self.shares.experiment, sample);
+            for j in (0..window.outputs()).filter(|&j| weight > 0.0 && window.is_measured(k, j, lane)) {
+                self.slopes.iter_mut().enumerate().for_each(|(c, slope)| *slope = window.at(k, j, c, lane));
+                self.shares.take(weight, &self.slopes, (j, sample));
+            }
+        }
+    }
+
+    fn append(&mut self, later: Self) {
+        self.shares.append(&later.shares);
+    }
+}
+
+impl Judgement<'_> {
+    /// The unknown whose interval rests most on one or two measurements: a parameter, or with a sandwich any.
+    pub(super) fn decided_by_few(&self, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
+        let exact = self.rounding || self.end.outcome == Outcome::Exact;
+        let filtered = self.objective.problem.settings.prefilter.is_some();
+        if filtered || exact || self.objective.sweep.predicts_variance() {
+            return None;
+        }
+        let examined;
+        let largest = match &covariances.shares {
+            Some(largest) => largest,
+            None => {
+                examined = self.shares(covariances)?;
+                &examined
+            }
+        };
+        let assumed = covariances.method != CovarianceMethod::Sandwich;
+        let known = |i: &usize| unknowns[*i].knowledge.standard_error().is_some();
+        let counts = |i: &usize| known(i) && (!assumed || matches!(unknowns[*i].role, Role::Parameter(_)));
+        let decided = (0..unknowns.len()).filter(counts).filter_map(|i| Some((i, largest[i].decisive()?)));
+        let (i, shares) = decided.max_by(|a, b| part(a.1).total_cmp(&part(b.1)))?;
+        let noise = match assumed {
+            true => "whose noise is taken to be that of all",
+            false => "and is so wide that it holds whatever the noise is there",
+        };
+        let text = format!(
+            "the interval of `{}` rests by {} on {}, {noise}: errors there do not tell, since the fit passes through them; \
+             measure more of the kind",
+            unknowns[i].name,
+            percent(part(shares), 2),
+            self.places(shares)
+        );
+        Some(Warning { code: WarningCode::DecidedByFew, severity: Severity::Usable, text })
+    }
+
+    /// Outputs, times and experiments of measurements.
+    fn places(&self, shares: &[Share]) -> String {
+        let problem = self.objective.problem;
+        let place = |share: &Share| {
+            format!(
+                "`{}` at t = {} s of `{}`",
+                problem.layout().outputs[share.output].name,
+                exact(problem.records[share.experiment].time(share.sample)),
+                problem.unknowns.labels[share.experiment]
+            )
+        };
+        shares.iter().map(place).collect::<Vec<_>>().join(" and ")
+    }
+
+    fn shares(&self, covariances: &Covariances) -> Option<Vec<Largest>> {
+        let (objective, unit) = (self.objective, covariances.unit.as_ref()?);
+        if self.residuals.measured > MOST {
+            return None;
+        }
+        let make = |e: usize| {
+            let shares = Shares::new(e, of_experiment(objective, unit, e));
+            Pass { objective, slopes: vec![0.0; shares.columns()], shares }
+        };
+        let all = objective.gather(&self.end.coordinates, true, make).ok()?;
+        Some(of_all(objective, all.iter().map(|one| &one.shares)))
+    }
+}
+
+/// The part that these measurements have together.
+fn part(shares: &[Share]) -> f64 {
+    shares.iter().map(|share| share.part).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn share(part: f64, sample: usize) -> Share {
+        Share { part, experiment: 0, output: 0, sample }
+    }
+
+    fn largest(parts: &[f64]) -> Largest {
+        let mut largest = Largest::default();
+        parts.iter().enumerate().for_each(|(sample, part)| largest.take(share(*part, sample)));
+        largest
+    }
+
+    /// Of two equal ones the first is kept, also where pieces of a record are joined.
+    #[test]
+    fn the_two_largest() {
+        let of_all = largest(&[0.1, 0.4, 0.2, 0.4, 0.3]);
+        assert_eq!(of_all, Largest([share(0.4, 1), share(0.4, 3)]));
+        let mut joined = largest(&[0.1, 0.4]);
+        let mut later = Largest::default();
+        [0.2, 0.4, 0.3].into_iter().enumerate().for_each(|(k, part)| later.take(share(part, 2 + k)));
+        joined.append(later);
+        assert_eq!(joined, of_all);
+    }
+
+    #[test]
+    fn one_or_two_decide() {
+        let decisive = |parts: &[f64]| largest(parts).decisive().map_or(0, <[Share]>::len);
+        let found = [&[0.91, 0.05][..], &[0.89, 0.02], &[0.5, 0.41], &[0.5, 0.39], &[]].map(decisive);
+        assert_eq!(found, [1, 2, 2, 0, 0]);
+    }
+
+    /// Slopes (1, 0), (0, 2), (1, 1) with weights 1, 1 and 2: the inverse curvature is that of [[3, 2], [2, 6]], which is
+    /// [[6, -2], [-2, 3]] / 14. The shares of each unknown add up to one, the leverages to the number of unknowns.
+    #[test]
+    fn shares_and_leverages_by_hand() {
+        let inverse = DMatrix::from_row_slice(2, 2, &[6.0, -2.0, -2.0, 3.0]) / 14.0;
+        let mut shares = Shares::new(0, inverse);
+        let rows = [(1.0, [1.0, 0.0]), (1.0, [0.0, 2.0]), (2.0, [1.0, 1.0])];
+        let take = |(k, (weight, slopes)): (usize, (f64, [f64; 2]))| shares.take(weight, &slopes, (0, k));
+        let leverages: Vec<f64> = rows.into_iter().enumerate().map(take).collect();
+        let expected = [6.0 / 14.0, 12.0 / 14.0, 10.0 / 14.0];
+        assert!(leverages.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{leverages:?}");
+        // (6, -4, 4) and (-2, 6, 1), squared, times the weights, over 6 * 14 and 3 * 14.
+        let expected = [[(36.0 / 84.0, 0), (32.0 / 84.0, 2)], [(36.0 / 42.0, 1), (4.0 / 42.0, 0)]];
+        for (Largest(found), expected) in shares.largest.iter().zip(expected) {
+            for (found, (part, sample)) in found.iter().zip(expected) {
+                assert!((found.part - part).abs() < 1e-15 && found.sample == sample, "{found:?}");
+            }
+        }
+    }
+}
