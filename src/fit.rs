@@ -189,8 +189,8 @@ impl<'a, M: Model> Fit<'a, M> {
     /// found.
     ///
     /// Unless set, a fit searches from the declared start. If it ends where the model explains nothing
-    /// ([`WarningCode::Unexplained`](crate::WarningCode::Unexplained), not usable), it goes on to search from 32 starts by itself, and
-    /// says so; with `starts(1)` it does not.
+    /// ([`WarningCode::Unexplained`](crate::WarningCode::Unexplained), not usable), it goes on to search from 32 starts by itself, after
+    /// 75 evaluations of each from the best four only, and says so; with `starts(1)` it does not.
     ///
     /// The first start is the declared one. The others are a Latin hypercube (McKay, Beckman and Conover, Technometrics 21
     /// (1979) 239), the same in every run. Of each unknown they span

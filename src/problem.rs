@@ -34,7 +34,7 @@ pub(crate) use search::{Optimizer, Round, RoundError};
 use segments::Cuts;
 pub(crate) use segments::Memory;
 pub use settings::Settings;
-pub(crate) use settings::{Observer, Weights};
+pub(crate) use settings::{Observer, SearchPlan, Weights};
 pub use simulate::Simulated;
 pub(crate) use together::{At, gather_together, linearize_together};
 pub use unknowns::Role;

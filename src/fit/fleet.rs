@@ -114,7 +114,7 @@ impl<'a, M: Model> Fleet<'a, M> {
                 Err(error) => answers.push(Some(Err(error))),
             }
         }
-        let single = self.settings.prefilter.is_none() && self.settings.searches() == 1;
+        let single = self.settings.prefilter.is_none() && self.settings.searches.count() == 1;
         let mut found = match single && self.is_wide(&valid) {
             true => fit_together(&valid),
             false => valid.iter().map(Problem::run).collect(),

@@ -178,7 +178,7 @@ impl Problem<'_> {
         let mut found = found?;
         for _ in 1..PARTS {
             let trials = most.saturating_sub(found.iterations);
-            if trials == 0 || self.settings.searches() > 1 || !may_go_on(&found) || control.stops() {
+            if trials == 0 || self.settings.searches.count() > 1 || !may_go_on(&found) || control.stops() {
                 break;
             }
             let start = Start { coordinates: found.coordinates(), trials, ends: None };
@@ -189,7 +189,7 @@ impl Problem<'_> {
 }
 
 /// Whether nothing but the step makes an estimate not usable.
-fn is_only_coarse(found: &Summary) -> bool {
+pub(super) fn is_only_coarse(found: &Summary) -> bool {
     let wrong = |warning: &Warning| warning.severity == Severity::NotUsable && warning.code != WarningCode::CoarseStep;
     found.outcome.converged() && !found.warnings.iter().any(wrong)
 }

@@ -60,8 +60,8 @@ impl Problem<'_> {
         let settings = &self.settings;
         settings.optimizer.check()?;
         let (plain, optimizer) = (self.in_units(control), settings.optimizer.limited(start.trials));
-        let end = match settings.searches() {
-            1 => search(&plain, &optimizer, start.coordinates)?,
+        let end = match settings.searches.count() {
+            1 => SearchEnd { starts: start.ends, ..search(&plain, &optimizer, start.coordinates)? },
             count => search_from_many(&plain, &optimizer, count, start.ends.as_ref())?,
         };
         // The time limit does not apply to the conclusion.

@@ -11,7 +11,7 @@ use crate::error::{Error, Failure};
 use crate::estimate::Starts;
 use crate::judge::SearchEnd;
 use crate::optimize::{Infeasible, LeastSquares, Linearization};
-use crate::problem::{At, CheckpointFile, Objective, Optimizer, each, linearize_together};
+use crate::problem::{At, CheckpointFile, Objective, Optimizer, SearchPlan, each, linearize_together};
 use minima::{Comparison, End};
 use progress::{Places, Progress};
 use serde::{Deserialize, Serialize};
@@ -24,6 +24,10 @@ const TOGETHER: usize = 4;
 const PATIENCE: u64 = 10;
 const LEAST_TRIALS: u64 = 100;
 const QUARTER: usize = 4;
+/// Where only the best are searched to their ends: so many, after so many evaluations of each. Some searches cross a plateau at first:
+/// of 138 right minima 137 are found without this rule, 136 with 75 evaluations, 122 with 40, 70 with 25.
+const BEST: usize = 4;
+const EVALUATIONS_OF_ALL: u64 = 75;
 
 type Answer = Result<Linearization, Infeasible>;
 
@@ -169,6 +173,10 @@ impl<'p> Searches<'p> {
         while self.advance() {
             self.cycle += 1;
             self.give_up_hopeless();
+            let races = matches!(self.plain.problem.settings.searches, SearchPlan::Best(_));
+            if races && self.cycle == EVALUATIONS_OF_ALL {
+                self.give_up_all_but(BEST);
+            }
             progress.show(self);
             if let Some(file) = file.filter(|file| self.cycle.is_multiple_of(file.every.max(1))) {
                 file.note(progress::write(self, file));
@@ -206,6 +214,20 @@ impl<'p> Searches<'p> {
             self.runs[i] = run.unwrap_or_else(lost);
         }
         !requesting.is_empty()
+    }
+
+    /// Gives up the searches whose cost is not among so many of the lowest.
+    fn give_up_all_but(&mut self, count: usize) {
+        let levels: Vec<Option<f64>> = self.runs.iter().map(|run| Some(run.place(&self.comparison)?.1)).collect();
+        let mut sorted: Vec<f64> = levels.iter().flatten().copied().collect();
+        sorted.sort_by(f64::total_cmp);
+        let Some(&most) = sorted.get(count - 1) else { return };
+        for (run, level) in self.runs.iter_mut().zip(levels) {
+            let Some(level) = level.filter(|&level| level > most && matches!(run, Run::Searching(_))) else { continue };
+            let ratio = crate::numeral::number(self.comparison.ratio(level, sorted[0]), 3);
+            let reason = format!("given up after {} evaluations at {ratio} times the best cost", self.cycle);
+            *run = Run::Failed(NoEnd::new(true, reason));
+        }
     }
 
     fn give_up_hopeless(&mut self) {

@@ -8,8 +8,9 @@ use crate::optimize::Severity;
 /// be better by more in less than `exp(-10 / 2)`, one of 150 records.
 pub(crate) const INDISTINGUISHABLE: f64 = 10.0;
 
-/// Warnings about an estimate that is the best end of these searches.
-pub(super) fn warnings(starts: &Starts, measurements: u64) -> Vec<Warning> {
+/// Warnings about an estimate that is the best end of these searches. Where they were not asked for, a minimum that is found once lowers
+/// the verdict no more than one that is found without other searches does.
+pub(super) fn warnings(starts: &Starts, measurements: u64, asked: bool) -> Vec<Warning> {
     let Starts { tried, agreed, minima, declared, failed, .. } = starts;
     let mut warnings = vec![];
     if *agreed == 1 && *tried > 1 {
@@ -18,7 +19,8 @@ pub(super) fn warnings(starts: &Starts, measurements: u64) -> Vec<Warning> {
             "only one of {tried} starts led to this minimum (others found: {others}; searches without one: {none}): there may be a \
              better one; try more starts, or give bounds"
         );
-        warnings.push(Warning { code: WarningCode::MinimumFoundOnce, severity: Severity::UsableWithCare, text });
+        let severity = if asked { Severity::UsableWithCare } else { Severity::Usable };
+        warnings.push(Warning { code: WarningCode::MinimumFoundOnce, severity, text });
     }
     let at = |minimum: &Minimum| {
         let places = minimum.unknowns.iter().map(|(name, value)| format!("`{name}` = {}", number(*value, 5)));
@@ -52,7 +54,7 @@ mod tests {
         let minimum = |cost_ratio| Minimum { cost_ratio, searches: 1, undetermined: vec![], unknowns: vec![] };
         let minima = vec![minimum(1.0), minimum(rival)];
         let starts = Starts { tried, agreed, minima, declared: Some(declared), failed: vec![], evaluations: 1 };
-        warnings(&starts, 100).iter().map(|warning| warning.code).collect()
+        warnings(&starts, 100, true).iter().map(|warning| warning.code).collect()
     }
 
     /// A deviance of `100 ln(ratio)` above 10 is another: at a ratio of 1.1052. A minimum found by one of several searches, and
@@ -66,5 +68,15 @@ mod tests {
         assert_eq!(codes(1, 1, 1.106, 0), []);
         assert_eq!(codes(8, 3, 1.106, 1), [DeclaredStartElsewhere]);
         assert_eq!(codes(8, 0, 1.104, 0), []);
+    }
+
+    /// A fit that searched by itself is not judged worse for it.
+    #[test]
+    fn searches_that_were_not_asked_for_lower_no_verdict() {
+        let minimum = Minimum { cost_ratio: 1.0, searches: 1, undetermined: vec![], unknowns: vec![] };
+        let starts =
+            Starts { tried: 8, agreed: 1, minima: vec![minimum], declared: None, failed: vec![], evaluations: 1 };
+        let severity = |asked: bool| warnings(&starts, 100, asked).iter().map(|warning| warning.severity).max();
+        assert_eq!([severity(true), severity(false)], [Some(Severity::UsableWithCare), Some(Severity::Usable)]);
     }
 }

@@ -6,7 +6,7 @@ use crate::estimate::{Direction, Knowledge, Unknown, Warning, WarningCode};
 use crate::layout::Kind;
 use crate::numeral::{counted, exact, number, percent};
 use crate::optimize::{Outcome, Severity};
-use crate::problem::Objective;
+use crate::problem::{Objective, SearchPlan};
 
 /// Largest change of a parameter with a finer step, in standard errors, without a warning: with a method that was chosen, and
 /// with one of the library's choice (beyond the former it makes the estimate unusable).
@@ -68,7 +68,8 @@ impl Judgement<'_> {
             warnings.push(Warning { code: WarningCode::NotAtMinimum, severity: Severity::NotUsable, text });
         }
         if let Some(starts) = &self.end.starts {
-            warnings.extend(super::starts::warnings(starts, self.residuals.measured));
+            let asked = matches!(self.objective.problem.settings.searches, SearchPlan::All(_));
+            warnings.extend(super::starts::warnings(starts, self.residuals.measured, asked));
         }
         if let Some(write_error) = &self.end.write_error {
             let text = format!("the checkpoint could not be written ({write_error}); the search went on without it");

@@ -181,6 +181,10 @@ impl Point {
         if step <= stop.step && gradient <= stop.gradient {
             return Some(Outcome::Converged { step, gradient });
         }
+        // The rounding of the data has slopes of this size, too, and the cost resolves no step.
+        if gradient <= self.rounding().min(PRECISION) && self.potential <= self.resolution() {
+            return Some(Outcome::LimitOfPrecision { gradient, step });
+        }
         let decrease = self.potential / self.cost_size();
         (stop.cost > 0.0 && decrease <= stop.cost).then_some(Outcome::CostUnchanged { decrease })
     }

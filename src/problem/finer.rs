@@ -12,8 +12,6 @@ pub(crate) type MakeSweep<'a> = Arc<dyn Fn() -> Result<Arc<dyn Sweep + 'a>, Erro
 pub(crate) trait Finer: Send + Sync {
     /// The problem by one of the methods; `None` after the last, and for a method that does not serve it.
     fn by(&self, number: usize) -> Option<&Problem<'_>>;
-    /// The same with searches from so many starts.
-    fn with_starts(&self, count: usize) -> Arc<dyn Finer + '_>;
 }
 
 /// Sweeps by finer and finer methods. Each is made when it is first needed, once for all problems that share these.
@@ -45,28 +43,16 @@ impl<'a> FinerSweeps<'a> {
 const TRIALS: u64 = 20;
 pub(crate) const PARTS: u64 = 5;
 
-/// The problem by each method is made when it is first needed, from that by the default one.
+/// The problem by each method is made when it is first needed.
 struct ByMethods<'a> {
     base: Problem<'a>,
     sweeps: Arc<FinerSweeps<'a>>,
     made: Vec<OnceLock<Option<Problem<'a>>>>,
 }
 
-impl<'a> ByMethods<'a> {
-    fn new(base: Problem<'a>, sweeps: Arc<FinerSweeps<'a>>) -> Arc<Self> {
-        let made = sweeps.make.iter().map(|_| OnceLock::new()).collect();
-        Arc::new(ByMethods { base: Problem { finer: None, refines: true, ..base }, sweeps, made })
-    }
-}
-
 impl Finer for ByMethods<'_> {
     fn by(&self, number: usize) -> Option<&Problem<'_>> {
         self.made.get(number)?.get_or_init(|| self.base.with_sweep(self.sweeps.get(number)?).ok()).as_ref()
-    }
-
-    fn with_starts(&self, count: usize) -> Arc<dyn Finer + '_> {
-        let settings = self.base.settings.with_starts(count);
-        ByMethods::new(Problem { settings, ..self.base.clone() }, self.sweeps.clone())
     }
 }
 
@@ -77,23 +63,19 @@ impl<'a> Problem<'a> {
         if sweeps.make.is_empty() {
             return self;
         }
-        Problem { refines: true, finer: Some(ByMethods::new(self.clone(), sweeps)), ..self }
+        // What is prepared of the records is another for each method, and so is a checkpoint.
+        let trials = if self.settings.searches.count() > 1 { TRIALS * PARTS } else { TRIALS };
+        let optimizer = self.settings.optimizer.limited(trials);
+        let settings = Settings { checkpoint: None, optimizer, ..self.settings.clone() };
+        let base = Problem { prepared: vec![], refines: true, settings, ..self.clone() };
+        let made = sweeps.make.iter().map(|_| OnceLock::new()).collect();
+        Problem { refines: true, finer: Some(Arc::new(ByMethods { base, sweeps, made })), ..self }
     }
 
-    /// The same problem by another method. What is prepared of the records is another for each method, and so is a checkpoint.
     fn with_sweep(&self, sweep: Arc<dyn Sweep + 'a>) -> Result<Self, Error> {
         let prepared = Problem::prepared(&*sweep, &self.records, &self.unknowns.parameters)?;
         let cuts = Cuts::new(&*sweep, &self.records, self.settings.prefilter.is_some());
-        let trials = if self.settings.searches() > 1 { TRIALS * PARTS } else { TRIALS };
-        let optimizer = self.settings.optimizer.limited(trials);
-        let settings = Settings { checkpoint: None, optimizer, ..self.settings.clone() };
-        Ok(Problem { sweep, prepared, cuts, settings, ..self.clone() })
-    }
-
-    /// The same problem, searched from so many starts, by each method.
-    pub(crate) fn with_starts(&self, count: usize) -> Problem<'_> {
-        let finer = self.finer.as_ref().map(|finer| finer.with_starts(count));
-        Problem { settings: self.settings.with_starts(count), finer, ..self.clone() }
+        Ok(Problem { sweep, prepared, cuts, ..self.clone() })
     }
 
     /// The problem by a finer method, numbered from the coarsest; `None` after the last.

@@ -125,7 +125,7 @@ fn hash(plain: &Objective<'_>) -> String {
     text(&sweep.predictor());
     text(&format!("{:?}{:?}", problem.unknowns.parameters, problem.unknowns.row));
     let noise: &Noise = &settings.noise;
-    text(&format!("{:?}{noise:?}{}", settings.prefilter, settings.searches()));
+    text(&format!("{:?}{noise:?}{}", settings.prefilter, settings.searches.count()));
     text(&format!("{:?}", settings.weights.as_ref().map(|weights| weights.describe())));
     text(&format!("{:?}", settings.loss.as_ref().map(|loss| loss.describe())));
     for record in &problem.records {

@@ -44,8 +44,28 @@ pub struct Settings<'a> {
     pub(crate) observers: Vec<(Observer, ObserverMode)>,
     pub(crate) checkpoint: Option<(PathBuf, u64)>,
     pub(crate) optimizer: Arc<dyn Optimizer>,
-    /// How many searches were asked for.
-    pub(crate) starts: Option<usize>,
+    pub(crate) searches: SearchPlan,
+}
+
+/// From where a fit searches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum SearchPlan {
+    /// From the declared start; from others only if that explains nothing.
+    Single,
+    /// From so many starts, as was asked for.
+    All(usize),
+    /// From so many starts, of which only the best are searched to their ends.
+    Best(usize),
+}
+
+impl SearchPlan {
+    /// How many there are at first.
+    pub fn count(self) -> usize {
+        match self {
+            SearchPlan::Single => 1,
+            SearchPlan::All(count) | SearchPlan::Best(count) => count,
+        }
+    }
 }
 
 impl Default for Settings<'_> {
@@ -62,7 +82,7 @@ impl Default for Settings<'_> {
             observers: vec![],
             checkpoint: None,
             optimizer: Arc::new(<LevenbergMarquardt>::default()),
-            starts: None,
+            searches: SearchPlan::Single,
         }
     }
 }
@@ -110,7 +130,7 @@ impl<'a> Settings<'a> {
     /// Searches from so many starts and keeps the best end; the first is the declared one
     /// ([`Fit::starts`](crate::Fit::starts)).
     pub fn starts(mut self, count: usize) -> Self {
-        self.starts = Some(count);
+        self.searches = SearchPlan::All(count);
         self
     }
 
@@ -145,16 +165,6 @@ impl<'a> Settings<'a> {
         self
     }
 
-    /// How many starts a fit searches from at first.
-    pub(crate) fn searches(&self) -> usize {
-        self.starts.unwrap_or(1)
-    }
-
-    /// These settings, for another fit from so many starts.
-    pub(super) fn with_starts(&self, count: usize) -> Self {
-        Settings { checkpoint: None, ..self.clone() }.starts(count)
-    }
-
     /// These settings, with the noise set to `Predicted` where the sweep predicts variances.
     pub(super) fn of(mut self, sweep: &dyn Sweep) -> Self {
         if sweep.predicts_variance() {
@@ -175,7 +185,7 @@ impl<'a> Settings<'a> {
                 return Err(Error::NotPositive { what, value: sigma[j] });
             }
         }
-        let count = self.searches();
+        let count = self.searches.count();
         if !(1..=MOST_STARTS).contains(&count) {
             return Err(Error::Option(format!("a fit from {count} starts was asked for; take 1 to {MOST_STARTS}")));
         }
