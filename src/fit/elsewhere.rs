@@ -39,7 +39,7 @@ impl Problem<'_> {
             return None;
         }
         let (begin, before, limit) = (Instant::now(), found.iterations, self.settings.optimizer.most());
-        let best = match is_useless(found, WarningCode::Unexplained) {
+        let best = match explains_nothing(found) {
             true => {
                 let trials = Trials::of(FROM_A_START, before, limit)?;
                 self.search_again(found, trials.most, begin, control)
@@ -77,6 +77,14 @@ impl Problem<'_> {
         best.warnings.push(Warning { code: WarningCode::Unexplained, severity: Severity::Usable, text });
         Some(best)
     }
+}
+
+/// Whether an estimate is not usable and leaves an output unexplained, which may not be the reason by itself: where the loss is robust
+/// or measurements are weighted, it is a warning only.
+fn explains_nothing(found: &Summary) -> bool {
+    let unexplained =
+        |warning: &Warning| warning.code == WarningCode::Unexplained && warning.severity > Severity::Usable;
+    found.severity() == Severity::NotUsable && found.warnings.iter().any(unexplained)
 }
 
 #[cfg(test)]
