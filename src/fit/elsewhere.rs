@@ -4,7 +4,7 @@
 use super::refine::{Start, after, is_only_coarse, is_useless};
 use crate::estimate::{Summary, Warning, WarningCode};
 use crate::optimize::Severity;
-use crate::problem::{Control, Problem, SearchPlan, Settings};
+use crate::problem::{Control, Noise, Problem, SearchPlan, Settings};
 use std::time::Instant;
 
 /// Starts of a fit whose first search ended where the model explains nothing, the declared one among them: of 138 records of predators
@@ -53,11 +53,16 @@ impl Problem<'_> {
     }
 
     /// The best minimum of searches from further starts, or the estimate itself if they found none; with a note. They run by the default
-    /// method; the best goes on by finer ones where only the step is wrong with it. `None` where a number of starts was asked for, and
-    /// where the measurements tell nothing by any parameters.
+    /// method; the best goes on by finer ones where only the step is wrong with it. `None` where a number of starts was asked for,
+    /// where the measurements tell nothing by any parameters, and where the variance is predicted: that likelihood has no bound at
+    /// noise levels of zero, which some start would find.
     fn search_again(&self, found: &Summary, trials: u64, begin: Instant, control: &Control) -> Option<Summary> {
         let hopeless = [WarningCode::ConstantOutput, WarningCode::TooFewMeasurements];
-        if self.settings.searches != SearchPlan::Single || hopeless.into_iter().any(|code| is_useless(found, code)) {
+        let predicted = self.settings.noise == Noise::Predicted;
+        if self.settings.searches != SearchPlan::Single
+            || predicted
+            || hopeless.into_iter().any(|code| is_useless(found, code))
+        {
             return None;
         }
         let settings = Settings { checkpoint: None, searches: SearchPlan::Best(STARTS), ..self.settings.clone() };

@@ -75,7 +75,7 @@ const GOOD: f64 = 0.9;
 const ACCEPT: f64 = 1e-4;
 /// The next step after one that was rejected.
 const SHORTER: f64 = 0.25;
-/// Five trials are enough where the differences of cost are rounding.
+/// Five trials are enough where the differences of cost, or the slopes, are rounding.
 const UNDECIDED: u32 = 5;
 /// So many where the slopes still predict a decrease: enough for ten digits if each step halves the distance.
 const UNRESOLVED: u32 = 60;
@@ -130,7 +130,8 @@ impl Descent {
         let resolved = predicted > point.resolution();
         let damping = damping(scales, lambda);
         let length = length(scales, &step);
-        let spent = self.is_rough() || self.undecided >= UNDECIDED || self.unresolved >= UNRESOLVED && !resolved;
+        let most = if point.is_flat() { UNDECIDED } else { UNRESOLVED };
+        let spent = self.is_rough() || self.undecided >= UNDECIDED || self.unresolved >= most && !resolved;
         (x != point.x && !spent).then_some(Trial { x, step, damping, length, predicted, resolved })
     }
 

@@ -163,6 +163,11 @@ impl Point {
         norm.map_or(0.0, |norm| ROUNDINGS * f64::EPSILON * norm / left)
     }
 
+    /// Whether the gradient is that of the rounding of the data.
+    pub fn is_flat(&self) -> bool {
+        self.cosine() <= self.rounding()
+    }
+
     /// Whether the residual is far below the data.
     fn is_next_to_data(&self) -> bool {
         self.linear.data_norm().is_some_and(|norm| self.linear.sum_of_squares() <= (ROUNDING * norm).powi(2))
@@ -180,10 +185,6 @@ impl Point {
         let (step, gradient) = (self.relative_step(), self.cosine());
         if step <= stop.step && gradient <= stop.gradient {
             return Some(Outcome::Converged { step, gradient });
-        }
-        // The rounding of the data has slopes of this size, too, and the cost resolves no step.
-        if gradient <= self.rounding().min(PRECISION) && self.potential <= self.resolution() {
-            return Some(Outcome::LimitOfPrecision { gradient, step });
         }
         let decrease = self.potential / self.cost_size();
         (stop.cost > 0.0 && decrease <= stop.cost).then_some(Outcome::CostUnchanged { decrease })

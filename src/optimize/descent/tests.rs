@@ -1,7 +1,9 @@
 //! Damping, lengths and ends of a descent, by hand.
 
 use super::*;
+use crate::optimize::machine::{Machine, Request};
 use crate::optimize::point::tests::{at, linear};
+use crate::optimize::{Domain, LevenbergMarquardt, Outcome};
 
 fn descent() -> Descent {
     Descent { lambda: 1.0, ..Descent::new(Reach { first: 1.0, later: 10.0 }) }
@@ -138,4 +140,22 @@ fn steps_of_limited_length() {
     // Within a tenth of the length, and more damped than that already.
     let of = |lambda: f64, longest: f64| limited(&here(), &[1.0], lambda, longest).unwrap().0;
     assert_eq!([of(0.0, 2.8), of(0.5, 2.0), of(2.0, 1.0)], [0.0, 0.5, 2.0]);
+}
+
+/// Each trial finds a thousandth less of a slope whose decrease the cost does not resolve: a search goes on with it for sixty trials, and
+/// for five where the rounding of data of norm 1e9 has slopes as large.
+#[test]
+fn slopes_of_rounding_end_a_search() {
+    let trials = |norm: f64| {
+        let mut search = LevenbergMarquardt::default();
+        search.begin(vec![6.0], Domain::default());
+        let (mut residual, mut evaluations) = (1e-6, 0);
+        while let Request::Linearize(_) = search.request() {
+            search.tell(Ok(linear(&[(1.0, residual), (0.0, 4.0)]).with_data_norm(norm)));
+            (residual, evaluations) = (0.999 * residual, evaluations + 1);
+        }
+        assert!(matches!(search.outcome(), Some(Outcome::LimitOfPrecision { .. })), "{:?}", search.outcome());
+        evaluations - 1
+    };
+    assert_eq!([trials(1e8), trials(1e9)], [60, 5]);
 }
