@@ -147,7 +147,7 @@ impl<'r> Rounds<'r> {
             }
             // Rounding errors differ from point to point: the noise would never settle.
             settled |= outcome == Outcome::Exact;
-            if !settled && (self.round == NOISE_ROUNDS || self.left == 0) {
+            if !settled && self.round == NOISE_ROUNDS {
                 outcome = Outcome::IterationLimit { iterations: self.iterations };
                 settled = true;
             }
