@@ -236,7 +236,8 @@ mod tests {
         let time = Time::Uniform { start: 0.0, step: 0.4 };
         let initial = Motion { x: 0.0, v: 0.0 };
         let exact = simulate(&Oscillator, &Spring { k: 49.0 }, &initial, time.clone(), &inputs).unwrap().outputs;
-        let outputs = exact.iter().zip(0..).map(|(y, k)| Place { x: y.x + 1e-3 * (f64::from(k * k % 11) - 5.0) }).collect();
+        let outputs =
+            exact.iter().zip(0..).map(|(y, k)| Place { x: y.x + 1e-3 * (f64::from(k * k % 11) - 5.0) }).collect();
         let record = Experiment::new(&Oscillator, time, inputs, outputs).unwrap();
         let problem = Fit::new(&Oscillator, &record).parameters(Spring { k: free(45.0) }).problem().unwrap();
         let never = Control::NEVER;

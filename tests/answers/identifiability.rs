@@ -275,7 +275,8 @@ fn a_flat_profile_is_given_up() {
         let far: f64 = 255.0 * 0.5e-6 * q;
         for (part, flat) in [(0.9e-3, true), (1.1e-3, false)] {
             let gain = part * q / (5.0 * far.powi(4));
-            let outputs = (0..25).map(|k| Answer { y: f64::from(k / 12 * 2 - 1) * f64::from(i32::from(k < 24)) }).collect();
+            let outputs =
+                (0..25).map(|k| Answer { y: f64::from(k / 12 * 2 - 1) * f64::from(i32::from(k < 24)) }).collect();
             let inputs = vec![Dose { u: gain }; 25];
             let record = Experiment::new(&Flat, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
             let fit = Fit::new(&Flat, &record).parameters(Fourth { a: free(0.0) }).noise(Answer { y: 1.0 });
