@@ -101,6 +101,13 @@ fn errors_as_large_as_their_noise_are_explained() {
     assert_eq!(found(1.0 / 20.0, WarningCode::GivenNoise), Some(Severity::NotUsable));
     assert_eq!(found(3.0, WarningCode::GivenNoise), Some(Severity::UsableWithCare));
     assert_eq!(found(200.0, WarningCode::GivenNoise), Some(Severity::NotUsable));
+    // Outliers, which a robust loss expects, are larger than the noise, but do not make errors smaller.
+    let robust = |sigma: f64| {
+        let fit = Fit::new(&Gain, &record).parameters(Factor { a: free(1.0) }).noise(Current { i: sigma });
+        let estimate = fit.loss(Huber::default()).run().unwrap();
+        estimate.warnings.iter().find(|warning| warning.code == WarningCode::GivenNoise).map(|warning| warning.severity)
+    };
+    assert_eq!([robust(1.0 / 3.0), robust(1.0), robust(3.0)], [None, None, Some(Severity::UsableWithCare)]);
 }
 
 /// A constant input is said, with care where its effect may be taken for an offset; one that moves in a second record is none.
