@@ -90,7 +90,7 @@ mod tests {
             let end = search_again(&plain, &problem.settings.optimizer, &earlier).unwrap();
             let found = end.starts.unwrap();
             assert_eq!((found.tried, found.agreed, found.minima.len(), found.declared), (4, 3, 1, expected));
-            assert_eq!(found.failed, [up.clone()]);
+            assert_eq!(found.failed, std::slice::from_ref(&up));
             assert!(found.evaluations > 1000 && found.evaluations < 1100, "{}", found.evaluations);
         }
     }

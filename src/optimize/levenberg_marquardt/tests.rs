@@ -57,3 +57,16 @@ fn the_best_point_of_a_canceled_search() {
         }
     }
 }
+
+/// A search that goes on elsewhere stays within the bounds given there, from the slopes where it stands.
+#[test]
+fn a_resumed_search_knows_its_bounds() {
+    let (mut search, trial) = on_trial();
+    let bound = 1.0 + 0.5 * trial.step[0];
+    search.resume(Domain { bounds: vec![(0.0, bound)], sizes: vec![] });
+    assert!(search.linearization().is_none());
+    assert!(matches!(search.request(), Request::Linearize([1.0])));
+    search.tell(Ok(linear(&[(2.0, 6.0)])));
+    let Request::Linearize(x) = search.request() else { panic!() };
+    assert_eq!(x, [bound]);
+}
