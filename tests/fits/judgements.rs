@@ -139,6 +139,26 @@ fn sentinels_are_said_of_their_record() {
     assert!(warning.text.contains("`y` of experiment `bad`"), "{warning:?}");
 }
 
+/// The same of an input, which acted on the plant with some other value.
+#[test]
+fn sentinels_of_inputs_are_said() {
+    let good = record(400, (2.0, 2.0), 0.01, moving);
+    let inputs = |k: usize, u: Drive| Drive { w: if k % 80 == 7 { -999.0 } else { u.w }, ..u };
+    let inputs = good.inputs().enumerate().map(|(k, u)| inputs(k, u)).collect();
+    let time = Time::Uniform { start: 0.0, step: 1.0 };
+    let bad = Experiment::new(&Twice, time, inputs, good.outputs().collect()).unwrap();
+    let said_of = |records: &[ExperimentOf<Twice>]| {
+        let estimate = fit(records).run().unwrap();
+        said(&estimate, WarningCode::Sentinel).map(|warning| (warning.severity, warning.text.clone()))
+    };
+    assert_eq!(said_of(std::slice::from_ref(&good)), None);
+    let (severity, text) = said_of(std::slice::from_ref(&bad)).unwrap();
+    assert!(severity == Severity::UsableWithCare && text.starts_with("the input `w` "), "{text}");
+    assert!(text.contains("-999") && !text.contains("of experiment"), "{text}");
+    let (_, text) = said_of(&[good.named("good"), bad.named("bad")]).unwrap();
+    assert!(text.starts_with("the input `w` of experiment `bad` "), "{text}");
+}
+
 /// As many unknowns as measurements leave nothing to judge them by.
 #[test]
 fn nothing_is_known_without_degrees_of_freedom() {
