@@ -147,7 +147,7 @@ impl<'r> Rounds<'r> {
             }
             // Rounding errors differ from point to point: the noise would never settle.
             settled |= outcome == Outcome::Exact;
-            if !settled && (self.round == NOISE_ROUNDS || self.left == 0) {
+            if !settled && self.round == NOISE_ROUNDS {
                 outcome = Outcome::IterationLimit { iterations: self.iterations };
                 settled = true;
             }
@@ -247,6 +247,7 @@ fn stopped(objective: &Objective<'_>) -> Error {
 #[cfg(test)]
 mod tests {
     use super::roughness;
+    use crate::error::Error;
     use crate::optimize::{JacobianColumns, LevenbergMarquardt, Outcome, Stop};
     use crate::tests::{Current, Gain, Line, Voltage};
     use crate::{Experiment, ExperimentOf, Fit, Huber, Time, free};
@@ -288,6 +289,24 @@ mod tests {
             assert_eq!(found.iterations, limit);
         }
         assert!(needed > 3 && within(needed).outcome.converged(), "{needed}");
+    }
+
+    /// The record is named whose cost is not finite, also where each of its errors is.
+    #[test]
+    fn the_start_of_one_record_has_no_cost() {
+        let huge = record().outputs().map(|y| Current { i: 1e200 * y.i }).collect();
+        let inputs = record().inputs().collect();
+        let huge = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, huge).unwrap();
+        let of = |names: [&str; 2]| {
+            let records = if names[0] == "huge" { [huge.clone(), record()] } else { [record(), huge.clone()] };
+            let [one, other] = records;
+            let records = [one.named(names[0]), other.named(names[1])];
+            Fit::new(&Line, &records).parameters(Gain { a: free(1.0) }).noise(Current { i: 1.0 }).run().unwrap_err()
+        };
+        for names in [["huge", "plain"], ["plain", "huge"]] {
+            let error = of(names);
+            assert!(matches!(&error, Error::Start(failure) if failure.experiment == "huge"), "{error}");
+        }
     }
 
     #[test]

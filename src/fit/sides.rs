@@ -127,6 +127,7 @@ fn best(mut ends: Vec<End>, frequencies: &str, limits: Limits) -> Option<Summary
 mod tests {
     use super::super::refine::tests::answer;
     use super::*;
+    use crate::{Experiment, Fit, Model, Scalar, Time, free, signals, simulate};
 
     const NONE: Limits = Limits { fewer: false, stop: false };
 
@@ -201,5 +202,47 @@ mod tests {
         assert_eq!((severity, few_text), (Severity::UsableWithCare, text));
         let ended = [(100.0, 1.0, true), (150.0, 7.0, true)];
         assert_eq!(judged(&ended, few), judged(&ended, NONE));
+    }
+
+    signals! { struct Motion { x: "m", v: "m/s" } }
+    signals! { struct Force { f: "N" } }
+    signals! { struct Place { x: "m" } }
+    signals! { struct Spring { k: "N/m" } }
+
+    /// A mass of 1 kg on a spring: 7 rad/s with `k` = 49 N/m.
+    #[derive(Clone)]
+    struct Oscillator;
+
+    impl Model for Oscillator {
+        type State = Motion;
+        type Input = Force;
+        type Output = Place;
+        type Parameters = Spring;
+
+        fn derivative<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Force<S>, p: &Spring<S>) -> Motion<S> {
+            Motion { x: x.v, v: u.f - p.k * x.x - x.v * 0.2 }
+        }
+        fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, _u: &Force<S>, _p: &Spring<S>) -> Place<S> {
+            Place { x: x.x }
+        }
+    }
+
+    /// The time of the searches is added to that of the estimate, here so long that no search takes a thousandth of it.
+    #[test]
+    fn the_time_of_all_searches_counts() {
+        let inputs: Vec<Force> = (0..60).map(|k| Force { f: f64::from(k * k % 7) - 3.0 }).collect();
+        let time = Time::Uniform { start: 0.0, step: 0.4 };
+        let initial = Motion { x: 0.0, v: 0.0 };
+        let exact = simulate(&Oscillator, &Spring { k: 49.0 }, &initial, time.clone(), &inputs).unwrap().outputs;
+        let outputs =
+            exact.iter().zip(0..).map(|(y, k)| Place { x: y.x + 1e-3 * (f64::from(k * k % 11) - 5.0) }).collect();
+        let record = Experiment::new(&Oscillator, time, inputs, outputs).unwrap();
+        let problem = Fit::new(&Oscillator, &record).parameters(Spring { k: free(45.0) }).problem().unwrap();
+        let never = Control::NEVER;
+        let found = problem.run_within(Instant::now(), &never, Start::declared(&problem)).unwrap();
+        let long = Summary { seconds: 1e9, ..found };
+        let found = problem.on_both_sides(&long, &never).unwrap();
+        assert!((found.seconds / 1e9 - 1.0).abs() < 1e-3 && found.seconds > 1e9, "{}", found.seconds);
+        assert!(found.evaluations > long.evaluations, "{found}");
     }
 }

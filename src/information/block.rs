@@ -128,3 +128,28 @@ impl Clone for Block {
         block
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::information::Information;
+
+    /// Rows that are not absorbed yet are copied with all columns and the residuals.
+    #[test]
+    fn a_copy_holds_the_same_rows() {
+        let mut block = Block::new(2, 64);
+        for (row, residual) in [([1.0, 2.0], 3.0), ([-1.0, 0.5], -2.0), ([4.0, -0.25], 7.0)] {
+            Information::new(2).gather(&mut block, &row, residual);
+        }
+        let absorbed = |mut block: Block| {
+            let mut triangle = Information::new(2);
+            triangle.absorb(&mut block);
+            triangle
+        };
+        let (copy, original) = (absorbed(block.clone()), absorbed(block));
+        // The sum of squares is that of the residuals.
+        assert!((original.residual_at_zero() - (9.0 + 4.0 + 49.0)).abs() < 1e-13, "{}", original.residual_at_zero());
+        assert_eq!(copy.residual_at_zero(), original.residual_at_zero());
+        assert_eq!(copy.solve().unwrap(), original.solve().unwrap());
+    }
+}

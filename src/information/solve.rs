@@ -59,3 +59,29 @@ impl Information {
         Ok(norms)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::information::Information;
+
+    /// Whether columns depend on each other is a matter of their directions, not of their units.
+    #[test]
+    fn rank_has_no_unit() {
+        let of = |second: [f64; 2], units: [f64; 2]| {
+            let mut triangle = Information::new(2);
+            for (first, second) in [3.0, 4.0].into_iter().zip(second) {
+                triangle.absorb_row(&[units[0] * first, units[1] * second], 1.0);
+            }
+            triangle.solve()
+        };
+        for units in [[1.0, 1.0], [1e-12, 1.0], [1e12, 1e-12], [1e12, 1e12]] {
+            // A right angle: each coefficient is that of a regression by itself, 7 / 25 and -1 / 25.
+            let found = of([-4.0, 3.0], units).unwrap();
+            assert!((found[0] * units[0] * 25.0 - 7.0).abs() < 1e-12, "{found:?} {units:?}");
+            assert!((found[1] * units[1] * 25.0 + 1.0).abs() < 1e-12, "{found:?} {units:?}");
+            let dependent = of([6.0, 8.0], units).unwrap_err();
+            assert!(dependent.column == 1 && dependent.independence < 1e-14, "{dependent:?}");
+            assert!((dependent.norm / (10.0 * units[1]) - 1.0).abs() < 1e-14, "{dependent:?}");
+        }
+    }
+}

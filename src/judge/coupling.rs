@@ -1,10 +1,9 @@
 //! Whether the errors of several outputs are correlated at the same sample.
 
 use super::conclude::Judgement;
-use super::covariances::Covariances;
 use super::sums::{Terms, sums};
 use super::whiteness::Whiteness;
-use crate::estimate::{CovarianceMethod, Warning, WarningCode};
+use crate::estimate::{Warning, WarningCode};
 use crate::numeral::{number, p_value};
 use crate::optimize::Severity;
 use crate::problem::{Noise, Whitening};
@@ -138,17 +137,13 @@ impl Judgement<'_> {
         self.residuals.coupled.filter(|_| independent && !own && !self.rounding)
     }
 
-    /// What is said of them.
-    pub(super) fn correlated_outputs(&self, covariances: &Covariances) -> Option<Warning> {
+    /// What is said of them: every covariance but the classical one, which is not taken then, allows for them.
+    pub(super) fn correlated_outputs(&self) -> Option<Warning> {
         let Coupled { outputs: (i, j), correlation, p_value: chance } = self.coupled()?;
         let outputs = &self.objective.problem.layout().outputs;
-        let allowed = match covariances.method {
-            CovarianceMethod::Classical => "the intervals do not",
-            _ => "the intervals do",
-        };
         let text = format!(
-            "the errors of `{}` and `{}` are correlated at the same sample ({}, {}); the estimate does not allow for it, {allowed}; \
-             a full noise covariance (Fit::noise_covariance) weighs them right",
+            "the errors of `{}` and `{}` are correlated at the same sample ({}, {}); the estimate does not allow for it, the intervals \
+             do; a full noise covariance (Fit::noise_covariance) weighs them right",
             outputs[i].name,
             outputs[j].name,
             number(correlation, 2),

@@ -43,23 +43,26 @@ impl Judgement<'_> {
     }
 
     fn outliers_of(&self, j: usize, errors: &[f64]) -> Option<Warning> {
-        let (_, deviation) = center_and_deviation(&mut errors.to_vec())?;
-        let far = hampel(&mut errors.to_vec(), NEIGHBORS, FAR, FAR * deviation);
-        let squares = |errors: &mut dyn Iterator<Item = f64>| errors.map(|error| error * error).sum::<f64>();
-        let share = squares(&mut far.iter().map(|k| errors[*k])) / squares(&mut errors.iter().copied());
-        if !(deviation > 0.0 && share > LITTLE) {
-            return None;
-        }
+        let (count, share) = far_errors(errors)?;
         let output = &self.objective.problem.layout().outputs[j].name;
         let text = format!(
             "{} of the errors of `{output}` are beyond {FAR} robust standard deviations, of all and of their neighbors, and make {} of the sum of squares: outliers, \
              or moments that the model misses; take a robust loss (Huber, Tukey), or mark these samples as missing",
-            percent(far.len() as f64 / errors.len() as f64, 2),
+            percent(count as f64 / errors.len() as f64, 2),
             percent(share, 2)
         );
         let severity = if share > DECIDE { Severity::UsableWithCare } else { Severity::Usable };
         Some(Warning { severity, ..care(WarningCode::Outliers, text) })
     }
+}
+
+/// How many errors are far from the others and from their neighbors, and their part of the sum of squares, if it is no little.
+fn far_errors(errors: &[f64]) -> Option<(usize, f64)> {
+    let (_, deviation) = center_and_deviation(&mut errors.to_vec())?;
+    let far = hampel(&mut errors.to_vec(), NEIGHBORS, FAR, FAR * deviation);
+    let squares = |errors: &mut dyn Iterator<Item = f64>| errors.map(|error| error * error).sum::<f64>();
+    let share = squares(&mut far.iter().map(|k| errors[*k])) / squares(&mut errors.iter().copied());
+    (deviation > 0.0 && share > LITTLE).then_some((far.len(), share))
 }
 
 /// Whether a kurtosis is beyond that of so many normal errors, whose variance is `24 / n`.
@@ -69,11 +72,31 @@ fn is_heavy(kurtosis: f64, samples: u64) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::is_heavy;
+    use super::{far_errors, is_heavy};
 
     /// Of 600 errors the deviation is 0.2.
     #[test]
     fn tails_are_heavy_beyond_five_deviations() {
         assert!(is_heavy(4.01, 600) && !is_heavy(3.99, 600) && !is_heavy(3.0, 0));
+    }
+
+    /// In whatever unit: errors of -1, 0 and 1 in turn, whose robust deviation is 1.4826, after calm ones of a tenth. Of the calm ones
+    /// one of 6 is far from its neighbors only, and 7.3 is not yet five deviations; 7.5 and -8 are.
+    #[test]
+    fn errors_far_from_all_and_from_their_neighbors() {
+        for unit in [1e-6, 1.0, 1e6] {
+            let error = |k: usize| unit * (k % 3) as f64 - unit;
+            let mut errors: Vec<f64> = (0..201).map(|k| if k < 40 { 0.1 * error(k) } else { error(k) }).collect();
+            let calm = errors[20];
+            (errors[20], errors[90]) = (6.0 * unit, 7.3 * unit);
+            assert_eq!(far_errors(&errors), None);
+            (errors[20], errors[60], errors[90]) = (calm, 7.5 * unit, -8.0 * unit);
+            let (count, share) = far_errors(&errors).unwrap();
+            // Squares of the others that are not zero: 105 of one, and 27 of a tenth.
+            let (far, others) = (7.5 * 7.5 + 8.0 * 8.0, 105.0 + 0.27);
+            assert!(count == 2 && (share - far / (far + others)).abs() < 1e-12, "{count} {share}");
+        }
+        assert_eq!(far_errors(&[]), None);
+        assert_eq!(far_errors(&[0.0, 0.0, 0.0, 1.0]), None);
     }
 }

@@ -295,3 +295,6 @@ fn failed(objective: &Objective<'_>, coordinates: &[f64]) -> Error {
 pub(crate) fn reason(error: Infeasible) -> Error {
     Error::Optimizer(error.to_string())
 }
+
+#[cfg(test)]
+mod tests;

@@ -227,6 +227,24 @@ mod tests {
         assert_eq!(found, [1, 2, 2, 0, 0]);
     }
 
+    /// Pieces of a record, in order of time: of each unknown the largest shares of all pieces, as if one had taken them all.
+    #[test]
+    fn pieces_of_a_record_join() {
+        let new = || Shares::new(3, DMatrix::from_row_slice(2, 2, &[2.0, 0.0, 0.0, 5.0]));
+        let slopes: Vec<[f64; 2]> = (0..6).map(|k| [(k * k % 7) as f64, (k * k * k % 11) as f64]).collect();
+        let take = |range: std::ops::Range<usize>| {
+            let mut shares = new();
+            range.for_each(|k| _ = shares.take(1.0, &slopes[k], (0, k)));
+            shares
+        };
+        let mut joined = take(0..3);
+        joined.append(&take(3..6));
+        // Squares of the slopes 0, 1, 4, 2, 2, 4 times 2, and of 0, 1, 8, 5, 9, 4 times 5.
+        let of = |parts: [(f64, usize); 2]| Largest(parts.map(|(part, k)| Share { experiment: 3, ..share(part, k) }));
+        assert_eq!(joined.largest, [of([(32.0, 2), (32.0, 5)]), of([(405.0, 4), (320.0, 2)])]);
+        assert_eq!((joined.columns(), take(0..6).largest), (2, joined.largest));
+    }
+
     /// Slopes (1, 0), (0, 2), (1, 1) with weights 1, 1 and 2: the inverse curvature is that of [[3, 2], [2, 6]], which is
     /// [[6, -2], [-2, 3]] / 14. The shares of each unknown add up to one, the leverages to the number of unknowns.
     #[test]

@@ -81,7 +81,7 @@ impl Judgement<'_> {
         warnings.extend(self.restart_noise(unknowns));
         warnings.extend(self.input_noise(unknowns));
         warnings.extend(self.autocorrelation(covariances));
-        warnings.extend(self.correlated_outputs(covariances));
+        warnings.extend(self.correlated_outputs());
         warnings
     }
 

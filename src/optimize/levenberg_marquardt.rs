@@ -388,3 +388,6 @@ impl Default for LevenbergMarquardt {
         LevenbergMarquardt::new(Stop::default(), OwnSize)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -249,6 +249,46 @@ fn a_profile_without_an_end_is_open() {
     assert!(found.points.iter().filter(|point| point.value < found.value).count() > 8, "{found:?}");
 }
 
+signals! { struct Fourth { a: "1" } }
+
+/// `y = a^4 u`: at zero it has no slope.
+#[derive(Clone)]
+struct Flat;
+
+impl Model for Flat {
+    type State = Nothing;
+    type Input = Dose;
+    type Output = Answer;
+    type Parameters = Fourth;
+    const KIND: Kind = Kind::Static;
+
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Dose<S>, p: &Fourth<S>) -> Answer<S> {
+        Answer { y: (p.a * p.a) * (p.a * p.a) * u.u }
+    }
+}
+
+/// A profile is given up as flat where it rises to less than a thousandth of the threshold's root in eight points: `5 gain a^4` is the
+/// root of the rise here, and the steps double from `1e-6` of half the threshold's root `q`, whatever the probability.
+#[test]
+fn a_flat_profile_is_given_up() {
+    for (probability, q) in [(0.5, 0.684_43), (0.95, 2.059_54), (0.9999, 4.61)] {
+        let far: f64 = 255.0 * 0.5e-6 * q;
+        for (part, flat) in [(0.9e-3, true), (1.1e-3, false)] {
+            let gain = part * q / (5.0 * far.powi(4));
+            let outputs =
+                (0..25).map(|k| Answer { y: f64::from(k / 12 * 2 - 1) * f64::from(i32::from(k < 24)) }).collect();
+            let inputs = vec![Dose { u: gain }; 25];
+            let record = Experiment::new(&Flat, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+            let fit = Fit::new(&Flat, &record).parameters(Fourth { a: free(0.0) }).noise(Answer { y: 1.0 });
+            let problem = fit.problem().unwrap();
+            let found = profile(&problem, &problem.run().unwrap(), "a", probability).unwrap();
+            println!("{probability} {part} {} {:?}", found.threshold.sqrt(), found);
+            assert_eq!(matches!(found.lower, End::Open(_)), flat, "{found:?}");
+            assert_eq!(matches!(found.upper, End::Open(_)), flat, "{found:?}");
+        }
+    }
+}
+
 /// Nothing is known with no probability, and nothing with certainty.
 #[test]
 fn a_probability_is_between_0_and_1() {

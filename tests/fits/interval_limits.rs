@@ -133,6 +133,27 @@ fn bent_intervals_are_named() {
     assert!(!has(&estimate, WarningCode::CurvedInterval), "{estimate}");
 }
 
+/// The profile of a gain is linear in the gain: with an error of `r` times its value, that of its logarithm reaches further below by
+/// `1.96 r / 2` of its half width, to second order, whatever a second gain is, which other inputs decide.
+#[test]
+fn the_curvature_of_a_logarithm() {
+    let signs = |k: usize, pattern: [f64; 8]| pattern[k % 8];
+    let across = |k: usize| signs(k, [1.0, 1.0, -1.0, -1.0, 1.0, 1.0, -1.0, -1.0]);
+    let error = |k: usize| signs(k, [1.0, -1.0, -1.0, 1.0, -1.0, 1.0, 1.0, -1.0]);
+    for unit in [1.0, 1e-3] {
+        let inputs = (0..24).map(|k| Drive { u: 1.0, w: across(k) }).collect();
+        let outputs = (0..24).map(|k| Current { i: unit * (0.7806 + error(k)) }).collect();
+        let record = Experiment::new(&Mixer, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        let fit = Fit::new(&Mixer, &record).parameters(Gains { u: free(0.4 * unit).log(), w: free(0.1 * unit) });
+        let estimate = fit.noise(Current { i: unit }).run().unwrap();
+        let warning = estimate.warnings.iter().find(|warning| warning.code == WarningCode::CurvedInterval);
+        // `r` is 1 / (0.7806 sqrt(24)) = 0.2615; a difference over a tenth of it is `0.1 r / 3` larger than the derivative, 0.9 %.
+        let text = &warning.unwrap_or_else(|| panic!("{estimate}")).text;
+        assert!(text.starts_with("the interval of `u`") && text.contains("26 % further below"), "{text}");
+        assert!(text.contains("(0.26 standard errors of curvature)"), "{text}");
+    }
+}
+
 /// A slope through noisy inputs is drawn to zero by `slope s^2 / (s^2 + mean u^2)`; half of the inputs' power is noise here.
 #[test]
 fn noise_of_inputs_is_declared_and_its_bias_said() {

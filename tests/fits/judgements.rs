@@ -101,6 +101,13 @@ fn errors_as_large_as_their_noise_are_explained() {
     assert_eq!(found(1.0 / 20.0, WarningCode::GivenNoise), Some(Severity::NotUsable));
     assert_eq!(found(3.0, WarningCode::GivenNoise), Some(Severity::UsableWithCare));
     assert_eq!(found(200.0, WarningCode::GivenNoise), Some(Severity::NotUsable));
+    // Outliers, which a robust loss expects, are larger than the noise, but do not make errors smaller.
+    let robust = |sigma: f64| {
+        let fit = Fit::new(&Gain, &record).parameters(Factor { a: free(1.0) }).noise(Current { i: sigma });
+        let estimate = fit.loss(Huber::default()).run().unwrap();
+        estimate.warnings.iter().find(|warning| warning.code == WarningCode::GivenNoise).map(|warning| warning.severity)
+    };
+    assert_eq!([robust(1.0 / 3.0), robust(1.0), robust(3.0)], [None, None, Some(Severity::UsableWithCare)]);
 }
 
 /// A constant input is said, with care where its effect may be taken for an offset; one that moves in a second record is none.
@@ -130,6 +137,26 @@ fn sentinels_are_said_of_their_record() {
     let both = fit(&[good.named("good"), bad.named("bad")]).run().unwrap();
     let warning = said(&both, WarningCode::Sentinel).unwrap();
     assert!(warning.text.contains("`y` of experiment `bad`"), "{warning:?}");
+}
+
+/// The same of an input, which acted on the plant with some other value.
+#[test]
+fn sentinels_of_inputs_are_said() {
+    let good = record(400, (2.0, 2.0), 0.01, moving);
+    let inputs = |k: usize, u: Drive| Drive { w: if k % 80 == 7 { -999.0 } else { u.w }, ..u };
+    let inputs = good.inputs().enumerate().map(|(k, u)| inputs(k, u)).collect();
+    let time = Time::Uniform { start: 0.0, step: 1.0 };
+    let bad = Experiment::new(&Twice, time, inputs, good.outputs().collect()).unwrap();
+    let said_of = |records: &[ExperimentOf<Twice>]| {
+        let estimate = fit(records).run().unwrap();
+        said(&estimate, WarningCode::Sentinel).map(|warning| (warning.severity, warning.text.clone()))
+    };
+    assert_eq!(said_of(std::slice::from_ref(&good)), None);
+    let (severity, text) = said_of(std::slice::from_ref(&bad)).unwrap();
+    assert!(severity == Severity::UsableWithCare && text.starts_with("the input `w` "), "{text}");
+    assert!(text.contains("-999") && !text.contains("of experiment"), "{text}");
+    let (_, text) = said_of(&[good.named("good"), bad.named("bad")]).unwrap();
+    assert!(text.starts_with("the input `w` of experiment `bad` "), "{text}");
 }
 
 /// As many unknowns as measurements leave nothing to judge them by.

@@ -42,6 +42,32 @@ fn where_a_search_goes_on() {
     assert_eq!(limited.each_ref().map(may_go_on), [true, true, false, true]);
 }
 
+/// A search that ended at a limit of trial steps goes on as long as any are left, and counts the work of all; one that ended at a
+/// minimum does not, nor do searches from several starts.
+#[test]
+fn what_is_run_on() {
+    let inputs: Vec<Voltage> = (0..8).map(|k| Voltage { u: f64::from(k) }).collect();
+    let outputs = (0..8).map(|k| Current { i: f64::from(k % 3) }).collect();
+    let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 0.1 }, inputs, outputs).unwrap();
+    let limited = Outcome::IterationLimit { iterations: 3 };
+    let evaluations = |outcome: Outcome, starts: usize, most: u64, control: &Control| {
+        let problem = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).starts(starts).problem().unwrap();
+        let found = Summary { outcome, ..answer("fine", 10.0, 1.0, true) };
+        let found = problem.run_on(Ok(found), most, Instant::now(), control).unwrap();
+        (found.iterations, found.evaluations)
+    };
+    let never = Control::NEVER;
+    let (iterations, some) = evaluations(limited, 1, 100, &never);
+    assert!(iterations > 3 && some > 5, "{iterations} {some}");
+    assert_eq!(evaluations(limited, 1, 3, &never), (3, 5));
+    assert_eq!(evaluations(limited, 2, 100, &never), (3, 5));
+    assert_eq!(evaluations(Outcome::TimeLimit, 1, 100, &never), (3, 5));
+    assert_eq!(evaluations(limited, 1, 100, &Control { deadline: Some(Instant::now()), ..never }), (3, 5));
+    let converged = answer("fine", 10.0, 1.0, true).outcome;
+    assert!(converged.converged());
+    assert_eq!(evaluations(converged, 1, 100, &Control::NEVER), (3, 5));
+}
+
 fn failure() -> Error {
     Error::Option("no answer".to_owned())
 }

@@ -75,18 +75,23 @@ mod tests {
         let failed =
             |a: f64, evaluated: bool, reason: &str| FailedStart { start: at(a), evaluated, reason: reason.to_owned() };
         let minimum = Minimum { cost_ratio: 1.0, searches: 2, undetermined: vec![], unknowns: at(1.9) };
-        let earlier = Starts {
-            tried: 4,
-            agreed: 2,
-            minima: vec![minimum],
-            declared: Some(0),
-            failed: vec![failed(5.0, true, "given up"), failed(7.0, false, "no simulation")],
-            evaluations: 1000,
-        };
-        let end = search_again(&plain, &problem.settings.optimizer, &earlier).unwrap();
-        let found = end.starts.unwrap();
-        assert_eq!((found.tried, found.agreed, found.minima.len(), found.declared), (4, 3, 1, Some(0)));
-        assert_eq!(found.failed, [failed(5.0, true, "given up")]);
-        assert!(found.evaluations > 1000 && found.evaluations < 1100, "{}", found.evaluations);
+        let (up, none) = (failed(5.0, true, "given up"), failed(7.0, false, "no simulation"));
+        // What comes first is the declared start: the minimum, the one that was given up, or the one that ends in the minimum now.
+        let cases = [(Some(0), [&up, &none], Some(0)), (None, [&up, &none], None), (None, [&none, &up], Some(0))];
+        for (declared, failed, expected) in cases {
+            let earlier = Starts {
+                tried: 4,
+                agreed: 2,
+                minima: vec![minimum.clone()],
+                declared,
+                failed: failed.map(Clone::clone).to_vec(),
+                evaluations: 1000,
+            };
+            let end = search_again(&plain, &problem.settings.optimizer, &earlier).unwrap();
+            let found = end.starts.unwrap();
+            assert_eq!((found.tried, found.agreed, found.minima.len(), found.declared), (4, 3, 1, expected));
+            assert_eq!(found.failed, std::slice::from_ref(&up));
+            assert!(found.evaluations > 1000 && found.evaluations < 1100, "{}", found.evaluations);
+        }
     }
 }

@@ -117,14 +117,23 @@ fn points_beside() {
     assert!(beside(0.0, None).is_empty());
 }
 
-/// Columns of lengths 2 and 4 that are one: nothing changes where the first unknown moves twice as far as the second, against it.
+/// Columns of lengths 2 and 4 that are one: nothing changes where the first unknown moves twice as far as the second, against it,
+/// unless one of them is on a bound, and stays there.
 #[test]
 fn a_direction_without_influence() {
     let mut information = Information::new(2);
     information.absorb_row(&[2.0, 4.0], 1.0);
     let linear = Linearization::new(0.5, 2, vec![information]);
-    let found = Point::new(vec![1.0; 2], linear, &Domain::default()).unwrap().without_influence();
-    assert!(found.len() == 1 && (found[0][0] / found[0][1] + 2.0).abs() < 1e-12, "{found:?}");
+    let of = |bounds: Vec<(f64, f64)>| {
+        Point::new(vec![1.0; 2], linear.clone(), &Domain { bounds, sizes: vec![] }).unwrap().without_influence()
+    };
+    let (inside, lower, upper) = ((0.0, 9.0), (1.0, 9.0), (-9.0, 1.0));
+    for found in [of(vec![]), of(vec![inside; 2])] {
+        assert!(found.len() == 1 && (found[0][0] / found[0][1] + 2.0).abs() < 1e-12, "{found:?}");
+    }
+    for bounds in [[lower, inside], [upper, inside], [inside, lower], [inside, upper], [lower, upper]] {
+        assert!(of(bounds.to_vec()).is_empty(), "{bounds:?}");
+    }
 }
 
 /// A step would gain 5e-7 of the cost 8.
