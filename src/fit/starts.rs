@@ -10,6 +10,7 @@ use super::search::{Rounds, checkpoint, start_error};
 use crate::error::{Error, Failure};
 use crate::estimate::Starts;
 use crate::judge::SearchEnd;
+use crate::numeral::{exact, number};
 use crate::optimize::{Infeasible, LeastSquares, Linearization};
 use crate::problem::{At, CheckpointFile, Objective, Optimizer, SearchPlan, each, linearize_together};
 use minima::{Comparison, End};
@@ -51,10 +52,17 @@ impl NoEnd {
         NoEnd { evaluated, reason: reason.into() }
     }
 
-    /// From the error at the start, without its hint, which would be repeated for each start.
+    /// From the error at the start, without its hint, which would be repeated for each start, and in the words of a report.
     fn at_start(error: Error) -> Self {
         match error {
-            Error::Start(failure) => NoEnd::new(false, Error::Start(Failure { hint: "", ..failure }).to_string()),
+            Error::Start(Failure { experiment, sample, time, signal, value, .. }) => NoEnd::new(
+                false,
+                format!(
+                    "the start cannot be evaluated: experiment `{experiment}`, sample {sample} (t = {} s): {signal} is {}",
+                    exact(time),
+                    number(value, 3)
+                ),
+            ),
             // A time limit, or a flag.
             other => NoEnd::new(true, other.to_string()),
         }
@@ -224,7 +232,7 @@ impl<'p> Searches<'p> {
         let Some(&most) = sorted.get(count - 1) else { return };
         for (run, level) in self.runs.iter_mut().zip(levels) {
             let Some(level) = level.filter(|&level| level > most && matches!(run, Run::Searching(_))) else { continue };
-            let ratio = crate::numeral::number(self.comparison.ratio(level, sorted[0]), 3);
+            let ratio = number(self.comparison.ratio(level, sorted[0]), 3);
             let reason = format!("given up after {} evaluations at {ratio} times the best cost", self.cycle);
             *run = Run::Failed(NoEnd::new(true, reason));
         }
@@ -243,7 +251,7 @@ impl<'p> Searches<'p> {
             let Some(linear) = search.machine.linearization() else { continue };
             let level = self.comparison.level(&search.objective, linear.cost);
             if search.trials() > most(typical) && level > best {
-                let ratio = crate::numeral::number(self.comparison.ratio(level, best), 3);
+                let ratio = number(self.comparison.ratio(level, best), 3);
                 let reason = format!(
                     "given up after {} steps at {ratio} times the best cost: the median search that found a minimum took {typical}",
                     search.trials()

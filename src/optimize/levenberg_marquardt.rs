@@ -105,8 +105,8 @@ const SECOND: Reach = Reach { first: 30.0, later: 30.0 };
 const FIRST_TRIALS: u64 = 2500;
 /// So often a search goes on that found a lower cost beside its end.
 const LEAPS: u64 = 5;
-/// Half the geodesic acceleration is added to a step where twice the acceleration's length is at most this part of the step's
-/// (Transtrum and Sethna 2012).
+/// Half the geodesic acceleration is added to a step where the acceleration is no longer than this part of the step (Transtrum and
+/// Sethna 2012 take half of this).
 const ACCELERATION: f64 = 0.75;
 
 impl<S: Scaling> LevenbergMarquardt<S> {
