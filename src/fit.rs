@@ -188,8 +188,8 @@ impl<'a, M: Model> Fit<'a, M> {
     /// Searches from `count` starts and keeps the best end. [`Summary::starts`](crate::Summary::starts) reports the minima that were
     /// found.
     ///
-    /// Unless set, a fit searches from the declared start. If it ends where the model explains nothing
-    /// ([`WarningCode::Unexplained`](crate::WarningCode::Unexplained), not usable), it goes on to search from 32 starts by itself, after
+    /// Unless set, a fit searches from the declared start. If it is not usable and the model explains none of the
+    /// outputs ([`WarningCode::Unexplained`](crate::WarningCode::Unexplained)), it goes on to search from 32 starts by itself, after
     /// 75 evaluations of each from the best four only, and says so; with `starts(1)` it does not.
     ///
     /// The first start is the declared one. The others are a Latin hypercube (McKay, Beckman and Conover, Technometrics 21

@@ -39,7 +39,7 @@ impl Problem<'_> {
             return None;
         }
         let (begin, before, limit) = (Instant::now(), found.iterations, self.settings.optimizer.most());
-        let best = match explains_nothing(found) {
+        let best = match explains_nothing(found, self.layout().outputs.len()) {
             true => {
                 let trials = Trials::of(FROM_A_START, before, limit)?;
                 self.search_again(found, trials.most, begin, control)
@@ -84,12 +84,12 @@ impl Problem<'_> {
     }
 }
 
-/// Whether an estimate is not usable and leaves an output unexplained, which may not be the reason by itself: where the loss is robust
-/// or measurements are weighted, it is a warning only.
-fn explains_nothing(found: &Summary) -> bool {
+/// Whether an estimate is not usable and leaves every output unexplained. That may not be the reason by itself: where the loss is robust
+/// or measurements are weighted, it is a warning only. Where one output is explained, the search was near the right minimum.
+fn explains_nothing(found: &Summary, outputs: usize) -> bool {
     let unexplained =
-        |warning: &Warning| warning.code == WarningCode::Unexplained && warning.severity > Severity::Usable;
-    found.severity() == Severity::NotUsable && found.warnings.iter().any(unexplained)
+        |warning: &&Warning| warning.code == WarningCode::Unexplained && warning.severity > Severity::Usable;
+    found.severity() == Severity::NotUsable && found.warnings.iter().filter(unexplained).count() == outputs
 }
 
 #[cfg(test)]
