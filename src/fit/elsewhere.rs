@@ -15,6 +15,9 @@ const LEAST_TRIALS: u64 = 100;
 const FROM_A_START: u64 = 1;
 const FROM_THE_OTHER_SIDE: u64 = 3;
 
+/// Deviances that differ by less are those of one minimum: a tenth of a standard error.
+const SAME: f64 = 0.01;
+
 /// The most trial steps of each further search, at least one, and whether the user's limit makes them fewer.
 #[derive(Clone, Copy)]
 pub(super) struct Trials {
@@ -75,9 +78,9 @@ impl Problem<'_> {
         let stopped = if control.stops() { "; limits of the fit stopped searches before their end" } else { "" };
         let text = format!(
             "the search from the declared start ended where the model explains nothing, so that the fit searched from {STARTS} starts \
-             by itself, as Fit::starts does{stopped}"
+             by itself, and went on from the best of them{stopped}"
         );
-        let better = again.outcome.converged() || !found.outcome.converged();
+        let better = is_better(&again, found, self.layout().outputs.len());
         let mut best = if better { after(found, again) } else { found.clone() };
         best.warnings.push(Warning { code: WarningCode::Unexplained, severity: Severity::Usable, text });
         Some(best)
@@ -92,9 +95,37 @@ fn explains_nothing(found: &Summary, outputs: usize) -> bool {
     found.severity() == Severity::NotUsable && found.warnings.iter().filter(unexplained).count() == outputs
 }
 
+/// Whether further searches found a better estimate: one that explains an output, or one of no higher deviance. The first search had more
+/// trial steps than most of theirs, and may have ended lower.
+fn is_better(again: &Summary, found: &Summary, outputs: usize) -> bool {
+    let lower = again.deviance.zip(found.deviance).is_some_and(|(again, found)| again <= found + SAME);
+    let converged = again.outcome.converged() || !found.outcome.converged();
+    converged && (lower || !explains_nothing(again, outputs))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::optimize::Outcome;
+    use crate::tests::{Current, Gain, Line, Voltage};
+    use crate::{Experiment, Fit, Time, free};
+
+    /// Neither a higher minimum nor a search that has not ended takes the place of a minimum, where no output is explained.
+    #[test]
+    fn a_higher_minimum_is_not_better() {
+        let inputs: Vec<Voltage> = (0..40).map(|k| Voltage { u: f64::from(k * 37 % 21) - 10.0 }).collect();
+        let outputs = (0..40).map(|k| Current { i: f64::from(k * 11 % 17) - 8.0 }).collect();
+        let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        let fit = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).starts(1);
+        let found = fit.run().unwrap().summary().clone();
+        assert!(explains_nothing(&found, 1) && found.outcome.converged(), "{found:?}");
+        let of = |by: f64| Summary { deviance: found.deviance.map(|deviance| deviance + by), ..found.clone() };
+        assert_eq!([-1.0, 0.0, 1.0].map(|by| is_better(&of(by), &found, 1)), [true, true, false]);
+        let unended = Summary { outcome: Outcome::IterationLimit { iterations: 9 }, ..of(-1.0) };
+        assert!(!is_better(&unended, &found, 1) && is_better(&of(-1.0), &unended, 1));
+        // A higher one that explains the output is better all the same: without its warnings it is usable.
+        assert!(is_better(&Summary { warnings: vec![], ..of(1.0) }, &found, 1));
+    }
 
     /// At least 100 steps, three times 50 or 60, as far as 200 leave them: 150 after 50, 140 after 60, none after 200.
     #[test]

@@ -1,12 +1,12 @@
 //! Fits of single records in lockstep: one evaluation of all of them is one pass over lanes.
 
 use super::refine::{Attempt, Start};
-use super::search::Rounds;
+use super::search::{Rounds, ended};
 use crate::error::Error;
 use crate::estimate::Summary;
-use crate::judge::{SearchEnd, conclude, conclude_from, residuals_together};
+use crate::judge::{SearchEnd, conclude, conclude_from, noise, residuals_together};
 use crate::optimize::{Domain, Infeasible, LeastSquares, Linearization, Machine, Outcome, Request};
-use crate::problem::{At, Control, Objective, Problem, Round, each, linearize_together};
+use crate::problem::{At, Control, Objective, Problem, Round, Whitening, each, linearize_together};
 use std::time::Instant;
 
 static NEVER: Control = Control::NEVER;
@@ -21,12 +21,43 @@ pub(super) struct Search<'p> {
     evaluations: u64,
 }
 
+/// A round at whose end the noise is to be estimated.
+pub(super) struct Measuring<'p> {
+    rounds: Rounds<'p>,
+    objective: Objective<'p>,
+    round: Round,
+}
+
+impl<'p> Measuring<'p> {
+    pub fn place(&self) -> At<'_> {
+        (&self.objective, &self.round.coordinates)
+    }
+
+    /// Passes on the noise there.
+    pub fn tell(self, noise: Result<Whitening, Infeasible>) -> Stage<'p> {
+        let Measuring { mut rounds, objective, round } = self;
+        let end = rounds.take(objective, round, Some(noise));
+        Stage::after(rounds, end)
+    }
+}
+
 /// The state of one record's fit.
 pub(super) enum Stage<'p> {
     Searching(Box<Search<'p>>),
+    Measuring(Box<Measuring<'p>>),
     Ended(Box<SearchEnd>),
     /// To be fitted by itself: its start cannot be evaluated, and the single fit gives the detailed error.
     Alone,
+}
+
+impl<'p> Stage<'p> {
+    /// After a round that has ended, or the search with it.
+    fn after(rounds: Rounds<'p>, end: Option<SearchEnd>) -> Self {
+        match end {
+            Some(end) => Stage::Ended(Box::new(end)),
+            None => Stage::Searching(Box::new(Search::new(rounds))),
+        }
+    }
 }
 
 impl<'p> Search<'p> {
@@ -75,7 +106,7 @@ impl<'p> Search<'p> {
     fn end(self: Box<Self>, outcome: Outcome) -> Stage<'p> {
         let Search { mut rounds, objective, machine, name, iterations, evaluations } = *self;
         let outcome = objective.control.named(outcome);
-        let round = Round {
+        let found = Round {
             coordinates: machine.place().to_vec(),
             linear: machine.linearization().cloned(),
             outcome,
@@ -83,10 +114,12 @@ impl<'p> Search<'p> {
             evaluations,
             name,
         };
-        match rounds.take(objective, round) {
-            Some(end) => Stage::Ended(Box::new(end)),
-            None => Stage::Searching(Box::new(Search::new(rounds))),
+        let round = ended(&objective, found);
+        if rounds.asks_noise(&round) {
+            return Stage::Measuring(Box::new(Measuring { rounds, objective, round }));
         }
+        let end = rounds.take(objective, round, None);
+        Stage::after(rounds, end)
     }
 }
 
@@ -141,16 +174,20 @@ type From<'p> = (&'p Problem<'p>, Start);
 fn by_one_method(problems: &[From<'_>], control: &Control) -> Vec<Result<Summary, Error>> {
     let begin = Instant::now();
     let plain: Vec<Objective<'_>> = problems.iter().map(|(problem, _)| problem.in_units(control)).collect();
-    let first = |(plain, (problem, start)): (_, &From<'_>)| match Rounds::new(
-        plain,
-        &problem.settings.optimizer.limited(start.trials),
-        start.coordinates.clone(),
-    ) {
-        Ok(rounds) => Stage::Searching(Box::new(Search::new(rounds))),
+    let starts: Vec<At<'_>> =
+        plain.iter().zip(problems).map(|(plain, (_, start))| (plain, &start.coordinates[..])).collect();
+    let first = |((plain, (problem, start)), noise): ((_, &From<'_>), Result<Whitening, Infeasible>)| match noise {
+        Ok(noise) => {
+            let optimizer = problem.settings.optimizer.limited(start.trials);
+            let rounds = Rounds::with(plain, &optimizer, start.coordinates.clone(), noise);
+            Stage::Searching(Box::new(Search::new(rounds)))
+        }
         Err(_) => Stage::Alone,
     };
-    let mut stages: Vec<Stage<'_>> = plain.iter().zip(problems).map(first).collect();
+    let mut stages: Vec<Stage<'_>> =
+        plain.iter().zip(problems).zip(noise::first_together(&starts)).map(first).collect();
     loop {
+        measure(&mut stages);
         let requesting = stages.iter().enumerate().filter_map(|(i, stage)| match stage {
             Stage::Searching(search) => Some((i, search.requested()?)),
             _ => None,
@@ -167,6 +204,20 @@ fn by_one_method(problems: &[From<'_>], control: &Control) -> Vec<Result<Summary
     }
     let starts: Vec<&Start> = problems.iter().map(|(_, start)| start).collect();
     conclude_together(&plain, stages, &starts, control, begin)
+}
+
+/// Estimates the noise where rounds have ended, in one pass.
+fn measure(stages: &mut [Stage<'_>]) {
+    let measuring = stages.iter().enumerate().filter_map(|(i, stage)| match stage {
+        Stage::Measuring(one) => Some((i, one.place())),
+        _ => None,
+    });
+    let (measuring, points): (Vec<usize>, Vec<At<'_>>) = measuring.unzip();
+    for (i, noise) in measuring.into_iter().zip(noise::estimate_together(&points)) {
+        if let Stage::Measuring(one) = std::mem::replace(&mut stages[i], Stage::Alone) {
+            stages[i] = one.tell(noise);
+        }
+    }
 }
 
 fn conclude_together(

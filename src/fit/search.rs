@@ -23,12 +23,14 @@ pub(super) fn search(
     let mut rounds = match optimizer.resume(&checkpoint)? {
         Some((place, iterations, saved)) if place.len() == start.len() => {
             checkpoint.before = iterations;
-            Rounds::from(plain, optimizer, place, saved)?
+            let whitening = first_whitening(plain, &place)?;
+            Rounds::from(plain, optimizer, place, saved, whitening)
         }
         // Written at once, so that a path that cannot be written is reported before the search.
         _ => {
             optimizer.begin(&checkpoint, &start)?;
-            Rounds::from(plain, optimizer, start, None)?
+            let whitening = first_whitening(plain, &start)?;
+            Rounds::from(plain, optimizer, start, None, whitening)
         }
     };
     rounds.iterations = checkpoint.before;
@@ -67,8 +69,19 @@ pub(super) struct Rounds<'r> {
 impl<'r> Rounds<'r> {
     /// From a start. With noise estimated there, the first round need not find an exact minimum.
     pub fn new(plain: &'r Objective<'r>, optimizer: &Arc<dyn Optimizer>, start: Vec<f64>) -> Result<Self, Error> {
+        let whitening = first_whitening(plain, &start)?;
+        Ok(Rounds::with(plain, optimizer, start, whitening))
+    }
+
+    /// The same with the noise at the start.
+    pub fn with(
+        plain: &'r Objective<'r>,
+        optimizer: &Arc<dyn Optimizer>,
+        start: Vec<f64>,
+        whitening: Whitening,
+    ) -> Self {
         let first = noise::is_estimated(plain).then(|| optimizer.rough());
-        Rounds::from(plain, optimizer, start, first)
+        Rounds::from(plain, optimizer, start, first, whitening)
     }
 
     /// From a point; `first` is the search of the first round, if it differs.
@@ -77,10 +90,9 @@ impl<'r> Rounds<'r> {
         optimizer: &Arc<dyn Optimizer>,
         coordinates: Vec<f64>,
         first: Option<Arc<dyn Optimizer>>,
-    ) -> Result<Self, Error> {
-        let whitening =
-            noise::first_whitening(plain, &coordinates).map_err(|error| start_error(plain, &coordinates, error))?;
-        Ok(Rounds {
+        whitening: Whitening,
+    ) -> Self {
+        Rounds {
             plain,
             optimizer: optimizer.clone(),
             next: first.unwrap_or_else(|| optimizer.clone()),
@@ -92,7 +104,7 @@ impl<'r> Rounds<'r> {
             iterations: 0,
             left: optimizer.most(),
             evaluations: 0,
-        })
+        }
     }
 
     fn run(mut self, file: Option<CheckpointFile>) -> Result<SearchEnd, Error> {
@@ -103,7 +115,9 @@ impl<'r> Rounds<'r> {
                 RoundError::Start(error) => start_error(self.plain, &self.coordinates, error),
                 RoundError::Optimizer(text) => Error::Optimizer(text),
             })?;
-            if let Some(mut end) = self.take(objective, result) {
+            let round = ended(&objective, result);
+            let noise = self.asks_noise(&round).then(|| noise::estimate(&objective, &round.coordinates));
+            if let Some(mut end) = self.take(objective, round, noise) {
                 end.write_error = file.and_then(|file| file.write_error());
                 return Ok(end);
             }
@@ -120,26 +134,28 @@ impl<'r> Rounds<'r> {
         Objective { memory: self.memory.clone(), ..self.plain.with(self.whitening.clone()) }
     }
 
-    /// Records the result of a round with this objective; returns the end of the search if no further round is needed.
-    pub fn take(&mut self, objective: Objective<'r>, result: Round) -> Option<SearchEnd> {
+    /// Whether the noise is to be estimated where a round has ended.
+    pub fn asks_noise(&self, round: &Round) -> bool {
+        !self.known && round.outcome.converged()
+    }
+
+    /// Records how a round with this objective [ended], and the noise there if it was asked for; returns the end of the search if
+    /// no further round is needed.
+    pub fn take(
+        &mut self,
+        objective: Objective<'r>,
+        round: Round,
+        noise: Option<Result<Whitening, Infeasible>>,
+    ) -> Option<SearchEnd> {
         self.round += 1;
-        self.iterations += result.iterations;
-        self.left = self.left.saturating_sub(result.iterations);
-        self.evaluations += result.evaluations;
-        self.coordinates = result.coordinates;
-        let (mut outcome, mut linear) = (result.outcome, result.linear);
-        let lost = matches!(outcome, Outcome::Stalled { .. } | Outcome::LimitOfPrecision { .. });
-        if lost && noise::reproduces(&objective, &self.coordinates) {
-            outcome = Outcome::Exact;
-        }
-        if matches!(outcome, Outcome::Stalled { .. } | Outcome::Creeping { .. })
-            && let Some(rough) = within_finer_tolerance(&objective, &self.coordinates)
-        {
-            outcome = rough;
-        }
-        let mut settled = self.known || !outcome.converged();
-        if !settled {
-            let found = noise::estimate(&objective, &self.coordinates).unwrap_or_else(|_| self.whitening.clone());
+        self.iterations += round.iterations;
+        self.left = self.left.saturating_sub(round.iterations);
+        self.evaluations += round.evaluations;
+        self.coordinates = round.coordinates;
+        let (mut outcome, mut linear) = (round.outcome, round.linear);
+        let mut settled = noise.is_none();
+        if let Some(found) = noise {
+            let found = found.unwrap_or_else(|_| self.whitening.clone());
             let changes = found.sigma().into_iter().zip(self.whitening.sigma()).map(|(a, b)| (a / b).ln().abs());
             settled = self.round > 1 && changes.fold(0.0, f64::max) < NOISE_TOLERANCE;
             if !settled {
@@ -165,12 +181,32 @@ impl<'r> Rounds<'r> {
             outcome,
             iterations: self.iterations,
             evaluations: self.evaluations,
-            name: result.name,
+            name: round.name,
             write_error: None,
             memory: self.memory.clone(),
             starts: None,
         })
     }
+}
+
+/// The noise of a search's first round.
+fn first_whitening(plain: &Objective<'_>, start: &[f64]) -> Result<Whitening, Error> {
+    noise::first_whitening(plain, start).map_err(|error| start_error(plain, start, error))
+}
+
+/// A round that found no further step has ended at a minimum all the same where the model reproduces the data, or to the tolerance of an
+/// adaptive integrator.
+pub(super) fn ended(objective: &Objective<'_>, mut round: Round) -> Round {
+    let lost = matches!(round.outcome, Outcome::Stalled { .. } | Outcome::LimitOfPrecision { .. });
+    if lost && noise::reproduces(objective, &round.coordinates) {
+        round.outcome = Outcome::Exact;
+    }
+    if matches!(round.outcome, Outcome::Stalled { .. } | Outcome::Creeping { .. })
+        && let Some(rough) = within_finer_tolerance(objective, &round.coordinates)
+    {
+        round.outcome = rough;
+    }
+    round
 }
 
 /// How a search ended that found no step to lower the cost of an adaptive integrator, whose number of steps changes from point

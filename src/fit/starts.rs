@@ -9,7 +9,7 @@ use super::lockstep::{Search, Stage};
 use super::search::{Rounds, checkpoint, start_error};
 use crate::error::{Error, Failure};
 use crate::estimate::Starts;
-use crate::judge::SearchEnd;
+use crate::judge::{SearchEnd, noise};
 use crate::numeral::{exact, number};
 use crate::optimize::{Infeasible, LeastSquares, Linearization};
 use crate::problem::{At, CheckpointFile, Objective, Optimizer, SearchPlan, each, linearize_together};
@@ -134,8 +134,17 @@ impl<'p> Run<'p> {
         if let (None, Err(error)) = (search.machine.linearization(), &answer) {
             return Run::Failed(NoEnd::at_start(start_error(plain, search.machine.place(), error.clone())));
         }
-        match search.tell(answer) {
+        Run::at(search.tell(answer), plain, comparison)
+    }
+
+    fn at(stage: Stage<'p>, plain: &Objective<'_>, comparison: &Comparison) -> Run<'p> {
+        match stage {
             Stage::Searching(search) => Run::Searching(search),
+            Stage::Measuring(round) => {
+                let (objective, place) = round.place();
+                let noise = noise::estimate(objective, place);
+                Run::at(round.tell(noise), plain, comparison)
+            }
             Stage::Ended(end) => match End::new(plain, comparison, &end) {
                 Some(End { level, .. }) => Run::Ended { level, end },
                 None => Run::Failed(NoEnd::new(true, "its end cannot be evaluated")),
@@ -181,8 +190,8 @@ impl<'p> Searches<'p> {
         while self.advance() {
             self.cycle += 1;
             self.give_up_hopeless();
-            let races = matches!(self.plain.problem.settings.searches, SearchPlan::Best(_));
-            if races && self.cycle == EVALUATIONS_OF_ALL {
+            let only_best = matches!(self.plain.problem.settings.searches, SearchPlan::Best(_));
+            if only_best && self.cycle == EVALUATIONS_OF_ALL {
                 self.give_up_all_but(BEST);
             }
             progress.show(self);

@@ -3,7 +3,7 @@
 use crate::information::SquareMatrix;
 use crate::loss::{Huber, Loss};
 use crate::optimize::Infeasible;
-use crate::problem::{Accumulate, Noise, Objective, Whitening};
+use crate::problem::{Accumulate, At, Noise, Objective, Whitening, gather_together};
 use crate::sweep::Window;
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
@@ -11,6 +11,9 @@ use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 const ROUNDING: f64 = 1e-15;
 /// The smallest noise that errors can be divided by.
 const SMALLEST: f64 = 1e-280;
+/// Most steps for the noise of robust losses, and the relative change at which they end.
+const ROBUST_STEPS: usize = 50;
+const ROBUST_TOLERANCE: f64 = 1e-9;
 /// Mean errors below this fraction of the output's magnitude are round-off, which accumulates along a record.
 const REPRODUCED: f64 = 1e-12;
 
@@ -24,23 +27,31 @@ fn clipped_variance(&Huber(c): &Huber) -> f64 {
 struct Moments<'m> {
     objective: &'m Objective<'m>,
     experiment: usize,
-    sigma: &'m [f64],
-    clip: Option<&'m (dyn Fn(f64) -> f64 + Sync)>,
+    /// Noise levels in whose units errors are clipped, for robust estimates.
+    clip: Option<&'m [f64]>,
     sums: SquareMatrix,
     pairs: SquareMatrix,
+}
+
+impl<'m> Moments<'m> {
+    fn new(objective: &'m Objective<'m>, experiment: usize, clip: Option<&'m [f64]>) -> Self {
+        let empty = SquareMatrix::zeros(objective.outputs());
+        Moments { objective, experiment, clip, sums: empty.clone(), pairs: empty }
+    }
 }
 
 impl Accumulate for Moments<'_> {
     fn add(&mut self, window: &Window, lane: usize) {
         let outputs = window.outputs();
         let mut errors = vec![None; outputs];
+        let huber = Huber::default();
         for k in 0..window.samples[lane] {
             if self.objective.weight(self.experiment, window.begin[lane] + k) <= 0.0 {
                 continue;
             }
             for (j, error) in errors.iter_mut().enumerate() {
                 let value = window.error(k, j, lane);
-                let clipped = || self.clip.map_or(value, |clip| clip(value / self.sigma[j]) * self.sigma[j]);
+                let clipped = || self.clip.map_or(value, |sigma| huber.psi(value / sigma[j]) * sigma[j]);
                 *error = window.is_measured(k, j, lane).then(clipped);
             }
             for i in 0..outputs {
@@ -62,19 +73,29 @@ impl Accumulate for Moments<'_> {
     }
 }
 
-/// Second moments of the (filtered) errors in the units of the outputs; each error through `clip` in units of
-/// `sigma`, for robust estimates.
-fn moments(
-    objective: &Objective<'_>,
-    coordinates: &[f64],
-    sigma: &[f64],
-    clip: Option<&(dyn Fn(f64) -> f64 + Sync)>,
-) -> Result<SquareMatrix, Infeasible> {
-    let outputs = objective.outputs();
+/// An objective, a point, and the noise levels in whose units its errors are clipped.
+type Asked<'o> = (At<'o>, Option<&'o [f64]>);
+
+/// Second moments of the (filtered) errors in the units of the outputs.
+fn moments(((objective, coordinates), clip): Asked<'_>) -> Result<SquareMatrix, Infeasible> {
     let plain = objective.in_units();
-    let empty = || SquareMatrix::zeros(outputs);
-    let make = |experiment| Moments { objective: &plain, experiment, sigma, clip, sums: empty(), pairs: empty() };
-    let all = plain.gather(coordinates, false, make)?;
+    covariance(&plain.gather(coordinates, false, |experiment| Moments::new(&plain, experiment, clip))?)
+}
+
+/// The same of several objectives of one record each. One that fails in lanes is asked alone.
+fn moments_together(asked: &[Asked<'_>]) -> Vec<Result<SquareMatrix, Infeasible>> {
+    let plain: Vec<Objective<'_>> = asked.iter().map(|((objective, _), _)| objective.in_units()).collect();
+    let points: Vec<At<'_>> = plain.iter().zip(asked).map(|(plain, ((_, x), _))| (plain, *x)).collect();
+    let all = gather_together(&points, |i| Moments::new(&plain[i], 0, asked[i].1));
+    let found = |(found, asked): (Option<Moments<'_>>, &Asked<'_>)| match found {
+        Some(found) => covariance(&[found]),
+        None => moments(*asked),
+    };
+    all.into_iter().zip(asked).map(found).collect()
+}
+
+fn covariance(all: &[Moments<'_>]) -> Result<SquareMatrix, Infeasible> {
+    let outputs = all.first().map_or(0, |one| one.sums.size());
     let sum = |part: &dyn Fn(&Moments<'_>) -> f64| all.iter().map(part).sum::<f64>();
     let covariance = SquareMatrix::from_fn(outputs, |i, j| {
         let at = (i.max(j), i.min(j));
@@ -101,42 +122,109 @@ pub(crate) fn is_estimated(objective: &Objective<'_>) -> bool {
 
 /// The noise as given, or estimated from the errors at a point.
 pub(crate) fn first_whitening(objective: &Objective<'_>, coordinates: &[f64]) -> Result<Whitening, Infeasible> {
+    given(objective).map_or_else(|| estimate(objective, coordinates), Ok)
+}
+
+/// The same of several objectives of one record each.
+pub(crate) fn first_together(points: &[At<'_>]) -> Vec<Result<Whitening, Infeasible>> {
+    let asked: Vec<At<'_>> = points.iter().copied().filter(|(objective, _)| given(objective).is_none()).collect();
+    let mut estimated = estimate_together(&asked).into_iter();
+    let first = |(objective, x): &At<'_>| match given(objective) {
+        Some(given) => Ok(given),
+        None => estimated.next().unwrap_or_else(|| estimate(objective, x)),
+    };
+    points.iter().map(first).collect()
+}
+
+/// The noise that the first round of a search has without an estimate.
+fn given(objective: &Objective<'_>) -> Option<Whitening> {
     match &objective.problem.settings.noise {
-        Noise::Given(sigma) => Ok(Whitening::Diagonal(sigma.clone())),
-        _ if is_estimated(objective) => estimate(objective, coordinates),
-        _ => Ok(objective.whitening.clone()),
+        Noise::Given(sigma) => Some(Whitening::Diagonal(sigma.clone())),
+        _ => (!is_estimated(objective)).then(|| objective.whitening.clone()),
     }
 }
 
 /// The noise estimated from the errors at a point: by their variance, or with a robust loss by Huber's proposal 2
-/// (Huber,
-/// *Robust Statistics*, 1981, section 6.4).
+/// (Huber, *Robust Statistics*, 1981, section 6.4).
 pub(crate) fn estimate(objective: &Objective<'_>, coordinates: &[f64]) -> Result<Whitening, Infeasible> {
-    let outputs = objective.outputs();
-    let mut found = moments(objective, coordinates, &vec![1.0; outputs], None)?;
-    let size = |size: f64| if size > 0.0 { size } else { 1.0 };
-    let floor: Vec<f64> = magnitudes(objective).into_iter().map(|magnitude| ROUNDING * size(magnitude)).collect();
-    let sigma = |moments: &SquareMatrix| -> Vec<f64> {
-        moments.diagonal().iter().zip(&floor).map(|(v, floor)| v.sqrt().max(*floor)).collect()
-    };
-    if objective.is_robust() {
-        let huber = Huber::default();
-        let kappa = clipped_variance(&huber);
-        for _ in 0..50 {
-            let before = sigma(&found);
-            found = moments(objective, coordinates, &before, Some(&|z| huber.psi(z)))?;
-            found = SquareMatrix::from_fn(outputs, |i, j| found[(i, j)] / kappa);
-            let change = |(a, b): (f64, &f64)| (a / b).ln().abs();
-            if sigma(&found).into_iter().zip(&before).map(change).fold(0.0, f64::max) < 1e-9 {
-                break;
+    let first = moments(((objective, coordinates), None))?;
+    let mut level = Level::new(objective, first);
+    while let Some(sigma) = level.clip() {
+        let found = moments(((objective, coordinates), Some(&sigma)))?;
+        level.tell(found);
+    }
+    Ok(level.whitening(objective))
+}
+
+/// The same at a point of each of several objectives of one record each, in parallel lanes.
+pub(crate) fn estimate_together(points: &[At<'_>]) -> Vec<Result<Whitening, Infeasible>> {
+    let plain: Vec<Asked<'_>> = points.iter().map(|point| (*point, None)).collect();
+    let first = moments_together(&plain).into_iter().zip(points);
+    let mut levels: Vec<Result<Level, Infeasible>> =
+        first.map(|(found, (objective, _))| Ok(Level::new(objective, found?))).collect();
+    loop {
+        let clips: Vec<(usize, Vec<f64>)> =
+            levels.iter().enumerate().filter_map(|(i, level)| Some((i, level.as_ref().ok()?.clip()?))).collect();
+        if clips.is_empty() {
+            break;
+        }
+        let asked: Vec<Asked<'_>> = clips.iter().map(|(i, sigma)| (points[*i], Some(&sigma[..]))).collect();
+        for (found, (i, _)) in moments_together(&asked).into_iter().zip(&clips) {
+            match (found, &mut levels[*i]) {
+                (Ok(found), Ok(level)) => level.tell(found),
+                (Err(error), level) => *level = Err(error),
+                _ => {}
             }
         }
     }
-    let diagonal = Whitening::Diagonal(sigma(&found));
-    Ok(match objective.problem.settings.noise {
-        Noise::Covariance => Whitening::full(found).unwrap_or(diagonal),
-        _ => diagonal,
-    })
+    levels.into_iter().zip(points).map(|(level, (objective, _))| Ok(level?.whitening(objective))).collect()
+}
+
+/// The iteration for the noise of robust losses; of other losses the first moments are the answer.
+struct Level {
+    moments: SquareMatrix,
+    /// The smallest level of each output.
+    floor: Vec<f64>,
+    /// Mean square of clipped normal errors.
+    kappa: f64,
+    /// Steps that are left.
+    left: usize,
+}
+
+impl Level {
+    fn new(objective: &Objective<'_>, moments: SquareMatrix) -> Self {
+        let size = |size: f64| if size > 0.0 { size } else { 1.0 };
+        let floor = magnitudes(objective).into_iter().map(|magnitude| ROUNDING * size(magnitude)).collect();
+        let left = if objective.is_robust() { ROBUST_STEPS } else { 0 };
+        Level { moments, floor, kappa: clipped_variance(&Huber::default()), left }
+    }
+
+    fn sigma(&self) -> Vec<f64> {
+        let levels = self.moments.diagonal().into_iter().zip(&self.floor);
+        levels.map(|(variance, floor)| variance.sqrt().max(*floor)).collect()
+    }
+
+    /// In which units errors are to be clipped for the next step.
+    fn clip(&self) -> Option<Vec<f64>> {
+        (self.left > 0).then(|| self.sigma())
+    }
+
+    /// Passes on the moments of the clipped errors.
+    fn tell(&mut self, clipped: SquareMatrix) {
+        let before = self.sigma();
+        self.moments = SquareMatrix::from_fn(clipped.size(), |i, j| clipped[(i, j)] / self.kappa);
+        let change = |(a, b): (f64, f64)| (a / b).ln().abs();
+        let settled = self.sigma().into_iter().zip(before).map(change).fold(0.0, f64::max) < ROBUST_TOLERANCE;
+        self.left = if settled { 0 } else { self.left - 1 };
+    }
+
+    fn whitening(self, objective: &Objective<'_>) -> Whitening {
+        let diagonal = Whitening::Diagonal(self.sigma());
+        match objective.problem.settings.noise {
+            Noise::Covariance => Whitening::full(self.moments).unwrap_or(diagonal),
+            _ => diagonal,
+        }
+    }
 }
 
 /// Whether the model reproduces the data up to round-off, from which no search direction follows.
@@ -145,7 +233,7 @@ pub(crate) fn reproduces(objective: &Objective<'_>, coordinates: &[f64]) -> bool
         let mut variances = moments.diagonal().into_iter().zip(magnitudes(objective));
         variances.all(|(variance, size)| variance.sqrt() <= REPRODUCED * size)
     };
-    moments(objective, coordinates, &vec![1.0; objective.outputs()], None).is_ok_and(reproduced)
+    moments(((objective, coordinates), None)).is_ok_and(reproduced)
 }
 
 /// Noise of the first output below which errors are round-off of the simulation, in its unit; zero where the measurements
