@@ -33,7 +33,7 @@ impl Pair {
 
 /// `a b`, `a^2`, `b^2` and `(a b)^2` of two errors.
 #[derive(Clone, Copy)]
-struct Products;
+pub(super) struct Products;
 
 impl Terms for Products {
     #[inline(always)]

@@ -1,5 +1,7 @@
 //! Noise levels from the prediction errors.
 
+use super::coupling::Products;
+use super::sums::sums;
 use crate::information::SquareMatrix;
 use crate::loss::{Huber, Loss};
 use crate::optimize::Infeasible;
@@ -31,36 +33,39 @@ struct Moments<'m> {
     clip: Option<&'m [f64]>,
     sums: SquareMatrix,
     pairs: SquareMatrix,
+    /// The errors of a window, output by output.
+    errors: Vec<f64>,
 }
 
 impl<'m> Moments<'m> {
     fn new(objective: &'m Objective<'m>, experiment: usize, clip: Option<&'m [f64]>) -> Self {
         let empty = SquareMatrix::zeros(objective.outputs());
-        Moments { objective, experiment, clip, sums: empty.clone(), pairs: empty }
+        Moments { objective, experiment, clip, sums: empty.clone(), pairs: empty, errors: vec![] }
     }
 }
 
 impl Accumulate for Moments<'_> {
     fn add(&mut self, window: &Window, lane: usize) {
-        let outputs = window.outputs();
-        let mut errors = vec![None; outputs];
+        let (outputs, samples) = (window.outputs(), window.samples[lane]);
         let huber = Huber::default();
-        for k in 0..window.samples[lane] {
-            if self.objective.weight(self.experiment, window.begin[lane] + k) <= 0.0 {
+        self.errors.clear();
+        for j in 0..outputs {
+            let clipped = |error: f64| self.clip.map_or(error, |sigma| huber.psi(error / sigma[j]) * sigma[j]);
+            self.errors.extend(window.errors(j, lane).map(clipped));
+        }
+        let of = |j: usize| &self.errors[j * samples..][..samples];
+        let weighted = self.objective.is_weighted();
+        let counts = |k: usize| !weighted || self.objective.weight(self.experiment, window.begin[lane] + k) > 0.0;
+        for (i, j) in (0..outputs).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+            if window.whole && !weighted {
+                self.sums[(i, j)] += sums(of(i), of(j), Products)[0];
+                self.pairs[(i, j)] += samples as f64;
                 continue;
             }
-            for (j, error) in errors.iter_mut().enumerate() {
-                let value = window.error(k, j, lane);
-                let clipped = || self.clip.map_or(value, |sigma| huber.psi(value / sigma[j]) * sigma[j]);
-                *error = window.is_measured(k, j, lane).then(clipped);
-            }
-            for i in 0..outputs {
-                let Some(error) = errors[i] else { continue };
-                for (j, other) in errors[..=i].iter().enumerate() {
-                    let Some(other) = other else { continue };
-                    self.sums[(i, j)] += error * other;
-                    self.pairs[(i, j)] += 1.0;
-                }
+            let both = |k: usize| window.is_measured(k, i, lane) && window.is_measured(k, j, lane) && counts(k);
+            for k in (0..samples).filter(|&k| both(k)) {
+                self.sums[(i, j)] += of(i)[k] * of(j)[k];
+                self.pairs[(i, j)] += 1.0;
             }
         }
     }
@@ -312,5 +317,31 @@ mod tests {
         let mean = (0..42).map(|k| (error(k).abs() / found).min(c).powi(2)).sum::<f64>() / 42.0;
         // The scale is found to 1e-9 from step to step, which shrink by a half or more.
         assert!((mean / clipped_variance(&Huber(c)) - 1.0).abs() < 1e-7, "{mean} {found}");
+    }
+
+    /// Records of other lengths, scales and missing measurements have the noise that each has by itself, by variance and robustly.
+    #[test]
+    fn noise_of_several_records_is_that_of_each() {
+        let record = |r: usize| {
+            let error = |k: usize| ((k * 37 % 21) as f64 - 10.0) * if k.is_multiple_of(7) { 30.0 } else { r as f64 };
+            let value = |k: usize| if k % 5 == r { f64::NAN } else { 2.0 * k as f64 + error(k) };
+            let inputs: Vec<Voltage> = (0..90 + r).map(|k| Voltage { u: k as f64 }).collect();
+            let outputs = (0..90 + r).map(|k| Current { i: value(k) }).collect();
+            Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap()
+        };
+        let records: Vec<_> = (1..4).map(record).collect();
+        for robust in [false, true] {
+            let fit = |record| Fit::new(&Line, record).parameters(Gain { a: free(1.0) });
+            let fit = |record| if robust { fit(record).loss(Huber::default()) } else { fit(record) };
+            let problems: Vec<_> = records.iter().map(|record| fit(record).problem().unwrap()).collect();
+            let objectives: Vec<_> = problems.iter().map(|problem| problem.objective().unwrap()).collect();
+            let points: Vec<At<'_>> = objectives.iter().map(|objective| (objective, &[2.0][..])).collect();
+            let together = estimate_together(&points).into_iter().map(|found| found.unwrap().sigma()[0]);
+            for (one, (objective, x)) in together.zip(&points) {
+                let alone = estimate(objective, x).unwrap().sigma()[0];
+                // Lanes add in another order.
+                assert!((one / alone - 1.0).abs() < 1e-14, "{one} {alone}");
+            }
+        }
     }
 }
