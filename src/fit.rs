@@ -190,7 +190,8 @@ impl<'a, M: Model> Fit<'a, M> {
     ///
     /// Unless set, a fit searches from the declared start. If it is not usable and the model explains none of the
     /// outputs ([`WarningCode::Unexplained`](crate::WarningCode::Unexplained)), it goes on to search from 32 starts by itself, after
-    /// 75 evaluations of each from the best four only, and says so; with `starts(1)` it does not.
+    /// 75 evaluations of each from the best four only, and says so; with `starts(1)` it does not, nor with more than 20,000 samples
+    /// (2,000 where the model does not run in vector registers).
     ///
     /// The first start is the declared one. The others are a Latin hypercube (McKay, Beckman and Conover, Technometrics 21
     /// (1979) 239), the same in every run. Of each unknown they span

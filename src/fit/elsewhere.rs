@@ -3,6 +3,7 @@
 
 use super::refine::{Start, after, is_only_coarse, is_useless};
 use crate::estimate::{Summary, Warning, WarningCode};
+use crate::numeral::counted;
 use crate::optimize::Severity;
 use crate::problem::{Control, Noise, Problem, SearchPlan, Settings};
 use std::time::Instant;
@@ -14,6 +15,10 @@ const STARTS: usize = 32;
 const LEAST_TRIALS: u64 = 100;
 const FROM_A_START: u64 = 1;
 const FROM_THE_OTHER_SIDE: u64 = 3;
+
+/// Records of more samples in all are not searched again by themselves: so long as they take seconds, in vector registers and otherwise.
+const LONGEST_IN_LANES: usize = 20_000;
+const LONGEST: usize = 2_000;
 
 /// Deviances that differ by less are those of one minimum: a tenth of a standard error.
 const SAME: f64 = 0.01;
@@ -55,10 +60,10 @@ impl Problem<'_> {
         Some(Summary { seconds: found.seconds + begin.elapsed().as_secs_f64(), ..best })
     }
 
-    /// The best minimum of searches from further starts, or the estimate itself if they found none; with a note. They run by the default
-    /// method; the best goes on by finer ones where only the step is wrong with it. `None` where a number of starts was asked for,
-    /// where the measurements tell nothing by any parameters, and where the variance is predicted: that likelihood has no bound at
-    /// noise levels of zero, which some start would find.
+    /// The best minimum of searches from further starts, or the estimate itself if they found none or records are too long for them; with
+    /// a note. They run by the default method; the best goes on by finer ones where only the step is wrong with it. `None` where a number
+    /// of starts was asked for, where the measurements tell nothing by any parameters, and where the variance is predicted: that
+    /// likelihood has no bound at noise levels of zero, which some start would find.
     fn search_again(&self, found: &Summary, trials: u64, begin: Instant, control: &Control) -> Option<Summary> {
         let hopeless = [WarningCode::ConstantOutput, WarningCode::TooFewMeasurements];
         let predicted = self.settings.noise == Noise::Predicted;
@@ -67,6 +72,17 @@ impl Problem<'_> {
             || hopeless.into_iter().any(|code| is_useless(found, code))
         {
             return None;
+        }
+        let note = |text: String| Warning { code: WarningCode::Unexplained, severity: Severity::Usable, text };
+        let most = if self.runs_in_lanes() { LONGEST_IN_LANES } else { LONGEST };
+        if self.samples() > most {
+            let mut only = found.clone();
+            only.warnings.push(note(format!(
+                "the search from the declared start ended where the model explains nothing; with more than {} the fit does not search \
+                 from further starts by itself, so ask for Fit::starts({STARTS})",
+                counted(most as u64, "sample")
+            )));
+            return Some(only);
         }
         let settings = Settings { checkpoint: None, searches: SearchPlan::Best(STARTS), ..self.settings.clone() };
         let problem = Problem { settings, finer: None, ..self.clone() };
@@ -82,8 +98,13 @@ impl Problem<'_> {
         );
         let better = is_better(&again, found, self.layout().outputs.len());
         let mut best = if better { after(found, again) } else { found.clone() };
-        best.warnings.push(Warning { code: WarningCode::Unexplained, severity: Severity::Usable, text });
+        best.warnings.push(note(text));
         Some(best)
+    }
+
+    /// Whether several pieces of records like the first one run together in vector registers.
+    pub(super) fn runs_in_lanes(&self) -> bool {
+        self.records.first().is_some_and(|first| self.sweep.lanes(first, self.unknowns.seeds(0)) > 1)
     }
 }
 
@@ -133,5 +154,22 @@ mod tests {
         let of = |times: u64, iterations: u64| Trials::of(times, iterations, 200).map(|left| (left.most, left.short));
         assert_eq!([of(1, 50), of(3, 50)], [Some((100, false)), Some((150, false))]);
         assert_eq!([of(3, 60), of(1, 200)], [Some((140, true)), None]);
+    }
+
+    /// A record of one sample more than the limit is not searched again, and says so.
+    #[test]
+    fn long_records_are_not_searched_again() {
+        let of = |samples: usize| {
+            let inputs: Vec<Voltage> = (0..samples).map(|k| Voltage { u: (k * 37 % 21) as f64 - 10.0 }).collect();
+            let outputs = (0..samples).map(|k| Current { i: (k * 11 % 17) as f64 - 8.0 }).collect();
+            let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+            let found = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).run().unwrap();
+            let said = found
+                .warnings
+                .iter()
+                .any(|warning| warning.text.contains("20,000 samples") && warning.text.contains("Fit::starts(32)"));
+            (found.starts.as_ref().map(|starts| starts.tried), said)
+        };
+        assert_eq!([of(LONGEST_IN_LANES), of(LONGEST_IN_LANES + 1)], [(Some(32), false), (None, true)]);
     }
 }

@@ -124,7 +124,7 @@ fn begin<'p>(plain: &'p Objective<'p>, optimizer: &Arc<dyn Optimizer>, place: &R
 fn is_wide(plain: &Objective<'_>) -> bool {
     let problem = plain.problem;
     let single = problem.records.len() == 1 && problem.settings.prefilter.is_none();
-    single && problem.sweep.lanes(&problem.records[0], problem.unknowns.seeds(0)) > 1
+    single && problem.runs_in_lanes()
 }
 
 impl<'p> Run<'p> {
