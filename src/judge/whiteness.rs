@@ -1,10 +1,9 @@
 //! [`Whiteness`]: how much the errors of an output are correlated over time.
 
-use crate::whiteness::{Portmanteau, levinson_durbin};
+use crate::whiteness::{FEW, Portmanteau, levinson_durbin};
 
-/// Lags of the portmanteau test, and of one that sees more of what only neighbors share.
+/// Lags of the portmanteau test; one over few sees more of what only neighbors share.
 pub(super) const LAGS: usize = 20;
-const FEW: usize = 3;
 
 /// Whiteness of the errors of an output.
 #[derive(Clone, Copy, Debug)]

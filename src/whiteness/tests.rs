@@ -81,6 +81,28 @@ fn recursion_finds_an_autoregression_of_second_order() {
     levinson_durbin(&[1.0], |_, _| panic!("a correlation of one has no innovations"));
 }
 
+/// White noise is called colored as often as the level says, where chi squared would say so six times as often: few errors, and
+/// errors whose size falls to a sixth. Of 20,000 series 20 are expected below 1e-3, and half to twice as many may be found, give or take two standard deviations of a small count.
+#[test]
+fn a_p_value_is_how_often_chance_shows_as_much() {
+    let mut random = crate::random::Random::stream(11, 0);
+    type Size = fn(f64) -> f64;
+    let cases: [(usize, Size); 2] = [(80, |_| 1.0), (200, |part| 0.5 + 2.5 * (-6.0 * part).exp())];
+    for (count, size) in cases {
+        let mut found = [0; 2];
+        for _ in 0..20_000 {
+            let run: Vec<f64> = (0..count).map(|k| size(k as f64 / count as f64) * random.normal()).collect();
+            let mut test = Portmanteau::new(20);
+            test.add(&run);
+            let p = test.p_value(20);
+            let squares = (1..=20).map(|lag| test.at(lag).0.powi(2)).sum::<f64>();
+            found[0] += usize::from(p < 1e-3);
+            found[1] += usize::from(chi_squared_tail(squares, 20.0) < 1e-3);
+        }
+        assert!((8..=42).contains(&found[0]) && found[1] > 80, "{count}: {found:?}");
+    }
+}
+
 /// By hand: n = 10, rho = (0.5, -0.2) gives 10 * 12 * (0.25 / 9 + 0.04 / 8); two degrees of freedom have the tail
 /// `exp(-q / 2)`.
 #[test]
