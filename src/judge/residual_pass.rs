@@ -4,18 +4,21 @@ use super::aliases::Point;
 use super::coupling::{Coupled, Coupling};
 use super::largest::Largest;
 use super::output_sums::OutputSums;
-use super::step_error::{Compared, Sampled, step_errors};
+use super::step_error::{Compared, Extremes, Sampled, step_errors};
 use super::whiteness::{LAGS, Whiteness};
 use crate::error::Error;
 use crate::estimate::OutputFit;
 use crate::optimize::Infeasible;
 use crate::problem::{Accumulate, At, Objective, gather_together};
+use crate::record::{Channel, Record, Time};
 use crate::sweep::Window;
 use crate::whiteness::Portmanteau;
+use std::ops::Range;
 
 /// Longest horizon over which errors are correlated.
 const HORIZON: usize = 100;
-/// Every how many windows one is simulated again with a finer step, and the most of them per record.
+/// Every how many windows one is simulated again with a finer step, and the most of them per record; of records of so many windows, all
+/// are.
 const EVERY: usize = 16;
 const AGAIN: usize = 16;
 
@@ -60,8 +63,11 @@ struct Sums<'s> {
     least_sigma: Vec<f64>,
     /// Whether autocorrelations count samples, instead of measurements.
     by_sample: bool,
-    /// The windows to be simulated again.
+    /// The windows to be simulated again, and of the others those with the most motion and with the longest intervals.
     again: Vec<Sampled>,
+    moving: Extremes,
+    waiting: Extremes,
+    points: Vec<(usize, Vec<f64>)>,
     /// The errors of a window, output by output, and those of one output that are tested for whiteness.
     errors: Vec<f64>,
     tested: Vec<f64>,
@@ -83,6 +89,9 @@ impl<'s> Sums<'s> {
             least_sigma: vec![f64::INFINITY; outputs],
             by_sample: horizon(objective) > 0,
             again: vec![],
+            moving: Extremes::default(),
+            waiting: Extremes::default(),
+            points: vec![],
             errors: vec![],
             tested: vec![],
         }
@@ -103,6 +112,45 @@ impl<'s> Sums<'s> {
         self.tested.clear();
         self.tested.extend(errors.iter().enumerate().filter(|(k, _)| counts(*k)).map(weigh));
         self.portmanteaus[j].add(&self.tested);
+    }
+
+    /// Keeps a window that may be simulated again.
+    fn sample(&mut self, window: &Window, lane: usize) {
+        if window.carry.is_empty() {
+            return;
+        }
+        let (outputs, samples, begin) = (window.outputs(), window.samples[lane], window.begin[lane]);
+        let record = &self.objective.problem.records[self.experiment];
+        let carry = || window.carry.iter().skip(lane).step_by(window.lanes()).copied().collect();
+        // Those in which a multiple of the distance lies.
+        let distance = (EVERY * window.capacity()).max(record.len() / AGAIN);
+        let at_distance = begin.next_multiple_of(distance) < begin + samples;
+        if at_distance {
+            self.points.push((begin, carry()));
+        }
+        let spaced = at_distance || record.len() <= AGAIN * window.capacity();
+        let sampled = || {
+            let errors = (0..samples).flat_map(|k| (0..outputs).map(move |j| window.error(k, j, lane))).collect();
+            Sampled { begin, spaced, errors, carry: carry() }
+        };
+        if spaced {
+            return self.again.push(sampled());
+        }
+        let range = begin..begin + samples;
+        self.moving.offer(motion(record, range.clone(), &self.objective.whitening.sigma()), sampled);
+        if let Time::Stamps(times) = record.times() {
+            let longest = times[range].windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+            self.waiting.offer(longest, sampled);
+        }
+    }
+
+    /// With all windows that are to be simulated again, each once.
+    fn complete(mut self) -> Self {
+        let (moving, waiting) = (std::mem::take(&mut self.moving), std::mem::take(&mut self.waiting));
+        self.again.extend(moving.windows().chain(waiting.windows()));
+        self.again.sort_by_key(|window| window.begin);
+        self.again.dedup_by_key(|window| window.begin);
+        self
     }
 
     /// The windows to be simulated again.
@@ -168,13 +216,7 @@ impl Accumulate for Sums<'_> {
             }
             self.follow(window, j, lane);
         }
-        // Those in which a multiple of the distance lies.
-        let distance = (EVERY * window.capacity()).max(record.len() / AGAIN);
-        if begin.next_multiple_of(distance) < begin + samples && !window.carry.is_empty() {
-            let errors = (0..samples).flat_map(|k| (0..outputs).map(move |j| window.error(k, j, lane))).collect();
-            let carry = window.carry.iter().skip(lane).step_by(window.lanes()).copied().collect();
-            self.again.push(Sampled { begin, errors, carry });
-        }
+        self.sample(window, lane);
     }
 
     fn append(&mut self, later: Self) {
@@ -186,6 +228,9 @@ impl Accumulate for Sums<'_> {
         self.largest.iter_mut().zip(&later.largest).for_each(|(largest, later)| *largest = largest.or(*later));
         self.least_sigma.iter_mut().zip(&later.least_sigma).for_each(|(least, later)| *least = least.min(*later));
         self.again.extend(later.again);
+        self.moving.append(later.moving);
+        self.waiting.append(later.waiting);
+        self.points.extend(later.points);
     }
 }
 
@@ -202,6 +247,7 @@ pub(crate) fn residual_pass(objective: &Objective<'_>, coordinates: &[f64]) -> R
     }
     let make = |experiment: usize| Sums::new(objective, experiment);
     let all = plain.gather(coordinates, false, make).map_err(|_| failed(objective, coordinates))?;
+    let all: Vec<Sums<'_>> = all.into_iter().map(Sums::complete).collect();
     let windows: Vec<Compared<'_>> = all.iter().map(|one| one.compared(coordinates)).collect();
     let step_error = step_errors(&windows).into_iter().sum::<f64>();
     Ok(residuals(objective, coordinates, &all, step_error))
@@ -212,6 +258,7 @@ pub(crate) fn residuals_together(points: &[At<'_>]) -> Vec<Option<Residuals>> {
     let plain: Vec<Objective<'_>> = points.iter().map(|(objective, _)| objective.in_units()).collect();
     let in_units: Vec<At<'_>> = plain.iter().zip(points).map(|(plain, (_, x))| (plain, *x)).collect();
     let all = gather_together(&in_units, |i| Sums::new(points[i].0, 0));
+    let all: Vec<Option<Sums<'_>>> = all.into_iter().map(|sums| sums.map(Sums::complete)).collect();
     let present = all.iter().zip(points).filter_map(|(sums, (_, x))| Some(sums.as_ref()?.compared(x)));
     let windows: Vec<Compared<'_>> = present.collect();
     let mut step_errors = step_errors(&windows).into_iter();
@@ -263,12 +310,21 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>], s
     }
 }
 
-/// The begins of the records, then where windows are simulated again.
+/// How much measurements change from sample to sample, by the noise: the sum of squares over all outputs.
+fn motion(record: &Record, samples: Range<usize>, sigma: &[f64]) -> f64 {
+    let of = |(channel, sigma): (&Channel, &f64)| {
+        let steps = channel.values[samples.clone()].windows(2).map(|pair| ((pair[1] - pair[0]) / sigma).powi(2));
+        steps.filter(|step| step.is_finite()).sum::<f64>()
+    };
+    record.outputs().iter().zip(sigma).map(of).sum()
+}
+
+/// The begins of the records, then some points along them.
 fn points(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -> Vec<Point> {
     let begin = |e: usize| (e, 0, objective.problem.unknowns.of_experiment(e, coordinates).x);
     let states = objective.problem.layout().states.len();
     let later = |(e, one): (usize, &Sums<'_>)| -> Vec<Point> {
-        one.again.iter().map(|sampled| (e, sampled.begin, sampled.carry[..states].to_vec())).collect()
+        one.points.iter().map(|(begin, carry)| (e, *begin, carry[..states].to_vec())).collect()
     };
     (0..all.len()).map(begin).chain(all.iter().enumerate().flat_map(later)).collect()
 }

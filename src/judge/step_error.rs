@@ -8,9 +8,39 @@ use std::borrow::Cow;
 /// A window that is to be compared with a finer simulation.
 pub(super) struct Sampled {
     pub begin: usize,
+    /// Whether it is one of those at even distances, which stand for the record.
+    pub spaced: bool,
     /// Its errors, sample by sample, output by output.
     pub errors: Vec<f64>,
     pub carry: Vec<f64>,
+}
+
+/// Those windows of a record that have most of something, such as motion: a plant may be at rest wherever windows at even distances lie.
+#[derive(Default)]
+pub(super) struct Extremes(Vec<(f64, Sampled)>);
+
+/// The most windows of a kind.
+const MOST: usize = 4;
+
+impl Extremes {
+    /// A window with so much of it, if that is among the most.
+    pub fn offer(&mut self, much: f64, window: impl FnOnce() -> Sampled) {
+        let Extremes(windows) = self;
+        let at = windows.partition_point(|(more, _)| *more >= much);
+        if at < MOST && much > 0.0 {
+            windows.insert(at, (much, window()));
+            windows.truncate(MOST);
+        }
+    }
+
+    /// Adds those of the windows that follow.
+    pub fn append(&mut self, Extremes(later): Extremes) {
+        later.into_iter().for_each(|(much, window)| self.offer(much, || window));
+    }
+
+    pub fn windows(self) -> impl Iterator<Item = Sampled> {
+        self.0.into_iter().map(|(_, window)| window)
+    }
 }
 
 /// So many samples are worth waking other threads.
@@ -31,12 +61,12 @@ impl Compared<'_> {
     }
 }
 
-/// The sum of the squared changes of all standardized predictions of each experiment with a finer step, extrapolated from its
-/// windows. All experiments are those of one sweep.
+/// The sum of the squared changes of all standardized predictions of each experiment with a finer step: extrapolated from its windows at
+/// even distances, or that of all its windows, whichever is larger. All experiments are those of one sweep.
 pub(super) fn step_errors(all: &[Compared<'_>]) -> Vec<f64> {
     let windows: Vec<(usize, &Sampled)> =
         all.iter().enumerate().flat_map(|(i, one)| one.windows.iter().map(move |window| (i, window))).collect();
-    let mut sums = vec![(0.0, 0usize); all.len()];
+    let mut sums = vec![Changes::default(); all.len()];
     let samples = windows.iter().map(|(i, window)| window.errors.len() / all[*i].objective.outputs()).sum();
     let finer = all.first().filter(|one| !one.objective.sweep.predicts_variance());
     if let Some(finer) = finer.and_then(|one| one.objective.sweep.refined(samples)) {
@@ -46,13 +76,26 @@ pub(super) fn step_errors(all: &[Compared<'_>]) -> Vec<f64> {
             true => each(batches.len(), one),
             false => (0..batches.len()).map(one).collect(),
         };
-        for ((i, _), (change, samples)) in windows.iter().zip(found.into_iter().flatten()) {
-            sums[*i] = (sums[*i].0 + change, sums[*i].1 + samples);
+        for ((i, window), (change, samples)) in windows.iter().zip(found.into_iter().flatten()) {
+            let sums = &mut sums[*i];
+            sums.all += change;
+            if window.spaced {
+                (sums.spaced, sums.samples) = (sums.spaced + change, sums.samples + samples);
+            }
         }
     }
-    let whole =
-        |(one, (change, seen)): (&Compared<'_>, (f64, usize))| change * one.record().len() as f64 / seen.max(1) as f64;
+    let whole = |(one, sums): (&Compared<'_>, Changes)| {
+        sums.all.max(sums.spaced * one.record().len() as f64 / sums.samples.max(1) as f64)
+    };
     all.iter().zip(sums).map(whole).collect()
+}
+
+/// Squared changes of an experiment's windows: of all, and of those at even distances, with their samples.
+#[derive(Clone, Copy, Default)]
+struct Changes {
+    all: f64,
+    spaced: f64,
+    samples: usize,
 }
 
 /// Windows that can run in parallel lanes, in their order.

@@ -1,6 +1,6 @@
 //! Fits whose integrator was not chosen take a finer one where the default step would decide the answer.
 
-use crate::common::levels;
+use crate::common::{Branch, Current, Lag, Noise, Voltage, levels};
 use crate::far_starts::{Coupled, Coupling, coupled};
 use approx::assert_relative_eq;
 use greybox::optimize::{JacobianColumns, LevenbergMarquardt, Outcome, Severity, Stop};
@@ -252,5 +252,55 @@ fn a_limit_of_trial_steps_holds_for_all_methods() {
         let found = fit(most);
         assert!(found.iterations <= most, "{found}");
         assert_eq!(found.severity() < Severity::NotUsable, most == enough, "{found}");
+    }
+}
+
+/// `i = u (1 - exp(-t / tau))` from sample to sample, exactly, with normal noise.
+fn exact(times: Time, inputs: Vec<f64>, seed: u64) -> ExperimentOf<Lag> {
+    let (mut noise, mut i, mut outputs) = (Noise(seed), 0.0, vec![]);
+    let time = |k: usize| match &times {
+        Time::Uniform { start, step } => start + step * k as f64,
+        Time::Stamps(stamps) => stamps[k],
+    };
+    for (k, u) in inputs.iter().enumerate() {
+        outputs.push(Current { i: i + 0.01 * noise.gauss() });
+        if k + 1 < inputs.len() {
+            i = 2.0 * u + (i - 2.0 * u) * (time(k) - time(k + 1)).exp();
+        }
+    }
+    Experiment::new(&Lag, times, inputs.into_iter().map(|u| Voltage { u }).collect(), outputs).unwrap()
+}
+
+/// Runge-Kutta's step of 1.2 time constants is 20 standard errors off, but not while the plant is at rest: at the begin of a short record,
+/// and everywhere but for a stretch of a long one. Neither is that of a gap amid short steps.
+#[test]
+fn a_step_is_judged_where_the_plant_moves() {
+    let step = 1.2;
+    let moving = |samples: usize, from: usize, to: usize| -> Vec<f64> {
+        let moving = levels(samples, 3, samples as u64).into_iter().enumerate();
+        moving.map(|(k, u)| if (from..to).contains(&k) { u } else { 0.0 }).collect()
+    };
+    let even = Time::Uniform { start: 0.0, step };
+    let gaps =
+        (0..3000).map(|k| 0.1 * f64::from(k) + if k > 300 { 3.0 } else { 0.0 } + if k > 1300 { 2.5 } else { 0.0 });
+    for (times, inputs) in [
+        (even.clone(), moving(300, 130, 300)),
+        (even.clone(), moving(3000, 200, 900)),
+        (even, moving(40_000, 21_000, 22_000)),
+        (Time::Stamps(gaps.collect()), moving(3000, 0, 3000)),
+    ] {
+        for seed in 1..4 {
+            let record = exact(times.clone(), inputs.clone(), seed);
+            let parameters = Branch { gain: free(1.5), tau: free(1.5) };
+            let fit = Fit::new(&Lag, &record).parameters(parameters).run().unwrap();
+            let coarse = Fit::new(&Lag, &record).parameters(parameters).integrator(Rk4 { substeps: 1 }).run().unwrap();
+            let off = |fit: &Estimate<Lag>| {
+                let off = (fit.parameters.tau - 1.0).abs() / fit.knowledge.tau.standard_error().unwrap();
+                off.max((fit.parameters.gain - 2.0).abs() / fit.knowledge.gain.standard_error().unwrap())
+            };
+            // Four standard errors: beyond lies a part of 1e-4 of all.
+            assert!(off(&fit) < 4.0 && fit.severity() < Severity::NotUsable, "{fit}");
+            assert!(fit.method.integrator.contains("4 steps per sample") && off(&coarse) > 1.5, "{fit}");
+        }
     }
 }
