@@ -206,3 +206,21 @@ fn remark(name: &str, failed: bool, lowest: f64) -> (Severity, String) {
     }
     (Severity::Usable, String::new())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A better minimum matters more than a profile with a gap; a deviance lower by a thousandth is rounding.
+    #[test]
+    fn a_better_minimum_is_named_first() {
+        for (failed, lowest, severity, says) in [
+            (true, -0.5, Severity::NotUsable, "(deviance lower by 0.5)"),
+            (true, -1e-3, Severity::UsableWithCare, "could not be computed everywhere"),
+            (false, -1e-3, Severity::Usable, ""),
+        ] {
+            let (found, text) = remark("tau", failed, lowest);
+            assert!(found == severity && text.contains(says) && text.is_empty() == says.is_empty(), "{lowest}: {text}");
+        }
+    }
+}

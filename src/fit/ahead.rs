@@ -107,6 +107,20 @@ mod tests {
         }
     }
 
+    /// One thread has an item and one more under way, however little is done.
+    #[test]
+    fn no_more_items_are_read_than_are_begun() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let (ended, mut read) = (AtomicUsize::new(0), 0);
+        let next = || {
+            read += 1;
+            assert!(read - ended.load(SeqCst) <= BEGUN, "{read} read, {} ended", ended.load(SeqCst));
+            Some(read)
+        };
+        let results = pool.install(|| in_order(next, |_| ended.fetch_add(1, SeqCst)));
+        assert!((ENOUGH..=MOST).contains(&results.len()), "{}", results.len());
+    }
+
     #[test]
     fn a_panic_is_passed_on() {
         let mut items = 0..9;

@@ -282,9 +282,10 @@ fn stopped(objective: &Objective<'_>) -> Error {
 
 #[cfg(test)]
 mod tests {
-    use super::roughness;
+    use super::{Rounds, roughness};
     use crate::error::Error;
     use crate::optimize::{JacobianColumns, LevenbergMarquardt, Outcome, Stop};
+    use crate::problem::{Control, Round, Whitening};
     use crate::tests::{Current, Gain, Line, Voltage};
     use crate::{Experiment, ExperimentOf, Fit, Huber, Time, free};
 
@@ -325,6 +326,24 @@ mod tests {
             assert_eq!(found.iterations, limit);
         }
         assert!(needed > 3 && within(needed).outcome.converged(), "{needed}");
+    }
+
+    /// Noise that doubles from round to round never settles: the hundredth round is the last, at a limit, not at a minimum.
+    #[test]
+    fn rounds_of_noise_that_does_not_settle_end() {
+        let record = record();
+        let problem = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).problem().unwrap();
+        let plain = problem.in_units(&Control::NEVER);
+        let mut rounds = Rounds::with(&plain, &problem.settings.optimizer, vec![1.0], Whitening::none(1));
+        let mut take = || {
+            let outcome = Outcome::CostUnchanged { decrease: 0.0 };
+            let (coordinates, name) = (vec![1.0], String::new());
+            let round = Round { coordinates, linear: None, outcome, iterations: 2, evaluations: 3, name };
+            let (objective, noise) = (rounds.objective(), rounds.whitening.widened(2.0));
+            rounds.take(objective, round, Some(Ok(noise))).map(|end| (end.outcome, end.iterations, end.evaluations))
+        };
+        assert!((1..100).all(|_| take().is_none()));
+        assert_eq!(take(), Some((Outcome::IterationLimit { iterations: 200 }, 200, 300)));
     }
 
     /// The record is named whose cost is not finite, also where each of its errors is.

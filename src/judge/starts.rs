@@ -77,6 +77,11 @@ mod tests {
         let starts =
             Starts { tried: 8, agreed: 1, minima: vec![minimum], declared: None, failed: vec![], evaluations: 1 };
         let severity = |asked: bool| warnings(&starts, 100, asked).iter().map(|warning| warning.severity).max();
+        let text = &warnings(&starts, 100, true)[0].text;
+        assert!(
+            text.contains("only one of 8 starts") && text.contains("others found: 0; searches without one: 0"),
+            "{text}"
+        );
         assert_eq!([severity(true), severity(false)], [Some(Severity::UsableWithCare), Some(Severity::Usable)]);
     }
 }

@@ -94,6 +94,40 @@ fn delta_method_by_hand() {
     assert_eq!(derived(&estimate, "root", |p| (-p.a).sqrt()).standard_error, None);
 }
 
+/// Of a parameter that each experiment has for itself, value and error are those of the first: the second is half as long, and
+/// knows its slope less well. The slope of `2 b` is two, to the last bit.
+#[test]
+fn a_derived_quantity_takes_local_parameters_from_the_first_experiment() {
+    let records = [record(3, 2.0, 0.4), record(4, 5.0, 0.4).slice(..20).unwrap()];
+    let parameters = Cubic { a: free(0.0), b: free(0.0).per_experiment(), c: free(0.1) };
+    let estimate = Fit::new(&Polynomial, &records).parameters(parameters).run().unwrap();
+    let of = |e: usize| estimate.unknowns.iter().position(|unknown| unknown.experiment == Some(e)).unwrap();
+    let (first, second) = (estimate.covariance.standard_error(of(0)), estimate.covariance.standard_error(of(1)));
+    assert!(second > 1.1 * first, "{first} {second}");
+    let double = derived(&estimate, "2 b", |p| p.b + p.b);
+    assert!((double.value / (2.0 * estimate.experiments[0].parameters.b) - 1.0).abs() < 1e-15, "{double:?}");
+    assert!((double.standard_error.unwrap() / (2.0 * first) - 1.0).abs() < 1e-12, "{double:?} {first}");
+}
+
+/// An experiment of the fit is predicted with its own parameters, which leave the residuals that the fit has left: a static model
+/// has no others. There is no third experiment.
+#[test]
+fn an_experiment_of_the_fit_is_predicted_with_its_own_parameters() {
+    let records = [record(3, 2.0, 0.4), record(4, 5.0, 0.4)];
+    let parameters = Cubic { a: free(0.0), b: free(0.0).per_experiment(), c: free(0.1) };
+    let estimate = Fit::new(&Polynomial, &records).parameters(parameters).run().unwrap();
+    for (k, record) in records.iter().enumerate() {
+        let own = estimate.predict_own(&Polynomial, record, k).unwrap().unwrap();
+        let p = estimate.experiments[k].parameters;
+        for (u, y) in record.inputs().zip(&own.outputs) {
+            assert!((p.a + p.b * u.u + p.c * u.u * u.u - y.y).abs() < 1e-14 * 6.0, "{p:?} {u:?} {y:?}");
+        }
+        // 40 samples of a noise of 0.1.
+        assert!((own.quality.y.rmse / 0.1 - 1.0).abs() < 0.4, "{:?}", own.quality);
+    }
+    assert!(estimate.predict_own(&Polynomial, &records[0], 2).is_none());
+}
+
 /// Refits of resampled residuals scatter as the standard errors of a model that is linear say: of 400 to 3.5 %, here four times
 /// that; so do their intervals, which lie about the estimate, with the share of the residuals that the fit has taken put back.
 #[test]
@@ -142,6 +176,8 @@ fn unseen_data_and_drift() {
         (steady.iter().filter(|d| !d.change.passed).count(), steady.iter().filter(|d| !d.trend.passed).count());
     println!("of {}: {changed} changes, {trended} trends", steady.len());
     assert!(steady.len() == 300 && changed <= 10 && trended <= 10, "{changed} {trended}");
+    // Three estimates are enough, two are not.
+    assert_eq!([2, 3].map(|days| drift(&each(20, &|_| 2.0)[..days]).len()), [0, 3]);
     let warming = drift(&each(20, &|day| 2.0 + 0.05 * day as f64));
     let b = warming.iter().find(|drift| drift.name == "b").unwrap();
     assert!(!b.trend.passed && !b.change.passed && (b.slope - 0.05).abs() < 0.02, "{b:?}");

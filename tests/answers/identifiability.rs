@@ -42,7 +42,8 @@ fn a_product_is_named_and_so_is_a_constant_input() {
         inputs.iter().enumerate().map(|(k, u)| Reading { y: 6.0 * u.u + 1.0 + noise(k), z: 1.5 + noise(k + 7) });
     let time = Time::Uniform { start: 0.0, step: 0.1 };
     let record = Experiment::new(&Amplifier, time, inputs.clone(), outputs.collect()).unwrap();
-    let parameters = Product { a: free(1.5), b: free(2.5), c: free(0.5) };
+    // One of the two by its logarithm: what is said of them is in their units all the same.
+    let parameters = Product { a: free(1.5).log(), b: free(2.5), c: free(0.5) };
     let problem = Fit::new(&Amplifier, &record).parameters(parameters).problem().unwrap();
     let estimate = Estimate::<Amplifier>::of(problem.run().unwrap()).unwrap();
     assert_eq!(estimate.knowledge.a, Knowledge::Unidentified);

@@ -108,6 +108,11 @@ fn errors_as_large_as_their_noise_are_explained() {
         estimate.warnings.iter().find(|warning| warning.code == WarningCode::GivenNoise).map(|warning| warning.severity)
     };
     assert_eq!([robust(1.0 / 3.0), robust(1.0), robust(3.0)], [None, None, Some(Severity::UsableWithCare)]);
+    // What a pre-filter leaves of the errors is not of the size of the noise.
+    let filter = Butterworth::low_pass(1, 0.1, 1.0).unwrap();
+    let fit = Fit::new(&Gain, &record).parameters(Factor { a: free(1.0) }).noise(Current { i: 1.0 / 3.0 });
+    let filtered = fit.prefilter(filter).run().unwrap();
+    assert!(filtered.warnings.iter().all(|warning| warning.code != WarningCode::GivenNoise), "{:?}", filtered.warnings);
 }
 
 /// A constant input is said, with care where its effect may be taken for an offset; one that moves in a second record is none.
@@ -119,6 +124,22 @@ fn constant_inputs_are_said() {
     assert_eq!(of(&[with(1.5), with(1.5).named("again")]), Some(Severity::UsableWithCare));
     assert_eq!(of(&[with(1.5), with(2.5).named("other")]), None);
     assert_eq!(of(&[record(40, (2.0, 2.0), 0.01, moving)]), None);
+}
+
+/// An output of which more than half is missing is said, with what is left of it in all records.
+#[test]
+fn missing_measurements_are_counted() {
+    let good = record(40, (2.0, 2.0), 0.01, moving);
+    let without = |missing: usize| edited(&good, |k, y| Pair { z: if k < missing { f64::NAN } else { y.z }, ..y });
+    let of = |records: &[ExperimentOf<Twice>]| {
+        let estimate = fit(records).run().unwrap();
+        said(&estimate, WarningCode::MissingMeasurements).map(|warning| (warning.severity, warning.text.clone()))
+    };
+    assert_eq!(of(&[without(20)]), None);
+    let text = "75 % of the measurements of `z` are missing (10 measurements are left)";
+    assert_eq!(of(&[without(30)]), Some((Severity::Usable, text.to_owned())));
+    let (_, text) = of(&[without(30), without(14).named("again")]).unwrap();
+    assert!(text.starts_with("55 % of the measurements of `z`") && text.contains("36 measurements"), "{text}");
 }
 
 /// A value that stands for a missing measurement: said with the size of the errors there, of the record if there are several.
@@ -134,6 +155,9 @@ fn sentinels_are_said_of_their_record() {
     let rms = (squares / 5.0).sqrt();
     assert!(warning.text.contains(&format!("differs there by {rms:.0} V")), "{rms} {warning:?}");
     assert!(!warning.text.contains("of experiment"), "{warning:?}");
+    // A robust loss leaves them little weight: they do not decide the estimate.
+    let robust = fit(std::slice::from_ref(&bad)).loss(Huber::default()).run().unwrap();
+    assert_eq!(severity(&robust, WarningCode::Sentinel), Some(Severity::UsableWithCare));
     let both = fit(&[good.named("good"), bad.named("bad")]).run().unwrap();
     let warning = said(&both, WarningCode::Sentinel).unwrap();
     assert!(warning.text.contains("`y` of experiment `bad`"), "{warning:?}");

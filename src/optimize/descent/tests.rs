@@ -81,6 +81,10 @@ fn slopes_decide_where_the_cost_does_not() {
     let gain = |cost: f64, residual: f64| descent().gain_by_slope(&here(), &trial(false), &there(cost, residual));
     assert_eq!([gain(12.5, 1.49), gain(12.5, 1.51), gain(12.5, 2.99), gain(12.5, 3.01)], [1.0, GOOD, GOOD, 0.0]);
     assert_eq!([gain(12.5 * (1.0 + 5e-11), 1.0), gain(12.5 * (1.0 + 2e-10), 1.0)], [1.0, 0.0]);
+    // Nine tenths are not yet a good step: the damping falls by Nielsen's rule.
+    let mut descent = descent();
+    assert!(descent.judge(&here(), &trial(false), Some(&there(12.5, 2.0))));
+    assert!((descent.lambda() - (1.0 - 0.8f64.powi(3))).abs() < 1e-12, "{}", descent.lambda());
 }
 
 /// Where the cost resolves nothing, five rejected steps are enough, and sixty of any kind.

@@ -58,6 +58,19 @@ fn the_best_point_of_a_canceled_search() {
     }
 }
 
+/// A search that creeps names the part of its cost that the next full step would take away: 18, of 18 and of 50.
+#[test]
+fn what_a_creeping_search_is_promised() {
+    let (search, _) = on_trial();
+    for (rows, part) in [(&[(2.0, 6.0)][..], 1.0), (&[(2.0, 6.0), (0.0, 8.0)], 0.36)] {
+        let (mut search, point) = (search.clone(), at(1.0, linear(rows)));
+        search.descent.trials = 301;
+        let found = search.given_up(&point);
+        let Some(Outcome::Creeping { trials, promised }) = found else { panic!("{found:?}") };
+        assert!(trials == 301 && (promised - part).abs() < 1e-9, "{trials} {promised}");
+    }
+}
+
 /// A search that goes on elsewhere stays within the bounds given there, from the slopes where it stands.
 #[test]
 fn a_resumed_search_knows_its_bounds() {

@@ -36,6 +36,19 @@ fn steps_end_on_their_bounds() {
     }
 }
 
+/// A residual of 3 asks for a step up, one of -3 for a step down: where a bound is in the way the unknown is held, and its slope
+/// no longer counts.
+#[test]
+fn what_its_bound_holds() {
+    let (below, above) = ((-9.0, 0.0), (0.0, 9.0));
+    for (bound, residual, held) in [(below, 3.0, true), (above, 3.0, false), (below, -3.0, false), (above, -3.0, true)]
+    {
+        let domain = Domain { bounds: vec![bound], sizes: vec![] };
+        let point = Point::new(vec![0.0], linear(&[(1.0, residual)]), &domain).unwrap();
+        assert_eq!((point.held[0], point.cosine()), (held, if held { 0.0 } else { 1.0 }), "{bound:?} {residual}");
+    }
+}
+
 #[test]
 fn what_the_cost_resolves() {
     assert_eq!(at(0.0, far()).resolution(), 12.5 * 1e-13);
