@@ -114,12 +114,12 @@ impl<'s> Sums<'s> {
         self.portmanteaus[j].add(&self.tested);
     }
 
-    /// Keeps a window that may be simulated again.
+    /// Keeps a window that may be simulated again, with its errors.
     fn sample(&mut self, window: &Window, lane: usize) {
         if window.carry.is_empty() {
             return;
         }
-        let (outputs, samples, begin) = (window.outputs(), window.samples[lane], window.begin[lane]);
+        let (samples, begin) = (window.samples[lane], window.begin[lane]);
         let record = &self.objective.problem.records[self.experiment];
         let carry = || window.carry.iter().skip(lane).step_by(window.lanes()).copied().collect();
         // Those in which a multiple of the distance lies.
@@ -129,10 +129,7 @@ impl<'s> Sums<'s> {
             self.points.push((begin, carry()));
         }
         let spaced = at_distance || record.len() <= AGAIN * window.capacity();
-        let sampled = || {
-            let errors = (0..samples).flat_map(|k| (0..outputs).map(move |j| window.error(k, j, lane))).collect();
-            Sampled { begin, spaced, errors, carry: carry() }
-        };
+        let sampled = || Sampled { begin, samples, spaced, errors: self.errors.clone(), carry: carry() };
         if spaced {
             return self.again.push(sampled());
         }

@@ -8,9 +8,10 @@ use std::borrow::Cow;
 /// A window that is to be compared with a finer simulation.
 pub(super) struct Sampled {
     pub begin: usize,
+    pub samples: usize,
     /// Whether it is one of those at even distances, which stand for the record.
     pub spaced: bool,
-    /// Its errors, sample by sample, output by output.
+    /// Its errors, output by output, sample by sample.
     pub errors: Vec<f64>,
     pub carry: Vec<f64>,
 }
@@ -67,7 +68,7 @@ pub(super) fn step_errors(all: &[Compared<'_>]) -> Vec<f64> {
     let windows: Vec<(usize, &Sampled)> =
         all.iter().enumerate().flat_map(|(i, one)| one.windows.iter().map(move |window| (i, window))).collect();
     let mut sums = vec![Changes::default(); all.len()];
-    let samples = windows.iter().map(|(i, window)| window.errors.len() / all[*i].objective.outputs()).sum();
+    let samples = windows.iter().map(|(_, window)| window.samples).sum();
     let finer = all.first().filter(|one| !one.objective.sweep.predicts_variance());
     if let Some(finer) = finer.and_then(|one| one.objective.sweep.refined(samples)) {
         let batches = batches(&*finer, all, &windows);
@@ -122,8 +123,8 @@ fn changes(finer: &dyn Sweep, all: &[Compared<'_>], windows: &[(usize, &Sampled)
     };
     let points: Vec<(Values, Prepared, Vec<f64>)> = windows.iter().map(|(i, _)| at(i)).collect();
     let mut pieces: Vec<Piece<'_>> = Vec::with_capacity(windows.len());
-    for ((i, window), (values, prepared, sigma)) in windows.iter().zip(&points) {
-        let samples = window.begin..window.begin + window.errors.len() / sigma.len();
+    for ((i, window), (values, prepared, _)) in windows.iter().zip(&points) {
+        let samples = window.begin..window.begin + window.samples;
         let (record, carry, slopes) = (all[*i].record(), Cow::Borrowed(&window.carry[..]), Cow::default());
         pieces.push(Piece { record, prepared, samples, carry, slopes, parameters: &values.p });
     }
@@ -134,7 +135,8 @@ fn changes(finer: &dyn Sweep, all: &[Compared<'_>], windows: &[(usize, &Sampled)
         {
             for k in 0..window.samples[lane] {
                 let row = window.begin[lane] + k - sampled.begin;
-                for (j, (before, sigma)) in sampled.errors[row * sigma.len()..].iter().zip(sigma).enumerate() {
+                for (j, sigma) in sigma.iter().enumerate() {
+                    let before = sampled.errors[j * sampled.samples + row];
                     *found += ((before - window.error(k, j, lane)) / sigma).powi(2);
                 }
             }
