@@ -184,8 +184,9 @@ impl Portmanteau {
         let (statistic, lags) = (terms.iter().sum::<f64>(), terms.len() as f64);
         let more = 4.0 * (lags - 1.0) / self.deciding(terms.len());
         let degrees = (2.0 * lags + 4.0 + 4.0 * more) / more;
-        if terms.len() > FEW && degrees < CHI_SQUARED {
-            let ratio = statistic / lags * degrees / (degrees - 2.0);
+        let ratio = statistic / lags * degrees / (degrees - 2.0);
+        // Sums of huge errors overflow.
+        if terms.len() > FEW && degrees < CHI_SQUARED && ratio.is_finite() {
             return FisherSnedecor::new(lags, degrees).map_or(1.0, |distribution| distribution.sf(ratio));
         }
         chi_squared_tail(statistic, lags)

@@ -14,7 +14,8 @@ pub(super) const RECORDS: usize = 8;
 const SAMPLES: usize = 16_384;
 
 impl Judgement<'_> {
-    /// The output and the input that it depends on otherwise than the model says, most certainly so.
+    /// The output and the input that it certainly depends on otherwise than the model says; of several those with the largest part of the
+    /// errors.
     pub(super) fn shape(&self) -> Option<Warning> {
         let objective = self.objective;
         let (layout, count) = (objective.problem.layout(), objective.outputs());
@@ -38,11 +39,12 @@ impl Judgement<'_> {
             }
         }
         let white: Vec<Whiteness> = sums.iter().map(|(sum, errors)| Whiteness::of(sum, *errors, 0)).collect();
-        let least = |a: &usize, b: &usize| white[*a].p_value.total_cmp(&white[*b].p_value);
-        let number = (0..white.len()).min_by(least)?;
-        let (i, j, white) = (number / count, number % count, white[number]);
-        let (chance, part) = (white.p_value * sums.len() as f64, self.colored(j, &white));
-        (chance < color::CERTAIN && part > color::SMALL).then(|| {
+        let chance = |number: usize| white[number].p_value * sums.len() as f64;
+        let more = |a: &usize, b: &usize| white[*a].predicted.total_cmp(&white[*b].predicted);
+        let number = (0..white.len()).filter(|number| chance(*number) < color::CERTAIN).max_by(more)?;
+        let (i, j, chance) = (number / count, number % count, chance(number));
+        let part = self.colored(j, &white[number]);
+        (part > color::SMALL).then(|| {
             let text = format!(
                 "the errors of `{}` follow from the input `{}` ({} in order of its size): the model has the wrong shape, by {} of \
                  what the output moves, and no interval allows for that",

@@ -103,6 +103,16 @@ fn a_p_value_is_how_often_chance_shows_as_much() {
     }
 }
 
+/// Squares that overflow say nothing, and do not panic.
+#[test]
+fn huge_errors_have_a_p_value() {
+    for size in [1e80, 1e160, f64::MAX] {
+        let mut test = Portmanteau::new(20);
+        test.add(&(0..40).map(|k| size * f64::from(k % 3 - 1)).collect::<Vec<_>>());
+        assert!((0.0..=1.0).contains(&test.p_value(20)), "{size}");
+    }
+}
+
 /// By hand: n = 10, rho = (0.5, -0.2) gives 10 * 12 * (0.25 / 9 + 0.04 / 8); two degrees of freedom have the tail
 /// `exp(-q / 2)`.
 #[test]
