@@ -192,8 +192,8 @@ impl Portmanteau {
         chi_squared_tail(statistic, lags)
     }
 
-    /// How many errors of one size would have the covariances of these, as near as second moments tell: all of them, times the square of
-    /// the part that counts in a sum of squares.
+    /// The effective number of errors: so many of equal variance would give sums at two lags the covariance that these have. That follows
+    /// from eighth moments; it is approximated by `n r^2` with `r = mean(e^2)^2 / mean(e[t]^2 e[t - k]^2)`, one where variances are equal.
     fn deciding(&self, lags: usize) -> f64 {
         let errors = self.neighbors.errors as f64;
         let squares = self.errors.squares.iter().skip(1).take(lags);
@@ -213,7 +213,7 @@ impl Portmanteau {
     }
 }
 
-/// So many lags are few.
+/// Up to so many lags the portmanteau statistic is compared with chi squared.
 pub(crate) const FEW: usize = 3;
 /// Degrees of freedom of the denominator from which on F is taken as chi squared.
 const CHI_SQUARED: f64 = 1e6;

@@ -16,11 +16,12 @@ const LEAST_TRIALS: u64 = 100;
 const FROM_A_START: u64 = 1;
 const FROM_THE_OTHER_SIDE: u64 = 3;
 
-/// Records of more samples in all are not searched again by themselves: so long as they take seconds, in vector registers and otherwise.
+/// The most samples of all records with which a fit searches from further starts without being asked, so that this takes seconds: of models
+/// that run in vector registers, and of others.
 const LONGEST_IN_LANES: usize = 20_000;
 const LONGEST: usize = 2_000;
 
-/// Deviances that differ by less are those of one minimum: a tenth of a standard error.
+/// Deviances that differ by less belong to one minimum: a move by a tenth of a standard error changes the deviance by 0.1^2.
 const SAME: f64 = 0.01;
 
 /// The most trial steps of each further search, at least one, and whether the user's limit makes them fewer.

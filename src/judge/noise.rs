@@ -185,10 +185,10 @@ pub(crate) fn estimate_together(points: &[At<'_>]) -> Vec<Result<Whitening, Infe
     levels.into_iter().zip(points).map(|(level, (objective, _))| Ok(level?.whitening(objective))).collect()
 }
 
-/// The iteration for the noise of robust losses; of other losses the first moments are the answer.
+/// The iteration for the noise: steps with clipped errors for robust losses; no step for others, whose noise follows from the first moments.
 struct Level {
     moments: SquareMatrix,
-    /// The smallest level of each output.
+    /// The smallest noise of each output that is not round-off, in its unit.
     floor: Vec<f64>,
     /// Mean square of clipped normal errors.
     kappa: f64,
@@ -209,7 +209,7 @@ impl Level {
         levels.map(|(variance, floor)| variance.sqrt().max(*floor)).collect()
     }
 
-    /// In which units errors are to be clipped for the next step.
+    /// The noise levels in whose units errors are to be clipped for the next step; `None` where there is none.
     fn clip(&self) -> Option<Vec<f64>> {
         (self.left > 0).then(|| self.sigma())
     }

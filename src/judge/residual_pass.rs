@@ -114,7 +114,8 @@ impl<'s> Sums<'s> {
         self.portmanteaus[j].add(&self.tested);
     }
 
-    /// Keeps a window that may be simulated again, with its errors.
+    /// Keeps a window that may be simulated again, with its errors. Each begins at the state that the coarse simulation has there, so that the
+    /// step from the last sample of a window to the next one is not compared.
     fn sample(&mut self, window: &Window, lane: usize) {
         if window.carry.is_empty() {
             return;

@@ -9,14 +9,15 @@ use std::borrow::Cow;
 pub(super) struct Sampled {
     pub begin: usize,
     pub samples: usize,
-    /// Whether it is one of those at even distances, which stand for the record.
+    /// Whether it is one of those at even distances, from which the change of the whole record is extrapolated.
     pub spaced: bool,
     /// Its errors, output by output, sample by sample.
     pub errors: Vec<f64>,
     pub carry: Vec<f64>,
 }
 
-/// Those windows of a record that have most of something, such as motion: a plant may be at rest wherever windows at even distances lie.
+/// The windows of a record in which a quantity is largest, such as the changes of its measurements: at all windows at even distances the plant
+/// may be at rest.
 #[derive(Default)]
 pub(super) struct Extremes(Vec<(f64, Sampled)>);
 
@@ -24,7 +25,7 @@ pub(super) struct Extremes(Vec<(f64, Sampled)>);
 const MOST: usize = 4;
 
 impl Extremes {
-    /// A window with so much of it, if that is among the most.
+    /// Keeps a window if its value of the quantity is above zero and among the largest.
     pub fn offer(&mut self, much: f64, window: impl FnOnce() -> Sampled) {
         let Extremes(windows) = self;
         let at = windows.partition_point(|(more, _)| *more >= much);
