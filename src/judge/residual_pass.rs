@@ -67,6 +67,9 @@ struct Sums<'s> {
     again: Vec<Sampled>,
     moving: Extremes,
     waiting: Extremes,
+    /// The first sample and its errors, to which the step from the samples before leads.
+    first: Option<(usize, Vec<f64>)>,
+    sigma: Vec<f64>,
     points: Vec<(usize, Vec<f64>)>,
     /// The errors of a window, output by output, and those of one output that are tested for whiteness.
     errors: Vec<f64>,
@@ -91,6 +94,8 @@ impl<'s> Sums<'s> {
             again: vec![],
             moving: Extremes::default(),
             waiting: Extremes::default(),
+            first: None,
+            sigma: objective.whitening.sigma(),
             points: vec![],
             errors: vec![],
             tested: vec![],
@@ -114,13 +119,22 @@ impl<'s> Sums<'s> {
         self.portmanteaus[j].add(&self.tested);
     }
 
-    /// Keeps a window that may be simulated again, with its errors. Each begins at the state that the coarse simulation has there, so that the
-    /// step from the last sample of a window to the next one is not compared.
+    /// Completes a window that ends before the sample.
+    fn close(&mut self, sample: usize, errors: &[f64]) {
+        self.again.last_mut().into_iter().for_each(|window| window.follow(sample, errors));
+        self.moving.follow(sample, errors);
+        self.waiting.follow(sample, errors);
+    }
+
+    /// Keeps a window that may be simulated again, with its errors.
     fn sample(&mut self, window: &Window, lane: usize) {
         if window.carry.is_empty() {
             return;
         }
         let (samples, begin) = (window.samples[lane], window.begin[lane]);
+        let first: Vec<f64> = (0..window.outputs()).map(|j| self.errors[j * samples]).collect();
+        self.close(begin, &first);
+        self.first.get_or_insert((begin, first));
         let record = &self.objective.problem.records[self.experiment];
         let carry = || window.carry.iter().skip(lane).step_by(window.lanes()).copied().collect();
         // Those in which a multiple of the distance lies.
@@ -130,12 +144,13 @@ impl<'s> Sums<'s> {
             self.points.push((begin, carry()));
         }
         let spaced = at_distance || record.len() <= AGAIN * window.capacity();
-        let sampled = || Sampled { begin, samples, spaced, errors: self.errors.clone(), carry: carry() };
+        let sampled = || Sampled { begin, samples, spaced, errors: self.errors.clone(), after: vec![], carry: carry() };
         if spaced {
             return self.again.push(sampled());
         }
-        let range = begin..begin + samples;
-        self.moving.offer(motion(record, range.clone(), &self.objective.whitening.sigma()), sampled);
+        // With the sample after it.
+        let range = begin..(begin + samples + 1).min(record.len());
+        self.moving.offer(motion(record, range.clone(), &self.sigma), sampled);
         if let Time::Stamps(times) = record.times() {
             let longest = times[range].windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
             self.waiting.offer(longest, sampled);
@@ -225,6 +240,9 @@ impl Accumulate for Sums<'_> {
         self.coupling.append(&later.coupling);
         self.largest.iter_mut().zip(&later.largest).for_each(|(largest, later)| *largest = largest.or(*later));
         self.least_sigma.iter_mut().zip(&later.least_sigma).for_each(|(least, later)| *least = least.min(*later));
+        if let Some((sample, errors)) = &later.first {
+            self.close(*sample, errors);
+        }
         self.again.extend(later.again);
         self.moving.append(later.moving);
         self.waiting.append(later.waiting);

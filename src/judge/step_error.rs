@@ -4,6 +4,7 @@ use crate::problem::{Objective, Values, each};
 use crate::record::{Record, Time};
 use crate::sweep::{Piece, Prepared, Sweep};
 use std::borrow::Cow;
+use std::ops::Range;
 
 /// A window that is to be compared with a finer simulation.
 pub(super) struct Sampled {
@@ -13,7 +14,27 @@ pub(super) struct Sampled {
     pub spaced: bool,
     /// Its errors, output by output, sample by sample.
     pub errors: Vec<f64>,
+    /// Those of the sample after it, to which the last of its steps leads; empty as long as that is not known, and at the end.
+    pub after: Vec<f64>,
     pub carry: Vec<f64>,
+}
+
+impl Sampled {
+    fn range(&self) -> Range<usize> {
+        self.begin..self.begin + self.samples + usize::from(!self.after.is_empty())
+    }
+
+    /// The error of an output at a sample, counted from the begin.
+    fn error(&self, j: usize, k: usize) -> f64 {
+        if k < self.samples { self.errors[j * self.samples + k] } else { self.after[j] }
+    }
+
+    /// Takes the errors of a sample if it is the one after the window.
+    pub fn follow(&mut self, sample: usize, errors: &[f64]) {
+        if self.begin + self.samples == sample {
+            self.after = errors.to_vec();
+        }
+    }
 }
 
 /// The windows of a record in which a quantity is largest, such as the changes of its measurements: at all windows at even distances the plant
@@ -38,6 +59,10 @@ impl Extremes {
     /// Adds those of the windows that follow.
     pub fn append(&mut self, Extremes(later): Extremes) {
         later.into_iter().for_each(|(much, window)| self.offer(much, || window));
+    }
+
+    pub fn follow(&mut self, sample: usize, errors: &[f64]) {
+        self.0.iter_mut().for_each(|(_, window)| window.follow(sample, errors));
     }
 
     pub fn windows(self) -> impl Iterator<Item = Sampled> {
@@ -69,7 +94,7 @@ pub(super) fn step_errors(all: &[Compared<'_>]) -> Vec<f64> {
     let windows: Vec<(usize, &Sampled)> =
         all.iter().enumerate().flat_map(|(i, one)| one.windows.iter().map(move |window| (i, window))).collect();
     let mut sums = vec![Changes::default(); all.len()];
-    let samples = windows.iter().map(|(_, window)| window.samples).sum();
+    let samples = windows.iter().map(|(_, window)| window.range().len()).sum();
     let finer = all.first().filter(|one| !one.objective.sweep.predicts_variance());
     if let Some(finer) = finer.and_then(|one| one.objective.sweep.refined(samples)) {
         let batches = batches(&*finer, all, &windows);
@@ -125,7 +150,7 @@ fn changes(finer: &dyn Sweep, all: &[Compared<'_>], windows: &[(usize, &Sampled)
     let points: Vec<(Values, Prepared, Vec<f64>)> = windows.iter().map(|(i, _)| at(i)).collect();
     let mut pieces: Vec<Piece<'_>> = Vec::with_capacity(windows.len());
     for ((i, window), (values, prepared, _)) in windows.iter().zip(&points) {
-        let samples = window.begin..window.begin + window.samples;
+        let samples = window.range();
         let (record, carry, slopes) = (all[*i].record(), Cow::Borrowed(&window.carry[..]), Cow::default());
         pieces.push(Piece { record, prepared, samples, carry, slopes, parameters: &values.p });
     }
@@ -137,7 +162,7 @@ fn changes(finer: &dyn Sweep, all: &[Compared<'_>], windows: &[(usize, &Sampled)
             for k in 0..window.samples[lane] {
                 let row = window.begin[lane] + k - sampled.begin;
                 for (j, sigma) in sigma.iter().enumerate() {
-                    let before = sampled.errors[j * sampled.samples + row];
+                    let before = sampled.error(j, row);
                     *found += ((before - window.error(k, j, lane)) / sigma).powi(2);
                 }
             }

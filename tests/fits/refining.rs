@@ -304,3 +304,15 @@ fn a_step_is_judged_where_the_plant_moves() {
         }
     }
 }
+
+/// A single gap of three time constants is found wherever it lies, between windows of samples too.
+#[test]
+fn a_gap_is_found_at_each_place() {
+    let inputs = levels(3000, 7, 5);
+    for place in 1560..1630 {
+        let times = (0..3000).map(|k| 0.1 * f64::from(k) + if k > place { 3.0 } else { 0.0 });
+        let record = exact(Time::Stamps(times.collect()), inputs.clone(), 9);
+        let fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau: free(1.5) }).run().unwrap();
+        assert!(!fit.method.integrator.contains("1 step per sample"), "{place}: {fit}");
+    }
+}
