@@ -171,9 +171,12 @@ impl<'j> Judgement<'j> {
         let slopes = (0..n).map(|i| unknowns.row[i].parameter.transform.slope(values[i])).collect();
         let estimated = undetermined.held.iter().filter(|held| !**held).count() as f64;
         let measured = residuals.measured;
-        // With no more measurements than unknowns there are no degrees of freedom to estimate the noise from.
-        let degrees = if measured <= n as u64 { 0.0 } else { measured as f64 - estimated };
         let noise = &objective.problem.settings.noise;
+        // There are no degrees of freedom to estimate the noise from with no more measurements than unknowns, nor where no output moves:
+        // what is left of a dead sensor are numbers next to the smallest.
+        let still = residuals.levels.iter().all(|(_, moves)| *moves == 0.0);
+        let none = measured <= n as u64 || still && !matches!(noise, Noise::Given(_) | Noise::Predicted);
+        let degrees = if none { 0.0 } else { measured as f64 - estimated };
         let widening = match noise {
             Noise::Given(_) | Noise::Predicted => 1.0,
             _ if noise::only_scales(objective) => {

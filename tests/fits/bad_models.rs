@@ -94,6 +94,24 @@ fn warns(estimate: &Summary, parts: &[&str]) {
     }
 }
 
+/// Outputs that never move leave no noise to tell the accuracy by: nothing is known, however small the errors became. With the noise
+/// given, a gain is known next to zero.
+#[test]
+fn nothing_is_known_of_constant_outputs() {
+    for samples in [100, 300, 500] {
+        let input = |k: usize| Force { u: (0.37 * k as f64).sin() + if k % 50 < 25 { 1.0 } else { -1.0 } };
+        let (inputs, outputs) = ((0..samples).map(input).collect(), vec![Position { x: 0.0 }; samples]);
+        let record = Experiment::new(&Lag, Time::Uniform { start: 0.0, step: 0.05 }, inputs, outputs).unwrap();
+        for pair in [free_pair(2.0, 1.0), Pair { a: free(2.0).log(), b: free(1.0).log() }] {
+            let found = Fit::new(&Lag, &record).parameters(pair).run().unwrap();
+            assert!(found.unknowns.iter().all(|unknown| unknown.knowledge == Knowledge::Unidentified), "{found}");
+        }
+        let fit = Fit::new(&Lag, &record).parameters(Pair { a: fixed(2.0), b: free(1.0) });
+        let found = fit.noise(Position { x: 0.1 }).run().unwrap();
+        assert!(found.knowledge.b.standard_error().is_some_and(|error| error < 0.1), "{found}");
+    }
+}
+
 #[test]
 fn a_parameter_without_influence_is_named() {
     let record = record(&Deaf, H, &lag(3.0, 1.0, H, 300, 1e-3));
