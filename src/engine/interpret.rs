@@ -161,10 +161,16 @@ impl<W: Wide, const K: usize> Operands<W, K> {
         self.slots.wrapping_add(usize::from(slot) * K * W::LANES)
     }
 
+    /// Those of a pair of slots.
+    #[inline(always)]
+    fn pair(&self, j: usize) -> [*mut f64; 2] {
+        let [a, b] = self.instruction.pairs[j];
+        [self.at(a), self.at(b)]
+    }
+
     #[inline(always)]
     unsafe fn each(&self, f: impl Fn([[W; 2]; 2]) -> W) {
-        let [[a, b], [c, d], ..] = self.instruction.pairs.map(|pair| pair.map(|slot| self.at(slot)));
-        let to = self.at(self.instruction.to);
+        let ([a, b], [c, d], to) = (self.pair(0), self.pair(1), self.at(self.instruction.to));
         let mut k = 0;
         while k < K {
             // SAFETY: the slots are there, as `interpret` demands; unused operands are slot zero.
@@ -185,32 +191,38 @@ impl<W: Wide, const K: usize> Operands<W, K> {
     /// A sum of `N` pairs: from `init`, or from the first product; each operation rounded, or each product with its sum.
     #[inline(always)]
     unsafe fn sum_of<const N: usize, const INIT: bool, const ROUNDED: bool>(&self) {
-        let pairs = self.instruction.pairs.map(|pair| pair.map(|slot| self.at(slot)));
-        let [init, factor, to] =
-            [self.instruction.init, self.instruction.factor, self.instruction.to].map(|s| self.at(s));
+        // Loops and no closures, which are compiled once for each of the hundreds of instances of this function.
+        let (init, factor) = (self.at(self.instruction.init), self.at(self.instruction.factor));
+        let to = self.at(self.instruction.to);
+        let mut pairs = [[to; 2]; N];
         let mut signs = [W::splat(0.0); N];
         let mut j = 0;
         while j < N {
+            pairs[j] = self.pair(j);
             signs[j] = W::splat(SIGNS[usize::from(self.instruction.signs >> j & 1)]);
             j += 1;
         }
         let mut k = 0;
         while k < K {
+            let from = k * W::LANES;
             // SAFETY: the slots are there, as `interpret` demands.
             unsafe {
-                let at = |slot: *mut f64| W::read(slot.add(k * W::LANES));
-                let mut sum = if INIT { at(init) } else { at(pairs[0][0]).mul(at(pairs[0][1])) };
+                let mut sum = if INIT {
+                    W::read(init.add(from))
+                } else {
+                    W::read(pairs[0][0].add(from)).mul(W::read(pairs[0][1].add(from)))
+                };
                 let mut j = usize::from(!INIT);
                 while j < N {
                     // Rounding is symmetric, so that a turned sign is as good as a subtraction.
-                    let (a, b) = (at(pairs[j][0]).xor(signs[j]), at(pairs[j][1]));
+                    let (a, b) = (W::read(pairs[j][0].add(from)).xor(signs[j]), W::read(pairs[j][1].add(from)));
                     sum = if ROUNDED { sum.add(a.mul(b)) } else { a.mul_add(b, sum) };
                     j += 1;
                 }
                 if self.instruction.scaled {
-                    sum = sum.mul(at(factor));
+                    sum = sum.mul(W::read(factor.add(from)));
                 }
-                sum.write(to.add(k * W::LANES));
+                sum.write(to.add(from));
             }
             k += 1;
         }
