@@ -2,6 +2,7 @@
 
 use super::conclude::Judgement;
 use super::covariances::Covariances;
+use super::directions::undetermined;
 use crate::estimate::{Direction, Knowledge, Unknown, Warning, WarningCode};
 use crate::layout::Kind;
 use crate::numeral::{counted, exact, number, percent};
@@ -185,10 +186,20 @@ impl Judgement<'_> {
             return None;
         }
         let stopped = matches!(self.end.outcome, Outcome::TimeLimit | Outcome::Cancelled);
+        let coarse = self.residuals.step_error / self.widening > most;
+        if refines && !stopped && coarse && self.step_hides() {
+            return Some(Warning {
+                code: WarningCode::CoarseStep,
+                severity: Severity::NotUsable,
+                text: "the step hides what the data determine: a finer one leaves fewer directions open; use it, or smooth the \
+                       model"
+                    .to_owned(),
+            });
+        }
         if refines && !stopped && !self.end.outcome.converged() {
             return self.step_decides_the_search();
         }
-        if self.residuals.step_error / self.widening <= most {
+        if !coarse {
             return None;
         }
         let finer = self.objective.sweep.refined(self.objective.problem.samples())?;
@@ -205,6 +216,20 @@ impl Judgement<'_> {
             );
             Warning { code: WarningCode::CoarseStep, severity, text }
         })
+    }
+
+    /// Whether more is determined by a finer step: the polynomial that a method makes of an eigenvalue has a slope of zero somewhere (that
+    /// of Runge-Kutta 4 at -1.6 over the step, below whose value no record can be followed), and a search ends there.
+    fn step_hides(&self) -> bool {
+        let open = self.undetermined.directions.len();
+        let refined = || {
+            let finer = self.objective.sweep.refined(self.objective.problem.samples())?;
+            let objective = self.objective.of(self.objective.problem, &*finer);
+            let linear = objective.evaluate(&self.end.coordinates).ok()?;
+            let held: Vec<bool> = self.held_at.iter().map(Option::is_some).collect();
+            Some(undetermined(&linear, &held).directions.len())
+        };
+        open > 0 && refined().is_some_and(|less| less < open)
     }
 
     /// Of a search that ended without a minimum: whether a finer step changes the cost at its start or at its end, so that the

@@ -316,3 +316,51 @@ fn a_gap_is_found_at_each_place() {
         assert!(!fit.method.integrator.contains("1 step per sample"), "{place}: {fit}");
     }
 }
+
+signals! { pub struct Amounts { central: "mg", tissue: "mg" } }
+signals! { pub struct Infusion { rate: "mg/h" } }
+signals! { pub struct Level { y: "mg/l" } }
+signals! { pub struct Compartments { ke: "1/h", k12: "1/h", k21: "1/h", v: "l" } }
+
+/// Two compartments of a drug.
+pub struct Drug;
+
+impl Model for Drug {
+    type State = Amounts;
+    type Input = Infusion;
+    type Output = Level;
+    type Parameters = Compartments;
+
+    fn derivative<S: Scalar>(&self, _t: S, x: &Amounts<S>, u: &Infusion<S>, p: &Compartments<S>) -> Amounts<S> {
+        let over = x.central * p.k12 - x.tissue * p.k21;
+        Amounts { central: u.rate - x.central * p.ke - over, tissue: over }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Amounts<S>, _u: &Infusion<S>, p: &Compartments<S>) -> Level<S> {
+        Level { y: x.central / p.v }
+    }
+}
+
+/// From one sample to the next the faster eigenvalue decays by more than the coarse step's polynomial can: most searches ended where its
+/// slope is zero, in a null direction, and nothing was known. All parameters are within four standard errors, in 39 of 40 at least (by
+/// the normal distribution one of 4,000 is not; of such curved intervals somewhat more).
+#[test]
+fn a_step_that_hides_a_direction_is_refined() {
+    let truth = Compartments { ke: 0.3, k12: 0.8, k21: 0.5, v: 12.0 };
+    let input: Vec<Infusion> = (0..20).map(|k| Infusion { rate: if k < 3 { 40.0 } else { 0.0 } }).collect();
+    let (time, empty) = (Time::Uniform { start: 0.0, step: 1.0 }, Amounts::from([0.0; 2]));
+    let exact = Simulator::new(&Drug).integrator(Rk45 { relative: 1e-10, absolute: 1e-12 });
+    let run = exact.run(&truth, &empty, time, &input).unwrap();
+    let mut right = 0;
+    for seed in 0..40 {
+        let record = run.clone().with_noise(Level { y: 0.1 }, seed).experiment(&Drug).unwrap();
+        let record = record.initial(Amounts::map(empty, fixed));
+        let start = Compartments { ke: 0.2, k12: 0.5, k21: 0.3, v: 8.0 };
+        let fit = Fit::new(&Drug, &record).parameters(Compartments::map(start, |x| free(x).log())).run().unwrap();
+        assert!(fit.severity() < Severity::NotUsable && !fit.method.integrator.contains("1 step per"), "{seed} {fit}");
+        let errors = fit.unknowns.iter().zip(Compartments::into_array(truth)).map(|(unknown, truth)| {
+            (unknown.value / truth).ln().abs() * unknown.value / unknown.knowledge.standard_error().unwrap()
+        });
+        right += usize::from(errors.fold(0.0, f64::max) < 4.0);
+    }
+    assert!(right >= 39, "{right}");
+}
