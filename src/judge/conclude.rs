@@ -172,11 +172,8 @@ impl<'j> Judgement<'j> {
         let estimated = undetermined.held.iter().filter(|held| !**held).count() as f64;
         let measured = residuals.measured;
         let noise = &objective.problem.settings.noise;
-        // There are no degrees of freedom to estimate the noise from with no more measurements than unknowns, nor where no output moves:
-        // what is left of a dead sensor are numbers next to the smallest.
-        let still = residuals.levels.iter().all(|(_, moves)| *moves == 0.0);
-        let none = measured <= n as u64 || still && !matches!(noise, Noise::Given(_) | Noise::Predicted);
-        let degrees = if none { 0.0 } else { measured as f64 - estimated };
+        // With no more measurements than unknowns there are no degrees of freedom to estimate the noise from.
+        let degrees = if measured <= n as u64 { 0.0 } else { measured as f64 - estimated };
         let widening = match noise {
             Noise::Given(_) | Noise::Predicted => 1.0,
             _ if noise::only_scales(objective) => {
@@ -223,6 +220,12 @@ impl<'j> Judgement<'j> {
             .filter(|(_, white)| white.p_value < WHITENESS_LEVEL && !self.rounding)
     }
 
+    /// Whether there is noise to tell the accuracy by: given, or measured. Where no output moves, errors are numbers next to the smallest.
+    fn has_noise(&self) -> bool {
+        let given = matches!(self.objective.problem.settings.noise, Noise::Given(_) | Noise::Predicted);
+        self.degrees > 0.0 && (given || self.residuals.levels.iter().any(|(_, moves)| *moves > 0.0))
+    }
+
     fn unknowns(&self, covariances: &Covariances) -> Vec<Unknown> {
         let free = &self.objective.problem.unknowns.row;
         let root = self.linear.sum_of_squares().sqrt();
@@ -231,7 +234,7 @@ impl<'j> Judgement<'j> {
             let transform = unknown.parameter.transform;
             // The standard errors of unknowns that are not seen are zero.
             let known = |covariance: &Covariance| Some(covariance.standard_error(i)).filter(|error| is_error(*error));
-            let error = covariances.unknowns.as_ref().filter(|_| self.degrees > 0.0).and_then(known);
+            let error = covariances.unknowns.as_ref().filter(|_| self.has_noise()).and_then(known);
             let degrees_of_freedom = covariances.degrees[i];
             let knowledge = match (self.held_at[i], error) {
                 (Some(bound), None) => Knowledge::Held { bound, end: None },
