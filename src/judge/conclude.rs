@@ -171,9 +171,9 @@ impl<'j> Judgement<'j> {
         let slopes = (0..n).map(|i| unknowns.row[i].parameter.transform.slope(values[i])).collect();
         let estimated = undetermined.held.iter().filter(|held| !**held).count() as f64;
         let measured = residuals.measured;
-        let noise = &objective.problem.settings.noise;
         // With no more measurements than unknowns there are no degrees of freedom to estimate the noise from.
         let degrees = if measured <= n as u64 { 0.0 } else { measured as f64 - estimated };
+        let noise = &objective.problem.settings.noise;
         let widening = match noise {
             Noise::Given(_) | Noise::Predicted => 1.0,
             _ if noise::only_scales(objective) => {

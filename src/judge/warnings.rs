@@ -2,7 +2,7 @@
 
 use super::conclude::Judgement;
 use super::covariances::Covariances;
-use super::directions::undetermined;
+use super::directions::{taking_part, undetermined};
 use crate::estimate::{Direction, Knowledge, Unknown, Warning, WarningCode};
 use crate::layout::Kind;
 use crate::numeral::{counted, exact, number, percent};
@@ -187,14 +187,9 @@ impl Judgement<'_> {
         }
         let stopped = matches!(self.end.outcome, Outcome::TimeLimit | Outcome::Cancelled);
         let coarse = self.residuals.step_error / self.widening > most;
-        if refines && !stopped && coarse && self.step_hides() {
-            return Some(Warning {
-                code: WarningCode::CoarseStep,
-                severity: Severity::NotUsable,
-                text: "the step hides what the data determine: a finer one leaves fewer directions open; use it, or smooth the \
-                       model"
-                    .to_owned(),
-            });
+        let fewer = (refines && !stopped && coarse).then(|| self.determined_by_a_finer_step(unknowns)).flatten();
+        if fewer.is_some() {
+            return fewer;
         }
         if refines && !stopped && !self.end.outcome.converged() {
             return self.step_decides_the_search();
@@ -218,18 +213,29 @@ impl Judgement<'_> {
         })
     }
 
-    /// Whether more is determined by a finer step: the polynomial that a method makes of an eigenvalue has a slope of zero somewhere (that
-    /// of Runge-Kutta 4 at -1.6 over the step, below whose value no record can be followed), and a search ends there.
-    fn step_hides(&self) -> bool {
-        let open = self.undetermined.directions.len();
-        let refined = || {
-            let finer = self.objective.sweep.refined(self.objective.problem.samples())?;
-            let objective = self.objective.of(self.objective.problem, &*finer);
-            let linear = objective.evaluate(&self.end.coordinates).ok()?;
-            let held: Vec<bool> = self.held_at.iter().map(Option::is_some).collect();
-            Some(undetermined(&linear, &held).directions.len())
-        };
-        open > 0 && refined().is_some_and(|less| less < open)
+    /// Of a fit with null directions: whether there are fewer with a finer step. The factor by which a method multiplies a state from step
+    /// to step has a minimum as a function of the eigenvalue (that of Runge-Kutta 4 at -1.6 over the step): a search whose data
+    /// decay faster ends there, where the slope is zero.
+    fn determined_by_a_finer_step(&self, unknowns: &[Unknown]) -> Option<Warning> {
+        let directions = &self.undetermined.directions;
+        if directions.is_empty() {
+            return None;
+        }
+        let finer = self.objective.sweep.refined(self.objective.problem.samples())?;
+        let linear = self.objective.of(self.objective.problem, &*finer).evaluate(&self.end.coordinates).ok()?;
+        let held: Vec<bool> = self.held_at.iter().map(Option::is_some).collect();
+        if undetermined(&linear, &held).directions.len() >= directions.len() {
+            return None;
+        }
+        let part = |i: usize| directions.iter().any(|direction| taking_part(direction).any(|(j, _)| i == j));
+        let names =
+            unknowns.iter().enumerate().filter(|(i, _)| part(*i)).map(|(_, unknown)| format!("`{}`", unknown.name));
+        let text = format!(
+            "the step is too coarse: with {} the data determine more of {}; use a finer step, or smooth the model",
+            finer.integrator(),
+            names.collect::<Vec<_>>().join(", ")
+        );
+        Some(Warning { code: WarningCode::CoarseStep, severity: Severity::NotUsable, text })
     }
 
     /// Of a search that ended without a minimum: whether a finer step changes the cost at its start or at its end, so that the
