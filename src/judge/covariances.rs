@@ -8,10 +8,13 @@ use super::shares::Largest;
 use crate::estimate::CovarianceMethod;
 use crate::information::Covariance;
 use crate::layout::Kind;
-use crate::problem::Whitening;
+use crate::problem::{Noise, Whitening};
 
 /// Below this number of measurements a HAC covariance is less accurate than the classical one.
 const CORRELATED_SAMPLES: u64 = 100;
+
+/// Level of the test for errors of changing size, over all outputs.
+const LIKE_SIZES_LEVEL: f64 = 0.01;
 
 /// The covariance of the unknowns in their own units, how it was made, and that of unit noise in coordinates.
 pub(super) struct Covariances {
@@ -68,7 +71,7 @@ impl Judgement<'_> {
         let (objective, x) = (self.objective, &self.end.coordinates);
         let (weights, degrees) = self.estimated_weights();
         let degrees = vec![degrees; self.slopes.len()];
-        if sandwich::is_needed(objective) || self.coupled().is_some() {
+        if sandwich::is_needed(objective) || self.coupled().is_some() || self.changes_size() {
             let filtered = objective.problem.settings.prefilter.is_some();
             let method = if filtered { CovarianceMethod::FilteredSandwich } else { CovarianceMethod::Sandwich };
             let found = sandwich::sandwich(objective, x, &self.exact).ok().flatten();
@@ -89,6 +92,14 @@ impl Judgement<'_> {
             degrees,
             shares: None,
         }
+    }
+
+    /// Whether errors that are not given a noise change in size along the record: the classical covariance takes them to be of one variance.
+    fn changes_size(&self) -> bool {
+        let (whiteness, noise) = (&self.residuals.whiteness, &self.objective.problem.settings.noise);
+        let tested = matches!(noise, Noise::PerOutput) && self.residuals.measured >= CORRELATED_SAMPLES;
+        let least = whiteness.iter().map(|white| white.like_sizes).fold(1.0, f64::min);
+        tested && least * (whiteness.len() as f64) < LIKE_SIZES_LEVEL
     }
 
     /// The factor by which weights between outputs that were estimated themselves, as a full noise covariance, widen the

@@ -36,6 +36,8 @@ pub fn all() -> Vec<Case> {
         case("lag, AR(1) 0.5, 500, initial state free", wide, |r| begun(r, 0.5, 1)),
         case("lag, AR(1) 0.9, 500, initial state free", wide, |r| begun(r, 0.9, 1)),
         case("lag, AR(1) 0.9, 500 of 2500 measured", slow, |r| begun(r, 0.9, 5)),
+        case("noise in proportion to what decays, steps", wide, stepped),
+        case("noise in proportion to what decays, initial state free", (92.0, 100.0), decaying),
         case("two outputs with one noise, 200", wide, one_noise),
         warned(WarningCode::CurvedInterval, "tau poorly known", |r| poorly(r, false)),
         case("tau poorly known, by logarithm", (91.0, 97.0), |r| poorly(r, true)),
@@ -198,6 +200,28 @@ fn begun(random: &mut Random, rho: f64, every: usize) -> Trial {
     let record = record(&Lag, 0.01, inputs, outputs, start).initial(Current { i: free(0.8) });
     let fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau: free(0.08) });
     Trial { summary: fit.run().unwrap().into_summary(), truth: vec![LAG.gain, LAG.tau, 1.0] }
+}
+
+/// A voltage on for 100 samples and off for 100; the noise is a tenth of the current, which the fit is not told.
+fn stepped(random: &mut Random) -> Trial {
+    let inputs: Vec<Voltage> = (0..400).map(|k| Voltage { u: if k / 100 % 2 == 0 { 2.0 } else { 0.2 } }).collect();
+    let truth = Branch { gain: 2.0, tau: 0.2 };
+    let mut outputs = clean(&Lag, 0.01, &inputs, &Current { i: 0.0 }, &truth);
+    outputs.iter_mut().for_each(|y| y.i += 0.1 * y.i * random.normal());
+    let record = record(&Lag, 0.01, inputs, outputs, Current { i: 0.0 });
+    let fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau: free(0.3) });
+    Trial { summary: fit.run().unwrap().into_summary(), truth: vec![truth.gain, truth.tau] }
+}
+
+/// A current decays to a fifth; the noise is a tenth of what decays.
+fn decaying(random: &mut Random) -> Trial {
+    let (truth, start) = (Branch { gain: 2.0, tau: 1.2 }, Current { i: 2.5 });
+    let inputs = vec![Voltage { u: 0.25 }; 400];
+    let mut outputs = clean(&Lag, 0.02, &inputs, &start, &truth);
+    outputs.iter_mut().for_each(|y| y.i += 0.1 * (y.i - 0.49) * random.normal());
+    let record = record(&Lag, 0.02, inputs, outputs, start).initial(Current { i: free(2.0) });
+    let fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau: free(0.8) });
+    Trial { summary: fit.run().unwrap().into_summary(), truth: vec![truth.gain, truth.tau, 2.5] }
 }
 
 /// Both currents of a motor have noise that is the same to nine tenths, which the fit is not told.
