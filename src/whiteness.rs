@@ -214,7 +214,12 @@ impl Portmanteau {
         let covariance: f64 =
             later.map(|(square, lag)| square / errors - (1.0 - f64::from(lag) / errors) * mean * mean).sum();
         let standardized = covariance / variance * (errors / lags as f64).sqrt();
-        if standardized > 0.0 { 0.5 * chi_squared_tail(standardized * standardized, 1.0) } else { 1.0 }
+        // Errors of one size have the variance of rounding.
+        if standardized > 0.0 && variance > 1e-9 * mean * mean {
+            0.5 * chi_squared_tail(standardized * standardized, 1.0)
+        } else {
+            1.0
+        }
     }
 
     /// The probability that errors without correlation agree, or disagree, as often in sign with the error before, or that

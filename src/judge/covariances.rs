@@ -94,12 +94,13 @@ impl Judgement<'_> {
         }
     }
 
-    /// Whether errors that are not given a noise change in size along the record: the classical covariance takes them to be of one variance.
+    /// Whether noise that is estimated changes in size along the record: the classical covariance takes it to be of one variance. Where
+    /// there are no states, the order of the samples means nothing.
     fn changes_size(&self) -> bool {
-        let (whiteness, noise) = (&self.residuals.whiteness, &self.objective.problem.settings.noise);
-        let tested = matches!(noise, Noise::PerOutput) && self.residuals.measured >= CORRELATED_SAMPLES;
+        let (whiteness, problem) = (&self.residuals.whiteness, self.objective.problem);
+        let tested = matches!(problem.settings.noise, Noise::PerOutput) && problem.layout().kind != Kind::Static;
         let least = whiteness.iter().map(|white| white.like_sizes).fold(1.0, f64::min);
-        tested && least * (whiteness.len() as f64) < LIKE_SIZES_LEVEL
+        tested && self.residuals.measured >= CORRELATED_SAMPLES && least * (whiteness.len() as f64) < LIKE_SIZES_LEVEL
     }
 
     /// The factor by which weights between outputs that were estimated themselves, as a full noise covariance, widen the

@@ -143,3 +143,42 @@ fn portmanteau_by_hand() {
     assert_eq!(less.at(1), (0.0, 0.0));
     assert!((less.at(2).1 - (5.0 / 15.0 - 0.25)).abs() < 1e-15, "{:?}", less.at(2));
 }
+
+fn like_sizes(errors: impl Iterator<Item = f64>) -> f64 {
+    let mut of = Portmanteau::new(20);
+    of.add(&errors.collect::<Vec<f64>>());
+    of.like_sizes_p_value(20)
+}
+
+/// Of 4,000 series of one distribution, normal or with heavy tails, one in a hundred is below 0.01: 40, with a binomial deviation of
+/// 6.3; half to twice as many may be found, since squares are far from normal.
+#[test]
+fn errors_of_one_distribution_are_seldom_of_like_size() {
+    let mut random = crate::random::Random::stream(23, 0);
+    for heavy in [false, true] {
+        let mut next = || random.normal() * if heavy { 1.0 + random.normal().abs() } else { 1.0 };
+        let below = (0..4_000).filter(|_| like_sizes((0..400).map(|_| next())) < 0.01).count();
+        assert!((20..=99).contains(&below), "heavy tails {heavy}: {below}");
+    }
+}
+
+/// Twice as large in one half of 400: the mean squares differ from their mean by 1.5, and squares have the variance
+/// `3 (1 + 16) / 2 - 2.5^2 = 19.25`; so the autocorrelations of squares are 0.117 each, and 20 of them 10 standard deviations.
+#[test]
+fn errors_that_grow_are_of_like_size() {
+    let mut random = crate::random::Random::stream(24, 0);
+    for _ in 0..20 {
+        let p = like_sizes((0..400).map(|k| random.normal() * if k < 200 { 1.0 } else { 2.0 }));
+        assert!(p < 1e-6, "{p:e}");
+    }
+}
+
+/// Errors of one size, none, and those whose squares overflow say nothing.
+#[test]
+fn sizes_that_have_no_variance() {
+    for e in [0.0, 1.0, 0.1, 1e-170, 1e90, 1e200] {
+        let p = like_sizes((0..400).map(|k| if k % 3 == 0 { e } else { -e }));
+        assert_eq!(p, 1.0, "{e:e}");
+    }
+    assert_eq!(like_sizes(std::iter::empty()), 1.0);
+}
