@@ -10,9 +10,8 @@ use crate::information::Covariance;
 use crate::layout::Kind;
 use crate::problem::{Noise, Whitening};
 
-/// Below this number of measurements a HAC covariance is less accurate than the classical one.
+/// Below this number of measurements a HAC covariance is less accurate than the classical one, and errors are not tested for changing size.
 const CORRELATED_SAMPLES: u64 = 100;
-
 /// Level of the test for errors of changing size, over all outputs.
 const LIKE_SIZES_LEVEL: f64 = 0.01;
 

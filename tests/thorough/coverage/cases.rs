@@ -213,7 +213,8 @@ fn stepped(random: &mut Random) -> Trial {
     Trial { summary: fit.run().unwrap().into_summary(), truth: vec![truth.gain, truth.tau] }
 }
 
-/// A current decays to a fifth; the noise is a tenth of what decays.
+/// A current decays to a fifth; the noise is a tenth of what decays. Of 1,000 records 91 to 95 % were
+/// covered (docs/intervals.md), which these bounds hold; classical errors cover 49 and 71 %.
 fn decaying(random: &mut Random) -> Trial {
     let (truth, start) = (Branch { gain: 2.0, tau: 1.2 }, Current { i: 2.5 });
     let inputs = vec![Voltage { u: 0.25 }; 400];
