@@ -342,7 +342,7 @@ fn finer<'a, M: Model + 'a>(
     is_default: bool,
     predictor: &Arc<dyn Prediction>,
 ) -> Arc<FinerSweeps<'a>> {
-    if !is_default || M::KIND != Kind::Continuous || predictor.predicts_variance() {
+    if !is_default || M::KIND != Kind::Continuous {
         return FinerSweeps::new(vec![]);
     }
     let by = |stepping: Stepping<M>| -> MakeSweep<'a> {

@@ -68,8 +68,7 @@ impl Judgement<'_> {
         let names = listed(unknown.iter().map(|unknown| unknown.name.as_str()));
         let text = match all {
             false => format!(
-                "{names} cannot be told from zero: an interval is wider than its value; excite what depends on it, or fix it \
-                 at zero"
+                "{names} cannot be told from zero: an interval is wider than its value; excite what depends on it, or fix it"
             ),
             true => format!(
                 "no parameter is known: the intervals of {names} are wider than their values; vary {} more, or measure longer",

@@ -71,7 +71,8 @@ struct Sums<'s> {
     first: Option<(usize, Vec<f64>)>,
     sigma: Vec<f64>,
     points: Vec<(usize, Vec<f64>)>,
-    /// The errors of a window, output by output, and those of one output that are tested for whiteness.
+    /// The errors of a window, output by output, then the logarithms of their variances, and those of one output that are tested for
+    /// whiteness.
     errors: Vec<f64>,
     tested: Vec<f64>,
 }
@@ -126,13 +127,23 @@ impl<'s> Sums<'s> {
         self.waiting.follow(sample, errors);
     }
 
+    /// Appends the logarithms of the variances of a window, where these are predicted.
+    fn add_variances(&mut self, window: &Window, lane: usize) {
+        if window.has_variances() {
+            for j in 0..window.outputs() {
+                self.errors.extend((0..window.samples[lane]).map(|k| window.log_variance(k, j, lane)));
+            }
+        }
+    }
+
     /// Keeps a window that may be simulated again, with its errors.
     fn sample(&mut self, window: &Window, lane: usize) {
         if window.carry.is_empty() {
             return;
         }
         let (samples, begin) = (window.samples[lane], window.begin[lane]);
-        let first: Vec<f64> = (0..window.outputs()).map(|j| self.errors[j * samples]).collect();
+        self.add_variances(window, lane);
+        let first: Vec<f64> = self.errors.iter().step_by(samples).copied().collect();
         self.close(begin, &first);
         self.first.get_or_insert((begin, first));
         let record = &self.objective.problem.records[self.experiment];

@@ -2,7 +2,7 @@
 
 use crate::problem::{Objective, Values, each};
 use crate::record::{Record, Time};
-use crate::sweep::{Piece, Prepared, Sweep};
+use crate::sweep::{Piece, Prepared, Sweep, Window};
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -12,7 +12,8 @@ pub(super) struct Sampled {
     pub samples: usize,
     /// Whether it is one of those at even distances, from which the change of the whole record is extrapolated.
     pub spaced: bool,
-    /// Its errors, output by output, sample by sample.
+    /// Its errors, output by output, sample by sample; where variances are predicted these are standardized by them, and the logarithms
+    /// of the variances follow.
     pub errors: Vec<f64>,
     /// Those of the sample after it, to which the last of its steps leads; empty as long as that is not known, and at the end.
     pub after: Vec<f64>,
@@ -24,9 +25,25 @@ impl Sampled {
         self.begin..self.begin + self.samples + usize::from(!self.after.is_empty())
     }
 
-    /// The error of an output at a sample, counted from the begin.
+    /// The error of an output at a sample, counted from the begin; behind the outputs, the logarithm of a variance.
     fn error(&self, j: usize, k: usize) -> f64 {
         if k < self.samples { self.errors[j * self.samples + k] } else { self.after[j] }
+    }
+
+    /// The square by which the prediction of an output changes at a sample of a window, in standard deviations. A logarithm of a variance
+    /// counts by half its square, as in the information of the likelihood.
+    fn change(&self, window: &Window, k: usize, j: usize, lane: usize, sigma: f64) -> f64 {
+        let row = window.begin[lane] + k - self.begin;
+        let error = window.error(k, j, lane);
+        if !window.has_variances() {
+            return ((self.error(j, row) - error) / sigma).powi(2);
+        }
+        if !window.is_measured(k, j, lane) {
+            return 0.0;
+        }
+        let before = self.error(window.outputs() + j, row);
+        let variance = window.variance(k, j, lane).ln() - before;
+        (self.error(j, row) - error / (0.5 * before).exp()).powi(2) + 0.5 * variance * variance
     }
 
     /// Takes the errors of a sample if it is the one after the window.
@@ -95,8 +112,7 @@ pub(super) fn step_errors(all: &[Compared<'_>]) -> Vec<f64> {
         all.iter().enumerate().flat_map(|(i, one)| one.windows.iter().map(move |window| (i, window))).collect();
     let mut sums = vec![Changes::default(); all.len()];
     let samples = windows.iter().map(|(_, window)| window.range().len()).sum();
-    let finer = all.first().filter(|one| !one.objective.sweep.predicts_variance());
-    if let Some(finer) = finer.and_then(|one| one.objective.sweep.refined(samples)) {
+    if let Some(finer) = all.first().and_then(|one| one.objective.sweep.refined(samples)) {
         let batches = batches(&*finer, all, &windows);
         let one = |b: usize| changes(&*finer, all, batches[b]);
         let found: Vec<Vec<(f64, usize)>> = match samples >= WORTH_THREADS {
@@ -160,11 +176,7 @@ fn changes(finer: &dyn Sweep, all: &[Compared<'_>], windows: &[(usize, &Sampled)
             found.iter_mut().zip(windows.iter().zip(&points)).enumerate()
         {
             for k in 0..window.samples[lane] {
-                let row = window.begin[lane] + k - sampled.begin;
-                for (j, sigma) in sigma.iter().enumerate() {
-                    let before = sampled.error(j, row);
-                    *found += ((before - window.error(k, j, lane)) / sigma).powi(2);
-                }
+                *found += sigma.iter().enumerate().map(|(j, s)| sampled.change(window, k, j, lane, *s)).sum::<f64>();
             }
         }
         true
@@ -178,7 +190,7 @@ fn changes(finer: &dyn Sweep, all: &[Compared<'_>], windows: &[(usize, &Sampled)
 #[cfg(test)]
 mod tests {
     use super::super::residual_pass::residual_pass;
-    use crate::{Experiment, Fit, Model, Rk4, Scalar, Time, free, signals, simulate};
+    use crate::{Experiment, Fit, Kalman, Model, Rk4, Scalar, Time, fixed, free, signals, simulate};
 
     signals! { struct Voltage { u: "V" } }
     signals! { struct Current { i: "A" } }
@@ -249,5 +261,58 @@ mod tests {
         let squares: f64 = records.iter().map(|one| step_error(std::slice::from_ref(one)).powi(2)).sum();
         let together = step_error(&records);
         assert!(together > 1e-2 && (together / squares.sqrt() - 1.0).abs() < 1e-10, "{together} {squares}");
+    }
+
+    signals! { struct Levels { a: "1/s", drift: "A", noise: "A" } }
+
+    /// A decay with process and measurement noise.
+    #[derive(Clone)]
+    struct Noisy;
+
+    impl Model for Noisy {
+        type State = Current;
+        type Input = Voltage;
+        type Output = Current;
+        type Parameters = Levels;
+
+        fn derivative<S: Scalar>(&self, _t: S, x: &Current<S>, u: &Voltage<S>, p: &Levels<S>) -> Current<S> {
+            Current { i: (u.u - x.i) * p.a }
+        }
+        fn diffusion<S: Scalar>(&self, p: &Levels<S>) -> Current<S> {
+            Current { i: p.drift }
+        }
+        fn noise<S: Scalar>(&self, p: &Levels<S>) -> Current<S> {
+            Current { i: p.noise }
+        }
+        fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, _p: &Levels<S>) -> Current<S> {
+            *x
+        }
+    }
+
+    /// A decay of rate one from 2 over one second, from an exact state: `x = 2 R(-1)` and `P = drift^2 (1 - R(-2)) / 2` by one step of
+    /// Runge-Kutta 4, whose factor is `R(z)`; by two steps `R(-1/2)^2` and `R(-1)^2` take their places. The mean counts by its
+    /// standard deviation, the variance by half the square of its logarithm; a sample that is missing does not count.
+    #[test]
+    fn predicted_variances_are_compared() {
+        let factor = |z: f64| 1.0 + z + z * z / 2.0 + z.powi(3) / 6.0 + z.powi(4) / 24.0;
+        let (drift, noise) = (0.5, 0.2);
+        let step_error = |last: f64| {
+            let (time, inputs) = (Time::Uniform { start: 0.0, step: 1.0 }, vec![Voltage { u: 0.0 }; 2]);
+            let outputs = vec![Current { i: 1.9 }, Current { i: last }];
+            let record = Experiment::new(&Noisy, time, inputs, outputs).unwrap().initial(Current { i: fixed(2.0) });
+            let parameters = Levels { a: free(1.0), drift: fixed(drift), noise: fixed(noise) };
+            let fit =
+                Fit::new(&Noisy, &record).parameters(parameters).predictor(Kalman).integrator(Rk4 { substeps: 1 });
+            let problem = fit.problem().unwrap();
+            let objective = problem.objective().unwrap();
+            residual_pass(&objective, &objective.start()).unwrap().step_error
+        };
+        let variance = |decay: f64| drift * drift * 0.5 * (1.0 - decay) + noise * noise;
+        let (coarse, fine) = (variance(factor(-2.0)), variance(factor(-1.0).powi(2)));
+        let mean = 2.0 * (factor(-1.0) - factor(-0.5).powi(2)) / coarse.sqrt();
+        let expected = (mean * mean + 0.5 * (fine / coarse).ln().powi(2)).sqrt();
+        // The rounding of sums of numbers near one.
+        assert!((step_error(0.7) / expected - 1.0).abs() < 1e-12 && expected > 0.1, "{} {expected}", step_error(0.7));
+        assert_eq!(step_error(f64::NAN), 0.0);
     }
 }

@@ -7,6 +7,7 @@ use crate::estimate::{Direction, Knowledge, Unknown, Warning, WarningCode};
 use crate::layout::Kind;
 use crate::numeral::{counted, exact, number, percent};
 use crate::optimize::{Outcome, Severity};
+use crate::problem::Role;
 use crate::problem::{Objective, SearchPlan};
 
 /// Largest change of a parameter with a finer step, in standard errors, without a warning: with a method that was chosen, and
@@ -109,10 +110,14 @@ impl Judgement<'_> {
         let of = |j: usize| (self.residuals.least_sigma[j], self.residuals.outputs[j].rmse);
         let j = (0..self.residuals.least_sigma.len()).find(|&j| is_nothing(of(j)))?;
         let (output, (least_sigma, rmse)) = (&self.objective.problem.layout().outputs[j], of(j));
+        let free = self.objective.problem.unknowns.row.iter().any(|one| matches!(one.role, Role::InitialState(_)));
+        let (cause, remedy) = match free {
+            true => ("a free initial state fits the first measurement exactly", "fix the initial state"),
+            false => ("such as a first one that equals the initial state", "leave out what is predicted exactly (NaN)"),
+        };
         let text = format!(
             "a measurement of `{}` is predicted with a standard deviation of {} {unit}, beside errors of {} {unit}: the \
-             likelihood grows without bound (a free initial state fits the first measurement exactly); give the noise a \
-             lower bound, or fix the initial state",
+             likelihood grows without bound ({cause}); give the noise a lower bound, or {remedy}",
             output.name,
             number(least_sigma, 2),
             number(rmse, 2),
