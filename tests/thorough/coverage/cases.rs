@@ -79,7 +79,7 @@ pub fn all() -> Vec<Case> {
 pub(super) fn levels(random: &mut Random, samples: usize, hold: usize) -> Vec<f64> {
     let mut level = 0.0;
     let next = |k: usize| {
-        if k % hold == 0 {
+        if k.is_multiple_of(hold) {
             level = 2.0 * random.uniform() - 1.0;
         }
         level
