@@ -20,7 +20,7 @@ use crate::problem::{Memory, Noise, Objective, Role, Whitening};
 /// Residuals below this fraction of a given sigma are round-off: no whiteness test, no HAC.
 const ROUNDING: f64 = 0.1;
 /// Significance level of the whiteness test.
-const WHITENESS_LEVEL: f64 = 0.01;
+pub(super) const WHITENESS_LEVEL: f64 = 0.01;
 
 /// The end of a search.
 #[derive(Clone)]
@@ -216,8 +216,13 @@ impl<'j> Judgement<'j> {
 
     /// The errors' autocorrelation; not computed where residuals are round-off.
     pub(super) fn autocorrelated(&self) -> Option<(usize, super::whiteness::Whiteness)> {
-        super::whiteness::least_white(&self.residuals.whiteness)
-            .filter(|(_, white)| white.p_value < WHITENESS_LEVEL && !self.rounding)
+        self.autocorrelated_at(WHITENESS_LEVEL)
+    }
+
+    /// The same at another level.
+    pub(super) fn autocorrelated_at(&self, level: f64) -> Option<(usize, super::whiteness::Whiteness)> {
+        let least = super::whiteness::least_white(&self.residuals.whiteness);
+        least.filter(|(_, white)| white.p_value < level && !self.rounding)
     }
 
     /// Whether there is noise to tell the accuracy by: given, or measured. Where no output moves, errors are numbers next to the smallest.

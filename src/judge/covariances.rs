@@ -1,6 +1,6 @@
 //! The covariance of the unknowns: classical, a sandwich, or HAC, and its degrees of freedom.
 
-use super::conclude::Judgement;
+use super::conclude::{Judgement, WHITENESS_LEVEL};
 use super::hac::hac;
 use super::predicted::Dependence;
 use super::sandwich;
@@ -10,8 +10,14 @@ use crate::information::Covariance;
 use crate::layout::Kind;
 use crate::problem::{Noise, Whitening};
 
-/// Below this number of measurements a HAC covariance is less accurate than the classical one, and errors are not tested for changing size.
-const CORRELATED_SAMPLES: u64 = 100;
+/// Below this number of measurements the covariance is the classical one, whether the errors are autocorrelated or not.
+const CORRELATED_SAMPLES: u64 = 12;
+/// Records of up to so many measurements are tested for color at this level before their intervals are made: the tests see little
+/// there, and white errors that are taken as colored lose nothing (docs/intervals.md).
+const SHORT: u64 = 1_000;
+const SHORT_LEVEL: f64 = 0.05;
+/// Below this number of measurements errors are not tested for changing size.
+const SIZED_SAMPLES: u64 = 100;
 /// Level of the test for errors of changing size, over all outputs.
 const LIKE_SIZES_LEVEL: f64 = 0.01;
 
@@ -40,10 +46,7 @@ struct CoordinateCovariance {
 impl Judgement<'_> {
     pub(super) fn covariances(&self) -> Covariances {
         let unit = self.linear.covariance(&self.exact);
-        let autocorrelated = self.autocorrelated().filter(|_| {
-            self.objective.problem.layout().kind != Kind::Static && self.residuals.measured >= CORRELATED_SAMPLES
-        });
-        let found = autocorrelated.and_then(|_| self.for_colored_errors(unit.as_ref()?));
+        let found = self.takes_color().then(|| self.for_colored_errors(unit.as_ref()?)).flatten();
         let CoordinateCovariance { covariance, method, factor, degrees, shares } =
             found.unwrap_or_else(|| self.for_white_errors(&unit));
         let seen = self.seen().into_iter().zip(&self.slopes);
@@ -55,6 +58,16 @@ impl Judgement<'_> {
         };
         let degrees = degrees.iter().zip(most).map(|(degrees, most)| degrees.min(most)).collect();
         Covariances { unknowns, method, unit, degrees, own, shares }
+    }
+
+    /// Whether the intervals allow for colored errors.
+    fn takes_color(&self) -> bool {
+        let level = match self.residuals.measured {
+            ..CORRELATED_SAMPLES => return false,
+            ..=SHORT => SHORT_LEVEL,
+            _ => WHITENESS_LEVEL,
+        };
+        self.objective.problem.layout().kind != Kind::Static && self.autocorrelated_at(level).is_some()
     }
 
     fn for_colored_errors(&self, unit: &Covariance) -> Option<CoordinateCovariance> {
@@ -99,7 +112,7 @@ impl Judgement<'_> {
         let (whiteness, problem) = (&self.residuals.whiteness, self.objective.problem);
         let tested = matches!(problem.settings.noise, Noise::PerOutput) && problem.layout().kind != Kind::Static;
         let least = whiteness.iter().map(|white| white.like_sizes).fold(1.0, f64::min);
-        tested && self.residuals.measured >= CORRELATED_SAMPLES && least * (whiteness.len() as f64) < LIKE_SIZES_LEVEL
+        tested && self.residuals.measured >= SIZED_SAMPLES && least * (whiteness.len() as f64) < LIKE_SIZES_LEVEL
     }
 
     /// The factor by which weights between outputs that were estimated themselves, as a full noise covariance, widen the

@@ -151,7 +151,7 @@ impl<'s> Sums<'s> {
         // Those in which a multiple of the distance lies.
         let distance = (EVERY * window.capacity()).max(record.len() / AGAIN);
         let at_distance = begin.next_multiple_of(distance) < begin + samples;
-        if at_distance {
+        if at_distance && self.objective.sweep.restarts().is_none() {
             self.points.push((begin, carry()));
         }
         let spaced = at_distance || record.len() <= AGAIN * window.capacity();

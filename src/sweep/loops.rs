@@ -230,7 +230,11 @@ impl<M: Model, I: Integrator> Task<'_, M, I> {
             let samples = capacity.min(piece.samples.end - begin);
             (window.begin[0], window.samples[0]) = (begin, samples);
             rows.read(begin, samples, self.restart.unwrap_or(0));
-            passes[0].write_carry(&mut window.carry);
+            match self.restart {
+                None => passes[0].write_carry(&mut window.carry),
+                // Nothing is carried from window to window: all of them begin with the state at the record's first sample.
+                Some(_) => window.carry.copy_from_slice(&piece.carry),
+            }
             for pass in &mut passes {
                 pass.fill(self, &rows, &mut window)?;
             }

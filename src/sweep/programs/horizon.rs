@@ -11,6 +11,8 @@ use std::ops::Range;
 pub(super) fn run(compiled: &Compiled, piece: &Piece<'_>, steps: usize, visit: Visit<'_>) -> Result<Reached, RunError> {
     let (outputs, seeds) = (compiled.program.outputs(), compiled.program.seeds().len());
     let mut window = Window::new(1, outputs, seeds, WINDOW, false);
+    // Nothing is carried from window to window: all of them begin with the state at the record's first sample.
+    window.carry = piece.carry.to_vec();
     let all = piece.samples.clone();
     // The first samples of a record are simulated from its begin.
     let simulated = all.start..steps.clamp(all.start, all.end);
