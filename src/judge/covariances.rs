@@ -9,6 +9,7 @@ use crate::estimate::CovarianceMethod;
 use crate::information::Covariance;
 use crate::layout::Kind;
 use crate::problem::{Noise, Whitening};
+use crate::record::Time;
 
 /// Below this number of measurements the covariance is the classical one, whether the errors are autocorrelated or not.
 const CORRELATED_SAMPLES: u64 = 12;
@@ -83,7 +84,7 @@ impl Judgement<'_> {
         let (objective, x) = (self.objective, &self.end.coordinates);
         let (weights, degrees) = self.estimated_weights();
         let degrees = vec![degrees; self.slopes.len()];
-        if sandwich::is_needed(objective) || self.coupled().is_some() || self.changes_size() {
+        if sandwich::is_needed(objective) || self.coupled().is_some() || self.changes_size() || self.spans_differ() {
             let filtered = objective.problem.settings.prefilter.is_some();
             let method = if filtered { CovarianceMethod::FilteredSandwich } else { CovarianceMethod::Sandwich };
             let found = sandwich::sandwich(objective, x, &self.exact).ok().flatten();
@@ -113,6 +114,13 @@ impl Judgement<'_> {
         let tested = matches!(problem.settings.noise, Noise::PerOutput) && problem.layout().kind != Kind::Static;
         let least = whiteness.iter().map(|white| white.like_sizes).fold(1.0, f64::min);
         tested && self.residuals.measured >= SIZED_SAMPLES && least * (whiteness.len() as f64) < LIKE_SIZES_LEVEL
+    }
+
+    /// Whether errors are those of predictions ahead over intervals that are not equal: what disturbs the plant grows with them.
+    fn spans_differ(&self) -> bool {
+        let problem = self.objective.problem;
+        let uneven = problem.records.iter().any(|record| matches!(record.times(), Time::Stamps(_)));
+        matches!(problem.settings.noise, Noise::PerOutput) && uneven && self.objective.sweep.restarts().is_some()
     }
 
     /// The factor by which weights between outputs that were estimated themselves, as a full noise covariance, widen the

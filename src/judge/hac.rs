@@ -33,6 +33,8 @@ const LARGEST: f64 = 0.97;
 const LONGEST: f64 = 500.0;
 /// Standard deviations by which a variance by moving sums must be above that of stationary errors to be taken instead.
 const CERTAIN: f64 = 2.0;
+/// The fewest degrees of freedom: Satterthwaite's rule knows none of less than a square of one normal number.
+const FEWEST: f64 = 1.0;
 /// Rows that are absorbed together.
 const ROWS: usize = 256;
 
@@ -113,7 +115,8 @@ impl Hac {
                 variances[i].1 += spread;
             }
         }
-        variances.into_iter().map(|(variance, spread)| 2.0 * variance * variance / spread).collect()
+        let degrees = |(variance, spread): (f64, f64)| (2.0 * variance * variance / spread).max(FEWEST);
+        variances.into_iter().map(degrees).collect()
     }
 }
 
