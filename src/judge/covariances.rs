@@ -65,7 +65,7 @@ impl Judgement<'_> {
     fn takes_color(&self) -> bool {
         let level = match self.residuals.measured {
             ..CORRELATED_SAMPLES => return false,
-            ..=SHORT => SHORT_LEVEL,
+            CORRELATED_SAMPLES..=SHORT => SHORT_LEVEL,
             _ => WHITENESS_LEVEL,
         };
         self.objective.problem.layout().kind != Kind::Static && self.autocorrelated_at(level).is_some()
