@@ -135,6 +135,10 @@ impl<L: LeastSquares> LeastSquares for Pinned<'_, L> {
     fn sizes(&self) -> Vec<Option<f64>> {
         self.problem.sizes()
     }
+
+    fn logarithms(&self) -> Vec<bool> {
+        self.problem.logarithms()
+    }
 }
 
 /// Refuses a result that was not computed to its end.

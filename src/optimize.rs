@@ -18,7 +18,7 @@ pub use levenberg_marquardt::LevenbergMarquardt;
 pub use linearization::Linearization;
 pub use machine::{Domain, Machine, Request};
 pub use outcome::{Outcome, Severity};
-pub(crate) use point::within_tolerance;
+pub(crate) use point::{vanishes, within_tolerance};
 
 use crate::error::Error;
 use serde::{Deserialize, Serialize};
@@ -57,6 +57,12 @@ pub trait LeastSquares {
     fn sizes(&self) -> Vec<Option<f64>> {
         Vec::new()
     }
+
+    /// Which unknowns are logarithms. Where the data want no such quantity at all, its logarithm has no minimum: it is left where its
+    /// influence has vanished. None, unless said otherwise.
+    fn logarithms(&self) -> Vec<bool> {
+        Vec::new()
+    }
 }
 
 impl<T: LeastSquares + ?Sized> LeastSquares for &T {
@@ -74,6 +80,10 @@ impl<T: LeastSquares + ?Sized> LeastSquares for &T {
 
     fn sizes(&self) -> Vec<Option<f64>> {
         (**self).sizes()
+    }
+
+    fn logarithms(&self) -> Vec<bool> {
+        (**self).logarithms()
     }
 }
 

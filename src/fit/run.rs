@@ -6,7 +6,7 @@ use super::starts::search_from_many;
 use crate::error::Error;
 use crate::estimate::Summary;
 use crate::judge::{SearchEnd, conclude, noise};
-use crate::optimize::{LeastSquares, LevenbergMarquardt};
+use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt};
 use crate::problem::{Control, Objective, Problem, Whitening};
 use std::time::Instant;
 
@@ -102,7 +102,7 @@ impl Problem<'_> {
         }
         let objective = self.objective()?;
         let linear = objective.linearize(coordinates).map_err(|error| start_error(&objective, coordinates, error))?;
-        let outcome = LevenbergMarquardt::default().judge(coordinates, &linear, &objective.bounds());
+        let outcome = LevenbergMarquardt::default().judge(coordinates, &linear, &Domain::of(&objective));
         let whitening = match noise::is_estimated(&objective) {
             true => noise::estimate(&objective, coordinates).unwrap_or_else(|_| objective.whitening.clone()),
             false => objective.whitening.clone(),

@@ -13,7 +13,7 @@ use crate::estimate::{
 };
 use crate::information::{Covariance, Undetermined};
 use crate::layout::Quantity;
-use crate::optimize::{Linearization, Outcome};
+use crate::optimize::{Linearization, Outcome, vanishes};
 use crate::parameter::Transform;
 use crate::problem::{Memory, Noise, Objective, Role, Whitening};
 
@@ -164,7 +164,13 @@ impl<'j> Judgement<'j> {
             let low = (x <= lower && gradient[i] >= 0.0).then_some(parameter.lower);
             low.or((x >= upper && gradient[i] <= 0.0).then_some(parameter.upper))
         };
-        let held_at: Vec<Option<f64>> = (0..n).map(at_bound).collect();
+        let residual = linear.sum_of_squares().sqrt();
+        let gone = |i: usize| {
+            let parameter = unknowns.row[i].parameter;
+            let positive = parameter.transform == Transform::Log && parameter.lower <= 0.0;
+            (positive && vanishes(norms[i], gradient[i], residual)).then_some(0.0)
+        };
+        let held_at: Vec<Option<f64>> = (0..n).map(|i| at_bound(i).or(gone(i))).collect();
         let at_bounds: Vec<bool> = held_at.iter().map(Option::is_some).collect();
         let undetermined = directions::undetermined(linear, &at_bounds);
         let values = unknowns.values(coordinates);
@@ -245,12 +251,17 @@ impl<'j> Judgement<'j> {
                 (Some(bound), None) => Knowledge::Held { bound, end: None },
                 (None, None) => Knowledge::Unidentified,
                 (held, Some(standard_error)) => {
-                    let spread =
-                        Spread { standard_error: standard_error / self.slopes[i], degrees: degrees_of_freedom };
-                    let (lower, upper) = spread.interval(self.end.coordinates[i] + self.release[i], transform, 0.95);
+                    // Next to zero, where a logarithm has no width, in the unknown's own unit.
+                    let (center, unit, transform) = match held {
+                        Some(0.0) => (value, 1.0, Transform::Identity),
+                        _ => (self.end.coordinates[i], self.slopes[i], transform),
+                    };
+                    let spread = Spread { standard_error: standard_error / unit, degrees: degrees_of_freedom };
+                    let release = self.release[i] * self.slopes[i] / unit;
+                    let (lower, upper) = spread.interval(center + release, transform, 0.95);
                     match held {
                         Some(bound) => {
-                            let end = if bound == unknown.parameter.lower { upper } else { lower };
+                            let end = if bound == unknown.parameter.upper { lower } else { upper };
                             Knowledge::Held { bound, end: Some(end).filter(|end| end.is_finite()) }
                         }
                         None if !has_ends((lower, upper), transform) => Knowledge::Unidentified,

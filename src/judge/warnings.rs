@@ -7,6 +7,7 @@ use crate::estimate::{Direction, Knowledge, Unknown, Warning, WarningCode};
 use crate::layout::Kind;
 use crate::numeral::{counted, exact, number, percent};
 use crate::optimize::{Outcome, Severity};
+use crate::parameter::Transform;
 use crate::problem::Role;
 use crate::problem::{Objective, SearchPlan};
 
@@ -47,15 +48,21 @@ impl Judgement<'_> {
         warnings.extend(self.guessed_starts());
         for unknown in unknowns {
             if let Knowledge::Held { bound, end } = unknown.knowledge {
-                let (Unknown { name, unit, .. }, bound) = (unknown, exact(bound));
+                let Unknown { name, unit, .. } = unknown;
+                let place = match (unknown.transform, bound) {
+                    (Transform::Log, 0.0) => {
+                        "is left where it changes nothing: its logarithm has no minimum, the data want none of it"
+                            .to_owned()
+                    }
+                    _ => format!("is held at its bound {} {unit}: the cost falls beyond it", exact(bound)),
+                };
                 let reaches = match end {
-                    Some(end) => format!("; its 95 % interval reaches from there to {} {unit}", number(end, 3)),
+                    Some(end) => {
+                        format!("; its 95 % interval reaches from {} to {} {unit}", exact(bound), number(end, 3))
+                    }
                     None => String::new(),
                 };
-                warnings.push(care(
-                    WarningCode::HeldAtBound,
-                    format!("`{name}` is held at its bound {bound} {unit}: the cost falls beyond it{reaches}"),
-                ));
+                warnings.push(care(WarningCode::HeldAtBound, format!("`{name}` {place}{reaches}")));
             }
         }
         warnings.extend(self.not_positive());

@@ -196,7 +196,7 @@ mod tests {
     /// The minimum of `(x - 3)^2` below a bound at 2: a search that was read back asks for its start again, and keeps the bound.
     #[test]
     fn a_search_goes_on_in_its_bounds() {
-        let domain = Domain { bounds: vec![(f64::NEG_INFINITY, 2.0)], sizes: vec![] };
+        let domain = Domain { bounds: vec![(f64::NEG_INFINITY, 2.0)], ..Domain::default() };
         let mut search = GaussNewton::default();
         search.begin(vec![0.0], domain.clone());
         search.tell(Ok(linear(&[(1.0, 3.0), (0.0, 4.0)])));

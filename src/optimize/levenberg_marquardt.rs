@@ -132,12 +132,11 @@ impl<S: Scaling> LevenbergMarquardt<S> {
 
     /// Whether a point that another search has found is a minimum, by this search's tests with a tolerance of 1e-4: what
     /// methods without slopes can reach.
-    pub(crate) fn judge(&self, x: &[f64], linear: &Linearization, bounds: &[(f64, f64)]) -> Outcome {
+    pub(crate) fn judge(&self, x: &[f64], linear: &Linearization, domain: &Domain) -> Outcome {
         const TOLERANCE: f64 = 1e-4;
-        let domain = Domain { bounds: bounds.to_vec(), ..Domain::default() };
         let stop = Stop { step: TOLERANCE, gradient: TOLERANCE, ..self.stop };
         let stalled = |gradient, step| Outcome::Stalled { gradient, step, failed: 0 };
-        let point = Point::new(x.to_vec(), linear.clone(), &domain);
+        let point = Point::new(x.to_vec(), linear.clone(), domain);
         point.map_or(stalled(0.0, 0.0), |point| {
             point.ended(&stop).unwrap_or(stalled(point.cosine(), point.relative_step()))
         })

@@ -27,12 +27,14 @@ pub struct Domain {
     pub bounds: Vec<(f64, f64)>,
     /// The size of those unknowns whose magnitude does not tell it (one for a logarithm); missing ones are `None`.
     pub sizes: Vec<Option<f64>>,
+    /// Which unknowns are logarithms; missing ones are none.
+    pub logarithms: Vec<bool>,
 }
 
 impl Domain {
     /// What a problem says of its unknowns.
     pub fn of(problem: &impl LeastSquares) -> Self {
-        Domain { bounds: problem.bounds(), sizes: problem.sizes() }
+        Domain { bounds: problem.bounds(), sizes: problem.sizes(), logarithms: problem.logarithms() }
     }
 }
 

@@ -39,6 +39,15 @@ const BESIDE: f64 = 1e-2;
 /// How far inside its bound an unknown without slopes is tried, as a part of its size.
 const INSIDE: f64 = 1e-3;
 
+/// A logarithm whose quantity, all of it, changes the residual by less than this part has vanished.
+const VANISHED: f64 = 1e-9;
+
+/// Whether a logarithm with a column of this norm has lost its influence while the cost still falls along with it: the least cost is that
+/// without the quantity.
+pub(crate) fn vanishes(norm: f64, gradient: f64, residual: f64) -> bool {
+    gradient >= 0.0 && norm <= VANISHED * residual
+}
+
 impl Point {
     /// `None` where cost or slopes are no finite numbers.
     pub fn new(x: Vec<f64>, linear: Linearization, domain: &Domain) -> Option<Self> {
@@ -49,9 +58,12 @@ impl Point {
         let mut bounds = domain.bounds.clone();
         bounds.resize(x.len(), (f64::NEG_INFINITY, f64::INFINITY));
         let limits: Vec<(f64, f64)> = bounds.iter().zip(&x).map(|(bound, x)| (bound.0 - x, bound.1 - x)).collect();
-        // Held: what has no influence, and what sits on a bound that it would cross.
+        // Held: what has no influence, or has lost it, and what sits on a bound that it would cross.
         let on_bound = |i: usize| limits[i].0 >= 0.0 && gradient[i] >= 0.0 || limits[i].1 <= 0.0 && gradient[i] <= 0.0;
-        let held: Vec<bool> = (0..x.len()).map(|i| norms[i] == 0.0 || on_bound(i)).collect();
+        let residual = linear.sum_of_squares().sqrt();
+        let is_logarithm = |i: usize| domain.logarithms.get(i) == Some(&true);
+        let gone = |i: usize| is_logarithm(i) && vanishes(norms[i], gradient[i], residual);
+        let held: Vec<bool> = (0..x.len()).map(|i| norms[i] == 0.0 || on_bound(i) || gone(i)).collect();
         let damping: Vec<f64> = norms.iter().map(|norm| RANK * norm).collect();
         let full = linear.step_within(&damping, &held, &limits);
         let potential = full.as_ref().map_or(f64::INFINITY, |step| linear.predicted_reduction(step));

@@ -6,7 +6,7 @@ use super::{Control, Problem, Whitening};
 use crate::error::Failure;
 use crate::loss::Loss;
 use crate::optimize::{Infeasible, LeastSquares, Linearization};
-use crate::parameter::Transform;
+use crate::parameter::{Parameter, Transform};
 use crate::record::Record;
 use crate::sweep::{Located, OVERFLOW, RunError, Sweep, Window};
 use std::sync::Arc;
@@ -227,6 +227,11 @@ impl LeastSquares for Objective<'_> {
             Transform::Identity => unknown.size.filter(|_| !filtered),
         };
         self.problem.unknowns.row.iter().map(size).collect()
+    }
+
+    fn logarithms(&self) -> Vec<bool> {
+        let positive = |parameter: &Parameter| parameter.transform == Transform::Log && parameter.lower <= 0.0;
+        self.problem.unknowns.row.iter().map(|unknown| positive(&unknown.parameter)).collect()
     }
 
     fn bounds(&self) -> Vec<(f64, f64)> {

@@ -49,6 +49,26 @@ fn a_positive_parameter_that_is_not_makes_the_estimate_unusable() {
     }
 }
 
+/// A logarithm of what the data want below zero: its quantity shrinks until it changes nothing, and the answer is that with a bound at
+/// zero, up to what the quantity still changes: a part of 1e-9 of the errors. The interval reaches from zero, too.
+#[test]
+fn a_logarithm_that_vanishes_is_a_bound_at_zero() {
+    let record = record(-0.05);
+    let fit = |f: Parameter| Fit::new(&Rolling, &record).parameters(Cart { m: free(1.0), f }).run().unwrap();
+    let (logarithm, bound) = (fit(free(0.1).log()), fit(free(0.1).within(0.0, f64::INFINITY)));
+    println!("{logarithm}\n{bound}");
+    assert!(logarithm.outcome.converged() && logarithm.iterations < 100, "{logarithm}");
+    let end = |fit: &Estimate<Rolling>| match fit.knowledge.f {
+        Knowledge::Held { bound: 0.0, end } => end,
+        _ => panic!("{fit}"),
+    };
+    let error = |fit: &Estimate<Rolling>| fit.knowledge.m.standard_error().unwrap();
+    assert!((logarithm.parameters.m - bound.parameters.m).abs() < 1e-8 * error(&bound), "{logarithm} {bound}");
+    assert!((error(&logarithm) / error(&bound) - 1.0).abs() < 1e-6, "{logarithm} {bound}");
+    assert_eq!(end(&logarithm).is_some(), end(&bound).is_some());
+    assert!(logarithm.warnings.iter().any(|one| one.text.contains("its logarithm has no minimum")), "{logarithm}");
+}
+
 #[test]
 fn the_wrong_hold_of_the_benchmark_is_not_usable() {
     let Some(path) = shared("emps/emps.csv") else { return };

@@ -76,7 +76,7 @@ fn what_a_creeping_search_is_promised() {
 fn a_resumed_search_knows_its_bounds() {
     let (mut search, trial) = on_trial();
     let bound = 1.0 + 0.5 * trial.step[0];
-    search.resume(Domain { bounds: vec![(0.0, bound)], sizes: vec![] });
+    search.resume(Domain { bounds: vec![(0.0, bound)], ..Domain::default() });
     assert!(search.linearization().is_none());
     assert!(matches!(search.request(), Request::Linearize([1.0])));
     search.tell(Ok(linear(&[(2.0, 6.0)])));

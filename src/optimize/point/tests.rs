@@ -29,7 +29,7 @@ fn near() -> Linearization {
 fn steps_end_on_their_bounds() {
     for (x, bound) in [(0.2, 0.9), (-2.3, 2.4), (0.7, 0.1), (2.0, -0.4)] {
         assert_ne!(x + (bound - x), bound);
-        let domain = Domain { bounds: vec![if bound > x { (-9.0, bound) } else { (bound, 9.0) }], sizes: vec![] };
+        let domain = Domain { bounds: vec![if bound > x { (-9.0, bound) } else { (bound, 9.0) }], ..Domain::default() };
         let point = Point::new(vec![x], linear(&[(1.0, 1.0)]), &domain).unwrap();
         assert_eq!([point.towards(&[bound - x]), point.towards(&[3.0 * (bound - x)])], [vec![bound], vec![bound]]);
         assert_eq!(point.towards(&[0.5 * (bound - x)]), [x + 0.5 * (bound - x)]);
@@ -43,7 +43,7 @@ fn what_its_bound_holds() {
     let (below, above) = ((-9.0, 0.0), (0.0, 9.0));
     for (bound, residual, held) in [(below, 3.0, true), (above, 3.0, false), (below, -3.0, false), (above, -3.0, true)]
     {
-        let domain = Domain { bounds: vec![bound], sizes: vec![] };
+        let domain = Domain { bounds: vec![bound], ..Domain::default() };
         let point = Point::new(vec![0.0], linear(&[(1.0, residual)]), &domain).unwrap();
         assert_eq!((point.held[0], point.cosine()), (held, if held { 0.0 } else { 1.0 }), "{bound:?} {residual}");
     }
@@ -110,7 +110,7 @@ fn a_search_without_a_lower_cost() {
 #[test]
 fn points_inside_of_a_bound() {
     let inside = |x: f64, bounds: (f64, f64), size: Option<f64>, slope: f64| {
-        let domain = Domain { bounds: vec![bounds], sizes: vec![] };
+        let domain = Domain { bounds: vec![bounds], ..Domain::default() };
         Point::new(vec![x], linear(&[(slope, 1.0)]), &domain).unwrap().inside(&Seen::new(&[x], &[size])).concat()
     };
     assert_eq!(inside(0.0, (0.0, 9.0), None, 0.0), [1e-3]);
@@ -138,7 +138,7 @@ fn a_direction_without_influence() {
     information.absorb_row(&[2.0, 4.0], 1.0);
     let linear = Linearization::new(0.5, 2, vec![information]);
     let of = |bounds: Vec<(f64, f64)>| {
-        Point::new(vec![1.0; 2], linear.clone(), &Domain { bounds, sizes: vec![] }).unwrap().without_influence()
+        Point::new(vec![1.0; 2], linear.clone(), &Domain { bounds, ..Domain::default() }).unwrap().without_influence()
     };
     let (inside, lower, upper) = ((0.0, 9.0), (1.0, 9.0), (-9.0, 1.0));
     for found in [of(vec![]), of(vec![inside; 2])] {
