@@ -13,7 +13,7 @@ use crate::estimate::{
 };
 use crate::information::{Covariance, Undetermined};
 use crate::layout::Quantity;
-use crate::optimize::{Linearization, Outcome, vanishes};
+use crate::optimize::{LeastSquares, Linearization, Outcome, vanishes};
 use crate::parameter::Transform;
 use crate::problem::{Memory, Noise, Objective, Role, Whitening};
 
@@ -165,10 +165,10 @@ impl<'j> Judgement<'j> {
             low.or((x >= upper && gradient[i] <= 0.0).then_some(parameter.upper))
         };
         let residual = linear.sum_of_squares().sqrt();
+        let (starts, logarithms) = (unknowns.start(), objective.logarithms());
         let gone = |i: usize| {
-            let parameter = unknowns.row[i].parameter;
-            let positive = parameter.transform == Transform::Log && parameter.lower <= 0.0;
-            (positive && vanishes(norms[i], gradient[i], residual)).then_some(0.0)
+            let shrank = logarithms[i] && coordinates[i] < starts[i];
+            (shrank && vanishes(norms[i], gradient[i], residual)).then_some(0.0)
         };
         let held_at: Vec<Option<f64>> = (0..n).map(|i| at_bound(i).or(gone(i))).collect();
         let at_bounds: Vec<bool> = held_at.iter().map(Option::is_some).collect();

@@ -3,6 +3,7 @@
 use super::machine::{self, Domain, Machine, Request};
 use super::point::Point;
 use super::{Infeasible, LeastSquares, LeastSquaresState, Linearization, Outcome, Stop};
+use crate::scaling::Seen;
 use argmin::core::{Error, KV, Problem, Solver, TerminationStatus};
 use serde::{Deserialize, Serialize};
 
@@ -151,14 +152,14 @@ impl Machine for GaussNewton {
             Ok(linear) => Some(linear),
         };
         let Some(point) = self.point.take() else {
-            match told.and_then(|linear| Point::new(self.x.clone(), linear, &self.domain)) {
+            match told.and_then(|linear| Point::new(self.x.clone(), linear, &self.domain, &Seen::default())) {
                 None => self.outcome = Some(Outcome::Stalled { gradient: 0.0, step: 0.0, failed: 1 }),
                 Some(point) => self.go_on(point),
             }
             return;
         };
         self.trials += 1;
-        match told.and_then(|linear| Point::new(self.line.trial.clone(), linear, &self.domain)) {
+        match told.and_then(|linear| Point::new(self.line.trial.clone(), linear, &self.domain, &Seen::default())) {
             Some(next) if self.accepts(&point, &next) => self.go_on(next),
             next => {
                 self.line.failed += u64::from(next.is_none());

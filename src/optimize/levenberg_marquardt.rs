@@ -136,7 +136,7 @@ impl<S: Scaling> LevenbergMarquardt<S> {
         const TOLERANCE: f64 = 1e-4;
         let stop = Stop { step: TOLERANCE, gradient: TOLERANCE, ..self.stop };
         let stalled = |gradient, step| Outcome::Stalled { gradient, step, failed: 0 };
-        let point = Point::new(x.to_vec(), linear.clone(), domain);
+        let point = Point::new(x.to_vec(), linear.clone(), domain, &Seen::default());
         point.map_or(stalled(0.0, 0.0), |point| {
             point.ended(&stop).unwrap_or(stalled(point.cosine(), point.relative_step()))
         })
@@ -342,17 +342,17 @@ impl<S: Scaling> Machine for LevenbergMarquardt<S> {
         match (std::mem::take(&mut self.stage), self.point.take(), self.first.take()) {
             (Stage::Step(trial), Some(point), first) => {
                 self.first = first;
-                let next = told.and_then(|linear| Point::new(trial.x.clone(), linear, &self.domain));
+                let next = told.and_then(|linear| Point::new(trial.x.clone(), linear, &self.domain, &self.seen));
                 self.judge_trial(point, &trial, next);
             }
             (Stage::Explore(mut exploration), Some(point), first) => {
                 self.first = first;
                 let x = exploration.take();
-                let next = told.and_then(|linear| Point::new(x, linear, &self.domain));
+                let next = told.and_then(|linear| Point::new(x, linear, &self.domain, &self.seen));
                 self.judge_explored(point, exploration, next);
             }
             (stage, _, first) => {
-                let point = told.and_then(|linear| Point::new(self.x.clone(), linear, &self.domain));
+                let point = told.and_then(|linear| Point::new(self.x.clone(), linear, &self.domain, &self.seen));
                 self.arrive(stage, point, first);
             }
         }

@@ -41,16 +41,18 @@ const INSIDE: f64 = 1e-3;
 
 /// A logarithm whose quantity, all of it, changes the residual by less than this part has vanished.
 const VANISHED: f64 = 1e-9;
+/// A column whose norm has fallen below this part of the largest one has lost influence.
+const FADED: f64 = 0.1;
 
-/// Whether a logarithm with a column of this norm has lost its influence while the cost still falls along with it: the least cost is that
-/// without the quantity.
+/// Whether a logarithm with a column of this norm has no influence while the cost still falls along with it: the least cost may be that
+/// without the quantity. (Or it has none because the quantity is far too large: then its influence grows on the way down.)
 pub(crate) fn vanishes(norm: f64, gradient: f64, residual: f64) -> bool {
     gradient >= 0.0 && norm <= VANISHED * residual
 }
 
 impl Point {
-    /// `None` where cost or slopes are no finite numbers.
-    pub fn new(x: Vec<f64>, linear: Linearization, domain: &Domain) -> Option<Self> {
+    /// `None` where cost or slopes are no finite numbers. `seen` is what came before, if anything did.
+    pub fn new(x: Vec<f64>, linear: Linearization, domain: &Domain, seen: &Seen) -> Option<Self> {
         let (gradient, norms) = (linear.gradient(), linear.column_norms());
         if !linear.cost.is_finite() || gradient.iter().chain(&norms).any(|entry| !entry.is_finite()) {
             return None;
@@ -62,7 +64,8 @@ impl Point {
         let on_bound = |i: usize| limits[i].0 >= 0.0 && gradient[i] >= 0.0 || limits[i].1 <= 0.0 && gradient[i] <= 0.0;
         let residual = linear.sum_of_squares().sqrt();
         let is_logarithm = |i: usize| domain.logarithms.get(i) == Some(&true);
-        let gone = |i: usize| is_logarithm(i) && vanishes(norms[i], gradient[i], residual);
+        let has_faded = |i: usize| seen.norms.get(i).is_some_and(|largest| norms[i] < FADED * largest);
+        let gone = |i: usize| is_logarithm(i) && has_faded(i) && vanishes(norms[i], gradient[i], residual);
         let held: Vec<bool> = (0..x.len()).map(|i| norms[i] == 0.0 || on_bound(i) || gone(i)).collect();
         let damping: Vec<f64> = norms.iter().map(|norm| RANK * norm).collect();
         let full = linear.step_within(&damping, &held, &limits);
@@ -235,7 +238,7 @@ pub(crate) fn within_tolerance(
     domain: &Domain,
     noise: impl Fn(&[f64]) -> f64,
 ) -> Option<Outcome> {
-    let point = Point::new(x.to_vec(), linear, domain)?;
+    let point = Point::new(x.to_vec(), linear, domain, &Seen::default())?;
     let noise = noise(&point.towards(point.full.as_ref()?));
     // The relative difference is not finite where the cost is zero.
     let rough = Some(noise / point.cost_size()).filter(|part| part.is_finite()).map(|part| point.rough(part))?;

@@ -108,7 +108,7 @@ mod tests {
         let mut information = Information::new(3);
         information.absorb_row(&[1.0, 0.0, 0.0], 1.0);
         let linear = Linearization::new(0.5, 1, vec![information]);
-        let point = Point::new(vec![1.0; 3], linear, &Domain::default()).unwrap();
+        let point = Point::new(vec![1.0; 3], linear, &Domain::default(), &Seen::default()).unwrap();
         let (end, seen) = (Outcome::Converged { step: 0.0, gradient: 0.0 }, Seen::new(&[1.0; 3], &[None; 3]));
         let exploration = |outcome, unseen| {
             let exploration = Exploration::before_end(&point, outcome, &seen, unseen);

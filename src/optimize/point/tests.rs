@@ -11,7 +11,7 @@ pub fn linear(rows: &[(f64, f64)]) -> Linearization {
 }
 
 pub fn at(x: f64, linear: Linearization) -> Point {
-    Point::new(vec![x], linear, &Domain::default()).unwrap()
+    Point::new(vec![x], linear, &Domain::default(), &Seen::default()).unwrap()
 }
 
 /// Residuals 3, which a step of 3 takes away, and 4: the cost 12.5 would fall by 4.5.
@@ -30,7 +30,7 @@ fn steps_end_on_their_bounds() {
     for (x, bound) in [(0.2, 0.9), (-2.3, 2.4), (0.7, 0.1), (2.0, -0.4)] {
         assert_ne!(x + (bound - x), bound);
         let domain = Domain { bounds: vec![if bound > x { (-9.0, bound) } else { (bound, 9.0) }], ..Domain::default() };
-        let point = Point::new(vec![x], linear(&[(1.0, 1.0)]), &domain).unwrap();
+        let point = Point::new(vec![x], linear(&[(1.0, 1.0)]), &domain, &Seen::default()).unwrap();
         assert_eq!([point.towards(&[bound - x]), point.towards(&[3.0 * (bound - x)])], [vec![bound], vec![bound]]);
         assert_eq!(point.towards(&[0.5 * (bound - x)]), [x + 0.5 * (bound - x)]);
     }
@@ -44,7 +44,7 @@ fn what_its_bound_holds() {
     for (bound, residual, held) in [(below, 3.0, true), (above, 3.0, false), (below, -3.0, false), (above, -3.0, true)]
     {
         let domain = Domain { bounds: vec![bound], ..Domain::default() };
-        let point = Point::new(vec![0.0], linear(&[(1.0, residual)]), &domain).unwrap();
+        let point = Point::new(vec![0.0], linear(&[(1.0, residual)]), &domain, &Seen::default()).unwrap();
         assert_eq!((point.held[0], point.cosine()), (held, if held { 0.0 } else { 1.0 }), "{bound:?} {residual}");
     }
 }
@@ -111,7 +111,10 @@ fn a_search_without_a_lower_cost() {
 fn points_inside_of_a_bound() {
     let inside = |x: f64, bounds: (f64, f64), size: Option<f64>, slope: f64| {
         let domain = Domain { bounds: vec![bounds], ..Domain::default() };
-        Point::new(vec![x], linear(&[(slope, 1.0)]), &domain).unwrap().inside(&Seen::new(&[x], &[size])).concat()
+        Point::new(vec![x], linear(&[(slope, 1.0)]), &domain, &Seen::default())
+            .unwrap()
+            .inside(&Seen::new(&[x], &[size]))
+            .concat()
     };
     assert_eq!(inside(0.0, (0.0, 9.0), None, 0.0), [1e-3]);
     assert_eq!(inside(0.0, (-9.0, 0.0), None, 0.0), [-1e-3]);
@@ -138,7 +141,9 @@ fn a_direction_without_influence() {
     information.absorb_row(&[2.0, 4.0], 1.0);
     let linear = Linearization::new(0.5, 2, vec![information]);
     let of = |bounds: Vec<(f64, f64)>| {
-        Point::new(vec![1.0; 2], linear.clone(), &Domain { bounds, ..Domain::default() }).unwrap().without_influence()
+        Point::new(vec![1.0; 2], linear.clone(), &Domain { bounds, ..Domain::default() }, &Seen::default())
+            .unwrap()
+            .without_influence()
     };
     let (inside, lower, upper) = ((0.0, 9.0), (1.0, 9.0), (-9.0, 1.0));
     for found in [of(vec![]), of(vec![inside; 2])] {
@@ -176,4 +181,21 @@ fn a_full_step_within_the_tolerance() {
     assert!(matches!(end(near(), 0.0), Some(Outcome::Rough { noise: 0.0, errors }) if errors < 4e-4));
     // A cost of zero has no part.
     assert_eq!(within_tolerance(&[6.0], linear(&[(1.0, 0.0)]), &Domain::default(), |_| 1.0), None);
+}
+
+/// A logarithm is held where its column has shrunk to nothing and the cost falls along with it; not where the column has not
+/// shrunk, as on a plateau from which it grows, not where the cost rises, and nothing but a logarithm.
+#[test]
+fn a_logarithm_without_influence() {
+    let held = |slope: f64, largest: f64, residual: f64, logarithm: bool| {
+        let domain = Domain { logarithms: vec![logarithm], ..Domain::default() };
+        let mut seen = Seen::new(&[-20.0], &[Some(1.0)]);
+        seen.add(&[-20.0], &[largest]);
+        Point::new(vec![-20.0], linear(&[(slope, residual), (0.0, 1.0)]), &domain, &seen).unwrap().held[0]
+    };
+    assert!(held(0.9e-9, 1.0, -0.1, true));
+    assert!(!held(0.9e-9, 1.0, 0.1, true), "the cost rises");
+    assert!(!held(1.1e-9, 1.0, -0.1, true), "it has influence");
+    assert!(!held(0.9e-9, 0.9e-9, -0.1, true), "it has not shrunk");
+    assert!(!held(0.9e-9, 1.0, -0.1, false), "no logarithm");
 }
