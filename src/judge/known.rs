@@ -7,6 +7,7 @@ use super::warnings::care;
 use crate::estimate::{Knowledge, Unknown, Warning, WarningCode};
 use crate::numeral::{exact, number};
 use crate::optimize::Severity;
+use crate::parameter::Prior;
 use crate::problem::Role;
 
 /// A parameter so many times its start, or one such part of it, is in another unit.
@@ -23,6 +24,16 @@ fn holds_zero(unknown: &Unknown) -> bool {
         Knowledge::Known { lower, upper, .. } => upper - lower >= 2.0 * unknown.value.abs(),
         _ => false,
     }
+}
+
+/// Whether the data tell an unknown from zero without its prior. What they say of it alone follows from both, as precisions add up.
+fn told_by_data(unknown: &Unknown, prior: Prior) -> bool {
+    let Knowledge::Known { standard_error, lower, upper } = unknown.knowledge else { return false };
+    let (both, before) = (standard_error.powi(-2), prior.std.powi(-2));
+    let alone = both - before;
+    let value = (both * unknown.value - before * prior.mean) / alone;
+    let quantile = 0.5 * (upper - lower) / standard_error;
+    alone > 0.0 && value.abs() > quantile / alone.sqrt()
 }
 
 impl Judgement<'_> {
@@ -55,16 +66,16 @@ impl Judgement<'_> {
     /// Parameters that cannot be told from zero.
     fn near_zero(&self, unknowns: &[Unknown]) -> Option<Warning> {
         let rows = &self.objective.problem.unknowns.row;
-        let own = |(i, unknown): &(usize, &Unknown)| {
-            matches!(unknown.role, Role::Parameter(_)) && rows[*i].parameter.prior.is_none()
-        };
-        let parameters: Vec<&Unknown> = unknowns.iter().enumerate().filter(own).map(|(_, unknown)| unknown).collect();
-        let unknown: Vec<&&Unknown> = parameters.iter().filter(|unknown| holds_zero(unknown)).collect();
+        let parameters = || unknowns.iter().zip(rows).filter(|(unknown, _)| matches!(unknown.role, Role::Parameter(_)));
+        let without_prior = parameters().filter(|(_, row)| row.parameter.prior.is_none()).map(|(unknown, _)| unknown);
+        let unknown: Vec<&Unknown> = without_prior.filter(|unknown| holds_zero(unknown)).collect();
         if unknown.is_empty() {
             return None;
         }
-        let nothing = |unknown: &&Unknown| holds_zero(unknown) || unknown.knowledge == Knowledge::Unidentified;
-        let all = parameters.iter().all(nothing);
+        let all = parameters().all(|(unknown, row)| match row.parameter.prior {
+            Some(prior) => !told_by_data(unknown, prior),
+            None => holds_zero(unknown) || unknown.knowledge == Knowledge::Unidentified,
+        });
         let names = listed(unknown.iter().map(|unknown| unknown.name.as_str()));
         let text = match all {
             false => format!(
@@ -168,6 +179,20 @@ mod tests {
         assert!(
             opposite(&[unknown(-2.0, 1.0, 4.0)]).is_empty() && far_from_start(&[unknown(2e3, 1.0, 4e3)]).is_empty()
         );
+    }
+
+    /// Prior 3 +- 1 and data 2 +- 0.5 make 2.2 +- 0.447: the data alone tell it from zero where their interval is below 2 wide to either
+    /// side, at a quantile below 4. Errors no smaller than the prior's are the prior's.
+    #[test]
+    fn what_the_data_say_without_the_prior() {
+        let error = 0.2f64.sqrt();
+        let told = |quantile: f64, error: f64| {
+            let (lower, upper) = (2.2 - quantile * error, 2.2 + quantile * error);
+            let knowledge = Knowledge::Known { standard_error: error, lower, upper };
+            told_by_data(&Unknown { knowledge, ..unknown(2.2, 1.0, 1.0) }, Prior { mean: 3.0, std: 1.0 })
+        };
+        assert!(told(3.99, error) && !told(4.01, error));
+        assert!(!told(1e-6, 1.0) && !told(1e-6, 1.1));
     }
 
     /// More than 400 times the start or less than a 400th of it; a start of zero says nothing, nor does a value not known.
