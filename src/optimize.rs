@@ -18,7 +18,7 @@ pub use levenberg_marquardt::LevenbergMarquardt;
 pub use linearization::Linearization;
 pub use machine::{Domain, Machine, Request};
 pub use outcome::{Outcome, Severity};
-pub(crate) use point::{vanishes, within_tolerance};
+pub(crate) use point::{is_negligible, within_tolerance};
 
 use crate::error::Error;
 use serde::{Deserialize, Serialize};
@@ -58,8 +58,8 @@ pub trait LeastSquares {
         Vec::new()
     }
 
-    /// Which unknowns are logarithms. Where the data want no such quantity at all, its logarithm has no minimum: it is left where its
-    /// influence has vanished. None, unless said otherwise.
+    /// Which unknowns are logarithms. Where the cost is least without such a quantity, its logarithm has no minimum and is held where
+    /// its influence has become negligible. None, unless said otherwise.
     fn logarithms(&self) -> Vec<bool> {
         Vec::new()
     }

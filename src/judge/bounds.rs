@@ -11,16 +11,17 @@ use crate::information::Undetermined;
 use crate::optimize::Linearization;
 
 /// Which unknowns remain held, of those at bounds and those held for null directions, and the step from the estimate to
-/// that without the bounds of the others. `unit` is the spread of an unknown whose variance is one.
+/// that without the bounds of the others. Slopes tell nothing of what is beyond for those that are `flat`. `unit` is the spread of
+/// an unknown whose variance is one.
 pub(super) fn released(
     linear: &Linearization,
     found: &Undetermined,
     at_bounds: &[bool],
+    flat: &[bool],
     unit: Spread,
 ) -> (Vec<bool>, Vec<f64>) {
     let none = vec![0.0; at_bounds.len()];
-    let norms = linear.column_norms();
-    let mut kept: Vec<bool> = at_bounds.iter().zip(&norms).map(|(at, norm)| *at && *norm == 0.0).collect();
+    let mut kept: Vec<bool> = at_bounds.iter().zip(flat).map(|(at, flat)| *at && *flat).collect();
     // Each round holds one more at least.
     while kept != at_bounds {
         let free = undetermined(linear, &kept);

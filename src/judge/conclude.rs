@@ -13,7 +13,7 @@ use crate::estimate::{
 };
 use crate::information::{Covariance, Undetermined};
 use crate::layout::Quantity;
-use crate::optimize::{LeastSquares, Linearization, Outcome, vanishes};
+use crate::optimize::{LeastSquares, Linearization, Outcome, is_negligible};
 use crate::parameter::Transform;
 use crate::problem::{Memory, Noise, Objective, Role, Whitening};
 
@@ -21,6 +21,19 @@ use crate::problem::{Memory, Noise, Objective, Role, Whitening};
 const ROUNDING: f64 = 0.1;
 /// Significance level of the whiteness test.
 pub(super) const WHITENESS_LEVEL: f64 = 0.01;
+
+/// Whether the cost rises as the slopes of a logarithm say when its quantity grows from next to zero until it changes the errors by one
+/// standard deviation, to half of that rise. Not so where the quantity enters as a square, as noise levels do: slopes next to zero then
+/// say nothing of its size.
+fn is_proportional(objective: &Objective<'_>, coordinates: &[f64], linear: &Linearization, i: usize) -> bool {
+    let (norm, gradient) = (linear.column_norms()[i], linear.gradient()[i]);
+    let times = (linear.sum_of_squares() / linear.rows().max(1) as f64).sqrt() / norm;
+    let rise = times * (gradient + 0.5 * norm * norm * times);
+    let mut grown = coordinates.to_vec();
+    grown[i] += times.ln_1p();
+    let costs = objective.cost_at(coordinates).ok().zip(objective.cost_at(&grown).ok());
+    costs.is_some_and(|(here, there)| (there - here - rise).abs() <= 0.5 * rise)
+}
 
 /// The end of a search.
 #[derive(Clone)]
@@ -166,11 +179,10 @@ impl<'j> Judgement<'j> {
         };
         let residual = linear.sum_of_squares().sqrt();
         let (starts, logarithms) = (unknowns.start(), objective.logarithms());
-        let gone = |i: usize| {
-            let shrank = logarithms[i] && coordinates[i] < starts[i];
-            (shrank && vanishes(norms[i], gradient[i], residual)).then_some(0.0)
-        };
-        let held_at: Vec<Option<f64>> = (0..n).map(|i| at_bound(i).or(gone(i))).collect();
+        let negligible =
+            |i: usize| logarithms[i] && coordinates[i] < starts[i] && is_negligible(norms[i], gradient[i], residual);
+        let held_at: Vec<Option<f64>> = (0..n).map(|i| at_bound(i).or(negligible(i).then_some(0.0))).collect();
+        let flat = |i: usize| norms[i] == 0.0 || negligible(i) && !is_proportional(objective, coordinates, linear, i);
         let at_bounds: Vec<bool> = held_at.iter().map(Option::is_some).collect();
         let undetermined = directions::undetermined(linear, &at_bounds);
         let values = unknowns.values(coordinates);
@@ -187,8 +199,9 @@ impl<'j> Judgement<'j> {
             }
             _ => (measured as f64 / degrees.max(1.0)).sqrt(),
         };
+        let flat: Vec<bool> = (0..n).map(flat).collect();
         let (exact, release) =
-            bounds::released(linear, &undetermined, &at_bounds, Spread { standard_error: widening, degrees });
+            bounds::released(linear, &undetermined, &at_bounds, &flat, Spread { standard_error: widening, degrees });
         let sigma = objective.whitening.sigma();
         let below = |(fit, sigma): (&crate::estimate::OutputFit, &f64)| fit.rmse < ROUNDING * sigma;
         let rounding = matches!(noise, Noise::Given(_)) && residuals.outputs.iter().zip(&sigma).all(below);

@@ -51,7 +51,7 @@ impl Judgement<'_> {
                 let Unknown { name, unit, .. } = unknown;
                 let place = match (unknown.transform, bound) {
                     (Transform::Log, 0.0) => {
-                        "is left where it changes nothing: its logarithm has no minimum, the data want none of it"
+                        "is held where it changes nothing: its logarithm has no minimum, the cost falls towards zero"
                             .to_owned()
                     }
                     _ => format!("is held at its bound {} {unit}: the cost falls beyond it", exact(bound)),

@@ -39,15 +39,16 @@ const BESIDE: f64 = 1e-2;
 /// How far inside its bound an unknown without slopes is tried, as a part of its size.
 const INSIDE: f64 = 1e-3;
 
-/// A logarithm whose quantity, all of it, changes the residual by less than this part has vanished.
-const VANISHED: f64 = 1e-9;
-/// A column whose norm has fallen below this part of the largest one has lost influence.
-const FADED: f64 = 0.1;
+/// A quantity that changes the residual by less than this part is negligible: it moves no other unknown by more than about so many
+/// standard errors times the root of the number of measurements.
+const NEGLIGIBLE: f64 = 1e-9;
+/// A column has shrunk if its norm is below this part of the largest one. On a plateau where the quantity is far too large, norms grow
+/// on the way down and never are.
+const SHRUNK: f64 = 0.1;
 
-/// Whether a logarithm with a column of this norm has no influence while the cost still falls along with it: the least cost may be that
-/// without the quantity. (Or it has none because the quantity is far too large: then its influence grows on the way down.)
-pub(crate) fn vanishes(norm: f64, gradient: f64, residual: f64) -> bool {
-    gradient >= 0.0 && norm <= VANISHED * residual
+/// Whether the quantity behind a logarithm with a column of this norm is negligible, while the cost still falls along with it.
+pub(crate) fn is_negligible(norm: f64, gradient: f64, residual: f64) -> bool {
+    gradient >= 0.0 && norm <= NEGLIGIBLE * residual
 }
 
 impl Point {
@@ -64,9 +65,9 @@ impl Point {
         let on_bound = |i: usize| limits[i].0 >= 0.0 && gradient[i] >= 0.0 || limits[i].1 <= 0.0 && gradient[i] <= 0.0;
         let residual = linear.sum_of_squares().sqrt();
         let is_logarithm = |i: usize| domain.logarithms.get(i) == Some(&true);
-        let has_faded = |i: usize| seen.norms.get(i).is_some_and(|largest| norms[i] < FADED * largest);
-        let gone = |i: usize| is_logarithm(i) && has_faded(i) && vanishes(norms[i], gradient[i], residual);
-        let held: Vec<bool> = (0..x.len()).map(|i| norms[i] == 0.0 || on_bound(i) || gone(i)).collect();
+        let has_shrunk = |i: usize| seen.norms.get(i).is_some_and(|largest| norms[i] < SHRUNK * largest);
+        let negligible = |i: usize| is_logarithm(i) && has_shrunk(i) && is_negligible(norms[i], gradient[i], residual);
+        let held: Vec<bool> = (0..x.len()).map(|i| norms[i] == 0.0 || on_bound(i) || negligible(i)).collect();
         let damping: Vec<f64> = norms.iter().map(|norm| RANK * norm).collect();
         let full = linear.step_within(&damping, &held, &limits);
         let potential = full.as_ref().map_or(f64::INFINITY, |step| linear.predicted_reduction(step));

@@ -5,7 +5,8 @@ use crate::random::Random;
 use greybox::diagnose::{bands, identifiability};
 use greybox::optimize::Severity;
 use greybox::{
-    Experiment, ExperimentOf, Fit, Kalman, Kind, Model, Parameter, Report, Scalar, Time, fixed, free, signals,
+    Experiment, ExperimentOf, Fit, Kalman, Kind, Knowledge, Model, Parameter, Report, Scalar, Time, fixed, free,
+    signals,
 };
 
 signals! { pub struct Level { x: "V" } }
@@ -36,6 +37,40 @@ impl Model for Drifting {
     fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Drive<S>, _p: &Unsteady<S>) -> Sensor<S> {
         Sensor { y: x.x }
     }
+}
+
+/// A drift that is zero: its variance is a square, whose slopes at zero say nothing. By logarithm it has no end, and all else is known as
+/// with the drift at a bound of zero.
+#[test]
+fn a_drift_that_is_zero_by_logarithm_and_by_bound() {
+    let (mut random, mut x, mut inputs, mut outputs, mut held) = (Random(3), 0.0, vec![], vec![], 0);
+    for k in 0..1200 {
+        let u = if k / 50 % 2 == 0 { 1.0 } else { -1.0 };
+        inputs.push(Drive { u });
+        outputs.push(Sensor { y: x + 0.2 * random.normal() });
+        x = 0.9 * x + u;
+    }
+    let record = Experiment::new(&Drifting, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+    for piece in (0..6).map(|i| record.slice(200 * i..200 * (i + 1)).unwrap()) {
+        let fit = |drift: Parameter| {
+            let parameters = Unsteady { decay: free(0.8), drift, noise: free(0.5) };
+            Fit::new(&Drifting, &piece).parameters(parameters).predictor(Kalman).run().unwrap()
+        };
+        let (logarithm, bound) = (fit(free(0.3).log()), fit(free(0.3).within(0.0, f64::INFINITY)));
+        if matches!(bound.knowledge.drift, Knowledge::Held { .. }) {
+            held += 1;
+            assert_eq!(logarithm.knowledge.drift, Knowledge::Held { bound: 0.0, end: None }, "{logarithm}");
+            let (Knowledge::Known { lower, upper, .. }, Knowledge::Known { lower: low, upper: high, standard_error }) =
+                (logarithm.knowledge.decay, bound.knowledge.decay)
+            else {
+                panic!("{logarithm}{bound}");
+            };
+            let off = (lower - low).abs().max((upper - high).abs()) / standard_error;
+            println!("{off}");
+            assert!(off < 1e-3, "{logarithm}{bound}");
+        }
+    }
+    assert!(held >= 2, "{held}");
 }
 
 /// Three of four samples are not measured in the second half.

@@ -49,8 +49,8 @@ fn a_positive_parameter_that_is_not_makes_the_estimate_unusable() {
     }
 }
 
-/// A logarithm of what the data want below zero: its quantity shrinks until it changes nothing, and the answer is that with a bound at
-/// zero, up to what the quantity still changes: a part of 1e-9 of the errors. The interval reaches from zero, too.
+/// The logarithm of a quantity whose least cost is below zero: the quantity shrinks until it is negligible, and the answer is that with a
+/// bound at zero, up to what the quantity still changes: a part of 1e-9 of the errors. The interval reaches from zero, too.
 #[test]
 fn a_logarithm_that_vanishes_is_a_bound_at_zero() {
     let record = record(-0.05);
