@@ -23,6 +23,7 @@ mod residual_pass;
 mod sandwich;
 mod shape;
 mod shares;
+mod sizes;
 mod starts;
 mod step_error;
 mod sums;

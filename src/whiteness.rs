@@ -202,26 +202,6 @@ impl Portmanteau {
         errors * part.min(1.0).powi(2)
     }
 
-    /// The probability that independent errors of one distribution are followed by errors of like size as much as these are, over
-    /// lags `1..=lags`: the autocorrelations of their squares have a variance of one over the number of errors each (McLeod and Li,
-    /// J. Time Series Analysis 4 (1983) 269); their sum is positive where the size changes slowly. Measurements that are missing lower
-    /// it.
-    pub fn like_sizes_p_value(&self, lags: usize) -> f64 {
-        let (errors, sums) = (self.neighbors.errors as f64, &self.errors);
-        let mean = sums.sums[0] / errors;
-        let variance = sums.squares[0] / errors - mean * mean;
-        let later = sums.squares.iter().zip(0..).skip(1).take(lags);
-        let covariance: f64 =
-            later.map(|(square, lag)| square / errors - (1.0 - f64::from(lag) / errors) * mean * mean).sum();
-        let standardized = covariance / variance * (errors / lags as f64).sqrt();
-        // Errors of one size have the variance of rounding.
-        if standardized > 0.0 && variance > 1e-9 * mean * mean {
-            0.5 * chi_squared_tail(standardized * standardized, 1.0)
-        } else {
-            1.0
-        }
-    }
-
     /// The probability that errors without correlation agree, or disagree, as often in sign with the error before, or that
     /// they have as large a correlation with it: the larger of both. Where noise changes much in size, signs alone show what
     /// an estimate is off by where there is little noise.

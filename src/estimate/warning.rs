@@ -76,6 +76,8 @@ pub enum WarningCode {
     CurvedInterval,
     /// One or two measurements decide an interval.
     DecidedByFew,
+    /// Errors that are larger, or smaller, where an unknown is determined.
+    UnevenErrors,
     /// Noise in the measured states from which predictions restart.
     RestartNoise,
     /// Noise declared for the inputs, which biases the estimate.

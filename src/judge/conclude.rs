@@ -245,7 +245,7 @@ impl<'j> Judgement<'j> {
     }
 
     /// Whether there is noise to tell the accuracy by: given, or measured. Where no output moves, errors are numbers next to the smallest.
-    fn has_noise(&self) -> bool {
+    pub(super) fn has_noise(&self) -> bool {
         let given = matches!(self.objective.problem.settings.noise, Noise::Given(_) | Noise::Predicted);
         self.degrees > 0.0 && (given || self.residuals.levels.iter().any(|(_, moves)| *moves > 0.0))
     }

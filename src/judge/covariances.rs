@@ -3,24 +3,26 @@
 use super::conclude::{Judgement, WHITENESS_LEVEL};
 use super::hac::hac;
 use super::predicted::Dependence;
-use super::sandwich;
+use super::sandwich::{self, Robust};
 use super::shares::Largest;
+use super::sizes::{Sizes, Uneven};
 use crate::estimate::CovarianceMethod;
+use crate::estimate::student::Spread;
 use crate::information::Covariance;
 use crate::layout::Kind;
+use crate::optimize::Outcome;
 use crate::problem::{Noise, Whitening};
 use crate::record::Time;
 
-/// Below this number of measurements the covariance is the classical one, whether the errors are autocorrelated or not.
+/// Below this number of measurements the covariance is the classical one, whether the errors are autocorrelated, or of one size, or not.
 const CORRELATED_SAMPLES: u64 = 12;
 /// Records of up to so many measurements are tested for color at this level before their intervals are made: the tests see little
 /// there, and white errors that are taken as colored lose nothing (docs/intervals.md).
 const SHORT: u64 = 1_000;
 const SHORT_LEVEL: f64 = 0.05;
-/// Below this number of measurements errors are not tested for changing size.
-const SIZED_SAMPLES: u64 = 100;
-/// Level of the test for errors of changing size, over all outputs.
-const LIKE_SIZES_LEVEL: f64 = 0.01;
+
+/// Probability by which the lengths of intervals are compared.
+const LEVEL: f64 = 0.95;
 
 /// The covariance of the unknowns in their own units, how it was made, and that of unit noise in coordinates.
 pub(super) struct Covariances {
@@ -33,6 +35,8 @@ pub(super) struct Covariances {
     pub own: Vec<f64>,
     /// The largest shares of measurements in the variances, if they were summed on the way.
     pub shares: Option<Vec<Largest>>,
+    /// The unknown for which noise that was estimated as of one size is of another.
+    pub uneven: Option<Uneven>,
 }
 
 /// A covariance in coordinates.
@@ -42,23 +46,24 @@ struct CoordinateCovariance {
     factor: f64,
     degrees: Vec<f64>,
     shares: Option<Vec<Largest>>,
+    uneven: Option<Uneven>,
 }
 
 impl Judgement<'_> {
     pub(super) fn covariances(&self) -> Covariances {
         let unit = self.linear.covariance(&self.exact);
         let found = self.takes_color().then(|| self.for_colored_errors(unit.as_ref()?)).flatten();
-        let CoordinateCovariance { covariance, method, factor, degrees, shares } =
+        let CoordinateCovariance { covariance, method, factor, degrees, shares, uneven } =
             found.unwrap_or_else(|| self.for_white_errors(&unit));
         let seen = self.seen().into_iter().zip(&self.slopes);
         let in_units: Vec<f64> = seen.map(|(seen, slope)| if seen { *slope } else { 0.0 }).collect();
         let unknowns = covariance.map(|covariance| covariance.times(factor).scaled(&in_units));
         let dependence = unit.as_ref().and_then(|unit| self.dependence_of_variances(unit));
         let Some(Dependence { degrees: most, own }) = dependence else {
-            return Covariances { unknowns, method, unit, degrees, own: vec![], shares };
+            return Covariances { unknowns, method, unit, degrees, own: vec![], shares, uneven };
         };
         let degrees = degrees.iter().zip(most).map(|(degrees, most)| degrees.min(most)).collect();
-        Covariances { unknowns, method, unit, degrees, own, shares }
+        Covariances { unknowns, method, unit, degrees, own, shares, uneven }
     }
 
     /// Whether the intervals allow for colored errors.
@@ -74,46 +79,71 @@ impl Judgement<'_> {
     fn for_colored_errors(&self, unit: &Covariance) -> Option<CoordinateCovariance> {
         let hac = hac(self.objective, &self.end.coordinates, self.linear, (&self.exact, unit))?;
         let degrees = hac.degrees(self.objective, unit);
-        let covariance = Some(hac.covariance(&self.exact, &degrees, self.coupled().is_some())?);
-        let degrees = degrees.into_iter().map(|degrees| degrees.min(self.degrees));
+        let covariance = hac.covariance(&self.exact, &degrees, self.coupled().is_some())?;
+        let mut degrees: Vec<f64> = degrees.into_iter().map(|degrees| degrees.min(self.degrees)).collect();
+        let differ = |sizes: &Sizes| self.takes_one_size() && sizes.differ(&self.exact);
+        let covariance = match hac.sizes.as_ref().is_some_and(differ) {
+            true => self.no_less_than_for_white_errors(covariance, &mut degrees),
+            false => covariance,
+        };
         let method = CovarianceMethod::Hac { lags: hac.lags as u64 };
-        Some(CoordinateCovariance { covariance, method, factor: 1.0, degrees: degrees.collect(), shares: hac.shares })
+        // That the squares of colored errors are correlated is not allowed for in the test: nothing is said.
+        let (covariance, shares, uneven) = (Some(covariance), hac.shares, None);
+        Some(CoordinateCovariance { covariance, method, factor: 1.0, degrees, shares, uneven })
+    }
+
+    /// Of errors that are larger where an unknown is determined: stationary ones have too small a standard error there, and moving sums
+    /// seldom certainly a larger one. No interval is to be shorter than that of independent errors of any size.
+    fn no_less_than_for_white_errors(&self, covariance: Covariance, degrees: &mut [f64]) -> Covariance {
+        let found = sandwich::sandwich(self.objective, &self.end.coordinates, &self.exact);
+        let Ok(Robust { covariance: Some(white), degrees: own, .. }) = found else { return covariance };
+        let mut factors = vec![1.0; degrees.len()];
+        for (i, (factor, degrees)) in factors.iter_mut().zip(degrees).enumerate() {
+            let own = Spread { standard_error: white.standard_error(i), degrees: own[i].min(self.degrees) };
+            let found = Spread { standard_error: covariance.standard_error(i), degrees: *degrees };
+            if own.reach(LEVEL) > found.reach(LEVEL) && found.standard_error > 0.0 {
+                (*factor, *degrees) = (own.standard_error / found.standard_error, own.degrees);
+            }
+        }
+        covariance.scaled(&factors)
     }
 
     fn for_white_errors(&self, unit: &Option<Covariance>) -> CoordinateCovariance {
         let (objective, x) = (self.objective, &self.end.coordinates);
-        let (weights, degrees) = self.estimated_weights();
+        let (factor, degrees) = self.estimated_weights();
         let degrees = vec![degrees; self.slopes.len()];
-        if sandwich::is_needed(objective) || self.coupled().is_some() || self.changes_size() || self.spans_differ() {
+        let tested = unit.as_ref().filter(|_| self.takes_one_size()).and_then(|unit| self.shares(unit));
+        let uneven = tested.as_ref().and_then(|(_, sizes)| sizes.uneven(&self.exact));
+        // Of models without states it is only said: classical standard errors are what certified ones are compared with.
+        let differ = |(_, sizes): &(Vec<Largest>, Sizes)| sizes.differ(&self.exact);
+        let sized = objective.problem.layout().kind != Kind::Static && tested.as_ref().is_some_and(differ);
+        let shares = tested.map(|(shares, _)| shares);
+        if sandwich::is_needed(objective) || self.coupled().is_some() || sized || self.spans_differ() {
             let filtered = objective.problem.settings.prefilter.is_some();
             let method = if filtered { CovarianceMethod::FilteredSandwich } else { CovarianceMethod::Sandwich };
-            let found = sandwich::sandwich(objective, x, &self.exact).ok().flatten();
-            let (covariance, shares) = found.map_or((None, None), |(covariance, shares)| (Some(covariance), shares));
-            return CoordinateCovariance { covariance, method, factor: weights, degrees, shares };
+            let none = Robust { covariance: None, shares: None, degrees: vec![f64::INFINITY; degrees.len()] };
+            let found = sandwich::sandwich(objective, x, &self.exact).ok().unwrap_or(none);
+            let degrees = degrees.iter().zip(found.degrees).map(|(most, own)| own.min(*most)).collect();
+            let Robust { covariance, shares, .. } = found;
+            return CoordinateCovariance { covariance, method, factor, degrees, shares, uneven };
         }
         let method = CovarianceMethod::Classical;
         // The widening applies to the errors, not to the priors.
         if self.widening != 1.0 && objective.problem.unknowns.priors(x).next().is_some() {
             let widened = objective.with(objective.whitening.widened(self.widening));
             let covariance = widened.evaluate(x).ok().and_then(|linear| linear.covariance(&self.exact));
-            return CoordinateCovariance { covariance, method, factor: weights, degrees, shares: None };
+            return CoordinateCovariance { covariance, method, factor, degrees, shares, uneven };
         }
-        CoordinateCovariance {
-            covariance: unit.clone(),
-            method,
-            factor: weights * self.widening * self.widening,
-            degrees,
-            shares: None,
-        }
+        let factor = factor * self.widening * self.widening;
+        CoordinateCovariance { covariance: unit.clone(), method, factor, degrees, shares, uneven }
     }
 
-    /// Whether noise that is estimated changes in size along the record: the classical covariance takes it to be of one variance. Where
-    /// there are no states, the order of the samples means nothing.
-    fn changes_size(&self) -> bool {
-        let (whiteness, problem) = (&self.residuals.whiteness, self.objective.problem);
-        let tested = matches!(problem.settings.noise, Noise::PerOutput) && problem.layout().kind != Kind::Static;
-        let least = whiteness.iter().map(|white| white.like_sizes).fold(1.0, f64::min);
-        tested && self.residuals.measured >= SIZED_SAMPLES && least * (whiteness.len() as f64) < LIKE_SIZES_LEVEL
+    /// Whether the classical covariance takes noise that is estimated to be of one size per output.
+    fn takes_one_size(&self) -> bool {
+        let objective = self.objective;
+        let estimated = matches!(objective.problem.settings.noise, Noise::PerOutput | Noise::Covariance);
+        let exact = self.rounding || self.end.outcome == Outcome::Exact || !self.has_noise();
+        estimated && !exact && !sandwich::is_needed(objective) && self.residuals.measured >= CORRELATED_SAMPLES
     }
 
     /// Whether errors are those of predictions ahead over intervals that are not equal: what disturbs the plant grows with them.

@@ -20,6 +20,7 @@ mod stationary;
 
 use super::sandwich::{self, Sandwich};
 use super::shares::Largest;
+use super::sizes::Sizes;
 use crate::information::{Covariance, Information};
 use crate::optimize::Linearization;
 use crate::problem::{Objective, each};
@@ -45,6 +46,8 @@ pub(crate) struct Hac {
     stationary: Option<Sandwich>,
     /// The largest shares of measurements in the variances of white errors.
     pub(super) shares: Option<Vec<Largest>>,
+    /// The sizes of the errors that have them.
+    pub(super) sizes: Option<Sizes>,
     pub lags: usize,
     runs: Vec<LongRun>,
 }
@@ -77,11 +80,14 @@ pub(crate) fn hac(
         scores
     };
     let stationary = stationary::scores(objective, coordinates, inverse).ok()?;
-    let (stationary, shares) = stationary.map_or((None, None), |(scores, shares)| (Some(scores), Some(shares)));
+    let (stationary, shares, sizes) = match stationary {
+        Some((scores, shares, sizes)) => (Some(scores), Some(shares), Some(sizes)),
+        None => (None, None, None),
+    };
     let stationary = stationary.map(|scores| found.with(with_priors(scores)));
     let scores = runs.iter().enumerate().map(|(e, run)| run.triangle(unknowns.columns(e).count())).collect();
     let lags = runs.iter().map(|run| run.window.saturating_sub(1)).max().unwrap_or(0);
-    Some(Hac { sandwich: found.with(with_priors(scores)), stationary, shares, lags, runs })
+    Some(Hac { sandwich: found.with(with_priors(scores)), stationary, shares, sizes, lags, runs })
 }
 
 impl Hac {

@@ -26,8 +26,15 @@ pub(super) const ALONE: f64 = 1e-6;
 /// Rows that are absorbed together.
 const ROWS: usize = 256;
 
-/// A covariance, and the largest shares in the variances, which a pre-filter has none of.
-pub(super) type WithShares = (Covariance, Option<Vec<Largest>>);
+/// A sandwich covariance.
+pub(super) struct Robust {
+    /// `None` if it has no number.
+    pub covariance: Option<Covariance>,
+    /// The largest shares in the variances, which a pre-filter has none of.
+    pub shares: Option<Vec<Largest>>,
+    /// Degrees of freedom of the variance of each unknown, infinite where they are not examined.
+    pub degrees: Vec<f64>,
+}
 
 /// Curvature of the cost and triangles of the scores, a pair per experiment.
 #[derive(Clone)]
@@ -103,12 +110,8 @@ pub(crate) fn is_needed(objective: &Objective<'_>) -> bool {
     objective.is_weighted() || objective.problem.settings.prefilter.is_some() || objective.is_robust()
 }
 
-/// The sandwich over all unknowns that are not held, in two more passes with slopes; `None` if it has no number.
-pub(super) fn sandwich(
-    objective: &Objective<'_>,
-    coordinates: &[f64],
-    held: &[bool],
-) -> Result<Option<WithShares>, Infeasible> {
+/// The sandwich over all unknowns that are not held, in two more passes with slopes.
+pub(super) fn sandwich(objective: &Objective<'_>, coordinates: &[f64], held: &[bool]) -> Result<Robust, Infeasible> {
     Passes { objective, coordinates }.sandwich(held)
 }
 
@@ -135,24 +138,30 @@ struct Passes<'p> {
 }
 
 impl Passes<'_> {
-    fn sandwich(&self, held: &[bool]) -> Result<Option<WithShares>, Infeasible> {
+    fn sandwich(&self, held: &[bool]) -> Result<Robust, Infeasible> {
         let (sandwich, tally) = self.without_scores()?;
-        let Some(inverse) = sandwich.bread.covariance(held) else { return Ok(None) };
-        let (mut scores, scale, largest) = match &self.objective.problem.settings.prefilter {
+        let degrees = vec![f64::INFINITY; held.len()];
+        let Some(inverse) = sandwich.bread.covariance(held) else {
+            return Ok(Robust { covariance: None, shares: None, degrees });
+        };
+        let (mut scores, scale, shares, degrees) = match &self.objective.problem.settings.prefilter {
             Some(filter) => {
                 let (scores, scale) = self.filtered_scores(&inverse, filter, &tally)?;
-                (scores, scale, None)
+                (scores, scale, None, degrees)
             }
             None => {
-                let (scores, largest) = self.scores(&inverse, tally.noise())?;
-                (scores, 1.0, Some(largest))
+                let all = self.scores(&inverse, tally.noise())?;
+                let largest = shares::of_all(self.objective, all.iter().map(|one| &one.shares));
+                let degrees = scores::degrees(self.objective, &all);
+                (all.into_iter().map(|one| one.scores).collect(), 1.0, Some(largest), degrees)
             }
         };
         for (i, slope, _) in self.objective.problem.unknowns.priors(self.coordinates) {
             let e = self.objective.problem.unknowns.row[i].experiment.unwrap_or(0);
             scores[e].absorb_row(&prior_row(self.objective, e, i, slope / scale.sqrt()), 0.0);
         }
-        Ok(Sandwich { scores, scale, ..sandwich }.covariance(held).map(|covariance| (covariance, largest)))
+        let covariance = Sandwich { scores, scale, ..sandwich }.covariance(held);
+        Ok(Robust { covariance, shares, degrees })
     }
 
     /// The curvature for the weights and the loss of this fit, in one pass with slopes; its scores are still missing.
@@ -184,19 +193,15 @@ impl Passes<'_> {
         Ok((Sandwich { bread, scores: vec![], curvature, scale: 1.0 }, tally))
     }
 
-    /// The triangle of each experiment's scores, sample by sample, and the largest shares of the unknowns; with the variance of
-    /// all errors.
-    fn scores(&self, inverse: &Covariance, noise: f64) -> Result<(Vec<Information>, Vec<Largest>), Infeasible> {
+    /// The scores of each experiment, with the variance of all errors.
+    fn scores(&self, inverse: &Covariance, noise: f64) -> Result<Vec<Scores<'_>>, Infeasible> {
         let make = |experiment: usize| {
             let shares = Shares::new(experiment, of_experiment(self.objective, inverse, experiment));
-            let columns = self.objective.problem.unknowns.columns(experiment).count();
-            let (scores, block) = (Information::new(columns), Block::new(columns, ROWS));
-            Scores { objective: self.objective, experiment, shares, noise, scores, block, row: vec![0.0; columns] }
+            Scores::new(self.objective, experiment, shares, noise)
         };
         let mut all = self.objective.gather(self.coordinates, true, make)?;
-        all.iter_mut().for_each(|one| one.scores.absorb(&mut one.block));
-        let largest = shares::of_all(self.objective, all.iter().map(|one| &one.shares));
-        Ok((all.into_iter().map(|one| one.scores).collect(), largest))
+        all.iter_mut().for_each(Scores::complete);
+        Ok(all)
     }
 
     /// The triangle of each experiment's scores where a filter correlated white errors, and the factor for all of them

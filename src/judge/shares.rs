@@ -7,8 +7,10 @@
 
 use super::conclude::Judgement;
 use super::covariances::Covariances;
-use super::sandwich::of_experiment;
+use super::sandwich::{ALONE, of_experiment};
+use super::sizes::Sizes;
 use crate::estimate::{CovarianceMethod, Unknown, Warning, WarningCode};
+use crate::information::Covariance;
 use crate::numeral::{exact, percent};
 use crate::optimize::{Outcome, Severity};
 use crate::problem::{Accumulate, Objective, Role};
@@ -54,19 +56,23 @@ impl Largest {
     }
 }
 
-/// The largest shares of the unknowns of one experiment.
+/// The largest shares of the unknowns of one experiment, and the sizes of the errors that have them.
 pub(super) struct Shares {
     experiment: usize,
     inverse: DMatrix<f64>,
     moved: Vec<f64>,
+    parts: Vec<f64>,
     largest: Vec<Largest>,
+    sizes: Sizes,
 }
 
 impl Shares {
     /// With the inverse curvature of the experiment's unknowns.
     pub fn new(experiment: usize, inverse: DMatrix<f64>) -> Self {
         let columns = inverse.nrows();
-        Shares { experiment, inverse, moved: vec![0.0; columns], largest: vec![Largest::default(); columns] }
+        let none = || vec![0.0; columns];
+        let (largest, sizes) = (vec![Largest::default(); columns], Sizes::new(columns));
+        Shares { experiment, inverse, moved: none(), parts: none(), largest, sizes }
     }
 
     /// The number of slopes that a measurement has.
@@ -74,21 +80,33 @@ impl Shares {
         self.moved.len()
     }
 
-    /// Takes a measurement with these slopes, and returns its leverage.
-    pub fn take(&mut self, weight: f64, slopes: &[f64], (output, sample): (usize, usize)) -> f64 {
+    /// By how much an error of one would move each unknown, of the measurement that was taken last.
+    pub fn moved(&self) -> &[f64] {
+        &self.moved
+    }
+
+    /// Takes a measurement with these slopes and this error, and returns its leverage.
+    pub fn take(&mut self, weight: f64, slopes: &[f64], error: f64, (output, sample): (usize, usize)) -> f64 {
         self.moved.fill(0.0);
         for (column, slope) in self.inverse.column_iter().zip(slopes) {
             self.moved.iter_mut().zip(&column).for_each(|(moved, entry)| *moved += entry * slope);
         }
         for (c, (moved, largest)) in self.moved.iter().zip(&mut self.largest).enumerate() {
             let part = weight * moved * moved / self.inverse[(c, c)];
+            self.parts[c] = part;
             largest.take(Share { part, experiment: self.experiment, output, sample });
         }
-        weight * self.moved.iter().zip(slopes).map(|(moved, slope)| moved * slope).sum::<f64>()
+        let leverage = weight * self.moved.iter().zip(slopes).map(|(moved, slope)| moved * slope).sum::<f64>();
+        // The error of a measurement that alone determines an unknown is rounding.
+        if 1.0 - leverage > ALONE {
+            self.sizes.take(&self.parts, weight * error * error / (1.0 - leverage));
+        }
+        leverage
     }
 
     pub fn append(&mut self, later: &Shares) {
         self.largest.iter_mut().zip(&later.largest).for_each(|(largest, later)| largest.append(*later));
+        self.sizes.append(&later.sizes);
     }
 }
 
@@ -100,6 +118,14 @@ pub(super) fn of_all<'s>(objective: &Objective<'_>, all: impl Iterator<Item = &'
         unknowns.columns(e).zip(&one.largest).for_each(|(i, own)| largest[i].append(*own));
     }
     largest
+}
+
+/// The sizes of all errors from those of the experiments.
+pub(super) fn sizes_of_all<'s>(objective: &Objective<'_>, all: impl Iterator<Item = &'s Shares>) -> Sizes {
+    let unknowns = &objective.problem.unknowns;
+    let mut sizes = Sizes::new(unknowns.row.len());
+    all.enumerate().for_each(|(e, one)| sizes.append_to(unknowns.columns(e), &one.sizes));
+    sizes
 }
 
 /// A pass over all measurements.
@@ -116,7 +142,7 @@ impl Accumulate for Pass<'_> {
             let weight = self.objective.weight(self.shares.experiment, sample);
             for j in (0..window.outputs()).filter(|&j| weight > 0.0 && window.is_measured(k, j, lane)) {
                 self.slopes.iter_mut().enumerate().for_each(|(c, slope)| *slope = window.at(k, j, c, lane));
-                self.shares.take(weight, &self.slopes, (j, sample));
+                self.shares.take(weight, &self.slopes, window.error(k, j, lane), (j, sample));
             }
         }
     }
@@ -135,12 +161,13 @@ impl Judgement<'_> {
             return None;
         }
         let examined;
-        let largest = match &covariances.shares {
-            Some(largest) => largest,
-            None => {
-                examined = self.shares(covariances)?;
+        let largest = match (&covariances.shares, &covariances.unit) {
+            (Some(largest), _) => largest,
+            (None, Some(unit)) if self.residuals.measured <= MOST => {
+                examined = self.shares(unit)?.0;
                 &examined
             }
+            _ => return None,
         };
         let assumed = covariances.method != CovarianceMethod::Sandwich;
         let known = |i: &usize| unknowns[*i].knowledge.standard_error().is_some();
@@ -175,17 +202,16 @@ impl Judgement<'_> {
         shares.iter().map(place).collect::<Vec<_>>().join(" and ")
     }
 
-    fn shares(&self, covariances: &Covariances) -> Option<Vec<Largest>> {
-        let (objective, unit) = (self.objective, covariances.unit.as_ref()?);
-        if self.residuals.measured > MOST {
-            return None;
-        }
+    /// The largest shares, and the sizes of the errors that have them, with the inverse curvature.
+    pub(super) fn shares(&self, unit: &Covariance) -> Option<(Vec<Largest>, Sizes)> {
+        let objective = self.objective;
         let make = |e: usize| {
             let shares = Shares::new(e, of_experiment(objective, unit, e));
             Pass { objective, slopes: vec![0.0; shares.columns()], shares }
         };
         let all = objective.gather(&self.end.coordinates, true, make).ok()?;
-        Some(of_all(objective, all.iter().map(|one| &one.shares)))
+        let each = || all.iter().map(|one| &one.shares);
+        Some((of_all(objective, each()), sizes_of_all(objective, each())))
     }
 }
 
@@ -234,7 +260,7 @@ mod tests {
         let slopes: Vec<[f64; 2]> = (0..6).map(|k| [(k * k % 7) as f64, (k * k * k % 11) as f64]).collect();
         let take = |range: std::ops::Range<usize>| {
             let mut shares = new();
-            range.for_each(|k| _ = shares.take(1.0, &slopes[k], (0, k)));
+            range.for_each(|k| _ = shares.take(1.0, &slopes[k], 0.0, (0, k)));
             shares
         };
         let mut joined = take(0..3);
@@ -252,7 +278,7 @@ mod tests {
         let inverse = DMatrix::from_row_slice(2, 2, &[6.0, -2.0, -2.0, 3.0]) / 14.0;
         let mut shares = Shares::new(0, inverse);
         let rows = [(1.0, [1.0, 0.0]), (1.0, [0.0, 2.0]), (2.0, [1.0, 1.0])];
-        let take = |(k, (weight, slopes)): (usize, (f64, [f64; 2]))| shares.take(weight, &slopes, (0, k));
+        let take = |(k, (weight, slopes)): (usize, (f64, [f64; 2]))| shares.take(weight, &slopes, 0.0, (0, k));
         let leverages: Vec<f64> = rows.into_iter().enumerate().map(take).collect();
         let expected = [6.0 / 14.0, 12.0 / 14.0, 10.0 / 14.0];
         assert!(leverages.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{leverages:?}");

@@ -87,6 +87,7 @@ impl Judgement<'_> {
         warnings.extend(self.curved(unknowns, covariances));
         warnings.extend(self.uneven(unknowns, covariances));
         warnings.extend(self.decided_by_few(unknowns, covariances));
+        warnings.extend(self.uneven_errors(unknowns, covariances));
         warnings.extend(self.restart_noise(unknowns));
         warnings.extend(self.input_noise(unknowns));
         warnings.extend(self.autocorrelation(covariances));

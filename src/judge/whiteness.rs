@@ -10,8 +10,6 @@ pub(super) const LAGS: usize = 20;
 pub(crate) struct Whiteness {
     /// Three times the least p-value of three tests: over 3 lags, over 20, and of neighbors.
     pub p_value: f64,
-    /// The probability that independent errors of one distribution are followed by errors of like size as much as these are.
-    pub like_sizes: f64,
     /// Autocorrelations at lags `1, 2, ...`.
     pub correlations: [f64; LAGS],
     /// The part of the errors' variance that follows from the errors before, by an autoregression over all lags, less
@@ -33,7 +31,6 @@ impl Whiteness {
         let over = |lags: usize| errors.p_value(most(lags));
         Whiteness {
             p_value: (3.0 * over(FEW).min(over(LAGS)).min(errors.neighbors_p_value())).min(1.0),
-            like_sizes: errors.like_sizes_p_value(most(LAGS)),
             correlations,
             predicted,
             dependence,
@@ -103,14 +100,7 @@ mod tests {
         let of = |p_value: f64, first: f64| {
             let mut correlations = [0.0; LAGS];
             correlations[0] = first;
-            Whiteness {
-                p_value,
-                correlations,
-                predicted: 0.0,
-                dependence: 1.0,
-                at_restart: (0.0, 0.0),
-                like_sizes: 1.0,
-            }
+            Whiteness { p_value, correlations, predicted: 0.0, dependence: 1.0, at_restart: (0.0, 0.0) }
         };
         let found = |all: &[Whiteness]| least_white(all).map(|(j, white)| (j, white.p_value));
         assert_eq!(found(&[]), None);

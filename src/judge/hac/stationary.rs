@@ -11,6 +11,7 @@ use super::ROWS;
 use crate::information::{Block, Covariance, Information};
 use crate::judge::sandwich::{ALONE, of_experiment};
 use crate::judge::shares::{self, Largest, Shares};
+use crate::judge::sizes::Sizes;
 use crate::optimize::Infeasible;
 use crate::problem::{Accumulate, Objective, each};
 use crate::sweep::Window;
@@ -25,8 +26,8 @@ const LONGEST: usize = 1000;
 /// An experiment with fewer measurements of an output takes the autoregression of all experiments together.
 const OWN: u64 = 100;
 
-/// Triangles of scores, one per experiment, and the largest shares of the unknowns.
-type WithShares = (Vec<Information>, Vec<Largest>);
+/// Triangles of scores, one per experiment, the largest shares of the unknowns, and the sizes of the errors that have them.
+type WithShares = (Vec<Information>, Vec<Largest>, Sizes);
 
 /// Triangles of such scores, one per experiment over its columns, by the inverse of the curvature; `None` where variances are
 /// predicted.
@@ -58,8 +59,9 @@ pub(super) fn scores(
         Some(objective.gather_one(coordinates, e, true, make).ok()?.triangle())
     };
     let triangles: Option<Vec<Information>> = each(all.len(), one).into_iter().collect();
-    let largest = shares::of_all(objective, all.iter().map(|one| &one.shares));
-    Ok(triangles.map(|triangles| (triangles, largest)))
+    let shares = || all.iter().map(|one| &one.shares);
+    let (largest, sizes) = (shares::of_all(objective, shares()), shares::sizes_of_all(objective, shares()));
+    Ok(triangles.map(|triangles| (triangles, largest, sizes)))
 }
 
 /// The sums and counts of all experiments, output by output.
@@ -135,7 +137,7 @@ impl Accumulate for Errors<'_> {
                 let sample = window.begin[lane] + k;
                 let (z, weight) = (window.error(k, j, lane), objective.weight(self.experiment, sample));
                 slopes.iter_mut().enumerate().for_each(|(c, slope)| *slope = window.at(k, j, c, lane));
-                raised(weight, self.shares.take(weight, &slopes, (j, sample))) * loss.map_or(z, |loss| loss.psi(z))
+                raised(weight, self.shares.take(weight, &slopes, z, (j, sample))) * loss.map_or(z, |loss| loss.psi(z))
             };
             self.run.clear();
             let measured = (0..window.samples[lane]).filter(|&k| window.is_measured(k, j, lane));

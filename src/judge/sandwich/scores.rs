@@ -5,7 +5,7 @@
 //! are of one size and may cancel by chance: of straight lines with one far measurement, noisier than the others, 84 % were covered.
 //! [`CANCELED`] times the variance of that prediction, by the noise of all measurements, is therefore added to the square.
 
-use super::ALONE;
+use super::{ALONE, ROWS};
 use crate::information::{Block, Information};
 use crate::judge::shares::Shares;
 use crate::problem::{Accumulate, Objective};
@@ -18,14 +18,33 @@ const CANCELED: f64 = 0.4;
 
 /// The triangle of the scores.
 pub(super) struct Scores<'s> {
-    pub objective: &'s Objective<'s>,
-    pub experiment: usize,
+    objective: &'s Objective<'s>,
+    experiment: usize,
     pub shares: Shares,
     /// Variance of all errors times the roots of their weights.
-    pub noise: f64,
+    noise: f64,
     pub scores: Information,
-    pub block: Block,
-    pub row: Vec<f64>,
+    block: Block,
+    row: Vec<f64>,
+    /// By what the errors of a sample move each unknown; the second less the part of them that is certain.
+    moves: Vec<[f64; 2]>,
+    /// The variance of each unknown, and the sum of squares by which it is uncertain.
+    variances: Vec<[f64; 2]>,
+}
+
+impl<'s> Scores<'s> {
+    pub fn new(objective: &'s Objective<'s>, experiment: usize, shares: Shares, noise: f64) -> Self {
+        let columns = shares.columns();
+        let (scores, block) = (Information::new(columns), Block::new(columns, ROWS));
+        let none = || vec![[0.0; 2]; columns];
+        let row = vec![0.0; columns];
+        Scores { objective, experiment, shares, noise, scores, block, row, moves: none(), variances: none() }
+    }
+
+    /// Absorbs the last rows.
+    pub fn complete(&mut self) {
+        self.scores.absorb(&mut self.block);
+    }
 }
 
 impl Accumulate for Scores<'_> {
@@ -36,26 +55,57 @@ impl Accumulate for Scores<'_> {
             let sample = window.begin[lane] + k;
             let weight = self.objective.weight(self.experiment, sample);
             self.row.fill(0.0);
+            self.moves.fill([0.0; 2]);
             for j in (0..window.outputs()).filter(|&j| weight > 0.0 && window.is_measured(k, j, lane)) {
                 let values = window.row(k, j).iter().skip(lane).step_by(lanes);
                 slopes.iter_mut().zip(values).for_each(|(to, from)| *to = *from);
                 let z = window.error(k, j, lane);
-                let leverage = self.shares.take(weight, &slopes, (j, sample));
+                let leverage = self.shares.take(weight, &slopes, z, (j, sample));
                 let less = (1.0 - leverage).max(ALONE);
                 let influence = weight * loss.map_or(z, |loss| loss.psi(z)) / less;
                 self.row.iter_mut().zip(&slopes).for_each(|(row, slope)| *row += slope * influence);
+                for ([move_by, uncertain], moved) in self.moves.iter_mut().zip(self.shares.moved()) {
+                    *move_by += moved * influence;
+                    *uncertain += moved * influence * less.sqrt();
+                }
                 let canceled = (CANCELED * weight * self.noise * leverage / less).sqrt();
                 slopes.iter_mut().for_each(|slope| *slope *= canceled);
                 self.scores.gather(&mut self.block, &slopes, 0.0);
             }
             self.scores.gather(&mut self.block, &self.row, 0.0);
+            for ([variance, spread], [move_by, uncertain]) in self.variances.iter_mut().zip(&self.moves) {
+                *variance += move_by * move_by;
+                *spread += uncertain.powi(4);
+            }
         }
     }
 
     fn append(&mut self, mut later: Self) {
         self.shares.append(&later.shares);
-        later.scores.absorb(&mut later.block);
-        self.scores.absorb(&mut self.block);
+        later.complete();
+        self.complete();
         self.scores.merge(&later.scores);
+        for (own, later) in self.variances.iter_mut().zip(&later.variances) {
+            own.iter_mut().zip(later).for_each(|(own, later)| *own += later);
+        }
     }
+}
+
+/// Degrees of freedom of the variance of each unknown, by Satterthwaite's rule (Biometrics Bulletin 2 (1946) 110): the variance is the
+/// sum of the squares of what the samples move it by, each of which has, if normal, a variance of two thirds of its own square
+/// on average. What the leverage takes is made up for by what is added to the square ([`CANCELED`]), and counts as certain.
+pub(super) fn degrees(objective: &Objective<'_>, all: &[Scores<'_>]) -> Vec<f64> {
+    let unknowns = &objective.problem.unknowns;
+    let mut sums = vec![[0.0; 2]; unknowns.row.len()];
+    for (e, one) in all.iter().enumerate() {
+        for (i, own) in unknowns.columns(e).zip(&one.variances) {
+            sums[i].iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+        }
+    }
+    let degrees = |[variance, squares]: [f64; 2]| {
+        let spread = 2.0 / 3.0 * squares;
+        let found = 2.0 * (variance * variance - spread) / spread;
+        if found.is_finite() { found.max(1.0) } else { f64::INFINITY }
+    };
+    sums.into_iter().map(degrees).collect()
 }

@@ -28,11 +28,11 @@ pub fn far(random: &mut Random, noisier: f64, by: By) -> Trial {
 }
 
 /// A straight line with noise that grows with the input's square.
-pub fn line(random: &mut Random, samples: usize) -> Trial {
+pub fn line(random: &mut Random, samples: usize, by: By) -> Trial {
     let inputs: Vec<Voltage> = (0..samples).map(|_| Voltage { u: random.normal() }).collect();
     let noise = |u: f64| 0.1 + 0.3 * u * u;
     let outputs = inputs.iter().map(|u| Current { i: 1.5 * u.u - 0.7 + noise(u.u) * random.normal() }).collect();
-    straight(inputs, outputs, By::Weights)
+    straight(inputs, outputs, by)
 }
 
 fn straight(inputs: Vec<Voltage>, outputs: Vec<Current>, by: By) -> Trial {
