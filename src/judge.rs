@@ -15,6 +15,7 @@ mod explained;
 mod hac;
 mod known;
 mod largest;
+mod memory;
 pub(crate) mod noise;
 mod outliers;
 mod output_sums;

@@ -10,7 +10,7 @@ use crate::numeral::number;
 use crate::optimize::Severity;
 use crate::problem::{Objective, Role};
 use crate::record::{Record, Time};
-use nalgebra::{DMatrix, Schur};
+use nalgebra::{Complex, DMatrix, Schur};
 use std::f64::consts::{PI, TAU};
 
 /// An oscillation with fewer samples a period than this can be taken for its alias, whose frequency is then within a factor of 1.5.
@@ -113,9 +113,13 @@ impl Judgement<'_> {
 /// same samples.
 fn unresolved<'p>(objective: &Objective<'_>, coordinates: &[f64], points: &'p [Point]) -> Option<Unresolved<'p>> {
     let interval = interval(&objective.problem.records)?;
-    let some = points.iter().step_by(points.len().div_ceil(POINTS).max(1));
-    let found = some.filter_map(|point| unresolved_at(objective, coordinates, point, interval));
+    let found = some(points).filter_map(|point| unresolved_at(objective, coordinates, point, interval));
     found.max_by(|a, b| a.mode.1.total_cmp(&b.mode.1))
+}
+
+/// Those of the points that are examined.
+pub(super) fn some(points: &[Point]) -> impl Iterator<Item = &Point> {
+    points.iter().step_by(points.len().div_ceil(POINTS).max(1))
 }
 
 /// The same at a point.
@@ -211,8 +215,12 @@ fn least(slopes: &[f64], needed: f64) -> Option<Vec<f64>> {
     (squares > 0.0).then(|| slopes.iter().map(|slope| slope * needed / squares).collect())
 }
 
-/// Each oscillation about a point.
-fn modes(objective: &Objective<'_>, coordinates: &[f64], (e, sample, state): &Point) -> Option<Vec<Mode>> {
+/// The eigenvalues of the state's Jacobian at a point (1/s).
+pub(super) fn eigenvalues(
+    objective: &Objective<'_>,
+    coordinates: &[f64],
+    (e, sample, state): &Point,
+) -> Option<Vec<Complex<f64>>> {
     let (record, n) = (&objective.problem.records[*e], state.len());
     let parameters = objective.problem.unknowns.of_experiment(*e, coordinates).p;
     let slopes = objective.sweep.state_slopes(record, *sample, state, &parameters)?;
@@ -220,7 +228,12 @@ fn modes(objective: &Objective<'_>, coordinates: &[f64], (e, sample, state): &Po
         return None;
     }
     let schur = Schur::try_new(DMatrix::from_row_slice(n, n, &slopes), f64::EPSILON, ITERATIONS)?;
-    let values = schur.complex_eigenvalues();
+    Some(schur.complex_eigenvalues().iter().copied().collect())
+}
+
+/// Each oscillation about a point.
+fn modes(objective: &Objective<'_>, coordinates: &[f64], point: &Point) -> Option<Vec<Mode>> {
+    let values = eigenvalues(objective, coordinates, point)?;
     Some(values.iter().filter(|value| value.im > 0.0).map(|value| (value.re, value.im)).collect())
 }
 

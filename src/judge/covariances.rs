@@ -1,5 +1,6 @@
 //! The covariance of the unknowns: classical, a sandwich, or HAC, and its degrees of freedom.
 
+use super::color;
 use super::conclude::{Judgement, WHITENESS_LEVEL};
 use super::hac::hac;
 use super::predicted::Dependence;
@@ -20,9 +21,6 @@ const CORRELATED_SAMPLES: u64 = 12;
 /// there, and white errors that are taken as colored lose nothing (docs/intervals.md).
 const SHORT: u64 = 1_000;
 const SHORT_LEVEL: f64 = 0.05;
-
-/// Probability by which the lengths of intervals are compared.
-const LEVEL: f64 = 0.95;
 
 /// The covariance of the unknowns in their own units, how it was made, and that of unit noise in coordinates.
 pub(super) struct Covariances {
@@ -80,32 +78,25 @@ impl Judgement<'_> {
         let hac = hac(self.objective, &self.end.coordinates, self.linear, (&self.exact, unit))?;
         let degrees = hac.degrees(self.objective, unit);
         let covariance = hac.covariance(&self.exact, &degrees, self.coupled().is_some())?;
-        let mut degrees: Vec<f64> = degrees.into_iter().map(|degrees| degrees.min(self.degrees)).collect();
-        let differ = |sizes: &Sizes| self.takes_one_size() && sizes.differ(&self.exact);
-        let covariance = match hac.sizes.as_ref().is_some_and(differ) {
-            true => self.no_less_than_for_white_errors(covariance, &mut degrees),
-            false => covariance,
-        };
+        let degrees = degrees.into_iter().map(|degrees| degrees.min(self.degrees)).collect();
         let method = CovarianceMethod::Hac { lags: hac.lags as u64 };
-        // That the squares of colored errors are correlated is not allowed for in the test: nothing is said.
-        let (covariance, shares, uneven) = (Some(covariance), hac.shares, None);
-        Some(CoordinateCovariance { covariance, method, factor: 1.0, degrees, shares, uneven })
-    }
-
-    /// Of errors that are larger where an unknown is determined: stationary ones have too small a standard error there, and moving sums
-    /// seldom certainly a larger one. No interval is to be shorter than that of independent errors of any size.
-    fn no_less_than_for_white_errors(&self, covariance: Covariance, degrees: &mut [f64]) -> Covariance {
-        let found = sandwich::sandwich(self.objective, &self.end.coordinates, &self.exact);
-        let Ok(Robust { covariance: Some(white), degrees: own, .. }) = found else { return covariance };
-        let mut factors = vec![1.0; degrees.len()];
-        for (i, (factor, degrees)) in factors.iter_mut().zip(degrees).enumerate() {
-            let own = Spread { standard_error: white.standard_error(i), degrees: own[i].min(self.degrees) };
-            let found = Spread { standard_error: covariance.standard_error(i), degrees: *degrees };
-            if own.reach(LEVEL) > found.reach(LEVEL) && found.standard_error > 0.0 {
-                (*factor, *degrees) = (own.standard_error / found.standard_error, own.degrees);
-            }
+        let found = CoordinateCovariance {
+            covariance: Some(covariance),
+            method,
+            factor: 1.0,
+            degrees,
+            shares: hac.shares,
+            uneven: None,
+        };
+        let differ = hac.sizes.as_ref().is_some_and(|sizes| self.takes_one_size() && sizes.differ(&self.exact));
+        let certain = self.autocorrelated_at(color::CERTAIN).is_some();
+        if certain && !differ {
+            return Some(found);
         }
-        covariance.scaled(&factors)
+        let white = self.for_white_errors(&Some(unit.clone()));
+        // The squares of colored errors are correlated, which the test of their sizes does not allow for.
+        let uneven = white.uneven.filter(|_| !certain);
+        Some(CoordinateCovariance { uneven, ..no_shorter(found, white) })
     }
 
     fn for_white_errors(&self, unit: &Option<Covariance>) -> CoordinateCovariance {
@@ -163,4 +154,27 @@ impl Judgement<'_> {
         let left = (degrees - outputs).max(1.0);
         (degrees / (left + 1.0) * (degrees - 1.0) / left, left + 1.0)
     }
+}
+
+/// Probability by which the lengths of intervals are compared.
+const LEVEL: f64 = 0.95;
+
+/// The covariance for colored errors, with intervals that are no shorter than those for white errors. A fit takes the slow part out of
+/// errors that are white, and what is left seems to have negative correlations; stationary errors have too small a standard error
+/// where errors are larger, and moving sums seldom certainly a larger one.
+fn no_shorter(mut colored: CoordinateCovariance, white: CoordinateCovariance) -> CoordinateCovariance {
+    let (Some(found), Some(least)) = (colored.covariance.take(), white.covariance) else { return colored };
+    let of = |covariance: &Covariance, i: usize, factor: f64, degrees: &[f64]| Spread {
+        standard_error: covariance.standard_error(i) * factor.sqrt(),
+        degrees: degrees[i],
+    };
+    let mut factors = vec![1.0; colored.degrees.len()];
+    for (i, factor) in factors.iter_mut().enumerate() {
+        let own = of(&least, i, white.factor, &white.degrees);
+        let by_color = of(&found, i, colored.factor, &colored.degrees);
+        if own.reach(LEVEL) > by_color.reach(LEVEL) && by_color.standard_error > 0.0 {
+            (*factor, colored.degrees[i]) = (own.standard_error / by_color.standard_error, own.degrees);
+        }
+    }
+    CoordinateCovariance { covariance: Some(found.scaled(&factors)), ..colored }
 }

@@ -76,17 +76,21 @@ impl Sizes {
         columns.zip(&own.of).for_each(|(i, of)| self.of[i].add(of));
     }
 
-    /// The ratio of the variance of an unknown to the classical one, and the probability that errors of one size have one as far
-    /// from one, by the variance of their squares: the ratio has a Gamma distribution of mean one, nearly.
-    fn ratio(&self, i: usize, of_squares: f64) -> (f64, f64) {
-        let Shared { shares, squares, errors } = self.of[i];
+    /// The ratio of the variance of an unknown to the classical one; one without shares or errors.
+    fn ratio(&self, i: usize) -> f64 {
+        let Shared { shares, errors, .. } = self.of[i];
         let ratio = errors / shares / (self.squares / self.count);
+        if ratio.is_finite() { ratio } else { 1.0 }
+    }
+
+    /// The probability that errors of one size have a ratio as far from one, by the variance of their squares: it has a Gamma
+    /// distribution of mean one, nearly.
+    fn p_value(&self, i: usize, of_squares: f64) -> f64 {
+        let (Shared { shares, squares, .. }, ratio) = (self.of[i], self.ratio(i));
         let variance = of_squares * (squares / (shares * shares) - 1.0 / self.count);
-        match Gamma::new(1.0 / variance, 1.0 / variance) {
-            Ok(gamma) if ratio.is_finite() => (ratio, 2.0 * gamma.cdf(ratio).min(gamma.sf(ratio))),
-            // Equal shares, no share, or no error.
-            _ => (1.0, 1.0),
-        }
+        let gamma = Gamma::new(1.0 / variance, 1.0 / variance);
+        // Equal shares have no variance.
+        gamma.map_or(1.0, |gamma| 2.0 * gamma.cdf(ratio).min(gamma.sf(ratio)))
     }
 
     /// The variance of the squares relative to the square of their mean.
@@ -100,10 +104,9 @@ impl Sizes {
     fn most(&self, held: &[bool], of_squares: f64, level: f64) -> Option<Uneven> {
         let tested: Vec<usize> = (0..self.of.len()).filter(|&i| !held[i]).collect();
         let of = |&unknown: &usize| {
-            let (ratio, p_value) = self.ratio(unknown, of_squares);
-            let p_value = p_value * tested.len() as f64;
-            let counts = p_value < level && (ratio - 1.0).abs() > LITTLE;
-            counts.then(|| Uneven { unknown, factor: ratio.sqrt(), p_value })
+            let factor = Some(self.ratio(unknown)).filter(|ratio| (ratio - 1.0).abs() > LITTLE)?.sqrt();
+            let p_value = self.p_value(unknown, of_squares) * tested.len() as f64;
+            (p_value < level).then_some(Uneven { unknown, factor, p_value })
         };
         let far = |one: &Uneven| one.factor.ln().abs();
         tested.iter().filter_map(of).max_by(|a, b| far(a).total_cmp(&far(b)))
@@ -170,12 +173,12 @@ mod tests {
         }
         // A mean of 3 in place of 2; fourths of 22/4, so an excess of 0.375; shares whose squares add up to 1/2 instead of 1/4.
         assert!((sizes.variance_of_squares() - 0.375).abs() < 1e-15);
-        let (ratio, p_value) = sizes.ratio(0, 0.375);
-        assert!((ratio - 1.5).abs() < 1e-15);
+        assert!((sizes.ratio(0) - 1.5).abs() < 1e-15);
+        let p_value = sizes.p_value(0, 0.375);
         let shape = 1.0 / (0.375 * 0.25);
         assert!((p_value - 2.0 * Gamma::new(shape, shape).unwrap().sf(1.5)).abs() < 1e-15, "{p_value}");
         // Equal shares say nothing.
-        assert_eq!(sizes.ratio(1, 0.375), (1.0, 1.0));
+        assert_eq!((sizes.ratio(1), sizes.p_value(1, 0.375)), (1.0, 1.0));
     }
 
     /// The shares of a line's slope in `count` measurements between -1 and 1 and of another unknown, and errors of these sizes.

@@ -199,7 +199,10 @@ impl Judgement<'_> {
             return None;
         }
         let stopped = matches!(self.end.outcome, Outcome::TimeLimit | Outcome::Cancelled);
-        let coarse = self.residuals.step_error / self.widening > most;
+        let change = self.residuals.step_error / self.widening;
+        // No more windows than samples.
+        let windows = self.objective.problem.samples() as f64;
+        let coarse = change > most || change * windows > most && change * self.windows_add_up() > most;
         let fewer = (refines && !stopped && coarse).then(|| self.determined_by_a_finer_step(unknowns)).flatten();
         if fewer.is_some() {
             return fewer;

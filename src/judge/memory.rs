@@ -1,0 +1,61 @@
+//! Over how many windows the errors of steps add up.
+//!
+//! The step of a method is compared with a finer one in windows that begin where the coarse simulation stands. What a window changes is
+//! passed on to the next ones as long as the plant remembers it: a resonator of high quality adds up errors of its phase over
+//! the whole record.
+
+use super::aliases::{eigenvalues, some};
+use super::conclude::Judgement;
+use crate::record::{Record, Time};
+
+/// Samples of the shortest windows that are compared.
+const WINDOW: f64 = 64.0;
+
+impl Judgement<'_> {
+    /// By which factor the changes of all windows are larger than those within them, at the most: by the slowest decay of the plant at
+    /// some points along the records. One for predictions that restart.
+    pub(super) fn windows_add_up(&self) -> f64 {
+        let objective = self.objective;
+        if objective.sweep.restarts().is_some() {
+            return 1.0;
+        }
+        let of = |point| eigenvalues(objective, &self.end.coordinates, point);
+        let slowest = some(&self.residuals.points).filter_map(of).flatten().map(|value| value.re).reduce(f64::max);
+        let Some(decay) = slowest else { return 1.0 };
+        let records = objective.problem.records.iter();
+        records.map(|record| sum(decay * WINDOW * interval(record), record.len() as f64 / WINDOW)).fold(1.0, f64::max)
+    }
+}
+
+/// The sum of what is left of the changes of so many windows, with the exponent by which a change decays over a window.
+fn sum(exponent: f64, windows: f64) -> f64 {
+    if exponent >= 0.0 {
+        return windows.max(1.0);
+    }
+    (exponent * windows).exp_m1() / exponent.exp_m1()
+}
+
+/// The mean time between samples (s).
+fn interval(record: &Record) -> f64 {
+    match record.times() {
+        Time::Uniform { step, .. } => *step,
+        Time::Stamps(stamps) => match stamps.as_slice() {
+            [first, .., last] => (last - first) / (stamps.len() - 1) as f64,
+            _ => 0.0,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::sum;
+
+    /// Ten windows of which nothing is forgotten, or half from each to the next; without end, a third of each is passed on.
+    #[test]
+    fn changes_of_windows_by_hand() {
+        assert_eq!([sum(0.0, 10.0), sum(0.1, 10.0), sum(0.0, 0.5)], [10.0, 10.0, 1.0]);
+        let halves: f64 = (0..10).map(|k| 0.5f64.powi(k)).sum();
+        assert!((sum(-std::f64::consts::LN_2, 10.0) - halves).abs() < 1e-14);
+        assert!((sum(-3f64.ln(), 1e6) - 1.5).abs() < 1e-14);
+    }
+}
