@@ -32,6 +32,7 @@ mod suspects;
 mod together;
 mod warnings;
 mod whiteness;
+mod within_loss;
 
 pub(crate) use aliases::Aliases;
 pub(crate) use conclude::{SearchEnd, conclude, conclude_from};

@@ -78,6 +78,8 @@ pub enum WarningCode {
     DecidedByFew,
     /// Errors that are larger, or smaller, where an unknown is determined.
     UnevenErrors,
+    /// A robust loss within whose constant are so few errors that its curvature is chance.
+    NarrowLoss,
     /// Noise in the measured states from which predictions restart.
     RestartNoise,
     /// Noise declared for the inputs, which biases the estimate.

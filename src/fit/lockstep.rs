@@ -149,11 +149,17 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
         let begin = Instant::now();
         let found = by_one_method(&finer, &control).into_iter().zip(&finer);
         let mut found = found.map(|(found, (finer, start))| finer.run_on(found, start.trials, begin, &control));
-        let next = |(attempt, coarse): (Attempt, bool)| match if coarse { found.next() } else { None } {
-            Some(again) => attempt.or(again),
-            None => attempt,
+        let next = |((attempt, coarse), problem): ((Attempt, bool), &Problem<'_>)| match (
+            if coarse { found.next() } else { None },
+            problem.finer(number),
+        ) {
+            (Some(again), Some(finer)) => {
+                let again = attempt.again_from_start(finer, again, begin, &control);
+                attempt.or(again)
+            }
+            _ => attempt,
         };
-        attempts = attempts.into_iter().zip(coarse).map(next).collect();
+        attempts = attempts.into_iter().zip(coarse).zip(problems).map(next).collect();
     }
     let found: Vec<Result<Summary, Error>> = attempts.into_iter().map(Attempt::answer).collect();
     let searched = each(found.len(), |i| problems[i].searched_elsewhere(found[i].as_ref().ok()?, &control));

@@ -68,7 +68,7 @@ impl Attempt {
             // An output that is constant determines no parameter by any method.
             Ok(found) => {
                 let coarse = found.warnings.iter().any(|warning| warning.code == WarningCode::CoarseStep);
-                coarse && !is_useless(found, WarningCode::ConstantOutput)
+                coarse && found.outcome != Outcome::Exact && !is_useless(found, WarningCode::ConstantOutput)
             }
             Err(error) => matches!(error, Error::Start(_)),
         }
@@ -88,12 +88,29 @@ impl Attempt {
                 let coordinates = found.coordinates().into_iter().zip(finer.unknowns.bounds()).map(within).collect();
                 Some(Start { coordinates, trials, ends: found.starts.clone() })
             }
-            _ => {
-                let start = finer.unknowns.start();
-                let steps = finer.in_units(control);
-                let fine = finer.sweep.is_adaptive() || !steps.step_decides(&start).unwrap_or(true);
-                fine.then_some(Start { coordinates: start, trials, ends: None })
-            }
+            _ => declared_start(finer, trials, control),
+        }
+    }
+
+    /// What a search by a finer method from [`start`](Self::start) found or, if it did not converge from the end of this one, what one
+    /// from the start of the problem found: a coarse step may end where a finer one finds the plant unstable.
+    pub fn again_from_start(
+        &self,
+        finer: &Problem<'_>,
+        again: Result<Summary, Error>,
+        begin: Instant,
+        control: &Control,
+    ) -> Result<Summary, Error> {
+        let from_end = matches!(&self.found, Ok(found) if is_only_coarse(found) && found.starts.is_none());
+        let (Ok(found), Ok(before), true) = (&again, &self.found, from_end) else { return again };
+        let trials = finer.settings.optimizer.most().saturating_sub(before.iterations + found.iterations);
+        if found.outcome.converged() || trials == 0 || control.stops() {
+            return again;
+        }
+        let Some(start) = declared_start(finer, trials, control) else { return again };
+        match finer.run_on(finer.run_within(begin, control, start), trials, begin, control) {
+            Ok(other) if other.outcome.converged() => Ok(after(found, other)),
+            _ => again,
         }
     }
 
@@ -129,6 +146,14 @@ impl Attempt {
         found.warnings.extend(warning);
         Ok(found)
     }
+}
+
+/// The start of the problem, with so many trial steps; `None` where the step of its method decides the cost.
+fn declared_start(finer: &Problem<'_>, trials: u64, control: &Control) -> Option<Start> {
+    let start = finer.unknowns.start();
+    let steps = finer.in_units(control);
+    let fine = finer.sweep.is_adaptive() || !steps.step_decides(&start).unwrap_or(true);
+    fine.then_some(Start { coordinates: start, trials, ends: None })
 }
 
 /// What is said where the data do not tell the estimate from that of a coarser step.

@@ -48,8 +48,9 @@ impl Problem<'_> {
             }
             if let Some(start) = attempt.start(finer, self.settings.optimizer.most(), control) {
                 let trials = start.trials;
-                let again = finer.run_within(begin, control, start);
-                attempt = attempt.or(finer.run_on(again, trials, begin, control));
+                let again = finer.run_on(finer.run_within(begin, control, start), trials, begin, control);
+                let again = attempt.again_from_start(finer, again, begin, control);
+                attempt = attempt.or(again);
             }
         }
         attempt.answer()

@@ -87,7 +87,11 @@ pub(super) fn search_from_many(
         Some((_, cycle, Some(places))) if places.0.len() == count => (cycle, places.0),
         _ => (0, starts.iter().cloned().map(Ok).collect::<Vec<_>>()),
     };
-    let begin = |i: usize| begin(plain, optimizer, &places[i]);
+    // The declared start is evaluated whatever the limits, so that there is an answer.
+    let begin = |i: usize| match i > 0 && plain.control.stops() {
+        true => Run::Failed(NoEnd::new(true, "a limit was reached before this start was evaluated")),
+        false => begin(plain, optimizer, &places[i]),
+    };
     let runs = each(count, begin);
     let mut searches = Searches { plain, comparison: Comparison::new(plain), runs, cycle, wide: is_wide(plain) };
     if let Some(file) = &file {

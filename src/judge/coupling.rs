@@ -63,6 +63,9 @@ fn pairs(outputs: usize) -> impl Iterator<Item = (usize, usize)> {
     (1..outputs).flat_map(|j| (0..j).map(move |i| (i, j)))
 }
 
+/// Errors of an output that are as white as this by chance are taken as white: their autocorrelations are chance, and an inflation by
+/// them hides correlated outputs in short records.
+const WHITE: f64 = 0.05;
 /// The largest ratio of the sums over the second and the first half of the known lags that is extrapolated.
 const SLOWEST: f64 = 0.99;
 
@@ -119,7 +122,9 @@ impl Coupling {
     pub fn strongest(&self, whiteness: &[Whiteness]) -> Option<Coupled> {
         let of = |(outputs, pair): ((usize, usize), &Pair)| {
             let size = (pair.squares[0] * pair.squares[1]).sqrt();
-            let more = inflation(&whiteness[outputs.0].correlations, &whiteness[outputs.1].correlations);
+            let (a, b) = (&whiteness[outputs.0], &whiteness[outputs.1]);
+            let colored = a.p_value.max(b.p_value) < WHITE;
+            let more = if colored { inflation(&a.correlations, &b.correlations) } else { 1.0 };
             let chance = chi_squared_tail(pair.product * pair.product / (more * pair.fourth), 1.0);
             let p_value = (chance * self.pairs.len() as f64).min(1.0);
             (size > 0.0 && pair.fourth > 0.0).then(|| Coupled { outputs, correlation: pair.product / size, p_value })
@@ -158,7 +163,7 @@ mod tests {
     use super::super::whiteness::LAGS;
     use super::*;
 
-    const WHITE: Whiteness =
+    const PLAIN: Whiteness =
         Whiteness { p_value: 1.0, correlations: [0.0; LAGS], predicted: 0.0, dependence: 1.0, at_restart: (0.0, 0.0) };
 
     /// By hand, two outputs with errors (1, 2), (1, 1), (-1, -1): products 2, 1, 1; squares 3 and 6; a sum of squared products
@@ -167,10 +172,10 @@ mod tests {
     #[test]
     fn correlation_by_hand() {
         let once = Coupling { pairs: vec![Pair { product: 4.0, squares: [3.0, 6.0], fourth: 6.0 }] };
-        assert!(once.strongest(&[WHITE; 2]).is_none());
+        assert!(once.strongest(&[PLAIN; 2]).is_none());
         let mut four = once.clone();
         (0..3).for_each(|_| four.append(&once));
-        let found = four.strongest(&[WHITE; 2]).unwrap();
+        let found = four.strongest(&[PLAIN; 2]).unwrap();
         assert_eq!(found.outputs, (0, 1));
         assert!((found.correlation - 4.0 / 18f64.sqrt()).abs() < 1e-15, "{found:?}");
         assert!((found.p_value - 0.001_091).abs() < 1e-6, "{found:?}");
@@ -224,9 +229,9 @@ mod tests {
         assert_eq!(inflation(&[0.5, 0.1], &[-0.5, 0.1]), 1.0);
         // A sum that turns negative is not continued: 1 + 2 (0.01 + 0.64 - 0.18).
         assert!((inflation(&[0.1, 0.8, 0.3, 0.3], &[0.1, 0.8, -0.3, -0.3]) - 1.94).abs() < 1e-14);
-        let colored = Whiteness { correlations: [0.9; LAGS], ..WHITE };
+        let colored = Whiteness { p_value: 0.0, correlations: [0.9; LAGS], ..PLAIN };
         let pair = Pair { product: 16.0, squares: [12.0, 24.0], fourth: 24.0 };
-        assert!(Coupling { pairs: vec![pair] }.strongest(&[WHITE, colored]).is_some());
+        assert!(Coupling { pairs: vec![pair] }.strongest(&[PLAIN, colored]).is_some());
         assert!(Coupling { pairs: vec![pair] }.strongest(&[colored; 2]).is_none());
     }
 }

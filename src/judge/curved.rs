@@ -14,11 +14,12 @@ use crate::parameter::Transform;
 use crate::problem::Role;
 use crate::sweep::Coupling;
 
-/// Standard errors below this part of the value are not examined: two passes over the data each.
-const SMALL: f64 = 0.15;
+/// Unknowns of which a smaller curvature is to be expected are not examined: two passes over the data each. It is reached by a standard
+/// error of 15 % of an unknown that no other replaces, and by smaller ones of unknowns that replace each other.
+const SMALL: f64 = 0.075;
 /// Records of more measurements are not examined: the predictions at two more points are kept in memory.
 const LONGEST: u64 = 200_000;
-/// At most so many unknowns are examined, those with the largest relative errors.
+/// At most so many unknowns are examined, those with the largest curvature to be expected.
 const MOST: usize = 8;
 /// Part of the half width by which an end may move without a warning.
 const ASYMMETRY: f64 = 0.25;
@@ -32,11 +33,11 @@ impl Judgement<'_> {
         if long || self.objective.sweep.predicts_variance() || self.rounding || self.end.outcome == Outcome::Exact {
             return None;
         }
-        let relative = |i: usize| {
-            let error = unknowns[i].knowledge.standard_error().filter(|error| error.is_finite())?;
-            Some((error / unknowns[i].value.abs(), i)).filter(|(part, _)| *part > SMALL)
+        let expected = |i: usize| {
+            unknowns[i].knowledge.standard_error().filter(|error| error.is_finite())?;
+            Some((self.expected_curvature(i, unknowns, covariances)?, i)).filter(|(curvature, _)| *curvature > SMALL)
         };
-        let mut examined: Vec<(f64, usize)> = (0..unknowns.len()).filter_map(relative).collect();
+        let mut examined: Vec<(f64, usize)> = (0..unknowns.len()).filter_map(expected).collect();
         // Where predictions are affine in the initial state, only parameters make them curved. Along the profile of an initial state
         // no parameter changes by more than its own standard error, which is small for all of them.
         let is_state = |i: usize| matches!(unknowns[i].role, Role::InitialState(_));
@@ -61,14 +62,33 @@ impl Judgement<'_> {
         Some(Warning { code: WarningCode::CurvedInterval, severity: Severity::UsableWithCare, text })
     }
 
+    /// The change of all coordinates along the profile of an unknown, by one standard error of it.
+    fn along(&self, i: usize, covariances: &Covariances) -> Option<Vec<f64>> {
+        let covariance = covariances.unknowns.as_ref()?;
+        let error = covariance.standard_error(i);
+        let of = |j: usize| if self.exact[j] { 0.0 } else { covariance.get(j, i) / (error * self.slopes[j]) };
+        Some((0..self.slopes.len()).map(of).collect())
+    }
+
+    /// How much predictions are bent along the profile of an unknown, by one standard error of it, in standard deviations of the noise,
+    /// if they are so in each unknown as a power or an exponential is: half the square of its change relative to itself, times what
+    /// its logarithm moves them by. What unknowns that replace each other move cancels to first order only.
+    fn expected_curvature(&self, i: usize, unknowns: &[Unknown], covariances: &Covariances) -> Option<f64> {
+        let bent = |(j, along): (usize, &f64)| {
+            let unit = if unknowns[j].transform == Transform::Log { 1.0 } else { self.end.coordinates[j].abs() };
+            let squares = along * along * self.norms[j];
+            // An initial state next to zero says nothing of others, nor does an unknown that does not change.
+            let counts = squares > 0.0 && (i == j || !matches!(unknowns[j].role, Role::InitialState(_)));
+            if counts { 0.5 * squares / (unit * self.widening) } else { 0.0 }
+        };
+        Some(self.along(i, covariances)?.iter().enumerate().map(bent).sum())
+    }
+
     /// By which part of its half width the ends of an interval move where the curvature is counted, positive where they
     /// move down.
     fn asymmetry(&self, i: usize, covariances: &Covariances) -> Option<f64> {
-        let covariance = covariances.unknowns.as_ref()?;
-        let error = covariance.standard_error(i);
-        let along: Vec<f64> = (0..self.slopes.len())
-            .map(|j| if self.exact[j] { 0.0 } else { covariance.get(j, i) / (error * self.slopes[j]) })
-            .collect();
+        let error = covariances.unknowns.as_ref()?.standard_error(i);
+        let along = self.along(i, covariances)?;
         let second = self.objective.second_along(&self.end.coordinates, &along).ok()?;
         // The errors are bent against the predictions.
         let bend = -second.step(&vec![0.0; along.len()], &self.exact)?[i] * self.slopes[i];

@@ -19,6 +19,8 @@ const REFINED_SHIFT: f64 = 0.1;
 const ZERO_DEVIATION: f64 = 1e-6;
 /// Smallest part of an unknown's value that a finer step must move it by for a warning.
 const DIGITS: f64 = 1e-6;
+/// The same from which on a fit without errors is not usable without care.
+const MUCH: f64 = 1e-3;
 /// Guessed initial states that are named; more are counted.
 const NAMED: usize = 4;
 
@@ -88,6 +90,7 @@ impl Judgement<'_> {
         warnings.extend(self.uneven(unknowns, covariances));
         warnings.extend(self.decided_by_few(unknowns, covariances));
         warnings.extend(self.uneven_errors(unknowns, covariances));
+        warnings.extend(self.few_within_the_loss());
         warnings.extend(self.restart_noise(unknowns));
         warnings.extend(self.input_noise(unknowns));
         warnings.extend(self.autocorrelation(covariances));
@@ -194,9 +197,8 @@ impl Judgement<'_> {
         // The noise, where the errors were not divided by it.
         let refines = self.objective.problem.refines;
         let most = if refines { REFINED_SHIFT } else { STEP_SHIFT };
-        // Data that are reproduced to their rounding were made with this step.
         if self.end.outcome == Outcome::Exact {
-            return None;
+            return if refines { self.exact_with_this_step(unknowns) } else { None };
         }
         let stopped = matches!(self.end.outcome, Outcome::TimeLimit | Outcome::Cancelled);
         let change = self.residuals.step_error / self.widening;
@@ -227,6 +229,23 @@ impl Judgement<'_> {
             );
             Warning { code: WarningCode::CoarseStep, severity, text }
         })
+    }
+
+    /// Data that are reproduced to their rounding may have been made with this step. But a step with held inputs is exact for a linear
+    /// plant of other parameters, too: so what a finer one changes is said.
+    fn exact_with_this_step(&self, unknowns: &[Unknown]) -> Option<Warning> {
+        let finer = self.objective.sweep.refined(self.objective.problem.samples())?;
+        let objective = self.objective.of(self.objective.problem, &*finer);
+        let (name, _, part) =
+            shift(&objective, &self.end.coordinates, unknowns).filter(|(.., part)| *part >= DIGITS)?;
+        let text = format!(
+            "the data are reproduced to their rounding by {}; {} would change `{name}` by {} of itself: right for a record that was              simulated with this step, else choose a finer one (Fit::integrator)",
+            self.objective.sweep.integrator(),
+            finer.integrator(),
+            percent(part, 2)
+        );
+        let severity = if part >= MUCH { Severity::UsableWithCare } else { Severity::Usable };
+        Some(Warning { code: WarningCode::CoarseStep, severity, text })
     }
 
     /// Of a fit with null directions: whether there are fewer with a finer step. The factor by which a method multiplies a state from step

@@ -1,0 +1,90 @@
+//! Whether enough errors are where a robust loss is curved.
+//!
+//! The curvature of the cost is the mean of `psi'` over all errors times that of the squares. With a constant far below the noise few
+//! errors are within it, or positive and negative slopes cancel: then the mean is chance, and the standard errors with it.
+
+use super::conclude::Judgement;
+use crate::estimate::{Warning, WarningCode};
+use crate::numeral::{number, percent};
+use crate::optimize::Severity;
+use crate::problem::{Accumulate, Objective};
+use crate::sweep::Window;
+
+/// Relative standard deviation of the curvature above which standard errors are not usable without care, and not at all.
+const CARE: f64 = 0.15;
+const NONE: f64 = 0.5;
+
+/// Sums of the slopes of `psi` and of their squares, and their number.
+struct Slopes<'s> {
+    objective: &'s Objective<'s>,
+    experiment: usize,
+    sum: f64,
+    squares: f64,
+    count: f64,
+}
+
+impl Accumulate for Slopes<'_> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        let Some(loss) = self.objective.loss() else { return };
+        for k in 0..window.samples[lane] {
+            let weight = self.objective.weight(self.experiment, window.begin[lane] + k);
+            for j in (0..window.outputs()).filter(|&j| weight > 0.0 && window.is_measured(k, j, lane)) {
+                let slope = loss.slope(window.error(k, j, lane));
+                self.sum += slope;
+                self.squares += slope * slope;
+                self.count += 1.0;
+            }
+        }
+    }
+
+    fn append(&mut self, later: Self) {
+        self.sum += later.sum;
+        self.squares += later.squares;
+        self.count += later.count;
+    }
+}
+
+impl Judgement<'_> {
+    /// A loss whose curvature at these errors is chance.
+    pub(super) fn few_within_the_loss(&self) -> Option<Warning> {
+        let objective = self.objective;
+        objective.loss()?;
+        let new = |experiment: usize| Slopes { objective, experiment, sum: 0.0, squares: 0.0, count: 0.0 };
+        let all = objective.gather(&self.end.coordinates, false, new).ok()?;
+        let total = |of: fn(&Slopes<'_>) -> f64| all.iter().map(of).sum::<f64>();
+        let (sum, squares, count) = (total(|one| one.sum), total(|one| one.squares), total(|one| one.count));
+        let severity = match relative_deviation(sum, squares, count) {
+            part if part > NONE => Severity::NotUsable,
+            part if part > CARE => Severity::UsableWithCare,
+            _ => return None,
+        };
+        let text = format!(
+            "the loss is too narrow for these errors: its mean curvature, {} of that of squares, is known to {} only, and the standard \
+             errors with it; take a larger constant, or a larger noise",
+            percent(sum / count, 2),
+            match relative_deviation(sum, squares, count) {
+                part if part.is_finite() => percent(part, 2),
+                part => number(part, 2),
+            }
+        );
+        Some(Warning { code: WarningCode::NarrowLoss, severity, text })
+    }
+}
+
+/// The relative standard deviation of a mean of so many numbers, from their sum and that of their squares; infinite where it is not
+/// above zero.
+fn relative_deviation(sum: f64, squares: f64, count: f64) -> f64 {
+    if sum > 0.0 { (squares - sum * sum / count).max(0.0).sqrt() / sum } else { f64::INFINITY }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::relative_deviation;
+
+    /// Of 100 errors four within the loss: a mean of 0.04 with a deviation of `sqrt(0.04 0.96 / 100)`; all within: none.
+    #[test]
+    fn deviations_by_hand() {
+        assert!((relative_deviation(4.0, 4.0, 100.0) - (0.04f64 * 0.96 / 100.0).sqrt() / 0.04).abs() < 1e-15);
+        assert_eq!([relative_deviation(100.0, 100.0, 100.0), relative_deviation(0.0, 3.0, 9.0)], [0.0, f64::INFINITY]);
+    }
+}
