@@ -115,7 +115,7 @@ pub struct Fit<'a, M: Model> {
     /// Whether the integrator was not chosen.
     is_default: bool,
     predictor: Arc<dyn Prediction>,
-    settings: Settings<'a>,
+    settings: Settings,
 }
 
 impl<'a, M: Model> Fit<'a, M> {
@@ -169,13 +169,18 @@ impl<'a, M: Model> Fit<'a, M> {
 
     /// Multiplies the cost of each sample by a weight (at least zero), any function of the sample. It is not an inverse
     /// variance: the covariance is that of the weighted estimate, whatever the noise (a sandwich).
-    pub fn weighting(mut self, weighting: impl Weighting<M> + 'a) -> Self {
+    ///
+    /// It is owned: a closure that captures takes its variables by `move`.
+    pub fn weighting(mut self, weighting: impl Weighting<M> + 'static) -> Self
+    where
+        M: 'static,
+    {
         self.settings.weights = Some(Arc::new(ByModel { weighting, model: PhantomData::<fn(&M)> }));
         self
     }
 
     /// Sets the loss, a function of the standardized errors.
-    pub fn loss(self, loss: impl Loss + 'a) -> Self {
+    pub fn loss(self, loss: impl Loss + 'static) -> Self {
         self.set(|settings| settings.loss(loss))
     }
 
@@ -250,7 +255,7 @@ impl<'a, M: Model> Fit<'a, M> {
         self.set(|settings| settings.checkpoint(path, every))
     }
 
-    fn set(self, change: impl FnOnce(Settings<'a>) -> Settings<'a>) -> Self {
+    fn set(self, change: impl FnOnce(Settings) -> Settings) -> Self {
         Fit { settings: change(self.settings), ..self }
     }
 
@@ -274,13 +279,17 @@ impl<'a, M: Model> Fit<'a, M> {
     }
 }
 
-impl<'a, M: Model + Clone + 'a> Fit<'a, M> {
+impl<M: Model> Fit<'_, M> {
     /// The fit as an untyped [`Problem`]: for [`diagnose`](crate::diagnose), for [`Report`](crate::Report), for
-    /// argmin's solvers, or to be run. It holds a copy of the model.
+    /// argmin's solvers, or to be run. It holds a copy of the model and shares the records' columns, so that it outlives both; `'m` is
+    /// `'static` unless the model's type itself borrows.
     ///
     /// # Errors
     /// As [`run`](Fit::run).
-    pub fn problem(self) -> Result<Problem<'a>, Error> {
+    pub fn problem<'m>(self) -> Result<Problem<'m>, Error>
+    where
+        M: Clone + 'm,
+    {
         let model = Handle::Shared(Arc::new(self.model.clone()));
         let sweep = sweep(model.clone(), &self.stepping, &self.predictor)?;
         let (records, parameters) = (records::<M>(self.experiments), declared::<M>(self.parameters));

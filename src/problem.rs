@@ -52,15 +52,15 @@ use std::sync::Arc;
 
 /// A model, records and settings, ready to be fitted, without the types of the model.
 ///
-/// It owns its records and settings. `'a` is the lifetime of what a sweep, a loss or a weighting borrows; that of a
-/// problem that a typed [`Fit`](crate::Fit) hands over is `'static`.
+/// It owns its records and settings, and can be moved to a thread. `'a` is the lifetime of what its sweep borrows: nothing, so `'static`,
+/// where it comes from [`Fit::problem`](crate::Fit::problem) of a model that borrows nothing itself.
 #[derive(Clone)]
 pub struct Problem<'a> {
     pub(crate) sweep: Arc<dyn Sweep + 'a>,
     pub(crate) records: Vec<Record>,
     pub(crate) prepared: Vec<Prepared>,
     pub(crate) unknowns: Arc<Unknowns>,
-    pub(crate) settings: Settings<'a>,
+    pub(crate) settings: Settings,
     /// Mean of `psi(z) z` for Gaussian `z`; needed where variances are predicted, one for least squares.
     pub(crate) kappa: f64,
     pub(crate) cuts: Cuts,
@@ -79,7 +79,7 @@ impl<'a> Problem<'a> {
         sweep: Arc<dyn Sweep + 'a>,
         records: Vec<Record>,
         parameters: &[Parameter],
-        settings: Settings<'a>,
+        settings: Settings,
     ) -> Result<Self, Error> {
         let problem = Problem::unchecked(sweep, records, parameters, settings)?;
         if problem.unknowns.row.is_empty() {
@@ -94,7 +94,7 @@ impl<'a> Problem<'a> {
         sweep: Arc<dyn Sweep + 'a>,
         records: Vec<Record>,
         parameters: &[Parameter],
-        settings: Settings<'a>,
+        settings: Settings,
     ) -> Result<Self, Error> {
         if records.is_empty() {
             return Err(Error::NoExperiment);

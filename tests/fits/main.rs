@@ -24,6 +24,7 @@ mod models;
 mod nist;
 mod noise;
 mod optimizers;
+mod owned_problems;
 mod recovery;
 mod refining;
 #[path = "../common/refused.rs"]
