@@ -14,13 +14,11 @@ mod starts;
 
 pub use fleet::Fleet;
 
-use crate::engine::only_duals;
 use crate::equations::Equations;
 use crate::error::Error;
 use crate::estimate::Estimate;
 use crate::experiment::{ExperimentOf, Sample};
 use crate::functions::Handle;
-use crate::graph::Untraceable;
 use crate::integrate::{Automatic, Integrator, Method, Rk4, Stiff, automatic, stiff};
 use crate::layout::{Kind, Layout};
 use crate::loss::Loss;
@@ -29,10 +27,10 @@ use crate::optimize::LeastSquaresState;
 use crate::parameter::Parameter;
 use crate::predict::{Prediction, Predictor, simulation};
 use crate::prefilter::Butterworth;
-use crate::problem::{FinerSweeps, MakeSweep, Problem, Search, Settings, Weights};
+use crate::problem::{FinerSweeps, MakeSweep, Problem, SUBSTEPS, Search, Settings, Weights};
 use crate::record::Record;
 use crate::signals::{Of, Signals};
-use crate::sweep::{DualSweep, Loops, Narrow, ProgramSweep, Sweep};
+use crate::sweep::{DualSweep, Loops, Narrow, Sweep, Typed, compiled};
 use crate::weighting::Weighting;
 use argmin::core::observers::{Observe, ObserverMode};
 use core::marker::PhantomData;
@@ -318,31 +316,12 @@ pub(crate) fn sweep<'a, M: Model + 'a>(
     let layout = Arc::new(Layout::of::<M>());
     method.check(layout.kind)?;
     predictor.check(&layout)?;
-    let traced = if only_duals() { None } else { Some(Equations::trace(&*model)) };
     let plain = |reason: String| -> Arc<dyn Sweep + 'a> {
-        let (layout, model, loops) = (layout.clone(), model.clone(), loops.clone());
-        Arc::new(DualSweep { layout, model, loops, method: method.clone(), predictor: predictor.clone(), reason })
+        let code = Arc::new(Typed { model: model.clone(), loops: loops.clone() });
+        let (layout, method, predictor) = (layout.clone(), method.clone(), predictor.clone());
+        Arc::new(DualSweep { layout, code, method, predictor, reason })
     };
-    Ok(compiled(traced, &method, predictor, &plain))
-}
-
-/// A compiled program of the traced equations, if there can be one, else what `plain` makes of the reason.
-fn compiled<'a>(
-    traced: Option<Result<Equations, Untraceable>>,
-    method: &Arc<dyn Method>,
-    predictor: &Arc<dyn Prediction>,
-    plain: &dyn Fn(String) -> Arc<dyn Sweep + 'a>,
-) -> Arc<dyn Sweep + 'a> {
-    let program = match traced {
-        None => return plain("dual numbers are asked for".to_owned()),
-        Some(traced) => traced.and_then(|equations| {
-            ProgramSweep::new(Arc::new(equations), method.clone(), predictor.clone(), plain(String::new()))
-        }),
-    };
-    match program {
-        Ok(sweep) => Arc::new(sweep),
-        Err(untraceable) => plain(untraceable.reason),
-    }
+    Ok(compiled(&|| Equations::trace(&*model).map(Arc::new), &method, predictor, &plain))
 }
 
 /// The sweeps by the methods that follow a default one that is too coarse.
@@ -358,7 +337,7 @@ fn finer<'a, M: Model + 'a>(
         let (model, predictor) = (model.clone(), predictor.clone());
         Arc::new(move || sweep(model.clone(), &stepping, &predictor))
     };
-    let steps = [4, 16, 64].map(|substeps| by(Stepping::automatic(substeps)));
+    let steps = SUBSTEPS.map(|substeps| by(Stepping::automatic(substeps)));
     let stiff = by(Stepping { loops: Arc::new(Narrow(Stiff::default())), method: stiff() });
     FinerSweeps::new(steps.into_iter().chain([stiff]).collect())
 }

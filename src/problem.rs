@@ -11,6 +11,7 @@ mod finer;
 mod fingerprint;
 mod linearize;
 mod objective;
+mod of_equations;
 mod pass;
 mod search;
 mod segments;
@@ -25,9 +26,10 @@ mod whitening;
 pub(crate) use batches::each;
 pub(crate) use checkpoint::CheckpointFile;
 pub(crate) use control::Control;
-pub(crate) use finer::{Finer, FinerSweeps, MakeSweep, PARTS};
+pub(crate) use finer::{Finer, FinerSweeps, MakeSweep, PARTS, SUBSTEPS};
 pub(crate) use fingerprint::Fingerprint;
 pub use objective::Objective;
+pub use of_equations::EquationsFit;
 pub(crate) use pass::Accumulate;
 pub use search::Search;
 pub(crate) use search::{Optimizer, Round, RoundError};
@@ -43,10 +45,10 @@ use weighing::Weighing;
 pub(crate) use whitening::{Noise, Whitening};
 
 use crate::error::Error;
-use crate::layout::Layout;
+use crate::layout::{Layout, Quantity};
 use crate::loss::expected_slope;
 use crate::parameter::Parameter;
-use crate::record::Record;
+use crate::record::{Channel, Record};
 use crate::sweep::{Prepared, Sweep};
 use std::sync::Arc;
 
@@ -73,7 +75,7 @@ impl<'a> Problem<'a> {
     /// Checks parameters and settings, and prepares every record.
     ///
     /// # Errors
-    /// No record, parameters that do not fit the model, nothing free, an output that was never measured, settings out
+    /// No record, a record or parameters that do not fit the model, nothing free, an output that was never measured, settings out
     /// of range ([`Error`] names which).
     pub fn new(
         sweep: Arc<dyn Sweep + 'a>,
@@ -100,6 +102,7 @@ impl<'a> Problem<'a> {
             return Err(Error::NoExperiment);
         }
         unknowns::check_count(sweep.layout(), parameters)?;
+        records.iter().try_for_each(|record| check_signals(sweep.layout(), record))?;
         settings.check(sweep.layout(), &records)?;
         let unknowns = Arc::new(Unknowns::new(&*sweep, &records, parameters)?);
         let prepared = Problem::prepared(&*sweep, &records, parameters)?;
@@ -165,5 +168,27 @@ impl<'a> Problem<'a> {
     pub(crate) fn in_units<'p>(&'p self, control: &'p Control) -> Objective<'p> {
         let whitening = Whitening::none(self.layout().outputs.len());
         Objective::new(self, &*self.sweep, whitening, control)
+    }
+}
+
+/// A record has the states and signals of the layout, in its order.
+fn check_signals(layout: &Layout, record: &Record) -> Result<(), Error> {
+    let quantities = |all: &[Quantity]| all.iter().map(|one| one.name.clone()).collect::<Vec<_>>();
+    let channels = |all: &[Channel]| all.iter().map(|one| one.name.clone()).collect::<Vec<_>>();
+    let roles = [
+        ("states", quantities(&layout.states), quantities(&record.states)),
+        ("inputs", quantities(&layout.inputs), channels(record.inputs())),
+        ("outputs", quantities(&layout.outputs), channels(record.outputs())),
+    ];
+    let listed =
+        |names: &[String]| if names.is_empty() { "none".to_owned() } else { format!("`{}`", names.join("`, `")) };
+    match roles.iter().find(|(_, expected, found)| expected != found) {
+        None => Ok(()),
+        Some((role, expected, found)) => Err(Error::Option(format!(
+            "the {role} of experiment `{}` are {}, those of the model are {}; give the model's, in its order",
+            record.name(),
+            listed(found),
+            listed(expected)
+        ))),
     }
 }

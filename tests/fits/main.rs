@@ -12,6 +12,7 @@ mod common;
 mod contradictions;
 mod declared;
 mod dense_answers;
+mod equations;
 mod extremes;
 mod far_starts;
 mod few_measurements;
