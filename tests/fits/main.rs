@@ -38,4 +38,5 @@ mod shared;
 mod spiral;
 mod starts;
 mod stiff;
+mod threads;
 mod user_code;
