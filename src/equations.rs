@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 
 /// A model's quantities and its arithmetic, known at run time.
 ///
-/// A Rust model is read once ([`Equations::trace`]); equations from elsewhere are made of a graph ([`Equations::new`]).
+/// A Rust model is read once ([`Equations::trace`]); equations from elsewhere are made of a graph
+/// ([`Equations::new`]), and fitted by [`EquationsFit`](crate::problem::EquationsFit).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Parts", into = "Parts")]
 pub struct Equations {

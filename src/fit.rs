@@ -14,13 +14,11 @@ mod starts;
 
 pub use fleet::Fleet;
 
-use crate::engine::only_duals;
 use crate::equations::Equations;
 use crate::error::Error;
 use crate::estimate::Estimate;
 use crate::experiment::{ExperimentOf, Sample};
 use crate::functions::Handle;
-use crate::graph::Untraceable;
 use crate::integrate::{Automatic, Integrator, Method, Rk4, Stiff, automatic, stiff};
 use crate::layout::{Kind, Layout};
 use crate::loss::Loss;
@@ -29,10 +27,10 @@ use crate::optimize::LeastSquaresState;
 use crate::parameter::Parameter;
 use crate::predict::{Prediction, Predictor, simulation};
 use crate::prefilter::Butterworth;
-use crate::problem::{FinerSweeps, MakeSweep, Problem, Search, Settings, Weights};
+use crate::problem::{FinerSweeps, MakeSweep, Problem, SUBSTEPS, Search, Settings, Weights};
 use crate::record::Record;
 use crate::signals::{Of, Signals};
-use crate::sweep::{DualSweep, Loops, Narrow, ProgramSweep, Sweep};
+use crate::sweep::{DualSweep, Loops, Narrow, Sweep, Typed, compiled};
 use crate::weighting::Weighting;
 use argmin::core::observers::{Observe, ObserverMode};
 use core::marker::PhantomData;
@@ -115,7 +113,7 @@ pub struct Fit<'a, M: Model> {
     /// Whether the integrator was not chosen.
     is_default: bool,
     predictor: Arc<dyn Prediction>,
-    settings: Settings<'a>,
+    settings: Settings,
 }
 
 impl<'a, M: Model> Fit<'a, M> {
@@ -169,13 +167,18 @@ impl<'a, M: Model> Fit<'a, M> {
 
     /// Multiplies the cost of each sample by a weight (at least zero), any function of the sample. It is not an inverse
     /// variance: the covariance is that of the weighted estimate, whatever the noise (a sandwich).
-    pub fn weighting(mut self, weighting: impl Weighting<M> + 'a) -> Self {
+    ///
+    /// It is owned: a closure that captures takes its variables by `move`.
+    pub fn weighting(mut self, weighting: impl Weighting<M> + 'static) -> Self
+    where
+        M: 'static,
+    {
         self.settings.weights = Some(Arc::new(ByModel { weighting, model: PhantomData::<fn(&M)> }));
         self
     }
 
     /// Sets the loss, a function of the standardized errors.
-    pub fn loss(self, loss: impl Loss + 'a) -> Self {
+    pub fn loss(self, loss: impl Loss + 'static) -> Self {
         self.set(|settings| settings.loss(loss))
     }
 
@@ -250,7 +253,7 @@ impl<'a, M: Model> Fit<'a, M> {
         self.set(|settings| settings.checkpoint(path, every))
     }
 
-    fn set(self, change: impl FnOnce(Settings<'a>) -> Settings<'a>) -> Self {
+    fn set(self, change: impl FnOnce(Settings) -> Settings) -> Self {
         Fit { settings: change(self.settings), ..self }
     }
 
@@ -274,13 +277,17 @@ impl<'a, M: Model> Fit<'a, M> {
     }
 }
 
-impl<'a, M: Model + Clone + 'a> Fit<'a, M> {
+impl<M: Model> Fit<'_, M> {
     /// The fit as an untyped [`Problem`]: for [`diagnose`](crate::diagnose), for [`Report`](crate::Report), for
-    /// argmin's solvers, or to be run. It holds a copy of the model.
+    /// argmin's solvers, or to be run. It holds a copy of the model and shares the records' columns, so that it outlives both; `'m` is
+    /// `'static` unless the model's type itself borrows.
     ///
     /// # Errors
     /// As [`run`](Fit::run).
-    pub fn problem(self) -> Result<Problem<'a>, Error> {
+    pub fn problem<'m>(self) -> Result<Problem<'m>, Error>
+    where
+        M: Clone + 'm,
+    {
         let model = Handle::Shared(Arc::new(self.model.clone()));
         let sweep = sweep(model.clone(), &self.stepping, &self.predictor)?;
         let (records, parameters) = (records::<M>(self.experiments), declared::<M>(self.parameters));
@@ -309,31 +316,12 @@ pub(crate) fn sweep<'a, M: Model + 'a>(
     let layout = Arc::new(Layout::of::<M>());
     method.check(layout.kind)?;
     predictor.check(&layout)?;
-    let traced = if only_duals() { None } else { Some(Equations::trace(&*model)) };
     let plain = |reason: String| -> Arc<dyn Sweep + 'a> {
-        let (layout, model, loops) = (layout.clone(), model.clone(), loops.clone());
-        Arc::new(DualSweep { layout, model, loops, method: method.clone(), predictor: predictor.clone(), reason })
+        let code = Arc::new(Typed { model: model.clone(), loops: loops.clone() });
+        let (layout, method, predictor) = (layout.clone(), method.clone(), predictor.clone());
+        Arc::new(DualSweep { layout, code, method, predictor, reason })
     };
-    Ok(compiled(traced, &method, predictor, &plain))
-}
-
-/// A compiled program of the traced equations, if there can be one, else what `plain` makes of the reason.
-fn compiled<'a>(
-    traced: Option<Result<Equations, Untraceable>>,
-    method: &Arc<dyn Method>,
-    predictor: &Arc<dyn Prediction>,
-    plain: &dyn Fn(String) -> Arc<dyn Sweep + 'a>,
-) -> Arc<dyn Sweep + 'a> {
-    let program = match traced {
-        None => return plain("dual numbers are asked for".to_owned()),
-        Some(traced) => traced.and_then(|equations| {
-            ProgramSweep::new(Arc::new(equations), method.clone(), predictor.clone(), plain(String::new()))
-        }),
-    };
-    match program {
-        Ok(sweep) => Arc::new(sweep),
-        Err(untraceable) => plain(untraceable.reason),
-    }
+    Ok(compiled(&|| Equations::trace(&*model).map(Arc::new), &method, predictor, &plain))
 }
 
 /// The sweeps by the methods that follow a default one that is too coarse.
@@ -349,7 +337,7 @@ fn finer<'a, M: Model + 'a>(
         let (model, predictor) = (model.clone(), predictor.clone());
         Arc::new(move || sweep(model.clone(), &stepping, &predictor))
     };
-    let steps = [4, 16, 64].map(|substeps| by(Stepping::automatic(substeps)));
+    let steps = SUBSTEPS.map(|substeps| by(Stepping::automatic(substeps)));
     let stiff = by(Stepping { loops: Arc::new(Narrow(Stiff::default())), method: stiff() });
     FinerSweeps::new(steps.into_iter().chain([stiff]).collect())
 }

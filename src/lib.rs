@@ -80,6 +80,7 @@
 //! | declare parameters | [`free`], [`fixed`], [`Parameter`], [`Prior`] |
 //! | fit one record or several together | [`Fit`] |
 //! | fit many records, each by itself | [`Fleet`] |
+//! | fit equations that are made at run time or read from a file | [`equations`], [`graph`], [`EquationsFit`](problem::EquationsFit) |
 //! | choose an integrator | [`Automatic`], [`Rk4`], [`Rk45`], [`Esdirk`], [`Discrete`] |
 //! | choose what is predicted | [`FreeRun`], [`Horizon`], [`Kalman`], [`predict`] |
 //! | weigh or filter errors, limit outliers | [`weighting`], [`loss`], [`Butterworth`] |

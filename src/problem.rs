@@ -11,6 +11,7 @@ mod finer;
 mod fingerprint;
 mod linearize;
 mod objective;
+mod of_equations;
 mod pass;
 mod search;
 mod segments;
@@ -25,9 +26,10 @@ mod whitening;
 pub(crate) use batches::each;
 pub(crate) use checkpoint::CheckpointFile;
 pub(crate) use control::Control;
-pub(crate) use finer::{Finer, FinerSweeps, MakeSweep, PARTS};
+pub(crate) use finer::{Finer, FinerSweeps, MakeSweep, PARTS, SUBSTEPS};
 pub(crate) use fingerprint::Fingerprint;
 pub use objective::Objective;
+pub use of_equations::EquationsFit;
 pub(crate) use pass::Accumulate;
 pub use search::Search;
 pub(crate) use search::{Optimizer, Round, RoundError};
@@ -43,24 +45,24 @@ use weighing::Weighing;
 pub(crate) use whitening::{Noise, Whitening};
 
 use crate::error::Error;
-use crate::layout::Layout;
+use crate::layout::{Layout, Quantity};
 use crate::loss::expected_slope;
 use crate::parameter::Parameter;
-use crate::record::Record;
+use crate::record::{Channel, Record};
 use crate::sweep::{Prepared, Sweep};
 use std::sync::Arc;
 
 /// A model, records and settings, ready to be fitted, without the types of the model.
 ///
-/// It owns its records and settings. `'a` is the lifetime of what a sweep, a loss or a weighting borrows; that of a
-/// problem that a typed [`Fit`](crate::Fit) hands over is `'static`.
+/// It owns its records and settings, and can be moved to a thread. `'a` is the lifetime of what its sweep borrows: nothing, so `'static`,
+/// where it comes from [`Fit::problem`](crate::Fit::problem) of a model that borrows nothing itself.
 #[derive(Clone)]
 pub struct Problem<'a> {
     pub(crate) sweep: Arc<dyn Sweep + 'a>,
     pub(crate) records: Vec<Record>,
     pub(crate) prepared: Vec<Prepared>,
     pub(crate) unknowns: Arc<Unknowns>,
-    pub(crate) settings: Settings<'a>,
+    pub(crate) settings: Settings,
     /// Mean of `psi(z) z` for Gaussian `z`; needed where variances are predicted, one for least squares.
     pub(crate) kappa: f64,
     pub(crate) cuts: Cuts,
@@ -73,13 +75,13 @@ impl<'a> Problem<'a> {
     /// Checks parameters and settings, and prepares every record.
     ///
     /// # Errors
-    /// No record, parameters that do not fit the model, nothing free, an output that was never measured, settings out
+    /// No record, a record or parameters that do not fit the model, nothing free, an output that was never measured, settings out
     /// of range ([`Error`] names which).
     pub fn new(
         sweep: Arc<dyn Sweep + 'a>,
         records: Vec<Record>,
         parameters: &[Parameter],
-        settings: Settings<'a>,
+        settings: Settings,
     ) -> Result<Self, Error> {
         let problem = Problem::unchecked(sweep, records, parameters, settings)?;
         if problem.unknowns.row.is_empty() {
@@ -94,12 +96,13 @@ impl<'a> Problem<'a> {
         sweep: Arc<dyn Sweep + 'a>,
         records: Vec<Record>,
         parameters: &[Parameter],
-        settings: Settings<'a>,
+        settings: Settings,
     ) -> Result<Self, Error> {
         if records.is_empty() {
             return Err(Error::NoExperiment);
         }
         unknowns::check_count(sweep.layout(), parameters)?;
+        records.iter().try_for_each(|record| check_signals(sweep.layout(), record))?;
         settings.check(sweep.layout(), &records)?;
         let unknowns = Arc::new(Unknowns::new(&*sweep, &records, parameters)?);
         let prepared = Problem::prepared(&*sweep, &records, parameters)?;
@@ -165,5 +168,27 @@ impl<'a> Problem<'a> {
     pub(crate) fn in_units<'p>(&'p self, control: &'p Control) -> Objective<'p> {
         let whitening = Whitening::none(self.layout().outputs.len());
         Objective::new(self, &*self.sweep, whitening, control)
+    }
+}
+
+/// A record has the states and signals of the layout, in its order.
+fn check_signals(layout: &Layout, record: &Record) -> Result<(), Error> {
+    let quantities = |all: &[Quantity]| all.iter().map(|one| one.name.clone()).collect::<Vec<_>>();
+    let channels = |all: &[Channel]| all.iter().map(|one| one.name.clone()).collect::<Vec<_>>();
+    let roles = [
+        ("states", quantities(&layout.states), quantities(&record.states)),
+        ("inputs", quantities(&layout.inputs), channels(record.inputs())),
+        ("outputs", quantities(&layout.outputs), channels(record.outputs())),
+    ];
+    let listed =
+        |names: &[String]| if names.is_empty() { "none".to_owned() } else { format!("`{}`", names.join("`, `")) };
+    match roles.iter().find(|(_, expected, found)| expected != found) {
+        None => Ok(()),
+        Some((role, expected, found)) => Err(Error::Option(format!(
+            "the {role} of experiment `{}` are {}, those of the model are {}; give the model's, in its order",
+            record.name(),
+            listed(found),
+            listed(expected)
+        ))),
     }
 }

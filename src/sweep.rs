@@ -6,11 +6,15 @@
 mod duals;
 mod filtered;
 mod loops;
+mod made;
+mod model_code;
 mod programs;
 mod window;
 
 pub(crate) use duals::{DualSweep, OVERFLOW};
 pub(crate) use loops::{Loops, Narrow};
+pub(crate) use made::{compiled, of_equations};
+pub(crate) use model_code::{ModelCode, Typed};
 pub(crate) use programs::{Derived, Interleaved, ProgramSweep};
 pub use window::Window;
 

@@ -32,7 +32,7 @@ pub struct Fleet<'a, M: Model> {
     sweep: Arc<dyn Sweep + 'a>,
     finer: Arc<FinerSweeps<'a>>,
     parameters: Vec<Parameter>,
-    settings: Settings<'a>,
+    settings: Settings,
     model: PhantomData<fn() -> M>,
 }
 

@@ -43,6 +43,9 @@ impl<'a> FinerSweeps<'a> {
 const TRIALS: u64 = 20;
 pub(crate) const PARTS: u64 = 5;
 
+/// Steps per sample of the methods that follow the default one; after them comes one for stiff models.
+pub(crate) const SUBSTEPS: [u32; 3] = [4, 16, 64];
+
 /// The problem by each method is made when it is first needed.
 struct ByMethods<'a> {
     base: Problem<'a>,

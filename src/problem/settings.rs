@@ -32,11 +32,11 @@ pub(crate) trait Weights: Send + Sync {
 
 /// The settings of a fit besides model, records and parameters; all have defaults.
 #[derive(Clone)]
-pub struct Settings<'a> {
+pub struct Settings {
     pub(crate) noise: Noise,
     pub(crate) input_noise: Option<Vec<f64>>,
-    pub(crate) loss: Option<Arc<dyn Loss + 'a>>,
-    pub(crate) weights: Option<Arc<dyn Weights + 'a>>,
+    pub(crate) loss: Option<Arc<dyn Loss>>,
+    pub(crate) weights: Option<Arc<dyn Weights>>,
     pub(crate) prefilter: Option<Butterworth>,
     pub(crate) cancel: Option<Arc<AtomicBool>>,
     pub(crate) counter: Option<Arc<AtomicU64>>,
@@ -68,7 +68,7 @@ impl SearchPlan {
     }
 }
 
-impl Default for Settings<'_> {
+impl Default for Settings {
     fn default() -> Self {
         Settings {
             noise: Noise::PerOutput,
@@ -87,7 +87,7 @@ impl Default for Settings<'_> {
     }
 }
 
-impl<'a> Settings<'a> {
+impl Settings {
     /// Sets the standard deviation of the noise of each output, in its unit (after the pre-filter, if there is one).
     /// Without it, the noise is estimated from the errors.
     pub fn noise(mut self, sigma: Vec<f64>) -> Self {
@@ -115,7 +115,7 @@ impl<'a> Settings<'a> {
     }
 
     /// Sets the loss, a function of the standardized errors.
-    pub fn loss(mut self, loss: impl Loss + 'a) -> Self {
+    pub fn loss(mut self, loss: impl Loss + 'static) -> Self {
         self.loss = Some(Arc::new(loss));
         self
     }

@@ -1,41 +1,44 @@
 //! [`DualSweep`]: models run in numbers with slopes, one piece at a time.
 
 use super::filtered::Filter;
-use super::{Located, Loops, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit, unmoved};
+use super::{Located, ModelCode, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit, unmoved};
 use crate::error::{Error, Failure};
-use crate::functions::{Functions, Handle};
+use crate::functions::Functions;
 use crate::integrate::{Duals, Method, Stuck};
 use crate::layout::{Kind, Layout};
-use crate::model::Model;
 use crate::predict::{Between, Guess, Place, Plant, Prediction, SlicePlant};
 use crate::record::{Channel, Record};
 use core::cell::Cell;
 use std::sync::Arc;
 
-/// A model's own code, run in dual numbers.
-pub(crate) struct DualSweep<'a, M: Model> {
+/// A model run in dual numbers.
+pub(crate) struct DualSweep<'a> {
     pub layout: Arc<Layout>,
-    pub model: Handle<'a, M>,
-    pub loops: Arc<dyn Loops<M> + 'a>,
+    pub code: Arc<dyn ModelCode + 'a>,
     pub method: Arc<dyn Method>,
     pub predictor: Arc<dyn Prediction>,
-    /// Why the model was not traced.
+    /// Why the model was not compiled.
     pub reason: String,
 }
 
-impl<M: Model> DualSweep<'_, M> {
+impl DualSweep<'_> {
     fn filter(&self) -> Filter<'_> {
         Filter {
             layout: &self.layout,
-            values: &self.model,
-            duals: &self.model,
+            values: self.code.values(),
+            duals: self.code.duals(),
             method: &*self.method,
             predictor: &*self.predictor,
         }
     }
+
+    /// The model at a sample.
+    fn place<'p>(&'p self, t: f64, u: &'p [f64], p: &'p [f64]) -> Place<'p> {
+        Place { layout: &self.layout, functions: self.code.duals(), t, u, p }
+    }
 }
 
-impl<M: Model> Sweep for DualSweep<'_, M> {
+impl Sweep for DualSweep<'_> {
     fn layout(&self) -> &Layout {
         &self.layout
     }
@@ -54,7 +57,7 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
 
     fn prepare(&self, record: &Record, parameters: &[f64]) -> Result<Prepared, Error> {
         let restarts = match self.predictor.restarts() {
-            Some(horizon) => horizon.states(&self.layout, &self.model, record, parameters)?,
+            Some(horizon) => horizon.states(&self.layout, self.code.duals(), record, parameters)?,
             None => vec![],
         };
         Ok(Prepared { restarts, ..Prepared::default() })
@@ -71,16 +74,16 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
         let one = |piece: &Piece<'_>| {
             let restart = self.predictor.restarts().map(|horizon| horizon.steps);
             match restart.is_some() || self.predictor.is_simulation() {
-                true => self.loops.run(&self.model, piece, seeds, restart, visit),
-                false => self.filter().run(piece, seeds, visit),
+                true => self.code.run(&self.filter(), piece, seeds, restart, visit),
+                false => self.filter().run(piece, seeds, None, visit),
             }
         };
         pieces.iter().map(one).collect()
     }
 
     fn measured_state(&self, record: &Record, sample: usize, p: &[f64]) -> Result<Vec<f64>, String> {
-        let place =
-            Place { layout: &self.layout, functions: &self.model, t: record.time(sample), u: &record.input(sample), p };
+        let u = record.input(sample);
+        let place = self.place(record.time(sample), &u, p);
         let x = place.state(&record.output(sample))?;
         match place.depends_on_parameter(&x) {
             Some(name) => Err(format!("the outputs depend on the parameter `{name}`, too")),
@@ -94,14 +97,12 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
         let half = |range: (f64, f64)| 0.5 * (range.1 - range.0);
         let moves: Vec<f64> =
             record.inspect_some().outputs.iter().map(|output| output.range.map_or(0.0, half)).collect();
-        Place { layout: &self.layout, functions: &self.model, t: record.time(0), u: &record.input(0), p }
-            .guess(&y, &moves)
+        self.place(record.time(0), &record.input(0), p).guess(&y, &moves)
     }
 
     fn state_slopes(&self, record: &Record, sample: usize, state: &[f64], p: &[f64]) -> Option<Vec<f64>> {
         let (t, u) = (record.time(sample), record.input(sample));
-        let place = Place { layout: &self.layout, functions: &self.model, t, u: &u, p };
-        (self.layout.kind == Kind::Continuous).then(|| place.state_slopes(state))
+        (self.layout.kind == Kind::Continuous).then(|| self.place(t, &u, p).state_slopes(state))
     }
 
     fn locate(
@@ -113,8 +114,8 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
         sigma: &[f64],
         stops: &dyn Fn() -> bool,
     ) -> Option<Located> {
-        let layout = &*self.layout;
-        let search = FailureSearch { layout, values: &self.model, duals: &self.model, method: &*self.method, record };
+        let (layout, values, duals) = (&*self.layout, self.code.values(), self.code.duals());
+        let search = FailureSearch { layout, values, duals, method: &*self.method, record };
         Some(search.locate(state, parameters, sample, sigma, stops))
     }
 
@@ -123,10 +124,10 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
     }
 
     fn refined<'s>(&'s self, _samples: usize) -> Option<Arc<dyn Sweep + 's>> {
-        let (loops, method) = (self.loops.refined(M::KIND)?, self.method.refined(M::KIND)?);
-        let (layout, model, predictor) = (self.layout.clone(), self.model.clone(), self.predictor.clone());
-        let reason = self.reason.clone();
-        Some(Arc::new(DualSweep { layout, model, loops, method, predictor, reason }))
+        let kind = self.layout.kind;
+        let (code, method) = (self.code.refined(kind)?, self.method.refined(kind)?);
+        let (layout, predictor, reason) = (self.layout.clone(), self.predictor.clone(), self.reason.clone());
+        Some(Arc::new(DualSweep { layout, code, method, predictor, reason }))
     }
 
     fn integrator(&self) -> String {
@@ -142,7 +143,7 @@ impl<M: Model> Sweep for DualSweep<'_, M> {
     }
 
     fn identity(&self) -> String {
-        std::any::type_name::<M>().to_owned()
+        self.code.identity()
     }
 }
 

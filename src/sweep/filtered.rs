@@ -1,4 +1,5 @@
-//! A piece run by a [`Predictor`](crate::Predictor) of any kind, on vectors of run-time length.
+//! A piece run by a [`Predictor`](crate::Predictor) of any kind, on vectors of run-time length: filters of all models, and models that
+//! have no types.
 
 use super::{Piece, Reached, RunError, Seed, Visit, Window};
 use crate::dual::Dual;
@@ -11,6 +12,8 @@ use core::cell::Cell;
 
 /// Samples per window.
 const WINDOW: usize = 128;
+/// The same where a single sample may take many steps: after each window a fit looks at its time limit.
+const ADAPTIVE_WINDOW: usize = 8;
 /// Slopes of a pass.
 const SLOPES: usize = 8;
 /// Slopes below this are set to zero: their squares are denormal.
@@ -25,9 +28,19 @@ pub(crate) struct Filter<'f> {
     pub predictor: &'f dyn Prediction,
 }
 
+/// A piece and how it is to be run.
+struct Task<'t, S> {
+    functions: &'t dyn Functions<S>,
+    steps: &'t dyn Steps<S>,
+    piece: &'t Piece<'t>,
+    restart: Option<usize>,
+}
+
 /// The state of one pass with up to eight slopes.
 struct Pass<S> {
     carry: Vec<S>,
+    /// The carry at the begin of the piece.
+    start: Vec<S>,
     p: Vec<S>,
     step: Cell<f64>,
     first: usize,
@@ -98,11 +111,18 @@ impl Filter<'_> {
         reached
     }
 
-    /// Runs a piece.
-    pub fn run(&self, piece: &Piece<'_>, seeds: &[Seed], visit: Visit<'_>) -> Result<Reached, RunError> {
+    /// Runs a piece. With `restart`, samples are predicted from the measured states that many samples before.
+    pub fn run(
+        &self,
+        piece: &Piece<'_>,
+        seeds: &[Seed],
+        restart: Option<usize>,
+        visit: Visit<'_>,
+    ) -> Result<Reached, RunError> {
+        let (values, duals) = (self.predictor.values(), self.predictor.duals());
         match seeds.is_empty() {
-            true => self.run_windows::<f64>(self.values, self.predictor.values(), piece, seeds, visit),
-            false => self.run_windows::<Duals>(self.duals, self.predictor.duals(), piece, seeds, visit),
+            true => self.run_windows(&Task { functions: self.values, steps: values, piece, restart }, seeds, visit),
+            false => self.run_windows(&Task { functions: self.duals, steps: duals, piece, restart }, seeds, visit),
         }
     }
 
@@ -118,26 +138,29 @@ impl Filter<'_> {
 
     fn run_windows<S: Number>(
         &self,
-        functions: &dyn Functions<S>,
-        steps: &dyn Steps<S>,
-        piece: &Piece<'_>,
+        task: &Task<'_, S>,
         seeds: &[Seed],
         visit: Visit<'_>,
     ) -> Result<Reached, RunError> {
+        let piece = task.piece;
+        let capacity = if self.method.is_fixed() { WINDOW } else { ADAPTIVE_WINDOW };
         let count = seeds.len().div_ceil(SLOPES).max(1);
         let mut passes: Vec<Pass<S>> = (0..count).map(|pass| Pass::new(piece, seeds, pass * SLOPES)).collect();
         let outputs = self.layout.outputs.len();
         let variances = self.predictor.predicts_variance();
-        let mut window = Window::new(1, outputs, seeds.len(), WINDOW, variances);
+        let mut window = Window::new(1, outputs, seeds.len(), capacity, variances);
         let mut begin = piece.samples.start;
         while begin < piece.samples.end {
-            let samples = WINDOW.min(piece.samples.end - begin);
+            let samples = capacity.min(piece.samples.end - begin);
             (window.begin[0], window.samples[0]) = (begin, samples);
-            window.carry = passes[0].carry.iter().map(Scalar::value).collect();
+            window.carry = match task.restart {
+                None => passes[0].carry.iter().map(Scalar::value).collect(),
+                // Nothing is carried from window to window: all of them begin with the state at the record's first sample.
+                Some(_) => piece.carry.to_vec(),
+            };
             for pass in &mut passes {
                 for k in 0..samples {
-                    self.sample(functions, steps, piece, pass, begin + k, k, &mut window)
-                        .map_err(|Stuck| RunError::Failed { sample: begin + k + 1 })?;
+                    self.sample(task, pass, begin + k, k, &mut window)?;
                 }
                 pass.carry.iter_mut().for_each(|x| *x = x.flushed());
             }
@@ -160,21 +183,23 @@ impl Filter<'_> {
     }
 
     /// Predicts the outputs of a sample, corrects the carry with the measured ones, and advances to the next sample.
-    #[expect(clippy::too_many_arguments, reason = "one place in two sequences")]
     fn sample<S: Number>(
         &self,
-        functions: &dyn Functions<S>,
-        steps: &dyn Steps<S>,
-        piece: &Piece<'_>,
+        task: &Task<'_, S>,
         pass: &mut Pass<S>,
         sample: usize,
         k: usize,
         window: &mut Window,
-    ) -> Result<(), Stuck> {
+    ) -> Result<(), RunError> {
+        let Task { functions, steps, piece, restart } = *task;
+        let is_known = match restart {
+            None => true,
+            Some(restart) => self.restart(task, pass, sample, restart).map_err(|Stuck| RunError::Failed { sample })?,
+        };
         let plant = self.plant(functions, Between::new(piece.record, sample), &pass.p, &pass.step);
         let columns = window.columns();
         for (j, channel) in piece.record.outputs().iter().enumerate() {
-            let y = channel.values[sample];
+            let y = if is_known { channel.values[sample] } else { f64::NAN };
             window.set_measured(k, j, u32::from(!y.is_nan()));
             if y.is_nan() {
                 window.row_mut(k, j).fill(0.0);
@@ -195,7 +220,37 @@ impl Filter<'_> {
             }
             steps.correct(&plant, &mut pass.carry, j, error);
         }
-        if sample + 1 < piece.record.len() { steps.advance(&plant, &mut pass.carry) } else { Ok(()) }
+        if restart.is_some() || sample + 1 >= piece.record.len() {
+            return Ok(());
+        }
+        steps.advance(&plant, &mut pass.carry).map_err(|Stuck| RunError::Failed { sample: sample + 1 })
+    }
+
+    /// Moves the carry to the state from which a sample is predicted; false where it was not measured.
+    fn restart<S: Number>(
+        &self,
+        task: &Task<'_, S>,
+        pass: &mut Pass<S>,
+        sample: usize,
+        restart: usize,
+    ) -> Result<bool, Stuck> {
+        let (piece, n) = (task.piece, self.layout.states.len());
+        let first = sample.saturating_sub(restart);
+        if sample < restart {
+            pass.carry.copy_from_slice(&pass.start);
+        } else {
+            let measured = &piece.prepared.restarts[first * n..][..n];
+            if measured.iter().any(|x| x.is_nan()) {
+                return Ok(false);
+            }
+            pass.carry.iter_mut().zip(measured).for_each(|(x, measured)| *x = S::from(*measured));
+        }
+        pass.step.set(0.0);
+        for from in first..sample {
+            let plant = self.plant(task.functions, Between::new(piece.record, from), &pass.p, &pass.step);
+            task.steps.advance(&plant, &mut pass.carry)?;
+        }
+        Ok(true)
     }
 }
 
@@ -206,9 +261,10 @@ impl<S: Number> Pass<S> {
             if i < used { piece.slopes[entry * seeds.len() + first + i] } else { 0.0 }
         };
         let moves = |j: usize, i: usize| i < used && seeds[first + i] == Seed::Parameter(j);
-        let carry = piece.carry.iter().enumerate().map(|(entry, x)| S::with(*x, &|i| slope(entry, i))).collect();
+        let carry: Vec<S> =
+            piece.carry.iter().enumerate().map(|(entry, x)| S::with(*x, &|i| slope(entry, i))).collect();
         let parameters = piece.parameters.iter().enumerate();
         let p = parameters.map(|(j, p)| S::with(*p, &|i| f64::from(u8::from(moves(j, i))))).collect();
-        Pass { carry, p, step: Cell::new(0.0), first, used }
+        Pass { start: carry.clone(), carry, p, step: Cell::new(0.0), first, used }
     }
 }

@@ -278,27 +278,6 @@ fn gradient_and_hessian_are_those_of_the_cost() {
     }
 }
 
-/// Seven experiments on one, two and three threads: the same bits.
-#[test]
-fn results_do_not_depend_on_threads() {
-    let one = |e: u64| {
-        let inputs = levels(300, 12, 20 + e).into_iter().map(|u| Voltage { u }).collect();
-        let record = simulated(&Lag, 5e-3, inputs, Current { i: 0.5 }, Branch { gain: 2.0, tau: 0.05 });
-        noisy(&Lag, &record.named(format!("run {e}")), Current { i: 0.1 }, &mut Noise(e + 1))
-    };
-    let records: Vec<_> = (0..7).map(one).collect();
-    let texts: Vec<String> = (1..=3)
-        .map(|threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let run = || Fit::new(&Lag, &records).parameters(lags_free()).loss(Huber(1.345)).run().unwrap();
-            let summary = Summary { seconds: 0.0, ..pool.install(run).into_summary() };
-            serde_json::to_string(&summary).unwrap()
-        })
-        .collect();
-    assert_eq!(texts[0], texts[1]);
-    assert_eq!(texts[0], texts[2]);
-}
-
 #[test]
 fn an_estimate_comes_back_from_json() {
     let parameters = Branch { tau: free(0.06).within(0.01, 1.0), ..lags_free() };

@@ -1,6 +1,9 @@
 //! Records cut into segments give what they give as a whole.
 
-use greybox::{Estimate, ExperimentOf, Fit, Horizon, Model, Of, Rk4, Scalar, Simulator, Time, fixed, free, signals};
+use greybox::models::{AxisParameters, ControlledAxisMotion, ControlledAxisOutput, PositioningLoop, Reference};
+use greybox::{
+    Estimate, ExperimentOf, Fit, Hold, Horizon, Model, Of, Rk4, Scalar, Simulator, Time, fixed, free, signals,
+};
 
 signals! {
     pub struct State { a: "", b: "" }
@@ -216,5 +219,73 @@ fn a_horizon_beyond_a_segment_counts_each_measurement_once() {
         // What the search leaves: a relative step of 1e-8.
         assert!((a.value - b.value).abs() < 1e-3 * error, "{a:?} {b:?}");
         assert!((a.knowledge.standard_error().unwrap() / error - 1.0).abs() < 1e-3, "{a:?} {b:?}");
+    }
+}
+
+/// The axis of the benchmark EMPS with its dry friction, under its controller; `whole` as for [`Plant`].
+struct Axis {
+    whole: bool,
+}
+
+impl Model for Axis {
+    type State = ControlledAxisMotion;
+    type Input = Reference;
+    type Output = ControlledAxisOutput;
+    type Parameters = AxisParameters;
+
+    fn derivative<S: Scalar>(
+        &self,
+        t: S,
+        x: &ControlledAxisMotion<S>,
+        u: &Reference<S>,
+        p: &AxisParameters<S>,
+    ) -> ControlledAxisMotion<S> {
+        if self.whole {
+            let _ = x.v.value();
+        }
+        PositioningLoop::EMPS.derivative(t, x, u, p)
+    }
+
+    fn output<S: Scalar>(
+        &self,
+        t: S,
+        x: &ControlledAxisMotion<S>,
+        u: &Reference<S>,
+        p: &AxisParameters<S>,
+    ) -> ControlledAxisOutput<S> {
+        PositioningLoop::EMPS.output(t, x, u, p)
+    }
+}
+
+/// The axis goes to and fro and rests between, where its friction turns over within half a millimeter per second.
+#[test]
+fn an_axis_with_dry_friction_is_fitted_in_segments() {
+    let place =
+        |k: usize| 0.1 + 0.05 * (0.5 - 0.5 * (0.006 * k as f64).cos()) * f64::from(u8::from(k / 1_047 % 3 != 1));
+    let inputs: Vec<_> = (0..4_200).map(|k| Reference { qg: place(k) }).collect();
+    let rest = ControlledAxisMotion { q: 0.1, v: 0.0, vm: 0.0 };
+    let (truth, time) =
+        (AxisParameters { m: 95.0, fv: 200.0, fc: 20.0, offset: -3.0 }, Time::Uniform { start: 0.0, step: 1e-3 });
+    let model = Axis { whole: false };
+    let run = Simulator::new(&model).hold(Hold::First).run(&truth, &rest, time, &inputs).unwrap();
+    let noise = ControlledAxisOutput { qm: 1e-6, vir: 0.05 };
+    let record = run.with_noise(noise, 3).experiment(&model).unwrap();
+    let record = record.initial(ControlledAxisMotion { q: free(0.1), v: fixed(0.0), vm: fixed(0.0) });
+    for [m, fv, fc] in [[80.0, 150.0, 15.0], [150.0, 400.0, 40.0], [60.0, 60.0, 60.0]] {
+        let fit = |whole: bool| {
+            let start = AxisParameters { m: free(m), fv: free(fv), fc: free(fc), offset: free(0.0) };
+            let model = Axis { whole };
+            let fit = Fit::new(&model, &record).parameters(start).noise(noise).integrator(Rk4::default());
+            fit.run().unwrap().into_summary()
+        };
+        let (cut, whole) = (fit(false), fit(true));
+        assert!(whole.method.engine.contains("dual") && cut.method.engine.contains("graph"));
+        assert!(cut.outcome.converged() && whole.outcome.converged(), "{} {}", cut.outcome, whole.outcome);
+        assert!((cut.cost - whole.cost).abs() <= 1e-8 * whole.cost, "{} {}", cut.cost, whole.cost);
+        for (a, b) in cut.unknowns.iter().zip(&whole.unknowns) {
+            let error = b.knowledge.standard_error().unwrap();
+            assert!((a.value - b.value).abs() <= 1e-3 * error, "{}: {} {}", a.name, a.value, b.value);
+            assert!((a.knowledge.standard_error().unwrap() / error - 1.0).abs() <= 1e-4, "{a:?} {b:?}");
+        }
     }
 }

@@ -14,7 +14,7 @@ signals! { pub struct Motor { r: "ohm", l: "H", k: "V s/rad", j: "kg m2", d: "N 
 
 /// A direct-current motor.
 #[derive(Clone)]
-struct Direct;
+pub struct Direct;
 
 impl Model for Direct {
     type State = Drive;
@@ -30,7 +30,7 @@ impl Model for Direct {
 }
 
 /// The motor whose current settles with this rate per sample of 10 ms, and a record of 300 samples with noise.
-fn motor(rate: f64) -> (Motor, ExperimentOf<Direct>) {
+pub fn motor(rate: f64) -> (Motor, ExperimentOf<Direct>) {
     let p = Motor { r: 1.0, l: 1e-2 / rate, k: 0.1, j: 1e-2, d: 1e-3 };
     let voltage = |k: usize| 10.0 * (0.03 * k as f64).sin() + if (k / 25).is_multiple_of(2) { 12.0 } else { 6.0 };
     let input: Vec<Volt> = (0..300).map(|k| Volt { u: voltage(k) }).collect();
@@ -40,7 +40,7 @@ fn motor(rate: f64) -> (Motor, ExperimentOf<Direct>) {
     (p, record.initial(Drive::map(Drive::default(), fixed)))
 }
 
-fn off(p: Motor) -> Motor<Parameter> {
+pub fn off(p: Motor) -> Motor<Parameter> {
     Motor { r: free(2.0), l: fixed(p.l), k: free(0.05), j: free(2e-2), d: free(5e-4) }
 }
 

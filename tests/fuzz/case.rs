@@ -119,7 +119,7 @@ impl Settings {
         }
     }
 
-    fn applied<'a, M: Model>(&self, mut fit: Fit<'a, M>) -> Fit<'a, M> {
+    fn applied<'a, M: Model + 'static>(&self, mut fit: Fit<'a, M>) -> Fit<'a, M> {
         fit = fit.time_limit(Duration::from_secs(1));
         if let Some(sigma) = self.noise {
             fit = fit.noise(M::Output::splat(sigma));

@@ -6,7 +6,7 @@ use crate::predict::{FreeRun, Horizon, Kalman, Predictor};
 use crate::record::{Channel, Column};
 use crate::scalar::Scalar;
 use crate::signals;
-use crate::sweep::{DualSweep, Window};
+use crate::sweep::{DualSweep, Typed, Window};
 
 signals! {
     struct Angle { phi: "rad", w: "rad/s" }
@@ -76,23 +76,23 @@ fn rows(sweep: &dyn Sweep, pieces: &[Piece<'_>], seeds: &[Seed]) -> (Vec<Vec<f64
     (all, reached.into_iter().map(Result::unwrap).collect())
 }
 
-fn sweeps<M: Model>(model: &M, predictor: impl Predictor) -> (Arc<dyn Sweep + '_>, ProgramSweep<'_>) {
+/// The model's own code in duals, its equations in duals, and programs.
+fn sweeps<M: Model>(model: &M, predictor: impl Predictor) -> [Arc<dyn Sweep + '_>; 3] {
     let (method, predictor): (Arc<dyn Method>, Arc<dyn Prediction>) = (Arc::new(Rk4::default()), Arc::new(predictor));
-    let plain: Arc<dyn Sweep> = Arc::new(DualSweep {
-        layout: Arc::new(Layout::of::<M>()),
-        model: Handle::Borrowed(model),
-        loops: Arc::new(Rk4::default()),
-        method: method.clone(),
-        predictor: predictor.clone(),
-        reason: String::new(),
-    });
     let equations = Arc::new(Equations::trace(model).unwrap());
-    (plain.clone(), ProgramSweep::new(equations, method, predictor, plain).unwrap())
+    let duals = |code| -> Arc<dyn Sweep + '_> {
+        let (layout, method, predictor) = (Arc::new(Layout::of::<M>()), method.clone(), predictor.clone());
+        Arc::new(DualSweep { layout, code, method, predictor, reason: String::new() })
+    };
+    let typed = duals(Arc::new(Typed { model: Handle::Borrowed(model), loops: Arc::new(Rk4::default()) }));
+    let evaluated = duals(Arc::new(equations.clone()));
+    let programs = ProgramSweep::new(equations, method.clone(), predictor.clone(), typed.clone()).unwrap();
+    [typed, evaluated, Arc::new(programs)]
 }
 
 /// Pieces of several records with different parameters, with slopes and without.
 fn compare(model: &Pendulum, predictor: impl Predictor, uniform: bool, hold: Hold) {
-    let (plain, programs) = sweeps(model, predictor);
+    let [plain, evaluated, programs] = sweeps(model, predictor);
     let lengths = [100, 64, 2, 33, 97];
     let parameters = |i: usize| [2.0 + 0.1 * i as f64, 0.3, 1.5, 0.2, 0.1];
     let records: Vec<Record> = lengths.iter().map(|&n| record(n.max(40), n as f64, uniform).hold(hold)).collect();
@@ -119,8 +119,10 @@ fn compare(model: &Pendulum, predictor: impl Predictor, uniform: bool, hold: Hol
             let (rows, reached): (Vec<_>, Vec<_>) = found.into_iter().unzip();
             (rows.concat(), reached.concat())
         };
-        let ((expected, ends), (found, reached)) = (all(&*plain, 1), all(&programs, lanes));
-        for lane in 0..pieces.len() {
+        let (expected, ends) = all(&*plain, 1);
+        let others = [all(&*evaluated, 1), all(&*programs, lanes)];
+        for (lane, (found, reached)) in others.iter().flat_map(|other| (0..pieces.len()).map(move |lane| (lane, other)))
+        {
             assert_eq!(expected[lane].len(), found[lane].len());
             for (at, (a, b)) in expected[lane].iter().zip(&found[lane]).enumerate() {
                 // A hundred steps, each of some dozens of roundings of numbers up to ten.
@@ -169,7 +171,7 @@ impl Model for Cart {
 /// without any memory, whatever ran before.
 #[test]
 fn kept_columns_are_those_of_the_records_at_hand() {
-    let (_, programs) = sweeps(&Cart, FreeRun);
+    let [.., programs] = sweeps(&Cart, FreeRun);
     let first = record(300, 1.0, true);
     let with_other_output = {
         let outputs = record(300, 4.0, true).outputs().to_vec();
@@ -189,7 +191,7 @@ fn kept_columns_are_those_of_the_records_at_hand() {
             slopes: vec![0.5; 2 * seeds.len()].into(),
             parameters: &p,
         };
-        rows(&programs, &[(records[0], first), (records[1], &other)].map(piece), seeds)
+        rows(&*programs, &[(records[0], first), (records[1], &other)].map(piece), seeds)
     };
     for (records, samples, seeds) in [
         ([&first, &second], 0..170, &seeds[..]),

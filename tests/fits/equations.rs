@@ -1,0 +1,222 @@
+//! Equations as data: fits of graphs that were read from a file or made by hand, against those of Rust models.
+
+use crate::refused::says;
+use crate::stiff;
+use approx::assert_relative_eq;
+use greybox::equations::Equations;
+use greybox::graph::{Function, Graph, Id, Leaf};
+use greybox::layout::{Layout, Quantity};
+use greybox::optimize::Severity;
+use greybox::problem::{EquationsFit, Settings};
+use greybox::record::{Channel, Record};
+use greybox::*;
+
+signals! {
+    pub struct Swing { phi: "rad", w: "rad/s" }
+    pub struct Torque { m: "N m" }
+    pub struct Pull { g: "1/s^2", d: "1/s", b: "1/(kg m^2)" }
+}
+
+#[derive(Clone)]
+struct Pendulum;
+
+#[rustfmt::skip]
+impl Model for Pendulum {
+    type State = Swing; type Input = Torque; type Output = Swing; type Parameters = Pull;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Swing<S>, u: &Torque<S>, p: &Pull<S>) -> Swing<S> {
+        Swing { phi: x.w, w: u.m * p.b - x.phi.sin() * p.g - x.w * p.d }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Swing<S>, _u: &Torque<S>, _p: &Pull<S>) -> Swing<S> { *x }
+}
+
+fn record(samples: usize) -> ExperimentOf<Pendulum> {
+    let push = |k: usize| Torque { m: [0.8, -0.5, 1.2, 0.2][k / 60 % 4] + 0.3 * (0.05 * k as f64).sin() };
+    let (truth, inputs) = (Pull { g: 9.81, d: 1.2, b: 2.0 }, (0..samples).map(push).collect::<Vec<_>>());
+    let time = Time::Uniform { start: 0.0, step: 0.02 };
+    let run = simulate(&Pendulum, &truth, &Swing { phi: 0.3, w: 0.0 }, time, &inputs).unwrap();
+    run.with_noise(Swing { phi: 0.02, w: 0.05 }, 4).experiment(&Pendulum).unwrap()
+}
+
+fn start() -> Pull<Parameter> {
+    Pull { g: free(9.0), d: free(1.0).within(0.0, 5.0), b: free(1.5) }
+}
+
+/// The equations of a model, written and read.
+fn read<M: Model>(model: &M) -> EquationsFit {
+    let text = serde_json::to_string(&Equations::trace(model).unwrap()).unwrap();
+    EquationsFit::new(serde_json::from_str::<Equations>(&text).unwrap())
+}
+
+/// What both come to: values to `close` of themselves, or to rounding next to their standard errors.
+fn same(found: &Summary, expected: &Summary, close: f64) {
+    assert_eq!(
+        std::mem::discriminant(&found.outcome),
+        std::mem::discriminant(&expected.outcome),
+        "{found}\n{expected}"
+    );
+    assert_eq!(found.method.integrator, expected.method.integrator);
+    let codes = |summary: &Summary| summary.warnings.iter().map(|warning| warning.code).collect::<Vec<_>>();
+    assert_eq!(codes(found), codes(expected), "{found}\n{expected}");
+    assert_eq!(found.unknowns.len(), expected.unknowns.len());
+    for (a, b) in found.unknowns.iter().zip(&expected.unknowns) {
+        assert_eq!((&a.name, &a.unit, a.role), (&b.name, &b.unit, b.role));
+        assert_relative_eq!(a.value, b.value, max_relative = close);
+        let errors = [a, b].map(|one| one.knowledge.standard_error().unwrap());
+        assert_relative_eq!(errors[0], errors[1], max_relative = 1e-8);
+        let ends = [a, b].map(|one| match one.knowledge {
+            Knowledge::Known { lower, upper, .. } => [lower, upper],
+            ref other => panic!("{}: {other:?}", one.name),
+        });
+        assert_relative_eq!(ends[0][..], ends[1][..], max_relative = 1e-8);
+    }
+    assert_relative_eq!(found.cost, expected.cost, max_relative = 1e-10);
+}
+
+/// Compiled, of a record in segments too; and in dual numbers, which methods that choose their steps ask for.
+#[test]
+fn equations_that_were_read_give_what_their_model_gives() {
+    for samples in [300, 1_200] {
+        let record = record(samples);
+        let (fit, parameters) = (Fit::new(&Pendulum, &record).parameters(start()), Pull::into_array(start()));
+        let problem =
+            |fit: EquationsFit| fit.problem(vec![record.record().clone()], &parameters, Settings::default()).unwrap();
+        let found = problem(read(&Pendulum)).run().unwrap();
+        assert_eq!(found.severity(), Severity::Usable, "{found}");
+        assert!(found.method.engine.contains("graph"), "{found}");
+        same(&found, &fit.run().unwrap(), 1e-10);
+        let fit = || Fit::new(&Pendulum, &record).parameters(start());
+        let horizon = problem(read(&Pendulum).predictor(Horizon::new(5))).run().unwrap();
+        same(&horizon, &fit().predictor(Horizon::new(5)).run().unwrap(), 1e-10);
+    }
+    let record = record(300);
+    let fit = || Fit::new(&Pendulum, &record).parameters(start()).integrator(Rk45::default());
+    let read = read(&Pendulum).integrator(Rk45::default());
+    let problem = |fit: EquationsFit| {
+        let parameters = Pull::into_array(start());
+        fit.problem(vec![record.record().clone()], &parameters, Settings::default()).unwrap()
+    };
+    let found = problem(read.clone()).run().unwrap();
+    assert!(found.method.engine.contains("dual numbers"), "{found}");
+    same(&found, &fit().run().unwrap(), 1e-10);
+    let horizon = problem(read.predictor(Horizon::new(5))).run().unwrap();
+    same(&horizon, &fit().predictor(Horizon::new(5)).run().unwrap(), 1e-10);
+}
+
+/// A default method, then three finer ones, then an implicit one.
+#[test]
+fn stiff_equations_take_the_method_that_their_model_takes() {
+    let (truth, record) = stiff::motor(1e4);
+    let expected = Fit::new(&stiff::Direct, &record).parameters(stiff::off(truth)).run().unwrap();
+    let parameters = stiff::Motor::into_array(stiff::off(truth));
+    let problem =
+        read(&stiff::Direct).problem(vec![record.record().clone()], &parameters, Settings::default()).unwrap();
+    let found = problem.run().unwrap();
+    assert!(found.method.integrator.contains("implicit"), "{found}");
+    same(&found, &expected, 1e-10);
+    let again = problem.predict(&found, record.record()).unwrap();
+    assert!(again.residuals[0].iter().all(|residual| residual.abs() < 0.5), "five standard deviations");
+}
+
+/// The error of a start that cannot be simulated says what was no number, where; so does that of the Rust model.
+#[test]
+fn a_start_that_fails_is_located() {
+    let record = record(300);
+    let runaway = Pull { d: free(-4e3), ..start() };
+    for chosen in [false, true] {
+        let fit = Fit::new(&Pendulum, &record).parameters(runaway);
+        let (fit, read) = match chosen {
+            true => (fit.integrator(Rk4::default()), read(&Pendulum).integrator(Rk4::default())),
+            false => (fit, read(&Pendulum)),
+        };
+        let expected = fit.run().err().unwrap();
+        let problem =
+            read.problem(vec![record.record().clone()], &Pull::into_array(runaway), Settings::default()).unwrap();
+        let found = problem.run().err().unwrap();
+        let Error::Start(failure) = &found else { panic!("{found}") };
+        assert!(failure.sample > 0 && failure.signal.contains('`'), "{failure:?}");
+        assert_eq!(found.to_string(), expected.to_string());
+    }
+}
+
+fn named(name: impl Into<String>, unit: &str) -> Quantity {
+    Quantity { name: name.into(), unit: unit.to_owned() }
+}
+
+/// `n` equal lags in a row, the first driven by `g u`, the last seen through `bend`.
+fn cascade(n: usize, bend: impl Fn(&mut Graph, Id) -> Id) -> Equations {
+    let layout = Layout {
+        kind: Kind::Continuous,
+        states: (1..=n).map(|i| named(format!("x{i}"), "V")).collect(),
+        inputs: vec![named("u", "V")],
+        outputs: vec![named("y", "V")],
+        parameters: vec![named("tau", "s"), named("g", "1")],
+    };
+    let mut graph = Graph::default();
+    let [u, tau, g] = [Leaf::Input(0), Leaf::Parameter(0), Leaf::Parameter(1)].map(|leaf| graph.leaf(leaf));
+    let mut before = graph.mul(g, u);
+    let mut slopes = vec![];
+    for i in 0..n as u32 {
+        let x = graph.leaf(Leaf::State(i));
+        let rest = graph.sub(before, x);
+        slopes.push(graph.div(rest, tau));
+        before = x;
+    }
+    let output = bend(&mut graph, before);
+    Equations::new(layout, &graph, &slopes, &[output]).unwrap()
+}
+
+/// The response to a step of 1 V: `g (1 - exp(-z) sum z^k / k!)`, `k < n`, `z = t / tau`.
+fn response(n: usize, t: f64, tau: f64, g: f64) -> f64 {
+    let z = t / tau;
+    let sum = (1..n).fold((1.0, 1.0), |(sum, term), k| (sum + term * z / k as f64, term * z / k as f64)).0;
+    g * (1.0 - (-z).exp() * sum)
+}
+
+fn step_record(equations: &Equations, y: impl Fn(f64) -> f64) -> Record {
+    let states = equations.layout().states.clone();
+    let (time, n) = (Time::Uniform { start: 0.0, step: 0.01 }, states.len());
+    let outputs = vec![Channel::new("y", "V", (0..600).map(|k| y(0.01 * f64::from(k))).collect::<Vec<_>>())];
+    let record = Record::new(states, time, vec![Channel::new("u", "V", vec![1.0; 600])], outputs).unwrap();
+    record.initial(Initial::Given(vec![fixed(0.0); n])).unwrap()
+}
+
+/// From one to four states; linear, and with an output that is not, whose record is cut in another way.
+#[test]
+fn equations_made_by_hand_are_fitted() {
+    for n in 1..=4 {
+        for bent in [false, true] {
+            let equations = cascade(n, |graph, x| if bent { graph.function(Function::Tanh, x) } else { x });
+            let seen = |t: f64| response(n, t, 0.5, 1.5);
+            let record = step_record(&equations, |t| if bent { seen(t).tanh() } else { seen(t) });
+            let fit = EquationsFit::new(equations);
+            let start = [free(0.8).within(0.01, 10.0), free(1.0)];
+            let problem = fit.problem(vec![record], &start, Settings::default()).unwrap();
+            let found = problem.run().unwrap();
+            // One step of Runge-Kutta's method per 0.02 time constants is right to 1e-8 or so.
+            assert_relative_eq!(found.parameters[0].value, 0.5, max_relative = 1e-6);
+            assert_relative_eq!(found.parameters[1].value, 1.5, max_relative = 1e-6);
+            assert!(Report::new(&problem, &found).unwrap().to_markdown().contains("tau"), "{n} states");
+        }
+    }
+}
+
+/// Records and parameters that are not those of the equations, and a predictor that cannot serve them.
+#[test]
+fn what_does_not_fit_the_equations_is_refused() {
+    let (fit, start) = (EquationsFit::new(cascade(2, |_, x| x)), [free(0.8), free(1.0)]);
+    let good = step_record(&cascade(2, |_, x| x), |t| t);
+    let one_state = step_record(&cascade(1, |_, x| x), |t| t);
+    let problem = |record: &Record, start: &[Parameter]| fit.problem(vec![record.clone()], start, Settings::default());
+    says(problem(&one_state, &start), &["states", "`x1`", "`x2`", "`record`"]);
+    let (states, time) = (good.clone(), good.times().clone());
+    let with = |inputs: Vec<Channel>, outputs: Vec<Channel>| {
+        Record::new(cascade(2, |_, x| x).layout().states.clone(), time.clone(), inputs, outputs).unwrap()
+    };
+    let swapped = with(states.outputs().to_vec(), states.inputs().to_vec());
+    says(problem(&swapped, &start), &["inputs", "`u`", "`y`"]);
+    says(problem(&with(states.inputs().to_vec(), vec![]), &start), &["outputs", "none", "`y`"]);
+    says(problem(&good, &start[..1]), &["1", "2"]);
+    let unobserved = fit.clone().predictor(Horizon::new(3)).problem(vec![good.clone()], &start, Settings::default());
+    says(unobserved, &["state"]);
+    says(fit.clone().integrator(Discrete).problem(vec![good], &start, Settings::default()), &["discrete"]);
+}
