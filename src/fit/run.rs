@@ -141,7 +141,7 @@ impl Problem<'_> {
         control: &'p Control,
     ) -> Result<(Objective<'p>, Vec<f64>), Error> {
         self.check_estimate(estimate)?;
-        let problem = self.by_name(&estimate.method.integrator);
+        let problem = self.by_number(estimate.method.refinement);
         let sigma = estimate.sigma();
         let full = estimate.noise_covariance.clone().and_then(Whitening::full);
         // An output without any error gives no noise level.
@@ -187,7 +187,7 @@ impl Problem<'_> {
         estimate: &Summary,
         record: &crate::record::Record,
     ) -> Result<crate::problem::Simulated, Error> {
-        let problem = self.by_name(&estimate.method.integrator);
+        let problem = self.by_number(estimate.method.refinement);
         super::predict::predict(problem.sweep.clone(), record, estimate)
     }
 }

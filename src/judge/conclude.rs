@@ -145,6 +145,7 @@ fn method(objective: &Objective<'_>, optimizer: String, covariance: CovarianceMe
     Method {
         optimizer,
         integrator: sweep.integrator(),
+        refinement: objective.problem.method,
         predictor: sweep.predictor(),
         engine: sweep.engine(),
         loss: or(settings.loss.as_ref().map(|loss| loss.describe()), "squared"),
