@@ -1,7 +1,7 @@
 //! The residuals: what their tests say together, and those of each output.
 
 use super::quoted;
-use crate::diagnose::residuals::{Correlation, Residuals, Spread};
+use crate::diagnose::residuals::{Correlation, Residuals, SignalRole, Spread};
 use crate::diagnose::{self, LEVEL, Test};
 use crate::numeral::{self, counted, number, resolved, rounded};
 use crate::optimize::Severity;
@@ -150,9 +150,8 @@ const HISTOGRAM: &str = "Histogram, beside a normal distribution of the same mea
 /// Autocorrelation of the residuals.
 fn autocorrelation(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
     let of = &fit.residuals;
-    let verdict = of.tests.iter().find(|test| test.name.starts_with("Ljung-Box"));
-    let verdict = verdict.map_or(String::new(), |test| {
-        let result = if test.passed { "passes" } else { "fails" };
+    let verdict = of.white.map_or(String::new(), |white| {
+        let result = if white { "passes" } else { "fails" };
         format!("; the test of Ljung and Box judges all lags together, and {result}")
     });
     let caption =
@@ -164,7 +163,7 @@ fn autocorrelation(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
 
 /// Correlation of the residual with a signal.
 fn cross_correlation(id: &str, record: &Record, fit: &OutputFit, with: &Correlation) -> Option<Plot> {
-    let Correlation { signal, role, first_lag, values, tested_from, band } = with;
+    let Correlation { signal, role, first_lag, values, tested_from, band, .. } = with;
     let title =
         format!("Correlation of the residual of {} of {} with {role} {signal} before it", fit.name, record.name);
     let caption = format!(
@@ -178,16 +177,9 @@ fn cross_correlation(id: &str, record: &Record, fit: &OutputFit, with: &Correlat
 /// The plots of the residual against each signal, those with the least probable tests first.
 fn against_signals(id: &str, record: &Record, fit: &OutputFit) -> Vec<Plot> {
     let of = &fit.residuals;
-    let p = |begin: &str, role: &str, signal: &str| {
-        let test = of.tests.iter().find(|test| test.name == format!("{begin} {role} `{signal}`"));
-        test.map_or(1.0, |test| test.p_value)
-    };
-    let correlations = of.correlations.iter().filter_map(|with| {
-        Some((p("cross-correlation with", &with.role, &with.signal), cross_correlation(id, record, fit, with)?))
-    });
-    let spreads = of.spreads.iter();
-    let spreads =
-        spreads.map(|over| (p("Breusch-Pagan-Koenker,", &over.role, &over.signal), spread(id, record, fit, over)));
+    let correlations = of.correlations.iter();
+    let correlations = correlations.filter_map(|with| Some((with.p_value, cross_correlation(id, record, fit, with)?)));
+    let spreads = of.spreads.iter().map(|over| (over.p_value, spread(id, record, fit, over)));
     let mut plots: Vec<(f64, Plot)> = correlations.chain(spreads).collect();
     plots.sort_by(|a, b| a.0.total_cmp(&b.0));
     plots.into_iter().map(|(_, plot)| plot).collect()
@@ -244,7 +236,7 @@ fn spectrum(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
 /// Size of the residual over the range of a signal.
 fn spread(id: &str, record: &Record, fit: &OutputFit, over: &Spread) -> Plot {
     let Spread { signal, role, unit, at, deviation, .. } = over;
-    let shift = if role == "time" { record.begin } else { 0.0 };
+    let shift = if *role == SignalRole::Time { record.begin } else { 0.0 };
     let points: Vec<(f64, f64)> = at.iter().map(|at| at - shift).zip(deviation.iter().copied()).collect();
     let all = Layer::Level { value: fit.residuals.standard_deviation, label: String::new() };
     let drawing = Curves {
