@@ -20,8 +20,8 @@ pub use compare::{Candidate, Comparison, Validation, cross_validate, f_test, lik
 pub use convergence::Convergence;
 pub use derived::{Derived, derived};
 pub use drift::{Drift, drift};
-pub(crate) use identifiability::reworded;
 pub use identifiability::{Collinear, Excitation, Identifiability, Segment, identifiability};
+pub(crate) use identifiability::{identifiability_beside_warnings, reworded};
 pub use profile::{End, Profile, ProfilePoint, profile};
 pub use side_by_side::Compared;
 

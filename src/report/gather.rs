@@ -31,7 +31,7 @@ impl Report {
     /// # Errors
     /// An estimate of another problem; a prediction that fails or is not finite.
     pub fn new(problem: &Problem<'_>, estimate: &Summary) -> Result<Report, Error> {
-        let identifiability = diagnose::identifiability(problem, estimate)?;
+        let identifiability = diagnose::identifiability_beside_warnings(problem, estimate)?;
         let (objective, best) = problem.at(estimate)?;
         let outputs = estimate.outputs.len();
         let numbers = NUMBERS / problem.records().len().min(DRAWN / outputs.max(1)).max(1);
