@@ -97,14 +97,6 @@ pub enum Coupling {
 /// Called with each window; returns false to stop.
 pub(crate) type Visit<'v> = &'v mut dyn FnMut(&mut Window) -> bool;
 
-/// The cause of a failure in an experiment.
-pub enum Located {
-    /// The simulation cannot go beyond this point.
-    Broken(Failure),
-    /// The simulation reaches the end; this is its largest error.
-    Largest(Failure),
-}
-
 /// Evaluates a model along records.
 pub trait Sweep: Send + Sync {
     /// The model's quantities.
@@ -191,8 +183,8 @@ pub trait Sweep: Send + Sync {
         None
     }
 
-    /// The exact cause of a failure that was noticed at `sample`. Where nothing fails, the error that is largest
-    /// relative to the noise levels. `None` if `stops` returns true.
+    /// The exact cause of a failure that was noticed at `sample`: an `Err` where the simulation cannot go on. Where nothing fails,
+    /// the error that is largest relative to the noise levels. `None` if `stops` returns true.
     fn locate(
         &self,
         record: &Record,
@@ -201,7 +193,7 @@ pub trait Sweep: Send + Sync {
         sample: usize,
         sigma: &[f64],
         stops: &dyn Fn() -> bool,
-    ) -> Option<Located> {
+    ) -> Option<Result<Failure, Failure>> {
         let _ = (record, state, parameters, sample, sigma, stops);
         None
     }

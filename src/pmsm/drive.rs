@@ -220,7 +220,7 @@ impl Simulation {
 
             let (torque, current_limited) = speed_control.step(*target, theta, wf, ts);
             let iq_ref = (torque / kt).clamp(-i_max, i_max);
-            let id_ref = self.injection.map_or(0.0, |injection| injection.at(k as f64 * ts).id);
+            let id_ref = self.injection.map_or(0.0, |injection| injection.id(k as f64 * ts));
             let reference = Currents { id: id_ref, iq: iq_ref };
             let command = current_control.step(reference, Currents { id, iq }, wf, ts);
             log.voltage_limited += usize::from(command.limited);

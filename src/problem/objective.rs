@@ -8,7 +8,7 @@ use crate::loss::Loss;
 use crate::optimize::{Infeasible, LeastSquares, Linearization};
 use crate::parameter::{Parameter, Transform};
 use crate::record::Record;
-use crate::sweep::{Located, OVERFLOW, RunError, Sweep, Window};
+use crate::sweep::{OVERFLOW, RunError, Sweep, Window};
 use std::sync::Arc;
 
 /// The cost of a fit, for its own and for argmin's solvers.
@@ -142,8 +142,8 @@ impl<'p> Objective<'p> {
             hint,
         };
         match found {
-            Some(Located::Broken(failure)) => Failure { experiment: label.clone(), ..failure },
-            Some(Located::Largest(largest)) => {
+            Some(Err(failure)) => Failure { experiment: label.clone(), ..failure },
+            Some(Ok(largest)) => {
                 let largest = Failure { experiment: label.clone(), ..largest };
                 self.unsound_prediction(e, coordinates).unwrap_or(largest)
             }

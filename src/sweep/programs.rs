@@ -7,10 +7,10 @@ mod interleaved;
 mod run;
 mod workspace;
 
-use super::{Coupling, Located, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
+use super::{Coupling, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
 use crate::engine::{Program, Sampling, Trajectories};
 use crate::equations::Equations;
-use crate::error::Error;
+use crate::error::{Error, Failure};
 use crate::graph::Untraceable;
 use crate::integrate::Method;
 use crate::interval::Hold;
@@ -217,7 +217,7 @@ impl Sweep for ProgramSweep<'_> {
         sample: usize,
         sigma: &[f64],
         stops: &dyn Fn() -> bool,
-    ) -> Option<Located> {
+    ) -> Option<Result<Failure, Failure>> {
         self.plain.locate(record, state, parameters, sample, sigma, stops)
     }
 

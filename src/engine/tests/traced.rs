@@ -7,10 +7,10 @@ use greybox::models::{
     Reference, Rotation,
 };
 use greybox::pmsm::{
-    AngledDrive, Cabled, Compensated, CompensatedDrive, CompensatedSalientWinding, CompensatedWinding, Currents, Drive,
-    EmfHarmonic, ExactSalient, ExactStep, ExactSurface, FluxLinkage, FluxWinding, HeldIn, InverterFed,
-    InverterFedWinding, Machine, MachineParameters, MachineState, Mechanics, Misaligned, Salient, SalientWinding,
-    Saturated, SaturatedWinding, Shaft, ShaftMotion, Surface, Torque, VoltageAndLoad, Winding,
+    AngledDrive, Cabled, Compensated, CompensatedDrive, CompensatedWinding, Currents, Drive, EmfHarmonic, ExactSalient,
+    ExactStep, ExactSurface, FluxLinkage, HeldIn, InverterFed, InverterFedWinding, Machine, MachineParameters,
+    MachineState, Mechanics, Misaligned, Salient, SalientWinding, Saturated, SaturatedWinding, Shaft, ShaftMotion,
+    Surface, Torque, VoltageAndLoad, Winding,
 };
 use greybox::{Automatic, Hold, Kind, Model, Nothing, Rk4, Scalar, Signals, equations::Equations, signals};
 
@@ -18,6 +18,16 @@ signals! {
     pub struct Pair { a: "1", b: "1" }
     pub struct Push { u: "1" }
     pub struct Gains { k: "1", d: "1" }
+}
+
+signals! {
+    /// A salient motor with a harmonic in its EMF, its cable, and the size of its inverter's dead time.
+    pub struct CompensatedSalientWinding { rs: "ohm", ld: "H", lq: "H", ke: "V s/rad", ke6: "V s/rad", vdt: "V" }
+}
+
+signals! {
+    /// A motor with surface magnets, its magnet by flux linkage.
+    pub struct FluxWinding { rs: "ohm", ls: "H", psi_m: "Wb" }
 }
 
 signals! {
