@@ -16,7 +16,7 @@ mod side_by_side;
 pub use bands::{Bands, bands};
 pub(crate) use bands::{Widths, widths};
 pub use bootstrap::{Bootstrap, Resampling, bootstrap};
-pub use compare::{Candidate, Comparison, Validation, cross_validate, f_test, likelihood_ratio, validate};
+pub use compare::{Candidate, Validation, cross_validate, f_test, likelihood_ratio, validate};
 pub use convergence::Convergence;
 pub use derived::{Derived, derived};
 pub use drift::{Drift, drift};

@@ -54,7 +54,7 @@ mod sections;
 mod text;
 mod words;
 
-pub use crate::section::{Axis, Cell, Curves, Drawing, Layer, Plot, Reason, Section, Style, Table};
+pub use crate::section::{Axis, Cell, Layer, Plot, Section, Style, Table};
 pub use origin::Origin;
 
 use crate::error::Error;
@@ -125,16 +125,16 @@ impl Report {
         self
     }
 
-    /// Why the estimate is not simply usable, the worst first.
-    pub fn reasons(&self) -> Vec<&Reason> {
-        let mut reasons: Vec<&Reason> = vec![];
+    /// Why the estimate is not simply usable, the worst first: how bad each reason is, and what it is.
+    pub fn reasons(&self) -> Vec<(Severity, &str)> {
+        let mut reasons: Vec<(Severity, &str)> = vec![];
         for reason in self.sections.iter().flat_map(Section::all_reasons) {
             // What two sections say is said once.
-            if !reasons.iter().any(|other| other.text == reason.text) {
+            if !reasons.iter().any(|other| other.1 == reason.1) {
                 reasons.push(reason);
             }
         }
-        reasons.sort_by_key(|reason| core::cmp::Reverse(reason.severity));
+        reasons.sort_by_key(|(severity, _)| core::cmp::Reverse(*severity));
         reasons
     }
 

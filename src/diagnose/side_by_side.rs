@@ -189,7 +189,7 @@ impl Compared {
         let title = format!("Measured and predicted outputs of {} over time, model by model", self.record);
         let name = identifier(&format!("compare-{}", self.record));
         let caption = format!("{} ({})", self.record, self.data);
-        Plot::new(name, caption, title, Drawing::Timeline(timeline))
+        Plot::of(name, caption, title, Drawing::Timeline(timeline))
     }
 }
 

@@ -120,7 +120,7 @@ impl<'a> Columns<'a> {
             hold,
             signals: inputs.chain(outputs).collect(),
             fits: fits.collect(),
-            timeline: Some(Plot::new(
+            timeline: Some(Plot::of(
                 format!("record-{}", self.name),
                 "",
                 format!("{} over time", self.name),
@@ -182,7 +182,7 @@ impl<'a> Columns<'a> {
         let stretches = vec![samples.stretch(about(worst, self.t.len()), CLOSE, start)];
         let drawing = Drawing::Timeline(Timeline { start, panels: self.panels(j).to_vec(), stretches });
         let title = format!("Output {output} of {record} about its largest residual");
-        Plot::new(identifier(&format!("closeup-{record}-{output}")), "About the largest residual", title, drawing)
+        Plot::of(identifier(&format!("closeup-{record}-{output}")), "About the largest residual", title, drawing)
     }
 }
 

@@ -15,13 +15,13 @@ pub struct Plot {
     pub caption: String,
     /// What is drawn; `None` in a report read from JSON without drawings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub drawing: Option<Drawing>,
+    pub(crate) drawing: Option<Drawing>,
 }
 
 /// What is drawn.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Drawing {
+pub(crate) enum Drawing {
     /// Curves, bars and levels over a pair of axes.
     Curves(Curves),
     /// Estimates with their intervals, on one scale.
@@ -35,7 +35,7 @@ pub enum Drawing {
 /// Layers over one pair of axes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Curves {
+pub(crate) struct Curves {
     /// To the right.
     pub x: Axis,
     /// Upwards.
@@ -177,8 +177,46 @@ pub struct Heat {
 }
 
 impl Plot {
-    /// A plot; in the name, what is no letter or digit becomes `-`.
-    pub fn new(name: impl AsRef<str>, caption: impl Into<String>, title: impl Into<String>, drawing: Drawing) -> Plot {
+    /// Layers over the axes `[x, y]`, the lowest first; in the name, what is no letter or digit becomes `-`.
+    pub fn new(
+        name: impl AsRef<str>,
+        caption: impl Into<String>,
+        title: impl Into<String>,
+        [x, y]: [Axis; 2],
+        layers: Vec<Layer>,
+    ) -> Plot {
+        Plot::of(name, caption, title, Drawing::Curves(Curves { x, y, layers }))
+    }
+
+    /// Its axes `[x, y]` and what is drawn over them, if it has axes.
+    pub fn curves(&self) -> Option<([&Axis; 2], &[Layer])> {
+        match &self.drawing {
+            Some(Drawing::Curves(Curves { x, y, layers })) => Some(([x, y], layers)),
+            _ => None,
+        }
+    }
+
+    /// Its signals over time, for tests.
+    #[doc(hidden)]
+    pub fn timeline(&self) -> Option<&Timeline> {
+        match &self.drawing {
+            Some(Drawing::Timeline(timeline)) => Some(timeline),
+            _ => None,
+        }
+    }
+
+    /// Whether it has its drawing: a report read from JSON may have none.
+    pub fn is_drawn(&self) -> bool {
+        self.drawing.is_some()
+    }
+
+    /// A plot of any kind.
+    pub(crate) fn of(
+        name: impl AsRef<str>,
+        caption: impl Into<String>,
+        title: impl Into<String>,
+        drawing: Drawing,
+    ) -> Plot {
         let name = identifier(name.as_ref());
         Plot { name, title: title.into(), caption: caption.into(), drawing: Some(drawing) }
     }

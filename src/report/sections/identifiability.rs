@@ -83,7 +83,7 @@ fn matrix(facts: &Facts) -> Option<Plot> {
         percent: false,
     };
     let plot =
-        Plot::new("correlation", "Correlation of the parameters", "Correlation of the parameters", Drawing::Heat(heat));
+        Plot::of("correlation", "Correlation of the parameters", "Correlation of the parameters", Drawing::Heat(heat));
     (shown.len() > 1).then_some(plot)
 }
 
@@ -151,5 +151,5 @@ fn excited(facts: &Facts) -> Option<Plot> {
             format!("Part of each parameter's information (%) from {group} records each, the first named")
         }
     };
-    Some(Plot::new("excitation", &caption, &caption, Drawing::Heat(heat))).filter(|_| !rows.is_empty())
+    Some(Plot::of("excitation", &caption, &caption, Drawing::Heat(heat))).filter(|_| !rows.is_empty())
 }

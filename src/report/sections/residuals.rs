@@ -141,7 +141,7 @@ fn histogram(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
         ],
     };
     let title = format!("Histogram of the residual of {} of {}", fit.name, record.name);
-    let plot = Plot::new(format!("histogram-{id}-{}", fit.name), HISTOGRAM, title, Drawing::Curves(drawing));
+    let plot = Plot::of(format!("histogram-{id}-{}", fit.name), HISTOGRAM, title, Drawing::Curves(drawing));
     (!histogram.counts.is_empty()).then_some(plot)
 }
 
@@ -158,7 +158,7 @@ fn autocorrelation(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
         format!("Autocorrelation; of white residuals, each lag for itself is between the lines in 99 of 100{verdict}");
     let title = format!("Autocorrelation of the residual of {} of {}", fit.name, record.name);
     let drawing = lags("autocorrelation", record.sample_time, 1, 1, &of.autocorrelation, of.autocorrelation_band)?;
-    Some(Plot::new(format!("autocorrelation-{id}-{}", fit.name), caption, title, drawing))
+    Some(Plot::of(format!("autocorrelation-{id}-{}", fit.name), caption, title, drawing))
 }
 
 /// Correlation of the residual with a signal.
@@ -171,7 +171,7 @@ fn cross_correlation(id: &str, record: &Record, fit: &OutputFit, with: &Correlat
          tested"
     );
     let drawing = lags("correlation", record.sample_time, *first_lag, *tested_from, values, *band)?;
-    Some(Plot::new(format!("correlation-{id}-{}-{signal}-{role}", fit.name), caption, title, drawing))
+    Some(Plot::of(format!("correlation-{id}-{}-{signal}-{role}", fit.name), caption, title, drawing))
 }
 
 /// The plots of the residual against each signal, those with the least probable tests first.
@@ -229,7 +229,7 @@ fn spectrum(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
         Curves { x: Axis::new("frequency", "Hz").from(0.0), y: Axis::new("power density", unit).logarithmic(), layers };
     let caption = "Spectrum: mean power density, and (thin) the greatest in each column; flat for white residuals";
     let title = format!("Spectrum of the residual of {} of {}", fit.name, record.name);
-    let plot = Plot::new(format!("spectrum-{id}-{}", fit.name), caption, title, Drawing::Curves(drawing));
+    let plot = Plot::of(format!("spectrum-{id}-{}", fit.name), caption, title, Drawing::Curves(drawing));
     (of.frequency.len() > 1).then_some(plot)
 }
 
@@ -250,5 +250,5 @@ fn spread(id: &str, record: &Record, fit: &OutputFit, over: &Spread) -> Plot {
     };
     let title = format!("Size of the residual of {} of {} over {role} {signal}", fit.name, record.name);
     let caption = format!("Size over {role} `{signal}`; dashed, that of all residuals");
-    Plot::new(format!("spread-{id}-{}-{signal}-{role}", fit.name), caption, title, Drawing::Curves(drawing))
+    Plot::of(format!("spread-{id}-{}-{signal}-{role}", fit.name), caption, title, Drawing::Curves(drawing))
 }
