@@ -1,4 +1,4 @@
-//! [`Error`]: why there is nothing to hand back. What a fit found but did not like is an outcome, not an error.
+//! [`Error`]: the cause where a call has no result. A fit that ends badly has a result: its [`Outcome`](crate::optimize::Outcome).
 
 use crate::numeral::exact;
 use std::path::PathBuf;
@@ -278,7 +278,7 @@ fn short(value: f64) -> String {
     if plain { value.to_string() } else { format!("{value:e}") }
 }
 
-/// What a text that is not a number gives away.
+/// A hint at the probable cause, from a text that is not a number.
 fn number_hint(text: &str) -> &'static str {
     let only = |letters: &str| text.chars().all(|letter| letter.is_ascii_digit() || letters.contains(letter));
     if text.replacen(',', ".", 1).parse::<f64>().is_ok() {

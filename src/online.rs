@@ -127,9 +127,9 @@ pub enum ObserverError {
     /// A quantity that must be positive and finite.
     #[error("{what} of `{signal}` is {value}; it must be positive and finite")]
     NotPositive {
-        /// What it is.
+        /// The quantity.
         what: &'static str,
-        /// Whose it is.
+        /// The signal or parameter that it belongs to.
         signal: &'static str,
         /// The value given.
         value: f64,

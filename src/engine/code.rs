@@ -157,7 +157,7 @@ pub(super) struct Code {
     pub tables: Vec<Arc<Table>>,
 }
 
-/// A code all of whose slots, columns and tables are there, and its turns: what reads and writes without looking relies on it.
+/// Code that was checked: all slots, columns and tables that it names exist. Unchecked reads and writes rely on it. With its turns.
 #[derive(Clone, Debug)]
 pub(super) struct Sound {
     code: Code,

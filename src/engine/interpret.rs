@@ -1,7 +1,7 @@
 //! The interpreter: one instruction after the other, each on several registers side by side.
 //!
-//! An instruction costs a jump that is hard to foresee, so that it pays to do much in each: four registers of eight lanes,
-//! or eight of four.
+//! Each instruction costs an indirect jump that the processor often mispredicts. An instruction therefore works on many values: four
+//! registers of eight lanes, or eight registers of four.
 
 use super::code::{Instruction, Operation, Sound};
 use super::functions::apply;

@@ -41,8 +41,8 @@ impl Trials {
 }
 
 impl Problem<'_> {
-    /// What searches from elsewhere make of an estimate, with their time and evaluations; `None` where it needs none, and where nothing
-    /// is left of the fit's limits.
+    /// The estimate after further searches from other starts, with their time and evaluations; `None` if it needs none, or if the fit's
+    /// limits of time and trial steps are used up.
     pub(super) fn searched_elsewhere(&self, found: &Summary, control: &Control) -> Option<Summary> {
         if control.stops() {
             return None;

@@ -28,7 +28,7 @@ pub(super) struct Start {
 }
 
 impl Start {
-    /// That of a problem.
+    /// The declared start of a problem.
     pub fn declared(problem: &Problem<'_>) -> Self {
         Start { coordinates: problem.unknowns.start(), trials: u64::MAX, ends: None }
     }

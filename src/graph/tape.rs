@@ -1,7 +1,7 @@
 //! [`Tape`]: a graph that is being made into a program.
 //!
-//! Values stay what the text says. Slopes, and the steps of an integrator, are *relaxed*: their signs are gathered, factors
-//! that do not vary within a pass are multiplied with each other first, and a sum of products becomes one instruction.
+//! Values are computed in the order of the model's text. Slopes, and the steps of an integrator, are *relaxed*: signs are moved to the
+//! outside of products, factors that do not vary within a pass are multiplied first, and a sum of products becomes one instruction.
 
 use super::{Function, Function2, Graph, Id, Leaf, Node};
 use crate::scalar::Comparison;

@@ -148,7 +148,7 @@ impl Arena {
     }
 }
 
-/// What one run came to.
+/// Result of one run: the answers to its comparisons, and its outputs.
 struct Run {
     path: Vec<Decision>,
     roots: Vec<Id>,

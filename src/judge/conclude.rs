@@ -348,7 +348,7 @@ impl<'j> Judgement<'j> {
             let found = noise::estimate(objective, &self.end.coordinates).map_err(reason)?;
             return Ok(found.widened((self.residuals.measured as f64 / self.degrees.max(1.0)).sqrt()));
         }
-        // That of errors that are rounding is said as it is, zero or not.
+        // The noise level of errors that are round-off is returned as computed, zero or not.
         let scale = (self.linear.sum_of_squares() / self.degrees.max(1.0)).sqrt();
         Ok(objective.whitening.widened(if noise::only_scales(objective) { scale } else { self.widening }))
     }

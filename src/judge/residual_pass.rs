@@ -17,8 +17,8 @@ use std::ops::Range;
 
 /// Longest horizon over which errors are correlated.
 const HORIZON: usize = 100;
-/// Every how many windows one is simulated again with a finer step, and the most of them per record; of records of so many windows, all
-/// are.
+/// To judge the step, one window in `EVERY` is simulated again with a finer step, at most `AGAIN` of a record. Records of up to `AGAIN`
+/// windows are simulated again as a whole.
 const EVERY: usize = 16;
 const AGAIN: usize = 16;
 

@@ -57,13 +57,12 @@ impl Finer for ByMethods<'_> {
 }
 
 impl<'a> Problem<'a> {
-    /// The same problem, which a run takes on to these methods, one after the other, as long as a finer step would move an
-    /// unknown.
+    /// The same problem with finer methods. A run continues with the next of them as long as a finer step would move an unknown.
     pub(crate) fn refining(self, sweeps: Arc<FinerSweeps<'a>>) -> Self {
         if sweeps.make.is_empty() {
             return self;
         }
-        // What is prepared of the records is another for each method, and so is a checkpoint.
+        // Prepared records and checkpoints depend on the method.
         let trials = if self.settings.searches.count() > 1 { TRIALS * PARTS } else { TRIALS };
         let optimizer = self.settings.optimizer.limited(trials);
         let settings = Settings { checkpoint: None, optimizer, ..self.settings.clone() };
