@@ -11,20 +11,20 @@ use crate::scalar::Scalar;
 use crate::signals;
 use crate::signals::{Nothing, Of, Signals};
 
-/// What does not hold, with the place and the numbers.
+/// A violated requirement, with the place and the numbers.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Disagreement {
     /// A loss that breaks a requirement of [`Loss`].
     #[error("the loss breaks a requirement at z = {z}: {requirement}: {found} against {expected}")]
     Loss {
-        /// What should hold.
+        /// The requirement.
         requirement: &'static str,
         /// The standardized error.
         z: f64,
-        /// What the loss says.
+        /// The value found.
         found: f64,
-        /// What it should be.
+        /// The expected value.
         expected: f64,
     },
     /// A slope of a model that finite differences do not confirm.

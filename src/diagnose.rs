@@ -1,4 +1,4 @@
-//! What can be said of an estimate beyond its numbers: residuals, identifiability, intervals, other models, other data.
+//! Diagnoses of an estimate: residuals, identifiability, intervals, other models, other data.
 //!
 //! Everything here is handed back as plain data that serializes, for reports and for programs.
 
@@ -52,7 +52,7 @@ pub struct Test {
     pub p_value: f64,
     /// Whether the hypothesis may stand: `p_value` is at least 0.01.
     pub passed: bool,
-    /// What the result means; where it failed, what that usually comes from.
+    /// Meaning of the result; of a failed test with the usual cause.
     pub meaning: String,
 }
 

@@ -24,16 +24,16 @@ use crate::parameter::{Parameter, Transform};
 use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
 
-/// What one update found.
+/// Result of one update.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Update<Y> {
     /// Measured less expected outputs, before the correction; zero for an output that was not used.
     pub innovation: Y,
-    /// What became of the estimates.
+    /// State of the estimates.
     pub outcome: UpdateOutcome,
 }
 
-/// What became of the estimates in one update.
+/// State of the estimates after one update.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum UpdateOutcome {
@@ -48,7 +48,7 @@ pub enum UpdateOutcome {
     Held {
         /// The parameter; the first, where there are several.
         parameter: &'static str,
-        /// What is too small, in words and with its unit.
+        /// The quantity that is too small, in words and with its unit.
         quantity: &'static str,
         /// Its value.
         value: f64,

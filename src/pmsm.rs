@@ -194,13 +194,13 @@ pub enum MotorError {
     /// A quantity lies outside the range in which it means something.
     #[error("{quantity} is {value} {unit}; it must {must}")]
     OutOfRange {
-        /// What it is, in words.
+        /// The quantity, in words.
         quantity: &'static str,
         /// Its value.
         value: f64,
         /// Its unit.
         unit: &'static str,
-        /// What it must be, in words.
+        /// The requirement, in words.
         must: &'static str,
     },
 }

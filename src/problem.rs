@@ -153,7 +153,7 @@ impl<'a> Problem<'a> {
         self.records.iter().map(Record::len).sum()
     }
 
-    /// What was declared of each parameter.
+    /// The declaration of each parameter.
     pub fn parameters(&self) -> &[Parameter] {
         &self.unknowns.parameters
     }

@@ -30,7 +30,7 @@ use serde::{Deserialize, Serialize};
 pub struct Section {
     /// A short name for programs and links, letters, digits and `-`; one section of a report has it.
     pub id: String,
-    /// What stands above it.
+    /// The heading.
     pub title: String,
     /// The worst that this section says of the estimate.
     pub severity: Severity,
@@ -38,7 +38,7 @@ pub struct Section {
     pub folded: bool,
     /// Why the estimate is not simply usable; a report gathers them at its head.
     pub(crate) reasons: Vec<Reason>,
-    /// What it says, a paragraph each.
+    /// Its paragraphs.
     pub sentences: Vec<String>,
     /// Its tables.
     pub tables: Vec<Table>,
@@ -54,7 +54,7 @@ pub struct Section {
 pub(crate) struct Reason {
     /// How bad it is; [`Severity::Usable`] is a note.
     pub severity: Severity,
-    /// What it is, with the numbers and the remedy.
+    /// The reason, with the numbers and the remedy.
     pub text: String,
 }
 

@@ -24,7 +24,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// What a sweep computes from a record before the search.
+/// Quantities that a sweep computes from a record before the search.
 #[derive(Clone, Debug, Default)]
 pub struct Prepared {
     /// The measured state at each sample, sample by sample, where predictions restart from it; NaN where there is none.
@@ -40,7 +40,7 @@ pub struct Prepared {
 pub struct Piece<'a> {
     /// The record.
     pub record: &'a Record,
-    /// What [`Sweep::prepare`] has computed from it.
+    /// The quantities that [`Sweep::prepare`] has computed from it.
     pub prepared: &'a Prepared,
     /// Its samples.
     pub samples: Range<usize>,

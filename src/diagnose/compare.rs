@@ -19,7 +19,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Candidate {
-    /// What the reader calls it.
+    /// Its name for the reader.
     pub title: String,
     /// The estimate.
     pub estimate: Summary,

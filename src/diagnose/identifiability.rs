@@ -16,7 +16,7 @@ use crate::problem::{Objective, Problem};
 use crate::random::Random;
 use serde::{Deserialize, Serialize};
 
-/// What the records can tell of the unknowns.
+/// Identifiability of the unknowns from the records.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identifiability {
@@ -34,7 +34,7 @@ pub struct Identifiability {
     pub collinear: Vec<Collinear>,
     /// Where each unknown is excited.
     pub excitation: Vec<Excitation>,
-    /// What it means and what would help, a sentence each; empty if all is well.
+    /// Meaning and remedies, a sentence each; empty if nothing is wrong.
     pub advice: Vec<String>,
 }
 

@@ -30,7 +30,7 @@ const LAGS: usize = 25;
 /// The fewest residuals that tests say anything of.
 const FEWEST: u64 = 20;
 
-/// What the residuals of one output show.
+/// Examination of the residuals of one output.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Residuals {
@@ -80,7 +80,7 @@ pub struct Residuals {
     pub spectrum: Spectrum,
     /// The strongest line of the spectrum, if it stands out.
     pub period: Option<Period>,
-    /// What the residuals were tested for.
+    /// Tests of the residuals.
     pub tests: Vec<Test>,
 }
 

@@ -37,7 +37,7 @@ use crate::signals::Signals;
 pub struct Compared {
     /// Name of the record.
     record: String,
-    /// What it was used for.
+    /// Its use: estimation or validation.
     data: &'static str,
     /// Time of each sample (s).
     t: Vec<f64>,

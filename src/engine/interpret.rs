@@ -10,9 +10,9 @@ use crate::scalar::Table;
 use crate::wide::{Task, Wide, Width};
 use std::sync::Arc;
 
-/// What is to be computed.
+/// The part of the code to be run.
 pub(super) enum Part<'a> {
-    /// What does not vary within a pass.
+    /// The part that does not vary within a pass.
     Once,
     /// A block of samples.
     Samples {
@@ -161,7 +161,7 @@ impl<W: Wide, const K: usize> Operands<W, K> {
         self.slots.wrapping_add(usize::from(slot) * K * W::LANES)
     }
 
-    /// Those of a pair of slots.
+    /// Addresses of a pair of slots.
     #[inline(always)]
     fn pair(&self, j: usize) -> [*mut f64; 2] {
         let [a, b] = self.instruction.pairs[j];

@@ -131,7 +131,7 @@ impl Attempt {
     }
 }
 
-/// What is said where the data do not tell the estimate from that of a coarser step.
+/// The warning where the data do not distinguish the estimate from that of a coarser step.
 fn explains_as_well(coarser: &[Coarser], deviance: f64, found: &Summary) -> Option<Warning> {
     let close = coarser.iter().filter(|coarser| coarser.deviance - deviance < WORSE);
     let moved = close.filter_map(|coarser| Some((coarser, farthest(found, coarser.values.iter().copied())?)));
@@ -150,7 +150,7 @@ fn explains_as_well(coarser: &[Coarser], deviance: f64, found: &Summary) -> Opti
     Some(Warning { code: WarningCode::CoarseStep, severity: Severity::Usable, text })
 }
 
-/// What is said where a coarser step explains the data better than that of the estimate, by so much.
+/// The warning where a coarser step explains the data better than that of the estimate, by so much.
 fn explains_better(coarser: &Coarser, better: f64, found: &Summary) -> Warning {
     let certain = better > CERTAINLY_WORSE;
     let why = if certain { "the record may have been simulated with it" } else { "which may be chance" };

@@ -6,7 +6,7 @@
 use super::{Function, Function2, Graph, Id, Leaf, Node};
 use crate::scalar::Comparison;
 
-/// What a node depends on, as bits.
+/// The quantities that a node depends on, as bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Depends(u8);
 

@@ -1,4 +1,4 @@
-//! What is known of unknowns at a bound, and what they leave of the others.
+//! Knowledge of unknowns at a bound, and their effect on the others.
 //!
 //! Where the estimate without bounds lies beyond one by less than its interval reaches, the truth may be within the bounds,
 //! and the others, estimated with the unknown at its bound, are biased by as much as they are correlated with it. There,

@@ -51,7 +51,7 @@ pub(crate) struct SearchEnd {
     pub write_error: Option<String>,
     /// Carries at the begins of the segments there.
     pub memory: Memory,
-    /// What searches from other starts found, if there were any.
+    /// Results of searches from other starts, if there were any.
     pub starts: Option<Starts>,
 }
 

@@ -94,7 +94,7 @@ impl Judgement<'_> {
         inputs.iter().enumerate().filter_map(one).collect()
     }
 
-    /// What is suspicious of an output, and confirmed by the errors.
+    /// Suspicious values of an output that the errors confirm.
     fn suspicions(&self, found: &[Arc<Inspection>]) -> Vec<Warning> {
         let mut suspicions: Vec<(Suspect, &ChannelInspection, &Suspicion)> = vec![];
         for (e, inspection) in found.iter().enumerate() {

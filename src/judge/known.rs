@@ -37,7 +37,7 @@ fn told_by_data(unknown: &Unknown, prior: Prior) -> bool {
 }
 
 impl Judgement<'_> {
-    /// What is said of the parameters one by one.
+    /// Warnings about single parameters.
     pub(super) fn knowledge(&self, unknowns: &[Unknown], covariances: &Covariances) -> Vec<Warning> {
         let mut warnings = vec![];
         warnings.extend(self.without_error(unknowns, covariances));

@@ -55,7 +55,7 @@ struct Sums<'s> {
     experiment: usize,
     outputs: Vec<OutputSums>,
     measured: u64,
-    /// That of the covariance of a sample with all outputs, and of all measurements so far.
+    /// Logarithm of the determinant of the covariance of a sample with all outputs, and of all measurements so far.
     log_determinants: (f64, f64),
     portmanteaus: Vec<Portmanteau>,
     coupling: Coupling,
@@ -148,7 +148,7 @@ impl<'s> Sums<'s> {
         self.first.get_or_insert((begin, first));
         let record = &self.objective.problem.records[self.experiment];
         let carry = || window.carry.iter().skip(lane).step_by(window.lanes()).copied().collect();
-        // Those in which a multiple of the distance lies.
+        // Windows in which a multiple of the distance lies.
         let distance = (EVERY * window.capacity()).max(record.len() / AGAIN);
         let at_distance = begin.next_multiple_of(distance) < begin + samples;
         if at_distance && self.objective.sweep.restarts().is_none() {

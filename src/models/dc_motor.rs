@@ -2,14 +2,14 @@ use crate::{Model, Scalar};
 use serde::{Deserialize, Serialize};
 
 crate::signals! {
-    /// What moves in a direct-current motor, and what is measured of it.
+    /// States of a direct-current motor, which are its measured outputs.
     pub struct Rotation {
         /// Armature current.
         i: "A",
         /// Speed.
         w: "rad/s",
     }
-    /// What acts on a direct-current motor.
+    /// Inputs of a direct-current motor.
     pub struct Feed {
         /// Armature voltage.
         u: "V",

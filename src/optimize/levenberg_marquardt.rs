@@ -93,9 +93,9 @@ enum Stage {
     Step(Trial),
     /// The second derivative along a step.
     Accelerate(Trial),
-    /// Those at points around the start or the end, where slopes show nothing.
+    /// Evaluations at points around the start or the end, where slopes show nothing.
     Explore(Exploration),
-    /// Those where the first try ended, which was the better one.
+    /// The slopes at the end of the first try, which was the better one.
     Return,
 }
 
@@ -142,7 +142,7 @@ impl<S: Scaling> LevenbergMarquardt<S> {
         })
     }
 
-    /// What to do at the point where the search stands: end, or ask for the next evaluation.
+    /// Ends at the present point, or asks for the next evaluation.
     fn go_on(&mut self, point: Point) {
         let ended = point.ended(&self.stop).or_else(|| self.given_up(&point));
         let trial = match ended {

@@ -19,7 +19,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 use serde::{Deserialize, Serialize};
 
-/// What keeps a real drive from being an ideal one; each may be switched off alone.
+/// Imperfections of a real drive; each may be switched off alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Disturbance {
     /// Voltage lost in the inverter.
@@ -83,9 +83,9 @@ impl Disturbance {
 pub struct Simulation {
     /// The axis that the controllers are designed for: data sheet, 20 C.
     pub nominal: RobotAxis,
-    /// What the axis is.
+    /// The axis.
     pub plant: Plant,
-    /// What makes the voltage.
+    /// The inverter.
     pub inverter: Inverter,
     /// Current sensors.
     pub currents: CurrentSensors,

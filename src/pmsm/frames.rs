@@ -62,7 +62,7 @@ pub struct Park {
     dq: f64,
     /// Zero component over the mean of the phases.
     zero: f64,
-    /// What to subtract from the caller's angle to reach the d axis (rad).
+    /// Angle to subtract from the caller's angle to obtain that of the d axis (rad).
     to_d: f64,
     /// Power over `ud id + uq iq`.
     power: f64,

@@ -14,7 +14,7 @@ pub enum Inverter {
     Switching {
         /// Direct voltage (V).
         vdc: f64,
-        /// What the duties are compared with.
+        /// The carrier that the duties are compared with.
         carrier: Carrier,
     },
 }

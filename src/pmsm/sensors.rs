@@ -1,4 +1,4 @@
-//! What a drive measures: two phase currents and the angle.
+//! Sensors of a drive: two phase currents and the angle.
 
 use super::frames::{Stator, clarke, inverse_clarke};
 use crate::scalar::Scalar;
@@ -47,7 +47,7 @@ pub struct Resolver {
     pub unevenness: f64,
     /// Step of the converter (rad); zero for none.
     pub step: f64,
-    /// What the reading is ahead by (rad, mechanical).
+    /// Angle by which the reading is ahead (rad, mechanical).
     pub offset: f64,
 }
 

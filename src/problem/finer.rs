@@ -175,7 +175,7 @@ mod tests {
     #[test]
     fn costs_differ_by_a_tenth_of_the_smaller_one() {
         assert!(differ(1.11, 1.0) && differ(1.0, 1.11) && !differ(1.09, 1.0) && !differ(1.0, 1.09));
-        // Those of likelihoods may be negative; two that are zero do not differ.
+        // Costs of likelihoods may be negative; two that are zero do not differ.
         assert!(differ(-1.11, -1.0) && !differ(-1.09, -1.0) && differ(1e-3, -1e-3) && !differ(0.0, 0.0));
     }
 }

@@ -126,7 +126,7 @@ impl<'p> Objective<'p> {
         }
     }
 
-    /// What exactly fails in an experiment that cannot be evaluated; `sample` is where it was noticed.
+    /// The exact failure of an experiment that cannot be evaluated; `sample` is where it was noticed.
     pub(crate) fn locate(&self, e: usize, coordinates: &[f64], sample: usize) -> Failure {
         let (problem, sigma) = (self.problem, self.whitening.sigma());
         let (label, record) = (&problem.unknowns.labels[e], &problem.records[e]);

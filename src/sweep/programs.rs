@@ -47,7 +47,7 @@ struct Programs {
 /// So many samples take about as long in dual numbers as a program takes to be compiled.
 const WORTH_COMPILING: usize = 4_000;
 
-/// What a program depends on besides the recurrence.
+/// Properties that a program depends on besides the recurrence.
 #[derive(Clone, Debug, PartialEq)]
 struct Key {
     hold: Hold,
@@ -56,7 +56,7 @@ struct Key {
     purpose: Purpose,
 }
 
-/// What a program computes.
+/// The functions that a program computes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Purpose {
     /// Rows of many trajectories.
@@ -100,7 +100,7 @@ impl Programs {
         Ok(programs)
     }
 
-    /// Those with a finer step, made when they are first needed.
+    /// The programs with a finer step, made when they are first needed.
     fn refined(&self) -> Option<Arc<Programs>> {
         let make = || {
             let method = self.method.refined(self.equations.layout().kind)?;

@@ -1,4 +1,4 @@
-//! What the findings mean and what would help, a sentence each.
+//! Meaning of the findings and remedies, a sentence each.
 
 use super::together::together;
 use super::{Collinear, Excitation, Identifiability};

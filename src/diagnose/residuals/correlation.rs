@@ -12,7 +12,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 pub struct Correlation {
     /// Name of the signal.
     pub signal: String,
-    /// What it is: an input or a measured output.
+    /// Its role: an input or a measured output.
     pub role: SignalRole,
     /// The first lag (samples): the signal this much before the residual; negative where it comes after.
     pub first_lag: i64,

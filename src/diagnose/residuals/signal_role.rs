@@ -3,7 +3,7 @@
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
-/// What a signal is, beside which residuals are examined; in JSON in small letters with underscores (`measured_output`).
+/// Role of a signal that residuals are compared with; in JSON in small letters with underscores (`measured_output`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]

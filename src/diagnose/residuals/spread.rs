@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 pub struct Spread {
     /// Name of the signal.
     pub signal: String,
-    /// What it is: an input, a predicted output or the time.
+    /// Its role: an input, a predicted output or the time.
     pub role: SignalRole,
     /// Unit of the signal.
     pub unit: String,
@@ -33,7 +33,7 @@ pub struct Spread {
 
 const PARTS: usize = 12;
 
-/// What can be done: a weighting sees time and inputs, but not the outputs.
+/// The remedy: a weighting sees time and inputs, but not the outputs.
 fn remedy(role: SignalRole, signal: &Series) -> String {
     match role {
         SignalRole::Input | SignalRole::Time => {

@@ -133,7 +133,7 @@ struct Kind<'e> {
     /// Which searches; that of the lowest cost first, at last that of the first start.
     searches: Vec<usize>,
     first: &'e End<'e>,
-    /// What the data do not determine at the first end.
+    /// The unknowns that the data do not determine at the first end.
     undetermined: Vec<usize>,
 }
 
@@ -167,7 +167,7 @@ fn kinds<'e>(comparison: &Comparison, ends: impl Iterator<Item = (usize, &'e End
     kinds
 }
 
-/// What the searches found: the ends in the order of the starts, each a search or why there is none.
+/// Results of the searches: the ends in the order of the starts, each a search or why there is none.
 pub(super) fn found(
     plain: &Objective<'_>,
     starts: &[Vec<f64>],

@@ -1,4 +1,4 @@
-//! What the data do not determine.
+//! Directions of the unknowns that the data do not determine.
 
 use super::Elimination;
 use super::reduce::{Reduced, Space, Terms};

@@ -44,7 +44,7 @@ crate::signals! {
         ke6: "V s/rad",
         /// Voltage that dead time takes from each phase.
         vdt: "V",
-        /// What is to be added to the `i0` of the equations: zero, but for the search's tolerance, where that was searched.
+        /// The correction to the `i0` of the equations: zero, but for the search's tolerance, where that was searched.
         i0: "A",
     }
 }
@@ -94,7 +94,7 @@ impl Spans {
         Equations::new().stream(q).stream(d)
     }
 
-    /// What dead time takes from the voltage along the flux and ahead of it, per volt.
+    /// The dead time's voltage along the flux and 90 degrees ahead of it, per volt.
     fn lost<S: Scalar>(&self, span: &Span, i0: S) -> (S, S) {
         let i = span.mean();
         let i = Currents { id: S::from(i.id - span.bend), iq: S::from(i.iq) };

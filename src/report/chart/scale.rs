@@ -66,7 +66,7 @@ impl Scale {
         (shown - self.from) / (self.to - self.from)
     }
 
-    /// What labels are written as multiples of: a power of ten, a multiple of three.
+    /// Exponent of the power of ten that labels are multiples of; it is a multiple of three.
     fn exponent(&self) -> i32 {
         let base = self.base();
         let size = (self.from - base).abs().max((self.to - base).abs());

@@ -1,4 +1,4 @@
-//! What is known of the parameters and initial states.
+//! The section on the parameters and initial states.
 
 use crate::estimate::{Knowledge, ParameterEstimate, Unknown, held};
 use crate::numeral::{number, resolved};

@@ -18,7 +18,7 @@ fn tests(facts: &Facts) -> impl Iterator<Item = (String, &Test)> {
     })
 }
 
-/// What the failed tests mean together; `None` if none failed.
+/// The joint meaning of the failed tests; `None` if none failed.
 pub(super) fn section(facts: &Facts) -> Option<Section> {
     let failed: Vec<_> = tests(facts).filter(|(_, test)| !test.passed).collect();
     let (of, clearest) = failed.iter().min_by(|a, b| a.1.p_value.total_cmp(&b.1.p_value))?;
@@ -39,7 +39,7 @@ pub(super) fn section(facts: &Facts) -> Option<Section> {
     Some(meanings(&failed).into_iter().fold(section, Section::says))
 }
 
-/// What the failed tests mean, each meaning once, with what failed it.
+/// Meanings of the failed tests, each once, with the tests that have it.
 fn meanings(failed: &[(String, &Test)]) -> Vec<String> {
     const NAMED: usize = 4;
     const SAID: usize = 20;

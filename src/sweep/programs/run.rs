@@ -210,7 +210,7 @@ impl<'r> Run<'r> {
             window.set_all_measured(samples, pieces);
             return;
         }
-        // What all pieces have and is finite was measured.
+        // A value that all pieces have and that is finite was measured.
         let shortest = window.samples[..self.pieces.len()].iter().copied().min().unwrap_or(0);
         let plain = if finite { shortest } else { 0 };
         window.set_all_measured(plain, pieces);
