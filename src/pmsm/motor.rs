@@ -1,7 +1,5 @@
 //! Motor constants from geometry (thesis (3.2) to (3.11)).
 
-#[cfg(any(test, doc))]
-use super::units::Constant;
 use super::{MotorError, PolePairs};
 use core::f64::consts::PI;
 use serde::{Deserialize, Serialize};
@@ -27,7 +25,8 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// Magnet flux linkage (Wb, peak): `psi_m = pi l1 l2 Bm Ns / (4 np)`; [`Constant::FluxLinkage`] makes the back-EMF constant of it.
+    /// Magnet flux linkage (Wb, peak): `psi_m = pi l1 l2 Bm Ns / (4 np)`; the back-EMF constant follows by
+    /// [`Constant::FluxLinkage`](super::units::Constant::FluxLinkage).
     ///
     /// # Errors
     /// A length, diameter, flux density or number of turns that is not positive.
@@ -43,7 +42,8 @@ impl Geometry {
     /// A length, diameter, gap or number of turns that is not positive.
     pub fn ls(&self) -> Result<f64, MotorError> {
         let (gap, np) = (MotorError::positive("air gap", self.air_gap, "m")?, self.pole_pairs.get());
-        Ok(1.5 * (PI * MU_0 * self.area()? * self.turns()?.powi(2) / (8.0 * gap * np * np)))
+        let (area, turns) = (self.area()?, self.turns()?);
+        Ok(1.5 * (PI * MU_0 * area * turns * turns / (8.0 * gap * np * np)))
     }
 
     /// `l1 l2` (m^2).
@@ -61,6 +61,7 @@ impl Geometry {
 mod tests {
     use super::*;
     use crate::pmsm::frames::Park;
+    use crate::pmsm::units::Constant;
     use approx::assert_relative_eq;
 
     const NP: u32 = 4;
