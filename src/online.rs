@@ -230,7 +230,7 @@ impl core::fmt::Display for Short {
 pub struct Watch<Y> {
     /// Limit of each output's innovation: in its unit ([`Mras`], [`Rls`]) or in its standard deviations ([`Ekf`]).
     pub limit: Y,
-    /// So many samples in a row.
+    /// Number of consecutive samples.
     pub patience: u32,
 }
 

@@ -1,7 +1,7 @@
 //! From a tape to instructions: which run once a pass, in which order the others run, and where their results stand.
 //!
-//! What is read first is computed first, depth first from the roots, so that few numbers wait at a time; slots are given by a
-//! linear scan. What is carried on is written in place where the old value is not read any more; the rest is moved at the end.
+//! Nodes are computed in the order in which they are read, depth first from the roots, so that few slots are in use; slots are assigned by a
+//! linear scan. Entries of the carry are written in place where the old value is not read any more; the others are moved at the end.
 
 mod slots;
 

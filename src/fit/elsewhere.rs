@@ -32,7 +32,7 @@ pub(super) struct Trials {
 }
 
 impl Trials {
-    /// So many times those of a search, as far as it left them of the user's limit; `None` where it left none.
+    /// A multiple of the trial steps of a search, at most as many as it left of the user's limit; `None` where it left none.
     fn of(times: u64, iterations: u64, limit: u64) -> Option<Self> {
         let wanted = LEAST_TRIALS.max(times * iterations);
         let most = wanted.min(limit.saturating_sub(iterations));

@@ -32,7 +32,7 @@ impl Problem<'_> {
         Ok(self.searched_elsewhere(&found, &control).unwrap_or(found))
     }
 
-    /// What a method found, numbered as in [`by_method`](Self::by_method), or methods finer than it, as long as a finer step would
+    /// The estimate by a method, numbered as in [`by_method`](Self::by_method), or by a finer one, as long as a finer step would
     /// move an unknown.
     pub(super) fn refined(
         &self,

@@ -216,7 +216,7 @@ impl Tape {
             let product = self.mul(a, y);
             return self.neg(product);
         }
-        // What does not vary within a pass is gathered: (x r) s = x (r s).
+        // Factors that do not vary within a pass are multiplied first: (x r) s = x (r s).
         for (a, b) in [(a, b), (b, a)] {
             let Node::Mul(x, y) = self.graph.node(a) else { continue };
             if self.depends(b).varies() || !self.depends(a).varies() || !self.relaxed[a.index()] {

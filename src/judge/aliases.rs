@@ -21,7 +21,7 @@ const LEFT: f64 = 0.1;
 const REACH: f64 = 10.0;
 /// Relative change of a parameter for the slope of a frequency.
 const CHANGE: f64 = 1e-4;
-/// So many points along the records are examined, and so many steps of time.
+/// Numbers of points along the records, and of steps of time, that are examined.
 const POINTS: usize = 8;
 const STEPS: usize = 1000;
 /// Sampling is uneven where the quartiles of its steps of time differ by more than this part of the median.

@@ -18,7 +18,7 @@ const DECIDE: f64 = 0.5;
 const FEW: usize = 8;
 const TIMES: usize = 4;
 const PART_OF_STEP: f64 = 0.1;
-/// So much of an output missing is worth a note.
+/// Missing part of an output from which on there is a note.
 const MISSING: f64 = 0.5;
 /// Warnings of one kind; more are counted.
 const NAMED: usize = 4;

@@ -14,7 +14,7 @@ use crate::record::{Channel, ChannelInspection, Inspection, Record as Measured};
 use crate::section::{Drawing, Keep, Line, Panel, PanelKind, Plot, Samples, Style, Timeline, identifier};
 use core::ops::Range;
 
-/// So many pairs of a record and an output are drawn; of more, those reproduced worst.
+/// Number of pairs of a record and an output that are drawn; of more, those reproduced worst.
 const DRAWN: usize = 24;
 /// Numbers kept for the drawings of all records: four bytes each, a third more in letters, they are 1.4 MB of a page.
 const NUMBERS: usize = 260_000;

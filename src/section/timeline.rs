@@ -50,7 +50,7 @@ pub enum PanelKind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Line {
-    /// What it stands for; [`Style::Confidence`](super::Style::Confidence) and
+    /// Its meaning; [`Style::Confidence`](super::Style::Confidence) and
     /// [`Style::Prediction`](super::Style::Prediction) are half widths of a band about the mean of the panel's predicted
     /// line.
     pub style: super::Style,

@@ -44,7 +44,7 @@ struct Programs {
     refined: OnceLock<Option<Arc<Programs>>>,
 }
 
-/// So many samples take about as long in dual numbers as a program takes to be compiled.
+/// Number of samples that take as long in dual numbers as a program takes to be compiled.
 const WORTH_COMPILING: usize = 4_000;
 
 /// Properties that a program depends on besides the recurrence.

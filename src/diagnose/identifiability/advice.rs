@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 const ONLY: f64 = 0.99;
 /// More than this is not told from all.
 const ALL: f64 = 0.999;
-/// So much of an unknown's information from one tenth of a record leaves little to the others.
+/// Part of an unknown's information from one tenth of a record, from which on the advice names it.
 const ONCE: f64 = 0.9;
 
 /// Sets that are put into words; the strongest come first.

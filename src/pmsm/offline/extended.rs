@@ -187,7 +187,7 @@ mod tests {
         spans.extended(0.15).solve().unwrap().parameters
     }
 
-    // What is left out is of the order of R Ts x / L, the angle by which the voltage of the resistance turns on, squared: 1e-5. Found:
+    // The neglected term is of the order of R Ts x / L, the angle by which the voltage of the resistance turns on, squared: 1e-5. Found:
     // R 1.3e-6 off, lq 6.5e-5; without the bend R is off by 6e-4, without the factor as well by 1.5e-3.
     #[test]
     fn a_held_voltage_and_the_bend_between_samples_are_allowed_for() {

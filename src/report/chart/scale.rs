@@ -23,7 +23,7 @@ pub(super) struct Tick {
     pub label: String,
 }
 
-/// So many letters of a name fit the narrowest screen beside a unit.
+/// Number of letters of a name that fit the narrowest screen beside a unit.
 const LETTERS: usize = 36;
 /// A range this much smaller than its distance from zero is written as what is above a round number.
 const NARROW: f64 = 1e-4;

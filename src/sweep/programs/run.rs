@@ -18,7 +18,7 @@ pub(super) struct Run<'r> {
     pieces: Vec<Piece<'r>>,
     /// Where windows are read from that are not kept.
     columns: Option<Columns<'r>>,
-    /// What the columns are, from the first sample of each piece on, if it is kept.
+    /// The kept columns, from the first sample of each piece on.
     kept: Option<Arc<Kept>>,
     space: Workspace,
 }
