@@ -216,7 +216,7 @@ impl Spiral {
 /// The order of an integrator with fixed steps: as which power of the step the errors fall, those of the states and those of their
 /// slopes with respect to parameters and initial states. The model is a point that spirals to the unit circle at rates that vary with time, over one second in 32 and in 64 intervals.
 ///
-/// The answer lies within some 0.2 of the order. It says nothing about an adaptive method (its tolerance does not follow
+/// The answer lies within some 0.2 of the order. It is not meaningful for an adaptive method (its tolerance does not follow
 /// the interval), unless its tolerance is so large that each interval is one step. `None` where the method is stuck.
 pub fn order<I: Integrator>(integrator: &I) -> Option<[f64; 2]> {
     let ([values, slopes], [finer_values, finer_slopes]) = (errors(integrator, 32)?, errors(integrator, 64)?);

@@ -1,6 +1,6 @@
 //! Diagnoses of an estimate: residuals, identifiability, intervals, other models, other data.
 //!
-//! Everything here is handed back as plain data that serializes, for reports and for programs.
+//! All results are plain data that serialize, for reports and for programs.
 
 mod bands;
 mod bootstrap;
@@ -102,7 +102,7 @@ pub fn tested<'a>(about: &str, tests: impl IntoIterator<Item = &'a Test>) -> Sec
     Section::new("tests", "Further tests").part(part)
 }
 
-/// Tests and their results; what each means stands where it failed.
+/// Tests and their results, with the meaning of those that failed.
 pub(crate) fn results<'a>(caption: &str, tests: impl IntoIterator<Item = &'a Test>) -> Table {
     let row = |test: &Test| {
         let result = if test.passed { "✓ passes" } else { "! fails" };

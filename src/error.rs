@@ -246,7 +246,7 @@ pub struct Failure {
 /// Columns of a file that are listed; of more, those whose names are nearest to the one wanted.
 const LISTED: usize = 10;
 
-/// The columns that a file has, and what the list gives away.
+/// The columns that a file has, with a hint at the probable cause.
 fn listed(columns: &[String], wanted: &str, signal: &str) -> String {
     let remedy = match columns {
         [single] if single.contains([';', '\t', '|']) => {

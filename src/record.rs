@@ -31,7 +31,7 @@ use std::sync::{Arc, OnceLock};
 /// Declarations of the state at the first sample.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Initial {
-    /// It is estimated, starting from what the first measurement of each output says, and from zero where that says nothing.
+    /// It is estimated, starting from the first measurement of each output, and from zero where that does not determine it.
     #[default]
     Estimated,
     /// It is what the first sample says, taken as exact.

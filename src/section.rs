@@ -59,7 +59,7 @@ pub(crate) struct Reason {
 }
 
 impl Section {
-    /// A section of this name that says nothing yet. In the name, what is no letter or digit becomes `-`.
+    /// An empty section of this name. In the name, what is no letter or digit becomes `-`.
     pub fn new(id: impl AsRef<str>, title: impl Into<String>) -> Section {
         Section {
             id: identifier(id.as_ref()),

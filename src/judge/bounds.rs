@@ -26,7 +26,7 @@ pub(super) fn released(
     while kept != at_bounds {
         let free = undetermined(linear, &kept);
         let steps = || Some((linear.covariance(&free.held)?, linear.step(&none, &free.held)?));
-        // Data that determine fewer directions without the bounds say nothing of what is beyond.
+        // Data that determine fewer directions without the bounds do not determine the values beyond them.
         let Some((covariance, step)) = steps().filter(|_| free.directions.len() == found.directions.len()) else {
             break;
         };

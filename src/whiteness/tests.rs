@@ -103,7 +103,7 @@ fn a_p_value_is_how_often_chance_shows_as_much() {
     }
 }
 
-/// Squares that overflow say nothing, and do not panic.
+/// Squares that overflow give no result, and do not panic.
 #[test]
 fn huge_errors_have_a_p_value() {
     for size in [1e80, 1e160, f64::MAX] {
@@ -173,7 +173,7 @@ fn errors_that_grow_are_of_like_size() {
     }
 }
 
-/// Errors of one size, none, and those whose squares overflow say nothing.
+/// Errors of one size, no errors, and errors whose squares overflow give no result.
 #[test]
 fn sizes_that_have_no_variance() {
     for e in [0.0, 1.0, 0.1, 1e-170, 1e90, 1e200] {

@@ -95,7 +95,7 @@ impl<'s> End<'s> {
         other.cost_ratio(self, comparison) <= 1.0 + self.tolerance().max(other.tolerance())
     }
 
-    /// How large its cost is relative to that of another end; costs that are both rounding say nothing.
+    /// Ratio of its cost to that of another end; one where both costs are rounding.
     fn cost_ratio(&self, to: &End<'_>, comparison: &Comparison) -> f64 {
         let are_rounding = [self, to].iter().all(|end| end.search.outcome == Outcome::Exact);
         if are_rounding { 1.0 } else { comparison.ratio(self.level, to.level) }
