@@ -2,11 +2,13 @@
 //! its program included; of the search itself on a problem whose model costs nothing; and of reading a CSV file:
 //! `cargo bench --bench fit`. `GREYBOX_ENGINE` chooses what evaluates the models (`duals`, `interpreter`, `machine-code`).
 
+#[path = "../tests/common/dc_motor.rs"]
+mod brushed;
+
 use argmin::core::CostFunction;
+use brushed::{Armature, DcMotor, Feed};
 use divan::{Bencher, counter::ItemsCount};
-use greybox::models::{
-    Armature, AxisParameters, Command, ControlledAxisOutput, DcMotor, Feed, Positioning, PositioningLoop, Reference,
-};
+use greybox::models::{AxisParameters, Command, ControlledAxisOutput, Positioning, PositioningLoop, Reference};
 use greybox::optimize::{LeastSquares, LevenbergMarquardt, Linearization};
 use greybox::pmsm::{Drive, Machine, MachineParameters, Salient, SalientWinding, Surface, VoltageAndLoad, Winding};
 use greybox::{

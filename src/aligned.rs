@@ -21,7 +21,7 @@ impl Aligned {
         Aligned::within(vec![0.0; count + LINE], count)
     }
 
-    /// So many numbers of any values, in the same memory if it is large enough.
+    /// A vector of this length with unspecified values, in the same memory if it is large enough.
     pub fn resized(self, count: usize) -> Self {
         if count > 0 && self.numbers.len() >= count + LINE {
             Aligned::within(self.numbers, count)

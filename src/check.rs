@@ -11,20 +11,20 @@ use crate::scalar::Scalar;
 use crate::signals;
 use crate::signals::{Nothing, Of, Signals};
 
-/// What does not hold, with the place and the numbers.
+/// A violated requirement, with the place and the numbers.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Disagreement {
     /// A loss that breaks a requirement of [`Loss`].
     #[error("the loss breaks a requirement at z = {z}: {requirement}: {found} against {expected}")]
     Loss {
-        /// What should hold.
+        /// The requirement.
         requirement: &'static str,
         /// The standardized error.
         z: f64,
-        /// What the loss says.
+        /// The value found.
         found: f64,
-        /// What it should be.
+        /// The expected value.
         expected: f64,
     },
     /// A slope of a model that finite differences do not confirm.
@@ -213,22 +213,14 @@ impl Spiral {
     }
 }
 
-/// How fast the error falls with the step, as a power of it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Order {
-    /// For the states.
-    pub values: f64,
-    /// For their slopes with respect to parameters and initial states.
-    pub slopes: f64,
-}
-
-/// The order of an integrator with fixed steps, on a point that spirals to the unit circle at rates that vary with time, over one second in 32 and in 64 intervals.
+/// The order of an integrator with fixed steps: as which power of the step the errors fall, those of the states and those of their
+/// slopes with respect to parameters and initial states. The model is a point that spirals to the unit circle at rates that vary with time, over one second in 32 and in 64 intervals.
 ///
-/// The answer lies within some 0.2 of the order. It says nothing about an adaptive method (its tolerance does not follow
+/// The answer lies within some 0.2 of the order. It is not meaningful for an adaptive method (its tolerance does not follow
 /// the interval), unless its tolerance is so large that each interval is one step. `None` where the method is stuck.
-pub fn order<I: Integrator>(integrator: &I) -> Option<Order> {
+pub fn order<I: Integrator>(integrator: &I) -> Option<[f64; 2]> {
     let ([values, slopes], [finer_values, finer_slopes]) = (errors(integrator, 32)?, errors(integrator, 64)?);
-    Some(Order { values: (values / finer_values).log2(), slopes: (slopes / finer_slopes).log2() })
+    Some([(values / finer_values).log2(), (slopes / finer_slopes).log2()])
 }
 
 /// Largest errors of values and slopes after one second.

@@ -1,6 +1,6 @@
-//! What can be said of an estimate beyond its numbers: residuals, identifiability, intervals, other models, other data.
+//! Diagnoses of an estimate: residuals, identifiability, intervals, other models, other data.
 //!
-//! Everything here is handed back as plain data that serializes, for reports and for programs.
+//! All results are plain data that serialize, for reports and for programs.
 
 mod bands;
 mod bootstrap;
@@ -16,12 +16,12 @@ mod side_by_side;
 pub use bands::{Bands, bands};
 pub(crate) use bands::{Widths, widths};
 pub use bootstrap::{Bootstrap, Resampling, bootstrap};
-pub use compare::{Candidate, Comparison, Validation, cross_validate, f_test, likelihood_ratio, validate};
+pub use compare::{Candidate, Validation, cross_validate, f_test, likelihood_ratio, validate};
 pub use convergence::Convergence;
 pub use derived::{Derived, derived};
 pub use drift::{Drift, drift};
-pub(crate) use identifiability::reworded;
 pub use identifiability::{Collinear, Excitation, Identifiability, Segment, identifiability};
+pub(crate) use identifiability::{identifiability_beside_warnings, reworded};
 pub use profile::{End, Profile, ProfilePoint, profile};
 pub use side_by_side::Compared;
 
@@ -52,7 +52,7 @@ pub struct Test {
     pub p_value: f64,
     /// Whether the hypothesis may stand: `p_value` is at least 0.01.
     pub passed: bool,
-    /// What the result means; where it failed, what that usually comes from.
+    /// Meaning of the result; of a failed test with the usual cause.
     pub meaning: String,
 }
 
@@ -102,7 +102,7 @@ pub fn tested<'a>(about: &str, tests: impl IntoIterator<Item = &'a Test>) -> Sec
     Section::new("tests", "Further tests").part(part)
 }
 
-/// Tests and their results; what each means stands where it failed.
+/// Tests and their results, with the meaning of those that failed.
 pub(crate) fn results<'a>(caption: &str, tests: impl IntoIterator<Item = &'a Test>) -> Table {
     let row = |test: &Test| {
         let result = if test.passed { "✓ passes" } else { "! fails" };

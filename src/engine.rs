@@ -139,7 +139,7 @@ impl Program {
         Group::new(Arc::clone(&self.0), self.0.registers(lanes))
     }
 
-    /// What is read at each sample, in order.
+    /// The columns read at each sample, in order.
     pub fn columns(&self) -> &[Column] {
         &self.0.code.columns
     }
@@ -149,7 +149,7 @@ impl Program {
         self.0.code.reads_next()
     }
 
-    /// What slopes are taken with respect to.
+    /// The quantities with respect to which slopes are computed.
     pub fn seeds(&self) -> &[Seed] {
         &self.0.seeds
     }

@@ -25,7 +25,7 @@ pub struct Equations {
     noise: Vec<Id>,
 }
 
-/// What is written of equations.
+/// The serialized form of equations.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Parts {
@@ -164,7 +164,7 @@ impl Equations {
     /// The equations of roots that were read: states, outputs, and the noise of both.
     fn traced(layout: Layout, graph: &Graph, [state, output, levels]: [&[Id]; 3]) -> Result<Self, Untraceable> {
         let (diffusion, noise) = levels.split_at(layout.states.len());
-        // What was not written is no noise.
+        // Noise that is not in the file is zero.
         let said = |levels: &[Id], unsaid: fn(f64) -> bool| {
             let unsaid = |id: &Id| graph.known(*id).is_some_and(unsaid);
             if levels.iter().all(unsaid) { vec![] } else { levels.to_vec() }

@@ -1,4 +1,4 @@
-//! [`Error`]: why there is nothing to hand back. What a fit found but did not like is an outcome, not an error.
+//! [`Error`]: the cause where a call has no result. A fit that ends badly has a result: its [`Outcome`](crate::optimize::Outcome).
 
 use crate::numeral::exact;
 use std::path::PathBuf;
@@ -16,7 +16,7 @@ pub enum Error {
         samples: usize,
         /// How many there must be.
         needed: usize,
-        /// What for.
+        /// The purpose.
         purpose: &'static str,
     },
     /// Two columns of one record differ in length.
@@ -68,7 +68,7 @@ pub enum Error {
     /// A sample time, factor or scale that must be a positive finite number.
     #[error("{what} is {}; it must be positive and finite", short(*value))]
     NotPositive {
-        /// What it is.
+        /// The quantity.
         what: String,
         /// The offending value.
         value: f64,
@@ -119,14 +119,14 @@ pub enum Error {
         /// Names in the header.
         expected: usize,
     },
-    /// What is wrong with a record, and on which line of its file.
+    /// An error in a record, with the line of its file.
     #[error("{}, line {line}: {problem}", path.display())]
     AtLine {
         /// The file.
         path: PathBuf,
         /// Line, from one.
         line: u64,
-        /// What is wrong.
+        /// The fault.
         problem: Box<Error>,
     },
     /// A renaming or factor for a signal that the model does not have.
@@ -146,7 +146,7 @@ pub enum Error {
         line: u64,
         /// Name of the column.
         column: String,
-        /// What stands there.
+        /// The text of the cell.
         text: String,
     },
     /// A file that could not be read or written.
@@ -162,7 +162,7 @@ pub enum Error {
     Parameter {
         /// Name of the parameter or initial state.
         parameter: String,
-        /// What is wrong, with the numbers and the remedy.
+        /// The fault, with the numbers and the remedy.
         problem: String,
     },
     /// A fit in which nothing may move.
@@ -190,7 +190,7 @@ pub enum Error {
         experiment: String,
         /// Why not.
         reason: String,
-        /// What to do instead.
+        /// The remedy.
         remedy: &'static str,
     },
     /// A simulation that fails where the search was to start.
@@ -210,7 +210,7 @@ pub enum Error {
     Checkpoint {
         /// The file.
         path: PathBuf,
-        /// What is wrong and what to do.
+        /// The fault and the remedy.
         problem: String,
     },
     /// An optimizer that gave up with an error of its own.
@@ -235,18 +235,18 @@ pub struct Failure {
     pub sample: usize,
     /// Its time (s).
     pub time: f64,
-    /// What failed: `state id`, `output iq`, `slope of output iq with respect to rs`, ...
+    /// The quantity that failed: `state id`, `output iq`, `slope of output iq with respect to rs`, ...
     pub signal: String,
     /// Its value there.
     pub value: f64,
-    /// What it usually means.
+    /// The usual cause.
     pub hint: &'static str,
 }
 
 /// Columns of a file that are listed; of more, those whose names are nearest to the one wanted.
 const LISTED: usize = 10;
 
-/// The columns that a file has, and what the list gives away.
+/// The columns that a file has, with a hint at the probable cause.
 fn listed(columns: &[String], wanted: &str, signal: &str) -> String {
     let remedy = match columns {
         [single] if single.contains([';', '\t', '|']) => {
@@ -261,7 +261,7 @@ fn listed(columns: &[String], wanted: &str, signal: &str) -> String {
         return format!("the file has: {}; {remedy}", columns.join(", "));
     }
     let wanted = wanted.to_lowercase();
-    // Those that contain the name come first.
+    // Names that contain the name come first.
     let near = |name: &str| {
         let name = name.to_lowercase();
         strsim::normalized_damerau_levenshtein(&name, &wanted) + if name.contains(&wanted) { 1.0 } else { 0.0 }
@@ -278,7 +278,7 @@ fn short(value: f64) -> String {
     if plain { value.to_string() } else { format!("{value:e}") }
 }
 
-/// What a text that is not a number gives away.
+/// A hint at the probable cause, from a text that is not a number.
 fn number_hint(text: &str) -> &'static str {
     let only = |letters: &str| text.chars().all(|letter| letter.is_ascii_digit() || letters.contains(letter));
     if text.replacen(',', ".", 1).parse::<f64>().is_ok() {

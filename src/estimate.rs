@@ -27,11 +27,11 @@ use crate::layout::Layout;
 use crate::optimize::{Outcome, Severity};
 use serde::{Deserialize, Serialize};
 
-/// What a fit found, and how well it is known, quantities by name. It borrows nothing.
+/// The result of a fit with its uncertainty, quantities by name. It borrows nothing.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Summary {
-    /// What kind of file its JSON is.
+    /// Format of its JSON.
     pub format: Format,
     /// Which version of it.
     pub version: Version,
@@ -39,7 +39,7 @@ pub struct Summary {
     pub layout: Layout,
     /// The parameters, in the model's order.
     pub parameters: Vec<ParameterEstimate>,
-    /// What each experiment has for itself.
+    /// Results of each experiment alone.
     pub experiments: Vec<ExperimentEstimate>,
     /// The outputs.
     pub outputs: Vec<OutputEstimate>,
@@ -50,13 +50,13 @@ pub struct Summary {
     pub covariance: Covariance,
     /// Covariance of the noise between outputs, where it was estimated in full.
     pub noise_covariance: Option<SquareMatrix>,
-    /// What the data cannot tell apart.
+    /// Directions of the unknowns that the data do not determine.
     pub directions: Vec<Direction>,
     /// How the search ended.
     pub outcome: Outcome,
-    /// What searches from other starts found; `None` if none were tried.
+    /// Results of searches from other starts; `None` if none were tried.
     pub starts: Option<Starts>,
-    /// What the reader must know.
+    /// Warnings and notes.
     pub warnings: Vec<Warning>,
     /// The minimized cost: the weighted sum of `rho` of the standardized errors, and half the squares of the priors.
     #[serde(with = "crate::real")]

@@ -226,7 +226,7 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
         self.record.input_hold()
     }
 
-    /// What is known of the state at the first sample.
+    /// Declarations of the state at the first sample.
     pub fn initial_state(&self) -> &Initial {
         self.record.initial_state()
     }
@@ -267,7 +267,7 @@ impl<'de, X: Signals, U: Signals, Y: Signals> Deserialize<'de> for Experiment<X,
     }
 }
 
-/// What several records are made of: one, or a slice or vector of them.
+/// Records for a fit: one, or a slice or vector of them.
 impl<X: Signals, U: Signals, Y: Signals> AsRef<[Experiment<X, U, Y>]> for Experiment<X, U, Y> {
     fn as_ref(&self) -> &[Experiment<X, U, Y>] {
         std::slice::from_ref(self)

@@ -1,4 +1,4 @@
-//! What a stored file says that it is: a format and a version, checked before anything else is read.
+//! Identification of a stored file: a format and a version, checked before anything else is read.
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;

@@ -1,6 +1,6 @@
 //! [`Graph`]: arithmetic as a value.
 //!
-//! A graph is a list of [`Node`]s, each of which names its operands by their [`Id`]s; equal nodes are kept once, and what is
+//! A graph is a list of nodes, each of which names its operands by their [`Id`]s; equal nodes are kept once, and what is
 //! known is computed at once. It is made by hand ([`Graph::add`], [`Graph::function`], ...) or read off generic Rust code,
 //! which is run once with [`Symbol`]s for numbers ([`Graph::trace`]).
 //!
@@ -33,7 +33,8 @@ mod trace;
 pub use differentiate::Seed;
 pub(crate) use differentiate::{Pattern, Tangent, Variables, Way, slopes};
 pub use function::{Function, Function2};
-pub use node::{Constant, Id, Leaf, Node};
+pub(crate) use node::{Constant, Node};
+pub use node::{Id, Leaf};
 pub use symbol::Symbol;
 pub(crate) use tape::Tape;
 pub use trace::Untraceable;
@@ -59,7 +60,7 @@ impl PartialEq for Graph {
 
 impl Graph {
     /// All nodes, in an order in which each comes after its operands.
-    pub fn nodes(&self) -> &[Node] {
+    pub(crate) fn nodes(&self) -> &[Node] {
         &self.nodes
     }
 
@@ -74,7 +75,7 @@ impl Graph {
     }
 
     /// The node of an identifier; not a number, if the graph has no such node.
-    pub fn node(&self, id: Id) -> Node {
+    pub(crate) fn node(&self, id: Id) -> Node {
         self.nodes.get(id.index()).copied().unwrap_or(Node::Constant(Constant::from(f64::NAN)))
     }
 

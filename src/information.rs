@@ -151,7 +151,7 @@ impl Information {
         self.rows = self.rows - (other.columns as u64 + 1) + other.rows;
     }
 
-    /// What is known of the remaining unknowns after the first `first` columns were minimized out.
+    /// The information on the remaining unknowns after the first `first` columns were minimized out.
     pub fn eliminate(&self, first: usize) -> Information {
         let columns = self.columns.saturating_sub(first);
         let size = (columns + 1) * (columns + 2) / 2;
@@ -171,7 +171,7 @@ impl Information {
         leading
     }
 
-    /// What is known of these columns, in this order, with all others held at a zero step.
+    /// The information on these columns, in this order, with all others held at a zero step.
     pub fn select(&self, columns: &[usize]) -> Information {
         let mut selected = Information::new(columns.len());
         selected.absorb(&mut self.block_of(columns));
@@ -179,7 +179,7 @@ impl Information {
         selected
     }
 
-    /// What is known of the unknowns counted from `d`: `y - Phi d` in the place of `y`. Missing entries of `d` are zero.
+    /// The information on the unknowns counted from `d`: `y - Phi d` in the place of `y`. Missing entries of `d` are zero.
     pub fn about(&self, d: &[f64]) -> Information {
         let (mut moved, mut start, width) = (self.clone(), 0, self.columns + 1);
         for i in 0..self.columns {

@@ -31,7 +31,7 @@ pub(crate) fn resolved(value: f64, error: f64) -> String {
     let first = if value == 0.0 { last } else { value.abs().log10().floor() as i32 };
     let digits = (first - last + 1).clamp(1, EXACT as i32) as usize;
     let text = written(value, digits.max(2));
-    // What rounds to nothing at the error's place is a zero of that place.
+    // A value that rounds to zero at the error's place is written as a zero of that place.
     if first < last && last < 0 { format!("{:.*}", -last as usize, value) } else { text }
 }
 

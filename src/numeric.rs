@@ -43,7 +43,7 @@ pub struct Derivative<F>(pub F);
 #[derive(Clone, Copy, Debug)]
 pub struct Next<F>(pub F);
 
-/// What a [`Numeric`] model knows of its state: [`Derivative`], [`Next`], or [`Nothing`].
+/// The state equation of a [`Numeric`] model: [`Derivative`], [`Next`], or [`Nothing`].
 pub trait StateEquation<X: Signals, U: Signals, P: Signals>: Send + Sync {
     /// The kind of model it makes.
     const KIND: Kind;

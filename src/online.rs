@@ -24,16 +24,16 @@ use crate::parameter::{Parameter, Transform};
 use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
 
-/// What one update found.
+/// Result of one update.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Update<Y> {
     /// Measured less expected outputs, before the correction; zero for an output that was not used.
     pub innovation: Y,
-    /// What became of the estimates.
+    /// State of the estimates.
     pub outcome: UpdateOutcome,
 }
 
-/// What became of the estimates in one update.
+/// State of the estimates after one update.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum UpdateOutcome {
@@ -48,7 +48,7 @@ pub enum UpdateOutcome {
     Held {
         /// The parameter; the first, where there are several.
         parameter: &'static str,
-        /// What is too small, in words and with its unit.
+        /// The quantity that is too small, in words and with its unit.
         quantity: &'static str,
         /// Its value.
         value: f64,
@@ -127,9 +127,9 @@ pub enum ObserverError {
     /// A quantity that must be positive and finite.
     #[error("{what} of `{signal}` is {value}; it must be positive and finite")]
     NotPositive {
-        /// What it is.
+        /// The quantity.
         what: &'static str,
-        /// Whose it is.
+        /// The signal or parameter that it belongs to.
         signal: &'static str,
         /// The value given.
         value: f64,
@@ -230,7 +230,7 @@ impl core::fmt::Display for Short {
 pub struct Watch<Y> {
     /// Limit of each output's innovation: in its unit ([`Mras`], [`Rls`]) or in its standard deviations ([`Ekf`]).
     pub limit: Y,
-    /// So many samples in a row.
+    /// Number of consecutive samples.
     pub patience: u32,
 }
 

@@ -23,7 +23,7 @@ pub(crate) use point::{is_negligible, within_tolerance};
 use crate::error::Error;
 use serde::{Deserialize, Serialize};
 
-/// What both solvers keep in argmin's state: the point, the gradient there, the cost.
+/// Contents of argmin's state for both solvers: the point, the gradient there, the cost.
 pub type LeastSquaresState = argmin::core::IterState<Vec<f64>, Vec<f64>, (), (), (), f64>;
 
 /// Where no step lowers the cost, a cosine up to this is rounding too.

@@ -46,7 +46,7 @@ pub struct Parameter {
     /// Upper bound; infinity stands for none.
     #[serde(with = "crate::real")]
     pub upper: f64,
-    /// What is known beforehand, as one more measurement.
+    /// Prior knowledge, which counts as one more measurement.
     pub prior: Option<Prior>,
     /// The coordinate that the optimizer works in.
     pub transform: Transform,

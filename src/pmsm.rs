@@ -78,17 +78,17 @@ mod surface;
 mod switching;
 
 pub use adaptation::{
-    Adaptation, AdaptationInput, DeadZone, DirectCurrent, KeConstantGain, KeLyapunov, MotorLaw, Normalized, NotAdapted,
-    RsDirect, RsLyapunov,
+    Adaptation, AdaptationInput, DeadZone, DirectCurrent, KeLyapunov, MotorLaw, Normalized, NotAdapted, RsDirect,
+    RsLyapunov,
 };
 pub use cabled::Cabled;
-pub use compensated::{Compensated, CompensatedDrive, CompensatedSalientWinding, CompensatedWinding};
+pub use compensated::{Compensated, CompensatedDrive, CompensatedWinding};
 pub use emf_harmonic::EmfHarmonic;
 pub use exact::{ExactSalient, ExactStep, ExactSurface, HeldIn};
-pub use flux_linkage::{FluxLinkage, FluxWinding};
+pub use flux_linkage::FluxLinkage;
 #[cfg(feature = "std")]
 pub use flux_mapped::{FluxMapped, MappedWinding};
-pub use injection::{Injection, InjectionStep};
+pub use injection::Injection;
 pub use inverter_fed::{AngledDrive, InverterFed, InverterFedWinding};
 pub use machine::{Machine, MachineParameters, MachineState, VoltageAndLoad};
 pub use misaligned::Misaligned;
@@ -109,7 +109,7 @@ use serde::{Deserialize, Serialize};
 pub const SQRT_2_3: f64 = 0.816_496_580_927_726;
 
 /// `sqrt(3/2)`: line-to-line rms from phase peak, and `kt / ke`.
-pub const SQRT_3_2: f64 = 1.224_744_871_391_589;
+const SQRT_3_2: f64 = 1.224_744_871_391_589;
 
 crate::signals! {
     /// Stator currents in the rotor frame, phase peak.
@@ -194,13 +194,13 @@ pub enum MotorError {
     /// A quantity lies outside the range in which it means something.
     #[error("{quantity} is {value} {unit}; it must {must}")]
     OutOfRange {
-        /// What it is, in words.
+        /// The quantity, in words.
         quantity: &'static str,
         /// Its value.
         value: f64,
         /// Its unit.
         unit: &'static str,
-        /// What it must be, in words.
+        /// The requirement, in words.
         must: &'static str,
     },
 }

@@ -28,9 +28,9 @@ const PART: usize = 128;
 /// Which frequencies pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 enum Pass {
-    /// Those below the cut-off; the gain at zero frequency is one.
+    /// Frequencies below the cut-off pass; the gain at zero frequency is one.
     Low,
-    /// Those above the cut-off; the gain at half the sampling rate is one.
+    /// Frequencies above the cut-off pass; the gain at half the sampling rate is one.
     High,
 }
 

@@ -66,6 +66,8 @@ pub struct Problem<'a> {
     /// Mean of `psi(z) z` for Gaussian `z`; needed where variances are predicted, one for least squares.
     pub(crate) kappa: f64,
     pub(crate) cuts: Cuts,
+    /// Number of the method among those of a default fit: that which it begins with, or that was chosen, is 0.
+    pub(crate) method: usize,
     /// Whether the method was chosen by the library, which then answers for its step.
     pub(crate) refines: bool,
     pub(crate) finer: Option<Arc<dyn Finer + 'a>>,
@@ -112,8 +114,8 @@ impl<'a> Problem<'a> {
             _ => 1.0,
         };
         let cuts = Cuts::new(&*sweep, &records, settings.prefilter.is_some());
-        let (refines, finer) = (false, None);
-        Ok(Problem { sweep, records, prepared, unknowns, settings, kappa, cuts, refines, finer })
+        let (method, refines, finer) = (0, false, None);
+        Ok(Problem { sweep, records, prepared, unknowns, settings, kappa, cuts, method, refines, finer })
     }
 
     fn prepared(sweep: &dyn Sweep, records: &[Record], parameters: &[Parameter]) -> Result<Vec<Prepared>, Error> {
@@ -154,7 +156,7 @@ impl<'a> Problem<'a> {
         self.records.iter().map(Record::len).sum()
     }
 
-    /// What was declared of each parameter.
+    /// The declaration of each parameter.
     pub fn parameters(&self) -> &[Parameter] {
         &self.unknowns.parameters
     }

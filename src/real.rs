@@ -128,7 +128,7 @@ impl<A: Real, B: Real, C: Real> Real for (A, B, C) {
     }
 }
 
-/// What stands beside numbers in pairs, stored as it is.
+/// Types beside numbers in pairs, stored as they are.
 macro_rules! plain {
     ($($type:ty),*) => {$(
         impl Real for $type {

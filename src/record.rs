@@ -28,10 +28,10 @@ use crate::layout::Quantity;
 use crate::parameter::Parameter;
 use std::sync::{Arc, OnceLock};
 
-/// What is known of the state at the first sample.
+/// Declarations of the state at the first sample.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Initial {
-    /// It is estimated, starting from what the first measurement of each output says, and from zero where that says nothing.
+    /// It is estimated, starting from the first measurement of each output, and from zero where that does not determine it.
     #[default]
     Estimated,
     /// It is what the first sample says, taken as exact.
@@ -54,7 +54,7 @@ pub struct Record {
     pub(crate) outputs: Arc<[Channel]>,
     pub(crate) hold: Hold,
     pub(crate) initial: Initial,
-    /// What its channels showed, once they have been looked at.
+    /// Result of the inspection of its channels, if there was one.
     pub(crate) looked: Arc<OnceLock<Looked>>,
 }
 
@@ -145,7 +145,7 @@ impl Record {
         self.hold
     }
 
-    /// What is known of the state at the first sample.
+    /// Declarations of the state at the first sample.
     pub fn initial_state(&self) -> &Initial {
         &self.initial
     }

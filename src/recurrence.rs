@@ -74,12 +74,12 @@ impl Recurrence {
         &self.graph
     }
 
-    /// What is carried to the next sample.
+    /// The carry to the next sample.
     pub fn next(&self) -> &[Id] {
         &self.next
     }
 
-    /// What is expected of each output.
+    /// The prediction of each output.
     pub fn mean(&self) -> &[Id] {
         &self.mean
     }

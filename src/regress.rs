@@ -103,7 +103,7 @@ impl<P: Signals> Regression<P> {
         self.rows.iter().map(move |row| row.residual(parameters.as_ref()))
     }
 
-    /// What the rows say of the parameters: the triangle of `sqrt(weight) (phi, y)`.
+    /// The information of the rows on the parameters: the triangle of `sqrt(weight) (phi, y)`.
     pub fn information(&self) -> Information {
         triangle::<P>(self.rows.iter().map(|row| {
             let root = row.weight.sqrt();

@@ -54,7 +54,7 @@ mod sections;
 mod text;
 mod words;
 
-pub use crate::section::{Axis, Cell, Curves, Drawing, Layer, Plot, Reason, Section, Style, Table};
+pub use crate::section::{Axis, Cell, Layer, Plot, Section, Style, Table};
 pub use origin::Origin;
 
 use crate::error::Error;
@@ -66,7 +66,7 @@ use format::{Format, Version};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// What an estimate is worth, for a reader.
+/// A report on an estimate, for readers.
 ///
 /// It leads with the [`severity`](Report::severity), and holds all that is needed to judge the fit and to repeat it. It is
 /// made by [`Report::new`], which makes the diagnoses that cost little; others are added by [`with`](Report::with). It is
@@ -75,17 +75,17 @@ use std::path::Path;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Report {
-    /// What kind of file its JSON is.
+    /// Format of its JSON.
     pub format: Format,
     /// Which version of it.
     pub version: Version,
-    /// What stands above it.
+    /// The heading.
     pub title: String,
     /// The worst that is said of the estimate.
     pub severity: Severity,
     /// The estimate, for programs.
     pub estimate: Summary,
-    /// What is said of it, for readers.
+    /// Its sections.
     pub sections: Vec<Section>,
 }
 
@@ -125,16 +125,16 @@ impl Report {
         self
     }
 
-    /// Why the estimate is not simply usable, the worst first.
-    pub fn reasons(&self) -> Vec<&Reason> {
-        let mut reasons: Vec<&Reason> = vec![];
+    /// Why the estimate is not simply usable, the worst first: how bad each reason is, and what it is.
+    pub fn reasons(&self) -> Vec<(Severity, &str)> {
+        let mut reasons: Vec<(Severity, &str)> = vec![];
         for reason in self.sections.iter().flat_map(Section::all_reasons) {
-            // What two sections say is said once.
-            if !reasons.iter().any(|other| other.text == reason.text) {
+            // A reason that two sections give appears once.
+            if !reasons.iter().any(|other| other.1 == reason.1) {
                 reasons.push(reason);
             }
         }
-        reasons.sort_by_key(|reason| core::cmp::Reverse(reason.severity));
+        reasons.sort_by_key(|(severity, _)| core::cmp::Reverse(*severity));
         reasons
     }
 

@@ -176,7 +176,7 @@ pub trait Scalar:
     /// `self` with the sign of `sign`.
     fn copysign(self, sign: Self) -> Self;
 
-    /// What a table has at a place, or its derivative of these orders there; [`Grid::at`] is shorter.
+    /// The value of a table at a place, or its derivative of these orders there; [`Grid::at`] is shorter.
     fn look_up(table: &Grid<'_>, at: [Self; 2], order: [u8; 2]) -> Self;
 
     /// `x + y`, entry by entry: slope arithmetic of [`Dual`](crate::Dual), as all that follows.

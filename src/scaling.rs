@@ -10,7 +10,7 @@ pub trait Scaling: Clone + Debug + Send + Sync {
     fn scales(&self, seen: &Seen) -> Vec<f64>;
 }
 
-/// What a search has seen of its unknowns, start and present point included; one entry per unknown.
+/// Start, present point and extremes of a search; one entry per unknown.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Seen {
     /// The start.

@@ -6,8 +6,8 @@ mod table;
 mod timeline;
 
 pub(crate) use plain::{WIDTH, visible, wrapped};
-pub use plot::{Axis, Curves, Drawing, Layer, Plot, Style};
-pub(crate) use plot::{Forest, Heat, Interval};
+pub use plot::{Axis, Layer, Plot, Style};
+pub(crate) use plot::{Curves, Drawing, Forest, Heat, Interval};
 pub use table::{Cell, Table};
 pub(crate) use timeline::{Keep, Line, Panel, PanelKind, Samples, Stretch, Timeline, Trace};
 
@@ -30,15 +30,15 @@ use serde::{Deserialize, Serialize};
 pub struct Section {
     /// A short name for programs and links, letters, digits and `-`; one section of a report has it.
     pub id: String,
-    /// What stands above it.
+    /// The heading.
     pub title: String,
     /// The worst that this section says of the estimate.
     pub severity: Severity,
     /// Whether it is a detail: a page shows it closed at first, and a terminal not at all.
     pub folded: bool,
     /// Why the estimate is not simply usable; a report gathers them at its head.
-    pub reasons: Vec<Reason>,
-    /// What it says, a paragraph each.
+    pub(crate) reasons: Vec<Reason>,
+    /// Its paragraphs.
     pub sentences: Vec<String>,
     /// Its tables.
     pub tables: Vec<Table>,
@@ -51,15 +51,15 @@ pub struct Section {
 /// Something that the reader of an estimate must know.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Reason {
+pub(crate) struct Reason {
     /// How bad it is; [`Severity::Usable`] is a note.
     pub severity: Severity,
-    /// What it is, with the numbers and the remedy.
+    /// The reason, with the numbers and the remedy.
     pub text: String,
 }
 
 impl Section {
-    /// A section of this name that says nothing yet. In the name, what is no letter or digit becomes `-`.
+    /// An empty section of this name. In the name, what is no letter or digit becomes `-`.
     pub fn new(id: impl AsRef<str>, title: impl Into<String>) -> Section {
         Section {
             id: identifier(id.as_ref()),
@@ -142,9 +142,11 @@ impl Section {
         self.sentences.is_empty() && self.tables.is_empty() && self.plots.is_empty() && self.parts.is_empty()
     }
 
-    /// The reasons given here and within.
-    pub fn all_reasons(&self) -> Vec<&Reason> {
-        self.reasons.iter().chain(self.parts.iter().flat_map(Section::all_reasons)).collect()
+    /// The reasons given here and within: how bad each is ([`Severity::Usable`] is a note), and what it is, with the numbers and the
+    /// remedy.
+    pub fn all_reasons(&self) -> Vec<(Severity, &str)> {
+        let here = self.reasons.iter().map(|reason| (reason.severity, reason.text.as_str()));
+        here.chain(self.parts.iter().flat_map(Section::all_reasons)).collect()
     }
 
     /// The plots shown here and within.

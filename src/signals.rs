@@ -5,7 +5,7 @@
 
 use core::fmt::Debug;
 
-/// What a signal vector may hold: numbers, guesses, intervals, names.
+/// Types of the entries of a signal vector: numbers, guesses, intervals, names.
 pub trait Entry: Copy + Debug + Send + Sync + 'static {}
 impl<T: Copy + Debug + Send + Sync + 'static> Entry for T {}
 

@@ -143,7 +143,7 @@ fn finite<S: Signals>(what: &str, signals: &Of<S, f64>, k: usize, time: &Time) -
     }
 }
 
-/// What a model did.
+/// Result of a simulation.
 #[derive(Debug)]
 pub struct Simulation<M: Model> {
     /// When.

@@ -28,7 +28,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// What a sweep computes from a record before the search.
+/// Quantities that a sweep computes from a record before the search.
 #[derive(Clone, Debug, Default)]
 pub struct Prepared {
     /// The measured state at each sample, sample by sample, where predictions restart from it; NaN where there is none.
@@ -44,7 +44,7 @@ pub struct Prepared {
 pub struct Piece<'a> {
     /// The record.
     pub record: &'a Record,
-    /// What [`Sweep::prepare`] has computed from it.
+    /// The quantities that [`Sweep::prepare`] has computed from it.
     pub prepared: &'a Prepared,
     /// Its samples.
     pub samples: Range<usize>,
@@ -100,14 +100,6 @@ pub enum Coupling {
 
 /// Called with each window; returns false to stop.
 pub(crate) type Visit<'v> = &'v mut dyn FnMut(&mut Window) -> bool;
-
-/// The cause of a failure in an experiment.
-pub enum Located {
-    /// The simulation cannot go beyond this point.
-    Broken(Failure),
-    /// The simulation reaches the end; this is its largest error.
-    Largest(Failure),
-}
 
 /// Evaluates a model along records.
 pub trait Sweep: Send + Sync {
@@ -195,8 +187,8 @@ pub trait Sweep: Send + Sync {
         None
     }
 
-    /// The exact cause of a failure that was noticed at `sample`. Where nothing fails, the error that is largest
-    /// relative to the noise levels. `None` if `stops` returns true.
+    /// The exact cause of a failure that was noticed at `sample`: an `Err` where the simulation cannot go on. Where nothing fails,
+    /// the error that is largest relative to the noise levels. `None` if `stops` returns true.
     fn locate(
         &self,
         record: &Record,
@@ -205,7 +197,7 @@ pub trait Sweep: Send + Sync {
         sample: usize,
         sigma: &[f64],
         stops: &dyn Fn() -> bool,
-    ) -> Option<Located> {
+    ) -> Option<Result<Failure, Failure>> {
         let _ = (record, state, parameters, sample, sigma, stops);
         None
     }

@@ -47,7 +47,7 @@ impl<M: Model, F: Fn(&Sample<M>) -> f64 + Send + Sync> Weighting<M> for F {
 pub struct BySignal {
     /// Name of the input.
     pub signal: String,
-    /// What becomes of it.
+    /// The weight as a function of the signal.
     pub function: WeightFunction,
 }
 

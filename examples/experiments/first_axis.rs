@@ -4,8 +4,23 @@ use crate::figure::{Figure, Panel, Series, curve, level, thin};
 use crate::methods::*;
 use crate::report::Report;
 use crate::speeds::{Found, by_speed};
-use greybox::pmsm::{DeadZone, KeConstantGain, KeLyapunov, Winding};
+use greybox::online::Rate;
+use greybox::pmsm::{Adaptation, AdaptationInput, DeadZone, KeLyapunov, SQRT_2_3, Winding};
 use greybox::regress::LinearEstimate;
+
+/// `Ke' = -g sqrt(2/3) sign(w) e_q/ls`, sign +1 at 0 (5.1.2): as fast at low speed as at high. It drifts at standstill.
+#[derive(Clone, Copy, Debug)]
+struct KeConstantGain {
+    /// `g`, above zero.
+    gain: f64,
+}
+
+impl Adaptation for KeConstantGain {
+    fn rate(&self, seen: &AdaptationInput) -> Rate {
+        let sign = if seen.w < 0.0 { -1.0 } else { 1.0 };
+        Rate::Adapt(-self.gain * SQRT_2_3 * sign / seen.ls * seen.e.iq)
+    }
+}
 
 pub fn first_axis(report: &mut Report, run: &Run, q: &Found, both: &Found) -> Result<()> {
     let axis = &run.axis;

@@ -4,11 +4,17 @@ use crate::methods::*;
 use greybox::pmsm::offline::{Extended, Spans};
 use greybox::pmsm::program::Cycle;
 use greybox::pmsm::robot::RobotAxis;
-use greybox::pmsm::{Compensated, CompensatedSalientWinding, EmfHarmonic, ExactSalient, ExactStep, HeldIn};
+use greybox::pmsm::{Compensated, EmfHarmonic, ExactSalient, ExactStep, HeldIn};
 use greybox::{
     Fit, free,
     regress::{PooledRegression, Regression},
+    signals,
 };
+
+signals! {
+    /// A salient motor with a harmonic in its EMF, its cable, and the size of its inverter's dead time.
+    pub struct CompensatedSalientWinding { rs: "ohm", ld: "H", lq: "H", ke: "V s/rad", ke6: "V s/rad", vdt: "V" }
+}
 
 /// What all cycles of a motor have in common: what belongs to the motor. How dead time acts on the mean voltage depends on how
 /// fast the currents pass through zero.

@@ -65,7 +65,7 @@ pub(crate) fn widths(
     experiment: usize,
     probability: f64,
 ) -> Result<Widths, Error> {
-    // Those of a variance that is predicted belong to one unknown, and most of the band is noise.
+    // Degrees of freedom of a predicted variance belong to one unknown, and most of the band is noise.
     let counts =
         |unknown: &&Unknown| unknown.knowledge.standard_error().is_some() && !objective.sweep.predicts_variance();
     let degrees = estimate.unknowns.iter().filter(counts);

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// What is drawn.
+/// The quantity that is resampled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Resampling {
     /// Single residuals (Efron, Annals of Statistics 7 (1979) 1): for white ones.
@@ -24,7 +24,7 @@ pub enum Resampling {
     Blocks(usize),
 }
 
-/// What the refits found.
+/// Results of the refits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bootstrap {

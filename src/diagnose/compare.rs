@@ -12,7 +12,6 @@ use crate::parameter::fixed;
 use crate::predict::Horizon;
 use crate::signals::Signals;
 use crate::whiteness::chi_squared_tail;
-use core::fmt;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -20,7 +19,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Candidate {
-    /// What the reader calls it.
+    /// Its name for the reader.
     pub title: String,
     /// The estimate.
     pub estimate: Summary,
@@ -152,16 +151,6 @@ fn verdict(name: String, statistic: f64, p_value: f64, restricted: &Candidate, f
     let failed =
         format!("`{}` says more than chance would let it: `{}` misses something", full.title, restricted.title);
     Test::new(name, statistic, p_value, &passed, &failed)
-}
-
-/// Candidates side by side; prints as a table, and is a section of a report.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Comparison(pub Vec<Candidate>);
-
-impl fmt::Display for Comparison {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(&self.table(), f)
-    }
 }
 
 /// How an estimate does on a record that it was not made from.

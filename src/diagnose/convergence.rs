@@ -83,7 +83,7 @@ impl From<&Convergence> for Section {
         let row = |(i, cost): &(u64, f64)| [(*i).into(), Cell::number(*cost, 8), Cell::number(above(*cost), 3)];
         let table = Table::new("Iterations", ["iteration", "cost", "above the last"]).rows(iterations.iter().map(row));
         let title = "Cost of each iteration above that of the last one";
-        let plot = Plot::new("convergence", "How the cost fell", title, Drawing::Curves(drawing));
+        let plot = Plot::of("convergence", "How the cost fell", title, Drawing::Curves(drawing));
         Section::new("convergence", "Course of the search").plot(plot).table(table.at_most(LISTED)).folded()
     }
 }

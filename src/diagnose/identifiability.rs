@@ -8,7 +8,7 @@ mod together;
 pub(crate) use together::reworded;
 
 use crate::error::Error;
-use crate::estimate::Summary;
+use crate::estimate::{Direction, Summary};
 use crate::information::Information;
 use crate::optimize::{LeastSquares, Linearization};
 use crate::parameter::Transform;
@@ -16,7 +16,7 @@ use crate::problem::{Objective, Problem};
 use crate::random::Random;
 use serde::{Deserialize, Serialize};
 
-/// What the records can tell of the unknowns.
+/// Identifiability of the unknowns from the records.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identifiability {
@@ -34,7 +34,7 @@ pub struct Identifiability {
     pub collinear: Vec<Collinear>,
     /// Where each unknown is excited.
     pub excitation: Vec<Excitation>,
-    /// What it means and what would help, a sentence each; empty if all is well.
+    /// Meaning and remedies, a sentence each; empty if nothing is wrong.
     pub advice: Vec<String>,
 }
 
@@ -110,6 +110,19 @@ const SEED: u64 = 1;
 /// # }
 /// ```
 pub fn identifiability(problem: &Problem<'_>, estimate: &Summary) -> Result<Identifiability, Error> {
+    examine(problem, estimate, &[])
+}
+
+/// The same without advice on sets of unknowns that the estimate's directions name, of which its warnings speak.
+pub(crate) fn identifiability_beside_warnings(
+    problem: &Problem<'_>,
+    estimate: &Summary,
+) -> Result<Identifiability, Error> {
+    examine(problem, estimate, &estimate.directions)
+}
+
+/// Examines the problem; no advice is given on the sets of unknowns of these directions.
+fn examine(problem: &Problem<'_>, estimate: &Summary, warned: &[Direction]) -> Result<Identifiability, Error> {
     let (objective, best) = problem.at(estimate)?;
     let linear = objective.linearize(&best).map_err(|error| Error::Optimizer(error.to_string()))?;
     let whole = assembled(&linear);
@@ -138,7 +151,7 @@ pub fn identifiability(problem: &Problem<'_>, estimate: &Summary) -> Result<Iden
         excitation,
         advice: vec![],
     };
-    result.advice = advice::advice(&result, &estimate.unknowns, problem.records());
+    result.advice = advice::advice(&result, warned, &estimate.unknowns, problem.records());
     Ok(result)
 }
 

@@ -51,7 +51,7 @@ pub struct Profile {
     /// said by the estimate over the classical one.
     #[serde(with = "crate::real")]
     pub inflation: f64,
-    /// What came up on the way.
+    /// Severity of the problems met during the computation.
     pub severity: Severity,
     /// The same in words; empty if nothing did.
     pub remark: String,
@@ -189,7 +189,7 @@ pub fn profile(problem: &Problem<'_>, estimate: &Summary, name: &str, probabilit
     })
 }
 
-/// What a profile says of its estimate beyond the interval, and how bad it is.
+/// Conclusions from a profile on its estimate beyond the interval, with their severity.
 fn remark(name: &str, failed: bool, lowest: f64) -> (Severity, String) {
     if -lowest > 1e-3 {
         let lower = number(-lowest, 3);

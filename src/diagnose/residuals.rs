@@ -8,11 +8,13 @@ mod correlation;
 mod normality;
 mod outliers;
 mod period;
+mod signal_role;
 mod spread;
 
 pub use correlation::Correlation;
 pub use outliers::Outlier;
 pub use period::{Period, Spectrum};
+pub use signal_role::SignalRole;
 pub use spread::Spread;
 
 use super::{LEVEL, Test};
@@ -28,7 +30,7 @@ const LAGS: usize = 25;
 /// The fewest residuals that tests say anything of.
 const FEWEST: u64 = 20;
 
-/// What the residuals of one output show.
+/// Examination of the residuals of one output.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Residuals {
@@ -62,6 +64,8 @@ pub struct Residuals {
     /// judges all lags together.
     #[serde(with = "crate::real")]
     pub autocorrelation_band: f64,
+    /// Whether the test of Ljung and Box calls them white; `None` if it was not made.
+    pub white: Option<bool>,
     /// Correlation with each input and measured output that is not constant.
     pub correlations: Vec<Correlation>,
     /// Inputs that do not change in this record: what they drive cannot be told.
@@ -76,7 +80,7 @@ pub struct Residuals {
     pub spectrum: Spectrum,
     /// The strongest line of the spectrum, if it stands out.
     pub period: Option<Period>,
-    /// What the residuals were tested for.
+    /// Tests of the residuals.
     pub tests: Vec<Test>,
 }
 
@@ -110,19 +114,13 @@ pub fn examine(prediction: &Simulated, record: &Record) -> Result<Vec<Residuals>
             expected: record.len(),
         });
     }
-    let series =
-        |what: &'static str, channel: &Channel, values: &[f64]| Series::new(what, &channel.name, &channel.unit, values);
-    let inputs: Vec<Series> = record.inputs().iter().map(|channel| series("input", channel, &channel.values)).collect();
-    let outputs: Vec<Series> =
-        record.outputs().iter().map(|channel| series("measured output", channel, &channel.values)).collect();
-    let predicted: Vec<Series> = record
-        .outputs()
-        .iter()
-        .zip(&prediction.outputs)
-        .map(|(channel, values)| series("predicted output", channel, values))
-        .collect();
+    let series = |channel: &Channel, values: &[f64]| Series::new(&channel.name, &channel.unit, values);
+    let inputs: Vec<Series> = record.inputs().iter().map(|channel| series(channel, &channel.values)).collect();
+    let outputs: Vec<Series> = record.outputs().iter().map(|channel| series(channel, &channel.values)).collect();
+    let predicted = record.outputs().iter().zip(&prediction.outputs);
+    let predicted: Vec<Series> = predicted.map(|(channel, values)| series(channel, values)).collect();
     let times: Vec<f64> = (0..record.len()).map(|k| record.time(k)).collect();
-    let time = Series::new("time", "t", "s", &times);
+    let time = Series::new("t", "s", &times);
     let even = record.gaps().is_empty();
     record
         .outputs()
@@ -138,7 +136,7 @@ pub fn examine(prediction: &Simulated, record: &Record) -> Result<Vec<Residuals>
                     time: record.time(k),
                 });
             }
-            let output = series("residual", channel, residuals);
+            let output = series(channel, residuals);
             let mut result = output.examine(record.name(), &inputs, &outputs, &predicted, &time);
             if result.samples >= FEWEST && output.deviation > 0.0 {
                 if even {
@@ -155,7 +153,6 @@ pub fn examine(prediction: &Simulated, record: &Record) -> Result<Vec<Residuals>
 
 /// A signal less its mean, zero where missing.
 struct Series {
-    role: &'static str,
     name: String,
     unit: String,
     values: Vec<f64>,
@@ -170,7 +167,7 @@ struct Series {
 }
 
 impl Series {
-    fn new(role: &'static str, name: &str, unit: &str, raw: &[f64]) -> Self {
+    fn new(name: &str, unit: &str, raw: &[f64]) -> Self {
         let count = raw.iter().filter(|v| v.is_finite()).count();
         let missing = if count < raw.len() { raw.iter().map(|v| !v.is_finite()).collect() } else { vec![] };
         let n = count.max(1) as f64;
@@ -184,7 +181,6 @@ impl Series {
         let values: Vec<f64> = raw.iter().map(|v| if v.is_finite() { v - mean } else { 0.0 }).collect();
         let deviation = if highest > lowest { (values.iter().map(|v| v * v).sum::<f64>() / n).sqrt() } else { 0.0 };
         Series {
-            role,
             name: name.to_owned(),
             unit: unit.to_owned(),
             values,
@@ -214,13 +210,13 @@ impl Series {
     }
 
     /// The numbers of these residuals, and their tests but that for a period.
-    fn examine(
+    fn examine<'s>(
         &self,
         experiment: &str,
-        inputs: &[Series],
-        outputs: &[Series],
-        predicted: &[Series],
-        time: &Series,
+        inputs: &'s [Series],
+        outputs: &'s [Series],
+        predicted: &'s [Series],
+        time: &'s Series,
     ) -> Residuals {
         let autocorrelation = self.autocorrelation().to_vec();
         let correlated: f64 = autocorrelation.iter().take_while(|rho| **rho > 0.0).sum();
@@ -238,6 +234,7 @@ impl Series {
             excess_kurtosis: 0.0,
             autocorrelation,
             autocorrelation_band: 2.576 / (self.count.max(1) as f64).sqrt(),
+            white: None,
             correlations: vec![],
             constant_inputs: constant,
             spreads: vec![],
@@ -252,6 +249,7 @@ impl Series {
         }
         let (q, p) = ljung_box(&result.autocorrelation, self.count);
         let lags = result.autocorrelation.len();
+        result.white = Some(p >= LEVEL);
         result.tests.push(Test::new(
             format!("Ljung-Box, {lags} lags"),
             q,
@@ -262,14 +260,18 @@ impl Series {
         ));
         result.tests.push(normality::mean(self, effective));
         normality::shape(self, p >= LEVEL, &mut result);
-        for signal in inputs.iter().chain(outputs).filter(|signal| signal.deviation > 0.0) {
-            let (correlation, test) = correlation::between(self, &result.autocorrelation, signal);
+        let with = |role: SignalRole, of: &'s [Series]| {
+            of.iter().filter(|signal| signal.deviation > 0.0).map(move |signal| (role, signal))
+        };
+        let inputs = || with(SignalRole::Input, inputs);
+        for (role, signal) in inputs().chain(with(SignalRole::MeasuredOutput, outputs)) {
+            let (correlation, test) = correlation::between(self, &result.autocorrelation, role, signal);
             result.correlations.push(correlation);
             result.tests.push(test);
         }
-        let own = [time];
-        for signal in inputs.iter().chain(predicted).chain(own).filter(|signal| signal.deviation > 0.0) {
-            if let Some((spread, test)) = spread::over(self, effective, signal) {
+        let predicted = with(SignalRole::PredictedOutput, predicted);
+        for (role, signal) in inputs().chain(predicted).chain(with(SignalRole::Time, std::slice::from_ref(time))) {
+            if let Some((spread, test)) = spread::over(self, effective, role, signal) {
                 result.spreads.push(spread);
                 result.tests.push(test);
             }

@@ -37,7 +37,7 @@ use crate::signals::Signals;
 pub struct Compared {
     /// Name of the record.
     record: String,
-    /// What it was used for.
+    /// Its use: estimation or validation.
     data: &'static str,
     /// Time of each sample (s).
     t: Vec<f64>,
@@ -189,7 +189,7 @@ impl Compared {
         let title = format!("Measured and predicted outputs of {} over time, model by model", self.record);
         let name = identifier(&format!("compare-{}", self.record));
         let caption = format!("{} ({})", self.record, self.data);
-        Plot::new(name, caption, title, Drawing::Timeline(timeline))
+        Plot::of(name, caption, title, Drawing::Timeline(timeline))
     }
 }
 

@@ -1,4 +1,4 @@
-//! What runs a program on this machine.
+//! The engine that runs a program on this machine.
 
 use super::Trajectories;
 use super::code::Sound;

@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// Where a number of each lane stands.
 pub(super) type Slot = u16;
 
-/// What an instruction does. Operands are its pairs, in order; sums name theirs.
+/// The operation of an instruction. Operands are its pairs, in order; sums name theirs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Operation {
     Copy,
@@ -51,7 +51,7 @@ pub(super) struct Instruction {
     /// Whether the sum is multiplied by `factor`, after all its terms.
     pub scaled: bool,
     pub to: Slot,
-    /// What a sum starts from.
+    /// The first term of a sum.
     pub init: Slot,
     pub factor: Slot,
     pub pairs: [[Slot; 2]; TERMS],
@@ -103,7 +103,7 @@ pub enum Column {
     Input(usize),
     /// An output as measured; not a number where there is none.
     Measured(usize),
-    /// What depends on the record alone and is costly, computed once a record.
+    /// Costly functions of the record alone, computed once per record.
     Derived(usize),
 }
 
@@ -157,7 +157,7 @@ pub(super) struct Code {
     pub tables: Vec<Arc<Table>>,
 }
 
-/// A code all of whose slots, columns and tables are there, and its turns: what reads and writes without looking relies on it.
+/// Code that was checked: all slots, columns and tables that it names exist. Unchecked reads and writes rely on it. With its turns.
 #[derive(Clone, Debug)]
 pub(super) struct Sound {
     code: Code,

@@ -1,6 +1,6 @@
 //! Functions in lanes.
 //!
-//! Those that models call most are written on whole registers, to about 1e-15; the others take one lane after the other. Each
+//! The functions that models call most are written on whole registers, to about 1e-15; the others take one lane after the other. Each
 //! lane has the bits that it would have alone.
 
 use crate::graph::Function;
@@ -142,7 +142,7 @@ fn sin_or_cos<W: Wide, const QUARTERS: u8>(x: W) -> W {
     let sin = r.mul(square).mul_add(polynomial(square, &SIN), r);
     let half = square.mul(W::splat(0.5));
     let cos = one.sub(half);
-    // What the subtraction rounded off comes back.
+    // The rounding error of the subtraction is added again.
     let rest = one.sub(cos).sub(half);
     let cos = cos.add(square.mul(square).mul_add(polynomial(square, &COS), rest));
     // Quarter turns, from 0 to 3, and what they make of sine and cosine.

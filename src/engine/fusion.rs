@@ -24,7 +24,7 @@ pub(super) struct Sum {
     pub factor: Option<Id>,
 }
 
-/// What computes a node.
+/// The instruction that computes a node.
 #[derive(Clone, Debug)]
 pub(super) enum Work {
     Sum(Sum),
@@ -39,7 +39,7 @@ pub(super) enum Work {
 }
 
 impl Work {
-    /// What it reads.
+    /// The nodes that it reads.
     pub fn operands(&self) -> Vec<Id> {
         match self {
             Work::Sum(Sum { init, terms, factor, .. }) => {
@@ -82,7 +82,7 @@ pub(super) fn instructions(tape: &Tape, roots: &[Id]) -> usize {
         .sum()
 }
 
-/// What computes each node that the roots need; none for leaves, numbers, and what is part of another's sum.
+/// The instruction of each node that the roots need; none for leaves, numbers, and nodes that are part of another node's sum.
 pub(super) fn works(tape: &Tape, roots: &[Id]) -> Vec<Option<Work>> {
     let reached = tape.graph.reached(roots);
     let mut uses = vec![0u32; tape.graph.len()];

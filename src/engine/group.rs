@@ -81,14 +81,14 @@ impl Group {
         }
     }
 
-    /// What a lane carries, without slopes.
+    /// The carry of a lane, without slopes.
     pub fn carry(&self, lane: usize, carry: &mut [f64]) {
         for (i, entry) in carry.iter_mut().enumerate().take(self.program.pattern.rows.len()) {
             *entry = self.number(i, lane);
         }
     }
 
-    /// What all lanes carry, without slopes: entry, lane.
+    /// The carries of all lanes, without slopes: entry, lane.
     pub fn carries(&self, carries: &mut [f64]) {
         let length = self.program.pattern.rows.len() * self.lanes();
         carries[..length].copy_from_slice(&self.numbers[..length]);

@@ -1,7 +1,7 @@
 //! The interpreter: one instruction after the other, each on several registers side by side.
 //!
-//! An instruction costs a jump that is hard to foresee, so that it pays to do much in each: four registers of eight lanes,
-//! or eight of four.
+//! Each instruction costs an indirect jump that the processor often mispredicts. An instruction therefore works on many values: four
+//! registers of eight lanes, or eight registers of four.
 
 use super::code::{Instruction, Operation, Sound};
 use super::functions::apply;
@@ -10,9 +10,9 @@ use crate::scalar::Table;
 use crate::wide::{Task, Wide, Width};
 use std::sync::Arc;
 
-/// What is to be computed.
+/// The part of the code to be run.
 pub(super) enum Part<'a> {
-    /// What does not vary within a pass.
+    /// The part that does not vary within a pass.
     Once,
     /// A block of samples.
     Samples {
@@ -161,7 +161,7 @@ impl<W: Wide, const K: usize> Operands<W, K> {
         self.slots.wrapping_add(usize::from(slot) * K * W::LANES)
     }
 
-    /// Those of a pair of slots.
+    /// Addresses of a pair of slots.
     #[inline(always)]
     fn pair(&self, j: usize) -> [*mut f64; 2] {
         let [a, b] = self.instruction.pairs[j];

@@ -25,7 +25,7 @@ type Entry = unsafe extern "sysv64" fn(*mut f64, *const f64, *mut f64, usize);
 #[derive(Debug)]
 pub(super) struct Machine {
     code: Mmap,
-    /// Those that the code names by their addresses.
+    /// The tables that the code names by their addresses.
     _tables: Vec<Arc<Table>>,
 }
 

@@ -1,7 +1,7 @@
 //! From a tape to instructions: which run once a pass, in which order the others run, and where their results stand.
 //!
-//! What is read first is computed first, depth first from the roots, so that few numbers wait at a time; slots are given by a
-//! linear scan. What is carried on is written in place where the old value is not read any more; the rest is moved at the end.
+//! Nodes are computed in the order in which they are read, depth first from the roots, so that few slots are in use; slots are assigned by a
+//! linear scan. Entries of the carry are written in place where the old value is not read any more; the others are moved at the end.
 
 mod slots;
 
@@ -19,7 +19,7 @@ pub struct TooLarge {
     pub limit: usize,
 }
 
-/// What a schedule is made for.
+/// The nodes to be scheduled.
 pub(super) struct Roots<'a> {
     pub tape: &'a Tape,
     /// In the order of the carried entries.
@@ -157,7 +157,7 @@ impl<'a> Scheduler<'a> {
         Ok(slot)
     }
 
-    /// What does not vary within a pass is computed before it, in the order of the nodes.
+    /// Nodes that do not vary within a pass are computed before it, in the order of the nodes.
     fn place_invariants(&mut self) -> Result<(), TooLarge> {
         let needed = self.needed();
         for i in (0..needed.len()).filter(|i| needed[*i] && !self.roots.tape.depends[*i].varies()) {
@@ -169,14 +169,14 @@ impl<'a> Scheduler<'a> {
             }
             self.visited[i] = true;
         }
-        // What every sum may need, while slots are still given for good.
+        // Constants that every sum may need, while slots are still assigned permanently.
         self.constant(0.0)?;
         self.code.one = self.constant(1.0)?;
         self.code.sign = self.constant(-0.0)?;
         Ok(())
     }
 
-    /// What the roots need and is not computed yet, depth first.
+    /// The nodes that the roots need and that are not computed yet, depth first.
     fn order(&mut self, roots: &[Id]) -> Vec<Id> {
         let mut order = vec![];
         let mut open: Vec<(Id, bool)> = roots.iter().rev().map(|root| (*root, false)).collect();

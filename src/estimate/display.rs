@@ -86,7 +86,7 @@ fn row(unknown: &Unknown) -> Vec<Cell> {
     }
 }
 
-/// What is said of an unknown at its bound.
+/// Description of an unknown at its bound.
 pub(crate) fn held(bound: f64, end: Option<f64>) -> String {
     let held = format!("held at its bound {}", exact(bound));
     end.map_or(held.clone(), |end| format!("{held}; 95 % to {}", number(end, 3)))

@@ -57,7 +57,7 @@ impl<M: Model> Estimate<M> {
     /// An estimate from the JSON that [`to_json`](Summary::to_json) wrote.
     ///
     /// # Errors
-    /// Those of [`Summary::from_json`], and an estimate of another model.
+    /// The errors of [`Summary::from_json`], and an estimate of another model.
     pub fn from_json(text: &str) -> Result<Self, Error> {
         Self::of(Summary::from_json(text)?)
     }

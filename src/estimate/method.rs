@@ -70,6 +70,9 @@ pub struct Method {
     pub optimizer: String,
     /// How the model was stepped.
     pub integrator: String,
+    /// How many times a fit whose integrator was not chosen went on to a finer one; zero if it was chosen.
+    #[serde(default)]
+    pub refinement: usize,
     /// Which prediction error.
     pub predictor: String,
     /// How the equations were evaluated.

@@ -5,7 +5,7 @@ use crate::model::Model;
 use crate::problem::Simulated;
 use crate::signals::Of;
 
-/// What an estimate says of a record: the outputs it predicts, beside those measured.
+/// Prediction of a record by an estimate, beside the measured outputs.
 #[derive(Debug)]
 pub struct Prediction<M: Model> {
     /// Time of each sample (s).

@@ -1,4 +1,4 @@
-//! What a fit says of each quantity: [`Unknown`], [`Knowledge`], parameters, outputs and experiments.
+//! Results of a fit for each quantity: [`Unknown`], [`Knowledge`], parameters, outputs and experiments.
 
 use crate::numeral::number;
 use crate::parameter::{Parameter, Transform};
@@ -6,7 +6,7 @@ use crate::problem::Role;
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
-/// What is known of one quantity; in JSON with its name as `code`, in small letters. `docs/intervals.md` in the repository
+/// Knowledge of one quantity; in JSON with its name as `code`, in small letters. `docs/intervals.md` in the repository
 /// lists how each interval is made, what it assumes, and how often it was found to cover.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "code", rename_all = "snake_case")]
@@ -57,7 +57,7 @@ pub struct Unknown {
     pub name: String,
     /// Unit.
     pub unit: String,
-    /// What it is in the model.
+    /// Its role in the model.
     pub role: Role,
     /// Index of the experiment that it belongs to; `None` if all share it.
     pub experiment: Option<usize>,
@@ -67,7 +67,7 @@ pub struct Unknown {
     /// Where the search started.
     #[serde(with = "crate::real")]
     pub start: f64,
-    /// What is known of it.
+    /// Knowledge of it.
     pub knowledge: Knowledge,
     /// Parametric error index (%), the others refitted: the relative change that doubles the sum of squares, in linear
     /// approximation (Tenerz 2011, eq. 5.14). Low is well excited. `None` where there is no interval, or the value is 0.
@@ -95,9 +95,9 @@ pub struct ParameterEstimate {
     /// Value; of a parameter that each experiment has for itself, the first experiment's.
     #[serde(with = "crate::real")]
     pub value: f64,
-    /// What is known of it.
+    /// Knowledge of it.
     pub knowledge: Knowledge,
-    /// What was declared of it.
+    /// Its declaration.
     pub declared: Parameter,
 }
 
@@ -152,7 +152,7 @@ impl fmt::Display for Direction {
     }
 }
 
-/// What one experiment has for itself.
+/// Results of one experiment alone.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExperimentEstimate {

@@ -7,13 +7,13 @@ use serde::{Deserialize, Serialize};
 /// Names written out in a sentence.
 const NAMED: usize = 6;
 
-/// What searches from several starts found ([`Fit::starts`](crate::Fit::starts)), asked for or not.
+/// Results of searches from several starts ([`Fit::starts`](crate::Fit::starts)), asked for or not.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Starts {
     /// Searches begun, that from the declared start among them.
     pub tried: u64,
-    /// Those that ended in the estimate, the estimate's own search among them; 0 if that did not converge.
+    /// Number of searches that ended in the estimate, the estimate's own search among them; 0 if that did not converge.
     pub agreed: u64,
     /// The minima found, by rising cost. If the estimate's search converged, the first is the estimate.
     pub minima: Vec<Minimum>,

@@ -10,7 +10,7 @@ use core::ops::Deref;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// What a fit found, and how well it is known, by the names of its model; everything of the [`Summary`] can be read from
+/// The result of a fit with its uncertainty, by the names of its model; everything of the [`Summary`] can be read from
 /// it, too.
 ///
 /// ```
@@ -34,7 +34,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 pub struct Estimate<M: Model> {
     /// The parameters; of those that each experiment has for itself, the first experiment's.
     pub parameters: Of<M::Parameters, f64>,
-    /// What is known of each parameter.
+    /// Knowledge of each parameter.
     pub knowledge: Of<M::Parameters, Knowledge>,
     /// How well each output is reproduced, over all experiments.
     pub quality: Of<M::Output, OutputFit>,

@@ -7,15 +7,15 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Warning {
-    /// What it is, for programs: the words of `text` may change, the code does not.
+    /// The kind of warning, for programs: the words of `text` may change, the code does not.
     pub code: WarningCode,
     /// How bad it is.
     pub severity: Severity,
-    /// What it is, with the numbers and the remedy.
+    /// The warning in words, with the numbers and the remedy.
     pub text: String,
 }
 
-/// What a [`Warning`] is about; in JSON in small letters with underscores (`held_at_bound`).
+/// The subject of a [`Warning`]; in JSON in small letters with underscores (`held_at_bound`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]

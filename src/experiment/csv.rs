@@ -25,7 +25,7 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     /// units; see [`CsvFile`] for files that are not.
     ///
     /// # Errors
-    /// Those of [`CsvFile::read`].
+    /// The errors of [`CsvFile::read`].
     pub fn from_csv<M: Model<State = X, Input = U, Output = Y>>(
         model: &M,
         path: impl Into<PathBuf>,

@@ -113,7 +113,7 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
         self.record.gaps()
     }
 
-    /// What the columns show before any model: constant, clipped, frozen or repeated values, sentinels, few levels, missing
+    /// Inspection of the columns, independent of the model: constant, clipped, frozen or repeated values, sentinels, few levels, missing
     /// measurements. Every fit looks for them, too, and warns of those that its errors confirm.
     pub fn inspect(&self) -> Inspection {
         self.record.inspect()

@@ -12,7 +12,7 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     /// A record in a folder of NumPy files, mapped into memory; see [`Record::from_npy`].
     ///
     /// # Errors
-    /// Those of [`Record::from_npy`].
+    /// The errors of [`Record::from_npy`].
     pub fn from_npy<M: Model<State = X, Input = U, Output = Y>>(
         _model: &M,
         folder: impl AsRef<Path>,

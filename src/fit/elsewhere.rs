@@ -32,7 +32,7 @@ pub(super) struct Trials {
 }
 
 impl Trials {
-    /// So many times those of a search, as far as it left them of the user's limit; `None` where it left none.
+    /// A multiple of the trial steps of a search, at most as many as it left of the user's limit; `None` where it left none.
     fn of(times: u64, iterations: u64, limit: u64) -> Option<Self> {
         let wanted = LEAST_TRIALS.max(times * iterations);
         let most = wanted.min(limit.saturating_sub(iterations));
@@ -41,8 +41,8 @@ impl Trials {
 }
 
 impl Problem<'_> {
-    /// What searches from elsewhere make of an estimate, with their time and evaluations; `None` where it needs none, and where nothing
-    /// is left of the fit's limits.
+    /// The estimate after further searches from other starts, with their time and evaluations; `None` if it needs none, or if the fit's
+    /// limits of time and trial steps are used up.
     pub(super) fn searched_elsewhere(&self, found: &Summary, control: &Control) -> Option<Summary> {
         if control.stops() {
             return None;

@@ -43,11 +43,8 @@ impl<M: Model> Fit<'_, M> {
         let model = crate::functions::Handle::Borrowed(self.model);
         let mut sweep = super::sweep(model.clone(), &self.stepping, &self.predictor)?;
         // The method of the estimate, where the fit would have come to it by itself.
-        let method = &estimate.method.integrator;
-        if sweep.integrator() != *method {
-            let finer = super::finer(model, self.is_default, &self.predictor);
-            sweep = finer.by_name(method).unwrap_or(sweep);
-        }
+        let finer = super::finer(model, self.is_default, &self.predictor);
+        sweep = finer.by_number(estimate.method.refinement).unwrap_or(sweep);
         predict(sweep, record.record(), estimate).map(|found| typed(found, record))
     }
 }

@@ -28,7 +28,7 @@ pub(super) struct Start {
 }
 
 impl Start {
-    /// That of a problem.
+    /// The declared start of a problem.
     pub fn declared(problem: &Problem<'_>) -> Self {
         Start { coordinates: problem.unknowns.start(), trials: u64::MAX, ends: None }
     }
@@ -156,7 +156,7 @@ fn declared_start(finer: &Problem<'_>, trials: u64, control: &Control) -> Option
     fine.then_some(Start { coordinates: start, trials, ends: None })
 }
 
-/// What is said where the data do not tell the estimate from that of a coarser step.
+/// The warning where the data do not distinguish the estimate from that of a coarser step.
 fn explains_as_well(coarser: &[Coarser], deviance: f64, found: &Summary) -> Option<Warning> {
     let close = coarser.iter().filter(|coarser| coarser.deviance - deviance < WORSE);
     let moved = close.filter_map(|coarser| Some((coarser, farthest(found, coarser.values.iter().copied())?)));
@@ -175,7 +175,7 @@ fn explains_as_well(coarser: &[Coarser], deviance: f64, found: &Summary) -> Opti
     Some(Warning { code: WarningCode::CoarseStep, severity: Severity::Usable, text })
 }
 
-/// What is said where a coarser step explains the data better than that of the estimate, by so much.
+/// The warning where a coarser step explains the data better than that of the estimate, by so much.
 fn explains_better(coarser: &Coarser, better: f64, found: &Summary) -> Warning {
     let certain = better > CERTAINLY_WORSE;
     let why = if certain { "the record may have been simulated with it" } else { "which may be chance" };

@@ -32,7 +32,7 @@ impl Problem<'_> {
         Ok(self.searched_elsewhere(&found, &control).unwrap_or(found))
     }
 
-    /// What a method found, numbered as in [`by_method`](Self::by_method), or methods finer than it, as long as a finer step would
+    /// The estimate by a method, numbered as in [`by_method`](Self::by_method), or by a finer one, as long as a finer step would
     /// move an unknown.
     pub(super) fn refined(
         &self,
@@ -142,7 +142,7 @@ impl Problem<'_> {
         control: &'p Control,
     ) -> Result<(Objective<'p>, Vec<f64>), Error> {
         self.check_estimate(estimate)?;
-        let problem = self.by_name(&estimate.method.integrator);
+        let problem = self.by_number(estimate.method.refinement);
         let sigma = estimate.sigma();
         let full = estimate.noise_covariance.clone().and_then(Whitening::full);
         // An output without any error gives no noise level.
@@ -188,7 +188,7 @@ impl Problem<'_> {
         estimate: &Summary,
         record: &crate::record::Record,
     ) -> Result<crate::problem::Simulated, Error> {
-        let problem = self.by_name(&estimate.method.integrator);
+        let problem = self.by_number(estimate.method.refinement);
         super::predict::predict(problem.sweep.clone(), record, estimate)
     }
 }

@@ -296,8 +296,8 @@ mod tests {
         Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap()
     }
 
-    /// The first of several rounds finds three digits: from a start that has them the answer is that from afar, to ten times the
-    /// tolerance of the noise.
+    /// The first of several rounds determines three digits. From a start that is right to three digits, the estimate equals that from a
+    /// far start to ten times the tolerance of the noise.
     #[test]
     fn the_first_round_is_not_the_last() {
         let record = record();

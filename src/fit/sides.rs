@@ -37,8 +37,7 @@ impl Problem<'_> {
         if !has_rivals(found) {
             return None;
         }
-        let method = self.by_method().position(|one| one.sweep.integrator() == found.method.integrator).unwrap_or(0);
-        let finest = self.by_method().nth(method)?;
+        let finest = self.by_number(found.method.refinement);
         let settings = Settings { checkpoint: None, ..finest.settings.clone() };
         let problem = Problem { settings, ..finest.clone() };
         let (objective, x) = problem.at_within(found, control).ok()?;
@@ -49,7 +48,7 @@ impl Problem<'_> {
         let search = |(_, coordinates): (f64, Vec<f64>)| {
             let start = Start { coordinates, trials, ends: None };
             let end = problem.run_on(problem.run_within(begin, control, start), trials, begin, control);
-            self.refined(end, method, begin, control).ok()
+            self.refined(end, finest.method, begin, control).ok()
         };
         let ends = std::iter::once(found.clone()).chain(others.into_iter().filter_map(search));
         let ends: Vec<End> = ends.filter_map(|end| Some((end.deviance?, end))).collect();

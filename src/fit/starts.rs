@@ -18,7 +18,7 @@ use progress::{Places, Progress};
 use serde::{Deserialize, Serialize};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// So many searches of a single record are run in lanes; fewer have more of the lanes with each record cut into segments.
+/// From this number on, searches of a single record are run in lanes; fewer have more of the lanes with each record cut into segments.
 const TOGETHER: usize = 4;
 /// A search that is above the best minimum is stopped after so many times the trial steps of the median search that found a
 /// minimum, if a quarter of the searches have found one, and after so many at the least.

@@ -180,7 +180,7 @@ impl Graph {
         }
     }
 
-    /// What a table has at a place, or its derivative of these orders; a table of one argument takes the first.
+    /// The value of a table at a place, or its derivative of these orders; a table of one argument takes the first.
     pub fn table(&mut self, table: &Table, order: [u8; 2], at: [Id; 2]) -> Id {
         let number = self.tables.iter().position(|known| **known == *table).unwrap_or_else(|| {
             self.tables.push(Arc::new(table.clone()));

@@ -30,7 +30,7 @@ pub(crate) enum Way {
     Reverse,
 }
 
-/// What slopes are taken with respect to.
+/// A quantity with respect to which slopes are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Seed {
     /// An entry of what is carried, at its start.

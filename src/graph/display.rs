@@ -111,7 +111,7 @@ fn numbered(leaf: Leaf) -> String {
 }
 
 impl Display for Graph {
-    /// What no other node uses, as roots.
+    /// Shows the graph, with the nodes that no other node uses as its roots.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut used = vec![false; self.len()];
         self.nodes().iter().flat_map(Node::operands).for_each(|operand| used[operand.index()] = true);

@@ -81,7 +81,7 @@ pub enum Node {
     Function(Function, Id),
     /// A function of two numbers.
     Function2(Function2, Id, Id),
-    /// What a table of the graph has at a place, or its derivative of these orders there.
+    /// The value of a table of the graph at a place, or its derivative of these orders there.
     Table {
         /// Which one.
         table: u32,

@@ -5,7 +5,7 @@ use crate::scalar::Table;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::sync::Arc;
 
-/// What of a graph is written.
+/// The part of a graph that is serialized.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Nodes {

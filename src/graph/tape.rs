@@ -1,12 +1,12 @@
 //! [`Tape`]: a graph that is being made into a program.
 //!
-//! Values stay what the text says. Slopes, and the steps of an integrator, are *relaxed*: their signs are gathered, factors
-//! that do not vary within a pass are multiplied with each other first, and a sum of products becomes one instruction.
+//! Values are computed in the order of the model's text. Slopes, and the steps of an integrator, are *relaxed*: signs are moved to the
+//! outside of products, factors that do not vary within a pass are multiplied first, and a sum of products becomes one instruction.
 
 use super::{Function, Function2, Graph, Id, Leaf, Node};
 use crate::scalar::Comparison;
 
-/// What a node depends on, as bits.
+/// The quantities that a node depends on, as bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Depends(u8);
 
@@ -216,7 +216,7 @@ impl Tape {
             let product = self.mul(a, y);
             return self.neg(product);
         }
-        // What does not vary within a pass is gathered: (x r) s = x (r s).
+        // Factors that do not vary within a pass are multiplied first: (x r) s = x (r s).
         for (a, b) in [(a, b), (b, a)] {
             let Node::Mul(x, y) = self.graph.node(a) else { continue };
             if self.depends(b).varies() || !self.depends(a).varies() || !self.relaxed[a.index()] {

@@ -45,7 +45,7 @@ struct Decision {
     holds: bool,
 }
 
-/// What two numbers may be to each other, as bits.
+/// Possible orders of two numbers, as bits.
 const LESS: u8 = 1;
 const EQUAL: u8 = 2;
 const GREATER: u8 = 4;
@@ -59,7 +59,7 @@ pub(super) struct Arena {
     /// The answers to be given, then those given on top.
     path: Vec<Decision>,
     asked: usize,
-    /// What each two numbers may still be to each other in this run.
+    /// The orders of each two numbers that are still possible in this run.
     relations: FxHashMap<(Id, Id), u8>,
     operations: usize,
     failure: Option<String>,
@@ -148,7 +148,7 @@ impl Arena {
     }
 }
 
-/// What one run came to.
+/// Result of one run: the answers to its comparisons, and its outputs.
 struct Run {
     path: Vec<Decision>,
     roots: Vec<Id>,

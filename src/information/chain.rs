@@ -48,7 +48,7 @@ impl<'c> Chain<'c> {
         Chain { carried, parameters, scales, slopes, defect, before, information, block, row, rows: 0, moved, squares }
     }
 
-    /// What is known of the initial value that the next segment has: by how much its guess is off, and its slopes.
+    /// The information on the initial value of the next segment: by how much its guess is off, and its slopes.
     pub fn begin(&self) -> (&[f64], &[f64]) {
         (&self.defect, &self.slopes)
     }

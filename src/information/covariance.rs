@@ -40,7 +40,7 @@ pub(super) struct Part {
     pub scores: Option<Scores>,
 }
 
-/// What a sandwich needs besides: there `z` is correlated with the border.
+/// Further parts of a sandwich covariance: there `z` is correlated with the border.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Scores {
@@ -52,7 +52,7 @@ pub(super) struct Scores {
     pub passed: Vec<f64>,
 }
 
-/// What one unknown is made of: the weight of each part's `z`, from its own part up to the shared unknowns.
+/// Composition of one unknown: the weight of each part's `z`, from its own part up to the shared unknowns.
 struct Path(Vec<(usize, Vec<f64>)>);
 
 impl Covariance {

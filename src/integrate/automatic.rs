@@ -4,7 +4,7 @@ use super::{Discrete, Integrator, Rk4, Stuck, System};
 use crate::layout::Kind;
 use serde::{Deserialize, Serialize};
 
-/// What a fit begins with when nothing is said ([`Fit::integrator`](crate::Fit::integrator)): [`Rk4`] for continuous models, [`Discrete`] for discrete ones, nothing for
+/// The default integrator of a fit ([`Fit::integrator`](crate::Fit::integrator)): [`Rk4`] for continuous models, [`Discrete`] for discrete ones, nothing for
 /// static ones.
 ///
 /// ```

@@ -198,7 +198,7 @@ impl Esdirk {
         guess: &Y::Vector<f64>,
         gamma_h: f64,
     ) -> Option<Linearization<Y>> {
-        // What is left is squared by the last step, so that 1e-10 is as good as it gets.
+        // The last step squares the remaining error: 1e-10 is at the limit of precision.
         let allowed = Tolerance { relative: self.relative.max(1e-10), ..self.tolerance(MAX_STEPS) };
         let mut k = system.vector(|i| (guess.as_ref()[i] - base.as_ref()[i]) / gamma_h);
         let mut before = f64::INFINITY;

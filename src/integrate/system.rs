@@ -12,7 +12,7 @@ use crate::signals::{Entry, Of, Signals};
 ///
 /// Positions in the interval are fractions of it, from 0 to 1.
 pub trait System {
-    /// What the state is made of.
+    /// Number type of the state.
     type Scalar: Scalar;
     /// One entry per state: an array, or a vector where the number of states is known at run time only.
     type Vector<T: Entry>: Clone + AsRef<[T]> + AsMut<[T]>;

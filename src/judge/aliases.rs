@@ -15,13 +15,13 @@ use std::f64::consts::{PI, TAU};
 
 /// An oscillation with fewer samples a period than this can be taken for its alias, whose frequency is then within a factor of 1.5.
 const SAMPLES: f64 = 2.5;
-/// What is left of an oscillation after an interval, at the least, for the next sample to show it.
+/// An oscillation must keep at least this part of its amplitude over an interval for the next sample to show it.
 const LEFT: f64 = 0.1;
 /// Factor within which unknowns may be off where no bound is nearer: that within which `Fit::starts` draws.
 const REACH: f64 = 10.0;
 /// Relative change of a parameter for the slope of a frequency.
 const CHANGE: f64 = 1e-4;
-/// So many points along the records are examined, and so many steps of time.
+/// Numbers of points along the records, and of steps of time, that are examined.
 const POINTS: usize = 8;
 const STEPS: usize = 1000;
 /// Sampling is uneven where the quartiles of its steps of time differ by more than this part of the median.
@@ -60,7 +60,7 @@ pub(crate) struct Aliases {
 }
 
 impl Aliases {
-    /// Those at a point; `None` where all oscillations are resolved. The other points are near this one and near the declared start,
+    /// The aliases at a point; `None` where all oscillations are resolved. The other points are near this one and near the declared start,
     /// with all unknowns changed that move the frequency, or that alone which moves it most.
     pub fn at(objective: &Objective<'_>, coordinates: &[f64]) -> Option<Self> {
         let points = residual_pass(objective, coordinates).ok()?.points;

@@ -1,4 +1,4 @@
-//! What is known of unknowns at a bound, and what they leave of the others.
+//! Knowledge of unknowns at a bound, and their effect on the others.
 //!
 //! Where the estimate without bounds lies beyond one by less than its interval reaches, the truth may be within the bounds,
 //! and the others, estimated with the unknown at its bound, are biased by as much as they are correlated with it. There,
@@ -26,7 +26,7 @@ pub(super) fn released(
     while kept != at_bounds {
         let free = undetermined(linear, &kept);
         let steps = || Some((linear.covariance(&free.held)?, linear.step(&none, &free.held)?));
-        // Data that determine fewer directions without the bounds say nothing of what is beyond.
+        // Data that determine fewer directions without the bounds do not determine the values beyond them.
         let Some((covariance, step)) = steps().filter(|_| free.directions.len() == found.directions.len()) else {
             break;
         };

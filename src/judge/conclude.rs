@@ -51,7 +51,7 @@ pub(crate) struct SearchEnd {
     pub write_error: Option<String>,
     /// Carries at the begins of the segments there.
     pub memory: Memory,
-    /// What searches from other starts found, if there were any.
+    /// Results of searches from other starts, if there were any.
     pub starts: Option<Starts>,
 }
 
@@ -145,6 +145,7 @@ fn method(objective: &Objective<'_>, optimizer: String, covariance: CovarianceMe
     Method {
         optimizer,
         integrator: sweep.integrator(),
+        refinement: objective.problem.method,
         predictor: sweep.predictor(),
         engine: sweep.engine(),
         loss: or(settings.loss.as_ref().map(|loss| loss.describe()), "squared"),
@@ -347,7 +348,7 @@ impl<'j> Judgement<'j> {
             let found = noise::estimate(objective, &self.end.coordinates).map_err(reason)?;
             return Ok(found.widened((self.residuals.measured as f64 / self.degrees.max(1.0)).sqrt()));
         }
-        // That of errors that are rounding is said as it is, zero or not.
+        // The noise level of errors that are round-off is returned as computed, zero or not.
         let scale = (self.linear.sum_of_squares() / self.degrees.max(1.0)).sqrt();
         Ok(objective.whitening.widened(if noise::only_scales(objective) { scale } else { self.widening }))
     }

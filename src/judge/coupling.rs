@@ -142,7 +142,7 @@ impl Judgement<'_> {
         self.residuals.coupled.filter(|_| independent && !own && !self.rounding)
     }
 
-    /// What is said of them: every covariance but the classical one, which is not taken then, allows for them.
+    /// The warning about correlated outputs: every covariance but the classical one, which is not taken then, allows for them.
     pub(super) fn correlated_outputs(&self) -> Option<Warning> {
         let Coupled { outputs: (i, j), correlation, p_value: chance } = self.coupled()?;
         let outputs = &self.objective.problem.layout().outputs;

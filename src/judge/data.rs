@@ -18,7 +18,7 @@ const DECIDE: f64 = 0.5;
 const FEW: usize = 8;
 const TIMES: usize = 4;
 const PART_OF_STEP: f64 = 0.1;
-/// So much of an output missing is worth a note.
+/// Missing part of an output from which on there is a note.
 const MISSING: f64 = 0.5;
 /// Warnings of one kind; more are counted.
 const NAMED: usize = 4;
@@ -94,7 +94,7 @@ impl Judgement<'_> {
         inputs.iter().enumerate().filter_map(one).collect()
     }
 
-    /// What is suspicious of an output, and confirmed by the errors.
+    /// Suspicious values of an output that the errors confirm.
     fn suspicions(&self, found: &[Arc<Inspection>]) -> Vec<Warning> {
         let mut suspicions: Vec<(Suspect, &ChannelInspection, &Suspicion)> = vec![];
         for (e, inspection) in found.iter().enumerate() {

@@ -11,7 +11,7 @@ const RANK: f64 = 1e-11;
 /// Unknowns with a smaller entry than this in a null direction are not part of it.
 const PART: f64 = 1e-3;
 
-/// What the data do not determine, with these unknowns held.
+/// Directions that the data do not determine, with these unknowns held.
 pub(crate) fn undetermined(linear: &Linearization, held: &[bool]) -> Undetermined {
     linear.undetermined(held, RANK)
 }

@@ -45,7 +45,7 @@ fn split(runs: &[Vec<(f64, f64)>]) -> Option<[Errors; 2]> {
 }
 
 impl Judgement<'_> {
-    /// What is said of an output with these errors, one run per experiment, `None` where nothing was measured.
+    /// The warning about an output with these errors, one run per experiment, `None` where nothing was measured.
     pub(super) fn dropouts_of(&self, j: usize, errors: &[Vec<Option<f64>>]) -> Option<Warning> {
         let problem = self.objective.problem;
         let run = |(record, errors): (&crate::record::Record, &Vec<Option<f64>>)| {

@@ -65,7 +65,7 @@ impl Judgement<'_> {
             (0..count).map(|j| relative[j].map_or(1.0, |relative| self.by_chance(j, relative))).collect();
         let explained = |j: usize| chance[j] < LEVEL && self.residuals.outputs[j].fit_percent > Some(LITTLE);
         let another = |j: usize| (0..count).any(|i| i != j && explained(i));
-        // What is filtered, weighted or cut off is not what the fit was to explain.
+        // With a pre-filter, a weighting or a robust loss the fit did not have to explain all errors.
         let settings = &self.objective.problem.settings;
         let partly = settings.prefilter.is_some() || self.objective.is_weighted() || self.objective.is_robust();
         let mut warnings = vec![];

@@ -37,7 +37,7 @@ fn told_by_data(unknown: &Unknown, prior: Prior) -> bool {
 }
 
 impl Judgement<'_> {
-    /// What is said of the parameters one by one.
+    /// Warnings about single parameters.
     pub(super) fn knowledge(&self, unknowns: &[Unknown], covariances: &Covariances) -> Vec<Warning> {
         let mut warnings = vec![];
         warnings.extend(self.without_error(unknowns, covariances));
@@ -195,7 +195,7 @@ mod tests {
         assert!(!told(1e-6, 1.0) && !told(1e-6, 1.1));
     }
 
-    /// More than 400 times the start or less than a 400th of it; a start of zero says nothing, nor does a value not known.
+    /// More than 400 times the start or less than a 400th of it; not for a start of zero, nor for a value that is not known.
     #[test]
     fn values_far_from_their_start() {
         let said = |value: f64, start: f64| far_from_start(&[unknown(value, start, 1e-3 * value.abs())]).len();

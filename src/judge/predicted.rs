@@ -33,7 +33,7 @@ pub(super) struct Dependence {
 }
 
 impl Judgement<'_> {
-    /// That of variances that are predicted; `unit` is the covariance of the unknowns in coordinates.
+    /// Dependence of the predicted variances; `unit` is the covariance of the unknowns in coordinates.
     pub(super) fn dependence_of_variances(&self, unit: &Covariance) -> Option<Dependence> {
         let n = self.slopes.len();
         let kept: Vec<usize> = (0..n).filter(|&i| !self.exact[i]).collect();

@@ -17,8 +17,8 @@ use std::ops::Range;
 
 /// Longest horizon over which errors are correlated.
 const HORIZON: usize = 100;
-/// Every how many windows one is simulated again with a finer step, and the most of them per record; of records of so many windows, all
-/// are.
+/// To judge the step, one window in `EVERY` is simulated again with a finer step, at most `AGAIN` of a record. Records of up to `AGAIN`
+/// windows are simulated again as a whole.
 const EVERY: usize = 16;
 const AGAIN: usize = 16;
 
@@ -55,7 +55,7 @@ struct Sums<'s> {
     experiment: usize,
     outputs: Vec<OutputSums>,
     measured: u64,
-    /// That of the covariance of a sample with all outputs, and of all measurements so far.
+    /// Logarithm of the determinant of the covariance of a sample with all outputs, and of all measurements so far.
     log_determinants: (f64, f64),
     portmanteaus: Vec<Portmanteau>,
     coupling: Coupling,
@@ -148,7 +148,7 @@ impl<'s> Sums<'s> {
         self.first.get_or_insert((begin, first));
         let record = &self.objective.problem.records[self.experiment];
         let carry = || window.carry.iter().skip(lane).step_by(window.lanes()).copied().collect();
-        // Those in which a multiple of the distance lies.
+        // Windows in which a multiple of the distance lies.
         let distance = (EVERY * window.capacity()).max(record.len() / AGAIN);
         let at_distance = begin.next_multiple_of(distance) < begin + samples;
         if at_distance && self.objective.sweep.restarts().is_none() {

@@ -1,4 +1,4 @@
-//! What searches from other starts say about an estimate.
+//! Warnings from searches from other starts.
 
 use crate::estimate::{Minimum, Starts, Warning, WarningCode, times_the_cost};
 use crate::numeral::number;

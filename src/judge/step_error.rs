@@ -15,7 +15,7 @@ pub(super) struct Sampled {
     /// Its errors, output by output, sample by sample; where variances are predicted these are standardized by them, and the logarithms
     /// of the variances follow.
     pub errors: Vec<f64>,
-    /// Those of the sample after it, to which the last of its steps leads; empty as long as that is not known, and at the end.
+    /// Errors of the sample after it, to which the last of its steps leads; empty before they are known, and at the end of the record.
     pub after: Vec<f64>,
     pub carry: Vec<f64>,
 }
@@ -87,7 +87,7 @@ impl Extremes {
     }
 }
 
-/// So many samples are worth waking other threads.
+/// Number of samples from which on other threads are used.
 const WORTH_THREADS: usize = 20_000;
 
 /// Windows of an experiment, at a point.
@@ -240,7 +240,7 @@ mod tests {
         assert!(expected > 1e-3 && (found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
     }
 
-    /// So many records that the finer step is compiled and runs in lanes: the sum of what each record alone gives, in dual numbers.
+    /// With this number of records the finer step is compiled and runs in lanes: the sum of what each record alone gives, in dual numbers.
     /// Both are sums of the same differences, of which the largest is a thousandth of the predictions: 13 digits less 3.
     #[test]
     fn many_records_are_compared_in_lanes() {

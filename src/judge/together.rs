@@ -17,8 +17,8 @@ use crate::whiteness::chi_squared_tail;
 
 /// Level of the test.
 const LEVEL: f64 = 1e-4;
-/// The fewest standard errors between two parts of the data by which a parameter is named, and the relative difference
-/// beyond which no value is worth anything.
+/// A parameter is named if its values from two parts of the data differ by more than this many standard errors. If they differ by more
+/// than the second (relative), the estimate is not usable.
 const APART: f64 = 4.0;
 const FAR_APART: f64 = 0.25;
 /// Rows that are absorbed together.

@@ -28,12 +28,12 @@ crate::signals! {
         /// Position that it is to have.
         qg: "m",
     }
-    /// What is measured of the axis.
+    /// Measured outputs of the axis.
     pub struct Position {
         /// Position.
         qm: "m",
     }
-    /// What is measured of the axis under its controller.
+    /// Measured outputs of the axis under its controller.
     pub struct ControlledAxisOutput {
         /// Position.
         qm: "m",

@@ -13,14 +13,14 @@ use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
 use nalgebra::SMatrix;
 
-/// What an [`Ekf`] knows at the start and expects of the noise; standard deviations, each in its signal's unit.
+/// Initial estimates of an [`Ekf`] and the noise it assumes; standard deviations, each in its signal's unit.
 #[derive(Clone, Copy)]
 pub struct EkfStart<M: Model> {
     /// Initial state: `free(x0).prior(x0, std)`, or `fixed(x0)` if known exactly.
     pub state: Of<M::State, Parameter>,
     /// Parameters: `free(p0).prior(p0, std)` are estimated; outside their bounds the filter has diverged.
     pub parameters: Of<M::Parameters, Parameter>,
-    /// What the model leaves out: standard deviation by which each state strays in one sample.
+    /// Process noise: standard deviation by which each state strays in one sample.
     pub state_drift: Of<M::State, f64>,
     /// Standard deviation by which each free parameter drifts in one sample; zero for constants.
     pub parameter_drift: Of<M::Parameters, f64>,

@@ -77,7 +77,7 @@ const ACCEPT: f64 = 1e-4;
 const SHORTER: f64 = 0.25;
 /// Five trials are enough where the differences of cost, or the slopes, are rounding.
 const UNDECIDED: u32 = 5;
-/// So many where the slopes still predict a decrease: enough for ten digits if each step halves the distance.
+/// The number of trials where the slopes still predict a decrease: enough for ten digits if each step halves the distance.
 const UNRESOLVED: u32 = 60;
 /// Where the cost is smooth, the relative error of the predicted decrease falls to a quarter with a step of a quarter of the
 /// length. The cost is called rough when that error stays above this part of the one before, so many times in a row.

@@ -44,7 +44,7 @@ use serde::{Deserialize, Serialize};
 pub struct LevenbergMarquardt<S = OwnSize> {
     /// When to stop.
     pub stop: Stop,
-    /// What a unit step of each unknown counts.
+    /// Scale of each unknown: the length of a step is measured in it.
     pub scaling: S,
     #[serde(with = "crate::real")]
     x: Vec<f64>,
@@ -54,7 +54,7 @@ pub struct LevenbergMarquardt<S = OwnSize> {
     unseen: usize,
     /// Steps taken.
     steps: u64,
-    /// Steps taken where slopes show no way.
+    /// Steps to points that were found by exploration, not by slopes.
     leaps: u64,
     first: Option<Try>,
     outcome: Option<Outcome>,
@@ -81,21 +81,21 @@ struct Try {
     point: Option<Point>,
 }
 
-/// What was asked for last.
+/// The evaluation that was asked for last.
 #[derive(Clone, Debug, Default)]
 enum Stage {
-    /// The slopes where a search stands that was read back.
+    /// The slopes at the point of a search that was read from a file.
     #[default]
     Resume,
-    /// Those at the start of a try.
+    /// The slopes at the start of a try.
     Start,
-    /// Those at a trial point.
+    /// The slopes at a trial point.
     Step(Trial),
     /// The second derivative along a step.
     Accelerate(Trial),
-    /// Those at points around the start or the end, where slopes show nothing.
+    /// Evaluations at points around the start or the end, where slopes show nothing.
     Explore(Exploration),
-    /// Those where the first try ended, which was the better one.
+    /// The slopes at the end of the first try, which was the better one.
     Return,
 }
 
@@ -103,7 +103,7 @@ const FIRST: Reach = Reach { first: 0.1, later: 1.0 };
 const SECOND: Reach = Reach { first: 30.0, later: 30.0 };
 /// A first try that has not ended after so many trials is stopped.
 const FIRST_TRIALS: u64 = 2500;
-/// So often a search goes on that found a lower cost beside its end.
+/// Number of times that a search goes on from a lower cost that exploration found beside its end.
 const LEAPS: u64 = 5;
 /// Half the geodesic acceleration is added to a step where the acceleration is no longer than this part of the step (Transtrum and
 /// Sethna 2012 take half of this).
@@ -142,7 +142,7 @@ impl<S: Scaling> LevenbergMarquardt<S> {
         })
     }
 
-    /// What to do at the point where the search stands: end, or ask for the next evaluation.
+    /// Ends at the present point, or asks for the next evaluation.
     fn go_on(&mut self, point: Point) {
         let ended = point.ended(&self.stop).or_else(|| self.given_up(&point));
         let trial = match ended {

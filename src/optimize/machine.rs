@@ -20,7 +20,7 @@ pub enum Request<'a> {
     Ended(Outcome),
 }
 
-/// What is known of the unknowns before a search.
+/// Declarations of the unknowns before a search.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Domain {
     /// Lower and upper bound of each unknown; missing ones are infinite.
@@ -32,7 +32,7 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// What a problem says of its unknowns.
+    /// The declarations of a problem's unknowns.
     pub fn of(problem: &impl LeastSquares) -> Self {
         Domain { bounds: problem.bounds(), sizes: problem.sizes(), logarithms: problem.logarithms() }
     }
@@ -87,7 +87,7 @@ pub trait Machine {
 
 /// Gives a search the evaluation it asks for, and those that this leads to, until one trial point has been judged.
 fn evaluate<O: LeastSquares>(search: &mut impl Machine, problem: &mut Problem<O>) -> Result<Option<Infeasible>, Error> {
-    // What both evaluations are counted as.
+    // The counter of both kinds of evaluation.
     const PASSES: &str = "linearization_count";
     loop {
         match search.request() {

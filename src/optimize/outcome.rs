@@ -111,7 +111,7 @@ impl Outcome {
         }
     }
 
-    /// What to do, in one sentence.
+    /// The advice, in one sentence.
     pub fn advice(&self) -> &'static str {
         match self {
             Outcome::Converged { .. } | Outcome::Exact => "Nothing to do.",
@@ -207,7 +207,7 @@ impl fmt::Display for Outcome {
 mod tests {
     use super::*;
 
-    /// What is a minimum, and that words and advice go with it.
+    /// Outcomes that are minima, with their words and advice.
     #[test]
     fn outcomes_and_their_words() {
         let precision = |gradient: f64, step: f64| Outcome::LimitOfPrecision { gradient, step };

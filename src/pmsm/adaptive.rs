@@ -33,7 +33,7 @@ pub struct Instant {
     pub estimate: Winding,
     /// The voltage from this sample to the next.
     pub command: Command,
-    /// What the observer said of this sample.
+    /// The observer's result at this sample.
     pub outcome: UpdateOutcome,
 }
 

@@ -34,21 +34,6 @@ crate::signals! {
         /// Voltage that dead time takes from each phase.
         vdt: "V",
     }
-    /// Parameters of a salient motor with a harmonic in its EMF, its cable and the size of its inverter's dead time.
-    pub struct CompensatedSalientWinding {
-        /// Phase resistance, cable included; must be positive.
-        rs: "ohm",
-        /// Inductance along the magnet flux; must be positive.
-        ld: "H",
-        /// Inductance 90 electrical degrees ahead of it; must be positive.
-        lq: "H",
-        /// Line-to-line rms back-EMF per mechanical speed.
-        ke: "V s/rad",
-        /// Amplitude of its sixth harmonic.
-        ke6: "V s/rad",
-        /// Voltage that dead time takes from each phase.
-        vdt: "V",
-    }
 }
 
 wraps_motor! {

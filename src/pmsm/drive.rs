@@ -19,7 +19,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 use serde::{Deserialize, Serialize};
 
-/// What keeps a real drive from being an ideal one; each may be switched off alone.
+/// Imperfections of a real drive; each may be switched off alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Disturbance {
     /// Voltage lost in the inverter.
@@ -83,9 +83,9 @@ impl Disturbance {
 pub struct Simulation {
     /// The axis that the controllers are designed for: data sheet, 20 C.
     pub nominal: RobotAxis,
-    /// What the axis is.
+    /// The axis.
     pub plant: Plant,
-    /// What makes the voltage.
+    /// The inverter.
     pub inverter: Inverter,
     /// Current sensors.
     pub currents: CurrentSensors,
@@ -220,7 +220,7 @@ impl Simulation {
 
             let (torque, current_limited) = speed_control.step(*target, theta, wf, ts);
             let iq_ref = (torque / kt).clamp(-i_max, i_max);
-            let id_ref = self.injection.map_or(0.0, |injection| injection.at(k as f64 * ts).id);
+            let id_ref = self.injection.map_or(0.0, |injection| injection.id(k as f64 * ts));
             let reference = Currents { id: id_ref, iq: iq_ref };
             let command = current_control.step(reference, Currents { id, iq }, wf, ts);
             log.voltage_limited += usize::from(command.limited);

@@ -24,7 +24,7 @@ wraps_motor! {
 }
 
 impl<M: MotorModel, P: Signals> EmfHarmonic<M, P> {
-    /// What the harmonic adds to `ke` at a mechanical angle (rad).
+    /// The harmonic's contribution to `ke` at a mechanical angle (rad).
     #[inline(always)]
     fn harmonic<S: Scalar>(&self, theta: S, p: &Of<P, S>) -> S {
         P::part::<SixthHarmonic, S>(*p).ke6 * (self.motor.pole_pairs().electrical(theta) * 6.0).cos()

@@ -4,18 +4,6 @@ use super::{Currents, PolePairs};
 use crate::signals::place_of;
 use crate::{Of, Scalar, Signals};
 
-crate::signals! {
-    /// Parameters of a motor with surface magnets, its magnet by flux linkage.
-    pub struct FluxWinding {
-        /// Phase resistance; must be positive.
-        rs: "ohm",
-        /// Synchronous inductance; must be positive.
-        ls: "H",
-        /// Magnet flux linkage, peak.
-        psi_m: "Wb",
-    }
-}
-
 wraps_motor! {
     /// A motor whose magnet is given, and found, by its flux linkage `psi_m` (Wb, peak) in place of `ke`: the parameters
     /// `P` hold `psi_m` and those of the motor `M` but for `ke`, by name.
@@ -24,7 +12,8 @@ wraps_motor! {
     /// ([`Constant::FluxLinkage`]).
     ///
     /// ```
-    /// use greybox::pmsm::{FluxLinkage, FluxWinding, Surface};
+    /// use greybox::{pmsm::{FluxLinkage, Surface}, signals};
+    /// signals! { pub struct FluxWinding { rs: "ohm", ls: "H", psi_m: "Wb" } }
     /// let model = FluxLinkage::<_, FluxWinding>::new(Surface::new(4)?);
     /// # Ok::<(), greybox::pmsm::MotorError>(())
     /// ```

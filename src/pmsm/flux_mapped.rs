@@ -49,7 +49,7 @@ pub struct FluxMapped {
     map_q: Table,
 }
 
-/// What is stored.
+/// The serialized form.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Parts {

@@ -17,17 +17,6 @@ pub struct Injection {
     period: f64,
 }
 
-/// What an [`Injection`] asks for at one time.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct InjectionStep {
-    /// Reference of the d current (A).
-    pub id: f64,
-    /// Whether the back-EMF may be adapted: not under injection, nor until its transient has gone.
-    pub adapt_ke: bool,
-    /// Whether the resistance may be adapted: on a step, once the current has settled.
-    pub adapt_rs: bool,
-}
-
 impl Injection {
     /// Steps of 0, A/2 and A amperes (`amplitude` A, negative weakens the field) of `step` seconds each, of which the
     /// first `settle` seconds are not used, every `period` seconds.
@@ -54,18 +43,31 @@ impl Injection {
         Ok(Injection { amplitude, step, settle, period })
     }
 
-    /// What to do at time `t` (s); the first step starts at 0.
-    pub fn at(&self, t: f64) -> InjectionStep {
+    /// Number of the step at time `t` (s), three or more in the rest; and the time since it began. The first step starts at 0.
+    fn step(&self, t: f64) -> (f64, f64) {
         let into = crate::Scalar::rem_euclid(t, self.period);
-        let number = crate::Scalar::floor(into / self.step);
-        let settled = into - number * self.step >= self.settle;
-        if number == 0.0 {
-            InjectionStep { id: 0.0, adapt_ke: false, adapt_rs: settled }
-        } else if number < 3.0 {
-            InjectionStep { id: self.amplitude * number * 0.5, adapt_ke: false, adapt_rs: settled }
-        } else {
-            InjectionStep { id: 0.0, adapt_ke: into - 3.0 * self.step >= self.settle, adapt_rs: false }
+        let number = crate::Scalar::min(crate::Scalar::floor(into / self.step), 3.0);
+        (number, into - number * self.step)
+    }
+
+    /// Reference of the d current (A) at time `t` (s).
+    pub fn id(&self, t: f64) -> f64 {
+        match self.step(t) {
+            (number, _) if number < 3.0 => self.amplitude * number * 0.5,
+            _ => 0.0,
         }
+    }
+
+    /// Whether the back-EMF may be adapted at time `t` (s): not under injection, nor until its transient has gone.
+    pub fn adapts_ke(&self, t: f64) -> bool {
+        let (number, since) = self.step(t);
+        number >= 3.0 && since >= self.settle
+    }
+
+    /// Whether the resistance may be adapted at time `t` (s): on a step, once the current has settled.
+    pub fn adapts_rs(&self, t: f64) -> bool {
+        let (number, since) = self.step(t);
+        number < 3.0 && since >= self.settle
     }
 }
 
@@ -76,17 +78,17 @@ mod tests {
     #[test]
     fn climbs_rests_and_repeats() {
         let injection = Injection::new(-8.0, 0.1, 0.02, 1.0).unwrap();
-        let step = |id, adapt_ke, adapt_rs| InjectionStep { id, adapt_ke, adapt_rs };
+        let at = |t: f64| (injection.id(t), injection.adapts_ke(t), injection.adapts_rs(t));
         for t in [0.0, 3.0] {
-            assert_eq!(injection.at(t + 0.01), step(0.0, false, false));
-            assert_eq!(injection.at(t + 0.05), step(0.0, false, true));
-            assert_eq!(injection.at(t + 0.11), step(-4.0, false, false));
-            assert_eq!(injection.at(t + 0.15), step(-4.0, false, true));
-            assert_eq!(injection.at(t + 0.25), step(-8.0, false, true));
-            assert_eq!(injection.at(t + 0.31), step(0.0, false, false));
-            assert_eq!(injection.at(t + 0.33), step(0.0, true, false));
+            assert_eq!(at(t + 0.01), (0.0, false, false));
+            assert_eq!(at(t + 0.05), (0.0, false, true));
+            assert_eq!(at(t + 0.11), (-4.0, false, false));
+            assert_eq!(at(t + 0.15), (-4.0, false, true));
+            assert_eq!(at(t + 0.25), (-8.0, false, true));
+            assert_eq!(at(t + 0.31), (0.0, false, false));
+            assert_eq!(at(t + 0.33), (0.0, true, false));
         }
-        assert_eq!(injection.at(-0.05), injection.at(0.95));
+        assert_eq!(at(-0.05), at(0.95));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The voltage-source inverter: when its voltage acts, and what dead time takes from it.
 
-use super::frames::{Phases, Stator, clarke, inverse_clarke};
+use super::frames::{Stator, clarke, inverse_clarke};
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +14,7 @@ pub enum Inverter {
     Switching {
         /// Direct voltage (V).
         vdc: f64,
-        /// What the duties are compared with.
+        /// The carrier that the duties are compared with.
         carrier: Carrier,
     },
 }
@@ -55,9 +55,7 @@ impl DeadTime {
         if self.vdt == 0.0 {
             return Stator::default();
         }
-        let phases = inverse_clarke(i);
-        let loss = |i: f64| self.vdt * Scalar::tanh(i / self.i0);
-        clarke(Phases { a: loss(phases.a), b: loss(phases.b), c: loss(phases.c) })
+        clarke(inverse_clarke(i).map(|i| self.vdt * Scalar::tanh(i / self.i0)))
     }
 }
 
@@ -65,11 +63,10 @@ impl DeadTime {
 /// common part is placed so that the largest and smallest duty are equally far from their ends (space vector).
 #[cfg(feature = "std")]
 #[inline]
-pub(super) fn duties(u: Stator, vdc: f64) -> Phases {
-    let p = inverse_clarke(u);
-    let middle = 0.5 * (Scalar::max(p.a, Scalar::max(p.b, p.c)) + Scalar::min(p.a, Scalar::min(p.b, p.c)));
-    let duty = |v: f64| Scalar::clamp(0.5 + (v - middle) / vdc, 0.0, 1.0);
-    Phases { a: duty(p.a), b: duty(p.b), c: duty(p.c) }
+pub(super) fn duties(u: Stator, vdc: f64) -> [f64; 3] {
+    let [a, b, c] = inverse_clarke(u);
+    let middle = 0.5 * (Scalar::max(a, Scalar::max(b, c)) + Scalar::min(a, Scalar::min(b, c)));
+    [a, b, c].map(|v| Scalar::clamp(0.5 + (v - middle) / vdc, 0.0, 1.0))
 }
 
 #[cfg(test)]
@@ -86,10 +83,10 @@ mod tests {
             let v = share * vdc / 3f64.sqrt();
             let u = Stator { alpha: v * angle.cos(), beta: v * angle.sin() };
             let d = duties(u, vdc);
-            for duty in [d.a, d.b, d.c] {
+            for duty in d {
                 prop_assert!((-1e-12..=1.0 + 1e-12).contains(&duty));
             }
-            let made = clarke(Phases { a: d.a * vdc, b: d.b * vdc, c: d.c * vdc });
+            let made = clarke(d.map(|duty| duty * vdc));
             prop_assert!((made.alpha - u.alpha).abs() + (made.beta - u.beta).abs() < 1e-10);
         }
     }

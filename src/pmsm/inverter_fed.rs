@@ -1,4 +1,4 @@
-use super::frames::{Dq0, Park};
+use super::frames::Park;
 use super::motor_model::{MotorModel, passes_on, wraps_motor};
 use super::{Currents, ExactSurface, PolePairs};
 use crate::online::{Ekf, EkfStart, ObserverError};
@@ -87,12 +87,9 @@ impl<S: Scalar> Currents<S> {
     #[inline]
     pub fn dead_time(&self, i0: S, theta_e: S) -> (S, S) {
         let park = Park::amplitude_invariant();
-        let mut phases = park.inverse(Dq0 { d: self.id, q: self.iq, zero: S::from(0.0) }, theta_e);
-        for i in [&mut phases.a, &mut phases.b, &mut phases.c] {
-            *i = (*i / i0).tanh();
-        }
-        let lost = park.forward(phases, theta_e);
-        (lost.d, lost.q)
+        let phases = park.inverse([self.id, self.iq, S::from(0.0)], theta_e);
+        let [d, q, _] = park.forward(phases.map(|i| (i / i0).tanh()), theta_e);
+        (d, q)
     }
 }
 

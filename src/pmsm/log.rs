@@ -59,7 +59,7 @@ impl Log {
         Experiment::new(model, Time::Uniform { start: 0.0, step: self.ts }, inputs, outputs)
     }
 
-    /// What kept the drive from doing as it was asked, a sentence each. The record stays good for identification: it holds
+    /// Causes why the drive did not follow its references, a sentence each. The record stays good for identification: it holds
     /// what acted.
     pub fn warnings(&self) -> Vec<String> {
         let of = self.rows.len();

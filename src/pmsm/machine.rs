@@ -17,7 +17,7 @@ crate::signals! {
         /// Mechanical angle, not wrapped.
         theta: "rad",
     }
-    /// What acts on a motor from outside.
+    /// Inputs of a motor with its rotor.
     pub struct VoltageAndLoad {
         /// Voltage along the magnet flux, phase peak.
         ud: "V",

@@ -79,7 +79,7 @@ mod tests {
             approx::assert_relative_eq!(recorded, Currents { id: bd, iq: bq }, epsilon = 1e-6, max_relative = 1e-10);
         }
 
-        // What acts late has turned back by what the rotor does in between.
+        // A late voltage has turned back by the rotor's angle in the meantime.
         #[test]
         fn a_late_voltage_has_turned_back(w in -400.0..400.0, tau in 0.0..1e-4f64) {
             let (x, u) = (Currents { id: 1.0, iq: 2.0 }, AngledDrive { ud: 20.0, uq: 50.0, w, theta: 0.0 });

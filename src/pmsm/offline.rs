@@ -54,7 +54,7 @@ impl Span {
     }
 }
 
-/// What the speed of a record is.
+/// Meaning of the speed in a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Speed {
     /// The value at the sample; the mean of an interval is that of its ends.

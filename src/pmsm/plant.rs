@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 pub struct Plant {
     /// Values at the temperatures of the run.
     pub axis: RobotAxis,
-    /// What the inverter loses.
+    /// The voltage error of the inverter.
     pub dead_time: DeadTime,
     /// Sixth harmonic of EMF and torque constant, as a share of Ke.
     pub emf_harmonic: f64,

@@ -169,7 +169,7 @@ mod tests {
             let top = program.targets[cycle.samples.clone()].iter().map(|t| t.w).fold(0.0, f64::max);
             assert!((top - cycle.speed).abs() < 1e-9, "{top} {}", cycle.speed);
         }
-        // What is asked for comes back to where it began: forth and back are equal.
+        // The reference returns to its first value: forward and backward motion are equal.
         let sum: f64 = program.targets.iter().map(|t| t.w * program.ts).sum();
         assert!(sum.abs() < 1e-9, "{sum}");
         // The acceleration is within the limit, but for ramps rounded down to whole samples: the shortest has 132.

@@ -14,7 +14,7 @@ crate::signals! {
         lq: "H",
         /// Incremental inductance of the q axis at large currents; must be positive.
         lq_saturated: "H",
-        /// What one ampere of id takes from or adds to the part of lq that saturates.
+        /// Change of the saturating part of lq per ampere of id.
         lq_cross: "H/A",
         /// Current around which the q axis saturates; must be positive.
         i_saturation: "A",

@@ -1,6 +1,6 @@
-//! What a drive measures: two phase currents and the angle.
+//! Sensors of a drive: two phase currents and the angle.
 
-use super::frames::{Phases, Stator, clarke, inverse_clarke};
+use super::frames::{Stator, clarke, inverse_clarke};
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
@@ -31,10 +31,10 @@ impl CurrentSensors {
     /// The current vector (A, stator frame) as read; `draws` are two independent standard normal numbers.
     #[inline]
     pub fn read(&self, i: Stator, draws: [f64; 2]) -> Stator {
-        let truth = inverse_clarke(i);
+        let [a, b, _] = inverse_clarke(i);
         let read = |i: f64, k: usize| round_to(self.gain[k] * (i + self.noise * draws[k]) + self.offset[k], self.step);
-        let (a, b) = (read(truth.a, 0), read(truth.b, 1));
-        clarke(Phases { a, b, c: -a - b })
+        let (a, b) = (read(a, 0), read(b, 1));
+        clarke([a, b, -a - b])
     }
 }
 
@@ -47,7 +47,7 @@ pub struct Resolver {
     pub unevenness: f64,
     /// Step of the converter (rad); zero for none.
     pub step: f64,
-    /// What the reading is ahead by (rad, mechanical).
+    /// Angle by which the reading is ahead (rad, mechanical).
     pub offset: f64,
 }
 

@@ -11,12 +11,12 @@ crate::signals! {
         /// Mechanical angle, not wrapped.
         theta: "rad",
     }
-    /// What drives the rotor.
+    /// Input of the rotor.
     pub struct Torque {
         /// Current that makes torque, phase peak.
         iq: "A",
     }
-    /// What the load of a rotor is made of, seen from the motor's side of the gear.
+    /// Parameters of a rotor's load, seen from the motor's side of the gear.
     pub struct Load {
         /// Inertia; must be positive.
         j: "kg m^2",

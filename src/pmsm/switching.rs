@@ -1,4 +1,4 @@
-use super::frames::{Phases, Stator, clarke, inverse_clarke, rotate_out_of};
+use super::frames::{Stator, clarke, inverse_clarke, rotate_out_of};
 use super::inverter::{Carrier, DeadTime, duties};
 use super::machine::runge_kutta;
 use super::plant::Plant;
@@ -84,7 +84,7 @@ impl SwitchingInverter {
         let d = duties(u, self.vdc);
         let mut edges = [Edge { at: ts, leg: 0, up: false }; 6];
         let mut count = 0;
-        for (leg, d) in [d.a, d.b, d.c].into_iter().enumerate() {
+        for (leg, d) in d.into_iter().enumerate() {
             let both = [(0.5 * (1.0 - d), true), (0.5 * (1.0 + d), false)];
             let half = [if self.down { (d, false) } else { (1.0 - d, true) }];
             let wanted: &[(f64, bool)] = if self.carrier == Carrier::PerSample { &both } else { &half };
@@ -104,7 +104,7 @@ impl SwitchingInverter {
             return 0.0;
         }
         let i = phase_currents(x, self.plant.axis.pole_pairs);
-        let sign = Scalar::tanh([i.a, i.b, i.c][edge.leg] / i0);
+        let sign = Scalar::tanh(i[edge.leg] / i0);
         vdt / self.vdc * self.carrier.period(ts) * 0.5 * (1.0 + if edge.up { sign } else { -sign })
     }
 
@@ -125,8 +125,7 @@ impl SwitchingInverter {
                 let steps = Scalar::ceil((end - *now) / longest);
                 let h = (end - *now) / steps;
                 let volts = |up: bool| if up { self.vdc } else { 0.0 };
-                let [a, b, c] = self.upper.map(volts);
-                let u = clarke(Phases { a, b, c });
+                let u = clarke(self.upper.map(volts));
                 for step in 1..=steps as u32 {
                     x = runge_kutta(x, h, |x| self.plant.derivative(x, u));
                     see(*now + step as f64 * h, &x);
@@ -140,7 +139,7 @@ impl SwitchingInverter {
     }
 }
 
-fn phase_currents(x: &MachineState, pole_pairs: PolePairs) -> Phases {
+fn phase_currents(x: &MachineState, pole_pairs: PolePairs) -> [f64; 3] {
     let (alpha, beta) = rotate_out_of((x.id, x.iq), pole_pairs.electrical(x.theta));
     inverse_clarke(Stator { alpha, beta })
 }
@@ -181,7 +180,7 @@ mod tests {
                 let u = turned((-50.0, 280.0), begin + 2.0 * w * RobotAxis::TS);
                 let d = duties(u, RobotAxis::V_DC);
                 let mut edges = Vec::new();
-                for (leg, d) in [d.a, d.b, d.c].into_iter().enumerate() {
+                for (leg, d) in d.into_iter().enumerate() {
                     match carrier {
                         Carrier::PerSample => edges.extend([(0.5 - 0.5 * d, leg), (0.5 + 0.5 * d, leg)]),
                         Carrier::HalfPerSample if k % 2 == 0 => edges.push((1.0 - d, leg)),
@@ -193,8 +192,7 @@ mod tests {
                 let mut upper = [carrier == Carrier::HalfPerSample && k % 2 == 1; 3];
                 let mut now = 0.0;
                 for (at, leg) in edges {
-                    let [a, b, c] = upper.map(|up| if up { RobotAxis::V_DC } else { 0.0 });
-                    let Stator { alpha, beta } = clarke(Phases { a, b, c });
+                    let Stator { alpha, beta } = clarke(upper.map(|up| if up { RobotAxis::V_DC } else { 0.0 }));
                     let (ud, uq) = rotate_into((alpha, beta), begin + 4.0 * w * 0.5 * (now + at) * RobotAxis::TS);
                     if at > now {
                         let step = ExactStep::new(4, (at - now) * RobotAxis::TS, HeldIn::Stationary).unwrap();

@@ -1,4 +1,4 @@
-//! What heat does to a winding and to a magnet, and reading temperatures back from estimates.
+//! Effects of heat on a winding and a magnet, and temperatures from estimates.
 //!
 //! One kelvin is 0.393 % of the winding's resistance and 0.11 % of Ke, both relative to 20 C. The thesis' (3.19) has the
 //! magnet's sign wrong and mixes absolute and relative slopes; the laws here are the corrected ones.

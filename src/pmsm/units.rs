@@ -188,13 +188,13 @@ mod tests {
     // Between two terminals with the rotor still, one phase carries i and another -i. The third is open.
     #[test]
     fn terminals_see_two_phases_in_series() {
-        use crate::pmsm::frames::{Park, Phases};
+        use crate::pmsm::frames::Park;
         let (rs, i) = (0.4, 7.0);
-        let volts = Phases { a: rs * i, b: -rs * i, c: 0.0 };
-        assert_relative_eq!(phase_from_terminals((volts.a - volts.b) / i), rs, max_relative = 1e-15);
-        let dq = Park::amplitude_invariant().forward(volts, 0.3);
-        let current = Park::amplitude_invariant().forward(Phases { a: i, b: -i, c: 0.0 }, 0.3);
-        assert_relative_eq!(dq.d / current.d, rs, max_relative = 1e-14);
+        let volts = [rs * i, -rs * i, 0.0];
+        assert_relative_eq!(phase_from_terminals((volts[0] - volts[1]) / i), rs, max_relative = 1e-15);
+        let [d, ..] = Park::amplitude_invariant().forward(volts, 0.3);
+        let [current, ..] = Park::amplitude_invariant().forward([i, -i, 0.0], 0.3);
+        assert_relative_eq!(d / current, rs, max_relative = 1e-14);
     }
 
     #[test]

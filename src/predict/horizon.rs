@@ -35,7 +35,7 @@ use serde::{Deserialize, Serialize};
 pub struct Horizon {
     /// Samples from the measured state to the predicted output: one or more, and fewer than the record has.
     pub steps: usize,
-    /// What the states are restarted from: the outputs as measured, or filtered forward and backward.
+    /// Source of the restarted states: the outputs as measured, or filtered forward and backward.
     pub filter: Option<Butterworth>,
 }
 

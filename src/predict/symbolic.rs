@@ -35,7 +35,7 @@ pub(crate) fn recurrence(
         for j in 0..outputs {
             let (mean, variance) = steps.predict(&plant, &carry, j);
             let y = Symbol::leaf(Leaf::Measured(number(j)));
-            // What was not measured is not a number, and equals nothing.
+            // A missing measurement is NaN, and equals nothing.
             let if_measured = |then: Symbol, or: Symbol| Symbol::select(Comparison::Equal, y, y, then, or);
             let error = if_measured(y - mean, Symbol::from(0.0));
             let mut corrected = carry.clone();

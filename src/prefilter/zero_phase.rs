@@ -11,7 +11,7 @@ impl Butterworth {
     /// Filters a whole record in place, forward and then backward: no delay at any frequency, and the gain squared (-6 dB
     /// at the cut-off).
     ///
-    /// What is not a number stays so, and each piece between is filtered by itself. At both ends a piece is continued by
+    /// Missing values (NaN) stay missing, and each piece between them is filtered separately. At both ends a piece is continued by
     /// its point reflection until the filter has settled, or as far as the piece reaches (F. Gustafsson, IEEE Transactions
     /// on Signal Processing 44, 1996, 988-992, section II).
     pub fn zero_phase(&self, values: &mut [f64]) {

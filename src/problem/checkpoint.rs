@@ -30,7 +30,7 @@ pub(crate) struct CheckpointFile {
 
 #[derive(Serialize, Deserialize)]
 struct Saved<S> {
-    /// What the file is.
+    /// Format of the file.
     format: Format,
     version: Version,
     problem: Fingerprint,

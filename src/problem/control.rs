@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-/// What may stop an evaluation.
+/// Conditions that stop an evaluation.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Control {
     pub cancel: Option<Arc<AtomicBool>>,

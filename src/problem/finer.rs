@@ -31,9 +31,9 @@ impl<'a> FinerSweeps<'a> {
         made.get_or_init(|| make().ok()).clone()
     }
 
-    /// The sweep by the method of this description.
-    pub fn by_name(&self, integrator: &str) -> Option<Arc<dyn Sweep + 'a>> {
-        (0..).map_while(|number| self.get(number)).find(|sweep| sweep.integrator() == integrator)
+    /// The sweep by the method of this number, as an estimate has it: from one on.
+    pub fn by_number(&self, number: usize) -> Option<Arc<dyn Sweep + 'a>> {
+        self.get(number.checked_sub(1)?)
     }
 }
 
@@ -55,18 +55,17 @@ struct ByMethods<'a> {
 
 impl Finer for ByMethods<'_> {
     fn by(&self, number: usize) -> Option<&Problem<'_>> {
-        self.made.get(number)?.get_or_init(|| self.base.with_sweep(self.sweeps.get(number)?).ok()).as_ref()
+        self.made.get(number)?.get_or_init(|| self.base.with_sweep(self.sweeps.get(number)?, number + 1).ok()).as_ref()
     }
 }
 
 impl<'a> Problem<'a> {
-    /// The same problem, which a run takes on to these methods, one after the other, as long as a finer step would move an
-    /// unknown.
+    /// The same problem with finer methods. A run continues with the next of them as long as a finer step would move an unknown.
     pub(crate) fn refining(self, sweeps: Arc<FinerSweeps<'a>>) -> Self {
         if sweeps.make.is_empty() {
             return self;
         }
-        // What is prepared of the records is another for each method, and so is a checkpoint.
+        // Prepared records and checkpoints depend on the method.
         let trials = if self.settings.searches.count() > 1 { TRIALS * PARTS } else { TRIALS };
         let optimizer = self.settings.optimizer.limited(trials);
         let settings = Settings { checkpoint: None, optimizer, ..self.settings.clone() };
@@ -75,10 +74,10 @@ impl<'a> Problem<'a> {
         Problem { refines: true, finer: Some(Arc::new(ByMethods { base, sweeps, made })), ..self }
     }
 
-    fn with_sweep(&self, sweep: Arc<dyn Sweep + 'a>) -> Result<Self, Error> {
+    fn with_sweep(&self, sweep: Arc<dyn Sweep + 'a>, method: usize) -> Result<Self, Error> {
         let prepared = Problem::prepared(&*sweep, &self.records, &self.unknowns.parameters)?;
         let cuts = Cuts::new(&*sweep, &self.records, self.settings.prefilter.is_some());
-        Ok(Problem { sweep, prepared, cuts, ..self.clone() })
+        Ok(Problem { sweep, prepared, cuts, method, ..self.clone() })
     }
 
     /// The problem by a finer method, numbered from the coarsest; `None` after the last.
@@ -91,10 +90,9 @@ impl<'a> Problem<'a> {
         std::iter::once::<&Problem<'_>>(self).chain((0..).map_while(|number| self.finer(number)))
     }
 
-    /// The problem by the method of this description, as an estimate names it; this one if there is none.
-    pub(crate) fn by_name(&self, integrator: &str) -> &Problem<'_> {
-        let is = |problem: &&Problem<'_>| problem.sweep.integrator() == integrator;
-        self.by_method().find(is).unwrap_or(self)
+    /// The problem by the method of this number, as an estimate has it; this one if there is none.
+    pub(crate) fn by_number(&self, method: usize) -> &Problem<'_> {
+        method.checked_sub(1).filter(|_| method != self.method).and_then(|number| self.finer(number)).unwrap_or(self)
     }
 }
 
@@ -158,7 +156,7 @@ mod tests {
     }
 
     /// Searches by finer methods have 20 trial steps at a time, five times as many from several starts; a search that is limited more
-    /// keeps its own limit. The sweep of a method is found by its description.
+    /// keeps its own limit. Methods are found by their number.
     #[test]
     fn finer_methods_search_within_limits() {
         let outputs = (0..4).map(|k| Current { i: f64::from(k) }).collect();
@@ -172,14 +170,15 @@ mod tests {
             let refined = Problem { settings, ..problem.clone() }.refining(sweeps());
             assert_eq!(refined.finer(0).unwrap().settings.optimizer.most(), trials);
             assert!(refined.finer(1).is_none() && refined.refines && refined.by_method().count() == 2);
+            assert_eq!([0, 1, 2].map(|number| refined.by_number(number).method), [0, 1, 0]);
         }
-        assert!(sweeps().by_name(&made.integrator()).is_some() && sweeps().by_name("another").is_none());
+        assert_eq!([0, 1, 2].map(|number| sweeps().by_number(number).is_some()), [false, true, false]);
     }
 
     #[test]
     fn costs_differ_by_a_tenth_of_the_smaller_one() {
         assert!(differ(1.11, 1.0) && differ(1.0, 1.11) && !differ(1.09, 1.0) && !differ(1.0, 1.09));
-        // Those of likelihoods may be negative; two that are zero do not differ.
+        // Costs of likelihoods may be negative; two that are zero do not differ.
         assert!(differ(-1.11, -1.0) && !differ(-1.09, -1.0) && differ(1e-3, -1e-3) && !differ(0.0, 0.0));
     }
 }

@@ -17,7 +17,7 @@ const SAMPLES: usize = 100_000;
 /// Standardized errors at which the loss is evaluated.
 const ERRORS: [f64; 8] = [0.1, 0.5, 1.0, 1.5, 2.5, 5.0, 10.0, 100.0];
 
-/// What distinguishes one problem from another.
+/// Identification of a problem.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Fingerprint {

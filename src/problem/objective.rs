@@ -8,7 +8,7 @@ use crate::loss::Loss;
 use crate::optimize::{Infeasible, LeastSquares, Linearization};
 use crate::parameter::{Parameter, Transform};
 use crate::record::Record;
-use crate::sweep::{Located, OVERFLOW, RunError, Sweep, Window};
+use crate::sweep::{OVERFLOW, RunError, Sweep, Window};
 use std::sync::Arc;
 
 /// The cost of a fit, for its own and for argmin's solvers.
@@ -126,7 +126,7 @@ impl<'p> Objective<'p> {
         }
     }
 
-    /// What exactly fails in an experiment that cannot be evaluated; `sample` is where it was noticed.
+    /// The exact failure of an experiment that cannot be evaluated; `sample` is where it was noticed.
     pub(crate) fn locate(&self, e: usize, coordinates: &[f64], sample: usize) -> Failure {
         let (problem, sigma) = (self.problem, self.whitening.sigma());
         let (label, record) = (&problem.unknowns.labels[e], &problem.records[e]);
@@ -142,8 +142,8 @@ impl<'p> Objective<'p> {
             hint,
         };
         match found {
-            Some(Located::Broken(failure)) => Failure { experiment: label.clone(), ..failure },
-            Some(Located::Largest(largest)) => {
+            Some(Err(failure)) => Failure { experiment: label.clone(), ..failure },
+            Some(Ok(largest)) => {
                 let largest = Failure { experiment: label.clone(), ..largest };
                 self.unsound_prediction(e, coordinates).unwrap_or(largest)
             }

@@ -12,7 +12,7 @@ use crate::sweep::{Guess, Seed, Sweep};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// What an unknown is in the model.
+/// Role of an unknown in the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(tag = "code", content = "number", rename_all = "snake_case")]
 pub enum Role {
@@ -50,12 +50,12 @@ pub(crate) struct Unknowns {
     /// The name of each experiment in reports and errors.
     pub labels: Vec<String>,
     pub parameters: Vec<Parameter>,
-    /// What is known of each experiment's initial state.
+    /// Declarations of each experiment's initial state.
     initial: Vec<Vec<Parameter>>,
     pub row: Vec<Free>,
     /// Index of the first local unknown of each experiment, then the number of unknowns.
     begins: Vec<usize>,
-    /// What each column of an experiment's slopes is taken with respect to.
+    /// The quantity with respect to which each column of an experiment's slopes is computed.
     seeds: Vec<Arc<[Seed]>>,
 }
 
@@ -156,7 +156,7 @@ impl Unknowns {
         values
     }
 
-    /// What each column of one experiment's slopes is taken with respect to.
+    /// The quantity with respect to which each column of one experiment's slopes is computed.
     pub fn seeds(&self, experiment: usize) -> &Arc<[Seed]> {
         &self.seeds[experiment]
     }
@@ -216,7 +216,7 @@ fn labels(records: &[Record]) -> Vec<String> {
     records.iter().map(label).collect()
 }
 
-/// What is known of the state at an experiment's first sample.
+/// Declaration of the state at an experiment's first sample.
 struct InitialState {
     state: Vec<Parameter>,
     /// Which entries are a start that nobody gave: neither the user nor the outputs.

@@ -87,7 +87,7 @@ pub struct CsvFile {
     columns: Vec<Column>,
 }
 
-/// What was said of one signal.
+/// Settings of one signal.
 #[derive(Clone, Debug)]
 struct Column {
     signal: String,
@@ -124,12 +124,12 @@ impl CsvFile {
         self.with(signal, |column| column.name = name.to_owned())
     }
 
-    /// What a cell of `signal` is multiplied by, such as [`units::RPM`](crate::units::RPM); positive.
+    /// Factor of the cells of `signal`, such as [`units::RPM`](crate::units::RPM); positive.
     pub fn factor(self, signal: &str, factor: f64) -> Self {
         self.with(signal, |column| column.factor = factor)
     }
 
-    /// What is added to `signal` after its factor, in the signal's unit.
+    /// Offset added to `signal` after its factor, in the signal's unit.
     pub fn offset(self, signal: &str, offset: f64) -> Self {
         self.with(signal, |column| column.offset = offset)
     }

@@ -1,4 +1,4 @@
-//! What a record consists of: operating cycles, gaps, and how much of each output was measured.
+//! Parts of a record: operating cycles, gaps, and how much of each output was measured.
 
 use super::{Record, Time};
 use crate::numeral::exact;

@@ -11,7 +11,7 @@ use core::ops::Range;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// What the columns of a record show. Nothing in it is an error in itself: a commanded voltage is clipped on purpose, and
+/// Inspection of the columns of a record. Nothing in it is an error in itself: a commanded voltage is clipped on purpose, and
 /// an encoder at rest repeats its value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -22,7 +22,7 @@ pub struct Inspection {
     pub outputs: Vec<ChannelInspection>,
 }
 
-/// What one column shows.
+/// Inspection of one column.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelInspection {
@@ -38,7 +38,7 @@ pub struct ChannelInspection {
     pub levels: Option<usize>,
     /// Least distance of two of these values.
     pub step: Option<f64>,
-    /// What is suspicious of an output. An input has sentinels only: commands are constant for a while, limited and
+    /// Suspicious values of an output. An input has sentinels only: commands are constant for a while, limited and
     /// repeated on purpose.
     pub suspicions: Vec<Suspicion>,
 }
@@ -76,7 +76,7 @@ pub enum Suspicion {
     },
 }
 
-/// What these channels of a record showed: it does not hold for a record with others that was made from it.
+/// Inspection of these channels of a record: it does not hold for a record with others that was made from it.
 #[derive(Debug)]
 pub(crate) struct Looked {
     inputs: Arc<[Channel]>,
@@ -122,7 +122,7 @@ impl Record {
 fn inspect(channel: &Channel, pieces: &[Range<usize>], output: bool) -> ChannelInspection {
     let values = &channel.values[..];
     let mut found = values::Values::of(values, pieces, output);
-    // What is constant, or takes few values, in some pieces may not in others.
+    // A channel that is constant, or takes few values, in some pieces may not be so in others.
     let whole = 0..values.len();
     if pieces.len() > 1 && (found.least >= found.greatest || output && found.levels.is_some()) {
         found = values::Values::of(values, std::slice::from_ref(&whole), output);
@@ -153,7 +153,7 @@ impl ChannelInspection {
         self.range.filter(|(least, greatest)| least == greatest).map(|(value, _)| value)
     }
 
-    /// What is worth mentioning of its values, in words; empty if nothing is.
+    /// Remarks on its values, in words; may be empty.
     pub fn remarks(&self) -> Vec<String> {
         let mut remarks = vec![];
         if let Some(value) = self.constant() {

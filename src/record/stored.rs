@@ -77,7 +77,7 @@ fn names(quantities: &[Quantity]) -> impl Iterator<Item = &str> + Clone {
     quantities.iter().map(|quantity| quantity.name.as_str())
 }
 
-/// What stands in a file, before it is checked against a model.
+/// Contents of a file, before they are checked against a model.
 #[derive(Deserialize)]
 #[serde(rename = "Experiment", deny_unknown_fields)]
 pub(crate) struct Stored {

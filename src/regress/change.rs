@@ -19,7 +19,7 @@ impl<P: Signals> Regression<P> {
     /// By how much the parameters changed from these rows to `later`, row by row the same experiment, such as one motion made
     /// cold and warm.
     ///
-    /// What the model leaves out then repeats: the residuals of the two rows of a pair are correlated, and what they do to the
+    /// Errors of the model then repeat: the residuals of the two rows of a pair are correlated, and their effect on the
     /// parameters cancels in the difference. The two influences on the parameters, `(sum phi phi^T)^-1 phi residual`, are
     /// subtracted pair by pair, and the covariance is the sum of the products of these differences: each of its own variance
     /// and, with [`correlated`](Self::correlated) rows, over as many lags, as in [`solve`](Self::solve). If nothing repeats,
@@ -31,7 +31,7 @@ impl<P: Signals> Regression<P> {
     ///     /// A resistor.
     ///     pub struct Resistor { r: "ohm" }
     /// }
-    /// // What the model leaves out is the same in both records, and a hundred times the noise.
+    /// // The errors of the model are the same in both records, and a hundred times the noise.
     /// let record = |r: f64, noise: f64| {
     ///     let mut rows = Regression::<Resistor>::new();
     ///     for k in 0..100 {

@@ -43,7 +43,7 @@ pub enum RegressionError {
     NotPaired {
         /// Rows of the earlier one whose weight is not zero.
         rows: usize,
-        /// Those of the later one.
+        /// Number of rows of the later one.
         later: usize,
     },
     /// Directions in which the parameters may move without any effect on the rows.

@@ -6,7 +6,7 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// What the standard errors assume of the residuals.
+/// Assumption of the standard errors on the residuals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Assumption {
     /// Independent, all of the same variance.
@@ -21,7 +21,7 @@ pub enum Assumption {
 }
 
 impl Assumption {
-    /// What so many lags and these weights of rows assume; a row of weight zero is not used.
+    /// The assumption for so many lags and these weights of rows; a row of weight zero is not used.
     pub(super) fn of(lags: Option<usize>, weights: impl Iterator<Item = f64>) -> Self {
         let mut used = weights.filter(|&weight| weight > 0.0);
         match (lags, used.next()) {
@@ -60,7 +60,7 @@ pub struct LinearEstimate<P: Signals> {
     /// Condition number of the weighted regressor columns, each scaled to unit norm.
     #[serde(with = "crate::real")]
     pub condition: f64,
-    /// What the standard errors assume of the residuals.
+    /// Assumption of the standard errors on the residuals.
     pub assumption: Assumption,
 }
 

@@ -129,7 +129,7 @@ impl<P: Signals> PooledRegression<P> {
         unknowns
     }
 
-    /// What a vector of all unknowns holds for the parameters of one set.
+    /// The entries for the parameters of one set in a vector of all unknowns.
     fn of(&self, set: usize, all: &[f64]) -> Vec<f64> {
         self.unknowns(set).into_iter().map(|unknown| all[unknown]).collect()
     }

@@ -20,7 +20,7 @@ use crate::section::{Drawing, Plot, Style};
 pub(super) enum Size {
     /// As wide as the page leaves it; signals over time in so many columns at most.
     Fluid(usize),
-    /// So many pixels, margins included.
+    /// Width in pixels, margins included.
     Fixed(f64),
 }
 

@@ -1,4 +1,4 @@
-//! What a report is made of: plain values that know nothing of the model's types.
+//! Contents of a report: plain values that do not depend on the model's types.
 
 use crate::diagnose::Identifiability;
 use crate::diagnose::residuals::Residuals;
@@ -33,7 +33,7 @@ pub(super) struct Record {
     pub hold: &'static str,
     /// The inputs and the measured outputs.
     pub signals: Vec<Signal>,
-    /// What the model made of each output.
+    /// The predictions of each output.
     pub fits: Vec<OutputFit>,
     /// Its drawing; `None` where too many records would be drawn.
     pub timeline: Option<Plot>,
@@ -46,7 +46,7 @@ pub(super) struct Signal {
     pub role: &'static str,
     /// Samples that were not measured.
     pub missing: u64,
-    /// What its values show before any model, in words.
+    /// Remarks on its values, independent of the model.
     pub remarks: Vec<String>,
     /// Least value, mean and greatest value, if any was measured.
     pub values: Option<[f64; 3]>,

@@ -15,7 +15,7 @@ pub(super) fn write(path: &Path, content: &[u8]) -> Result<(), Error> {
     beside.push(".part");
     let written = fs::write(&beside, content).and_then(|()| fs::rename(&beside, path));
     written.map_err(|source| {
-        // What matters is why nothing was written, not whether its remains could be removed.
+        // The error to report is that of writing, not one of removing the partial file.
         let _ = fs::remove_file(&beside);
         failed(source)
     })

@@ -14,7 +14,7 @@ use crate::record::{Channel, ChannelInspection, Inspection, Record as Measured};
 use crate::section::{Drawing, Keep, Line, Panel, PanelKind, Plot, Samples, Style, Timeline, identifier};
 use core::ops::Range;
 
-/// So many pairs of a record and an output are drawn; of more, those reproduced worst.
+/// Number of pairs of a record and an output that are drawn; of more, those reproduced worst.
 const DRAWN: usize = 24;
 /// Numbers kept for the drawings of all records: four bytes each, a third more in letters, they are 1.4 MB of a page.
 const NUMBERS: usize = 260_000;
@@ -31,7 +31,7 @@ impl Report {
     /// # Errors
     /// An estimate of another problem; a prediction that fails or is not finite.
     pub fn new(problem: &Problem<'_>, estimate: &Summary) -> Result<Report, Error> {
-        let identifiability = diagnose::identifiability(problem, estimate)?;
+        let identifiability = diagnose::identifiability_beside_warnings(problem, estimate)?;
         let (objective, best) = problem.at(estimate)?;
         let outputs = estimate.outputs.len();
         let numbers = NUMBERS / problem.records().len().min(DRAWN / outputs.max(1)).max(1);
@@ -120,7 +120,7 @@ impl<'a> Columns<'a> {
             hold,
             signals: inputs.chain(outputs).collect(),
             fits: fits.collect(),
-            timeline: Some(Plot::new(
+            timeline: Some(Plot::of(
                 format!("record-{}", self.name),
                 "",
                 format!("{} over time", self.name),
@@ -182,7 +182,7 @@ impl<'a> Columns<'a> {
         let stretches = vec![samples.stretch(about(worst, self.t.len()), CLOSE, start)];
         let drawing = Drawing::Timeline(Timeline { start, panels: self.panels(j).to_vec(), stretches });
         let title = format!("Output {output} of {record} about its largest residual");
-        Plot::new(identifier(&format!("closeup-{record}-{output}")), "About the largest residual", title, drawing)
+        Plot::of(identifier(&format!("closeup-{record}-{output}")), "About the largest residual", title, drawing)
     }
 }
 

@@ -104,8 +104,8 @@ fn verdict(body: &mut Markup, report: &Report, prose: &mut Prose) {
         let reasons = report.reasons();
         if !reasons.is_empty() {
             header.node("ul", &[("class", &"reasons")], |list| {
-                for reason in &reasons {
-                    list.node("li", &[("class", &class(reason.severity))], |item| prose.sentence(item, &reason.text));
+                for (severity, text) in reasons {
+                    list.node("li", &[("class", &class(severity))], |item| prose.sentence(item, text));
                 }
             });
         }

@@ -8,8 +8,8 @@ pub(super) fn page(report: &Report) -> String {
     let verdict = words::verdict(report.severity);
     lines.push(format!("**{} {verdict}.** {}", words::sign(report.severity), sentence(&words::search(report))));
     lines.push(String::new());
-    for reason in report.reasons() {
-        lines.push(format!("- {} {}", words::sign_of_reason(reason.severity), sentence(&reason.text)));
+    for (severity, text) in report.reasons() {
+        lines.push(format!("- {} {}", words::sign_of_reason(severity), sentence(text)));
     }
     report.sections.iter().for_each(|part| section(&mut lines, part, 2));
     lines.push(String::new());

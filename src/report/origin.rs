@@ -70,7 +70,7 @@ impl Origin {
         Origin { at: Some(time), ..self }
     }
 
-    /// What is said of it, a row each.
+    /// Its table.
     fn table(&self) -> Table {
         let table = Table::new("Made from", ["what", "is"]);
         let files = self.files.iter().map(|(path, size, hash)| {

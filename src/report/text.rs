@@ -15,8 +15,8 @@ pub(super) fn page(report: &Report, color: bool) -> String {
     page.text.push('\n');
     let verdict = format!("{} {}.", words::sign(report.severity), words::verdict(report.severity));
     page.painted(report.severity, &verdict, &words::search(report), 0);
-    for reason in report.reasons() {
-        page.painted(reason.severity, words::sign_of_reason(reason.severity), &reason.text, 2);
+    for (severity, text) in report.reasons() {
+        page.painted(severity, words::sign_of_reason(severity), text, 2);
     }
     report.sections.iter().filter(|section| !section.folded).for_each(|section| page.section(section, 0));
     page.left_out(&report.sections);

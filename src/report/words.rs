@@ -1,4 +1,4 @@
-//! What a report says of an estimate as a whole, in sentences that every form of it shares. Names stand between backticks.
+//! Sentences of a report on the estimate as a whole, shared by all its formats. Names stand between backticks.
 
 use super::Report;
 use crate::estimate::Knowledge;

@@ -9,19 +9,19 @@ use serde::{Deserialize, Serialize};
 pub struct Plot {
     /// A name made of letters, digits and `-`, fit for a file; one plot of a report has it.
     pub name: String,
-    /// What it shows, in a sentence for those who do not see it.
+    /// Description in a sentence, for readers who do not see it.
     pub title: String,
-    /// What stands above it.
+    /// The caption above it.
     pub caption: String,
-    /// What is drawn; `None` in a report read from JSON without drawings.
+    /// The drawing; `None` in a report read from JSON without drawings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub drawing: Option<Drawing>,
+    pub(crate) drawing: Option<Drawing>,
 }
 
-/// What is drawn.
+/// The kinds of drawing.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Drawing {
+pub(crate) enum Drawing {
     /// Curves, bars and levels over a pair of axes.
     Curves(Curves),
     /// Estimates with their intervals, on one scale.
@@ -35,7 +35,7 @@ pub enum Drawing {
 /// Layers over one pair of axes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Curves {
+pub(crate) struct Curves {
     /// To the right.
     pub x: Axis,
     /// Upwards.
@@ -48,13 +48,13 @@ pub struct Curves {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Axis {
-    /// What it shows.
+    /// Name of the quantity.
     pub name: String,
     /// Its unit; may be empty.
     pub unit: String,
     /// Whether it is logarithmic; what is not above zero is not drawn then.
     pub logarithmic: bool,
-    /// What is shown besides the layers.
+    /// A value that is shown besides the layers.
     #[serde(with = "crate::real")]
     pub from: Option<f64>,
     /// Nothing beyond this is shown.
@@ -62,13 +62,13 @@ pub struct Axis {
     pub to: Option<f64>,
 }
 
-/// What a line or bar stands for; it chooses the color.
+/// Meaning of a line or bar; it determines the color.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Style {
-    /// What was measured.
+    /// Measured values.
     Measured,
-    /// What the model predicts; in a comparison, the first model.
+    /// Values predicted by the model; in a comparison, the first model.
     Predicted,
     /// Measured less predicted.
     Residual,
@@ -76,13 +76,13 @@ pub enum Style {
     Confidence,
     /// Where a new measurement is.
     Prediction,
-    /// What drives the model.
+    /// An input of the model.
     Input,
-    /// What the plot is about.
+    /// The subject of the plot.
     Main,
-    /// What it is compared with; in a comparison, the second model.
+    /// The reference for comparison; in a comparison, the second model.
     Reference,
-    /// What is there but not judged; in a comparison, further models.
+    /// Context that is not judged; in a comparison, further models.
     Quiet,
 }
 
@@ -92,7 +92,7 @@ pub enum Style {
 pub enum Layer {
     /// A curve through points.
     Line {
-        /// What it stands for.
+        /// Its meaning.
         style: Style,
         /// `x` and `y`.
         #[serde(with = "crate::real")]
@@ -100,7 +100,7 @@ pub enum Layer {
     },
     /// Points.
     Dots {
-        /// What they stand for.
+        /// Their meaning.
         style: Style,
         /// `x` and `y`.
         #[serde(with = "crate::real")]
@@ -108,7 +108,7 @@ pub enum Layer {
     },
     /// Bars of equal width, standing on zero.
     Bars {
-        /// What they stand for.
+        /// Their meaning.
         style: Style,
         /// Left edge of the first.
         #[serde(with = "crate::real")]
@@ -125,7 +125,7 @@ pub enum Layer {
         /// The value.
         #[serde(with = "crate::real")]
         value: f64,
-        /// What it is; may be empty.
+        /// Its label; may be empty.
         label: String,
     },
     /// A value of `x` to look at.
@@ -133,7 +133,7 @@ pub enum Layer {
         /// The value.
         #[serde(with = "crate::real")]
         value: f64,
-        /// What it is; may be empty.
+        /// Its label; may be empty.
         label: String,
     },
 }
@@ -142,7 +142,7 @@ pub enum Layer {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Forest {
-    /// What the scale shows, in percent.
+    /// Label of the scale, which is in percent.
     pub scale: String,
     /// One estimate each.
     pub rows: Vec<Interval>,
@@ -167,7 +167,7 @@ pub struct Interval {
 pub struct Heat {
     /// Names of the rows.
     pub rows: Vec<String>,
-    /// What stands above the columns.
+    /// Headings of the columns.
     pub columns: Vec<String>,
     /// Row by row, from -1 to 1; `None` where nothing is known.
     #[serde(with = "crate::real")]
@@ -177,8 +177,46 @@ pub struct Heat {
 }
 
 impl Plot {
-    /// A plot; in the name, what is no letter or digit becomes `-`.
-    pub fn new(name: impl AsRef<str>, caption: impl Into<String>, title: impl Into<String>, drawing: Drawing) -> Plot {
+    /// Layers over the axes `[x, y]`, the lowest first; in the name, what is no letter or digit becomes `-`.
+    pub fn new(
+        name: impl AsRef<str>,
+        caption: impl Into<String>,
+        title: impl Into<String>,
+        [x, y]: [Axis; 2],
+        layers: Vec<Layer>,
+    ) -> Plot {
+        Plot::of(name, caption, title, Drawing::Curves(Curves { x, y, layers }))
+    }
+
+    /// Its axes `[x, y]` and what is drawn over them, if it has axes.
+    pub fn curves(&self) -> Option<([&Axis; 2], &[Layer])> {
+        match &self.drawing {
+            Some(Drawing::Curves(Curves { x, y, layers })) => Some(([x, y], layers)),
+            _ => None,
+        }
+    }
+
+    /// Its signals over time, for tests.
+    #[doc(hidden)]
+    pub fn timeline(&self) -> Option<&Timeline> {
+        match &self.drawing {
+            Some(Drawing::Timeline(timeline)) => Some(timeline),
+            _ => None,
+        }
+    }
+
+    /// Whether it has its drawing: a report read from JSON may have none.
+    pub fn is_drawn(&self) -> bool {
+        self.drawing.is_some()
+    }
+
+    /// A plot of any kind.
+    pub(crate) fn of(
+        name: impl AsRef<str>,
+        caption: impl Into<String>,
+        title: impl Into<String>,
+        drawing: Drawing,
+    ) -> Plot {
         let name = identifier(name.as_ref());
         Plot { name, title: title.into(), caption: caption.into(), drawing: Some(drawing) }
     }

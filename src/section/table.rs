@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Table {
-    /// What it shows.
+    /// The caption.
     pub caption: String,
     /// Names of the columns, with units where the rows have no unit of their own.
     pub columns: Vec<String>,
@@ -75,7 +75,7 @@ impl Table {
         self.rows.iter().all(|row| row.iter().skip(1).all(number))
     }
 
-    /// What is said of the rows left out.
+    /// Remark on the rows left out.
     pub(crate) fn remainder(&self) -> Option<String> {
         (self.omitted > 0).then(|| format!("and {} more", self.omitted))
     }
@@ -119,7 +119,7 @@ impl Cell {
         percent.map_or("constant".into(), |value| Cell::Number { value, text: format!("{} %", fit(value)) })
     }
 
-    /// What a reader sees.
+    /// The text shown to the reader.
     pub fn text(&self) -> &str {
         match self {
             Cell::Empty => "",

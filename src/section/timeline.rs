@@ -14,7 +14,7 @@ pub struct Timeline {
     /// Time of the record's first sample (s), which all others count from.
     #[serde(with = "crate::real")]
     pub start: f64,
-    /// What is drawn below each other.
+    /// The panels, from top to bottom.
     pub panels: Vec<Panel>,
     /// The numbers: first those of the whole record, then pieces of it sample by sample, if the first are not.
     pub stretches: Vec<Stretch>,
@@ -24,17 +24,17 @@ pub struct Timeline {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Panel {
-    /// What it shows.
+    /// Name of the signal.
     pub name: String,
     /// Unit of its axis.
     pub unit: String,
-    /// What it is to the record.
+    /// Its role in the record.
     pub kind: PanelKind,
     /// Its lines, from the lowest to the topmost.
     pub lines: Vec<Line>,
 }
 
-/// What a panel is to the record.
+/// Role of a panel in the record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PanelKind {
@@ -50,11 +50,11 @@ pub enum PanelKind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Line {
-    /// What it stands for; [`Style::Confidence`](super::Style::Confidence) and
+    /// Its meaning; [`Style::Confidence`](super::Style::Confidence) and
     /// [`Style::Prediction`](super::Style::Prediction) are half widths of a band about the mean of the panel's predicted
     /// line.
     pub style: super::Style,
-    /// What it is called.
+    /// Its label.
     pub name: String,
     /// Whether it keeps its value from sample to sample.
     pub held: bool,
@@ -88,7 +88,7 @@ pub struct Trace {
     pub mean: Vec<Option<f64>>,
 }
 
-/// What is kept of the samples of a column.
+/// The samples of a column that are kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Keep {
     /// The least and the greatest.
@@ -232,7 +232,7 @@ mod tests {
         }
     }
 
-    /// What is missing in all of a column is a gap; time without samples is one too, if it is wider than a column.
+    /// Samples that are missing throughout a column are a gap; time without samples is one too, if it is wider than a column.
     #[test]
     fn what_is_missing_is_a_gap() {
         let t = [10.0, 11.0, 12.0, 13.0, 14.0, 15.0];

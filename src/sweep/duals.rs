@@ -1,7 +1,7 @@
 //! [`DualSweep`]: models run in numbers with slopes, one piece at a time.
 
 use super::filtered::Filter;
-use super::{Located, ModelCode, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit, unmoved};
+use super::{ModelCode, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit, unmoved};
 use crate::error::{Error, Failure};
 use crate::functions::Functions;
 use crate::integrate::{Duals, Method, Stuck};
@@ -113,7 +113,7 @@ impl Sweep for DualSweep<'_> {
         sample: usize,
         sigma: &[f64],
         stops: &dyn Fn() -> bool,
-    ) -> Option<Located> {
+    ) -> Option<Result<Failure, Failure>> {
         let (layout, values, duals) = (&*self.layout, self.code.values(), self.code.duals());
         let search = FailureSearch { layout, values, duals, method: &*self.method, record };
         Some(search.locate(state, parameters, sample, sigma, stops))
@@ -161,10 +161,17 @@ impl FailureSearch<'_> {
         Failure { experiment: self.record.name().to_owned(), sample: k, time: self.record.time(k), signal, value, hint }
     }
 
-    /// The cause of a failure in a simulation from this state; where nothing fails, the error that is largest relative
-    /// to the noise.
-    pub fn locate(&self, state: &[f64], p: &[f64], sample: usize, sigma: &[f64], stops: &dyn Fn() -> bool) -> Located {
-        let broken = |k, signal, value, hint| Located::Broken(self.failure(k, signal, value, hint));
+    /// The cause of a failure in a simulation from this state, as an error; where nothing fails, the error of an output that is
+    /// largest relative to the noise.
+    pub fn locate(
+        &self,
+        state: &[f64],
+        p: &[f64],
+        sample: usize,
+        sigma: &[f64],
+        stops: &dyn Fn() -> bool,
+    ) -> Result<Failure, Failure> {
+        let broken = |k, signal, value, hint| Err(self.failure(k, signal, value, hint));
         let unsound = |values: &[f64]| {
             let i = values.iter().position(|v| !v.is_finite())?;
             Some((i, values[i], if values[i].is_nan() { UNDEFINED } else { OVERFLOW }))
@@ -213,7 +220,7 @@ impl FailureSearch<'_> {
             x = next;
         }
         let (k, j, error) = largest;
-        Located::Largest(self.failure(k, format!("the error of output `{}`", self.layout.outputs[j].name), error, HUGE))
+        Ok(self.failure(k, format!("the error of output `{}`", self.layout.outputs[j].name), error, HUGE))
     }
 }
 

@@ -36,7 +36,7 @@ trait Unit: Copy {
     fn run<M: Model, I: Integrator, D: Number>(self, fill: Fill<'_, '_, M, I, D>) -> Result<(), RunError>;
 }
 
-/// Those that every machine has.
+/// The instructions that every machine has.
 #[derive(Clone, Copy)]
 struct Portable;
 

@@ -7,10 +7,10 @@ mod interleaved;
 mod run;
 mod workspace;
 
-use super::{Coupling, Located, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
+use super::{Coupling, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
 use crate::engine::{Program, Sampling, Trajectories};
 use crate::equations::Equations;
-use crate::error::Error;
+use crate::error::{Error, Failure};
 use crate::graph::Untraceable;
 use crate::integrate::Method;
 use crate::interval::Hold;
@@ -44,10 +44,10 @@ struct Programs {
     refined: OnceLock<Option<Arc<Programs>>>,
 }
 
-/// So many samples take about as long in dual numbers as a program takes to be compiled.
+/// Number of samples that take as long in dual numbers as a program takes to be compiled.
 const WORTH_COMPILING: usize = 4_000;
 
-/// What a program depends on besides the recurrence.
+/// Properties that a program depends on besides the recurrence.
 #[derive(Clone, Debug, PartialEq)]
 struct Key {
     hold: Hold,
@@ -56,7 +56,7 @@ struct Key {
     purpose: Purpose,
 }
 
-/// What a program computes.
+/// The functions that a program computes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Purpose {
     /// Rows of many trajectories.
@@ -100,7 +100,7 @@ impl Programs {
         Ok(programs)
     }
 
-    /// Those with a finer step, made when they are first needed.
+    /// The programs with a finer step, made when they are first needed.
     fn refined(&self) -> Option<Arc<Programs>> {
         let make = || {
             let method = self.method.refined(self.equations.layout().kind)?;
@@ -217,7 +217,7 @@ impl Sweep for ProgramSweep<'_> {
         sample: usize,
         sigma: &[f64],
         stops: &dyn Fn() -> bool,
-    ) -> Option<Located> {
+    ) -> Option<Result<Failure, Failure>> {
         self.plain.locate(record, state, parameters, sample, sigma, stops)
     }
 

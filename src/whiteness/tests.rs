@@ -103,7 +103,7 @@ fn a_p_value_is_how_often_chance_shows_as_much() {
     }
 }
 
-/// Squares that overflow say nothing, and do not panic.
+/// Squares that overflow give no result, and do not panic.
 #[test]
 fn huge_errors_have_a_p_value() {
     for size in [1e80, 1e160, f64::MAX] {

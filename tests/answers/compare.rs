@@ -2,8 +2,7 @@
 
 use crate::random::Random;
 use greybox::diagnose::{
-    Candidate, Comparison, Resampling, Test, bootstrap, cross_validate, derived, drift, f_test, likelihood_ratio,
-    tested, validate,
+    Candidate, Resampling, Test, bootstrap, cross_validate, derived, drift, f_test, likelihood_ratio, tested, validate,
 };
 use greybox::optimize::Severity;
 use greybox::{
@@ -74,7 +73,7 @@ fn nested_models_are_told_apart() {
     assert!((statistic / expected - 1.0).abs() < 1e-12, "{statistic} {expected}");
     let (few, many) = (&line.estimate, &parabola.estimate);
     assert!(many.aicc() < few.aicc() && many.bic() < few.bic());
-    let table = Comparison(vec![line, parabola]).to_string();
+    let table = greybox::report::Section::from(&[line, parabola][..]).tables[0].to_string();
     println!("{table}");
     assert!(table.lines().any(|line| line.starts_with("c ") && line.contains(" - ")), "{table}");
 }
@@ -275,7 +274,7 @@ fn failed_tests_are_reasons() {
         meaning: format!("passed: {passed}"),
     };
     let section = tested("models", [&test(true), &test(false), &test(true)]);
-    let reasons: Vec<_> = section.parts.iter().flat_map(|part| &part.reasons).collect();
+    let reasons = section.all_reasons();
     assert_eq!(reasons.len(), 1, "{reasons:?}");
-    assert!(reasons[0].text.contains("passed: false") && reasons[0].severity == Severity::UsableWithCare);
+    assert!(reasons[0].1.contains("passed: false") && reasons[0].0 == Severity::UsableWithCare);
 }

@@ -117,6 +117,7 @@ fn programs_find_codes_and_the_covariance() {
     assert_eq!(codes, ["known", "known", "fixed"]);
     assert_eq!(value["outcome"]["code"], "converged");
     assert_eq!(value["method"]["covariance"]["code"], "classical");
+    assert_eq!(value["method"]["refinement"], 0);
     assert_eq!(value["unknowns"][1]["role"], serde_json::json!({ "code": "parameter", "number": 1 }));
     assert_eq!(value["parameters"][1]["declared"]["upper"], "Infinity");
     let matrix = &value["covariance"]["matrix"];

@@ -4,7 +4,7 @@ use crate::random::Random;
 use greybox::diagnose::residuals::examine;
 use greybox::diagnose::{Compared, Convergence, bands, profile};
 use greybox::optimize::Severity;
-use greybox::report::{Drawing, Layer, Plot, Section, Style};
+use greybox::report::{Layer, Plot, Section, Style};
 use greybox::{Error, Experiment, ExperimentOf, Fit, Model, Report, Scalar, Time, free, signals};
 
 signals! { pub struct Drive { u: "V" } }
@@ -67,16 +67,12 @@ fn plot<'a>(report: &'a Report, begin: &str) -> &'a Plot {
 
 macro_rules! timeline {
     ($plot:expr) => {
-        match &$plot.drawing {
-            Some(Drawing::Timeline(timeline)) => timeline,
-            _ => panic!("no timeline: {}", $plot.name),
-        }
+        $plot.timeline().expect("a timeline")
     };
 }
 
 fn layers(plot: &Plot) -> &[Layer] {
-    let Some(Drawing::Curves(curves)) = &plot.drawing else { panic!("no curves: {}", plot.name) };
-    &curves.layers
+    plot.curves().expect(&plot.name).1
 }
 
 /// The `d` of every path of a class.
@@ -313,9 +309,9 @@ fn profiles_are_compared_with_their_parabola() {
 fn what_was_missing_is_there() {
     let fitted = record(even(1000), 0.02, 41);
     let report = report(std::slice::from_ref(&fitted)).unwrap();
-    let Some(Drawing::Curves(curves)) = &plot(&report, "autocorrelation").drawing else { panic!() };
-    let Layer::Bars { first, width, .. } = &curves.layers[0] else { panic!() };
-    assert_eq!((curves.x.unit.as_str(), *width), ("s", 0.01));
+    let ([x, _], bars) = plot(&report, "autocorrelation").curves().unwrap();
+    let Layer::Bars { first, width, .. } = &bars[0] else { panic!() };
+    assert_eq!((x.unit.as_str(), *width), ("s", 0.01));
     assert!((first - 0.005).abs() < 1e-12);
     let spectrum = plot(&report, "spectrum");
     let Layer::Line { points, .. } = &layers(spectrum)[1] else { panic!() };

@@ -3,7 +3,7 @@
 use greybox::diagnose::{Resampling, Test, bootstrap, profile, tested};
 use greybox::optimize::Severity;
 use greybox::pmsm::{Surface, Winding};
-use greybox::report::{Cell, Drawing, Origin, Section, Table};
+use greybox::report::{Cell, Origin, Section, Table};
 use greybox::{
     Error, Experiment, ExperimentOf, Fit, Kind, Model, Nothing, Report, Scalar, Signals, Time, fixed, free, signals,
 };
@@ -12,13 +12,7 @@ use std::path::PathBuf;
 
 /// The drawing of the first record.
 macro_rules! timeline {
-    ($report:expr) => {{
-        let drawn = $report.plots().into_iter().find_map(|plot| match &plot.drawing {
-            Some(Drawing::Timeline(timeline)) => Some(timeline),
-            _ => None,
-        });
-        drawn.unwrap()
-    }};
+    ($report:expr) => {{ $report.plots().into_iter().find_map(|plot| plot.timeline()).unwrap() }};
 }
 
 signals! {
@@ -311,7 +305,7 @@ fn tests_that_may_fail_by_chance_are_called_so() {
     let section = report.sections.iter().find(|section| section.id == "residuals").unwrap();
     assert_eq!(section.severity, Severity::Usable);
     let reason = "2 of 32 tests of the residuals failed, none clearly: among so many that may be chance";
-    assert_eq!(section.reasons[0].text, reason);
+    assert_eq!(section.all_reasons()[0].1, reason);
     assert_eq!(section.sentences[0], "Of 32 tests so many may fail by chance. If it is none:");
 }
 

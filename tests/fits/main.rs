@@ -10,6 +10,8 @@ mod closure_sweep;
 #[path = "../common/mod.rs"]
 mod common;
 mod contradictions;
+#[path = "../common/dc_motor.rs"]
+mod dc_motor;
 mod declared;
 mod dense_answers;
 mod equations;

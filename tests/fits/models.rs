@@ -1,5 +1,6 @@
-//! The models that ship: their slopes, what physics says of them, and the records that they were made for.
+//! The models that ship, and a direct-current motor: their slopes, their balance of power, and the records that they were made for.
 
+use crate::dc_motor::{Armature, DcMotor, Feed, Rotation};
 use crate::shared::shared;
 use approx::assert_relative_eq;
 use greybox::models::*;

@@ -30,6 +30,8 @@ fn the_default_method_is_as_fine_as_the_plant_asks_for() {
         let fit = Fit::new(&Coupled, &record).parameters(near(truth)).run().unwrap();
         println!("{fit}");
         assert!(fit.method.integrator.contains(method), "{c}: {}", fit.method.integrator);
+        let steps = ["1 step ", "4 steps ", "16 steps ", "64 steps "];
+        assert_eq!(Some(fit.method.refinement), steps.iter().position(|steps| method.starts_with(steps)));
         assert!(fit.severity() < Severity::NotUsable, "{fit}");
         // A note at most, that the data alone do not tell this step from a coarser one.
         let coarse = |warning: &estimate::Warning| {

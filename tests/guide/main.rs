@@ -9,7 +9,7 @@ mod models;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use greybox::diagnose::{self, Compared};
 use greybox::pmsm::{Currents, Drive, Surface, Winding};
-use greybox::report::{Axis, Curves, Drawing, Layer, Plot, Section, Style};
+use greybox::report::{Axis, Layer, Plot, Section, Style};
 use greybox::{Estimate, Experiment, ExperimentOf, Fit, Model, Report, Time, fixed, free, simulate};
 use models::{Behind, Coil, Current, Force, Mass, Position, Rotor, Shaft, Speed, Spring, Swing, Torque, Voltage};
 use std::path::Path;
@@ -78,8 +78,7 @@ fn over_time<M: Model>(
         Layer::Dots { style: Style::Main, points: all.into_iter().step_by(every).collect() },
         Layer::Line { style: Style::Predicted, points: predicted },
     ];
-    let drawing = Curves { x: Axis::new("time", "s"), y: Axis::new(name, unit), layers };
-    Ok(Plot::new(name, caption, caption, Drawing::Curves(drawing)))
+    Ok(Plot::new(name, caption, caption, [Axis::new("time", "s"), Axis::new(name, unit)], layers))
 }
 
 /// The plot of a section whose name begins so.

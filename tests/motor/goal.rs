@@ -8,9 +8,14 @@ use crate::acceptance_records::{Worst, cycles, every, filter, percent};
 use greybox::pmsm::offline::{Equations, Extended, Spans};
 use greybox::pmsm::program::Cycle;
 use greybox::pmsm::robot::RobotAxis;
-use greybox::pmsm::{Compensated, CompensatedSalientWinding, EmfHarmonic, ExactSalient, ExactStep, HeldIn};
-use greybox::{Fit, free, regress::PooledRegression};
+use greybox::pmsm::{Compensated, EmfHarmonic, ExactSalient, ExactStep, HeldIn};
+use greybox::{Fit, free, regress::PooledRegression, signals};
 use std::sync::OnceLock;
+
+signals! {
+    /// A salient motor with a harmonic in its EMF, its cable, and the size of its inverter's dead time.
+    pub struct CompensatedSalientWinding { rs: "ohm", ld: "H", lq: "H", ke: "V s/rad", ke6: "V s/rad", vdt: "V" }
+}
 
 /// What all cycles of an axis share: what belongs to the motor. How dead time acts on the mean voltage depends on how fast the
 /// currents pass through zero, and with it on the speed.

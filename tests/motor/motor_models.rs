@@ -19,6 +19,11 @@ signals! {
     }
 }
 
+signals! {
+    /// A motor with surface magnets, its magnet by flux linkage.
+    pub struct FluxWinding { rs: "ohm", ls: "H", psi_m: "Wb" }
+}
+
 const T: f64 = 0.3;
 const I: Currents = Currents { id: -3.0, iq: 11.0 };
 const U: Drive = Drive { ud: -20.0, uq: 90.0, w: 120.0 };

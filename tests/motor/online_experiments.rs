@@ -3,10 +3,12 @@
 use greybox::online::{Divergence, Mras, MrasStart, Order, Stepping, UpdateOutcome, Watch};
 use greybox::pmsm::{
     Adaptation, Currents, Drive, ExactStep, ExactSurface, HeldIn, KeLyapunov, MotorLaw, NotAdapted, RsDirect,
-    RsLyapunov, SQRT_2_3, SQRT_3_2, Surface, Winding,
+    RsLyapunov, SQRT_2_3, Surface, Winding,
 };
 use greybox::{Model, Parameter, fixed, free};
 
+/// `kt / ke`: torque per phase peak over line-to-line rms back-EMF per speed.
+const SQRT_3_2: f64 = 1.224_744_871_391_589;
 const TS: f64 = 0.126e-3;
 const LAMBDA: f64 = 1e-3;
 

@@ -24,10 +24,10 @@ fn orders() {
         ("Esdirk", order(&Esdirk { relative: ANY, absolute: ANY }), 4.0),
     ];
     for (name, found, expected) in cases {
-        let found = found.unwrap();
+        let [values, slopes] = found.unwrap();
         println!("{name}: {found:?}");
-        assert!((found.values - expected).abs() < 0.2, "{name}: {found:?}");
-        assert!((found.slopes - expected).abs() < 0.2, "{name}: {found:?}");
+        assert!((values - expected).abs() < 0.2, "{name}: {found:?}");
+        assert!((slopes - expected).abs() < 0.2, "{name}: {found:?}");
     }
 }
 

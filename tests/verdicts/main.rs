@@ -1,5 +1,7 @@
 //! Verdicts on records of many kinds, good and bad: what is junk is never called usable, and what is good is.
 
+#[path = "../common/dc_motor.rs"]
+mod dc_motor;
 mod extremes;
 mod further;
 mod good;

@@ -1,7 +1,7 @@
 //! Plants, and what their records are made of.
 
+use crate::dc_motor::DcMotor;
 pub use crate::records::*;
-use greybox::models::DcMotor;
 use greybox::pmsm::Surface;
 use greybox::{Kind, Model, Nothing, Scalar, signals};
 

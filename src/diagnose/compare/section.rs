@@ -1,43 +1,41 @@
 //! Comparisons and validations as sections of a report.
 
-use super::{Comparison, Validation};
+use super::{Candidate, Validation};
 use crate::estimate::{Knowledge, OutputFit, Summary, Unknown};
 use crate::numeral::{counted, error_size, number, resolved};
 use crate::section::{Cell, Section, Table};
 
-impl Comparison {
-    /// The unknowns and criteria, a column for each candidate.
-    pub(super) fn table(&self) -> Table {
-        let mut names: Vec<&str> = vec![];
-        for unknown in self.0.iter().flat_map(|candidate| &candidate.estimate.unknowns) {
-            if !names.contains(&unknown.name.as_str()) {
-                names.push(&unknown.name);
-            }
+/// The unknowns and criteria, a column for each candidate.
+fn table(candidates: &[Candidate]) -> Table {
+    let mut names: Vec<&str> = vec![];
+    for unknown in candidates.iter().flat_map(|candidate| &candidate.estimate.unknowns) {
+        if !names.contains(&unknown.name.as_str()) {
+            names.push(&unknown.name);
         }
-        let columns = [""].into_iter().chain(self.0.iter().map(|candidate| candidate.title.as_str()));
-        let columns = columns.map(str::to_owned).collect();
-        let empty = Table { columns, ..Table::new("Estimates side by side", []) };
-        let row = |label: &str, cell: &dyn Fn(&Summary) -> Cell| -> Vec<Cell> {
-            [label.into()].into_iter().chain(self.0.iter().map(|candidate| cell(&candidate.estimate))).collect()
-        };
-        let unknowns = names
-            .iter()
-            .map(|name| row(name, &|s| s.unknowns.iter().find(|u| u.name == *name).map_or("-".into(), estimate)));
-        let optional = |value: Option<f64>| value.map_or("-".into(), |value| Cell::number(value, 8));
-        let fits = |s: &Summary| {
-            let fit = |fit: Option<f64>| fit.map_or("-".to_owned(), crate::numeral::fit);
-            s.outputs.iter().map(|output| fit(output.fit.fit_percent)).collect::<Vec<_>>().join(" / ").into()
-        };
-        empty.rows(unknowns).rows([
-            row("fit %", &fits),
-            row("measurements", &|s| s.measurements.into()),
-            row("unknowns", &|s| (s.unknowns.len() as u64).into()),
-            row("AIC", &|s| optional(s.aic())),
-            row("AICc", &|s| optional(s.aicc())),
-            row("BIC", &|s| optional(s.bic())),
-            row("verdict", &|s| s.severity().to_string().into()),
-        ])
     }
+    let columns = [""].into_iter().chain(candidates.iter().map(|candidate| candidate.title.as_str()));
+    let columns = columns.map(str::to_owned).collect();
+    let empty = Table { columns, ..Table::new("Estimates side by side", []) };
+    let row = |label: &str, cell: &dyn Fn(&Summary) -> Cell| -> Vec<Cell> {
+        [label.into()].into_iter().chain(candidates.iter().map(|candidate| cell(&candidate.estimate))).collect()
+    };
+    let unknowns = names
+        .iter()
+        .map(|name| row(name, &|s| s.unknowns.iter().find(|u| u.name == *name).map_or("-".into(), estimate)));
+    let optional = |value: Option<f64>| value.map_or("-".into(), |value| Cell::number(value, 8));
+    let fits = |s: &Summary| {
+        let fit = |fit: Option<f64>| fit.map_or("-".to_owned(), crate::numeral::fit);
+        s.outputs.iter().map(|output| fit(output.fit.fit_percent)).collect::<Vec<_>>().join(" / ").into()
+    };
+    empty.rows(unknowns).rows([
+        row("fit %", &fits),
+        row("measurements", &|s| s.measurements.into()),
+        row("unknowns", &|s| (s.unknowns.len() as u64).into()),
+        row("AIC", &|s| optional(s.aic())),
+        row("AICc", &|s| optional(s.aicc())),
+        row("BIC", &|s| optional(s.bic())),
+        row("verdict", &|s| s.severity().to_string().into()),
+    ])
 }
 
 /// An estimate with its standard error.
@@ -54,15 +52,10 @@ fn estimate(unknown: &Unknown) -> Cell {
     Cell::Number { value, text }
 }
 
-impl From<&Comparison> for Section {
-    fn from(comparison: &Comparison) -> Section {
-        Section::new("comparison", "Estimates side by side").table(comparison.table())
-    }
-}
-
-impl From<Comparison> for Section {
-    fn from(comparison: Comparison) -> Section {
-        Section::from(&comparison)
+/// Candidates side by side.
+impl From<&[Candidate]> for Section {
+    fn from(candidates: &[Candidate]) -> Section {
+        Section::new("comparison", "Estimates side by side").table(table(candidates))
     }
 }
 

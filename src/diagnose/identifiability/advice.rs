@@ -1,23 +1,30 @@
-//! What the findings mean and what would help, a sentence each.
+//! Meaning of the findings and remedies, a sentence each.
 
 use super::together::together;
-use super::{Excitation, Identifiability};
-use crate::estimate::Unknown;
+use super::{Collinear, Excitation, Identifiability};
+use crate::estimate::{Direction, Unknown};
 use crate::numeral::{counted, exact, number, percent};
 use crate::problem::Role;
 use crate::record::Record;
+use std::collections::BTreeSet;
 
 /// An output that holds so much of an unknown's information is the only one that determines it.
 const ONLY: f64 = 0.99;
 /// More than this is not told from all.
 const ALL: f64 = 0.999;
-/// So much of an unknown's information from one tenth of a record leaves little to the others.
+/// Part of an unknown's information from one tenth of a record, from which on the advice names it.
 const ONCE: f64 = 0.9;
 
 /// Sets that are put into words; the strongest come first.
 const MENTIONED: usize = 3;
 
-pub(super) fn advice(found: &Identifiability, unknowns: &[Unknown], records: &[Record]) -> Vec<String> {
+/// The sets of unknowns of the directions `warned` are left out.
+pub(super) fn advice(
+    found: &Identifiability,
+    warned: &[Direction],
+    unknowns: &[Unknown],
+    records: &[Record],
+) -> Vec<String> {
     let mut advice = vec![];
     let n = unknowns.len() as u64;
     if found.generic_rank < n {
@@ -34,7 +41,8 @@ pub(super) fn advice(found: &Identifiability, unknowns: &[Unknown], records: &[R
             found.rank
         ));
     }
-    for set in found.collinear.iter().take(MENTIONED) {
+    let is_warned = |set: &Collinear| warned.iter().any(|direction| names(&direction.moves) == names(&set.moves));
+    for set in found.collinear.iter().take(MENTIONED).filter(|set| !is_warned(set)) {
         let left = set.index.map_or(0.0, f64::recip);
         advice.extend(together(&set.moves, left, unknowns).map(|text| text + "; fix one, or excite them apart"));
     }
@@ -64,6 +72,11 @@ pub(super) fn advice(found: &Identifiability, unknowns: &[Unknown], records: &[R
         }
     }
     advice
+}
+
+/// The names of unknowns that change together.
+fn names(moves: &[(String, f64)]) -> BTreeSet<&str> {
+    moves.iter().map(|(name, _)| name.as_str()).collect()
 }
 
 /// Which parameters only one of several outputs determines, output by output.
@@ -109,7 +122,7 @@ fn one_moment(excited: &Excitation) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Collinear, Segment};
+    use super::super::Segment;
     use super::*;
     use crate::tests::{Current, Gain, Line, Voltage};
     use crate::{Experiment, Fit, Time, free};
@@ -152,7 +165,13 @@ mod tests {
             advice: vec![],
         };
         let records: Vec<Record> = records.iter().map(|record| record.record().clone()).collect();
-        advice(&found, &unknowns, &records)
+        // A direction of the same unknowns, in any order, takes the sets' place; one of others does not.
+        let direction =
+            |names: &[&str]| Direction { moves: names.iter().map(|name| ((*name).to_owned(), 1.0)).collect() };
+        let left = |names: &[&str]| advice(&found, &[direction(names)], &unknowns, &records).len();
+        let all = advice(&found, &[], &unknowns, &records).len();
+        assert_eq!([left(&["a"]), left(&["a", "c"]), left(&["b", "a"])], [all, all, all - sets.min(MENTIONED)]);
+        advice(&found, &[], &unknowns, &records)
     }
 
     const EVEN: [f64; 4] = [0.25; 4];

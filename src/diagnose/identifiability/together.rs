@@ -6,7 +6,7 @@ use crate::numeral::{number, percent};
 /// Moves are the same if they differ by less than this part.
 const SAME: f64 = 0.02;
 
-/// What cannot be told apart, in the words that fit the case; `None` of a single unknown, or of one that is not listed.
+/// Unknowns that cannot be told apart, in the words that fit the case; `None` of a single unknown, or of one that is not listed.
 ///
 /// `moves` holds names and changes in the unknowns' own units; `left` is what remains of the effect when they move
 /// together, as a part of what one alone would change, zero for nothing at all.

@@ -82,7 +82,7 @@ impl Profile {
             self.name
         );
         let caption = format!("`{}`: {} {}", self.name, self.ends(), self.unit);
-        Plot::new(format!("profile-{}", self.name), caption.trim_end(), title, Drawing::Curves(drawing))
+        Plot::of(format!("profile-{}", self.name), caption.trim_end(), title, Drawing::Curves(drawing))
     }
 
     /// The quadratic approximation over what the curve spans.

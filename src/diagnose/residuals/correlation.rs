@@ -1,6 +1,6 @@
 //! Correlation of residuals with what went in and what was measured before.
 
-use super::Series;
+use super::{Series, SignalRole};
 use crate::diagnose::{LEVEL, Test};
 use crate::whiteness::dot;
 use serde::{Deserialize, Serialize};
@@ -12,8 +12,8 @@ use statrs::distribution::{ContinuousCDF, Normal};
 pub struct Correlation {
     /// Name of the signal.
     pub signal: String,
-    /// What it is: `input` or `measured output`.
-    pub role: String,
+    /// Its role: an input or a measured output.
+    pub role: SignalRole,
     /// The first lag (samples): the signal this much before the residual; negative where it comes after.
     pub first_lag: i64,
     /// Correlation at that lag and the following ones.
@@ -26,6 +26,9 @@ pub struct Correlation {
     /// 16.65).
     #[serde(with = "crate::real")]
     pub band: f64,
+    /// The test's probability of correlations so large if there is none.
+    #[serde(with = "crate::real")]
+    pub p_value: f64,
 }
 
 /// Sum of `a[t] b[t - k]` for `k = 0..=lags`, in pieces that stay close to the processor for all lags.
@@ -43,7 +46,7 @@ pub(super) fn lagged(a: &[f64], b: &[f64], lags: usize) -> Vec<f64> {
     sums
 }
 
-pub(super) fn between(residuals: &Series, own: &[f64], signal: &Series) -> (Correlation, Test) {
+pub(super) fn between(residuals: &Series, own: &[f64], role: SignalRole, signal: &Series) -> (Correlation, Test) {
     let lags = residuals.lags();
     let (e, s) = (&residuals.values, &signal.values);
     let common = match residuals.missing.is_empty() && signal.missing.is_empty() {
@@ -58,7 +61,7 @@ pub(super) fn between(residuals: &Series, own: &[f64], signal: &Series) -> (Corr
     let deviation = ((1.0 + 2.0 * both).max(0.1) / common).sqrt();
 
     // Residuals go with their own output of the same sample by construction: only its past is tested.
-    let is_output = signal.role == "measured output";
+    let is_output = role == SignalRole::MeasuredOutput;
     let tested_from = i64::from(is_output);
     let tested = &values[lags + usize::from(is_output)..];
     let largest = tested.iter().fold(0.0f64, |m, r| m.max(r.abs())) / deviation;
@@ -81,7 +84,7 @@ pub(super) fn between(residuals: &Series, own: &[f64], signal: &Series) -> (Corr
         ),
     };
     let test = Test::new(
-        format!("cross-correlation with {} `{}`", signal.role, signal.name),
+        format!("cross-correlation with {role} `{}`", signal.name),
         largest,
         p_value,
         "nothing of it is left in the residuals",
@@ -89,11 +92,12 @@ pub(super) fn between(residuals: &Series, own: &[f64], signal: &Series) -> (Corr
     );
     let correlation = Correlation {
         signal: signal.name.to_owned(),
-        role: signal.role.to_owned(),
+        role,
         first_lag: -(lags as i64),
         values,
         tested_from,
         band,
+        p_value,
     };
     (correlation, test)
 }

@@ -178,7 +178,7 @@ mod tests {
             (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
         };
         let raw: Vec<f64> = (0..4096).map(|_| noise()).collect();
-        let series = Series::new("residual", "y", "V", &raw);
+        let series = Series::new("y", "V", &raw);
         let (spectrum, period, _) = find(&series, 0.01);
         let width = 50.0 / BANDS as f64;
         let power: f64 = spectrum.density.iter().map(|density| density * width).sum();
@@ -242,7 +242,7 @@ mod tests {
                 low = 0.98 * low + e;
                 raw.push(low + amplitude * (TAU * (k * line) as f64 / samples as f64).sin());
             }
-            let series = Series::new("residual", "y", "V", &raw);
+            let series = Series::new("y", "V", &raw);
             let (_, period, test) = find(&series, 0.01);
             let power = |f: usize| {
                 let turn = |k: usize| -TAU * (f * k % samples) as f64 / samples as f64;
@@ -273,7 +273,7 @@ mod tests {
         let (samples, step, frequency) = (1024, 0.01, 12.3);
         let sine = |k: usize| 0.5 * (TAU * frequency * k as f64 * step + 0.4).sin();
         let raw: Vec<f64> = noise(samples).enumerate().map(|(k, e)| sine(k) + 1e-3 * e).collect();
-        let (spectrum, period, _) = find(&Series::new("residual", "y", "V", &raw), step);
+        let (spectrum, period, _) = find(&Series::new("y", "V", &raw), step);
         let period = period.unwrap();
         // Lines are 0.098 Hz apart; the top of the parabola is within a tenth of that. 12.3 Hz is 0.05 lines off one, which
         // takes sinc(0.05)^2, less than a hundredth.

@@ -1,6 +1,6 @@
 //! Whether the residuals' spread depends on a signal (heteroscedasticity).
 
-use super::Series;
+use super::{Series, SignalRole};
 use crate::diagnose::Test;
 use crate::whiteness::chi_squared_tail;
 use serde::{Deserialize, Serialize};
@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 pub struct Spread {
     /// Name of the signal.
     pub signal: String,
-    /// What it is: `input`, `predicted output` or `time`.
-    pub role: String,
+    /// Its role: an input, a predicted output or the time.
+    pub role: SignalRole,
     /// Unit of the signal.
     pub unit: String,
     /// Middle of each part of the signal's range in which it was met.
@@ -26,15 +26,20 @@ pub struct Spread {
     /// Part of the variance of the squared residuals that the signal explains.
     #[serde(with = "crate::real")]
     pub share: f64,
+    /// The test's probability of such a part if the residuals are of one size.
+    #[serde(with = "crate::real")]
+    pub p_value: f64,
 }
 
 const PARTS: usize = 12;
 
-/// What can be done: a weighting sees time and inputs, but not the outputs.
-fn remedy(signal: &Series) -> String {
-    match signal.role {
-        "input" | "time" => format!("a weighting by `{}` makes the quieter part count for more", signal.name),
-        _ => {
+/// The remedy: a weighting sees time and inputs, but not the outputs.
+fn remedy(role: SignalRole, signal: &Series) -> String {
+    match role {
+        SignalRole::Input | SignalRole::Time => {
+            format!("a weighting by `{}` makes the quieter part count for more", signal.name)
+        }
+        SignalRole::MeasuredOutput | SignalRole::PredictedOutput => {
             "fit a part of the record in which they are of one size (`Experiment::between`), and compare the estimates"
                 .to_owned()
         }
@@ -43,7 +48,7 @@ fn remedy(signal: &Series) -> String {
 
 /// Koenker's form (J. Econometrics 17 (1981) 107) of Breusch and Pagan's test with the signal and its square, which does
 /// not ask for normal residuals.
-pub(super) fn over(residuals: &Series, effective: f64, signal: &Series) -> Option<(Spread, Test)> {
+pub(super) fn over(residuals: &Series, effective: f64, role: SignalRole, signal: &Series) -> Option<(Spread, Test)> {
     let scale = signal.deviation.recip();
     let variance = residuals.deviation.powi(2);
     // Sums of products of (1, x, x^2) and the squared residuals.
@@ -96,20 +101,20 @@ pub(super) fn over(residuals: &Series, effective: f64, signal: &Series) -> Optio
     let met = || (0..PARTS).filter(|&part| counts[part] > 0);
     let spread = Spread {
         signal: signal.name.to_owned(),
-        role: signal.role.to_owned(),
+        role,
         unit: signal.unit.to_owned(),
         at: met().map(|part| signal.mean + low + width * (part as f64 + 0.5)).collect(),
         deviation: met().map(|part| (sums[part] / counts[part] as f64).sqrt()).collect(),
         count: met().map(|part| counts[part]).collect(),
         share,
+        p_value,
     };
     let failed = format!(
-        "the size of the residuals changes with {} `{}`: the noise does, or the model is wrong in part of its range; {}",
-        signal.role,
+        "the size of the residuals changes with {role} `{}`: the noise does, or the model is wrong in part of its range; {}",
         signal.name,
-        remedy(signal)
+        remedy(role, signal)
     );
-    let name = format!("Breusch-Pagan-Koenker, {} `{}`", signal.role, signal.name);
+    let name = format!("Breusch-Pagan-Koenker, {role} `{}`", signal.name);
     Some((spread, Test::new(name, statistic, p_value, "the residuals are of one size over its range", &failed)))
 }
 
@@ -117,31 +122,35 @@ pub(super) fn over(residuals: &Series, effective: f64, signal: &Series) -> Optio
 mod tests {
     use super::*;
 
-    fn series(role: &'static str, values: impl Iterator<Item = f64>) -> Series {
-        Series::new(role, "u", "V", &values.collect::<Vec<f64>>())
+    fn series(values: impl Iterator<Item = f64>) -> Series {
+        Series::new("u", "V", &values.collect::<Vec<f64>>())
+    }
+
+    fn over_input(residuals: &Series, effective: f64, signal: &Series) -> Option<(Spread, Test)> {
+        over(residuals, effective, SignalRole::Input, signal)
     }
 
     fn residuals(size: impl Fn(usize) -> f64) -> Series {
-        series("residual", (0..40).map(|k| if k % 2 == 0 { size(k) } else { -size(k) }))
+        series((0..40).map(|k| if k % 2 == 0 { size(k) } else { -size(k) }))
     }
 
     /// Errors of one size have no variance of their squares to explain, and a constant explains none.
     #[test]
     fn no_spread_without_change() {
-        let moving = series("input", (0..40).map(|k| k as f64));
+        let moving = series((0..40).map(|k| k as f64));
         let levels = |k: usize| if k < 20 { 1.0 } else { 2.0 };
-        assert!(over(&residuals(|_| 1.0), 40.0, &moving).is_none());
-        assert!(over(&residuals(levels), 40.0, &series("input", (0..40).map(|_| 3.0))).is_none());
-        assert!(over(&residuals(levels), 40.0, &moving).is_some());
+        assert!(over_input(&residuals(|_| 1.0), 40.0, &moving).is_none());
+        assert!(over_input(&residuals(levels), 40.0, &series((0..40).map(|_| 3.0))).is_none());
+        assert!(over_input(&residuals(levels), 40.0, &moving).is_some());
     }
 
     /// The square of a rare pulse is the pulse, but for the rounding of the fourth powers: one degree of freedom.
     #[test]
     fn a_pulse_has_no_square_of_its_own() {
-        let errors = series("residual", (0..2000).map(|k| (1.0 - 2.0 * (k % 2) as f64) * (1.0 + (k % 7) as f64)));
+        let errors = series((0..2000).map(|k| (1.0 - 2.0 * (k % 2) as f64) * (1.0 + (k % 7) as f64)));
         for period in [500, 1000, 1250] {
-            let pulse = series("input", (0..2000).map(|k| if k % period == 7 { 1.0 } else { 0.0 }));
-            let (spread, test) = over(&errors, 2000.0, &pulse).unwrap();
+            let pulse = series((0..2000).map(|k| if k % period == 7 { 1.0 } else { 0.0 }));
+            let (spread, test) = over_input(&errors, 2000.0, &pulse).unwrap();
             let expected = chi_squared_tail(2000.0 * spread.share, 1.0);
             assert!((test.p_value / expected - 1.0).abs() < 1e-9, "{period}: {test:?} {expected}");
         }
@@ -155,7 +164,7 @@ mod tests {
         for unit in [1e-90, 1.0, 1e90] {
             let level = |k: usize| if k < 16 { 0.0 } else { 6.0 * unit };
             let size = |k: usize| unit * if k < 16 { 1.0 } else { 2.0 };
-            let (spread, test) = over(&residuals(size), 36.0, &series("input", (0..40).map(level))).unwrap();
+            let (spread, test) = over_input(&residuals(size), 36.0, &series((0..40).map(level))).unwrap();
             assert!((spread.share - 1.0).abs() < 1e-12 && spread.count == [16, 24], "{spread:?}");
             let close = |found: &[f64], expected: [f64; 2]| {
                 found.iter().zip(expected).all(|(a, b)| (a / unit - b).abs() < 1e-12)

@@ -14,7 +14,7 @@ const INPUTS: Register = Register::R12;
 const ROWS: Register = Register::R13;
 const LEFT: Register = Register::R14;
 
-/// What happens at each sample, in order.
+/// The work of each sample, in order.
 #[derive(Clone, Copy)]
 enum Event<'a> {
     Instruction(&'a Instruction),
@@ -155,7 +155,7 @@ impl<'a> Emitter<'a> {
                 Event::Instruction(instruction) => Some(instruction.to),
                 Event::Row(..) => None,
             };
-            // What an instruction overwrites is read by it for the last time.
+            // A slot that an instruction overwrites is read by it for the last time.
             for (slot, next) in &after {
                 self.registers.next[usize::from(*slot)] = if Some(*slot) == to { NEVER } else { *next };
             }

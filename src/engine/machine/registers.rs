@@ -5,7 +5,7 @@ use super::super::code::Slot;
 /// Never read again.
 pub(super) const NEVER: usize = usize::MAX;
 
-/// What has to happen for a register to become free.
+/// The work needed before a register is free.
 pub(super) enum Freed {
     /// Nothing.
     Clean(u8),

@@ -3,14 +3,13 @@
 use super::steps::agrees;
 use greybox::graph::{Function, Graph, Leaf, Symbol};
 use greybox::models::{
-    Armature, AxisMotion, AxisParameters, Command, ControlledAxisMotion, DcMotor, Feed, Positioning, PositioningLoop,
-    Reference, Rotation,
+    AxisMotion, AxisParameters, Command, ControlledAxisMotion, Positioning, PositioningLoop, Reference,
 };
 use greybox::pmsm::{
-    AngledDrive, Cabled, Compensated, CompensatedDrive, CompensatedSalientWinding, CompensatedWinding, Currents, Drive,
-    EmfHarmonic, ExactSalient, ExactStep, ExactSurface, FluxLinkage, FluxWinding, HeldIn, InverterFed,
-    InverterFedWinding, Machine, MachineParameters, MachineState, Mechanics, Misaligned, Salient, SalientWinding,
-    Saturated, SaturatedWinding, Shaft, ShaftMotion, Surface, Torque, VoltageAndLoad, Winding,
+    AngledDrive, Cabled, Compensated, CompensatedDrive, CompensatedWinding, Currents, Drive, EmfHarmonic, ExactSalient,
+    ExactStep, ExactSurface, FluxLinkage, HeldIn, InverterFed, InverterFedWinding, Machine, MachineParameters,
+    MachineState, Mechanics, Misaligned, Salient, SalientWinding, Saturated, SaturatedWinding, Shaft, ShaftMotion,
+    Surface, Torque, VoltageAndLoad, Winding,
 };
 use greybox::{Automatic, Hold, Kind, Model, Nothing, Rk4, Scalar, Signals, equations::Equations, signals};
 
@@ -18,6 +17,16 @@ signals! {
     pub struct Pair { a: "1", b: "1" }
     pub struct Push { u: "1" }
     pub struct Gains { k: "1", d: "1" }
+}
+
+signals! {
+    /// A salient motor with a harmonic in its EMF, its cable, and the size of its inverter's dead time.
+    pub struct CompensatedSalientWinding { rs: "ohm", ld: "H", lq: "H", ke: "V s/rad", ke6: "V s/rad", vdt: "V" }
+}
+
+signals! {
+    /// A motor with surface magnets, its magnet by flux linkage.
+    pub struct FluxWinding { rs: "ohm", ls: "H", psi_m: "Wb" }
 }
 
 signals! {
@@ -199,11 +208,8 @@ fn exact_and_wrapped_motors_run_on_lanes() {
 }
 
 #[test]
-fn shipped_axes_and_brushed_motors_run_on_lanes() {
+fn shipped_axes_run_on_lanes() {
     let rk4 = Rk4::default();
-    let feed = swing::<Feed>(Feed { u: 24.0, tau_l: 0.1 }, 60);
-    let armature = Armature { r: 1.0, l: 1e-3, k: 0.05, j: 1e-4, b: 1e-5 };
-    agrees::<_, _, 7>(&DcMotor, &rk4, Hold::Zero, Rotation::from([0.5, 10.0]), armature, &feed, 1e-4);
     let axis = AxisParameters { m: 95.0, fv: 200.0, fc: 20.0, offset: -3.0 };
     let command = swing::<Command>(Command { vir: 2.0 }, 60);
     agrees::<_, _, 6>(&Positioning::EMPS, &rk4, Hold::Zero, AxisMotion { q: 0.1, v: 0.0 }, axis, &command, 1e-3);

@@ -90,7 +90,7 @@ fn the_finer_answer_is_preferred() {
     assert_eq!((both.iterations, both.evaluations), (6, 10));
 }
 
-/// What is said of a coarser minimum: more than 15 lower in deviance is a warning, more than 4 a note; otherwise a note where
+/// The warning about a coarser minimum: more than 15 lower in deviance is a warning, more than 4 a note; otherwise a note where
 /// its value is more than a standard error away and it does not explain the data worse by 4. One that did not converge says
 /// nothing.
 #[test]

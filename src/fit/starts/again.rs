@@ -76,7 +76,7 @@ mod tests {
             |a: f64, evaluated: bool, reason: &str| FailedStart { start: at(a), evaluated, reason: reason.to_owned() };
         let minimum = Minimum { cost_ratio: 1.0, searches: 2, undetermined: vec![], unknowns: at(1.9) };
         let (up, none) = (failed(5.0, true, "given up"), failed(7.0, false, "no simulation"));
-        // What comes first is the declared start: the minimum, the one that was given up, or the one that ends in the minimum now.
+        // The first start is the declared one: it led to the minimum, was given up, or ends in the minimum now.
         let cases = [(Some(0), [&up, &none], Some(0)), (None, [&up, &none], None), (None, [&none, &up], Some(0))];
         for (declared, failed, expected) in cases {
             let earlier = Starts {

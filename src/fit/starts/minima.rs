@@ -95,7 +95,7 @@ impl<'s> End<'s> {
         other.cost_ratio(self, comparison) <= 1.0 + self.tolerance().max(other.tolerance())
     }
 
-    /// How large its cost is relative to that of another end; costs that are both rounding say nothing.
+    /// Ratio of its cost to that of another end; one where both costs are rounding.
     fn cost_ratio(&self, to: &End<'_>, comparison: &Comparison) -> f64 {
         let are_rounding = [self, to].iter().all(|end| end.search.outcome == Outcome::Exact);
         if are_rounding { 1.0 } else { comparison.ratio(self.level, to.level) }
@@ -133,7 +133,7 @@ struct Kind<'e> {
     /// Which searches; that of the lowest cost first, at last that of the first start.
     searches: Vec<usize>,
     first: &'e End<'e>,
-    /// What the data do not determine at the first end.
+    /// The unknowns that the data do not determine at the first end.
     undetermined: Vec<usize>,
 }
 
@@ -167,7 +167,7 @@ fn kinds<'e>(comparison: &Comparison, ends: impl Iterator<Item = (usize, &'e End
     kinds
 }
 
-/// What the searches found: the ends in the order of the starts, each a search or why there is none.
+/// Results of the searches: the ends in the order of the starts, each a search or why there is none.
 pub(super) fn found(
     plain: &Objective<'_>,
     starts: &[Vec<f64>],

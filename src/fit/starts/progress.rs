@@ -9,7 +9,7 @@ use argmin::core::{KV, State};
 use serde::{Deserialize, Serialize};
 use std::sync::PoisonError;
 
-/// What a checkpoint keeps: the point of each search, or why there is none.
+/// State of the searches in a checkpoint: the point of each search, or the cause why there is none.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Places(pub Vec<Result<Vec<f64>, NoEnd>>);
 

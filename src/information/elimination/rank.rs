@@ -1,10 +1,10 @@
-//! What the data do not determine.
+//! Directions of the unknowns that the data do not determine.
 
 use super::Elimination;
 use super::reduce::{Reduced, Space, Terms};
 use crate::information::Information;
 
-/// Directions in the space of the unknowns along which the data say nothing.
+/// Directions in the space of the unknowns that the data do not determine.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Undetermined {
     /// Each direction as unknowns and components, all others being zero: of unit length in unknowns that are scaled by the
@@ -17,7 +17,7 @@ pub struct Undetermined {
 }
 
 impl Elimination {
-    /// The directions of the unknowns that are not held along which the data say nothing: those whose singular values, the
+    /// The directions of the unknowns that are not held and that the data do not determine: those whose singular values, the
     /// columns scaled to unit norm, are at most `tolerance`, or at most that part of the largest.
     ///
     /// Each piece's own unknowns are examined given its border, with what the pieces below say of them; what is not
@@ -98,7 +98,7 @@ impl Elimination {
     }
 }
 
-/// Directions of a piece's own unknowns, scaled by their norms, along which its triangle says nothing.
+/// Directions of a piece's own unknowns, scaled by their norms, that its triangle does not determine.
 fn null_directions(piece: &Reduced<'_>, norms: &[f64], tolerance: f64) -> Vec<Vec<(usize, f64)>> {
     let own = &piece.columns[..piece.own];
     let scales: Vec<f64> = own.iter().map(|&i| norms[i].recip()).collect();

@@ -7,7 +7,7 @@ use std::borrow::Cow;
 /// Rows gathered for one absorption.
 const ROWS: usize = 64;
 
-/// What the elimination is to assume of the unknowns, each by its number; missing entries are zeros.
+/// Assumptions of the elimination on the unknowns, by their numbers; missing entries are zeros.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Terms<'a> {
     /// Rows `diag(damping) d = 0` are added.
@@ -153,7 +153,7 @@ impl Elimination {
         Some(Reduced { own: n, columns: Cow::Borrowed(&piece.columns), triangle: Cow::Owned(damped) })
     }
 
-    /// What the data say of the shared unknowns alone, all others minimized out.
+    /// The information on the shared unknowns alone, all others minimized out.
     pub fn shared_information(&self) -> Information {
         self.reduce(Terms::default()).total.triangle.into_owned()
     }

@@ -30,7 +30,7 @@ pub enum Rate {
     Adapt(f64),
     /// Not at all: this sample does not determine it reliably.
     Hold {
-        /// What is too small, in words and with its unit.
+        /// The quantity that is too small, in words and with its unit.
         quantity: &'static str,
         /// Its value.
         value: f64,

@@ -4,7 +4,8 @@ use crate::optimize::Outcome;
 use crate::optimize::point::Point;
 use crate::scaling::Seen;
 
-/// A search that is to end like this, or to go on if it has just begun, unless the cost is lower at one of these points.
+/// Points to be evaluated before a search ends, or after its start. If the cost is lower at one of them, the search goes on from there;
+/// if not, it ends with this outcome, or goes on from its start.
 #[derive(Clone, Debug)]
 pub(super) struct Exploration {
     outcome: Option<Outcome>,
@@ -26,8 +27,8 @@ impl Exploration {
         Exploration { outcome: None, points: point.inside(seen), beside: 0, lost: 0, flat: 0 }
     }
 
-    /// The same before a search ends, and along directions that have lost their influence on the way: there were this many
-    /// without at the fewest.
+    /// Points before the end of a search: those of [`at_start`](Self::at_start), and points along directions that lost their influence
+    /// during the search. `unseen` is the least number of directions without influence that was met.
     pub fn before_end(point: &Point, outcome: Outcome, seen: &Seen, unseen: usize) -> Self {
         let mut exploration = Exploration { outcome: Some(outcome), points: vec![], beside: 0, lost: 0, flat: 0 };
         let without_influence = point.without_influence();

@@ -44,7 +44,7 @@ impl<P: Signals> Equations<P> {
     /// Filters every stream, causally and from rest: each entry of `phi`, and `y`, by the same filter, which leaves the
     /// equations true.
     ///
-    /// What noise is left is correlated over the filter's memory; the standard errors count this.
+    /// The remaining noise is correlated over the filter's memory; the standard errors count this.
     pub fn prefiltered(mut self, filter: &Butterworth) -> Self {
         for stream in &mut self.streams {
             let (mut states, mut row) = (vec![], Vec::with_capacity(P::LEN + 1));

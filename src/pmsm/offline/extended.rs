@@ -44,7 +44,7 @@ crate::signals! {
         ke6: "V s/rad",
         /// Voltage that dead time takes from each phase.
         vdt: "V",
-        /// What is to be added to the `i0` of the equations: zero, but for the search's tolerance, where that was searched.
+        /// The correction to the `i0` of the equations: zero, but for the search's tolerance, where that was searched.
         i0: "A",
     }
 }
@@ -94,7 +94,7 @@ impl Spans {
         Equations::new().stream(q).stream(d)
     }
 
-    /// What dead time takes from the voltage along the flux and ahead of it, per volt.
+    /// The dead time's voltage along the flux and 90 degrees ahead of it, per volt.
     fn lost<S: Scalar>(&self, span: &Span, i0: S) -> (S, S) {
         let i = span.mean();
         let i = Currents { id: S::from(i.id - span.bend), iq: S::from(i.iq) };
@@ -187,7 +187,7 @@ mod tests {
         spans.extended(0.15).solve().unwrap().parameters
     }
 
-    // What is left out is of the order of R Ts x / L, the angle by which the voltage of the resistance turns on, squared: 1e-5. Found:
+    // The neglected term is of the order of R Ts x / L, the angle by which the voltage of the resistance turns on, squared: 1e-5. Found:
     // R 1.3e-6 off, lq 6.5e-5; without the bend R is off by 6e-4, without the factor as well by 1.5e-3.
     #[test]
     fn a_held_voltage_and_the_bend_between_samples_are_allowed_for() {

@@ -25,7 +25,7 @@ pub(super) fn write(record: &Record, path: &Path) -> Result<(), Error> {
     let beside = Path::new(&beside);
     let written = rows(record, &names, beside).and_then(|()| Ok(fs::rename(beside, path)?));
     written.map_err(|source| {
-        // What matters is why the record was not written, not whether its remains could be removed.
+        // The error to report is that of writing, not one of removing the partial file.
         let _ = fs::remove_file(beside);
         cannot(path, source)
     })

@@ -29,7 +29,7 @@ pub(super) struct Extreme {
     others: f64,
 }
 
-/// What a pass over a column finds.
+/// Statistics of a column from one pass.
 pub(super) struct Values<'v> {
     values: &'v [f64],
     pieces: &'v [Range<usize>],

@@ -35,7 +35,7 @@ pub(super) fn draw(curves: &Curves, to: &mut Markup, size: Size, name: &str) {
     );
 }
 
-/// What is written along the axis to the right.
+/// The text along the horizontal axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Along {
     /// Numbers and a title.
@@ -109,7 +109,7 @@ pub(super) fn surface(
     });
 }
 
-/// What the layers span, of places that both axes can show.
+/// The range of the layers, of points that both axes can show.
 fn span(curves: &Curves, of: impl Fn((f64, f64)) -> f64) -> Option<(f64, f64)> {
     let shown = |axis: &Axis, value: f64| value.is_finite() && (!axis.logarithmic || value > 0.0);
     let points = curves.layers.iter().flat_map(|layer| -> Vec<(f64, f64)> {

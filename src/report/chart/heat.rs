@@ -31,7 +31,7 @@ pub(super) fn draw(heat: &Heat, to: &mut Markup, size: Size, name: &str) {
             svg.words("text", &[("class", &"end"), ("x", &-6), ("y", &y), ("dy", &4)], cut(label, LETTERS));
             let largest = cells.iter().flatten().copied().fold(f64::MIN_POSITIVE, f64::max);
             for (j, cell) in cells.iter().enumerate().take(n) {
-                // What is not finite has no color.
+                // Values that are not finite have no color.
                 let cell = &cell.filter(|value| value.is_finite());
                 let (class, strength) = match cell {
                     None => ("none", 1.0),

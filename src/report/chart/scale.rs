@@ -23,7 +23,7 @@ pub(super) struct Tick {
     pub label: String,
 }
 
-/// So many letters of a name fit the narrowest screen beside a unit.
+/// Number of letters of a name that fit the narrowest screen beside a unit.
 const LETTERS: usize = 36;
 /// A range this much smaller than its distance from zero is written as what is above a round number.
 const NARROW: f64 = 1e-4;
@@ -66,7 +66,7 @@ impl Scale {
         (shown - self.from) / (self.to - self.from)
     }
 
-    /// What labels are written as multiples of: a power of ten, a multiple of three.
+    /// Exponent of the power of ten that labels are multiples of; it is a multiple of three.
     fn exponent(&self) -> i32 {
         let base = self.base();
         let size = (self.from - base).abs().max((self.to - base).abs());

@@ -20,7 +20,7 @@ fn height(kind: PanelKind) -> f64 {
     }
 }
 
-/// What is written below a panel: numbers below each output, the title below the last.
+/// The text below a panel: numbers below each output, the title below the last.
 fn along(timeline: &Timeline, panel: &Panel) -> Along {
     match timeline.panels.last() == Some(panel) {
         true => Along::Titled,
@@ -110,7 +110,7 @@ pub(in crate::report) fn time_axis(timeline: &Timeline) -> Axis {
     }
 }
 
-/// What the legend names: each style once, with its name.
+/// Entries of the legend: each style once, with its name.
 pub(in crate::report) fn keys(timeline: &Timeline) -> Vec<(&'static str, &str)> {
     let mut keys: Vec<(&str, &str)> = vec![];
     for (panel, line) in timeline.lines().filter(|(panel, _)| panel.kind != PanelKind::Input) {

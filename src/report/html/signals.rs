@@ -11,7 +11,7 @@ use serde::Serialize;
 /// The numbers of a drawing, as `timeline.js` reads them.
 #[derive(Serialize)]
 struct Numbers<'a> {
-    /// What the axis of time is called.
+    /// Label of the axis of time.
     time: String,
     panels: &'a [crate::section::Panel],
     stretches: Vec<Packed>,

@@ -17,7 +17,7 @@ const SHORT: usize = 20;
 const SCREEN: f64 = 340.0;
 const LETTER: f64 = 8.7;
 const BETWEEN: f64 = 24.0;
-/// What stands between the ends of an interval, which stay on one line.
+/// The separator between the ends of an interval, which stay on one line.
 const SPACED: &str = " … ";
 
 pub(super) fn draw(to: &mut Markup, table: &Table, prose: &mut Prose) {

@@ -8,7 +8,7 @@ pub(super) struct Term {
 }
 
 impl Term {
-    /// What it is called above its explanation.
+    /// The heading of its explanation.
     pub fn name(&self) -> String {
         self.words.join(", ")
     }

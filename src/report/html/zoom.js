@@ -103,13 +103,13 @@ const zoomable = (root) => {
     point(middle(), timeline.panels[0]);
   });
   root.addEventListener("focusout", unpoint);
-  // What was closed was drawn coarsely.
+  // Plots in closed sections were drawn coarsely.
   const closed = root.closest("details");
   closed?.addEventListener("toggle", () => closed.open && show(...timeline.shown));
   timeline.panels.forEach((panel) => pointing(panel, { timeline, show, scale, all, point, unpoint, timeAt, box }));
 };
 
-// What a mouse or fingers do on one panel.
+// Gestures of mouse or fingers on one panel.
 const pointing = (panel, { timeline, show, scale, all, point, unpoint, timeAt, box }) => {
   const { node } = panel;
   const band = Object.assign(document.createElement("div"), { className: "band", hidden: true });

@@ -34,7 +34,7 @@ fn size(value: f64, range: f64) -> Cell {
     Cell::Number { value, text: number(if rounding { 0.0 } else { value }, 4) }
 }
 
-/// What the values of the signals show before any model, a sentence for each signal of which there is something to say.
+/// Remarks on the values of the signals, independent of the model: a sentence for each signal that needs one.
 fn remarks(record: &Record) -> Vec<String> {
     let said = record.signals.iter().filter(|signal| !signal.remarks.is_empty());
     said.map(|signal| format!("`{}`: {}.", signal.name, signal.remarks.join("; "))).collect()

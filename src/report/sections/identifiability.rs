@@ -2,9 +2,7 @@
 
 use crate::numeral::number;
 use crate::report::facts::Facts;
-use crate::report::words;
 use crate::section::{Cell, Drawing, Heat, Plot, Section, Table};
-use std::collections::BTreeSet;
 
 /// Parameters in a matrix of correlations.
 const MATRIX: usize = 20;
@@ -16,22 +14,13 @@ const SHOWN: usize = 40;
 pub(super) fn section(facts: &Facts) -> Section {
     let found = &facts.identifiability;
     let section = Section::new("identifiability", "What the data tell apart").says(rank(facts));
-    // What a warning says of the same unknowns stands in the verdict.
-    let said: Vec<_> = facts.estimate.warnings.iter().map(|warning| named(&warning.text)).collect();
-    let advice = found.advice.iter().filter(|text| named(text).len() < 2 || !said.contains(&named(text)));
-    let section = advice.fold(section, |section, text| section.says(sentence(text)));
+    let section = found.advice.iter().fold(section, |section, text| section.says(sentence(text)));
     let correlations = pairs(facts);
     let section = match correlations.rows.is_empty() {
         true => section.says("No two estimates are correlated by more than 0.95."),
         false => section.table(correlations),
     };
     section.table(excitation(facts)).plot(matrix(facts)).plot(excited(facts)).part(numbers(facts))
-}
-
-/// The names that a sentence begins with, before its colon.
-fn named(text: &str) -> BTreeSet<&str> {
-    let begin = text.split(": ").next().unwrap_or_default();
-    words::pieces(begin).filter(|(name, _)| *name).map(|(_, piece)| piece).collect()
 }
 
 /// A sentence as it stands at the begin of a paragraph.
@@ -94,7 +83,7 @@ fn matrix(facts: &Facts) -> Option<Plot> {
         percent: false,
     };
     let plot =
-        Plot::new("correlation", "Correlation of the parameters", "Correlation of the parameters", Drawing::Heat(heat));
+        Plot::of("correlation", "Correlation of the parameters", "Correlation of the parameters", Drawing::Heat(heat));
     (shown.len() > 1).then_some(plot)
 }
 
@@ -162,5 +151,5 @@ fn excited(facts: &Facts) -> Option<Plot> {
             format!("Part of each parameter's information (%) from {group} records each, the first named")
         }
     };
-    Some(Plot::new("excitation", &caption, &caption, Drawing::Heat(heat))).filter(|_| !rows.is_empty())
+    Some(Plot::of("excitation", &caption, &caption, Drawing::Heat(heat))).filter(|_| !rows.is_empty())
 }

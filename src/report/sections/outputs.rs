@@ -66,7 +66,7 @@ fn overview(facts: &Facts) -> Option<Plot> {
         layers: vec![Layer::Dots { style: Style::Main, points }],
     };
     let title = "Fit of each record, in the order they were handed over";
-    Some(Plot::new("records", "Fit of each record", title, Drawing::Curves(drawing)))
+    Some(Plot::of("records", "Fit of each record", title, Drawing::Curves(drawing)))
 }
 
 /// A record in one sentence.

@@ -1,4 +1,4 @@
-//! What is known of the parameters and initial states.
+//! The section on the parameters and initial states.
 
 use crate::estimate::{Knowledge, ParameterEstimate, Unknown, held};
 use crate::numeral::{number, resolved};
@@ -79,5 +79,5 @@ fn forest(name: &str, unknowns: &[&Unknown]) -> Option<Plot> {
     let rows: Vec<Interval> = unknowns.iter().take(SHOWN).map(row).collect();
     let drawing = Forest { scale: "95 % interval about the estimate".to_owned(), rows };
     let title = "95 % intervals of the estimates, relative to them";
-    (!unknowns.is_empty()).then(|| Plot::new(name, "Intervals beside each other", title, Drawing::Forest(drawing)))
+    (!unknowns.is_empty()).then(|| Plot::of(name, "Intervals beside each other", title, Drawing::Forest(drawing)))
 }

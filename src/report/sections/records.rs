@@ -42,7 +42,7 @@ fn section(number: usize, record: &Record, against: usize) -> Section {
     })
 }
 
-/// What the drawing of a record shows, and what it cannot.
+/// Explanation of the drawing of a record, with its limits.
 fn sentences(record: &Record) -> Vec<String> {
     let mut said = vec![];
     let Some(Drawing::Timeline(timeline)) = record.timeline.as_ref().and_then(|plot| plot.drawing.as_ref()) else {

@@ -1,7 +1,7 @@
 //! The residuals: what their tests say together, and those of each output.
 
 use super::quoted;
-use crate::diagnose::residuals::{Correlation, Residuals, Spread};
+use crate::diagnose::residuals::{Correlation, Residuals, SignalRole, Spread};
 use crate::diagnose::{self, LEVEL, Test};
 use crate::numeral::{self, counted, number, resolved, rounded};
 use crate::optimize::Severity;
@@ -18,7 +18,7 @@ fn tests(facts: &Facts) -> impl Iterator<Item = (String, &Test)> {
     })
 }
 
-/// What the failed tests mean together; `None` if none failed.
+/// The joint meaning of the failed tests; `None` if none failed.
 pub(super) fn section(facts: &Facts) -> Option<Section> {
     let failed: Vec<_> = tests(facts).filter(|(_, test)| !test.passed).collect();
     let (of, clearest) = failed.iter().min_by(|a, b| a.1.p_value.total_cmp(&b.1.p_value))?;
@@ -39,7 +39,7 @@ pub(super) fn section(facts: &Facts) -> Option<Section> {
     Some(meanings(&failed).into_iter().fold(section, Section::says))
 }
 
-/// What the failed tests mean, each meaning once, with what failed it.
+/// Meanings of the failed tests, each once, with the tests that have it.
 fn meanings(failed: &[(String, &Test)]) -> Vec<String> {
     const NAMED: usize = 4;
     const SAID: usize = 20;
@@ -141,7 +141,7 @@ fn histogram(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
         ],
     };
     let title = format!("Histogram of the residual of {} of {}", fit.name, record.name);
-    let plot = Plot::new(format!("histogram-{id}-{}", fit.name), HISTOGRAM, title, Drawing::Curves(drawing));
+    let plot = Plot::of(format!("histogram-{id}-{}", fit.name), HISTOGRAM, title, Drawing::Curves(drawing));
     (!histogram.counts.is_empty()).then_some(plot)
 }
 
@@ -150,21 +150,20 @@ const HISTOGRAM: &str = "Histogram, beside a normal distribution of the same mea
 /// Autocorrelation of the residuals.
 fn autocorrelation(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
     let of = &fit.residuals;
-    let verdict = of.tests.iter().find(|test| test.name.starts_with("Ljung-Box"));
-    let verdict = verdict.map_or(String::new(), |test| {
-        let result = if test.passed { "passes" } else { "fails" };
+    let verdict = of.white.map_or(String::new(), |white| {
+        let result = if white { "passes" } else { "fails" };
         format!("; the test of Ljung and Box judges all lags together, and {result}")
     });
     let caption =
         format!("Autocorrelation; of white residuals, each lag for itself is between the lines in 99 of 100{verdict}");
     let title = format!("Autocorrelation of the residual of {} of {}", fit.name, record.name);
     let drawing = lags("autocorrelation", record.sample_time, 1, 1, &of.autocorrelation, of.autocorrelation_band)?;
-    Some(Plot::new(format!("autocorrelation-{id}-{}", fit.name), caption, title, drawing))
+    Some(Plot::of(format!("autocorrelation-{id}-{}", fit.name), caption, title, drawing))
 }
 
 /// Correlation of the residual with a signal.
 fn cross_correlation(id: &str, record: &Record, fit: &OutputFit, with: &Correlation) -> Option<Plot> {
-    let Correlation { signal, role, first_lag, values, tested_from, band } = with;
+    let Correlation { signal, role, first_lag, values, tested_from, band, .. } = with;
     let title =
         format!("Correlation of the residual of {} of {} with {role} {signal} before it", fit.name, record.name);
     let caption = format!(
@@ -172,22 +171,15 @@ fn cross_correlation(id: &str, record: &Record, fit: &OutputFit, with: &Correlat
          tested"
     );
     let drawing = lags("correlation", record.sample_time, *first_lag, *tested_from, values, *band)?;
-    Some(Plot::new(format!("correlation-{id}-{}-{signal}-{role}", fit.name), caption, title, drawing))
+    Some(Plot::of(format!("correlation-{id}-{}-{signal}-{role}", fit.name), caption, title, drawing))
 }
 
 /// The plots of the residual against each signal, those with the least probable tests first.
 fn against_signals(id: &str, record: &Record, fit: &OutputFit) -> Vec<Plot> {
     let of = &fit.residuals;
-    let p = |begin: &str, role: &str, signal: &str| {
-        let test = of.tests.iter().find(|test| test.name == format!("{begin} {role} `{signal}`"));
-        test.map_or(1.0, |test| test.p_value)
-    };
-    let correlations = of.correlations.iter().filter_map(|with| {
-        Some((p("cross-correlation with", &with.role, &with.signal), cross_correlation(id, record, fit, with)?))
-    });
-    let spreads = of.spreads.iter();
-    let spreads =
-        spreads.map(|over| (p("Breusch-Pagan-Koenker,", &over.role, &over.signal), spread(id, record, fit, over)));
+    let correlations = of.correlations.iter();
+    let correlations = correlations.filter_map(|with| Some((with.p_value, cross_correlation(id, record, fit, with)?)));
+    let spreads = of.spreads.iter().map(|over| (over.p_value, spread(id, record, fit, over)));
     let mut plots: Vec<(f64, Plot)> = correlations.chain(spreads).collect();
     plots.sort_by(|a, b| a.0.total_cmp(&b.0));
     plots.into_iter().map(|(_, plot)| plot).collect()
@@ -237,14 +229,14 @@ fn spectrum(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
         Curves { x: Axis::new("frequency", "Hz").from(0.0), y: Axis::new("power density", unit).logarithmic(), layers };
     let caption = "Spectrum: mean power density, and (thin) the greatest in each column; flat for white residuals";
     let title = format!("Spectrum of the residual of {} of {}", fit.name, record.name);
-    let plot = Plot::new(format!("spectrum-{id}-{}", fit.name), caption, title, Drawing::Curves(drawing));
+    let plot = Plot::of(format!("spectrum-{id}-{}", fit.name), caption, title, Drawing::Curves(drawing));
     (of.frequency.len() > 1).then_some(plot)
 }
 
 /// Size of the residual over the range of a signal.
 fn spread(id: &str, record: &Record, fit: &OutputFit, over: &Spread) -> Plot {
     let Spread { signal, role, unit, at, deviation, .. } = over;
-    let shift = if role == "time" { record.begin } else { 0.0 };
+    let shift = if *role == SignalRole::Time { record.begin } else { 0.0 };
     let points: Vec<(f64, f64)> = at.iter().map(|at| at - shift).zip(deviation.iter().copied()).collect();
     let all = Layer::Level { value: fit.residuals.standard_deviation, label: String::new() };
     let drawing = Curves {
@@ -258,5 +250,5 @@ fn spread(id: &str, record: &Record, fit: &OutputFit, over: &Spread) -> Plot {
     };
     let title = format!("Size of the residual of {} of {} over {role} {signal}", fit.name, record.name);
     let caption = format!("Size over {role} `{signal}`; dashed, that of all residuals");
-    Plot::new(format!("spread-{id}-{}-{signal}-{role}", fit.name), caption, title, Drawing::Curves(drawing))
+    Plot::of(format!("spread-{id}-{}-{signal}-{role}", fit.name), caption, title, Drawing::Curves(drawing))
 }

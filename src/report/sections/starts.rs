@@ -82,5 +82,5 @@ fn waterfall(minima: &[Minimum]) -> Option<Plot> {
     };
     let title = "Cost at the end of each search from another start, by rising cost, relative to the estimate's";
     let caption = "Cost where each search ended; a step is a minimum";
-    (!minima.is_empty()).then(|| Plot::new("starts", caption, title, Drawing::Curves(drawing)))
+    (!minima.is_empty()).then(|| Plot::of("starts", caption, title, Drawing::Curves(drawing)))
 }

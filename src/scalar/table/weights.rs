@@ -1,4 +1,4 @@
-//! What each point of an axis counts at a place between them.
+//! Weights of the points of an axis at a place between them.
 
 use super::{Extrapolation, Interpolation};
 

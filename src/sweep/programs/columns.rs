@@ -152,7 +152,7 @@ const LANES: usize = 8;
 
 /// Turns as many columns of the same length as a register has lanes into rows.
 struct Transpose<'t> {
-    /// Those after the first register's worth are not read.
+    /// Lanes beyond the first register are not read.
     from: [&'t [f64]; LANES],
     stride: usize,
     to: &'t mut [f64],

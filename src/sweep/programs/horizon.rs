@@ -20,7 +20,7 @@ pub(super) fn run(compiled: &Compiled, piece: &Piece<'_>, steps: usize, visit: V
         let from_begin = Piece { samples: 0..simulated.end, ..piece.clone() };
         let mut go_on = true;
         Run::new(compiled, vec![from_begin]).all(&mut |many| {
-            // Those before this piece belong to others.
+            // Samples before this piece belong to other pieces.
             let before = simulated.start.saturating_sub(many.begin[0]).min(many.samples[0]);
             (window.begin[0], window.samples[0]) = (many.begin[0] + before, many.samples[0] - before);
             let rows = (0..window.samples[0]).flat_map(|k| (0..outputs).map(move |j| (k, j)));

@@ -18,7 +18,7 @@ pub(super) struct Run<'r> {
     pieces: Vec<Piece<'r>>,
     /// Where windows are read from that are not kept.
     columns: Option<Columns<'r>>,
-    /// What the columns are, from the first sample of each piece on, if it is kept.
+    /// The kept columns, from the first sample of each piece on.
     kept: Option<Arc<Kept>>,
     space: Workspace,
 }
@@ -210,7 +210,7 @@ impl<'r> Run<'r> {
             window.set_all_measured(samples, pieces);
             return;
         }
-        // What all pieces have and is finite was measured.
+        // A value that all pieces have and that is finite was measured.
         let shortest = window.samples[..self.pieces.len()].iter().copied().min().unwrap_or(0);
         let plain = if finite { shortest } else { 0 };
         window.set_all_measured(plain, pieces);

@@ -7,7 +7,7 @@ use crate::{Experiment, Fit, Time, free};
 const MINIMUM: Outcome = Outcome::Converged { step: 0.0, gradient: 0.0 };
 const LIMIT: Outcome = Outcome::IterationLimit { iterations: 9 };
 
-/// What searches found that ended at these gains, of eight measurements whose sum of squares is `8 + 800 (a - 2)^2`, in units of
+/// The results of searches that ended at these gains, of eight measurements whose sum of squares is `8 + 800 (a - 2)^2`, in units of
 /// the noise.
 fn ended(ends: &[Option<(f64, Outcome)>]) -> (usize, Starts) {
     let inputs: Vec<Voltage> = (0..8).map(|k| Voltage { u: f64::from(1 - 2 * (k % 2)) }).collect();

@@ -1,4 +1,4 @@
-//! What keeps its shape on a drawing of curves: points, and the labels of levels and marks.
+//! The parts of a drawing of curves that are not scaled: points, and the labels of levels and marks.
 
 use super::super::scale::Scale;
 use super::super::{Frame, Short, class};
@@ -13,7 +13,7 @@ const BELOW: f64 = 14.0;
 const HEIGHT: f64 = 11.0;
 const UNDER: f64 = 3.0;
 const WIDTH: f64 = 6.3;
-/// What is left free at both ends of a label (px).
+/// Margin at both ends of a label (px).
 const BESIDE: f64 = 4.0;
 /// The least width of a drawing on a page (px).
 const NARROW: f64 = 275.0;

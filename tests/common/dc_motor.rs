@@ -1,15 +1,16 @@
-use crate::{Model, Scalar};
-use serde::{Deserialize, Serialize};
+//! A direct-current motor, of which all parameters are determined.
 
-crate::signals! {
-    /// What moves in a direct-current motor, and what is measured of it.
+use greybox::{Model, Scalar, signals};
+
+signals! {
+    /// States of a direct-current motor, which are its measured outputs.
     pub struct Rotation {
         /// Armature current.
         i: "A",
         /// Speed.
         w: "rad/s",
     }
-    /// What acts on a direct-current motor.
+    /// Inputs of a direct-current motor.
     pub struct Feed {
         /// Armature voltage.
         u: "V",
@@ -41,7 +42,7 @@ crate::signals! {
 ///
 /// From voltage, current and speed all five parameters are known. From voltage and speed alone only four combinations
 /// are: current, and with it `r`, `l`, `k` and `j`, may be scaled together.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug)]
 pub struct DcMotor;
 
 impl Model for DcMotor {
@@ -50,12 +51,10 @@ impl Model for DcMotor {
     type Output = Rotation;
     type Parameters = Armature;
 
-    #[inline]
     fn derivative<S: Scalar>(&self, _t: S, x: &Rotation<S>, u: &Feed<S>, p: &Armature<S>) -> Rotation<S> {
         Rotation { i: (u.u - p.r * x.i - p.k * x.w) / p.l, w: (p.k * x.i - p.b * x.w - u.tau_l) / p.j }
     }
 
-    #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Rotation<S>, _u: &Feed<S>, _p: &Armature<S>) -> Rotation<S> {
         *x
     }
