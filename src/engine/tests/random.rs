@@ -6,7 +6,8 @@
 use super::steps::start;
 use greybox::engine::{Program, Sampling, Trajectories};
 use greybox::graph::{Function, Function2, Graph, Id, Leaf, Node, Seed};
-use greybox::{Dual, recurrence::Recurrence, scalar::Comparison};
+use greybox::scalar::{Comparison, Extrapolation, Interpolation};
+use greybox::{Dual, Table, recurrence::Recurrence};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
@@ -39,8 +40,22 @@ impl Random {
     }
 }
 
+/// A curve and a surface for each way between their points and beyond. Points where random numbers often are, too.
+fn tables() -> Vec<Table> {
+    let (x, y): ([f64; 4], [f64; 3]) = ([-1.0, 0.0, 0.5, 1.7], [-1.2, 0.0, 1.0]);
+    let values: Vec<f64> = x.iter().flat_map(|x| y.map(|y| (x * 0.7).sin() + 0.3 * x * y - 0.1 * y * y)).collect();
+    let mut all = vec![];
+    for between in [Interpolation::Linear, Interpolation::Smooth] {
+        for beyond in [Extrapolation::Hold, Extrapolation::Linear] {
+            all.push(Table::curve(&x, &[2.0, 1.0, 1.5, -1.0], between, beyond).unwrap());
+            all.push(Table::surface(&x, &y, &values, between, beyond).unwrap());
+        }
+    }
+    all
+}
+
 pub fn expression(random: &mut Random, size: usize) -> (Graph, Vec<Id>) {
-    let mut graph = Graph::default();
+    let (mut graph, tables) = (Graph::default(), tables());
     let mut nodes: Vec<Id> = (0..STATES as u32).map(|i| graph.leaf(Leaf::State(i))).collect();
     nodes.extend((0..PARAMETERS as u32).map(|j| graph.leaf(Leaf::Parameter(j))));
     for _ in 0..size {
@@ -54,7 +69,7 @@ pub fn expression(random: &mut Random, size: usize) -> (Graph, Vec<Id>) {
             }
         };
         let [a, b, c, d] = core::array::from_fn(|_| any(random, &mut graph));
-        let node = match random.below(16) {
+        let node = match random.below(17) {
             0..=2 => graph.add(a, b),
             3 | 4 => graph.sub(a, b),
             5..=8 => graph.mul(a, b),
@@ -63,6 +78,10 @@ pub fn expression(random: &mut Random, size: usize) -> (Graph, Vec<Id>) {
             11 => graph.power(a, random.below(9) as i32 - 4),
             12 | 13 => graph.function(Function::ALL[random.below(28)], a),
             14 => graph.function2(FUNCTIONS2[random.below(6)], a, b),
+            15 => {
+                let (table, at) = (&tables[random.below(tables.len())], [a, b]);
+                graph.table(table, [0, 0], if table.grid().is_surface() { at } else { [a, a] })
+            }
             _ => graph.select(COMPARISONS[random.below(3)], a, b, c, d),
         };
         nodes.push(node);

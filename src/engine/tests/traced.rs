@@ -7,11 +7,12 @@ use greybox::models::{
 };
 use greybox::pmsm::{
     AngledDrive, Cabled, Compensated, CompensatedDrive, CompensatedWinding, Currents, Drive, EmfHarmonic, ExactSalient,
-    ExactStep, ExactSurface, FluxLinkage, HeldIn, InverterFed, InverterFedWinding, Machine, MachineParameters,
-    MachineState, Mechanics, Misaligned, Salient, SalientWinding, Saturated, SaturatedWinding, Shaft, ShaftMotion,
-    Surface, Torque, VoltageAndLoad, Winding,
+    ExactStep, ExactSurface, FluxLinkage, FluxMapped, HeldIn, InverterFed, InverterFedWinding, Machine,
+    MachineParameters, MachineState, MappedWinding, Mechanics, Misaligned, Salient, SalientWinding, Saturated,
+    SaturatedWinding, Shaft, ShaftMotion, Surface, Torque, VoltageAndLoad, Winding,
 };
-use greybox::{Automatic, Hold, Kind, Model, Nothing, Rk4, Scalar, Signals, equations::Equations, signals};
+use greybox::scalar::{Extrapolation, Interpolation};
+use greybox::{Automatic, Hold, Kind, Model, Nothing, Rk4, Scalar, Signals, Table, equations::Equations, signals};
 
 signals! {
     pub struct Pair { a: "1", b: "1" }
@@ -160,6 +161,30 @@ fn shipped_motors_run_on_lanes() {
         &torque,
         1e-3,
     );
+}
+
+/// Currents that cross points of the maps and leave them, by a smooth map and by one with kinks.
+#[test]
+fn motors_with_flux_maps_run_on_lanes() {
+    let (id, iq) = ([-12.0, -5.0, 0.0, 5.0, 12.0], [-12.0, -6.0, 0.0, 6.0, 12.0]);
+    let over = |psi: fn(f64, f64) -> f64| -> Vec<f64> {
+        id.iter().flat_map(|d| iq.iter().map(move |q| psi(*d, *q))).collect()
+    };
+    let drive: Vec<Drive> = (0..300)
+        .map(|k| 0.05 * f64::from(k))
+        .map(|a| Drive { ud: 15.0 * a.sin(), uq: 30.0 * (0.7 * a).cos(), w: 20.0 * (0.1 * a).sin() })
+        .collect();
+    let p = MappedWinding { rs: 0.6, ke: 0.9, flux: 1.1 };
+    for between in [Interpolation::Smooth, Interpolation::Linear] {
+        let map = |psi| Table::surface(&id, &iq, &over(psi), between, Extrapolation::Linear).unwrap();
+        let map_d = map(|d, q| 4e-3 * d - 1e-6 * d * q * q);
+        let map_q = map(|d, q| 0.06 * (q / 15.0).atan() - 1e-6 * q * d * d);
+        let motor = FluxMapped::new(4, map_d, map_q).unwrap();
+        for hold in [Hold::Zero, Hold::First] {
+            let start = Currents { id: -9.0, iq: 7.0 };
+            agrees::<_, _, 5>(&motor, &Rk4::default(), hold, start, p, &drive, 2e-4);
+        }
+    }
 }
 
 #[test]
