@@ -24,6 +24,7 @@ mod interval_limits;
 mod judgements;
 mod kalman;
 mod models;
+mod narrow_losses;
 mod nist;
 mod noise;
 mod optimizers;
@@ -39,6 +40,7 @@ mod shared;
 #[path = "../common/spiral.rs"]
 mod spiral;
 mod starts;
+mod step_errors;
 mod stiff;
 mod threads;
 mod user_code;
