@@ -70,7 +70,8 @@ pub(crate) fn widths(
         |unknown: &&Unknown| unknown.knowledge.standard_error().is_some() && !objective.sweep.predicts_variance();
     let degrees = estimate.unknowns.iter().filter(counts);
     let degrees = degrees.map(|unknown| unknown.degrees_of_freedom).fold(estimate.degrees_of_freedom(), f64::min);
-    let quantile = student::quantile(0.5 + probability / 2.0, degrees);
+    let quantile = |degrees: f64| student::quantile(0.5 + probability / 2.0, degrees);
+    let quantiles = [quantile(degrees), quantile(estimate.degrees_of_freedom())];
     // Slopes in the outputs' own units, and the covariance in the optimizer's coordinates.
     let objective = objective.in_units();
     // A filter needs the measurements; else, bands are wanted where nothing was measured, too.
@@ -86,7 +87,7 @@ pub(crate) fn widths(
     let make = || {
         let none = vec![vec![]; sigma.len()];
         let found = Widths { confidence: none.clone(), prediction: none };
-        Gather { covariance: &covariance, quantile, sigma: &sigma, found }
+        Gather { covariance: &covariance, quantiles, sigma: &sigma, found }
     };
     let gathered = objective.gather_one(best, experiment, true, make);
     gathered.map(|gather| gather.found).map_err(|_| Error::Simulation(objective.locate(experiment, best, 0)))
@@ -95,7 +96,8 @@ pub(crate) fn widths(
 /// The half widths of the rows of each window.
 struct Gather<'g> {
     covariance: &'g [f64],
-    quantile: f64,
+    /// Of the unknowns' variances, and of the noise, each with its degrees of freedom.
+    quantiles: [f64; 2],
     sigma: &'g [f64],
     found: Widths,
 }
@@ -111,9 +113,9 @@ impl Accumulate for Gather<'_> {
                 // Slopes were divided by the predicted standard deviation, which takes the place of the common one.
                 let root = window.variance_root(k, j, lane);
                 let noise = if window.has_variances() { root } else { *sigma };
-                let quantile = if window.is_measured(k, j, lane) { self.quantile } else { f64::NAN };
-                self.found.confidence[j].push(quantile * deviation * root);
-                self.found.prediction[j].push(quantile * (deviation * root).hypot(noise));
+                let [own, of_noise] = if window.is_measured(k, j, lane) { self.quantiles } else { [f64::NAN; 2] };
+                self.found.confidence[j].push(own * deviation * root);
+                self.found.prediction[j].push((own * deviation * root).hypot(of_noise * noise));
             }
         }
     }

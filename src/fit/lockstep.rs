@@ -154,7 +154,7 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
             problem.finer(number),
         ) {
             (Some(again), Some(finer)) => {
-                let again = attempt.again_from_start(finer, again, begin, &control);
+                let again = attempt.again_from_start(finer, (again, most(problem)), begin, &control);
                 attempt.or(again)
             }
             _ => attempt,

@@ -93,17 +93,18 @@ impl Attempt {
     }
 
     /// What a search by a finer method from [`start`](Self::start) found or, if it did not converge from the end of this one, what one
-    /// from the start of the problem found: a coarse step may end where a finer one finds the plant unstable.
+    /// from the start of the problem found: a coarse step may end where a finer one finds the plant unstable. All methods together have
+    /// so many trial steps.
     pub fn again_from_start(
         &self,
         finer: &Problem<'_>,
-        again: Result<Summary, Error>,
+        (again, most): (Result<Summary, Error>, u64),
         begin: Instant,
         control: &Control,
     ) -> Result<Summary, Error> {
         let from_end = matches!(&self.found, Ok(found) if is_only_coarse(found) && found.starts.is_none());
         let (Ok(found), Ok(before), true) = (&again, &self.found, from_end) else { return again };
-        let trials = finer.settings.optimizer.most().saturating_sub(before.iterations + found.iterations);
+        let trials = most.saturating_sub(before.iterations + found.iterations);
         if found.outcome.converged() || trials == 0 || control.stops() {
             return again;
         }

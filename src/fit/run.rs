@@ -46,10 +46,11 @@ impl Problem<'_> {
             if !attempt.is_coarse() || control.stops() {
                 break;
             }
-            if let Some(start) = attempt.start(finer, self.settings.optimizer.most(), control) {
+            let most = self.settings.optimizer.most();
+            if let Some(start) = attempt.start(finer, most, control) {
                 let trials = start.trials;
                 let again = finer.run_on(finer.run_within(begin, control, start), trials, begin, control);
-                let again = attempt.again_from_start(finer, again, begin, control);
+                let again = attempt.again_from_start(finer, (again, most), begin, control);
                 attempt = attempt.or(again);
             }
         }

@@ -178,3 +178,37 @@ fn no_shorter(mut colored: CoordinateCovariance, white: CoordinateCovariance) ->
     }
     CoordinateCovariance { covariance: Some(found.scaled(&factors)), ..colored }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::information::Information;
+    use crate::optimize::Linearization;
+
+    /// Of independent unknowns with these standard errors.
+    fn of(errors: &[f64], factor: f64, degrees: f64) -> CoordinateCovariance {
+        let mut triangle = Information::new(errors.len());
+        for (i, error) in errors.iter().enumerate() {
+            let row: Vec<f64> = (0..errors.len()).map(|j| if i == j { 1.0 / error } else { 0.0 }).collect();
+            triangle.absorb_row(&row, 0.0);
+        }
+        let linear = Linearization::new(0.0, errors.len(), vec![triangle]);
+        let covariance = linear.covariance(&vec![false; errors.len()]);
+        let (method, degrees) = (CovarianceMethod::Classical, vec![degrees; errors.len()]);
+        CoordinateCovariance { covariance, method, factor, degrees, shares: None, uneven: None }
+    }
+
+    /// Standard errors of 1 and 3 for colored errors, of 2 each for white ones, with a factor of four for the variance of unit
+    /// noise: the first takes that of white errors with its degrees of freedom, the second stays. Few degrees of freedom make the
+    /// interval for colored errors the longer one.
+    #[test]
+    fn the_longer_interval_is_taken() {
+        let found = no_shorter(of(&[1.0, 3.0], 1.0, 50.0), of(&[1.0, 1.0], 4.0, 90.0));
+        let covariance = found.covariance.unwrap();
+        let errors = [covariance.standard_error(0), covariance.standard_error(1)];
+        assert!((errors[0] - 2.0).abs() < 1e-14 && (errors[1] - 3.0).abs() < 1e-14, "{errors:?}");
+        assert_eq!(found.degrees, [90.0, 50.0]);
+        let few = no_shorter(of(&[1.0], 1.0, 1.0), of(&[2.0], 1.0, 90.0));
+        assert!((few.covariance.unwrap().standard_error(0) - 1.0).abs() < 1e-14 && few.degrees == [1.0]);
+    }
+}

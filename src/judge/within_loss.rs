@@ -5,7 +5,7 @@
 
 use super::conclude::Judgement;
 use crate::estimate::{Warning, WarningCode};
-use crate::numeral::{number, percent};
+use crate::numeral::percent;
 use crate::optimize::Severity;
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
@@ -53,38 +53,42 @@ impl Judgement<'_> {
         let all = objective.gather(&self.end.coordinates, false, new).ok()?;
         let total = |of: fn(&Slopes<'_>) -> f64| all.iter().map(of).sum::<f64>();
         let (sum, squares, count) = (total(|one| one.sum), total(|one| one.squares), total(|one| one.count));
-        let severity = match relative_deviation(sum, squares, count) {
+        let deviation = relative_deviation(sum, squares, count, objective.problem.unknowns.row.len() as f64);
+        let severity = match deviation {
             part if part > NONE => Severity::NotUsable,
             part if part > CARE => Severity::UsableWithCare,
             _ => return None,
         };
         let text = format!(
-            "the loss is too narrow for these errors: its mean curvature, {} of that of squares, is known to {} only, and the standard \
+            "the loss is too narrow for these errors: its mean curvature, {} of that of squares, is known {}, and the standard \
              errors with it; take a larger constant, or a larger noise",
             percent(sum / count, 2),
-            match relative_deviation(sum, squares, count) {
-                part if part.is_finite() => percent(part, 2),
-                part => number(part, 2),
-            }
+            if deviation.is_finite() { format!("to {} only", percent(deviation, 2)) } else { "not at all".to_owned() }
         );
         Some(Warning { code: WarningCode::NarrowLoss, severity, text })
     }
 }
 
-/// The relative standard deviation of a mean of so many numbers, from their sum and that of their squares; infinite where it is not
-/// above zero.
-fn relative_deviation(sum: f64, squares: f64, count: f64) -> f64 {
-    if sum > 0.0 { (squares - sum * sum / count).max(0.0).sqrt() / sum } else { f64::INFINITY }
+/// The relative standard deviation of a mean of so many numbers of one at most, from their sum and that of their squares, less the
+/// `unknowns`: a fit by absolute errors passes through as many measurements. Infinite where nothing is left.
+fn relative_deviation(sum: f64, squares: f64, count: f64, unknowns: f64) -> f64 {
+    let left = sum - unknowns;
+    if left > 0.0 { (squares - sum * sum / count).max(0.0).sqrt() / left } else { f64::INFINITY }
 }
 
 #[cfg(test)]
 mod tests {
     use super::relative_deviation;
 
-    /// Of 100 errors four within the loss: a mean of 0.04 with a deviation of `sqrt(0.04 0.96 / 100)`; all within: none.
+    /// Of 100 errors four within the loss, one of which is that of an unknown: a deviation of `sqrt(4 0.96)` of three; all within: none;
+    /// no more than unknowns: infinite.
     #[test]
     fn deviations_by_hand() {
-        assert!((relative_deviation(4.0, 4.0, 100.0) - (0.04f64 * 0.96 / 100.0).sqrt() / 0.04).abs() < 1e-15);
-        assert_eq!([relative_deviation(100.0, 100.0, 100.0), relative_deviation(0.0, 3.0, 9.0)], [0.0, f64::INFINITY]);
+        assert!((relative_deviation(4.0, 4.0, 100.0, 1.0) - (4.0 * 0.96f64).sqrt() / 3.0).abs() < 1e-15);
+        assert_eq!(relative_deviation(100.0, 100.0, 100.0, 2.0), 0.0);
+        assert_eq!(
+            [relative_deviation(2.0, 2.0, 9.0, 2.0), relative_deviation(-1.0, 3.0, 9.0, 0.0)],
+            [f64::INFINITY; 2]
+        );
     }
 }

@@ -59,11 +59,17 @@ fn two_measurements_that_decide_are_named() {
     assert_eq!(said(&fitted(&record(51, &[(7, 14.5), (40, -14.5)]), false)), None);
 }
 
-/// Plain fits of more than 200 measurements have no pass for it; a sandwich and colored errors have.
+/// Fits with given noise and more than 200 measurements have no pass for it; estimated noise, a sandwich and colored errors have.
 #[test]
 fn long_records() {
     let found = |samples: usize, weighted: bool| said(&fitted(&record(samples, &[(7, 200.0)]), weighted)).is_some();
-    assert_eq!([found(200, false), found(201, false), found(201, true)], [true, false, true]);
+    assert_eq!([found(200, false), found(201, false), found(201, true)], [true; 3]);
+    let given = |samples: usize| {
+        let record = record(samples, &[(7, 200.0)]);
+        let fit = Fit::new(&Gain, &record).parameters(Factor { a: free(1.0) }).noise(Current { i: 1.0 });
+        said(&fit.run().unwrap().into_summary()).is_some()
+    };
+    assert_eq!([given(200), given(201)], [true, false]);
     let colored = fitted(&disturbed(500, &[(7, 200.0)], 0.9), false);
     assert!(matches!(colored.method.covariance, CovarianceMethod::Hac { .. }), "{:?}", colored.method.covariance);
     // 200^2 / (200^2 + 499).
