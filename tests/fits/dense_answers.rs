@@ -198,8 +198,10 @@ fn check(records: &[ExperimentOf<Bending>], told: Told) {
                 };
                 let all = score(false);
                 meat += &all * all.transpose();
-                variance += (&inverse * all).map(|moved| moved.powi(2));
-                spread += (&inverse * score(true)).map(|moved| moved.powi(4) * 2.0 / 3.0);
+                // Of an unknown of one record those of its own samples count.
+                let counts = DVector::from_fn(4, |i, _| if i < 2 || i == 2 + e { 1.0 } else { 0.0 });
+                variance += (&inverse * all).map(|moved| moved.powi(2)).component_mul(&counts);
+                spread += (&inverse * score(true)).map(|moved| moved.powi(4) * 2.0 / 3.0).component_mul(&counts);
             }
         }
         own_degrees = std::array::from_fn(|i| (2.0 * (variance[i].powi(2) - spread[i]) / spread[i]).max(1.0));

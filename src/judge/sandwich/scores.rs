@@ -93,7 +93,8 @@ impl Accumulate for Scores<'_> {
 
 /// Degrees of freedom of the variance of each unknown, by Satterthwaite's rule (Biometrics Bulletin 2 (1946) 110): the variance is the
 /// sum of the squares of what the samples move it by, each of which has, if normal, a variance of two thirds of its own square
-/// on average. What the leverage takes is made up for by what is added to the square ([`CANCELED`]), and counts as certain.
+/// on average. What the leverage takes is made up for by what is added to the square ([`CANCELED`]), and counts as certain. Of an
+/// unknown of one experiment its own samples count.
 pub(super) fn degrees(objective: &Objective<'_>, all: &[Scores<'_>]) -> Vec<f64> {
     let unknowns = &objective.problem.unknowns;
     let mut sums = vec![[0.0; 2]; unknowns.row.len()];
