@@ -87,26 +87,24 @@ impl Aliases {
     }
 }
 
-impl Judgement<'_> {
-    /// An oscillation of which there are too few samples, with parameters that may make it another one.
-    pub(super) fn aliased(&self) -> Option<Warning> {
-        let found = unresolved(self.objective, &self.end.coordinates, &self.residuals.points)?;
-        let Unresolved { mode: (_, frequency), interval, alias, name, .. } = found;
-        // Ends of other searches have been compared.
-        let compared = self.end.starts.is_some();
-        let severity = if compared { Severity::Usable } else { Severity::UsableWithCare };
-        let tried = if compared { "searches were started on both sides" } else { "no search was started there" };
-        let text = format!(
-            "the model oscillates at {} rad/s, of which the samples, {} s apart, take {} a period: an oscillation at {} rad/s gives \
-             the same samples, with other parameters ({tried}); sample faster, search from several starts (Fit::starts), or bound \
-             `{name}`",
-            number(frequency, 3),
-            number(interval, 3),
-            number(TAU / (frequency * interval), 2),
-            number(alias, 3)
-        );
-        Some(Warning { code: WarningCode::Aliased, severity, text })
-    }
+/// An oscillation of which there are too few samples, with parameters that may make it another one.
+pub(super) fn aliased(judgement: &Judgement<'_>) -> Option<Warning> {
+    let found = unresolved(judgement.objective, &judgement.end.coordinates, &judgement.residuals.points)?;
+    let Unresolved { mode: (_, frequency), interval, alias, name, .. } = found;
+    // Ends of other searches have been compared.
+    let compared = judgement.end.starts.is_some();
+    let severity = if compared { Severity::Usable } else { Severity::UsableWithCare };
+    let tried = if compared { "searches were started on both sides" } else { "no search was started there" };
+    let text = format!(
+        "the model oscillates at {} rad/s, of which the samples, {} s apart, take {} a period: an oscillation at {} rad/s gives \
+         the same samples, with other parameters ({tried}); sample faster, search from several starts (Fit::starts), or bound \
+         `{name}`",
+        number(frequency, 3),
+        number(interval, 3),
+        number(TAU / (frequency * interval), 2),
+        number(alias, 3)
+    );
+    Some(Warning { code: WarningCode::Aliased, severity, text })
 }
 
 /// The fastest oscillation of which there are too few samples, where parameters within their bounds reach another one with the

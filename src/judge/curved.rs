@@ -26,74 +26,81 @@ const ASYMMETRY: f64 = 0.25;
 /// Quantile of the normal distribution for an interval of 95 %.
 const QUANTILE: f64 = 1.96;
 
-impl Judgement<'_> {
-    /// The unknown whose interval is bent most, if that matters.
-    pub(super) fn curved(&self, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
-        let long = self.residuals.measured > LONGEST;
-        if long || self.objective.sweep.predicts_variance() || self.rounding || self.end.outcome == Outcome::Exact {
-            return None;
-        }
-        let expected = |i: usize| {
-            unknowns[i].knowledge.standard_error().filter(|error| error.is_finite())?;
-            Some((self.expected_curvature(i, unknowns, covariances)?, i)).filter(|(curvature, _)| *curvature > SMALL)
-        };
-        let mut examined: Vec<(f64, usize)> = (0..unknowns.len()).filter_map(expected).collect();
-        // Where predictions are affine in the initial state, only parameters make them curved. Along the profile of an initial state
-        // no parameter changes by more than its own standard error, which is small for all of them.
-        let is_state = |i: usize| matches!(unknowns[i].role, Role::InitialState(_));
-        if self.objective.sweep.coupling() == Coupling::Affine && examined.iter().all(|(_, i)| is_state(*i)) {
-            return None;
-        }
-        examined.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let bent = examined.into_iter().take(MOST).filter_map(|(_, i)| Some((i, self.asymmetry(i, covariances)?)));
-        let (i, asymmetry) = bent.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
-        if asymmetry.abs() <= ASYMMETRY {
-            return None;
-        }
-        let unknown = &unknowns[i];
-        let (by_logarithm, side) = (by_logarithm(unknown.transform, unknown.value), side(asymmetry));
-        let text = format!(
-            "the interval of `{}` is linear where the model is not: by its curvature it should reach {} further {side} than \
-             it says ({} standard errors of curvature); {by_logarithm}take diagnose::profile",
-            unknown.name,
-            percent(asymmetry.abs(), 2),
-            number(2.0 * asymmetry.abs() / QUANTILE, 2)
-        );
-        Some(Warning { code: WarningCode::CurvedInterval, severity: Severity::UsableWithCare, text })
+/// The unknown whose interval is bent most, if that matters.
+pub(super) fn curved(judgement: &Judgement<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
+    let long = judgement.residuals.measured > LONGEST;
+    if long
+        || judgement.objective.sweep.predicts_variance()
+        || judgement.rounding
+        || judgement.end.outcome == Outcome::Exact
+    {
+        return None;
     }
+    let expected = |i: usize| {
+        unknowns[i].knowledge.standard_error().filter(|error| error.is_finite())?;
+        Some((expected_curvature(judgement, i, unknowns, covariances)?, i)).filter(|(curvature, _)| *curvature > SMALL)
+    };
+    let mut examined: Vec<(f64, usize)> = (0..unknowns.len()).filter_map(expected).collect();
+    // Where predictions are affine in the initial state, only parameters make them curved. Along the profile of an initial state
+    // no parameter changes by more than its own standard error, which is small for all of them.
+    let is_state = |i: usize| matches!(unknowns[i].role, Role::InitialState(_));
+    if judgement.objective.sweep.coupling() == Coupling::Affine && examined.iter().all(|(_, i)| is_state(*i)) {
+        return None;
+    }
+    examined.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let bent = examined.into_iter().take(MOST).filter_map(|(_, i)| Some((i, asymmetry(judgement, i, covariances)?)));
+    let (i, asymmetry) = bent.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+    if asymmetry.abs() <= ASYMMETRY {
+        return None;
+    }
+    let unknown = &unknowns[i];
+    let (by_logarithm, side) = (by_logarithm(unknown.transform, unknown.value), side(asymmetry));
+    let text = format!(
+        "the interval of `{}` is linear where the model is not: by its curvature it should reach {} further {side} than \
+         it says ({} standard errors of curvature); {by_logarithm}take diagnose::profile",
+        unknown.name,
+        percent(asymmetry.abs(), 2),
+        number(2.0 * asymmetry.abs() / QUANTILE, 2)
+    );
+    Some(Warning { code: WarningCode::CurvedInterval, severity: Severity::UsableWithCare, text })
+}
 
-    /// The change of all coordinates along the profile of an unknown, by one standard error of it.
-    fn along(&self, i: usize, covariances: &Covariances) -> Option<Vec<f64>> {
-        let covariance = covariances.unknowns.as_ref()?;
-        let error = covariance.standard_error(i);
-        let of = |j: usize| if self.exact[j] { 0.0 } else { covariance.get(j, i) / (error * self.slopes[j]) };
-        Some((0..self.slopes.len()).map(of).collect())
-    }
+/// The change of all coordinates along the profile of an unknown, by one standard error of it.
+fn along(judgement: &Judgement<'_>, i: usize, covariances: &Covariances) -> Option<Vec<f64>> {
+    let covariance = covariances.unknowns.as_ref()?;
+    let error = covariance.standard_error(i);
+    let of = |j: usize| if judgement.exact[j] { 0.0 } else { covariance.get(j, i) / (error * judgement.slopes[j]) };
+    Some((0..judgement.slopes.len()).map(of).collect())
+}
 
-    /// How much predictions are bent along the profile of an unknown, by one standard error of it, in standard deviations of the noise,
-    /// if they are so in each unknown as a power or an exponential is: half the square of its change relative to itself, times what
-    /// its logarithm moves them by. What unknowns that replace each other move cancels to first order only.
-    fn expected_curvature(&self, i: usize, unknowns: &[Unknown], covariances: &Covariances) -> Option<f64> {
-        let bent = |(j, along): (usize, &f64)| {
-            let unit = if unknowns[j].transform == Transform::Log { 1.0 } else { self.end.coordinates[j].abs() };
-            let squares = along * along * self.norms[j];
-            // An initial state next to zero says nothing of others, nor does an unknown that does not change.
-            let counts = squares > 0.0 && (i == j || !matches!(unknowns[j].role, Role::InitialState(_)));
-            if counts { 0.5 * squares / (unit * self.widening) } else { 0.0 }
-        };
-        Some(self.along(i, covariances)?.iter().enumerate().map(bent).sum())
-    }
+/// How much predictions are bent along the profile of an unknown, by one standard error of it, in standard deviations of the noise,
+/// if they are so in each unknown as a power or an exponential is: half the square of its change relative to itself, times what
+/// its logarithm moves them by. What unknowns that replace each other move cancels to first order only.
+fn expected_curvature(
+    judgement: &Judgement<'_>,
+    i: usize,
+    unknowns: &[Unknown],
+    covariances: &Covariances,
+) -> Option<f64> {
+    let bent = |(j, along): (usize, &f64)| {
+        let unit = if unknowns[j].transform == Transform::Log { 1.0 } else { judgement.end.coordinates[j].abs() };
+        let squares = along * along * judgement.norms[j];
+        // An initial state next to zero says nothing of others, nor does an unknown that does not change.
+        let counts = squares > 0.0 && (i == j || !matches!(unknowns[j].role, Role::InitialState(_)));
+        if counts { 0.5 * squares / (unit * judgement.widening) } else { 0.0 }
+    };
+    Some(along(judgement, i, covariances)?.iter().enumerate().map(bent).sum())
+}
 
-    /// By which part of its half width the ends of an interval move where the curvature is counted, positive where they
-    /// move down.
-    fn asymmetry(&self, i: usize, covariances: &Covariances) -> Option<f64> {
-        let error = covariances.unknowns.as_ref()?.standard_error(i);
-        let along = self.along(i, covariances)?;
-        let second = self.objective.second_along(&self.end.coordinates, &along).ok()?;
-        // The errors are bent against the predictions.
-        let bend = -second.step(&vec![0.0; along.len()], &self.exact)?[i] * self.slopes[i];
-        Some(0.5 * QUANTILE * bend / error).filter(|asymmetry| asymmetry.is_finite())
-    }
+/// By which part of its half width the ends of an interval move where the curvature is counted, positive where they
+/// move down.
+fn asymmetry(judgement: &Judgement<'_>, i: usize, covariances: &Covariances) -> Option<f64> {
+    let error = covariances.unknowns.as_ref()?.standard_error(i);
+    let along = along(judgement, i, covariances)?;
+    let second = judgement.objective.second_along(&judgement.end.coordinates, &along).ok()?;
+    // The errors are bent against the predictions.
+    let bend = -second.step(&vec![0.0; along.len()], &judgement.exact)?[i] * judgement.slopes[i];
+    Some(0.5 * QUANTILE * bend / error).filter(|asymmetry| asymmetry.is_finite())
 }
 
 /// A remedy for an unknown of this value, if it has one.

@@ -29,214 +29,209 @@ fn warning(code: WarningCode, severity: Severity, text: String) -> Warning {
     Warning { code, severity, text }
 }
 
-impl Judgement<'_> {
-    /// Warnings about the columns of the records.
-    pub(super) fn data(&self) -> Vec<Warning> {
-        let found: Vec<Arc<Inspection>> = self.objective.problem.records.iter().map(|r| r.inspect_some()).collect();
-        let mut warnings = self.constant_outputs(&found);
-        warnings.extend(self.constant_inputs(&found));
-        warnings.extend(self.suspicions(&found));
-        warnings.extend(self.coarse(&found));
-        warnings.extend(self.sentinels_of_inputs(&found));
-        warnings.extend(self.missing(&found));
-        warnings.extend(self.twice());
-        warnings
-    }
+/// Warnings about the columns of the records.
+pub(super) fn data(judgement: &Judgement<'_>) -> Vec<Warning> {
+    let found: Vec<Arc<Inspection>> = judgement.objective.problem.records.iter().map(|r| r.inspect_some()).collect();
+    let mut warnings = constant_outputs(judgement, &found);
+    warnings.extend(constant_inputs(judgement, &found));
+    warnings.extend(suspicions(judgement, &found));
+    warnings.extend(coarse(judgement, &found));
+    warnings.extend(sentinels_of_inputs(judgement, &found));
+    warnings.extend(missing(judgement, &found));
+    warnings.extend(twice(judgement));
+    warnings
+}
 
-    /// ` of experiment ...`, if there are several.
-    fn of_experiment(&self, e: usize) -> String {
-        let labels = &self.objective.problem.unknowns.labels;
-        if labels.len() > 1 { format!(" of experiment `{}`", labels[e]) } else { String::new() }
-    }
+/// ` of experiment ...`, if there are several.
+fn of_experiment(judgement: &Judgement<'_>, e: usize) -> String {
+    let labels = &judgement.objective.problem.unknowns.labels;
+    if labels.len() > 1 { format!(" of experiment `{}`", labels[e]) } else { String::new() }
+}
 
-    /// The value of a channel that is the same in all records.
-    fn constant<'i>(found: &'i [Arc<Inspection>], of: impl Fn(&'i Inspection) -> &'i ChannelInspection) -> Option<f64> {
-        let mut values = found.iter().map(|one| of(one).constant());
-        let first = values.next()??;
-        values.all(|value| value == Some(first)).then_some(first)
-    }
+/// The value of a channel that is the same in all records.
+fn constant<'i>(found: &'i [Arc<Inspection>], of: impl Fn(&'i Inspection) -> &'i ChannelInspection) -> Option<f64> {
+    let mut values = found.iter().map(|one| of(one).constant());
+    let first = values.next()??;
+    values.all(|value| value == Some(first)).then_some(first)
+}
 
-    fn constant_outputs(&self, found: &[Arc<Inspection>]) -> Vec<Warning> {
-        let outputs = &self.objective.problem.layout().outputs;
-        let still: Vec<Option<f64>> =
-            (0..outputs.len()).map(|j| Self::constant(found, |one| &one.outputs[j])).collect();
-        let all = still.iter().all(Option::is_some);
-        let one = |(j, value): (usize, &Option<f64>)| {
-            let (value, rmse) = ((*value)?, self.residuals.outputs[j].rmse);
-            // A controller may hold an output; the model then gives the same.
-            let held = !all && rmse <= REPRODUCED * value.abs();
-            let (name, unit) = (&outputs[j].name, &outputs[j].unit);
-            let text = format!(
-                "the output `{name}` is {} {unit} throughout: it never moves and says nothing of the parameters; check the \
-                 sensor, or excite the plant",
-                exact(value)
-            );
-            let severity = if held { Severity::Usable } else { Severity::NotUsable };
-            Some(warning(WarningCode::ConstantOutput, severity, text))
-        };
-        still.iter().enumerate().filter_map(one).collect()
-    }
-
-    fn constant_inputs(&self, found: &[Arc<Inspection>]) -> Vec<Warning> {
-        let inputs = &self.objective.problem.layout().inputs;
-        let one = |(i, input): (usize, &crate::layout::Quantity)| {
-            let value = Self::constant(found, |one| &one.inputs[i])?;
-            // Nothing can be mistaken for the effect of an input that is zero.
-            let severity = if value == 0.0 { Severity::Usable } else { Severity::UsableWithCare };
-            let text = format!(
-                "the input `{}` is {} {} throughout: what it drives cannot be told from an offset; vary it",
-                input.name,
-                exact(value),
-                input.unit
-            );
-            Some(warning(WarningCode::ConstantInput, severity, text))
-        };
-        inputs.iter().enumerate().filter_map(one).collect()
-    }
-
-    /// Suspicious values of an output that the errors confirm.
-    fn suspicions(&self, found: &[Arc<Inspection>]) -> Vec<Warning> {
-        let mut suspicions: Vec<(Suspect, &ChannelInspection, &Suspicion)> = vec![];
-        for (e, inspection) in found.iter().enumerate() {
-            for (j, channel) in inspection.outputs.iter().enumerate() {
-                for suspicion in &channel.suspicions {
-                    suspicions.push((Suspect::new(e, j, suspicion), channel, suspicion));
-                }
-            }
-        }
-        if suspicions.is_empty() {
-            return vec![];
-        }
-        let (suspects, named): (Vec<Suspect>, Vec<_>) =
-            suspicions.into_iter().map(|(suspect, channel, suspicion)| (suspect, (channel, suspicion))).unzip();
-        let splits = splits(self.objective, &self.end.coordinates, &suspects);
-        let mut warnings = vec![];
-        for ((suspect, (channel, suspicion)), split) in suspects.iter().zip(named).zip(&splits) {
-            let Some((code, severity, advice)) = self.confirmed(channel, suspicion, split) else { continue };
-            if warnings.len() < NAMED {
-                let of = self.of_experiment(suspect.experiment);
-                let text = format!(
-                    "the output `{}`{of} {suspicion}, and the model differs there by {} {}: {advice}",
-                    channel.name,
-                    number(split.rms(), 2),
-                    self.objective.problem.layout().outputs[suspect.output].unit
-                );
-                warnings.push(warning(code, severity, text));
-            }
-        }
-        warnings
-    }
-
-    /// Code, severity and remedy of a suspicion that the errors confirm.
-    fn confirmed(
-        &self,
-        channel: &ChannelInspection,
-        suspicion: &Suspicion,
-        split: &Split,
-    ) -> Option<(WarningCode, Severity, &'static str)> {
-        let (least, greatest) = channel.range?;
-        if split.rms() <= REPRODUCED * (greatest - least) {
-            return None;
-        }
-        let decides = |bad: bool| if bad { Severity::NotUsable } else { Severity::UsableWithCare };
-        let dominates = split.share() > DECIDE;
-        match suspicion {
-            Suspicion::Sentinel { .. } => (split.ratio() > LARGER).then_some((
-                WarningCode::Sentinel,
-                decides(dominates && !self.objective.is_robust()),
-                "it stands for a missing measurement; mark it as missing",
-            )),
-            Suspicion::Clipped { .. } => Some((
-                WarningCode::Clipped,
-                decides(dominates),
-                "the sensor is at its limit; mark these samples as missing, or use a wider range",
-            )),
-            Suspicion::Frozen { .. } => (split.ratio() > LARGER).then_some((
-                WarningCode::Frozen,
-                decides(dominates),
-                "the sensor was stuck; mark these samples as missing",
-            )),
-            Suspicion::Repeated { .. } => Some((
-                WarningCode::Repeated,
-                decides(dominates),
-                "a buffer was written twice; leave one of the blocks out",
-            )),
-        }
-    }
-
-    /// Outputs of few values, whose errors are not far below the step between them.
-    fn coarse(&self, found: &[Arc<Inspection>]) -> Vec<Warning> {
-        let outputs = self.objective.problem.layout().outputs.iter().enumerate();
-        let one = |(j, output): (usize, &crate::layout::Quantity)| {
-            let levels = found.iter().map(|one| one.outputs[j].levels).try_fold(0, |most, n| Some(most.max(n?)))?;
-            let step = found.iter().filter_map(|one| one.outputs[j].step).reduce(f64::min)?;
-            let rmse = self.residuals.outputs[j].rmse;
-            let often = self.residuals.outputs[j].samples >= (TIMES * levels) as u64;
-            (levels <= FEW && often && rmse > PART_OF_STEP * step).then(|| {
-                let text = format!(
-                    "the output `{}` has {levels} values only, {} {} apart: its rounding is no noise, and parameters are off \
-                     by it; measure it finer",
-                    output.name,
-                    number(step, 3),
-                    output.unit
-                );
-                warning(WarningCode::CoarseOutput, Severity::UsableWithCare, text)
-            })
-        };
-        outputs.filter_map(one).collect()
-    }
-
-    fn sentinels_of_inputs(&self, found: &[Arc<Inspection>]) -> Vec<Warning> {
-        let channels = found.iter().enumerate().flat_map(|(e, one)| one.inputs.iter().map(move |channel| (e, channel)));
-        let one = |(e, channel): (usize, &ChannelInspection)| {
-            let suspicion = channel.suspicions.first()?;
-            let text = format!(
-                "the input `{}`{} {suspicion}: if it stands for a missing measurement, give the value that acted on the \
-                 plant, or leave these samples out",
-                channel.name,
-                self.of_experiment(e)
-            );
-            Some(warning(WarningCode::Sentinel, Severity::UsableWithCare, text))
-        };
-        channels.filter_map(one).take(NAMED).collect()
-    }
-
-    /// Whether two records hold the same measurements.
-    fn twice(&self) -> Option<Warning> {
-        let (records, labels) = (&self.objective.problem.records, &self.objective.problem.unknowns.labels);
-        let same = |a: &Record, b: &Record| {
-            let columns = || a.outputs().iter().zip(b.outputs()).map(|(a, b)| (&a.values[..], &b.values[..]));
-            let equal = |(a, b): (&f64, &f64)| a == b || a.is_nan() && b.is_nan();
-            a.len() == b.len() && columns().all(|(a, b)| a.iter().zip(b).all(equal)) && columns().any(|(a, _)| moves(a))
-        };
-        let pairs = (1..records.len().min(COMPARED)).flat_map(|b| (0..b).map(move |a| (a, b)));
-        let (a, b) = pairs.into_iter().find(|&(a, b)| same(&records[a], &records[b]))?;
+fn constant_outputs(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
+    let outputs = &judgement.objective.problem.layout().outputs;
+    let still: Vec<Option<f64>> = (0..outputs.len()).map(|j| constant(found, |one| &one.outputs[j])).collect();
+    let all = still.iter().all(Option::is_some);
+    let one = |(j, value): (usize, &Option<f64>)| {
+        let (value, rmse) = ((*value)?, judgement.residuals.outputs[j].rmse);
+        // A controller may hold an output; the model then gives the same.
+        let held = !all && rmse <= REPRODUCED * value.abs();
+        let (name, unit) = (&outputs[j].name, &outputs[j].unit);
         let text = format!(
-            "the experiments `{}` and `{}` hold the same measurements, which count twice: intervals are too narrow; leave one \
-             out",
-            labels[a], labels[b]
+            "the output `{name}` is {} {unit} throughout: it never moves and says nothing of the parameters; check the \
+             sensor, or excite the plant",
+            exact(value)
         );
-        Some(warning(WarningCode::Repeated, Severity::UsableWithCare, text))
-    }
+        let severity = if held { Severity::Usable } else { Severity::NotUsable };
+        Some(warning(WarningCode::ConstantOutput, severity, text))
+    };
+    still.iter().enumerate().filter_map(one).collect()
+}
 
-    fn missing(&self, found: &[Arc<Inspection>]) -> Vec<Warning> {
-        let outputs = self.objective.problem.layout().outputs.iter().enumerate();
-        let one = |(j, output): (usize, &crate::layout::Quantity)| {
-            let of = |count: fn(&ChannelInspection) -> usize| found.iter().map(|one| count(&one.outputs[j])).sum();
-            let (missing, samples): (usize, usize) = (of(|one| one.missing), of(|one| one.samples));
-            let part = missing as f64 / samples.max(1) as f64;
-            (part > MISSING).then(|| {
-                let text = format!(
-                    "{} of the measurements of `{}` are missing ({} are left)",
-                    percent(part, 2),
-                    output.name,
-                    counted(self.residuals.outputs[j].samples, "measurement")
-                );
-                warning(WarningCode::MissingMeasurements, Severity::Usable, text)
-            })
-        };
-        outputs.filter_map(one).collect()
+fn constant_inputs(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
+    let inputs = &judgement.objective.problem.layout().inputs;
+    let one = |(i, input): (usize, &crate::layout::Quantity)| {
+        let value = constant(found, |one| &one.inputs[i])?;
+        // Nothing can be mistaken for the effect of an input that is zero.
+        let severity = if value == 0.0 { Severity::Usable } else { Severity::UsableWithCare };
+        let text = format!(
+            "the input `{}` is {} {} throughout: what it drives cannot be told from an offset; vary it",
+            input.name,
+            exact(value),
+            input.unit
+        );
+        Some(warning(WarningCode::ConstantInput, severity, text))
+    };
+    inputs.iter().enumerate().filter_map(one).collect()
+}
+
+/// Suspicious values of an output that the errors confirm.
+fn suspicions(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
+    let mut suspicions: Vec<(Suspect, &ChannelInspection, &Suspicion)> = vec![];
+    for (e, inspection) in found.iter().enumerate() {
+        for (j, channel) in inspection.outputs.iter().enumerate() {
+            for suspicion in &channel.suspicions {
+                suspicions.push((Suspect::new(e, j, suspicion), channel, suspicion));
+            }
+        }
     }
+    if suspicions.is_empty() {
+        return vec![];
+    }
+    let (suspects, named): (Vec<Suspect>, Vec<_>) =
+        suspicions.into_iter().map(|(suspect, channel, suspicion)| (suspect, (channel, suspicion))).unzip();
+    let splits = splits(judgement.objective, &judgement.end.coordinates, &suspects);
+    let mut warnings = vec![];
+    for ((suspect, (channel, suspicion)), split) in suspects.iter().zip(named).zip(&splits) {
+        let Some((code, severity, advice)) = confirmed(judgement, channel, suspicion, split) else { continue };
+        if warnings.len() < NAMED {
+            let of = of_experiment(judgement, suspect.experiment);
+            let text = format!(
+                "the output `{}`{of} {suspicion}, and the model differs there by {} {}: {advice}",
+                channel.name,
+                number(split.rms(), 2),
+                judgement.objective.problem.layout().outputs[suspect.output].unit
+            );
+            warnings.push(warning(code, severity, text));
+        }
+    }
+    warnings
+}
+
+/// Code, severity and remedy of a suspicion that the errors confirm.
+fn confirmed(
+    judgement: &Judgement<'_>,
+    channel: &ChannelInspection,
+    suspicion: &Suspicion,
+    split: &Split,
+) -> Option<(WarningCode, Severity, &'static str)> {
+    let (least, greatest) = channel.range?;
+    if split.rms() <= REPRODUCED * (greatest - least) {
+        return None;
+    }
+    let decides = |bad: bool| if bad { Severity::NotUsable } else { Severity::UsableWithCare };
+    let dominates = split.share() > DECIDE;
+    match suspicion {
+        Suspicion::Sentinel { .. } => (split.ratio() > LARGER).then_some((
+            WarningCode::Sentinel,
+            decides(dominates && !judgement.objective.is_robust()),
+            "it stands for a missing measurement; mark it as missing",
+        )),
+        Suspicion::Clipped { .. } => Some((
+            WarningCode::Clipped,
+            decides(dominates),
+            "the sensor is at its limit; mark these samples as missing, or use a wider range",
+        )),
+        Suspicion::Frozen { .. } => (split.ratio() > LARGER).then_some((
+            WarningCode::Frozen,
+            decides(dominates),
+            "the sensor was stuck; mark these samples as missing",
+        )),
+        Suspicion::Repeated { .. } => {
+            Some((WarningCode::Repeated, decides(dominates), "a buffer was written twice; leave one of the blocks out"))
+        }
+    }
+}
+
+/// Outputs of few values, whose errors are not far below the step between them.
+fn coarse(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
+    let outputs = judgement.objective.problem.layout().outputs.iter().enumerate();
+    let one = |(j, output): (usize, &crate::layout::Quantity)| {
+        let levels = found.iter().map(|one| one.outputs[j].levels).try_fold(0, |most, n| Some(most.max(n?)))?;
+        let step = found.iter().filter_map(|one| one.outputs[j].step).reduce(f64::min)?;
+        let rmse = judgement.residuals.outputs[j].rmse;
+        let often = judgement.residuals.outputs[j].samples >= (TIMES * levels) as u64;
+        (levels <= FEW && often && rmse > PART_OF_STEP * step).then(|| {
+            let text = format!(
+                "the output `{}` has {levels} values only, {} {} apart: its rounding is no noise, and parameters are off \
+                 by it; measure it finer",
+                output.name,
+                number(step, 3),
+                output.unit
+            );
+            warning(WarningCode::CoarseOutput, Severity::UsableWithCare, text)
+        })
+    };
+    outputs.filter_map(one).collect()
+}
+
+fn sentinels_of_inputs(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
+    let channels = found.iter().enumerate().flat_map(|(e, one)| one.inputs.iter().map(move |channel| (e, channel)));
+    let one = |(e, channel): (usize, &ChannelInspection)| {
+        let suspicion = channel.suspicions.first()?;
+        let text = format!(
+            "the input `{}`{} {suspicion}: if it stands for a missing measurement, give the value that acted on the \
+             plant, or leave these samples out",
+            channel.name,
+            of_experiment(judgement, e)
+        );
+        Some(warning(WarningCode::Sentinel, Severity::UsableWithCare, text))
+    };
+    channels.filter_map(one).take(NAMED).collect()
+}
+
+/// Whether two records hold the same measurements.
+fn twice(judgement: &Judgement<'_>) -> Option<Warning> {
+    let (records, labels) = (&judgement.objective.problem.records, &judgement.objective.problem.unknowns.labels);
+    let same = |a: &Record, b: &Record| {
+        let columns = || a.outputs().iter().zip(b.outputs()).map(|(a, b)| (&a.values[..], &b.values[..]));
+        let equal = |(a, b): (&f64, &f64)| a == b || a.is_nan() && b.is_nan();
+        a.len() == b.len() && columns().all(|(a, b)| a.iter().zip(b).all(equal)) && columns().any(|(a, _)| moves(a))
+    };
+    let pairs = (1..records.len().min(COMPARED)).flat_map(|b| (0..b).map(move |a| (a, b)));
+    let (a, b) = pairs.into_iter().find(|&(a, b)| same(&records[a], &records[b]))?;
+    let text = format!(
+        "the experiments `{}` and `{}` hold the same measurements, which count twice: intervals are too narrow; leave one \
+         out",
+        labels[a], labels[b]
+    );
+    Some(warning(WarningCode::Repeated, Severity::UsableWithCare, text))
+}
+
+fn missing(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
+    let outputs = judgement.objective.problem.layout().outputs.iter().enumerate();
+    let one = |(j, output): (usize, &crate::layout::Quantity)| {
+        let of = |count: fn(&ChannelInspection) -> usize| found.iter().map(|one| count(&one.outputs[j])).sum();
+        let (missing, samples): (usize, usize) = (of(|one| one.missing), of(|one| one.samples));
+        let part = missing as f64 / samples.max(1) as f64;
+        (part > MISSING).then(|| {
+            let text = format!(
+                "{} of the measurements of `{}` are missing ({} are left)",
+                percent(part, 2),
+                output.name,
+                counted(judgement.residuals.outputs[j].samples, "measurement")
+            );
+            warning(WarningCode::MissingMeasurements, Severity::Usable, text)
+        })
+    };
+    outputs.filter_map(one).collect()
 }
 
 /// Whether measurements are not all the same.

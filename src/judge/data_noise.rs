@@ -35,99 +35,97 @@ struct Bias<'u> {
     change: f64,
 }
 
-impl Judgement<'_> {
-    /// The largest bias, in standard errors, by noise that `with` adds to the problem: a factor (1 or -1) and the number of
-    /// the draw.
-    fn largest_bias<'p, 'u>(
-        &'p self,
-        unknowns: &'u [Unknown],
-        with: impl Fn(f64, u64) -> Result<Problem<'p>, Error>,
-    ) -> Option<Bias<'u>> {
-        let held: Vec<bool> = unknowns.iter().map(|row| row.knowledge.standard_error().is_none()).collect();
-        let none = vec![0.0; unknowns.len()];
-        let mut mean: Vec<f64> = self.linear.step(&none, &held)?.iter().map(|step| -step).collect();
-        for (draw, sign) in (0..DRAWS).flat_map(|draw| [(draw, 1.0), (draw, -1.0)]) {
-            let problem = with(sign, draw).ok()?;
-            let objective = self.objective.of(&problem, self.objective.sweep);
-            let step = objective.evaluate(&self.end.coordinates).ok()?.step(&none, &held)?;
-            mean.iter_mut().zip(&step).for_each(|(mean, step)| *mean += step / (2 * DRAWS) as f64);
-        }
-        let bias = |(unknown, step): (&'u Unknown, &f64)| {
-            let change = step * unknown.transform.slope(unknown.value);
-            let error = unknown.knowledge.standard_error()?;
-            Some(Bias { unknown, errors: change.abs() / error, change })
-        };
-        unknowns.iter().zip(&mean).filter_map(bias).max_by(|a, b| a.errors.total_cmp(&b.errors))
+/// The largest bias, in standard errors, by noise that `with` adds to the problem: a factor (1 or -1) and the number of
+/// the draw.
+fn largest_bias<'p, 'u>(
+    judgement: &'p Judgement<'_>,
+    unknowns: &'u [Unknown],
+    with: impl Fn(f64, u64) -> Result<Problem<'p>, Error>,
+) -> Option<Bias<'u>> {
+    let held: Vec<bool> = unknowns.iter().map(|row| row.knowledge.standard_error().is_none()).collect();
+    let none = vec![0.0; unknowns.len()];
+    let mut mean: Vec<f64> = judgement.linear.step(&none, &held)?.iter().map(|step| -step).collect();
+    for (draw, sign) in (0..DRAWS).flat_map(|draw| [(draw, 1.0), (draw, -1.0)]) {
+        let problem = with(sign, draw).ok()?;
+        let objective = judgement.objective.of(&problem, judgement.objective.sweep);
+        let step = objective.evaluate(&judgement.end.coordinates).ok()?.step(&none, &held)?;
+        mean.iter_mut().zip(&step).for_each(|(mean, step)| *mean += step / (2 * DRAWS) as f64);
     }
+    let bias = |(unknown, step): (&'u Unknown, &f64)| {
+        let change = step * unknown.transform.slope(unknown.value);
+        let error = unknown.knowledge.standard_error()?;
+        Some(Bias { unknown, errors: change.abs() / error, change })
+    };
+    unknowns.iter().zip(&mean).filter_map(bias).max_by(|a, b| a.errors.total_cmp(&b.errors))
+}
 
-    /// Whether noise in the states from which predictions restart biases the estimate. Such noise is in the error at
-    /// the restart, and with the opposite sign in the error a horizon later.
-    pub(super) fn restart_noise(&self, unknowns: &[Unknown]) -> Option<Warning> {
-        let steps = self.objective.sweep.restarts()?;
-        let outputs = &self.residuals.outputs;
-        let found = self.residuals.whiteness.iter().map(|white| white.at_restart);
-        let tail = |z: f64| outputs.len() as f64 * Normal::standard().cdf(z);
-        let least = found.clone().map(|(z, _)| tail(z)).fold(1.0, f64::min);
-        if least >= LEVEL || self.rounding {
-            return None;
-        }
-        let deviation = |((_, rho), fit): ((f64, f64), &crate::estimate::OutputFit)| fit.rmse * (-rho).max(0.0).sqrt();
-        let sigma: Vec<f64> = found.zip(outputs).map(deviation).collect();
-        let problem = self.objective.problem;
-        let bias = self.largest_bias(unknowns, |sign, draw| {
-            let records = problem.records.iter().enumerate();
-            let noisy = records.map(|(e, record)| {
-                let outputs = noisy(&record.outputs, &sigma, sign, draw, e);
-                Record { outputs: outputs.into(), ..record.clone() }
-            });
-            // The measurements that predictions are compared with stay as they are.
-            let restarted = problem.with_records(noisy.collect())?;
-            Ok(Problem { records: problem.records.clone(), ..restarted })
-        })?;
-        let Bias { unknown, errors, .. } = bias;
-        if errors < NO_BIAS {
-            return None;
-        }
-        let severity = if errors > BIAS { Severity::NotUsable } else { Severity::UsableWithCare };
-        let text = format!(
-            "the states from which predictions restart are noisy: errors {steps} sample(s) apart are negatively correlated \
-             ({}), and the noise biases the estimate, `{}` by about {} standard errors (more where the inputs are fed back \
-             from the same measurements); use Kalman with Model::noise, filter the restarts (Horizon::filtered), or take a \
-             longer horizon",
-            p_value(least),
-            unknown.name,
-            number(errors, 2)
-        );
-        Some(Warning { code: WarningCode::RestartNoise, severity, text })
+/// Whether noise in the states from which predictions restart biases the estimate. Such noise is in the error at
+/// the restart, and with the opposite sign in the error a horizon later.
+pub(super) fn restart_noise(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Option<Warning> {
+    let steps = judgement.objective.sweep.restarts()?;
+    let outputs = &judgement.residuals.outputs;
+    let found = judgement.residuals.whiteness.iter().map(|white| white.at_restart);
+    let tail = |z: f64| outputs.len() as f64 * Normal::standard().cdf(z);
+    let least = found.clone().map(|(z, _)| tail(z)).fold(1.0, f64::min);
+    if least >= LEVEL || judgement.rounding {
+        return None;
     }
+    let deviation = |((_, rho), fit): ((f64, f64), &crate::estimate::OutputFit)| fit.rmse * (-rho).max(0.0).sqrt();
+    let sigma: Vec<f64> = found.zip(outputs).map(deviation).collect();
+    let problem = judgement.objective.problem;
+    let bias = largest_bias(judgement, unknowns, |sign, draw| {
+        let records = problem.records.iter().enumerate();
+        let noisy = records.map(|(e, record)| {
+            let outputs = noisy(&record.outputs, &sigma, sign, draw, e);
+            Record { outputs: outputs.into(), ..record.clone() }
+        });
+        // The measurements that predictions are compared with stay as they are.
+        let restarted = problem.with_records(noisy.collect())?;
+        Ok(Problem { records: problem.records.clone(), ..restarted })
+    })?;
+    let Bias { unknown, errors, .. } = bias;
+    if errors < NO_BIAS {
+        return None;
+    }
+    let severity = if errors > BIAS { Severity::NotUsable } else { Severity::UsableWithCare };
+    let text = format!(
+        "the states from which predictions restart are noisy: errors {steps} sample(s) apart are negatively correlated \
+         ({}), and the noise biases the estimate, `{}` by about {} standard errors (more where the inputs are fed back \
+         from the same measurements); use Kalman with Model::noise, filter the restarts (Horizon::filtered), or take a \
+         longer horizon",
+        p_value(least),
+        unknown.name,
+        number(errors, 2)
+    );
+    Some(Warning { code: WarningCode::RestartNoise, severity, text })
+}
 
-    /// The bias by the noise of inputs that was declared.
-    pub(super) fn input_noise(&self, unknowns: &[Unknown]) -> Option<Warning> {
-        let problem = self.objective.problem;
-        let sigma = problem.settings.input_noise.as_ref()?;
-        let bias = self.largest_bias(unknowns, |sign, draw| {
-            let records = problem.records.iter().enumerate();
-            let noisy = records.map(|(e, record)| {
-                let inputs = noisy(&record.inputs, sigma, sign, draw, e);
-                Record { inputs: inputs.into(), ..record.clone() }
-            });
-            problem.with_records(noisy.collect())
-        })?;
-        let Bias { unknown, errors, change } = bias;
-        if errors < BIAS {
-            return None;
-        }
-        let text = format!(
-            "the noise declared for the inputs biases `{}` by about {} {} ({} of it, {} standard errors), which no interval \
-             allows for; measure the inputs better, filter record and outputs alike, or average over periods",
-            unknown.name,
-            number(change, 2),
-            unknown.unit,
-            percent((change / unknown.value).abs(), 2),
-            number(errors, 2)
-        );
-        Some(Warning { code: WarningCode::InputNoise, severity: Severity::UsableWithCare, text })
+/// The bias by the noise of inputs that was declared.
+pub(super) fn input_noise(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Option<Warning> {
+    let problem = judgement.objective.problem;
+    let sigma = problem.settings.input_noise.as_ref()?;
+    let bias = largest_bias(judgement, unknowns, |sign, draw| {
+        let records = problem.records.iter().enumerate();
+        let noisy = records.map(|(e, record)| {
+            let inputs = noisy(&record.inputs, sigma, sign, draw, e);
+            Record { inputs: inputs.into(), ..record.clone() }
+        });
+        problem.with_records(noisy.collect())
+    })?;
+    let Bias { unknown, errors, change } = bias;
+    if errors < BIAS {
+        return None;
     }
+    let text = format!(
+        "the noise declared for the inputs biases `{}` by about {} {} ({} of it, {} standard errors), which no interval \
+         allows for; measure the inputs better, filter record and outputs alike, or average over periods",
+        unknown.name,
+        number(change, 2),
+        unknown.unit,
+        percent((change / unknown.value).abs(), 2),
+        number(errors, 2)
+    );
+    Some(Warning { code: WarningCode::InputNoise, severity: Severity::UsableWithCare, text })
 }
 
 /// The channels with Gaussian noise of these standard deviations, times a sign.

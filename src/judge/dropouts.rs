@@ -44,30 +44,28 @@ fn split(runs: &[Vec<(f64, f64)>]) -> Option<[Errors; 2]> {
     (!few && again * ROUNDED <= held.count).then_some(split)
 }
 
-impl Judgement<'_> {
-    /// The warning about an output with these errors, one run per experiment, `None` where nothing was measured.
-    pub(super) fn dropouts_of(&self, j: usize, errors: &[Vec<Option<f64>>]) -> Option<Warning> {
-        let problem = self.objective.problem;
-        let run = |(record, errors): (&crate::record::Record, &Vec<Option<f64>>)| {
-            let values = record.outputs()[j].values.iter().zip(errors);
-            values.filter_map(|(y, error)| Some((*y, (*error)?))).collect()
-        };
-        let runs: Vec<Vec<(f64, f64)>> = problem.records.iter().zip(errors).map(run).collect();
-        let [held, others] = split(&runs)?;
-        are_larger(held, others).then(|| {
-            let output = &problem.layout().outputs[j];
-            let text = format!(
-                "{} of the measurements of `{}` are equal to the one before, and the model differs there by {} {unit}, elsewhere by \
-                 {} {unit}: the last value was held where none arrived; mark these samples as missing",
-                percent(held.count as f64 / (held.count + others.count) as f64, 2),
-                output.name,
-                number(held.mean().sqrt(), 2),
-                number(others.mean().sqrt(), 2),
-                unit = output.unit
-            );
-            care(WarningCode::Frozen, text)
-        })
-    }
+/// The warning about an output with these errors, one run per experiment, `None` where nothing was measured.
+pub(super) fn dropouts_of(judgement: &Judgement<'_>, j: usize, errors: &[Vec<Option<f64>>]) -> Option<Warning> {
+    let problem = judgement.objective.problem;
+    let run = |(record, errors): (&crate::record::Record, &Vec<Option<f64>>)| {
+        let values = record.outputs()[j].values.iter().zip(errors);
+        values.filter_map(|(y, error)| Some((*y, (*error)?))).collect()
+    };
+    let runs: Vec<Vec<(f64, f64)>> = problem.records.iter().zip(errors).map(run).collect();
+    let [held, others] = split(&runs)?;
+    are_larger(held, others).then(|| {
+        let output = &problem.layout().outputs[j];
+        let text = format!(
+            "{} of the measurements of `{}` are equal to the one before, and the model differs there by {} {unit}, elsewhere by \
+             {} {unit}: the last value was held where none arrived; mark these samples as missing",
+            percent(held.count as f64 / (held.count + others.count) as f64, 2),
+            output.name,
+            number(held.mean().sqrt(), 2),
+            number(others.mean().sqrt(), 2),
+            unit = output.unit
+        );
+        care(WarningCode::Frozen, text)
+    })
 }
 
 /// Whether the errors of measurements that are equal to the one before are so much larger than the others that the last value was held.

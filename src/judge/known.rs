@@ -36,62 +36,60 @@ fn told_by_data(unknown: &Unknown, prior: Prior) -> bool {
     alone > 0.0 && value.abs() > quantile / alone.sqrt()
 }
 
-impl Judgement<'_> {
-    /// Warnings about single parameters.
-    pub(super) fn knowledge(&self, unknowns: &[Unknown], covariances: &Covariances) -> Vec<Warning> {
-        let mut warnings = vec![];
-        warnings.extend(self.without_error(unknowns, covariances));
-        warnings.extend(self.near_zero(unknowns));
-        warnings.extend(opposite(unknowns));
-        warnings.extend(far_from_start(unknowns));
-        warnings
-    }
+/// Warnings about single parameters.
+pub(super) fn knowledge(judgement: &Judgement<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Vec<Warning> {
+    let mut warnings = vec![];
+    warnings.extend(without_error(judgement, unknowns, covariances));
+    warnings.extend(near_zero(judgement, unknowns));
+    warnings.extend(opposite(unknowns));
+    warnings.extend(far_from_start(unknowns));
+    warnings
+}
 
-    /// Unknowns whose standard error came out as zero, infinite or not a number.
-    fn without_error(&self, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
-        let covariance = covariances.unknowns.as_ref().filter(|_| self.degrees > 0.0)?;
-        let seen = self.seen();
-        let wrong = |(i, _): &(usize, &Unknown)| seen[*i] && !is_error(covariance.standard_error(*i));
-        let wrong: Vec<(usize, &Unknown)> = unknowns.iter().enumerate().filter(wrong).collect();
-        let (first, _) = *wrong.first()?;
-        let text = format!(
-            "the standard error of {} is {}: nothing is known of it; check noise, loss and weighting, and whether the outputs \
-             move at all",
-            listed(wrong.iter().map(|(_, unknown)| unknown.name.as_str())),
-            number(covariance.standard_error(first), 2)
-        );
-        Some(Warning { code: WarningCode::NoStandardError, severity: Severity::NotUsable, text })
-    }
+/// Unknowns whose standard error came out as zero, infinite or not a number.
+fn without_error(judgement: &Judgement<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
+    let covariance = covariances.unknowns.as_ref().filter(|_| judgement.degrees > 0.0)?;
+    let seen = judgement.seen();
+    let wrong = |(i, _): &(usize, &Unknown)| seen[*i] && !is_error(covariance.standard_error(*i));
+    let wrong: Vec<(usize, &Unknown)> = unknowns.iter().enumerate().filter(wrong).collect();
+    let (first, _) = *wrong.first()?;
+    let text = format!(
+        "the standard error of {} is {}: nothing is known of it; check noise, loss and weighting, and whether the outputs \
+         move at all",
+        listed(wrong.iter().map(|(_, unknown)| unknown.name.as_str())),
+        number(covariance.standard_error(first), 2)
+    );
+    Some(Warning { code: WarningCode::NoStandardError, severity: Severity::NotUsable, text })
+}
 
-    /// Parameters that cannot be told from zero.
-    fn near_zero(&self, unknowns: &[Unknown]) -> Option<Warning> {
-        let rows = &self.objective.problem.unknowns.row;
-        let parameters = || unknowns.iter().zip(rows).filter(|(unknown, _)| matches!(unknown.role, Role::Parameter(_)));
-        let without_prior = parameters().filter(|(_, row)| row.parameter.prior.is_none()).map(|(unknown, _)| unknown);
-        let unknown: Vec<&Unknown> = without_prior.filter(|unknown| holds_zero(unknown)).collect();
-        if unknown.is_empty() {
-            return None;
-        }
-        let all = parameters().all(|(unknown, row)| match row.parameter.prior {
-            Some(prior) => !told_by_data(unknown, prior),
-            None => holds_zero(unknown) || unknown.knowledge == Knowledge::Unidentified,
-        });
-        let names = listed(unknown.iter().map(|unknown| unknown.name.as_str()));
-        let text = match all {
-            false => format!(
-                "{names} cannot be told from zero: an interval is wider than its value; excite what depends on it, or fix it"
-            ),
-            true => format!(
-                "no parameter is known: the intervals of {names} are wider than their values; vary {} more, or measure longer",
-                match self.objective.problem.layout().inputs.as_slice() {
-                    [] => "the initial state".to_owned(),
-                    inputs => listed(inputs.iter().map(|input| input.name.as_str())),
-                }
-            ),
-        };
-        let severity = if all { Severity::NotUsable } else { Severity::UsableWithCare };
-        Some(Warning { code: WarningCode::HoldsZero, severity, text })
+/// Parameters that cannot be told from zero.
+fn near_zero(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Option<Warning> {
+    let rows = &judgement.objective.problem.unknowns.row;
+    let parameters = || unknowns.iter().zip(rows).filter(|(unknown, _)| matches!(unknown.role, Role::Parameter(_)));
+    let without_prior = parameters().filter(|(_, row)| row.parameter.prior.is_none()).map(|(unknown, _)| unknown);
+    let unknown: Vec<&Unknown> = without_prior.filter(|unknown| holds_zero(unknown)).collect();
+    if unknown.is_empty() {
+        return None;
     }
+    let all = parameters().all(|(unknown, row)| match row.parameter.prior {
+        Some(prior) => !told_by_data(unknown, prior),
+        None => holds_zero(unknown) || unknown.knowledge == Knowledge::Unidentified,
+    });
+    let names = listed(unknown.iter().map(|unknown| unknown.name.as_str()));
+    let text = match all {
+        false => format!(
+            "{names} cannot be told from zero: an interval is wider than its value; excite what depends on it, or fix it"
+        ),
+        true => format!(
+            "no parameter is known: the intervals of {names} are wider than their values; vary {} more, or measure longer",
+            match judgement.objective.problem.layout().inputs.as_slice() {
+                [] => "the initial state".to_owned(),
+                inputs => listed(inputs.iter().map(|input| input.name.as_str())),
+            }
+        ),
+    };
+    let severity = if all { Severity::NotUsable } else { Severity::UsableWithCare };
+    Some(Warning { code: WarningCode::HoldsZero, severity, text })
 }
 
 /// Whether a number can be a standard error.

@@ -43,30 +43,28 @@ fn chance(error: f64, rmse: f64, count: f64) -> (f64, f64) {
     (ratio, (2.0 * count * tail).min(1.0))
 }
 
-impl Judgement<'_> {
-    /// The largest error of an output, if normal ones are hardly so large.
-    pub(super) fn extreme(&self, j: usize) -> Option<Warning> {
-        let (fit, largest) = (&self.residuals.outputs[j], self.residuals.largest[j]);
-        let count = fit.samples as f64;
-        if fit.rmse <= 0.0 || self.end.outcome == Outcome::Exact {
-            return None;
-        }
-        let (ratio, chance) = chance(largest.error, fit.rmse, count);
-        if !ratio.is_finite() || chance >= LEVEL {
-            return None;
-        }
-        let problem = self.objective.problem;
-        let text = format!(
-            "the error of `{}` at t = {} s of `{}` is {} times the deviation of all others ({} for the largest of {count} normal \
-             errors): look at this measurement, and mark it as missing if it is wrong",
-            problem.layout().outputs[j].name,
-            exact(problem.records[largest.experiment].time(largest.sample)),
-            problem.unknowns.labels[largest.experiment],
-            number(ratio, 3),
-            p_value(chance)
-        );
-        Some(Warning { code: WarningCode::Outliers, severity: Severity::Usable, text })
+/// The largest error of an output, if normal ones are hardly so large.
+pub(super) fn extreme(judgement: &Judgement<'_>, j: usize) -> Option<Warning> {
+    let (fit, largest) = (&judgement.residuals.outputs[j], judgement.residuals.largest[j]);
+    let count = fit.samples as f64;
+    if fit.rmse <= 0.0 || judgement.end.outcome == Outcome::Exact {
+        return None;
     }
+    let (ratio, chance) = chance(largest.error, fit.rmse, count);
+    if !ratio.is_finite() || chance >= LEVEL {
+        return None;
+    }
+    let problem = judgement.objective.problem;
+    let text = format!(
+        "the error of `{}` at t = {} s of `{}` is {} times the deviation of all others ({} for the largest of {count} normal \
+         errors): look at this measurement, and mark it as missing if it is wrong",
+        problem.layout().outputs[j].name,
+        exact(problem.records[largest.experiment].time(largest.sample)),
+        problem.unknowns.labels[largest.experiment],
+        number(ratio, 3),
+        p_value(chance)
+    );
+    Some(Warning { code: WarningCode::Outliers, severity: Severity::Usable, text })
 }
 
 #[cfg(test)]

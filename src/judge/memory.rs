@@ -11,20 +11,18 @@ use crate::record::{Record, Time};
 /// Samples of the shortest windows that are compared.
 const WINDOW: f64 = 64.0;
 
-impl Judgement<'_> {
-    /// By which factor the changes of all windows are larger than those within them, at the most: by the slowest decay of the plant at
-    /// some points along the records. One for predictions that restart.
-    pub(super) fn windows_add_up(&self) -> f64 {
-        let objective = self.objective;
-        if objective.sweep.restarts().is_some() {
-            return 1.0;
-        }
-        let of = |point| eigenvalues(objective, &self.end.coordinates, point);
-        let slowest = some(&self.residuals.points).filter_map(of).flatten().map(|value| value.re).reduce(f64::max);
-        let Some(decay) = slowest else { return 1.0 };
-        let records = objective.problem.records.iter();
-        records.map(|record| sum(decay * WINDOW * interval(record), record.len() as f64 / WINDOW)).fold(1.0, f64::max)
+/// By which factor the changes of all windows are larger than those within them, at the most: by the slowest decay of the plant at
+/// some points along the records. One for predictions that restart.
+pub(super) fn windows_add_up(judgement: &Judgement<'_>) -> f64 {
+    let objective = judgement.objective;
+    if objective.sweep.restarts().is_some() {
+        return 1.0;
     }
+    let of = |point| eigenvalues(objective, &judgement.end.coordinates, point);
+    let slowest = some(&judgement.residuals.points).filter_map(of).flatten().map(|value| value.re).reduce(f64::max);
+    let Some(decay) = slowest else { return 1.0 };
+    let records = objective.problem.records.iter();
+    records.map(|record| sum(decay * WINDOW * interval(record), record.len() as f64 / WINDOW)).fold(1.0, f64::max)
 }
 
 /// The sum of what is left of the changes of so many windows, with the exponent by which a change decays over a window.

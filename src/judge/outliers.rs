@@ -2,6 +2,7 @@
 
 use super::conclude::Judgement;
 use super::warnings::care;
+use super::{dropouts, largest, shape};
 use crate::estimate::{Warning, WarningCode};
 use crate::numeral::percent;
 use crate::optimize::{Outcome, Severity};
@@ -17,43 +18,41 @@ const NEIGHBORS: usize = 10;
 const DECIDE: f64 = 0.5;
 const LITTLE: f64 = 0.1;
 
-impl Judgement<'_> {
-    /// Outputs whose errors have outliers, or measurements that were held, of a fit by their squares.
-    pub(super) fn outliers(&self) -> Vec<Warning> {
-        let objective = self.objective;
-        let squares = objective.loss().is_none() && !objective.is_weighted() && !objective.sweep.predicts_variance();
-        if !squares || self.rounding || self.end.outcome == Outcome::Exact {
-            return vec![];
-        }
-        let heavy = |j: usize| is_heavy(self.residuals.kurtosis[j], self.residuals.outputs[j].samples);
-        let heavy: Vec<bool> = (0..objective.outputs()).map(heavy).collect();
-        if !heavy.contains(&true) {
-            return (0..objective.outputs()).filter_map(|j| self.extreme(j)).collect();
-        }
-        let mut errors = vec![vec![]; objective.outputs()];
-        for e in 0..objective.experiments().min(super::shape::RECORDS) {
-            errors.iter_mut().zip(self.first_errors(e)).for_each(|(all, own)| all.push(own));
-        }
-        let of = |j: usize| {
-            let all: Vec<f64> = errors[j].iter().flatten().flatten().copied().collect();
-            self.dropouts_of(j, &errors[j]).or_else(|| self.outliers_of(j, &all))
-        };
-        let of = |j: usize| if heavy[j] { of(j) } else { None };
-        (0..objective.outputs()).filter_map(|j| of(j).or_else(|| self.extreme(j))).collect()
+/// Outputs whose errors have outliers, or measurements that were held, of a fit by their squares.
+pub(super) fn outliers(judgement: &Judgement<'_>) -> Vec<Warning> {
+    let objective = judgement.objective;
+    let squares = objective.loss().is_none() && !objective.is_weighted() && !objective.sweep.predicts_variance();
+    if !squares || judgement.rounding || judgement.end.outcome == Outcome::Exact {
+        return vec![];
     }
+    let heavy = |j: usize| is_heavy(judgement.residuals.kurtosis[j], judgement.residuals.outputs[j].samples);
+    let heavy: Vec<bool> = (0..objective.outputs()).map(heavy).collect();
+    if !heavy.contains(&true) {
+        return (0..objective.outputs()).filter_map(|j| largest::extreme(judgement, j)).collect();
+    }
+    let mut errors = vec![vec![]; objective.outputs()];
+    for e in 0..objective.experiments().min(super::shape::RECORDS) {
+        errors.iter_mut().zip(shape::first_errors(judgement, e)).for_each(|(all, own)| all.push(own));
+    }
+    let of = |j: usize| {
+        let all: Vec<f64> = errors[j].iter().flatten().flatten().copied().collect();
+        dropouts::dropouts_of(judgement, j, &errors[j]).or_else(|| outliers_of(judgement, j, &all))
+    };
+    let of = |j: usize| if heavy[j] { of(j) } else { None };
+    (0..objective.outputs()).filter_map(|j| of(j).or_else(|| largest::extreme(judgement, j))).collect()
+}
 
-    fn outliers_of(&self, j: usize, errors: &[f64]) -> Option<Warning> {
-        let (count, share) = far_errors(errors)?;
-        let output = &self.objective.problem.layout().outputs[j].name;
-        let text = format!(
-            "{} of the errors of `{output}` are beyond {FAR} robust standard deviations, of all and of their neighbors, and make {} of the sum of squares: outliers, \
-             or moments that the model misses; take a robust loss (Huber, Tukey), or mark these samples as missing",
-            percent(count as f64 / errors.len() as f64, 2),
-            percent(share, 2)
-        );
-        let severity = if share > DECIDE { Severity::UsableWithCare } else { Severity::Usable };
-        Some(Warning { severity, ..care(WarningCode::Outliers, text) })
-    }
+fn outliers_of(judgement: &Judgement<'_>, j: usize, errors: &[f64]) -> Option<Warning> {
+    let (count, share) = far_errors(errors)?;
+    let output = &judgement.objective.problem.layout().outputs[j].name;
+    let text = format!(
+        "{} of the errors of `{output}` are beyond {FAR} robust standard deviations, of all and of their neighbors, and make {} of the sum of squares: outliers, \
+         or moments that the model misses; take a robust loss (Huber, Tukey), or mark these samples as missing",
+        percent(count as f64 / errors.len() as f64, 2),
+        percent(share, 2)
+    );
+    let severity = if share > DECIDE { Severity::UsableWithCare } else { Severity::Usable };
+    Some(Warning { severity, ..care(WarningCode::Outliers, text) })
 }
 
 /// How many errors are far from the others and from their neighbors, and their part of the sum of squares, if it is no little.

@@ -7,7 +7,6 @@
 //! covariance, since one that allows for errors of changing size is right for errors of one size, too; that found, which heavy tails
 //! and errors of changing size enlarge (Koenker, J. Econometrics 17 (1981) 107), decides on what is said.
 
-use super::conclude::Judgement;
 use super::covariances::Covariances;
 use crate::estimate::{CovarianceMethod, Unknown, Warning, WarningCode};
 use crate::numeral::number;
@@ -131,32 +130,30 @@ pub(super) struct Uneven {
     pub p_value: f64,
 }
 
-impl Judgement<'_> {
-    /// Errors that are larger or smaller where an unknown is determined.
-    pub(super) fn uneven_errors(&self, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
-        let Uneven { unknown, factor, p_value } = covariances.uneven?;
-        let (name, times) = (&unknowns[unknown].name, number(factor, 2));
-        let found = format!(
-            "the errors are {times} times as large where `{name}` is determined as they are on average ({})",
-            crate::numeral::p_value(p_value)
-        );
-        let classical = covariances.method == CovarianceMethod::Classical;
-        let (allowed, severity) = match classical {
-            true => (
-                format!(
-                    "its standard error takes them as of one size and would be {times} times as large otherwise; weigh them by \
-                     their noise, or by one, with which the intervals allow for it (Fit::weighting)"
-                ),
-                if factor > NARROW { Severity::UsableWithCare } else { Severity::Usable },
+/// Errors that are larger or smaller where an unknown is determined.
+pub(super) fn uneven_errors(unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
+    let Uneven { unknown, factor, p_value } = covariances.uneven?;
+    let (name, times) = (&unknowns[unknown].name, number(factor, 2));
+    let found = format!(
+        "the errors are {times} times as large where `{name}` is determined as they are on average ({})",
+        crate::numeral::p_value(p_value)
+    );
+    let classical = covariances.method == CovarianceMethod::Classical;
+    let (allowed, severity) = match classical {
+        true => (
+            format!(
+                "its standard error takes them as of one size and would be {times} times as large otherwise; weigh them by \
+                 their noise, or by one, with which the intervals allow for it (Fit::weighting)"
             ),
-            false => (
-                "the intervals allow for it; weights by their noise would make the estimate better (Fit::weighting)"
-                    .to_owned(),
-                Severity::Usable,
-            ),
-        };
-        Some(Warning { code: WarningCode::UnevenErrors, severity, text: format!("{found}: {allowed}") })
-    }
+            if factor > NARROW { Severity::UsableWithCare } else { Severity::Usable },
+        ),
+        false => (
+            "the intervals allow for it; weights by their noise would make the estimate better (Fit::weighting)"
+                .to_owned(),
+            Severity::Usable,
+        ),
+    };
+    Some(Warning { code: WarningCode::UnevenErrors, severity, text: format!("{found}: {allowed}") })
 }
 
 #[cfg(test)]

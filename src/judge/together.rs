@@ -94,148 +94,147 @@ struct Piece {
     dependence: f64,
 }
 
-impl Judgement<'_> {
-    /// Parameters that differ between outputs, records or halves of the data. Compared where errors are correlated, because what
-    /// contradicts the model is, and of static models with several outputs.
-    pub(super) fn contradictions(&self, unknowns: &[Unknown]) -> Vec<Warning> {
-        let objective = self.objective;
-        let plain =
-            objective.loss().is_none() && !objective.is_weighted() && objective.problem.settings.prefilter.is_none();
-        let possible = plain && !objective.sweep.predicts_variance() && unknowns.len() <= MOST && self.degrees > 0.0;
-        if !possible || !self.end.outcome.converged() || !(self.is_colored() || self.is_static()) {
-            return vec![];
-        }
-        let diagonal = objective.with(crate::problem::Whitening::Diagonal(objective.whitening.sigma()));
-        let make = |e: usize| {
-            let columns = objective.problem.unknowns.columns(e).count();
-            let halves = |_| [Part::new(columns), Part::new(columns)];
-            let of = (0..objective.outputs()).map(halves).collect();
-            Halves { objective, experiment: e, of, row: vec![0.0; columns] }
-        };
-        let Ok(mut all) = diagonal.gather(&self.end.coordinates, true, make) else { return vec![] };
-        all.iter_mut()
-            .flat_map(|halves| &mut halves.of)
-            .flatten()
-            .for_each(|part| part.triangle.absorb(&mut part.block));
-        let outputs = objective.outputs();
-        let layout = &objective.problem.layout().outputs;
-        let output = |j: usize| self.piece(&all, |_, one, _| one == j, format!("`{}` alone", layout[j].name));
-        let half = |h: usize| {
-            self.piece(&all, |_, _, one| one == h, format!("the {} half of the data", ["first", "second"][h]))
-        };
-        let labels = &objective.problem.unknowns.labels;
-        let record = |e: usize| self.piece(&all, |one, _, _| one == e, format!("`{}` alone", labels[e]));
-        let mut warnings = vec![];
-        if (2..=RECORDS).contains(&all.len()) {
-            let pieces = (0..all.len()).filter_map(record).collect();
-            warnings.extend(self.compared(pieces, unknowns, WarningCode::RecordsContradict));
-        }
-        if outputs > 1 {
-            let pieces = (0..outputs).filter_map(output).collect();
-            warnings.extend(self.compared(pieces, unknowns, WarningCode::OutputsContradict));
-        }
-        if !self.is_static() {
-            let pieces = (0..2).filter_map(half).collect();
-            warnings.extend(self.compared(pieces, unknowns, WarningCode::HalvesContradict));
-        }
-        warnings
+/// Parameters that differ between outputs, records or halves of the data. Compared where errors are correlated, because what
+/// contradicts the model is, and of static models with several outputs.
+pub(super) fn contradictions(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
+    let objective = judgement.objective;
+    let plain =
+        objective.loss().is_none() && !objective.is_weighted() && objective.problem.settings.prefilter.is_none();
+    let possible = plain && !objective.sweep.predicts_variance() && unknowns.len() <= MOST && judgement.degrees > 0.0;
+    if !possible || !judgement.end.outcome.converged() || !(judgement.is_colored() || judgement.is_static()) {
+        return vec![];
     }
+    let diagonal = objective.with(crate::problem::Whitening::Diagonal(objective.whitening.sigma()));
+    let make = |e: usize| {
+        let columns = objective.problem.unknowns.columns(e).count();
+        let halves = |_| [Part::new(columns), Part::new(columns)];
+        let of = (0..objective.outputs()).map(halves).collect();
+        Halves { objective, experiment: e, of, row: vec![0.0; columns] }
+    };
+    let Ok(mut all) = diagonal.gather(&judgement.end.coordinates, true, make) else { return vec![] };
+    all.iter_mut().flat_map(|halves| &mut halves.of).flatten().for_each(|part| part.triangle.absorb(&mut part.block));
+    let outputs = objective.outputs();
+    let layout = &objective.problem.layout().outputs;
+    let output = |j: usize| piece(judgement, &all, |_, one, _| one == j, format!("`{}` alone", layout[j].name));
+    let half = |h: usize| {
+        piece(judgement, &all, |_, _, one| one == h, format!("the {} half of the data", ["first", "second"][h]))
+    };
+    let labels = &objective.problem.unknowns.labels;
+    let record = |e: usize| piece(judgement, &all, |one, _, _| one == e, format!("`{}` alone", labels[e]));
+    let mut warnings = vec![];
+    if (2..=RECORDS).contains(&all.len()) {
+        let pieces = (0..all.len()).filter_map(record).collect();
+        warnings.extend(compared(judgement, pieces, unknowns, WarningCode::RecordsContradict));
+    }
+    if outputs > 1 {
+        let pieces = (0..outputs).filter_map(output).collect();
+        warnings.extend(compared(judgement, pieces, unknowns, WarningCode::OutputsContradict));
+    }
+    if !judgement.is_static() {
+        let pieces = (0..2).filter_map(half).collect();
+        warnings.extend(compared(judgement, pieces, unknowns, WarningCode::HalvesContradict));
+    }
+    warnings
+}
 
-    /// The triangles of chosen experiments, outputs and halves, those of each output divided by the noise that is left when
-    /// its own step is taken.
-    fn piece(&self, all: &[Halves<'_>], chosen: impl Fn(usize, usize, usize) -> bool, name: String) -> Option<Piece> {
-        let shared = self.objective.problem.unknowns.shared();
-        let held = &self.undetermined.held;
-        let empty = || all.iter().map(|halves| Information::new(halves.row.len())).collect::<Vec<_>>();
-        let (mut merged, mut dependence) = (empty(), 1.0f64);
-        for j in 0..self.objective.outputs() {
-            let (mut triangles, mut squares, mut count) = (empty(), 0.0, 0);
-            for (e, halves) in all.iter().enumerate() {
-                for (_, part) in halves.of[j].iter().enumerate().filter(|(h, _)| chosen(e, j, *h)) {
-                    triangles[e].merge(&part.triangle);
-                    squares += part.squares;
-                    count += part.count;
-                }
+/// The triangles of chosen experiments, outputs and halves, those of each output divided by the noise that is left when
+/// its own step is taken.
+fn piece(
+    judgement: &Judgement<'_>,
+    all: &[Halves<'_>],
+    chosen: impl Fn(usize, usize, usize) -> bool,
+    name: String,
+) -> Option<Piece> {
+    let shared = judgement.objective.problem.unknowns.shared();
+    let held = &judgement.undetermined.held;
+    let empty = || all.iter().map(|halves| Information::new(halves.row.len())).collect::<Vec<_>>();
+    let (mut merged, mut dependence) = (empty(), 1.0f64);
+    for j in 0..judgement.objective.outputs() {
+        let (mut triangles, mut squares, mut count) = (empty(), 0.0, 0);
+        for (e, halves) in all.iter().enumerate() {
+            for (_, part) in halves.of[j].iter().enumerate().filter(|(h, _)| chosen(e, j, *h)) {
+                triangles[e].merge(&part.triangle);
+                squares += part.squares;
+                count += part.count;
             }
-            if count == 0 {
+        }
+        if count == 0 {
+            continue;
+        }
+        let linear = Linearization::new(0.0, shared, triangles);
+        let own = directions::undetermined(&linear, held).held;
+        let step = linear.step(&vec![0.0; own.len()], &own)?;
+        let free = own.iter().filter(|held| !**held).count() as f64;
+        let variance = (squares - 2.0 * linear.predicted_reduction(&step)) / (count as f64 - free);
+        if !(variance > 0.0 && variance.is_finite()) {
+            return None;
+        }
+        for (all, (triangle, _)) in merged.iter_mut().zip(linear.columns()) {
+            all.merge(&scaled(triangle, variance.sqrt().recip()));
+        }
+        dependence = dependence.max(judgement.dependence(j));
+    }
+    Piece::new(name, Linearization::new(0.0, shared, merged), held, dependence)
+}
+
+/// Whether pieces follow one set of parameters.
+fn compared(judgement: &Judgement<'_>, pieces: Vec<Piece>, unknowns: &[Unknown], code: WarningCode) -> Option<Warning> {
+    let first = pieces.first().filter(|_| pieces.len() > 1)?;
+    let dependence = pieces.iter().map(|piece| piece.dependence).fold(1.0, f64::max);
+    let shared = judgement.objective.problem.unknowns.shared();
+    let mut whole: Vec<Information> = first.linear.columns().map(|(triangle, _)| triangle.clone()).collect();
+    for piece in &pieces[1..] {
+        whole.iter_mut().zip(piece.linear.columns()).for_each(|(all, (one, _))| all.merge(one));
+    }
+    let whole =
+        Piece::new(String::new(), Linearization::new(0.0, shared, whole), &judgement.undetermined.held, dependence)?;
+    let free = |piece: &Piece| piece.held.iter().filter(|held| !**held).count() as f64;
+    let degrees = pieces.iter().map(free).sum::<f64>() - free(&whole);
+    let gain = pieces.iter().map(|piece| piece.gain).sum::<f64>() - whole.gain;
+    let chance = no_chance(gain / dependence, degrees)?;
+    let (i, a, b, _) = furthest(&pieces, unknowns)?;
+    let (unknown, slope) = (&unknowns[i], judgement.slopes[i]);
+    let value = |piece: &Piece| unknown.value + slope * piece.step[i];
+    let error = |piece: &Piece| {
+        let unit = piece.linear.covariance(&piece.held).map_or(f64::NAN, |covariance| covariance.standard_error(i));
+        (slope * unit).abs() * piece.dependence.sqrt()
+    };
+    let (one, two) = (&pieces[a], &pieces[b]);
+    let part = (value(one) - value(two)).abs() / unknown.value.abs().max(f64::MIN_POSITIVE);
+    let said = |piece: &Piece| format!("{} +- {} by {}", number(value(piece), 4), number(error(piece), 2), piece.name);
+    let text = format!(
+        "`{}` is {} and {} ({} apart; chi-square {}): check gains, signs and delays of the sensors, whether all data are of \
+         one plant, and what the model leaves out",
+        unknown.name,
+        said(one),
+        said(two),
+        percent(part, 2),
+        p_value(chance)
+    );
+    let severity = if part > FAR_APART { Severity::NotUsable } else { Severity::UsableWithCare };
+    Some(Warning { code, severity, text })
+}
+
+/// The parameter that differs most between two pieces, in standard errors: its number, and those of the pieces.
+fn furthest(pieces: &[Piece], unknowns: &[Unknown]) -> Option<(usize, usize, usize, f64)> {
+    let mut found: Option<(usize, usize, usize, f64)> = None;
+    let covariances: Vec<_> = pieces.iter().map(|piece| piece.linear.covariance(&piece.held)).collect();
+    for (i, unknown) in unknowns.iter().enumerate().filter(|(_, u)| matches!(u.role, Role::Parameter(_))) {
+        for (a, b) in (0..pieces.len()).flat_map(|b| (0..b).map(move |a| (a, b))) {
+            let (Some(first), Some(second)) = (&covariances[a], &covariances[b]) else { continue };
+            if pieces[a].held[i] || pieces[b].held[i] {
                 continue;
             }
-            let linear = Linearization::new(0.0, shared, triangles);
-            let own = directions::undetermined(&linear, held).held;
-            let step = linear.step(&vec![0.0; own.len()], &own)?;
-            let free = own.iter().filter(|held| !**held).count() as f64;
-            let variance = (squares - 2.0 * linear.predicted_reduction(&step)) / (count as f64 - free);
-            if !(variance > 0.0 && variance.is_finite()) {
-                return None;
-            }
-            for (all, (triangle, _)) in merged.iter_mut().zip(linear.columns()) {
-                all.merge(&scaled(triangle, variance.sqrt().recip()));
-            }
-            dependence = dependence.max(self.dependence(j));
-        }
-        Piece::new(name, Linearization::new(0.0, shared, merged), held, dependence)
-    }
-
-    /// Whether pieces follow one set of parameters.
-    fn compared(&self, pieces: Vec<Piece>, unknowns: &[Unknown], code: WarningCode) -> Option<Warning> {
-        let first = pieces.first().filter(|_| pieces.len() > 1)?;
-        let dependence = pieces.iter().map(|piece| piece.dependence).fold(1.0, f64::max);
-        let shared = self.objective.problem.unknowns.shared();
-        let mut whole: Vec<Information> = first.linear.columns().map(|(triangle, _)| triangle.clone()).collect();
-        for piece in &pieces[1..] {
-            whole.iter_mut().zip(piece.linear.columns()).for_each(|(all, (one, _))| all.merge(one));
-        }
-        let whole =
-            Piece::new(String::new(), Linearization::new(0.0, shared, whole), &self.undetermined.held, dependence)?;
-        let free = |piece: &Piece| piece.held.iter().filter(|held| !**held).count() as f64;
-        let degrees = pieces.iter().map(free).sum::<f64>() - free(&whole);
-        let gain = pieces.iter().map(|piece| piece.gain).sum::<f64>() - whole.gain;
-        let chance = no_chance(gain / dependence, degrees)?;
-        let (i, a, b, _) = self.furthest(&pieces, unknowns)?;
-        let (unknown, slope) = (&unknowns[i], self.slopes[i]);
-        let value = |piece: &Piece| unknown.value + slope * piece.step[i];
-        let error = |piece: &Piece| {
-            let unit = piece.linear.covariance(&piece.held).map_or(f64::NAN, |covariance| covariance.standard_error(i));
-            (slope * unit).abs() * piece.dependence.sqrt()
-        };
-        let (one, two) = (&pieces[a], &pieces[b]);
-        let part = (value(one) - value(two)).abs() / unknown.value.abs().max(f64::MIN_POSITIVE);
-        let said =
-            |piece: &Piece| format!("{} +- {} by {}", number(value(piece), 4), number(error(piece), 2), piece.name);
-        let text = format!(
-            "`{}` is {} and {} ({} apart; chi-square {}): check gains, signs and delays of the sensors, whether all data are of \
-             one plant, and what the model leaves out",
-            unknown.name,
-            said(one),
-            said(two),
-            percent(part, 2),
-            p_value(chance)
-        );
-        let severity = if part > FAR_APART { Severity::NotUsable } else { Severity::UsableWithCare };
-        Some(Warning { code, severity, text })
-    }
-
-    /// The parameter that differs most between two pieces, in standard errors: its number, and those of the pieces.
-    fn furthest(&self, pieces: &[Piece], unknowns: &[Unknown]) -> Option<(usize, usize, usize, f64)> {
-        let mut found: Option<(usize, usize, usize, f64)> = None;
-        let covariances: Vec<_> = pieces.iter().map(|piece| piece.linear.covariance(&piece.held)).collect();
-        for (i, unknown) in unknowns.iter().enumerate().filter(|(_, u)| matches!(u.role, Role::Parameter(_))) {
-            for (a, b) in (0..pieces.len()).flat_map(|b| (0..b).map(move |a| (a, b))) {
-                let (Some(first), Some(second)) = (&covariances[a], &covariances[b]) else { continue };
-                if pieces[a].held[i] || pieces[b].held[i] {
-                    continue;
-                }
-                let error = |covariance: &crate::information::Covariance, piece: usize| {
-                    covariance.standard_error(i) * pieces[piece].dependence.sqrt()
-                };
-                let apart = (pieces[a].step[i] - pieces[b].step[i]).abs() / error(first, a).hypot(error(second, b));
-                if apart > found.map_or(APART, |(_, _, _, most)| most) && unknown.value != 0.0 {
-                    found = Some((i, a, b, apart));
-                }
+            let error = |covariance: &crate::information::Covariance, piece: usize| {
+                covariance.standard_error(i) * pieces[piece].dependence.sqrt()
+            };
+            let apart = (pieces[a].step[i] - pieces[b].step[i]).abs() / error(first, a).hypot(error(second, b));
+            if apart > found.map_or(APART, |(_, _, _, most)| most) && unknown.value != 0.0 {
+                found = Some((i, a, b, apart));
             }
         }
-        found
     }
+    found
 }
 
 impl Piece {

@@ -3,6 +3,7 @@
 use super::conclude::Judgement;
 use super::covariances::Covariances;
 use super::directions::{taking_part, undetermined};
+use super::{aliases, curved, data, data_noise, known, memory, outliers, shape, sizes, together, within_loss};
 use crate::estimate::{Direction, Knowledge, Unknown, Warning, WarningCode};
 use crate::layout::Kind;
 use crate::numeral::{counted, exact, number, percent};
@@ -38,13 +39,13 @@ impl Judgement<'_> {
     ) -> Vec<Warning> {
         let mut warnings = vec![];
         warnings.extend(self.of_the_data(unknowns));
-        warnings.extend(self.data());
+        warnings.extend(data::data(self));
         warnings.extend(self.unexplained());
         warnings.extend(self.given_noise());
-        warnings.extend(self.shape());
-        warnings.extend(self.outliers());
-        warnings.extend(self.contradictions(unknowns));
-        warnings.extend(self.knowledge(unknowns, covariances));
+        warnings.extend(shape::shape(self));
+        warnings.extend(outliers::outliers(self));
+        warnings.extend(together::contradictions(self, unknowns));
+        warnings.extend(known::knowledge(self, unknowns, covariances));
         warnings.extend(self.unbounded());
         warnings.extend(self.gaps());
         warnings.extend(self.guessed_starts());
@@ -72,7 +73,7 @@ impl Judgement<'_> {
             care(WarningCode::Unidentified, format!("{d}; fix one, add a prior, or excite the system differently"))
         }));
         warnings.extend(self.step(unknowns));
-        warnings.extend(self.aliased());
+        warnings.extend(aliases::aliased(self));
         if !self.end.outcome.converged() && unknowns.iter().any(|row| row.knowledge.standard_error().is_some()) {
             let text =
                 "standard errors and intervals are those of a minimum, where the search did not arrive".to_owned();
@@ -86,13 +87,13 @@ impl Judgement<'_> {
             let text = format!("the checkpoint could not be written ({write_error}); the search went on without it");
             warnings.push(Warning { code: WarningCode::CheckpointNotWritten, severity: Severity::Usable, text });
         }
-        warnings.extend(self.curved(unknowns, covariances));
+        warnings.extend(curved::curved(self, unknowns, covariances));
         warnings.extend(self.uneven(unknowns, covariances));
         warnings.extend(self.decided_by_few(unknowns, covariances));
-        warnings.extend(self.uneven_errors(unknowns, covariances));
-        warnings.extend(self.few_within_the_loss());
-        warnings.extend(self.restart_noise(unknowns));
-        warnings.extend(self.input_noise(unknowns));
+        warnings.extend(sizes::uneven_errors(unknowns, covariances));
+        warnings.extend(within_loss::few_within_the_loss(self));
+        warnings.extend(data_noise::restart_noise(self, unknowns));
+        warnings.extend(data_noise::input_noise(self, unknowns));
         warnings.extend(self.autocorrelation(covariances));
         warnings.extend(self.correlated_outputs());
         warnings
@@ -204,7 +205,7 @@ impl Judgement<'_> {
         let change = self.residuals.step_error / self.widening;
         // No more windows than samples.
         let windows = self.objective.problem.samples() as f64;
-        let coarse = change > most || change * windows > most && change * self.windows_add_up() > most;
+        let coarse = change > most || change * windows > most && change * memory::windows_add_up(self) > most;
         let fewer = (refines && !stopped && coarse).then(|| self.determined_by_a_finer_step(unknowns)).flatten();
         if fewer.is_some() {
             return fewer;

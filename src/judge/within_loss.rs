@@ -44,29 +44,27 @@ impl Accumulate for Slopes<'_> {
     }
 }
 
-impl Judgement<'_> {
-    /// A loss whose curvature at these errors is chance.
-    pub(super) fn few_within_the_loss(&self) -> Option<Warning> {
-        let objective = self.objective;
-        objective.loss()?;
-        let new = |experiment: usize| Slopes { objective, experiment, sum: 0.0, squares: 0.0, count: 0.0 };
-        let all = objective.gather(&self.end.coordinates, false, new).ok()?;
-        let total = |of: fn(&Slopes<'_>) -> f64| all.iter().map(of).sum::<f64>();
-        let (sum, squares, count) = (total(|one| one.sum), total(|one| one.squares), total(|one| one.count));
-        let deviation = relative_deviation(sum, squares, count, objective.problem.unknowns.row.len() as f64);
-        let severity = match deviation {
-            part if part > NONE => Severity::NotUsable,
-            part if part > CARE => Severity::UsableWithCare,
-            _ => return None,
-        };
-        let text = format!(
-            "the loss is too narrow for these errors: its mean curvature, {} of that of squares, is known {}, and the standard \
-             errors with it; take a larger constant, or a larger noise",
-            percent(sum / count, 2),
-            if deviation.is_finite() { format!("to {} only", percent(deviation, 2)) } else { "not at all".to_owned() }
-        );
-        Some(Warning { code: WarningCode::NarrowLoss, severity, text })
-    }
+/// A loss whose curvature at these errors is chance.
+pub(super) fn few_within_the_loss(judgement: &Judgement<'_>) -> Option<Warning> {
+    let objective = judgement.objective;
+    objective.loss()?;
+    let new = |experiment: usize| Slopes { objective, experiment, sum: 0.0, squares: 0.0, count: 0.0 };
+    let all = objective.gather(&judgement.end.coordinates, false, new).ok()?;
+    let total = |of: fn(&Slopes<'_>) -> f64| all.iter().map(of).sum::<f64>();
+    let (sum, squares, count) = (total(|one| one.sum), total(|one| one.squares), total(|one| one.count));
+    let deviation = relative_deviation(sum, squares, count, objective.problem.unknowns.row.len() as f64);
+    let severity = match deviation {
+        part if part > NONE => Severity::NotUsable,
+        part if part > CARE => Severity::UsableWithCare,
+        _ => return None,
+    };
+    let text = format!(
+        "the loss is too narrow for these errors: its mean curvature, {} of that of squares, is known {}, and the standard \
+         errors with it; take a larger constant, or a larger noise",
+        percent(sum / count, 2),
+        if deviation.is_finite() { format!("to {} only", percent(deviation, 2)) } else { "not at all".to_owned() }
+    );
+    Some(Warning { code: WarningCode::NarrowLoss, severity, text })
 }
 
 /// The relative standard deviation of a mean of so many numbers of one at most, from their sum and that of their squares, less the
