@@ -78,7 +78,7 @@ pub enum WarningCode {
     DecidedByFew,
     /// Errors that are larger, or smaller, where an unknown is determined.
     UnevenErrors,
-    /// A robust loss within whose constant are so few errors that its curvature is chance.
+    /// A robust loss with so few errors within its constant that its mean curvature is uncertain.
     NarrowLoss,
     /// Noise in the measured states from which predictions restart.
     RestartNoise,

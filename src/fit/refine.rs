@@ -92,9 +92,9 @@ impl Attempt {
         }
     }
 
-    /// What a search by a finer method from [`start`](Self::start) found or, if it did not converge from the end of this one, what one
-    /// from the start of the problem found: a coarse step may end where a finer one finds the plant unstable. All methods together have
-    /// so many trial steps.
+    /// The result `again` of a finer method's search from [`start`](Self::start). If that search began at the end of this one and did not
+    /// converge, the result of another from the declared start, if it converges: at the end of a coarse method the plant may be
+    /// unstable with a finer step. `most` limits the trial steps of all methods together.
     pub fn again_from_start(
         &self,
         finer: &Problem<'_>,

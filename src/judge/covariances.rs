@@ -159,9 +159,9 @@ impl Judgement<'_> {
 /// Probability by which the lengths of intervals are compared.
 const LEVEL: f64 = 0.95;
 
-/// The covariance for colored errors, with intervals that are no shorter than those for white errors. A fit takes the slow part out of
-/// errors that are white, and what is left seems to have negative correlations; stationary errors have too small a standard error
-/// where errors are larger, and moving sums seldom certainly a larger one.
+/// The covariance for colored errors, with intervals that are no shorter than those for white errors. Residuals of white errors have
+/// negative correlations, since the fit removes their slow part; and standard errors of stationary errors are too small where the
+/// errors are larger, while the variance of moving sums is seldom certain enough to be taken.
 fn no_shorter(mut colored: CoordinateCovariance, white: CoordinateCovariance) -> CoordinateCovariance {
     let (Some(found), Some(least)) = (colored.covariance.take(), white.covariance) else { return colored };
     let of = |covariance: &Covariance, i: usize, factor: f64, degrees: &[f64]| Spread {

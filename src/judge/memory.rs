@@ -1,8 +1,8 @@
 //! Over how many windows the errors of steps add up.
 //!
-//! The step of a method is compared with a finer one in windows that begin where the coarse simulation stands. What a window changes is
-//! passed on to the next ones as long as the plant remembers it: a resonator of high quality adds up errors of its phase over
-//! the whole record.
+//! The step of a method is compared with a finer one in windows that begin where the coarse simulation stands. The difference at the
+//! end of a window persists in the next ones until the state has decayed: the phase errors of a resonator of high quality add up over the
+//! whole record.
 
 use super::aliases::{eigenvalues, some};
 use super::conclude::Judgement;
@@ -11,8 +11,8 @@ use crate::record::{Record, Time};
 /// Samples of the shortest windows that are compared.
 const WINDOW: f64 = 64.0;
 
-/// By which factor the changes of all windows are larger than those within them, at the most: by the slowest decay of the plant at
-/// some points along the records. One for predictions that restart.
+/// An upper bound of the ratio of the whole record's differences to those within windows, from the slowest decay of the state at some
+/// points along the records. One for predictions that restart.
 pub(super) fn windows_add_up(judgement: &Judgement<'_>) -> f64 {
     let objective = judgement.objective;
     if objective.sweep.restarts().is_some() {
@@ -25,7 +25,7 @@ pub(super) fn windows_add_up(judgement: &Judgement<'_>) -> f64 {
     records.map(|record| sum(decay * WINDOW * interval(record), record.len() as f64 / WINDOW)).fold(1.0, f64::max)
 }
 
-/// The sum of what is left of the changes of so many windows, with the exponent by which a change decays over a window.
+/// The sum of a geometric series with so many terms, one per window; `exponent` is the logarithm of the decay over a window.
 fn sum(exponent: f64, windows: f64) -> f64 {
     if exponent >= 0.0 {
         return windows.max(1.0);
@@ -48,7 +48,7 @@ fn interval(record: &Record) -> f64 {
 mod tests {
     use super::sum;
 
-    /// Ten windows of which nothing is forgotten, or half from each to the next; without end, a third of each is passed on.
+    /// Ten windows without decay, ten with a decay by half each, and infinitely many with a decay to a third each.
     #[test]
     fn changes_of_windows_by_hand() {
         assert_eq!([sum(0.0, 10.0), sum(0.1, 10.0), sum(0.0, 0.5)], [10.0, 10.0, 1.0]);

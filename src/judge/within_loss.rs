@@ -1,7 +1,7 @@
 //! Whether enough errors are where a robust loss is curved.
 //!
 //! The curvature of the cost is the mean of `psi'` over all errors times that of the squares. With a constant far below the noise few
-//! errors are within it, or positive and negative slopes cancel: then the mean is chance, and the standard errors with it.
+//! errors are within it, or positive and negative slopes cancel: then the mean depends on few errors, and so do the standard errors.
 
 use super::conclude::Judgement;
 use crate::estimate::{Warning, WarningCode};
@@ -13,6 +13,9 @@ use crate::sweep::Window;
 /// Relative standard deviation of the curvature above which standard errors are not usable without care, and not at all.
 const CARE: f64 = 0.15;
 const NONE: f64 = 0.5;
+
+/// A loss with a larger mean curvature is not narrow: in a few measurements that mean is uncertain with any loss.
+const NARROW: f64 = 0.5;
 
 /// Sums of the slopes of `psi` and of their squares, and their number.
 struct Slopes<'s> {
@@ -44,7 +47,7 @@ impl Accumulate for Slopes<'_> {
     }
 }
 
-/// A loss whose curvature at these errors is chance.
+/// A warning of a loss whose mean curvature at these errors is too uncertain for standard errors.
 pub(super) fn few_within_the_loss(judgement: &Judgement<'_>) -> Option<Warning> {
     let objective = judgement.objective;
     objective.loss()?;
@@ -52,6 +55,9 @@ pub(super) fn few_within_the_loss(judgement: &Judgement<'_>) -> Option<Warning> 
     let all = objective.gather(&judgement.end.coordinates, false, new).ok()?;
     let total = |of: fn(&Slopes<'_>) -> f64| all.iter().map(of).sum::<f64>();
     let (sum, squares, count) = (total(|one| one.sum), total(|one| one.squares), total(|one| one.count));
+    if sum / count >= NARROW {
+        return None;
+    }
     let deviation = relative_deviation(sum, squares, count, objective.problem.unknowns.row.len() as f64);
     let severity = match deviation {
         part if part > NONE => Severity::NotUsable,

@@ -115,10 +115,10 @@ impl Model for TwoMasses {
     }
 }
 
-/// One step per sample, which dampens the oscillation, is reproduced with a damping below zero; with it the finer steps are unstable, so
-/// that searches from there lead nowhere. From the declared start they find the minimum.
+/// One step per sample, which damps the oscillation numerically, is fitted with a damping below zero. With finer steps the model is unstable
+/// there, and searches from there do not converge; from the declared start they do.
 #[test]
-fn finer_methods_begin_again_where_a_coarse_one_leads_astray() {
+fn finer_methods_begin_again_after_a_coarse_one_ends_at_a_negative_damping() {
     for seed in 0..3 {
         let truth = Shaft { j1: 0.01, j2: 0.03, c: 900.0, d: 0.05, b: 0.02 };
         let time = Time::Uniform { start: 0.0, step: 4e-3 };
