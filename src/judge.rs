@@ -19,6 +19,7 @@ mod memory;
 pub(crate) mod noise;
 mod outliers;
 mod output_sums;
+mod powers;
 mod predicted;
 mod residual_pass;
 mod sandwich;

@@ -34,6 +34,8 @@ pub enum WarningCode {
     Clipped,
     /// An output that stands still where the model moves.
     Frozen,
+    /// An output that holds each value for several samples.
+    HeldOutput,
     /// A block of an output, or a whole record, that occurs twice.
     Repeated,
     /// An output of few values.
@@ -52,7 +54,7 @@ pub enum WarningCode {
     SignChanged,
     /// A parameter of another order of magnitude than its start.
     FarFromStart,
-    /// Errors of a static model that follow from an input.
+    /// Errors that follow from the prediction or, of a static model, from an input.
     WrongShape,
     /// Parameters that differ from record to record.
     RecordsContradict,

@@ -35,9 +35,9 @@ impl Pair {
 #[derive(Clone, Copy)]
 pub(super) struct Products;
 
-impl Terms for Products {
+impl Terms<2, 4> for Products {
     #[inline(always)]
-    fn of<W: Wide>(self, a: W, b: W) -> [W; 4] {
+    fn of<W: Wide>(self, [a, b]: [W; 2]) -> [W; 4] {
         let product = a.mul(b);
         [product, a.mul(a), b.mul(b), product.mul(product)]
     }
@@ -109,7 +109,7 @@ impl Coupling {
     pub fn add_all(&mut self, errors: &[f64], samples: usize) {
         let of = |j: usize| &errors[j * samples..][..samples];
         for ((i, j), pair) in pairs(errors.len().checked_div(samples).unwrap_or(0)).zip(&mut self.pairs) {
-            let [product, a, b, fourth] = sums(of(i), of(j), Products);
+            let [product, a, b, fourth] = sums([of(i), of(j)], Products);
             pair.append(&Pair { product, squares: [a, b], fourth });
         }
     }

@@ -14,6 +14,10 @@ const REPRODUCED: f64 = 1e-6;
 const LARGER: f64 = 2.0;
 /// Suspicious samples that make so much of the sum of squares decide the estimate.
 const DECIDE: f64 = 0.5;
+/// A prediction that moves by more than this part of what the output moves, while that stands still, confirms that it should have moved;
+/// one that stands still for more than the second part of the samples decides the estimate.
+const MOVES: f64 = 0.1;
+const LONG: f64 = 0.25;
 /// Outputs with so few values are coarse, where each occurs so many times and the errors are larger than this part of a step.
 const FEW: usize = 8;
 const TIMES: usize = 4;
@@ -110,7 +114,9 @@ fn suspicions(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> Vec<Warni
     let splits = splits(judgement.objective, &judgement.end.coordinates, &suspects);
     let mut warnings = vec![];
     for ((suspect, (channel, suspicion)), split) in suspects.iter().zip(named).zip(&splits) {
-        let Some((code, severity, advice)) = confirmed(judgement, channel, suspicion, split) else { continue };
+        let Some((code, severity, advice)) = confirmed(judgement, channel, suspicion, (suspect.output, split)) else {
+            continue;
+        };
         if warnings.len() < NAMED {
             let of = of_experiment(judgement, suspect.experiment);
             let text = format!(
@@ -130,9 +136,10 @@ fn confirmed(
     judgement: &Judgement<'_>,
     channel: &ChannelInspection,
     suspicion: &Suspicion,
-    split: &Split,
+    (output, split): (usize, &Split),
 ) -> Option<(WarningCode, Severity, &'static str)> {
     let (least, greatest) = channel.range?;
+    let (_, moves) = judgement.residuals.levels[output];
     if split.rms() <= REPRODUCED * (greatest - least) {
         return None;
     }
@@ -149,10 +156,17 @@ fn confirmed(
             decides(dominates),
             "the sensor is at its limit; mark these samples as missing, or use a wider range",
         )),
-        Suspicion::Frozen { .. } => (split.ratio() > LARGER).then_some((
+        // A long one makes the errors elsewhere as large.
+        Suspicion::Frozen { .. } => (split.ratio() > LARGER || split.spread() > MOVES * moves).then_some((
             WarningCode::Frozen,
-            decides(dominates),
+            decides(dominates || split.part() > LONG),
             "the sensor was stuck; mark these samples as missing",
+        )),
+        Suspicion::Held { .. } => Some((
+            WarningCode::HeldOutput,
+            Severity::UsableWithCare,
+            "the sensor measures less often, so that samples count more than once and come late; mark all but the first \
+             of each value as missing",
         )),
         Suspicion::Repeated { .. } => {
             Some((WarningCode::Repeated, decides(dominates), "a buffer was written twice; leave one of the blocks out"))

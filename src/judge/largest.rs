@@ -50,7 +50,9 @@ pub(super) fn extreme(judgement: &Judgement<'_>, j: usize) -> Option<Warning> {
     if fit.rmse <= 0.0 || judgement.end.outcome == Outcome::Exact {
         return None;
     }
-    let (ratio, chance) = chance(largest.error, fit.rmse, count);
+    // Errors that are divided by their predicted deviations.
+    let rmse = if judgement.objective.sweep.predicts_variance() { 1.0 } else { fit.rmse };
+    let (ratio, chance) = chance(largest.error, rmse, count);
     if !ratio.is_finite() || chance >= LEVEL {
         return None;
     }

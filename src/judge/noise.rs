@@ -58,7 +58,7 @@ impl Accumulate for Moments<'_> {
         let counts = |k: usize| !weighted || self.objective.weight(self.experiment, window.begin[lane] + k) > 0.0;
         for (i, j) in (0..outputs).flat_map(|i| (0..=i).map(move |j| (i, j))) {
             if window.whole && !weighted {
-                self.sums[(i, j)] += sums(of(i), of(j), Products)[0];
+                self.sums[(i, j)] += sums([of(i), of(j)], Products)[0];
                 self.pairs[(i, j)] += samples as f64;
                 continue;
             }

@@ -21,7 +21,7 @@ const LITTLE: f64 = 0.1;
 /// Outputs whose errors have outliers, or measurements that were held, of a fit by their squares.
 pub(super) fn outliers(judgement: &Judgement<'_>) -> Vec<Warning> {
     let objective = judgement.objective;
-    let squares = objective.loss().is_none() && !objective.is_weighted() && !objective.sweep.predicts_variance();
+    let squares = objective.loss().is_none() && !objective.is_weighted();
     if !squares || judgement.rounding || judgement.end.outcome == Outcome::Exact {
         return vec![];
     }

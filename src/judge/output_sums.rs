@@ -37,7 +37,7 @@ impl OutputSums {
         }
         let first = self.first;
         self.count += values.len() as u64;
-        let [sum, squares, of_errors, fourth] = sums(values, errors, Moments { first });
+        let [sum, squares, of_errors, fourth] = sums([values, errors], Moments { first });
         self.sum += sum;
         self.squares += squares;
         self.errors += of_errors;
@@ -93,9 +93,9 @@ struct Moments {
     first: f64,
 }
 
-impl Terms for Moments {
+impl Terms<2, 4> for Moments {
     #[inline(always)]
-    fn of<W: Wide>(self, y: W, error: W) -> [W; 4] {
+    fn of<W: Wide>(self, [y, error]: [W; 2]) -> [W; 4] {
         let (y, square) = (y.sub(W::splat(self.first)), error.mul(error));
         [y, y.mul(y), square, square.mul(square)]
     }

@@ -4,7 +4,9 @@ use super::aliases::Point;
 use super::coupling::{Coupled, Coupling};
 use super::largest::Largest;
 use super::output_sums::OutputSums;
+use super::powers::{Powers, Scale, parts_by_chance, scales};
 use super::step_error::{Compared, Extremes, Sampled, step_errors};
+use super::together::RECORDS;
 use super::whiteness::{LAGS, Whiteness};
 use crate::error::Error;
 use crate::estimate::OutputFit;
@@ -47,6 +49,11 @@ pub(crate) struct Residuals {
     /// The smallest standard deviation that was predicted for a measurement of each output; infinite without
     /// predictions.
     pub least_sigma: Vec<f64>,
+    /// The probability that an output's errors follow as much from powers of its prediction by chance; empty where that is not examined.
+    pub shape: Vec<f64>,
+    /// The least probability that errors of the halves of the records, or of several records, follow from the prediction in ways
+    /// that differ as much by chance.
+    pub parts: f64,
 }
 
 /// Sums over one experiment.
@@ -75,10 +82,14 @@ struct Sums<'s> {
     /// whiteness.
     errors: Vec<f64>,
     tested: Vec<f64>,
+    /// Of the predictions of each output; empty where errors are not examined for following from them.
+    scales: &'s [Scale],
+    /// Of the first half and of the second.
+    powers: Vec<[Powers; 2]>,
 }
 
 impl<'s> Sums<'s> {
-    fn new(objective: &'s Objective<'s>, experiment: usize) -> Self {
+    fn new(objective: &'s Objective<'s>, experiment: usize, scales: &'s [Scale]) -> Self {
         let outputs = objective.outputs();
         let all: Vec<usize> = (0..outputs).collect();
         Sums {
@@ -100,6 +111,39 @@ impl<'s> Sums<'s> {
             points: vec![],
             errors: vec![],
             tested: vec![],
+            scales,
+            powers: vec![Default::default(); scales.len()],
+        }
+    }
+
+    /// Sums of errors and predictions, on both sides of the middle of the record.
+    fn add_powers(&mut self, window: &Window, lane: usize) {
+        let (samples, begin) = (window.samples[lane], window.begin[lane]);
+        let record = &self.objective.problem.records[self.experiment];
+        let middle = (record.len() / 2).clamp(begin, begin + samples) - begin;
+        for (j, (powers, scale)) in self.powers.iter_mut().zip(self.scales).enumerate() {
+            let values = &record.outputs()[j].values[begin..begin + samples];
+            let mut errors = &self.errors[j * samples..][..samples];
+            let in_units: Vec<f64>;
+            if window.has_variances() {
+                in_units =
+                    errors.iter().enumerate().map(|(k, error)| error * window.variance_root(k, j, lane)).collect();
+                errors = &in_units;
+            }
+            for (half, range) in [0..middle, middle..samples].into_iter().enumerate() {
+                if window.whole {
+                    powers[half].add(*scale, &values[range.clone()], &errors[range]);
+                    continue;
+                }
+                // Runs of samples that were all measured.
+                let mut from = range.start;
+                for k in range.start..=range.end {
+                    if k == range.end || !window.is_measured(k, j, lane) {
+                        powers[half].add(*scale, &values[from..k], &errors[from..k]);
+                        from = k + 1;
+                    }
+                }
+            }
         }
     }
 
@@ -219,6 +263,7 @@ impl Accumulate for Sums<'_> {
             true => self.coupling.add_all(&self.errors, samples),
             false => self.coupling.add(window, lane, objective.is_weighted().then_some(&weight)),
         }
+        self.add_powers(window, lane);
         let record = &self.objective.problem.records[self.experiment];
         for j in 0..outputs {
             let errors = &self.errors[j * samples..][..samples];
@@ -258,7 +303,32 @@ impl Accumulate for Sums<'_> {
         self.moving.append(later.moving);
         self.waiting.append(later.waiting);
         self.points.extend(later.points);
+        for (powers, later) in self.powers.iter_mut().flatten().zip(later.powers.iter().flatten()) {
+            powers.append(later);
+        }
     }
+}
+
+/// The least of the probabilities that the halves of the records, or some records, differ as much by chance.
+fn parts(all: &[Sums<'_>]) -> f64 {
+    let outputs = all[0].powers.len();
+    let half = |j: usize, half: usize| {
+        let mut sum = Powers::default();
+        all.iter().for_each(|one| sum.append(&one.powers[j][half]));
+        sum
+    };
+    let record = |one: &Sums<'_>, j: usize| {
+        let mut sum = one.powers[j][0];
+        sum.append(&one.powers[j][1]);
+        sum
+    };
+    let of = |j: usize| {
+        let halves = parts_by_chance(&[half(j, 0), half(j, 1)]);
+        let several = (2..=RECORDS).contains(&all.len());
+        let records = || all.iter().map(|one| record(one, j)).collect::<Vec<_>>();
+        if several { halves.min(parts_by_chance(&records())) } else { halves }
+    };
+    (0..outputs).map(of).fold(1.0, f64::min)
 }
 
 /// The residuals at a point, in the units of the outputs.
@@ -272,7 +342,8 @@ pub(crate) fn residual_pass(objective: &Objective<'_>, coordinates: &[f64]) -> R
         unfiltered = problem;
         plain = Objective { problem: &unfiltered, ..plain };
     }
-    let make = |experiment: usize| Sums::new(objective, experiment);
+    let scales = scales(objective);
+    let make = |experiment: usize| Sums::new(objective, experiment, &scales);
     let all = plain.gather(coordinates, false, make).map_err(|_| failed(objective, coordinates))?;
     let all: Vec<Sums<'_>> = all.into_iter().map(Sums::complete).collect();
     let windows: Vec<Compared<'_>> = all.iter().map(|one| one.compared(coordinates)).collect();
@@ -284,7 +355,8 @@ pub(crate) fn residual_pass(objective: &Objective<'_>, coordinates: &[f64]) -> R
 pub(crate) fn residuals_together(points: &[At<'_>]) -> Vec<Option<Residuals>> {
     let plain: Vec<Objective<'_>> = points.iter().map(|(objective, _)| objective.in_units()).collect();
     let in_units: Vec<At<'_>> = plain.iter().zip(points).map(|(plain, (_, x))| (plain, *x)).collect();
-    let all = gather_together(&in_units, |i| Sums::new(points[i].0, 0));
+    let scales: Vec<Vec<Scale>> = points.iter().map(|(objective, _)| scales(objective)).collect();
+    let all = gather_together(&in_units, |i| Sums::new(points[i].0, 0, &scales[i]));
     let all: Vec<Option<Sums<'_>>> = all.into_iter().map(|sums| sums.map(Sums::complete)).collect();
     let present = all.iter().zip(points).filter_map(|(sums, (_, x))| Some(sums.as_ref()?.compared(x)));
     let windows: Vec<Compared<'_>> = present.collect();
@@ -318,7 +390,14 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>], s
         Whiteness::of(&total.without(own as f64 / count.max(1) as f64), count, horizon(objective))
     };
     let whiteness: Vec<Whiteness> = (0..outputs).map(whiteness).collect();
+    let shape = |j: usize| {
+        let mut sum = Powers::default();
+        all.iter().flat_map(|one| one.powers[j]).for_each(|half| sum.append(&half));
+        sum.shape_by_chance()
+    };
     Residuals {
+        shape: (0..all[0].powers.len()).map(shape).collect(),
+        parts: parts(all),
         outputs: sums.iter().map(OutputSums::fit).collect(),
         levels: sums.iter().map(OutputSums::level).collect(),
         kurtosis: sums.iter().map(OutputSums::kurtosis).collect(),

@@ -1,21 +1,32 @@
-//! Whether the errors of a static model follow from its inputs: in order of an input's size they are white if the shape of
-//! the model is right, whatever the order of the samples in time.
+//! Whether errors follow from the inputs or from the prediction, which those of a model of the right shape do not.
+//!
+//! The errors of a static model are white in order of an input's size, whatever the order of the samples in time. Those of any model
+//! are uncorrelated with powers of its prediction.
 
 use super::color;
 use super::conclude::Judgement;
+use super::powers::{SHAPE, Scale, explained, scales};
 use super::whiteness::{LAGS, Whiteness};
 use crate::estimate::{Warning, WarningCode};
 use crate::numeral::{p_value, percent};
+use crate::optimize::Outcome;
+use crate::problem::Accumulate;
+use crate::record::Record;
 use crate::sweep::Window;
-use crate::whiteness::Portmanteau;
+use crate::whiteness::{Portmanteau, chi_squared_tail};
 
 /// Records that are looked at, and samples of each: the first ones.
 pub(super) const RECORDS: usize = 8;
 const SAMPLES: usize = 16_384;
 
+/// Whether the model certainly has the wrong shape.
+pub(super) fn shape(judgement: &Judgement<'_>) -> Option<Warning> {
+    by_inputs(judgement).or_else(|| by_predictions(judgement))
+}
+
 /// The output and the input that it certainly depends on otherwise than the model says; of several those with the largest part of the
 /// errors.
-pub(super) fn shape(judgement: &Judgement<'_>) -> Option<Warning> {
+fn by_inputs(judgement: &Judgement<'_>) -> Option<Warning> {
     let objective = judgement.objective;
     let (layout, count) = (objective.problem.layout(), objective.outputs());
     if !judgement.is_static() {
@@ -54,6 +65,111 @@ pub(super) fn shape(judgement: &Judgement<'_>) -> Option<Warning> {
         );
         Warning { code: WarningCode::WrongShape, severity: color::severity(part), text }
     })
+}
+
+/// The output whose errors certainly follow from its prediction; of several that with the largest part of what it moves. White errors
+/// only: correlated ones follow from a prediction that is as slow as they are.
+fn by_predictions(judgement: &Judgement<'_>) -> Option<Warning> {
+    let (objective, chances) = (judgement.objective, &judgement.residuals.shape);
+    let count = chances.len() as f64;
+    let suspicious = chances.iter().any(|chance| chance * count < color::CERTAIN);
+    let examined = suspicious && !judgement.rounding && judgement.end.outcome != Outcome::Exact;
+    if !examined || judgement.autocorrelated_at(color::CERTAIN).is_some() {
+        return None;
+    }
+    let scales = scales(objective);
+    let make = |experiment: usize| Following {
+        record: &objective.problem.records[experiment],
+        scales: &scales,
+        sums: vec![Products::default(); scales.len()],
+    };
+    let all = objective.in_units().gather(&judgement.end.coordinates, false, make).ok()?;
+    let mut sums = vec![Products::default(); scales.len()];
+    for one in all {
+        sums.iter_mut().zip(&one.sums).for_each(|(sum, own)| sum.append(own));
+    }
+    let of = |j: usize| {
+        let (part, chance) =
+            (sums[j].explained_part() * judgement.residuals.outputs[j].rmse, sums[j].by_chance() * count);
+        (j, part / judgement.residuals.levels[j].1, chance)
+    };
+    let (j, part, chance) =
+        (0..sums.len()).map(of).filter(|(.., chance)| *chance < color::CERTAIN).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let text = format!(
+        "the errors of `{}` follow from what the model predicts for it ({}): the model has the wrong shape, by {} of what the output \
+         moves, and no interval allows for that",
+        objective.problem.layout().outputs[j].name,
+        p_value(chance),
+        percent(part, 2)
+    );
+    Some(Warning { code: WarningCode::WrongShape, severity: color::severity(part), text })
+}
+
+/// Products of an output's errors and of the powers of its prediction, for one experiment.
+struct Following<'f> {
+    record: &'f Record,
+    scales: &'f [Scale],
+    sums: Vec<Products>,
+}
+
+/// Sums over errors `e` and powers `z` of the prediction.
+#[derive(Clone, Copy, Default)]
+struct Products {
+    powers: [[f64; SHAPE]; SHAPE],
+    /// Of `e z` and of `e^2 z z'`, which is the covariance of the former, of whatever size the errors are each (White, Econometrica 48
+    /// (1980) 817).
+    errors: [f64; SHAPE],
+    squares: [[f64; SHAPE]; SHAPE],
+    sum_of_squares: f64,
+}
+
+impl Products {
+    fn take(&mut self, prediction: f64, error: f64) {
+        let z: [f64; SHAPE] = std::array::from_fn(|i| prediction.powi(i as i32));
+        for i in 0..SHAPE {
+            self.errors[i] += error * z[i];
+            for c in 0..SHAPE {
+                self.powers[i][c] += z[i] * z[c];
+                self.squares[i][c] += error * error * z[i] * z[c];
+            }
+        }
+        self.sum_of_squares += error * error;
+    }
+
+    fn append(&mut self, other: &Products) {
+        let add = |(sum, other): (&mut f64, &f64)| *sum += other;
+        self.powers.as_flattened_mut().iter_mut().zip(other.powers.as_flattened()).for_each(add);
+        self.squares.as_flattened_mut().iter_mut().zip(other.squares.as_flattened()).for_each(add);
+        self.errors.iter_mut().zip(&other.errors).for_each(add);
+        self.sum_of_squares += other.sum_of_squares;
+    }
+
+    /// The root of the part of the squared errors that follows from the prediction.
+    fn explained_part(&self) -> f64 {
+        let (gain, _) = explained(self.powers, self.errors);
+        (gain / self.sum_of_squares).clamp(0.0, 1.0).sqrt()
+    }
+
+    fn by_chance(&self) -> f64 {
+        let (gain, rank) = explained(self.squares, self.errors);
+        chi_squared_tail(gain, rank)
+    }
+}
+
+impl Accumulate for Following<'_> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        for (j, (sums, scale)) in self.sums.iter_mut().zip(self.scales).enumerate() {
+            let values = &self.record.outputs()[j].values[window.begin[lane]..];
+            for k in (0..window.samples[lane]).filter(|k| window.is_measured(*k, j, lane)) {
+                let error = window.error(k, j, lane) * window.variance_root(k, j, lane);
+                sums.take(scale.one(values[k] - error), error);
+            }
+        }
+    }
+
+    fn append(&mut self, later: Self) {
+        self.sums.iter_mut().zip(&later.sums).for_each(|(sum, later)| sum.append(later));
+    }
 }
 
 /// The first errors of an experiment, output by output; `None` where nothing was measured.

@@ -1,59 +1,70 @@
-//! Sums over pairs of numbers, in vector registers.
+//! Sums over numbers side by side, in vector registers.
 
 use crate::wide::{self, Task, Wide, Width};
 
 /// Number of partial sums, the same for registers of any width, so that the bits of a result do not depend on the processor.
 const BLOCK: usize = 8;
 
-/// The four numbers that are summed over pairs.
-pub(super) trait Terms: Copy {
-    fn of<W: Wide>(self, a: W, b: W) -> [W; 4];
+/// The `N` numbers that are summed, from one number of each of `A` sequences.
+pub(super) trait Terms<const A: usize, const N: usize>: Copy {
+    fn of<W: Wide>(self, of: [W; A]) -> [W; N];
 }
 
-/// Sums the terms of all pairs `(a[k], b[k])`. `b` must be as long as `a`.
-pub(super) fn sums(a: &[f64], b: &[f64], terms: impl Terms) -> [f64; 4] {
-    wide::run(Width::widest(), Sums { a, b, terms })
+/// Sums the terms over all places of sequences, the first of which is no longer than any other.
+pub(super) fn sums<const A: usize, const N: usize>(of: [&[f64]; A], terms: impl Terms<A, N>) -> [f64; N] {
+    wide::run(Width::widest(), Sums { of, terms })
 }
 
-struct Sums<'s, T> {
-    a: &'s [f64],
-    b: &'s [f64],
+struct Sums<'s, const A: usize, const N: usize, T> {
+    of: [&'s [f64]; A],
     terms: T,
 }
 
-impl<T: Terms> Task for Sums<'_, T> {
-    type Output = [f64; 4];
+impl<const A: usize, const N: usize, T: Terms<A, N>> Task for Sums<'_, A, N, T> {
+    type Output = [f64; N];
 
     #[inline(always)]
-    fn run<W: Wide>(self) -> [f64; 4] {
-        let Sums { a, b, terms } = self;
-        let whole = a.len() - a.len() % BLOCK;
-        let mut totals = [[0.0; BLOCK]; 4];
+    fn run<W: Wide>(self) -> [f64; N] {
+        let Sums { of, terms } = self;
+        let whole = of[0].len() - of[0].len() % BLOCK;
+        let mut totals = [[0.0; BLOCK]; N];
         let mut begin = 0;
         while begin < BLOCK {
-            let mut sums = [W::splat(0.0); 4];
+            let mut sums = [W::splat(0.0); N];
             let mut k = begin;
             while k < whole {
-                let terms = terms.of(W::load(&a[k..]), W::load(&b[k..]));
+                let mut numbers = [W::splat(0.0); A];
                 let mut i = 0;
-                while i < 4 {
+                while i < A {
+                    numbers[i] = W::load(&of[i][k..]);
+                    i += 1;
+                }
+                let terms = terms.of(numbers);
+                let mut i = 0;
+                while i < N {
                     sums[i] = sums[i].add(terms[i]);
                     i += 1;
                 }
                 k += BLOCK;
             }
             let mut i = 0;
-            while i < 4 {
+            while i < N {
                 sums[i].store(&mut totals[i][begin..]);
                 i += 1;
             }
             begin += W::LANES;
         }
         let mut k = whole;
-        while k < a.len() {
-            let terms = terms.of(W::splat(a[k]), W::splat(b[k]));
+        while k < of[0].len() {
+            let mut numbers = [W::splat(0.0); A];
             let mut i = 0;
-            while i < 4 {
+            while i < A {
+                numbers[i] = W::splat(of[i][k]);
+                i += 1;
+            }
+            let terms = terms.of(numbers);
+            let mut i = 0;
+            while i < N {
                 let mut alike = [0.0; BLOCK];
                 terms[i].store(&mut alike);
                 totals[i][k - whole] += alike[0];

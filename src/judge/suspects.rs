@@ -1,5 +1,5 @@
-//! Whether the errors at suspicious samples are larger than elsewhere: the output of a plant at rest is constant, too, but its
-//! errors are no larger than elsewhere; those of a frozen sensor are.
+//! Whether the errors at suspicious samples are larger than elsewhere, or the prediction moves there: the output of a plant at rest
+//! is constant, too, but so is its prediction, and its errors are no larger than elsewhere.
 
 use crate::problem::{Accumulate, Objective};
 use crate::record::{Record, Suspicion};
@@ -16,11 +16,13 @@ pub(super) struct Suspect {
 enum Inside {
     Value(f64),
     Samples(Range<usize>),
+    Again,
 }
 
-/// Sum of squared errors, and how many there were.
+/// Sums of errors and of their squares, and how many there were.
 #[derive(Clone, Copy, Default)]
 struct Errors {
+    sum: f64,
     squares: f64,
     count: u64,
 }
@@ -37,6 +39,7 @@ impl Suspect {
         let inside = match suspicion {
             Suspicion::Sentinel { value, .. } | Suspicion::Clipped { value, .. } => Inside::Value(*value),
             Suspicion::Frozen { samples, .. } => Inside::Samples(samples.clone()),
+            Suspicion::Held { .. } => Inside::Again,
             Suspicion::Repeated { samples, again } => Inside::Samples(*again..again + samples.len()),
         };
         Suspect { experiment, output, inside }
@@ -53,6 +56,18 @@ impl Split {
     pub fn ratio(&self) -> f64 {
         let mean = |errors: Errors| errors.squares / errors.count.max(1) as f64;
         mean(self.inside) / mean(self.outside).max(f64::MIN_POSITIVE)
+    }
+
+    /// Standard deviation of the errors inside: of a value that stands still, that of its prediction.
+    pub fn spread(&self) -> f64 {
+        let Errors { sum, squares, count } = self.inside;
+        let n = count.max(1) as f64;
+        (squares / n - (sum / n).powi(2)).max(0.0).sqrt()
+    }
+
+    /// Part of the measurements that lies inside.
+    pub fn part(&self) -> f64 {
+        self.inside.count as f64 / (self.inside.count + self.outside.count).max(1) as f64
     }
 
     /// Part of the sum of squares that lies inside.
@@ -76,9 +91,12 @@ impl Accumulate for Sums<'_> {
                 let inside = match &suspect.inside {
                     Inside::Value(value) => values[sample] == *value,
                     Inside::Samples(samples) => samples.contains(&sample),
+                    Inside::Again => sample > 0 && values[sample] == values[sample - 1],
                 };
                 let errors = if inside { &mut split.inside } else { &mut split.outside };
-                errors.squares += window.error(k, suspect.output, lane).powi(2);
+                let error = window.error(k, suspect.output, lane);
+                errors.sum += error;
+                errors.squares += error * error;
                 errors.count += 1;
             }
         }
@@ -87,6 +105,7 @@ impl Accumulate for Sums<'_> {
     fn append(&mut self, later: Self) {
         for (split, later) in self.splits.iter_mut().zip(later.splits) {
             for (errors, later) in [(&mut split.inside, later.inside), (&mut split.outside, later.outside)] {
+                errors.sum += later.sum;
                 errors.squares += later.squares;
                 errors.count += later.count;
             }
@@ -139,13 +158,30 @@ mod tests {
         assert_eq!(found, [[(9.0, 1), (53.0, 2)], [(4.0, 1), (58.0, 2)], [(49.0, 1), (13.0, 2)]]);
     }
 
-    /// Errors of 1 and 3 inside, of 1, 1, 0 and 0 outside, in two pieces of a record: mean squares of 5 and of a half.
+    /// Values that equal the one before, in a piece that begins at the second sample.
+    #[test]
+    fn values_that_are_held() {
+        let channel = Channel::new("y", "", vec![7.0, 7.0, 7.0, 8.0, 8.0, 9.0]);
+        let record = Record::new(vec![], Time::Uniform { start: 0.0, step: 1.0 }, vec![], vec![channel]).unwrap();
+        let suspects = [Suspect::new(0, 0, &Suspicion::Held { samples: 2 })];
+        let mut sums = Sums { record: &record, suspects: suspects.iter().collect(), splits: vec![Split::default()] };
+        let mut window = Window::new(1, 1, 0, 5, false);
+        (window.begin, window.samples) = (vec![1], vec![5]);
+        for k in 0..5 {
+            window.row_mut(k, 0)[0] = 10f64.powi(k as i32);
+            window.set_measured(k, 0, 1);
+        }
+        sums.add(&window, 0);
+        assert_eq!((sums.splits[0].inside.sum, sums.splits[0].outside.sum), (1011.0, 10_100.0));
+    }
+
+    /// Errors of 1 and 3 inside, and four whose squares add up to two outside, in two pieces of a record: mean squares of 5 and of a half.
     #[test]
     fn errors_of_pieces_add_up() {
         let channel = Channel::new("y", "", vec![1.0; 6]);
         let record = Record::new(vec![], Time::Uniform { start: 0.0, step: 1.0 }, vec![], vec![channel]).unwrap();
         let sums = |inside: (f64, u64), outside: (f64, u64)| {
-            let errors = |(squares, count)| Errors { squares, count };
+            let errors = |(squares, count): (f64, u64)| Errors { sum: squares.sqrt() * count as f64, squares, count };
             let split = Split { inside: errors(inside), outside: errors(outside) };
             Sums { record: &record, suspects: vec![], splits: vec![split] }
         };
@@ -154,7 +190,9 @@ mod tests {
         let split = whole.splits[0];
         assert_eq!((split.inside.count, split.outside.count), (2, 4));
         assert_eq!((split.rms(), split.ratio(), split.share()), (5f64.sqrt(), 10.0, 10.0 / 12.0));
+        // Of 1 and 3 the standard deviation is 1.
+        assert_eq!((split.spread(), split.part()), (1.0, 2.0 / 6.0));
         let none = Split::default();
-        assert_eq!((none.rms(), none.ratio(), none.share()), (0.0, 0.0, 0.0));
+        assert_eq!([none.rms(), none.ratio(), none.share(), none.spread(), none.part()], [0.0; 5]);
     }
 }

@@ -2,8 +2,10 @@
 //!
 //! At the minimum each part has a triangle of its own, and with it a step to the minimum that it would have by itself. If
 //! all parts follow one model, what they gain by steps of their own over the common one is noise: chi squared with as many
-//! degrees of freedom as they have steps more (Chow, Econometrica 28 (1960) 591). Errors that are correlated over time
-//! count for fewer.
+//! degrees of freedom as they have steps more (Chow, Econometrica 28 (1960) 591). Errors that are correlated over time, also
+//! without what contradicts the common step, count for fewer.
+
+mod left;
 
 use super::conclude::Judgement;
 use super::directions;
@@ -14,17 +16,18 @@ use crate::optimize::{Linearization, Severity};
 use crate::problem::{Accumulate, Objective, Role};
 use crate::sweep::Window;
 use crate::whiteness::chi_squared_tail;
+use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Level of the test.
-const LEVEL: f64 = 1e-4;
+pub(super) const LEVEL: f64 = 1e-4;
 /// A parameter is named if its values from two parts of the data differ by more than this many standard errors. If they differ by more
 /// than the second (relative), the estimate is not usable.
-const APART: f64 = 4.0;
+const APART: f64 = 3.0;
 const FAR_APART: f64 = 0.25;
 /// Rows that are absorbed together.
 const ROWS: usize = 256;
 /// More records than these are not compared one by one.
-const RECORDS: usize = 12;
+pub(super) const RECORDS: usize = 12;
 /// More unknowns than these are not compared: the triangles of all parts are kept.
 const MOST: usize = 200;
 
@@ -41,12 +44,19 @@ struct Part {
     triangle: Information,
     block: Block,
     squares: f64,
+    fourths: f64,
     count: u64,
 }
 
 impl Part {
     fn new(columns: usize) -> Self {
-        Part { triangle: Information::new(columns), block: Block::new(columns, ROWS), squares: 0.0, count: 0 }
+        Part {
+            triangle: Information::new(columns),
+            block: Block::new(columns, ROWS),
+            squares: 0.0,
+            fourths: 0.0,
+            count: 0,
+        }
     }
 
     fn append(&mut self, later: &mut Part) {
@@ -54,6 +64,7 @@ impl Part {
         later.triangle.absorb(&mut later.block);
         self.triangle.merge(&later.triangle);
         self.squares += later.squares;
+        self.fourths += later.fourths;
         self.count += later.count;
     }
 }
@@ -69,8 +80,15 @@ impl Accumulate for Halves<'_> {
                 self.row.iter_mut().zip(values).for_each(|(to, from)| *to = *from);
                 let error = window.error(k, j, lane);
                 part.squares += error * error;
+                part.fourths += error.powi(4);
                 part.count += 1;
                 part.triangle.gather(&mut part.block, &self.row, error);
+                if window.has_variances() {
+                    let slope = |column: usize| window.variance_at(k, j, column, lane);
+                    self.row.iter_mut().enumerate().for_each(|(c, to)| *to = slope(c));
+                    let second = (error * error - 1.0) * FRAC_1_SQRT_2;
+                    part.triangle.gather(&mut part.block, &self.row, second);
+                }
             }
         }
     }
@@ -82,9 +100,27 @@ impl Accumulate for Halves<'_> {
     }
 }
 
+/// Which rows a piece has.
+#[derive(Clone, Copy)]
+enum Rows {
+    Record(usize),
+    Output(usize),
+    Half(usize),
+}
+
+impl Rows {
+    fn contain(self, experiment: usize, output: usize, half: usize) -> bool {
+        match self {
+            Rows::Record(e) => e == experiment,
+            Rows::Output(j) => j == output,
+            Rows::Half(h) => h == half,
+        }
+    }
+}
+
 /// A part of the data: a triangle per experiment, in units of its own noise.
 struct Piece {
-    name: String,
+    rows: Rows,
     linear: Linearization,
     held: Vec<bool>,
     /// By what a step of its own would lower the sum of squares.
@@ -94,14 +130,22 @@ struct Piece {
     dependence: f64,
 }
 
-/// Parameters that differ between outputs, records or halves of the data. Compared where errors are correlated, because what
-/// contradicts the model is, and of static models with several outputs.
+/// Whether anything speaks for parts of the data that contradict each other, which a comparison by slopes then shows or not: errors that
+/// are correlated over time or with the prediction. A filter takes what contradicts its model as process noise, and leaves
+/// little of it in the errors; outputs of static models have no order.
+fn is_suspicious(judgement: &Judgement<'_>) -> bool {
+    let least = judgement.residuals.shape.iter().copied().fold(judgement.residuals.parts, f64::min);
+    let follow = least * (judgement.objective.outputs() as f64) < LEVEL && !judgement.rounding;
+    follow || judgement.is_colored() || judgement.is_static() || judgement.objective.sweep.predicts_variance()
+}
+
+/// Parameters that differ between outputs, records or halves of the data.
 pub(super) fn contradictions(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
     let objective = judgement.objective;
     let plain =
         objective.loss().is_none() && !objective.is_weighted() && objective.problem.settings.prefilter.is_none();
-    let possible = plain && !objective.sweep.predicts_variance() && unknowns.len() <= MOST && judgement.degrees > 0.0;
-    if !possible || !judgement.end.outcome.converged() || !(judgement.is_colored() || judgement.is_static()) {
+    let possible = plain && unknowns.len() <= MOST && judgement.degrees > 0.0 && judgement.end.outcome.converged();
+    if !possible || !is_suspicious(judgement) {
         return vec![];
     }
     let diagonal = objective.with(crate::problem::Whitening::Diagonal(objective.whitening.sigma()));
@@ -113,48 +157,44 @@ pub(super) fn contradictions(judgement: &Judgement<'_>, unknowns: &[Unknown]) ->
     };
     let Ok(mut all) = diagonal.gather(&judgement.end.coordinates, true, make) else { return vec![] };
     all.iter_mut().flat_map(|halves| &mut halves.of).flatten().for_each(|part| part.triangle.absorb(&mut part.block));
-    let outputs = objective.outputs();
-    let layout = &objective.problem.layout().outputs;
-    let output = |j: usize| piece(judgement, &all, |_, one, _| one == j, format!("`{}` alone", layout[j].name));
-    let half = |h: usize| {
-        piece(judgement, &all, |_, _, one| one == h, format!("the {} half of the data", ["first", "second"][h]))
-    };
-    let labels = &objective.problem.unknowns.labels;
-    let record = |e: usize| piece(judgement, &all, |one, _, _| one == e, format!("`{}` alone", labels[e]));
-    let mut warnings = vec![];
+    let mut kinds: Vec<(WarningCode, Vec<Rows>)> = vec![];
     if (2..=RECORDS).contains(&all.len()) {
-        let pieces = (0..all.len()).filter_map(record).collect();
-        warnings.extend(compared(judgement, pieces, unknowns, WarningCode::RecordsContradict));
+        kinds.push((WarningCode::RecordsContradict, (0..all.len()).map(Rows::Record).collect()));
     }
-    if outputs > 1 {
-        let pieces = (0..outputs).filter_map(output).collect();
-        warnings.extend(compared(judgement, pieces, unknowns, WarningCode::OutputsContradict));
+    if objective.outputs() > 1 {
+        kinds.push((WarningCode::OutputsContradict, (0..objective.outputs()).map(Rows::Output).collect()));
     }
     if !judgement.is_static() {
-        let pieces = (0..2).filter_map(half).collect();
-        warnings.extend(compared(judgement, pieces, unknowns, WarningCode::HalvesContradict));
+        kinds.push((WarningCode::HalvesContradict, (0..2).map(Rows::Half).collect()));
     }
-    warnings
+    let of = |(code, rows): (WarningCode, Vec<Rows>)| {
+        let mut pieces: Vec<Piece> = rows.into_iter().filter_map(|rows| piece(judgement, &all, rows)).collect();
+        compared(judgement, &pieces, unknowns)?;
+        // Only now, since it takes another pass. Samples of static models have no order.
+        if !judgement.is_static() {
+            let dependences = left::dependences(&diagonal, &judgement.end.coordinates, &pieces)?;
+            pieces.iter_mut().zip(dependences).for_each(|(piece, of_errors)| piece.dependence *= of_errors);
+        }
+        Some(warning(judgement, &pieces, unknowns, code, compared(judgement, &pieces, unknowns)?))
+    };
+    kinds.into_iter().filter_map(of).collect()
 }
 
 /// The triangles of chosen experiments, outputs and halves, those of each output divided by the noise that is left when
 /// its own step is taken.
-fn piece(
-    judgement: &Judgement<'_>,
-    all: &[Halves<'_>],
-    chosen: impl Fn(usize, usize, usize) -> bool,
-    name: String,
-) -> Option<Piece> {
+fn piece(judgement: &Judgement<'_>, all: &[Halves<'_>], rows: Rows) -> Option<Piece> {
     let shared = judgement.objective.problem.unknowns.shared();
     let held = &judgement.undetermined.held;
+    let predicted = judgement.objective.sweep.predicts_variance();
     let empty = || all.iter().map(|halves| Information::new(halves.row.len())).collect::<Vec<_>>();
     let (mut merged, mut dependence) = (empty(), 1.0f64);
     for j in 0..judgement.objective.outputs() {
-        let (mut triangles, mut squares, mut count) = (empty(), 0.0, 0);
+        let (mut triangles, mut squares, mut fourths, mut count) = (empty(), 0.0, 0.0, 0);
         for (e, halves) in all.iter().enumerate() {
-            for (_, part) in halves.of[j].iter().enumerate().filter(|(h, _)| chosen(e, j, *h)) {
+            for (_, part) in halves.of[j].iter().enumerate().filter(|(h, _)| rows.contain(e, j, *h)) {
                 triangles[e].merge(&part.triangle);
                 squares += part.squares;
+                fourths += part.fourths;
                 count += part.count;
             }
         }
@@ -165,20 +205,32 @@ fn piece(
         let own = directions::undetermined(&linear, held).held;
         let step = linear.step(&vec![0.0; own.len()], &own)?;
         let free = own.iter().filter(|held| !**held).count() as f64;
-        let variance = (squares - 2.0 * linear.predicted_reduction(&step)) / (count as f64 - free);
+        let left = (squares - 2.0 * linear.predicted_reduction(&step)) / (count as f64 - free);
+        // Predicted noise levels are among the unknowns.
+        let variance = if predicted { 1.0 } else { left };
         if !(variance > 0.0 && variance.is_finite()) {
             return None;
         }
         for (all, (triangle, _)) in merged.iter_mut().zip(linear.columns()) {
             all.merge(&scaled(triangle, variance.sqrt().recip()));
         }
-        dependence = dependence.max(judgement.dependence(j));
+        if predicted {
+            // Squares of errors with heavy tails vary more than those of normal ones.
+            dependence = dependence.max(0.5 * (count as f64 * fourths / (squares * squares) - 1.0));
+        }
     }
-    Piece::new(name, Linearization::new(0.0, shared, merged), held, dependence)
+    Piece::new(rows, Linearization::new(0.0, shared, merged), held, dependence)
+}
+
+/// A difference between pieces that is no chance: its probability, the parameter that differs most, and the two pieces.
+struct Difference {
+    chance: f64,
+    unknown: usize,
+    pieces: [usize; 2],
 }
 
 /// Whether pieces follow one set of parameters.
-fn compared(judgement: &Judgement<'_>, pieces: Vec<Piece>, unknowns: &[Unknown], code: WarningCode) -> Option<Warning> {
+fn compared(judgement: &Judgement<'_>, pieces: &[Piece], unknowns: &[Unknown]) -> Option<Difference> {
     let first = pieces.first().filter(|_| pieces.len() > 1)?;
     let dependence = pieces.iter().map(|piece| piece.dependence).fold(1.0, f64::max);
     let shared = judgement.objective.problem.unknowns.shared();
@@ -186,13 +238,24 @@ fn compared(judgement: &Judgement<'_>, pieces: Vec<Piece>, unknowns: &[Unknown],
     for piece in &pieces[1..] {
         whole.iter_mut().zip(piece.linear.columns()).for_each(|(all, (one, _))| all.merge(one));
     }
-    let whole =
-        Piece::new(String::new(), Linearization::new(0.0, shared, whole), &judgement.undetermined.held, dependence)?;
+    let whole = Piece::new(first.rows, Linearization::new(0.0, shared, whole), &judgement.undetermined.held, 1.0)?;
     let free = |piece: &Piece| piece.held.iter().filter(|held| !**held).count() as f64;
     let degrees = pieces.iter().map(free).sum::<f64>() - free(&whole);
     let gain = pieces.iter().map(|piece| piece.gain).sum::<f64>() - whole.gain;
     let chance = no_chance(gain / dependence, degrees)?;
-    let (i, a, b, _) = furthest(&pieces, unknowns)?;
+    let (unknown, a, b, _) = furthest(pieces, unknowns)?;
+    Some(Difference { chance, unknown, pieces: [a, b] })
+}
+
+fn warning(
+    judgement: &Judgement<'_>,
+    pieces: &[Piece],
+    unknowns: &[Unknown],
+    code: WarningCode,
+    difference: Difference,
+) -> Warning {
+    let problem = judgement.objective.problem;
+    let Difference { chance, unknown: i, pieces: [a, b] } = difference;
     let (unknown, slope) = (&unknowns[i], judgement.slopes[i]);
     let value = |piece: &Piece| unknown.value + slope * piece.step[i];
     let error = |piece: &Piece| {
@@ -201,7 +264,12 @@ fn compared(judgement: &Judgement<'_>, pieces: Vec<Piece>, unknowns: &[Unknown],
     };
     let (one, two) = (&pieces[a], &pieces[b]);
     let part = (value(one) - value(two)).abs() / unknown.value.abs().max(f64::MIN_POSITIVE);
-    let said = |piece: &Piece| format!("{} +- {} by {}", number(value(piece), 4), number(error(piece), 2), piece.name);
+    let name = |piece: &Piece| match piece.rows {
+        Rows::Record(e) => format!("`{}` alone", problem.unknowns.labels[e]),
+        Rows::Output(j) => format!("`{}` alone", problem.layout().outputs[j].name),
+        Rows::Half(h) => format!("the {} half of the data", ["first", "second"][h]),
+    };
+    let said = |piece: &Piece| format!("{} +- {} by {}", number(value(piece), 4), number(error(piece), 2), name(piece));
     let text = format!(
         "`{}` is {} and {} ({} apart; chi-square {}): check gains, signs and delays of the sensors, whether all data are of \
          one plant, and what the model leaves out",
@@ -212,7 +280,7 @@ fn compared(judgement: &Judgement<'_>, pieces: Vec<Piece>, unknowns: &[Unknown],
         p_value(chance)
     );
     let severity = if part > FAR_APART { Severity::NotUsable } else { Severity::UsableWithCare };
-    Some(Warning { code, severity, text })
+    Warning { code, severity, text }
 }
 
 /// The parameter that differs most between two pieces, in standard errors: its number, and those of the pieces.
@@ -238,11 +306,11 @@ fn furthest(pieces: &[Piece], unknowns: &[Unknown]) -> Option<(usize, usize, usi
 }
 
 impl Piece {
-    fn new(name: String, linear: Linearization, held: &[bool], dependence: f64) -> Option<Self> {
+    fn new(rows: Rows, linear: Linearization, held: &[bool], dependence: f64) -> Option<Self> {
         let held = directions::undetermined(&linear, held).held;
         let step = linear.step(&vec![0.0; held.len()], &held)?;
         let gain = 2.0 * linear.predicted_reduction(&step);
-        Some(Piece { name, linear, held, gain, step, dependence })
+        Some(Piece { rows, linear, held, gain, step, dependence })
     }
 }
 

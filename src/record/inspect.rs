@@ -1,6 +1,7 @@
-//! [`Inspection`]: what the columns of a record show before any model: constant, clipped, frozen or repeated values,
+//! [`Inspection`]: what the columns of a record show before any model: constant, clipped, frozen, held or repeated values,
 //! sentinels, few levels, missing measurements.
 
+mod held;
 mod repeated;
 mod values;
 
@@ -67,6 +68,11 @@ pub enum Suspicion {
         /// The samples.
         samples: Range<usize>,
     },
+    /// Each value stands for several samples, as if the sensor measured less often.
+    Held {
+        /// For how many: the median.
+        samples: usize,
+    },
     /// A block of samples occurs twice.
     Repeated {
         /// The samples of the block.
@@ -132,6 +138,9 @@ fn inspect(channel: &Channel, pieces: &[Range<usize>], output: bool) -> ChannelI
     if output && suspicions.is_empty() {
         suspicions.extend(found.clipped(&extremes));
         suspicions.extend(found.frozen().filter(|_| suspicions.is_empty()));
+        if suspicions.is_empty() && found.repeats_mostly() {
+            suspicions.extend(held::held(values, pieces));
+        }
         if suspicions.is_empty() && pieces.len() == 1 && found.continuous() {
             suspicions.extend(repeated::repeated(values));
         }
@@ -182,6 +191,7 @@ impl fmt::Display for Suspicion {
                 samples.len(),
                 samples.start
             ),
+            Suspicion::Held { samples } => write!(f, "holds each value for {samples} samples"),
             Suspicion::Repeated { samples, again } => {
                 write!(f, "has the same {} values from sample {} and from sample {again}", samples.len(), samples.start)
             }

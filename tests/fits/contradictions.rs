@@ -122,20 +122,22 @@ impl Model for Ordered {
     }
 }
 
-/// Where samples have an order, a contradiction between parts is one of correlated errors; inputs without correlation leave none.
+/// Outputs whose gains differ are named, whether the inputs leave errors that are correlated over time or not; equal ones are not.
 #[test]
-fn white_errors_contradict_nothing() {
-    let contradicts = |hold: usize| {
+fn outputs_contradict_by_colored_and_by_white_errors() {
+    let contradicts = |hold: usize, gain: f64| {
         let (u, w) = (levels(400, hold, 1), levels(400, hold, 2));
         let mut noise = Noise(3);
-        let mut output = |k: usize| Pair { y: 2.0 * u[k] + 0.05 * noise.gauss(), z: 2.6 * w[k] + 0.05 * noise.gauss() };
+        let mut output =
+            |k: usize| Pair { y: 2.0 * u[k] + 0.05 * noise.gauss(), z: gain * w[k] + 0.05 * noise.gauss() };
         let outputs = (0..400).map(&mut output).collect();
         let inputs = (0..400).map(|k| Drive { u: u[k], w: w[k] }).collect();
         let record = Experiment::new(&Ordered, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
         let estimate = Fit::new(&Ordered, &record).parameters(Factor { a: free(1.0) }).run().unwrap();
         estimate.warnings.iter().any(|warning| warning.code == WarningCode::OutputsContradict)
     };
-    assert!(contradicts(20) && !contradicts(1));
+    assert!(contradicts(20, 2.6) && contradicts(1, 2.6));
+    assert!(!contradicts(20, 2.0) && !contradicts(1, 2.0));
 }
 
 /// The same of two records, one of which is noisier: each counts by its own noise, `(0.1^2 + 0.3^2) / 79` for the difference,

@@ -44,3 +44,4 @@ mod step_errors;
 mod stiff;
 mod threads;
 mod user_code;
+mod white_contradictions;

@@ -126,6 +126,11 @@ impl<'v> Values<'v> {
         self.levels.is_none() && self.chance_of_repeat() < REPEATS
     }
 
+    /// Whether there are many values, and a third of them or more equal the one before.
+    pub fn repeats_mostly(&self) -> bool {
+        self.levels.is_none() && 3 * self.repeats >= self.measured
+    }
+
     /// The part of the values that equal the one before, the longest run left out.
     fn chance_of_repeat(&self) -> f64 {
         let inside = self.longest.len().saturating_sub(1);

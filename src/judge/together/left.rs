@@ -1,0 +1,81 @@
+//! How the errors that parts of the data leave, each with a step of its own, are correlated over time.
+//!
+//! What contradicts the common estimate correlates the errors beside it: only what is left without the contradiction tells how many
+//! errors have the information of one.
+
+use super::Piece;
+use crate::judge::whiteness::{LAGS, Whiteness};
+use crate::problem::{Accumulate, Objective};
+use crate::sweep::Window;
+use crate::whiteness::Portmanteau;
+
+/// What is left of an output's errors by a piece.
+#[derive(Clone)]
+struct Left {
+    sums: Portmanteau,
+    count: u64,
+}
+
+/// The errors of an experiment, piece by piece and output by output.
+struct Pass<'p> {
+    objective: &'p Objective<'p>,
+    pieces: &'p [Piece],
+    experiment: usize,
+    columns: Vec<usize>,
+    of: Vec<Vec<Left>>,
+    run: Vec<f64>,
+}
+
+impl Accumulate for Pass<'_> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        let (e, begin) = (self.experiment, window.begin[lane]);
+        let middle = self.objective.problem.records[e].len() / 2;
+        for (piece, of) in self.pieces.iter().zip(&mut self.of) {
+            for (j, left) in of.iter_mut().enumerate() {
+                let inside = |k: &usize| {
+                    piece.rows.contain(e, j, usize::from(begin + k >= middle)) && window.is_measured(*k, j, lane)
+                };
+                let moved = |k: usize| {
+                    let by = self.columns.iter().enumerate().map(|(c, i)| window.at(k, j, c, lane) * piece.step[*i]);
+                    window.error(k, j, lane) - by.sum::<f64>()
+                };
+                self.run.clear();
+                self.run.extend((0..window.samples[lane]).filter(inside).map(moved));
+                left.count += self.run.len() as u64;
+                left.sums.add(&self.run);
+            }
+        }
+    }
+
+    fn append(&mut self, later: Self) {
+        for (left, later) in self.of.iter_mut().flatten().zip(later.of.iter().flatten()) {
+            left.sums.follow(&later.sums);
+            left.count += later.count;
+        }
+    }
+}
+
+/// How many errors have the information of one, by each piece: the most of its outputs.
+pub(super) fn dependences(objective: &Objective<'_>, coordinates: &[f64], pieces: &[Piece]) -> Option<Vec<f64>> {
+    let none = Left { sums: Portmanteau::new(LAGS), count: 0 };
+    let empty = vec![vec![none; objective.outputs()]; pieces.len()];
+    let make = |experiment: usize| Pass {
+        objective,
+        pieces,
+        experiment,
+        columns: objective.problem.unknowns.columns(experiment).collect(),
+        of: empty.clone(),
+        run: vec![],
+    };
+    let all = objective.gather(coordinates, true, make).ok()?;
+    let mut sums = empty.clone();
+    for one in all {
+        for (sum, own) in sums.iter_mut().flatten().zip(one.of.iter().flatten()) {
+            sum.sums.append(&own.sums);
+            sum.count += own.count;
+        }
+    }
+    let dependence = |left: &Left| Whiteness::of(&left.sums, left.count, 0).dependence;
+    let most = |of: &Vec<Left>| of.iter().filter(|left| left.count > 0).map(dependence).fold(1.0, f64::max);
+    Some(sums.iter().map(most).collect())
+}
