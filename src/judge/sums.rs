@@ -54,23 +54,32 @@ impl<const A: usize, const N: usize, T: Terms<A, N>> Task for Sums<'_, A, N, T> 
             }
             begin += W::LANES;
         }
-        let mut k = whole;
-        while k < of[0].len() {
+        // The rest, filled up with zeros whose terms are left out.
+        let left = of[0].len() - whole;
+        let mut begin = 0;
+        while begin < left {
             let mut numbers = [W::splat(0.0); A];
             let mut i = 0;
             while i < A {
-                numbers[i] = W::splat(of[i][k]);
+                let mut filled = [0.0; BLOCK];
+                let count = (left - begin).min(W::LANES);
+                filled[..count].copy_from_slice(&of[i][whole + begin..][..count]);
+                numbers[i] = W::load(&filled);
                 i += 1;
             }
             let terms = terms.of(numbers);
             let mut i = 0;
             while i < N {
-                let mut alike = [0.0; BLOCK];
-                terms[i].store(&mut alike);
-                totals[i][k - whole] += alike[0];
+                let mut values = [0.0; BLOCK];
+                terms[i].store(&mut values);
+                let mut lane = 0;
+                while lane < W::LANES && begin + lane < left {
+                    totals[i][begin + lane] += values[lane];
+                    lane += 1;
+                }
                 i += 1;
             }
-            k += 1;
+            begin += W::LANES;
         }
         totals.map(|parts| parts.iter().sum())
     }
