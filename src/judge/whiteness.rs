@@ -20,6 +20,8 @@ pub(crate) struct Whiteness {
     /// Standardized sum of products of errors a horizon apart, and their autocorrelation; zeros where predictions do not
     /// restart, or from too far.
     pub at_restart: (f64, f64),
+    /// The same of errors two horizons apart; zeros where these are too far, too.
+    pub at_second: (f64, f64),
 }
 
 impl Whiteness {
@@ -29,12 +31,14 @@ impl Whiteness {
         let (predicted, dependence) = color(&correlations, count);
         let most = |lags: usize| lags.min(count as usize / 4).max(1);
         let over = |lags: usize| errors.p_value(most(lags));
+        let at = |lag: usize| if lag == 0 || lag > errors.lags() { (0.0, 0.0) } else { errors.at(lag) };
         Whiteness {
             p_value: (3.0 * over(FEW).min(over(LAGS)).min(errors.neighbors_p_value())).min(1.0),
             correlations,
             predicted,
             dependence,
-            at_restart: if restart == 0 { (0.0, 0.0) } else { errors.at(restart) },
+            at_restart: at(restart),
+            at_second: at(2 * restart),
         }
     }
 }
@@ -53,11 +57,10 @@ fn color(coefficients: &[f64], count: u64) -> (f64, f64) {
     (predicted, (1.0 + 2.0 * positive).max(autoregression).max(1.0))
 }
 
-/// The output whose errors are least white, and how white they are; the probability counts all outputs that were tested.
-pub(super) fn least_white(whiteness: &[Whiteness]) -> Option<(usize, Whiteness)> {
-    let count = whiteness.len() as f64;
-    let tested = whiteness.iter().enumerate();
-    let tested = tested.map(|(j, white)| (j, Whiteness { p_value: white.p_value * count, ..*white }));
+/// Of the outputs that were tested that whose errors are least white, and how white they are; the probability counts all of them.
+pub(super) fn least_white(tested: &[(usize, Whiteness)]) -> Option<(usize, Whiteness)> {
+    let count = tested.len() as f64;
+    let tested = tested.iter().map(|(j, white)| (*j, Whiteness { p_value: white.p_value * count, ..*white }));
     let strongest = |a: &Whiteness, b: &Whiteness| {
         a.p_value.total_cmp(&b.p_value).then(b.correlations[0].total_cmp(&a.correlations[0]))
     };
@@ -100,9 +103,13 @@ mod tests {
         let of = |p_value: f64, first: f64| {
             let mut correlations = [0.0; LAGS];
             correlations[0] = first;
-            Whiteness { p_value, correlations, predicted: 0.0, dependence: 1.0, at_restart: (0.0, 0.0) }
+            let none = (0.0, 0.0);
+            Whiteness { p_value, correlations, predicted: 0.0, dependence: 1.0, at_restart: none, at_second: none }
         };
-        let found = |all: &[Whiteness]| least_white(all).map(|(j, white)| (j, white.p_value));
+        let found = |all: &[Whiteness]| {
+            let tested: Vec<(usize, Whiteness)> = all.iter().copied().enumerate().collect();
+            least_white(&tested).map(|(j, white)| (j, white.p_value))
+        };
         assert_eq!(found(&[]), None);
         assert_eq!(found(&[of(0.5, 0.9), of(0.125, 0.1), of(0.25, 0.9)]), Some((1, 0.375)));
         assert_eq!(found(&[of(0.0, 0.3), of(0.0, 0.9), of(0.0, 0.6)]), Some((1, 0.0)));
