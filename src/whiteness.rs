@@ -164,11 +164,6 @@ impl Portmanteau {
         self.neighbors.append(&other.neighbors);
     }
 
-    /// The longest lag.
-    pub fn lags(&self) -> usize {
-        self.errors.sums.len() - 1
-    }
-
     /// The sum of products at a lag over its standard deviation without correlation, and the autocorrelation.
     pub fn at(&self, lag: usize) -> (f64, f64) {
         let (sum, squares) = (self.errors.sums[lag], self.errors.squares[lag]);

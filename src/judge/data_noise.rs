@@ -7,7 +7,6 @@
 //! added and subtracted, in which all but the second order cancels.
 
 use super::conclude::Judgement;
-use super::whiteness::Whiteness;
 use crate::error::Error;
 use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::numeral::{number, p_value, percent};
@@ -61,13 +60,11 @@ fn largest_bias<'p, 'u>(
 }
 
 /// Whether noise in the states from which predictions restart biases the estimate. Such noise is in the error at
-/// the restart, and with the opposite sign in the error a horizon later, but not in that two horizons later. Where disturbances of the
-/// plant alternate by themselves, errors two horizons apart are positively correlated, by the square of what those at one are.
+/// the restart, and with the opposite sign in the error a horizon later.
 pub(super) fn restart_noise(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Option<Warning> {
     let steps = judgement.objective.sweep.restarts()?;
     let outputs = &judgement.residuals.outputs;
-    let of = |white: &Whiteness| if alternates(white) { (0.0, 0.0) } else { white.at_restart };
-    let found = judgement.residuals.whiteness.iter().map(of);
+    let found = judgement.residuals.whiteness.iter().map(|white| white.at_restart);
     let tail = |z: f64| outputs.len() as f64 * Normal::standard().cdf(z);
     let least = found.clone().map(|(z, _)| tail(z)).fold(1.0, f64::min);
     if least >= LEVEL || judgement.rounding {
@@ -92,27 +89,15 @@ pub(super) fn restart_noise(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> 
     }
     let severity = if errors > BIAS { Severity::NotUsable } else { Severity::UsableWithCare };
     let text = format!(
-        "the states from which predictions restart are noisy: errors {steps} sample(s) apart are negatively correlated \
-         ({}), and the noise biases the estimate, `{}` by about {} standard errors (more where the inputs are fed back \
-         from the same measurements); use Kalman with Model::noise, filter the restarts (Horizon::filtered), or take a \
+        "the states from which predictions restart are noisy, or what disturbs the plant alternates: errors {steps} sample(s) apart \
+         are negatively correlated ({}). Either biases the estimate; noise, `{}` by about {} standard errors, and more where the \
+         inputs are fed back from the same measurements: use Kalman with Model::noise, filter the restarts (Horizon::filtered), or take a \
          longer horizon",
         p_value(least),
         unknown.name,
         number(errors, 2)
     );
     Some(Warning { code: WarningCode::RestartNoise, severity, text })
-}
-
-/// Whether errors that are negatively correlated at a horizon are those of an autoregression: at two horizons they are correlated by the
-/// square of that, and certainly more than not at all.
-fn alternates(white: &Whiteness) -> bool {
-    let ((first, rho), (second, squared)) = (white.at_restart, white.at_second);
-    let quantile = Normal::standard().inverse_cdf(1.0 - LEVEL);
-    // The standard deviation of a correlation, by the ratio of one to its standardized sum.
-    let deviation = if second == 0.0 { f64::INFINITY } else { squared / second };
-    first < -quantile
-        && second > quantile
-        && (squared - rho * rho).abs() < quantile * deviation.max(first.recip() * rho)
 }
 
 /// The bias by the noise of inputs that was declared.
@@ -156,21 +141,6 @@ fn noisy(channels: &[Channel], sigma: &[f64], sign: f64, draw: u64, experiment: 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Of 1,000 errors, whose correlations have a deviation of 0.032: those of an autoregression with -0.5 are correlated by 0.25 at two
-    /// horizons, those with noise at both ends of a prediction by nothing, and those that are slowly disturbed besides by more.
-    #[test]
-    fn errors_that_alternate() {
-        let white = |first: f64, second: f64| {
-            let of = |rho: f64| (rho * 1000f64.sqrt(), rho);
-            let none = [0.0; crate::judge::whiteness::LAGS];
-            let (at_restart, at_second) = (of(first), of(second));
-            Whiteness { p_value: 0.0, correlations: none, predicted: 0.2, dependence: 1.0, at_restart, at_second }
-        };
-        let cases = [(-0.5, 0.25), (-0.5, 0.2), (-0.5, 0.03), (-0.5, 0.0), (-0.5, 0.45), (0.5, 0.25), (-0.05, 0.0025)];
-        let found = cases.map(|(first, second)| alternates(&white(first, second)));
-        assert_eq!(found, [true, true, false, false, false, false, false]);
-    }
 
     /// Each channel of each experiment has noise of its own, which adding and subtracting cancels.
     #[test]

@@ -20,8 +20,6 @@ pub(crate) struct Whiteness {
     /// Standardized sum of products of errors a horizon apart, and their autocorrelation; zeros where predictions do not
     /// restart, or from too far.
     pub at_restart: (f64, f64),
-    /// The same of errors two horizons apart; zeros where these are too far, too.
-    pub at_second: (f64, f64),
 }
 
 impl Whiteness {
@@ -31,14 +29,12 @@ impl Whiteness {
         let (predicted, dependence) = color(&correlations, count);
         let most = |lags: usize| lags.min(count as usize / 4).max(1);
         let over = |lags: usize| errors.p_value(most(lags));
-        let at = |lag: usize| if lag == 0 || lag > errors.lags() { (0.0, 0.0) } else { errors.at(lag) };
         Whiteness {
             p_value: (3.0 * over(FEW).min(over(LAGS)).min(errors.neighbors_p_value())).min(1.0),
             correlations,
             predicted,
             dependence,
-            at_restart: at(restart),
-            at_second: at(2 * restart),
+            at_restart: if restart == 0 { (0.0, 0.0) } else { errors.at(restart) },
         }
     }
 }
@@ -103,8 +99,7 @@ mod tests {
         let of = |p_value: f64, first: f64| {
             let mut correlations = [0.0; LAGS];
             correlations[0] = first;
-            let none = (0.0, 0.0);
-            Whiteness { p_value, correlations, predicted: 0.0, dependence: 1.0, at_restart: none, at_second: none }
+            Whiteness { p_value, correlations, predicted: 0.0, dependence: 1.0, at_restart: (0.0, 0.0) }
         };
         let found = |all: &[Whiteness]| {
             let tested: Vec<(usize, Whiteness)> = all.iter().copied().enumerate().collect();

@@ -215,30 +215,6 @@ fn noise_in_restarts_is_named() {
     assert!(!has(&fit(&with_outputs(&Lag, &clean, outputs)), WarningCode::RestartNoise));
 }
 
-/// Disturbances that alternate, an autoregression with -0.5, with a controller that acts on an output that is measured exactly: the errors
-/// of neighbors are negatively correlated, but no state is noisy.
-#[test]
-fn disturbances_that_alternate_are_no_noise_in_restarts() {
-    for gain in [0.0, 2.0] {
-        let mut noise = Noise(11);
-        let (mut x, mut disturbance, mut outputs) = (0.0, 0.0, vec![]);
-        let decay = (-5e-3f64 / 0.05).exp();
-        let levels = levels(2000, 50, 4);
-        let mut act = |level: f64| {
-            outputs.push(Current { i: x });
-            let u = if gain > 0.0 { gain * (level - x) } else { level };
-            disturbance = 0.05 * noise.gauss() - 0.5 * disturbance;
-            x = 2.0 * u + (x - 2.0 * u) * decay + disturbance;
-            Voltage { u }
-        };
-        let inputs = levels.into_iter().map(&mut act).collect();
-        let record = Experiment::new(&Lag, Time::Uniform { start: 0.0, step: 5e-3 }, inputs, outputs).unwrap();
-        let fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau: free(0.06) });
-        let found = fit.predictor(Horizon::new(1)).run().unwrap().into_summary();
-        assert!(!has(&found, WarningCode::RestartNoise) && has(&found, WarningCode::ColoredErrors), "{found}");
-    }
-}
-
 /// The slope of an integral along its gain does not depend on where it begins: the errors at both ends of a prediction are
 /// correlated, and nothing is biased.
 #[test]
