@@ -100,7 +100,8 @@ impl Parameter {
         Parameter { positive: true, ..self }
     }
 
-    /// Gives each experiment a value of its own.
+    /// Gives each experiment a value of its own: of several, since for a fit of one it has no effect and is refused. Each record of a
+    /// [`Fleet`](crate::Fleet) has its own values anyway, with or without this.
     pub fn per_experiment(self) -> Self {
         Parameter { per_experiment: true, ..self }
     }

@@ -78,7 +78,7 @@ impl<'a> Problem<'a> {
     ///
     /// # Errors
     /// No record, a record or parameters that do not fit the model, nothing free, an output that was never measured, settings out
-    /// of range ([`Error`] names which).
+    /// of range, a value per experiment where there is one experiment ([`Error`] names which).
     pub fn new(
         sweep: Arc<dyn Sweep + 'a>,
         records: Vec<Record>,
@@ -86,6 +86,7 @@ impl<'a> Problem<'a> {
         settings: Settings,
     ) -> Result<Self, Error> {
         let problem = Problem::unchecked(sweep, records, parameters, settings)?;
+        unknowns::check_own(problem.layout(), parameters, problem.records.len())?;
         if problem.unknowns.row.is_empty() {
             return Err(Error::NothingFree);
         }

@@ -50,7 +50,9 @@ impl<'a, M: Model> Fit<'a, M> {
         self.settings.optimizer.check()?;
         let sweep = sweep(Handle::Borrowed(self.model), &self.stepping, &self.predictor)?;
         let finer = finer(Handle::Borrowed(self.model), self.is_default, &self.predictor);
-        let (parameters, settings) = (declared::<M>(self.parameters), self.settings);
+        let (mut parameters, settings) = (declared::<M>(self.parameters), self.settings);
+        // Each record is fitted by itself, so that all its values are its own.
+        parameters.iter_mut().filter(|parameter| parameter.free).for_each(|parameter| parameter.per_experiment = false);
         Ok(Fleet { sweep, finer, parameters, settings, model: PhantomData })
     }
 }

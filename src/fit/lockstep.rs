@@ -155,7 +155,7 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
         ) {
             (Some(again), Some(finer)) => {
                 let again = attempt.again_from_start(finer, (again, most(problem)), begin, &control);
-                attempt.or(again)
+                attempt.or(again, finer.sweep.is_adaptive())
             }
             _ => attempt,
         };

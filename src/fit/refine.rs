@@ -67,8 +67,7 @@ impl Attempt {
         match &self.found {
             // An output that is constant determines no parameter by any method.
             Ok(found) => {
-                let coarse = found.warnings.iter().any(|warning| warning.code == WarningCode::CoarseStep);
-                coarse && found.outcome != Outcome::Exact && !is_useless(found, WarningCode::ConstantOutput)
+                is_coarse(found) && found.outcome != Outcome::Exact && !is_useless(found, WarningCode::ConstantOutput)
             }
             Err(error) => matches!(error, Error::Start(_)),
         }
@@ -116,10 +115,19 @@ impl Attempt {
     }
 
     /// The answer of a finer method if it converged, else this one. A finer step is closer to the model's equations, so that it
-    /// is preferred also where a coarser one has a smaller deviance.
-    pub fn or(self, again: Result<Summary, Error>) -> Self {
+    /// is preferred also where a coarser one has a smaller deviance. But the tolerance of an adaptive one may be coarser than the steps
+    /// before it, those of the next coarser method: if it is too coarse, too, it has to make usable what was not.
+    pub fn or(self, again: Result<Summary, Error>, adaptive: bool) -> Self {
+        let no_finer = |before: &Summary, again: &Summary| {
+            let next = again.method.refinement == before.method.refinement + 1;
+            let good = before.outcome.converged() && !is_useless(before, WarningCode::CoarseStep);
+            adaptive && next && good && is_coarse(again)
+        };
         let (before, again) = match (self.found, again) {
             (Err(_), again @ Ok(_)) => return Attempt { found: again, coarser: self.coarser },
+            (Ok(before), Ok(again)) if no_finer(&before, &again) => {
+                return Attempt { found: Ok(with_work_of(before, &again)), coarser: self.coarser };
+            }
             (Ok(before), Ok(again)) if again.outcome.converged() || !before.outcome.converged() => (before, again),
             (before, _) => return Attempt { found: before, coarser: self.coarser },
         };
@@ -209,6 +217,9 @@ impl Problem<'_> {
             }
             let start = Start { coordinates: found.coordinates(), trials, ends: None };
             found = after(&found, self.run_within(begin, control, start)?);
+            if let Outcome::OwnLimit { iterations, .. } = &mut found.outcome {
+                *iterations = found.iterations;
+            }
         }
         Ok(found)
     }
@@ -222,7 +233,23 @@ pub(super) fn is_only_coarse(found: &Summary) -> bool {
 
 /// Whether a search ended at a limit of trial steps where the model explains the data better than a constant.
 fn may_go_on(found: &Summary) -> bool {
-    matches!(found.outcome, Outcome::IterationLimit { .. }) && !is_useless(found, WarningCode::Unexplained)
+    matches!(found.outcome, Outcome::IterationLimit { .. } | Outcome::OwnLimit { .. })
+        && !is_useless(found, WarningCode::Unexplained)
+}
+
+/// Whether a finer step would move an unknown.
+fn is_coarse(found: &Summary) -> bool {
+    found.warnings.iter().any(|warning| warning.code == WarningCode::CoarseStep)
+}
+
+/// An estimate with the work of a later search that found no better one.
+fn with_work_of(found: Summary, again: &Summary) -> Summary {
+    Summary {
+        iterations: found.iterations + again.iterations,
+        evaluations: found.evaluations + again.evaluations,
+        seconds: found.seconds.max(again.seconds),
+        ..found
+    }
 }
 
 /// Whether an estimate is not usable for this reason.

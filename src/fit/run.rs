@@ -51,7 +51,7 @@ impl Problem<'_> {
                 let trials = start.trials;
                 let again = finer.run_on(finer.run_within(begin, control, start), trials, begin, control);
                 let again = attempt.again_from_start(finer, (again, most), begin, control);
-                attempt = attempt.or(again);
+                attempt = attempt.or(again, finer.sweep.is_adaptive());
             }
         }
         attempt.answer()

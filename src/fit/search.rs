@@ -2,8 +2,10 @@
 
 use crate::error::Error;
 use crate::judge::{SearchEnd, noise};
-use crate::optimize::{Domain, Infeasible, LeastSquares, Outcome, within_tolerance};
-use crate::problem::{CheckpointFile, Fingerprint, Memory, Objective, Optimizer, Round, RoundError, Whitening};
+use crate::optimize::{Domain, Infeasible, LeastSquares, Outcome, SearchLimit, within_tolerance};
+use crate::problem::{
+    CheckpointFile, Fingerprint, Memory, Objective, Optimizer, Round, RoundError, SearchPlan, Whitening,
+};
 use std::sync::Arc;
 
 /// Rounds end when the noise levels change by less than this, relatively: no unknown then moves by more than that
@@ -134,6 +136,16 @@ impl<'r> Rounds<'r> {
         Objective { memory: self.memory.clone(), ..self.plain.with(self.whitening.clone()) }
     }
 
+    /// What the limit of this search is of, where it is not that of the user.
+    fn own_limit(&self) -> Option<SearchLimit> {
+        let (problem, most) = (self.plain.problem, self.optimizer.most());
+        match problem.settings.searches {
+            SearchPlan::Best(_) => Some(SearchLimit::FurtherStart),
+            _ if problem.limits_search_to(most) => Some(SearchLimit::FinerMethod),
+            _ => None,
+        }
+    }
+
     /// Whether the noise is to be estimated where a round has ended.
     pub fn asks_noise(&self, round: &Round) -> bool {
         !self.known && round.outcome.converged()
@@ -164,14 +176,18 @@ impl<'r> Rounds<'r> {
             // Rounding errors differ from point to point: the noise would never settle.
             settled |= outcome == Outcome::Exact;
             if !settled && self.round == NOISE_ROUNDS {
-                outcome = Outcome::IterationLimit { iterations: self.iterations };
+                outcome = Outcome::OwnLimit { iterations: self.iterations, limit: SearchLimit::NoiseRounds };
                 settled = true;
             }
         }
         // A round's limit is what earlier rounds left.
-        if let Outcome::IterationLimit { iterations } = &mut outcome {
-            *iterations = self.iterations;
-        }
+        outcome = match (outcome, self.own_limit()) {
+            (Outcome::IterationLimit { .. }, None) => Outcome::IterationLimit { iterations: self.iterations },
+            (Outcome::IterationLimit { .. }, Some(limit)) | (Outcome::OwnLimit { limit, .. }, _) => {
+                Outcome::OwnLimit { iterations: self.iterations, limit }
+            }
+            (outcome, _) => outcome,
+        };
         self.next = self.optimizer.limited(self.left);
         self.memory = objective.memory;
         settled.then(|| SearchEnd {
@@ -284,7 +300,7 @@ fn stopped(objective: &Objective<'_>) -> Error {
 mod tests {
     use super::{Rounds, roughness};
     use crate::error::Error;
-    use crate::optimize::{JacobianColumns, LevenbergMarquardt, Outcome, Stop};
+    use crate::optimize::{JacobianColumns, LevenbergMarquardt, Outcome, SearchLimit, Stop};
     use crate::problem::{Control, Round, Whitening};
     use crate::tests::{Current, Gain, Line, Voltage};
     use crate::{Experiment, ExperimentOf, Fit, Huber, Time, free};
@@ -343,7 +359,8 @@ mod tests {
             rounds.take(objective, round, Some(Ok(noise))).map(|end| (end.outcome, end.iterations, end.evaluations))
         };
         assert!((1..100).all(|_| take().is_none()));
-        assert_eq!(take(), Some((Outcome::IterationLimit { iterations: 200 }, 200, 300)));
+        let limit = SearchLimit::NoiseRounds;
+        assert_eq!(take(), Some((Outcome::OwnLimit { iterations: 200, limit }, 200, 300)));
     }
 
     /// The record is named whose cost is not finite, also where each of its errors is.

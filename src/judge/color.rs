@@ -21,15 +21,15 @@ const LARGE: f64 = 0.5;
 impl Judgement<'_> {
     /// Whether the errors of an output are correlated over time, beyond chance and rounding.
     pub(super) fn is_colored(&self) -> bool {
-        !self.rounding && self.colored_part() > SMALL
+        self.colored_part() > SMALL
     }
 
     /// The largest part of an output's movement that is an error and follows from the errors before.
     fn colored_part(&self) -> f64 {
-        let whiteness = &self.residuals.whiteness;
-        let parts = whiteness.iter().enumerate().filter_map(|(j, white)| {
-            let part = self.colored(j, white);
-            is_certain(white.p_value, whiteness.len(), part).then_some(part)
+        let tested = self.tested();
+        let parts = tested.iter().filter_map(|(j, white)| {
+            let part = self.colored(*j, white);
+            is_certain(white.p_value, tested.len(), part).then_some(part)
         });
         parts.fold(0.0, f64::max)
     }

@@ -17,7 +17,7 @@ use crate::optimize::{LeastSquares, Linearization, Outcome, is_negligible};
 use crate::parameter::Transform;
 use crate::problem::{Memory, Noise, Objective, Role, Whitening};
 
-/// Residuals below this fraction of a given sigma are round-off: no whiteness test, no HAC.
+/// Errors below this fraction of a given noise are round-off: no whiteness test, no HAC.
 const ROUNDING: f64 = 0.1;
 /// Significance level of the whiteness test.
 pub(super) const WHITENESS_LEVEL: f64 = 0.01;
@@ -79,7 +79,8 @@ pub(super) struct Judgement<'j> {
     pub degrees: f64,
     /// Estimated noise level relative to that by which the errors were divided.
     pub widening: f64,
-    /// Whether the errors are far enough below a given noise to be round-off.
+    /// Which outputs have errors that are round-off: nothing beside their measurements, or far below a given noise; and whether all have.
+    pub rounded: Vec<bool>,
     pub rounding: bool,
 }
 
@@ -96,6 +97,14 @@ pub(crate) fn conclude_from(
     residuals: Residuals,
     seconds: f64,
 ) -> Result<Summary, Error> {
+    let exact;
+    let end = match end.outcome.converged() && residuals.is_rounding() {
+        true => {
+            exact = SearchEnd { outcome: Outcome::Exact, ..end.clone() };
+            &exact
+        }
+        false => end,
+    };
     let evaluated;
     let linear = match &end.linear {
         Some(linear) => linear,
@@ -204,8 +213,13 @@ impl<'j> Judgement<'j> {
         let (exact, release) =
             bounds::released(linear, &undetermined, &at_bounds, &flat, Spread { standard_error: widening, degrees });
         let sigma = objective.whitening.sigma();
-        let below = |(fit, sigma): (&crate::estimate::OutputFit, &f64)| fit.rmse < ROUNDING * sigma;
-        let rounding = matches!(noise, Noise::Given(_)) && residuals.outputs.iter().zip(&sigma).all(below);
+        let (exact_end, given) = (end.outcome == Outcome::Exact, matches!(noise, Noise::Given(_)));
+        let rounded = |(j, sigma): (usize, &f64)| {
+            let rmse = residuals.outputs[j].rmse;
+            exact_end || given && rmse < ROUNDING * sigma || residuals.is_rounding_of(j)
+        };
+        let rounded: Vec<bool> = sigma.iter().enumerate().map(rounded).collect();
+        let rounding = rounded.iter().all(|rounded| *rounded);
         Ok(Judgement {
             objective,
             end,
@@ -220,6 +234,7 @@ impl<'j> Judgement<'j> {
             release,
             degrees,
             widening,
+            rounded,
             rounding,
         })
     }
@@ -241,8 +256,13 @@ impl<'j> Judgement<'j> {
 
     /// The same at another level.
     pub(super) fn autocorrelated_at(&self, level: f64) -> Option<(usize, super::whiteness::Whiteness)> {
-        let least = super::whiteness::least_white(&self.residuals.whiteness);
-        least.filter(|(_, white)| white.p_value < level && !self.rounding)
+        super::whiteness::least_white(&self.tested()).filter(|(_, white)| white.p_value < level)
+    }
+
+    /// The outputs whose errors are tested for whiteness, all but those that are round-off.
+    pub(super) fn tested(&self) -> Vec<(usize, super::whiteness::Whiteness)> {
+        let whiteness = self.residuals.whiteness.iter().copied().enumerate();
+        whiteness.filter(|(j, _)| !self.rounded[*j]).collect()
     }
 
     /// Whether there is noise to tell the accuracy by: given, or measured. Where no output moves, errors are numbers next to the smallest.

@@ -89,9 +89,9 @@ pub(super) fn restart_noise(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> 
     }
     let severity = if errors > BIAS { Severity::NotUsable } else { Severity::UsableWithCare };
     let text = format!(
-        "the states from which predictions restart are noisy: errors {steps} sample(s) apart are negatively correlated \
-         ({}), and the noise biases the estimate, `{}` by about {} standard errors (more where the inputs are fed back \
-         from the same measurements); use Kalman with Model::noise, filter the restarts (Horizon::filtered), or take a \
+        "the states from which predictions restart are noisy, or what disturbs the plant alternates: errors {steps} sample(s) apart \
+         are negatively correlated ({}). Either biases the estimate; noise, `{}` by about {} standard errors, and more where the \
+         inputs are fed back from the same measurements: use Kalman with Model::noise, filter the restarts (Horizon::filtered), or take a \
          longer horizon",
         p_value(least),
         unknown.name,

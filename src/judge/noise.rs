@@ -17,7 +17,7 @@ const SMALLEST: f64 = 1e-280;
 const ROBUST_STEPS: usize = 50;
 const ROBUST_TOLERANCE: f64 = 1e-9;
 /// Mean errors below this fraction of the output's magnitude are round-off, which accumulates along a record.
-const REPRODUCED: f64 = 1e-12;
+pub(super) const REPRODUCED: f64 = 1e-12;
 
 /// `E[psi^2]` of Huber's loss under the standard normal.
 fn clipped_variance(&Huber(c): &Huber) -> f64 {

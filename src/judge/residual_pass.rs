@@ -3,6 +3,7 @@
 use super::aliases::Point;
 use super::coupling::{Coupled, Coupling};
 use super::largest::Largest;
+use super::noise::REPRODUCED;
 use super::output_sums::OutputSums;
 use super::powers::{Powers, Scale, parts_by_chance, scales};
 use super::step_error::{Compared, Extremes, Sampled, step_errors};
@@ -54,6 +55,19 @@ pub(crate) struct Residuals {
     /// The least probability that errors of the halves of the records, or of several records, follow from the prediction in ways
     /// that differ as much by chance.
     pub parts: f64,
+}
+
+impl Residuals {
+    /// Whether the errors of an output are round-off of its measurements.
+    pub fn is_rounding_of(&self, j: usize) -> bool {
+        let (level, moves) = self.levels[j];
+        self.outputs[j].rmse <= REPRODUCED * level.hypot(moves)
+    }
+
+    /// Whether those of all outputs are, so that the model reproduces the data.
+    pub fn is_rounding(&self) -> bool {
+        (0..self.outputs.len()).all(|j| self.is_rounding_of(j))
+    }
 }
 
 /// Sums over one experiment.

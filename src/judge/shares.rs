@@ -5,6 +5,8 @@
 //! entry. Where this part is close to one, the interval is as right as what is assumed of this measurement's noise: the fit
 //! passes through it, so its error does not tell.
 
+mod pass;
+
 use super::conclude::Judgement;
 use super::covariances::Covariances;
 use super::sandwich::{ALONE, of_experiment};
@@ -13,9 +15,9 @@ use crate::estimate::{CovarianceMethod, Unknown, Warning, WarningCode};
 use crate::information::Covariance;
 use crate::numeral::{exact, percent};
 use crate::optimize::{Outcome, Severity};
-use crate::problem::{Accumulate, Objective, Role};
-use crate::sweep::Window;
+use crate::problem::{Objective, Role};
 use nalgebra::DMatrix;
+use pass::Pass;
 
 /// Part of the variance from which on one measurement, or two together, decide.
 const DECIDES: f64 = 0.9;
@@ -128,30 +130,6 @@ pub(super) fn sizes_of_all<'s>(objective: &Objective<'_>, all: impl Iterator<Ite
     sizes
 }
 
-/// A pass over all measurements.
-struct Pass<'p> {
-    objective: &'p Objective<'p>,
-    shares: Shares,
-    slopes: Vec<f64>,
-}
-
-impl Accumulate for Pass<'_> {
-    fn add(&mut self, window: &Window, lane: usize) {
-        for k in 0..window.samples[lane] {
-            let sample = window.begin[lane] + k;
-            let weight = self.objective.weight(self.shares.experiment, sample);
-            for j in (0..window.outputs()).filter(|&j| weight > 0.0 && window.is_measured(k, j, lane)) {
-                self.slopes.iter_mut().enumerate().for_each(|(c, slope)| *slope = window.at(k, j, c, lane));
-                self.shares.take(weight, &self.slopes, window.error(k, j, lane), (j, sample));
-            }
-        }
-    }
-
-    fn append(&mut self, later: Self) {
-        self.shares.append(&later.shares);
-    }
-}
-
 impl Judgement<'_> {
     /// The unknown whose interval rests most on one or two measurements: a parameter, or with a sandwich any.
     pub(super) fn decided_by_few(&self, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
@@ -205,10 +183,7 @@ impl Judgement<'_> {
     /// The largest shares, and the sizes of the errors that have them, with the inverse curvature.
     pub(super) fn shares(&self, unit: &Covariance) -> Option<(Vec<Largest>, Sizes)> {
         let objective = self.objective;
-        let make = |e: usize| {
-            let shares = Shares::new(e, of_experiment(objective, unit, e));
-            Pass { objective, slopes: vec![0.0; shares.columns()], shares }
-        };
+        let make = |e: usize| Pass::new(objective, Shares::new(e, of_experiment(objective, unit, e)));
         let all = objective.gather(&self.end.coordinates, true, make).ok()?;
         let each = || all.iter().map(|one| &one.shares);
         Some((of_all(objective, each()), sizes_of_all(objective, each())))

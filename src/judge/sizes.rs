@@ -63,6 +63,15 @@ impl Sizes {
         }
     }
 
+    /// Takes the number of measurements, the sums of their squared errors and of the squares of these; and of each unknown the sums of the
+    /// shares, of their squares, and of shares times squared errors.
+    pub fn add_sums(&mut self, [count, squares, fourths]: [f64; 3], of: impl Iterator<Item = [f64; 3]>) {
+        (self.count, self.squares, self.fourths) = (self.count + count, self.squares + squares, self.fourths + fourths);
+        for (sums, [shares, squares, errors]) in self.of.iter_mut().zip(of) {
+            sums.add(&Shared { shares, squares, errors });
+        }
+    }
+
     pub fn append(&mut self, later: &Sizes) {
         self.append_to(0..self.of.len(), later);
     }
@@ -73,6 +82,13 @@ impl Sizes {
         self.squares += own.squares;
         self.fourths += own.fourths;
         columns.zip(&own.of).for_each(|(i, of)| self.of[i].add(of));
+    }
+
+    /// All sums, those over the errors first.
+    #[cfg(test)]
+    pub fn sums(&self) -> Vec<f64> {
+        let of = self.of.iter().flat_map(|of| [of.shares, of.squares, of.errors]);
+        [self.count, self.squares, self.fourths].into_iter().chain(of).collect()
     }
 
     /// The ratio of the variance of an unknown to the classical one; one without shares or errors.

@@ -8,18 +8,26 @@ use crate::optimize::Severity;
 /// be better by more in less than `exp(-10 / 2)`, one of 150 records.
 pub(crate) const INDISTINGUISHABLE: f64 = 10.0;
 
-/// Warnings about an estimate that is the best end of these searches. Where they were not asked for, a minimum that is found once lowers
-/// the verdict no more than one that is found without other searches does.
-pub(super) fn warnings(starts: &Starts, measurements: u64, asked: bool) -> Vec<Warning> {
+/// A minimum that half of all searches lead to is found at most once by so many in less than one of twenty cases: `(8 + 1) / 2^8`.
+const MANY: u64 = 8;
+
+/// Warnings about an estimate that is the best end of these searches, with errors that are colored or not. Where searches were not asked
+/// for, a minimum that is found once lowers the verdict no more than one that is found without other searches does. But one that is found
+/// once by many searches, and leaves errors that follow from each other, is not the right one: there the model itself would explain them.
+pub(super) fn warnings(starts: &Starts, measurements: u64, asked: bool, colored: bool) -> Vec<Warning> {
     let Starts { tried, agreed, minima, declared, failed, .. } = starts;
     let mut warnings = vec![];
     if *agreed == 1 && *tried > 1 {
         let (others, none) = (minima.len() - 1, failed.len());
+        let (left, severity) = match (colored && *tried >= MANY, asked) {
+            (true, _) => (", and it leaves errors that are not noise", Severity::NotUsable),
+            (_, true) => ("", Severity::UsableWithCare),
+            _ => ("", Severity::Usable),
+        };
         let text = format!(
-            "only one of {tried} starts led to this minimum (others found: {others}; searches without one: {none}): there may be a \
-             better one; try more starts, or give bounds"
+            "only one of {tried} starts led to this minimum (others found: {others}; searches without one: {none}){left}: there may be \
+             a better one; try more starts, or give bounds"
         );
-        let severity = if asked { Severity::UsableWithCare } else { Severity::Usable };
         warnings.push(Warning { code: WarningCode::MinimumFoundOnce, severity, text });
     }
     let at = |minimum: &Minimum| {
@@ -54,7 +62,7 @@ mod tests {
         let minimum = |cost_ratio| Minimum { cost_ratio, searches: 1, undetermined: vec![], unknowns: vec![] };
         let minima = vec![minimum(1.0), minimum(rival)];
         let starts = Starts { tried, agreed, minima, declared: Some(declared), failed: vec![], evaluations: 1 };
-        warnings(&starts, 100, true).iter().map(|warning| warning.code).collect()
+        warnings(&starts, 100, true, false).iter().map(|warning| warning.code).collect()
     }
 
     /// A deviance of `100 ln(ratio)` above 10 is another: at a ratio of 1.1052. A minimum found by one of several searches, and
@@ -70,18 +78,29 @@ mod tests {
         assert_eq!(codes(8, 0, 1.104, 0), []);
     }
 
-    /// A fit that searched by itself is not judged worse for it.
+    /// A minimum that one of eight searches led to is not usable where it leaves colored errors. Where it leaves white ones, or one of
+    /// seven led to it, a fit that searched by itself is not judged worse for it, and one that was asked to with care.
     #[test]
-    fn searches_that_were_not_asked_for_lower_no_verdict() {
-        let minimum = Minimum { cost_ratio: 1.0, searches: 1, undetermined: vec![], unknowns: vec![] };
-        let starts =
-            Starts { tried: 8, agreed: 1, minima: vec![minimum], declared: None, failed: vec![], evaluations: 1 };
-        let severity = |asked: bool| warnings(&starts, 100, asked).iter().map(|warning| warning.severity).max();
-        let text = &warnings(&starts, 100, true)[0].text;
+    fn a_minimum_that_is_found_once() {
+        let said = |tried: u64, agreed: u64, asked: bool, colored: bool| {
+            let minimum = Minimum { cost_ratio: 1.0, searches: agreed, undetermined: vec![], unknowns: vec![] };
+            let starts =
+                Starts { tried, agreed, minima: vec![minimum], declared: None, failed: vec![], evaluations: 1 };
+            warnings(&starts, 100, asked, colored)
+        };
+        let text = &said(8, 1, true, false)[0].text;
         assert!(
-            text.contains("only one of 8 starts") && text.contains("others found: 0; searches without one: 0"),
+            text.contains("only one of 8 starts") && text.contains("others found: 0; searches without one: 0): there"),
             "{text}"
         );
-        assert_eq!([severity(true), severity(false)], [Some(Severity::UsableWithCare), Some(Severity::Usable)]);
+        assert!(said(8, 1, true, true)[0].text.contains("searches without one: 0), and it leaves errors"));
+        use Severity::{NotUsable, Usable, UsableWithCare};
+        let severity = |tried, asked, colored| said(tried, 1, asked, colored)[0].severity;
+        let white = [(8, true), (8, false)].map(|(tried, asked)| severity(tried, asked, false));
+        assert_eq!(white, [UsableWithCare, Usable]);
+        let colored = [(8, true), (8, false), (7, true), (7, false)];
+        let colored = colored.map(|(tried, asked)| severity(tried, asked, true));
+        assert_eq!(colored, [NotUsable, NotUsable, UsableWithCare, Usable]);
+        assert!(said(8, 2, true, true).is_empty());
     }
 }

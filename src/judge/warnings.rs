@@ -18,7 +18,8 @@ const STEP_SHIFT: f64 = 0.5;
 const REFINED_SHIFT: f64 = 0.1;
 /// A predicted standard deviation below this fraction of the errors counts as zero.
 const ZERO_DEVIATION: f64 = 1e-6;
-/// Smallest part of an unknown's value that a finer step must move it by for a warning.
+/// Smallest part of an unknown's value that a finer step must move it by for a warning about data that are reproduced, and about a
+/// step that is too coarse to be used: of values that are right to more digits only the intervals are wrong.
 const DIGITS: f64 = 1e-6;
 /// The same from which on a fit without errors is not usable without care.
 const MUCH: f64 = 1e-3;
@@ -81,7 +82,8 @@ impl Judgement<'_> {
         }
         if let Some(starts) = &self.end.starts {
             let asked = matches!(self.objective.problem.settings.searches, SearchPlan::All(_));
-            warnings.extend(super::starts::warnings(starts, self.residuals.measured, asked));
+            let colored = self.is_colored();
+            warnings.extend(super::starts::warnings(starts, self.residuals.measured, asked, colored));
         }
         if let Some(write_error) = &self.end.write_error {
             let text = format!("the checkpoint could not be written ({write_error}); the search went on without it");
@@ -220,8 +222,9 @@ impl Judgement<'_> {
         let objective = self.objective.of(self.objective.problem, &*finer);
         let (name, shift, part) = shift(&objective, &self.end.coordinates, unknowns)?;
         let finer = finer.integrator();
-        let severity = if refines && shift > STEP_SHIFT { Severity::NotUsable } else { Severity::UsableWithCare };
-        (shift > most && part >= DIGITS).then(|| {
+        let wrong = refines && shift > STEP_SHIFT && part >= DIGITS;
+        let severity = if wrong { Severity::NotUsable } else { Severity::UsableWithCare };
+        (shift > most).then(|| {
             let (part, errors) = (percent(part, 2), number(shift, 2));
             let tried = if refines { "no method that was tried steps finely enough" } else { "the step is too coarse" };
             let text = format!(
@@ -240,7 +243,8 @@ impl Judgement<'_> {
         let (name, _, part) =
             shift(&objective, &self.end.coordinates, unknowns).filter(|(.., part)| *part >= DIGITS)?;
         let text = format!(
-            "the data are reproduced to their rounding by {}; {} would change `{name}` by {} of itself: right for a record that was              simulated with this step, else choose a finer one (Fit::integrator)",
+            "the data are reproduced to their rounding by {}; {} would change `{name}` by {} of itself: right for a record that was \
+             simulated with this step, else choose a finer one (Fit::integrator)",
             self.objective.sweep.integrator(),
             finer.integrator(),
             percent(part, 2)

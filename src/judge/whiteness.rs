@@ -53,11 +53,10 @@ fn color(coefficients: &[f64], count: u64) -> (f64, f64) {
     (predicted, (1.0 + 2.0 * positive).max(autoregression).max(1.0))
 }
 
-/// The output whose errors are least white, and how white they are; the probability counts all outputs that were tested.
-pub(super) fn least_white(whiteness: &[Whiteness]) -> Option<(usize, Whiteness)> {
-    let count = whiteness.len() as f64;
-    let tested = whiteness.iter().enumerate();
-    let tested = tested.map(|(j, white)| (j, Whiteness { p_value: white.p_value * count, ..*white }));
+/// Of the outputs that were tested that whose errors are least white, and how white they are; the probability counts all of them.
+pub(super) fn least_white(tested: &[(usize, Whiteness)]) -> Option<(usize, Whiteness)> {
+    let count = tested.len() as f64;
+    let tested = tested.iter().map(|(j, white)| (*j, Whiteness { p_value: white.p_value * count, ..*white }));
     let strongest = |a: &Whiteness, b: &Whiteness| {
         a.p_value.total_cmp(&b.p_value).then(b.correlations[0].total_cmp(&a.correlations[0]))
     };
@@ -102,7 +101,10 @@ mod tests {
             correlations[0] = first;
             Whiteness { p_value, correlations, predicted: 0.0, dependence: 1.0, at_restart: (0.0, 0.0) }
         };
-        let found = |all: &[Whiteness]| least_white(all).map(|(j, white)| (j, white.p_value));
+        let found = |all: &[Whiteness]| {
+            let tested: Vec<(usize, Whiteness)> = all.iter().copied().enumerate().collect();
+            least_white(&tested).map(|(j, white)| (j, white.p_value))
+        };
         assert_eq!(found(&[]), None);
         assert_eq!(found(&[of(0.5, 0.9), of(0.125, 0.1), of(0.25, 0.9)]), Some((1, 0.375)));
         assert_eq!(found(&[of(0.0, 0.3), of(0.0, 0.9), of(0.0, 0.6)]), Some((1, 0.0)));

@@ -6,7 +6,7 @@ mod solver;
 use super::descent::{Descent, Reach, Trial, length};
 use super::machine::{Domain, Machine, Request};
 use super::point::Point;
-use super::{Infeasible, Linearization, Outcome, Stop};
+use super::{Infeasible, Linearization, Outcome, SearchLimit, Stop};
 use crate::scaling::{OwnSize, Scaling, Seen};
 use exploration::Exploration;
 use serde::{Deserialize, Serialize};
@@ -163,8 +163,11 @@ impl<S: Scaling> LevenbergMarquardt<S> {
 
     fn given_up(&mut self, point: &Point) -> Option<Outcome> {
         let (trials, all) = (self.descent.trials, self.trials());
-        if all >= self.stop.iterations || self.first.is_none() && trials >= FIRST_TRIALS {
+        if all >= self.stop.iterations {
             return Some(Outcome::IterationLimit { iterations: all });
+        }
+        if self.first.is_none() && trials >= FIRST_TRIALS {
+            return Some(Outcome::OwnLimit { iterations: all, limit: SearchLimit::FirstTry });
         }
         if !self.descent.creeps(point) {
             return None;

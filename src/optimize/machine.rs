@@ -152,7 +152,7 @@ pub(super) fn termination(search: &impl Machine) -> TerminationStatus {
     TerminationStatus::Terminated(match search.outcome() {
         None => return TerminationStatus::NotTerminated,
         Some(Outcome::Cancelled) => TerminationReason::Interrupt,
-        Some(Outcome::IterationLimit { .. }) => TerminationReason::MaxItersReached,
+        Some(Outcome::IterationLimit { .. } | Outcome::OwnLimit { .. }) => TerminationReason::MaxItersReached,
         Some(outcome) if outcome.converged() => TerminationReason::SolverConverged,
         Some(outcome) => TerminationReason::SolverExit(outcome.to_string()),
     })

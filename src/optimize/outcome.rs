@@ -77,10 +77,42 @@ pub enum Outcome {
         /// The limit.
         iterations: u64,
     },
+    /// A limit of iterations that the library has, not the user, was met first.
+    OwnLimit {
+        /// How many there were.
+        iterations: u64,
+        /// What the limit is of.
+        limit: SearchLimit,
+    },
     /// The time limit was met first.
     TimeLimit,
     /// The user stopped the search.
     Cancelled,
+}
+
+/// What has a limit of iterations of its own, apart from that which the user gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SearchLimit {
+    /// The first of two tries from a start.
+    FirstTry,
+    /// A search by a finer method than the default one, which the fit took by itself.
+    FinerMethod,
+    /// A search from a further start, which the fit drew by itself.
+    FurtherStart,
+    /// The rounds in which the noise levels are estimated.
+    NoiseRounds,
+}
+
+impl fmt::Display for SearchLimit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            SearchLimit::FirstTry => "where a first try is ended; the second one found nothing better",
+            SearchLimit::FinerMethod => "the most by a finer method that the fit takes by itself",
+            SearchLimit::FurtherStart => "the most from a start that the fit draws by itself",
+            SearchLimit::NoiseRounds => "in which the noise levels did not settle",
+        })
+    }
 }
 
 /// Whether to trust what a search found.
@@ -145,9 +177,19 @@ impl Outcome {
                 "Look for parameters that only appear together, and fix one of them or give it a prior; or start closer."
             }
             Outcome::IterationLimit { .. } => {
-                "Allow more iterations (by a finer method that the fit took by itself a search has at most 100: name the integrator), \
-                 or start closer; if the cost hardly falls any more, look for parameters that only appear together."
+                "Allow more iterations, or start closer; if the cost hardly falls any more, look for parameters that only \
+                 appear together."
             }
+            Outcome::OwnLimit { limit: SearchLimit::FinerMethod, .. } => {
+                "Name the integrator (Fit::integrator), with which a search has all its iterations, or start closer."
+            }
+            Outcome::OwnLimit { limit: SearchLimit::FurtherStart, .. } => {
+                "Ask for more starts (Fit::starts), which have all their iterations, or start closer."
+            }
+            Outcome::OwnLimit { limit: SearchLimit::FirstTry, .. } => {
+                "Start closer, or look for parameters that only appear together."
+            }
+            Outcome::OwnLimit { limit: SearchLimit::NoiseRounds, .. } => "Give the noise, or fix an unknown.",
             Outcome::TimeLimit => "Allow more time, or resume from the checkpoint.",
             Outcome::Cancelled => "Resume from the checkpoint to go on.",
         }
@@ -197,6 +239,9 @@ impl fmt::Display for Outcome {
                 100.0 * promised
             ),
             Outcome::IterationLimit { iterations } => write!(f, "not converged after {iterations} iterations"),
+            Outcome::OwnLimit { iterations, limit } => {
+                write!(f, "not converged after {iterations} iterations, {limit}")
+            }
             Outcome::TimeLimit => write!(f, "not converged within the time limit"),
             Outcome::Cancelled => write!(f, "cancelled"),
         }
@@ -213,6 +258,7 @@ mod tests {
         let precision = |gradient: f64, step: f64| Outcome::LimitOfPrecision { gradient, step };
         let rough = |errors: f64| Outcome::Rough { noise: 1e-9, errors };
         let stalled = |failed: u64| Outcome::Stalled { gradient: 0.5, step: 0.25, failed };
+        let own = |limit: SearchLimit| Outcome::OwnLimit { iterations: 7, limit };
         let cases = [
             (Outcome::Converged { step: 1e-9, gradient: 1e-12 }, true, "converged (", "Nothing to do."),
             (Outcome::CostUnchanged { decrease: 1e-9 }, true, "converged (", "Drop the cost tolerance"),
@@ -227,6 +273,10 @@ mod tests {
             (Outcome::Plateau { lost: 1, gradient: 0.5 }, false, "not converged: 1 unknown", "Start elsewhere"),
             (Outcome::Creeping { trials: 9, promised: 0.5 }, false, "not converged: 9 steps", "Look for parameters"),
             (Outcome::IterationLimit { iterations: 7 }, false, "not converged after 7", "Allow more iterations"),
+            (own(SearchLimit::FirstTry), false, "not converged after 7 iterations, where a first try", "Start closer"),
+            (own(SearchLimit::FinerMethod), false, "not converged after 7 iterations, the most by", "Name the integ"),
+            (own(SearchLimit::FurtherStart), false, "not converged after 7 iterations, the most from", "Ask for more"),
+            (own(SearchLimit::NoiseRounds), false, "not converged after 7 iterations, in which", "Give the noise"),
             (Outcome::TimeLimit, false, "not converged within the time", "Allow more time"),
             (Outcome::Cancelled, false, "cancelled", "Resume"),
         ];

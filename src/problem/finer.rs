@@ -74,6 +74,11 @@ impl<'a> Problem<'a> {
         Problem { refines: true, finer: Some(Arc::new(ByMethods { base, sweeps, made })), ..self }
     }
 
+    /// Whether a search of so many trial steps has the limit of a finer method, and not what is left of the user's.
+    pub(crate) fn limits_search_to(&self, most: u64) -> bool {
+        self.method > 0 && (most == TRIALS || most == TRIALS * PARTS)
+    }
+
     fn with_sweep(&self, sweep: Arc<dyn Sweep + 'a>, method: usize) -> Result<Self, Error> {
         let prepared = Problem::prepared(&*sweep, &self.records, &self.unknowns.parameters)?;
         let cuts = Cuts::new(&*sweep, &self.records, self.settings.prefilter.is_some());
@@ -168,7 +173,10 @@ mod tests {
         for (starts, trials) in [(1, 20), (2, 100)] {
             let settings = problem.settings.clone().starts(starts);
             let refined = Problem { settings, ..problem.clone() }.refining(sweeps());
-            assert_eq!(refined.finer(0).unwrap().settings.optimizer.most(), trials);
+            let finer = refined.finer(0).unwrap();
+            assert_eq!(finer.settings.optimizer.most(), trials);
+            assert_eq!([trials, trials - 1].map(|most| finer.limits_search_to(most)), [true, false]);
+            assert!(!refined.limits_search_to(trials));
             assert!(refined.finer(1).is_none() && refined.refines && refined.by_method().count() == 2);
             assert_eq!([0, 1, 2].map(|number| refined.by_number(number).method), [0, 1, 0]);
         }

@@ -304,6 +304,21 @@ fn check(name: &str, parameter: &Parameter) -> Result<(), Error> {
     }
 }
 
+/// Refuses a value per experiment where there is one experiment, whose value the shared one is, too.
+pub(super) fn check_own(layout: &Layout, parameters: &[Parameter], experiments: usize) -> Result<(), Error> {
+    let own = |(_, parameter): &(&Quantity, &Parameter)| parameter.free && parameter.per_experiment;
+    match layout.parameters.iter().zip(parameters).find(own) {
+        Some((Quantity { name, .. }, _)) if experiments == 1 => Err(Error::Parameter {
+            parameter: name.clone(),
+            problem:
+                "its value per experiment has no effect because there is one experiment; add the others, or leave \
+                      .per_experiment() out"
+                    .to_owned(),
+        }),
+        _ => Ok(()),
+    }
+}
+
 /// The quantities by name.
 pub(crate) fn names(layout: &[Quantity]) -> Vec<String> {
     layout.iter().map(|quantity| quantity.name.clone()).collect()

@@ -367,9 +367,11 @@ fn profiles_cover() {
 #[test]
 fn several_experiments_are_diagnosed_together() {
     let records = [binding(1, 1.0).named("cold"), binding(2, 3.0).named("warm")];
-    let parameters = Saturation { top: fixed(5.0), half: free(0.5).within(0.0, 100.0).per_experiment() };
-    let fit = |records| Fit::new(&Binding, records).parameters(parameters).noise(Answer { y: 0.2 });
-    let problem = fit(&records[..]).problem().unwrap();
+    let half = free(0.5).within(0.0, 100.0);
+    let fit = |records, half| {
+        Fit::new(&Binding, records).parameters(Saturation { top: fixed(5.0), half }).noise(Answer { y: 0.2 })
+    };
+    let problem = fit(&records[..], half.per_experiment()).problem().unwrap();
     let estimate = problem.run().unwrap();
     let found = identifiability(&problem, &estimate).unwrap();
     assert_eq!((found.unknowns.as_slice(), found.rank), (&["half [cold]".to_owned(), "half [warm]".to_owned()][..], 2));
@@ -381,7 +383,7 @@ fn several_experiments_are_diagnosed_together() {
     // Singular values one: nothing of one record stands in the other.
     assert!((found.condition.unwrap() - 1.0).abs() < 1e-9);
     for (i, record) in records.iter().enumerate() {
-        let alone = fit(std::slice::from_ref(record)).problem().unwrap();
+        let alone = fit(std::slice::from_ref(record), half).problem().unwrap();
         let own = alone.run().unwrap();
         let expected = profile(&alone, &own, &own.unknowns[0].name, 0.95).unwrap();
         let together = profile(&problem, &estimate, &found.unknowns[i], 0.95).unwrap();

@@ -304,11 +304,13 @@ fn names_that_experiments_share() {
     assert_eq!(estimate.summary().experiments[1].name, "bench #2");
     let bad = [record(), record().initial(Current { i: fixed(1e300) }), record().named("other")];
     says(Fit::new(&Rl, &bad).parameters(START).noise(Current { i: 1.0 }).run(), &["`bench #2`", "`i`"]);
-    // One value per experiment, and one experiment.
-    let estimate = sound(Fit::new(&Rl, &pair[0]).parameters(parameters).run());
-    let same = fit(&pair[0]).run().unwrap();
-    assert_eq!(estimate.unknowns.last().unwrap().name, "r [bench]");
-    assert_relative_eq!(estimate.parameters.r, same.parameters.r, max_relative = 1e-9);
+    // One value per experiment, and one experiment: refused, but for a fleet, where it is the rule.
+    let parts = ["`r`", "there is one experiment", "leave .per_experiment() out"];
+    says(Fit::new(&Rl, &pair[0]).parameters(parameters).run(), &parts);
+    says(Fit::new(&Rl, &pair[0]).parameters(parameters).problem(), &parts);
+    let fleet = Fleet::new(&Rl).parameters(parameters).fleet().unwrap();
+    let (alone, same) = (fleet.fit(&pair[0]).unwrap(), fit(&pair[0]).run().unwrap());
+    assert_eq!((alone.unknowns[0].name.as_str(), alone.parameters.r), ("r", same.parameters.r));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Numbers near the ends of what an `f64` can hold: an answer or an error, and nothing known that is not finite.
 
-use greybox::optimize::{GaussNewton, LevenbergMarquardt, Severity};
+use greybox::optimize::{GaussNewton, LevenbergMarquardt, Outcome, Severity};
 use greybox::*;
 
 signals! {
@@ -124,5 +124,20 @@ fn whiteness_is_that_of_measurements_with_weight() {
         let fit = Fit::new(&Straight, &record).parameters(Line { a: free(1.0), b: free(0.0) }).weighting(weight);
         let fit = fit.run().unwrap();
         assert_eq!(fit.warnings.iter().any(|warning| warning.code == WarningCode::ColoredErrors), named, "{fit}");
+    }
+}
+
+/// Errors that are a part of 1e-14 of the output are rounding, whatever their color: nothing is said of it, with noise that is estimated.
+/// Errors a million times larger are colored.
+#[test]
+fn the_color_of_rounding_is_not_named() {
+    for (size, named) in [(1e-14, false), (1e-8, true)] {
+        let input = |k: usize| (0.1 * k as f64).sin();
+        let outputs = (0..300).map(|k| Out { y: 1.0 + 0.5 * input(k) + size * (0.37 * k as f64).sin() }).collect();
+        let inputs = (0..300).map(|k| In { u: input(k) }).collect();
+        let record = Experiment::new(&Straight, Time::Uniform { start: 0.0, step: 0.01 }, inputs, outputs).unwrap();
+        let fit = Fit::new(&Straight, &record).parameters(Line { a: free(1.0), b: free(0.0) }).run().unwrap();
+        assert_eq!(fit.warnings.iter().any(|warning| warning.code == WarningCode::ColoredErrors), named, "{fit}");
+        assert_eq!(fit.outcome == Outcome::Exact, !named, "{fit}");
     }
 }

@@ -74,6 +74,17 @@ fn the_best_of_many_minima_is_found_and_the_others_are_listed() {
     );
 }
 
+/// Within bounds that do not hold the frequency each search ends in a minimum of its own: what is left is the whole oscillation.
+#[test]
+fn one_of_many_wrong_minima_is_not_usable() {
+    let record = sine();
+    let start = Wave { omega: free(12.0).within(10.0, 60.0), amplitude: free(1.0) };
+    let fit = Fit::new(&Sine, &record).parameters(start).starts(10).run().unwrap();
+    println!("{fit} {:?}", fit.starts);
+    let once = fit.warnings.iter().find(|one| one.code == WarningCode::MinimumFoundOnce).unwrap();
+    assert!(once.severity == Severity::NotUsable && once.text.contains("leaves errors that are not noise"), "{once:?}");
+}
+
 signals! { pub struct Swings { y: "V", z: "V" } }
 
 /// `y = a sin(omega t)`, `z = a cos(omega t)`.

@@ -8,7 +8,7 @@ use greybox::optimize::{GaussNewton, LevenbergMarquardt, Outcome, Severity, Stop
 use greybox::pmsm::Surface;
 use greybox::{
     Automatic, Butterworth, Error, Esdirk, Estimate, ExperimentOf, Fit, Fleet, Horizon, Huber, Kind, Knowledge, Model,
-    Problem, Report, Rk4, Rk45, Sample, Signals, Summary,
+    Parameter, Problem, Report, Rk4, Rk45, Sample, Signals, Summary,
     loss::{Cauchy, SoftL1, Tukey},
     optimize::{JacobianColumns, OwnSize},
 };
@@ -62,8 +62,12 @@ fn through<M: Model + Clone + 'static>(draw: &mut Draw, model: &M) -> Result<Tal
     }
     tally.records = 1;
     let declared = M::Parameters::from_fn(|_| parameter(draw));
+    // A value per experiment is refused where there is one.
+    let of = M::Parameters::into_array(declared);
+    let shared = M::Parameters::from_fn(|i| Parameter { per_experiment: false, ..of.as_ref()[i] });
     let settings = Settings::drawn(draw);
-    let fit = || settings.applied(Fit::new(model, &records).parameters(declared));
+    let together = if records.len() > 1 { declared } else { shared };
+    let fit = || settings.applied(Fit::new(model, &records).parameters(together));
     let problem = match fit().problem() {
         Ok(problem) => problem,
         Err(error) => return said(&error).map(|()| tally),
@@ -84,7 +88,7 @@ fn through<M: Model + Clone + 'static>(draw: &mut Draw, model: &M) -> Result<Tal
             Err(error) => return said(&error).map(|()| tally),
         };
         for (answer, record) in fleet.run(records.iter().cloned()).zip(&records) {
-            agree(&answer, &settings.applied(Fit::new(model, record).parameters(declared)).run())?;
+            agree(&answer, &settings.applied(Fit::new(model, record).parameters(shared)).run())?;
         }
         tally.fleets = 1;
     }

@@ -81,12 +81,12 @@ fn the_finer_answer_is_preferred() {
     for (before, again, expected) in
         [(true, true, "fine"), (true, false, "coarse"), (false, true, "fine"), (false, false, "fine")]
     {
-        assert_eq!(name(coarse(before).or(fine(again))), expected, "{before} {again}");
+        assert_eq!(name(coarse(before).or(fine(again), false)), expected, "{before} {again}");
     }
-    assert_eq!(name(Attempt::new(Err(failure())).or(fine(false))), "fine");
-    assert_eq!(name(coarse(false).or(Err(failure()))), "coarse");
-    assert!(Attempt::new(Err(failure())).or(Err(failure())).answer().is_err());
-    let both = coarse(true).or(fine(true)).answer().unwrap();
+    assert_eq!(name(Attempt::new(Err(failure())).or(fine(false), false)), "fine");
+    assert_eq!(name(coarse(false).or(Err(failure()), false)), "coarse");
+    assert!(Attempt::new(Err(failure())).or(Err(failure()), false).answer().is_err());
+    let both = coarse(true).or(fine(true), false).answer().unwrap();
     assert_eq!((both.iterations, both.evaluations), (6, 10));
 }
 
@@ -97,7 +97,7 @@ fn the_finer_answer_is_preferred() {
 fn coarser_minima_are_said() {
     let said = |deviance: f64, value: f64, converged: bool| {
         let attempt = Attempt::new(Ok(answer("coarse", deviance, value, converged)));
-        let found = attempt.or(Ok(answer("fine", 100.0, 7.0, true))).answer().unwrap();
+        let found = attempt.or(Ok(answer("fine", 100.0, 7.0, true)), false).answer().unwrap();
         found.warnings.iter().map(|warning| (warning.severity, warning.text.clone())).next()
     };
     let severity = |deviance: f64, value: f64| said(deviance, value, true).map(|(severity, _)| severity);
@@ -118,7 +118,33 @@ fn coarser_minima_are_said() {
 #[test]
 fn the_farthest_of_several_is_said() {
     let attempt = Attempt::new(Ok(answer("first", 100.0, 9.0, true)));
-    let attempt = attempt.or(Ok(answer("second", 101.0, 3.0, true))).or(Ok(answer("third", 102.0, 7.0, true)));
+    let attempt =
+        attempt.or(Ok(answer("second", 101.0, 3.0, true)), false).or(Ok(answer("third", 102.0, 7.0, true)), false);
     let found = attempt.answer().unwrap();
     assert!(found.warnings[0].text.contains("second gives 3 A/V"), "{}", found.warnings[0].text);
+}
+
+/// An adaptive method that is too coarse, too, does not take the place of the steps before it, if these were converged and not useless;
+/// the work of both is counted.
+#[test]
+fn an_adaptive_method_that_is_no_finer() {
+    let of = |name: &str, refinement: usize, severity: Option<Severity>| {
+        let coarse = |severity| Warning { code: WarningCode::CoarseStep, severity, text: String::new() };
+        let mut found = answer(name, 10.0, 1.0, true);
+        found.method.refinement = refinement;
+        Summary { warnings: severity.map(coarse).into_iter().collect(), ..found }
+    };
+    let care = Some(Severity::UsableWithCare);
+    let taken = |before: Summary, again: Summary, adaptive: bool| {
+        let found = Attempt::new(Ok(before)).or(Ok(again), adaptive).answer().unwrap();
+        assert_eq!((found.iterations, found.evaluations), (6, 10));
+        found.method.integrator
+    };
+    assert_eq!(taken(of("steps", 3, care), of("adaptive", 4, care), true), "steps");
+    assert_eq!(taken(of("steps", 3, care), of("finer", 4, care), false), "finer");
+    assert_eq!(taken(of("steps", 3, care), of("adaptive", 4, None), true), "adaptive");
+    assert_eq!(taken(of("steps", 3, Some(Severity::NotUsable)), of("adaptive", 4, care), true), "adaptive");
+    assert_eq!(taken(of("steps", 1, care), of("adaptive", 4, care), true), "adaptive");
+    let lost = Summary { outcome: Outcome::TimeLimit, ..of("steps", 3, care) };
+    assert_eq!(taken(lost, of("adaptive", 4, care), true), "adaptive");
 }

@@ -1,4 +1,5 @@
 use super::residual_pass;
+use crate::problem::{Problem, Settings};
 use crate::random::Random;
 use crate::tests::{Current, Gain, Line, Voltage};
 use crate::{Experiment, ExperimentOf, Fit, Parameter, Time, free};
@@ -23,7 +24,9 @@ fn unknowns_of_single_records_reduce_autocorrelations() {
     let errors: Vec<Vec<f64>> = [24, 30, 26].iter().map(|&n| (0..n).map(|_| random.normal()).collect()).collect();
     let check = |errors: &[Vec<f64>], gain: Parameter, own: f64| {
         let records: Vec<_> = errors.iter().zip(["a", "b", "c"]).map(|(e, name)| record(e, name)).collect();
-        let problem = Fit::new(&Line, &records).parameters(Gain { a: gain }).problem().unwrap();
+        let shared = Fit::new(&Line, &records).parameters(Gain { a: free(0.0) }).problem().unwrap();
+        let of = records.iter().map(|record| record.record().clone()).collect();
+        let problem = Problem::unchecked(shared.sweep.clone(), of, &[gain], Settings::default()).unwrap();
         let objective = problem.objective().unwrap();
         let found = residual_pass(&objective, &objective.start()).unwrap().whiteness[0].correlations;
         let count: usize = errors.iter().map(Vec::len).sum();
