@@ -194,8 +194,8 @@ pub fn validate<M: Model>(
 ) -> Result<Validation, Error> {
     let fit = || Fit::new(model, record).parameters(M::Parameters::map(estimate.parameters, fixed));
     let quality = |fit: Fit<'_, M>| -> Result<NamedQualities, Error> {
-        let found = M::Output::into_array(fit.predict(estimate, record)?.quality);
-        Ok(M::Output::NAMES.iter().map(|name| (*name).to_owned()).zip(found).collect())
+        let prediction = fit.predict(estimate, record)?;
+        Ok(prediction.columns.names.into_iter().zip(M::Output::into_array(prediction.quality)).collect())
     };
     let mut qualities = vec![(None, quality(fit())?)];
     for &steps in steps {

@@ -55,13 +55,14 @@ pub fn derived<M: Model>(
         let first = |u: &Unknown| u.role == Role::Parameter(j) && u.experiment.is_none_or(|e| e == 0);
         estimate.unknowns.iter().position(first)
     };
+    let parameters = estimate.layout.parameters.len();
     let mut gradient = vec![0.0; estimate.unknowns.len()];
     let (mut value, mut known) = (f64::NAN, true);
-    for first in (0..M::Parameters::LEN.max(1)).step_by(LANES) {
+    for first in (0..parameters.max(1)).step_by(LANES) {
         let seeded = M::Parameters::from_fn(|j| Dual::variable(values.as_ref()[j], j.wrapping_sub(first)));
         let result = f(&seeded);
         value = result.value;
-        for lane in 0..LANES.min(M::Parameters::LEN - first.min(M::Parameters::LEN)) {
+        for lane in 0..LANES.min(parameters - first.min(parameters)) {
             let slope = result.slopes[lane];
             if let Some(i) = unknown(first + lane).filter(|_| slope != 0.0) {
                 gradient[i] = slope;

@@ -6,7 +6,6 @@ use crate::model::Model;
 use crate::record::{Channel, Record};
 use crate::section::{Cell, Keep, Line, Panel, PanelKind, Samples, Section, Style, Table, Timeline, identifier};
 use crate::section::{Drawing, Plot};
-use crate::signals::Signals;
 
 /// One record, and what each of several models predicts of it.
 ///
@@ -98,9 +97,9 @@ impl Compared {
             });
         }
         for output in &mut self.outputs {
-            let Some(j) = M::Output::position(&output.name) else {
-                let available = M::Output::NAMES.iter().map(|&name| name.to_owned()).collect();
-                return Err(Error::UnknownSignal { signal: output.name.clone(), available });
+            let names = &prediction.columns.names;
+            let Some(j) = names.iter().position(|name| *name == output.name) else {
+                return Err(Error::UnknownSignal { signal: output.name.clone(), available: names.clone() });
             };
             output.predicted.push((model.to_owned(), prediction.columns.outputs[j].clone()));
         }

@@ -2,6 +2,7 @@
 
 mod bits;
 mod groups;
+mod guards;
 mod random;
 mod steps;
 mod tables;

@@ -1,6 +1,8 @@
 //! Results of a fit for each quantity: [`Unknown`], [`Knowledge`], parameters, outputs and experiments.
 
+use super::{Warning, WarningCode};
 use crate::numeral::number;
+use crate::optimize::Severity;
 use crate::parameter::{Parameter, Transform};
 use crate::problem::Role;
 use core::fmt;
@@ -137,6 +139,14 @@ pub struct Direction {
     /// Absolute, where the value is zero.
     #[serde(with = "crate::real")]
     pub moves: Vec<(String, f64)>,
+}
+
+impl Direction {
+    /// The warning about a direction, of which `what` says what it is.
+    pub(crate) fn warning(what: String) -> Warning {
+        let text = what + "; fix one, add a prior, or excite the system differently";
+        Warning { code: WarningCode::Unidentified, severity: Severity::UsableWithCare, text }
+    }
 }
 
 impl fmt::Display for Direction {

@@ -10,7 +10,7 @@ use crate::experiment::ExperimentOf;
 use crate::functions::Handle;
 use crate::model::Model;
 use crate::parameter::Parameter;
-use crate::problem::{FinerSweeps, Problem, Settings};
+use crate::problem::{EquationsFit, FinerSweeps, Problem, Settings};
 use crate::record::Record;
 use crate::sweep::Sweep;
 use core::marker::PhantomData;
@@ -29,11 +29,17 @@ const GROUP: usize = 32;
 /// of a default integrator included; a record that fails does not affect the others. Records that are fitted together share
 /// the sum of their time limits.
 pub struct Fleet<'a, M: Model> {
+    fits: Fits<'a>,
+    model: PhantomData<fn() -> M>,
+}
+
+/// The same fit of many records, quantities known by position.
+#[derive(Clone)]
+struct Fits<'a> {
     sweep: Arc<dyn Sweep + 'a>,
     finer: Arc<FinerSweeps<'a>>,
     parameters: Vec<Parameter>,
     settings: Settings,
-    model: PhantomData<fn() -> M>,
 }
 
 impl<'a, M: Model> Fit<'a, M> {
@@ -43,17 +49,30 @@ impl<'a, M: Model> Fit<'a, M> {
     /// An integrator or a predictor that does not support the model; settings that only a single fit can have (a
     /// checkpoint, observers).
     pub fn fleet(self) -> Result<Fleet<'a, M>, Error> {
-        if self.settings.checkpoint.is_some() || !self.settings.observers.is_empty() {
-            let text = "a fleet writes no checkpoint and shows no progress; ask its answers, which come in order";
-            return Err(Error::Option(text.to_owned()));
-        }
-        self.settings.optimizer.check()?;
         let sweep = sweep(Handle::Borrowed(self.model), &self.stepping, &self.predictor)?;
         let finer = finer(Handle::Borrowed(self.model), self.is_default, &self.predictor);
-        let (mut parameters, settings) = (declared::<M>(self.parameters), self.settings);
-        // Each record is fitted by itself, so that all its values are its own.
-        parameters.iter_mut().filter(|parameter| parameter.free).for_each(|parameter| parameter.per_experiment = false);
-        Ok(Fleet { sweep, finer, parameters, settings, model: PhantomData })
+        let fits = Fits { sweep, finer, parameters: declared::<M>(self.parameters), settings: self.settings };
+        Ok(Fleet { fits: fits.checked()?, model: PhantomData })
+    }
+}
+
+impl EquationsFit {
+    /// Fits many records, each by itself, as a [`Fleet`](crate::Fleet) does: in vector lanes and on threads, lazily, answers in the order
+    /// of the records.
+    ///
+    /// # Errors
+    /// As [`Fit::fleet`](crate::Fit::fleet); whatever is wrong with a record is its own answer.
+    pub fn fleet<R>(
+        &self,
+        parameters: &[Parameter],
+        settings: Settings,
+        records: R,
+    ) -> Result<impl Iterator<Item = Result<Summary, Error>> + use<R>, Error>
+    where
+        R: IntoIterator<Item = Record>,
+    {
+        let fits = Fits { sweep: self.sweep()?, finer: self.finer(), parameters: parameters.to_vec(), settings };
+        Ok(fits.checked()?.answers(records))
     }
 }
 
@@ -87,7 +106,8 @@ impl<'a, M: Model> Fleet<'a, M> {
     where
         R: IntoIterator<Item = ExperimentOf<M>>,
     {
-        Answers { fleet: self, records: records.into_iter().fuse(), ready: VecDeque::new() }
+        let records = records.into_iter().map(|experiment| experiment.record().clone());
+        self.fits.clone().answers(records).map(|answer| Estimate::of(answer?))
     }
 
     /// Fits one record.
@@ -95,7 +115,25 @@ impl<'a, M: Model> Fleet<'a, M> {
     /// # Errors
     /// As [`Fit::run`].
     pub fn fit(&self, record: &ExperimentOf<M>) -> Result<Estimate<M>, Error> {
-        Estimate::of(self.problem(record.record().clone())?.run()?)
+        Estimate::of(self.fits.problem(record.record().clone())?.run()?)
+    }
+}
+
+impl<'a> Fits<'a> {
+    /// Refuses settings that only a single fit can have. Each record is fitted by itself, so that all its values are its own anyway.
+    fn checked(mut self) -> Result<Self, Error> {
+        if self.settings.checkpoint.is_some() || !self.settings.observers.is_empty() {
+            let text = "a fleet writes no checkpoint and shows no progress; ask its answers, which come in order";
+            return Err(Error::Option(text.to_owned()));
+        }
+        self.settings.optimizer.check()?;
+        let free = self.parameters.iter_mut().filter(|parameter| parameter.free);
+        free.for_each(|parameter| parameter.per_experiment = false);
+        Ok(self)
+    }
+
+    fn answers<R: IntoIterator<Item = Record>>(self, records: R) -> Answers<'a, R::IntoIter> {
+        Answers { fits: self, records: records.into_iter().fuse(), ready: VecDeque::new() }
     }
 
     fn problem(&self, record: Record) -> Result<Problem<'a>, Error> {
@@ -132,26 +170,25 @@ impl<'a, M: Model> Fleet<'a, M> {
 }
 
 /// Iterator of the answers of a fleet, in the order of its records.
-struct Answers<'f, 'a, M: Model, R> {
-    fleet: &'f Fleet<'a, M>,
+struct Answers<'a, R> {
+    fits: Fits<'a>,
     records: Fuse<R>,
     ready: VecDeque<Result<Summary, Error>>,
 }
 
-impl<M: Model, R: Iterator<Item = ExperimentOf<M>>> Iterator for Answers<'_, '_, M, R> {
-    type Item = Result<Estimate<M>, Error>;
+impl<R: Iterator<Item = Record>> Iterator for Answers<'_, R> {
+    type Item = Result<Summary, Error>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.ready.is_empty() {
             let records = self.records.by_ref();
             let group = || -> Option<Vec<Record>> {
-                let records = records.take(GROUP).map(|experiment| experiment.record().clone()).collect();
-                Some(records).filter(|records: &Vec<_>| !records.is_empty())
+                Some(records.take(GROUP).collect()).filter(|records: &Vec<_>| !records.is_empty())
             };
-            let fleet = self.fleet;
-            self.ready.extend(in_order(group, |group| fleet.group(&group)).into_iter().flatten());
+            let fits = &self.fits;
+            self.ready.extend(in_order(group, |group| fits.group(&group)).into_iter().flatten());
         }
-        self.ready.pop_front().map(|answer| Estimate::of(answer?))
+        self.ready.pop_front()
     }
 }
 

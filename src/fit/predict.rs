@@ -82,7 +82,7 @@ impl<M: Model> Estimate<M> {
 
 /// A prediction with the model's types.
 fn typed<M: Model>(found: Simulated, record: &ExperimentOf<M>) -> Prediction<M> {
-    let Simulated { outputs, residuals, initial_state } = &found;
+    let Simulated { outputs, residuals, initial_state, .. } = &found;
     let channels = record.record().outputs();
     Prediction {
         t: (0..record.len()).map(|k| record.time(k)).collect(),

@@ -70,9 +70,7 @@ impl Judgement<'_> {
             }
         }
         warnings.extend(self.not_positive());
-        warnings.extend(directions.iter().map(|d| {
-            care(WarningCode::Unidentified, format!("{d}; fix one, add a prior, or excite the system differently"))
-        }));
+        warnings.extend(directions.iter().map(|direction| Direction::warning(direction.to_string())));
         warnings.extend(self.step(unknowns));
         warnings.extend(aliases::aliased(self));
         if !self.end.outcome.converged() && unknowns.iter().any(|row| row.knowledge.standard_error().is_some()) {

@@ -1,14 +1,14 @@
 //! [`EquationsFit`]: from equations that are known at run time to a problem.
 
 use super::finer::SUBSTEPS;
-use super::{FinerSweeps, MakeSweep, Problem, Settings};
+use super::{Control, FinerSweeps, MakeSweep, Problem, Settings};
 use crate::equations::Equations;
 use crate::error::Error;
 use crate::integrate::{Integrator, Method, automatic, stiff};
-use crate::layout::Kind;
-use crate::parameter::Parameter;
+use crate::layout::{Kind, Quantity};
+use crate::parameter::{Parameter, fixed};
 use crate::predict::{Prediction, Predictor, simulation};
-use crate::record::Record;
+use crate::record::{Channel, Initial, Record, Time};
 use crate::sweep::{Sweep, of_equations};
 use std::sync::Arc;
 
@@ -88,8 +88,47 @@ impl EquationsFit {
         parameters: &[Parameter],
         settings: Settings,
     ) -> Result<Problem<'static>, Error> {
-        let sweep = self.by(&self.method.clone().unwrap_or_else(|| automatic(1)))?;
-        Ok(Problem::new(sweep, records, parameters, settings)?.refining(self.finer()))
+        Ok(Problem::new(self.sweep()?, records, parameters, settings)?.refining(self.finer()))
+    }
+
+    /// Simulates the equations by this integrator (or one step per sample) from an initial state, inputs held from sample to sample, as
+    /// [`simulate`](crate::simulate()) does a Rust model. Parameters, states and each sample's row of inputs are in the order of the
+    /// layout. Gives a record of inputs and outputs, to which [`Record::with_noise`] adds noise; its initial state is to be estimated.
+    ///
+    /// # Errors
+    /// As [`Record::new`]; not one number for each parameter, state and input, or one that is not finite; a simulation that fails.
+    pub fn simulate(
+        &self,
+        parameters: &[f64],
+        initial: &[f64],
+        time: Time,
+        inputs: &[Vec<f64>],
+    ) -> Result<Record, Error> {
+        let layout = self.equations.layout();
+        if let Some(k) = inputs.iter().position(|row| row.len() != layout.inputs.len()) {
+            let (found, expected) = (inputs[k].len(), layout.inputs.len());
+            return Err(Error::Option(format!("sample {k} has {found} input(s), the equations have {expected}")));
+        }
+        let record = |outputs: Vec<Vec<f64>>| {
+            let channel = |of: &Quantity, values: Vec<f64>| Channel::new(&of.name, &of.unit, values);
+            let column = |(i, of): (usize, &Quantity)| channel(of, inputs.iter().map(|row| row[i]).collect());
+            let inputs = layout.inputs.iter().enumerate().map(column).collect();
+            let outputs = layout.outputs.iter().zip(outputs).map(|(of, values)| channel(of, values)).collect();
+            Record::new(layout.states.clone(), time.clone(), inputs, outputs)
+        };
+        let given = Initial::Given(initial.iter().copied().map(fixed).collect());
+        let unmeasured = record(vec![vec![0.0; inputs.len()]; layout.outputs.len()])?;
+        let parameters: Vec<Parameter> = parameters.iter().copied().map(fixed).collect();
+        let method = self.method.clone().unwrap_or_else(|| automatic(1));
+        let sweep = of_equations(&self.equations, &method, &simulation())?;
+        let records = vec![unmeasured.named("simulation").initial(given)?];
+        let problem = Problem::unchecked(sweep, records, &parameters, Settings::default())?;
+        record(problem.in_units(&Control::NEVER).predict(0, &[])?.outputs)
+    }
+
+    /// The equations by the integrator, or by the first of the default ones.
+    pub(crate) fn sweep(&self) -> Result<Arc<dyn Sweep>, Error> {
+        self.by(&self.method.clone().unwrap_or_else(|| automatic(1)))
     }
 
     fn by(&self, method: &Arc<dyn Method>) -> Result<Arc<dyn Sweep>, Error> {
@@ -97,7 +136,7 @@ impl EquationsFit {
     }
 
     /// The methods that follow the default one.
-    fn finer(&self) -> Arc<FinerSweeps<'static>> {
+    pub(crate) fn finer(&self) -> Arc<FinerSweeps<'static>> {
         if self.method.is_some() || self.equations.layout().kind != Kind::Continuous {
             return FinerSweeps::new(vec![]);
         }

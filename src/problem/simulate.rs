@@ -1,5 +1,6 @@
 //! Prediction of a record at given values of its unknowns.
 
+use super::unknowns::names;
 use super::{Objective, Problem};
 use crate::error::Error;
 use crate::record::{Column, Record};
@@ -8,6 +9,8 @@ use crate::sweep::RunError;
 /// The outputs of one record, predicted.
 #[derive(Clone, Debug)]
 pub struct Simulated {
+    /// Name of each output.
+    pub names: Vec<String>,
     /// Predicted outputs, a column each; NaN where there is no prediction.
     pub outputs: Vec<Vec<f64>>,
     /// Measured minus predicted; NaN where either is missing.
@@ -53,7 +56,8 @@ impl Objective<'_> {
             measured.iter().zip(predicted).map(|(y, predicted)| y - predicted).collect()
         };
         let residuals = measured.iter().zip(&outputs).map(residual).collect();
-        Ok(Simulated { outputs, residuals, initial_state: self.problem.unknowns.of_experiment(e, coordinates).x })
+        let initial_state = self.problem.unknowns.of_experiment(e, coordinates).x;
+        Ok(Simulated { names: names(&self.problem.layout().outputs), outputs, residuals, initial_state })
     }
 }
 

@@ -6,6 +6,7 @@
 use super::{Channel, Initial, Record, Time};
 use crate::error::Error;
 use crate::interval::Hold;
+use crate::random::Random;
 use std::ops::{Bound, Range, RangeBounds};
 use std::sync::Arc;
 
@@ -13,6 +14,19 @@ use std::sync::Arc;
 const SAME: f64 = 1e-6;
 
 impl Record {
+    /// The record with white Gaussian noise of these standard deviations added to its outputs, in their order; the same seed adds the
+    /// same noise.
+    pub fn with_noise(&self, sigma: &[f64], seed: u64) -> Self {
+        let noisy = |(j, (channel, sigma)): (usize, (&Channel, &f64))| {
+            let mut random = Random::stream(seed, j as u64);
+            channel.with(channel.values.iter().map(|y| y + sigma * random.normal()).collect::<Vec<f64>>())
+        };
+        let mut outputs = self.outputs.to_vec();
+        let found: Vec<Channel> = self.outputs.iter().zip(sigma).enumerate().map(noisy).collect();
+        outputs.splice(..found.len(), found);
+        Record { outputs: outputs.into(), looked: Arc::default(), ..self.clone() }
+    }
+
     /// The samples of a range, by index from zero: `record.slice(1000..)`.
     ///
     /// # Errors

@@ -78,3 +78,48 @@ fn column(path: &Path) -> Result<Column, Error> {
         )),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::pmsm::{Drive, Surface, Winding};
+    use crate::{Experiment, ExperimentOf, Fleet, Time, free, pmsm::Currents, simulate};
+
+    /// A file of one column.
+    fn save(path: &std::path::Path, values: impl Iterator<Item = f64>) {
+        let numbers: Vec<u8> = values.flat_map(f64::to_le_bytes).collect();
+        let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({},), }}", numbers.len() / 8);
+        let header = format!("{header:<117}\n");
+        std::fs::write(path, [b"\x93NUMPY\x01\x00\x76\x00", header.as_bytes(), &numbers].concat()).unwrap();
+    }
+
+    /// Parts of one mapped record, fitted side by side on threads after the record itself is gone: the bits of a record in memory.
+    #[cfg(target_endian = "little")]
+    #[test]
+    fn mapped_records_outlive_the_one_they_are_cut_from() {
+        let model = Surface::new(4).unwrap();
+        let drive =
+            |k: usize| Drive { ud: 0.0, uq: [20.0, 60.0][k / 30 % 2], w: 50.0 + 30.0 * (0.01 * k as f64).sin() };
+        let (winding, step) = (Winding { rs: 0.6, ls: 4e-3, ke: 0.8 }, 1e-3);
+        let (rest, time) = (Currents { id: 0.0, iq: 0.0 }, Time::Uniform { start: 0.0, step });
+        let run = simulate(&model, &winding, &rest, time, &(0..2_000).map(drive).collect::<Vec<_>>()).unwrap();
+        let whole = run.with_noise(Currents { id: 0.1, iq: 0.1 }, 1).experiment(&model).unwrap();
+        let folder = std::env::temp_dir().join(format!("greybox-npy-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        for channel in whole.record().inputs().iter().chain(whole.record().outputs()) {
+            save(&folder.join(format!("{}.npy", channel.name)), channel.values.iter().copied());
+        }
+        let mapped = Experiment::from_npy(&model, &folder, Some(step)).unwrap();
+        let cut = |record: ExperimentOf<Surface>| -> Vec<ExperimentOf<Surface>> {
+            (0..40).map(|i| record.slice(50 * i..50 * (i + 1)).unwrap()).collect()
+        };
+        let start = Winding { rs: free(1.0), ls: free(3e-3), ke: free(0.5) };
+        let fleet = Fleet::new(&model).parameters(start).fleet().unwrap();
+        let bits = |records: Vec<ExperimentOf<Surface>>| -> Vec<[u64; 3]> {
+            let answers = fleet.run(records).map(|answer| answer.unwrap().parameters);
+            answers.map(|p| [p.rs, p.ls, p.ke].map(f64::to_bits)).collect()
+        };
+        let found = cut(mapped);
+        std::fs::remove_dir_all(&folder).unwrap();
+        assert_eq!(bits(found), bits(cut(whole)));
+    }
+}

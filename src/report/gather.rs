@@ -46,8 +46,7 @@ impl Report {
             records.push(of.gathered(problem.layout().kind, residuals::examine(&prediction, record)?, numbers));
         }
         thin(&mut records, outputs);
-        let reworded = |warning| diagnose::reworded(warning, &estimate.directions, &estimate.unknowns);
-        let warnings = estimate.warnings.iter().map(reworded).collect();
+        let warnings = diagnose::reworded(&estimate.warnings, &estimate.directions, &estimate.unknowns);
         Ok(Report::of(&Facts {
             model: problem.sweep.identity(),
             correlation: estimate.correlation(&(0..estimate.unknowns.len()).collect::<Vec<usize>>()),

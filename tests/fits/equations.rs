@@ -220,3 +220,65 @@ fn what_does_not_fit_the_equations_is_refused() {
     says(unobserved, &["state"]);
     says(fit.clone().integrator(Discrete).problem(vec![good], &start, Settings::default()), &["discrete"]);
 }
+
+/// The same arithmetic from sample to sample, up to the rounding of a damped swing; the same noise from the same seed.
+#[test]
+fn equations_are_simulated_as_their_model() {
+    let (truth, time) = (Pull { g: 9.81, d: 1.2, b: 2.0 }, Time::Uniform { start: 0.5, step: 0.02 });
+    let push: Vec<f64> = (0..300).map(|k| (0.05 * f64::from(k)).sin()).collect();
+    let rows: Vec<Vec<f64>> = push.iter().map(|m| vec![*m]).collect();
+    let torques: Vec<Torque> = push.iter().map(|m| Torque { m: *m }).collect();
+    let (from, start) = ([9.81, 1.2, 2.0], Swing { phi: 0.3, w: -0.1 });
+    let close = |found: &Record, run: Simulation<Pendulum>| {
+        for (k, y) in run.outputs.iter().enumerate() {
+            let found = [0, 1].map(|j| found.outputs()[j].values[k]);
+            assert!((found[0] - y.phi).abs() < 1e-13 && (found[1] - y.w).abs() < 1e-13, "{k}: {found:?} {y:?}");
+        }
+    };
+    let found = read(&Pendulum).simulate(&from, &[0.3, -0.1], time.clone(), &rows).unwrap();
+    let run = simulate(&Pendulum, &truth, &start, time.clone(), &torques).unwrap();
+    assert_eq!((found.len(), found.time(1), &found.inputs()[0].values[..]), (300, 0.52, &push[..]));
+    close(&found.with_noise(&[0.02, 0.05], 4), run.clone().with_noise(Swing { phi: 0.02, w: 0.05 }, 4));
+    close(&found, run);
+    // A method that chooses its steps.
+    let found = read(&Pendulum).integrator(Rk45::default()).simulate(&from, &[0.3, -0.1], time.clone(), &rows).unwrap();
+    let simulator = Simulator::new(&Pendulum).integrator(Rk45::default());
+    close(&found, simulator.run(&truth, &start, time.clone(), &torques).unwrap());
+    let refused = |p: &[f64], x: &[f64], rows: &[Vec<f64>]| read(&Pendulum).simulate(p, x, time.clone(), rows);
+    says(refused(&from, &[0.3, -0.1], &[vec![0.0], vec![0.0, 1.0]]), &["sample 1 has 2 input(s)", "have 1"]);
+    says(refused(&from[..2], &[0.3, -0.1], &rows), &["2 parameter(s)", "has 3"]);
+    says(refused(&from, &[0.3], &rows), &["1 entries", "2 states"]);
+    says(refused(&[f64::NAN, 1.2, 2.0], &[0.3, -0.1], &rows), &["`g`", "not a number"]);
+    says(refused(&[9.81, -400.0, 2.0], &[0.3, -0.1], &rows), &["simulation"]);
+}
+
+/// Decays of their own rates: each answer is that of the record alone, in the order of the records, beside one that is none of the
+/// equations'.
+#[test]
+fn a_fleet_of_equations_is_each_fit_alone() {
+    let fit = read(&Pendulum);
+    let rows: Vec<Vec<f64>> = (0..200).map(|k| vec![[1.0, -0.5][k / 40 % 2]]).collect();
+    let record = |i: usize| {
+        let time = Time::Uniform { start: 0.0, step: 0.02 };
+        let swing = fit.simulate(&[9.81, 0.8 + 0.02 * i as f64, 2.0], &[0.2, 0.0], time, &rows).unwrap();
+        swing.with_noise(&[0.02, 0.05], i as u64).named(format!("{i}"))
+    };
+    let mut records: Vec<Record> = (0..40).map(record).collect();
+    let other = vec![Channel::new("v", "V", vec![0.0; 200])];
+    let time = records[0].times().clone();
+    records[7] = Record::new(vec![], time, other.clone(), other).unwrap();
+    let parameters = Pull::into_array(start());
+    let answers: Vec<_> = fit.fleet(&parameters, Settings::default(), records.clone()).unwrap().collect();
+    assert_eq!(answers.len(), 40);
+    for (i, (record, answer)) in records.into_iter().zip(answers).enumerate() {
+        if i == 7 {
+            assert!(answer.is_err());
+            continue;
+        }
+        let answer = answer.unwrap();
+        same(&answer, &fit.problem(vec![record], &parameters, Settings::default()).unwrap().run().unwrap(), 1e-10);
+        let damping = &answer.parameters[1];
+        let error = damping.knowledge.standard_error().unwrap();
+        assert!((damping.value - 0.8 - 0.02 * i as f64).abs() < 5.0 * error && error < 0.05, "{i}: {answer}");
+    }
+}

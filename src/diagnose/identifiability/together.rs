@@ -1,6 +1,6 @@
 //! Words for unknowns that are known only together: a common shift, a common factor, a ratio, a product.
 
-use crate::estimate::{Direction, Unknown, Warning};
+use crate::estimate::{Direction, Unknown, Warning, WarningCode};
 use crate::numeral::{number, percent};
 
 /// Moves are the same if they differ by less than this part.
@@ -62,13 +62,15 @@ fn listed(mut names: Vec<String>) -> String {
     }
 }
 
-/// A warning about a direction, saying what kind of direction it is; any other stays as it is.
-pub(crate) fn reworded(warning: &Warning, directions: &[Direction], unknowns: &[Unknown]) -> Warning {
-    let found = directions.iter().find_map(|direction| {
-        let advice = warning.text.strip_prefix(&direction.to_string())?;
-        Some(together(&absolute(direction, unknowns), 0.0, unknowns)? + advice)
-    });
-    Warning { code: warning.code, severity: warning.severity, text: found.unwrap_or_else(|| warning.text.clone()) }
+/// The warnings, those about directions saying what kind of direction it is. There is one for each direction, in the same order.
+pub(crate) fn reworded(warnings: &[Warning], directions: &[Direction], unknowns: &[Unknown]) -> Vec<Warning> {
+    let mut directions = directions.iter();
+    let reworded = |warning: &Warning| {
+        let direction = if warning.code == WarningCode::Unidentified { directions.next() } else { None };
+        let kind = direction.and_then(|direction| together(&absolute(direction, unknowns), 0.0, unknowns));
+        kind.map_or_else(|| warning.clone(), Direction::warning)
+    };
+    warnings.iter().map(reworded).collect()
 }
 
 /// The changes of a direction in the unknowns' own units.
