@@ -19,6 +19,7 @@
 //! ```
 
 mod build;
+mod choices;
 mod differentiate;
 mod display;
 mod evaluate;
@@ -30,6 +31,7 @@ mod symbol;
 mod tape;
 mod trace;
 
+pub(crate) use choices::choosing;
 pub use differentiate::Seed;
 pub(crate) use differentiate::{Pattern, Tangent, Variables, Way, slopes};
 pub use function::{Function, Function2};

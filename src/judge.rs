@@ -13,6 +13,7 @@ mod directions;
 mod dropouts;
 mod explained;
 mod hac;
+mod kinks;
 mod known;
 mod largest;
 mod memory;

@@ -134,6 +134,11 @@ pub trait Sweep: Send + Sync {
         Coupling::Uncut
     }
 
+    /// The parameters that decide a choice of the model, as far as that is known: an `if`, a limit, an absolute value, a place in a table.
+    fn choosing(&self) -> &[usize] {
+        &[]
+    }
+
     /// Prepares a record, once, with the parameters at their start values.
     ///
     /// # Errors

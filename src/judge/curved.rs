@@ -24,7 +24,7 @@ const MOST: usize = 8;
 /// Part of the half width by which an end may move without a warning.
 const ASYMMETRY: f64 = 0.25;
 /// Quantile of the normal distribution for an interval of 95 %.
-const QUANTILE: f64 = 1.96;
+pub(super) const QUANTILE: f64 = 1.96;
 
 /// The unknown whose interval is bent most, if that matters.
 pub(super) fn curved(judgement: &Judgement<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
@@ -66,7 +66,7 @@ pub(super) fn curved(judgement: &Judgement<'_>, unknowns: &[Unknown], covariance
 }
 
 /// The change of all coordinates along the profile of an unknown, by one standard error of it.
-fn along(judgement: &Judgement<'_>, i: usize, covariances: &Covariances) -> Option<Vec<f64>> {
+pub(super) fn along(judgement: &Judgement<'_>, i: usize, covariances: &Covariances) -> Option<Vec<f64>> {
     let covariance = covariances.unknowns.as_ref()?;
     let error = covariance.standard_error(i);
     let of = |j: usize| if judgement.exact[j] { 0.0 } else { covariance.get(j, i) / (error * judgement.slopes[j]) };

@@ -3,7 +3,7 @@
 use super::conclude::Judgement;
 use super::covariances::Covariances;
 use super::directions::{taking_part, undetermined};
-use super::{aliases, curved, data, data_noise, known, memory, outliers, shape, sizes, together, within_loss};
+use super::{aliases, curved, data, data_noise, kinks, known, memory, outliers, shape, sizes, together, within_loss};
 use crate::estimate::{Direction, Knowledge, Unknown, Warning, WarningCode};
 use crate::layout::Kind;
 use crate::numeral::{counted, exact, number, percent};
@@ -87,7 +87,8 @@ impl Judgement<'_> {
             let text = format!("the checkpoint could not be written ({write_error}); the search went on without it");
             warnings.push(Warning { code: WarningCode::CheckpointNotWritten, severity: Severity::Usable, text });
         }
-        warnings.extend(curved::curved(self, unknowns, covariances));
+        let curved = curved::curved(self, unknowns, covariances);
+        warnings.extend(curved.or_else(|| kinks::kinked(self, unknowns, covariances)));
         warnings.extend(self.uneven(unknowns, covariances));
         warnings.extend(self.decided_by_few(unknowns, covariances));
         warnings.extend(sizes::uneven_errors(unknowns, covariances));

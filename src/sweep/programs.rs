@@ -11,7 +11,7 @@ use super::{Coupling, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
 use crate::engine::{Program, Sampling, Trajectories};
 use crate::equations::Equations;
 use crate::error::{Error, Failure};
-use crate::graph::Untraceable;
+use crate::graph::{Untraceable, choosing};
 use crate::integrate::Method;
 use crate::interval::Hold;
 use crate::layout::{Kind, Layout};
@@ -37,6 +37,8 @@ struct Programs {
     method: Arc<dyn Method>,
     predictor: Arc<dyn Prediction>,
     coupling: Coupling,
+    /// Parameters that decide a choice.
+    choosing: Vec<usize>,
     /// By hold: zero, first.
     recurrences: [OnceLock<Arc<Recurrence>>; 2],
     compiled: Mutex<Vec<(Key, Arc<Compiled>)>>,
@@ -95,7 +97,8 @@ impl Programs {
         };
         let recurrences = [OnceLock::new(), OnceLock::new()];
         let (compiled, refined) = (Mutex::new(vec![]), OnceLock::new());
-        let programs = Programs { equations, method, predictor, coupling, recurrences, compiled, refined };
+        let choosing = choosing(equations.graph());
+        let programs = Programs { equations, method, predictor, coupling, choosing, recurrences, compiled, refined };
         programs.recurrence(Hold::Zero)?;
         Ok(programs)
     }
@@ -166,6 +169,10 @@ impl Sweep for ProgramSweep<'_> {
 
     fn coupling(&self) -> Coupling {
         self.programs.coupling
+    }
+
+    fn choosing(&self) -> &[usize] {
+        &self.programs.choosing
     }
 
     fn prepare(&self, record: &Record, parameters: &[f64]) -> Result<Prepared, Error> {

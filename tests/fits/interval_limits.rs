@@ -225,3 +225,51 @@ fn noise_in_restarts_that_biases_nothing_is_not_named() {
     let fit = Fit::new(&Integrator, &record).parameters(Rate { b: free(2.0) }).predictor(Horizon::new(1));
     assert!(!has(&fit.run().unwrap(), WarningCode::RestartNoise));
 }
+
+signals! { pub struct Limited { gain: "A/V", limit: "V" } }
+
+/// `i = gain min(u, limit)`.
+struct Limiter;
+
+impl Model for Limiter {
+    type State = Nothing;
+    type Input = Voltage;
+    type Output = Current;
+    type Parameters = Limited;
+    const KIND: Kind = Kind::Static;
+
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Limited<S>) -> Current<S> {
+        Current { i: p.gain * u.u.min(p.limit) }
+    }
+}
+
+/// Inputs up to 1 V. A limit of 2 V, which none reaches, ends at the largest of them in half of the records, because its noise is below zero: there
+/// the slope is that of one sample, and the cost above rises by less than that says, unless that sample is 2.8 standard deviations off, as
+/// one in 180 is: two of twenty are a chance of 0.6 %. A limit of 0.5 V is known by half of the samples.
+#[test]
+fn a_limit_that_one_sample_reaches_is_not_known() {
+    let fit = |limit: f64, start: f64, seed: u64| {
+        let mut noise = Noise(seed);
+        let inputs: Vec<Voltage> = (0..60).map(|k| Voltage { u: (0.618 * f64::from(k)).fract() }).collect();
+        let outputs = inputs.iter().map(|u| Current { i: 3.0 * u.u.min(limit) + 0.02 * noise.gauss() }).collect();
+        let record = Experiment::new(&Limiter, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        Fit::new(&Limiter, &record).parameters(Limited { gain: free(2.0), limit: free(start) }).run().unwrap()
+    };
+    let said = |fit: &Estimate<Limiter>| fit.warnings.iter().any(|warning| warning.code == WarningCode::CurvedInterval);
+    let (mut known, mut silent, mut warned) = (0, 0, 0);
+    for seed in 1..=40 {
+        let unreached = fit(2.0, 0.9, seed);
+        if unreached.knowledge.limit.standard_error().is_some() {
+            known += 1;
+            silent += usize::from(!said(&unreached));
+        }
+        let reached = fit(0.5, 0.4, seed);
+        warned += usize::from(said(&reached));
+        println!(
+            "{seed} {} {}",
+            (reached.parameters.limit - 0.5) / reached.knowledge.limit.standard_error().unwrap(),
+            said(&reached)
+        );
+    }
+    assert!(known >= 10 && silent <= 1 && warned <= 2, "{known} {silent} {warned}");
+}
