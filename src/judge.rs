@@ -29,6 +29,7 @@ mod shares;
 mod sizes;
 mod starts;
 mod step_error;
+mod summary;
 mod sums;
 mod suspects;
 mod together;

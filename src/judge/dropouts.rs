@@ -8,6 +8,8 @@ use crate::numeral::{number, percent};
 /// The fewest measurements that are equal to the one before, and the part of them all, that are looked at.
 const FEWEST: usize = 4;
 const PART: f64 = 0.005;
+/// From this part on it is a sensor that measures less often, which the look at the columns names.
+const MOST: f64 = 1.0 / 3.0;
 /// Rounded measurements are equal to the last but one as well, nearly as often.
 const ROUNDED: usize = 8;
 /// Mean squared errors of such measurements beyond so many times those of the others confirm it.
@@ -27,7 +29,7 @@ impl Errors {
 }
 
 /// Measurements with their errors, in order of time, of those that are equal to the one before and of the others; `None`
-/// where the former are few, or rounded.
+/// where the former are few, a third or more, or rounded.
 fn split(runs: &[Vec<(f64, f64)>]) -> Option<[Errors; 2]> {
     let (mut split, mut again) = ([Errors::default(); 2], 0);
     for run in runs {
@@ -40,8 +42,9 @@ fn split(runs: &[Vec<(f64, f64)>]) -> Option<[Errors; 2]> {
         }
     }
     let [held, others] = split;
-    let few = held.count < FEWEST || (held.count as f64) < PART * (held.count + others.count) as f64;
-    (!few && again * ROUNDED <= held.count).then_some(split)
+    let part = held.count as f64 / (held.count + others.count) as f64;
+    let single = held.count >= FEWEST && (PART..MOST).contains(&part);
+    (single && again * ROUNDED <= held.count).then_some(split)
 }
 
 /// The warning about an output with these errors, one run per experiment, `None` where nothing was measured.
@@ -86,15 +89,17 @@ mod tests {
         }
     }
 
-    /// Of nine measurements the last of each three is the one before, with an error of three instead of one.
+    /// The last of each four measurements is the one before, with an error of three instead of one.
     #[test]
     fn values_that_are_held() {
-        let y = |k: usize| if k % 3 == 2 { k - 1 } else { k } as f64;
-        let run: Vec<(f64, f64)> = (0..15).map(|k| (y(k), if k % 3 == 2 { 3.0 } else { 1.0 })).collect();
-        let [held, others] = split(&[run]).unwrap();
-        assert_eq!((held.count, held.mean(), others.count, others.mean()), (5, 9.0, 10, 1.0));
-        // Three are few, and of a rounded sensor each second value is the last but one.
-        assert!(split(&[(0..9).map(|k| (y(k), 1.0)).collect()]).is_none());
+        let run = |count: usize, every: usize| -> Vec<(f64, f64)> {
+            let again = |k: usize| k % every == every - 1;
+            (0..count).map(|k| (if again(k) { k - 1 } else { k } as f64, if again(k) { 3.0 } else { 1.0 })).collect()
+        };
+        let [held, others] = split(&[run(20, 4)]).unwrap();
+        assert_eq!((held.count, held.mean(), others.count, others.mean()), (5, 9.0, 15, 1.0));
+        // Three are few, each third is a slow sensor, and of a rounded sensor each second value is the last but one.
+        assert!(split(&[run(12, 4)]).is_none() && split(&[run(30, 3)]).is_none());
         let six_of = |count: usize| -> Vec<(f64, f64)> {
             (0..count).map(|k| (if k % 2 == 1 && k < 12 { k - 1 } else { k } as f64, 1.0)).collect()
         };
