@@ -105,7 +105,7 @@ fn sensors() -> Vec<Junk> {
         named("sensor that measures at each fourth sample", HeldOutput, |s| {
             spoiled(s, |c, _| c.y.iter_mut().for_each(|y| (0..SAMPLES).for_each(|k| y[k] = y[k - k % 4])))
         }),
-        named("sensor stuck for the second half", Frozen, |s| {
+        seen("sensor stuck for the second half", |s| {
             spoiled(s, |c, _| {
                 for y in &mut c.y {
                     let stuck = y[SAMPLES / 2];
