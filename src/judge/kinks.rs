@@ -4,6 +4,7 @@
 use super::conclude::Judgement;
 use super::covariances::Covariances;
 use super::curved::{QUANTILE, along};
+use super::directions;
 use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::numeral::percent;
 use crate::optimize::{Outcome, Severity};
@@ -36,16 +37,25 @@ pub(super) fn kinked(judgement: &Judgement<'_>, unknowns: &[Unknown], covariance
     Some(Warning { code: WarningCode::CurvedInterval, severity: Severity::UsableWithCare, text })
 }
 
-/// By which part of what the slopes say the cost rises, so many standard errors along the profile of an unknown; `None` beyond bounds, or
-/// where there is no prediction.
+/// By which part of what the slopes say the cost rises, so many standard errors along the profile of an unknown, where the others follow by
+/// the slopes here or by those there, whichever is less; `None` beyond bounds, or where there is no prediction.
 fn rise(judgement: &Judgement<'_>, i: usize, standard_errors: f64, covariances: &Covariances) -> Option<f64> {
+    let objective = judgement.objective;
     let step: Vec<f64> = along(judgement, i, covariances)?.iter().map(|along| standard_errors * along).collect();
-    let place: Vec<f64> = judgement.end.coordinates.iter().zip(&step).map(|(x, step)| x + step).collect();
-    let mut bounds = judgement.objective.problem.unknowns.bounds().into_iter().zip(&place);
-    if !bounds.all(|((lower, upper), x)| (lower..=upper).contains(x)) {
+    let moved = |from: &[f64], step: &[f64]| from.iter().zip(step).map(|(x, step)| x + step).collect::<Vec<f64>>();
+    let bounds = objective.problem.unknowns.bounds();
+    let inside = |place: &[f64]| bounds.iter().zip(place).all(|((lower, upper), x)| (*lower..=*upper).contains(x));
+    let place = moved(&judgement.end.coordinates, &step);
+    if !inside(&place) {
         return None;
     }
+    let there = objective.evaluate(&place).ok()?;
+    let mut held = judgement.exact.clone();
+    held[i] = true;
+    let held = directions::undetermined(&there, &held).held;
+    let again = there.step(&vec![0.0; held.len()], &held).map(|step| moved(&place, &step));
+    let least = again.filter(|place| inside(place)).and_then(|place| objective.cost_at(&place).ok());
+    let rise = least.map_or(there.cost, |least| least.min(there.cost)) - judgement.linear.cost;
     let expected = -judgement.linear.predicted_reduction(&step);
-    let rise = judgement.objective.cost_at(&place).ok()? - judgement.linear.cost;
     Some(rise / expected).filter(|part| part.is_finite() && expected > 0.0)
 }
