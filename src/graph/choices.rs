@@ -1,4 +1,4 @@
-//! Which parameters decide a choice of a graph.
+//! Which parameters the conditions of a graph depend on.
 
 use super::{Function, Function2, Graph, Leaf, Node};
 use std::collections::BTreeSet;

@@ -165,8 +165,8 @@ fn confirmed(
         Suspicion::Held { .. } => Some((
             WarningCode::HeldOutput,
             Severity::UsableWithCare,
-            "the sensor measures less often, so that samples count more than once and come late; mark all but the first \
-             of each value as missing",
+            "the sensor measures less often, or rounds away what changes in between, so that measurements count more than \
+             once and may come late; mark all but the first of each value as missing",
         )),
         Suspicion::Repeated { .. } => {
             Some((WarningCode::Repeated, decides(dominates), "a buffer was written twice; leave one of the blocks out"))

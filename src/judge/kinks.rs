@@ -1,5 +1,5 @@
-//! Whether the cost rises as its slopes say, out to the ends of the intervals of unknowns that decide a choice of the model: a limit
-//! that few samples reach, or none, is known by those few only, and its cost is flat beyond them.
+//! Whether the cost rises towards the ends of an interval as its slopes say, for parameters in a condition of the model. A limit that few
+//! samples reach is determined by those few; where it is beyond them all, the cost does not depend on it.
 
 use super::conclude::Judgement;
 use super::covariances::Covariances;
@@ -10,12 +10,13 @@ use crate::numeral::percent;
 use crate::optimize::{Outcome, Severity};
 use crate::problem::Role;
 
-/// Half widths of the interval at which the cost is compared.
+/// Half widths of the interval at which the cost is compared: at its ends, and as far again, where a limit is beyond the few samples that
+/// reach it though an end is not.
 const PLACES: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
-/// A cost that rises by less than this part of what it should makes the interval too short.
+/// A cost that rises by less than this part of what its slopes say: an interval by the likelihood is longer by the root of two or more.
 const LITTLE: f64 = 0.5;
 
-/// The unknown whose cost rises least.
+/// The parameter along which the cost rises least, relative to what its slopes say.
 pub(super) fn kinked(judgement: &Judgement<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
     let choosing = judgement.objective.sweep.choosing();
     if choosing.is_empty() || judgement.rounding || judgement.end.outcome == Outcome::Exact {
@@ -28,8 +29,9 @@ pub(super) fn kinked(judgement: &Judgement<'_>, unknowns: &[Unknown], covariance
     let (i, place, part) =
         places.filter_map(of).min_by(|a, b| a.2.total_cmp(&b.2)).filter(|(.., part)| *part < LITTLE)?;
     let text = format!(
-        "the interval of `{}` is too short {}: it decides a choice of the model (an `if`, a limit, an absolute value, a table), and the \
-         cost rises by {} of what its slopes say; few samples tell where; take diagnose::profile, or excite it beyond its limit",
+        "the interval of `{}` is too short {}: a condition of the model depends on it (an `if`, a limit, an absolute value, a table), few \
+         samples are near, and the cost rises by {} of what its slopes say; take diagnose::profile, or record more on both sides of the \
+         condition",
         unknowns[i].name,
         if place > 0.0 { "above" } else { "below" },
         percent(part.max(0.0), 2)
@@ -37,8 +39,9 @@ pub(super) fn kinked(judgement: &Judgement<'_>, unknowns: &[Unknown], covariance
     Some(Warning { code: WarningCode::CurvedInterval, severity: Severity::UsableWithCare, text })
 }
 
-/// By which part of what the slopes say the cost rises, so many standard errors along the profile of an unknown, where the others follow by
-/// the slopes here or by those there, whichever is less; `None` beyond bounds, or where there is no prediction.
+/// The rise of the cost so many standard errors away from the estimate of one unknown, relative to what the slopes say. The other unknowns
+/// are moved by the slopes at the estimate, then by one step with those at the new place; the smaller cost of both counts. `None`
+/// outside of bounds, or where there is no prediction.
 fn rise(judgement: &Judgement<'_>, i: usize, standard_errors: f64, covariances: &Covariances) -> Option<f64> {
     let objective = judgement.objective;
     let step: Vec<f64> = along(judgement, i, covariances)?.iter().map(|along| standard_errors * along).collect();

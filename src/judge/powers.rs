@@ -1,8 +1,9 @@
 //! Sums of errors and powers of their predictions, for tests of the model's shape and of changes between parts of the data.
 //!
 //! Errors of a model of the right shape are uncorrelated with every function of what it predicts (Ramsey, J. Royal Statistical
-//! Society B 31 (1969) 350), in every part of the data. What unknowns of the model remove from the errors can only make a
-//! regression explain less of them than by chance, so that these tests need no slopes.
+//! Society B 31 (1969) 350), in every part of the data. The fit has removed from the errors what its unknowns explain, so that by
+//! chance a regression explains no more of them than of the noise: the tests hold without slopes, with a level that is at most the
+//! nominal one.
 
 use super::sums::{Terms, sums};
 use crate::problem::Objective;
@@ -13,7 +14,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 pub(super) const SHAPE: usize = 4;
 /// Regressors of a part of the data: a constant, the prediction, and its change from the sample before.
 const PART: usize = 3;
-/// Errors of fewer measurements than this are not examined.
+/// With fewer degrees of freedom the errors are not examined: Fisher's distribution is that of normal errors.
 const FEWEST: f64 = 30.0;
 /// A regressor of which less than this part of its square is left beside the others is one of their combinations.
 const ALIKE: f64 = 1e-9;

@@ -13,14 +13,14 @@ const MANY: u64 = 8;
 
 /// Warnings about an estimate that is the best end of these searches, with errors that are colored or not. Where searches were not asked
 /// for, a minimum that is found once lowers the verdict no more than one that is found without other searches does. But one that is found
-/// once by many searches, and leaves errors that follow from each other, is not the right one: there the model itself would explain them.
+/// once by many searches and leaves colored errors is seldom the right one: what is colored there is what the model does not explain.
 pub(super) fn warnings(starts: &Starts, measurements: u64, asked: bool, colored: bool) -> Vec<Warning> {
     let Starts { tried, agreed, minima, declared, failed, .. } = starts;
     let mut warnings = vec![];
     if *agreed == 1 && *tried > 1 {
         let (others, none) = (minima.len() - 1, failed.len());
         let (left, severity) = match (colored && *tried >= MANY, asked) {
-            (true, _) => (", and it leaves errors that are not noise", Severity::NotUsable),
+            (true, _) => (", and it leaves errors that are correlated over time", Severity::NotUsable),
             (_, true) => ("", Severity::UsableWithCare),
             _ => ("", Severity::Usable),
         };

@@ -20,8 +20,8 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Level of the test.
 pub(super) const LEVEL: f64 = 1e-4;
-/// A parameter is named if its values from two parts of the data differ by more than this many standard errors. If they differ by more
-/// than the second (relative), the estimate is not usable.
+/// A parameter is named if its values from two parts of the data differ by more than this many standard errors, where the test above
+/// has found a difference. If they differ by more than the second (relative), the estimate is not usable.
 const APART: f64 = 3.0;
 const FAR_APART: f64 = 0.25;
 /// Rows that are absorbed together.
@@ -130,9 +130,9 @@ struct Piece {
     dependence: f64,
 }
 
-/// Whether anything speaks for parts of the data that contradict each other, which a comparison by slopes then shows or not: errors that
-/// are correlated over time or with the prediction. A filter takes what contradicts its model as process noise, and leaves
-/// little of it in the errors; outputs of static models have no order.
+/// Whether parts of the data are compared, which takes slopes: where errors are correlated over time or with the prediction. Always of
+/// filters, which estimate what contradicts them as process noise, so that their errors stay white; and of static models, whose
+/// samples have no order.
 fn is_suspicious(judgement: &Judgement<'_>) -> bool {
     let least = judgement.residuals.shape.iter().copied().fold(judgement.residuals.parts, f64::min);
     let follow = least * (judgement.objective.outputs() as f64) < LEVEL && !judgement.rounding;

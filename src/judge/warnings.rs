@@ -87,8 +87,8 @@ impl Judgement<'_> {
             let text = format!("the checkpoint could not be written ({write_error}); the search went on without it");
             warnings.push(Warning { code: WarningCode::CheckpointNotWritten, severity: Severity::Usable, text });
         }
-        let curved = curved::curved(self, unknowns, covariances);
-        warnings.extend(curved.or_else(|| kinks::kinked(self, unknowns, covariances)));
+        warnings.extend(curved::curved(self, unknowns, covariances));
+        warnings.extend(kinks::kinked(self, unknowns, covariances));
         warnings.extend(self.uneven(unknowns, covariances));
         warnings.extend(self.decided_by_few(unknowns, covariances));
         warnings.extend(sizes::uneven_errors(unknowns, covariances));

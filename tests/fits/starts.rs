@@ -82,7 +82,10 @@ fn one_of_many_wrong_minima_is_not_usable() {
     let fit = Fit::new(&Sine, &record).parameters(start).starts(10).run().unwrap();
     println!("{fit} {:?}", fit.starts);
     let once = fit.warnings.iter().find(|one| one.code == WarningCode::MinimumFoundOnce).unwrap();
-    assert!(once.severity == Severity::NotUsable && once.text.contains("leaves errors that are not noise"), "{once:?}");
+    assert!(
+        once.severity == Severity::NotUsable && once.text.contains("leaves errors that are correlated over time"),
+        "{once:?}"
+    );
 }
 
 signals! { pub struct Swings { y: "V", z: "V" } }

@@ -1,7 +1,7 @@
-//! How the errors that parts of the data leave, each with a step of its own, are correlated over time.
+//! Correlation over time of the errors that remain when each part of the data has taken its own step.
 //!
-//! What contradicts the common estimate correlates the errors beside it: only what is left without the contradiction tells how many
-//! errors have the information of one.
+//! At the common estimate, a contradiction between parts makes the errors correlated by itself. How many errors have the information of
+//! one is therefore taken from those that remain without the contradiction.
 
 use super::Piece;
 use crate::judge::whiteness::{LAGS, Whiteness};
@@ -9,7 +9,7 @@ use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
 use crate::whiteness::Portmanteau;
 
-/// What is left of an output's errors by a piece.
+/// Correlations and number of the errors of one output that remain in a piece.
 #[derive(Clone)]
 struct Left {
     sums: Portmanteau,

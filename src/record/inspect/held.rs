@@ -6,8 +6,8 @@ use core::ops::Range;
 /// The fewest values that are looked at, and the part of them that stand for several samples.
 const FEWEST: usize = 20;
 const PART: f64 = 0.95;
-/// Changes of up to so many times the smallest one are single steps of a rounded value: that of a slow movement changes by
-/// these, too, each time after some samples.
+/// Changes of up to so many times the smallest one are single steps of a rounded value. A slow movement that is rounded changes by single
+/// steps, each after some samples, without a slow sensor.
 const STEP: f64 = 1.5;
 
 /// Values that stand for several samples each, nearly all of them, and change by more than single steps.
