@@ -136,11 +136,14 @@ fn inspect(channel: &Channel, pieces: &[Range<usize>], output: bool) -> ChannelI
     let extremes = found.extremes().map_or(vec![], Vec::from);
     let mut suspicions = Vec::from_iter(found.sentinel(&extremes));
     if output && suspicions.is_empty() {
-        suspicions.extend(found.clipped(&extremes));
-        suspicions.extend(found.frozen().filter(|_| suspicions.is_empty()));
-        if suspicions.is_empty() && found.repeats_mostly() {
+        // Where each value is held, so are the extremes.
+        if found.repeats_mostly() {
             suspicions.extend(held::held(values, pieces));
         }
+        if suspicions.is_empty() {
+            suspicions.extend(found.clipped(&extremes));
+        }
+        suspicions.extend(found.frozen().filter(|_| suspicions.is_empty()));
         if suspicions.is_empty() && pieces.len() == 1 && found.continuous() {
             suspicions.extend(repeated::repeated(values));
         }

@@ -89,6 +89,12 @@ fn limits_stops_and_copies_are_found() {
     let mut frozen = signal(500);
     frozen[200..260].fill(0.1);
     assert_eq!(suspicions(&frozen), [Suspicion::Frozen { value: 0.1, samples: 200..260 }]);
+    // Steps are no limits, though the largest of them occurs ten times and the values beside it once each.
+    let levels = signal(500);
+    let steps: Vec<f64> = (0..500).map(|k| levels[k / 11 * 11] * if k % 11 == 0 { 0.999 } else { 1.0 }).collect();
+    assert_eq!(suspicions(&steps), []);
+    let held: Vec<f64> = (0..500).map(|k| levels[k / 10 * 10]).collect();
+    assert_eq!(suspicions(&held), [Suspicion::Held { samples: 10 }]);
     let mut copied = signal(500);
     copied.copy_within(20..120, 300);
     assert_eq!(suspicions(&copied), [Suspicion::Repeated { samples: 20..120, again: 300 }]);

@@ -15,6 +15,8 @@ const KNOWN: [f64; 9] = [-999.0, -9999.0, -99.0, 999.0, 9999.0, 99999.0, -99999.
 /// The fewest samples at a limit, and how much more often than its neighbor it must occur.
 const AT_LIMIT: usize = 5;
 const NEIGHBORS: usize = 4;
+/// The fewest other runs that are about as long as that of an extreme which is one step of several.
+const STEPS: usize = 3;
 /// The fewest samples of a value that stands still, and the expected number of such runs by chance.
 const STILL: usize = 10;
 const BY_CHANCE: f64 = 1e-6;
@@ -174,8 +176,16 @@ impl<'v> Values<'v> {
         };
         let clips =
             |extreme: &&Extreme| extreme.count >= AT_LIMIT && extreme.count >= AT_LIMIT + NEIGHBORS * at(extreme.next);
+        let limit = |extreme: &&Extreme| clips(extreme) && !self.is_step(extreme);
         let one = |&Extreme { value, count, .. }: &Extreme| Suspicion::Clipped { value, count };
-        extremes.iter().filter(clips).map(one).collect()
+        extremes.iter().filter(limit).map(one).collect()
+    }
+
+    /// Whether an extreme is one of several steps: it occurs in one run, and runs of other values are about as long.
+    fn is_step(&self, extreme: &Extreme) -> bool {
+        let runs = self.pieces.iter().flat_map(|piece| self.values[piece.clone()].chunk_by(|a, b| a == b));
+        let (at, others): (Vec<&[f64]>, Vec<&[f64]>) = runs.partition(|run| run[0] == extreme.value);
+        at.len() == 1 && others.iter().filter(|run| 2 * run.len() >= extreme.count).count() >= STEPS
     }
 
     /// The longest run of one value, if chance does not make it.
