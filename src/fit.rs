@@ -247,8 +247,8 @@ impl<'a, M: Model> Fit<'a, M> {
         self.set(|settings| settings.observe(observer, mode))
     }
 
-    /// Saves the state of the search into a file every `every` iterations, and resumes from the file if it exists. A
-    /// file of another problem is refused.
+    /// Saves the state of the search into a file every `every` iterations, and resumes from the file if it exists; a
+    /// search with other settings, or of another kind, begins at the point that was reached. A file of another problem is refused.
     pub fn checkpoint(self, path: impl Into<PathBuf>, every: u64) -> Self {
         self.set(|settings| settings.checkpoint(path, every))
     }

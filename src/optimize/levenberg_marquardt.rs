@@ -2,6 +2,7 @@
 
 mod exploration;
 mod solver;
+mod stored;
 
 use super::descent::{Descent, Reach, Trial, length};
 use super::machine::{Domain, Machine, Request};
@@ -10,6 +11,7 @@ use super::{Infeasible, Linearization, Outcome, SearchLimit, Stop};
 use crate::scaling::{OwnSize, Scaling, Seen};
 use exploration::Exploration;
 use serde::{Deserialize, Serialize};
+use stored::Stored;
 
 /// The method of Levenberg (1944) and Marquardt (1963), in bounds, with steps measured by the unknowns' own sizes.
 ///
@@ -41,12 +43,16 @@ use serde::{Deserialize, Serialize};
 /// # }
 /// ```
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(
+    into = "Stored<S>",
+    try_from = "Stored<S>",
+    bound(serialize = "S: Clone + Serialize", deserialize = "S: Deserialize<'de>")
+)]
 pub struct LevenbergMarquardt<S = OwnSize> {
     /// When to stop.
     pub stop: Stop,
     /// Scale of each unknown: the length of a step is measured in it.
     pub scaling: S,
-    #[serde(with = "crate::real")]
     x: Vec<f64>,
     seen: Seen,
     descent: Descent,
@@ -60,11 +66,8 @@ pub struct LevenbergMarquardt<S = OwnSize> {
     outcome: Option<Outcome>,
     /// Whether the problem may have second derivatives.
     curved: bool,
-    #[serde(skip)]
     domain: Domain,
-    #[serde(skip)]
     stage: Stage,
-    #[serde(skip)]
     point: Option<Point>,
 }
 

@@ -40,7 +40,10 @@ impl<'o> Absorber<'o> {
     pub fn absorb(&mut self, window: &mut Window) {
         let count = window.len() * window.outputs();
         if self.plain {
-            self.square(window);
+            self.count(window);
+            if window.lanes() > 1 {
+                self.square(window);
+            }
         } else {
             self.weigh(window);
         }
@@ -57,12 +60,16 @@ impl<'o> Absorber<'o> {
         }
     }
 
-    /// Sums of squares.
+    /// Sums of squares of parallel lanes.
     fn square(&mut self, window: &mut Window) {
-        let (lanes, columns, outputs) = (window.lanes(), window.columns(), window.outputs());
-        self.squares.resize(lanes, 0.0);
-        let width = window.width;
+        let (width, columns) = (window.width, window.columns());
+        self.squares.resize(window.lanes(), 0.0);
         wide::run(width, Square { rows: window.rows_mut(), columns, squares: &mut self.squares });
+    }
+
+    /// Counts the measurements.
+    fn count(&mut self, window: &Window) {
+        let outputs = window.outputs();
         for (lane, rows) in self.rows.iter_mut().enumerate() {
             *rows += match window.whole {
                 true => (window.samples[lane] * outputs) as u64,
@@ -97,7 +104,11 @@ impl<'o> Absorber<'o> {
 
     /// Cost and triangle of a job.
     pub fn part(&mut self, lane: usize) -> (f64, Information) {
-        let cost = self.weighing[lane].cost + 0.5 * self.squares.get(lane).unwrap_or(&0.0);
+        let squares = match &self.alone {
+            Some(alone) if self.plain => alone.squares,
+            _ => self.squares.get(lane).copied().unwrap_or(0.0),
+        };
+        let cost = self.weighing[lane].cost + 0.5 * squares;
         let triangle = match (&mut self.alone, &self.triangles) {
             (Some(alone), _) => alone.triangle(),
             (None, Some(triangles)) => triangles.triangle(lane),
@@ -111,11 +122,13 @@ impl<'o> Absorber<'o> {
 struct Alone {
     information: Information,
     block: Block,
+    /// The sum of the squares of the errors.
+    squares: f64,
 }
 
 impl Alone {
     fn new(columns: usize) -> Self {
-        Alone { information: Information::new(columns), block: Block::new(columns, ROWS) }
+        Alone { information: Information::new(columns), block: Block::new(columns, ROWS), squares: 0.0 }
     }
 
     fn absorb(&mut self, mut rows: &[f64]) {
@@ -128,6 +141,7 @@ impl Alone {
                 let to = &mut self.block.column_mut(column)[len..len + count];
                 to.iter_mut().zip(now.iter().skip(column).step_by(width)).for_each(|(to, from)| *to = *from);
             }
+            self.squares += sum_of_squares(&self.block.column_mut(width - 1)[len..len + count]);
             self.block.set_len(len + count);
             if self.block.is_full() {
                 self.information.absorb(&mut self.block);
@@ -140,6 +154,18 @@ impl Alone {
         self.information.absorb(&mut self.block);
         self.information.clone()
     }
+}
+
+/// In eight sums, so that no addition waits for the one before.
+fn sum_of_squares(values: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let eights = values.chunks_exact(8);
+    let rest = eights.remainder();
+    for eight in eights {
+        sums.iter_mut().zip(eight).for_each(|(sum, value)| *sum += value * value);
+    }
+    sums.iter_mut().zip(rest).for_each(|(sum, value)| *sum += value * value);
+    sums.iter().sum()
 }
 
 /// Adds the squares of the errors, the last column of each row, to each lane's sum.

@@ -11,6 +11,7 @@ use argmin::core::State;
 use argmin::core::checkpointing::{Checkpoint, CheckpointingFrequency};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use serde_json::value::RawValue;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
@@ -28,8 +29,9 @@ pub(crate) struct CheckpointFile {
     write_error: Arc<Mutex<Option<String>>>,
 }
 
+/// What the file holds. The solver is kept as text, so that all else is compiled once, not for each kind of solver.
 #[derive(Serialize, Deserialize)]
-struct Saved<S> {
+struct Saved {
     /// Format of the file.
     format: Format,
     version: Version,
@@ -39,10 +41,13 @@ struct Saved<S> {
     coordinates: Vec<f64>,
     /// The solver as it was set, as text.
     settings: String,
-    solver: S,
+    solver: Box<RawValue>,
 }
 
-crate::format::format!("greybox checkpoint", 2);
+crate::format::format!("greybox checkpoint", 3);
+
+const OTHER: &str = "it belongs to another problem (other data, equations, constants, weighting, parameters or settings); \
+                     delete it or name another file";
 
 /// Point, iterations so far, and the solver if it can be resumed.
 type Resumed<S> = (Vec<f64>, u64, Option<S>);
@@ -70,6 +75,13 @@ impl CheckpointFile {
     /// The point, the iterations so far and, if its settings are those of this run, the solver of an earlier run;
     /// `None` if there is no file yet.
     pub fn load<S: DeserializeOwned>(&self) -> Result<Option<Resumed<S>>, Error> {
+        let Some(saved) = self.read()? else { return Ok(None) };
+        let solver = (saved.settings == self.settings).then(|| serde_json::from_str(saved.solver.get()));
+        let solver = solver.transpose().map_err(|error| self.unreadable(&error))?;
+        Ok(Some((saved.coordinates, saved.iterations, solver)))
+    }
+
+    fn read(&self) -> Result<Option<Saved>, Error> {
         // Reading a device may never end, and a device must not be replaced by a file.
         if std::fs::metadata(&self.path).is_ok_and(|meta| !meta.is_file()) {
             let problem = "it is no regular file; name one that can be written".to_owned();
@@ -80,22 +92,30 @@ impl CheckpointFile {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(Error::File { path: self.path.clone(), source: Box::new(error) }),
         };
-        let wrong = |problem: String| Error::Checkpoint { path: self.path.clone(), problem };
-        let saved: Saved<S> = crate::format::read::<Format, Version, _>(&text)
-            .map_err(|error| wrong(format!("it cannot be read ({error}); delete it to start afresh")))?;
-        if !saved.problem.is_same(&self.fingerprint) {
-            return Err(wrong(
-                "it belongs to another problem (other data, equations, constants, weighting, parameters or settings); delete it or name another file"
-                    .to_owned(),
-            ));
+        let saved: Saved = crate::format::read::<Format, Version, _>(&text).map_err(|error| self.unreadable(&error))?;
+        match saved.problem.is_same(&self.fingerprint) {
+            true => Ok(Some(saved)),
+            false => Err(Error::Checkpoint { path: self.path.clone(), problem: OTHER.to_owned() }),
         }
-        let solver = (saved.settings == self.settings).then_some(saved.solver);
-        Ok(Some((saved.coordinates, saved.iterations, solver)))
+    }
+
+    fn unreadable(&self, error: &serde_json::Error) -> Error {
+        let problem = format!("it cannot be read ({error}); delete it to start afresh");
+        Error::Checkpoint { path: self.path.clone(), problem }
     }
 
     /// Writes a temporary file in the same folder and renames it.
     pub fn write<S: Serialize>(&self, coordinates: &[f64], iterations: u64, solver: &S) -> Result<(), Error> {
-        let saved = Saved {
+        self.write_text(coordinates, iterations, serde_json::to_string(solver))
+    }
+
+    fn write_text(
+        &self,
+        coordinates: &[f64],
+        iterations: u64,
+        solver: Result<String, serde_json::Error>,
+    ) -> Result<(), Error> {
+        let saved = |solver| Saved {
             format: Format,
             version: Version,
             problem: self.fingerprint.clone(),
@@ -105,7 +125,8 @@ impl CheckpointFile {
             solver,
         };
         let file = |source: Box<dyn std::error::Error + Send + Sync>| Error::File { path: self.path.clone(), source };
-        let text = serde_json::to_string(&saved).map_err(|error| file(Box::new(error)))?;
+        let text = solver.and_then(RawValue::from_string).and_then(|solver| serde_json::to_string(&saved(solver)));
+        let text = text.map_err(|error| file(Box::new(error)))?;
         write_whole(&self.path, text.as_bytes()).map_err(|error| file(Box::new(error)))
     }
 }

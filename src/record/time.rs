@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// When the samples were taken (s).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -39,6 +40,14 @@ impl Time {
         match self {
             Time::Uniform { start, step } => start + k as f64 * step,
             Time::Stamps(stamps) => stamps.get(k).copied().unwrap_or(f64::NAN),
+        }
+    }
+
+    /// Appends the times of samples (s).
+    pub(crate) fn append(&self, samples: Range<usize>, to: &mut Vec<f64>) {
+        match self {
+            Time::Uniform { start, step } => to.extend(samples.map(|k| start + k as f64 * step)),
+            Time::Stamps(stamps) => to.extend_from_slice(&stamps[samples]),
         }
     }
 

@@ -154,7 +154,8 @@ impl<M: Model, I: Integrator> Loops<M> for I {
         };
         #[cfg(not(debug_assertions))]
         let passes = match (seeds.len(), wide) {
-            (0, _) => task.passes::<f64>(Portable),
+            (0, None) => task.passes::<f64>(Portable),
+            (0, Some(wide)) => task.passes::<Dual<0, Fused>>(wide),
             (1..=4, None) => task.passes::<Dual<4>>(Portable),
             (5 | 6 | 9..=12, None) => task.passes::<Dual<6>>(Portable),
             (_, None) => task.passes::<Dual<8>>(Portable),
@@ -304,8 +305,8 @@ impl<M: Model, I> Task<'_, M, I> {
     {
         // A constant in the AVX-512 loop, so that the compiler moves out of the stages what depends on the input alone.
         let hold = if <D::Slope as lanes::Number>::FUSED { Hold::Zero } else { self.piece.record.input_hold() };
-        let u0 = rows.inputs[k];
-        let u1 = if hold == Hold::First { rows.inputs[k + 1] } else { u0 };
+        let u0 = M::Input::from_array(rows.inputs[k]);
+        let u1 = if hold == Hold::First { M::Input::from_array(rows.inputs[k + 1]) } else { u0 };
         let interval = Interval { t0: rows.times[k], t1: rows.times[k + 1], u0, u1, hold };
         ModelSystem { model: self.model, interval: &interval, p }.step(self.integrator, x, step)
     }
@@ -363,19 +364,22 @@ impl<M: Model, I: Integrator, D: Number> Fill<'_, '_, M, I, D> {
             if k == samples {
                 break;
             }
-            let u = M::Input::map(rows.inputs[row], D::from);
+            let u = M::Input::map(M::Input::from_array(rows.inputs[row]), D::from);
             let expected = task.model.output(D::from(rows.times[row]), &x, &u, &p);
-            let (expected, found) = (M::Output::into_array(expected), M::Output::into_array(rows.outputs[k]));
+            let (expected, found) = (M::Output::into_array(expected), rows.outputs[k]);
             for (j, (expected, found)) in expected.into_iter().zip(found).enumerate() {
                 let (here, number) = (!found.is_nan(), k * M::Output::LEN + j);
                 measured[number] = u32::from(here);
                 let row = &mut filled[number * columns..][..columns];
                 let error = found - expected.value();
                 whole &= error.is_finite();
-                row[columns - 1] = if here { error } else { 0.0 };
-                for (i, slope) in row[first..first + used].iter_mut().enumerate() {
-                    *slope = if here { expected.slope(i) } else { 0.0 };
+                let slope = |i: usize| if here { expected.slope(i) } else { 0.0 };
+                match row.get_mut(first..first + D::SLOPES) {
+                    // A count that the compiler knows; one slope more than used is where the error goes next.
+                    Some(row) => row.iter_mut().enumerate().for_each(|(i, to)| *to = slope(i)),
+                    None => row[first..first + used].iter_mut().enumerate().for_each(|(i, to)| *to = slope(i)),
                 }
+                row[columns - 1] = if here { error } else { 0.0 };
             }
         }
         window.whole = whole;

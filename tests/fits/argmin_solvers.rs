@@ -189,6 +189,10 @@ fn a_checkpoint_goes_on() {
     let again = fit(&record).checkpoint(&path, 1).run().unwrap();
     assert!(again.outcome.converged() && again.evaluations > 0 && again.iterations >= resumed.iterations, "{again}");
     assert!((again.parameters.gain - whole.parameters.gain).abs() < 1e-6 * error);
+    // Another search begins at the point that was reached.
+    let other_search = fit(&record).optimizer(GaussNewton::default()).checkpoint(&path, 1).run().unwrap();
+    assert!(other_search.outcome.converged() && other_search.iterations >= again.iterations, "{other_search}");
+    assert!(other_search.evaluations <= 2, "it begins at the minimum: {}", other_search.evaluations);
     let refused = fit(&other).checkpoint(&path, 1).run().unwrap_err().to_string();
     assert!(refused.contains("another problem"), "{refused}");
     std::fs::write(&path, "{}").unwrap();

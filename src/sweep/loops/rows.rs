@@ -3,7 +3,8 @@
 use super::WINDOW;
 use crate::model::Model;
 use crate::record::Record;
-use crate::signals::{Of, Signals};
+use crate::signals::Signals;
+use std::ops::Range;
 
 /// The rows of one window, with the sample after its last one, and the samples before from which it is predicted; made
 /// once, and filled for each window.
@@ -14,8 +15,8 @@ pub(super) struct Rows<'p, M: Model> {
     /// How many samples there are before the window's first.
     pub before: usize,
     pub times: Vec<f64>,
-    pub inputs: Vec<Of<M::Input, f64>>,
-    pub outputs: Vec<Of<M::Output, f64>>,
+    pub inputs: Vec<<M::Input as Signals>::Array<f64>>,
+    pub outputs: Vec<<M::Output as Signals>::Array<f64>>,
 }
 
 impl<'p, M: Model> Rows<'p, M> {
@@ -36,10 +37,18 @@ impl<'p, M: Model> Rows<'p, M> {
         self.before = before.min(begin);
         let all = begin - self.before..record.len().min(begin + samples + 1);
         self.times.clear();
-        self.times.extend(all.clone().map(|k| record.time(k)));
-        self.inputs.clear();
-        self.inputs.extend(all.map(|k| M::Input::from_fn(|i| inputs[i][k])));
-        self.outputs.clear();
-        self.outputs.extend((begin..begin + samples).map(|k| M::Output::from_fn(|j| outputs[j][k])));
+        record.times().append(all.clone(), &mut self.times);
+        gather::<M::Input>(inputs, all, &mut self.inputs);
+        gather::<M::Output>(outputs, begin..begin + samples, &mut self.outputs);
+    }
+}
+
+/// Samples of columns, row by row.
+fn gather<S: Signals>(columns: &[&[f64]], samples: Range<usize>, rows: &mut Vec<S::Array<f64>>) {
+    rows.resize(samples.len(), S::array_from_fn(|_| 0.0));
+    for (i, column) in columns.iter().enumerate() {
+        for (row, value) in rows.iter_mut().zip(&column[samples.clone()]) {
+            row.as_mut()[i] = *value;
+        }
     }
 }
