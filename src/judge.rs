@@ -23,6 +23,7 @@ mod output_sums;
 mod powers;
 mod predicted;
 mod residual_pass;
+mod rise;
 mod sandwich;
 mod shape;
 mod shares;

@@ -7,6 +7,7 @@
 
 use super::conclude::Judgement;
 use super::covariances::Covariances;
+use super::rise::{Place, least_rise};
 use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::numeral::{number, percent};
 use crate::optimize::{Outcome, Severity};
@@ -23,6 +24,9 @@ const LONGEST: u64 = 200_000;
 const MOST: usize = 8;
 /// Part of the half width by which an end may move without a warning.
 const ASYMMETRY: f64 = 0.25;
+/// Half widths of an interval at which the cost is looked at, and the part of the rise which slopes say that is little there: an interval
+/// by the likelihood is longer by the root of two or more, or reaches at least as far.
+const FLAT: [(f64, f64); 4] = [(-1.0, 0.5), (1.0, 0.5), (-2.0, 0.25), (2.0, 0.25)];
 /// Quantile of the normal distribution for an interval of 95 %.
 pub(super) const QUANTILE: f64 = 1.96;
 
@@ -48,21 +52,57 @@ pub(super) fn curved(judgement: &Judgement<'_>, unknowns: &[Unknown], covariance
         return None;
     }
     examined.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let bent = examined.into_iter().take(MOST).filter_map(|(_, i)| Some((i, asymmetry(judgement, i, covariances)?)));
-    let (i, asymmetry) = bent.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+    examined.truncate(MOST);
+    let examined: Vec<usize> = examined.into_iter().map(|(_, i)| i).collect();
+    let text = bent(judgement, unknowns, &examined, covariances)
+        .or_else(|| flat(judgement, unknowns, &examined, covariances))?;
+    Some(Warning { code: WarningCode::CurvedInterval, severity: Severity::UsableWithCare, text })
+}
+
+/// The unknown whose interval the curvature at the estimate moves most.
+fn bent(
+    judgement: &Judgement<'_>,
+    unknowns: &[Unknown],
+    examined: &[usize],
+    covariances: &Covariances,
+) -> Option<String> {
+    let of = |&i: &usize| Some((i, asymmetry(judgement, i, covariances)?));
+    let (i, asymmetry) = examined.iter().filter_map(of).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
     if asymmetry.abs() <= ASYMMETRY {
         return None;
     }
     let unknown = &unknowns[i];
     let (by_logarithm, side) = (by_logarithm(unknown.transform, unknown.value), side(asymmetry));
-    let text = format!(
+    Some(format!(
         "the interval of `{}` is linear where the model is not: by its curvature it should reach {} further {side} than \
          it says ({} standard errors of curvature); {by_logarithm}take diagnose::profile",
         unknown.name,
         percent(asymmetry.abs(), 2),
         number(2.0 * asymmetry.abs() / QUANTILE, 2)
-    );
-    Some(Warning { code: WarningCode::CurvedInterval, severity: Severity::UsableWithCare, text })
+    ))
+}
+
+/// The unknown towards whose end the cost rises too little. The curvature at the estimate may be small where that further on is not, and its
+/// part along the other unknowns moves these instead of the ends.
+fn flat(
+    judgement: &Judgement<'_>,
+    unknowns: &[Unknown],
+    examined: &[usize],
+    covariances: &Covariances,
+) -> Option<String> {
+    let place = |unknown, (halves, little)| Place { unknown, standard_errors: halves * QUANTILE, little };
+    let places = examined.iter().flat_map(|&i| FLAT.map(|at| place(i, at)));
+    let (place, part) = least_rise(judgement, places, covariances)?;
+    let unknown = &unknowns[place.unknown];
+    Some(format!(
+        "the interval of `{}` is too short {}: {} the cost rises by {} of what the slopes at the estimate say; {}take \
+         diagnose::profile",
+        unknown.name,
+        if place.standard_errors > 0.0 { "above" } else { "below" },
+        if place.standard_errors.abs() > QUANTILE { "twice as far" } else { "at its end" },
+        percent(part.max(0.0), 2),
+        by_logarithm(unknown.transform, unknown.value)
+    ))
 }
 
 /// The change of all coordinates along the profile of an unknown, by one standard error of it.
