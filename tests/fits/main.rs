@@ -42,6 +42,7 @@ mod spiral;
 mod starts;
 mod step_errors;
 mod stiff;
+mod stopped;
 mod threads;
 mod user_code;
 mod white_contradictions;
