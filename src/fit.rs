@@ -237,7 +237,8 @@ impl<'a, M: Model> Fit<'a, M> {
         self.set(|settings| settings.counter(counter))
     }
 
-    /// Stops the search at its best point so far after this time.
+    /// Stops the search at its best point so far after this time. Of the tests that follow, those are left out that
+    /// were not made by then, which a warning says ([`NotExamined`](crate::WarningCode::NotExamined)).
     pub fn time_limit(self, limit: Duration) -> Self {
         self.set(|settings| settings.time_limit(limit))
     }

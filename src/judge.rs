@@ -18,6 +18,7 @@ mod known;
 mod largest;
 mod memory;
 pub(crate) mod noise;
+mod not_examined;
 mod outliers;
 mod output_sums;
 mod powers;

@@ -94,6 +94,8 @@ pub enum WarningCode {
     Aliased,
     /// Intervals of a search that did not end at a minimum.
     NotAtMinimum,
+    /// The time limit was over, or the fit cancelled, before all tests of the estimate had been made.
+    NotExamined,
     /// One of several starts led to the estimate.
     MinimumFoundOnce,
     /// Another minimum explains the data as well.

@@ -9,8 +9,6 @@ use crate::optimize::{Domain, Infeasible, LeastSquares, Linearization, Machine, 
 use crate::problem::{At, Control, Objective, Problem, Round, Whitening, each, linearize_together};
 use std::time::Instant;
 
-static NEVER: Control = Control::NEVER;
-
 /// A search that has not ended.
 pub(super) struct Search<'p> {
     rounds: Rounds<'p>,
@@ -82,11 +80,18 @@ impl<'p> Search<'p> {
         self.rounds.iterations() + self.iterations
     }
 
+    /// The end of the search where its flag or time limit stopped the first evaluation of a later round.
+    pub fn stopped(&self, error: &Infeasible) -> Option<SearchEnd> {
+        self.rounds.stopped().filter(|_| *error == Infeasible::Cancelled)
+    }
+
     /// Passes on the evaluation and advances the search to its next request.
     pub fn tell(mut self: Box<Self>, answer: Result<Linearization, Infeasible>) -> Stage<'p> {
         self.evaluations += 1;
         match (self.machine.linearization().is_some(), &answer) {
-            (false, Err(_)) => return Stage::Alone,
+            (false, Err(error)) => {
+                return self.stopped(error).map_or(Stage::Alone, |end| Stage::Ended(Box::new(end)));
+            }
             (begun, _) => self.iterations += u64::from(begun),
         }
         self.machine.tell(answer);
@@ -254,7 +259,7 @@ fn conclude_together(
     (0..plain.len()).map(finish).collect()
 }
 
-/// The objective that a search ended with. The time limit does not apply to the conclusion.
+/// The objective that a search ended with.
 fn at_end<'p>(plain: &Objective<'p>, end: &SearchEnd) -> Objective<'p> {
-    Objective { memory: end.memory.clone(), control: &NEVER, ..plain.with(end.whitening.clone()) }
+    Objective { memory: end.memory.clone(), ..plain.with(end.whitening.clone()) }
 }

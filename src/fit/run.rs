@@ -66,9 +66,7 @@ impl Problem<'_> {
             1 => SearchEnd { starts: start.ends, ..search(&plain, &optimizer, start.coordinates)? },
             count => search_from_many(&plain, &optimizer, count, start.ends.as_ref())?,
         };
-        // The time limit does not apply to the conclusion.
-        let objective = plain.with(end.whitening.clone());
-        let objective = Objective { memory: end.memory.clone(), control: &NEVER, ..objective };
+        let objective = Objective { memory: end.memory.clone(), ..plain.with(end.whitening.clone()) };
         conclude(&objective, &end, begin.elapsed().as_secs_f64())
     }
 

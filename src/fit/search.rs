@@ -66,6 +66,8 @@ pub(super) struct Rounds<'r> {
     /// Trial steps that are left of the limit.
     left: u64,
     evaluations: u64,
+    /// The end of the last round, if there has been one.
+    last: Option<SearchEnd>,
 }
 
 impl<'r> Rounds<'r> {
@@ -106,6 +108,7 @@ impl<'r> Rounds<'r> {
             iterations: 0,
             left: optimizer.most(),
             evaluations: 0,
+            last: None,
         }
     }
 
@@ -113,10 +116,16 @@ impl<'r> Rounds<'r> {
         loop {
             let objective = self.objective();
             let result = self.next.round(&objective, self.coordinates.clone(), file.as_ref());
-            let result = result.map_err(|error| match error {
-                RoundError::Start(error) => start_error(self.plain, &self.coordinates, error),
-                RoundError::Optimizer(text) => Error::Optimizer(text),
-            })?;
+            let result = match (result, self.stopped()) {
+                (Err(RoundError::Start(Infeasible::Cancelled)), Some(end)) => {
+                    let write_error = file.and_then(|file| file.write_error());
+                    return Ok(SearchEnd { write_error, ..end });
+                }
+                (result, _) => result.map_err(|error| match error {
+                    RoundError::Start(error) => start_error(self.plain, &self.coordinates, error),
+                    RoundError::Optimizer(text) => Error::Optimizer(text),
+                })?,
+            };
             let round = ended(&objective, result);
             let noise = self.asks_noise(&round).then(|| noise::estimate(&objective, &round.coordinates));
             if let Some(mut end) = self.take(objective, round, noise) {
@@ -134,6 +143,12 @@ impl<'r> Rounds<'r> {
     /// The objective of the next round.
     pub fn objective(&self) -> Objective<'r> {
         Objective { memory: self.memory.clone(), ..self.plain.with(self.whitening.clone()) }
+    }
+
+    /// The end of a search that was stopped before the first evaluation of a later round: that of the round before.
+    pub fn stopped(&self) -> Option<SearchEnd> {
+        let outcome = self.plain.control.named(Outcome::Cancelled);
+        self.last.clone().map(|last| SearchEnd { outcome, ..last })
     }
 
     /// What the limit of this search is of, where it is not that of the user.
@@ -165,6 +180,13 @@ impl<'r> Rounds<'r> {
         self.evaluations += round.evaluations;
         self.coordinates = round.coordinates;
         let (mut outcome, mut linear) = (round.outcome, round.linear);
+        let noise = match noise {
+            Some(Err(Infeasible::Cancelled)) => {
+                outcome = objective.control.named(Outcome::Cancelled);
+                None
+            }
+            noise => noise,
+        };
         let mut settled = noise.is_none();
         if let Some(found) = noise {
             let found = found.unwrap_or_else(|_| self.whitening.clone());
@@ -190,7 +212,7 @@ impl<'r> Rounds<'r> {
         };
         self.next = self.optimizer.limited(self.left);
         self.memory = objective.memory;
-        settled.then(|| SearchEnd {
+        let end = SearchEnd {
             coordinates: self.coordinates.clone(),
             whitening: self.whitening.clone(),
             linear,
@@ -201,7 +223,12 @@ impl<'r> Rounds<'r> {
             write_error: None,
             memory: self.memory.clone(),
             starts: None,
-        })
+        };
+        if settled {
+            return Some(end);
+        }
+        self.last = Some(end);
+        None
     }
 }
 
@@ -300,10 +327,12 @@ fn stopped(objective: &Objective<'_>) -> Error {
 mod tests {
     use super::{Rounds, roughness};
     use crate::error::Error;
-    use crate::optimize::{JacobianColumns, LevenbergMarquardt, Outcome, SearchLimit, Stop};
+    use crate::optimize::{Infeasible, JacobianColumns, LevenbergMarquardt, Outcome, SearchLimit, Stop};
     use crate::problem::{Control, Round, Whitening};
     use crate::tests::{Current, Gain, Line, Voltage};
     use crate::{Experiment, ExperimentOf, Fit, Huber, Time, free};
+    use std::sync::Arc;
+    use std::sync::atomic::AtomicBool;
 
     /// A gain of two, and errors that are no line.
     fn record() -> ExperimentOf<Line> {
@@ -361,6 +390,37 @@ mod tests {
         assert!((1..100).all(|_| take().is_none()));
         let limit = SearchLimit::NoiseRounds;
         assert_eq!(take(), Some((Outcome::OwnLimit { iterations: 200, limit }, 200, 300)));
+    }
+
+    /// A flag that is set while noise is estimated, or before the first evaluation of the next round, leaves the end of the last round.
+    #[test]
+    fn a_stop_between_rounds_leaves_an_end() {
+        let record = record();
+        let problem = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).problem().unwrap();
+        let control = Control { cancel: Some(Arc::new(AtomicBool::new(true))), deadline: None };
+        let plain = problem.in_units(&control);
+        let rounds = || {
+            let mut rounds = Rounds::with(&plain, &problem.settings.optimizer, vec![1.0], Whitening::none(1));
+            rounds.known = false;
+            rounds
+        };
+        let ended = || Round {
+            coordinates: vec![1.5],
+            linear: None,
+            outcome: Outcome::CostUnchanged { decrease: 0.0 },
+            iterations: 2,
+            evaluations: 3,
+            name: String::new(),
+        };
+        assert!(rounds().stopped().is_none() && rounds().run(None).is_err());
+        let mut next = rounds();
+        assert!(next.take(next.objective(), ended(), Some(Ok(Whitening::none(1).widened(2.0)))).is_none());
+        let end = next.run(None).unwrap();
+        assert_eq!((end.outcome, end.coordinates, end.iterations), (Outcome::Cancelled, vec![1.5], 2));
+        assert_eq!(end.whitening.sigma(), [2.0]);
+        let mut measuring = rounds();
+        let end = measuring.take(measuring.objective(), ended(), Some(Err(Infeasible::Cancelled))).unwrap();
+        assert_eq!((end.outcome, end.coordinates), (Outcome::Cancelled, vec![1.5]));
     }
 
     /// The record is named whose cost is not finite, also where each of its errors is.

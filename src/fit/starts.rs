@@ -135,7 +135,9 @@ impl<'p> Run<'p> {
     /// Passes on an evaluation. One that fails at the start is told why.
     fn told(self, answer: Answer, plain: &Objective<'_>, comparison: &Comparison) -> Run<'p> {
         let Run::Searching(search) = self else { return self };
-        if let (None, Err(error)) = (search.machine.linearization(), &answer) {
+        if let (None, Err(error)) = (search.machine.linearization(), &answer)
+            && search.stopped(error).is_none()
+        {
             return Run::Failed(NoEnd::at_start(start_error(plain, search.machine.place(), error.clone())));
         }
         Run::at(search.tell(answer), plain, comparison)

@@ -78,9 +78,10 @@ pub(super) struct Judgement<'j> {
     pub rounding: bool,
 }
 
-/// The summary at the end of a search; the objective has the whitening that it ended with.
+/// The summary at the end of a search; the objective has the whitening that it ended with. Cost, slopes and residuals there are computed
+/// whatever the objective's stop conditions. These end every further pass, and a warning tells that something was left out.
 pub(crate) fn conclude(objective: &Objective<'_>, end: &SearchEnd, seconds: f64) -> Result<Summary, Error> {
-    let residuals = residual_pass(objective, &end.coordinates)?;
+    let residuals = residual_pass(&objective.unlimited(), &end.coordinates)?;
     conclude_from(objective, end, residuals, seconds)
 }
 
@@ -103,7 +104,7 @@ pub(crate) fn conclude_from(
     let linear = match &end.linear {
         Some(linear) => linear,
         None => {
-            evaluated = objective.evaluate(&end.coordinates).map_err(reason)?;
+            evaluated = objective.unlimited().evaluate(&end.coordinates).map_err(reason)?;
             &evaluated
         }
     };

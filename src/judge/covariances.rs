@@ -11,7 +11,7 @@ use crate::estimate::CovarianceMethod;
 use crate::estimate::student::Spread;
 use crate::information::Covariance;
 use crate::layout::Kind;
-use crate::optimize::Outcome;
+use crate::optimize::{Infeasible, Outcome};
 use crate::problem::{Noise, Whitening};
 use crate::record::Time;
 
@@ -113,17 +113,21 @@ impl Judgement<'_> {
             let filtered = objective.problem.settings.prefilter.is_some();
             let method = if filtered { CovarianceMethod::FilteredSandwich } else { CovarianceMethod::Sandwich };
             let none = Robust { covariance: None, shares: None, degrees: vec![f64::INFINITY; degrees.len()] };
-            let found = sandwich::sandwich(objective, x, &self.exact).ok().unwrap_or(none);
-            let degrees = degrees.iter().zip(found.degrees).map(|(most, own)| own.min(*most)).collect();
-            let Robust { covariance, shares, .. } = found;
-            return CoordinateCovariance { covariance, method, factor, degrees, shares, uneven };
+            if let Some(found) = unless_stopped(sandwich::sandwich(objective, x, &self.exact)) {
+                let found = found.unwrap_or(none);
+                let degrees = degrees.iter().zip(found.degrees).map(|(most, own)| own.min(*most)).collect();
+                let Robust { covariance, shares, .. } = found;
+                return CoordinateCovariance { covariance, method, factor, degrees, shares, uneven };
+            }
         }
         let method = CovarianceMethod::Classical;
         // The widening applies to the errors, not to the priors.
         if self.widening != 1.0 && objective.problem.unknowns.priors(x).next().is_some() {
             let widened = objective.with(objective.whitening.widened(self.widening));
-            let covariance = widened.evaluate(x).ok().and_then(|linear| linear.covariance(&self.exact));
-            return CoordinateCovariance { covariance, method, factor, degrees, shares, uneven };
+            if let Some(linear) = unless_stopped(widened.evaluate(x)) {
+                let covariance = linear.and_then(|linear| linear.covariance(&self.exact));
+                return CoordinateCovariance { covariance, method, factor, degrees, shares, uneven };
+            }
         }
         let factor = factor * self.widening * self.widening;
         CoordinateCovariance { covariance: unit.clone(), method, factor, degrees, shares, uneven }
@@ -153,6 +157,15 @@ impl Judgement<'_> {
         let degrees = self.degrees / outputs;
         let left = (degrees - outputs).max(1.0);
         (degrees / (left + 1.0) * (degrees - 1.0) / left, left + 1.0)
+    }
+}
+
+/// The result of a pass, if it has one; `None` where stop conditions ended it: the classical covariance, which needs no pass, then takes its
+/// place.
+fn unless_stopped<T>(found: Result<T, Infeasible>) -> Option<Option<T>> {
+    match found {
+        Err(Infeasible::Cancelled) => None,
+        found => Some(found.ok()),
     }
 }
 

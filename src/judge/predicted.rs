@@ -60,6 +60,10 @@ impl Judgement<'_> {
                 own[i] += slope * direction[row] / unit.standard_error(i);
             }
         }
+        // Places that were not evaluated because of the time say nothing.
+        if self.objective.control.stops() {
+            return None;
+        }
         let most = self.degrees.max(FEWEST);
         let degrees = |square: f64| if square.is_finite() { (2.0 / square).clamp(FEWEST, most) } else { FEWEST };
         Some(Dependence { degrees: squares.into_iter().map(degrees).collect(), own })

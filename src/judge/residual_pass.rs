@@ -106,9 +106,9 @@ pub(crate) fn residual_pass(objective: &Objective<'_>, coordinates: &[f64]) -> R
     Ok(residuals(objective, coordinates, &all, step_error))
 }
 
-/// The same of several objectives of one record each, at points of their own; `None` for one that fails.
+/// The same of several objectives of one record each, at points of their own, whatever their stop conditions; `None` for one that fails.
 pub(crate) fn residuals_together(points: &[At<'_>]) -> Vec<Option<Residuals>> {
-    let plain: Vec<Objective<'_>> = points.iter().map(|(objective, _)| objective.in_units()).collect();
+    let plain: Vec<Objective<'_>> = points.iter().map(|(objective, _)| objective.in_units().unlimited()).collect();
     let in_units: Vec<At<'_>> = plain.iter().zip(points).map(|(plain, (_, x))| (plain, *x)).collect();
     let scales: Vec<Vec<Scale>> = points.iter().map(|(objective, _)| scales(objective)).collect();
     let all = gather_together(&in_units, |i| Sums::new(points[i].0, 0, &scales[i]));

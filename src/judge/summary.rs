@@ -133,7 +133,7 @@ impl Judgement<'_> {
         let objective = self.objective;
         // Weights enter the sum of squares, but are not part of the noise.
         if objective.is_weighted() && noise::only_scales(objective) {
-            let found = noise::estimate(objective, &self.end.coordinates).map_err(reason)?;
+            let found = noise::estimate(&objective.unlimited(), &self.end.coordinates).map_err(reason)?;
             return Ok(found.widened((self.residuals.measured as f64 / self.degrees.max(1.0)).sqrt()));
         }
         // The noise level of errors that are round-off is returned as computed, zero or not.

@@ -38,6 +38,7 @@ impl Judgement<'_> {
         directions: &[Direction],
         covariances: &Covariances,
     ) -> Vec<Warning> {
+        let early = self.objective.control.stops();
         let mut warnings = vec![];
         warnings.extend(self.of_the_data(unknowns));
         warnings.extend(data::data(self));
@@ -97,6 +98,7 @@ impl Judgement<'_> {
         warnings.extend(data_noise::input_noise(self, unknowns));
         warnings.extend(self.autocorrelation(covariances));
         warnings.extend(self.correlated_outputs());
+        warnings.extend(self.not_examined(early));
         warnings
     }
 

@@ -11,6 +11,8 @@ use crate::record::Record;
 use crate::sweep::{OVERFLOW, RunError, Sweep, Window};
 use std::sync::Arc;
 
+static NEVER: Control = Control::NEVER;
+
 /// The cost of a fit, for its own and for argmin's solvers.
 ///
 /// The unknowns are coordinates in a row: shared parameters, then each experiment's free initial states and own
@@ -72,6 +74,11 @@ impl<'p> Objective<'p> {
     /// The same with errors standardized otherwise.
     pub(crate) fn with(&self, whitening: Whitening) -> Self {
         Objective { whitening, ..self.clone() }
+    }
+
+    /// The same without stop conditions: for passes that an answer cannot do without.
+    pub(crate) fn unlimited(&self) -> Self {
+        Objective { control: &NEVER, ..self.clone() }
     }
 
     /// Norm of the standardized measurements; `None` where variances are predicted.

@@ -146,7 +146,8 @@ impl Settings {
         self
     }
 
-    /// Stops the search at its best point so far after this time.
+    /// Stops the search at its best point so far after this time. Of the tests that follow, those are left out that
+    /// were not made by then, which a warning says ([`NotExamined`](crate::WarningCode::NotExamined)).
     pub fn time_limit(mut self, limit: Duration) -> Self {
         self.time_limit = Some(limit);
         self

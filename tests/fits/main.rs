@@ -43,6 +43,7 @@ mod spiral;
 mod starts;
 mod step_errors;
 mod stiff;
+mod stopped;
 mod threads;
 mod user_code;
 mod white_contradictions;
