@@ -106,7 +106,7 @@ fn flat(
 }
 
 /// The change of all coordinates along the profile of an unknown, by one standard error of it.
-pub(super) fn along(judgement: &Judgement<'_>, i: usize, covariances: &Covariances) -> Option<Vec<f64>> {
+fn along(judgement: &Judgement<'_>, i: usize, covariances: &Covariances) -> Option<Vec<f64>> {
     let covariance = covariances.unknowns.as_ref()?;
     let error = covariance.standard_error(i);
     let of = |j: usize| if judgement.exact[j] { 0.0 } else { covariance.get(j, i) / (error * judgement.slopes[j]) };

@@ -2,7 +2,6 @@
 
 use super::conclude::Judgement;
 use super::covariances::Covariances;
-use super::curved::along;
 use super::directions;
 use crate::problem::Objective;
 
@@ -40,7 +39,11 @@ pub(super) fn least_rise(
 fn rise(judgement: &Judgement<'_>, at: Place, covariances: &Covariances) -> Option<f64> {
     let Place { unknown: i, standard_errors, little } = at;
     let objective = judgement.objective;
-    let step: Vec<f64> = along(judgement, i, covariances)?.iter().map(|along| standard_errors * along).collect();
+    // The others follow by the curvature of the cost, not by a covariance that counts colored errors.
+    let unit = judgement.linear.covariance(&judgement.exact)?;
+    let shift = standard_errors * covariances.unknowns.as_ref()?.standard_error(i) / judgement.slopes[i];
+    let along = |j: usize| if judgement.exact[j] { 0.0 } else { shift * unit.get(j, i) / unit.get(i, i) };
+    let step: Vec<f64> = (0..judgement.slopes.len()).map(along).collect();
     let expected = -judgement.linear.predicted_reduction(&step);
     let mut held = judgement.exact.clone();
     held[i] = true;
