@@ -12,6 +12,7 @@ mod data_noise;
 mod directions;
 mod dropouts;
 mod explained;
+mod feedback;
 mod hac;
 mod kinks;
 mod known;

@@ -7,6 +7,7 @@
 //! added and subtracted, in which all but the second order cancels.
 
 use super::conclude::Judgement;
+use super::feedback::Feedback;
 use crate::error::Error;
 use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::numeral::{number, p_value, percent};
@@ -73,26 +74,32 @@ pub(super) fn restart_noise(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> 
     let deviation = |((_, rho), fit): ((f64, f64), &crate::estimate::OutputFit)| fit.rmse * (-rho).max(0.0).sqrt();
     let sigma: Vec<f64> = found.zip(outputs).map(deviation).collect();
     let problem = judgement.objective.problem;
+    let feedback = Feedback::of(judgement);
     let bias = largest_bias(judgement, unknowns, |sign, draw| {
         let records = problem.records.iter().enumerate();
-        let noisy = records.map(|(e, record)| {
+        let noisy = |(e, record): (usize, &Record)| {
             let outputs = noisy(&record.outputs, &sigma, sign, draw, e);
-            Record { outputs: outputs.into(), ..record.clone() }
-        });
-        // The measurements that predictions are compared with stay as they are.
-        let restarted = problem.with_records(noisy.collect())?;
-        Ok(Problem { records: problem.records.clone(), ..restarted })
+            let inputs = feedback.inputs(record, &outputs);
+            Record { inputs: inputs.into(), outputs: outputs.into(), ..record.clone() }
+        };
+        let noisy: Vec<Record> = records.map(noisy).collect();
+        // The measurements that predictions are compared with have no more noise than before, but what inputs did to the plant.
+        let compared = feedback.outputs(judgement, &noisy);
+        Ok(Problem { records: compared, ..problem.with_records(noisy)? })
     })?;
     let Bias { unknown, errors, .. } = bias;
     if errors < NO_BIAS {
         return None;
     }
     let severity = if errors > BIAS { Severity::NotUsable } else { Severity::UsableWithCare };
+    let also = match feedback.names(problem.layout()) {
+        names if names.is_empty() => String::new(),
+        names => format!(", {} being fed back from the same measurements", names.join(" and ")),
+    };
     let text = format!(
         "the states from which predictions restart are noisy, or what disturbs the plant alternates: errors {steps} sample(s) apart \
-         are negatively correlated ({}). Either biases the estimate; noise, `{}` by about {} standard errors, and more where the \
-         inputs are fed back from the same measurements: use Kalman with Model::noise, filter the restarts (Horizon::filtered), or take a \
-         longer horizon",
+         are negatively correlated ({}). Either biases the estimate; noise, `{}` by about {} standard errors{also}: use Kalman with \
+         Model::noise, filter the restarts (Horizon::filtered), or take a longer horizon",
         p_value(least),
         unknown.name,
         number(errors, 2)

@@ -10,7 +10,7 @@ use super::whiteness::{LAGS, Whiteness};
 use crate::estimate::{Warning, WarningCode};
 use crate::numeral::{p_value, percent};
 use crate::optimize::Outcome;
-use crate::problem::Accumulate;
+use crate::problem::{Accumulate, Objective};
 use crate::record::Record;
 use crate::sweep::Window;
 use crate::whiteness::{Portmanteau, chi_squared_tail};
@@ -174,7 +174,17 @@ impl Accumulate for Following<'_> {
 
 /// The first errors of an experiment, output by output; `None` where nothing was measured.
 pub(super) fn first_errors(judgement: &Judgement<'_>, e: usize) -> Vec<Vec<Option<f64>>> {
-    let mut errors = vec![vec![]; judgement.objective.outputs()];
+    errors(judgement.objective, &judgement.end.coordinates, e, SAMPLES)
+}
+
+/// Errors of an experiment, in the units of the outputs, as far as this many samples or somewhat beyond.
+pub(super) fn errors(
+    objective: &Objective<'_>,
+    coordinates: &[f64],
+    e: usize,
+    samples: usize,
+) -> Vec<Vec<Option<f64>>> {
+    let mut errors = vec![vec![]; objective.outputs()];
     let visit = &mut |window: &mut Window| {
         for k in 0..window.samples[0] {
             for (j, errors) in errors.iter_mut().enumerate() {
@@ -182,9 +192,9 @@ pub(super) fn first_errors(judgement: &Judgement<'_>, e: usize) -> Vec<Vec<Optio
                 errors.push((window.is_measured(k, j, 0) && error.is_finite()).then_some(error));
             }
         }
-        errors[0].len() < SAMPLES
+        errors[0].len() < samples
     };
     // It stops early where there are enough.
-    let _ = judgement.objective.run_alone(e, &judgement.end.coordinates, false, visit);
+    let _ = objective.run_alone(e, coordinates, false, visit);
     errors
 }

@@ -1,0 +1,120 @@
+//! Inputs that follow the measurements of the same sample, as those of a controller do.
+//!
+//! What is new in a sample's measurements beside those before is its error of prediction. An input that follows it at once, beside what
+//! inputs and measurements before say of it, is fed back (Granger, Econometrica 37 (1969) 424, of instantaneous causality).
+
+use super::conclude::Judgement;
+use super::shape::{RECORDS, errors, first_errors};
+use crate::estimate::student::quantile;
+use crate::information::{Block, Information};
+use crate::layout::Layout;
+use crate::problem::Problem;
+use crate::record::{Channel, Record};
+
+/// Samples before that an input is explained by first.
+const BEFORE: usize = 2;
+/// Significance level of a gain; one that is not significant counts as zero.
+const LEVEL: f64 = 0.01;
+/// Rows that are absorbed together.
+const ROWS: usize = 256;
+
+/// By how much each input follows the measurement of each output, at the same sample.
+pub(super) struct Feedback {
+    /// `gains[input][output]`.
+    gains: Vec<Vec<f64>>,
+}
+
+impl Feedback {
+    /// From the errors of the first records.
+    pub fn of(judgement: &Judgement<'_>) -> Self {
+        let problem = judgement.objective.problem;
+        let (inputs, outputs) = (problem.layout().inputs.len(), judgement.objective.outputs());
+        let controls = 1 + BEFORE * (inputs + outputs);
+        let mut found = vec![Information::new(controls + outputs); inputs];
+        for (e, record) in problem.records.iter().enumerate().take(RECORDS) {
+            let errors = first_errors(judgement, e);
+            let rows = (BEFORE..errors[0].len()).filter_map(|k| {
+                let now: Option<Vec<f64>> = errors.iter().map(|errors| errors[k]).collect();
+                Some((k, [before(record, k), now?].concat()))
+            });
+            let rows: Vec<_> = rows.filter(|(_, row)| row.iter().all(|value| value.is_finite())).collect();
+            for (information, input) in found.iter_mut().zip(record.inputs.iter()) {
+                let mut block = Block::new(controls + outputs, ROWS);
+                rows.iter().for_each(|(k, row)| information.gather(&mut block, row, input.values[*k]));
+                information.absorb(&mut block);
+            }
+        }
+        let gains = found.iter().map(|all| significant(&all.eliminate(controls), controls)).collect();
+        Feedback { gains }
+    }
+
+    fn is_fed_back(gains: &[f64]) -> bool {
+        gains.iter().any(|gain| *gain != 0.0)
+    }
+
+    /// The inputs that are fed back.
+    pub fn names(&self, layout: &Layout) -> Vec<String> {
+        let inputs = layout.inputs.iter().zip(&self.gains).filter(|(_, gains)| Self::is_fed_back(gains));
+        inputs.map(|(input, _)| format!("`{}`", input.name)).collect()
+    }
+
+    /// The inputs of a record as they would be after other measurements.
+    pub fn inputs(&self, record: &Record, outputs: &[Channel]) -> Vec<Channel> {
+        let one = |(input, gains): (&Channel, &Vec<f64>)| {
+            let mut values = input.values.to_vec();
+            let measured = outputs.iter().zip(record.outputs.iter());
+            for ((other, measured), gain) in measured.zip(gains).filter(|(_, gain)| **gain != 0.0) {
+                let changes = other.values.iter().zip(measured.values.iter()).map(|(other, measured)| other - measured);
+                let changes = values.iter_mut().zip(changes).filter(|(_, change)| change.is_finite());
+                changes.for_each(|(value, change)| *value += gain * change);
+            }
+            input.with(values)
+        };
+        record.inputs.iter().zip(&self.gains).map(one).collect()
+    }
+
+    /// Records with these inputs, and the measurements that the plant would have had with them by the model.
+    pub fn outputs(&self, judgement: &Judgement<'_>, with: &[Record]) -> Vec<Record> {
+        let problem = judgement.objective.problem;
+        let records = with.iter().zip(&problem.records);
+        let as_measured = records.map(|(with, record)| Record { outputs: record.outputs.clone(), ..with.clone() });
+        let driven = Problem { records: as_measured.collect(), ..problem.clone() };
+        if !self.gains.iter().any(|gains| Self::is_fed_back(gains)) {
+            return driven.records;
+        }
+        let objective = judgement.objective.of(&driven, judgement.objective.sweep);
+        let respond = |(e, record): (usize, &Record)| {
+            let all = |objective| errors(objective, &judgement.end.coordinates, e, usize::MAX);
+            let (before, after) = (all(judgement.objective), all(&objective));
+            let outputs = record.outputs.iter().zip(before.iter().zip(&after)).map(|(output, (before, after))| {
+                let change =
+                    |(before, after): (&Option<f64>, &Option<f64>)| before.zip(*after).map_or(0.0, |(b, a)| b - a);
+                let changes = before.iter().zip(after).map(change);
+                output
+                    .with(output.values.iter().zip(changes).map(|(value, change)| value + change).collect::<Vec<f64>>())
+            });
+            Record { outputs: outputs.collect(), ..record.clone() }
+        };
+        driven.records.iter().enumerate().map(respond).collect()
+    }
+}
+
+/// A constant, and the signals of the samples before this one.
+fn before(record: &Record, k: usize) -> Vec<f64> {
+    let channels = || record.inputs.iter().chain(record.outputs.iter());
+    let at = |lag: usize| channels().map(move |channel| channel.values[k - lag]);
+    std::iter::once(1.0).chain((1..=BEFORE).flat_map(at)).collect()
+}
+
+/// The solution where it is significant, after so many others were eliminated, and zeros elsewhere.
+fn significant(information: &Information, eliminated: usize) -> Vec<f64> {
+    let none = vec![0.0; information.columns()];
+    let free = information.rows() as f64 - (eliminated + information.columns()) as f64;
+    let (Ok(gains), Ok(inverse)) = (information.solve(), information.covariance()) else { return none };
+    if free < 1.0 {
+        return none;
+    }
+    let least = quantile(1.0 - 0.5 * LEVEL, free) * (information.residual() / free).sqrt();
+    let one = |(i, gain): (usize, &f64)| if gain.abs() > least * inverse[(i, i)].sqrt() { *gain } else { 0.0 };
+    gains.iter().enumerate().map(one).collect()
+}
