@@ -105,8 +105,11 @@ impl Judgement<'_> {
         let degrees = vec![degrees; self.slopes.len()];
         let tested = unit.as_ref().filter(|_| self.takes_one_size()).and_then(|unit| self.shares(unit));
         let uneven = tested.as_ref().and_then(|(_, sizes)| sizes.uneven(&self.exact));
-        // Of models without states it is only said: classical standard errors are what certified ones are compared with.
-        let differ = |(_, sizes): &(Vec<Largest>, Sizes)| sizes.differ(&self.exact);
+        // Of models without states it is only said: classical standard errors are what certified ones are compared with. A noise that was
+        // given is only left where it certainly is of another size.
+        let given = matches!(objective.problem.settings.noise, Noise::Given(_));
+        let differ =
+            |(_, sizes): &(Vec<Largest>, Sizes)| if given { uneven.is_some() } else { sizes.differ(&self.exact) };
         let sized = objective.problem.layout().kind != Kind::Static && tested.as_ref().is_some_and(differ);
         let shares = tested.map(|(shares, _)| shares);
         if sandwich::is_needed(objective) || self.coupled().is_some() || sized || self.spans_differ() {
@@ -133,12 +136,12 @@ impl Judgement<'_> {
         CoordinateCovariance { covariance: unit.clone(), method, factor, degrees, shares, uneven }
     }
 
-    /// Whether the classical covariance takes noise that is estimated to be of one size per output.
+    /// Whether the classical covariance takes noise, estimated or given, to be of one size per output.
     fn takes_one_size(&self) -> bool {
         let objective = self.objective;
-        let estimated = matches!(objective.problem.settings.noise, Noise::PerOutput | Noise::Covariance);
+        let predicted = matches!(objective.problem.settings.noise, Noise::Predicted);
         let exact = self.rounding || self.end.outcome == Outcome::Exact || !self.has_noise();
-        estimated && !exact && !sandwich::is_needed(objective) && self.residuals.measured >= CORRELATED_SAMPLES
+        !predicted && !exact && !sandwich::is_needed(objective) && self.residuals.measured >= CORRELATED_SAMPLES
     }
 
     /// Whether errors are those of predictions ahead over intervals that are not equal: what disturbs the plant grows with them.

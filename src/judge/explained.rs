@@ -1,7 +1,7 @@
 //! Warnings about outputs that the model does not explain, and about a given noise that the errors contradict.
 
 use super::conclude::Judgement;
-use crate::estimate::{Warning, WarningCode};
+use crate::estimate::{CovarianceMethod, Warning, WarningCode};
 use crate::layout::Kind;
 use crate::numeral::{fit, number};
 use crate::optimize::Severity;
@@ -92,7 +92,7 @@ impl Judgement<'_> {
     }
 
     /// Noise that was given, and errors of another size.
-    pub(super) fn given_noise(&self) -> Vec<Warning> {
+    pub(super) fn given_noise(&self, method: CovarianceMethod) -> Vec<Warning> {
         let Noise::Given(sigma) = &self.objective.problem.settings.noise else { return vec![] };
         if self.objective.problem.settings.prefilter.is_some() || self.objective.is_weighted() {
             return vec![];
@@ -107,10 +107,14 @@ impl Judgement<'_> {
             }
             let (_, moves) = self.residuals.levels[j];
             let severity = off(ratio, sigma[j] > moves);
-            let wide = if ratio > 1.0 { "narrow" } else { "wide" };
+            let intervals = match method {
+                CovarianceMethod::Classical if ratio > 1.0 => "intervals are too narrow",
+                CovarianceMethod::Classical => "intervals are too wide",
+                _ => "intervals are by the errors",
+            };
             let text = format!(
-                "the noise of `{}` was given as {} {unit}, but the errors are {} {unit} (rms): intervals are too {wide}; leave \
-                 the noise out to have it estimated",
+                "the noise of `{}` was given as {} {unit}, but the errors are {} {unit} (rms): {intervals}; leave the noise out to \
+                 have it estimated",
                 output.name,
                 number(sigma[j], 3),
                 number(found.rmse, 3),

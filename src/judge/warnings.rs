@@ -43,7 +43,7 @@ impl Judgement<'_> {
         warnings.extend(self.of_the_data(unknowns));
         warnings.extend(data::data(self));
         warnings.extend(self.unexplained());
-        warnings.extend(self.given_noise());
+        warnings.extend(self.given_noise(covariances.method));
         warnings.extend(shape::shape(self));
         warnings.extend(outliers::outliers(self));
         warnings.extend(together::contradictions(self, unknowns));

@@ -43,9 +43,12 @@ pub fn all() -> Vec<Case> {
         case("lag, AR(1) 0.5, 500, initial state free", wide, |r| begun(r, 0.5, 1)),
         case("lag, AR(1) 0.9, 500, initial state free", wide, |r| begun(r, 0.9, 1)),
         case("lag, AR(1) 0.9, 500 of 2500 measured", slow, |r| begun(r, 0.9, 5)),
-        case("noise in proportion to what decays, steps", wide, stepped),
-        case("noise in proportion to what decays, initial state free", wide, |r| decaying(r, 400)),
-        case("noise in proportion to what decays, 60", (90.0, 97.0), |r| decaying(r, 60)),
+        case("noise in proportion to what decays, steps", wide, |r| stepped(r, false)),
+        case("noise in proportion to what decays, steps, given as one size", wide, |r| stepped(r, true)),
+        case("noise in proportion to what decays, initial state free", wide, |r| decaying(r, 400, false)),
+        case("noise in proportion to what decays, given as one size", wide, |r| decaying(r, 400, true)),
+        case("noise in proportion to what decays, 60", (90.0, 97.0), |r| decaying(r, 60, false)),
+        case("lag, white, 500, noise given", exact, given),
         case("noise as w^2, not told, 200", wide, |r| unweighted(r, 29)),
         case("noise as w^2 from sample to sample, not told, 200", wide, |r| unweighted(r, 1)),
         case("lag, noise as the input from sample to sample, 400", wide, following),
@@ -259,25 +262,44 @@ fn begun(random: &mut Random, rho: f64, every: usize) -> Trial {
 }
 
 /// A voltage on for 100 samples and off for 100; the noise is a tenth of the current, which the fit is not told.
-fn stepped(random: &mut Random) -> Trial {
+fn stepped(random: &mut Random, given: bool) -> Trial {
     let inputs: Vec<Voltage> = (0..400).map(|k| Voltage { u: if k / 100 % 2 == 0 { 2.0 } else { 0.2 } }).collect();
     let truth = Branch { gain: 2.0, tau: 0.2 };
     let mut outputs = clean(&Lag, 0.01, &inputs, &Current { i: 0.0 }, &truth);
+    let power = outputs.iter().map(|y| y.i * y.i).sum::<f64>() / 400.0;
     outputs.iter_mut().for_each(|y| y.i += 0.1 * y.i * random.normal());
     let record = record(&Lag, 0.01, inputs, outputs, Current { i: 0.0 });
-    let fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau: free(0.3) });
+    let mut fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau: free(0.3) });
+    if given {
+        fit = fit.noise(Current { i: 0.1 * power.sqrt() });
+    }
     Trial { summary: fit.run().unwrap().into_summary(), truth: vec![truth.gain, truth.tau] }
 }
 
 /// A current decays to a fifth; the noise is a tenth of what decays. Classical errors of 400 measurements cover 49 and 71 %.
-fn decaying(random: &mut Random, samples: usize) -> Trial {
+fn decaying(random: &mut Random, samples: usize, given: bool) -> Trial {
     let (truth, start) = (Branch { gain: 2.0, tau: 1.2 }, Current { i: 2.5 });
     let inputs = vec![Voltage { u: 0.25 }; samples];
     let mut outputs = clean(&Lag, 8.0 / samples as f64, &inputs, &start, &truth);
+    let power = outputs.iter().map(|y| (y.i - 0.49).powi(2)).sum::<f64>() / samples as f64;
     outputs.iter_mut().for_each(|y| y.i += 0.1 * (y.i - 0.49) * random.normal());
     let record = record(&Lag, 8.0 / samples as f64, inputs, outputs, start).initial(Current { i: free(2.0) });
-    let fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau: free(0.8) });
+    let mut fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau: free(0.8) });
+    if given {
+        fit = fit.noise(Current { i: 0.1 * power.sqrt() });
+    }
     Trial { summary: fit.run().unwrap().into_summary(), truth: vec![truth.gain, truth.tau, 2.5] }
+}
+
+/// White noise of the size that is given.
+fn given(random: &mut Random) -> Trial {
+    let inputs: Vec<Voltage> = levels(random, 500, 17).into_iter().map(|u| Voltage { u }).collect();
+    let mut outputs = clean(&Lag, 0.01, &inputs, &Current { i: 0.0 }, &LAG);
+    outputs.iter_mut().for_each(|y| y.i += 0.3 * random.normal());
+    let record = record(&Lag, 0.01, inputs, outputs, Current { i: 0.0 });
+    let fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau: free(0.07) });
+    let fit = fit.noise(Current { i: 0.3 });
+    Trial { summary: fit.run().unwrap().into_summary(), truth: vec![LAG.gain, LAG.tau] }
 }
 
 /// Both currents of a motor have noise that is the same to nine tenths, which the fit is not told.
