@@ -317,10 +317,10 @@ pub(crate) fn sweep<'a, M: Model + 'a>(
     let layout = Arc::new(Layout::of::<M>());
     method.check(layout.kind)?;
     predictor.check(&layout)?;
-    let plain = |reason: String| -> Arc<dyn Sweep + 'a> {
+    let plain = |uncompiled| -> Arc<dyn Sweep + 'a> {
         let code = Arc::new(Typed { model: model.clone(), loops: loops.clone() });
         let (layout, method, predictor) = (layout.clone(), method.clone(), predictor.clone());
-        Arc::new(DualSweep { layout, code, method, predictor, reason })
+        Arc::new(DualSweep { layout, code, method, predictor, uncompiled })
     };
     Ok(compiled(&|| Equations::trace(&*model).map(Arc::new), &method, predictor, &plain))
 }

@@ -24,6 +24,7 @@ mod outliers;
 mod output_sums;
 mod powers;
 mod predicted;
+mod products;
 mod residual_pass;
 mod rise;
 mod sandwich;

@@ -134,9 +134,10 @@ pub trait Sweep: Send + Sync {
         Coupling::Uncut
     }
 
-    /// The parameters that decide a choice of the model, as far as that is known: an `if`, a limit, an absolute value, a place in a table.
-    fn choosing(&self) -> &[usize] {
-        &[]
+    /// The parameters that decide a choice of the model: an `if`, a limit, an absolute value, a place in a table. `None` where that is not
+    /// known.
+    fn choosing(&self) -> Option<&[usize]> {
+        None
     }
 
     /// Prepares a record, once, with the parameters at their start values.

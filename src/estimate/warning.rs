@@ -72,6 +72,8 @@ pub enum WarningCode {
     TimeGaps,
     /// An unknown is held at a bound.
     HeldAtBound,
+    /// A prior that the data contradict.
+    PriorContradicts,
     /// A parameter that was declared positive is not.
     NotPositive,
     /// The model bends so much within an interval that it should be asymmetric.

@@ -11,11 +11,11 @@ use crate::optimize::Severity;
 /// widened it is a note.
 pub(super) const CERTAIN: f64 = 1e-4;
 /// A level that is enough where the colored part is above the second.
-const LIKELY: f64 = 5e-4;
+const LIKELY: f64 = 1e-3;
 const MUCH: f64 = 0.05;
 /// The part of an output's movement that is an error, and follows from the errors before: below the first it is a note,
 /// above the second the model is wrong or noise dominates the output.
-pub(super) const SMALL: f64 = 1e-3;
+pub(super) const SMALL: f64 = 1e-4;
 const LARGE: f64 = 0.5;
 
 impl Judgement<'_> {
@@ -99,9 +99,9 @@ mod tests {
     #[test]
     fn color_is_certain_at_its_levels() {
         assert!(is_certain(0.99e-4, 1, 0.0) && !is_certain(1e-4, 1, 0.0));
-        assert!(is_certain(4.9e-4, 1, 0.051) && !is_certain(5e-4, 1, 0.051) && !is_certain(4.9e-4, 1, 0.05));
+        assert!(is_certain(0.99e-3, 1, 0.051) && !is_certain(1e-3, 1, 0.051) && !is_certain(0.99e-3, 1, 0.05));
         assert!(is_certain(0.24e-4, 4, 0.0) && !is_certain(0.26e-4, 4, 0.0));
-        let levels = [0.501, 0.5, 1.01e-3, 1e-3].map(severity);
+        let levels = [0.501, 0.5, 1.01e-4, 1e-4].map(severity);
         use Severity::{NotUsable, Usable, UsableWithCare};
         assert_eq!(levels, [NotUsable, UsableWithCare, UsableWithCare, Usable]);
     }

@@ -21,6 +21,8 @@ const LEVEL_PART: f64 = 0.1;
 /// Errors of such times the given noise, either way, say that it is wrong; beyond the second, or below the third where the
 /// noise is larger than all that the output moves, that intervals mean nothing.
 const DIFFERENT: f64 = 2.0;
+/// From this ratio on intervals by a noise that was given cover 90 % or less.
+const NARROW: f64 = 1.2;
 const FAR: f64 = 10.0;
 const FAR_BELOW: f64 = 100.0;
 
@@ -106,7 +108,8 @@ impl Judgement<'_> {
                 return None;
             }
             let (_, moves) = self.residuals.levels[j];
-            let severity = off(ratio, sigma[j] > moves);
+            let narrow = method == CovarianceMethod::Classical && ratio > NARROW;
+            let severity = off(ratio, sigma[j] > moves, narrow);
             let intervals = match method {
                 CovarianceMethod::Classical if ratio > 1.0 => "intervals are too narrow",
                 CovarianceMethod::Classical => "intervals are too wide",
@@ -162,11 +165,11 @@ fn contradicts(ratio: f64, independent: f64, unknowns: usize) -> bool {
 }
 
 /// How severe it is that errors are off the noise given by this ratio; `beyond` says that the noise is larger than all that the
-/// output moves.
-fn off(ratio: f64, beyond: bool) -> Severity {
+/// output moves, `narrow` that intervals are too narrow by that.
+fn off(ratio: f64, beyond: bool, narrow: bool) -> Severity {
     match ratio {
         ratio if ratio > FAR || ratio < FAR_BELOW.recip() && beyond => Severity::NotUsable,
-        ratio if ratio > DIFFERENT || ratio < DIFFERENT.recip() => Severity::UsableWithCare,
+        ratio if narrow || ratio > DIFFERENT || ratio < DIFFERENT.recip() => Severity::UsableWithCare,
         _ => Severity::Usable,
     }
 }
@@ -230,9 +233,12 @@ mod tests {
 
     #[test]
     fn how_far_errors_are_off_their_noise() {
-        let severities = [10.1, 10.0, 2.01, 2.0, 0.5, 0.49, 0.0101, 0.0099].map(|ratio| off(ratio, true));
+        let severities = [10.1, 10.0, 2.01, 2.0, 0.5, 0.49, 0.0101, 0.0099].map(|ratio| off(ratio, true, false));
         let care = UsableWithCare;
         assert_eq!(severities, [NotUsable, care, care, Usable, Usable, care, care, NotUsable]);
-        assert_eq!([off(0.0099, false), off(10.1, false)], [care, NotUsable]);
+        assert_eq!(
+            [off(0.0099, false, false), off(10.1, false, false), off(1.3, false, true)],
+            [care, NotUsable, care]
+        );
     }
 }

@@ -13,25 +13,30 @@ use crate::problem::Role;
 /// Half widths of the interval at which the cost is compared: at its ends, and as far again, where a limit is beyond the few samples that
 /// reach it though an end is not.
 const PLACES: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
+/// Models that are not read as a graph are examined with at most so many measurements: four passes with slopes for each parameter.
+const LONGEST: u64 = 5_000;
 /// A cost that rises by less than this part of what its slopes say: an interval by the likelihood is longer by the root of two or more.
 const LITTLE: f64 = 0.5;
 /// The parameter along which the cost rises least, relative to what its slopes say.
 pub(super) fn kinked(judgement: &Judgement<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
     let choosing = judgement.objective.sweep.choosing();
-    if choosing.is_empty() || judgement.rounding || judgement.end.outcome == Outcome::Exact {
+    if judgement.rounding || judgement.end.outcome == Outcome::Exact {
         return None;
     }
-    let chooses = |i: &usize| matches!(unknowns[*i].role, Role::Parameter(p) if choosing.contains(&p));
+    // Of a model that is not read as a graph any parameter may be in a condition.
+    let any = judgement.residuals.measured <= LONGEST;
+    let chooses = |i: &usize| matches!(unknowns[*i].role, Role::Parameter(p) if choosing.map_or(any, |choosing| choosing.contains(&p)));
     let known = (0..unknowns.len()).filter(chooses).filter(|&i| unknowns[i].knowledge.standard_error().is_some());
     let place = |unknown, place: f64| Place { unknown, standard_errors: place * QUANTILE, little: LITTLE };
     let places = known.flat_map(|i| PLACES.map(|at| place(i, at)));
     let (place, part) = least_rise(judgement, places, covariances)?;
     let text = format!(
-        "the interval of `{}` is too short {}: a condition of the model depends on it (an `if`, a limit, an absolute value, a table), few \
+        "the interval of `{}` is too short {}: a condition of the model {} on it (an `if`, a limit, an absolute value, a table), few \
          samples are near, and the cost rises by {} of what its slopes say; take diagnose::profile, or record more on both sides of the \
          condition",
         unknowns[place.unknown].name,
         if place.standard_errors > 0.0 { "above" } else { "below" },
+        if choosing.is_some() { "depends" } else { "may depend" },
         percent(part.max(0.0), 2)
     );
     Some(Warning { code: WarningCode::CurvedInterval, severity: Severity::UsableWithCare, text })

@@ -8,10 +8,16 @@ use crate::estimate::{Knowledge, Unknown, Warning, WarningCode};
 use crate::numeral::{exact, number};
 use crate::optimize::Severity;
 use crate::parameter::Prior;
-use crate::problem::Role;
+use crate::problem::{Free, Role};
 
 /// A parameter so many times its start, or one such part of it, is in another unit.
 const ANOTHER_UNIT: f64 = 400.0;
+
+/// Standard deviations between a prior and an estimate that are no chance, and that make an estimate unusable.
+const UNLIKELY: f64 = 3.3;
+const CONTRADICTS: f64 = 5.0;
+/// A part of a prior's variance that is rounding, or what noise that is estimated adds to an estimate's.
+const LITTLE: f64 = 1e-3;
 
 /// Names in backquotes, with commas.
 fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
@@ -41,6 +47,7 @@ pub(super) fn knowledge(judgement: &Judgement<'_>, unknowns: &[Unknown], covaria
     let mut warnings = vec![];
     warnings.extend(without_error(judgement, unknowns, covariances));
     warnings.extend(near_zero(judgement, unknowns));
+    warnings.extend(against_priors(judgement, unknowns));
     warnings.extend(opposite(unknowns));
     warnings.extend(far_from_start(unknowns));
     warnings
@@ -90,6 +97,36 @@ fn near_zero(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Option<Warning>
     };
     let severity = if all { Severity::NotUsable } else { Severity::UsableWithCare };
     Some(Warning { code: WarningCode::HoldsZero, severity, text })
+}
+
+/// Unknowns that the data draw further from the mean of their prior than both are uncertain.
+fn against_priors(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
+    let rows = judgement.objective.problem.unknowns.row.iter().zip(unknowns);
+    let one = |(row, unknown): (&Free, &Unknown)| {
+        let prior = row.parameter.prior?;
+        let distance = distance(unknown, prior).filter(|distance| *distance > UNLIKELY)?;
+        let (Unknown { name, unit, value, .. }, Prior { mean, std }) = (unknown, prior);
+        let text = format!(
+            "the data contradict the prior of `{name}`, {} +- {} {unit}: with it `{name}` is {} {unit}, {} standard deviations off \
+             what it lets expect; check prior, model and units, or leave the prior out",
+            exact(mean),
+            exact(std),
+            number(*value, 4),
+            number(distance, 2)
+        );
+        let severity = if distance > CONTRADICTS { Severity::NotUsable } else { Severity::UsableWithCare };
+        Some(Warning { code: WarningCode::PriorContradicts, severity, text })
+    };
+    rows.filter_map(one).collect()
+}
+
+/// How far an estimate is from the mean of its prior, in standard deviations of that distance: the prior's variance less that of the
+/// estimate (Hausman, Econometrica 46 (1978) 1251: an estimate that is efficient is uncorrelated with its difference to another one).
+fn distance(unknown: &Unknown, prior: Prior) -> Option<f64> {
+    let error = unknown.knowledge.standard_error()?;
+    let variance = prior.std * prior.std - error * error;
+    // An estimate that is hardly better than its prior says nothing of it.
+    (variance > LITTLE * prior.std * prior.std).then(|| (unknown.value - prior.mean).abs() / variance.sqrt())
 }
 
 /// Whether a number can be a standard error.

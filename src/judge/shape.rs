@@ -1,11 +1,12 @@
 //! Whether errors follow from the inputs or from the prediction, which those of a model of the right shape do not.
 //!
 //! The errors of a static model are white in order of an input's size, whatever the order of the samples in time. Those of any model
-//! are uncorrelated with powers of its prediction.
+//! are uncorrelated with powers of its prediction, and with the inputs of the samples before.
 
 use super::color;
 use super::conclude::Judgement;
-use super::powers::{SHAPE, Scale, explained, scales};
+use super::powers::{SHAPE, Scale, scales};
+use super::products::Products;
 use super::whiteness::{LAGS, Whiteness};
 use crate::estimate::{Warning, WarningCode};
 use crate::numeral::{p_value, percent};
@@ -13,15 +14,17 @@ use crate::optimize::Outcome;
 use crate::problem::{Accumulate, Objective};
 use crate::record::Record;
 use crate::sweep::Window;
-use crate::whiteness::{Portmanteau, chi_squared_tail};
+use crate::whiteness::Portmanteau;
 
 /// Records that are looked at, and samples of each: the first ones.
 pub(super) const RECORDS: usize = 8;
 const SAMPLES: usize = 16_384;
+/// The input of the sample before, and its changes up to that sample, that errors are examined for following from.
+const BEFORE: usize = 4;
 
 /// Whether the model certainly has the wrong shape.
 pub(super) fn shape(judgement: &Judgement<'_>) -> Option<Warning> {
-    by_inputs(judgement).or_else(|| by_predictions(judgement))
+    by_inputs(judgement).or_else(|| by_inputs_before(judgement)).or_else(|| by_predictions(judgement))
 }
 
 /// The output and the input that it certainly depends on otherwise than the model says; of several those with the largest part of the
@@ -67,6 +70,54 @@ fn by_inputs(judgement: &Judgement<'_>) -> Option<Warning> {
     })
 }
 
+/// The output whose errors certainly follow from an input of the samples before: its value, and its changes. Not that of the same sample,
+/// which a controller may have drawn from the error. White errors only, as below.
+fn by_inputs_before(judgement: &Judgement<'_>) -> Option<Warning> {
+    let objective = judgement.objective;
+    let (layout, outputs) = (objective.problem.layout(), objective.outputs());
+    let examined = !judgement.is_static() && !scales(objective).is_empty() && !layout.inputs.is_empty();
+    let exact = judgement.rounding || judgement.end.outcome == Outcome::Exact;
+    if !examined || exact || judgement.autocorrelated_at(color::CERTAIN).is_some() {
+        return None;
+    }
+    let mut sums = vec![Products::<{ BEFORE + 1 }>::default(); outputs * layout.inputs.len()];
+    for e in 0..objective.experiments().min(RECORDS) {
+        let errors = first_errors(judgement, e);
+        for (input, sums) in objective.problem.records[e].inputs().iter().zip(sums.chunks_mut(outputs)) {
+            let (u, scale) = (&input.values, Scale::of_range(input));
+            for k in BEFORE..errors[0].len() {
+                let changes = |i: usize| scale.one(u[k - i + 1]) - scale.one(u[k - i]);
+                let before: [f64; BEFORE + 1] = std::array::from_fn(|i| match i {
+                    0 => 1.0,
+                    1 => scale.one(u[k - 1]),
+                    _ => changes(i),
+                });
+                sums.iter_mut()
+                    .zip(&errors)
+                    .filter_map(|(sums, own)| Some((sums, own[k]?)))
+                    .for_each(|(sums, error)| sums.take(before, error));
+            }
+        }
+    }
+    let of = |number: usize| {
+        let (i, j) = (number / outputs, number % outputs);
+        let part =
+            sums[number].explained_part() * judgement.residuals.outputs[j].rmse / judgement.residuals.levels[j].1;
+        (i, j, part, sums[number].by_chance() * sums.len() as f64)
+    };
+    let certain = (0..sums.len()).map(of).filter(|(.., chance)| *chance < color::CERTAIN);
+    let (i, j, part, chance) = certain.max_by(|a, b| a.2.total_cmp(&b.2))?;
+    let text = format!(
+        "the errors of `{}` follow from what the input `{}` was at the samples before ({}): the model lacks a delay or an inertia, or \
+         the signals are not of the same moments, by {} of what the output moves, and no interval allows for that",
+        layout.outputs[j].name,
+        layout.inputs[i].name,
+        p_value(chance),
+        percent(part, 2)
+    );
+    Some(Warning { code: WarningCode::WrongShape, severity: color::severity(part), text })
+}
+
 /// The output whose errors certainly follow from its prediction; of several that with the largest part of what it moves. White errors
 /// only: correlated ones follow from a prediction that is as slow as they are.
 fn by_predictions(judgement: &Judgement<'_>) -> Option<Warning> {
@@ -109,51 +160,7 @@ fn by_predictions(judgement: &Judgement<'_>) -> Option<Warning> {
 struct Following<'f> {
     record: &'f Record,
     scales: &'f [Scale],
-    sums: Vec<Products>,
-}
-
-/// Sums over errors `e` and powers `z` of the prediction.
-#[derive(Clone, Copy, Default)]
-struct Products {
-    powers: [[f64; SHAPE]; SHAPE],
-    /// Of `e z` and of `e^2 z z'`, which is the covariance of the former, of whatever size the errors are each (White, Econometrica 48
-    /// (1980) 817).
-    errors: [f64; SHAPE],
-    squares: [[f64; SHAPE]; SHAPE],
-    sum_of_squares: f64,
-}
-
-impl Products {
-    fn take(&mut self, prediction: f64, error: f64) {
-        let z: [f64; SHAPE] = std::array::from_fn(|i| prediction.powi(i as i32));
-        for i in 0..SHAPE {
-            self.errors[i] += error * z[i];
-            for c in 0..SHAPE {
-                self.powers[i][c] += z[i] * z[c];
-                self.squares[i][c] += error * error * z[i] * z[c];
-            }
-        }
-        self.sum_of_squares += error * error;
-    }
-
-    fn append(&mut self, other: &Products) {
-        let add = |(sum, other): (&mut f64, &f64)| *sum += other;
-        self.powers.as_flattened_mut().iter_mut().zip(other.powers.as_flattened()).for_each(add);
-        self.squares.as_flattened_mut().iter_mut().zip(other.squares.as_flattened()).for_each(add);
-        self.errors.iter_mut().zip(&other.errors).for_each(add);
-        self.sum_of_squares += other.sum_of_squares;
-    }
-
-    /// The root of the part of the squared errors that follows from the prediction.
-    fn explained_part(&self) -> f64 {
-        let (gain, _) = explained(self.powers, self.errors);
-        (gain / self.sum_of_squares).clamp(0.0, 1.0).sqrt()
-    }
-
-    fn by_chance(&self) -> f64 {
-        let (gain, rank) = explained(self.squares, self.errors);
-        chi_squared_tail(gain, rank)
-    }
+    sums: Vec<Products<SHAPE>>,
 }
 
 impl Accumulate for Following<'_> {
@@ -162,7 +169,8 @@ impl Accumulate for Following<'_> {
             let values = &self.record.outputs()[j].values[window.begin[lane]..];
             for k in (0..window.samples[lane]).filter(|k| window.is_measured(*k, j, lane)) {
                 let error = window.error(k, j, lane) * window.variance_root(k, j, lane);
-                sums.take(scale.one(values[k] - error), error);
+                let one = scale.one(values[k] - error);
+                sums.take(std::array::from_fn(|i| one.powi(i as i32)), error);
             }
         }
     }

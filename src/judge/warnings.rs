@@ -9,8 +9,7 @@ use crate::layout::Kind;
 use crate::numeral::{counted, exact, number, percent};
 use crate::optimize::{Outcome, Severity};
 use crate::parameter::Transform;
-use crate::problem::Role;
-use crate::problem::{Objective, SearchPlan};
+use crate::problem::{Free, Objective, Role, SearchPlan};
 
 /// Largest change of a parameter with a finer step, in standard errors, without a warning: with a method that was chosen, and
 /// with one of the library's choice (beyond the former it makes the estimate unusable).
@@ -70,7 +69,7 @@ impl Judgement<'_> {
                 warnings.push(care(WarningCode::HeldAtBound, format!("`{name}` {place}{reaches}")));
             }
         }
-        warnings.extend(self.not_positive());
+        warnings.extend(self.not_positive(unknowns));
         warnings.extend(directions.iter().map(|direction| Direction::warning(direction.to_string())));
         warnings.extend(self.step(unknowns));
         warnings.extend(aliases::aliased(self));
@@ -142,17 +141,19 @@ impl Judgement<'_> {
     }
 
     /// Parameters that were declared positive and are not.
-    fn not_positive(&self) -> Vec<Warning> {
-        let unknowns = self.objective.problem.unknowns.row.iter().zip(&self.values);
-        let wrong = unknowns.filter(|(unknown, value)| unknown.parameter.positive && **value <= 0.0);
-        let warning = |(unknown, value): (&crate::problem::Free, &f64)| {
-            let text = format!(
-                "`{}` is {} {}, but was declared positive: model and record contradict each other; check units, signs and the \
-                 hold of the inputs",
-                unknown.name,
-                number(*value, 4),
-                unknown.unit
-            );
+    fn not_positive(&self, unknowns: &[Unknown]) -> Vec<Warning> {
+        let rows = self.objective.problem.unknowns.row.iter().zip(unknowns);
+        let wrong = rows.filter(|(row, unknown)| row.parameter.positive && unknown.value <= 0.0);
+        let warning = |(_, unknown): (&Free, &Unknown)| {
+            let consistent = matches!(unknown.knowledge, Knowledge::Known { upper, .. } if upper > 0.0);
+            let means = match consistent {
+                true => {
+                    "its interval reaches above zero: the record says little of it; excite what depends on it, or fix it"
+                }
+                false => "model and record contradict each other; check units, signs and the hold of the inputs",
+            };
+            let (value, unit) = (number(unknown.value, 4), &unknown.unit);
+            let text = format!("`{}` is {value} {unit}, but was declared positive: {means}", unknown.name);
             Warning { code: WarningCode::NotPositive, severity: Severity::NotUsable, text }
         };
         wrong.map(warning).collect()
@@ -221,7 +222,9 @@ impl Judgement<'_> {
         }
         let finer = self.objective.sweep.refined(self.objective.problem.samples())?;
         let objective = self.objective.of(self.objective.problem, &*finer);
-        let (name, shift, part) = shift(&objective, &self.end.coordinates, unknowns)?;
+        let Some((name, shift, part)) = shift(&objective, &self.end.coordinates, unknowns) else {
+            return self.diverges(unknowns, change, &finer.integrator());
+        };
         let finer = finer.integrator();
         let wrong = refines && shift > STEP_SHIFT && part >= DIGITS;
         let severity = if wrong { Severity::NotUsable } else { Severity::UsableWithCare };
@@ -234,6 +237,21 @@ impl Judgement<'_> {
             );
             Warning { code: WarningCode::CoarseStep, severity, text }
         })
+    }
+
+    /// Of a fit whose simulation fails with a finer step, or grows until no unknown can be told from others: a coarse step damps what
+    /// oscillates, and a plant that is unstable with a finer one may fit with it.
+    fn diverges(&self, unknowns: &[Unknown], change: f64, finer: &str) -> Option<Warning> {
+        let known = unknowns.iter().any(|unknown| unknown.knowledge.standard_error().is_some());
+        let by = if change.is_finite() {
+            format!("changes by {} standard deviations", number(change, 2))
+        } else {
+            "fails".to_owned()
+        };
+        let text = format!(
+            "the step is too coarse: with {finer} the simulation at the estimate {by}; use a finer step, or smooth the model"
+        );
+        known.then_some(Warning { code: WarningCode::CoarseStep, severity: Severity::NotUsable, text })
     }
 
     /// Data that are reproduced to their rounding may have been made with this step. But a step with held inputs is exact for a linear

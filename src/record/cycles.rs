@@ -26,9 +26,22 @@ impl fmt::Display for Gap {
 const GAP: f64 = 1.5;
 /// Sampling is even if half of the steps are within this part of the median one.
 const EVEN: f64 = 0.1;
+/// One long step in so many, or more, is too often for gaps where they come regularly.
+const MANY: usize = 10;
 /// Of uneven sampling, a step is a gap that is beyond the longest tenth by so many times the distance of that from the
 /// median: of intervals between independent events, three of 100,000 are.
 const BEYOND: f64 = 5.0;
+
+/// Whether steps longer than this belong to a pattern of sampling: they are many, and follow each other after the same number of samples.
+fn is_pattern(stamps: &[f64], longest: f64) -> bool {
+    let steps = stamps.windows(2).enumerate();
+    let long: Vec<usize> = steps.filter(|(_, pair)| pair[1] - pair[0] > longest).map(|(k, _)| k).collect();
+    let mut apart: Vec<usize> = long.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    apart.sort_unstable();
+    let Some(middle) = apart.get(apart.len() / 2) else { return false };
+    let same = apart.iter().filter(|apart| *apart == middle).count();
+    MANY * long.len() >= stamps.len() && 10 * same >= 9 * apart.len()
+}
 
 /// The longest step that is no gap.
 fn longest_step(stamps: &[f64]) -> f64 {
@@ -39,7 +52,7 @@ fn longest_step(stamps: &[f64]) -> f64 {
     let (middle, tenth) = (steps.len() / 2, steps.len() * 9 / 10);
     let median = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
     let alike = steps.iter().filter(|step| (*step / median - 1.0).abs() <= EVEN).count();
-    if 2 * alike >= steps.len() {
+    if 2 * alike >= steps.len() && !is_pattern(stamps, GAP * median) {
         return GAP * median;
     }
     let long = *steps.select_nth_unstable_by(tenth, f64::total_cmp).1;

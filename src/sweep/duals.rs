@@ -1,6 +1,7 @@
 //! [`DualSweep`]: models run in numbers with slopes, one piece at a time.
 
 use super::filtered::Filter;
+use super::made::Uncompiled;
 use super::{ModelCode, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit, unmoved};
 use crate::error::{Error, Failure};
 use crate::functions::Functions;
@@ -17,8 +18,7 @@ pub(crate) struct DualSweep<'a> {
     pub code: Arc<dyn ModelCode + 'a>,
     pub method: Arc<dyn Method>,
     pub predictor: Arc<dyn Prediction>,
-    /// Why the model was not compiled.
-    pub reason: String,
+    pub uncompiled: Uncompiled,
 }
 
 impl DualSweep<'_> {
@@ -53,6 +53,10 @@ impl Sweep for DualSweep<'_> {
 
     fn restarts(&self) -> Option<usize> {
         self.predictor.restarts().map(|horizon| horizon.steps)
+    }
+
+    fn choosing(&self) -> Option<&[usize]> {
+        self.uncompiled.choosing.as_deref()
     }
 
     fn prepare(&self, record: &Record, parameters: &[f64]) -> Result<Prepared, Error> {
@@ -126,8 +130,8 @@ impl Sweep for DualSweep<'_> {
     fn refined<'s>(&'s self, _samples: usize) -> Option<Arc<dyn Sweep + 's>> {
         let kind = self.layout.kind;
         let (code, method) = (self.code.refined(kind)?, self.method.refined(kind)?);
-        let (layout, predictor, reason) = (self.layout.clone(), self.predictor.clone(), self.reason.clone());
-        Some(Arc::new(DualSweep { layout, code, method, predictor, reason }))
+        let (layout, predictor, uncompiled) = (self.layout.clone(), self.predictor.clone(), self.uncompiled.clone());
+        Some(Arc::new(DualSweep { layout, code, method, predictor, uncompiled }))
     }
 
     fn integrator(&self) -> String {
@@ -139,7 +143,7 @@ impl Sweep for DualSweep<'_> {
     }
 
     fn engine(&self) -> String {
-        format!("dual numbers ({})", self.reason)
+        format!("dual numbers ({})", self.uncompiled.reason)
     }
 
     fn identity(&self) -> String {

@@ -4,26 +4,38 @@ use super::{DualSweep, ProgramSweep, Sweep};
 use crate::engine::only_duals;
 use crate::equations::Equations;
 use crate::error::Error;
-use crate::graph::Untraceable;
+use crate::graph::{Untraceable, choosing};
 use crate::integrate::Method;
 use crate::predict::Prediction;
 use std::sync::Arc;
+
+/// Equations that run in dual numbers.
+#[derive(Clone, Default)]
+pub(crate) struct Uncompiled {
+    /// Why they were not compiled.
+    pub reason: String,
+    /// The parameters that decide a choice of theirs; `None` where they are not read as a graph.
+    pub choosing: Option<Vec<usize>>,
+}
 
 /// A compiled program of the equations that `trace` reads, if there can be one, else what `plain` makes of the reason.
 pub(crate) fn compiled<'a>(
     trace: &dyn Fn() -> Result<Arc<Equations>, Untraceable>,
     method: &Arc<dyn Method>,
     predictor: &Arc<dyn Prediction>,
-    plain: &dyn Fn(String) -> Arc<dyn Sweep + 'a>,
+    plain: &dyn Fn(Uncompiled) -> Arc<dyn Sweep + 'a>,
 ) -> Arc<dyn Sweep + 'a> {
     if only_duals() {
-        return plain("dual numbers are asked for".to_owned());
+        return plain(Uncompiled { reason: "dual numbers are asked for".to_owned(), choosing: None });
     }
-    let program = trace()
-        .and_then(|equations| ProgramSweep::new(equations, method.clone(), predictor.clone(), plain(String::new())));
-    match program {
+    let equations = match trace() {
+        Ok(equations) => equations,
+        Err(Untraceable { reason, .. }) => return plain(Uncompiled { reason, choosing: None }),
+    };
+    let choosing = Some(choosing(equations.graph()));
+    match ProgramSweep::new(equations, method.clone(), predictor.clone(), plain(Uncompiled::default())) {
         Ok(sweep) => Arc::new(sweep),
-        Err(untraceable) => plain(untraceable.reason),
+        Err(Untraceable { reason, .. }) => plain(Uncompiled { reason, choosing }),
     }
 }
 
@@ -39,9 +51,9 @@ pub(crate) fn of_equations(
     let layout = Arc::new(equations.layout().clone());
     method.check(layout.kind)?;
     predictor.check(&layout)?;
-    let plain = |reason: String| -> Arc<dyn Sweep> {
+    let plain = |uncompiled| -> Arc<dyn Sweep> {
         let (layout, method, predictor) = (layout.clone(), method.clone(), predictor.clone());
-        Arc::new(DualSweep { layout, code: Arc::new(equations.clone()), method, predictor, reason })
+        Arc::new(DualSweep { layout, code: Arc::new(equations.clone()), method, predictor, uncompiled })
     };
     Ok(compiled(&|| Ok(equations.clone()), method, predictor, &plain))
 }

@@ -171,8 +171,8 @@ impl Sweep for ProgramSweep<'_> {
         self.programs.coupling
     }
 
-    fn choosing(&self) -> &[usize] {
-        &self.programs.choosing
+    fn choosing(&self) -> Option<&[usize]> {
+        Some(&self.programs.choosing)
     }
 
     fn prepare(&self, record: &Record, parameters: &[f64]) -> Result<Prepared, Error> {

@@ -59,7 +59,7 @@ fn two_measurements_that_decide_are_named() {
     assert_eq!(said(&fitted(&record(51, &[(7, 14.5), (40, -14.5)]), false)), None);
 }
 
-/// Fits with given noise and more than 200 measurements have no pass for it; estimated noise, a sandwich and colored errors have.
+/// Whether there are more than 200 measurements or not: with estimated noise, given noise, a sandwich and colored errors.
 #[test]
 fn long_records() {
     let found = |samples: usize, weighted: bool| said(&fitted(&record(samples, &[(7, 200.0)]), weighted)).is_some();
@@ -69,7 +69,7 @@ fn long_records() {
         let fit = Fit::new(&Gain, &record).parameters(Factor { a: free(1.0) }).noise(Current { i: 1.0 });
         said(&fit.run().unwrap().into_summary()).is_some()
     };
-    assert_eq!([given(200), given(201)], [true, false]);
+    assert_eq!([given(200), given(201)], [true; 2]);
     let colored = fitted(&disturbed(500, &[(7, 200.0)], 0.9), false);
     assert!(matches!(colored.method.covariance, CovarianceMethod::Hac { .. }), "{:?}", colored.method.covariance);
     // 200^2 / (200^2 + 499).

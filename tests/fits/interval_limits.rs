@@ -267,7 +267,24 @@ fn noise_of_restarts_that_is_fed_back_is_named() {
 signals! { pub struct Limited { gain: "A/V", limit: "V" } }
 
 /// `i = gain min(u, limit)`.
+#[derive(Clone)]
 struct Limiter;
+
+/// The same by an `if` among values.
+#[derive(Clone)]
+struct Comparing;
+
+impl Model for Comparing {
+    type State = Nothing;
+    type Input = Voltage;
+    type Output = Current;
+    type Parameters = Limited;
+    const KIND: Kind = Kind::Static;
+
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Limited<S>) -> Current<S> {
+        Current { i: p.gain * if u.u.value() < p.limit.value() { u.u } else { p.limit } }
+    }
+}
 
 impl Model for Limiter {
     type State = Nothing;
@@ -287,18 +304,34 @@ impl Model for Limiter {
 /// said to be curved where it ended far from the truth.
 #[test]
 fn a_limit_that_one_sample_reaches_is_not_known() {
+    seen_by_limit(&Limiter);
+}
+
+/// The same of a model that compares values, and is not read as a graph.
+#[test]
+fn a_limit_among_values_is_not_known_either() {
+    seen_by_limit(&Comparing);
+}
+
+fn seen_by_limit<M: Model<Input = Voltage, Output = Current, Parameters = Limited, State = Nothing> + Clone>(
+    model: &M,
+) {
     let fit = |limit: f64, start: f64, seed: u64| {
         let mut noise = Noise(seed);
         let inputs: Vec<Voltage> = (0..60).map(|k| Voltage { u: (0.618 * f64::from(k)).fract() }).collect();
         let outputs = inputs.iter().map(|u| Current { i: 3.0 * u.u.min(limit) + 0.02 * noise.gauss() }).collect();
-        let record = Experiment::new(&Limiter, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
-        Fit::new(&Limiter, &record).parameters(Limited { gain: free(2.0), limit: free(start) }).run().unwrap()
+        let record = Experiment::new(model, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        Fit::new(model, &record)
+            .parameters(Limited { gain: free(2.0), limit: free(start) })
+            .run()
+            .unwrap()
+            .into_summary()
     };
-    let said = |fit: &Estimate<Limiter>| fit.warnings.iter().any(|warning| warning.code == WarningCode::CurvedInterval);
+    let said = |fit: &Summary| has(fit, WarningCode::CurvedInterval);
     let (mut known, mut silent, mut warned) = (0, 0, 0);
     for seed in 1..=40 {
         let unreached = fit(2.0, 0.9, seed);
-        if unreached.knowledge.limit.standard_error().is_some() {
+        if unreached.unknowns[1].knowledge.standard_error().is_some() {
             known += 1;
             silent += usize::from(!said(&unreached));
         }

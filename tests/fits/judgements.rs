@@ -94,9 +94,9 @@ fn errors_as_large_as_their_noise_are_explained() {
     assert_eq!(found(1.0 / 1.2, WarningCode::Unexplained), None);
     assert_eq!(found(1.0 / 1.35, WarningCode::Unexplained), Some(Severity::NotUsable));
     assert_eq!(found(1.0, WarningCode::HoldsZero), Some(Severity::NotUsable));
-    // Errors of twice and ten times the noise, and noise beyond all that the output moves.
+    // Errors of 1.2 and ten times the noise, and noise beyond all that the output moves.
     assert_eq!(found(1.0, WarningCode::GivenNoise), None);
-    assert_eq!(found(1.0 / 1.6, WarningCode::GivenNoise), Some(Severity::Usable));
+    assert_eq!(found(1.0 / 1.6, WarningCode::GivenNoise), Some(Severity::UsableWithCare));
     assert_eq!(found(1.0 / 3.0, WarningCode::GivenNoise), Some(Severity::UsableWithCare));
     assert_eq!(found(1.0 / 20.0, WarningCode::GivenNoise), Some(Severity::NotUsable));
     assert_eq!(found(3.0, WarningCode::GivenNoise), Some(Severity::UsableWithCare));
@@ -362,4 +362,31 @@ fn the_deviance_of_a_long_record() {
     let ratio = estimate.quality.i.rmse / 0.1;
     let expected = 2_000.0 * ((core::f64::consts::TAU * 0.01).ln() + ratio * ratio);
     assert!((estimate.deviance.unwrap() / expected - 1.0).abs() < 1e-9, "{:?} {expected}", estimate.deviance);
+}
+
+/// Priors so many standard errors of the data from what these say. The difference has the variance of both: four are 3.98 with a prior of a
+/// tenth of a standard error, less 1 % because the errors grow with it, and twelve are 3.62 with one of the root of ten. A prior that
+/// decides alone says nothing of itself.
+#[test]
+fn a_prior_that_the_data_contradict_is_said() {
+    let record = record(400, (2.0, 2.0), 0.5, moving);
+    let alone = Fit::new(&Twice, &record).parameters(Factor { a: free(1.0) }).run().unwrap();
+    let (a, error) = (alone.parameters.a, alone.unknowns[0].knowledge.standard_error().unwrap());
+    let said = |far: f64, std: f64| {
+        let prior = free(1.0).prior(a + far * error, std * error);
+        let fit = Fit::new(&Twice, &record).parameters(Factor { a: prior }).run().unwrap();
+        let warning = fit.warnings.iter().find(|warning| warning.code == WarningCode::PriorContradicts);
+        warning.map(|warning| (warning.severity, warning.text.clone()))
+    };
+    let (narrow, wide) = (0.1, 10f64.sqrt());
+    assert_eq!(said(3.0, narrow), None);
+    let (severity, text) = said(4.0, narrow).unwrap();
+    assert_eq!(severity, Severity::UsableWithCare);
+    assert!(text.contains("3.9 standard deviations off"), "{text}");
+    assert_eq!(said(6.0, narrow).map(|said| said.0), Some(Severity::NotUsable));
+    assert_eq!(said(-6.0, wide), None);
+    let (severity, text) = said(-12.0, wide).unwrap();
+    assert_eq!(severity, Severity::UsableWithCare);
+    assert!(text.contains("3.6 standard deviations off"), "{text}");
+    assert_eq!(said(6.0, 0.01), None);
 }

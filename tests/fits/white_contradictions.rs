@@ -31,6 +31,11 @@ impl Model for Lag {
 /// A record with inputs that are independent of each other, so that its errors are nearly white whatever the model misses: with the
 /// square of the input times `curve`, and a gain `b` of its own in the second half. The noise grows with the level by `grows`.
 fn record(seed: u64, curve: f64, second: f64, grows: f64) -> ExperimentOf<Lag> {
+    delayed(seed, curve, second, grows, 0.0)
+}
+
+/// The same with a part of the input that acts two samples later.
+fn delayed(seed: u64, curve: f64, second: f64, grows: f64, late: f64) -> ExperimentOf<Lag> {
     let mut noise = Noise(seed);
     let (mut x, mut inputs, mut outputs) = (0.0, vec![], vec![]);
     for k in 0..SAMPLES {
@@ -38,7 +43,8 @@ fn record(seed: u64, curve: f64, second: f64, grows: f64) -> ExperimentOf<Lag> {
         inputs.push(Drive { u });
         outputs.push(Level { x: x + (0.2 + grows * f64::abs(x)) * noise.gauss() });
         let b = if k < SAMPLES / 2 { 1.0 } else { second };
-        x = 0.1 * x + b * u + curve * u * u;
+        let before = inputs.get(k.wrapping_sub(2)).map_or(0.0, |before| before.u);
+        x = 0.1 * x + b * u + curve * u * u + late * before;
     }
     Experiment::new(&Lag, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap()
 }
@@ -64,6 +70,17 @@ fn a_curve_left_out_is_said() {
         colored += usize::from(severity(&estimate, WarningCode::ColoredErrors).is_some());
     }
     assert!(colored <= 5, "{colored}");
+}
+
+/// A tenth of the input acts two samples later: a quarter of the errors' square, which is as white as the input and follows from it.
+#[test]
+fn a_delay_left_out_is_said() {
+    for seed in 1..=10 {
+        let estimate = fit(&delayed(seed, 0.0, 1.0, 0.1, 0.1));
+        assert_eq!(severity(&estimate, WarningCode::WrongShape), Some(Severity::UsableWithCare), "{estimate}");
+        let text = &estimate.warnings.iter().find(|warning| warning.code == WarningCode::WrongShape).unwrap().text;
+        assert!(text.contains("from what the input `u` was at the samples before"), "{text}");
+    }
 }
 
 /// A gain that is 10 % larger in the second half.

@@ -132,4 +132,12 @@ fn gaps_are_judged_against_the_spread_of_the_intervals() {
     assert!(gaps(|k| 1e-3 - (1.0 - fraction(k)).ln()).is_empty());
     assert_eq!(gaps(|k| if k == 200 { 10.0 } else { 0.3 + 1.4 * fraction(k) }), [200]);
     assert_eq!(gaps(|k| if k == 200 { 2.0 } else { 1.0 + 0.02 * fraction(k) }), [200]);
+    // Patterns: two steps by turns, every third or sixth one longer; with a gap in the first. One of a hundred is no pattern.
+    assert!(gaps(|k| [0.3, 1.7][k % 2]).is_empty() && gaps(|k| [0.6, 1.4][k % 2]).is_empty());
+    assert!(gaps(|k| [0.5, 0.5, 2.0][k % 3]).is_empty());
+    assert!(gaps(|k| if k % 6 == 5 { 8.0 } else { 1.0 }).is_empty());
+    assert_eq!(gaps(|k| if k == 200 { 20.0 } else { [0.3, 1.7][k % 2] }), [200]);
+    assert_eq!(gaps(|k| if k % 100 == 50 { 3.0 } else { 1.0 }), [50, 150, 250, 350]);
+    // Three of ten rows lost, here and there.
+    assert!(gaps(|k| if fraction(k) < 0.3 { 2.0 } else { 1.0 }).len() > 100);
 }

@@ -82,7 +82,7 @@ fn sweeps<M: Model>(model: &M, predictor: impl Predictor) -> [Arc<dyn Sweep + '_
     let equations = Arc::new(Equations::trace(model).unwrap());
     let duals = |code| -> Arc<dyn Sweep + '_> {
         let (layout, method, predictor) = (Arc::new(Layout::of::<M>()), method.clone(), predictor.clone());
-        Arc::new(DualSweep { layout, code, method, predictor, reason: String::new() })
+        Arc::new(DualSweep { layout, code, method, predictor, uncompiled: Default::default() })
     };
     let typed = duals(Arc::new(Typed { model: Handle::Borrowed(model), loops: Arc::new(Rk4::default()) }));
     let evaluated = duals(Arc::new(equations.clone()));
