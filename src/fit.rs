@@ -10,6 +10,7 @@ mod refine;
 mod run;
 mod search;
 mod sides;
+mod simulated;
 mod starts;
 
 pub use fleet::Fleet;

@@ -220,6 +220,11 @@ pub trait Sweep: Send + Sync {
         None
     }
 
+    /// Of predictions that restart from measured states: the simulation by the same equations and method.
+    fn simulating<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
+        None
+    }
+
     /// Description of the integrator and its settings.
     fn integrator(&self) -> String;
 

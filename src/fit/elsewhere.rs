@@ -44,6 +44,11 @@ impl Problem<'_> {
     /// The estimate after further searches from other starts, with their time and evaluations; `None` if it needs none, or if the fit's
     /// limits of time and trial steps are used up.
     pub(super) fn searched_elsewhere(&self, found: &Summary, control: &Control) -> Option<Summary> {
+        let searched = self.searched(found, control);
+        self.compared_with_simulation(searched.as_ref().unwrap_or(found), control).or(searched)
+    }
+
+    fn searched(&self, found: &Summary, control: &Control) -> Option<Summary> {
         if control.stops() {
             return None;
         }

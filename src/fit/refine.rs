@@ -11,7 +11,7 @@ use std::time::Instant;
 /// record of the finer model would favor the coarser one by 15 in less than `exp(-15 / 2)`, one of 1,800 records; with estimated
 /// parameters that is about right only.
 const WORSE: f64 = 4.0;
-const CERTAINLY_WORSE: f64 = 15.0;
+pub(super) const CERTAINLY_WORSE: f64 = 15.0;
 
 /// An unknown that a finer step moved by more than so many standard errors is worth a note, where the data do not tell the two
 /// apart.

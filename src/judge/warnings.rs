@@ -198,12 +198,12 @@ impl Judgement<'_> {
 
     /// Whether a finer step would move an unknown. The bound first, which costs little; the shift itself only where the
     /// bound is not enough.
-    fn step(&self, unknowns: &[Unknown]) -> Option<Warning> {
+    fn step(&self, unknowns: &[Unknown]) -> Vec<Warning> {
         // The noise, where the errors were not divided by it.
         let refines = self.objective.problem.refines;
         let most = if refines { REFINED_SHIFT } else { STEP_SHIFT };
         if self.end.outcome == Outcome::Exact {
-            return if refines { self.exact_with_this_step(unknowns) } else { None };
+            return refines.then(|| self.exact_with_this_step(unknowns)).flatten().into_iter().collect();
         }
         let stopped = matches!(self.end.outcome, Outcome::TimeLimit | Outcome::Cancelled);
         let change = self.residuals.step_error / self.widening;
@@ -211,16 +211,14 @@ impl Judgement<'_> {
         let windows = self.objective.problem.samples() as f64;
         let coarse = change > most || change * windows > most && change * memory::windows_add_up(self) > most;
         let fewer = (refines && !stopped && coarse).then(|| self.determined_by_a_finer_step(unknowns)).flatten();
-        if fewer.is_some() {
-            return fewer;
+        if let Some(fewer) = fewer {
+            return vec![fewer];
         }
         if refines && !stopped && !self.end.outcome.converged() {
-            return self.step_decides_the_search();
+            return self.step_decides_the_search().into_iter().collect();
         }
-        if !coarse {
-            return None;
-        }
-        let finer = self.objective.sweep.refined(self.objective.problem.samples())?;
+        let finer = self.objective.sweep.refined(self.objective.problem.samples()).filter(|_| coarse);
+        let Some(finer) = finer else { return vec![] };
         let objective = self.objective.of(self.objective.problem, &*finer);
         let Some((name, shift, part)) = shift(&objective, &self.end.coordinates, unknowns) else {
             return self.diverges(unknowns, change, &finer.integrator());
@@ -228,7 +226,7 @@ impl Judgement<'_> {
         let finer = finer.integrator();
         let wrong = refines && shift > STEP_SHIFT && part >= DIGITS;
         let severity = if wrong { Severity::NotUsable } else { Severity::UsableWithCare };
-        (shift > most).then(|| {
+        let warning = || {
             let (part, errors) = (percent(part, 2), number(shift, 2));
             let tried = if refines { "no method that was tried steps finely enough" } else { "the step is too coarse" };
             let text = format!(
@@ -236,22 +234,30 @@ impl Judgement<'_> {
                  or smooth the model"
             );
             Warning { code: WarningCode::CoarseStep, severity, text }
-        })
+        };
+        if shift > most { vec![warning()] } else { vec![] }
     }
 
     /// Of a fit whose simulation fails with a finer step, or grows until no unknown can be told from others: a coarse step damps what
-    /// oscillates, and a plant that is unstable with a finer one may fit with it.
-    fn diverges(&self, unknowns: &[Unknown], change: f64, finer: &str) -> Option<Warning> {
-        let known = unknowns.iter().any(|unknown| unknown.knowledge.standard_error().is_some());
-        let by = if change.is_finite() {
-            format!("changes by {} standard deviations", number(change, 2))
-        } else {
-            "fails".to_owned()
+    /// oscillates, and a plant that is unstable with a finer one may fit with it. That one has no minimum here.
+    fn diverges(&self, unknowns: &[Unknown], change: f64, finer: &str) -> Vec<Warning> {
+        if unknowns.iter().all(|unknown| unknown.knowledge.standard_error().is_none()) {
+            return vec![];
+        }
+        let by = match change.is_finite() {
+            true => format!("changes by {} standard deviations", number(change, 2)),
+            false => "fails".to_owned(),
         };
-        let text = format!(
-            "the step is too coarse: with {finer} the simulation at the estimate {by}; use a finer step, or smooth the model"
-        );
-        known.then_some(Warning { code: WarningCode::CoarseStep, severity: Severity::NotUsable, text })
+        let texts = [
+            (
+                WarningCode::CoarseStep,
+                format!(
+                    "the step is too coarse: with {finer} the simulation at the estimate {by}; use a finer step, or smooth the model"
+                ),
+            ),
+            (WarningCode::NotAtMinimum, "this is a minimum with the coarse step alone".to_owned()),
+        ];
+        texts.map(|(code, text)| Warning { code, severity: Severity::NotUsable, text }).into()
     }
 
     /// Data that are reproduced to their rounding may have been made with this step. But a step with held inputs is exact for a linear

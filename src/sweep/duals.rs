@@ -7,7 +7,7 @@ use crate::error::{Error, Failure};
 use crate::functions::Functions;
 use crate::integrate::{Duals, Method, Stuck};
 use crate::layout::{Kind, Layout};
-use crate::predict::{Between, Guess, Place, Plant, Prediction, SlicePlant};
+use crate::predict::{Between, FreeRun, Guess, Place, Plant, Prediction, SlicePlant};
 use crate::record::{Channel, Record};
 use core::cell::Cell;
 use std::sync::Arc;
@@ -132,6 +132,18 @@ impl Sweep for DualSweep<'_> {
         let (code, method) = (self.code.refined(kind)?, self.method.refined(kind)?);
         let (layout, predictor, uncompiled) = (self.layout.clone(), self.predictor.clone(), self.uncompiled.clone());
         Some(Arc::new(DualSweep { layout, code, method, predictor, uncompiled }))
+    }
+
+    fn simulating<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
+        self.predictor.restarts()?;
+        let (layout, code, method) = (self.layout.clone(), self.code.clone(), self.method.clone());
+        Some(Arc::new(DualSweep {
+            layout,
+            code,
+            method,
+            predictor: Arc::new(FreeRun),
+            uncompiled: self.uncompiled.clone(),
+        }))
     }
 
     fn integrator(&self) -> String {

@@ -15,7 +15,7 @@ use crate::graph::{Untraceable, choosing};
 use crate::integrate::Method;
 use crate::interval::Hold;
 use crate::layout::{Kind, Layout};
-use crate::predict::{Guess, Prediction, recurrence};
+use crate::predict::{FreeRun, Guess, Prediction, recurrence};
 use crate::record::{Record, Time};
 use crate::recurrence::Recurrence;
 pub(crate) use derived::Derived;
@@ -234,6 +234,15 @@ impl Sweep for ProgramSweep<'_> {
         Some(match programs {
             Some(programs) => Arc::new(ProgramSweep { programs, plain }),
             None => plain,
+        })
+    }
+
+    fn simulating<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
+        let plain = self.plain.simulating()?;
+        let (equations, method) = (self.programs.equations.clone(), self.programs.method.clone());
+        Some(match ProgramSweep::new(equations, method, Arc::new(FreeRun), plain.clone()) {
+            Ok(sweep) => Arc::new(sweep),
+            Err(_) => plain,
         })
     }
 
