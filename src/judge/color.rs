@@ -11,17 +11,24 @@ use crate::optimize::Severity;
 /// widened it is a note.
 pub(super) const CERTAIN: f64 = 1e-4;
 /// A level that is enough where the colored part is above the second.
-const LIKELY: f64 = 1e-3;
+pub(super) const LIKELY: f64 = 1e-3;
 const MUCH: f64 = 0.05;
 /// The part of an output's movement that is an error, and follows from the errors before: below the first it is a note,
 /// above the second the model is wrong or noise dominates the output.
 pub(super) const SMALL: f64 = 1e-4;
 const LARGE: f64 = 0.5;
+/// The part that a wrong minimum leaves: pendulums at another natural frequency left 0.3, colored noise of a tenth of the output less.
+const LEFT: f64 = 0.1;
 
 impl Judgement<'_> {
     /// Whether the errors of an output are correlated over time, beyond chance and rounding.
     pub(super) fn is_colored(&self) -> bool {
         self.colored_part() > SMALL
+    }
+
+    /// Whether so much of an output is colored errors that it is rather the model than the noise.
+    pub(super) fn leaves_much(&self) -> bool {
+        self.colored_part() > LEFT
     }
 
     /// The largest part of an output's movement that is an error and follows from the errors before.

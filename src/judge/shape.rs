@@ -19,8 +19,9 @@ use crate::whiteness::Portmanteau;
 /// Records that are looked at, and samples of each: the first ones.
 pub(super) const RECORDS: usize = 8;
 const SAMPLES: usize = 16_384;
-/// The input of the sample before, and its changes up to that sample, that errors are examined for following from.
+/// Samples before whose inputs errors are examined for following from, by a constant, three powers of the last one, and its changes.
 const BEFORE: usize = 4;
+const REGRESSORS: usize = 7;
 
 /// Whether the model certainly has the wrong shape.
 pub(super) fn shape(judgement: &Judgement<'_>) -> Option<Warning> {
@@ -70,46 +71,49 @@ fn by_inputs(judgement: &Judgement<'_>) -> Option<Warning> {
     })
 }
 
-/// The output whose errors certainly follow from an input of the samples before: its value, and its changes. Not that of the same sample,
+/// The output whose errors certainly follow from an input of the samples before: its powers, and its changes. Not that of the same sample,
 /// which a controller may have drawn from the error. White errors only, as below.
 fn by_inputs_before(judgement: &Judgement<'_>) -> Option<Warning> {
     let objective = judgement.objective;
     let (layout, outputs) = (objective.problem.layout(), objective.outputs());
-    let examined = !judgement.is_static() && !scales(objective).is_empty() && !layout.inputs.is_empty();
+    let plain = objective.problem.settings.prefilter.is_none() && objective.sweep.restarts().is_none();
+    let examined = !judgement.is_static() && plain && !layout.inputs.is_empty();
     let exact = judgement.rounding || judgement.end.outcome == Outcome::Exact;
     if !examined || exact || judgement.autocorrelated_at(color::CERTAIN).is_some() {
         return None;
     }
-    let mut sums = vec![Products::<{ BEFORE + 1 }>::default(); outputs * layout.inputs.len()];
+    let sigma = objective.whitening.sigma();
+    // What the minimum makes orthogonal to the slopes: errors times their weights.
+    let weight = |e: usize, j: usize, k: usize, error: f64| {
+        let by_loss = objective.loss().map_or(1.0, |loss| loss.weight(error / sigma[j]));
+        objective.weight(e, k) * by_loss
+    };
+    let mut sums = vec![Products::<REGRESSORS>::default(); outputs * layout.inputs.len()];
     for e in 0..objective.experiments().min(RECORDS) {
         let errors = first_errors(judgement, e);
         for (input, sums) in objective.problem.records[e].inputs().iter().zip(sums.chunks_mut(outputs)) {
             let (u, scale) = (&input.values, Scale::of_range(input));
             for k in BEFORE..errors[0].len() {
-                let changes = |i: usize| scale.one(u[k - i + 1]) - scale.one(u[k - i]);
-                let before: [f64; BEFORE + 1] = std::array::from_fn(|i| match i {
-                    0 => 1.0,
-                    1 => scale.one(u[k - 1]),
-                    _ => changes(i),
-                });
-                sums.iter_mut()
-                    .zip(&errors)
-                    .filter_map(|(sums, own)| Some((sums, own[k]?)))
-                    .for_each(|(sums, error)| sums.take(before, error));
+                let [one, two, three, four] = std::array::from_fn(|lag| scale.one(u[k - 1 - lag]));
+                let before = [1.0, one, one * one, one.powi(3), one - two, two - three, three - four];
+                for (j, (sums, errors)) in sums.iter_mut().zip(&errors).enumerate() {
+                    if let Some(error) = errors[k] {
+                        sums.take(before, error * weight(e, j, k, error));
+                    }
+                }
             }
         }
     }
     let of = |number: usize| {
         let (i, j) = (number / outputs, number % outputs);
-        let part =
-            sums[number].explained_part() * judgement.residuals.outputs[j].rmse / judgement.residuals.levels[j].1;
-        (i, j, part, sums[number].by_chance() * sums.len() as f64)
+        let part = sums[number].explained_part() * judgement.residuals.outputs[j].rmse;
+        (i, j, part / judgement.residuals.levels[j].1, sums[number].by_chance() * sums.len() as f64)
     };
-    let certain = (0..sums.len()).map(of).filter(|(.., chance)| *chance < color::CERTAIN);
+    let certain = (0..sums.len()).map(of).filter(|(.., chance)| *chance < color::LIKELY);
     let (i, j, part, chance) = certain.max_by(|a, b| a.2.total_cmp(&b.2))?;
     let text = format!(
-        "the errors of `{}` follow from what the input `{}` was at the samples before ({}): the model lacks a delay or an inertia, or \
-         the signals are not of the same moments, by {} of what the output moves, and no interval allows for that",
+        "the errors of `{}` follow from what the input `{}` was at the samples before ({}): the model lacks a delay, an inertia or a \
+         curve, or the signals are not of the same moments, by {} of what the output moves, and no interval allows for that",
         layout.outputs[j].name,
         layout.inputs[i].name,
         p_value(chance),

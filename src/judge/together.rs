@@ -74,11 +74,16 @@ impl Accumulate for Halves<'_> {
         let middle = self.objective.problem.records[self.experiment].len() / 2;
         for k in 0..window.samples[lane] {
             let half = usize::from(window.begin[lane] + k >= middle);
-            for j in (0..window.outputs()).filter(|&j| window.is_measured(k, j, lane)) {
+            let weight = self.objective.weight(self.experiment, window.begin[lane] + k);
+            for j in (0..window.outputs()).filter(|&j| window.is_measured(k, j, lane) && weight > 0.0) {
                 let part = &mut self.of[j][half];
                 let values = window.row(k, j).iter().skip(lane).step_by(window.lanes());
-                self.row.iter_mut().zip(values).for_each(|(to, from)| *to = *from);
                 let error = window.error(k, j, lane);
+                // As in iteratively reweighted least squares, whose minimum is that of the loss.
+                let by_loss = self.objective.loss().map_or(1.0, |loss| loss.weight(error));
+                let root = (weight * by_loss).sqrt();
+                self.row.iter_mut().zip(values).for_each(|(to, from)| *to = root * from);
+                let error = root * error;
                 part.squares += error * error;
                 part.fourths += error.powi(4);
                 part.count += 1;
@@ -131,20 +136,22 @@ struct Piece {
 }
 
 /// Whether parts of the data are compared, which takes slopes: where errors are correlated over time or with the prediction. Always of
-/// filters, which estimate what contradicts them as process noise, so that their errors stay white; and of static models, whose
-/// samples have no order.
+/// filters, which estimate what contradicts them as process noise, so that their errors stay white; of static models, whose
+/// samples have no order; and where errors are not examined for following from the prediction.
 fn is_suspicious(judgement: &Judgement<'_>) -> bool {
     let least = judgement.residuals.shape.iter().copied().fold(judgement.residuals.parts, f64::min);
     let follow = least * (judgement.objective.outputs() as f64) < LEVEL && !judgement.rounding;
-    follow || judgement.is_colored() || judgement.is_static() || judgement.objective.sweep.predicts_variance()
+    let unseen = judgement.residuals.shape.is_empty() && !judgement.rounding;
+    follow || unseen || judgement.is_colored() || judgement.is_static() || judgement.objective.sweep.predicts_variance()
 }
 
 /// Parameters that differ between outputs, records or halves of the data.
 pub(super) fn contradictions(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
     let objective = judgement.objective;
-    let plain =
-        objective.loss().is_none() && !objective.is_weighted() && objective.problem.settings.prefilter.is_none();
-    let possible = plain && unknowns.len() <= MOST && judgement.degrees > 0.0 && judgement.end.outcome.converged();
+    let possible = objective.problem.settings.prefilter.is_none()
+        && unknowns.len() <= MOST
+        && judgement.degrees > 0.0
+        && judgement.end.outcome.converged();
     if !possible || !is_suspicious(judgement) {
         return vec![];
     }
@@ -214,8 +221,8 @@ fn piece(judgement: &Judgement<'_>, all: &[Halves<'_>], rows: Rows) -> Option<Pi
         for (all, (triangle, _)) in merged.iter_mut().zip(linear.columns()) {
             all.merge(&scaled(triangle, variance.sqrt().recip()));
         }
-        if predicted {
-            // Squares of errors with heavy tails vary more than those of normal ones.
+        if predicted || judgement.objective.is_weighted() {
+            // Squares of errors with heavy tails, or of several sizes, vary more than those of normal ones.
             dependence = dependence.max(0.5 * (count as f64 * fourths / (squares * squares) - 1.0));
         }
     }

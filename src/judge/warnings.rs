@@ -70,7 +70,7 @@ impl Judgement<'_> {
             }
         }
         warnings.extend(self.not_positive(unknowns));
-        warnings.extend(directions.iter().map(|direction| Direction::warning(direction.to_string())));
+        warnings.extend(directions.iter().map(|direction| self.without_influence(direction, unknowns)));
         warnings.extend(self.step(unknowns));
         warnings.extend(aliases::aliased(self));
         if !self.end.outcome.converged() && unknowns.iter().any(|row| row.knowledge.standard_error().is_some()) {
@@ -80,7 +80,7 @@ impl Judgement<'_> {
         }
         if let Some(starts) = &self.end.starts {
             let asked = matches!(self.objective.problem.settings.searches, SearchPlan::All(_));
-            let colored = self.is_colored();
+            let colored = self.leaves_much();
             warnings.extend(super::starts::warnings(starts, self.residuals.measured, asked, colored));
         }
         if let Some(write_error) = &self.end.write_error {
@@ -157,6 +157,19 @@ impl Judgement<'_> {
             Warning { code: WarningCode::NotPositive, severity: Severity::NotUsable, text }
         };
         wrong.map(warning).collect()
+    }
+
+    /// A direction that the data do not determine; a note for an initial state that has died out, which changes no other unknown.
+    fn without_influence(&self, direction: &Direction, unknowns: &[Unknown]) -> Warning {
+        if let [(name, _)] = direction.moves.as_slice()
+            && self.linear.forgotten().iter().any(|i| unknowns[*i].name == *name)
+        {
+            let text = format!(
+                "`{name}` has died out before the first measurement: it is not known, and no other unknown depends on it"
+            );
+            return Warning { code: WarningCode::Unidentified, severity: Severity::Usable, text };
+        }
+        Direction::warning(direction.to_string())
     }
 
     /// Initial states whose start is a guess of the library.

@@ -11,6 +11,7 @@ pub struct Linearization {
     slopes: Elimination,
     data_norm: Option<f64>,
     roughness: f64,
+    forgotten: Vec<usize>,
 }
 
 impl Linearization {
@@ -23,7 +24,7 @@ impl Linearization {
 
     /// From the cost and the slopes.
     pub fn of(cost: f64, slopes: Elimination) -> Self {
-        Linearization { cost, slopes, data_norm: None, roughness: 0.0 }
+        Linearization { cost, slopes, data_norm: None, roughness: 0.0, forgotten: vec![] }
     }
 
     /// With the norm of the data themselves, weighted as the rows are: what residuals are small against.
@@ -34,6 +35,17 @@ impl Linearization {
     /// With a part of the cost by which it may jump from point to point: that of an integrator with a tolerance.
     pub fn with_roughness(self, roughness: f64) -> Self {
         Linearization { roughness, ..self }
+    }
+
+    /// With unknowns whose slopes were left out because they are below the rounding of the residual: that they have no influence does not
+    /// make a plateau.
+    pub fn with_forgotten(self, forgotten: Vec<usize>) -> Self {
+        Linearization { forgotten, ..self }
+    }
+
+    /// The unknowns whose slopes were left out as rounding.
+    pub fn forgotten(&self) -> &[usize] {
+        &self.forgotten
     }
 
     /// Norm of the data, if it was said.

@@ -128,9 +128,10 @@ impl Point {
         RESOLUTION.max(self.linear.roughness()) * self.cost_size()
     }
 
-    /// The directions, of unknowns that are not on a bound, that have no influence.
+    /// The directions, of unknowns that are not on a bound nor forgotten, that have no influence.
     pub fn without_influence(&self) -> Vec<Vec<f64>> {
-        let on_bound: Vec<bool> = self.limits.iter().map(|(down, up)| *down >= 0.0 || *up <= 0.0).collect();
+        let mut held: Vec<bool> = self.limits.iter().map(|(down, up)| *down >= 0.0 || *up <= 0.0).collect();
+        self.linear.forgotten().iter().for_each(|i| held[*i] = true);
         let direction = |entries: Vec<(usize, f64)>| {
             let mut direction = vec![0.0; self.x.len()];
             for (i, entry) in entries {
@@ -138,7 +139,7 @@ impl Point {
             }
             direction
         };
-        self.linear.undetermined(&on_bound, RANK).directions.into_iter().map(direction).collect()
+        self.linear.undetermined(&held, RANK).directions.into_iter().map(direction).collect()
     }
 
     /// Points to either side along a direction, a hundredth of the unknowns' sizes away.

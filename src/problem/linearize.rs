@@ -5,13 +5,17 @@ use super::batches::{Broken, in_batches, run};
 use super::borders::Guess;
 use super::pass::Job;
 use super::segments::{Borders, Carries};
-use super::{Objective, Values, Weighing};
+use super::{Free, Objective, Role, Values, Weighing};
 use crate::information::{Chain, Information};
 use crate::optimize::{Infeasible, Linearization};
+use crate::parameter::Transform;
 use crate::sweep::{Piece, Reached, RunError, Seed};
 use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
+
+/// A change of the predictions below this part of the residual is rounding: beside noise of a percent, 1e-12 of the output.
+const FORGOTTEN: f64 = 1e-10;
 
 /// Cost, triangle and final carry of one segment.
 pub(super) struct Part {
@@ -63,14 +67,45 @@ impl Objective<'_> {
         Ok(self.with_priors(coordinates, cost, vec![triangle]))
     }
 
+    /// Leaves out the slopes of initial states that have died out where the measurements begin: a change of one by its own size moves the
+    /// predictions by less than the residual's rounding, and a search for it would have no end.
+    fn without_forgotten(&self, coordinates: &[f64], blocks: &mut [Information]) -> Vec<usize> {
+        let unknowns = &self.problem.unknowns;
+        let residual = blocks.iter().map(Information::residual_at_zero).sum::<f64>().sqrt();
+        let is_forgotten = |i: usize, norm: f64| {
+            let Free { role, parameter, .. } = &unknowns.row[i];
+            let size = coordinates[i].abs().max(parameter.start.abs());
+            let counts = matches!(role, Role::InitialState(_)) && parameter.prior.is_none();
+            counts
+                && parameter.transform == Transform::Identity
+                && norm > 0.0
+                && size > 0.0
+                && norm * size < FORGOTTEN * residual
+        };
+        let mut forgotten = vec![];
+        for (e, block) in blocks.iter_mut().enumerate() {
+            let norms = block.column_norms().into_iter().zip(unknowns.columns(e));
+            let own: Vec<usize> = norms.filter(|(norm, i)| is_forgotten(*i, *norm)).map(|(_, i)| i).collect();
+            if !own.is_empty() {
+                let scales: Vec<f64> = unknowns.columns(e).map(|i| if own.contains(&i) { 0.0 } else { 1.0 }).collect();
+                forgotten.extend(own);
+                let mut left = std::mem::replace(block, Information::new(scales.len()));
+                left.scale_columns(&scales);
+                block.merge(&left);
+            }
+        }
+        forgotten
+    }
+
     fn with_priors(&self, coordinates: &[f64], mut cost: f64, mut blocks: Vec<Information>) -> Linearization {
+        let forgotten = self.without_forgotten(coordinates, &mut blocks);
         for (i, slope, error) in self.problem.unknowns.priors(coordinates) {
             let e = self.problem.unknowns.row[i].experiment.unwrap_or(0);
             let row: Vec<f64> = self.problem.unknowns.columns(e).map(|c| if c == i { slope } else { 0.0 }).collect();
             blocks[e].absorb_row(&row, error);
             cost += 0.5 * error * error;
         }
-        let linear = Linearization::new(cost, self.problem.unknowns.shared(), blocks);
+        let linear = Linearization::new(cost, self.problem.unknowns.shared(), blocks).with_forgotten(forgotten);
         match self.data_norm() {
             Some(norm) => linear.with_data_norm(norm),
             None => linear,

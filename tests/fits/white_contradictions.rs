@@ -83,6 +83,23 @@ fn a_delay_left_out_is_said() {
     }
 }
 
+/// The delay above, and the gain below, by a robust loss and by weights: the tests are those of the errors by their weights.
+#[test]
+fn a_loss_and_weights_hide_nothing() {
+    for seed in 1..=5 {
+        for (code, record) in [
+            (WarningCode::WrongShape, delayed(seed, 0.0, 1.0, 0.1, 0.1)),
+            (WarningCode::HalvesContradict, record(seed, 0.0, 1.1, 0.0)),
+        ] {
+            let fit = || Fit::new(&Lag, &record).parameters(Map { a: free(0.3), b: free(0.8) });
+            for fit in [fit().loss(Huber::default()), fit().weighting(|_: &Sample<Lag>| 1.0)] {
+                let estimate = fit.run().unwrap();
+                assert_eq!(severity(&estimate, code), Some(Severity::UsableWithCare), "{estimate}");
+            }
+        }
+    }
+}
+
 /// A gain that is 10 % larger in the second half.
 #[test]
 fn halves_that_differ_are_said() {
