@@ -6,7 +6,7 @@
 use super::color;
 use super::conclude::Judgement;
 use super::powers::{SHAPE, Scale, scales};
-use super::products::Products;
+use super::products::{Change, Products};
 use super::whiteness::{LAGS, Whiteness};
 use crate::estimate::{Warning, WarningCode};
 use crate::numeral::{p_value, percent};
@@ -19,9 +19,8 @@ use crate::whiteness::Portmanteau;
 /// Records that are looked at, and samples of each: the first ones.
 pub(super) const RECORDS: usize = 8;
 const SAMPLES: usize = 16_384;
-/// Samples before whose inputs errors are examined for following from, by a constant, three powers of the last one, and its changes.
+/// Samples before whose inputs errors are examined for following from.
 const BEFORE: usize = 4;
-const REGRESSORS: usize = 7;
 
 /// Whether the model certainly has the wrong shape.
 pub(super) fn shape(judgement: &Judgement<'_>) -> Option<Warning> {
@@ -88,14 +87,13 @@ fn by_inputs_before(judgement: &Judgement<'_>) -> Option<Warning> {
         let by_loss = objective.loss().map_or(1.0, |loss| loss.weight(error / sigma[j]));
         objective.weight(e, k) * by_loss
     };
-    let mut sums = vec![Products::<REGRESSORS>::default(); outputs * layout.inputs.len()];
+    let mut sums = vec![Before::default(); outputs * layout.inputs.len()];
     for e in 0..objective.experiments().min(RECORDS) {
         let errors = first_errors(judgement, e);
         for (input, sums) in objective.problem.records[e].inputs().iter().zip(sums.chunks_mut(outputs)) {
             let (u, scale) = (&input.values, Scale::of_range(input));
             for k in BEFORE..errors[0].len() {
-                let [one, two, three, four] = std::array::from_fn(|lag| scale.one(u[k - 1 - lag]));
-                let before = [1.0, one, one * one, one.powi(3), one - two, two - three, three - four];
+                let before = std::array::from_fn(|lag| scale.one(u[k - 1 - lag]));
                 for (j, (sums, errors)) in sums.iter_mut().zip(&errors).enumerate() {
                     if let Some(error) = errors[k] {
                         sums.take(before, error * weight(e, j, k, error));
@@ -106,8 +104,9 @@ fn by_inputs_before(judgement: &Judgement<'_>) -> Option<Warning> {
     }
     let of = |number: usize| {
         let (i, j) = (number / outputs, number % outputs);
-        let part = sums[number].explained_part() * judgement.residuals.outputs[j].rmse;
-        (i, j, part / judgement.residuals.levels[j].1, sums[number].by_chance() * sums.len() as f64)
+        let (part, chance) = sums[number].follows();
+        let part = part * judgement.residuals.outputs[j].rmse / judgement.residuals.levels[j].1;
+        (i, j, part, chance * sums.len() as f64)
     };
     let certain = (0..sums.len()).map(of).filter(|(.., chance)| *chance < color::LIKELY);
     let (i, j, part, chance) = certain.max_by(|a, b| a.2.total_cmp(&b.2))?;
@@ -120,6 +119,30 @@ fn by_inputs_before(judgement: &Judgement<'_>) -> Option<Warning> {
         percent(part, 2)
     );
     Some(Warning { code: WarningCode::WrongShape, severity: color::severity(part), text })
+}
+
+/// Sums over errors and an input at the samples before: with powers of the last one, and with each of its changes. These may be few and
+/// far between, so that each is tested alone.
+#[derive(Clone, Copy, Default)]
+struct Before {
+    powers: Products<SHAPE>,
+    changes: [Change; BEFORE - 1],
+}
+
+impl Before {
+    fn take(&mut self, before: [f64; BEFORE], error: f64) {
+        self.powers.take(std::array::from_fn(|i| before[0].powi(i as i32)), error);
+        self.changes.iter_mut().zip(before.windows(2)).for_each(|(sums, pair)| sums.take(pair[0] - pair[1], error));
+    }
+
+    /// The root of the part of the squared errors that follows most certainly, and the probability by chance.
+    fn follows(&self) -> (f64, f64) {
+        let squares = self.powers.sum_of_squares();
+        let changes = self.changes.iter().map(|one| (one.explained_part(squares), one.by_chance()));
+        let all = std::iter::once((self.powers.explained_part(), self.powers.by_chance())).chain(changes);
+        let (part, chance) = all.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0.0, 1.0));
+        (part, chance * BEFORE as f64)
+    }
 }
 
 /// The output whose errors certainly follow from its prediction; of several that with the largest part of what it moves. White errors
