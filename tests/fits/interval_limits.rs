@@ -264,6 +264,38 @@ fn noise_of_restarts_that_is_fed_back_is_named() {
     assert!((said / expected - 1.0).abs() < 0.2 && (off / expected - 1.0).abs() < 0.3, "{said} {expected} {off}");
 }
 
+/// A loop of proportional and integral gain, whose measurements are noisy by a fifth of what moves: the errors of predictions from them
+/// are nearly white with a time constant of a part of the right one. Where they are so by every test, the simulation of the record, whose errors
+/// are smaller, tells.
+#[test]
+fn noise_of_restarts_that_leaves_white_errors_is_named() {
+    let (step, truth) = (0.02, Branch { gain: 5.0, tau: 1.5 });
+    let mut simulations = 0;
+    for seed in 21..27 {
+        let (mut x, mut integral, mut noise) = (0.0, 0.0, Noise(seed));
+        let (mut inputs, mut outputs) = (vec![], vec![]);
+        for wanted in levels(800, 100, seed) {
+            let i = x + 0.4 * noise.gauss();
+            let error = 2.0 * wanted - i;
+            integral += step * error;
+            let u = 3.0 * error + 4.0 * integral;
+            outputs.push(Current { i });
+            inputs.push(Voltage { u });
+            x = truth.gain * u + (x - truth.gain * u) * (-step / truth.tau).exp();
+        }
+        let record = Experiment::new(&Lag, Time::Uniform { start: 0.0, step }, inputs, outputs).unwrap();
+        let fit = || Fit::new(&Lag, &record).parameters(Branch { gain: free(4.0), tau: free(1.2) });
+        let ahead = fit().predictor(Horizon::new(1)).run().unwrap();
+        let off = (ahead.parameters.tau - truth.tau) / ahead.knowledge.tau.standard_error().unwrap();
+        assert!(off.abs() > 10.0 && ahead.severity() == optimize::Severity::NotUsable, "{off} {ahead}");
+        let said =
+            |warning: &&Warning| warning.code == WarningCode::RestartNoise && warning.text.contains("a simulation");
+        simulations += usize::from(ahead.warnings.iter().any(|warning| said(&warning)));
+        assert_eq!(fit().run().unwrap().severity(), optimize::Severity::Usable);
+    }
+    assert!(simulations >= 2, "{simulations}");
+}
+
 signals! { pub struct Limited { gain: "A/V", limit: "V" } }
 
 /// `i = gain min(u, limit)`.

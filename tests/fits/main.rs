@@ -23,6 +23,7 @@ mod guessed_states;
 mod interval_limits;
 mod judgements;
 mod kalman;
+mod late_sensor;
 mod long_profile;
 mod models;
 mod narrow_losses;

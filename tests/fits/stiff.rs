@@ -182,6 +182,49 @@ fn a_search_that_fails_by_its_step_is_repeated_with_a_finer_one() {
     is_right(&fit, &[truth.r, truth.l], "4 steps per sample");
 }
 
+signals! { pub struct Torque { m: "N m" } }
+signals! { pub struct Shaft { w1: "rad/s", w2: "rad/s", twist: "rad" } }
+signals! { pub struct Speed { w1: "rad/s" } }
+signals! { pub struct Masses { j1: "kg m^2", j2: "kg m^2", c: "N m/rad", d: "N m s", b: "N m s" } }
+
+/// Two inertias on an elastic shaft.
+#[derive(Clone)]
+struct TwoMass;
+
+impl Model for TwoMass {
+    type State = Shaft;
+    type Input = Torque;
+    type Output = Speed;
+    type Parameters = Masses;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Shaft<S>, u: &Torque<S>, p: &Masses<S>) -> Shaft<S> {
+        let torque = p.c * x.twist + p.d * (x.w1 - x.w2);
+        Shaft { w1: (u.m - p.b * x.w1 - torque) / p.j1, w2: torque / p.j2, twist: x.w1 - x.w2 }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Shaft<S>, _u: &Torque<S>, _p: &Masses<S>) -> Speed<S> {
+        Speed { w1: x.w1 }
+    }
+}
+
+/// Three samples per period of a shaft that is damped by 0.009: Runge-Kutta's method with one step per sample damps more than that, so that a
+/// damping of the wrong sign fits. With a finer step that one grows beyond all bounds, where slopes tell nothing; the fit goes on
+/// from its start by a finer method. Where the one step is asked for, it is refused.
+#[test]
+fn a_plant_that_a_coarse_step_keeps_stable_is_fitted_by_a_finer_one() {
+    let truth = Masses { j1: 3e-3, j2: 8e-3, c: 2406.0, d: 0.0419, b: 0.02 };
+    let levels = crate::common::levels(250, 7, 2);
+    let input: Vec<Torque> = levels.into_iter().map(|m| Torque { m: 5.0 * m }).collect();
+    let time = Time::Uniform { start: 0.0, step: 2e-3 };
+    let run = Simulator::new(&TwoMass).integrator(EXACT).run(&truth, &Shaft::default(), time, &input).unwrap();
+    let record = run.with_noise(Speed { w1: 6e-3 }, 3).experiment(&TwoMass).unwrap();
+    let record = record.initial(Shaft::map(Shaft::default(), fixed));
+    let start = Masses { j1: free(3.1e-3), j2: free(7.6e-3), c: free(2480.0), d: free(0.0), b: free(0.018) };
+    let fit = || Fit::new(&TwoMass, &record).parameters(start);
+    is_right(&fit().run().unwrap(), &[3e-3, 8e-3, 2406.0, 0.0419, 0.02], "steps per sample");
+    let coarse = fit().integrator(Rk4 { substeps: 1 }).run().unwrap();
+    assert!(coarse.parameters.d < -0.1 && coarse.severity() == Severity::NotUsable, "{coarse}");
+    assert!(coarse.warnings.iter().any(|warning| warning.code == WarningCode::CoarseStep), "{coarse}");
+}
+
 signals! { pub struct Growth { gain: "1/s", turn: "rad/s" } }
 
 /// Grows beyond all bounds within a finite time, and turns; counts how often its equations are evaluated.

@@ -1,0 +1,54 @@
+#![cfg(feature = "std")]
+//! Records whose sensor begins to measure when the initial state has died out.
+
+use crate::common::{Noise, levels};
+use greybox::optimize::Severity;
+use greybox::*;
+
+signals! { pub struct Level { x: "1" } }
+signals! { pub struct Drive { u: "1" } }
+signals! { pub struct Lag { gain: "1", tau: "s" } }
+
+/// `tau dx/dt = gain u - x - x^3`.
+#[derive(Clone)]
+struct Cubic;
+
+impl Model for Cubic {
+    type State = Level;
+    type Input = Drive;
+    type Output = Level;
+    type Parameters = Lag;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Drive<S>, p: &Lag<S>) -> Level<S> {
+        Level { x: (p.gain * u.u - x.x - x.x.powi(3)) / p.tau }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Drive<S>, _p: &Lag<S>) -> Level<S> {
+        *x
+    }
+}
+
+/// After 25 and more time constants a change of the initial state by itself moves the outputs by a part of 1e-11 or less: it is said not to be
+/// known, the parameters are.
+#[test]
+fn an_initial_state_that_has_died_out_does_not_keep_a_fit_from_its_end() {
+    for (seed, late) in [(1, 100), (2, 150), (3, 200), (4, 300)] {
+        let mut noise = Noise(seed);
+        let inputs: Vec<Drive> = levels(400, 15, seed).into_iter().map(|u| Drive { u: 2.0 * u }).collect();
+        let time = Time::Uniform { start: 0.0, step: 0.1 };
+        let run = simulate(&Cubic, &Lag { gain: 1.5, tau: 0.4 }, &Level { x: 0.3 }, time.clone(), &inputs).unwrap();
+        let measured =
+            |(k, y): (usize, &Level)| Level { x: if k < late { f64::NAN } else { y.x + 0.02 * noise.gauss() } };
+        let outputs = run.outputs.iter().enumerate().map(measured).collect();
+        let record = Experiment::new(&Cubic, time, inputs, outputs).unwrap();
+        let fit = Fit::new(&Cubic, &record).parameters(Lag { gain: free(0.8), tau: free(0.3) }).run().unwrap();
+        assert!(fit.outcome.converged() && fit.severity() == Severity::Usable, "{late}: {fit}");
+        let [gain, tau, start] = &fit.unknowns[..] else { panic!("{fit}") };
+        for (unknown, truth) in [(gain, 1.5), (tau, 0.4)] {
+            let error = unknown.knowledge.standard_error().unwrap();
+            assert!((unknown.value - truth).abs() < 4.0 * error, "{late}: {fit}");
+        }
+        assert_eq!(start.knowledge, Knowledge::Unidentified, "{late}: {fit}");
+        let said =
+            |warning: &Warning| warning.code == WarningCode::Unidentified && warning.text.contains("has died out");
+        assert!(fit.warnings.iter().any(said), "{late}: {fit}");
+    }
+}
