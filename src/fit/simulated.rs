@@ -7,15 +7,15 @@ use crate::optimize::Severity;
 use crate::problem::{Control, Problem, SearchPlan, Settings};
 use std::time::Instant;
 
-/// Most trial steps of the simulation's search.
+/// Most trial steps of the simulation's search: from a start that led the predictions to a minimum, tens are usual.
 const TRIALS: u64 = 200;
-/// Estimates that are so many standard errors of the prediction's apart are not the same.
+/// Standard errors of the predictions' estimate by which the simulation's must differ: chance exceeds three in 0.3 %.
 const APART: f64 = 3.0;
 
 impl Problem<'_> {
-    /// The estimate with a warning where a simulation explains the outputs better than predictions from measured states do, by other
-    /// parameters: what disturbs the plant would make it worse, so the measurements are noisy. `None` where there is none, the
-    /// simulation has no minimum, or measurements are left out by one of them.
+    /// The estimate with a warning, where a fit of the simulation has a certainly higher likelihood than that of the predictions from measured
+    /// states, with other parameters. Disturbances of the plant would lower the likelihood of the simulation, so noise in the
+    /// measurements is the cause. `None` where this is not so, the simulation has no minimum, or the two use different measurements.
     pub(super) fn compared_with_simulation(&self, found: &Summary, control: &Control) -> Option<Summary> {
         if !found.outcome.converged() || control.stops() || is_useless(found, WarningCode::RestartNoise) {
             return None;

@@ -17,7 +17,8 @@ const MUCH: f64 = 0.05;
 /// above the second the model is wrong or noise dominates the output.
 pub(super) const SMALL: f64 = 1e-4;
 const LARGE: f64 = 0.5;
-/// The part that a wrong minimum leaves: pendulums at another natural frequency left 0.3, colored noise of a tenth of the output less.
+/// The same part from which on a minimum that was found once is taken as wrong: driven pendulums fitted with a wrong natural frequency had
+/// 0.3, right models with colored noise of 5 % of the output less than 0.05.
 const LEFT: f64 = 0.1;
 
 impl Judgement<'_> {
@@ -26,7 +27,7 @@ impl Judgement<'_> {
         self.colored_part() > SMALL
     }
 
-    /// Whether so much of an output is colored errors that it is rather the model than the noise.
+    /// Whether so large a part of an output is colored errors that the model is more likely to be wrong than the noise to be colored.
     pub(super) fn leaves_much(&self) -> bool {
         self.colored_part() > LEFT
     }

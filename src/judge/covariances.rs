@@ -106,7 +106,7 @@ impl Judgement<'_> {
         let tested = unit.as_ref().filter(|_| self.takes_one_size()).and_then(|unit| self.shares(unit));
         let uneven = tested.as_ref().and_then(|(_, sizes)| sizes.uneven(&self.exact));
         // Of models without states it is only said: classical standard errors are what certified ones are compared with. A noise that was
-        // given is only left where it certainly is of another size.
+        // given is replaced only where the errors certainly are of another size.
         let given = matches!(objective.problem.settings.noise, Noise::Given(_));
         let differ =
             |(_, sizes): &(Vec<Largest>, Sizes)| if given { uneven.is_some() } else { sizes.differ(&self.exact) };

@@ -83,7 +83,7 @@ pub(super) fn restart_noise(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> 
             Record { inputs: inputs.into(), outputs: outputs.into(), ..record.clone() }
         };
         let noisy: Vec<Record> = records.map(noisy).collect();
-        // The measurements that predictions are compared with have no more noise than before, but what inputs did to the plant.
+        // Predictions are compared with the measurements without the added noise, plus the plant's response to the added inputs.
         let compared = feedback.outputs(judgement, &noisy);
         Ok(Problem { records: compared, ..problem.with_records(noisy)? })
     })?;

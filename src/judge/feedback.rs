@@ -1,17 +1,17 @@
 //! Inputs that follow the measurements of the same sample, as those of a controller do.
 //!
-//! What is new in a sample's measurements beside those before is its error of prediction. An input that follows it at once, beside what
-//! inputs and measurements before say of it, is fed back (Granger, Econometrica 37 (1969) 424, of instantaneous causality).
+//! Each input is regressed on the prediction errors of the same sample, after the inputs and measurements of the samples before. A
+//! significant coefficient is the gain of a controller that acts without delay (instantaneous causality: Granger, Econometrica 37 (1969) 424).
 
 use super::conclude::Judgement;
-use super::shape::{RECORDS, errors, first_errors};
+use super::errors::{RECORDS, errors, first_errors};
 use crate::estimate::student::quantile;
 use crate::information::{Block, Information};
 use crate::layout::Layout;
 use crate::problem::Problem;
 use crate::record::{Channel, Record};
 
-/// Samples before that an input is explained by first.
+/// Samples before that are regressors, too: two tell level and trend of an input.
 const BEFORE: usize = 2;
 /// Significance level of a gain; one that is not significant counts as zero.
 const LEVEL: f64 = 0.01;

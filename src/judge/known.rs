@@ -13,10 +13,11 @@ use crate::problem::{Free, Role};
 /// A parameter so many times its start, or one such part of it, is in another unit.
 const ANOTHER_UNIT: f64 = 400.0;
 
-/// Standard deviations between a prior and an estimate that are no chance, and that make an estimate unusable.
+/// Standard deviations of their difference between estimate and prior mean from which on an estimate is with care (chance exceeds them in
+/// 0.1 %), and not usable.
 const UNLIKELY: f64 = 3.3;
 const CONTRADICTS: f64 = 5.0;
-/// A part of a prior's variance that is rounding, or what noise that is estimated adds to an estimate's.
+/// The least part of a prior's variance by which the data must lower it for the prior to be tested.
 const LITTLE: f64 = 1e-3;
 
 /// Names in backquotes, with commas.
@@ -99,7 +100,7 @@ fn near_zero(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Option<Warning>
     Some(Warning { code: WarningCode::HoldsZero, severity, text })
 }
 
-/// Unknowns that the data draw further from the mean of their prior than both are uncertain.
+/// Unknowns whose estimate differs from the mean of their prior by more than chance.
 fn against_priors(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
     let rows = judgement.objective.problem.unknowns.row.iter().zip(unknowns);
     let one = |(row, unknown): (&Free, &Unknown)| {
@@ -107,8 +108,8 @@ fn against_priors(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Vec<Warnin
         let distance = distance(unknown, prior).filter(|distance| *distance > UNLIKELY)?;
         let (Unknown { name, unit, value, .. }, Prior { mean, std }) = (unknown, prior);
         let text = format!(
-            "the data contradict the prior of `{name}`, {} +- {} {unit}: with it `{name}` is {} {unit}, {} standard deviations off \
-             what it lets expect; check prior, model and units, or leave the prior out",
+            "the data contradict the prior of `{name}`, {} +- {} {unit}: with it `{name}` is {} {unit}, {} standard deviations of \
+             that difference from its mean; check prior, model and units, or leave the prior out",
             exact(mean),
             exact(std),
             number(*value, 4),

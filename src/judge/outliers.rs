@@ -1,8 +1,9 @@
 //! Whether a few errors far beyond the others decide a fit with a squared loss.
 
 use super::conclude::Judgement;
+use super::errors::{RECORDS, first_errors};
 use super::warnings::care;
-use super::{dropouts, largest, shape};
+use super::{dropouts, largest};
 use crate::estimate::{Warning, WarningCode};
 use crate::numeral::percent;
 use crate::optimize::{Outcome, Severity};
@@ -31,8 +32,8 @@ pub(super) fn outliers(judgement: &Judgement<'_>) -> Vec<Warning> {
         return (0..objective.outputs()).filter_map(|j| largest::extreme(judgement, j)).collect();
     }
     let mut errors = vec![vec![]; objective.outputs()];
-    for e in 0..objective.experiments().min(super::shape::RECORDS) {
-        errors.iter_mut().zip(shape::first_errors(judgement, e)).for_each(|(all, own)| all.push(own));
+    for e in 0..objective.experiments().min(RECORDS) {
+        errors.iter_mut().zip(first_errors(judgement, e)).for_each(|(all, own)| all.push(own));
     }
     let of = |j: usize| {
         let all: Vec<f64> = errors[j].iter().flatten().flatten().copied().collect();

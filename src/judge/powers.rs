@@ -7,7 +7,6 @@
 
 use super::sums::{Terms, sums};
 use crate::problem::Objective;
-use crate::record::Channel;
 use crate::wide::Wide;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -32,12 +31,6 @@ impl Scale {
     pub fn new((least, greatest): (f64, f64)) -> Self {
         let inverse = (0.5 * (greatest - least)).recip();
         Scale { center: 0.5 * (least + greatest), inverse: if inverse.is_finite() { inverse } else { 0.0 } }
-    }
-
-    /// Of the values of a channel.
-    pub fn of_range(channel: &Channel) -> Self {
-        let ends = channel.values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-        Scale::new(ends)
     }
 
     #[inline(always)]

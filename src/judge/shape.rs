@@ -5,22 +5,18 @@
 
 use super::color;
 use super::conclude::Judgement;
+use super::errors::{RECORDS, first_errors};
+use super::inputs_before::by_inputs_before;
 use super::powers::{SHAPE, Scale, scales};
-use super::products::{Change, Products};
+use super::products::Products;
 use super::whiteness::{LAGS, Whiteness};
 use crate::estimate::{Warning, WarningCode};
 use crate::numeral::{p_value, percent};
 use crate::optimize::Outcome;
-use crate::problem::{Accumulate, Objective};
+use crate::problem::Accumulate;
 use crate::record::Record;
 use crate::sweep::Window;
 use crate::whiteness::Portmanteau;
-
-/// Records that are looked at, and samples of each: the first ones.
-pub(super) const RECORDS: usize = 8;
-const SAMPLES: usize = 16_384;
-/// Samples before whose inputs errors are examined for following from.
-const BEFORE: usize = 4;
 
 /// Whether the model certainly has the wrong shape.
 pub(super) fn shape(judgement: &Judgement<'_>) -> Option<Warning> {
@@ -68,81 +64,6 @@ fn by_inputs(judgement: &Judgement<'_>) -> Option<Warning> {
         );
         Warning { code: WarningCode::WrongShape, severity: color::severity(part), text }
     })
-}
-
-/// The output whose errors certainly follow from an input of the samples before: its powers, and its changes. Not that of the same sample,
-/// which a controller may have drawn from the error. White errors only, as below.
-fn by_inputs_before(judgement: &Judgement<'_>) -> Option<Warning> {
-    let objective = judgement.objective;
-    let (layout, outputs) = (objective.problem.layout(), objective.outputs());
-    let plain = objective.problem.settings.prefilter.is_none() && objective.sweep.restarts().is_none();
-    let examined = !judgement.is_static() && plain && !layout.inputs.is_empty();
-    let exact = judgement.rounding || judgement.end.outcome == Outcome::Exact;
-    if !examined || exact || judgement.autocorrelated_at(color::CERTAIN).is_some() {
-        return None;
-    }
-    let sigma = objective.whitening.sigma();
-    // What the minimum makes orthogonal to the slopes: errors times their weights.
-    let weight = |e: usize, j: usize, k: usize, error: f64| {
-        let by_loss = objective.loss().map_or(1.0, |loss| loss.weight(error / sigma[j]));
-        objective.weight(e, k) * by_loss
-    };
-    let mut sums = vec![Before::default(); outputs * layout.inputs.len()];
-    for e in 0..objective.experiments().min(RECORDS) {
-        let errors = first_errors(judgement, e);
-        for (input, sums) in objective.problem.records[e].inputs().iter().zip(sums.chunks_mut(outputs)) {
-            let (u, scale) = (&input.values, Scale::of_range(input));
-            for k in BEFORE..errors[0].len() {
-                let before = std::array::from_fn(|lag| scale.one(u[k - 1 - lag]));
-                for (j, (sums, errors)) in sums.iter_mut().zip(&errors).enumerate() {
-                    if let Some(error) = errors[k] {
-                        sums.take(before, error * weight(e, j, k, error));
-                    }
-                }
-            }
-        }
-    }
-    let of = |number: usize| {
-        let (i, j) = (number / outputs, number % outputs);
-        let (part, chance) = sums[number].follows();
-        let part = part * judgement.residuals.outputs[j].rmse / judgement.residuals.levels[j].1;
-        (i, j, part, chance * sums.len() as f64)
-    };
-    let certain = (0..sums.len()).map(of).filter(|(.., chance)| *chance < color::LIKELY);
-    let (i, j, part, chance) = certain.max_by(|a, b| a.2.total_cmp(&b.2))?;
-    let text = format!(
-        "the errors of `{}` follow from what the input `{}` was at the samples before ({}): the model lacks a delay, an inertia or a \
-         curve, or the signals are not of the same moments, by {} of what the output moves, and no interval allows for that",
-        layout.outputs[j].name,
-        layout.inputs[i].name,
-        p_value(chance),
-        percent(part, 2)
-    );
-    Some(Warning { code: WarningCode::WrongShape, severity: color::severity(part), text })
-}
-
-/// Sums over errors and an input at the samples before: with powers of the last one, and with each of its changes. These may be few and
-/// far between, so that each is tested alone.
-#[derive(Clone, Copy, Default)]
-struct Before {
-    powers: Products<SHAPE>,
-    changes: [Change; BEFORE - 1],
-}
-
-impl Before {
-    fn take(&mut self, before: [f64; BEFORE], error: f64) {
-        self.powers.take(std::array::from_fn(|i| before[0].powi(i as i32)), error);
-        self.changes.iter_mut().zip(before.windows(2)).for_each(|(sums, pair)| sums.take(pair[0] - pair[1], error));
-    }
-
-    /// The root of the part of the squared errors that follows most certainly, and the probability by chance.
-    fn follows(&self) -> (f64, f64) {
-        let squares = self.powers.sum_of_squares();
-        let changes = self.changes.iter().map(|one| (one.explained_part(squares), one.by_chance()));
-        let all = std::iter::once((self.powers.explained_part(), self.powers.by_chance())).chain(changes);
-        let (part, chance) = all.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0.0, 1.0));
-        (part, chance * BEFORE as f64)
-    }
 }
 
 /// The output whose errors certainly follow from its prediction; of several that with the largest part of what it moves. White errors
@@ -205,31 +126,4 @@ impl Accumulate for Following<'_> {
     fn append(&mut self, later: Self) {
         self.sums.iter_mut().zip(&later.sums).for_each(|(sum, later)| sum.append(later));
     }
-}
-
-/// The first errors of an experiment, output by output; `None` where nothing was measured.
-pub(super) fn first_errors(judgement: &Judgement<'_>, e: usize) -> Vec<Vec<Option<f64>>> {
-    errors(judgement.objective, &judgement.end.coordinates, e, SAMPLES)
-}
-
-/// Errors of an experiment, in the units of the outputs, as far as this many samples or somewhat beyond.
-pub(super) fn errors(
-    objective: &Objective<'_>,
-    coordinates: &[f64],
-    e: usize,
-    samples: usize,
-) -> Vec<Vec<Option<f64>>> {
-    let mut errors = vec![vec![]; objective.outputs()];
-    let visit = &mut |window: &mut Window| {
-        for k in 0..window.samples[0] {
-            for (j, errors) in errors.iter_mut().enumerate() {
-                let error = window.error(k, j, 0);
-                errors.push((window.is_measured(k, j, 0) && error.is_finite()).then_some(error));
-            }
-        }
-        errors[0].len() < samples
-    };
-    // It stops early where there are enough.
-    let _ = objective.run_alone(e, coordinates, false, visit);
-    errors
 }

@@ -137,7 +137,7 @@ struct Piece {
 
 /// Whether parts of the data are compared, which takes slopes: where errors are correlated over time or with the prediction. Always of
 /// filters, which estimate what contradicts them as process noise, so that their errors stay white; of static models, whose
-/// samples have no order; and where errors are not examined for following from the prediction.
+/// samples have no order; and with a loss, weights or restarts, where errors are not tested against powers of the prediction.
 fn is_suspicious(judgement: &Judgement<'_>) -> bool {
     let least = judgement.residuals.shape.iter().copied().fold(judgement.residuals.parts, f64::min);
     let follow = least * (judgement.objective.outputs() as f64) < LEVEL && !judgement.rounding;

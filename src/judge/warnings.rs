@@ -230,7 +230,7 @@ impl Judgement<'_> {
         if refines && !stopped && !self.end.outcome.converged() {
             return self.step_decides_the_search().into_iter().collect();
         }
-        let finer = self.objective.sweep.refined(self.objective.problem.samples()).filter(|_| coarse);
+        let finer = coarse.then(|| self.objective.sweep.refined(self.objective.problem.samples())).flatten();
         let Some(finer) = finer else { return vec![] };
         let objective = self.objective.of(self.objective.problem, &*finer);
         let Some((name, shift, part)) = shift(&objective, &self.end.coordinates, unknowns) else {
@@ -251,8 +251,8 @@ impl Judgement<'_> {
         if shift > most { vec![warning()] } else { vec![] }
     }
 
-    /// Of a fit whose simulation fails with a finer step, or grows until no unknown can be told from others: a coarse step damps what
-    /// oscillates, and a plant that is unstable with a finer one may fit with it. That one has no minimum here.
+    /// Warnings where the simulation with a finer step fails at the estimate, or grows until its slopes determine no step: a coarse step damps
+    /// oscillations by itself, so that parameters of an unstable plant may fit. These are no minimum with the finer step.
     fn diverges(&self, unknowns: &[Unknown], change: f64, finer: &str) -> Vec<Warning> {
         if unknowns.iter().all(|unknown| unknown.knowledge.standard_error().is_none()) {
             return vec![];
@@ -268,7 +268,7 @@ impl Judgement<'_> {
                     "the step is too coarse: with {finer} the simulation at the estimate {by}; use a finer step, or smooth the model"
                 ),
             ),
-            (WarningCode::NotAtMinimum, "this is a minimum with the coarse step alone".to_owned()),
+            (WarningCode::NotAtMinimum, "the estimate is a minimum with the coarse step only".to_owned()),
         ];
         texts.map(|(code, text)| Warning { code, severity: Severity::NotUsable, text }).into()
     }

@@ -37,13 +37,13 @@ impl Linearization {
         Linearization { roughness, ..self }
     }
 
-    /// With unknowns whose slopes were left out because they are below the rounding of the residual: that they have no influence does not
-    /// make a plateau.
+    /// With the numbers of unknowns whose slopes were set to zero because they are below the rounding of the residual. A search that ends where
+    /// these have no influence has not ended on a plateau.
     pub fn with_forgotten(self, forgotten: Vec<usize>) -> Self {
         Linearization { forgotten, ..self }
     }
 
-    /// The unknowns whose slopes were left out as rounding.
+    /// The numbers of these unknowns, in the order of the coordinates.
     pub fn forgotten(&self) -> &[usize] {
         &self.forgotten
     }

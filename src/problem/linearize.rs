@@ -14,7 +14,8 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A change of the predictions below this part of the residual is rounding: beside noise of a percent, 1e-12 of the output.
+/// A change of the predictions below this part of the residual cannot be told from rounding: with noise of a percent of the output it is
+/// 1e-12 of the output.
 const FORGOTTEN: f64 = 1e-10;
 
 /// Cost, triangle and final carry of one segment.
@@ -67,34 +68,42 @@ impl Objective<'_> {
         Ok(self.with_priors(coordinates, cost, vec![triangle]))
     }
 
-    /// Leaves out the slopes of initial states that have died out where the measurements begin: a change of one by its own size moves the
-    /// predictions by less than the residual's rounding, and a search for it would have no end.
+    /// Leaves out the slopes of initial states that have decayed before the first measurement, and returns these unknowns: a change by the size
+    /// of the state moves the predictions by less than the rounding of the residual, so that a search for it would have no end.
     fn without_forgotten(&self, coordinates: &[f64], blocks: &mut [Information]) -> Vec<usize> {
-        let unknowns = &self.problem.unknowns;
-        let residual = blocks.iter().map(Information::residual_at_zero).sum::<f64>().sqrt();
-        let is_forgotten = |i: usize, norm: f64| {
-            let Free { role, parameter, .. } = &unknowns.row[i];
-            let size = coordinates[i].abs().max(parameter.start.abs());
-            let counts = matches!(role, Role::InitialState(_)) && parameter.prior.is_none();
-            counts
-                && parameter.transform == Transform::Identity
-                && norm > 0.0
-                && size > 0.0
-                && norm * size < FORGOTTEN * residual
-        };
         let mut forgotten = vec![];
-        for (e, block) in blocks.iter_mut().enumerate() {
-            let norms = block.column_norms().into_iter().zip(unknowns.columns(e));
-            let own: Vec<usize> = norms.filter(|(norm, i)| is_forgotten(*i, *norm)).map(|(_, i)| i).collect();
-            if !own.is_empty() {
-                let scales: Vec<f64> = unknowns.columns(e).map(|i| if own.contains(&i) { 0.0 } else { 1.0 }).collect();
-                forgotten.extend(own);
-                let mut left = std::mem::replace(block, Information::new(scales.len()));
+        let begins_late = |e: &usize| self.problem.records[*e].outputs().iter().all(|output| output.values[0].is_nan());
+        let late: Vec<usize> = (0..blocks.len()).filter(begins_late).collect();
+        if late.is_empty() {
+            return forgotten;
+        }
+        let residual = blocks.iter().map(Information::residual_at_zero).sum::<f64>().sqrt();
+        for e in late {
+            let columns: Vec<usize> = self.problem.unknowns.columns(e).collect();
+            let norms = blocks[e].column_norms();
+            let reach = self.reach(e);
+            let decayed = |(norm, i): (&f64, &usize)| {
+                let Free { role, parameter, .. } = &self.problem.unknowns.row[*i];
+                let plain = parameter.prior.is_none() && parameter.transform == Transform::Identity;
+                let size = coordinates[*i].abs().max(parameter.start.abs()).max(reach);
+                plain && matches!(role, Role::InitialState(_)) && *norm > 0.0 && norm * size < FORGOTTEN * residual
+            };
+            let left_out: Vec<bool> = norms.iter().zip(&columns).map(decayed).collect();
+            if left_out.contains(&true) {
+                let scales: Vec<f64> = left_out.iter().map(|out| if *out { 0.0 } else { 1.0 }).collect();
+                let mut left = std::mem::replace(&mut blocks[e], Information::new(scales.len()));
                 left.scale_columns(&scales);
-                block.merge(&left);
+                blocks[e].merge(&left);
+                forgotten.extend(columns.iter().zip(left_out).filter_map(|(i, out)| out.then_some(*i)));
             }
         }
         forgotten
+    }
+
+    /// The largest magnitude that an output of a record has: what its states may be expected to reach.
+    fn reach(&self, e: usize) -> f64 {
+        let found = self.problem.records[e].inspect_some();
+        found.outputs.iter().filter_map(|output| output.range).fold(0.0, |most, (low, high)| most.max(-low).max(high))
     }
 
     fn with_priors(&self, coordinates: &[f64], mut cost: f64, mut blocks: Vec<Information>) -> Linearization {

@@ -26,13 +26,14 @@ impl fmt::Display for Gap {
 const GAP: f64 = 1.5;
 /// Sampling is even if half of the steps are within this part of the median one.
 const EVEN: f64 = 0.1;
-/// One long step in so many, or more, is too often for gaps where they come regularly.
+/// Regular long steps are a pattern where they are at least one in so many: rarer ones may be pauses of a logger.
 const MANY: usize = 10;
 /// Of uneven sampling, a step is a gap that is beyond the longest tenth by so many times the distance of that from the
 /// median: of intervals between independent events, three of 100,000 are.
 const BEYOND: f64 = 5.0;
 
-/// Whether steps longer than this belong to a pattern of sampling: they are many, and follow each other after the same number of samples.
+/// Whether steps longer than this belong to a pattern of sampling: they are frequent, and nine of ten follow the one before after the same
+/// number of samples.
 fn is_pattern(stamps: &[f64], longest: f64) -> bool {
     let steps = stamps.windows(2).enumerate();
     let long: Vec<usize> = steps.filter(|(_, pair)| pair[1] - pair[0] > longest).map(|(k, _)| k).collect();

@@ -1,7 +1,6 @@
 //! [`DualSweep`]: models run in numbers with slopes, one piece at a time.
 
 use super::filtered::Filter;
-use super::made::Uncompiled;
 use super::{ModelCode, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit, unmoved};
 use crate::error::{Error, Failure};
 use crate::functions::Functions;
@@ -11,6 +10,15 @@ use crate::predict::{Between, FreeRun, Guess, Place, Plant, Prediction, SlicePla
 use crate::record::{Channel, Record};
 use core::cell::Cell;
 use std::sync::Arc;
+
+/// What is known of equations that run in dual numbers.
+#[derive(Clone, Default)]
+pub(crate) struct Uncompiled {
+    /// Why they were not compiled.
+    pub reason: String,
+    /// The parameters that decide a choice of theirs; `None` where they are not read as a graph.
+    pub choosing: Option<Vec<usize>>,
+}
 
 /// A model run in dual numbers.
 pub(crate) struct DualSweep<'a> {

@@ -1,5 +1,6 @@
 //! Sweeps made of equations: compiled where they can be, else in dual numbers.
 
+use super::duals::Uncompiled;
 use super::{DualSweep, ProgramSweep, Sweep};
 use crate::engine::only_duals;
 use crate::equations::Equations;
@@ -8,15 +9,6 @@ use crate::graph::{Untraceable, choosing};
 use crate::integrate::Method;
 use crate::predict::Prediction;
 use std::sync::Arc;
-
-/// Equations that run in dual numbers.
-#[derive(Clone, Default)]
-pub(crate) struct Uncompiled {
-    /// Why they were not compiled.
-    pub reason: String,
-    /// The parameters that decide a choice of theirs; `None` where they are not read as a graph.
-    pub choosing: Option<Vec<usize>>,
-}
 
 /// A compiled program of the equations that `trace` reads, if there can be one, else what `plain` makes of the reason.
 pub(crate) fn compiled<'a>(
@@ -33,7 +25,8 @@ pub(crate) fn compiled<'a>(
         Err(Untraceable { reason, .. }) => return plain(Uncompiled { reason, choosing: None }),
     };
     let choosing = Some(choosing(equations.graph()));
-    match ProgramSweep::new(equations, method.clone(), predictor.clone(), plain(Uncompiled::default())) {
+    let beside = plain(Uncompiled { reason: String::new(), choosing: choosing.clone() });
+    match ProgramSweep::new(equations, method.clone(), predictor.clone(), beside) {
         Ok(sweep) => Arc::new(sweep),
         Err(Untraceable { reason, .. }) => plain(Uncompiled { reason, choosing }),
     }

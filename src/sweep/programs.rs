@@ -11,7 +11,7 @@ use super::{Coupling, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
 use crate::engine::{Program, Sampling, Trajectories};
 use crate::equations::Equations;
 use crate::error::{Error, Failure};
-use crate::graph::{Untraceable, choosing};
+use crate::graph::Untraceable;
 use crate::integrate::Method;
 use crate::interval::Hold;
 use crate::layout::{Kind, Layout};
@@ -38,7 +38,6 @@ struct Programs {
     predictor: Arc<dyn Prediction>,
     coupling: Coupling,
     /// Parameters that decide a choice.
-    choosing: Vec<usize>,
     /// By hold: zero, first.
     recurrences: [OnceLock<Arc<Recurrence>>; 2],
     compiled: Mutex<Vec<(Key, Arc<Compiled>)>>,
@@ -97,8 +96,7 @@ impl Programs {
         };
         let recurrences = [OnceLock::new(), OnceLock::new()];
         let (compiled, refined) = (Mutex::new(vec![]), OnceLock::new());
-        let choosing = choosing(equations.graph());
-        let programs = Programs { equations, method, predictor, coupling, choosing, recurrences, compiled, refined };
+        let programs = Programs { equations, method, predictor, coupling, recurrences, compiled, refined };
         programs.recurrence(Hold::Zero)?;
         Ok(programs)
     }
@@ -172,7 +170,7 @@ impl Sweep for ProgramSweep<'_> {
     }
 
     fn choosing(&self) -> Option<&[usize]> {
-        Some(&self.programs.choosing)
+        self.plain.choosing()
     }
 
     fn prepare(&self, record: &Record, parameters: &[f64]) -> Result<Prepared, Error> {

@@ -382,11 +382,11 @@ fn a_prior_that_the_data_contradict_is_said() {
     assert_eq!(said(3.0, narrow), None);
     let (severity, text) = said(4.0, narrow).unwrap();
     assert_eq!(severity, Severity::UsableWithCare);
-    assert!(text.contains("3.9 standard deviations off"), "{text}");
+    assert!(text.contains("3.9 standard deviations of"), "{text}");
     assert_eq!(said(6.0, narrow).map(|said| said.0), Some(Severity::NotUsable));
     assert_eq!(said(-6.0, wide), None);
     let (severity, text) = said(-12.0, wide).unwrap();
     assert_eq!(severity, Severity::UsableWithCare);
-    assert!(text.contains("3.6 standard deviations off"), "{text}");
+    assert!(text.contains("3.6 standard deviations of"), "{text}");
     assert_eq!(said(6.0, 0.01), None);
 }

@@ -52,3 +52,28 @@ fn an_initial_state_that_has_died_out_does_not_keep_a_fit_from_its_end() {
         assert!(fit.warnings.iter().any(said), "{late}: {fit}");
     }
 }
+
+/// A plant that is at rest at first, whose first measurement is zero but for rounding: a start without size. The initial state is told by the
+/// measurements after it, whether these begin at once or two samples late.
+#[test]
+fn a_start_next_to_zero_is_not_taken_as_died_out() {
+    for late in [0, 2] {
+        let mut noise = Noise(7);
+        let level = |(k, u): (usize, f64)| Drive { u: if k < 3 { 0.0 } else { 2.0 * u } };
+        let inputs: Vec<Drive> = levels(200, 15, 7).into_iter().enumerate().map(level).collect();
+        let time = Time::Uniform { start: 0.0, step: 0.1 };
+        let run = simulate(&Cubic, &Lag { gain: 1.5, tau: 0.4 }, &Level::default(), time.clone(), &inputs).unwrap();
+        let measured = |(k, y): (usize, &Level)| match k {
+            k if k < late => Level { x: f64::NAN },
+            k if k == late => Level { x: 1e-17 },
+            _ => Level { x: y.x + 0.02 * noise.gauss() },
+        };
+        let outputs = run.outputs.iter().enumerate().map(measured).collect();
+        let record = Experiment::new(&Cubic, time, inputs, outputs).unwrap();
+        let start = Lag { gain: free(1.2), tau: free(0.5) };
+        let fit = Fit::new(&Cubic, &record).parameters(start).run().unwrap();
+        let error = fit.unknowns[2].knowledge.standard_error().unwrap_or_else(|| panic!("{late}: {fit}"));
+        // The first measurement tells it to 0.02, by a decay of `exp(0.2 / 0.4)` where it is two samples late.
+        assert!(error < 0.04 && fit.severity() == Severity::Usable, "{late}: {fit}");
+    }
+}

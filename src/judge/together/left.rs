@@ -33,7 +33,9 @@ impl Accumulate for Pass<'_> {
         for (piece, of) in self.pieces.iter().zip(&mut self.of) {
             for (j, left) in of.iter_mut().enumerate() {
                 let inside = |k: &usize| {
-                    piece.rows.contain(e, j, usize::from(begin + k >= middle)) && window.is_measured(*k, j, lane)
+                    piece.rows.contain(e, j, usize::from(begin + k >= middle))
+                        && window.is_measured(*k, j, lane)
+                        && self.objective.weight(e, begin + k) > 0.0
                 };
                 let moved = |k: usize| {
                     let by = self.columns.iter().enumerate().map(|(c, i)| window.at(k, j, c, lane) * piece.step[*i]);
