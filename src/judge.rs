@@ -30,6 +30,7 @@ mod products;
 mod residual_pass;
 mod rise;
 mod sandwich;
+mod sensors;
 mod shape;
 mod shares;
 mod sizes;

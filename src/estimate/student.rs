@@ -27,6 +27,14 @@ pub(crate) fn quantile(probability: f64, degrees: f64) -> f64 {
     }
 }
 
+/// The probability that Student's t is as far from zero; one where that is not defined.
+pub(crate) fn two_sided(t: f64, degrees: f64) -> f64 {
+    match StudentsT::new(0.0, 1.0, degrees) {
+        Ok(student) if t.is_finite() && degrees >= 1.0 => 2.0 * student.sf(t.abs()),
+        _ => 1.0,
+    }
+}
+
 /// How far an estimate scatters in the coordinate that it was estimated in.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Spread {

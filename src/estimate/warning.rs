@@ -60,6 +60,8 @@ pub enum WarningCode {
     RecordsContradict,
     /// Parameters that differ from output to output.
     OutputsContradict,
+    /// An output that has a gain, an offset or a delay that the model does not have.
+    SensorContradicts,
     /// Parameters that differ from the first half of the data to the second.
     HalvesContradict,
     /// A predicted variance goes to zero, and the likelihood to infinity.

@@ -1,8 +1,8 @@
 //! Products of errors with what they may follow from.
 
 use super::powers::explained;
+use crate::estimate::student::two_sided;
 use crate::whiteness::chi_squared_tail;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Sums over errors `e` and regressors `z`.
 #[derive(Clone, Copy)]
@@ -90,10 +90,7 @@ impl Change {
         let slope = self.product / self.squares;
         let variance = self.errors - 2.0 * slope * self.mixed + slope * slope * self.fourths;
         let (t, degrees) = (self.product / variance.sqrt(), self.squares * self.squares / self.fourths - 1.0);
-        match StudentsT::new(0.0, 1.0, degrees) {
-            Ok(student) if t.is_finite() && degrees >= 1.0 => 2.0 * student.sf(t.abs()),
-            _ => 1.0,
-        }
+        two_sided(t, degrees)
     }
 }
 

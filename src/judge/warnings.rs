@@ -3,7 +3,9 @@
 use super::conclude::Judgement;
 use super::covariances::Covariances;
 use super::directions::{taking_part, undetermined};
-use super::{aliases, curved, data, data_noise, kinks, known, memory, outliers, shape, sizes, together, within_loss};
+use super::{
+    aliases, curved, data, data_noise, kinks, known, memory, outliers, sensors, shape, sizes, together, within_loss,
+};
 use crate::estimate::{Direction, Knowledge, Unknown, Warning, WarningCode};
 use crate::layout::Kind;
 use crate::numeral::{counted, exact, number, percent};
@@ -46,6 +48,7 @@ impl Judgement<'_> {
         warnings.extend(shape::shape(self));
         warnings.extend(outliers::outliers(self));
         warnings.extend(together::contradictions(self, unknowns));
+        warnings.extend(sensors::contradicts(self, unknowns));
         warnings.extend(known::knowledge(self, unknowns, covariances));
         warnings.extend(self.unbounded());
         warnings.extend(self.gaps());

@@ -1,0 +1,165 @@
+//! Whether an output is scaled, shifted or late against what the model predicts.
+//!
+//! What unknowns absorb of a sensor's error moves them and leaves little in the errors. Gain, offset and delay of each output are
+//! therefore released one by one beside all unknowns, by the slopes at the estimate (Rao, Proc. Cambridge Philosophical Society 44 (1948)
+//! 50), and the most certain one is tested again with errors of whatever sizes and color.
+
+mod confirm;
+mod rows;
+
+use super::conclude::Judgement;
+use super::directions;
+use crate::estimate::student::two_sided;
+use crate::estimate::{Unknown, Warning, WarningCode};
+use crate::information::Information;
+use crate::numeral::{number, p_value, percent};
+use crate::optimize::{Linearization, Severity};
+use crate::problem::{Objective, Role, Whitening};
+use rows::{KINDS, Kind, Triangle};
+
+/// Level of the test, which all regressors share.
+const LEVEL: f64 = 1e-4;
+/// A parameter that the sensor's error moves by more than this part of itself is not usable; by less than the second, it is a note.
+const FAR: f64 = 0.25;
+const NOTHING: f64 = 1e-4;
+/// More unknowns than these are not examined.
+const MOST: usize = 200;
+/// Of a regressor at least this part must be left beside the unknowns.
+const LEFT: f64 = 1e-4;
+
+/// A regressor that was released beside the unknowns.
+struct Released {
+    number: usize,
+    /// The steps of the unknowns and of the regressor.
+    step: Vec<f64>,
+    value: f64,
+    standard_error: f64,
+    chance: f64,
+}
+
+/// The slopes at the estimate, with the regressors of each output behind the shared unknowns.
+struct Extended<'j> {
+    judgement: &'j Judgement<'j>,
+    objective: Objective<'j>,
+    linear: Linearization,
+}
+
+/// The output that most certainly has a gain, an offset or a delay of its own.
+pub(super) fn contradicts(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Option<Warning> {
+    let settings = &judgement.objective.problem.settings;
+    let possible = settings.prefilter.is_none()
+        && judgement.objective.sweep.restarts().is_none()
+        && unknowns.len() <= MOST
+        && judgement.degrees > 1.0
+        && !judgement.rounding
+        && judgement.end.outcome.converged();
+    if !possible {
+        return None;
+    }
+    let extended = Extended::new(judgement)?;
+    let numbers = (0..judgement.objective.outputs() * KINDS).filter(|number| extended.is_examined(*number));
+    let tests = numbers.clone().count() as f64;
+    let found = numbers.filter_map(|number| extended.release(number));
+    let mut most = found.min_by(|a, b| a.chance.total_cmp(&b.chance)).filter(|one| one.chance * tests < LEVEL)?;
+    (most.standard_error, most.chance) = extended.confirm(&most)?;
+    most.chance *= tests;
+    (most.chance < LEVEL).then(|| extended.warning(&most, unknowns))
+}
+
+impl<'j> Extended<'j> {
+    fn new(judgement: &'j Judgement<'j>) -> Option<Self> {
+        // Rows of single outputs.
+        let sigma = Whitening::Diagonal(judgement.objective.whitening.sigma());
+        let objective = judgement.objective.with(sigma);
+        let outputs = objective.outputs();
+        let make = |e: usize| Triangle::new(&objective, e);
+        let all = objective.gather(&judgement.end.coordinates, true, make).ok()?;
+        let triangles: Vec<Information> = all.into_iter().map(Triangle::of_all_outputs).collect();
+        let shared = objective.problem.unknowns.shared() + outputs * KINDS;
+        Some(Extended { judgement, linear: Linearization::new(0.0, shared, triangles), objective })
+    }
+
+    /// The place of a regressor.
+    fn place(&self, number: usize) -> usize {
+        self.objective.problem.unknowns.shared() + number
+    }
+
+    /// The place of an unknown.
+    fn place_of(&self, unknown: usize) -> usize {
+        let shared = self.objective.problem.unknowns.shared();
+        if unknown < shared { unknown } else { unknown + self.objective.outputs() * KINDS }
+    }
+
+    /// Whether an output has noise to tell it by, and its samples an order where it is asked for a delay.
+    fn is_examined(&self, number: usize) -> bool {
+        let (j, kind) = (number / KINDS, Kind::ALL[number % KINDS]);
+        !(self.judgement.rounded[j] || kind == Kind::Delay && self.judgement.is_static())
+    }
+
+    /// Which unknowns and regressors are held, one of the latter released.
+    fn held(&self, released: Option<usize>) -> Vec<bool> {
+        let mut held = vec![true; self.linear.unknowns()];
+        for (unknown, of_unknown) in self.judgement.undetermined.held.iter().enumerate() {
+            held[self.place_of(unknown)] = *of_unknown;
+        }
+        if let Some(number) = released {
+            held[self.place(number)] = false;
+        }
+        held
+    }
+
+    /// The regressor beside the unknowns; `None` where these replace it.
+    fn release(&self, number: usize) -> Option<Released> {
+        let (place, held) = (self.place(number), self.held(Some(number)));
+        let held = directions::undetermined(&self.linear, &held).held;
+        let norm = self.linear.column_norms()[place];
+        let unit = self.linear.covariance(&held).filter(|_| !held[place])?.standard_error(place);
+        // One over what is left of it beside the unknowns.
+        if unit * norm * LEFT >= 1.0 || !unit.is_finite() {
+            return None;
+        }
+        let step = self.linear.step(&vec![0.0; held.len()], &held)?;
+        let left = self.linear.sum_of_squares() - 2.0 * self.linear.predicted_reduction(&step);
+        let degrees = self.judgement.degrees - 1.0;
+        let (value, standard_error) = (step[place], unit * (left / degrees).sqrt());
+        let chance = two_sided(value / standard_error, degrees);
+        Some(Released { number, step, value, standard_error, chance })
+    }
+
+    fn warning(&self, found: &Released, unknowns: &[Unknown]) -> Warning {
+        let output = &self.objective.problem.layout().outputs[found.number / KINDS];
+        let moves = |i: usize| {
+            let unknown = &unknowns[i];
+            let error = unknown.knowledge.standard_error().filter(|_| matches!(unknown.role, Role::Parameter(_)))?;
+            let by = self.judgement.slopes[i] * found.step[self.place_of(i)];
+            Some((&unknown.name, (by / unknown.value).abs(), (by / error).abs()))
+        };
+        let furthest = (0..unknowns.len()).filter_map(moves).max_by(|a, b| a.2.total_cmp(&b.2));
+        let (value, error) = (found.value, number(found.standard_error, 2));
+        let said = match Kind::ALL[found.number % KINDS] {
+            Kind::Gain => format!("is {} +- {error} times what the model predicts", number(1.0 + value, 4)),
+            Kind::Offset => {
+                format!("lies {} +- {error} {} beside what the model predicts", number(value, 3), output.unit)
+            }
+            Kind::Delay => {
+                let order = if value > 0.0 { "after" } else { "before" };
+                format!("comes {} +- {error} samples {order} what the model predicts", number(value.abs(), 3))
+            }
+        };
+        let moved = furthest.map_or(String::new(), |(name, part, errors)| {
+            format!(", and `{name}` {} ({} standard errors) elsewhere", percent(part, 2), number(errors, 2))
+        });
+        let severity = match furthest {
+            Some((_, part, _)) if part > FAR => Severity::NotUsable,
+            Some((_, part, _)) if part <= NOTHING => Severity::Usable,
+            _ => Severity::UsableWithCare,
+        };
+        let text = format!(
+            "`{}` {said}{moved}, if that is estimated, too ({}): check unit, gain, zero and filter of the sensor, and what the model leaves \
+             out; no interval allows for it",
+            output.name,
+            p_value(found.chance)
+        );
+        Warning { code: WarningCode::SensorContradicts, severity, text }
+    }
+}

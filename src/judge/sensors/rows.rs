@@ -1,0 +1,131 @@
+//! The rows of each output, extended by its gain, offset and delay.
+
+use crate::information::{Block, Information};
+use crate::problem::{Accumulate, Objective};
+use crate::sweep::Window;
+
+/// What may be wrong with a sensor.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Kind {
+    Gain,
+    Offset,
+    Delay,
+}
+
+impl Kind {
+    pub const ALL: [Kind; KINDS] = [Kind::Gain, Kind::Offset, Kind::Delay];
+}
+
+pub(super) const KINDS: usize = 3;
+/// Rows that are absorbed together.
+const ROWS: usize = 256;
+
+/// The measurements of an experiment, one after the other.
+pub(super) struct Measurements<'o> {
+    objective: &'o Objective<'o>,
+    experiment: usize,
+    sigma: Vec<f64>,
+    /// The prediction of each output at the sample before, if it was measured.
+    before: Vec<Option<f64>>,
+}
+
+/// A measurement: its place in the window, the factor of its row, and the slopes by gain, offset and delay.
+pub(super) struct Measurement {
+    pub k: usize,
+    pub output: usize,
+    pub root: f64,
+    pub slopes: [f64; KINDS],
+}
+
+impl<'o> Measurements<'o> {
+    pub fn new(objective: &'o Objective<'o>, experiment: usize) -> Self {
+        let before = vec![None; objective.outputs()];
+        Measurements { objective, experiment, sigma: objective.whitening.sigma(), before }
+    }
+
+    /// Those of a window that count.
+    pub fn visit(&mut self, window: &Window, lane: usize, mut visit: impl FnMut(Measurement)) {
+        let record = &self.objective.problem.records[self.experiment];
+        for (k, output) in (0..window.samples[lane]).flat_map(|k| (0..window.outputs()).map(move |j| (k, j))) {
+            let before = std::mem::take(&mut self.before[output]);
+            if !window.is_measured(k, output, lane) {
+                continue;
+            }
+            let (sample, error) = (window.begin[lane] + k, window.error(k, output, lane));
+            let unit = if window.has_variances() { window.variance_root(k, output, lane) } else { self.sigma[output] };
+            let prediction = record.outputs()[output].values[sample] - error * unit;
+            self.before[output] = Some(prediction);
+            // As in iteratively reweighted least squares, whose minimum is that of the loss.
+            let by_loss = self.objective.loss().map_or(1.0, |loss| loss.weight(error));
+            let weight = self.objective.weight(self.experiment, sample) * by_loss;
+            if weight > 0.0 {
+                let change = before.map_or(0.0, |before| before - prediction);
+                let slopes = [prediction / unit, unit.recip(), change / unit];
+                visit(Measurement { k, output, root: weight.sqrt(), slopes });
+            }
+        }
+    }
+
+    /// Goes on behind a segment that follows.
+    pub fn append(&mut self, later: Self) {
+        self.before = later.before;
+    }
+}
+
+/// The triangle of each output's rows, of one experiment: slopes of the unknowns, then of gain, offset and delay.
+pub(super) struct Triangle<'o> {
+    measurements: Measurements<'o>,
+    of: Vec<(Information, Block)>,
+    row: Vec<f64>,
+}
+
+impl<'o> Triangle<'o> {
+    pub fn new(objective: &'o Objective<'o>, experiment: usize) -> Self {
+        let columns = objective.problem.unknowns.columns(experiment).count() + KINDS;
+        let empty = |_| (Information::new(columns), Block::new(columns, ROWS));
+        Triangle {
+            measurements: Measurements::new(objective, experiment),
+            of: (0..objective.outputs()).map(empty).collect(),
+            row: vec![0.0; columns],
+        }
+    }
+
+    /// One triangle, with the regressors of each output in columns of their own.
+    pub fn of_all_outputs(mut self) -> Information {
+        let unknowns = self.row.len() - KINDS;
+        let outputs = self.of.len();
+        let mut all = Information::new(unknowns + outputs * KINDS);
+        for (j, (triangle, block)) in self.of.iter_mut().enumerate() {
+            triangle.absorb(block);
+            for i in 0..=triangle.columns() {
+                let mut row = vec![0.0; all.columns()];
+                let place = |c: usize| if c < unknowns { c } else { c + j * KINDS };
+                (i..triangle.columns()).for_each(|c| row[place(c)] = triangle.at(i, c));
+                all.absorb_row(&row, triangle.at(i, triangle.columns()));
+            }
+        }
+        all
+    }
+}
+
+impl Accumulate for Triangle<'_> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        let Triangle { measurements, of, row } = self;
+        let unknowns = row.len() - KINDS;
+        measurements.visit(window, lane, |Measurement { k, output, root, slopes }| {
+            let own = window.row(k, output).iter().skip(lane).step_by(window.lanes()).take(unknowns);
+            row.iter_mut().zip(own.chain(&slopes)).for_each(|(to, slope)| *to = root * slope);
+            let (triangle, block) = &mut of[output];
+            triangle.gather(block, row, root * window.error(k, output, lane));
+        });
+    }
+
+    fn append(&mut self, later: Self) {
+        for ((triangle, block), (other, mut rows)) in self.of.iter_mut().zip(later.of) {
+            triangle.absorb(block);
+            triangle.absorb(&mut rows);
+            triangle.merge(&other);
+        }
+        self.measurements.append(later.measurements);
+    }
+}
