@@ -26,6 +26,10 @@ const NOTHING: f64 = 1e-4;
 const MOST: usize = 200;
 /// Of a regressor at least this part must be left beside the unknowns.
 const LEFT: f64 = 1e-4;
+/// Regressors whose sum of squares is within this many variances of the least explain the errors as well: of a current and a speed that are
+/// both wrong by a gain, often only the ratio shows. No more than some are said.
+const AS_WELL: f64 = 10.0;
+const SAID: usize = 3;
 
 /// A regressor that was released beside the unknowns.
 struct Released {
@@ -34,6 +38,8 @@ struct Released {
     step: Vec<f64>,
     value: f64,
     standard_error: f64,
+    /// The sum of squares that is left, and its probability by chance.
+    left: f64,
     chance: f64,
 }
 
@@ -58,12 +64,20 @@ pub(super) fn contradicts(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Op
     }
     let extended = Extended::new(judgement)?;
     let numbers = (0..judgement.objective.outputs() * KINDS).filter(|number| extended.is_examined(*number));
-    let tests = numbers.clone().count() as f64;
-    let found = numbers.filter_map(|number| extended.release(number));
-    let mut most = found.min_by(|a, b| a.chance.total_cmp(&b.chance)).filter(|one| one.chance * tests < LEVEL)?;
-    (most.standard_error, most.chance) = extended.confirm(&most)?;
-    most.chance *= tests;
-    (most.chance < LEVEL).then(|| extended.warning(&most, unknowns))
+    let mut found: Vec<Released> = numbers.clone().filter_map(|number| extended.release(number)).collect();
+    found.sort_by(|a, b| a.left.total_cmp(&b.left));
+    let first = found.first()?;
+    let (tests, least) = (numbers.count() as f64, first.left);
+    if first.chance * tests >= LEVEL {
+        return None;
+    }
+    let (standard_error, chance) = extended.confirm(first)?;
+    let wider = standard_error / first.standard_error;
+    let as_well = AS_WELL * wider * wider * least / extended.degrees();
+    found.retain(|one| one.left <= least + as_well);
+    found.truncate(SAID);
+    found.iter_mut().for_each(|one| one.standard_error *= wider);
+    (chance * tests < LEVEL).then(|| extended.warning(&found, chance * tests, unknowns))
 }
 
 impl<'j> Extended<'j> {
@@ -120,13 +134,30 @@ impl<'j> Extended<'j> {
         }
         let step = self.linear.step(&vec![0.0; held.len()], &held)?;
         let left = self.linear.sum_of_squares() - 2.0 * self.linear.predicted_reduction(&step);
-        let degrees = self.judgement.degrees - 1.0;
+        let degrees = self.degrees();
         let (value, standard_error) = (step[place], unit * (left / degrees).sqrt());
         let chance = two_sided(value / standard_error, degrees);
-        Some(Released { number, step, value, standard_error, chance })
+        Some(Released { number, step, value, standard_error, left, chance })
     }
 
-    fn warning(&self, found: &Released, unknowns: &[Unknown]) -> Warning {
+    /// Degrees of freedom with a regressor.
+    fn degrees(&self) -> f64 {
+        self.judgement.degrees - 1.0
+    }
+
+    fn warning(&self, found: &[Released], chance: f64, unknowns: &[Unknown]) -> Warning {
+        let (said, severities): (Vec<String>, Vec<Severity>) = found.iter().map(|one| self.said(one, unknowns)).unzip();
+        let severity = severities.into_iter().max().unwrap_or(Severity::Usable);
+        let text = format!(
+            "{} ({}): check unit, gain, zero and filter of the sensor, and what the model leaves out; no interval allows for it",
+            said.join(", or "),
+            p_value(chance)
+        );
+        Warning { code: WarningCode::SensorContradicts, severity, text }
+    }
+
+    /// What is wrong with a sensor and how far that moves a parameter, and how severe that is.
+    fn said(&self, found: &Released, unknowns: &[Unknown]) -> (String, Severity) {
         let output = &self.objective.problem.layout().outputs[found.number / KINDS];
         let moves = |i: usize| {
             let unknown = &unknowns[i];
@@ -136,7 +167,7 @@ impl<'j> Extended<'j> {
         };
         let furthest = (0..unknowns.len()).filter_map(moves).max_by(|a, b| a.2.total_cmp(&b.2));
         let (value, error) = (found.value, number(found.standard_error, 2));
-        let said = match Kind::ALL[found.number % KINDS] {
+        let is = match Kind::ALL[found.number % KINDS] {
             Kind::Gain => format!("is {} +- {error} times what the model predicts", number(1.0 + value, 4)),
             Kind::Offset => {
                 format!("lies {} +- {error} {} beside what the model predicts", number(value, 3), output.unit)
@@ -147,19 +178,13 @@ impl<'j> Extended<'j> {
             }
         };
         let moved = furthest.map_or(String::new(), |(name, part, errors)| {
-            format!(", and `{name}` {} ({} standard errors) elsewhere", percent(part, 2), number(errors, 2))
+            format!(" and `{name}` {} ({} standard errors) from here", percent(part, 2), number(errors, 2))
         });
         let severity = match furthest {
             Some((_, part, _)) if part > FAR => Severity::NotUsable,
             Some((_, part, _)) if part <= NOTHING => Severity::Usable,
             _ => Severity::UsableWithCare,
         };
-        let text = format!(
-            "`{}` {said}{moved}, if that is estimated, too ({}): check unit, gain, zero and filter of the sensor, and what the model leaves \
-             out; no interval allows for it",
-            output.name,
-            p_value(found.chance)
-        );
-        Warning { code: WarningCode::SensorContradicts, severity, text }
+        (format!("`{}` {is}{moved}", output.name), severity)
     }
 }

@@ -37,6 +37,7 @@ mod refining;
 mod refused;
 mod sandwiches;
 mod segments;
+mod sensors;
 #[path = "../common/shared.rs"]
 mod shared;
 #[path = "../common/spiral.rs"]

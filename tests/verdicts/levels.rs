@@ -17,7 +17,7 @@ fn outputs_of_one_plant_do_not_contradict_each_other() {
         let plant = plane();
         plant.fit(&plant.record(seed, 200).noisy(0.2, 0.0, seed), &How::default(), seed)
     };
-    assert!(said(500, &[OutputsContradict], judged) <= 1);
+    assert!(said(500, &[OutputsContradict, SensorContradicts], judged) <= 1);
 }
 
 /// Noise that is correlated over time counts for fewer measurements, and raises no alarm either.
@@ -27,7 +27,7 @@ fn colored_noise_is_no_contradiction() {
         let plant = surface();
         plant.fit(&plant.record(seed, 300).noisy(0.1, 0.8, seed), &How::default(), seed)
     };
-    assert!(said(100, &[OutputsContradict, HalvesContradict], judged) <= 1);
+    assert!(said(100, &[OutputsContradict, HalvesContradict, SensorContradicts], judged) <= 1);
 }
 
 /// The right noise is not contradicted; one of two fifths or of two and a half times it is, every time.

@@ -106,7 +106,7 @@ impl Extended<'_> {
             sums.append(&one.sums);
             errors.iter_mut().zip(&one.errors).for_each(|(errors, own)| errors.append(own));
         }
-        let free = self.judgement.degrees - 1.0;
+        let free = self.degrees();
         let count = sums.counts.iter().sum::<u64>() as f64;
         let plain = sums.errors / free * sums.squares;
         let own = sums.products * count / free;

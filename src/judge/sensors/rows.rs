@@ -113,8 +113,10 @@ impl Accumulate for Triangle<'_> {
         let Triangle { measurements, of, row } = self;
         let unknowns = row.len() - KINDS;
         measurements.visit(window, lane, |Measurement { k, output, root, slopes }| {
-            let own = window.row(k, output).iter().skip(lane).step_by(window.lanes()).take(unknowns);
-            row.iter_mut().zip(own.chain(&slopes)).for_each(|(to, slope)| *to = root * slope);
+            let (of_unknowns, of_sensor) = row.split_at_mut(unknowns);
+            let own = window.row(k, output).chunks_exact(window.lanes());
+            of_unknowns.iter_mut().zip(own).for_each(|(to, lanes)| *to = root * lanes[lane]);
+            of_sensor.iter_mut().zip(slopes).for_each(|(to, slope)| *to = root * slope);
             let (triangle, block) = &mut of[output];
             triangle.gather(block, row, root * window.error(k, output, lane));
         });
