@@ -5,6 +5,7 @@
 //! 50), and the most certain one is tested again with errors of whatever sizes and color.
 
 mod confirm;
+mod cut_off;
 mod rows;
 
 use super::conclude::Judgement;
@@ -50,8 +51,8 @@ struct Extended<'j> {
     linear: Linearization,
 }
 
-/// The output that most certainly has a gain, an offset or a delay of its own.
-pub(super) fn contradicts(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Option<Warning> {
+/// What is wrong with outputs, or may be.
+pub(super) fn sensors(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
     let settings = &judgement.objective.problem.settings;
     let possible = settings.prefilter.is_none()
         && judgement.objective.sweep.restarts().is_none()
@@ -59,25 +60,11 @@ pub(super) fn contradicts(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Op
         && judgement.degrees > 1.0
         && !judgement.rounding
         && judgement.end.outcome.converged();
-    if !possible {
-        return None;
+    let Some(extended) = possible.then(|| Extended::new(judgement)).flatten() else { return vec![] };
+    match extended.contradicts(unknowns) {
+        Some(warning) => vec![warning],
+        None => extended.cut_off(unknowns),
     }
-    let extended = Extended::new(judgement)?;
-    let numbers = (0..judgement.objective.outputs() * KINDS).filter(|number| extended.is_examined(*number));
-    let mut found: Vec<Released> = numbers.clone().filter_map(|number| extended.release(number)).collect();
-    found.sort_by(|a, b| a.left.total_cmp(&b.left));
-    let first = found.first()?;
-    let (tests, least) = (numbers.count() as f64, first.left);
-    if first.chance * tests >= LEVEL {
-        return None;
-    }
-    let (standard_error, chance) = extended.confirm(first)?;
-    let wider = standard_error / first.standard_error;
-    let as_well = AS_WELL * wider * wider * least / extended.degrees();
-    found.retain(|one| one.left <= least + as_well);
-    found.truncate(SAID);
-    found.iter_mut().for_each(|one| one.standard_error *= wider);
-    (chance * tests < LEVEL).then(|| extended.warning(&found, chance * tests, unknowns))
 }
 
 impl<'j> Extended<'j> {
@@ -91,6 +78,25 @@ impl<'j> Extended<'j> {
         let triangles: Vec<Information> = all.into_iter().map(Triangle::of_all_outputs).collect();
         let shared = objective.problem.unknowns.shared() + outputs * KINDS;
         Some(Extended { judgement, linear: Linearization::new(0.0, shared, triangles), objective })
+    }
+
+    /// What most certainly is wrong with an output.
+    fn contradicts(&self, unknowns: &[Unknown]) -> Option<Warning> {
+        let numbers = (0..self.objective.outputs() * KINDS).filter(|number| self.is_examined(*number));
+        let mut found: Vec<Released> = numbers.clone().filter_map(|number| self.release(number)).collect();
+        found.sort_by(|a, b| a.left.total_cmp(&b.left));
+        let first = found.first()?;
+        let (tests, least) = (numbers.count() as f64, first.left);
+        if first.chance * tests >= LEVEL {
+            return None;
+        }
+        let (standard_error, chance) = self.confirm(first)?;
+        let wider = standard_error / first.standard_error;
+        let as_well = AS_WELL * wider * wider * least / self.degrees();
+        found.retain(|one| one.left <= least + as_well);
+        found.truncate(SAID);
+        found.iter_mut().for_each(|one| one.standard_error *= wider);
+        (chance * tests < LEVEL).then(|| self.warning(&found, chance * tests, unknowns))
     }
 
     /// The place of a regressor.
@@ -159,13 +165,7 @@ impl<'j> Extended<'j> {
     /// What is wrong with a sensor and how far that moves a parameter, and how severe that is.
     fn said(&self, found: &Released, unknowns: &[Unknown]) -> (String, Severity) {
         let output = &self.objective.problem.layout().outputs[found.number / KINDS];
-        let moves = |i: usize| {
-            let unknown = &unknowns[i];
-            let error = unknown.knowledge.standard_error().filter(|_| matches!(unknown.role, Role::Parameter(_)))?;
-            let by = self.judgement.slopes[i] * found.step[self.place_of(i)];
-            Some((&unknown.name, (by / unknown.value).abs(), (by / error).abs()))
-        };
-        let furthest = (0..unknowns.len()).filter_map(moves).max_by(|a, b| a.2.total_cmp(&b.2));
+        let furthest = self.furthest(&found.step, unknowns);
         let (value, error) = (found.value, number(found.standard_error, 2));
         let is = match Kind::ALL[found.number % KINDS] {
             Kind::Gain => format!("is {} +- {error} times what the model predicts", number(1.0 + value, 4)),
@@ -186,5 +186,16 @@ impl<'j> Extended<'j> {
             _ => Severity::UsableWithCare,
         };
         (format!("`{}` {is}{moved}", output.name), severity)
+    }
+
+    /// The parameter that a step moves by most standard errors, by which part of itself, and by how many.
+    fn furthest<'u>(&self, step: &[f64], unknowns: &'u [Unknown]) -> Option<(&'u str, f64, f64)> {
+        let moves = |i: usize| {
+            let unknown = &unknowns[i];
+            let error = unknown.knowledge.standard_error().filter(|_| matches!(unknown.role, Role::Parameter(_)))?;
+            let by = self.judgement.slopes[i] * step[self.place_of(i)];
+            Some((&*unknown.name, (by / unknown.value).abs(), (by / error).abs()))
+        };
+        (0..unknowns.len()).filter_map(moves).max_by(|a, b| a.2.total_cmp(&b.2))
     }
 }

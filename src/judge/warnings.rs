@@ -48,7 +48,7 @@ impl Judgement<'_> {
         warnings.extend(shape::shape(self));
         warnings.extend(outliers::outliers(self));
         warnings.extend(together::contradictions(self, unknowns));
-        warnings.extend(sensors::contradicts(self, unknowns));
+        warnings.extend(sensors::sensors(self, unknowns));
         warnings.extend(known::knowledge(self, unknowns, covariances));
         warnings.extend(self.unbounded());
         warnings.extend(self.gaps());

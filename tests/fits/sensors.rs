@@ -155,3 +155,58 @@ fn noise_of_changing_size_is_no_fault() {
     println!("{count} of 300");
     assert!(count <= 3, "{count}");
 }
+
+/// `y = slope u + offset`.
+#[derive(Clone)]
+struct Gauge;
+
+impl Model for Gauge {
+    type State = Nothing;
+    type Input = Voltage;
+    type Output = Current;
+    type Parameters = Affine;
+    const KIND: Kind = Kind::Static;
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Affine<S>) -> Current<S> {
+        Current { i: p.slope * u.u + p.offset }
+    }
+}
+
+fn coarse(estimate: &Estimate<Gauge>) -> Option<&Warning> {
+    estimate.warnings.iter().find(|warning| warning.code == WarningCode::CoarseOutput)
+}
+
+/// A sensor with steps of 0.1, which may round or cut off: the offset replaces half a step, and moves by exactly that. What no offset replaces
+/// tells one from the other.
+#[test]
+fn half_a_step_that_may_have_been_cut_off_is_said() {
+    let step = 0.1;
+    let fit = |size: f64, low: f64, offset: Parameter| {
+        let mut noise = Noise(8);
+        let inputs: Vec<Voltage> = (0..400).map(|k| Voltage { u: low + 0.0037 * f64::from(k % 397) }).collect();
+        let measured = |u: &Voltage| 2.0 * u.u + 1.0 + 0.03 * noise.gauss();
+        let outputs = inputs.iter().map(measured).map(|y| Current { i: (y / size).floor() * size }).collect();
+        let record = Experiment::new(&Gauge, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        Fit::new(&Gauge, &record).parameters(Affine { slope: free(1.5), offset }).run().unwrap()
+    };
+    let estimate = fit(step, 0.0, free(0.5));
+    let [slope, offset] = &estimate.unknowns[..] else { panic!("{estimate}") };
+    assert!((slope.value - 2.0).abs() < 0.02 && (offset.value - 0.95).abs() < 0.02, "{estimate}");
+    let warning = coarse(&estimate).unwrap_or_else(|| panic!("{estimate}"));
+    let error = offset.knowledge.standard_error().unwrap();
+    let said = format!("`offset` is {:.1} % ({:.0} standard errors) from here", 5.0 / offset.value, 0.05 / error);
+    assert!(warning.text.starts_with("the output `i` has ") && warning.text.contains(&said), "{said} {}", warning.text);
+    assert!(warning.text.contains(" values, 0.1 A apart") && warning.severity == Severity::UsableWithCare);
+    // Beyond 64 values, half a step counts for little.
+    let finer = fit(0.1 * step, 0.0, free(0.5));
+    assert!(coarse(&finer).is_none(), "{finer}");
+    // With inputs of both signs the slope replaces no offset, which is known here: it is found where it was cut off.
+    let known = fit(step, -0.7, fixed(1.0));
+    let (value, error) = numbers(&said_of(&known).text, "`i` lies ", " A beside").unwrap();
+    assert!((value + 0.05).abs() < 4.0 * error && coarse(&known).is_none(), "{known}");
+    let rounded = fit(step, -0.7, fixed(0.95));
+    assert!(coarse(&rounded).is_none() && rounded.severity() == Severity::Usable, "{rounded}");
+}
+
+fn said_of(estimate: &Estimate<Gauge>) -> &Warning {
+    said(estimate).unwrap_or_else(|| panic!("{estimate}"))
+}

@@ -1,0 +1,103 @@
+//! Outputs in steps that may have been cut off, not rounded.
+//!
+//! Values that are cut off lie half a step below what was there, in the mean, and unknowns absorb a part of it. Both kinds of sensors are
+//! compared by the slopes at the estimate.
+
+use super::{Extended, KINDS, Kind};
+use crate::estimate::{Unknown, Warning, WarningCode};
+use crate::numeral::{number, percent};
+use crate::optimize::{Linearization, Severity};
+
+/// Outputs of fewer values are coarse in any case; of more the step counts for little.
+const FEWEST: usize = 9;
+const MOST: usize = 64;
+/// Each value occurs so many times on average.
+const TIMES: u64 = 4;
+/// Errors below this part of a step are of values that are exact.
+const PART_OF_STEP: f64 = 0.1;
+/// By how much more in variances the squares of a sensor that cuts off exceed those of one that rounds where the latter is certain.
+const CERTAIN: f64 = 9.0;
+/// Standard errors that a parameter moves by.
+const FAR: f64 = 2.0;
+/// How much more certain half a step is than all data together.
+const HELD: f64 = 1e6;
+
+impl Extended<'_> {
+    /// Outputs whose step may have been cut off, if that moves a parameter.
+    pub(super) fn cut_off(&self, unknowns: &[Unknown]) -> Vec<Warning> {
+        let residuals = &self.judgement.residuals.outputs;
+        let coarse = |j: usize| {
+            let records = self.objective.problem.records.iter();
+            let (count, step) = steps(records.flat_map(|record| record.outputs()[j].values.iter().copied()))?;
+            let often = residuals[j].samples >= TIMES * count as u64;
+            (often && residuals[j].rmse > PART_OF_STEP * step && !self.judgement.rounded[j]).then_some((j, count, step))
+        };
+        let found = (0..self.objective.outputs()).filter_map(coarse);
+        found.filter_map(|(j, count, step)| self.if_cut_off(unknowns, (j, count, step))).collect()
+    }
+
+    fn if_cut_off(&self, unknowns: &[Unknown], (j, count, size): (usize, usize, f64)) -> Option<Warning> {
+        let number_of = j * KINDS + Kind::ALL.iter().position(|kind| *kind == Kind::Offset)?;
+        let place = self.place(number_of);
+        let held = self.held(Some(number_of));
+        // The offset is half a step for certain.
+        let weight = HELD * self.linear.column_norms()[place];
+        let mut triangles: Vec<_> = self.linear.columns().map(|(triangle, _)| triangle.clone()).collect();
+        let (_, columns) = self.linear.columns().next()?;
+        let row: Vec<f64> = columns.iter().map(|column| if *column == place { weight } else { 0.0 }).collect();
+        triangles[0].absorb_row(&row, -0.5 * weight * size);
+        let shared = self.place(self.objective.outputs() * KINDS);
+        let step = Linearization::new(0.0, shared, triangles).step(&vec![0.0; held.len()], &held)?;
+        let without = self.linear.step(&vec![0.0; held.len()], &self.held(None))?;
+        let gain = |step: &[f64]| 2.0 * self.linear.predicted_reduction(step);
+        let variance = (self.linear.sum_of_squares() - gain(&without)) / self.judgement.degrees;
+        if gain(&without) - gain(&step) > CERTAIN * variance {
+            return None;
+        }
+        let (name, part, errors) = self.furthest(&step, unknowns).filter(|(.., errors)| *errors > FAR)?;
+        let output = &self.objective.problem.layout().outputs[j];
+        let text = format!(
+            "the output `{}` has {count} values, {} {} apart: if the sensor cuts off what is less than a step, which the record does not \
+             exclude, `{name}` is {} ({} standard errors) from here; add half a step to values that are cut off, or measure it finer",
+            output.name,
+            number(size, 3),
+            output.unit,
+            percent(part, 2),
+            number(errors, 2)
+        );
+        Some(Warning { code: WarningCode::CoarseOutput, severity: Severity::UsableWithCare, text })
+    }
+}
+
+/// How many values there are and the step between them, if these are some, all multiples of one step apart.
+fn steps(measured: impl Iterator<Item = f64>) -> Option<(usize, f64)> {
+    let mut values: Vec<f64> = vec![];
+    for value in measured.filter(|value| !value.is_nan()) {
+        if let Err(at) = values.binary_search_by(|one| one.total_cmp(&value)) {
+            values.insert(at, value);
+            if values.len() > MOST {
+                return None;
+            }
+        }
+    }
+    let apart = || values.windows(2).map(|pair| pair[1] - pair[0]);
+    let step = apart().reduce(f64::min)?;
+    let multiple = |apart: f64| (apart / step - (apart / step).round()).abs() < 1e-6;
+    (values.len() >= FEWEST && apart().all(multiple)).then_some((values.len(), step))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::steps;
+
+    /// Values a multiple of a quarter apart, with gaps; others have no step. Few and many values are left out.
+    #[test]
+    fn steps_of_a_sensor() {
+        let of = |count: usize, value: fn(usize) -> f64| steps((0..count).map(value));
+        assert_eq!(of(40, |k| 3.0 + 0.25 * (k * k % 23) as f64), Some((12, 0.25)));
+        assert_eq!(of(40, |k| (k % 12) as f64 + if k % 12 == 5 { 0.1 } else { 0.0 }), None);
+        assert_eq!([64, 65].map(|count| of(count, |k| k as f64)), [Some((64, 1.0)), None]);
+        assert_eq!(of(20, |k| (k % 8) as f64), None);
+        assert_eq!(of(20, |k| if k % 2 == 0 { f64::NAN } else { k as f64 }), Some((10, 2.0)));
+    }
+}
