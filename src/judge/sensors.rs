@@ -10,6 +10,7 @@ mod rows;
 
 use super::conclude::Judgement;
 use super::directions;
+use super::sandwich::prior_row;
 use crate::estimate::student::two_sided;
 use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::information::Information;
@@ -75,9 +76,14 @@ impl<'j> Extended<'j> {
         let outputs = objective.outputs();
         let make = |e: usize| Triangle::new(&objective, e);
         let all = objective.gather(&judgement.end.coordinates, true, make).ok()?;
-        let triangles: Vec<Information> = all.into_iter().map(Triangle::of_all_outputs).collect();
-        let shared = objective.problem.unknowns.shared() + outputs * KINDS;
-        Some(Extended { judgement, linear: Linearization::new(0.0, shared, triangles), objective })
+        let mut triangles: Vec<Information> = all.into_iter().map(Triangle::of_all_outputs).collect();
+        let unknowns = &objective.problem.unknowns;
+        for (i, slope, error) in unknowns.priors(&judgement.end.coordinates) {
+            let e = unknowns.row[i].experiment.unwrap_or(0);
+            triangles[e].absorb_row(&prior_row(&objective, e, i, slope), error);
+        }
+        let linear = Linearization::new(0.0, unknowns.shared() + outputs * KINDS, triangles);
+        Some(Extended { judgement, linear, objective })
     }
 
     /// What most certainly is wrong with an output.

@@ -199,10 +199,12 @@ fn half_a_step_that_may_have_been_cut_off_is_said() {
     // Beyond 64 values, half a step counts for little.
     let finer = fit(0.1 * step, 0.0, free(0.5));
     assert!(coarse(&finer).is_none(), "{finer}");
-    // With inputs of both signs the slope replaces no offset, which is known here: it is found where it was cut off.
-    let known = fit(step, -0.7, fixed(1.0));
-    let (value, error) = numbers(&said_of(&known).text, "`i` lies ", " A beside").unwrap();
-    assert!((value + 0.05).abs() < 4.0 * error && coarse(&known).is_none(), "{known}");
+    // With inputs of both signs the slope replaces no offset, which is known here, or by a prior: it is found where it was cut off.
+    for known in [fixed(1.0), free(1.0).prior(1.0, 1e-3)] {
+        let known = fit(step, -0.7, known);
+        let (value, error) = numbers(&said_of(&known).text, "`i` lies ", " A beside").unwrap();
+        assert!((value + 0.05).abs() < 4.0 * error && coarse(&known).is_none(), "{known}");
+    }
     let rounded = fit(step, -0.7, fixed(0.95));
     assert!(coarse(&rounded).is_none() && rounded.severity() == Severity::Usable, "{rounded}");
 }

@@ -37,9 +37,9 @@ impl Extended<'_> {
     }
 
     fn if_cut_off(&self, unknowns: &[Unknown], (j, count, size): (usize, usize, f64)) -> Option<Warning> {
-        let number_of = j * KINDS + Kind::ALL.iter().position(|kind| *kind == Kind::Offset)?;
-        let place = self.place(number_of);
-        let held = self.held(Some(number_of));
+        let regressor = j * KINDS + Kind::ALL.iter().position(|kind| *kind == Kind::Offset)?;
+        let place = self.place(regressor);
+        let held = self.held(Some(regressor));
         // The offset is half a step for certain.
         let weight = HELD * self.linear.column_norms()[place];
         let mut triangles: Vec<_> = self.linear.columns().map(|(triangle, _)| triangle.clone()).collect();
