@@ -19,9 +19,9 @@ const DECIDE: f64 = 0.5;
 const MOVES: f64 = 0.1;
 const LONG: f64 = 0.25;
 /// Outputs with so few values are coarse, where each occurs so many times and the errors are larger than this part of a step.
-const FEW: usize = 8;
-const TIMES: usize = 4;
-const PART_OF_STEP: f64 = 0.1;
+pub(super) const FEW: usize = 8;
+pub(super) const TIMES: usize = 4;
+pub(super) const PART_OF_STEP: f64 = 0.1;
 /// Missing part of an output from which on there is a note.
 const MISSING: f64 = 0.5;
 /// Warnings of one kind; more are counted.

@@ -1,8 +1,9 @@
-//! Whether an output is scaled, shifted or late against what the model predicts.
+//! Whether a sensor has a gain, an offset or a delay that the model does not have.
 //!
-//! What unknowns absorb of a sensor's error moves them and leaves little in the errors. Gain, offset and delay of each output are
-//! therefore released one by one beside all unknowns, by the slopes at the estimate (Rao, Proc. Cambridge Philosophical Society 44 (1948)
-//! 50), and the most certain one is tested again with errors of whatever sizes and color.
+//! The unknowns take a part of such a fault, which biases them and leaves little in the errors. Gain, offset and delay of each output are
+//! therefore tested one by one as one more unknown beside all others, by the slopes at the estimate (score test: Rao, Proc. Cambridge
+//! Philosophical Society 44 (1948) 50). The most significant one is tested again ([`confirm`]) for errors of changing variance and
+//! autocorrelated ones.
 
 mod confirm;
 mod cut_off;
@@ -19,21 +20,21 @@ use crate::optimize::{Linearization, Severity};
 use crate::problem::{Objective, Role, Whitening};
 use rows::{KINDS, Kind, Triangle};
 
-/// Level of the test, which all regressors share.
+/// Level of the test, divided by the number of regressors.
 const LEVEL: f64 = 1e-4;
-/// A parameter that the sensor's error moves by more than this part of itself is not usable; by less than the second, it is a note.
+/// The estimate is not usable where the fault moves a parameter by more than this part of itself; below the second part it is a note.
 const FAR: f64 = 0.25;
 const NOTHING: f64 = 1e-4;
 /// More unknowns than these are not examined.
 const MOST: usize = 200;
-/// Of a regressor at least this part must be left beside the unknowns.
+/// Part of a regressor's norm that must be orthogonal to the slopes of the unknowns: below it, curvature and rounding decide.
 const LEFT: f64 = 1e-4;
-/// Regressors whose sum of squares is within this many variances of the least explain the errors as well: of a current and a speed that are
-/// both wrong by a gain, often only the ratio shows. No more than some are said.
+/// Regressors whose sum of squares is within this many variances of the least (a chance of 0.002) explain the errors as well: of the gains of
+/// two sensors, often only the ratio is determined. At most so many are said.
 const AS_WELL: f64 = 10.0;
 const SAID: usize = 3;
 
-/// A regressor that was released beside the unknowns.
+/// A regressor that was estimated beside the unknowns.
 struct Released {
     number: usize,
     /// The steps of the unknowns and of the regressor.
@@ -184,7 +185,11 @@ impl<'j> Extended<'j> {
             }
         };
         let moved = furthest.map_or(String::new(), |(name, part, errors)| {
-            format!(" and `{name}` {} ({} standard errors) from here", percent(part, 2), number(errors, 2))
+            format!(
+                " with `{name}` {} ({} standard errors) away from this estimate",
+                percent(part, 2),
+                number(errors, 2)
+            )
         });
         let severity = match furthest {
             Some((_, part, _)) if part > FAR => Severity::NotUsable,
@@ -200,7 +205,7 @@ impl<'j> Extended<'j> {
             let unknown = &unknowns[i];
             let error = unknown.knowledge.standard_error().filter(|_| matches!(unknown.role, Role::Parameter(_)))?;
             let by = self.judgement.slopes[i] * step[self.place_of(i)];
-            Some((&*unknown.name, (by / unknown.value).abs(), (by / error).abs()))
+            (unknown.value != 0.0).then_some((&*unknown.name, (by / unknown.value).abs(), (by / error).abs()))
         };
         (0..unknowns.len()).filter_map(moves).max_by(|a, b| a.2.total_cmp(&b.2))
     }

@@ -25,6 +25,22 @@ impl Model for Line {
     }
 }
 
+/// `i = slope u + offset`.
+#[derive(Clone)]
+pub struct Straight;
+
+impl Model for Straight {
+    type State = Nothing;
+    type Input = Voltage;
+    type Output = Current;
+    type Parameters = Affine;
+    const KIND: Kind = Kind::Static;
+
+    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Affine<S>) -> Current<S> {
+        Current { i: p.slope * u.u + p.offset }
+    }
+}
+
 /// `tau di/dt = gain u - i`, the current measured.
 #[derive(Clone)]
 pub struct Lag;

@@ -38,11 +38,7 @@ fn a_gain_is_that_of_a_regression() {
     assert!((value - (1.0 - d / a)).abs() < 1e-4 && (said_error / error - 1.0).abs() < 0.05, "{}", warning.text);
     // `a` moves by `d/2`, which is a part of 2.4 %; its error is that of 160 errors of 0.1 and of `d/2`, with 159 degrees of freedom.
     let moved = 0.5 * d / (160.0 * (0.01 + 0.25 * d * d) / 159.0 / 160.0f64).sqrt();
-    assert!(
-        warning.text.contains(&format!("`a` 2.4 % ({moved:.1} standard errors) from here")),
-        "{moved} {}",
-        warning.text
-    );
+    assert!(warning.text.contains(&format!("`a` 2.4 % ({moved:.1} standard errors) away")), "{moved} {}", warning.text);
     assert_eq!(warning.severity, Severity::UsableWithCare);
 }
 
@@ -138,63 +134,40 @@ fn what_unknowns_replace_is_not_named() {
     assert!((estimate.parameters.gain - 2.6).abs() < 0.02, "{estimate}");
 }
 
-/// Noise that is ten times as large where the output moves, of 300 records: errors at these samples alone decide the delay, and by their mean
-/// size they would be significant in many.
-#[test]
-fn noise_of_changing_size_is_no_fault() {
-    let named = |seed: u64| {
-        let inputs: Vec<Voltage> = levels(200, 10, seed).into_iter().map(|u| Voltage { u }).collect();
-        let clean = simulated(&Lag, 5e-3, inputs, Current { i: 0.0 }, Branch { gain: 2.0, tau: 0.02 });
-        let mut noise = Noise(seed);
-        let outputs: Vec<Current> = clean.outputs().collect();
-        let size = |k: usize| if k % 10 < 3 { 0.05 } else { 0.005 };
-        let measured = (0..200).map(|k| Current { i: outputs[k].i + size(k) * noise.gauss() }).collect();
-        let record = with_outputs(&Lag, &clean, measured);
-        let estimate = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau: free(0.03) }).run().unwrap();
-        usize::from(said(&estimate).is_some())
-    };
-    let count: usize = (1..=300).map(named).sum();
-    println!("{count} of 300");
-    assert!(count <= 3, "{count}");
-}
-
-/// Noise that is correlated to nine tenths from sample to sample, of 300 records of 200: a dozen of errors have the information of one.
-#[test]
-fn colored_noise_is_no_fault() {
+/// Of 300 records of 200 samples without a fault, with such noise, those of which one is named.
+fn named_of_300(noise: impl Fn(usize, f64, f64) -> f64) -> usize {
     let named = |seed: u64| {
         let inputs: Vec<Voltage> = levels(200, 10, seed).into_iter().map(|u| Voltage { u: 1.0 + u }).collect();
         let clean = simulated(&Lag, 5e-3, inputs, Current { i: 0.0 }, Branch { gain: 2.0, tau: 0.02 });
-        let (mut noise, mut error) = (Noise(seed), 0.0);
-        let mut disturbed = |y: Current| {
-            error = 0.9 * error + 0.02 * noise.gauss();
+        let (mut random, mut error) = (Noise(seed), 0.0);
+        let mut disturbed = |(k, y): (usize, Current)| {
+            error = noise(k, error, random.gauss());
             Current { i: y.i + error }
         };
-        let measured = clean.outputs().map(&mut disturbed).collect();
+        let measured = clean.outputs().enumerate().map(&mut disturbed).collect();
         let record = with_outputs(&Lag, &clean, measured);
         let estimate = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau: free(0.03) }).run().unwrap();
         usize::from(said(&estimate).is_some())
     };
-    let count: usize = (1..=300).map(named).sum();
-    println!("{count} of 300");
+    (1..=300).map(named).sum()
+}
+
+/// Noise that is ten times as large in the three samples after each step of the input, which decide the delay: the second test, at 1e-3, may
+/// pass it by chance; four would be one chance in 300. By the errors' mean square alone there are more.
+#[test]
+fn noise_of_changing_size_is_no_fault() {
+    let count = named_of_300(|k, _, normal| if k % 10 < 3 { 0.05 * normal } else { 0.005 * normal });
     assert!(count <= 3, "{count}");
 }
 
-/// `y = slope u + offset`.
-#[derive(Clone)]
-struct Gauge;
-
-impl Model for Gauge {
-    type State = Nothing;
-    type Input = Voltage;
-    type Output = Current;
-    type Parameters = Affine;
-    const KIND: Kind = Kind::Static;
-    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Affine<S>) -> Current<S> {
-        Current { i: p.slope * u.u + p.offset }
-    }
+/// First-order autoregressive noise with coefficient 0.9. Taken as white there are more.
+#[test]
+fn colored_noise_is_no_fault() {
+    let count = named_of_300(|_, before, normal| 0.9 * before + 0.02 * normal);
+    assert!(count <= 3, "{count}");
 }
 
-fn coarse(estimate: &Estimate<Gauge>) -> Option<&Warning> {
+fn coarse(estimate: &Estimate<Straight>) -> Option<&Warning> {
     estimate.warnings.iter().find(|warning| warning.code == WarningCode::CoarseOutput)
 }
 
@@ -208,15 +181,15 @@ fn half_a_step_that_may_have_been_cut_off_is_said() {
         let inputs: Vec<Voltage> = (0..400).map(|k| Voltage { u: low + 0.0037 * f64::from(k % 397) }).collect();
         let measured = |u: &Voltage| 2.0 * u.u + 1.0 + 0.03 * noise.gauss();
         let outputs = inputs.iter().map(measured).map(|y| Current { i: (y / size).floor() * size }).collect();
-        let record = Experiment::new(&Gauge, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
-        Fit::new(&Gauge, &record).parameters(Affine { slope: free(1.5), offset }).run().unwrap()
+        let record = Experiment::new(&Straight, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        Fit::new(&Straight, &record).parameters(Affine { slope: free(1.5), offset }).run().unwrap()
     };
     let estimate = fit(step, 0.0, free(0.5));
     let [slope, offset] = &estimate.unknowns[..] else { panic!("{estimate}") };
     assert!((slope.value - 2.0).abs() < 0.02 && (offset.value - 0.95).abs() < 0.02, "{estimate}");
     let warning = coarse(&estimate).unwrap_or_else(|| panic!("{estimate}"));
     let error = offset.knowledge.standard_error().unwrap();
-    let said = format!("`offset` is {:.1} % ({:.0} standard errors) from here", 5.0 / offset.value, 0.05 / error);
+    let said = format!("`offset` is {:.1} % ({:.0} standard errors) away", 5.0 / offset.value, 0.05 / error);
     assert!(warning.text.starts_with("the output `i` has ") && warning.text.contains(&said), "{said} {}", warning.text);
     assert!(warning.text.contains(" values, 0.1 A apart") && warning.severity == Severity::UsableWithCare);
     // Beyond 64 values, half a step counts for little.
@@ -232,6 +205,6 @@ fn half_a_step_that_may_have_been_cut_off_is_said() {
     assert!(coarse(&rounded).is_none() && rounded.severity() == Severity::Usable, "{rounded}");
 }
 
-fn said_of(estimate: &Estimate<Gauge>) -> &Warning {
+fn said_of(estimate: &Estimate<Straight>) -> &Warning {
     said(estimate).unwrap_or_else(|| panic!("{estimate}"))
 }

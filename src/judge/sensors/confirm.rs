@@ -1,4 +1,4 @@
-//! The test of one regressor with errors of whatever sizes and color.
+//! The test of one regressor that allows for errors of changing variance and for autocorrelated ones.
 
 use super::rows::{KINDS, Measurement, Measurements};
 use super::{Extended, Released};
@@ -10,13 +10,13 @@ use crate::whiteness::Portmanteau;
 
 /// Level below which errors that are left are taken as colored.
 const COLORED: f64 = 0.01;
-/// Level of the test by the errors' own squares, which few rows may decide.
+/// Level of the heteroscedasticity-consistent test, which is a check of the other one: few rows may decide it.
 const OWN: f64 = 1e-3;
 
-/// Sums over what is left of the errors `e` with the regressor, and what is left of this, `z`, beside the unknowns.
+/// Sums over the errors `e` that remain with the regressor, and the part `z` of the regressor that is orthogonal to the unknowns' slopes.
 struct Left<'s> {
     measurements: Measurements<'s>,
-    /// The steps of the columns with the regressor, and by which the regressor replaces each of them.
+    /// For each unknown of the experiment: its step beside the regressor, and its coefficient in the regression of the regressor on the slopes.
     steps: &'s [(f64, f64)],
     output: usize,
     kind: usize,
@@ -27,7 +27,7 @@ struct Left<'s> {
 }
 
 /// Of `z^2`, `z^4`, `e^2 z^2` and `e^2`; and the number of errors of each output.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 struct Sums {
     squares: f64,
     fourths: f64,
@@ -42,7 +42,6 @@ impl Sums {
         self.fourths += other.fourths;
         self.products += other.products;
         self.errors += other.errors;
-        self.counts.resize(other.counts.len(), 0);
         self.counts.iter_mut().zip(&other.counts).for_each(|(count, other)| *count += other);
     }
 }
@@ -79,8 +78,8 @@ impl Accumulate for Left<'_> {
 }
 
 impl Extended<'_> {
-    /// Standard error and probability of a regressor, by how many correlated errors have the information of one; `None` where it is not
-    /// significant by the errors' own squares (White, Econometrica 48 (1980) 817).
+    /// Standard error and probability of a regressor, with fewer degrees of freedom for autocorrelated errors; `None` where it is not significant
+    /// by the heteroscedasticity-consistent variance (White, Econometrica 48 (1980) 817).
     pub(super) fn confirm(&self, found: &Released) -> Option<(f64, f64)> {
         let (objective, outputs) = (&self.objective, self.objective.outputs());
         let without = self.linear.step(&vec![0.0; self.linear.unknowns()], &self.held(None))?;
@@ -95,7 +94,7 @@ impl Extended<'_> {
             output: found.number / KINDS,
             kind: found.number % KINDS,
             value: found.value,
-            sums: Sums { counts: vec![0; outputs], ..Sums::default() },
+            sums: Sums { squares: 0.0, fourths: 0.0, products: 0.0, errors: 0.0, counts: vec![0; outputs] },
             errors: vec![Portmanteau::new(LAGS); outputs],
             runs: vec![vec![]; outputs],
         };
@@ -114,7 +113,7 @@ impl Extended<'_> {
         let colored = white.filter(|white| white.p_value < COLORED && !self.judgement.is_static());
         let dependence = colored.map(|white| white.dependence).fold(1.0, f64::max);
         let error = |variance: f64| (variance * dependence).sqrt() / sums.squares;
-        // Of the rows that count, which may be few.
+        // The effective number of rows, by the fourth powers of `z`.
         let degrees = (sums.squares * sums.squares / sums.fourths - 1.0).min(free) / dependence;
         let by_own = two_sided(found.value / error(own), degrees);
         let chance = two_sided(found.value / error(plain), free / dependence);

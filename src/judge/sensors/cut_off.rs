@@ -1,35 +1,31 @@
-//! Outputs in steps that may have been cut off, not rounded.
+//! Quantized outputs whose values may have been truncated instead of rounded.
 //!
-//! Values that are cut off lie half a step below what was there, in the mean, and unknowns absorb a part of it. Both kinds of sensors are
-//! compared by the slopes at the estimate.
+//! Truncation puts an offset of half a quantization step, on average, into an output, of which the unknowns take a part. The fit with that
+//! offset is compared with the fit without it, by the slopes at the estimate.
 
 use super::{Extended, KINDS, Kind};
 use crate::estimate::{Unknown, Warning, WarningCode};
+use crate::judge::data::{FEW, PART_OF_STEP, TIMES};
 use crate::numeral::{number, percent};
 use crate::optimize::{Linearization, Severity};
 
-/// Outputs of fewer values are coarse in any case; of more the step counts for little.
-const FEWEST: usize = 9;
+/// With more values than these (6 bits) the offset of half a step is below a hundredth of the range.
 const MOST: usize = 64;
-/// Each value occurs so many times on average.
-const TIMES: u64 = 4;
-/// Errors below this part of a step are of values that are exact.
-const PART_OF_STEP: f64 = 0.1;
-/// By how much more in variances the squares of a sensor that cuts off exceed those of one that rounds where the latter is certain.
+/// Truncation is excluded where its offset raises the sum of squares by more than this many variances: three standard deviations.
 const CERTAIN: f64 = 9.0;
-/// Standard errors that a parameter moves by.
+/// Standard errors by which a parameter must move: the reach of a 95 % interval.
 const FAR: f64 = 2.0;
-/// How much more certain half a step is than all data together.
+/// Weight of the row that fixes the offset, relative to the norm of the offset's column: what the data say of it adds 1e-12.
 const HELD: f64 = 1e6;
 
 impl Extended<'_> {
-    /// Outputs whose step may have been cut off, if that moves a parameter.
+    /// Outputs that may have been truncated, where that moves a parameter.
     pub(super) fn cut_off(&self, unknowns: &[Unknown]) -> Vec<Warning> {
         let residuals = &self.judgement.residuals.outputs;
         let coarse = |j: usize| {
             let records = self.objective.problem.records.iter();
             let (count, step) = steps(records.flat_map(|record| record.outputs()[j].values.iter().copied()))?;
-            let often = residuals[j].samples >= TIMES * count as u64;
+            let often = residuals[j].samples >= (TIMES * count) as u64;
             (often && residuals[j].rmse > PART_OF_STEP * step && !self.judgement.rounded[j]).then_some((j, count, step))
         };
         let found = (0..self.objective.outputs()).filter_map(coarse);
@@ -40,7 +36,6 @@ impl Extended<'_> {
         let regressor = j * KINDS + Kind::ALL.iter().position(|kind| *kind == Kind::Offset)?;
         let place = self.place(regressor);
         let held = self.held(Some(regressor));
-        // The offset is half a step for certain.
         let weight = HELD * self.linear.column_norms()[place];
         let mut triangles: Vec<_> = self.linear.columns().map(|(triangle, _)| triangle.clone()).collect();
         let (_, columns) = self.linear.columns().next()?;
@@ -57,8 +52,8 @@ impl Extended<'_> {
         let (name, part, errors) = self.furthest(&step, unknowns).filter(|(.., errors)| *errors > FAR)?;
         let output = &self.objective.problem.layout().outputs[j];
         let text = format!(
-            "the output `{}` has {count} values, {} {} apart: if the sensor cuts off what is less than a step, which the record does not \
-             exclude, `{name}` is {} ({} standard errors) from here; add half a step to values that are cut off, or measure it finer",
+            "the output `{}` has {count} values, {} {} apart: if the sensor truncates instead of rounding, which the record does not \
+             exclude, `{name}` is {} ({} standard errors) away from this estimate; add half a step to truncated values, or measure it finer",
             output.name,
             number(size, 3),
             output.unit,
@@ -69,7 +64,8 @@ impl Extended<'_> {
     }
 }
 
-/// How many values there are and the step between them, if these are some, all multiples of one step apart.
+/// The number of distinct values and the quantization step, where there are more than [`FEW`] and at most [`MOST`], all multiples of one step
+/// apart.
 fn steps(measured: impl Iterator<Item = f64>) -> Option<(usize, f64)> {
     let mut values: Vec<f64> = vec![];
     for value in measured.filter(|value| !value.is_nan()) {
@@ -83,7 +79,7 @@ fn steps(measured: impl Iterator<Item = f64>) -> Option<(usize, f64)> {
     let apart = || values.windows(2).map(|pair| pair[1] - pair[0]);
     let step = apart().reduce(f64::min)?;
     let multiple = |apart: f64| (apart / step - (apart / step).round()).abs() < 1e-6;
-    (values.len() >= FEWEST && apart().all(multiple)).then_some((values.len(), step))
+    (values.len() > FEW && apart().all(multiple)).then_some((values.len(), step))
 }
 
 #[cfg(test)]

@@ -3,8 +3,8 @@
 
 use super::Trial;
 use super::cases::{LAG, WINDING, clean, levels, record, supply, winding};
-use super::models::{Armature, Straight};
-use crate::common::{Affine, Branch, Current, Lag, Voltage};
+use super::models::Armature;
+use crate::common::{Affine, Branch, Current, Lag, Straight, Voltage};
 use crate::random::Random;
 use greybox::loss::Tukey;
 use greybox::{Experiment, Fit, Huber, Sample, Time, free};

@@ -1,7 +1,7 @@
 //! Models of the table of coverage, beside those that all tests share.
 
-use crate::common::{Affine, Current, Voltage};
-use greybox::{Kind, Model, Nothing, Scalar, signals};
+use crate::common::Current;
+use greybox::{Model, Scalar, signals};
 
 signals! { pub struct Angle { q: "rad", v: "rad/s" } }
 signals! { pub struct Torque { u: "N m" } }
@@ -45,21 +45,5 @@ impl Model for Armature {
 
     fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Supply<S>, _p: &Winding<S>) -> Current<S> {
         *x
-    }
-}
-
-/// `i = slope u + offset`.
-#[derive(Clone)]
-pub struct Straight;
-
-impl Model for Straight {
-    type State = Nothing;
-    type Input = Voltage;
-    type Output = Current;
-    type Parameters = Affine;
-    const KIND: Kind = Kind::Static;
-
-    fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Affine<S>) -> Current<S> {
-        Current { i: p.slope * u.u + p.offset }
     }
 }
