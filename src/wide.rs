@@ -11,6 +11,9 @@ mod array;
 mod one;
 #[cfg(target_arch = "x86_64")]
 mod registers;
+mod sums;
+
+pub(crate) use sums::{Terms, sums};
 
 use array::Array;
 use one::One;

@@ -1,6 +1,5 @@
 //! [`Code`]: a step as a list of instructions on numbered slots, for one lane or many.
 
-use super::fusion::TERMS;
 use super::turns::Turns;
 use crate::graph::{Function, Function2, Leaf};
 use crate::scalar::Table;
@@ -39,6 +38,9 @@ pub(super) enum Operation {
     /// The table named by `init`, or its derivative of the orders in the upper and the lower four bits.
     Table(u8),
 }
+
+/// Terms of one instruction.
+pub(super) const TERMS: usize = 5;
 
 /// One instruction.
 #[derive(Clone, Copy, Debug)]

@@ -2,7 +2,7 @@
 //!
 //! Of values every operation is rounded as the text says; slopes are fused.
 
-use super::code::Operation;
+use super::code::{Operation, TERMS};
 use crate::graph::{Function, Function2, Id, Node, Tape};
 use crate::scalar::Comparison;
 
@@ -64,9 +64,6 @@ impl Sum {
         }
     }
 }
-
-/// Terms of one instruction.
-pub(super) const TERMS: usize = 5;
 
 /// How many instructions the roots take at each sample.
 pub(super) fn instructions(tape: &Tape, roots: &[Id]) -> usize {

@@ -5,8 +5,8 @@
 
 mod slots;
 
-use super::code::{Code, Column, Instruction, Operation, Read, Slot, Sound};
-use super::fusion::{Sum, TERMS, Term, Work, works};
+use super::code::{Code, Column, Instruction, Operation, Read, Slot, Sound, TERMS};
+use super::fusion::{Sum, Term, Work, works};
 use crate::graph::{Id, Leaf, Node, Tape};
 use rustc_hash::FxHashMap;
 use slots::Slots;

@@ -4,9 +4,9 @@ use super::refine::{Attempt, Start};
 use super::search::{Rounds, ended};
 use crate::error::Error;
 use crate::estimate::Summary;
-use crate::judge::{SearchEnd, conclude, conclude_from, noise, residuals_together};
+use crate::judge::{SearchEnd, conclude, conclude_from, residuals_together};
 use crate::optimize::{Domain, Infeasible, LeastSquares, Linearization, Machine, Outcome, Request};
-use crate::problem::{At, Control, Objective, Problem, Round, Whitening, each, linearize_together};
+use crate::problem::{At, Control, Objective, Problem, Round, Whitening, each, linearize_together, noise};
 use std::time::Instant;
 
 /// A search that has not ended.

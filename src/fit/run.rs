@@ -5,9 +5,9 @@ use super::search::{search, start_error};
 use super::starts::search_from_many;
 use crate::error::Error;
 use crate::estimate::Summary;
-use crate::judge::{SearchEnd, conclude, noise};
+use crate::judge::{SearchEnd, conclude};
 use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt};
-use crate::problem::{Control, Objective, Problem, Whitening};
+use crate::problem::{Control, Objective, Problem, Whitening, noise};
 use std::time::Instant;
 
 static NEVER: Control = Control::NEVER;

@@ -1,10 +1,10 @@
 //! The search: rounds of an optimizer, with the noise estimated between them.
 
 use crate::error::Error;
-use crate::judge::{SearchEnd, noise};
+use crate::judge::SearchEnd;
 use crate::optimize::{Domain, Infeasible, LeastSquares, Outcome, SearchLimit, within_tolerance};
 use crate::problem::{
-    CheckpointFile, Fingerprint, Memory, Objective, Optimizer, Round, RoundError, SearchPlan, Whitening,
+    CheckpointFile, Fingerprint, Memory, Objective, Optimizer, Round, RoundError, SearchPlan, Whitening, noise,
 };
 use std::sync::Arc;
 

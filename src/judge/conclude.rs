@@ -1,6 +1,5 @@
 //! From the end of a search to a [`Summary`].
 
-use super::noise;
 use super::residual_pass::{Residuals, reason, residual_pass};
 use super::summary::method;
 use super::{bounds, directions};
@@ -9,7 +8,7 @@ use crate::estimate::student::Spread;
 use crate::estimate::{Format, Starts, Summary, Version};
 use crate::information::{Covariance, Undetermined};
 use crate::optimize::{LeastSquares, Linearization, Outcome, is_negligible};
-use crate::problem::{Memory, Noise, Objective, Whitening};
+use crate::problem::{Memory, Noise, Objective, Whitening, noise};
 
 /// Errors below this fraction of a given noise are round-off: no whiteness test, no HAC.
 const ROUNDING: f64 = 0.1;

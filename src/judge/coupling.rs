@@ -1,7 +1,6 @@
 //! Whether the errors of several outputs are correlated at the same sample.
 
 use super::conclude::Judgement;
-use super::sums::{Terms, sums};
 use super::whiteness::Whiteness;
 use crate::estimate::{Warning, WarningCode};
 use crate::numeral::{number, p_value};
@@ -9,7 +8,7 @@ use crate::optimize::Severity;
 use crate::problem::{Noise, Whitening};
 use crate::sweep::Window;
 use crate::whiteness::chi_squared_tail;
-use crate::wide::Wide;
+use crate::wide::{Terms, Wide, sums};
 
 /// Level of the test, over all pairs of outputs.
 const LEVEL: f64 = 0.01;

@@ -1,8 +1,7 @@
 //! Running sums of an output and its errors.
 
-use super::sums::{Terms, sums};
 use crate::estimate::OutputFit;
-use crate::wide::Wide;
+use crate::wide::{Terms, Wide, sums};
 
 /// Sums over the measurements of an output.
 #[derive(Clone, Copy, Debug, Default)]

@@ -5,9 +5,8 @@
 //! chance a regression explains no more of them than of the noise: the tests hold without slopes, with a level that is at most the
 //! nominal one.
 
-use super::sums::{Terms, sums};
 use crate::problem::Objective;
-use crate::wide::Wide;
+use crate::wide::{Terms, Wide, sums};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 /// Regressors of a test of shape: a constant and three powers.

@@ -5,7 +5,6 @@ mod experiment;
 use super::aliases::Point;
 use super::coupling::Coupled;
 use super::largest::Largest;
-use super::noise::REPRODUCED;
 use super::output_sums::OutputSums;
 use super::powers::{Powers, Scale, parts_by_chance, scales};
 use super::step_error::{Compared, step_errors};
@@ -14,6 +13,7 @@ use super::whiteness::Whiteness;
 use crate::error::Error;
 use crate::estimate::OutputFit;
 use crate::optimize::Infeasible;
+use crate::problem::noise::REPRODUCED;
 use crate::problem::{At, Objective, gather_together};
 use experiment::Sums;
 

@@ -2,9 +2,9 @@
 
 use super::conclude::Judgement;
 use super::covariances::Covariances;
+use super::directions;
 use super::known::is_error;
 use super::residual_pass::reason;
-use super::{directions, noise};
 use crate::error::Error;
 use crate::estimate::student::Spread;
 use crate::estimate::{
@@ -13,7 +13,7 @@ use crate::estimate::{
 use crate::information::Covariance;
 use crate::layout::Quantity;
 use crate::parameter::Transform;
-use crate::problem::{Noise, Objective, Role, Whitening};
+use crate::problem::{Noise, Objective, Role, Whitening, noise};
 
 pub(super) fn method(objective: &Objective<'_>, optimizer: String, covariance: CovarianceMethod) -> Method {
     let (settings, sweep) = (&objective.problem.settings, objective.sweep);

@@ -1,7 +1,7 @@
 //! [`Absorber`]: from windows of standardized errors to costs and triangles.
 
 use super::Weighing;
-use super::pass::Job;
+use super::job::Job;
 use crate::information::{Block, Information, Triangles};
 use crate::sweep::Window;
 use crate::wide::{self, Task, Wide, Width};

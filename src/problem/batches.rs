@@ -1,6 +1,6 @@
 //! Jobs run in parallel lanes, and batches of them on threads.
 
-use super::pass::Job;
+use super::job::Job;
 use super::standardize::Standardize;
 use crate::record::Time;
 use crate::sweep::{Piece, Reached, RunError, Window};

@@ -1,8 +1,8 @@
 //! Where the segments of a record begin at a point that is to be evaluated: guessed, corrected, or simulated.
 
 use super::batches::{each, in_batches};
+use super::job::Job;
 use super::linearize::Triangulation;
-use super::pass::Job;
 use super::segments::{Borders, Carries};
 use super::{Objective, Values};
 use crate::optimize::Infeasible;

@@ -3,7 +3,7 @@
 use super::absorb::Absorber;
 use super::batches::{Broken, in_batches, run};
 use super::borders::Guess;
-use super::pass::Job;
+use super::job::Job;
 use super::segments::{Borders, Carries};
 use super::{Free, Objective, Role, Values, Weighing};
 use crate::information::{Chain, Information};

@@ -1,12 +1,11 @@
 //! Noise levels from the prediction errors.
 
-use super::coupling::Products;
-use super::sums::sums;
+use super::{Accumulate, At, Noise, Objective, Whitening, gather_together};
 use crate::information::SquareMatrix;
 use crate::loss::{Huber, Loss};
 use crate::optimize::Infeasible;
-use crate::problem::{Accumulate, At, Noise, Objective, Whitening, gather_together};
 use crate::sweep::Window;
+use crate::wide::{Terms, Wide, sums};
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 /// Noise below this fraction of the output's magnitude is round-off of the simulation.
@@ -17,12 +16,23 @@ const SMALLEST: f64 = 1e-280;
 const ROBUST_STEPS: usize = 50;
 const ROBUST_TOLERANCE: f64 = 1e-9;
 /// Mean errors below this fraction of the output's magnitude are round-off, which accumulates along a record.
-pub(super) const REPRODUCED: f64 = 1e-12;
+pub(crate) const REPRODUCED: f64 = 1e-12;
 
 /// `E[psi^2]` of Huber's loss under the standard normal.
 fn clipped_variance(&Huber(c): &Huber) -> f64 {
     let normal = Normal::standard();
     2.0 * (normal.cdf(c) - 0.5 - c * normal.pdf(c) + c * c * normal.sf(c))
+}
+
+/// The product of two errors.
+#[derive(Clone, Copy)]
+struct Product;
+
+impl Terms<2, 1> for Product {
+    #[inline(always)]
+    fn of<W: Wide>(self, [a, b]: [W; 2]) -> [W; 1] {
+        [a.mul(b)]
+    }
 }
 
 /// Sums of the products of two outputs' errors, and how many there were: lower triangles.
@@ -58,7 +68,7 @@ impl Accumulate for Moments<'_> {
         let counts = |k: usize| !weighted || self.objective.weight(self.experiment, window.begin[lane] + k) > 0.0;
         for (i, j) in (0..outputs).flat_map(|i| (0..=i).map(move |j| (i, j))) {
             if window.whole && !weighted {
-                self.sums[(i, j)] += sums([of(i), of(j)], Products)[0];
+                self.sums[(i, j)] += sums([of(i), of(j)], Product)[0];
                 self.pairs[(i, j)] += samples as f64;
                 continue;
             }

@@ -2,11 +2,10 @@
 //! windows.
 
 use super::batches::{Broken, in_batches, run};
-use super::segments::Borders;
+use super::job::Job;
 use super::{Objective, Values};
 use crate::optimize::Infeasible;
-use crate::sweep::{Piece, Reached, RunError, Seed, Visit, Window};
-use std::sync::Arc;
+use crate::sweep::{RunError, Visit, Window};
 
 /// An accumulator of the windows of a segment of an experiment.
 pub(crate) trait Accumulate: Send + Sized {
@@ -17,79 +16,7 @@ pub(crate) trait Accumulate: Send + Sized {
     fn append(&mut self, later: Self);
 }
 
-/// A segment of an experiment, with the objective that standardizes and weighs its windows.
-pub(crate) struct Job<'p> {
-    pub objective: &'p Objective<'p>,
-    pub experiment: usize,
-    pub seeds: Arc<[Seed]>,
-    /// Derivative of the quantity of each seed with respect to its coordinate; zero where its slopes are left out.
-    pub scales: Vec<f64>,
-    pub piece: Piece<'p>,
-}
-
 impl Objective<'_> {
-    /// An experiment as one piece.
-    pub(super) fn job<'p>(&'p self, e: usize, values: &'p Values, coordinates: &[f64], slopes: bool) -> Job<'p> {
-        let (problem, unknowns) = (self.problem, &self.problem.unknowns);
-        let record = &problem.records[e];
-        let seeds = if slopes { unknowns.seeds(e).clone() } else { Arc::default() };
-        let mut scales = if slopes { unknowns.scales(e, coordinates) } else { vec![] };
-        for (scale, i) in scales.iter_mut().zip(unknowns.columns(e)) {
-            if self.left_out.get(i) == Some(&true) {
-                *scale = 0.0;
-            }
-        }
-        let Reached { carry, slopes: all } = self.sweep.start(record, &values.x, &values.p);
-        let (states, width) = (values.x.len(), values.x.len() + values.p.len());
-        let column = |seed: &Seed| match *seed {
-            Seed::Carry(i) => i,
-            Seed::Parameter(j) => states + j,
-        };
-        let known = seeds.iter().zip(&scales);
-        let slopes =
-            (0..carry.len()).flat_map(|row| known.clone().map(move |(seed, scale)| (row, column(seed), *scale)));
-        let slope =
-            |(row, column, scale): (usize, usize, f64)| if scale == 0.0 { 0.0 } else { all[row * width + column] };
-        let (carry, slopes) = (carry.into(), slopes.map(slope).collect());
-        let (prepared, samples) = (&problem.prepared[e], 0..record.len());
-        Job {
-            objective: self,
-            experiment: e,
-            seeds,
-            scales,
-            piece: Piece { record, prepared, samples, carry, slopes, parameters: &values.p },
-        }
-    }
-
-    /// The segments of an experiment, from the carries in `borders`.
-    pub(super) fn segments<'p>(
-        &'p self,
-        e: usize,
-        values: &'p Values,
-        coordinates: &[f64],
-        slopes: bool,
-        borders: Option<&Borders>,
-    ) -> Vec<Job<'p>> {
-        let whole = self.job(e, values, coordinates, slopes);
-        let segments = self.problem.cuts.segments[e].iter().enumerate();
-        let job = |(s, samples): (usize, &std::ops::Range<usize>)| {
-            let Piece { carry, slopes: own, .. } = &whole.piece;
-            let carries = borders.map(|borders| &borders.of[e]);
-            let slopes = carries.filter(|_| slopes).and_then(|carries| carries.slopes_at(s, own.len())).unwrap_or(own);
-            let carry = carries.and_then(|carries| carries.at(s, carry.len())).unwrap_or(carry).to_vec().into();
-            let slopes = slopes.to_vec().into();
-            let (seeds, scales) = (whole.seeds.clone(), whole.scales.clone());
-            Job {
-                objective: self,
-                experiment: e,
-                seeds,
-                scales,
-                piece: Piece { samples: samples.clone(), carry, slopes, ..whole.piece },
-            }
-        };
-        segments.map(job).collect()
-    }
-
     /// Initial state and parameters of each experiment.
     pub(super) fn values(&self, coordinates: &[f64]) -> Vec<Values> {
         (0..self.experiments()).map(|e| self.problem.unknowns.of_experiment(e, coordinates)).collect()

@@ -1,7 +1,7 @@
 //! [`Standardize`]: from errors and slopes in the units of the outputs to standardized ones.
 
 use super::Whitening;
-use super::pass::Job;
+use super::job::Job;
 use crate::prefilter::Butterworth;
 use crate::sweep::Window;
 use crate::wide::{self, Task, Wide};

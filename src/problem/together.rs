@@ -1,8 +1,9 @@
 //! Passes over the single records of several problems, in parallel lanes.
 
 use super::batches::in_batches;
+use super::job::Job;
 use super::linearize::parts;
-use super::pass::{Job, gather};
+use super::pass::gather;
 use super::{Accumulate, Objective, Values};
 use crate::optimize::{Infeasible, Linearization};
 

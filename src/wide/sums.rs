@@ -6,12 +6,12 @@ use crate::wide::{self, Task, Wide, Width};
 const BLOCK: usize = 8;
 
 /// The `N` numbers that are summed, from one number of each of `A` sequences.
-pub(super) trait Terms<const A: usize, const N: usize>: Copy {
+pub(crate) trait Terms<const A: usize, const N: usize>: Copy {
     fn of<W: Wide>(self, of: [W; A]) -> [W; N];
 }
 
 /// Sums the terms over all places of sequences, the first of which is no longer than any other.
-pub(super) fn sums<const A: usize, const N: usize>(of: [&[f64]; A], terms: impl Terms<A, N>) -> [f64; N] {
+pub(crate) fn sums<const A: usize, const N: usize>(of: [&[f64]; A], terms: impl Terms<A, N>) -> [f64; N] {
     wide::run(Width::widest(), Sums { of, terms })
 }
 

@@ -2,9 +2,9 @@
 
 use super::NoEnd;
 use crate::estimate::{FailedStart, Minimum, Starts};
-use crate::judge::{SearchEnd, in_null_directions, noise};
+use crate::judge::{SearchEnd, in_null_directions};
 use crate::optimize::{LeastSquares, Linearization, Outcome};
-use crate::problem::{Noise, Objective, each};
+use crate::problem::{Noise, Objective, each, noise};
 
 /// Costs that differ by less than this part are the same.
 const SAME_COST: f64 = 1e-6;

@@ -1,8 +1,8 @@
 //! Predictions a fixed number of samples ahead: every restart is a trajectory of its own, so restarts run in parallel
 //! lanes.
 
-use super::run::{Run, WINDOW};
-use super::workspace::Compiled;
+use super::run::Run;
+use super::workspace::{Compiled, WINDOW};
 use crate::sweep::{Piece, Reached, RunError, Visit, Window};
 use std::borrow::Cow;
 use std::ops::Range;

@@ -1,8 +1,7 @@
 //! [`Interleaved`]: what a program reads of the records in its lanes, side by side, kept from pass to pass.
 
 use super::columns::Columns;
-use super::run::WINDOW;
-use super::workspace::Compiled;
+use super::workspace::{Compiled, WINDOW};
 use crate::aligned::Aligned;
 use crate::engine::{Column, Program};
 use crate::record;

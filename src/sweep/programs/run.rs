@@ -2,15 +2,11 @@
 
 use super::columns::Columns;
 use super::interleaved::Kept;
-use super::workspace::{Compiled, Workspace};
+use super::workspace::{Compiled, WINDOW, Workspace};
 use crate::record::Time;
 use crate::sweep::{Piece, Reached, RunError, Visit, Window};
 use crate::wide::{self, Task, Wide};
 use std::sync::Arc;
-
-/// Samples per window. Windows are counted from the begin of each piece, so that a lane's bits do not depend on the
-/// length of another.
-pub(super) const WINDOW: usize = 64;
 
 /// Pieces that run in the lanes of a group.
 pub(super) struct Run<'r> {

@@ -1,11 +1,14 @@
 //! [`Compiled`]: a program with memory for its runs, which the next run uses again.
 
 use super::interleaved::Idle;
-use super::run::WINDOW;
 use crate::aligned::Aligned;
 use crate::engine::{Group, Program};
 use crate::sweep::Window;
 use std::sync::{Arc, Mutex, PoisonError};
+
+/// Samples per window. Windows are counted from the begin of each piece, so that a lane's bits do not depend on the
+/// length of another.
+pub(super) const WINDOW: usize = 64;
 
 /// A program, and the memory of the runs that have ended: a fit runs it some ten times, a fleet thousands of times.
 pub(super) struct Compiled {
