@@ -1,19 +1,24 @@
 //! The covariance of the unknowns: classical, a sandwich, or HAC, and its degrees of freedom.
 
-use super::color;
-use super::conclude::{Judgement, WHITENESS_LEVEL};
-use super::hac::hac;
-use super::predicted::Dependence;
-use super::sandwich::{self, Robust};
-use super::shares::Largest;
-use super::sizes::{Sizes, Uneven};
+mod hac;
+mod predicted;
+pub(crate) mod sandwich;
+
 use crate::estimate::CovarianceMethod;
 use crate::estimate::student::Spread;
 use crate::information::Covariance;
-use crate::layout::Kind;
-use crate::optimize::{Infeasible, Outcome};
+use crate::judge::evidence::Evidence;
+use crate::judge::evidence::color;
+use crate::judge::evidence::shares::{Largest, shares};
+use crate::judge::evidence::sizes::{Sizes, Uneven};
+use crate::judge::evidence::whiteness::WHITENESS_LEVEL;
+use crate::judge::point::Point;
+use crate::optimize::{Infeasible, LeastSquares};
 use crate::problem::{Noise, Whitening};
 use crate::record::Time;
+use hac::hac;
+use predicted::{Dependence, dependence_of_variances};
+use sandwich::Robust;
 
 /// Below this number of measurements the covariance is the classical one, whether the errors are autocorrelated, or of one size, or not.
 const CORRELATED_SAMPLES: u64 = 12;
@@ -22,11 +27,10 @@ const CORRELATED_SAMPLES: u64 = 12;
 const SHORT: u64 = 1_000;
 const SHORT_LEVEL: f64 = 0.05;
 
-/// The covariance of the unknowns in their own units, how it was made, and that of unit noise in coordinates.
-pub(super) struct Covariances {
+/// The covariance of the unknowns in their own units, and how it was made.
+pub(crate) struct Covariances {
     pub unknowns: Option<Covariance>,
     pub method: CovarianceMethod,
-    pub unit: Option<Covariance>,
     /// Degrees of freedom of the variance of each unknown.
     pub degrees: Vec<f64>,
     /// Where variances are predicted: by how much the logarithm of that of each unknown grows along one of its standard errors.
@@ -35,6 +39,11 @@ pub(super) struct Covariances {
     pub shares: Option<Vec<Largest>>,
     /// The unknown for which noise that was estimated as of one size is of another.
     pub uneven: Option<Uneven>,
+}
+
+/// Whether a number can be a standard error.
+pub(crate) fn is_error(error: f64) -> bool {
+    error > 0.0 && error.is_finite()
 }
 
 /// A covariance in coordinates.
@@ -47,120 +56,121 @@ struct CoordinateCovariance {
     uneven: Option<Uneven>,
 }
 
-impl Judgement<'_> {
-    pub(super) fn covariances(&self) -> Covariances {
-        let unit = self.linear.covariance(&self.exact);
-        let found = self.takes_color().then(|| self.for_colored_errors(unit.as_ref()?)).flatten();
-        let CoordinateCovariance { covariance, method, factor, degrees, shares, uneven } =
-            found.unwrap_or_else(|| self.for_white_errors(&unit));
-        let seen = self.seen().into_iter().zip(&self.slopes);
-        let in_units: Vec<f64> = seen.map(|(seen, slope)| if seen { *slope } else { 0.0 }).collect();
-        let unknowns = covariance.map(|covariance| covariance.times(factor).scaled(&in_units));
-        let dependence = unit.as_ref().and_then(|unit| self.dependence_of_variances(unit));
-        let Some(Dependence { degrees: most, own }) = dependence else {
-            return Covariances { unknowns, method, unit, degrees, own: vec![], shares, uneven };
-        };
-        let degrees = degrees.iter().zip(most).map(|(degrees, most)| degrees.min(most)).collect();
-        Covariances { unknowns, method, unit, degrees, own, shares, uneven }
-    }
+pub(crate) fn covariances(evidence: &Evidence<'_>) -> Covariances {
+    let unit = evidence.unit();
+    let found = uses_hac(evidence).then(|| for_colored_errors(evidence, unit?)).flatten();
+    let CoordinateCovariance { covariance, method, factor, degrees, shares, uneven } =
+        found.unwrap_or_else(|| for_white_errors(evidence, unit));
+    let seen = evidence.point.seen().into_iter().zip(&evidence.point.slopes);
+    let in_units: Vec<f64> = seen.map(|(seen, slope)| if seen { *slope } else { 0.0 }).collect();
+    let unknowns = covariance.map(|covariance| covariance.times(factor).scaled(&in_units));
+    let dependence = unit.and_then(|unit| dependence_of_variances(&evidence.point, unit));
+    let Some(Dependence { degrees: most, own }) = dependence else {
+        return Covariances { unknowns, method, degrees, own: vec![], shares, uneven };
+    };
+    let degrees = degrees.iter().zip(most).map(|(degrees, most)| degrees.min(most)).collect();
+    Covariances { unknowns, method, degrees, own, shares, uneven }
+}
 
-    /// Whether the intervals allow for colored errors.
-    fn takes_color(&self) -> bool {
-        let level = match self.residuals.measured {
-            ..CORRELATED_SAMPLES => return false,
-            CORRELATED_SAMPLES..=SHORT => SHORT_LEVEL,
-            _ => WHITENESS_LEVEL,
-        };
-        self.objective.problem.layout().kind != Kind::Static && self.autocorrelated_at(level).is_some()
-    }
+/// Whether the intervals allow for colored errors.
+fn uses_hac(evidence: &Evidence<'_>) -> bool {
+    let level = match evidence.residuals.measured {
+        ..CORRELATED_SAMPLES => return false,
+        CORRELATED_SAMPLES..=SHORT => SHORT_LEVEL,
+        _ => WHITENESS_LEVEL,
+    };
+    !evidence.point.is_static() && evidence.autocorrelated_at(level).is_some()
+}
 
-    fn for_colored_errors(&self, unit: &Covariance) -> Option<CoordinateCovariance> {
-        let hac = hac(self.objective, &self.end.coordinates, self.linear, (&self.exact, unit))?;
-        let degrees = hac.degrees(self.objective, unit);
-        let covariance = hac.covariance(&self.exact, &degrees, self.coupled().is_some())?;
-        let degrees = degrees.into_iter().map(|degrees| degrees.min(self.degrees)).collect();
-        let method = CovarianceMethod::Hac { lags: hac.lags as u64 };
-        let found = CoordinateCovariance {
-            covariance: Some(covariance),
-            method,
-            factor: 1.0,
-            degrees,
-            shares: hac.shares,
-            uneven: None,
-        };
-        let differ = hac.sizes.as_ref().is_some_and(|sizes| self.takes_one_size() && sizes.differ(&self.exact));
-        let certain = self.autocorrelated_at(color::CERTAIN).is_some();
-        if certain && !differ {
-            return Some(found);
+fn for_colored_errors(evidence: &Evidence<'_>, unit: &Covariance) -> Option<CoordinateCovariance> {
+    let Point { objective, end, linear, held_for_covariance: held, .. } = &evidence.point;
+    let hac = hac(objective, &end.coordinates, linear, (held, unit))?;
+    let degrees = hac.degrees(objective, unit);
+    let covariance = hac.covariance(held, &degrees, evidence.coupled().is_some())?;
+    let degrees = degrees.into_iter().map(|degrees| degrees.min(evidence.point.degrees)).collect();
+    let method = CovarianceMethod::Hac { lags: hac.lags as u64 };
+    let found = CoordinateCovariance {
+        covariance: Some(covariance),
+        method,
+        factor: 1.0,
+        degrees,
+        shares: hac.shares,
+        uneven: None,
+    };
+    let differ = hac.sizes.as_ref().is_some_and(|sizes| takes_one_size(evidence) && sizes.differ(held));
+    let certain = evidence.autocorrelated_at(color::CERTAIN).is_some();
+    if certain && !differ {
+        return Some(found);
+    }
+    let white = for_white_errors(evidence, Some(unit));
+    // The squares of colored errors are correlated, which the test of their sizes does not allow for.
+    let uneven = white.uneven.filter(|_| !certain);
+    Some(CoordinateCovariance { uneven, ..no_shorter(found, white) })
+}
+
+fn for_white_errors(evidence: &Evidence<'_>, unit: Option<&Covariance>) -> CoordinateCovariance {
+    let Point { objective, end, held_for_covariance: held, widening, .. } = &evidence.point;
+    let x = &end.coordinates;
+    let (factor, degrees) = estimated_weights(evidence);
+    let degrees = vec![degrees; evidence.point.slopes.len()];
+    let tested = unit.filter(|_| takes_one_size(evidence)).and_then(|unit| shares(objective, x, unit));
+    let uneven = tested.as_ref().and_then(|(_, sizes)| sizes.uneven(held));
+    // Of models without states it is only said: classical standard errors are what certified ones are compared with. A noise that was
+    // given is replaced only where the errors certainly are of another size.
+    let given = matches!(objective.problem.settings.noise, Noise::Given(_));
+    let differ = |(_, sizes): &(Vec<Largest>, Sizes)| if given { uneven.is_some() } else { sizes.differ(held) };
+    let sized = !evidence.point.is_static() && tested.as_ref().is_some_and(differ);
+    let shares = tested.map(|(shares, _)| shares);
+    if sandwich::is_needed(objective) || evidence.coupled().is_some() || sized || spans_differ(evidence) {
+        let filtered = objective.problem.settings.prefilter.is_some();
+        let method = if filtered { CovarianceMethod::FilteredSandwich } else { CovarianceMethod::Sandwich };
+        let none = Robust { covariance: None, shares: None, degrees: vec![f64::INFINITY; degrees.len()] };
+        if let Some(found) = unless_stopped(sandwich::sandwich(objective, x, held)) {
+            let found = found.unwrap_or(none);
+            let degrees = degrees.iter().zip(found.degrees).map(|(most, own)| own.min(*most)).collect();
+            let Robust { covariance, shares, .. } = found;
+            return CoordinateCovariance { covariance, method, factor, degrees, shares, uneven };
         }
-        let white = self.for_white_errors(&Some(unit.clone()));
-        // The squares of colored errors are correlated, which the test of their sizes does not allow for.
-        let uneven = white.uneven.filter(|_| !certain);
-        Some(CoordinateCovariance { uneven, ..no_shorter(found, white) })
     }
-
-    fn for_white_errors(&self, unit: &Option<Covariance>) -> CoordinateCovariance {
-        let (objective, x) = (self.objective, &self.end.coordinates);
-        let (factor, degrees) = self.estimated_weights();
-        let degrees = vec![degrees; self.slopes.len()];
-        let tested = unit.as_ref().filter(|_| self.takes_one_size()).and_then(|unit| self.shares(unit));
-        let uneven = tested.as_ref().and_then(|(_, sizes)| sizes.uneven(&self.exact));
-        // Of models without states it is only said: classical standard errors are what certified ones are compared with. A noise that was
-        // given is replaced only where the errors certainly are of another size.
-        let given = matches!(objective.problem.settings.noise, Noise::Given(_));
-        let differ =
-            |(_, sizes): &(Vec<Largest>, Sizes)| if given { uneven.is_some() } else { sizes.differ(&self.exact) };
-        let sized = objective.problem.layout().kind != Kind::Static && tested.as_ref().is_some_and(differ);
-        let shares = tested.map(|(shares, _)| shares);
-        if sandwich::is_needed(objective) || self.coupled().is_some() || sized || self.spans_differ() {
-            let filtered = objective.problem.settings.prefilter.is_some();
-            let method = if filtered { CovarianceMethod::FilteredSandwich } else { CovarianceMethod::Sandwich };
-            let none = Robust { covariance: None, shares: None, degrees: vec![f64::INFINITY; degrees.len()] };
-            if let Some(found) = unless_stopped(sandwich::sandwich(objective, x, &self.exact)) {
-                let found = found.unwrap_or(none);
-                let degrees = degrees.iter().zip(found.degrees).map(|(most, own)| own.min(*most)).collect();
-                let Robust { covariance, shares, .. } = found;
-                return CoordinateCovariance { covariance, method, factor, degrees, shares, uneven };
-            }
+    let method = CovarianceMethod::Classical;
+    // The widening applies to the errors, not to the priors.
+    if *widening != 1.0 && objective.problem.unknowns.priors(x).next().is_some() {
+        let widened = objective.with(objective.whitening.widened(*widening));
+        if let Some(linear) = unless_stopped(widened.evaluate(x)) {
+            let covariance = linear.and_then(|linear| linear.covariance(held));
+            return CoordinateCovariance { covariance, method, factor, degrees, shares, uneven };
         }
-        let method = CovarianceMethod::Classical;
-        // The widening applies to the errors, not to the priors.
-        if self.widening != 1.0 && objective.problem.unknowns.priors(x).next().is_some() {
-            let widened = objective.with(objective.whitening.widened(self.widening));
-            if let Some(linear) = unless_stopped(widened.evaluate(x)) {
-                let covariance = linear.and_then(|linear| linear.covariance(&self.exact));
-                return CoordinateCovariance { covariance, method, factor, degrees, shares, uneven };
-            }
-        }
-        let factor = factor * self.widening * self.widening;
-        CoordinateCovariance { covariance: unit.clone(), method, factor, degrees, shares, uneven }
     }
+    let factor = factor * widening * widening;
+    CoordinateCovariance { covariance: unit.cloned(), method, factor, degrees, shares, uneven }
+}
 
-    /// Whether the classical covariance takes noise, estimated or given, to be of one size per output.
-    fn takes_one_size(&self) -> bool {
-        let objective = self.objective;
-        let predicted = matches!(objective.problem.settings.noise, Noise::Predicted);
-        let exact = self.rounding || self.end.outcome == Outcome::Exact || !self.has_noise();
-        !predicted && !exact && !sandwich::is_needed(objective) && self.residuals.measured >= CORRELATED_SAMPLES
-    }
+/// Whether the classical covariance takes noise, estimated or given, to be of one size per output.
+fn takes_one_size(evidence: &Evidence<'_>) -> bool {
+    let objective = evidence.point.objective;
+    let predicted = matches!(objective.problem.settings.noise, Noise::Predicted);
+    let exact = evidence.rounding || evidence.point.is_exact() || !evidence.has_noise();
+    !predicted && !exact && !sandwich::is_needed(objective) && evidence.residuals.measured >= CORRELATED_SAMPLES
+}
 
-    /// Whether errors are those of predictions ahead over intervals that are not equal: what disturbs the plant grows with them.
-    fn spans_differ(&self) -> bool {
-        let problem = self.objective.problem;
-        let uneven = problem.records.iter().any(|record| matches!(record.times(), Time::Stamps(_)));
-        matches!(problem.settings.noise, Noise::PerOutput) && uneven && self.objective.sweep.restarts().is_some()
-    }
+/// Whether errors are those of predictions ahead over intervals that are not equal: what disturbs the plant grows with them.
+fn spans_differ(evidence: &Evidence<'_>) -> bool {
+    let problem = evidence.point.objective.problem;
+    let uneven = problem.records.iter().any(|record| matches!(record.times(), Time::Stamps(_)));
+    matches!(problem.settings.noise, Noise::PerOutput) && uneven && evidence.point.objective.sweep.restarts().is_some()
+}
 
-    /// The factor by which weights between outputs that were estimated themselves, as a full noise covariance, widen the
-    /// covariance, and the degrees of freedom that they leave: exact for the mean of Gaussian vectors (Rao, Biometrika 54
-    /// (1967) 259), with `degrees` per output for the number of samples less one.
-    fn estimated_weights(&self) -> (f64, f64) {
-        let Whitening::Full { covariance, .. } = &self.objective.whitening else { return (1.0, self.degrees) };
-        let outputs = covariance.size() as f64;
-        let degrees = self.degrees / outputs;
-        let left = (degrees - outputs).max(1.0);
-        (degrees / (left + 1.0) * (degrees - 1.0) / left, left + 1.0)
-    }
+/// The factor by which weights between outputs that were estimated themselves, as a full noise covariance, widen the
+/// covariance, and the degrees of freedom that they leave: exact for the mean of Gaussian vectors (Rao, Biometrika 54
+/// (1967) 259), with `degrees` per output for the number of samples less one.
+fn estimated_weights(evidence: &Evidence<'_>) -> (f64, f64) {
+    let Whitening::Full { covariance, .. } = &evidence.point.objective.whitening else {
+        return (1.0, evidence.point.degrees);
+    };
+    let outputs = covariance.size() as f64;
+    let degrees = evidence.point.degrees / outputs;
+    let left = (degrees - outputs).max(1.0);
+    (degrees / (left + 1.0) * (degrees - 1.0) / left, left + 1.0)
 }
 
 /// The result of a pass, if it has one; `None` where stop conditions ended it: the classical covariance, which needs no pass, then takes its

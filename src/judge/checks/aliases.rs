@@ -3,14 +3,14 @@
 //! Samples `h` apart of an oscillation at the frequency `w` are those of one at `2 pi/h - w`, too. What the inputs do between
 //! samples tells the two apart, but each of them has a minimum of its own, and a search ends in that on its side of `pi/h`.
 
-use super::conclude::Judgement;
-use super::residual_pass::residual_pass;
 use crate::estimate::{Warning, WarningCode};
+use crate::judge::evidence::Evidence;
+use crate::judge::evidence::modes::{StateAt, eigenvalues, some};
+use crate::judge::evidence::residual_pass::residual_pass;
 use crate::numeral::number;
 use crate::optimize::Severity;
 use crate::problem::{Objective, Role};
 use crate::record::{Record, Time};
-use nalgebra::{Complex, DMatrix, Schur};
 use std::f64::consts::{PI, TAU};
 
 /// An oscillation with fewer samples a period than this can be taken for its alias, whose frequency is then within a factor of 1.5.
@@ -21,27 +21,22 @@ const LEFT: f64 = 0.1;
 const REACH: f64 = 10.0;
 /// Relative change of a parameter for the slope of a frequency.
 const CHANGE: f64 = 1e-4;
-/// Numbers of points along the records, and of steps of time, that are examined.
-const POINTS: usize = 8;
+/// Number of steps of time that are examined.
 const STEPS: usize = 1000;
 /// Sampling is uneven where the quartiles of its steps of time differ by more than this part of the median.
 const EVEN: f64 = 0.1;
-const ITERATIONS: usize = 10_000;
 
 /// Steps of the change of unknowns towards another frequency, the largest of each, and how far off they may end (all relative).
 const STEPS_TO_ALIAS: usize = 50;
 const LARGEST_STEP: f64 = 0.1;
 const ARRIVED: f64 = 1e-3;
 
-/// A point of a record: experiment, sample and state.
-pub(super) type Point = (usize, usize, Vec<f64>);
-
 /// Decay (negative, 1/s) and frequency (rad/s).
 type Mode = (f64, f64);
 
 /// An oscillation of which there are too few samples.
 struct Unresolved<'p> {
-    point: &'p Point,
+    point: &'p StateAt,
     mode: Mode,
     /// Between samples (s).
     interval: f64,
@@ -88,11 +83,11 @@ impl Aliases {
 }
 
 /// An oscillation of which there are too few samples, with parameters that may make it another one.
-pub(super) fn aliased(judgement: &Judgement<'_>) -> Option<Warning> {
-    let found = unresolved(judgement.objective, &judgement.end.coordinates, &judgement.residuals.points)?;
+pub(crate) fn aliased(evidence: &Evidence<'_>) -> Option<Warning> {
+    let found = unresolved(evidence.point.objective, &evidence.point.end.coordinates, &evidence.residuals.points)?;
     let Unresolved { mode: (_, frequency), interval, alias, name, .. } = found;
     // Ends of other searches have been compared.
-    let compared = judgement.end.starts.is_some();
+    let compared = evidence.point.end.starts.is_some();
     let severity = if compared { Severity::Usable } else { Severity::UsableWithCare };
     let tried = if compared { "searches were started on both sides" } else { "no search was started there" };
     let text = format!(
@@ -109,22 +104,17 @@ pub(super) fn aliased(judgement: &Judgement<'_>) -> Option<Warning> {
 
 /// The fastest oscillation of which there are too few samples, where parameters within their bounds reach another one with the
 /// same samples.
-fn unresolved<'p>(objective: &Objective<'_>, coordinates: &[f64], points: &'p [Point]) -> Option<Unresolved<'p>> {
+fn unresolved<'p>(objective: &Objective<'_>, coordinates: &[f64], points: &'p [StateAt]) -> Option<Unresolved<'p>> {
     let interval = interval(&objective.problem.records)?;
     let found = some(points).filter_map(|point| unresolved_at(objective, coordinates, point, interval));
     found.max_by(|a, b| a.mode.1.total_cmp(&b.mode.1))
 }
 
-/// Those of the points that are examined.
-pub(super) fn some(points: &[Point]) -> impl Iterator<Item = &Point> {
-    points.iter().step_by(points.len().div_ceil(POINTS).max(1))
-}
-
-/// The same at a point.
+/// The same at one of these points.
 fn unresolved_at<'p>(
     objective: &Objective<'_>,
     coordinates: &[f64],
-    point: &'p Point,
+    point: &'p StateAt,
     interval: f64,
 ) -> Option<Unresolved<'p>> {
     let modes = modes(objective, coordinates, point)?;
@@ -164,11 +154,11 @@ fn moved_within(slope: f64, value: f64, needed: f64, (lower, upper): (f64, f64))
 }
 
 /// By which part of itself the frequency of an oscillation grows where an unknown grows by a part of itself, for each.
-fn slopes(objective: &Objective<'_>, coordinates: &[f64], point: &Point, mode: Mode) -> Option<Vec<f64>> {
+fn slopes(objective: &Objective<'_>, coordinates: &[f64], point: &StateAt, mode: Mode) -> Option<Vec<f64>> {
     let unknowns = &objective.problem.unknowns;
     let slope = |(i, value): (usize, f64)| {
         let unknown = &unknowns.row[i];
-        if matches!(unknown.role, Role::InitialState(_)) || unknown.experiment.is_some_and(|e| e != point.0) {
+        if matches!(unknown.role, Role::InitialState(_)) || unknown.experiment.is_some_and(|e| e != point.experiment) {
             return Some(0.0);
         }
         let mut changed = coordinates.to_vec();
@@ -183,7 +173,7 @@ fn slopes(objective: &Objective<'_>, coordinates: &[f64], point: &Point, mode: M
 fn moved(
     objective: &Objective<'_>,
     coordinates: &[f64],
-    (point, mode): (&Point, Mode),
+    (point, mode): (&StateAt, Mode),
     frequency: f64,
     moving: &[usize],
 ) -> Option<Vec<f64>> {
@@ -213,24 +203,8 @@ fn least(slopes: &[f64], needed: f64) -> Option<Vec<f64>> {
     (squares > 0.0).then(|| slopes.iter().map(|slope| slope * needed / squares).collect())
 }
 
-/// The eigenvalues of the state's Jacobian at a point (1/s).
-pub(super) fn eigenvalues(
-    objective: &Objective<'_>,
-    coordinates: &[f64],
-    (e, sample, state): &Point,
-) -> Option<Vec<Complex<f64>>> {
-    let (record, n) = (&objective.problem.records[*e], state.len());
-    let parameters = objective.problem.unknowns.of_experiment(*e, coordinates).p;
-    let slopes = objective.sweep.state_slopes(record, *sample, state, &parameters)?;
-    if !slopes.iter().all(|slope| slope.is_finite()) {
-        return None;
-    }
-    let schur = Schur::try_new(DMatrix::from_row_slice(n, n, &slopes), f64::EPSILON, ITERATIONS)?;
-    Some(schur.complex_eigenvalues().iter().copied().collect())
-}
-
 /// Each oscillation about a point.
-fn modes(objective: &Objective<'_>, coordinates: &[f64], point: &Point) -> Option<Vec<Mode>> {
+fn modes(objective: &Objective<'_>, coordinates: &[f64], point: &StateAt) -> Option<Vec<Mode>> {
     let values = eigenvalues(objective, coordinates, point)?;
     Some(values.iter().filter(|value| value.im > 0.0).map(|value| (value.re, value.im)).collect())
 }

@@ -1,11 +1,11 @@
 //! Whether the cost rises towards the ends of an interval as its slopes say, for parameters in a condition of the model. A limit that few
 //! samples reach is determined by those few; where it is beyond them all, the cost does not depend on it.
 
-use super::conclude::Judgement;
-use super::covariances::Covariances;
-use super::curved::QUANTILE;
-use super::rise::{Place, least_rise};
 use crate::estimate::{Unknown, Warning, WarningCode};
+use crate::judge::checks::curved::QUANTILE;
+use crate::judge::checks::rise::{Place, least_rise};
+use crate::judge::covariances::Covariances;
+use crate::judge::evidence::Evidence;
 use crate::numeral::percent;
 use crate::optimize::{Outcome, Severity};
 use crate::problem::Role;
@@ -18,18 +18,18 @@ const LONGEST: u64 = 5_000;
 /// A cost that rises by less than this part of what its slopes say: an interval by the likelihood is longer by the root of two or more.
 const LITTLE: f64 = 0.5;
 /// The parameter along which the cost rises least, relative to what its slopes say.
-pub(super) fn kinked(judgement: &Judgement<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
-    let choosing = judgement.objective.sweep.choosing();
-    if judgement.rounding || judgement.end.outcome == Outcome::Exact {
+pub(crate) fn kinked(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
+    let choosing = evidence.point.objective.sweep.choosing();
+    if evidence.rounding || evidence.point.is_exact() {
         return None;
     }
     // Of a model that is not read as a graph any parameter may be in a condition.
-    let any = judgement.residuals.measured <= LONGEST;
+    let any = evidence.residuals.measured <= LONGEST;
     let chooses = |i: &usize| matches!(unknowns[*i].role, Role::Parameter(p) if choosing.map_or(any, |choosing| choosing.contains(&p)));
     let known = (0..unknowns.len()).filter(chooses).filter(|&i| unknowns[i].knowledge.standard_error().is_some());
     let place = |unknown, place: f64| Place { unknown, standard_errors: place * QUANTILE, little: LITTLE };
     let places = known.flat_map(|i| PLACES.map(|at| place(i, at)));
-    let (place, part) = least_rise(judgement, places, covariances)?;
+    let (place, part) = least_rise(evidence, places, covariances)?;
     let text = format!(
         "the interval of `{}` is too short {}: a condition of the model {} on it (an `if`, a limit, an absolute value, a table), few \
          samples are near, and the cost rises by {} of what its slopes say; take diagnose::profile, or record more on both sides of the \

@@ -5,10 +5,10 @@
 //! slopes (the parameter-effects curvature of Bates and Watts, J. Royal Statistical Society B 42 (1980) 1, in that
 //! direction). The ends of the profile's interval solve `t + t^2/2 a_i / s_i = -+z`; those of the linear one are `-+z`.
 
-use super::conclude::Judgement;
-use super::covariances::Covariances;
-use super::rise::{Place, least_rise};
 use crate::estimate::{Unknown, Warning, WarningCode};
+use crate::judge::checks::rise::{Place, least_rise};
+use crate::judge::covariances::Covariances;
+use crate::judge::evidence::Evidence;
 use crate::numeral::{number, percent};
 use crate::optimize::{Outcome, Severity};
 use crate::parameter::Transform;
@@ -28,45 +28,41 @@ const ASYMMETRY: f64 = 0.25;
 /// by the likelihood is longer by the root of two or more, or reaches at least as far.
 const FLAT: [(f64, f64); 4] = [(-1.0, 0.5), (1.0, 0.5), (-2.0, 0.25), (2.0, 0.25)];
 /// Quantile of the normal distribution for an interval of 95 %.
-pub(super) const QUANTILE: f64 = 1.96;
+pub(crate) const QUANTILE: f64 = 1.96;
 
 /// The unknown whose interval is bent most, if that matters.
-pub(super) fn curved(judgement: &Judgement<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
-    let long = judgement.residuals.measured > LONGEST;
-    if long
-        || judgement.objective.sweep.predicts_variance()
-        || judgement.rounding
-        || judgement.end.outcome == Outcome::Exact
-    {
+pub(crate) fn curved(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
+    let long = evidence.residuals.measured > LONGEST;
+    if long || evidence.point.objective.sweep.predicts_variance() || evidence.rounding || evidence.point.is_exact() {
         return None;
     }
     let expected = |i: usize| {
         unknowns[i].knowledge.standard_error().filter(|error| error.is_finite())?;
-        Some((expected_curvature(judgement, i, unknowns, covariances)?, i)).filter(|(curvature, _)| *curvature > SMALL)
+        Some((expected_curvature(evidence, i, unknowns, covariances)?, i)).filter(|(curvature, _)| *curvature > SMALL)
     };
     let mut examined: Vec<(f64, usize)> = (0..unknowns.len()).filter_map(expected).collect();
     // Where predictions are affine in the initial state, only parameters make them curved. Along the profile of an initial state
     // no parameter changes by more than its own standard error, which is small for all of them.
     let is_state = |i: usize| matches!(unknowns[i].role, Role::InitialState(_));
-    if judgement.objective.sweep.coupling() == Coupling::Affine && examined.iter().all(|(_, i)| is_state(*i)) {
+    if evidence.point.objective.sweep.coupling() == Coupling::Affine && examined.iter().all(|(_, i)| is_state(*i)) {
         return None;
     }
     examined.sort_by(|a, b| b.0.total_cmp(&a.0));
     examined.truncate(MOST);
     let examined: Vec<usize> = examined.into_iter().map(|(_, i)| i).collect();
-    let text = bent(judgement, unknowns, &examined, covariances)
-        .or_else(|| flat(judgement, unknowns, &examined, covariances))?;
+    let text = bent(evidence, unknowns, &examined, covariances)
+        .or_else(|| flat(evidence, unknowns, &examined, covariances))?;
     Some(Warning { code: WarningCode::CurvedInterval, severity: Severity::UsableWithCare, text })
 }
 
 /// The unknown whose interval the curvature at the estimate moves most.
 fn bent(
-    judgement: &Judgement<'_>,
+    evidence: &Evidence<'_>,
     unknowns: &[Unknown],
     examined: &[usize],
     covariances: &Covariances,
 ) -> Option<String> {
-    let of = |&i: &usize| Some((i, asymmetry(judgement, i, covariances)?));
+    let of = |&i: &usize| Some((i, asymmetry(evidence, i, covariances)?));
     let (i, asymmetry) = examined.iter().filter_map(of).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
     if asymmetry.abs() <= ASYMMETRY {
         return None;
@@ -85,14 +81,14 @@ fn bent(
 /// The unknown towards whose end the cost rises too little. The curvature at the estimate may be small where that further on is not, and its
 /// part along the other unknowns moves these instead of the ends.
 fn flat(
-    judgement: &Judgement<'_>,
+    evidence: &Evidence<'_>,
     unknowns: &[Unknown],
     examined: &[usize],
     covariances: &Covariances,
 ) -> Option<String> {
     let place = |unknown, (halves, little)| Place { unknown, standard_errors: halves * QUANTILE, little };
     let places = examined.iter().flat_map(|&i| FLAT.map(|at| place(i, at)));
-    let (place, part) = least_rise(judgement, places, covariances)?;
+    let (place, part) = least_rise(evidence, places, covariances)?;
     let unknown = &unknowns[place.unknown];
     Some(format!(
         "the interval of `{}` is too short {}: {} the cost rises by {} of what the slopes at the estimate say; {}take \
@@ -106,40 +102,47 @@ fn flat(
 }
 
 /// The change of all coordinates along the profile of an unknown, by one standard error of it.
-fn along(judgement: &Judgement<'_>, i: usize, covariances: &Covariances) -> Option<Vec<f64>> {
+fn along(evidence: &Evidence<'_>, i: usize, covariances: &Covariances) -> Option<Vec<f64>> {
     let covariance = covariances.unknowns.as_ref()?;
     let error = covariance.standard_error(i);
-    let of = |j: usize| if judgement.exact[j] { 0.0 } else { covariance.get(j, i) / (error * judgement.slopes[j]) };
-    Some((0..judgement.slopes.len()).map(of).collect())
+    let of = |j: usize| {
+        if evidence.point.held_for_covariance[j] {
+            0.0
+        } else {
+            covariance.get(j, i) / (error * evidence.point.slopes[j])
+        }
+    };
+    Some((0..evidence.point.slopes.len()).map(of).collect())
 }
 
 /// How much predictions are bent along the profile of an unknown, by one standard error of it, in standard deviations of the noise,
 /// if they are so in each unknown as a power or an exponential is: half the square of its change relative to itself, times what
 /// its logarithm moves them by. What unknowns that replace each other move cancels to first order only.
 fn expected_curvature(
-    judgement: &Judgement<'_>,
+    evidence: &Evidence<'_>,
     i: usize,
     unknowns: &[Unknown],
     covariances: &Covariances,
 ) -> Option<f64> {
     let bent = |(j, along): (usize, &f64)| {
-        let unit = if unknowns[j].transform == Transform::Log { 1.0 } else { judgement.end.coordinates[j].abs() };
-        let squares = along * along * judgement.norms[j];
+        let unit = if unknowns[j].transform == Transform::Log { 1.0 } else { evidence.point.end.coordinates[j].abs() };
+        let squares = along * along * evidence.point.norms[j];
         // An initial state next to zero says nothing of others, nor does an unknown that does not change.
         let counts = squares > 0.0 && (i == j || !matches!(unknowns[j].role, Role::InitialState(_)));
-        if counts { 0.5 * squares / (unit * judgement.widening) } else { 0.0 }
+        if counts { 0.5 * squares / (unit * evidence.point.widening) } else { 0.0 }
     };
-    Some(along(judgement, i, covariances)?.iter().enumerate().map(bent).sum())
+    Some(along(evidence, i, covariances)?.iter().enumerate().map(bent).sum())
 }
 
 /// By which part of its half width the ends of an interval move where the curvature is counted, positive where they
 /// move down.
-fn asymmetry(judgement: &Judgement<'_>, i: usize, covariances: &Covariances) -> Option<f64> {
+fn asymmetry(evidence: &Evidence<'_>, i: usize, covariances: &Covariances) -> Option<f64> {
     let error = covariances.unknowns.as_ref()?.standard_error(i);
-    let along = along(judgement, i, covariances)?;
-    let second = judgement.objective.second_along(&judgement.end.coordinates, &along).ok()?;
+    let along = along(evidence, i, covariances)?;
+    let second = evidence.point.objective.second_along(&evidence.point.end.coordinates, &along).ok()?;
     // The errors are bent against the predictions.
-    let bend = -second.step(&vec![0.0; along.len()], &judgement.exact)?[i] * judgement.slopes[i];
+    let bend =
+        -second.step(&vec![0.0; along.len()], &evidence.point.held_for_covariance)?[i] * evidence.point.slopes[i];
     Some(0.5 * QUANTILE * bend / error).filter(|asymmetry| asymmetry.is_finite())
 }
 

@@ -1,8 +1,8 @@
 //! Warnings about the data themselves: what the look at the columns found, where the errors confirm it.
 
-use super::conclude::Judgement;
-use super::suspects::{Split, Suspect, splits};
 use crate::estimate::{Warning, WarningCode};
+use crate::judge::evidence::Evidence;
+use crate::judge::evidence::suspects::{Split, Suspect, splits};
 use crate::numeral::{counted, exact, number, percent};
 use crate::optimize::Severity;
 use crate::record::{ChannelInspection, Inspection, Record, Suspicion};
@@ -19,9 +19,9 @@ const DECIDE: f64 = 0.5;
 const MOVES: f64 = 0.1;
 const LONG: f64 = 0.25;
 /// Outputs with so few values are coarse, where each occurs so many times and the errors are larger than this part of a step.
-pub(super) const FEW: usize = 8;
-pub(super) const TIMES: usize = 4;
-pub(super) const PART_OF_STEP: f64 = 0.1;
+pub(crate) const FEW: usize = 8;
+pub(crate) const TIMES: usize = 4;
+pub(crate) const PART_OF_STEP: f64 = 0.1;
 /// Missing part of an output from which on there is a note.
 const MISSING: f64 = 0.5;
 /// Warnings of one kind; more are counted.
@@ -34,21 +34,22 @@ fn warning(code: WarningCode, severity: Severity, text: String) -> Warning {
 }
 
 /// Warnings about the columns of the records.
-pub(super) fn data(judgement: &Judgement<'_>) -> Vec<Warning> {
-    let found: Vec<Arc<Inspection>> = judgement.objective.problem.records.iter().map(|r| r.inspect_some()).collect();
-    let mut warnings = constant_outputs(judgement, &found);
-    warnings.extend(constant_inputs(judgement, &found));
-    warnings.extend(suspicions(judgement, &found));
-    warnings.extend(coarse(judgement, &found));
-    warnings.extend(sentinels_of_inputs(judgement, &found));
-    warnings.extend(missing(judgement, &found));
-    warnings.extend(twice(judgement));
+pub(crate) fn data(evidence: &Evidence<'_>) -> Vec<Warning> {
+    let found: Vec<Arc<Inspection>> =
+        evidence.point.objective.problem.records.iter().map(|r| r.inspect_some()).collect();
+    let mut warnings = constant_outputs(evidence, &found);
+    warnings.extend(constant_inputs(evidence, &found));
+    warnings.extend(suspicions(evidence, &found));
+    warnings.extend(coarse(evidence, &found));
+    warnings.extend(sentinels_of_inputs(evidence, &found));
+    warnings.extend(missing(evidence, &found));
+    warnings.extend(twice(evidence));
     warnings
 }
 
 /// ` of experiment ...`, if there are several.
-fn of_experiment(judgement: &Judgement<'_>, e: usize) -> String {
-    let labels = &judgement.objective.problem.unknowns.labels;
+fn of_experiment(evidence: &Evidence<'_>, e: usize) -> String {
+    let labels = &evidence.point.objective.problem.unknowns.labels;
     if labels.len() > 1 { format!(" of experiment `{}`", labels[e]) } else { String::new() }
 }
 
@@ -59,12 +60,12 @@ fn constant<'i>(found: &'i [Arc<Inspection>], of: impl Fn(&'i Inspection) -> &'i
     values.all(|value| value == Some(first)).then_some(first)
 }
 
-fn constant_outputs(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
-    let outputs = &judgement.objective.problem.layout().outputs;
+fn constant_outputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
+    let outputs = &evidence.point.objective.problem.layout().outputs;
     let still: Vec<Option<f64>> = (0..outputs.len()).map(|j| constant(found, |one| &one.outputs[j])).collect();
     let all = still.iter().all(Option::is_some);
     let one = |(j, value): (usize, &Option<f64>)| {
-        let (value, rmse) = ((*value)?, judgement.residuals.outputs[j].rmse);
+        let (value, rmse) = ((*value)?, evidence.residuals.outputs[j].rmse);
         // A controller may hold an output; the model then gives the same.
         let held = !all && rmse <= REPRODUCED * value.abs();
         let (name, unit) = (&outputs[j].name, &outputs[j].unit);
@@ -79,8 +80,8 @@ fn constant_outputs(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> Vec
     still.iter().enumerate().filter_map(one).collect()
 }
 
-fn constant_inputs(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
-    let inputs = &judgement.objective.problem.layout().inputs;
+fn constant_inputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
+    let inputs = &evidence.point.objective.problem.layout().inputs;
     let one = |(i, input): (usize, &crate::layout::Quantity)| {
         let value = constant(found, |one| &one.inputs[i])?;
         // Nothing can be mistaken for the effect of an input that is zero.
@@ -97,7 +98,7 @@ fn constant_inputs(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> Vec<
 }
 
 /// Suspicious values of an output that the errors confirm.
-fn suspicions(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
+fn suspicions(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
     let mut suspicions: Vec<(Suspect, &ChannelInspection, &Suspicion)> = vec![];
     for (e, inspection) in found.iter().enumerate() {
         for (j, channel) in inspection.outputs.iter().enumerate() {
@@ -111,19 +112,19 @@ fn suspicions(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> Vec<Warni
     }
     let (suspects, named): (Vec<Suspect>, Vec<_>) =
         suspicions.into_iter().map(|(suspect, channel, suspicion)| (suspect, (channel, suspicion))).unzip();
-    let splits = splits(judgement.objective, &judgement.end.coordinates, &suspects);
+    let splits = splits(evidence.point.objective, &evidence.point.end.coordinates, &suspects);
     let mut warnings = vec![];
     for ((suspect, (channel, suspicion)), split) in suspects.iter().zip(named).zip(&splits) {
-        let Some((code, severity, advice)) = confirmed(judgement, channel, suspicion, (suspect.output, split)) else {
+        let Some((code, severity, advice)) = confirmed(evidence, channel, suspicion, (suspect.output, split)) else {
             continue;
         };
         if warnings.len() < NAMED {
-            let of = of_experiment(judgement, suspect.experiment);
+            let of = of_experiment(evidence, suspect.experiment);
             let text = format!(
                 "the output `{}`{of} {suspicion}, and the model differs there by {} {}: {advice}",
                 channel.name,
                 number(split.rms(), 2),
-                judgement.objective.problem.layout().outputs[suspect.output].unit
+                evidence.point.objective.problem.layout().outputs[suspect.output].unit
             );
             warnings.push(warning(code, severity, text));
         }
@@ -133,13 +134,13 @@ fn suspicions(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> Vec<Warni
 
 /// Code, severity and remedy of a suspicion that the errors confirm.
 fn confirmed(
-    judgement: &Judgement<'_>,
+    evidence: &Evidence<'_>,
     channel: &ChannelInspection,
     suspicion: &Suspicion,
     (output, split): (usize, &Split),
 ) -> Option<(WarningCode, Severity, &'static str)> {
     let (least, greatest) = channel.range?;
-    let (_, moves) = judgement.residuals.levels[output];
+    let (_, moves) = evidence.residuals.levels[output];
     if split.rms() <= REPRODUCED * (greatest - least) {
         return None;
     }
@@ -148,7 +149,7 @@ fn confirmed(
     match suspicion {
         Suspicion::Sentinel { .. } => (split.ratio() > LARGER).then_some((
             WarningCode::Sentinel,
-            decides(dominates && !judgement.objective.is_robust()),
+            decides(dominates && !evidence.point.objective.is_robust()),
             "it stands for a missing measurement; mark it as missing",
         )),
         Suspicion::Clipped { .. } => Some((
@@ -175,13 +176,13 @@ fn confirmed(
 }
 
 /// Outputs of few values, whose errors are not far below the step between them.
-fn coarse(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
-    let outputs = judgement.objective.problem.layout().outputs.iter().enumerate();
+fn coarse(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
+    let outputs = evidence.point.objective.problem.layout().outputs.iter().enumerate();
     let one = |(j, output): (usize, &crate::layout::Quantity)| {
         let levels = found.iter().map(|one| one.outputs[j].levels).try_fold(0, |most, n| Some(most.max(n?)))?;
         let step = found.iter().filter_map(|one| one.outputs[j].step).reduce(f64::min)?;
-        let rmse = judgement.residuals.outputs[j].rmse;
-        let often = judgement.residuals.outputs[j].samples >= (TIMES * levels) as u64;
+        let rmse = evidence.residuals.outputs[j].rmse;
+        let often = evidence.residuals.outputs[j].samples >= (TIMES * levels) as u64;
         (levels <= FEW && often && rmse > PART_OF_STEP * step).then(|| {
             let text = format!(
                 "the output `{}` has {levels} values only, {} {} apart: its rounding is no noise, and parameters are off \
@@ -196,7 +197,7 @@ fn coarse(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> 
     outputs.filter_map(one).collect()
 }
 
-fn sentinels_of_inputs(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
+fn sentinels_of_inputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
     let channels = found.iter().enumerate().flat_map(|(e, one)| one.inputs.iter().map(move |channel| (e, channel)));
     let one = |(e, channel): (usize, &ChannelInspection)| {
         let suspicion = channel.suspicions.first()?;
@@ -204,7 +205,7 @@ fn sentinels_of_inputs(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> 
             "the input `{}`{} {suspicion}: if it stands for a missing measurement, give the value that acted on the \
              plant, or leave these samples out",
             channel.name,
-            of_experiment(judgement, e)
+            of_experiment(evidence, e)
         );
         Some(warning(WarningCode::Sentinel, Severity::UsableWithCare, text))
     };
@@ -212,8 +213,9 @@ fn sentinels_of_inputs(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> 
 }
 
 /// Whether two records hold the same measurements.
-fn twice(judgement: &Judgement<'_>) -> Option<Warning> {
-    let (records, labels) = (&judgement.objective.problem.records, &judgement.objective.problem.unknowns.labels);
+fn twice(evidence: &Evidence<'_>) -> Option<Warning> {
+    let (records, labels) =
+        (&evidence.point.objective.problem.records, &evidence.point.objective.problem.unknowns.labels);
     let same = |a: &Record, b: &Record| {
         let columns = || a.outputs().iter().zip(b.outputs()).map(|(a, b)| (&a.values[..], &b.values[..]));
         let equal = |(a, b): (&f64, &f64)| a == b || a.is_nan() && b.is_nan();
@@ -229,8 +231,8 @@ fn twice(judgement: &Judgement<'_>) -> Option<Warning> {
     Some(warning(WarningCode::Repeated, Severity::UsableWithCare, text))
 }
 
-fn missing(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
-    let outputs = judgement.objective.problem.layout().outputs.iter().enumerate();
+fn missing(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
+    let outputs = evidence.point.objective.problem.layout().outputs.iter().enumerate();
     let one = |(j, output): (usize, &crate::layout::Quantity)| {
         let of = |count: fn(&ChannelInspection) -> usize| found.iter().map(|one| count(&one.outputs[j])).sum();
         let (missing, samples): (usize, usize) = (of(|one| one.missing), of(|one| one.samples));
@@ -240,7 +242,7 @@ fn missing(judgement: &Judgement<'_>, found: &[Arc<Inspection>]) -> Vec<Warning>
                 "{} of the measurements of `{}` are missing ({} are left)",
                 percent(part, 2),
                 output.name,
-                counted(judgement.residuals.outputs[j].samples, "measurement")
+                counted(evidence.residuals.outputs[j].samples, "measurement")
             );
             warning(WarningCode::MissingMeasurements, Severity::Usable, text)
         })

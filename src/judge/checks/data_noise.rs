@@ -6,10 +6,10 @@
 //! Stefanski, J. American Statistical Association 89 (1994) 1314). One Gauss-Newton step measures it, as the mean of noise
 //! added and subtracted, in which all but the second order cancels.
 
-use super::conclude::Judgement;
-use super::feedback::Feedback;
 use crate::error::Error;
 use crate::estimate::{Unknown, Warning, WarningCode};
+use crate::judge::checks::feedback::Feedback;
+use crate::judge::evidence::Evidence;
 use crate::numeral::{number, p_value, percent};
 use crate::optimize::Severity;
 use crate::problem::Problem;
@@ -39,17 +39,17 @@ struct Bias<'u> {
 /// The largest bias, in standard errors, by noise that `with` adds to the problem: a factor (1 or -1) and the number of
 /// the draw.
 fn largest_bias<'p, 'u>(
-    judgement: &'p Judgement<'_>,
+    evidence: &'p Evidence<'_>,
     unknowns: &'u [Unknown],
     with: impl Fn(f64, u64) -> Result<Problem<'p>, Error>,
 ) -> Option<Bias<'u>> {
     let held: Vec<bool> = unknowns.iter().map(|row| row.knowledge.standard_error().is_none()).collect();
     let none = vec![0.0; unknowns.len()];
-    let mut mean: Vec<f64> = judgement.linear.step(&none, &held)?.iter().map(|step| -step).collect();
+    let mut mean: Vec<f64> = evidence.point.linear.step(&none, &held)?.iter().map(|step| -step).collect();
     for (draw, sign) in (0..DRAWS).flat_map(|draw| [(draw, 1.0), (draw, -1.0)]) {
         let problem = with(sign, draw).ok()?;
-        let objective = judgement.objective.of(&problem, judgement.objective.sweep);
-        let step = objective.evaluate(&judgement.end.coordinates).ok()?.step(&none, &held)?;
+        let objective = evidence.point.objective.of(&problem, evidence.point.objective.sweep);
+        let step = objective.evaluate(&evidence.point.end.coordinates).ok()?.step(&none, &held)?;
         mean.iter_mut().zip(&step).for_each(|(mean, step)| *mean += step / (2 * DRAWS) as f64);
     }
     let bias = |(unknown, step): (&'u Unknown, &f64)| {
@@ -62,20 +62,20 @@ fn largest_bias<'p, 'u>(
 
 /// Whether noise in the states from which predictions restart biases the estimate. Such noise is in the error at
 /// the restart, and with the opposite sign in the error a horizon later.
-pub(super) fn restart_noise(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Option<Warning> {
-    let steps = judgement.objective.sweep.restarts()?;
-    let outputs = &judgement.residuals.outputs;
-    let found = judgement.residuals.whiteness.iter().map(|white| white.at_restart);
+pub(crate) fn restart_noise(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
+    let steps = evidence.point.objective.sweep.restarts()?;
+    let outputs = &evidence.residuals.outputs;
+    let found = evidence.residuals.whiteness.iter().map(|white| white.at_restart);
     let tail = |z: f64| outputs.len() as f64 * Normal::standard().cdf(z);
     let least = found.clone().map(|(z, _)| tail(z)).fold(1.0, f64::min);
-    if least >= LEVEL || judgement.rounding {
+    if least >= LEVEL || evidence.rounding {
         return None;
     }
     let deviation = |((_, rho), fit): ((f64, f64), &crate::estimate::OutputFit)| fit.rmse * (-rho).max(0.0).sqrt();
     let sigma: Vec<f64> = found.zip(outputs).map(deviation).collect();
-    let problem = judgement.objective.problem;
-    let feedback = Feedback::of(judgement);
-    let bias = largest_bias(judgement, unknowns, |sign, draw| {
+    let problem = evidence.point.objective.problem;
+    let feedback = Feedback::of(evidence);
+    let bias = largest_bias(evidence, unknowns, |sign, draw| {
         let records = problem.records.iter().enumerate();
         let noisy = |(e, record): (usize, &Record)| {
             let outputs = noisy(&record.outputs, &sigma, sign, draw, e);
@@ -84,7 +84,7 @@ pub(super) fn restart_noise(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> 
         };
         let noisy: Vec<Record> = records.map(noisy).collect();
         // Predictions are compared with the measurements without the added noise, plus the plant's response to the added inputs.
-        let compared = feedback.outputs(judgement, &noisy);
+        let compared = feedback.outputs(evidence, &noisy);
         Ok(Problem { records: compared, ..problem.with_records(noisy)? })
     })?;
     let Bias { unknown, errors, .. } = bias;
@@ -108,10 +108,10 @@ pub(super) fn restart_noise(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> 
 }
 
 /// The bias by the noise of inputs that was declared.
-pub(super) fn input_noise(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Option<Warning> {
-    let problem = judgement.objective.problem;
+pub(crate) fn input_noise(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
+    let problem = evidence.point.objective.problem;
     let sigma = problem.settings.input_noise.as_ref()?;
-    let bias = largest_bias(judgement, unknowns, |sign, draw| {
+    let bias = largest_bias(evidence, unknowns, |sign, draw| {
         let records = problem.records.iter().enumerate();
         let noisy = records.map(|(e, record)| {
             let inputs = noisy(&record.inputs, sigma, sign, draw, e);

@@ -1,8 +1,9 @@
 //! Whether single measurements are missing and the one before stands in their place.
 
-use super::conclude::Judgement;
-use super::warnings::care;
 use crate::estimate::{Warning, WarningCode};
+use crate::judge::checks::step::care;
+use crate::judge::evidence::Evidence;
+use crate::judge::evidence::first_errors::Errors as FirstErrors;
 use crate::numeral::{number, percent};
 
 /// The fewest measurements that are equal to the one before, and the part of them all, that are looked at.
@@ -47,14 +48,14 @@ fn split(runs: &[Vec<(f64, f64)>]) -> Option<[Errors; 2]> {
     (single && again * ROUNDED <= held.count).then_some(split)
 }
 
-/// The warning about an output with these errors, one run per experiment, `None` where nothing was measured.
-pub(super) fn dropouts_of(judgement: &Judgement<'_>, j: usize, errors: &[Vec<Option<f64>>]) -> Option<Warning> {
-    let problem = judgement.objective.problem;
-    let run = |(record, errors): (&crate::record::Record, &Vec<Option<f64>>)| {
-        let values = record.outputs()[j].values.iter().zip(errors);
+/// The warning about an output.
+pub(crate) fn dropouts_of(evidence: &Evidence<'_>, j: usize) -> Option<Warning> {
+    let problem = evidence.point.objective.problem;
+    let run = |(record, errors): (&crate::record::Record, &FirstErrors)| {
+        let values = record.outputs()[j].values.iter().zip(&errors[j]);
         values.filter_map(|(y, error)| Some((*y, (*error)?))).collect()
     };
-    let runs: Vec<Vec<(f64, f64)>> = problem.records.iter().zip(errors).map(run).collect();
+    let runs: Vec<Vec<(f64, f64)>> = problem.records.iter().zip(evidence.first_errors()).map(run).collect();
     let [held, others] = split(&runs)?;
     are_larger(held, others).then(|| {
         let output = &problem.layout().outputs[j];

@@ -1,8 +1,7 @@
 //! Warnings about outputs that the model does not explain, and about a given noise that the errors contradict.
 
-use super::conclude::Judgement;
 use crate::estimate::{CovarianceMethod, Warning, WarningCode};
-use crate::layout::Kind;
+use crate::judge::evidence::Evidence;
 use crate::numeral::{fit, number};
 use crate::optimize::Severity;
 use crate::problem::Noise;
@@ -26,107 +25,93 @@ const NARROW: f64 = 1.2;
 const FAR: f64 = 10.0;
 const FAR_BELOW: f64 = 100.0;
 
-impl Judgement<'_> {
-    /// How many errors have the information of one independent error.
-    pub(super) fn dependence(&self, j: usize) -> f64 {
-        if self.is_static() { 1.0 } else { self.residuals.whiteness[j].dependence }
-    }
+/// Sum of squared errors relative to that about the output's mean.
+fn relative_errors(evidence: &Evidence<'_>, j: usize) -> Option<f64> {
+    let (rmse, (_, moves)) = (evidence.residuals.outputs[j].rmse, evidence.residuals.levels[j]);
+    (moves > 0.0 && evidence.residuals.outputs[j].fit_percent.is_some()).then(|| (rmse / moves).powi(2))
+}
 
-    pub(super) fn is_static(&self) -> bool {
-        self.objective.problem.layout().kind == Kind::Static
-    }
+/// Probability that noise about a mean is explained as well: Fisher's test with as many measurements as are
+/// independent.
+fn by_chance_of(evidence: &Evidence<'_>, j: usize, relative: f64) -> f64 {
+    by_chance(evidence.independent(j), evidence.point.values.len(), relative)
+}
 
-    /// Sum of squared errors relative to that about the output's mean.
-    fn relative_errors(&self, j: usize) -> Option<f64> {
-        let (rmse, (_, moves)) = (self.residuals.outputs[j].rmse, self.residuals.levels[j]);
-        (moves > 0.0 && self.residuals.outputs[j].fit_percent.is_some()).then(|| (rmse / moves).powi(2))
-    }
+/// Whether the errors are no larger than the noise that was given.
+fn is_noise(evidence: &Evidence<'_>, j: usize) -> bool {
+    let Noise::Given(sigma) = &evidence.point.objective.problem.settings.noise else { return false };
+    evidence.residuals.outputs[j].rmse <= sigma[j] * (1.0 + 3.0 / (2.0 * evidence.independent(j)).sqrt())
+}
 
-    /// How many independent errors an output has the information of, one at least.
-    fn independent(&self, j: usize) -> f64 {
-        self.residuals.outputs[j].samples.max(1) as f64 / self.dependence(j)
-    }
-
-    /// Probability that noise about a mean is explained as well: Fisher's test with as many measurements as are
-    /// independent.
-    fn by_chance(&self, j: usize, relative: f64) -> f64 {
-        by_chance(self.independent(j), self.values.len(), relative)
-    }
-
-    /// Whether the errors are no larger than the noise that was given.
-    fn is_noise(&self, j: usize) -> bool {
-        let Noise::Given(sigma) = &self.objective.problem.settings.noise else { return false };
-        self.residuals.outputs[j].rmse <= sigma[j] * (1.0 + 3.0 / (2.0 * self.independent(j)).sqrt())
-    }
-
-    /// Outputs that the model explains no better than their mean does.
-    pub(super) fn unexplained(&self) -> Vec<Warning> {
-        let count = self.objective.outputs();
-        let relative: Vec<Option<f64>> = (0..count).map(|j| self.relative_errors(j)).collect();
-        let chance: Vec<f64> =
-            (0..count).map(|j| relative[j].map_or(1.0, |relative| self.by_chance(j, relative))).collect();
-        let explained = |j: usize| chance[j] < LEVEL && self.residuals.outputs[j].fit_percent > Some(LITTLE);
-        let another = |j: usize| (0..count).any(|i| i != j && explained(i));
-        // With a pre-filter, a weighting or a robust loss the fit did not have to explain all errors.
-        let settings = &self.objective.problem.settings;
-        let partly = settings.prefilter.is_some() || self.objective.is_weighted() || self.objective.is_robust();
-        let mut warnings = vec![];
-        for j in (0..count).filter(|&j| !explained(j) && !self.is_noise(j)) {
-            let (Some(relative), (level, moves)) = (relative[j], self.residuals.levels[j]) else { continue };
-            if relative < 1.0 - MUCH {
-                continue;
-            }
-            let fit_percent = self.residuals.outputs[j].fit_percent.unwrap_or(0.0);
-            let worse = is_worse(relative, self.independent(j));
-            let rmse = self.residuals.outputs[j].rmse;
-            let at_level = moves.max(rmse) < LEVEL_PART * level.abs();
-            let Some(severity) = unexplained(another(j), at_level, worse, partly) else { continue };
-            let output = &self.objective.problem.layout().outputs[j].name;
-            let than = if worse { "worse than" } else { "no better than" };
-            let text = format!(
-                "the model explains `{output}` {than} its mean does (fit {} %): check signals, signs, units and the start \
-                 (Fit::starts searches from more), or excite the plant; if noise is all that is left, give its size",
-                fit(fit_percent)
-            );
-            warnings.push(Warning { code: WarningCode::Unexplained, severity, text });
+/// Outputs that the model explains no better than their mean does.
+pub(crate) fn unexplained(evidence: &Evidence<'_>) -> Vec<Warning> {
+    let count = evidence.point.objective.outputs();
+    let relative: Vec<Option<f64>> = (0..count).map(|j| relative_errors(evidence, j)).collect();
+    let chance: Vec<f64> =
+        (0..count).map(|j| relative[j].map_or(1.0, |relative| by_chance_of(evidence, j, relative))).collect();
+    let explained = |j: usize| chance[j] < LEVEL && evidence.residuals.outputs[j].fit_percent > Some(LITTLE);
+    let another = |j: usize| (0..count).any(|i| i != j && explained(i));
+    // With a pre-filter, a weighting or a robust loss the fit did not have to explain all errors.
+    let settings = &evidence.point.objective.problem.settings;
+    let partly =
+        settings.prefilter.is_some() || evidence.point.objective.is_weighted() || evidence.point.objective.is_robust();
+    let mut warnings = vec![];
+    for j in (0..count).filter(|&j| !explained(j) && !is_noise(evidence, j)) {
+        let (Some(relative), (level, moves)) = (relative[j], evidence.residuals.levels[j]) else { continue };
+        if relative < 1.0 - MUCH {
+            continue;
         }
-        warnings
+        let fit_percent = evidence.residuals.outputs[j].fit_percent.unwrap_or(0.0);
+        let worse = is_worse(relative, evidence.independent(j));
+        let rmse = evidence.residuals.outputs[j].rmse;
+        let at_level = moves.max(rmse) < LEVEL_PART * level.abs();
+        let Some(severity) = unexplained(another(j), at_level, worse, partly) else { continue };
+        let output = &evidence.point.objective.problem.layout().outputs[j].name;
+        let than = if worse { "worse than" } else { "no better than" };
+        let text = format!(
+            "the model explains `{output}` {than} its mean does (fit {} %): check signals, signs, units and the start \
+             (Fit::starts searches from more), or excite the plant; if noise is all that is left, give its size",
+            fit(fit_percent)
+        );
+        warnings.push(Warning { code: WarningCode::Unexplained, severity, text });
     }
+    warnings
+}
 
-    /// Noise that was given, and errors of another size.
-    pub(super) fn given_noise(&self, method: CovarianceMethod) -> Vec<Warning> {
-        let Noise::Given(sigma) = &self.objective.problem.settings.noise else { return vec![] };
-        if self.objective.problem.settings.prefilter.is_some() || self.objective.is_weighted() {
-            return vec![];
+/// Noise that was given, and errors of another size.
+pub(crate) fn given_noise(evidence: &Evidence<'_>, method: CovarianceMethod) -> Vec<Warning> {
+    let Noise::Given(sigma) = &evidence.point.objective.problem.settings.noise else { return vec![] };
+    if evidence.point.objective.problem.settings.prefilter.is_some() || evidence.point.objective.is_weighted() {
+        return vec![];
+    }
+    let outputs = evidence.point.objective.problem.layout().outputs.iter().enumerate();
+    let one = |(j, output): (usize, &crate::layout::Quantity)| {
+        let found = &evidence.residuals.outputs[j];
+        let ratio = found.rmse / sigma[j];
+        if !contradicts(ratio, evidence.independent(j), evidence.point.values.len())
+            || ratio > 1.0 && evidence.point.objective.is_robust()
+        {
+            return None;
         }
-        let outputs = self.objective.problem.layout().outputs.iter().enumerate();
-        let one = |(j, output): (usize, &crate::layout::Quantity)| {
-            let found = &self.residuals.outputs[j];
-            let ratio = found.rmse / sigma[j];
-            if !contradicts(ratio, self.independent(j), self.values.len()) || ratio > 1.0 && self.objective.is_robust()
-            {
-                return None;
-            }
-            let (_, moves) = self.residuals.levels[j];
-            let narrow = method == CovarianceMethod::Classical && ratio > NARROW;
-            let severity = off(ratio, sigma[j] > moves, narrow);
-            let intervals = match method {
-                CovarianceMethod::Classical if ratio > 1.0 => "intervals are too narrow",
-                CovarianceMethod::Classical => "intervals are too wide",
-                _ => "intervals are by the errors",
-            };
-            let text = format!(
-                "the noise of `{}` was given as {} {unit}, but the errors are {} {unit} (rms): {intervals}; leave the noise out to \
-                 have it estimated",
-                output.name,
-                number(sigma[j], 3),
-                number(found.rmse, 3),
-                unit = output.unit
-            );
-            Some(Warning { code: WarningCode::GivenNoise, severity, text })
+        let (_, moves) = evidence.residuals.levels[j];
+        let narrow = method == CovarianceMethod::Classical && ratio > NARROW;
+        let severity = noise_severity(ratio, sigma[j] > moves, narrow);
+        let intervals = match method {
+            CovarianceMethod::Classical if ratio > 1.0 => "intervals are too narrow",
+            CovarianceMethod::Classical => "intervals are too wide",
+            _ => "intervals are by the errors",
         };
-        outputs.filter_map(one).collect()
-    }
+        let text = format!(
+            "the noise of `{}` was given as {} {unit}, but the errors are {} {unit} (rms): {intervals}; leave the noise out to \
+             have it estimated",
+            output.name,
+            number(sigma[j], 3),
+            number(found.rmse, 3),
+            unit = output.unit
+        );
+        Some(Warning { code: WarningCode::GivenNoise, severity, text })
+    };
+    outputs.filter_map(one).collect()
 }
 
 /// Probability that so many unknowns leave at most this part of the squares of as many independent errors about their mean
@@ -166,7 +151,7 @@ fn contradicts(ratio: f64, independent: f64, unknowns: usize) -> bool {
 
 /// How severe it is that errors are off the noise given by this ratio; `beyond` says that the noise is larger than all that the
 /// output moves, `narrow` that intervals are too narrow by that.
-fn off(ratio: f64, beyond: bool, narrow: bool) -> Severity {
+fn noise_severity(ratio: f64, beyond: bool, narrow: bool) -> Severity {
     match ratio {
         ratio if ratio > FAR || ratio < FAR_BELOW.recip() && beyond => Severity::NotUsable,
         ratio if narrow || ratio > DIFFERENT || ratio < DIFFERENT.recip() => Severity::UsableWithCare,
@@ -233,11 +218,16 @@ mod tests {
 
     #[test]
     fn how_far_errors_are_off_their_noise() {
-        let severities = [10.1, 10.0, 2.01, 2.0, 0.5, 0.49, 0.0101, 0.0099].map(|ratio| off(ratio, true, false));
+        let severities =
+            [10.1, 10.0, 2.01, 2.0, 0.5, 0.49, 0.0101, 0.0099].map(|ratio| noise_severity(ratio, true, false));
         let care = UsableWithCare;
         assert_eq!(severities, [NotUsable, care, care, Usable, Usable, care, care, NotUsable]);
         assert_eq!(
-            [off(0.0099, false, false), off(10.1, false, false), off(1.3, false, true)],
+            [
+                noise_severity(0.0099, false, false),
+                noise_severity(10.1, false, false),
+                noise_severity(1.3, false, true)
+            ],
             [care, NotUsable, care]
         );
     }

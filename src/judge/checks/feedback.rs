@@ -3,10 +3,10 @@
 //! Each input is regressed on the prediction errors of the same sample, after the inputs and measurements of the samples before. A
 //! significant coefficient is the gain of a controller that acts without delay (instantaneous causality: Granger, Econometrica 37 (1969) 424).
 
-use super::conclude::Judgement;
-use super::errors::{RECORDS, errors, first_errors};
 use crate::estimate::student::quantile;
 use crate::information::{Block, Information};
+use crate::judge::evidence::Evidence;
+use crate::judge::evidence::first_errors::errors;
 use crate::layout::Layout;
 use crate::problem::Problem;
 use crate::record::{Channel, Record};
@@ -19,20 +19,19 @@ const LEVEL: f64 = 0.01;
 const ROWS: usize = 256;
 
 /// By how much each input follows the measurement of each output, at the same sample.
-pub(super) struct Feedback {
+pub(crate) struct Feedback {
     /// `gains[input][output]`.
     gains: Vec<Vec<f64>>,
 }
 
 impl Feedback {
     /// From the errors of the first records.
-    pub fn of(judgement: &Judgement<'_>) -> Self {
-        let problem = judgement.objective.problem;
-        let (inputs, outputs) = (problem.layout().inputs.len(), judgement.objective.outputs());
+    pub fn of(evidence: &Evidence<'_>) -> Self {
+        let problem = evidence.point.objective.problem;
+        let (inputs, outputs) = (problem.layout().inputs.len(), evidence.point.objective.outputs());
         let controls = 1 + BEFORE * (inputs + outputs);
         let mut found = vec![Information::new(controls + outputs); inputs];
-        for (e, record) in problem.records.iter().enumerate().take(RECORDS) {
-            let errors = first_errors(judgement, e);
+        for (record, errors) in problem.records.iter().zip(evidence.first_errors()) {
             let rows = (BEFORE..errors[0].len()).filter_map(|k| {
                 let now: Option<Vec<f64>> = errors.iter().map(|errors| errors[k]).collect();
                 Some((k, [before(record, k), now?].concat()))
@@ -74,18 +73,18 @@ impl Feedback {
     }
 
     /// Records with these inputs, and the measurements that the plant would have had with them by the model.
-    pub fn outputs(&self, judgement: &Judgement<'_>, with: &[Record]) -> Vec<Record> {
-        let problem = judgement.objective.problem;
+    pub fn outputs(&self, evidence: &Evidence<'_>, with: &[Record]) -> Vec<Record> {
+        let problem = evidence.point.objective.problem;
         let records = with.iter().zip(&problem.records);
         let as_measured = records.map(|(with, record)| Record { outputs: record.outputs.clone(), ..with.clone() });
         let driven = Problem { records: as_measured.collect(), ..problem.clone() };
         if !self.gains.iter().any(|gains| Self::is_fed_back(gains)) {
             return driven.records;
         }
-        let objective = judgement.objective.of(&driven, judgement.objective.sweep);
+        let objective = evidence.point.objective.of(&driven, evidence.point.objective.sweep);
         let respond = |(e, record): (usize, &Record)| {
-            let all = |objective| errors(objective, &judgement.end.coordinates, e, usize::MAX);
-            let (before, after) = (all(judgement.objective), all(&objective));
+            let all = |objective| errors(objective, &evidence.point.end.coordinates, e, usize::MAX);
+            let (before, after) = (all(evidence.point.objective), all(&objective));
             let outputs = record.outputs.iter().zip(before.iter().zip(&after)).map(|(output, (before, after))| {
                 let change =
                     |(before, after): (&Option<f64>, &Option<f64>)| before.zip(*after).map_or(0.0, |(b, a)| b - a);

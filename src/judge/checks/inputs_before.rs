@@ -3,12 +3,11 @@
 //! What a model of the right shape leaves is uncorrelated with every input that has acted. A delay or a lag that it lacks shows at the
 //! samples after each change of an input, a curve that it lacks in the powers of the input.
 
-use super::color;
-use super::conclude::Judgement;
-use super::errors::{RECORDS, first_errors};
-use super::powers::{SHAPE, Scale};
-use super::products::{Change, Products};
 use crate::estimate::{Warning, WarningCode};
+use crate::judge::evidence::Evidence;
+use crate::judge::evidence::color;
+use crate::judge::evidence::powers::{SHAPE, Scale};
+use crate::judge::evidence::products::{Change, Products};
 use crate::numeral::{p_value, percent};
 use crate::optimize::Outcome;
 
@@ -18,13 +17,13 @@ const BEFORE: usize = 4;
 /// The output whose errors certainly follow from an input: from powers of its value at the sample before, or from one of its changes. The
 /// input of the same sample is left out, since a controller may have computed it from the measurement. White errors only: correlated
 /// ones follow from an input that a controller has computed from earlier ones.
-pub(super) fn by_inputs_before(judgement: &Judgement<'_>) -> Option<Warning> {
-    let objective = judgement.objective;
+pub(crate) fn by_inputs_before(evidence: &Evidence<'_>) -> Option<Warning> {
+    let objective = evidence.point.objective;
     let (layout, outputs) = (objective.problem.layout(), objective.outputs());
     let plain = objective.problem.settings.prefilter.is_none() && objective.sweep.restarts().is_none();
-    let examined = !judgement.is_static() && plain && !layout.inputs.is_empty();
-    let exact = judgement.rounding || judgement.end.outcome == Outcome::Exact;
-    if !examined || exact || judgement.autocorrelated_at(color::CERTAIN).is_some() {
+    let examined = !evidence.point.is_static() && plain && !layout.inputs.is_empty();
+    let exact = evidence.rounding || evidence.point.is_exact();
+    if !examined || exact || evidence.autocorrelated_at(color::CERTAIN).is_some() {
         return None;
     }
     let sigma = objective.whitening.sigma();
@@ -33,16 +32,15 @@ pub(super) fn by_inputs_before(judgement: &Judgement<'_>) -> Option<Warning> {
         let by_loss = objective.loss().map_or(1.0, |loss| loss.weight(error / sigma[j]));
         objective.weight(e, k) * by_loss
     };
-    let scales: Vec<Scale> = (0..layout.inputs.len()).map(|i| scale(judgement, i)).collect();
+    let scales: Vec<Scale> = (0..layout.inputs.len()).map(|i| scale(evidence, i)).collect();
     let mut sums = vec![Before::default(); outputs * layout.inputs.len()];
-    for e in 0..objective.experiments().min(RECORDS) {
-        let errors = first_errors(judgement, e);
+    for (e, errors) in evidence.first_errors().iter().enumerate() {
         let inputs = objective.problem.records[e].inputs().iter().zip(&scales);
         for ((input, scale), sums) in inputs.zip(sums.chunks_mut(outputs)) {
             let u = &input.values;
             for k in BEFORE..errors[0].len() {
                 let before = std::array::from_fn(|lag| scale.one(u[k - 1 - lag]));
-                for (j, (sums, errors)) in sums.iter_mut().zip(&errors).enumerate() {
+                for (j, (sums, errors)) in sums.iter_mut().zip(errors).enumerate() {
                     if let Some(error) = errors[k] {
                         sums.take(before, error * weight(e, j, k, error));
                     }
@@ -53,7 +51,7 @@ pub(super) fn by_inputs_before(judgement: &Judgement<'_>) -> Option<Warning> {
     let of = |number: usize| {
         let (i, j) = (number / outputs, number % outputs);
         let (part, chance) = sums[number].follows();
-        let part = part * judgement.residuals.outputs[j].rmse / judgement.residuals.levels[j].1;
+        let part = part * evidence.residuals.outputs[j].rmse / evidence.residuals.levels[j].1;
         (i, j, part, chance * sums.len() as f64)
     };
     let certain = (0..sums.len()).map(of).filter(|(.., chance)| *chance < color::LIKELY);
@@ -71,10 +69,10 @@ pub(super) fn by_inputs_before(judgement: &Judgement<'_>) -> Option<Warning> {
 }
 
 /// Center and width of an input over all records.
-fn scale(judgement: &Judgement<'_>, i: usize) -> Scale {
+fn scale(evidence: &Evidence<'_>, i: usize) -> Scale {
     let range =
         |(low, high): (f64, f64), own: Option<(f64, f64)>| own.map_or((low, high), |(a, b)| (low.min(a), high.max(b)));
-    let records = judgement.objective.problem.records.iter();
+    let records = evidence.point.objective.problem.records.iter();
     Scale::new(
         records.map(|record| record.inspect_some().inputs[i].range).fold((f64::INFINITY, f64::NEG_INFINITY), range),
     )

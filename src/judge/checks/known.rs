@@ -1,10 +1,10 @@
 //! Warnings about what is known of the parameters: standard errors that are none, intervals that hold zero, signs and
 //! sizes that are not those of the start.
 
-use super::conclude::Judgement;
-use super::covariances::Covariances;
-use super::warnings::care;
 use crate::estimate::{Knowledge, Unknown, Warning, WarningCode};
+use crate::judge::checks::step::care;
+use crate::judge::covariances::{Covariances, is_error};
+use crate::judge::evidence::Evidence;
 use crate::numeral::{exact, number};
 use crate::optimize::Severity;
 use crate::parameter::Prior;
@@ -44,20 +44,20 @@ fn told_by_data(unknown: &Unknown, prior: Prior) -> bool {
 }
 
 /// Warnings about single parameters.
-pub(super) fn knowledge(judgement: &Judgement<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Vec<Warning> {
+pub(crate) fn knowledge(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Vec<Warning> {
     let mut warnings = vec![];
-    warnings.extend(without_error(judgement, unknowns, covariances));
-    warnings.extend(near_zero(judgement, unknowns));
-    warnings.extend(against_priors(judgement, unknowns));
+    warnings.extend(without_error(evidence, unknowns, covariances));
+    warnings.extend(near_zero(evidence, unknowns));
+    warnings.extend(against_priors(evidence, unknowns));
     warnings.extend(opposite(unknowns));
     warnings.extend(far_from_start(unknowns));
     warnings
 }
 
 /// Unknowns whose standard error came out as zero, infinite or not a number.
-fn without_error(judgement: &Judgement<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
-    let covariance = covariances.unknowns.as_ref().filter(|_| judgement.degrees > 0.0)?;
-    let seen = judgement.seen();
+fn without_error(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
+    let covariance = covariances.unknowns.as_ref().filter(|_| evidence.point.degrees > 0.0)?;
+    let seen = evidence.point.seen();
     let wrong = |(i, _): &(usize, &Unknown)| seen[*i] && !is_error(covariance.standard_error(*i));
     let wrong: Vec<(usize, &Unknown)> = unknowns.iter().enumerate().filter(wrong).collect();
     let (first, _) = *wrong.first()?;
@@ -71,8 +71,8 @@ fn without_error(judgement: &Judgement<'_>, unknowns: &[Unknown], covariances: &
 }
 
 /// Parameters that cannot be told from zero.
-fn near_zero(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Option<Warning> {
-    let rows = &judgement.objective.problem.unknowns.row;
+fn near_zero(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
+    let rows = &evidence.point.objective.problem.unknowns.row;
     let parameters = || unknowns.iter().zip(rows).filter(|(unknown, _)| matches!(unknown.role, Role::Parameter(_)));
     let without_prior = parameters().filter(|(_, row)| row.parameter.prior.is_none()).map(|(unknown, _)| unknown);
     let unknown: Vec<&Unknown> = without_prior.filter(|unknown| holds_zero(unknown)).collect();
@@ -90,7 +90,7 @@ fn near_zero(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Option<Warning>
         ),
         true => format!(
             "no parameter is known: the intervals of {names} are wider than their values; vary {} more, or measure longer",
-            match judgement.objective.problem.layout().inputs.as_slice() {
+            match evidence.point.objective.problem.layout().inputs.as_slice() {
                 [] => "the initial state".to_owned(),
                 inputs => listed(inputs.iter().map(|input| input.name.as_str())),
             }
@@ -101,8 +101,8 @@ fn near_zero(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Option<Warning>
 }
 
 /// Unknowns whose estimate differs from the mean of their prior by more than chance.
-fn against_priors(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
-    let rows = judgement.objective.problem.unknowns.row.iter().zip(unknowns);
+fn against_priors(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
+    let rows = evidence.point.objective.problem.unknowns.row.iter().zip(unknowns);
     let one = |(row, unknown): (&Free, &Unknown)| {
         let prior = row.parameter.prior?;
         let distance = distance(unknown, prior).filter(|distance| *distance > UNLIKELY)?;
@@ -128,11 +128,6 @@ fn distance(unknown: &Unknown, prior: Prior) -> Option<f64> {
     let variance = prior.std * prior.std - error * error;
     // An estimate that is hardly better than its prior says nothing of it.
     (variance > LITTLE * prior.std * prior.std).then(|| (unknown.value - prior.mean).abs() / variance.sqrt())
-}
-
-/// Whether a number can be a standard error.
-pub(super) fn is_error(error: f64) -> bool {
-    error > 0.0 && error.is_finite()
 }
 
 /// The parameters that a start was given for, with the ratio of value and start.

@@ -1,34 +1,32 @@
-//! What was left out of a judgement because a time limit was over or a flag was set.
+//! What was left out of a evidence because a time limit was over or a flag was set.
 
-use super::conclude::Judgement;
 use crate::estimate::{Warning, WarningCode};
+use crate::judge::evidence::Evidence;
 use crate::optimize::Severity;
 
-impl Judgement<'_> {
-    /// Whether stop conditions ended passes over the data before all tests had been made; `early` if already those for the intervals.
-    pub(super) fn not_examined(&self, early: bool) -> Option<Warning> {
-        let control = self.objective.control;
-        if !control.stops() {
-            return None;
-        }
-        let stop = if control.expired() { "the time limit was over" } else { "the fit was cancelled" };
-        let (text, severity) = match early {
-            true => (
-                format!(
-                    "{stop} before intervals had been examined: they are those of white errors of one size, and tests of errors, of the \
-                     step and of parts of the data were left out; allow more time"
-                ),
-                Severity::NotUsable,
-            ),
-            false => (
-                format!(
-                    "{stop} before all tests of the estimate had been made: what the others would find is not said; allow more time"
-                ),
-                Severity::UsableWithCare,
-            ),
-        };
-        Some(Warning { code: WarningCode::NotExamined, severity, text })
+/// Whether stop conditions ended passes over the data before all tests had been made; `early` if already those for the intervals.
+pub(crate) fn not_examined(evidence: &Evidence<'_>, early: bool) -> Option<Warning> {
+    let control = evidence.point.objective.control;
+    if !control.stops() {
+        return None;
     }
+    let stop = if control.expired() { "the time limit was over" } else { "the fit was cancelled" };
+    let (text, severity) = match early {
+        true => (
+            format!(
+                "{stop} before intervals had been examined: they are those of white errors of one size, and tests of errors, of the \
+                 step and of parts of the data were left out; allow more time"
+            ),
+            Severity::NotUsable,
+        ),
+        false => (
+            format!(
+                "{stop} before all tests of the estimate had been made: what the others would find is not said; allow more time"
+            ),
+            Severity::UsableWithCare,
+        ),
+    };
+    Some(Warning { code: WarningCode::NotExamined, severity, text })
 }
 
 #[cfg(test)]
@@ -42,7 +40,7 @@ mod tests {
     use std::sync::Arc;
     use std::sync::atomic::AtomicBool;
 
-    /// A minimum that is judged after the flag was set: cost, noise and value are those of the whole judgement, the intervals are classical
+    /// A minimum that is judged after the flag was set: cost, noise and value are those of the whole evidence, the intervals are classical
     /// instead of a sandwich, and it is said. A flag that is not set changes nothing.
     #[test]
     fn a_minimum_that_is_not_examined() {

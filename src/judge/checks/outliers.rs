@@ -1,11 +1,11 @@
 //! Whether a few errors far beyond the others decide a fit with a squared loss.
 
-use super::conclude::Judgement;
-use super::errors::{RECORDS, first_errors};
-use super::warnings::care;
-use super::{dropouts, largest};
 use crate::estimate::{Warning, WarningCode};
-use crate::numeral::percent;
+use crate::judge::checks::dropouts;
+use crate::judge::checks::step::care;
+use crate::judge::evidence::Evidence;
+use crate::judge::evidence::largest::chance;
+use crate::numeral::{exact, number, p_value, percent};
 use crate::optimize::{Outcome, Severity};
 use crate::outliers::{center_and_deviation, hampel};
 
@@ -18,34 +18,32 @@ const NEIGHBORS: usize = 10;
 /// A warning if outliers make more than the first part of the sum of squares, a note if they make more than the second.
 const DECIDE: f64 = 0.5;
 const LITTLE: f64 = 0.1;
+/// Level of the test of the largest error.
+const LEVEL: f64 = 1e-3;
 
 /// Outputs whose errors have outliers, or measurements that were held, of a fit by their squares.
-pub(super) fn outliers(judgement: &Judgement<'_>) -> Vec<Warning> {
-    let objective = judgement.objective;
+pub(crate) fn outliers(evidence: &Evidence<'_>) -> Vec<Warning> {
+    let objective = evidence.point.objective;
     let squares = objective.loss().is_none() && !objective.is_weighted();
-    if !squares || judgement.rounding || judgement.end.outcome == Outcome::Exact {
+    if !squares || evidence.rounding || evidence.point.is_exact() {
         return vec![];
     }
-    let heavy = |j: usize| is_heavy(judgement.residuals.kurtosis[j], judgement.residuals.outputs[j].samples);
+    let heavy = |j: usize| is_heavy(evidence.residuals.kurtosis[j], evidence.residuals.outputs[j].samples);
     let heavy: Vec<bool> = (0..objective.outputs()).map(heavy).collect();
     if !heavy.contains(&true) {
-        return (0..objective.outputs()).filter_map(|j| largest::extreme(judgement, j)).collect();
-    }
-    let mut errors = vec![vec![]; objective.outputs()];
-    for e in 0..objective.experiments().min(RECORDS) {
-        errors.iter_mut().zip(first_errors(judgement, e)).for_each(|(all, own)| all.push(own));
+        return (0..objective.outputs()).filter_map(|j| extreme(evidence, j)).collect();
     }
     let of = |j: usize| {
-        let all: Vec<f64> = errors[j].iter().flatten().flatten().copied().collect();
-        dropouts::dropouts_of(judgement, j, &errors[j]).or_else(|| outliers_of(judgement, j, &all))
+        let all: Vec<f64> = evidence.first_errors().iter().flat_map(|one| &one[j]).flatten().copied().collect();
+        dropouts::dropouts_of(evidence, j).or_else(|| outliers_of(evidence, j, &all))
     };
     let of = |j: usize| if heavy[j] { of(j) } else { None };
-    (0..objective.outputs()).filter_map(|j| of(j).or_else(|| largest::extreme(judgement, j))).collect()
+    (0..objective.outputs()).filter_map(|j| of(j).or_else(|| extreme(evidence, j))).collect()
 }
 
-fn outliers_of(judgement: &Judgement<'_>, j: usize, errors: &[f64]) -> Option<Warning> {
+fn outliers_of(evidence: &Evidence<'_>, j: usize, errors: &[f64]) -> Option<Warning> {
     let (count, share) = far_errors(errors)?;
-    let output = &judgement.objective.problem.layout().outputs[j].name;
+    let output = &evidence.point.objective.problem.layout().outputs[j].name;
     let text = format!(
         "{} of the errors of `{output}` are beyond {FAR} robust standard deviations, of all and of their neighbors, and make {} of the sum of squares: outliers, \
          or moments that the model misses; take a robust loss (Huber, Tukey), or mark these samples as missing",
@@ -54,6 +52,32 @@ fn outliers_of(judgement: &Judgement<'_>, j: usize, errors: &[f64]) -> Option<Wa
     );
     let severity = if share > DECIDE { Severity::UsableWithCare } else { Severity::Usable };
     Some(Warning { severity, ..care(WarningCode::Outliers, text) })
+}
+
+/// The largest error of an output, if normal ones are hardly so large.
+fn extreme(evidence: &Evidence<'_>, j: usize) -> Option<Warning> {
+    let (fit, largest) = (&evidence.residuals.outputs[j], evidence.residuals.largest[j]);
+    let count = fit.samples as f64;
+    if fit.rmse <= 0.0 || evidence.point.is_exact() {
+        return None;
+    }
+    // Errors that are divided by their predicted deviations.
+    let rmse = if evidence.point.objective.sweep.predicts_variance() { 1.0 } else { fit.rmse };
+    let (ratio, chance) = chance(largest.error, rmse, count);
+    if !ratio.is_finite() || chance >= LEVEL {
+        return None;
+    }
+    let problem = evidence.point.objective.problem;
+    let text = format!(
+        "the error of `{}` at t = {} s of `{}` is {} times the deviation of all others ({} for the largest of {count} normal \
+         errors): look at this measurement, and mark it as missing if it is wrong",
+        problem.layout().outputs[j].name,
+        exact(problem.records[largest.experiment].time(largest.sample)),
+        problem.unknowns.labels[largest.experiment],
+        number(ratio, 3),
+        p_value(chance)
+    );
+    Some(Warning { code: WarningCode::Outliers, severity: Severity::Usable, text })
 }
 
 /// How many errors are far from the others and from their neighbors, and their part of the sum of squares, if it is no little.

@@ -7,10 +7,11 @@
 
 mod left;
 
-use super::conclude::Judgement;
-use super::directions;
 use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::information::{Block, Information};
+use crate::judge::directions;
+use crate::judge::evidence::Evidence;
+use crate::judge::evidence::powers::COMPARED;
 use crate::numeral::{number, p_value, percent};
 use crate::optimize::{Linearization, Severity};
 use crate::problem::{Accumulate, Objective, Role};
@@ -19,15 +20,13 @@ use crate::whiteness::chi_squared_tail;
 use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Level of the test.
-pub(super) const LEVEL: f64 = 1e-4;
+pub(crate) const LEVEL: f64 = 1e-4;
 /// A parameter is named if its values from two parts of the data differ by more than this many standard errors, where the test above
 /// has found a difference. If they differ by more than the second (relative), the estimate is not usable.
 const APART: f64 = 3.0;
 const FAR_APART: f64 = 0.25;
 /// Rows that are absorbed together.
 const ROWS: usize = 256;
-/// More records than these are not compared one by one.
-pub(super) const RECORDS: usize = 12;
 /// More unknowns than these are not compared: the triangles of all parts are kept.
 const MOST: usize = 200;
 
@@ -138,21 +137,25 @@ struct Piece {
 /// Whether parts of the data are compared, which takes slopes: where errors are correlated over time or with the prediction. Always of
 /// filters, which estimate what contradicts them as process noise, so that their errors stay white; of static models, whose
 /// samples have no order; and with a loss, weights or restarts, where errors are not tested against powers of the prediction.
-fn is_suspicious(judgement: &Judgement<'_>) -> bool {
-    let least = judgement.residuals.shape.iter().copied().fold(judgement.residuals.parts, f64::min);
-    let follow = least * (judgement.objective.outputs() as f64) < LEVEL && !judgement.rounding;
-    let unseen = judgement.residuals.shape.is_empty() && !judgement.rounding;
-    follow || unseen || judgement.is_colored() || judgement.is_static() || judgement.objective.sweep.predicts_variance()
+fn is_suspicious(evidence: &Evidence<'_>) -> bool {
+    let least = evidence.residuals.shape.iter().copied().fold(evidence.residuals.parts, f64::min);
+    let follow = least * (evidence.point.objective.outputs() as f64) < LEVEL && !evidence.rounding;
+    let unseen = evidence.residuals.shape.is_empty() && !evidence.rounding;
+    follow
+        || unseen
+        || evidence.is_colored()
+        || evidence.point.is_static()
+        || evidence.point.objective.sweep.predicts_variance()
 }
 
 /// Parameters that differ between outputs, records or halves of the data.
-pub(super) fn contradictions(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
-    let objective = judgement.objective;
+pub(crate) fn contradictions(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
+    let objective = evidence.point.objective;
     let possible = objective.problem.settings.prefilter.is_none()
         && unknowns.len() <= MOST
-        && judgement.degrees > 0.0
-        && judgement.end.outcome.converged();
-    if !possible || !is_suspicious(judgement) {
+        && evidence.point.degrees > 0.0
+        && evidence.point.end.outcome.converged();
+    if !possible || !is_suspicious(evidence) {
         return vec![];
     }
     let diagonal = objective.with(crate::problem::Whitening::Diagonal(objective.whitening.sigma()));
@@ -162,40 +165,40 @@ pub(super) fn contradictions(judgement: &Judgement<'_>, unknowns: &[Unknown]) ->
         let of = (0..objective.outputs()).map(halves).collect();
         Halves { objective, experiment: e, of, row: vec![0.0; columns] }
     };
-    let Ok(mut all) = diagonal.gather(&judgement.end.coordinates, true, make) else { return vec![] };
+    let Ok(mut all) = diagonal.gather(&evidence.point.end.coordinates, true, make) else { return vec![] };
     all.iter_mut().flat_map(|halves| &mut halves.of).flatten().for_each(|part| part.triangle.absorb(&mut part.block));
     let mut kinds: Vec<(WarningCode, Vec<Rows>)> = vec![];
-    if (2..=RECORDS).contains(&all.len()) {
+    if (2..=COMPARED).contains(&all.len()) {
         kinds.push((WarningCode::RecordsContradict, (0..all.len()).map(Rows::Record).collect()));
     }
     if objective.outputs() > 1 {
         kinds.push((WarningCode::OutputsContradict, (0..objective.outputs()).map(Rows::Output).collect()));
     }
-    if !judgement.is_static() {
+    if !evidence.point.is_static() {
         kinds.push((WarningCode::HalvesContradict, (0..2).map(Rows::Half).collect()));
     }
     let of = |(code, rows): (WarningCode, Vec<Rows>)| {
-        let mut pieces: Vec<Piece> = rows.into_iter().filter_map(|rows| piece(judgement, &all, rows)).collect();
-        compared(judgement, &pieces, unknowns)?;
+        let mut pieces: Vec<Piece> = rows.into_iter().filter_map(|rows| piece(evidence, &all, rows)).collect();
+        compared(evidence, &pieces, unknowns)?;
         // Only now, since it takes another pass. Samples of static models have no order.
-        if !judgement.is_static() {
-            let dependences = left::dependences(&diagonal, &judgement.end.coordinates, &pieces)?;
+        if !evidence.point.is_static() {
+            let dependences = left::dependences(&diagonal, &evidence.point.end.coordinates, &pieces)?;
             pieces.iter_mut().zip(dependences).for_each(|(piece, of_errors)| piece.dependence *= of_errors);
         }
-        Some(warning(judgement, &pieces, unknowns, code, compared(judgement, &pieces, unknowns)?))
+        Some(warning(evidence, &pieces, unknowns, code, compared(evidence, &pieces, unknowns)?))
     };
     kinds.into_iter().filter_map(of).collect()
 }
 
 /// The triangles of chosen experiments, outputs and halves, those of each output divided by the noise that is left when
 /// its own step is taken.
-fn piece(judgement: &Judgement<'_>, all: &[Halves<'_>], rows: Rows) -> Option<Piece> {
-    let shared = judgement.objective.problem.unknowns.shared();
-    let held = &judgement.undetermined.held;
-    let predicted = judgement.objective.sweep.predicts_variance();
+fn piece(evidence: &Evidence<'_>, all: &[Halves<'_>], rows: Rows) -> Option<Piece> {
+    let shared = evidence.point.objective.problem.unknowns.shared();
+    let held = &evidence.point.undetermined.held;
+    let predicted = evidence.point.objective.sweep.predicts_variance();
     let empty = || all.iter().map(|halves| Information::new(halves.row.len())).collect::<Vec<_>>();
     let (mut merged, mut dependence) = (empty(), 1.0f64);
-    for j in 0..judgement.objective.outputs() {
+    for j in 0..evidence.point.objective.outputs() {
         let (mut triangles, mut squares, mut fourths, mut count) = (empty(), 0.0, 0.0, 0);
         for (e, halves) in all.iter().enumerate() {
             for (_, part) in halves.of[j].iter().enumerate().filter(|(h, _)| rows.contain(e, j, *h)) {
@@ -221,7 +224,7 @@ fn piece(judgement: &Judgement<'_>, all: &[Halves<'_>], rows: Rows) -> Option<Pi
         for (all, (triangle, _)) in merged.iter_mut().zip(linear.columns()) {
             all.merge(&scaled(triangle, variance.sqrt().recip()));
         }
-        if predicted || judgement.objective.is_weighted() {
+        if predicted || evidence.point.objective.is_weighted() {
             // Squares of errors with heavy tails, or of several sizes, vary more than those of normal ones.
             dependence = dependence.max(0.5 * (count as f64 * fourths / (squares * squares) - 1.0));
         }
@@ -237,15 +240,15 @@ struct Difference {
 }
 
 /// Whether pieces follow one set of parameters.
-fn compared(judgement: &Judgement<'_>, pieces: &[Piece], unknowns: &[Unknown]) -> Option<Difference> {
+fn compared(evidence: &Evidence<'_>, pieces: &[Piece], unknowns: &[Unknown]) -> Option<Difference> {
     let first = pieces.first().filter(|_| pieces.len() > 1)?;
     let dependence = pieces.iter().map(|piece| piece.dependence).fold(1.0, f64::max);
-    let shared = judgement.objective.problem.unknowns.shared();
+    let shared = evidence.point.objective.problem.unknowns.shared();
     let mut whole: Vec<Information> = first.linear.columns().map(|(triangle, _)| triangle.clone()).collect();
     for piece in &pieces[1..] {
         whole.iter_mut().zip(piece.linear.columns()).for_each(|(all, (one, _))| all.merge(one));
     }
-    let whole = Piece::new(first.rows, Linearization::new(0.0, shared, whole), &judgement.undetermined.held, 1.0)?;
+    let whole = Piece::new(first.rows, Linearization::new(0.0, shared, whole), &evidence.point.undetermined.held, 1.0)?;
     let free = |piece: &Piece| piece.held.iter().filter(|held| !**held).count() as f64;
     let degrees = pieces.iter().map(free).sum::<f64>() - free(&whole);
     let gain = pieces.iter().map(|piece| piece.gain).sum::<f64>() - whole.gain;
@@ -255,15 +258,15 @@ fn compared(judgement: &Judgement<'_>, pieces: &[Piece], unknowns: &[Unknown]) -
 }
 
 fn warning(
-    judgement: &Judgement<'_>,
+    evidence: &Evidence<'_>,
     pieces: &[Piece],
     unknowns: &[Unknown],
     code: WarningCode,
     difference: Difference,
 ) -> Warning {
-    let problem = judgement.objective.problem;
+    let problem = evidence.point.objective.problem;
     let Difference { chance, unknown: i, pieces: [a, b] } = difference;
-    let (unknown, slope) = (&unknowns[i], judgement.slopes[i]);
+    let (unknown, slope) = (&unknowns[i], evidence.point.slopes[i]);
     let value = |piece: &Piece| unknown.value + slope * piece.step[i];
     let error = |piece: &Piece| {
         let unit = piece.linear.covariance(&piece.held).map_or(f64::NAN, |covariance| covariance.standard_error(i));

@@ -1,8 +1,8 @@
 //! How the cost rises away from the minimum, against what the slopes at the minimum say.
 
-use super::conclude::Judgement;
-use super::covariances::Covariances;
-use super::directions;
+use crate::judge::covariances::Covariances;
+use crate::judge::directions;
+use crate::judge::evidence::Evidence;
 use crate::problem::Objective;
 
 /// Steps of the other unknowns; each takes two passes over the data. Where a model is close to linear none is taken.
@@ -14,7 +14,7 @@ const PARTS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
 
 /// Where the rise of the cost is looked at.
 #[derive(Clone, Copy)]
-pub(super) struct Place {
+pub(crate) struct Place {
     pub unknown: usize,
     /// Standard errors from the estimate.
     pub standard_errors: f64,
@@ -23,12 +23,12 @@ pub(super) struct Place {
 }
 
 /// The place of these where the rise of the cost is least, of those where it is little, and the part that it is of what the slopes say.
-pub(super) fn least_rise(
-    judgement: &Judgement<'_>,
+pub(crate) fn least_rise(
+    evidence: &Evidence<'_>,
     places: impl Iterator<Item = Place>,
     covariances: &Covariances,
 ) -> Option<(Place, f64)> {
-    let of = |place: Place| Some((place, rise(judgement, place, covariances)?));
+    let of = |place: Place| Some((place, rise(evidence, place, covariances)?));
     let little = places.filter_map(of).filter(|(place, part)| *part < place.little);
     little.min_by(|a, b| (a.1 / a.0.little).total_cmp(&(b.1 / b.0.little)))
 }
@@ -36,18 +36,19 @@ pub(super) fn least_rise(
 /// The rise of the cost at a place of one unknown, relative to what the slopes say. The other unknowns
 /// are moved by the slopes at the estimate, then towards the least cost there, as far as that tells a little rise from another. `None`
 /// outside of bounds, or where there is no prediction.
-fn rise(judgement: &Judgement<'_>, at: Place, covariances: &Covariances) -> Option<f64> {
+fn rise(evidence: &Evidence<'_>, at: Place, covariances: &Covariances) -> Option<f64> {
     let Place { unknown: i, standard_errors, little } = at;
-    let objective = judgement.objective;
+    let objective = evidence.point.objective;
     // The others follow by the curvature of the cost, not by a covariance that counts colored errors.
-    let unit = judgement.linear.covariance(&judgement.exact)?;
-    let shift = standard_errors * covariances.unknowns.as_ref()?.standard_error(i) / judgement.slopes[i];
-    let along = |j: usize| if judgement.exact[j] { 0.0 } else { shift * unit.get(j, i) / unit.get(i, i) };
-    let step: Vec<f64> = (0..judgement.slopes.len()).map(along).collect();
-    let expected = -judgement.linear.predicted_reduction(&step);
-    let mut held = judgement.exact.clone();
+    let unit = evidence.unit()?;
+    let shift = standard_errors * covariances.unknowns.as_ref()?.standard_error(i) / evidence.point.slopes[i];
+    let along =
+        |j: usize| if evidence.point.held_for_covariance[j] { 0.0 } else { shift * unit.get(j, i) / unit.get(i, i) };
+    let step: Vec<f64> = (0..evidence.point.slopes.len()).map(along).collect();
+    let expected = -evidence.point.linear.predicted_reduction(&step);
+    let mut held = evidence.point.held_for_covariance.clone();
     held[i] = true;
-    let mut place = moved(&judgement.end.coordinates, &step, 1.0);
+    let mut place = moved(&evidence.point.end.coordinates, &step, 1.0);
     if !is_inside(objective, &place) {
         return None;
     }
@@ -56,13 +57,13 @@ fn rise(judgement: &Judgement<'_>, at: Place, covariances: &Covariances) -> Opti
         let held = directions::undetermined(&there, &held).held;
         let step = there.step(&vec![0.0; held.len()], &held);
         let gains = |step: &Vec<f64>| there.predicted_reduction(step) > SETTLED * expected;
-        let is_little = there.cost - judgement.linear.cost < little * expected;
+        let is_little = there.cost - evidence.point.linear.cost < little * expected;
         let Some(step) = step.filter(|step| !is_little && gains(step)) else { break };
         let Some(lower) = lower(objective, &place, there.cost, &step) else { break };
         there = objective.evaluate(&lower).ok()?;
         place = lower;
     }
-    Some((there.cost - judgement.linear.cost) / expected).filter(|part| part.is_finite() && expected > 0.0)
+    Some((there.cost - evidence.point.linear.cost) / expected).filter(|part| part.is_finite() && expected > 0.0)
 }
 
 /// A place along a step where the cost is lower.

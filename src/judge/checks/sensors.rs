@@ -9,12 +9,12 @@ mod confirm;
 mod cut_off;
 mod rows;
 
-use super::conclude::Judgement;
-use super::directions;
-use super::sandwich::prior_row;
 use crate::estimate::student::two_sided;
 use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::information::Information;
+use crate::judge::directions;
+use crate::judge::evidence::Evidence;
+use crate::judge::leverage::prior_row;
 use crate::numeral::{number, p_value, percent};
 use crate::optimize::{Linearization, Severity};
 use crate::problem::{Objective, Role, Whitening};
@@ -48,21 +48,21 @@ struct Released {
 
 /// The slopes at the estimate, with the regressors of each output behind the shared unknowns.
 struct Extended<'j> {
-    judgement: &'j Judgement<'j>,
+    evidence: &'j Evidence<'j>,
     objective: Objective<'j>,
     linear: Linearization,
 }
 
 /// What is wrong with outputs, or may be.
-pub(super) fn sensors(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
-    let settings = &judgement.objective.problem.settings;
+pub(crate) fn sensors(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
+    let settings = &evidence.point.objective.problem.settings;
     let possible = settings.prefilter.is_none()
-        && judgement.objective.sweep.restarts().is_none()
+        && evidence.point.objective.sweep.restarts().is_none()
         && unknowns.len() <= MOST
-        && judgement.degrees > 1.0
-        && !judgement.rounding
-        && judgement.end.outcome.converged();
-    let Some(extended) = possible.then(|| Extended::new(judgement)).flatten() else { return vec![] };
+        && evidence.point.degrees > 1.0
+        && !evidence.rounding
+        && evidence.point.end.outcome.converged();
+    let Some(extended) = possible.then(|| Extended::new(evidence)).flatten() else { return vec![] };
     match extended.contradicts(unknowns) {
         Some(warning) => vec![warning],
         None => extended.cut_off(unknowns),
@@ -70,21 +70,21 @@ pub(super) fn sensors(judgement: &Judgement<'_>, unknowns: &[Unknown]) -> Vec<Wa
 }
 
 impl<'j> Extended<'j> {
-    fn new(judgement: &'j Judgement<'j>) -> Option<Self> {
+    fn new(evidence: &'j Evidence<'j>) -> Option<Self> {
         // Rows of single outputs.
-        let sigma = Whitening::Diagonal(judgement.objective.whitening.sigma());
-        let objective = judgement.objective.with(sigma);
+        let sigma = Whitening::Diagonal(evidence.point.objective.whitening.sigma());
+        let objective = evidence.point.objective.with(sigma);
         let outputs = objective.outputs();
         let make = |e: usize| Triangle::new(&objective, e);
-        let all = objective.gather(&judgement.end.coordinates, true, make).ok()?;
+        let all = objective.gather(&evidence.point.end.coordinates, true, make).ok()?;
         let mut triangles: Vec<Information> = all.into_iter().map(Triangle::of_all_outputs).collect();
         let unknowns = &objective.problem.unknowns;
-        for (i, slope, error) in unknowns.priors(&judgement.end.coordinates) {
+        for (i, slope, error) in unknowns.priors(&evidence.point.end.coordinates) {
             let e = unknowns.row[i].experiment.unwrap_or(0);
             triangles[e].absorb_row(&prior_row(&objective, e, i, slope), error);
         }
         let linear = Linearization::new(0.0, unknowns.shared() + outputs * KINDS, triangles);
-        Some(Extended { judgement, linear, objective })
+        Some(Extended { evidence, linear, objective })
     }
 
     /// What most certainly is wrong with an output.
@@ -120,13 +120,13 @@ impl<'j> Extended<'j> {
     /// Whether an output has noise to tell it by, and its samples an order where it is asked for a delay.
     fn is_examined(&self, number: usize) -> bool {
         let (j, kind) = (number / KINDS, Kind::ALL[number % KINDS]);
-        !(self.judgement.rounded[j] || kind == Kind::Delay && self.judgement.is_static())
+        !(self.evidence.rounded[j] || kind == Kind::Delay && self.evidence.point.is_static())
     }
 
     /// Which unknowns and regressors are held, one of the latter released.
     fn held(&self, released: Option<usize>) -> Vec<bool> {
         let mut held = vec![true; self.linear.unknowns()];
-        for (unknown, of_unknown) in self.judgement.undetermined.held.iter().enumerate() {
+        for (unknown, of_unknown) in self.evidence.point.undetermined.held.iter().enumerate() {
             held[self.place_of(unknown)] = *of_unknown;
         }
         if let Some(number) = released {
@@ -155,7 +155,7 @@ impl<'j> Extended<'j> {
 
     /// Degrees of freedom with a regressor.
     fn degrees(&self) -> f64 {
-        self.judgement.degrees - 1.0
+        self.evidence.point.degrees - 1.0
     }
 
     fn warning(&self, found: &[Released], chance: f64, unknowns: &[Unknown]) -> Warning {
@@ -204,7 +204,7 @@ impl<'j> Extended<'j> {
         let moves = |i: usize| {
             let unknown = &unknowns[i];
             let error = unknown.knowledge.standard_error().filter(|_| matches!(unknown.role, Role::Parameter(_)))?;
-            let by = self.judgement.slopes[i] * step[self.place_of(i)];
+            let by = self.evidence.point.slopes[i] * step[self.place_of(i)];
             (unknown.value != 0.0).then_some((&*unknown.name, (by / unknown.value).abs(), (by / error).abs()))
         };
         (0..unknowns.len()).filter_map(moves).max_by(|a, b| a.2.total_cmp(&b.2))

@@ -3,14 +3,13 @@
 //! The errors of a static model are white in order of an input's size, whatever the order of the samples in time. Those of any model
 //! are uncorrelated with powers of its prediction, and with the inputs of the samples before.
 
-use super::color;
-use super::conclude::Judgement;
-use super::errors::{RECORDS, first_errors};
-use super::inputs_before::by_inputs_before;
-use super::powers::{SHAPE, Scale, scales};
-use super::products::Products;
-use super::whiteness::{LAGS, Whiteness};
 use crate::estimate::{Warning, WarningCode};
+use crate::judge::checks::inputs_before::by_inputs_before;
+use crate::judge::evidence::Evidence;
+use crate::judge::evidence::color;
+use crate::judge::evidence::powers::{SHAPE, Scale, scales};
+use crate::judge::evidence::products::Products;
+use crate::judge::evidence::whiteness::{LAGS, Whiteness};
 use crate::numeral::{p_value, percent};
 use crate::optimize::Outcome;
 use crate::problem::Accumulate;
@@ -19,21 +18,20 @@ use crate::sweep::Window;
 use crate::whiteness::Portmanteau;
 
 /// Whether the model certainly has the wrong shape.
-pub(super) fn shape(judgement: &Judgement<'_>) -> Option<Warning> {
-    by_inputs(judgement).or_else(|| by_inputs_before(judgement)).or_else(|| by_predictions(judgement))
+pub(crate) fn shape(evidence: &Evidence<'_>) -> Option<Warning> {
+    by_inputs(evidence).or_else(|| by_inputs_before(evidence)).or_else(|| by_predictions(evidence))
 }
 
 /// The output and the input that it certainly depends on otherwise than the model says; of several those with the largest part of the
 /// errors.
-fn by_inputs(judgement: &Judgement<'_>) -> Option<Warning> {
-    let objective = judgement.objective;
+fn by_inputs(evidence: &Evidence<'_>) -> Option<Warning> {
+    let objective = evidence.point.objective;
     let (layout, count) = (objective.problem.layout(), objective.outputs());
-    if !judgement.is_static() {
+    if !evidence.point.is_static() {
         return None;
     }
     let mut sums = vec![(Portmanteau::new(LAGS), 0); count * layout.inputs.len()];
-    for e in 0..objective.experiments().min(RECORDS) {
-        let errors = first_errors(judgement, e);
+    for (e, errors) in evidence.first_errors().iter().enumerate() {
         for (i, input) in objective.problem.records[e].inputs().iter().enumerate() {
             let mut order: Vec<usize> = (0..errors[0].len()).collect();
             order.sort_by(|a, b| input.values[*a].total_cmp(&input.values[*b]));
@@ -52,7 +50,7 @@ fn by_inputs(judgement: &Judgement<'_>) -> Option<Warning> {
     let more = |a: &usize, b: &usize| white[*a].predicted.total_cmp(&white[*b].predicted);
     let number = (0..white.len()).filter(|number| chance(*number) < color::CERTAIN).max_by(more)?;
     let (i, j, chance) = (number / count, number % count, chance(number));
-    let part = judgement.colored(j, &white[number]);
+    let part = evidence.colored(j, &white[number]);
     (part > color::SMALL).then(|| {
         let text = format!(
             "the errors of `{}` follow from the input `{}` ({} in order of its size): the model has the wrong shape, by {} of \
@@ -68,12 +66,12 @@ fn by_inputs(judgement: &Judgement<'_>) -> Option<Warning> {
 
 /// The output whose errors certainly follow from its prediction; of several that with the largest part of what it moves. White errors
 /// only: correlated ones follow from a prediction that is as slow as they are.
-fn by_predictions(judgement: &Judgement<'_>) -> Option<Warning> {
-    let (objective, chances) = (judgement.objective, &judgement.residuals.shape);
+fn by_predictions(evidence: &Evidence<'_>) -> Option<Warning> {
+    let (objective, chances) = (evidence.point.objective, &evidence.residuals.shape);
     let count = chances.len() as f64;
     let suspicious = chances.iter().any(|chance| chance * count < color::CERTAIN);
-    let examined = suspicious && !judgement.rounding && judgement.end.outcome != Outcome::Exact;
-    if !examined || judgement.autocorrelated_at(color::CERTAIN).is_some() {
+    let examined = suspicious && !evidence.rounding && !evidence.point.is_exact();
+    if !examined || evidence.autocorrelated_at(color::CERTAIN).is_some() {
         return None;
     }
     let scales = scales(objective);
@@ -82,15 +80,15 @@ fn by_predictions(judgement: &Judgement<'_>) -> Option<Warning> {
         scales: &scales,
         sums: vec![Products::default(); scales.len()],
     };
-    let all = objective.in_units().gather(&judgement.end.coordinates, false, make).ok()?;
+    let all = objective.in_units().gather(&evidence.point.end.coordinates, false, make).ok()?;
     let mut sums = vec![Products::default(); scales.len()];
     for one in all {
         sums.iter_mut().zip(&one.sums).for_each(|(sum, own)| sum.append(own));
     }
     let of = |j: usize| {
         let (part, chance) =
-            (sums[j].explained_part() * judgement.residuals.outputs[j].rmse, sums[j].by_chance() * count);
-        (j, part / judgement.residuals.levels[j].1, chance)
+            (sums[j].explained_part() * evidence.residuals.outputs[j].rmse, sums[j].by_chance() * count);
+        (j, part / evidence.residuals.levels[j].1, chance)
     };
     let (j, part, chance) =
         (0..sums.len()).map(of).filter(|(.., chance)| *chance < color::CERTAIN).max_by(|a, b| a.1.total_cmp(&b.1))?;

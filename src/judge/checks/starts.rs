@@ -14,7 +14,7 @@ const MANY: u64 = 8;
 /// Warnings about an estimate that is the best end of these searches, with errors that are colored or not. Where searches were not asked
 /// for, a minimum that is found once lowers the verdict no more than one that is found without other searches does. But one that is found
 /// once by many searches and leaves colored errors is seldom the right one: what is colored there is what the model does not explain.
-pub(super) fn warnings(starts: &Starts, measurements: u64, asked: bool, colored: bool) -> Vec<Warning> {
+pub(crate) fn warnings(starts: &Starts, measurements: u64, asked: bool, colored: bool) -> Vec<Warning> {
     let Starts { tried, agreed, minima, declared, failed, .. } = starts;
     let mut warnings = vec![];
     if *agreed == 1 && *tried > 1 {

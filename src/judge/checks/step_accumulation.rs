@@ -4,8 +4,8 @@
 //! end of a window persists in the next ones until the state has decayed: the phase errors of a resonator of high quality add up over the
 //! whole record.
 
-use super::aliases::{eigenvalues, some};
-use super::conclude::Judgement;
+use crate::judge::evidence::Evidence;
+use crate::judge::evidence::modes::{eigenvalues, some};
 use crate::record::{Record, Time};
 
 /// Samples of the shortest windows that are compared.
@@ -13,13 +13,13 @@ const WINDOW: f64 = 64.0;
 
 /// An upper bound of the ratio of the whole record's differences to those within windows, from the slowest decay of the state at some
 /// points along the records. One for predictions that restart.
-pub(super) fn windows_add_up(judgement: &Judgement<'_>) -> f64 {
-    let objective = judgement.objective;
+pub(crate) fn windows_add_up(evidence: &Evidence<'_>) -> f64 {
+    let objective = evidence.point.objective;
     if objective.sweep.restarts().is_some() {
         return 1.0;
     }
-    let of = |point| eigenvalues(objective, &judgement.end.coordinates, point);
-    let slowest = some(&judgement.residuals.points).filter_map(of).flatten().map(|value| value.re).reduce(f64::max);
+    let of = |point| eigenvalues(objective, &evidence.point.end.coordinates, point);
+    let slowest = some(&evidence.residuals.points).filter_map(of).flatten().map(|value| value.re).reduce(f64::max);
     let Some(decay) = slowest else { return 1.0 };
     let records = objective.problem.records.iter();
     records.map(|record| sum(decay * WINDOW * interval(record), record.len() as f64 / WINDOW)).fold(1.0, f64::max)

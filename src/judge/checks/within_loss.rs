@@ -3,8 +3,8 @@
 //! The curvature of the cost is the mean of `psi'` over all errors times that of the squares. With a constant far below the noise few
 //! errors are within it, or positive and negative slopes cancel: then the mean depends on few errors, and so do the standard errors.
 
-use super::conclude::Judgement;
 use crate::estimate::{Warning, WarningCode};
+use crate::judge::evidence::Evidence;
 use crate::numeral::percent;
 use crate::optimize::Severity;
 use crate::problem::{Accumulate, Objective};
@@ -48,11 +48,11 @@ impl Accumulate for Slopes<'_> {
 }
 
 /// A warning of a loss whose mean curvature at these errors is too uncertain for standard errors.
-pub(super) fn few_within_the_loss(judgement: &Judgement<'_>) -> Option<Warning> {
-    let objective = judgement.objective;
+pub(crate) fn few_within_the_loss(evidence: &Evidence<'_>) -> Option<Warning> {
+    let objective = evidence.point.objective;
     objective.loss()?;
     let new = |experiment: usize| Slopes { objective, experiment, sum: 0.0, squares: 0.0, count: 0.0 };
-    let all = objective.gather(&judgement.end.coordinates, false, new).ok()?;
+    let all = objective.gather(&evidence.point.end.coordinates, false, new).ok()?;
     let total = |of: fn(&Slopes<'_>) -> f64| all.iter().map(of).sum::<f64>();
     let (sum, squares, count) = (total(|one| one.sum), total(|one| one.squares), total(|one| one.count));
     if sum / count >= NARROW {

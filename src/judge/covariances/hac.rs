@@ -18,10 +18,11 @@ mod joined;
 mod scores;
 mod stationary;
 
-use super::sandwich::{self, Sandwich};
-use super::shares::Largest;
-use super::sizes::Sizes;
 use crate::information::{Covariance, Information};
+use crate::judge::covariances::sandwich::{self, Sandwich};
+use crate::judge::evidence::shares::Largest;
+use crate::judge::evidence::sizes::Sizes;
+use crate::judge::leverage::{of_experiment, prior_row};
 use crate::optimize::Linearization;
 use crate::problem::{Objective, each};
 use joined::joined;
@@ -45,9 +46,9 @@ pub(crate) struct Hac {
     /// The same with the scores of stationary errors, if they have such.
     stationary: Option<Sandwich>,
     /// The largest shares of measurements in the variances of white errors.
-    pub(super) shares: Option<Vec<Largest>>,
+    pub(crate) shares: Option<Vec<Largest>>,
     /// The sizes of the errors that have them.
-    pub(super) sizes: Option<Sizes>,
+    pub(crate) sizes: Option<Sizes>,
     pub lags: usize,
     runs: Vec<LongRun>,
 }
@@ -69,13 +70,13 @@ pub(crate) fn hac(
         columns.filter(|(_, i)| !held[*i]).map(|(c, _)| c).collect()
     };
     let runs = each(objective.experiments(), |e| {
-        LongRun::of(objective, e, coordinates, (kept(e), sandwich::of_experiment(objective, inverse, e)))
+        LongRun::of(objective, e, coordinates, (kept(e), of_experiment(objective, inverse, e)))
     });
     let runs: Vec<LongRun> = runs.into_iter().collect::<Option<_>>()?;
     let with_priors = |mut scores: Vec<Information>| {
         for (i, slope, _) in unknowns.priors(coordinates) {
             let e = unknowns.row[i].experiment.unwrap_or(0);
-            scores[e].absorb_row(&sandwich::prior_row(objective, e, i, slope), 0.0);
+            scores[e].absorb_row(&prior_row(objective, e, i, slope), 0.0);
         }
         scores
     };

@@ -5,12 +5,8 @@
 //! with `var(v)` by the slopes of `v` along the unknowns, weighed by their covariance (Fai and Cornelius, J. Statistical
 //! Computation and Simulation 54 (1996) 363).
 
-use super::conclude::Judgement;
-use super::covariances::Covariances;
-use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::information::Covariance;
-use crate::numeral::percent;
-use crate::optimize::Severity;
+use crate::judge::point::Point;
 use crate::parameter::{Parameter, Transform};
 use nalgebra::{Cholesky, DMatrix};
 
@@ -20,87 +16,63 @@ const MOST: usize = 12;
 const APART: f64 = 0.5;
 /// The fewest degrees of freedom: below this the approximation is too rough.
 const FEWEST: f64 = 2.0;
-/// Change of the logarithm of an unknown's variance over one standard error of the unknown, from which on a symmetric interval is
-/// named. For a noise level the change is twice its relative standard error, so that 0.3 is 15 % (see docs/intervals.md).
-const UNEVEN: f64 = 0.3;
 
 /// How the variances of the unknowns depend on the unknowns.
-pub(super) struct Dependence {
+pub(crate) struct Dependence {
     /// Degrees of freedom of the variance of each unknown.
     pub degrees: Vec<f64>,
     /// By how much the logarithm of the variance of each unknown grows along one of its own standard errors.
     pub own: Vec<f64>,
 }
 
-impl Judgement<'_> {
-    /// Dependence of the predicted variances; `unit` is the covariance of the unknowns in coordinates.
-    pub(super) fn dependence_of_variances(&self, unit: &Covariance) -> Option<Dependence> {
-        let n = self.slopes.len();
-        let kept: Vec<usize> = (0..n).filter(|&i| !self.exact[i]).collect();
-        if !self.objective.sweep.predicts_variance() || kept.len() > MOST {
-            return None;
-        }
-        let covariance = unit.dense(&kept);
-        let covariance = DMatrix::from_fn(kept.len(), kept.len(), |i, j| covariance[(i, j)]);
-        let directions = Cholesky::new(covariance)?.unpack();
-        let (mut squares, mut own) = (vec![0.0; n], vec![0.0; n]);
-        let here = logarithms(unit, n);
-        for direction in directions.column_iter() {
-            let apart = self.apart(&kept, direction.iter().copied());
-            let beside = |sign: f64| {
-                let mut place = self.end.coordinates.clone();
-                kept.iter().zip(direction.iter()).for_each(|(&i, along)| place[i] += sign * apart * along);
-                self.logarithms_of_variances(&place)
-            };
-            let (above, below) = (beside(1.0), beside(-1.0));
-            for (row, &i) in kept.iter().enumerate() {
-                let of = |place: &Option<Vec<f64>>| place.as_ref().map(|logarithms| logarithms[i]);
-                let slope = slope(of(&above), here[i], of(&below), apart);
-                squares[i] += slope * slope;
-                own[i] += slope * direction[row] / unit.standard_error(i);
-            }
-        }
-        // Places that were not evaluated because of the time say nothing.
-        if self.objective.control.stops() {
-            return None;
-        }
-        let most = self.degrees.max(FEWEST);
-        let degrees = |square: f64| if square.is_finite() { (2.0 / square).clamp(FEWEST, most) } else { FEWEST };
-        Some(Dependence { degrees: squares.into_iter().map(degrees).collect(), own })
+/// Dependence of the predicted variances; `unit` is the covariance of the unknowns in coordinates.
+pub(crate) fn dependence_of_variances(point: &Point<'_>, unit: &Covariance) -> Option<Dependence> {
+    let n = point.slopes.len();
+    let kept: Vec<usize> = (0..n).filter(|&i| !point.held_for_covariance[i]).collect();
+    if !point.objective.sweep.predicts_variance() || kept.len() > MOST {
+        return None;
     }
-
-    /// How far to go along a direction: nine tenths of the way to the nearest bound at most.
-    fn apart(&self, kept: &[usize], direction: impl Iterator<Item = f64>) -> f64 {
-        let least = |apart: f64, (&i, along): (&usize, f64)| {
-            let parameter = &self.objective.problem.unknowns.row[i].parameter;
-            shortened(apart, bounds(parameter), self.end.coordinates[i], along)
+    let covariance = unit.dense(&kept);
+    let covariance = DMatrix::from_fn(kept.len(), kept.len(), |i, j| covariance[(i, j)]);
+    let directions = Cholesky::new(covariance)?.unpack();
+    let (mut squares, mut own) = (vec![0.0; n], vec![0.0; n]);
+    let here = logarithms(unit, n);
+    for direction in directions.column_iter() {
+        let apart = apart(point, &kept, direction.iter().copied());
+        let beside = |sign: f64| {
+            let mut place = point.end.coordinates.clone();
+            kept.iter().zip(direction.iter()).for_each(|(&i, along)| place[i] += sign * apart * along);
+            logarithms_of_variances(point, &place)
         };
-        kept.iter().zip(direction).fold(APART, least)
-    }
-
-    fn logarithms_of_variances(&self, place: &[f64]) -> Option<Vec<f64>> {
-        let covariance = self.objective.evaluate(place).ok()?.covariance(&self.exact)?;
-        Some(logarithms(&covariance, place.len()))
-    }
-
-    /// An unknown, such as a noise level, whose interval should reach further above than below.
-    pub(super) fn uneven(&self, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
-        let eligible =
-            |i: usize| unknowns[i].transform == Transform::Identity && unknowns[i].knowledge.standard_error().is_some();
-        let own = covariances.own.iter().enumerate().filter(|(i, own)| own.is_finite() && eligible(*i));
-        let (i, own) = own.max_by(|a, b| a.1.total_cmp(b.1))?;
-        if *own <= UNEVEN {
-            return None;
+        let (above, below) = (beside(1.0), beside(-1.0));
+        for (row, &i) in kept.iter().enumerate() {
+            let of = |place: &Option<Vec<f64>>| place.as_ref().map(|logarithms| logarithms[i]);
+            let slope = slope(of(&above), here[i], of(&below), apart);
+            squares[i] += slope * slope;
+            own[i] += slope * direction[row] / unit.standard_error(i);
         }
-        let unknown = &unknowns[i];
-        let text = format!(
-            "the standard error of `{}` grows with its value, by {} per standard error: its interval is too short above; \
-             estimate its logarithm (.log())",
-            unknown.name,
-            percent(0.5 * own, 2)
-        );
-        Some(Warning { code: WarningCode::CurvedInterval, severity: Severity::Usable, text })
     }
+    // Places that were not evaluated because of the time say nothing.
+    if point.objective.control.stops() {
+        return None;
+    }
+    let most = point.degrees.max(FEWEST);
+    let degrees = |square: f64| if square.is_finite() { (2.0 / square).clamp(FEWEST, most) } else { FEWEST };
+    Some(Dependence { degrees: squares.into_iter().map(degrees).collect(), own })
+}
+
+/// How far to go along a direction: nine tenths of the way to the nearest bound at most.
+fn apart(point: &Point<'_>, kept: &[usize], direction: impl Iterator<Item = f64>) -> f64 {
+    let least = |apart: f64, (&i, along): (&usize, f64)| {
+        let parameter = &point.objective.problem.unknowns.row[i].parameter;
+        shortened(apart, bounds(parameter), point.end.coordinates[i], along)
+    };
+    kept.iter().zip(direction).fold(APART, least)
+}
+
+fn logarithms_of_variances(point: &Point<'_>, place: &[f64]) -> Option<Vec<f64>> {
+    let covariance = point.objective.evaluate(place).ok()?.covariance(&point.held_for_covariance)?;
+    Some(logarithms(&covariance, place.len()))
 }
 
 /// The logarithms of the variances of so many unknowns.

@@ -12,8 +12,9 @@
 
 mod scores;
 
-use super::shares::{self, Largest, Shares};
 use crate::information::{Block, Covariance, Information};
+use crate::judge::evidence::shares::{self, Largest, Shares};
+use crate::judge::leverage::{form, of_experiment, prior_row};
 use crate::optimize::{Infeasible, Linearization};
 use crate::prefilter::Butterworth;
 use crate::problem::{Accumulate, Objective};
@@ -21,13 +22,11 @@ use crate::sweep::Window;
 use nalgebra::DMatrix;
 use scores::Scores;
 
-/// One less the leverage of a measurement that alone determines an unknown: its error is rounding.
-pub(super) const ALONE: f64 = 1e-6;
 /// Rows that are absorbed together.
 const ROWS: usize = 256;
 
 /// A sandwich covariance.
-pub(super) struct Robust {
+pub(crate) struct Robust {
     /// `None` if it has no number.
     pub covariance: Option<Covariance>,
     /// The largest shares in the variances, which a pre-filter has none of.
@@ -111,24 +110,13 @@ pub(crate) fn is_needed(objective: &Objective<'_>) -> bool {
 }
 
 /// The sandwich over all unknowns that are not held, in two more passes with slopes.
-pub(super) fn sandwich(objective: &Objective<'_>, coordinates: &[f64], held: &[bool]) -> Result<Robust, Infeasible> {
+pub(crate) fn sandwich(objective: &Objective<'_>, coordinates: &[f64], held: &[bool]) -> Result<Robust, Infeasible> {
     Passes { objective, coordinates }.sandwich(held)
 }
 
 /// The curvature for the weights and the loss of a fit, in one pass with slopes; its scores are still missing.
 pub(crate) fn curvature(objective: &Objective<'_>, coordinates: &[f64]) -> Result<Sandwich, Infeasible> {
     Ok(Passes { objective, coordinates }.without_scores()?.0)
-}
-
-/// The row of a prior on unknown `i` among the columns of experiment `e`.
-pub(crate) fn prior_row(objective: &Objective<'_>, e: usize, i: usize, slope: f64) -> Vec<f64> {
-    objective.problem.unknowns.columns(e).map(|c| if c == i { slope } else { 0.0 }).collect()
-}
-
-/// The rows and columns of one experiment.
-pub(super) fn of_experiment(objective: &Objective<'_>, covariance: &Covariance, e: usize) -> DMatrix<f64> {
-    let columns: Vec<usize> = objective.problem.unknowns.columns(e).collect();
-    DMatrix::from(&covariance.dense(&columns))
 }
 
 /// Passes over the data at a point.
@@ -350,13 +338,6 @@ impl Backward<'_> {
         scores.absorb(&mut block);
         (scores, taken)
     }
-}
-
-/// `v' m v`.
-pub(super) fn form(m: &DMatrix<f64>, v: &[f64]) -> f64 {
-    let product =
-        |(column, b): (nalgebra::DVectorView<'_, f64>, &f64)| column.iter().zip(v).map(|(m, a)| m * a).sum::<f64>() * b;
-    m.column_iter().zip(v).map(product).sum()
 }
 
 /// Variance that white noise of variance one has after a filter that was at rest: the sum of the squared impulse

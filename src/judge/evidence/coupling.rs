@@ -1,11 +1,6 @@
 //! Whether the errors of several outputs are correlated at the same sample.
 
-use super::conclude::Judgement;
-use super::whiteness::Whiteness;
-use crate::estimate::{Warning, WarningCode};
-use crate::numeral::{number, p_value};
-use crate::optimize::Severity;
-use crate::problem::{Noise, Whitening};
+use crate::judge::evidence::whiteness::Whiteness;
 use crate::sweep::Window;
 use crate::whiteness::chi_squared_tail;
 use crate::wide::{Terms, Wide, sums};
@@ -32,7 +27,7 @@ impl Pair {
 
 /// `a b`, `a^2`, `b^2` and `(a b)^2` of two errors.
 #[derive(Clone, Copy)]
-pub(super) struct Products;
+pub(crate) struct Products;
 
 impl Terms<2, 4> for Products {
     #[inline(always)]
@@ -44,7 +39,7 @@ impl Terms<2, 4> for Products {
 
 /// The sums of all pairs.
 #[derive(Clone, Debug)]
-pub(super) struct Coupling {
+pub(crate) struct Coupling {
     pairs: Vec<Pair>,
 }
 
@@ -133,34 +128,10 @@ impl Coupling {
     }
 }
 
-impl Judgement<'_> {
-    /// Outputs whose errors are correlated, where the fit took them as independent.
-    pub(super) fn coupled(&self) -> Option<Coupled> {
-        let independent = matches!(self.objective.whitening, Whitening::Diagonal(_));
-        let own = matches!(self.objective.problem.settings.noise, Noise::Predicted);
-        self.residuals.coupled.filter(|_| independent && !own && !self.rounding)
-    }
-
-    /// The warning about correlated outputs: every covariance but the classical one, which is not taken then, allows for them.
-    pub(super) fn correlated_outputs(&self) -> Option<Warning> {
-        let Coupled { outputs: (i, j), correlation, p_value: chance } = self.coupled()?;
-        let outputs = &self.objective.problem.layout().outputs;
-        let text = format!(
-            "the errors of `{}` and `{}` are correlated at the same sample ({}, {}); the estimate does not allow for it, the intervals \
-             do; a full noise covariance (Fit::noise_covariance) weighs them right",
-            outputs[i].name,
-            outputs[j].name,
-            number(correlation, 2),
-            p_value(chance)
-        );
-        Some(Warning { code: WarningCode::CorrelatedOutputs, severity: Severity::Usable, text })
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::whiteness::LAGS;
     use super::*;
+    use crate::judge::evidence::whiteness::LAGS;
 
     const PLAIN: Whiteness =
         Whiteness { p_value: 1.0, correlations: [0.0; LAGS], predicted: 0.0, dependence: 1.0, at_restart: (0.0, 0.0) };

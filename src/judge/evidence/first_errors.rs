@@ -1,25 +1,22 @@
 //! Errors of single experiments at the estimate, for tests that need them sample by sample.
 
-use super::conclude::Judgement;
 use crate::problem::Objective;
 use crate::sweep::Window;
 
 /// Records that are looked at, and samples of each: the first ones.
-pub(super) const RECORDS: usize = 8;
-const SAMPLES: usize = 16_384;
+pub(crate) const RECORDS: usize = 8;
+pub(crate) const SAMPLES: usize = 16_384;
 
-/// The first errors of an experiment, output by output; `None` where nothing was measured.
-pub(super) fn first_errors(judgement: &Judgement<'_>, e: usize) -> Vec<Vec<Option<f64>>> {
-    errors(judgement.objective, &judgement.end.coordinates, e, SAMPLES)
+/// Errors of an experiment, output by output, sample by sample; `None` where nothing was measured.
+pub(crate) type Errors = Vec<Vec<Option<f64>>>;
+
+/// The first errors of the first records.
+pub(crate) fn of_all(objective: &Objective<'_>, coordinates: &[f64]) -> Vec<Errors> {
+    (0..objective.experiments().min(RECORDS)).map(|e| errors(objective, coordinates, e, SAMPLES)).collect()
 }
 
 /// Errors of an experiment, in the units of the outputs, as far as this many samples or somewhat beyond.
-pub(super) fn errors(
-    objective: &Objective<'_>,
-    coordinates: &[f64],
-    e: usize,
-    samples: usize,
-) -> Vec<Vec<Option<f64>>> {
+pub(crate) fn errors(objective: &Objective<'_>, coordinates: &[f64], e: usize, samples: usize) -> Errors {
     let mut errors = vec![vec![]; objective.outputs()];
     let visit = &mut |window: &mut Window| {
         for k in 0..window.samples[0] {

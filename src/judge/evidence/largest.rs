@@ -1,20 +1,13 @@
 //! The largest error of an output, tested against the largest of as many normal ones.
 
-use super::conclude::Judgement;
-use crate::estimate::{Warning, WarningCode};
-use crate::numeral::{exact, number, p_value};
-use crate::optimize::{Outcome, Severity};
 use statrs::distribution::{ContinuousCDF, StudentsT};
-
-/// Level of the test.
-const LEVEL: f64 = 1e-3;
 
 /// An error, and where it is.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Largest {
-    error: f64,
-    experiment: usize,
-    sample: usize,
+    pub error: f64,
+    pub experiment: usize,
+    pub sample: usize,
 }
 
 impl Largest {
@@ -36,37 +29,11 @@ impl Largest {
 
 /// The probability that one of `count` normal errors with this root mean square is as large: Bonferroni's bound with the error
 /// divided by the deviation of all others (Grubbs, Annals of Mathematical Statistics 21 (1950) 27).
-fn chance(error: f64, rmse: f64, count: f64) -> (f64, f64) {
+pub(crate) fn chance(error: f64, rmse: f64, count: f64) -> (f64, f64) {
     let others = ((count * rmse * rmse - error * error) / (count - 1.0)).max(0.0).sqrt();
     let ratio = error.abs() / others;
     let tail = StudentsT::new(0.0, 1.0, count - 1.0).map_or(1.0, |student| student.sf(ratio));
     (ratio, (2.0 * count * tail).min(1.0))
-}
-
-/// The largest error of an output, if normal ones are hardly so large.
-pub(super) fn extreme(judgement: &Judgement<'_>, j: usize) -> Option<Warning> {
-    let (fit, largest) = (&judgement.residuals.outputs[j], judgement.residuals.largest[j]);
-    let count = fit.samples as f64;
-    if fit.rmse <= 0.0 || judgement.end.outcome == Outcome::Exact {
-        return None;
-    }
-    // Errors that are divided by their predicted deviations.
-    let rmse = if judgement.objective.sweep.predicts_variance() { 1.0 } else { fit.rmse };
-    let (ratio, chance) = chance(largest.error, rmse, count);
-    if !ratio.is_finite() || chance >= LEVEL {
-        return None;
-    }
-    let problem = judgement.objective.problem;
-    let text = format!(
-        "the error of `{}` at t = {} s of `{}` is {} times the deviation of all others ({} for the largest of {count} normal \
-         errors): look at this measurement, and mark it as missing if it is wrong",
-        problem.layout().outputs[j].name,
-        exact(problem.records[largest.experiment].time(largest.sample)),
-        problem.unknowns.labels[largest.experiment],
-        number(ratio, 3),
-        p_value(chance)
-    );
-    Some(Warning { code: WarningCode::Outliers, severity: Severity::Usable, text })
 }
 
 #[cfg(test)]
@@ -80,7 +47,7 @@ mod tests {
         let n = 1e7;
         let (ratio, p) = chance(7.0, 1.0, n);
         assert!((ratio - 7.0).abs() < 1e-4 && (p / (2.0 * n * 1.2798e-12) - 1.0).abs() < 1e-3, "{ratio} {p}");
-        assert!(chance(6.3, 1.0, n).1 > LEVEL);
+        assert!(chance(6.3, 1.0, n).1 > 1e-3);
         assert_eq!(chance(2.0, 1.0, 4.0).1, 0.0);
         // Three times the others, of four: beyond 3 and -3 is 2 (1/2 - (sqrt(3)/4 + pi/3) / pi) of Student's t with three degrees.
         let (ratio, p) = chance(-3.0, 3f64.sqrt(), 4.0);

@@ -5,7 +5,7 @@ use crate::wide::{Terms, Wide, sums};
 
 /// Sums over the measurements of an output.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct OutputSums {
+pub(crate) struct OutputSums {
     pub count: u64,
     first: f64,
     sum: f64,

@@ -10,9 +10,11 @@ use crate::wide::{Terms, Wide, sums};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 /// Regressors of a test of shape: a constant and three powers.
-pub(super) const SHAPE: usize = 4;
+pub(crate) const SHAPE: usize = 4;
 /// Regressors of a part of the data: a constant, the prediction, and its change from the sample before.
 const PART: usize = 3;
+/// More records than these are not compared one by one.
+pub(crate) const COMPARED: usize = 12;
 /// With fewer degrees of freedom the errors are not examined: Fisher's distribution is that of normal errors.
 const FEWEST: f64 = 30.0;
 /// A regressor of which less than this part of its square is left beside the others is one of their combinations.
@@ -20,7 +22,7 @@ const ALIKE: f64 = 1e-9;
 
 /// Center and width of a range of predictions, which makes their powers numbers around one.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Scale {
+pub(crate) struct Scale {
     center: f64,
     inverse: f64,
 }
@@ -73,7 +75,7 @@ impl Terms<4, 7> for High {
 
 /// Sums over samples that follow another one.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Powers {
+pub(crate) struct Powers {
     count: f64,
     low: [f64; 8],
     high: [f64; 7],
@@ -131,7 +133,7 @@ impl Powers {
 }
 
 /// The probability that errors of several parts of the data differ as much in how they follow from the prediction.
-pub(super) fn parts_by_chance(parts: &[Powers]) -> f64 {
+pub(crate) fn parts_by_chance(parts: &[Powers]) -> f64 {
     let mut whole = Powers::default();
     let (mut gain, mut degrees, mut free) = (0.0, 0.0, 0.0);
     for part in parts.iter().filter(|part| part.count > 2.0 * PART as f64) {
@@ -159,7 +161,7 @@ fn by_chance(gain: f64, degrees: f64, squares: f64, free: f64) -> f64 {
 
 /// What a regression explains of the errors, and how many of its regressors are no combinations of those before, from their
 /// products among each other and with the errors.
-pub(super) fn explained<const D: usize>(mut gram: [[f64; D]; D], mut right: [f64; D]) -> (f64, f64) {
+pub(crate) fn explained<const D: usize>(mut gram: [[f64; D]; D], mut right: [f64; D]) -> (f64, f64) {
     let (mut gain, mut rank) = (0.0, 0.0);
     let own: [f64; D] = std::array::from_fn(|i| gram[i][i]);
     for i in 0..D {
@@ -180,7 +182,7 @@ pub(super) fn explained<const D: usize>(mut gram: [[f64; D]; D], mut right: [f64
 
 /// The scales of an objective's predictions; none where errors do not have to be uncorrelated with them: with a loss, weights or a
 /// pre-filter, and where predictions restart from measurements with errors of their own.
-pub(super) fn scales(objective: &Objective<'_>) -> Vec<Scale> {
+pub(crate) fn scales(objective: &Objective<'_>) -> Vec<Scale> {
     let all = objective.loss().is_none() && !objective.is_weighted() && objective.problem.settings.prefilter.is_none();
     if !all || objective.sweep.restarts().is_some() {
         return vec![];

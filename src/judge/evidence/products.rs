@@ -1,12 +1,12 @@
 //! Products of errors with what they may follow from.
 
-use super::powers::explained;
 use crate::estimate::student::two_sided;
+use crate::judge::evidence::powers::explained;
 use crate::whiteness::chi_squared_tail;
 
 /// Sums over errors `e` and regressors `z`.
 #[derive(Clone, Copy)]
-pub(super) struct Products<const N: usize> {
+pub(crate) struct Products<const N: usize> {
     regressors: [[f64; N]; N],
     /// Of `e z` and of `e^2 z z'`, which is the covariance of the former, of whatever size the errors are each (White, Econometrica 48
     /// (1980) 817).
@@ -60,7 +60,7 @@ impl<const N: usize> Products<N> {
 
 /// Sums over errors `e` and one regressor `z` that may be zero but for a few samples, such as the steps of an input.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Change {
+pub(crate) struct Change {
     squares: f64,
     fourths: f64,
     product: f64,

@@ -2,16 +2,15 @@
 
 mod experiment;
 
-use super::aliases::Point;
-use super::coupling::Coupled;
-use super::largest::Largest;
-use super::output_sums::OutputSums;
-use super::powers::{Powers, Scale, parts_by_chance, scales};
-use super::step_error::{Compared, step_errors};
-use super::together::RECORDS;
-use super::whiteness::Whiteness;
 use crate::error::Error;
 use crate::estimate::OutputFit;
+use crate::judge::evidence::coupling::Coupled;
+use crate::judge::evidence::largest::Largest;
+use crate::judge::evidence::modes::StateAt;
+use crate::judge::evidence::output_sums::OutputSums;
+use crate::judge::evidence::powers::{COMPARED, Powers, Scale, parts_by_chance, scales};
+use crate::judge::evidence::step_error::{Compared, step_errors};
+use crate::judge::evidence::whiteness::Whiteness;
 use crate::optimize::Infeasible;
 use crate::problem::noise::REPRODUCED;
 use crate::problem::{At, Objective, gather_together};
@@ -30,7 +29,7 @@ pub(crate) struct Residuals {
     /// standardized predictions, extrapolated from the windows that were simulated again.
     pub step_error: f64,
     /// Some points along the records, their begins first.
-    pub points: Vec<Point>,
+    pub points: Vec<StateAt>,
     /// The whiteness of each output's errors.
     pub whiteness: Vec<Whiteness>,
     /// Outputs whose errors are correlated at the same sample, if there are such.
@@ -79,7 +78,7 @@ fn parts(all: &[Sums<'_>]) -> f64 {
     };
     let of = |j: usize| {
         let halves = parts_by_chance(&[half(j, 0), half(j, 1)]);
-        let several = (2..=RECORDS).contains(&all.len());
+        let several = (2..=COMPARED).contains(&all.len());
         let records = || all.iter().map(|one| record(one, j)).collect::<Vec<_>>();
         if several { halves.min(parts_by_chance(&records())) } else { halves }
     };
@@ -172,11 +171,19 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>], s
 }
 
 /// The begins of the records, then some points along them.
-fn points(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -> Vec<Point> {
-    let begin = |e: usize| (e, 0, objective.problem.unknowns.of_experiment(e, coordinates).x);
+fn points(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -> Vec<StateAt> {
+    let begin = |experiment: usize| {
+        let state = objective.problem.unknowns.of_experiment(experiment, coordinates).x;
+        StateAt { experiment, sample: 0, state }
+    };
     let states = objective.problem.layout().states.len();
-    let later = |(e, one): (usize, &Sums<'_>)| -> Vec<Point> {
-        one.points.iter().map(|(begin, carry)| (e, *begin, carry[..states].to_vec())).collect()
+    let later = |(experiment, one): (usize, &Sums<'_>)| -> Vec<StateAt> {
+        let at = |(sample, carry): &(usize, Vec<f64>)| StateAt {
+            experiment,
+            sample: *sample,
+            state: carry[..states].to_vec(),
+        };
+        one.points.iter().map(at).collect()
     };
     (0..all.len()).map(begin).chain(all.iter().enumerate().flat_map(later)).collect()
 }

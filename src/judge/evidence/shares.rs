@@ -7,26 +7,19 @@
 
 mod pass;
 
-use super::conclude::Judgement;
-use super::covariances::Covariances;
-use super::sandwich::{ALONE, of_experiment};
-use super::sizes::Sizes;
-use crate::estimate::{CovarianceMethod, Unknown, Warning, WarningCode};
 use crate::information::Covariance;
-use crate::numeral::{exact, percent};
-use crate::optimize::{Outcome, Severity};
-use crate::problem::{Objective, Role};
+use crate::judge::evidence::sizes::Sizes;
+use crate::judge::leverage::{ALONE, of_experiment};
+use crate::problem::Objective;
 use nalgebra::DMatrix;
 use pass::Pass;
 
 /// Part of the variance from which on one measurement, or two together, decide.
 const DECIDES: f64 = 0.9;
-/// Fits of more measurements are not examined if that takes a pass of its own.
-const MOST: u64 = 200;
 
 /// A measurement, and its part in the variance of an unknown.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Share {
+pub(crate) struct Share {
     pub part: f64,
     pub experiment: usize,
     pub output: usize,
@@ -35,7 +28,7 @@ pub(super) struct Share {
 
 /// The two largest shares in the variance of an unknown, the largest first; of equal ones those that were taken first.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Largest([Share; 2]);
+pub(crate) struct Largest([Share; 2]);
 
 impl Largest {
     pub fn take(&mut self, share: Share) {
@@ -48,7 +41,7 @@ impl Largest {
     }
 
     /// The measurements that decide: one, or two together.
-    fn decisive(&self) -> Option<&[Share]> {
+    pub fn decisive(&self) -> Option<&[Share]> {
         let Largest(shares) = self;
         (1..=shares.len()).map(|count| &shares[..count]).find(|shares| part(shares) >= DECIDES)
     }
@@ -59,7 +52,7 @@ impl Largest {
 }
 
 /// The largest shares of the unknowns of one experiment, and the sizes of the errors that have them.
-pub(super) struct Shares {
+pub(crate) struct Shares {
     experiment: usize,
     inverse: DMatrix<f64>,
     moved: Vec<f64>,
@@ -113,7 +106,7 @@ impl Shares {
 }
 
 /// The largest shares of all unknowns from those of the experiments.
-pub(super) fn of_all<'s>(objective: &Objective<'_>, all: impl Iterator<Item = &'s Shares>) -> Vec<Largest> {
+pub(crate) fn of_all<'s>(objective: &Objective<'_>, all: impl Iterator<Item = &'s Shares>) -> Vec<Largest> {
     let unknowns = &objective.problem.unknowns;
     let mut largest = vec![Largest::default(); unknowns.row.len()];
     for (e, one) in all.enumerate() {
@@ -123,75 +116,27 @@ pub(super) fn of_all<'s>(objective: &Objective<'_>, all: impl Iterator<Item = &'
 }
 
 /// The sizes of all errors from those of the experiments.
-pub(super) fn sizes_of_all<'s>(objective: &Objective<'_>, all: impl Iterator<Item = &'s Shares>) -> Sizes {
+pub(crate) fn sizes_of_all<'s>(objective: &Objective<'_>, all: impl Iterator<Item = &'s Shares>) -> Sizes {
     let unknowns = &objective.problem.unknowns;
     let mut sizes = Sizes::new(unknowns.row.len());
     all.enumerate().for_each(|(e, one)| sizes.append_to(unknowns.columns(e), &one.sizes));
     sizes
 }
 
-impl Judgement<'_> {
-    /// The unknown whose interval rests most on one or two measurements: a parameter, or with a sandwich any.
-    pub(super) fn decided_by_few(&self, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
-        let exact = self.rounding || self.end.outcome == Outcome::Exact;
-        let filtered = self.objective.problem.settings.prefilter.is_some();
-        if filtered || exact || self.objective.sweep.predicts_variance() {
-            return None;
-        }
-        let examined;
-        let largest = match (&covariances.shares, &covariances.unit) {
-            (Some(largest), _) => largest,
-            (None, Some(unit)) if self.residuals.measured <= MOST => {
-                examined = self.shares(unit)?.0;
-                &examined
-            }
-            _ => return None,
-        };
-        let assumed = covariances.method != CovarianceMethod::Sandwich;
-        let known = |i: &usize| unknowns[*i].knowledge.standard_error().is_some();
-        let counts = |i: &usize| known(i) && (!assumed || matches!(unknowns[*i].role, Role::Parameter(_)));
-        let decided = (0..unknowns.len()).filter(counts).filter_map(|i| Some((i, largest[i].decisive()?)));
-        let (i, shares) = decided.max_by(|a, b| part(a.1).total_cmp(&part(b.1)))?;
-        let noise = match assumed {
-            true => "whose noise is taken to be that of all",
-            false => "and is so wide that it holds whatever the noise is there",
-        };
-        let text = format!(
-            "the interval of `{}` rests by {} on {}, {noise}: errors there do not tell, since the fit passes through them; \
-             measure more of the kind",
-            unknowns[i].name,
-            percent(part(shares), 2),
-            self.places(shares)
-        );
-        Some(Warning { code: WarningCode::DecidedByFew, severity: Severity::Usable, text })
-    }
-
-    /// Outputs, times and experiments of measurements.
-    fn places(&self, shares: &[Share]) -> String {
-        let problem = self.objective.problem;
-        let place = |share: &Share| {
-            format!(
-                "`{}` at t = {} s of `{}`",
-                problem.layout().outputs[share.output].name,
-                exact(problem.records[share.experiment].time(share.sample)),
-                problem.unknowns.labels[share.experiment]
-            )
-        };
-        shares.iter().map(place).collect::<Vec<_>>().join(" and ")
-    }
-
-    /// The largest shares, and the sizes of the errors that have them, with the inverse curvature.
-    pub(super) fn shares(&self, unit: &Covariance) -> Option<(Vec<Largest>, Sizes)> {
-        let objective = self.objective;
-        let make = |e: usize| Pass::new(objective, Shares::new(e, of_experiment(objective, unit, e)));
-        let all = objective.gather(&self.end.coordinates, true, make).ok()?;
-        let each = || all.iter().map(|one| &one.shares);
-        Some((of_all(objective, each()), sizes_of_all(objective, each())))
-    }
+/// The largest shares, and the sizes of the errors that have them, with the inverse curvature.
+pub(crate) fn shares(
+    objective: &Objective<'_>,
+    coordinates: &[f64],
+    unit: &Covariance,
+) -> Option<(Vec<Largest>, Sizes)> {
+    let make = |e: usize| Pass::new(objective, Shares::new(e, of_experiment(objective, unit, e)));
+    let all = objective.gather(coordinates, true, make).ok()?;
+    let each = || all.iter().map(|one| &one.shares);
+    Some((of_all(objective, each()), sizes_of_all(objective, each())))
 }
 
 /// The part that these measurements have together.
-fn part(shares: &[Share]) -> f64 {
+pub(crate) fn part(shares: &[Share]) -> f64 {
     shares.iter().map(|share| share.part).sum()
 }
 

@@ -7,10 +7,6 @@
 //! covariance, since one that allows for errors of changing size is right for errors of one size, too; that found, which heavy tails
 //! and errors of changing size enlarge (Koenker, J. Econometrics 17 (1981) 107), decides on what is said.
 
-use super::covariances::Covariances;
-use crate::estimate::{CovarianceMethod, Unknown, Warning, WarningCode};
-use crate::numeral::number;
-use crate::optimize::Severity;
 use statrs::distribution::{ContinuousCDF, Gamma};
 
 /// Levels, over all unknowns, of the test that decides on the covariance and of that which decides on a warning.
@@ -20,12 +16,10 @@ const SAID: f64 = 0.01;
 const NORMAL: f64 = 2.0;
 /// A variance that differs from the classical one by a smaller part is not worth another method.
 const LITTLE: f64 = 0.05;
-/// From this ratio of standard errors on, a classical interval is not usable without care: it covers 90 % or less.
-const NARROW: f64 = 1.2;
 
 /// Sums over the errors, and over the errors times the shares in the variance of each unknown.
 #[derive(Clone)]
-pub(super) struct Sizes {
+pub(crate) struct Sizes {
     count: f64,
     squares: f64,
     fourths: f64,
@@ -140,36 +134,10 @@ impl Sizes {
 
 /// An unknown where errors are of another size: by which factor its standard error differs from the classical one.
 #[derive(Clone, Copy)]
-pub(super) struct Uneven {
+pub(crate) struct Uneven {
     pub unknown: usize,
     pub factor: f64,
     pub p_value: f64,
-}
-
-/// Errors that are larger or smaller where an unknown is determined.
-pub(super) fn uneven_errors(unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
-    let Uneven { unknown, factor, p_value } = covariances.uneven?;
-    let (name, times) = (&unknowns[unknown].name, number(factor, 2));
-    let found = format!(
-        "the errors are {times} times as large where `{name}` is determined as they are on average ({})",
-        crate::numeral::p_value(p_value)
-    );
-    let classical = covariances.method == CovarianceMethod::Classical;
-    let (allowed, severity) = match classical {
-        true => (
-            format!(
-                "its standard error takes them as of one size and would be {times} times as large otherwise; weigh them by \
-                 their noise, or by one, with which the intervals allow for it (Fit::weighting)"
-            ),
-            if factor > NARROW { Severity::UsableWithCare } else { Severity::Usable },
-        ),
-        false => (
-            "the intervals allow for it; weights by their noise would make the estimate better (Fit::weighting)"
-                .to_owned(),
-            Severity::Usable,
-        ),
-    };
-    Some(Warning { code: WarningCode::UnevenErrors, severity, text: format!("{found}: {allowed}") })
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 /// A window that is to be compared with a finer simulation.
-pub(super) struct Sampled {
+pub(crate) struct Sampled {
     pub begin: usize,
     pub samples: usize,
     /// Whether it is one of those at even distances, from which the change of the whole record is extrapolated.
@@ -57,7 +57,7 @@ impl Sampled {
 /// The windows of a record in which a quantity is largest, such as the changes of its measurements: at all windows at even distances the plant
 /// may be at rest.
 #[derive(Default)]
-pub(super) struct Extremes(Vec<(f64, Sampled)>);
+pub(crate) struct Extremes(Vec<(f64, Sampled)>);
 
 /// The most windows of a kind.
 const MOST: usize = 4;
@@ -92,7 +92,7 @@ const WORTH_THREADS: usize = 20_000;
 
 /// Windows of an experiment, at a point.
 #[derive(Clone, Copy)]
-pub(super) struct Compared<'s> {
+pub(crate) struct Compared<'s> {
     pub objective: &'s Objective<'s>,
     pub coordinates: &'s [f64],
     pub experiment: usize,
@@ -107,7 +107,7 @@ impl Compared<'_> {
 
 /// The sum of the squared changes of all standardized predictions of each experiment with a finer step: extrapolated from its windows at
 /// even distances, or that of all its windows, whichever is larger. All experiments are those of one sweep.
-pub(super) fn step_errors(all: &[Compared<'_>]) -> Vec<f64> {
+pub(crate) fn step_errors(all: &[Compared<'_>]) -> Vec<f64> {
     let windows: Vec<(usize, &Sampled)> =
         all.iter().enumerate().flat_map(|(i, one)| one.windows.iter().map(move |window| (i, window))).collect();
     let mut sums = vec![Changes::default(); all.len()];
@@ -189,7 +189,7 @@ fn changes(finer: &dyn Sweep, all: &[Compared<'_>], windows: &[(usize, &Sampled)
 
 #[cfg(test)]
 mod tests {
-    use super::super::residual_pass::residual_pass;
+    use crate::judge::evidence::residual_pass::residual_pass;
     use crate::{Experiment, Fit, Kalman, Model, Rk4, Scalar, Time, fixed, free, signals, simulate};
 
     signals! { struct Voltage { u: "V" } }

@@ -7,7 +7,7 @@ use crate::sweep::Window;
 use core::ops::Range;
 
 /// Samples of an output that may be wrong.
-pub(super) struct Suspect {
+pub(crate) struct Suspect {
     pub experiment: usize,
     pub output: usize,
     inside: Inside,
@@ -29,7 +29,7 @@ struct Errors {
 
 /// The errors inside and outside the samples of a suspect.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Split {
+pub(crate) struct Split {
     inside: Errors,
     outside: Errors,
 }
@@ -114,7 +114,7 @@ impl Accumulate for Sums<'_> {
 }
 
 /// The errors of each suspect, by one pass over the data; empty where they cannot be evaluated.
-pub(super) fn splits(objective: &Objective<'_>, coordinates: &[f64], suspects: &[Suspect]) -> Vec<Split> {
+pub(crate) fn splits(objective: &Objective<'_>, coordinates: &[f64], suspects: &[Suspect]) -> Vec<Split> {
     let plain = objective.in_units();
     let of = |experiment: usize| suspects.iter().filter(move |suspect| suspect.experiment == experiment);
     let make = |experiment: usize| {

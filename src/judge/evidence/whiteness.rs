@@ -2,8 +2,10 @@
 
 use crate::whiteness::{FEW, Portmanteau, levinson_durbin};
 
+/// Significance level of the whiteness test.
+pub(crate) const WHITENESS_LEVEL: f64 = 0.01;
 /// Lags of the portmanteau test; one over few sees more of what only neighbors share.
-pub(super) const LAGS: usize = 20;
+pub(crate) const LAGS: usize = 20;
 
 /// Whiteness of the errors of an output.
 #[derive(Clone, Copy, Debug)]
@@ -54,7 +56,7 @@ fn color(coefficients: &[f64], count: u64) -> (f64, f64) {
 }
 
 /// Of the outputs that were tested that whose errors are least white, and how white they are; the probability counts all of them.
-pub(super) fn least_white(tested: &[(usize, Whiteness)]) -> Option<(usize, Whiteness)> {
+pub(crate) fn least_white(tested: &[(usize, Whiteness)]) -> Option<(usize, Whiteness)> {
     let count = tested.len() as f64;
     let tested = tested.iter().map(|(j, white)| (*j, Whiteness { p_value: white.p_value * count, ..*white }));
     let strongest = |a: &Whiteness, b: &Whiteness| {

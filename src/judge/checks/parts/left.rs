@@ -4,7 +4,7 @@
 //! one is therefore taken from those that remain without the contradiction.
 
 use super::Piece;
-use crate::judge::whiteness::{LAGS, Whiteness};
+use crate::judge::evidence::whiteness::{LAGS, Whiteness};
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
 use crate::whiteness::Portmanteau;
@@ -58,7 +58,7 @@ impl Accumulate for Pass<'_> {
 }
 
 /// How many errors have the information of one, by each piece: the most of its outputs.
-pub(super) fn dependences(objective: &Objective<'_>, coordinates: &[f64], pieces: &[Piece]) -> Option<Vec<f64>> {
+pub(crate) fn dependences(objective: &Objective<'_>, coordinates: &[f64], pieces: &[Piece]) -> Option<Vec<f64>> {
     let none = Left { sums: Portmanteau::new(LAGS), count: 0 };
     let empty = vec![vec![none; objective.outputs()]; pieces.len()];
     let make = |experiment: usize| Pass {

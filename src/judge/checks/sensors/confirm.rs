@@ -3,7 +3,7 @@
 use super::rows::{KINDS, Measurement, Measurements};
 use super::{Extended, Released};
 use crate::estimate::student::two_sided;
-use crate::judge::whiteness::{LAGS, Whiteness};
+use crate::judge::evidence::whiteness::{LAGS, Whiteness};
 use crate::problem::Accumulate;
 use crate::sweep::Window;
 use crate::whiteness::Portmanteau;
@@ -80,7 +80,7 @@ impl Accumulate for Left<'_> {
 impl Extended<'_> {
     /// Standard error and probability of a regressor, with fewer degrees of freedom for autocorrelated errors; `None` where it is not significant
     /// by the heteroscedasticity-consistent variance (White, Econometrica 48 (1980) 817).
-    pub(super) fn confirm(&self, found: &Released) -> Option<(f64, f64)> {
+    pub(crate) fn confirm(&self, found: &Released) -> Option<(f64, f64)> {
         let (objective, outputs) = (&self.objective, self.objective.outputs());
         let without = self.linear.step(&vec![0.0; self.linear.unknowns()], &self.held(None))?;
         let steps = |e: usize| -> Vec<(f64, f64)> {
@@ -98,7 +98,7 @@ impl Extended<'_> {
             errors: vec![Portmanteau::new(LAGS); outputs],
             runs: vec![vec![]; outputs],
         };
-        let mut all = objective.gather(&self.judgement.end.coordinates, true, make).ok()?.into_iter();
+        let mut all = objective.gather(&self.evidence.point.end.coordinates, true, make).ok()?.into_iter();
         let first = all.next()?;
         let (mut sums, mut errors) = (first.sums, first.errors);
         for one in all {
@@ -110,7 +110,7 @@ impl Extended<'_> {
         let plain = sums.errors / free * sums.squares;
         let own = sums.products * count / free;
         let white = errors.iter().zip(&sums.counts).map(|(errors, count)| Whiteness::of(errors, *count, 0));
-        let colored = white.filter(|white| white.p_value < COLORED && !self.judgement.is_static());
+        let colored = white.filter(|white| white.p_value < COLORED && !self.evidence.point.is_static());
         let dependence = colored.map(|white| white.dependence).fold(1.0, f64::max);
         let error = |variance: f64| (variance * dependence).sqrt() / sums.squares;
         // The effective number of rows, by the fourth powers of `z`.

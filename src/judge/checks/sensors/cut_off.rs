@@ -5,7 +5,7 @@
 
 use super::{Extended, KINDS, Kind};
 use crate::estimate::{Unknown, Warning, WarningCode};
-use crate::judge::data::{FEW, PART_OF_STEP, TIMES};
+use crate::judge::checks::data::{FEW, PART_OF_STEP, TIMES};
 use crate::numeral::{number, percent};
 use crate::optimize::{Linearization, Severity};
 
@@ -20,13 +20,13 @@ const HELD: f64 = 1e6;
 
 impl Extended<'_> {
     /// Outputs that may have been truncated, where that moves a parameter.
-    pub(super) fn cut_off(&self, unknowns: &[Unknown]) -> Vec<Warning> {
-        let residuals = &self.judgement.residuals.outputs;
+    pub(crate) fn cut_off(&self, unknowns: &[Unknown]) -> Vec<Warning> {
+        let residuals = &self.evidence.residuals.outputs;
         let coarse = |j: usize| {
             let records = self.objective.problem.records.iter();
             let (count, step) = steps(records.flat_map(|record| record.outputs()[j].values.iter().copied()))?;
             let often = residuals[j].samples >= (TIMES * count) as u64;
-            (often && residuals[j].rmse > PART_OF_STEP * step && !self.judgement.rounded[j]).then_some((j, count, step))
+            (often && residuals[j].rmse > PART_OF_STEP * step && !self.evidence.rounded[j]).then_some((j, count, step))
         };
         let found = (0..self.objective.outputs()).filter_map(coarse);
         found.filter_map(|(j, count, step)| self.if_cut_off(unknowns, (j, count, step))).collect()
@@ -45,7 +45,7 @@ impl Extended<'_> {
         let step = Linearization::new(0.0, shared, triangles).step(&vec![0.0; held.len()], &held)?;
         let without = self.linear.step(&vec![0.0; held.len()], &self.held(None))?;
         let gain = |step: &[f64]| 2.0 * self.linear.predicted_reduction(step);
-        let variance = (self.linear.sum_of_squares() - gain(&without)) / self.judgement.degrees;
+        let variance = (self.linear.sum_of_squares() - gain(&without)) / self.evidence.point.degrees;
         if gain(&without) - gain(&step) > CERTAIN * variance {
             return None;
         }

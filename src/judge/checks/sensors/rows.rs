@@ -6,7 +6,7 @@ use crate::sweep::Window;
 
 /// What may be wrong with a sensor.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     Gain,
     Offset,
     Delay,
@@ -16,12 +16,12 @@ impl Kind {
     pub const ALL: [Kind; KINDS] = [Kind::Gain, Kind::Offset, Kind::Delay];
 }
 
-pub(super) const KINDS: usize = 3;
+pub(crate) const KINDS: usize = 3;
 /// Rows that are absorbed together.
 const ROWS: usize = 256;
 
 /// The measurements of an experiment, one after the other.
-pub(super) struct Measurements<'o> {
+pub(crate) struct Measurements<'o> {
     objective: &'o Objective<'o>,
     experiment: usize,
     sigma: Vec<f64>,
@@ -30,7 +30,7 @@ pub(super) struct Measurements<'o> {
 }
 
 /// A measurement: its place in the window, the factor of its row, and the slopes by gain, offset and delay.
-pub(super) struct Measurement {
+pub(crate) struct Measurement {
     pub k: usize,
     pub output: usize,
     pub root: f64,
@@ -73,7 +73,7 @@ impl<'o> Measurements<'o> {
 }
 
 /// The triangle of each output's rows, of one experiment: slopes of the unknowns, then of gain, offset and delay.
-pub(super) struct Triangle<'o> {
+pub(crate) struct Triangle<'o> {
     measurements: Measurements<'o>,
     of: Vec<(Information, Block)>,
     row: Vec<f64>,

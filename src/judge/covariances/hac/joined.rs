@@ -3,7 +3,7 @@
 /// The standard error to report relative to that of the moving sums, from that of stationary errors relative to the same: the
 /// latter, unless the variance of the moving sums exceeds it by more than the part `certain`. Between three quarters and five
 /// quarters of that part the variance is interpolated, so that no jump makes rounding decide.
-pub(super) fn joined(ratio: f64, certain: f64) -> f64 {
+pub(crate) fn joined(ratio: f64, certain: f64) -> f64 {
     let square = ratio * ratio;
     match 1.0 / square - 1.0 {
         excess if !(ratio.is_finite() && certain.is_finite()) || excess.is_nan() => 1.0,

@@ -2,7 +2,7 @@
 
 use super::ROWS;
 use crate::information::{Block, Information};
-use crate::judge::sandwich::{ALONE, form};
+use crate::judge::leverage::{ALONE, form};
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
 use core::f64::consts::FRAC_1_SQRT_2;
@@ -10,7 +10,7 @@ use nalgebra::DMatrix;
 use std::collections::VecDeque;
 
 /// An accumulator of scores in order of time.
-pub(super) trait AccumulateScores: Send {
+pub(crate) trait AccumulateScores: Send {
     fn take(&mut self, score: &[f64]);
     /// Adds the accumulator of the scores that follow.
     fn append(&mut self, later: Self);
@@ -20,7 +20,7 @@ pub(super) trait AccumulateScores: Send {
 /// `w (psi(z) z - kappa) dv / (2 v)`. Each error is divided by the root of one less its leverage, with which the variance of
 /// independent errors is right (HC2). Without the root, as in the sandwich for independent errors, the standard error of an initial
 /// state that a single measurement determines is several times too large.
-pub(super) struct EachScore<'s, T> {
+pub(crate) struct EachScore<'s, T> {
     objective: &'s Objective<'s>,
     experiment: usize,
     kept: &'s [usize],
@@ -80,7 +80,7 @@ impl<T: AccumulateScores> Accumulate for EachScore<'_, T> {
 }
 
 /// Sums of products of the scores with those one and two samples before, and the triangle of the scores themselves.
-pub(super) struct Lagged {
+pub(crate) struct Lagged {
     pub count: usize,
     pub triangle: Information,
     pub block: Block,
@@ -152,7 +152,7 @@ impl AccumulateScores for Lagged {
 }
 
 /// Triangle of the moving sums of `window` prewhitened scores, each divided by the root of the window.
-pub(super) struct MovingSums<'m> {
+pub(crate) struct MovingSums<'m> {
     w: &'m DMatrix<f64>,
     a: &'m DMatrix<f64>,
     window: usize,

@@ -9,9 +9,9 @@
 
 use super::ROWS;
 use crate::information::{Block, Covariance, Information};
-use crate::judge::sandwich::{ALONE, of_experiment};
-use crate::judge::shares::{self, Largest, Shares};
-use crate::judge::sizes::Sizes;
+use crate::judge::evidence::shares::{self, Largest, Shares};
+use crate::judge::evidence::sizes::Sizes;
+use crate::judge::leverage::{ALONE, of_experiment};
 use crate::optimize::Infeasible;
 use crate::problem::{Accumulate, Objective, each};
 use crate::sweep::Window;
@@ -31,7 +31,7 @@ type WithShares = (Vec<Information>, Vec<Largest>, Sizes);
 
 /// Triangles of such scores, one per experiment over its columns, by the inverse of the curvature; `None` where variances are
 /// predicted.
-pub(super) fn scores(
+pub(crate) fn scores(
     objective: &Objective<'_>,
     coordinates: &[f64],
     inverse: &Covariance,

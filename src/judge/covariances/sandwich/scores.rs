@@ -5,9 +5,10 @@
 //! are of one size and may cancel by chance: of straight lines with one far measurement, noisier than the others, 84 % were covered.
 //! [`CANCELED`] times the variance of that prediction, by the noise of all measurements, is therefore added to the square.
 
-use super::{ALONE, ROWS};
+use super::ROWS;
 use crate::information::{Block, Information};
-use crate::judge::shares::Shares;
+use crate::judge::evidence::shares::Shares;
+use crate::judge::leverage::ALONE;
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
 
@@ -17,7 +18,7 @@ use crate::sweep::Window;
 const CANCELED: f64 = 0.4;
 
 /// The triangle of the scores.
-pub(super) struct Scores<'s> {
+pub(crate) struct Scores<'s> {
     objective: &'s Objective<'s>,
     experiment: usize,
     pub shares: Shares,
@@ -95,7 +96,7 @@ impl Accumulate for Scores<'_> {
 /// sum of the squares of what the samples move it by, each of which has, if normal, a variance of two thirds of its own square
 /// on average. What the leverage takes is made up for by what is added to the square ([`CANCELED`]), and counts as certain. Of an
 /// unknown of one experiment its own samples count.
-pub(super) fn degrees(objective: &Objective<'_>, all: &[Scores<'_>]) -> Vec<f64> {
+pub(crate) fn degrees(objective: &Objective<'_>, all: &[Scores<'_>]) -> Vec<f64> {
     let unknowns = &objective.problem.unknowns;
     let mut sums = vec![[0.0; 2]; unknowns.row.len()];
     for (e, one) in all.iter().enumerate() {

@@ -1,12 +1,12 @@
 //! Sums over the errors of one experiment, window by window.
 
 use super::horizon;
-use crate::judge::coupling::Coupling;
-use crate::judge::largest::Largest;
-use crate::judge::output_sums::OutputSums;
-use crate::judge::powers::{Powers, Scale};
-use crate::judge::step_error::{Compared, Extremes, Sampled};
-use crate::judge::whiteness::LAGS;
+use crate::judge::evidence::coupling::Coupling;
+use crate::judge::evidence::largest::Largest;
+use crate::judge::evidence::output_sums::OutputSums;
+use crate::judge::evidence::powers::{Powers, Scale};
+use crate::judge::evidence::step_error::{Compared, Extremes, Sampled};
+use crate::judge::evidence::whiteness::LAGS;
 use crate::problem::{Accumulate, Objective};
 use crate::record::{Channel, Record, Time};
 use crate::sweep::Window;
@@ -19,7 +19,7 @@ const EVERY: usize = 16;
 const AGAIN: usize = 16;
 
 /// Sums over one experiment.
-pub(super) struct Sums<'s> {
+pub(crate) struct Sums<'s> {
     objective: &'s Objective<'s>,
     experiment: usize,
     pub outputs: Vec<OutputSums>,

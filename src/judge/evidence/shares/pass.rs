@@ -117,7 +117,7 @@ fn add<W: Wide>(to: &mut [f64], x: W) {
 }
 
 /// A pass over all measurements of an experiment.
-pub(super) struct Pass<'p> {
+pub(crate) struct Pass<'p> {
     objective: &'p Objective<'p>,
     pub shares: Shares,
     rows: Rows,

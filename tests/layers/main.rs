@@ -5,6 +5,8 @@
 //! Comments, doc comments and unit tests are not examined. Names of the crate's public list (`crate::Model`) may be imported
 //! by results and shipped models only, which use most layers.
 
+mod circles;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -110,7 +112,7 @@ fn layers() -> BTreeMap<&'static str, usize> {
 fn wrong(place: &[String], code: &str) -> Vec<String> {
     let (layers, module) = (layers(), place[0].as_str());
     let Some(&layer) = layers.get(module) else {
-        return vec![format!("`{module}` is in no layer; add it to a row of tests/layers.rs")];
+        return vec![format!("`{module}` is in no layer; add it to a row of tests/layers/main.rs")];
     };
     let mut modules = heads(code, "crate::");
     // As many `super` as the file is deep lead to the other modules.

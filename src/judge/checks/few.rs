@@ -1,0 +1,65 @@
+//! Warnings about unknowns whose intervals rest on one or two measurements.
+
+use crate::estimate::{CovarianceMethod, Unknown, Warning, WarningCode};
+use crate::judge::covariances::Covariances;
+use crate::judge::evidence::Evidence;
+use crate::judge::evidence::shares::{self, Share, part};
+use crate::numeral::{exact, percent};
+use crate::optimize::{Outcome, Severity};
+use crate::problem::Role;
+
+/// Fits of more measurements are not examined if that takes a pass of its own.
+const MOST: u64 = 200;
+
+/// The unknown whose interval rests most on one or two measurements: a parameter, or with a sandwich any.
+pub(crate) fn decided_by_few(
+    evidence: &Evidence<'_>,
+    unknowns: &[Unknown],
+    covariances: &Covariances,
+) -> Option<Warning> {
+    let exact = evidence.rounding || evidence.point.is_exact();
+    let filtered = evidence.point.objective.problem.settings.prefilter.is_some();
+    if filtered || exact || evidence.point.objective.sweep.predicts_variance() {
+        return None;
+    }
+    let examined;
+    let largest = match (&covariances.shares, evidence.unit()) {
+        (Some(largest), _) => largest,
+        (None, Some(unit)) if evidence.residuals.measured <= MOST => {
+            examined = shares::shares(evidence.point.objective, &evidence.point.end.coordinates, unit)?.0;
+            &examined
+        }
+        _ => return None,
+    };
+    let assumed = covariances.method != CovarianceMethod::Sandwich;
+    let known = |i: &usize| unknowns[*i].knowledge.standard_error().is_some();
+    let counts = |i: &usize| known(i) && (!assumed || matches!(unknowns[*i].role, Role::Parameter(_)));
+    let decided = (0..unknowns.len()).filter(counts).filter_map(|i| Some((i, largest[i].decisive()?)));
+    let (i, shares) = decided.max_by(|a, b| part(a.1).total_cmp(&part(b.1)))?;
+    let noise = match assumed {
+        true => "whose noise is taken to be that of all",
+        false => "and is so wide that it holds whatever the noise is there",
+    };
+    let text = format!(
+        "the interval of `{}` rests by {} on {}, {noise}: errors there do not tell, since the fit passes through them; \
+         measure more of the kind",
+        unknowns[i].name,
+        percent(part(shares), 2),
+        places(evidence, shares)
+    );
+    Some(Warning { code: WarningCode::DecidedByFew, severity: Severity::Usable, text })
+}
+
+/// Outputs, times and experiments of measurements.
+fn places(evidence: &Evidence<'_>, shares: &[Share]) -> String {
+    let problem = evidence.point.objective.problem;
+    let place = |share: &Share| {
+        format!(
+            "`{}` at t = {} s of `{}`",
+            problem.layout().outputs[share.output].name,
+            exact(problem.records[share.experiment].time(share.sample)),
+            problem.unknowns.labels[share.experiment]
+        )
+    };
+    shares.iter().map(place).collect::<Vec<_>>().join(" and ")
+}

@@ -1,0 +1,30 @@
+//! Warnings about standard errors that grow with the unknown itself, as those of noise levels do.
+
+use crate::estimate::{Unknown, Warning, WarningCode};
+use crate::judge::covariances::Covariances;
+use crate::numeral::percent;
+use crate::optimize::Severity;
+use crate::parameter::Transform;
+
+/// Change of the logarithm of an unknown's variance over one standard error of the unknown, from which on a symmetric interval is
+/// named. For a noise level the change is twice its relative standard error, so that 0.3 is 15 % (see docs/intervals.md).
+const UNEVEN: f64 = 0.3;
+
+/// An unknown, such as a noise level, whose interval should reach further above than below.
+pub(crate) fn uneven(unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
+    let eligible =
+        |i: usize| unknowns[i].transform == Transform::Identity && unknowns[i].knowledge.standard_error().is_some();
+    let own = covariances.own.iter().enumerate().filter(|(i, own)| own.is_finite() && eligible(*i));
+    let (i, own) = own.max_by(|a, b| a.1.total_cmp(b.1))?;
+    if *own <= UNEVEN {
+        return None;
+    }
+    let unknown = &unknowns[i];
+    let text = format!(
+        "the standard error of `{}` grows with its value, by {} per standard error: its interval is too short above; \
+         estimate its logarithm (.log())",
+        unknown.name,
+        percent(0.5 * own, 2)
+    );
+    Some(Warning { code: WarningCode::CurvedInterval, severity: Severity::Usable, text })
+}

@@ -1,0 +1,131 @@
+//! [`Evidence`]: what passes over the data say of a point, each made once, when it is first asked for.
+
+pub(crate) mod color;
+pub(crate) mod coupling;
+pub(crate) mod first_errors;
+pub(crate) mod largest;
+pub(crate) mod modes;
+pub(crate) mod output_sums;
+pub(crate) mod powers;
+pub(crate) mod products;
+pub(crate) mod residual_pass;
+pub(crate) mod shares;
+pub(crate) mod sizes;
+mod step_error;
+pub(crate) mod suspects;
+pub(crate) mod whiteness;
+
+use crate::information::Covariance;
+use crate::judge::point::Point;
+use crate::problem::{Noise, Whitening};
+use color::is_certain;
+use coupling::Coupled;
+use first_errors::Errors;
+use residual_pass::Residuals;
+use std::cell::OnceCell;
+use whiteness::{WHITENESS_LEVEL, Whiteness, least_white};
+
+/// Errors below this fraction of a given noise are round-off: no whiteness test, no HAC.
+const ROUNDING: f64 = 0.1;
+
+/// The end of a search, and what passes over the data say of it.
+pub(crate) struct Evidence<'e> {
+    pub point: Point<'e>,
+    pub residuals: Residuals,
+    /// Which outputs have errors that are round-off: nothing beside their measurements, or far below a given noise; and whether all have.
+    pub rounded: Vec<bool>,
+    pub rounding: bool,
+    unit: OnceCell<Option<Covariance>>,
+    first_errors: OnceCell<Vec<Errors>>,
+}
+
+impl<'e> Evidence<'e> {
+    pub fn new(point: Point<'e>, residuals: Residuals) -> Self {
+        let objective = point.objective;
+        let sigma = objective.whitening.sigma();
+        let given = matches!(objective.problem.settings.noise, Noise::Given(_));
+        let rounded = |(j, sigma): (usize, &f64)| {
+            let rmse = residuals.outputs[j].rmse;
+            point.is_exact() || given && rmse < ROUNDING * sigma || residuals.is_rounding_of(j)
+        };
+        let rounded: Vec<bool> = sigma.iter().enumerate().map(rounded).collect();
+        let rounding = rounded.iter().all(|rounded| *rounded);
+        Evidence { point, residuals, rounded, rounding, unit: OnceCell::new(), first_errors: OnceCell::new() }
+    }
+
+    /// The covariance of unit noise in coordinates.
+    pub fn unit(&self) -> Option<&Covariance> {
+        self.unit.get_or_init(|| self.point.linear.covariance(&self.point.held_for_covariance)).as_ref()
+    }
+
+    /// The first errors of the first records: one pass in values.
+    pub fn first_errors(&self) -> &[Errors] {
+        self.first_errors.get_or_init(|| first_errors::of_all(self.point.objective, &self.point.end.coordinates))
+    }
+
+    /// The errors' autocorrelation; not computed where residuals are round-off.
+    pub fn autocorrelated(&self) -> Option<(usize, Whiteness)> {
+        self.autocorrelated_at(WHITENESS_LEVEL)
+    }
+
+    /// The same at another level.
+    pub fn autocorrelated_at(&self, level: f64) -> Option<(usize, Whiteness)> {
+        least_white(&self.tested()).filter(|(_, white)| white.p_value < level)
+    }
+
+    /// The outputs whose errors are tested for whiteness, all but those that are round-off.
+    fn tested(&self) -> Vec<(usize, Whiteness)> {
+        let whiteness = self.residuals.whiteness.iter().copied().enumerate();
+        whiteness.filter(|(j, _)| !self.rounded[*j]).collect()
+    }
+
+    /// Whether there is noise to tell the accuracy by: given, or measured. Where no output moves, errors are numbers next to the smallest.
+    pub fn has_noise(&self) -> bool {
+        let given = matches!(self.point.objective.problem.settings.noise, Noise::Given(_) | Noise::Predicted);
+        self.point.degrees > 0.0 && (given || self.residuals.levels.iter().any(|(_, moves)| *moves > 0.0))
+    }
+
+    /// Whether the errors of an output are correlated over time, beyond chance and rounding.
+    pub fn is_colored(&self) -> bool {
+        self.colored_part() > color::SMALL
+    }
+
+    /// Whether so large a part of an output is colored errors that the model is more likely to be wrong than the noise to be colored.
+    pub fn color_dominates(&self) -> bool {
+        self.colored_part() > color::LEFT
+    }
+
+    /// The largest part of an output's movement that is an error and follows from the errors before.
+    pub fn colored_part(&self) -> f64 {
+        let tested = self.tested();
+        let parts = tested.iter().filter_map(|(j, white)| {
+            let part = self.colored(*j, white);
+            is_certain(white.p_value, tested.len(), part).then_some(part)
+        });
+        parts.fold(0.0, f64::max)
+    }
+
+    /// The part of an output's movement that is an error and follows from others.
+    pub fn colored(&self, j: usize, white: &Whiteness) -> f64 {
+        let (rmse, (_, moves)) = (self.residuals.outputs[j].rmse, self.residuals.levels[j]);
+        if moves > 0.0 { rmse / moves * white.predicted.sqrt() } else { 0.0 }
+    }
+
+    /// How many errors have the information of one independent error.
+    fn variance_inflation(&self, j: usize) -> f64 {
+        if self.point.is_static() { 1.0 } else { self.residuals.whiteness[j].dependence }
+    }
+
+    /// How many independent errors an output has the information of, one at least.
+    pub fn independent(&self, j: usize) -> f64 {
+        self.residuals.outputs[j].samples.max(1) as f64 / self.variance_inflation(j)
+    }
+
+    /// Outputs whose errors are correlated, where the fit took them as independent.
+    pub fn coupled(&self) -> Option<Coupled> {
+        let objective = self.point.objective;
+        let independent = matches!(objective.whitening, Whitening::Diagonal(_));
+        let own = matches!(objective.problem.settings.noise, Noise::Predicted);
+        self.residuals.coupled.filter(|_| independent && !own && !self.rounding)
+    }
+}
