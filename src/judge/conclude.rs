@@ -9,7 +9,7 @@ use super::summary;
 use crate::error::Error;
 use crate::estimate::{Format, Summary, Version};
 use crate::information::Covariance;
-use crate::optimize::{LeastSquares, Outcome};
+use crate::optimize::Outcome;
 use crate::problem::{Objective, Whitening};
 
 /// The summary at the end of a search; the objective has the whitening that it ended with. Cost, slopes and residuals there are computed

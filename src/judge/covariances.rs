@@ -13,7 +13,7 @@ use crate::judge::evidence::shares::{Largest, shares};
 use crate::judge::evidence::sizes::{Sizes, Uneven};
 use crate::judge::evidence::whiteness::WHITENESS_LEVEL;
 use crate::judge::point::Point;
-use crate::optimize::{Infeasible, LeastSquares};
+use crate::optimize::Infeasible;
 use crate::problem::{Noise, Whitening};
 use crate::record::Time;
 use hac::hac;

@@ -7,7 +7,7 @@ use crate::judge::checks::rise::{Place, least_rise};
 use crate::judge::covariances::Covariances;
 use crate::judge::evidence::Evidence;
 use crate::numeral::percent;
-use crate::optimize::{Outcome, Severity};
+use crate::optimize::Severity;
 use crate::problem::Role;
 
 /// Half widths of the interval at which the cost is compared: at its ends, and as far again, where a limit is beyond the few samples that

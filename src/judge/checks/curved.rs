@@ -10,7 +10,7 @@ use crate::judge::checks::rise::{Place, least_rise};
 use crate::judge::covariances::Covariances;
 use crate::judge::evidence::Evidence;
 use crate::numeral::{number, percent};
-use crate::optimize::{Outcome, Severity};
+use crate::optimize::Severity;
 use crate::parameter::Transform;
 use crate::problem::Role;
 use crate::sweep::Coupling;

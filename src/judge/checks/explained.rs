@@ -65,7 +65,7 @@ pub(crate) fn unexplained(evidence: &Evidence<'_>) -> Vec<Warning> {
         let worse = is_worse(relative, evidence.independent(j));
         let rmse = evidence.residuals.outputs[j].rmse;
         let at_level = moves.max(rmse) < LEVEL_PART * level.abs();
-        let Some(severity) = unexplained(another(j), at_level, worse, partly) else { continue };
+        let Some(severity) = unexplained_severity(another(j), at_level, worse, partly) else { continue };
         let output = &evidence.point.objective.problem.layout().outputs[j].name;
         let than = if worse { "worse than" } else { "no better than" };
         let text = format!(
@@ -132,7 +132,7 @@ fn is_worse(relative: f64, independent: f64) -> bool {
 
 /// How severe it is that an output is not explained: whether another is, whether this one stands at a level that the model
 /// gives, whether its mean is better than the model, and whether the fit was to explain only a part of it.
-fn unexplained(another: bool, at_level: bool, worse: bool, partly: bool) -> Option<Severity> {
+fn unexplained_severity(another: bool, at_level: bool, worse: bool, partly: bool) -> Option<Severity> {
     match another {
         // Held by a controller, and given by the model.
         true if at_level && !worse => None,
@@ -198,7 +198,7 @@ mod tests {
         ];
         for ((another, at_level, worse, partly), severity) in cases {
             assert_eq!(
-                unexplained(another, at_level, worse, partly),
+                unexplained_severity(another, at_level, worse, partly),
                 severity,
                 "{another} {at_level} {worse} {partly}"
             );

@@ -5,7 +5,7 @@ use crate::judge::covariances::Covariances;
 use crate::judge::evidence::Evidence;
 use crate::judge::evidence::shares::{self, Share, part};
 use crate::numeral::{exact, percent};
-use crate::optimize::{Outcome, Severity};
+use crate::optimize::Severity;
 use crate::problem::Role;
 
 /// Fits of more measurements are not examined if that takes a pass of its own.

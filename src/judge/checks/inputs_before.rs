@@ -9,7 +9,6 @@ use crate::judge::evidence::color;
 use crate::judge::evidence::powers::{SHAPE, Scale};
 use crate::judge::evidence::products::{Change, Products};
 use crate::numeral::{p_value, percent};
-use crate::optimize::Outcome;
 
 /// Number of samples before an error whose inputs are regressors.
 const BEFORE: usize = 4;

@@ -6,7 +6,7 @@ use crate::judge::checks::step::care;
 use crate::judge::evidence::Evidence;
 use crate::judge::evidence::largest::chance;
 use crate::numeral::{exact, number, p_value, percent};
-use crate::optimize::{Outcome, Severity};
+use crate::optimize::Severity;
 use crate::outliers::{center_and_deviation, hampel};
 
 /// Single errors are examined if the kurtosis exceeds that of a normal distribution by this many of its standard deviations.

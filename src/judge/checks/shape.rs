@@ -11,7 +11,6 @@ use crate::judge::evidence::powers::{SHAPE, Scale, scales};
 use crate::judge::evidence::products::Products;
 use crate::judge::evidence::whiteness::{LAGS, Whiteness};
 use crate::numeral::{p_value, percent};
-use crate::optimize::Outcome;
 use crate::problem::Accumulate;
 use crate::record::Record;
 use crate::sweep::Window;

@@ -239,7 +239,7 @@ fn step(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
     let Some(finer) = finer else { return vec![] };
     let objective = evidence.point.objective.of(evidence.point.objective.problem, &*finer);
     let Some((name, shift, part)) = shift(&objective, &evidence.point.end.coordinates, unknowns) else {
-        return diverges(evidence, unknowns, change, &finer.integrator());
+        return diverges(unknowns, change, &finer.integrator());
     };
     let finer = finer.integrator();
     let wrong = refines && shift > STEP_SHIFT && part >= DIGITS;
@@ -258,7 +258,7 @@ fn step(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
 
 /// Warnings where the simulation with a finer step fails at the estimate, or grows until its slopes determine no step: a coarse step damps
 /// oscillations by itself, so that parameters of an unstable plant may fit. These are no minimum with the finer step.
-fn diverges(evidence: &Evidence<'_>, unknowns: &[Unknown], change: f64, finer: &str) -> Vec<Warning> {
+fn diverges(unknowns: &[Unknown], change: f64, finer: &str) -> Vec<Warning> {
     if unknowns.iter().all(|unknown| unknown.knowledge.standard_error().is_none()) {
         return vec![];
     }

@@ -1,4 +1,4 @@
-use crate::judge::evidence::residual_pass;
+use super::residual_pass;
 use crate::problem::{Problem, Settings};
 use crate::random::Random;
 use crate::tests::{Current, Gain, Line, Voltage};
