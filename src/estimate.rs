@@ -2,6 +2,7 @@
 
 mod criteria;
 mod display;
+mod examination;
 mod format;
 mod json;
 mod method;
@@ -13,6 +14,7 @@ mod typed;
 mod warning;
 
 pub(crate) use display::held;
+pub use examination::{Examination, Extent};
 pub(crate) use format::{Format, Version};
 pub use method::{CovarianceMethod, Method, NoiseModel};
 pub use prediction::Prediction;
@@ -58,6 +60,8 @@ pub struct Summary {
     pub starts: Option<Starts>,
     /// Warnings and notes.
     pub warnings: Vec<Warning>,
+    /// All checks, and how far each was made.
+    pub examined: Vec<Examination>,
     /// The minimized cost: the weighted sum of `rho` of the standardized errors, and half the squares of the priors.
     #[serde(with = "crate::real")]
     pub cost: f64,

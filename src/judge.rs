@@ -1,6 +1,7 @@
 //! Evaluation of the result of a search: noise, covariance, null directions, warnings.
 
 mod bounds;
+mod check;
 mod checks;
 mod conclude;
 mod covariances;

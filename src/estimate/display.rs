@@ -1,5 +1,6 @@
 //! An estimate as plain text, within the 80 columns of a terminal.
 
+use super::examination::described;
 use super::{Knowledge, ParameterEstimate, Summary, Unknown};
 use crate::numeral::{counted, error_size, exact, number, resolved};
 use crate::optimize::Severity;
@@ -48,6 +49,7 @@ impl fmt::Display for Summary {
             figures += &value.map_or(String::new(), |value| format!(", {name} {}", number(value, 6)));
         }
         line(f, &figures, 0)?;
+        line(f, &described(&self.examined), 0)?;
         let m = &self.method;
         let seconds = number(self.seconds, 2);
         let search = format!(

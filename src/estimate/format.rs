@@ -1,3 +1,3 @@
 //! [`Format`] and [`Version`] of an estimate's JSON.
 
-crate::format::format!("greybox estimate", 1);
+crate::format::format!("greybox estimate", 2);

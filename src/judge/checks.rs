@@ -1,4 +1,4 @@
-//! The questions that the verdict asks of an estimate.
+//! The questions that the verdict asks of an estimate: [`CHECKS`] is their only list.
 
 mod aliases;
 mod color;
@@ -7,24 +7,95 @@ mod correlated_outputs;
 mod curved;
 mod data;
 mod data_noise;
+mod declared;
 mod dropouts;
+mod enough;
 mod explained;
 mod feedback;
 mod few;
 mod growing_errors;
 mod inputs_before;
 mod known;
+mod likelihood;
 mod not_examined;
 mod outliers;
 mod parts;
 mod rise;
+mod search;
 mod sensors;
 mod shape;
-mod starts;
-pub(crate) mod step;
+mod step;
 mod step_accumulation;
+#[cfg(test)]
+mod tests;
 mod uneven_errors;
 mod within_loss;
 
 pub(crate) use aliases::Aliases;
-pub(crate) use starts::INDISTINGUISHABLE;
+pub(crate) use search::INDISTINGUISHABLE;
+
+use crate::estimate::{Examination, Extent, Warning};
+use crate::judge::check::Check;
+use crate::judge::evidence::Evidence;
+use crate::judge::intervals::Intervals;
+
+/// All checks, in the order in which their warnings are shown.
+pub(crate) const CHECKS: &[Check] = &[
+    enough::ENOUGH,
+    data::CONSTANT_OUTPUTS,
+    data::CONSTANT_INPUTS,
+    data::SUSPICIONS,
+    data::COARSE,
+    data::INPUT_SENTINELS,
+    data::MISSING_PART,
+    data::TWICE,
+    explained::UNEXPLAINED,
+    explained::GIVEN_NOISE,
+    shape::FOLLOWING,
+    outliers::OUTLIERS,
+    parts::PARTS,
+    sensors::SENSORS,
+    known::NO_ERROR,
+    known::ZERO,
+    known::PRIORS,
+    known::SIGNS,
+    known::SIZES,
+    likelihood::LIKELIHOOD,
+    declared::GAPS,
+    declared::GUESSED,
+    declared::HELD,
+    declared::POSITIVE,
+    declared::IDENTIFIED,
+    step::STEP,
+    aliases::ALIASES,
+    search::MINIMUM,
+    search::STARTS,
+    search::CHECKPOINT,
+    curved::CURVED,
+    conditions::CONDITIONS,
+    growing_errors::GROWING,
+    few::DECIDED,
+    uneven_errors::UNEVEN_ERRORS,
+    within_loss::LOSS,
+    data_noise::RESTARTS,
+    data_noise::INPUT_NOISE,
+    color::COLOR,
+    correlated_outputs::COUPLED,
+    not_examined::TIME,
+];
+
+/// The warnings of all checks, and how far each was made.
+pub(crate) fn examine(evidence: &Evidence<'_>, intervals: &Intervals) -> (Vec<Warning>, Vec<Examination>) {
+    let (control, mut warnings, mut examined) = (evidence.point.objective.control, vec![], vec![]);
+    for check in CHECKS {
+        let mut found = (check.examine)(evidence, intervals);
+        debug_assert!(found.warnings.iter().all(|warning| check.codes.contains(&warning.code)), "{}", check.name);
+        // Passes that are ended find nothing.
+        if !check.costs.is_empty() && control.stops() {
+            found.extent = Extent::Nothing { because: control.reason().into() };
+        }
+        warnings.append(&mut found.warnings);
+        examined.push(Examination { check: check.name.into(), extent: found.extent });
+    }
+    (warnings, examined)
+}

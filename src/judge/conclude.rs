@@ -1,6 +1,6 @@
 //! From the end of a search to a [`Summary`].
 
-use super::checks::step;
+use super::checks::examine;
 use super::evidence::Evidence;
 use super::evidence::residual_pass::{Residuals, reason, residual_pass};
 use super::intervals::Intervals;
@@ -45,11 +45,11 @@ pub(crate) fn conclude_from(
     let point = Point::new(objective, end, linear, residuals.measured);
     let evidence = Evidence::new(point, residuals);
     let intervals = Intervals::of(&evidence);
-    let warnings = step::warnings(&evidence, &intervals.unknowns, &intervals.directions, &intervals.covariances);
+    let (warnings, examined) = examine(&evidence, &intervals);
     let noise = summary::noise(&evidence)?;
     let problem = objective.problem;
     let measurements = evidence.residuals.measured;
-    let Intervals { covariances, unknowns, directions } = intervals;
+    let Intervals { covariances, unknowns, directions, .. } = intervals;
     Ok(Summary {
         format: Format,
         version: Version,
@@ -68,6 +68,7 @@ pub(crate) fn conclude_from(
         outcome: end.outcome,
         starts: end.starts.clone(),
         warnings,
+        examined,
         cost: linear.cost,
         measurements,
         iterations: end.iterations,

@@ -15,12 +15,16 @@ pub(crate) struct Intervals {
     pub unknowns: Vec<Unknown>,
     /// Directions that the data do not determine.
     pub directions: Vec<Direction>,
+    /// Whether stop conditions ended passes before these were complete.
+    pub stopped: bool,
 }
 
 impl Intervals {
     pub fn of(evidence: &Evidence<'_>) -> Self {
         let covariances = covariances(evidence);
-        Intervals { unknowns: unknowns(evidence, &covariances), directions: directions(&evidence.point), covariances }
+        let (unknowns, directions) = (unknowns(evidence, &covariances), directions(&evidence.point));
+        let stopped = evidence.point.objective.control.stops();
+        Intervals { covariances, unknowns, directions, stopped }
     }
 }
 

@@ -24,6 +24,11 @@ impl Control {
         self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
 
+    /// What stopped it.
+    pub fn reason(&self) -> &'static str {
+        if self.expired() { "the time limit was over" } else { "the fit was cancelled" }
+    }
+
     /// The outcome of a search, with the time limit named where that is what stopped it.
     pub fn named(&self, outcome: Outcome) -> Outcome {
         if outcome == Outcome::Cancelled && self.expired() { Outcome::TimeLimit } else { outcome }

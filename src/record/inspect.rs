@@ -115,6 +115,11 @@ impl Record {
         found
     }
 
+    /// Whether that looks at every sample.
+    pub(crate) fn is_inspected_whole(&self) -> bool {
+        self.len() <= WHOLE
+    }
+
     fn inspect_within(&self, whole: usize) -> Inspection {
         let n = self.len();
         let (count, length) = if n <= whole { (1, n) } else { (WHOLE / PIECE, PIECE) };

@@ -147,7 +147,8 @@ fn circles_are_seen() {
     let count = |all: &[(&str, &str)]| circles(&files(all).edges()).iter().map(BTreeSet::len).max().unwrap_or(0);
     let passed = [("m", "pub use a::A; pub use b::B;"), ("m/a", "use super::B; struct A;"), ("m/b", "struct B;")];
     assert_eq!(count(&passed), 0);
-    let back = [passed[0], passed[1], ("m/b", "struct B; fn f() { crate::m::c::g() }"), ("m/c", "use crate::m::{A, a::X};")];
+    let back =
+        [passed[0], passed[1], ("m/b", "struct B; fn f() { crate::m::c::g() }"), ("m/c", "use crate::m::{A, a::X};")];
     assert_eq!(count(&back), 3);
     assert_eq!(count(&[("m", "use a::A; struct M;"), ("m/a", "use super::M; struct A;")]), 0);
 }

@@ -4,6 +4,7 @@
 //! samples tells the two apart, but each of them has a minimum of its own, and a search ends in that on its side of `pi/h`.
 
 use crate::estimate::{Warning, WarningCode};
+use crate::judge::check::{Check, Level};
 use crate::judge::evidence::Evidence;
 use crate::judge::evidence::modes::{StateAt, eigenvalues, some};
 use crate::judge::evidence::residual_pass::residual_pass;
@@ -12,6 +13,18 @@ use crate::optimize::Severity;
 use crate::problem::{Objective, Role};
 use crate::record::{Record, Time};
 use std::f64::consts::{PI, TAU};
+
+pub(crate) const ALIASES: Check = Check {
+    name: "oscillations are resolved",
+    asks: "Are there fewer than 2.5 samples a period of an oscillation that parameters within their bounds turn into its alias?",
+    codes: &[WarningCode::Aliased],
+    costs: &[],
+    levels: &[
+        Level { of: "samples a period", value: SAMPLES, source: "below it an alias is within a factor of 1.5" },
+        Level { of: "the amplitude that is left after a sample", value: LEFT, source: "a tenth shows" },
+    ],
+    examine: |evidence, _| aliased(evidence).into(),
+};
 
 /// An oscillation with fewer samples a period than this can be taken for its alias, whose frequency is then within a factor of 1.5.
 const SAMPLES: f64 = 2.5;
@@ -83,7 +96,7 @@ impl Aliases {
 }
 
 /// An oscillation of which there are too few samples, with parameters that may make it another one.
-pub(crate) fn aliased(evidence: &Evidence<'_>) -> Option<Warning> {
+fn aliased(evidence: &Evidence<'_>) -> Option<Warning> {
     let found = unresolved(evidence.point.objective, &evidence.point.end.coordinates, &evidence.residuals.points)?;
     let Unresolved { mode: (_, frequency), interval, alias, name, .. } = found;
     // Ends of other searches have been compared.

@@ -1,13 +1,32 @@
 //! Warnings about errors that are correlated over time.
 
 use crate::estimate::{CovarianceMethod, Warning, WarningCode};
+use crate::judge::check::{Check, Level};
 use crate::judge::covariances::Covariances;
 use crate::judge::evidence::Evidence;
-use crate::judge::evidence::color::{SMALL, severity};
+use crate::judge::evidence::color::{LARGE, SMALL, severity};
+use crate::judge::evidence::whiteness::WHITENESS_LEVEL;
 use crate::numeral::{counted, number, p_value, percent};
 
+pub(crate) const COLOR: Check = Check {
+    name: "errors are white",
+    asks: "Are errors autocorrelated (portmanteau tests over 3 and 20 lags, and of neighbors), and how much of the output is that?",
+    codes: &[WarningCode::ColoredErrors],
+    costs: &[],
+    levels: &[
+        Level {
+            of: "the probability by chance, over all outputs",
+            value: WHITENESS_LEVEL,
+            source: "one good record in a hundred, a note",
+        },
+        Level { of: "the part of what an output moves of care", value: SMALL, source: "no parameter moves by more" },
+        Level { of: "the part that is not usable", value: LARGE, source: "a half" },
+    ],
+    examine: |evidence, intervals| autocorrelation(evidence, &intervals.covariances).into(),
+};
+
 /// Whether the errors are autocorrelated, how much of the output that is, and what of it the intervals allow for.
-pub(crate) fn autocorrelation(evidence: &Evidence<'_>, covariances: &Covariances) -> Option<Warning> {
+fn autocorrelation(evidence: &Evidence<'_>, covariances: &Covariances) -> Option<Warning> {
     let (output, white) = evidence.autocorrelated()?;
     let part = evidence.colored_part();
     let severity = severity(part);

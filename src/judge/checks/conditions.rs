@@ -2,6 +2,7 @@
 //! samples reach is determined by those few; where it is beyond them all, the cost does not depend on it.
 
 use crate::estimate::{Unknown, Warning, WarningCode};
+use crate::judge::check::{Check, Examined, Level, Pass, ROUND_OFF};
 use crate::judge::checks::curved::QUANTILE;
 use crate::judge::checks::rise::{Place, least_rise};
 use crate::judge::covariances::Covariances;
@@ -10,6 +11,21 @@ use crate::numeral::percent;
 use crate::optimize::Severity;
 use crate::problem::Role;
 
+pub(crate) const CONDITIONS: Check = Check {
+    name: "intervals do not end at a condition",
+    asks: "For parameters in a condition of the model: does the cost rise towards the ends of the interval as the slopes say?",
+    codes: &[WarningCode::CurvedInterval],
+    costs: &[Pass::EachUnknown(4)],
+    levels: &[Level {
+        of: "the rise of the cost, in what the slopes say",
+        value: LITTLE,
+        source: "an interval by the likelihood is longer by the root of two",
+    }],
+    examine: |evidence, intervals| {
+        Examined::unless(skipped(evidence), || kinked(evidence, &intervals.unknowns, &intervals.covariances))
+    },
+};
+
 /// Half widths of the interval at which the cost is compared: at its ends, and as far again, where a limit is beyond the few samples that
 /// reach it though an end is not.
 const PLACES: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
@@ -17,12 +33,17 @@ const PLACES: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
 const LONGEST: u64 = 5_000;
 /// A cost that rises by less than this part of what its slopes say: an interval by the likelihood is longer by the root of two or more.
 const LITTLE: f64 = 0.5;
+
+/// Why conditions are not examined.
+fn skipped(evidence: &Evidence<'_>) -> Option<&'static str> {
+    let long = evidence.residuals.measured > LONGEST && evidence.point.objective.sweep.choosing().is_none();
+    let long = long.then_some("more than 5,000 measurements of a model that is not read as a graph");
+    (evidence.rounding || evidence.point.is_exact()).then_some(ROUND_OFF).or(long)
+}
+
 /// The parameter along which the cost rises least, relative to what its slopes say.
-pub(crate) fn kinked(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
+fn kinked(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
     let choosing = evidence.point.objective.sweep.choosing();
-    if evidence.rounding || evidence.point.is_exact() {
-        return None;
-    }
     // Of a model that is not read as a graph any parameter may be in a condition.
     let any = evidence.residuals.measured <= LONGEST;
     let chooses = |i: &usize| matches!(unknowns[*i].role, Role::Parameter(p) if choosing.map_or(any, |choosing| choosing.contains(&p)));

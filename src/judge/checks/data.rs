@@ -1,12 +1,109 @@
 //! Warnings about the data themselves: what the look at the columns found, where the errors confirm it.
 
 use crate::estimate::{Warning, WarningCode};
+use crate::judge::check::{Check, Examined, Level, Pass};
 use crate::judge::evidence::Evidence;
 use crate::judge::evidence::suspects::{Split, Suspect, splits};
 use crate::numeral::{counted, exact, number, percent};
 use crate::optimize::Severity;
 use crate::record::{ChannelInspection, Inspection, Record, Suspicion};
 use std::sync::Arc;
+
+pub(crate) const CONSTANT_OUTPUTS: Check = Check {
+    name: "outputs move",
+    asks: "Has an output one value throughout? A note where a controller holds it and the model gives the same.",
+    codes: &[WarningCode::ConstantOutput],
+    costs: &[],
+    levels: &[Level {
+        of: "the error of an output that the model holds, in parts of its value",
+        value: REPRODUCED,
+        source: "rounding of records with six digits",
+    }],
+    examine: |evidence, _| constant_outputs(evidence, &inspected(evidence)).into(),
+};
+
+pub(crate) const CONSTANT_INPUTS: Check = Check {
+    name: "inputs move",
+    asks: "Has an input one value throughout, so that its effect cannot be told from an offset?",
+    codes: &[WarningCode::ConstantInput],
+    costs: &[],
+    levels: &[],
+    examine: |evidence, _| constant_inputs(evidence, &inspected(evidence)).into(),
+};
+
+pub(crate) const SUSPICIONS: Check = Check {
+    name: "no stretch of an output was invented",
+    asks: "Are the errors larger, or does the prediction move, where the columns look like sentinels, limits, stuck sensors, held values or blocks written twice?",
+    codes: &[
+        WarningCode::Sentinel,
+        WarningCode::Clipped,
+        WarningCode::Frozen,
+        WarningCode::HeldOutput,
+        WarningCode::Repeated,
+    ],
+    costs: &[Pass::Values(1)],
+    levels: &[
+        Level {
+            of: "the mean squared error there, in those elsewhere",
+            value: LARGER,
+            source: "twice: of a stretch of ten good errors one in fifty",
+        },
+        Level { of: "the part of the sum of squares that decides the estimate", value: DECIDE, source: "a half" },
+        Level {
+            of: "the movement of the prediction where the output stands still, in parts of that of the output",
+            value: MOVES,
+            source: "noise of a tenth of an output moves it less",
+        },
+        Level { of: "the part of the samples that decides the estimate", value: LONG, source: "a quarter" },
+    ],
+    examine: |evidence, _| {
+        let pieces = has_long(evidence).then_some("samples between pieces of columns of more than 16,384");
+        Examined::from(suspicions(evidence, &inspected(evidence))).without(pieces)
+    },
+};
+
+pub(crate) const COARSE: Check = Check {
+    name: "outputs have more than a few values",
+    asks: "Has an output few values, and errors that are not far below the step between them?",
+    codes: &[WarningCode::CoarseOutput],
+    costs: &[],
+    levels: &[
+        Level { of: "the number of values", value: FEW as f64, source: "three bits" },
+        Level { of: "how often each occurs", value: TIMES as f64, source: "fewer say nothing of the sensor" },
+        Level { of: "the error, in steps", value: PART_OF_STEP, source: "rounding alone is 0.29" },
+    ],
+    examine: |evidence, _| coarse(evidence, &inspected(evidence)).into(),
+};
+
+pub(crate) const INPUT_SENTINELS: Check = Check {
+    name: "no input has sentinels",
+    asks: "Has an input one exact value far from all others?",
+    codes: &[WarningCode::Sentinel],
+    costs: &[],
+    levels: &[],
+    examine: |evidence, _| sentinels_of_inputs(evidence, &inspected(evidence)).into(),
+};
+
+pub(crate) const MISSING_PART: Check = Check {
+    name: "outputs are measured",
+    asks: "Is most of an output missing?",
+    codes: &[WarningCode::MissingMeasurements],
+    costs: &[],
+    levels: &[Level { of: "the missing part", value: MISSING, source: "a half" }],
+    examine: |evidence, _| missing(evidence, &inspected(evidence)).into(),
+};
+
+pub(crate) const TWICE: Check = Check {
+    name: "no record counts twice",
+    asks: "Do two records hold the same measurements?",
+    codes: &[WarningCode::Repeated],
+    costs: &[],
+    levels: &[],
+    examine: |evidence, _| {
+        let more = evidence.point.objective.experiments() > COMPARED;
+        Examined::from(twice(evidence)).without(more.then_some("records beyond the first 300"))
+    },
+};
 
 /// Errors below this part of an output's range or level are rounding: the model reproduces what is suspicious.
 const REPRODUCED: f64 = 1e-6;
@@ -33,18 +130,14 @@ fn warning(code: WarningCode, severity: Severity, text: String) -> Warning {
     Warning { code, severity, text }
 }
 
-/// Warnings about the columns of the records.
-pub(crate) fn data(evidence: &Evidence<'_>) -> Vec<Warning> {
-    let found: Vec<Arc<Inspection>> =
-        evidence.point.objective.problem.records.iter().map(|r| r.inspect_some()).collect();
-    let mut warnings = constant_outputs(evidence, &found);
-    warnings.extend(constant_inputs(evidence, &found));
-    warnings.extend(suspicions(evidence, &found));
-    warnings.extend(coarse(evidence, &found));
-    warnings.extend(sentinels_of_inputs(evidence, &found));
-    warnings.extend(missing(evidence, &found));
-    warnings.extend(twice(evidence));
-    warnings
+/// What the look at the columns of each record found.
+fn inspected(evidence: &Evidence<'_>) -> Vec<Arc<Inspection>> {
+    evidence.point.objective.problem.records.iter().map(Record::inspect_some).collect()
+}
+
+/// Whether a record is longer than what is looked at.
+fn has_long(evidence: &Evidence<'_>) -> bool {
+    evidence.point.objective.problem.records.iter().any(|record| !record.is_inspected_whole())
 }
 
 /// ` of experiment ...`, if there are several.

@@ -8,6 +8,7 @@
 
 use crate::error::Error;
 use crate::estimate::{Unknown, Warning, WarningCode};
+use crate::judge::check::{Check, Level, Pass};
 use crate::judge::checks::feedback::Feedback;
 use crate::judge::evidence::Evidence;
 use crate::numeral::{number, p_value, percent};
@@ -16,6 +17,32 @@ use crate::problem::Problem;
 use crate::random::Random;
 use crate::record::{Channel, Record};
 use statrs::distribution::{ContinuousCDF, Normal};
+
+pub(crate) const RESTARTS: Check = Check {
+    name: "measured states are without noise",
+    asks: "Where predictions restart and errors a horizon apart are negatively correlated: how far does the noise move an unknown (simulation and extrapolation, Cook and Stefanski 1994)?",
+    codes: &[WarningCode::RestartNoise],
+    costs: &[Pass::Slopes(8)],
+    levels: &[
+        Level { of: "the probability by chance", value: LEVEL, source: "one good record in a hundred" },
+        Level { of: "the bias of care, in standard errors", value: NO_BIAS, source: "a tenth" },
+        Level { of: "the bias that is not usable", value: BIAS, source: "a quarter: intervals of 95 % cover 94 %" },
+    ],
+    examine: |evidence, intervals| restart_noise(evidence, &intervals.unknowns).into(),
+};
+
+pub(crate) const INPUT_NOISE: Check = Check {
+    name: "noise of the inputs moves nothing",
+    asks: "How far does the noise that was declared for the inputs move an unknown, by the same?",
+    codes: &[WarningCode::InputNoise],
+    costs: &[Pass::Slopes(8)],
+    levels: &[Level {
+        of: "the bias, in standard errors",
+        value: BIAS,
+        source: "a quarter: intervals of 95 % cover 94 %",
+    }],
+    examine: |evidence, intervals| input_noise(evidence, &intervals.unknowns).into(),
+};
 
 /// Draws of noise, each added and subtracted.
 const DRAWS: u64 = 4;
@@ -62,7 +89,7 @@ fn largest_bias<'p, 'u>(
 
 /// Whether noise in the states from which predictions restart biases the estimate. Such noise is in the error at
 /// the restart, and with the opposite sign in the error a horizon later.
-pub(crate) fn restart_noise(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
+fn restart_noise(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
     let steps = evidence.point.objective.sweep.restarts()?;
     let outputs = &evidence.residuals.outputs;
     let found = evidence.residuals.whiteness.iter().map(|white| white.at_restart);
@@ -108,7 +135,7 @@ pub(crate) fn restart_noise(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Op
 }
 
 /// The bias by the noise of inputs that was declared.
-pub(crate) fn input_noise(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
+fn input_noise(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
     let problem = evidence.point.objective.problem;
     let sigma = problem.settings.input_noise.as_ref()?;
     let bias = largest_bias(evidence, unknowns, |sign, draw| {

@@ -1,7 +1,7 @@
 //! Whether single measurements are missing and the one before stands in their place.
 
 use crate::estimate::{Warning, WarningCode};
-use crate::judge::checks::step::care;
+use crate::judge::check::with_care;
 use crate::judge::evidence::Evidence;
 use crate::judge::evidence::first_errors::Errors as FirstErrors;
 use crate::numeral::{number, percent};
@@ -68,7 +68,7 @@ pub(crate) fn dropouts_of(evidence: &Evidence<'_>, j: usize) -> Option<Warning> 
             number(others.mean().sqrt(), 2),
             unit = output.unit
         );
-        care(WarningCode::Frozen, text)
+        with_care(WarningCode::Frozen, text)
     })
 }
 

@@ -1,12 +1,43 @@
 //! Warnings about outputs that the model does not explain, and about a given noise that the errors contradict.
 
 use crate::estimate::{CovarianceMethod, Warning, WarningCode};
+use crate::judge::check::{Check, Level};
 use crate::judge::evidence::Evidence;
 use crate::numeral::{fit, number};
 use crate::optimize::Severity;
 use crate::problem::Noise;
 use crate::whiteness::chi_squared_tail;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+pub(crate) const UNEXPLAINED: Check = Check {
+    name: "the model explains its outputs",
+    asks: "Is the sum of squares smaller than that about the mean of the output, by Fisher's test with as many measurements as are independent?",
+    codes: &[WarningCode::Unexplained],
+    costs: &[],
+    levels: &[
+        Level { of: "the probability by chance", value: LEVEL, source: "one good output in a thousand" },
+        Level { of: "the fit (%) that explains nothing, whatever its significance", value: LITTLE, source: "5 %" },
+    ],
+    examine: |evidence, _| unexplained(evidence).into(),
+};
+
+pub(crate) const GIVEN_NOISE: Check = Check {
+    name: "the given noise is that of the errors",
+    asks: "Are the errors of the size that was given, by chi-squared with as many errors as are independent?",
+    codes: &[WarningCode::GivenNoise],
+    costs: &[],
+    levels: &[
+        Level { of: "the probability by chance", value: LEVEL, source: "one good output in a thousand" },
+        Level {
+            of: "the ratio from which on intervals are too narrow",
+            value: NARROW,
+            source: "they cover 90 % or less",
+        },
+        Level { of: "the ratio of care", value: DIFFERENT, source: "twice or half" },
+        Level { of: "the ratio beyond which intervals mean nothing", value: FAR, source: "ten times" },
+    ],
+    examine: |evidence, intervals| given_noise(evidence, intervals.covariances.method).into(),
+};
 
 /// Level of the tests against the mean and of a given noise.
 const LEVEL: f64 = 1e-3;
@@ -44,7 +75,7 @@ fn is_noise(evidence: &Evidence<'_>, j: usize) -> bool {
 }
 
 /// Outputs that the model explains no better than their mean does.
-pub(crate) fn unexplained(evidence: &Evidence<'_>) -> Vec<Warning> {
+fn unexplained(evidence: &Evidence<'_>) -> Vec<Warning> {
     let count = evidence.point.objective.outputs();
     let relative: Vec<Option<f64>> = (0..count).map(|j| relative_errors(evidence, j)).collect();
     let chance: Vec<f64> =
@@ -79,7 +110,7 @@ pub(crate) fn unexplained(evidence: &Evidence<'_>) -> Vec<Warning> {
 }
 
 /// Noise that was given, and errors of another size.
-pub(crate) fn given_noise(evidence: &Evidence<'_>, method: CovarianceMethod) -> Vec<Warning> {
+fn given_noise(evidence: &Evidence<'_>, method: CovarianceMethod) -> Vec<Warning> {
     let Noise::Given(sigma) = &evidence.point.objective.problem.settings.noise else { return vec![] };
     if evidence.point.objective.problem.settings.prefilter.is_some() || evidence.point.objective.is_weighted() {
         return vec![];

@@ -1,27 +1,45 @@
 //! Warnings about unknowns whose intervals rest on one or two measurements.
 
 use crate::estimate::{CovarianceMethod, Unknown, Warning, WarningCode};
+use crate::judge::check::{Check, Examined, Level, PREFILTER, Pass, ROUND_OFF};
 use crate::judge::covariances::Covariances;
 use crate::judge::evidence::Evidence;
-use crate::judge::evidence::shares::{self, Share, part};
+use crate::judge::evidence::shares::{self, DECIDES, Share, part};
+use crate::judge::intervals::Intervals;
 use crate::numeral::{exact, percent};
 use crate::optimize::Severity;
 use crate::problem::Role;
 
+pub(crate) const DECIDED: Check = Check {
+    name: "no measurement decides an interval",
+    asks: "Does one measurement, or do two together, make most of the variance of an unknown?",
+    codes: &[WarningCode::DecidedByFew],
+    costs: &[Pass::Rows],
+    levels: &[Level { of: "the part of the variance", value: DECIDES, source: "nine tenths" }],
+    examine: |evidence, intervals| {
+        Examined::unless(skipped(evidence, intervals), || {
+            decided_by_few(evidence, &intervals.unknowns, &intervals.covariances)
+        })
+    },
+};
+
 /// Fits of more measurements are not examined if that takes a pass of its own.
 const MOST: u64 = 200;
 
-/// The unknown whose interval rests most on one or two measurements: a parameter, or with a sandwich any.
-pub(crate) fn decided_by_few(
-    evidence: &Evidence<'_>,
-    unknowns: &[Unknown],
-    covariances: &Covariances,
-) -> Option<Warning> {
-    let exact = evidence.rounding || evidence.point.is_exact();
-    let filtered = evidence.point.objective.problem.settings.prefilter.is_some();
-    if filtered || exact || evidence.point.objective.sweep.predicts_variance() {
-        return None;
+/// Why that is not examined.
+fn skipped(evidence: &Evidence<'_>, intervals: &Intervals) -> Option<&'static str> {
+    let objective = evidence.point.objective;
+    let long = intervals.covariances.shares.is_none() && evidence.residuals.measured > MOST;
+    match () {
+        _ if objective.problem.settings.prefilter.is_some() => Some(PREFILTER),
+        _ if evidence.rounding || evidence.point.is_exact() => Some(ROUND_OFF),
+        _ if objective.sweep.predicts_variance() => Some("variances are predicted"),
+        _ => long.then_some("more than 200 measurements"),
     }
+}
+
+/// The unknown whose interval rests most on one or two measurements: a parameter, or with a sandwich any.
+fn decided_by_few(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
     let examined;
     let largest = match (&covariances.shares, evidence.unit()) {
         (Some(largest), _) => largest,

@@ -2,13 +2,61 @@
 //! sizes that are not those of the start.
 
 use crate::estimate::{Knowledge, Unknown, Warning, WarningCode};
-use crate::judge::checks::step::care;
+use crate::judge::check::{Check, Level, with_care};
 use crate::judge::covariances::{Covariances, is_error};
 use crate::judge::evidence::Evidence;
 use crate::numeral::{exact, number};
 use crate::optimize::Severity;
 use crate::parameter::Prior;
 use crate::problem::{Free, Role};
+
+pub(crate) const NO_ERROR: Check = Check {
+    name: "standard errors are numbers",
+    asks: "Is a standard error zero, infinite or no number?",
+    codes: &[WarningCode::NoStandardError],
+    costs: &[],
+    levels: &[],
+    examine: |evidence, intervals| without_error(evidence, &intervals.unknowns, &intervals.covariances).into(),
+};
+
+pub(crate) const ZERO: Check = Check {
+    name: "parameters are told from zero",
+    asks: "Is an interval wider than its value? Not usable where it is so for all parameters.",
+    codes: &[WarningCode::HoldsZero],
+    costs: &[],
+    levels: &[],
+    examine: |evidence, intervals| near_zero(evidence, &intervals.unknowns).into(),
+};
+
+pub(crate) const PRIORS: Check = Check {
+    name: "the data agree with the priors",
+    asks: "Is the estimate as far from the mean of its prior as chance allows (Hausman 1978)?",
+    codes: &[WarningCode::PriorContradicts],
+    costs: &[],
+    levels: &[
+        Level { of: "the distance of care, in standard deviations", value: UNLIKELY, source: "one in a thousand" },
+        Level { of: "the distance that is not usable", value: CONTRADICTS, source: "one in two million" },
+    ],
+    examine: |evidence, intervals| against_priors(evidence, &intervals.unknowns).into(),
+};
+
+pub(crate) const SIGNS: Check = Check {
+    name: "parameters have the sign of their start",
+    asks: "Has a parameter that is told from zero the opposite sign of its start?",
+    codes: &[WarningCode::SignChanged],
+    costs: &[],
+    levels: &[],
+    examine: |_, intervals| opposite(&intervals.unknowns).into(),
+};
+
+pub(crate) const SIZES: Check = Check {
+    name: "parameters are of the size of their start",
+    asks: "Is a parameter so many times its start, or one such part of it, that a unit is another?",
+    codes: &[WarningCode::FarFromStart],
+    costs: &[],
+    levels: &[Level { of: "the ratio", value: ANOTHER_UNIT, source: "beyond 360 degrees in a turn, below 1,000" }],
+    examine: |_, intervals| far_from_start(&intervals.unknowns).into(),
+};
 
 /// A parameter so many times its start, or one such part of it, is in another unit.
 const ANOTHER_UNIT: f64 = 400.0;
@@ -41,17 +89,6 @@ fn told_by_data(unknown: &Unknown, prior: Prior) -> bool {
     let value = (both * unknown.value - before * prior.mean) / alone;
     let quantile = 0.5 * (upper - lower) / standard_error;
     alone > 0.0 && value.abs() > quantile / alone.sqrt()
-}
-
-/// Warnings about single parameters.
-pub(crate) fn knowledge(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Vec<Warning> {
-    let mut warnings = vec![];
-    warnings.extend(without_error(evidence, unknowns, covariances));
-    warnings.extend(near_zero(evidence, unknowns));
-    warnings.extend(against_priors(evidence, unknowns));
-    warnings.extend(opposite(unknowns));
-    warnings.extend(far_from_start(unknowns));
-    warnings
 }
 
 /// Unknowns whose standard error came out as zero, infinite or not a number.
@@ -151,7 +188,7 @@ fn opposite(unknowns: &[Unknown]) -> Vec<Warning> {
             number(*value, 4),
             exact(*start)
         );
-        care(WarningCode::SignChanged, text)
+        with_care(WarningCode::SignChanged, text)
     };
     turned.map(one).collect()
 }
@@ -170,7 +207,7 @@ fn far_from_start(unknowns: &[Unknown]) -> Vec<Warning> {
             number(ratio, 2),
             exact(*start)
         );
-        care(WarningCode::FarFromStart, text)
+        with_care(WarningCode::FarFromStart, text)
     };
     far.map(one).collect()
 }

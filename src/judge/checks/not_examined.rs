@@ -1,16 +1,26 @@
-//! What was left out of a evidence because a time limit was over or a flag was set.
+//! What was left out of a verdict because a time limit was over or a flag was set.
 
 use crate::estimate::{Warning, WarningCode};
+use crate::judge::check::Check;
 use crate::judge::evidence::Evidence;
 use crate::optimize::Severity;
 
+pub(crate) const TIME: Check = Check {
+    name: "there was time for all checks",
+    asks: "Did the time limit or a flag end passes before all checks had been made?",
+    codes: &[WarningCode::NotExamined],
+    costs: &[],
+    levels: &[],
+    examine: |evidence, intervals| not_examined(evidence, intervals.stopped).into(),
+};
+
 /// Whether stop conditions ended passes over the data before all tests had been made; `early` if already those for the intervals.
-pub(crate) fn not_examined(evidence: &Evidence<'_>, early: bool) -> Option<Warning> {
+fn not_examined(evidence: &Evidence<'_>, early: bool) -> Option<Warning> {
     let control = evidence.point.objective.control;
     if !control.stops() {
         return None;
     }
-    let stop = if control.expired() { "the time limit was over" } else { "the fit was cancelled" };
+    let stop = control.reason();
     let (text, severity) = match early {
         true => (
             format!(

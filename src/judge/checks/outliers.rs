@@ -1,13 +1,36 @@
 //! Whether a few errors far beyond the others decide a fit with a squared loss.
 
 use crate::estimate::{Warning, WarningCode};
+use crate::judge::check::{Check, Examined, Level, ROUND_OFF, with_care};
 use crate::judge::checks::dropouts;
-use crate::judge::checks::step::care;
 use crate::judge::evidence::Evidence;
+use crate::judge::evidence::first_errors;
 use crate::judge::evidence::largest::chance;
 use crate::numeral::{exact, number, p_value, percent};
 use crate::optimize::Severity;
 use crate::outliers::{center_and_deviation, hampel};
+
+pub(crate) const OUTLIERS: Check = Check {
+    name: "no error is far beyond the others",
+    asks: "Where the kurtosis is that of heavy tails: do errors far from all and from their neighbors make a part of the sum of squares (Hampel's test), or were values held where none arrived? Else: is the largest error no chance among normal ones (Grubbs 1950)?",
+    codes: &[WarningCode::Outliers, WarningCode::Frozen],
+    costs: &[],
+    levels: &[
+        Level { of: "the kurtosis, in its standard deviations", value: HEAVY, source: "one in two million" },
+        Level {
+            of: "robust standard deviations of an outlier",
+            value: FAR,
+            source: "one in two million normal errors",
+        },
+        Level { of: "the part of the sum of squares of a note", value: LITTLE, source: "a tenth" },
+        Level { of: "the part of care", value: DECIDE, source: "a half" },
+        Level { of: "the probability of the largest error", value: LEVEL, source: "one good output in a thousand" },
+    ],
+    examine: |evidence, _| {
+        let without = is_any_heavy(evidence).then(|| first_errors::left_out(evidence.point.objective)).flatten();
+        Examined::unless(skipped(evidence), || outliers(evidence)).without(without)
+    },
+};
 
 /// Single errors are examined if the kurtosis exceeds that of a normal distribution by this many of its standard deviations.
 const HEAVY: f64 = 5.0;
@@ -21,15 +44,29 @@ const LITTLE: f64 = 0.1;
 /// Level of the test of the largest error.
 const LEVEL: f64 = 1e-3;
 
-/// Outputs whose errors have outliers, or measurements that were held, of a fit by their squares.
-pub(crate) fn outliers(evidence: &Evidence<'_>) -> Vec<Warning> {
+/// Why outliers are not looked for.
+fn skipped(evidence: &Evidence<'_>) -> Option<&'static str> {
     let objective = evidence.point.objective;
-    let squares = objective.loss().is_none() && !objective.is_weighted();
-    if !squares || evidence.rounding || evidence.point.is_exact() {
-        return vec![];
+    match () {
+        _ if objective.loss().is_some() || objective.is_weighted() => Some("a robust loss or weights"),
+        _ => (evidence.rounding || evidence.point.is_exact()).then_some(ROUND_OFF),
     }
-    let heavy = |j: usize| is_heavy(evidence.residuals.kurtosis[j], evidence.residuals.outputs[j].samples);
-    let heavy: Vec<bool> = (0..objective.outputs()).map(heavy).collect();
+}
+
+/// Which outputs have errors with heavy tails.
+fn heavy(evidence: &Evidence<'_>) -> Vec<bool> {
+    let of = |j: usize| is_heavy(evidence.residuals.kurtosis[j], evidence.residuals.outputs[j].samples);
+    (0..evidence.point.objective.outputs()).map(of).collect()
+}
+
+fn is_any_heavy(evidence: &Evidence<'_>) -> bool {
+    heavy(evidence).contains(&true)
+}
+
+/// Outputs whose errors have outliers, or measurements that were held, of a fit by their squares.
+fn outliers(evidence: &Evidence<'_>) -> Vec<Warning> {
+    let objective = evidence.point.objective;
+    let heavy = heavy(evidence);
     if !heavy.contains(&true) {
         return (0..objective.outputs()).filter_map(|j| extreme(evidence, j)).collect();
     }
@@ -51,7 +88,7 @@ fn outliers_of(evidence: &Evidence<'_>, j: usize, errors: &[f64]) -> Option<Warn
         percent(share, 2)
     );
     let severity = if share > DECIDE { Severity::UsableWithCare } else { Severity::Usable };
-    Some(Warning { severity, ..care(WarningCode::Outliers, text) })
+    Some(Warning { severity, ..with_care(WarningCode::Outliers, text) })
 }
 
 /// The largest error of an output, if normal ones are hardly so large.

@@ -9,6 +9,7 @@ mod left;
 
 use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::information::{Block, Information};
+use crate::judge::check::{Check, Examined, Level, PREFILTER, Pass};
 use crate::judge::directions;
 use crate::judge::evidence::Evidence;
 use crate::judge::evidence::powers::COMPARED;
@@ -18,6 +19,26 @@ use crate::problem::{Accumulate, Objective, Role};
 use crate::sweep::Window;
 use crate::whiteness::chi_squared_tail;
 use std::f64::consts::FRAC_1_SQRT_2;
+
+pub(crate) const PARTS: Check = Check {
+    name: "parts of the data agree",
+    asks: "Where errors are colored or follow from the prediction, or where that is not examined: do outputs, records and halves give one set of parameters (Chow 1960)?",
+    codes: &[WarningCode::RecordsContradict, WarningCode::OutputsContradict, WarningCode::HalvesContradict],
+    costs: &[Pass::Slopes(1), Pass::Slopes(3)],
+    levels: &[
+        Level { of: "the probability by chance", value: LEVEL, source: "one good record in ten thousand" },
+        Level {
+            of: "the distance of two values of a parameter, in standard errors",
+            value: APART,
+            source: "beside the test above",
+        },
+        Level { of: "the distance, in parts of the value, that is not usable", value: FAR_APART, source: "a quarter" },
+    ],
+    examine: |evidence, intervals| {
+        Examined::unless(skipped(evidence), || contradictions(evidence, &intervals.unknowns))
+            .without(left_out(evidence))
+    },
+};
 
 /// Level of the test.
 pub(crate) const LEVEL: f64 = 1e-4;
@@ -148,14 +169,27 @@ fn is_suspicious(evidence: &Evidence<'_>) -> bool {
         || evidence.point.objective.sweep.predicts_variance()
 }
 
+/// Why parts are not compared.
+fn skipped(evidence: &Evidence<'_>) -> Option<&'static str> {
+    let problem = evidence.point.objective.problem;
+    match () {
+        _ if problem.settings.prefilter.is_some() => Some(PREFILTER),
+        _ if problem.unknowns.row.len() > MOST => Some("more than 200 unknowns"),
+        _ if evidence.point.degrees <= 0.0 => Some("no degrees of freedom"),
+        _ => (!evidence.point.end.outcome.converged()).then_some("no minimum"),
+    }
+}
+
+/// Which parts are not compared though others are.
+fn left_out(evidence: &Evidence<'_>) -> Option<&'static str> {
+    let many = evidence.point.objective.experiments() > COMPARED;
+    (many && is_suspicious(evidence)).then_some("single records, of which there are more than 12")
+}
+
 /// Parameters that differ between outputs, records or halves of the data.
-pub(crate) fn contradictions(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
+fn contradictions(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
     let objective = evidence.point.objective;
-    let possible = objective.problem.settings.prefilter.is_none()
-        && unknowns.len() <= MOST
-        && evidence.point.degrees > 0.0
-        && evidence.point.end.outcome.converged();
-    if !possible || !is_suspicious(evidence) {
+    if !is_suspicious(evidence) {
         return vec![];
     }
     let diagonal = objective.with(crate::problem::Whitening::Diagonal(objective.whitening.sigma()));

@@ -12,6 +12,7 @@ mod rows;
 use crate::estimate::student::two_sided;
 use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::information::Information;
+use crate::judge::check::{Check, Examined, Level, PREFILTER, Pass, ROUND_OFF};
 use crate::judge::directions;
 use crate::judge::evidence::Evidence;
 use crate::judge::leverage::prior_row;
@@ -19,6 +20,23 @@ use crate::numeral::{number, p_value, percent};
 use crate::optimize::{Linearization, Severity};
 use crate::problem::{Objective, Role, Whitening};
 use rows::{KINDS, Kind, Triangle};
+
+pub(crate) const SENSORS: Check = Check {
+    name: "sensors have the model's gain, offset and delay",
+    asks: "Does a gain, an offset or a delay of an output, as one more unknown, explain the errors (score test, Rao 1948; confirmed by White 1980 and for autocorrelated errors), or may a quantized output have been truncated?",
+    codes: &[WarningCode::SensorContradicts, WarningCode::CoarseOutput],
+    costs: &[Pass::Rows, Pass::Slopes(1)],
+    levels: &[
+        Level {
+            of: "the probability by chance, over all regressors",
+            value: LEVEL,
+            source: "one good record in ten thousand",
+        },
+        Level { of: "the part of a parameter that is a note", value: NOTHING, source: "no digit of it changes" },
+        Level { of: "the part of a parameter that is not usable", value: FAR, source: "a quarter" },
+    ],
+    examine: |evidence, intervals| Examined::unless(skipped(evidence), || sensors(evidence, &intervals.unknowns)),
+};
 
 /// Level of the test, divided by the number of regressors.
 const LEVEL: f64 = 1e-4;
@@ -53,16 +71,22 @@ struct Extended<'j> {
     linear: Linearization,
 }
 
+/// Why sensors are not tested.
+fn skipped(evidence: &Evidence<'_>) -> Option<&'static str> {
+    let objective = evidence.point.objective;
+    match () {
+        _ if objective.problem.settings.prefilter.is_some() => Some(PREFILTER),
+        _ if objective.sweep.restarts().is_some() => Some("predictions that restart from measurements"),
+        _ if objective.problem.unknowns.row.len() > MOST => Some("more than 200 unknowns"),
+        _ if evidence.point.degrees <= 1.0 => Some("no degrees of freedom"),
+        _ if evidence.rounding => Some(ROUND_OFF),
+        _ => (!evidence.point.end.outcome.converged()).then_some("no minimum"),
+    }
+}
+
 /// What is wrong with outputs, or may be.
-pub(crate) fn sensors(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
-    let settings = &evidence.point.objective.problem.settings;
-    let possible = settings.prefilter.is_none()
-        && evidence.point.objective.sweep.restarts().is_none()
-        && unknowns.len() <= MOST
-        && evidence.point.degrees > 1.0
-        && !evidence.rounding
-        && evidence.point.end.outcome.converged();
-    let Some(extended) = possible.then(|| Extended::new(evidence)).flatten() else { return vec![] };
+fn sensors(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
+    let Some(extended) = Extended::new(evidence) else { return vec![] };
     match extended.contradicts(unknowns) {
         Some(warning) => vec![warning],
         None => extended.cut_off(unknowns),

@@ -4,9 +4,11 @@
 //! are uncorrelated with powers of its prediction, and with the inputs of the samples before.
 
 use crate::estimate::{Warning, WarningCode};
+use crate::judge::check::{Check, Examined, Level, PREFILTER, Pass, ROUND_OFF};
 use crate::judge::checks::inputs_before::by_inputs_before;
 use crate::judge::evidence::Evidence;
 use crate::judge::evidence::color;
+use crate::judge::evidence::first_errors;
 use crate::judge::evidence::powers::{SHAPE, Scale, scales};
 use crate::judge::evidence::products::Products;
 use crate::judge::evidence::whiteness::{LAGS, Whiteness};
@@ -16,8 +18,47 @@ use crate::record::Record;
 use crate::sweep::Window;
 use crate::whiteness::Portmanteau;
 
+pub(crate) const FOLLOWING: Check = Check {
+    name: "errors follow from nothing that is known",
+    asks: "Do the errors follow from the size of an input (static models), from the inputs of four samples before, or from powers of the prediction (Ramsey 1969; White 1980)?",
+    codes: &[WarningCode::WrongShape],
+    costs: &[Pass::Values(1)],
+    levels: &[
+        Level {
+            of: "the probability by chance, over all outputs and inputs",
+            value: color::CERTAIN,
+            source: "one good record in ten thousand; for inputs before 1e-3",
+        },
+        Level {
+            of: "the part of what an output moves that is a note",
+            value: color::SMALL,
+            source: "no parameter moves by more",
+        },
+    ],
+    examine: |evidence, _| Examined::unless(skipped(evidence), || shape(evidence)).without(left_out(evidence)),
+};
+
+/// Why none of the tests below is made.
+fn skipped(evidence: &Evidence<'_>) -> Option<&'static str> {
+    let objective = evidence.point.objective;
+    match () {
+        _ if evidence.point.is_static() => None,
+        _ if evidence.rounding || evidence.point.is_exact() => Some(ROUND_OFF),
+        _ if objective.problem.settings.prefilter.is_some() => Some(PREFILTER),
+        _ if objective.sweep.restarts().is_some() => Some("predictions that restart from measurements"),
+        _ => evidence.autocorrelated_at(color::CERTAIN).map(|_| "errors that are correlated over time"),
+    }
+}
+
+/// Which of them are not made.
+fn left_out(evidence: &Evidence<'_>) -> Option<&'static str> {
+    let powers =
+        evidence.residuals.shape.is_empty().then_some("powers of the prediction (a loss, weights or a pre-filter)");
+    powers.or_else(|| first_errors::left_out(evidence.point.objective))
+}
+
 /// Whether the model certainly has the wrong shape.
-pub(crate) fn shape(evidence: &Evidence<'_>) -> Option<Warning> {
+fn shape(evidence: &Evidence<'_>) -> Option<Warning> {
     by_inputs(evidence).or_else(|| by_inputs_before(evidence)).or_else(|| by_predictions(evidence))
 }
 

@@ -1,217 +1,48 @@
-//! Warnings about the data and the method of an estimate.
+//! Warnings about the step of the method.
 
-use super::{
-    aliases, color, conditions, correlated_outputs, curved, data, data_noise, explained, few, growing_errors, known,
-    not_examined, outliers, parts, sensors, shape, starts, step_accumulation, uneven_errors, within_loss,
-};
-use crate::estimate::{Direction, Knowledge, Unknown, Warning, WarningCode};
-use crate::judge::covariances::Covariances;
+use crate::estimate::{Unknown, Warning, WarningCode};
+use crate::judge::check::{Check, Level, Pass};
+use crate::judge::checks::step_accumulation::windows_add_up;
 use crate::judge::directions::{taking_part, undetermined};
 use crate::judge::evidence::Evidence;
-use crate::layout::Kind;
-use crate::numeral::{counted, exact, number, percent};
+use crate::numeral::{number, percent};
 use crate::optimize::{Outcome, Severity};
-use crate::parameter::Transform;
-use crate::problem::{Free, Objective, Role, SearchPlan};
+use crate::problem::Objective;
+
+pub(crate) const STEP: Check = Check {
+    name: "a finer step changes nothing",
+    asks: "Where some windows change with a finer step: by how many standard errors would an unknown move, or is there no minimum with it?",
+    codes: &[WarningCode::CoarseStep, WarningCode::NotAtMinimum],
+    costs: &[Pass::Finer],
+    levels: &[
+        Level {
+            of: "standard errors, with a method that was chosen",
+            value: STEP_SHIFT,
+            source: "half of one: intervals of 95 % then cover 92 %",
+        },
+        Level {
+            of: "standard errors, with one of the library's choice",
+            value: REFINED_SHIFT,
+            source: "a tenth: nothing is lost",
+        },
+        Level {
+            of: "the part of a value that moves, where the data are reproduced",
+            value: DIGITS,
+            source: "a millionth",
+        },
+    ],
+    examine: |evidence, intervals| step(evidence, &intervals.unknowns).into(),
+};
 
 /// Largest change of a parameter with a finer step, in standard errors, without a warning: with a method that was chosen, and
 /// with one of the library's choice (beyond the former it makes the estimate unusable).
 const STEP_SHIFT: f64 = 0.5;
 const REFINED_SHIFT: f64 = 0.1;
-/// A predicted standard deviation below this fraction of the errors counts as zero.
-const ZERO_DEVIATION: f64 = 1e-6;
 /// Smallest part of an unknown's value that a finer step must move it by for a warning about data that are reproduced, and about a
 /// step that is too coarse to be used: of values that are right to more digits only the intervals are wrong.
 const DIGITS: f64 = 1e-6;
 /// The same from which on a fit without errors is not usable without care.
 const MUCH: f64 = 1e-3;
-/// Guessed initial states that are named; more are counted.
-const NAMED: usize = 4;
-
-pub(crate) fn care(code: WarningCode, text: String) -> Warning {
-    Warning { code, severity: Severity::UsableWithCare, text }
-}
-
-/// All warnings, in the order in which they are shown.
-pub(crate) fn warnings(
-    evidence: &Evidence<'_>,
-    unknowns: &[Unknown],
-    directions: &[Direction],
-    covariances: &Covariances,
-) -> Vec<Warning> {
-    let early = evidence.point.objective.control.stops();
-    let mut warnings = vec![];
-    warnings.extend(of_the_data(evidence, unknowns));
-    warnings.extend(data::data(evidence));
-    warnings.extend(explained::unexplained(evidence));
-    warnings.extend(explained::given_noise(evidence, covariances.method));
-    warnings.extend(shape::shape(evidence));
-    warnings.extend(outliers::outliers(evidence));
-    warnings.extend(parts::contradictions(evidence, unknowns));
-    warnings.extend(sensors::sensors(evidence, unknowns));
-    warnings.extend(known::knowledge(evidence, unknowns, covariances));
-    warnings.extend(unbounded(evidence));
-    warnings.extend(gaps(evidence));
-    warnings.extend(guessed_starts(evidence));
-    for unknown in unknowns {
-        if let Knowledge::Held { bound, end } = unknown.knowledge {
-            let Unknown { name, unit, .. } = unknown;
-            let place = match (unknown.transform, bound) {
-                (Transform::Log, 0.0) => {
-                    "is held where it changes nothing: its logarithm has no minimum, the cost falls towards zero"
-                        .to_owned()
-                }
-                _ => format!("is held at its bound {} {unit}: the cost falls beyond it", exact(bound)),
-            };
-            let reaches = match end {
-                Some(end) => {
-                    format!("; its 95 % interval reaches from {} to {} {unit}", exact(bound), number(end, 3))
-                }
-                None => String::new(),
-            };
-            warnings.push(care(WarningCode::HeldAtBound, format!("`{name}` {place}{reaches}")));
-        }
-    }
-    warnings.extend(not_positive(evidence, unknowns));
-    warnings.extend(directions.iter().map(|direction| without_influence(evidence, direction, unknowns)));
-    warnings.extend(step(evidence, unknowns));
-    warnings.extend(aliases::aliased(evidence));
-    if !evidence.point.end.outcome.converged() && unknowns.iter().any(|row| row.knowledge.standard_error().is_some()) {
-        let text = "standard errors and intervals are those of a minimum, where the search did not arrive".to_owned();
-        warnings.push(Warning { code: WarningCode::NotAtMinimum, severity: Severity::NotUsable, text });
-    }
-    if let Some(starts) = &evidence.point.end.starts {
-        let asked = matches!(evidence.point.objective.problem.settings.searches, SearchPlan::All(_));
-        let colored = evidence.color_dominates();
-        warnings.extend(starts::warnings(starts, evidence.residuals.measured, asked, colored));
-    }
-    if let Some(write_error) = &evidence.point.end.write_error {
-        let text = format!("the checkpoint could not be written ({write_error}); the search went on without it");
-        warnings.push(Warning { code: WarningCode::CheckpointNotWritten, severity: Severity::Usable, text });
-    }
-    warnings.extend(curved::curved(evidence, unknowns, covariances));
-    warnings.extend(conditions::kinked(evidence, unknowns, covariances));
-    warnings.extend(growing_errors::uneven(unknowns, covariances));
-    warnings.extend(few::decided_by_few(evidence, unknowns, covariances));
-    warnings.extend(uneven_errors::uneven_errors(unknowns, covariances));
-    warnings.extend(within_loss::few_within_the_loss(evidence));
-    warnings.extend(data_noise::restart_noise(evidence, unknowns));
-    warnings.extend(data_noise::input_noise(evidence, unknowns));
-    warnings.extend(color::autocorrelation(evidence, covariances));
-    warnings.extend(correlated_outputs::correlated_outputs(evidence));
-    warnings.extend(not_examined::not_examined(evidence, early));
-    warnings
-}
-
-/// Whether there are too few measurements, or none that determine an unknown.
-fn of_the_data(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
-    let (measured, severity) = (evidence.residuals.measured, Severity::NotUsable);
-    if measured <= unknowns.len() as u64 {
-        let text = format!(
-            "{measured} measurement(s) for {} unknown(s) leave nothing to tell the accuracy by; fix some, or record more",
-            unknowns.len()
-        );
-        return Some(Warning { code: WarningCode::TooFewMeasurements, severity, text });
-    }
-    let none = unknowns.iter().all(|row| row.knowledge == Knowledge::Unidentified);
-    none.then(|| Warning {
-        code: WarningCode::NothingDetermined,
-        severity,
-        text: "the data determine none of the unknowns".to_owned(),
-    })
-}
-
-/// Whether a predicted variance goes to zero: there the likelihood has no maximum.
-fn unbounded(evidence: &Evidence<'_>) -> Option<Warning> {
-    let of = |j: usize| (evidence.residuals.least_sigma[j], evidence.residuals.outputs[j].rmse);
-    let j = (0..evidence.residuals.least_sigma.len()).find(|&j| is_nothing(of(j)))?;
-    let (output, (least_sigma, rmse)) = (&evidence.point.objective.problem.layout().outputs[j], of(j));
-    let free =
-        evidence.point.objective.problem.unknowns.row.iter().any(|one| matches!(one.role, Role::InitialState(_)));
-    let (cause, remedy) = match free {
-        true => ("a free initial state fits the first measurement exactly", "fix the initial state"),
-        false => ("such as a first one that equals the initial state", "leave out what is predicted exactly (NaN)"),
-    };
-    let text = format!(
-        "a measurement of `{}` is predicted with a standard deviation of {} {unit}, beside errors of {} {unit}: the \
-         likelihood grows without bound ({cause}); give the noise a lower bound, or {remedy}",
-        output.name,
-        number(least_sigma, 2),
-        number(rmse, 2),
-        unit = output.unit
-    );
-    Some(Warning { code: WarningCode::UnboundedLikelihood, severity: Severity::NotUsable, text })
-}
-
-/// Parameters that were declared positive and are not.
-fn not_positive(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
-    let rows = evidence.point.objective.problem.unknowns.row.iter().zip(unknowns);
-    let wrong = rows.filter(|(row, unknown)| row.parameter.positive && unknown.value <= 0.0);
-    let warning = |(_, unknown): (&Free, &Unknown)| {
-        let consistent = matches!(unknown.knowledge, Knowledge::Known { upper, .. } if upper > 0.0);
-        let means = match consistent {
-            true => {
-                "its interval reaches above zero: the record says little of it; excite what depends on it, or fix it"
-            }
-            false => "model and record contradict each other; check units, signs and the hold of the inputs",
-        };
-        let (value, unit) = (number(unknown.value, 4), &unknown.unit);
-        let text = format!("`{}` is {value} {unit}, but was declared positive: {means}", unknown.name);
-        Warning { code: WarningCode::NotPositive, severity: Severity::NotUsable, text }
-    };
-    wrong.map(warning).collect()
-}
-
-/// A direction that the data do not determine; a note for an initial state that has died out, which changes no other unknown.
-fn without_influence(evidence: &Evidence<'_>, direction: &Direction, unknowns: &[Unknown]) -> Warning {
-    if let [(name, _)] = direction.moves.as_slice()
-        && evidence.point.linear.forgotten().iter().any(|i| unknowns[*i].name == *name)
-    {
-        let text = format!(
-            "`{name}` has died out before the first measurement: it is not known, and no other unknown depends on it"
-        );
-        return Warning { code: WarningCode::Unidentified, severity: Severity::Usable, text };
-    }
-    Direction::warning(direction.to_string())
-}
-
-/// Initial states whose start is a guess of the library.
-fn guessed_starts(evidence: &Evidence<'_>) -> Option<Warning> {
-    let rows = &evidence.point.objective.problem.unknowns.row;
-    let guessed: Vec<_> = rows.iter().filter(|unknown| unknown.guessed).collect();
-    let first = guessed.first()?;
-    let names: Vec<String> = guessed.iter().take(NAMED).map(|unknown| format!("`{}`", unknown.name)).collect();
-    let more = if guessed.len() > NAMED { format!(" and {} more", guessed.len() - NAMED) } else { String::new() };
-    let text = format!(
-        "the outputs do not give {}{more}: estimated, from a start of {}; if it is known, or nearly, say so \
-         (Experiment::initial)",
-        names.join(", "),
-        exact(first.parameter.start)
-    );
-    Some(Warning { code: WarningCode::GuessedStart, severity: Severity::Usable, text })
-}
-
-fn gaps(evidence: &Evidence<'_>) -> Vec<Warning> {
-    let problem = evidence.point.objective.problem;
-    // Nothing is held between samples without a state or without an input.
-    if problem.layout().kind == Kind::Static || problem.layout().inputs.is_empty() {
-        return vec![];
-    }
-    let records = problem.records.iter().zip(&problem.unknowns.labels);
-    let gaps = |(record, label): (&crate::record::Record, &String)| {
-        let gaps = record.gaps();
-        let (count, first) = (counted(gaps.len() as u64, "gap"), gaps.first()?);
-        Some(care(
-            WarningCode::TimeGaps,
-            format!(
-                "time jumps in experiment `{label}` ({count}, the first: {first}): the input is taken as held meanwhile, \
-             which is seldom what happened; fit the pieces between (Experiment::without_gaps)"
-            ),
-        ))
-    };
-    records.filter_map(gaps).collect()
-}
-
 /// Whether a finer step would move an unknown. The bound first, which costs little; the shift itself only where the
 /// bound is not enough.
 fn step(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
@@ -225,8 +56,7 @@ fn step(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
     let change = evidence.residuals.step_error / evidence.point.widening;
     // No more windows than samples.
     let windows = evidence.point.objective.problem.samples() as f64;
-    let coarse =
-        change > most || change * windows > most && change * step_accumulation::windows_add_up(evidence) > most;
+    let coarse = change > most || change * windows > most && change * windows_add_up(evidence) > most;
     let fewer = (refines && !stopped && coarse).then(|| determined_by_a_finer_step(evidence, unknowns)).flatten();
     if let Some(fewer) = fewer {
         return vec![fewer];
@@ -360,14 +190,9 @@ fn shift(objective: &Objective<'_>, coordinates: &[f64], unknowns: &[Unknown]) -
     (0..unknowns.len()).filter_map(shift).max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Whether a predicted standard deviation is nothing beside the root mean square of the errors.
-fn is_nothing((sigma, rmse): (f64, f64)) -> bool {
-    sigma < ZERO_DEVIATION * rmse
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{is_nothing, shift};
+    use super::shift;
     use crate::estimate::Knowledge;
     use crate::tests::{Current, Gain, Line, Voltage};
     use crate::{Experiment, Fit, Time, free};
@@ -386,14 +211,5 @@ mod tests {
             let (_, errors, part) = shift(&problem.objective().unwrap(), &[coordinate], &unknowns).unwrap();
             assert!((errors - 2.0).abs() < 1e-12 && (part - 0.5).abs() < 1e-12, "{errors} {part}");
         }
-    }
-
-    /// A millionth, of large errors and of small ones.
-    #[test]
-    fn deviations_of_nothing() {
-        for rmse in [1e-3, 1e3] {
-            assert!(is_nothing((0.99e-6 * rmse, rmse)) && !is_nothing((1.01e-6 * rmse, rmse)));
-        }
-        assert!(!is_nothing((0.0, 0.0)) && !is_nothing((f64::INFINITY, 1.0)));
     }
 }

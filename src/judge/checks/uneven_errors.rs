@@ -1,16 +1,33 @@
 //! Warnings about errors that are larger or smaller where an unknown is determined.
 
 use crate::estimate::{CovarianceMethod, Unknown, Warning, WarningCode};
+use crate::judge::check::{Check, Level, Pass};
 use crate::judge::covariances::Covariances;
-use crate::judge::evidence::sizes::Uneven;
+use crate::judge::evidence::sizes::{SAID, Uneven};
 use crate::numeral::number;
 use crate::optimize::Severity;
+
+pub(crate) const UNEVEN_ERRORS: Check = Check {
+    name: "errors are of one size",
+    asks: "Are errors larger, or smaller, where an unknown is determined (White 1980; Koenker 1981)?",
+    codes: &[WarningCode::UnevenErrors],
+    costs: &[Pass::Rows],
+    levels: &[
+        Level {
+            of: "the probability by chance, over all unknowns",
+            value: SAID,
+            source: "one good record in a hundred",
+        },
+        Level { of: "the ratio of standard errors of care", value: NARROW, source: "intervals cover 90 % or less" },
+    ],
+    examine: |_, intervals| uneven_errors(&intervals.unknowns, &intervals.covariances).into(),
+};
 
 /// From this ratio of standard errors on, a classical interval is not usable without care: it covers 90 % or less.
 const NARROW: f64 = 1.2;
 
 /// Errors that are larger or smaller where an unknown is determined.
-pub(crate) fn uneven_errors(unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
+fn uneven_errors(unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
     let Uneven { unknown, factor, p_value } = covariances.uneven?;
     let (name, times) = (&unknowns[unknown].name, number(factor, 2));
     let found = format!(

@@ -4,11 +4,28 @@
 //! errors are within it, or positive and negative slopes cancel: then the mean depends on few errors, and so do the standard errors.
 
 use crate::estimate::{Warning, WarningCode};
+use crate::judge::check::{Check, Level, Pass};
 use crate::judge::evidence::Evidence;
 use crate::numeral::percent;
 use crate::optimize::Severity;
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
+
+pub(crate) const LOSS: Check = Check {
+    name: "the loss is wide enough",
+    asks: "How well do the errors within a robust loss determine its mean curvature?",
+    codes: &[WarningCode::NarrowLoss],
+    costs: &[Pass::Values(1)],
+    levels: &[
+        Level {
+            of: "the relative standard deviation of care",
+            value: CARE,
+            source: "standard errors are off by as much",
+        },
+        Level { of: "that is not usable", value: NONE, source: "a half" },
+    ],
+    examine: |evidence, _| few_within_the_loss(evidence).into(),
+};
 
 /// Relative standard deviation of the curvature above which standard errors are not usable without care, and not at all.
 const CARE: f64 = 0.15;
@@ -48,7 +65,7 @@ impl Accumulate for Slopes<'_> {
 }
 
 /// A warning of a loss whose mean curvature at these errors is too uncertain for standard errors.
-pub(crate) fn few_within_the_loss(evidence: &Evidence<'_>) -> Option<Warning> {
+fn few_within_the_loss(evidence: &Evidence<'_>) -> Option<Warning> {
     let objective = evidence.point.objective;
     objective.loss()?;
     let new = |experiment: usize| Slopes { objective, experiment, sum: 0.0, squares: 0.0, count: 0.0 };

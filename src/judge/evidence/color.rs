@@ -11,7 +11,7 @@ const MUCH: f64 = 0.05;
 /// The part of an output's movement that is an error, and follows from the errors before: below the first it is a note,
 /// above the second the model is wrong or noise dominates the output.
 pub(crate) const SMALL: f64 = 1e-4;
-const LARGE: f64 = 0.5;
+pub(crate) const LARGE: f64 = 0.5;
 /// The same part from which on a minimum that was found once is taken as wrong: driven pendulums fitted with a wrong natural frequency had
 /// 0.3, right models with colored noise of 5 % of the output less than 0.05.
 pub(crate) const LEFT: f64 = 0.1;

@@ -6,7 +6,7 @@ use crate::whiteness::chi_squared_tail;
 use crate::wide::{Terms, Wide, sums};
 
 /// Level of the test, over all pairs of outputs.
-const LEVEL: f64 = 0.01;
+pub(crate) const LEVEL: f64 = 0.01;
 
 /// Sums over the samples at which both outputs of a pair were measured.
 #[derive(Clone, Copy, Debug, Default)]

@@ -4,8 +4,8 @@ use crate::problem::Objective;
 use crate::sweep::Window;
 
 /// Records that are looked at, and samples of each: the first ones.
-pub(crate) const RECORDS: usize = 8;
-pub(crate) const SAMPLES: usize = 16_384;
+const RECORDS: usize = 8;
+const SAMPLES: usize = 16_384;
 
 /// Errors of an experiment, output by output, sample by sample; `None` where nothing was measured.
 pub(crate) type Errors = Vec<Vec<Option<f64>>>;
@@ -13,6 +13,13 @@ pub(crate) type Errors = Vec<Vec<Option<f64>>>;
 /// The first errors of the first records.
 pub(crate) fn of_all(objective: &Objective<'_>, coordinates: &[f64]) -> Vec<Errors> {
     (0..objective.experiments().min(RECORDS)).map(|e| errors(objective, coordinates, e, SAMPLES)).collect()
+}
+
+/// What is left out, if something is.
+pub(crate) fn left_out(objective: &Objective<'_>) -> Option<&'static str> {
+    let long = objective.problem.records.iter().any(|record| record.len() > SAMPLES);
+    (long || objective.experiments() > RECORDS)
+        .then_some("records beyond the first 8, and samples beyond the first 16,384")
 }
 
 /// Errors of an experiment, in the units of the outputs, as far as this many samples or somewhat beyond.

@@ -15,7 +15,7 @@ use nalgebra::DMatrix;
 use pass::Pass;
 
 /// Part of the variance from which on one measurement, or two together, decide.
-const DECIDES: f64 = 0.9;
+pub(crate) const DECIDES: f64 = 0.9;
 
 /// A measurement, and its part in the variance of an unknown.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

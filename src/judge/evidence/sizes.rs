@@ -11,7 +11,7 @@ use statrs::distribution::{ContinuousCDF, Gamma};
 
 /// Levels, over all unknowns, of the test that decides on the covariance and of that which decides on a warning.
 const CHOSEN: f64 = 0.05;
-const SAID: f64 = 0.01;
+pub(crate) const SAID: f64 = 0.01;
 /// Variance of the squares of normal errors of unit variance.
 const NORMAL: f64 = 2.0;
 /// A variance that differs from the classical one by a smaller part is not worth another method.

@@ -1,8 +1,49 @@
-//! Warnings from searches from other starts.
+//! Warnings about the search: its end, searches from other starts, its checkpoint.
 
-use crate::estimate::{Minimum, Starts, Warning, WarningCode, times_the_cost};
+use crate::estimate::{Minimum, Starts, Unknown, Warning, WarningCode, times_the_cost};
+use crate::judge::check::{Check, Level};
+use crate::judge::evidence::Evidence;
 use crate::numeral::number;
 use crate::optimize::Severity;
+use crate::problem::SearchPlan;
+
+pub(crate) const MINIMUM: Check = Check {
+    name: "the search ended at a minimum",
+    asks: "Are intervals given where the search did not arrive at a minimum?",
+    codes: &[WarningCode::NotAtMinimum],
+    costs: &[],
+    levels: &[],
+    examine: |evidence, intervals| not_at_minimum(evidence, &intervals.unknowns).into(),
+};
+
+pub(crate) const STARTS: Check = Check {
+    name: "searches from other starts agree",
+    asks: "Did other starts lead to the estimate, to another minimum that explains the data as well, or the declared start elsewhere?",
+    codes: &[WarningCode::MinimumFoundOnce, WarningCode::RivalMinimum, WarningCode::DeclaredStartElsewhere],
+    costs: &[],
+    levels: &[
+        Level {
+            of: "the difference of deviances that tells two minima apart",
+            value: INDISTINGUISHABLE,
+            source: "one of 150 records",
+        },
+        Level {
+            of: "searches of which a minimum is found more than once",
+            value: MANY as f64,
+            source: "one of twenty cases",
+        },
+    ],
+    examine: |evidence, _| starts(evidence).into(),
+};
+
+pub(crate) const CHECKPOINT: Check = Check {
+    name: "the checkpoint was written",
+    asks: "Was there an error in writing the checkpoint?",
+    codes: &[WarningCode::CheckpointNotWritten],
+    costs: &[],
+    levels: &[],
+    examine: |evidence, _| checkpoint(evidence).into(),
+};
 
 /// Minima whose deviances differ by less cannot be told apart: if both had the same number of fixed parameters, the wrong one would
 /// be better by more in less than `exp(-10 / 2)`, one of 150 records.
@@ -11,10 +52,34 @@ pub(crate) const INDISTINGUISHABLE: f64 = 10.0;
 /// A minimum that half of all searches lead to is found at most once by so many in less than one of twenty cases: `(8 + 1) / 2^8`.
 const MANY: u64 = 8;
 
+/// Intervals of a search that did not end at a minimum.
+fn not_at_minimum(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
+    let known = unknowns.iter().any(|row| row.knowledge.standard_error().is_some());
+    (known && !evidence.point.end.outcome.converged()).then(|| Warning {
+        code: WarningCode::NotAtMinimum,
+        severity: Severity::NotUsable,
+        text: "standard errors and intervals are those of a minimum, where the search did not arrive".to_owned(),
+    })
+}
+
+/// A checkpoint that could not be written.
+fn checkpoint(evidence: &Evidence<'_>) -> Option<Warning> {
+    let write_error = evidence.point.end.write_error.as_ref()?;
+    let text = format!("the checkpoint could not be written ({write_error}); the search went on without it");
+    Some(Warning { code: WarningCode::CheckpointNotWritten, severity: Severity::Usable, text })
+}
+
+/// Searches from other starts, if there were any.
+fn starts(evidence: &Evidence<'_>) -> Vec<Warning> {
+    let asked = matches!(evidence.point.objective.problem.settings.searches, SearchPlan::All(_));
+    let of = |starts| warnings(starts, evidence.residuals.measured, asked, evidence.color_dominates());
+    evidence.point.end.starts.as_ref().map_or(vec![], of)
+}
+
 /// Warnings about an estimate that is the best end of these searches, with errors that are colored or not. Where searches were not asked
 /// for, a minimum that is found once lowers the verdict no more than one that is found without other searches does. But one that is found
 /// once by many searches and leaves colored errors is seldom the right one: what is colored there is what the model does not explain.
-pub(crate) fn warnings(starts: &Starts, measurements: u64, asked: bool, colored: bool) -> Vec<Warning> {
+fn warnings(starts: &Starts, measurements: u64, asked: bool, colored: bool) -> Vec<Warning> {
     let Starts { tried, agreed, minima, declared, failed, .. } = starts;
     let mut warnings = vec![];
     if *agreed == 1 && *tried > 1 {

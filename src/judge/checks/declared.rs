@@ -1,0 +1,159 @@
+//! Warnings about what was declared: times, initial states, bounds, signs; and what the data do not determine of it.
+
+use crate::estimate::{Direction, Knowledge, Unknown, Warning, WarningCode};
+use crate::judge::check::{Check, with_care};
+use crate::judge::evidence::Evidence;
+use crate::layout::Kind;
+use crate::numeral::{counted, exact, number};
+use crate::optimize::Severity;
+use crate::parameter::Transform;
+use crate::problem::Free;
+
+pub(crate) const GAPS: Check = Check {
+    name: "time has no gaps",
+    asks: "Does time jump within a record whose inputs are held meanwhile?",
+    codes: &[WarningCode::TimeGaps],
+    costs: &[],
+    levels: &[],
+    examine: |evidence, _| gaps(evidence).into(),
+};
+
+pub(crate) const GUESSED: Check = Check {
+    name: "initial states have a start",
+    asks: "Does neither the user nor an output give a start for an initial state?",
+    codes: &[WarningCode::GuessedStart],
+    costs: &[],
+    levels: &[],
+    examine: |evidence, _| guessed_starts(evidence).into(),
+};
+
+pub(crate) const HELD: Check = Check {
+    name: "no unknown is at a bound",
+    asks: "Is an unknown held at a bound, beyond which the cost falls?",
+    codes: &[WarningCode::HeldAtBound],
+    costs: &[],
+    levels: &[],
+    examine: |_, intervals| held_at_bound(&intervals.unknowns).into(),
+};
+
+pub(crate) const POSITIVE: Check = Check {
+    name: "positive parameters are positive",
+    asks: "Is a parameter that was declared positive zero or below?",
+    codes: &[WarningCode::NotPositive],
+    costs: &[],
+    levels: &[],
+    examine: |evidence, intervals| not_positive(evidence, &intervals.unknowns).into(),
+};
+
+pub(crate) const IDENTIFIED: Check = Check {
+    name: "all unknowns are identified",
+    asks: "Along which directions of the unknowns do the data say nothing, by the singular values of the slopes?",
+    codes: &[WarningCode::Unidentified],
+    costs: &[],
+    levels: &[],
+    examine: |evidence, intervals| {
+        intervals
+            .directions
+            .iter()
+            .map(|one| without_influence(evidence, one, &intervals.unknowns))
+            .collect::<Vec<_>>()
+            .into()
+    },
+};
+
+/// Guessed initial states that are named; more are counted.
+const NAMED: usize = 4;
+
+/// Unknowns that are held at a bound.
+fn held_at_bound(unknowns: &[Unknown]) -> Vec<Warning> {
+    let mut warnings = vec![];
+    for unknown in unknowns {
+        if let Knowledge::Held { bound, end } = unknown.knowledge {
+            let Unknown { name, unit, .. } = unknown;
+            let place = match (unknown.transform, bound) {
+                (Transform::Log, 0.0) => {
+                    "is held where it changes nothing: its logarithm has no minimum, the cost falls towards zero"
+                        .to_owned()
+                }
+                _ => format!("is held at its bound {} {unit}: the cost falls beyond it", exact(bound)),
+            };
+            let reaches = match end {
+                Some(end) => {
+                    format!("; its 95 % interval reaches from {} to {} {unit}", exact(bound), number(end, 3))
+                }
+                None => String::new(),
+            };
+            warnings.push(with_care(WarningCode::HeldAtBound, format!("`{name}` {place}{reaches}")));
+        }
+    }
+    warnings
+}
+
+/// Parameters that were declared positive and are not.
+fn not_positive(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
+    let rows = evidence.point.objective.problem.unknowns.row.iter().zip(unknowns);
+    let wrong = rows.filter(|(row, unknown)| row.parameter.positive && unknown.value <= 0.0);
+    let warning = |(_, unknown): (&Free, &Unknown)| {
+        let consistent = matches!(unknown.knowledge, Knowledge::Known { upper, .. } if upper > 0.0);
+        let means = match consistent {
+            true => {
+                "its interval reaches above zero: the record says little of it; excite what depends on it, or fix it"
+            }
+            false => "model and record contradict each other; check units, signs and the hold of the inputs",
+        };
+        let (value, unit) = (number(unknown.value, 4), &unknown.unit);
+        let text = format!("`{}` is {value} {unit}, but was declared positive: {means}", unknown.name);
+        Warning { code: WarningCode::NotPositive, severity: Severity::NotUsable, text }
+    };
+    wrong.map(warning).collect()
+}
+
+/// A direction that the data do not determine; a note for an initial state that has died out, which changes no other unknown.
+fn without_influence(evidence: &Evidence<'_>, direction: &Direction, unknowns: &[Unknown]) -> Warning {
+    if let [(name, _)] = direction.moves.as_slice()
+        && evidence.point.linear.forgotten().iter().any(|i| unknowns[*i].name == *name)
+    {
+        let text = format!(
+            "`{name}` has died out before the first measurement: it is not known, and no other unknown depends on it"
+        );
+        return Warning { code: WarningCode::Unidentified, severity: Severity::Usable, text };
+    }
+    Direction::warning(direction.to_string())
+}
+
+/// Initial states whose start is a guess of the library.
+fn guessed_starts(evidence: &Evidence<'_>) -> Option<Warning> {
+    let rows = &evidence.point.objective.problem.unknowns.row;
+    let guessed: Vec<_> = rows.iter().filter(|unknown| unknown.guessed).collect();
+    let first = guessed.first()?;
+    let names: Vec<String> = guessed.iter().take(NAMED).map(|unknown| format!("`{}`", unknown.name)).collect();
+    let more = if guessed.len() > NAMED { format!(" and {} more", guessed.len() - NAMED) } else { String::new() };
+    let text = format!(
+        "the outputs do not give {}{more}: estimated, from a start of {}; if it is known, or nearly, say so \
+         (Experiment::initial)",
+        names.join(", "),
+        exact(first.parameter.start)
+    );
+    Some(Warning { code: WarningCode::GuessedStart, severity: Severity::Usable, text })
+}
+
+fn gaps(evidence: &Evidence<'_>) -> Vec<Warning> {
+    let problem = evidence.point.objective.problem;
+    // Nothing is held between samples without a state or without an input.
+    if problem.layout().kind == Kind::Static || problem.layout().inputs.is_empty() {
+        return vec![];
+    }
+    let records = problem.records.iter().zip(&problem.unknowns.labels);
+    let gaps = |(record, label): (&crate::record::Record, &String)| {
+        let gaps = record.gaps();
+        let (count, first) = (counted(gaps.len() as u64, "gap"), gaps.first()?);
+        Some(with_care(
+            WarningCode::TimeGaps,
+            format!(
+                "time jumps in experiment `{label}` ({count}, the first: {first}): the input is taken as held meanwhile, \
+             which is seldom what happened; fit the pieces between (Experiment::without_gaps)"
+            ),
+        ))
+    };
+    records.filter_map(gaps).collect()
+}

@@ -1,0 +1,66 @@
+//! The table of checks against `docs/checks.md` and the schema of an estimate's JSON.
+
+use super::*;
+use crate::judge::check::{Level, Pass};
+use crate::numeral::{counted, exact};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+fn code(code: impl serde::Serialize) -> String {
+    serde_json::to_value(code).unwrap().as_str().unwrap().to_owned()
+}
+
+fn pass(pass: &Pass) -> String {
+    match pass {
+        Pass::Rows => "the pass with slopes that checks share".to_owned(),
+        Pass::Values(count) => format!("up to {} in values, where there is a reason", counted(*count as u64, "pass")),
+        Pass::Slopes(count) => format!("up to {} with slopes, where there is a reason", counted(*count as u64, "pass")),
+        Pass::EachUnknown(count) => {
+            format!("{} or more for each unknown with a reason", counted(*count as u64, "pass"))
+        }
+        Pass::Finer => "a pass by a finer method, where there is a reason".to_owned(),
+    }
+}
+
+/// The page about all checks.
+fn page() -> String {
+    let mut page = "# Checks of an estimate\n\nWritten from the table `CHECKS` in `src/judge/checks.rs` by \
+                    `GREYBOX_WRITE_CHECKS=1 cargo test --lib checks`; a test compares it. The checks stand in the order in which their \
+                    warnings are shown. Passes over the data are counted beside the one in values that every estimate takes.\n"
+        .to_owned();
+    for (number, Check { name, asks, codes, costs, levels, .. }) in CHECKS.iter().enumerate() {
+        let codes: Vec<String> = codes.iter().map(|one| format!("`{}`", code(one))).collect();
+        let costs: Vec<String> = costs.iter().map(pass).collect();
+        let costs = if costs.is_empty() { "none".to_owned() } else { costs.join("; ") };
+        page += &format!("\n## {}. {name}\n\n{asks}\n\nCodes: {}. Passes: {costs}.\n", number + 1, codes.join(", "));
+        if !levels.is_empty() {
+            page += "\n| level | value | where it comes from |\n|---|---|---|\n";
+        }
+        for Level { of, value, source } in *levels {
+            page += &format!("| {of} | {} | {source} |\n", exact(*value));
+        }
+    }
+    page
+}
+
+/// `GREYBOX_WRITE_CHECKS=1` writes the page.
+#[test]
+fn the_page_is_that_of_the_table() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/checks.md");
+    if std::env::var_os("GREYBOX_WRITE_CHECKS").is_some() {
+        std::fs::write(&path, page()).unwrap();
+    }
+    assert_eq!(std::fs::read_to_string(path).unwrap(), page(), "run it with GREYBOX_WRITE_CHECKS=1");
+}
+
+/// No name stands twice, and the schema lists the codes of all checks.
+#[test]
+fn names_and_codes_are_complete() {
+    let names: BTreeSet<&str> = CHECKS.iter().map(|check| check.name).collect();
+    assert_eq!(names.len(), CHECKS.len());
+    let codes: BTreeSet<String> = CHECKS.iter().flat_map(|check| check.codes).map(code).collect();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("schema/estimate.schema.json");
+    let schema: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let listed = schema["$defs"]["warning"]["properties"]["code"]["enum"].as_array().unwrap().iter().map(code);
+    assert_eq!(listed.collect::<BTreeSet<String>>(), codes);
+}
