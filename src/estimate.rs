@@ -14,6 +14,7 @@ mod typed;
 mod warning;
 
 pub(crate) use display::held;
+pub(crate) use examination::described;
 pub use examination::{Examination, Extent};
 pub(crate) use format::{Format, Version};
 pub use method::{CovarianceMethod, Method, NoiseModel};

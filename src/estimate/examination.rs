@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+use std::fmt;
 
 /// A check of an estimate, and how far it was made; `docs/checks.md` in the repository says what each asks.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -31,15 +32,24 @@ pub enum Extent {
     },
 }
 
+impl fmt::Display for Extent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Extent::Whole => f.write_str("as a whole"),
+            Extent::Part { without } => write!(f, "without {without}"),
+            Extent::Nothing { because } => write!(f, "not made: {because}"),
+        }
+    }
+}
+
 /// How many checks were made, and which were not, with the reason; checks with one reason stand together.
 pub(crate) fn described(examined: &[Examination]) -> String {
     let mut left_out: Vec<(String, Vec<&str>)> = vec![];
     for Examination { check, extent } in examined {
-        let reason = match extent {
-            Extent::Whole => continue,
-            Extent::Part { without } => format!("without {without}"),
-            Extent::Nothing { because } => format!("not made: {because}"),
-        };
+        if *extent == Extent::Whole {
+            continue;
+        }
+        let reason = extent.to_string();
         match left_out.iter_mut().find(|(other, _)| *other == reason) {
             Some((_, checks)) => checks.push(check),
             None => left_out.push((reason, vec![check])),

@@ -1,5 +1,6 @@
 //! The sections that every report has, made of its plain values.
 
+mod checks;
 mod data;
 mod identifiability;
 mod outputs;
@@ -13,7 +14,7 @@ use super::facts::Facts;
 use crate::section::Section;
 
 /// They come after whatever is added to a report.
-pub(super) const LAST: [&str; 2] = ["data", "reproduce"];
+pub(super) const LAST: [&str; 3] = ["checks", "data", "reproduce"];
 
 pub(super) fn all(facts: &Facts) -> Vec<Section> {
     let mut sections = vec![parameters::section(facts), outputs::section(facts)];
@@ -21,7 +22,7 @@ pub(super) fn all(facts: &Facts) -> Vec<Section> {
     sections.extend(residuals::section(facts));
     sections.push(identifiability::section(facts));
     sections.extend(starts::section(facts));
-    sections.extend([data::section(facts), reproduce::section(facts)]);
+    sections.extend([checks::section(facts), data::section(facts), reproduce::section(facts)]);
     sections
 }
 

@@ -151,8 +151,8 @@ fn markdown_tables_have_as_many_cells_as_columns() {
         tables += usize::from(pair[1].starts_with("| :--"));
     }
     let named = "parameters, outputs, tests of the residuals, excitation, correlations, profiles, bootstrap, starts, further \
-                 tests, signals, origin, declarations, settings, figures";
-    assert_eq!(tables, 14, "{named}: {markdown}");
+                 tests, checks, signals, origin, declarations, settings, figures";
+    assert_eq!(tables, 15, "{named}: {markdown}");
     assert!(markdown.contains("| offset | 0.3 | N |  | fixed |  |"), "{markdown}");
 }
 

@@ -9,10 +9,14 @@ use std::path::Path;
 
 type Name = Vec<String>;
 
+/// The names of a path.
+fn names(text: &str) -> impl Iterator<Item = String> {
+    text.split("::").map(|one| one.trim().to_owned()).filter(|one| !one.is_empty())
+}
+
 /// The paths of an import: `a::b` and `a::c` of `a::{b, c}`, with the name by which each is known.
 fn paths(prefix: &[String], text: &str, found: &mut Vec<(Name, String)>) {
     let text = text.trim();
-    let names = |text: &str| text.split("::").map(|one| one.trim().to_owned()).filter(|one| !one.is_empty());
     let Some((before, list)) = text.split_once('{') else {
         let (path, other) = text.split_once(" as ").unwrap_or((text, ""));
         let mut path: Name = prefix.iter().cloned().chain(names(path)).collect();
@@ -101,7 +105,7 @@ impl Files {
 
 /// The circles of imports: sets of files each of which leads to all others.
 fn circles(edges: &BTreeMap<Name, BTreeSet<Name>>) -> Vec<BTreeSet<&Name>> {
-    let reached = |from| {
+    let reached = |from| -> BTreeSet<&Name> {
         let (mut found, mut open) = (BTreeSet::new(), vec![from]);
         while let Some(file) = open.pop() {
             open.extend(edges.get(file).into_iter().flatten().filter(|next| found.insert(*next)));
@@ -109,10 +113,10 @@ fn circles(edges: &BTreeMap<Name, BTreeSet<Name>>) -> Vec<BTreeSet<&Name>> {
         found
     };
     let reached: BTreeMap<&Name, BTreeSet<&Name>> = edges.keys().map(|file| (file, reached(file))).collect();
-    let circle = |(file, all): (&&Name, &BTreeSet<&Name>)| -> BTreeSet<&Name> {
-        all.iter().copied().filter(|other| reached[*other].contains(*file)).collect()
-    };
-    let circles: BTreeSet<BTreeSet<&Name>> = reached.iter().map(circle).collect();
+    let mut circles = BTreeSet::new();
+    for (file, all) in &reached {
+        circles.insert(all.iter().copied().filter(|other| reached[*other].contains(file)).collect());
+    }
     circles.into_iter().collect()
 }
 

@@ -46,7 +46,7 @@ pub(crate) const SUSPICIONS: Check = Check {
         Level {
             of: "the mean squared error there, in those elsewhere",
             value: LARGER,
-            source: "twice: of a stretch of ten good errors one in fifty",
+            source: "one in 34 of stretches of ten good errors",
         },
         Level { of: "the part of the sum of squares that decides the estimate", value: DECIDE, source: "a half" },
         Level {
