@@ -131,8 +131,8 @@ fn programs_find_codes_and_the_covariance() {
 fn other_files_are_refused() {
     let text = estimate().to_json().unwrap();
     let refused = |text: &str| Estimate::<Winding>::from_json(text).unwrap_err().to_string();
-    let newer = refused(&text.replacen("\"version\": 1", "\"something\": 0, \"version\": 2", 1));
-    assert!(newer.contains("version 2 of the format \"greybox estimate\"") && newer.contains("reads 1"), "{newer}");
+    let newer = refused(&text.replacen("\"version\": 2", "\"something\": 0, \"version\": 3", 1));
+    assert!(newer.contains("version 3 of the format \"greybox estimate\"") && newer.contains("reads 2"), "{newer}");
     let other = refused(&text.replacen("greybox estimate", "greybox report", 1));
     assert!(other.contains("the format is \"greybox report\""), "{other}");
     assert!(refused("{}").contains("missing field `format`"), "{}", refused("{}"));
