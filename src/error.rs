@@ -51,9 +51,9 @@ pub enum Error {
         /// Its time (s).
         time: f64,
     },
-    /// Time that stands still or runs backwards.
+    /// Time that runs backwards, or that no sample is at another instant of.
     #[error(
-        "experiment `{experiment}`: time does not increase at sample {sample}: {} s is followed by {} s; sort the record or drop repeated stamps", exact(*before), exact(*time)
+        "experiment `{experiment}`: time does not increase at sample {sample}: {} s is followed by {} s; sort the record, which may hold several measurements of one instant, but not of one only", exact(*before), exact(*time)
     )]
     TimeOrder {
         /// Name of the experiment.
@@ -64,6 +64,24 @@ pub enum Error {
         before: f64,
         /// Time of the second (s).
         time: f64,
+    },
+    /// Two samples of one instant whose inputs differ.
+    #[error(
+        "experiment `{experiment}`: samples {} and {sample} are at one instant (t = {} s), where `{input}` is {} and {}; measurements may repeat at an instant, inputs may not: give the samples times of their own", sample - 1, exact(*time), short(*before), short(*value)
+    )]
+    InputsAtOneInstant {
+        /// Name of the experiment.
+        experiment: String,
+        /// Index of the second of the two samples.
+        sample: usize,
+        /// Their time (s).
+        time: f64,
+        /// Name of the input.
+        input: String,
+        /// Its value at the first.
+        before: f64,
+        /// Its value at the second.
+        value: f64,
     },
     /// A sample time, factor or scale that must be a positive finite number.
     #[error("{what} is {}; it must be positive and finite", short(*value))]
@@ -182,6 +200,16 @@ pub enum Error {
         integrator: String,
         /// The kind that it serves.
         serves: &'static str,
+    },
+    /// A predictor for models that are affine in their state, and a model that is not.
+    #[error(
+        "{what} is not affine in the state, as {predictor} needs it; simulate the record (FreeRun, the default), predict from measured states (Horizon), or estimate state and parameters online by the extended filter (online::Ekf)"
+    )]
+    NotAffine {
+        /// The equation: a derivative, a next state or an output.
+        what: String,
+        /// The predictor.
+        predictor: String,
     },
     /// An initial state, or a restart, that the outputs do not give.
     #[error("experiment `{experiment}`: the state cannot be computed from the outputs ({reason}); {remedy}")]

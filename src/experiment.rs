@@ -19,7 +19,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// One measured record of inputs `U` and outputs `Y`, and what is known of the state `X` at its first sample.
 ///
-/// Time increases, inputs are finite, lengths agree; an output that was not measured is `NaN`. Unless told otherwise the
+/// Time does not decrease, inputs are finite, lengths agree; an output that was not measured is `NaN`. Samples may be at one instant, with
+/// the same inputs: several measurements of the same state, which passes the interval between them unchanged. Unless told otherwise the
 /// input is held from sample to sample, and the initial state is estimated, from a start that the first measurements give.
 ///
 /// It is made of vectors ([`new`](Experiment::new)), of columns ([`from_columns`](Experiment::from_columns)) or of a CSV

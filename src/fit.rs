@@ -11,6 +11,7 @@ mod run;
 mod search;
 mod sides;
 mod simulated;
+mod start_error;
 mod starts;
 
 pub use fleet::Fleet;
@@ -323,7 +324,7 @@ pub(crate) fn sweep<'a, M: Model + 'a>(
         let (layout, method, predictor) = (layout.clone(), method.clone(), predictor.clone());
         Arc::new(DualSweep { layout, code, method, predictor, uncompiled })
     };
-    Ok(compiled(&|| Equations::trace(&*model).map(Arc::new), &method, predictor, &plain))
+    compiled(&|| Equations::trace(&*model).map(Arc::new), &method, predictor, &plain)
 }
 
 /// The sweeps by the methods that follow a default one that is too coarse.

@@ -58,6 +58,18 @@ impl Layout {
     }
 }
 
+#[cfg(feature = "std")]
+impl Layout {
+    /// The equation of this number among those of the states, then of the outputs, in words.
+    pub(crate) fn equation(&self, number: usize) -> String {
+        match (self.states.get(number), self.kind) {
+            (Some(state), Kind::Continuous) => format!("the derivative of state `{}`", state.name),
+            (Some(state), _) => format!("the next value of state `{}`", state.name),
+            (None, _) => format!("output `{}`", self.outputs[number - self.states.len()].name),
+        }
+    }
+}
+
 /// The quantities of a vector of signals.
 #[cfg(feature = "std")]
 pub(crate) fn quantities<X: Signals>() -> Vec<Quantity> {

@@ -10,6 +10,7 @@ mod symbolic;
 pub use free_run::FreeRun;
 pub use horizon::Horizon;
 pub use kalman::Kalman;
+pub(crate) use kalman::LONG;
 pub use measured::Guess;
 pub(crate) use measured::Place;
 pub use plant::Plant;
@@ -47,6 +48,12 @@ pub trait Predictor: Debug + Clone + Send + Sync + 'static {
     /// carried from sample to sample then.
     fn restarts(&self) -> Option<Horizon> {
         None
+    }
+
+    /// Whether it predicts only models whose derivatives (next states) and outputs are affine in the state. Others are refused
+    /// ([`Error::NotAffine`]).
+    fn needs_affine(&self) -> bool {
+        false
     }
 
     /// Checks that it can predict a model of this layout.
@@ -99,6 +106,7 @@ pub(crate) trait Prediction: Debug + Send + Sync {
     fn predicts_variance(&self) -> bool;
     fn restarts(&self) -> Option<Horizon>;
     fn is_simulation(&self) -> bool;
+    fn needs_affine(&self) -> bool;
     fn check(&self, layout: &Layout) -> Result<(), Error>;
     fn describe(&self) -> String;
     fn values(&self) -> &dyn Steps<f64>;
@@ -147,6 +155,10 @@ impl<P: Predictor> Prediction for P {
 
     fn is_simulation(&self) -> bool {
         std::any::TypeId::of::<P>() == std::any::TypeId::of::<FreeRun>()
+    }
+
+    fn needs_affine(&self) -> bool {
+        Predictor::needs_affine(self)
     }
 
     fn check(&self, layout: &Layout) -> Result<(), Error> {

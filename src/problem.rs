@@ -47,10 +47,10 @@ use weighing::Weighing;
 pub(crate) use whitening::{Noise, Whitening};
 
 use crate::error::Error;
-use crate::layout::{Layout, Quantity};
+use crate::layout::{Kind, Layout, Quantity};
 use crate::loss::expected_slope;
 use crate::parameter::Parameter;
-use crate::record::{Channel, Record};
+use crate::record::{Channel, Record, Time};
 use crate::sweep::{Prepared, Sweep};
 use std::sync::Arc;
 
@@ -108,6 +108,9 @@ impl<'a> Problem<'a> {
         }
         unknowns::check_count(sweep.layout(), parameters)?;
         records.iter().try_for_each(|record| check_signals(sweep.layout(), record))?;
+        if sweep.layout().kind == Kind::Discrete {
+            records.iter().try_for_each(check_steps)?;
+        }
         settings.check(sweep.layout(), &records)?;
         let unknowns = Arc::new(Unknowns::new(&*sweep, &records, parameters)?);
         let prepared = Problem::prepared(&*sweep, &records, parameters)?;
@@ -173,6 +176,19 @@ impl<'a> Problem<'a> {
     pub(crate) fn in_units<'p>(&'p self, control: &'p Control) -> Objective<'p> {
         let whitening = Whitening::none(self.layout().outputs.len());
         Objective::new(self, &*self.sweep, whitening, control)
+    }
+}
+
+/// A discrete model steps from sample to sample, so that each has an instant of its own.
+fn check_steps(record: &Record) -> Result<(), Error> {
+    let Time::Stamps(stamps) = record.times() else { return Ok(()) };
+    match stamps.windows(2).position(|pair| pair[0] == pair[1]) {
+        Some(k) => Err(Error::Option(format!(
+            "experiment `{}`: samples {k} and {} are at one instant, between which a discrete model would step; keep one of them, or              their mean",
+            record.name(),
+            k + 1
+        ))),
+        None => Ok(()),
     }
 }
 

@@ -21,6 +21,7 @@ pub(crate) use stored::Stored;
 #[cfg(feature = "csv")]
 pub(crate) use time::Clock;
 pub use time::Time;
+pub(crate) use time::steps;
 
 use crate::error::Error;
 use crate::interval::Hold;
@@ -42,7 +43,8 @@ pub enum Initial {
 
 /// One measured record, its signals in columns.
 ///
-/// Time increases, inputs are finite, lengths agree; an output that was not measured is `NaN`. An
+/// Time does not decrease, inputs are finite, lengths agree; an output that was not measured is `NaN`. Samples may be at one instant, with
+/// the same inputs: several measurements of the same state. An
 /// [`Experiment`](crate::Experiment) is a record that knows its model's signals by their types; this one knows them by
 /// name. Copies and pieces share the columns.
 #[derive(Clone, Debug)]
@@ -62,8 +64,8 @@ impl Record {
     /// A record of these signals for a model with these states, held from sample to sample, its initial state estimated.
     ///
     /// # Errors
-    /// No signal at all, fewer than two samples (one, without state), lengths that differ, time that does not increase, a
-    /// time or input that is not finite, an infinite output.
+    /// No signal at all, fewer than two samples (one, without state), lengths that differ, time that decreases or stands still, samples of
+    /// one instant with different inputs, a time or input that is not finite, an infinite output.
     pub fn new(states: Vec<Quantity>, time: Time, inputs: Vec<Channel>, outputs: Vec<Channel>) -> Result<Self, Error> {
         let (name, hold, initial) = ("record".to_owned(), Hold::default(), Initial::default());
         let (states, inputs, outputs) = (states.into(), inputs.into(), outputs.into());
@@ -170,6 +172,29 @@ impl Record {
         if self.states.is_empty() { 1 } else { 2 }
     }
 
+    /// Refuses samples of one instant with different inputs, and a record of a model with states that has one instant only.
+    fn check_instants(&self) -> Result<(), Error> {
+        let Time::Stamps(stamps) = &self.time else { return Ok(()) };
+        for (sample, pair) in (1..).zip(stamps.windows(2)) {
+            let [before, time] = [pair[0], pair[1]];
+            let changed = |channel: &&Channel| channel.values[sample - 1] != channel.values[sample];
+            if before == time
+                && let Some(channel) = self.inputs.iter().find(changed)
+            {
+                let (experiment, input) = (self.name.clone(), channel.name.clone());
+                let (before, value) = (channel.values[sample - 1], channel.values[sample]);
+                return Err(Error::InputsAtOneInstant { experiment, sample, time, input, before, value });
+            }
+        }
+        match stamps.as_slice() {
+            [first, .., last] if first == last && !self.states.is_empty() => {
+                let (experiment, sample) = (self.name.clone(), stamps.len() - 1);
+                Err(Error::TimeOrder { experiment, sample, before: *first, time: *last })
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// The record, if it is valid.
     pub(crate) fn checked(self) -> Result<Self, Error> {
         let mut channels = self.inputs.iter().chain(self.outputs.iter());
@@ -187,6 +212,7 @@ impl Record {
         if samples < needed {
             return Err(Error::TooFewSamples { experiment: self.name, samples, needed, purpose: "for a fit" });
         }
+        self.check_instants()?;
         let bad_input = |channel: &Channel| channel.values.iter().position(|value| !value.is_finite());
         let bad_output = |channel: &Channel| channel.values.iter().position(|value| value.is_infinite());
         let inputs = self.inputs.iter().filter_map(|channel| Some((bad_input(channel)?, channel)));

@@ -3,7 +3,9 @@
 //! The implementers of this trait depend on the model's type and on how its equations are evaluated. Its callers
 //! (search, noise, covariance, diagnoses) are not generic: they know quantities by position.
 
+mod affine;
 mod duals;
+mod failure;
 mod filtered;
 mod loops;
 mod made;
@@ -11,7 +13,8 @@ mod model_code;
 mod programs;
 mod window;
 
-pub(crate) use duals::{DualSweep, OVERFLOW};
+pub(crate) use duals::DualSweep;
+pub(crate) use failure::OVERFLOW;
 pub(crate) use loops::{Loops, Narrow};
 pub(crate) use made::{compiled, of_equations};
 pub(crate) use model_code::{ModelCode, Typed};

@@ -1,7 +1,7 @@
 //! Fits of single records in lockstep: one evaluation of all of them is one pass over lanes.
 
 use super::refine::{Attempt, Start};
-use super::search::{Rounds, ended};
+use super::search::{Rounds, at_end, ended, settled};
 use crate::error::Error;
 use crate::estimate::Summary;
 use crate::judge::{SearchEnd, conclude, conclude_from, residuals_together};
@@ -238,6 +238,11 @@ fn conclude_together(
     control: &Control,
     begin: Instant,
 ) -> Vec<Result<Summary, Error>> {
+    let settle = |(stage, plain)| match stage {
+        Stage::Ended(end) => Stage::Ended(Box::new(settled(plain, *end))),
+        other => other,
+    };
+    let stages: Vec<Stage<'_>> = stages.into_iter().zip(plain).map(settle).collect();
     let ended = |(stage, plain): (&Stage<'_>, _)| match stage {
         Stage::Ended(end) => Some(at_end(plain, end)),
         _ => None,
@@ -257,9 +262,4 @@ fn conclude_together(
         _ => plain[i].problem.run_within(Instant::now(), control, starts[i].clone()),
     };
     (0..plain.len()).map(finish).collect()
-}
-
-/// The objective that a search ended with.
-fn at_end<'p>(plain: &Objective<'p>, end: &SearchEnd) -> Objective<'p> {
-    Objective { memory: end.memory.clone(), ..plain.with(end.whitening.clone()) }
 }

@@ -1,7 +1,8 @@
 //! Running a problem: search, estimate at a given point, objective, prediction.
 
 use super::refine::{Attempt, Start};
-use super::search::{search, start_error};
+use super::search::{at_end, search, settled};
+use super::start_error::start_error;
 use super::starts::search_from_many;
 use crate::error::Error;
 use crate::estimate::Summary;
@@ -66,8 +67,8 @@ impl Problem<'_> {
             1 => SearchEnd { starts: start.ends, ..search(&plain, &optimizer, start.coordinates)? },
             count => search_from_many(&plain, &optimizer, count, start.ends.as_ref())?,
         };
-        let objective = Objective { memory: end.memory.clone(), ..plain.with(end.whitening.clone()) };
-        conclude(&objective, &end, begin.elapsed().as_secs_f64())
+        let end = settled(&plain, end);
+        conclude(&at_end(&plain, &end), &end, begin.elapsed().as_secs_f64())
     }
 
     /// The stop conditions of a run that began then: flag and time limit.

@@ -1,5 +1,6 @@
 //! The search: rounds of an optimizer, with the noise estimated between them.
 
+use super::start_error::start_error;
 use crate::error::Error;
 use crate::judge::SearchEnd;
 use crate::optimize::{Domain, Infeasible, LeastSquares, Outcome, SearchLimit, within_tolerance};
@@ -232,6 +233,23 @@ impl<'r> Rounds<'r> {
     }
 }
 
+/// An end with the noise of the errors there: that of a search that did not converge is the noise where its last round began.
+pub(super) fn settled(plain: &Objective<'_>, end: SearchEnd) -> SearchEnd {
+    if end.outcome.converged() || !noise::is_estimated(plain) {
+        return end;
+    }
+    let there = Objective { memory: end.memory.clone(), ..plain.unlimited() };
+    match noise::estimate(&there, &end.coordinates) {
+        Ok(whitening) => SearchEnd { whitening, linear: None, ..end },
+        Err(_) => end,
+    }
+}
+
+/// The objective that a search ended with.
+pub(super) fn at_end<'p>(plain: &Objective<'p>, end: &SearchEnd) -> Objective<'p> {
+    Objective { memory: end.memory.clone(), ..plain.with(end.whitening.clone()) }
+}
+
 /// The noise of a search's first round.
 fn first_whitening(plain: &Objective<'_>, start: &[f64]) -> Result<Whitening, Error> {
     noise::first_whitening(plain, start).map_err(|error| start_error(plain, start, error))
@@ -279,54 +297,9 @@ fn roughness(here: f64, there: Option<f64>) -> f64 {
     there.map_or(0.0, |there| (there - here).abs()).max(here.abs())
 }
 
-/// Why the start could not be evaluated.
-pub(super) fn start_error(objective: &Objective<'_>, coordinates: &[f64], error: Infeasible) -> Error {
-    if error == Infeasible::Cancelled {
-        return stopped(objective);
-    }
-    let locate = |e: usize, sample: usize| {
-        let failure = objective.locate(e, coordinates, sample);
-        if objective.control.stops() { stopped(objective) } else { Error::Start(failure) }
-    };
-    for e in 0..objective.experiments() {
-        let mut last = 0;
-        let failed = objective.run_alone(e, coordinates, true, &mut |window| {
-            last = window.begin[0];
-            let errors = (0..window.samples[0]).flat_map(|k| (0..window.outputs()).map(move |j| (k, j)));
-            let mut bad = errors.clone().filter(|&(k, j)| !window.error(k, j, 0).is_finite());
-            match bad.next() {
-                Some((k, _)) => {
-                    last += k;
-                    false
-                }
-                None => true,
-            }
-        });
-        if failed.is_err() {
-            return locate(e, last);
-        }
-    }
-    let failing = (0..objective.experiments()).find(|&e| {
-        let alone = objective.cost_of(e, coordinates);
-        !alone.is_ok_and(f64::is_finite)
-    });
-    locate(failing.unwrap_or(0), 0)
-}
-
-fn stopped(objective: &Objective<'_>) -> Error {
-    Error::Option(match objective.problem.settings.time_limit {
-        Some(limit) if objective.control.expired() => format!(
-            "the time limit of {} s was over before the start had been evaluated; allow more time",
-            limit.as_secs_f64()
-        ),
-        _ => "the fit was cancelled before its start had been evaluated; lower the flag to run it".to_owned(),
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::{Rounds, roughness};
-    use crate::error::Error;
     use crate::optimize::{Infeasible, JacobianColumns, LevenbergMarquardt, Outcome, SearchLimit, Stop};
     use crate::problem::{Control, Round, Whitening};
     use crate::tests::{Current, Gain, Line, Voltage};
@@ -421,24 +394,6 @@ mod tests {
         let mut measuring = rounds();
         let end = measuring.take(measuring.objective(), ended(), Some(Err(Infeasible::Cancelled))).unwrap();
         assert_eq!((end.outcome, end.coordinates), (Outcome::Cancelled, vec![1.5]));
-    }
-
-    /// The record is named whose cost is not finite, also where each of its errors is.
-    #[test]
-    fn the_start_of_one_record_has_no_cost() {
-        let huge = record().outputs().map(|y| Current { i: 1e200 * y.i }).collect();
-        let inputs = record().inputs().collect();
-        let huge = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, huge).unwrap();
-        let of = |names: [&str; 2]| {
-            let records = if names[0] == "huge" { [huge.clone(), record()] } else { [record(), huge.clone()] };
-            let [one, other] = records;
-            let records = [one.named(names[0]), other.named(names[1])];
-            Fit::new(&Line, &records).parameters(Gain { a: free(1.0) }).noise(Current { i: 1.0 }).run().unwrap_err()
-        };
-        for names in [["huge", "plain"], ["plain", "huge"]] {
-            let error = of(names);
-            assert!(matches!(&error, Error::Start(failure) if failure.experiment == "huge"), "{error}");
-        }
     }
 
     #[test]

@@ -6,7 +6,8 @@ mod minima;
 mod progress;
 
 use super::lockstep::{Search, Stage};
-use super::search::{Rounds, checkpoint, start_error};
+use super::search::{Rounds, checkpoint};
+use super::start_error::start_error;
 use crate::error::{Error, Failure};
 use crate::estimate::Starts;
 use crate::judge::SearchEnd;

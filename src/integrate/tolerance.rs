@@ -67,6 +67,10 @@ impl Tolerance {
         mut step: impl FnMut(&Y::Vector<Y::Scalar>, f64, f64) -> Option<Trial<Y>>,
     ) -> Result<Y::Vector<Y::Scalar>, Stuck> {
         let (t0, length) = system.interval();
+        // Between samples of one instant.
+        if length == 0.0 {
+            return Ok(x);
+        }
         let (mut tau, mut growth) = (0.0, 5.0);
         // The first step is a cautious guess; a few steps later it is forgotten.
         let mut proposed = if *memory > 0.0 { *memory } else { 1e-3 * length };

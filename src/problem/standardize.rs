@@ -124,7 +124,9 @@ fn by_variance(window: &mut Window) -> Result<(), (usize, usize)> {
     for k in 0..window.len() {
         for j in 0..window.outputs() {
             for lane in 0..lanes {
+                let number = (k * window.outputs() + j) * lanes + lane;
                 if !window.is_measured(k, j, lane) {
+                    window.log_variances[number] = 0.0;
                     continue;
                 }
                 let v = window.variance(k, j, lane);
@@ -132,7 +134,6 @@ fn by_variance(window: &mut Window) -> Result<(), (usize, usize)> {
                     return Err((lane, window.begin[lane] + k));
                 }
                 let (root, half) = (v.sqrt(), std::f64::consts::FRAC_1_SQRT_2);
-                let number = (k * window.outputs() + j) * lanes + lane;
                 window.log_variances[number] = v.ln();
                 let at = |column: usize| column * lanes + lane;
                 let row = window.row_mut(k, j);

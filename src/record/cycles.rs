@@ -1,6 +1,6 @@
 //! Parts of a record: operating cycles, gaps, and how much of each output was measured.
 
-use super::{Record, Time};
+use super::{Record, Time, steps};
 use crate::numeral::exact;
 use core::fmt;
 use std::ops::Range;
@@ -46,7 +46,7 @@ fn is_pattern(stamps: &[f64], longest: f64) -> bool {
 
 /// The longest step that is no gap.
 fn longest_step(stamps: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let mut steps = steps(stamps);
     if steps.is_empty() {
         return f64::INFINITY;
     }

@@ -16,7 +16,7 @@ pub enum Time {
         #[serde(with = "crate::real")]
         step: f64,
     },
-    /// One stamp per sample, increasing.
+    /// One stamp per sample; none is smaller than the one before. Equal stamps are several measurements at one instant.
     Stamps(#[serde(with = "crate::real")] Vec<f64>),
 }
 
@@ -51,12 +51,12 @@ impl Time {
         }
     }
 
-    /// Median time from sample to sample (s); zero where there are not two.
+    /// Median time from instant to instant (s); zero where there are not two.
     pub(crate) fn median_step(&self) -> f64 {
         match self {
             Time::Uniform { step, .. } => *step,
             Time::Stamps(stamps) => {
-                let mut steps: Vec<f64> = stamps.windows(2).map(|w| w[1] - w[0]).collect();
+                let mut steps = steps(stamps);
                 if steps.is_empty() {
                     return 0.0;
                 }
@@ -74,7 +74,7 @@ impl Time {
         }
     }
 
-    /// Refuses time that is not finite, does not increase, or does not go with the samples of the channel `reference`.
+    /// Refuses time that is not finite, decreases, or does not go with the samples of the channel `reference`.
     pub(crate) fn check(&self, experiment: &str, samples: usize, reference: &str) -> Result<(), Error> {
         if let Time::Stamps(stamps) = self
             && stamps.len() != samples
@@ -101,7 +101,8 @@ impl Time {
                     let (experiment, signal) = (experiment.to_owned(), "t".to_owned());
                     return Err(Error::NotFinite { experiment, signal, value: time, sample, time });
                 }
-                if time <= before {
+                // Stamps may repeat; those of an even grid do where they have no more digits.
+                if time < before || time == before && matches!(self, Time::Uniform { .. }) {
                     return Err(Error::TimeOrder { experiment: experiment.to_owned(), sample, before, time });
                 }
                 before = time;
@@ -109,6 +110,11 @@ impl Time {
         }
         Ok(())
     }
+}
+
+/// The times between instants (s): those of several measurements at one instant are left out.
+pub(crate) fn steps(stamps: &[f64]) -> Vec<f64> {
+    stamps.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect()
 }
 
 /// How far a stamp may be off an even grid, as a fraction of the step.

@@ -202,7 +202,7 @@ impl Filter<'_> {
             let y = if is_known { channel.values[sample] } else { f64::NAN };
             window.set_measured(k, j, u32::from(!y.is_nan()));
             if y.is_nan() {
-                window.row_mut(k, j).fill(0.0);
+                window.clear_unmeasured_row(k, j);
                 continue;
             }
             let (mean, variance) = steps.predict(&plant, &pass.carry, j);

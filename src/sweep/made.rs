@@ -11,25 +11,33 @@ use crate::predict::Prediction;
 use std::sync::Arc;
 
 /// A compiled program of the equations that `trace` reads, if there can be one, else what `plain` makes of the reason.
+///
+/// # Errors
+/// Equations that are not affine in the state, for a predictor that needs that.
 pub(crate) fn compiled<'a>(
     trace: &dyn Fn() -> Result<Arc<Equations>, Untraceable>,
     method: &Arc<dyn Method>,
     predictor: &Arc<dyn Prediction>,
     plain: &dyn Fn(Uncompiled) -> Arc<dyn Sweep + 'a>,
-) -> Arc<dyn Sweep + 'a> {
+) -> Result<Arc<dyn Sweep + 'a>, Error> {
     if only_duals() {
-        return plain(Uncompiled { reason: "dual numbers are asked for".to_owned(), choosing: None });
+        return Ok(plain(Uncompiled { reason: "dual numbers are asked for".to_owned(), choosing: None }));
     }
     let equations = match trace() {
         Ok(equations) => equations,
-        Err(Untraceable { reason, .. }) => return plain(Uncompiled { reason, choosing: None }),
+        Err(Untraceable { reason, .. }) => return Ok(plain(Uncompiled { reason, choosing: None })),
     };
+    if predictor.needs_affine()
+        && let Some(number) = equations.not_affine()
+    {
+        return Err(Error::NotAffine { what: equations.layout().equation(number), predictor: predictor.describe() });
+    }
     let choosing = Some(choosing(equations.graph()));
     let beside = plain(Uncompiled { reason: String::new(), choosing: choosing.clone() });
-    match ProgramSweep::new(equations, method.clone(), predictor.clone(), beside) {
+    Ok(match ProgramSweep::new(equations, method.clone(), predictor.clone(), beside) {
         Ok(sweep) => Arc::new(sweep),
         Err(Untraceable { reason, .. }) => plain(Uncompiled { reason, choosing }),
-    }
+    })
 }
 
 /// The sweep of equations.
@@ -48,5 +56,5 @@ pub(crate) fn of_equations(
         let (layout, method, predictor) = (layout.clone(), method.clone(), predictor.clone());
         Arc::new(DualSweep { layout, code: Arc::new(equations.clone()), method, predictor, uncompiled })
     };
-    Ok(compiled(&|| Ok(equations.clone()), method, predictor, &plain))
+    compiled(&|| Ok(equations.clone()), method, predictor, &plain)
 }

@@ -330,6 +330,82 @@ fn a_first_order_lag_in_continuous_time_sampled_unevenly() {
     agrees(fit, &chain);
 }
 
+/// Two sensors of one position, far better than the model predicts it: the variance that the second one meets is a part of 1e-12 to 1e-18
+/// of that before the first. The reference has it as a product, and each sensor's term has the rounding of an error of some 1e-16 of a
+/// position in a noise of 1e-9.
+#[test]
+fn sensors_far_better_than_the_model() {
+    for level in [1e-6, 1e-7, 1e-8, 1e-9] {
+        let (mut noise, mut x, mut outputs) = (Noise(4), 0.0, vec![]);
+        for _ in 0..60 {
+            outputs.push(Sensors { y: x + level * noise.gauss(), z: x + level * noise.gauss() });
+            x += 0.1 * noise.gauss();
+        }
+        let time = Time::Uniform { start: 0.0, step: 1.0 };
+        let record = Experiment::new(&RandomWalk, time, vec![Push { u: 0.0 }; 60], outputs).unwrap();
+        let record = record.initial(Position { x: fixed(0.0) });
+        let parameters = Levels { drift: free(0.1).log(), y: free(level).log(), z: free(level).log() };
+        let problem = Fit::new(&RandomWalk, &record).parameters(parameters).predictor(Kalman).problem().unwrap();
+        let objective = problem.objective().unwrap();
+        let at = objective.start();
+        let found = objective.cost(&at).unwrap() + 60.0 * TAU.ln();
+        let chain = Chain {
+            start: 0.0,
+            steps: vec![[1.0, 0.0, (2.0 * at[0]).exp()]; 59],
+            measurements: measurements(record.outputs(), [1.0, 1.0], [at[1].exp(), at[2].exp()]),
+        };
+        let exact = chain.by_filter();
+        assert!((found / exact - 1.0).abs() < 1e-8, "{level}: {found} {exact}");
+    }
+}
+
+/// Methods that choose their steps run in dual numbers, in windows of eight samples: in most of them other measurements are missing than
+/// in the window before. The gradient at the start, a sum of some hundred terms, is that of the exact likelihood to the tolerance.
+#[test]
+fn missing_measurements_by_methods_that_choose_their_steps() {
+    let time = Time::Stamps((0..60).map(|k| 0.1 * k as f64 + if k % 2 == 0 { 0.0 } else { 0.03 }).collect());
+    let (record, chain) = lag(time);
+    let parameters = || Dynamics { tau: free(0.5).log(), ..dynamics() };
+    let fit = || Fit::new(&Lag, &record).parameters(parameters()).predictor(Kalman);
+    let (relative, absolute) = (1e-10, 1e-12);
+    for fit in [fit().integrator(Rk45 { relative, absolute }), fit().integrator(Esdirk { relative, absolute })] {
+        let problem = fit.problem().unwrap();
+        let objective = problem.objective().unwrap();
+        let start = objective.start();
+        let (found, exact) = (objective.gradient(&start).unwrap(), gradient(&chain, &start));
+        let size = exact.iter().fold(0.0f64, |size, g| size.max(g.abs()));
+        for (found, exact) in found.iter().zip(&exact) {
+            assert!((found - exact).abs() < 1e-7 * size, "{found} {exact}");
+        }
+    }
+}
+
+/// Ten samples, the last one not measured: from the field, where the slope with respect to the sensor's noise was 32.08.
+#[test]
+fn one_missing_measurement_in_the_second_window() {
+    let y = [0.9, 0.8, 0.75, 0.6, 0.66, 0.55, 0.5, 0.62, 0.58, f64::NAN];
+    let outputs = y.map(|y| Sensors { y, z: f64::NAN }).to_vec();
+    let time = Time::Uniform { start: 0.0, step: 0.2 };
+    // dx/dt = -x + u / 2 + 0.3 dw, the noise of y is 0.2; the second sensor is measured once, so exactly that it does not matter.
+    let outputs = [&[Sensors { y: outputs[0].y, z: 2.0 }], &outputs[1..]].concat();
+    let record = Experiment::new(&Lag, time, vec![Push { u: 1.0 }; 10], outputs).unwrap();
+    let record = record.initial(Position { x: fixed(1.0) });
+    let parameters = Dynamics { tau: fixed(1.0), gain: fixed(0.5), drift: fixed(0.3), y: free(0.2), z: fixed(1.0) };
+    let slope = |fit: Fit<'_, Lag>| {
+        let problem = fit.predictor(Kalman).problem().unwrap();
+        let objective = problem.objective().unwrap();
+        objective.gradient(&objective.start()).unwrap()[0]
+    };
+    let fit = || Fit::new(&Lag, &record).parameters(parameters);
+    for slope in [
+        slope(fit().integrator(Esdirk { relative: 1e-9, absolute: 1e-12 })),
+        slope(fit().integrator(Rk4 { substeps: 64 })),
+    ] {
+        // The value of an independent filter, to its digits.
+        assert!((slope - 29.2259).abs() < 5e-5, "{slope}");
+    }
+}
+
 /// Samples 1.5 and 3 time constants apart. A default fit steps so finely that the next finer step would move no unknown by a tenth of
 /// its standard error, and says nothing of the step; by a method of fourth order all finer ones together then move it by little more
 /// than a tenth. One step per sample, where it was chosen, is 1.2 errors off, and a warning says so; at 3 time constants its variance
@@ -411,6 +487,62 @@ fn what_cannot_be_filtered_is_refused() {
     );
     let why = refused(&Stateless, Nothing);
     assert!(why.contains("no state to filter"), "{why}");
+}
+
+signals! { pub struct Swing { phi: "rad", w: "rad/s" } }
+signals! { pub struct Angle { phi: "rad" } }
+signals! { pub struct Hanging { g: "1/s^2", d: "1/s" } }
+
+/// A pendulum, whose output may be bent, too.
+#[derive(Clone)]
+struct Pendulum {
+    bent: bool,
+}
+
+impl Model for Pendulum {
+    type State = Swing;
+    type Input = Push;
+    type Output = Angle;
+    type Parameters = Hanging;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Swing<S>, u: &Push<S>, p: &Hanging<S>) -> Swing<S> {
+        let pull = if self.bent { x.phi } else { x.phi.sin() };
+        Swing { phi: x.w, w: u.u - p.g * pull - p.d * x.w }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Swing<S>, _u: &Push<S>, _p: &Hanging<S>) -> Angle<S> {
+        Angle { phi: if self.bent { x.phi + x.phi.powi(2) } else { x.phi } }
+    }
+}
+
+/// The equation is named, of models that are read as a graph and of functions that are not; functions that are affine are filtered.
+#[test]
+fn models_that_are_not_affine_are_refused() {
+    fn fitted<M>(model: &M) -> Result<Estimate<M>, Error>
+    where
+        M: Model<State = Swing, Input = Push, Output = Angle, Parameters = Hanging>,
+    {
+        let outputs = (0..20).map(|k| Angle { phi: (0.3 * f64::from(k)).cos() }).collect();
+        let time = Time::Uniform { start: 0.0, step: 0.1 };
+        let record = Experiment::new(model, time, vec![Push { u: 0.2 }; 20], outputs)?;
+        Fit::new(model, &record).parameters(Hanging { g: free(9.0), d: free(0.1) }).predictor(Kalman).run()
+    }
+    let refused = |found: Result<(), Error>, equation: &str| {
+        let error = found.unwrap_err();
+        assert!(matches!(&error, Error::NotAffine { what, .. } if what == equation), "{error}");
+        assert!(error.to_string().contains("Horizon"), "{error}");
+    };
+    refused(fitted(&Pendulum { bent: false }).map(|_| ()), "the derivative of state `w`");
+    refused(fitted(&Pendulum { bent: true }).map(|_| ()), "output `phi`");
+    let numeric = |power: i32| {
+        let derivative = move |_: f64, x: &Swing, u: &Push, p: &Hanging| Swing {
+            phi: x.w,
+            w: u.u - p.g * x.phi.powi(power) - p.d * x.w,
+        };
+        Numeric::continuous(derivative, |_, x: &Swing, _: &Push, _: &Hanging| Angle { phi: x.phi })
+    };
+    refused(fitted(&numeric(3)).map(|_| ()), "the derivative of state `w`");
+    // It says nothing of its noise, which is the next thing to be missed.
+    let error = fitted(&numeric(1)).unwrap_err().to_string();
+    assert!(error.contains("write Model::noise"), "{error}");
 }
 
 /// Of 20 errors of size `s` the deviance rises by `20 (ln(s'^2 / s^2) + s^2 / s'^2 - 1)` where the level is `s'`: by the square of

@@ -20,6 +20,7 @@ mod far_starts;
 mod few_measurements;
 mod fleet;
 mod guessed_states;
+mod instants;
 mod interval_limits;
 mod judgements;
 mod kalman;

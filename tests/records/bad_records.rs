@@ -100,14 +100,22 @@ fn missing_inputs_and_time() {
 }
 
 #[test]
-fn time_does_not_increase() {
-    for second in ["1", "0.5"] {
-        let text = format!("t,ud,w,id,iq\n0,1,2,3,4\n1,1,2,3,4\n{second},1,2,3,4\n");
-        let shown = format!("1 s is followed by {second} s");
-        let error = refused("order.csv", &text, &["order.csv, line 4", "`order`", "sample 2", &shown]);
-        let Error::AtLine { problem, .. } = error else { panic!("{error}") };
-        assert!(matches!(*problem, Error::TimeOrder { .. }));
-    }
+fn time_runs_backwards_or_stands_still() {
+    let text = "t,ud,w,id,iq\n0,1,2,3,4\n1,1,2,3,4\n0.5,1,2,3,4\n";
+    let error = refused("order.csv", text, &["order.csv, line 4", "`order`", "sample 2", "1 s is followed by 0.5 s"]);
+    let Error::AtLine { problem, .. } = error else { panic!("{error}") };
+    assert!(matches!(*problem, Error::TimeOrder { .. }));
+    let error = refused("still.csv", "t,ud,w,id,iq\n1,1,2,3,4\n1,1,2,3,5\n", &["sample 1", "1 s is followed by 1 s"]);
+    assert!(matches!(error, Error::TimeOrder { .. }));
+}
+
+/// Measurements may repeat at an instant, inputs may not.
+#[test]
+fn inputs_that_differ_at_one_instant() {
+    Experiment::from_csv(&Pmsm, file("instant.csv", "t,ud,w,id,iq\n0,1,2,3,4\n1,1,2,3,4\n1,1,2,5,4\n")).unwrap();
+    let parts = ["samples 1 and 2", "t = 1 s", "`w` is 2 and 2.5", "times of their own"];
+    let error = refused("jump.csv", "t,ud,w,id,iq\n0,1,2,3,4\n1,1,2,3,4\n1,1,2.5,5,4\n", &parts);
+    assert!(matches!(error, Error::InputsAtOneInstant { .. }));
 }
 
 #[test]

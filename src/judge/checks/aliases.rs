@@ -11,7 +11,7 @@ use crate::judge::evidence::residual_pass::residual_pass;
 use crate::numeral::number;
 use crate::optimize::Severity;
 use crate::problem::{Objective, Role};
-use crate::record::{Record, Time};
+use crate::record::{Record, Time, steps};
 use std::f64::consts::{PI, TAU};
 
 pub(crate) const ALIASES: Check = Check {
@@ -257,7 +257,7 @@ fn step(record: &Record) -> Option<f64> {
         Time::Uniform { step, .. } => return Some(*step),
         Time::Stamps(stamps) => stamps,
     };
-    let mut steps: Vec<f64> = stamps.windows(2).take(STEPS).map(|t| t[1] - t[0]).collect();
+    let mut steps = steps(&stamps[..stamps.len().min(STEPS + 1)]);
     steps.sort_by(f64::total_cmp);
     let part = |quarters: usize| steps.get(quarters * (steps.len().max(1) - 1) / 4).copied();
     let (low, middle, high) = (part(1)?, part(2)?, part(3)?);

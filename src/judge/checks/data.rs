@@ -119,6 +119,8 @@ const LONG: f64 = 0.25;
 pub(crate) const FEW: usize = 8;
 pub(crate) const TIMES: usize = 4;
 pub(crate) const PART_OF_STEP: f64 = 0.1;
+/// An output that was measured at fewer instants does not show whether it moves.
+const INSTANTS: usize = 3;
 /// Missing part of an output from which on there is a note.
 const MISSING: f64 = 0.5;
 /// Warnings of one kind; more are counted.
@@ -157,7 +159,11 @@ fn constant_outputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<W
     let outputs = &evidence.point.objective.problem.layout().outputs;
     let still: Vec<Option<f64>> = (0..outputs.len()).map(|j| constant(found, |one| &one.outputs[j])).collect();
     let all = still.iter().all(Option::is_some);
+    let records = &evidence.point.objective.problem.records;
     let one = |(j, value): (usize, &Option<f64>)| {
+        if records.iter().map(|record| instants(record, j)).sum::<usize>() < INSTANTS {
+            return None;
+        }
         let (value, rmse) = ((*value)?, evidence.residuals.outputs[j].rmse);
         // A controller may hold an output; the model then gives the same.
         let held = !all && rmse <= REPRODUCED * value.abs();
@@ -171,6 +177,14 @@ fn constant_outputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<W
         Some(warning(WarningCode::ConstantOutput, severity, text))
     };
     still.iter().enumerate().filter_map(one).collect()
+}
+
+/// The number of instants at which an output was measured.
+fn instants(record: &Record, output: usize) -> usize {
+    let values = &record.outputs()[output].values;
+    let mut times: Vec<f64> = (0..record.len()).filter(|&k| !values[k].is_nan()).map(|k| record.time(k)).collect();
+    times.dedup();
+    times.len()
 }
 
 fn constant_inputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
@@ -352,12 +366,24 @@ fn moves(values: &[f64]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::moves;
+    use super::{instants, moves};
+    use crate::record::{Channel, Record, Time};
 
     #[test]
     fn a_missing_measurement_is_no_movement() {
         let nan = f64::NAN;
         assert_eq!([&[][..], &[nan], &[3.0, nan, 3.0], &[nan, 3.0, 3.0]].map(moves), [false; 4]);
         assert_eq!([&[3.0, 4.0][..], &[nan, 3.0, nan, 4.0], &[0.0, 0.0, 1.0]].map(moves), [true; 3]);
+    }
+
+    /// Several measurements at one instant count once.
+    #[test]
+    fn instants_of_measurements() {
+        let of = |stamps: [f64; 4], values: [f64; 4]| {
+            let channel = Channel::new("y", "", values.to_vec());
+            instants(&Record::new(vec![], Time::Stamps(stamps.to_vec()), vec![], vec![channel]).unwrap(), 0)
+        };
+        assert_eq!(of([0.0, 0.0, 1.0, 2.0], [5.0; 4]), 3);
+        assert_eq!(of([0.0, 0.0, 1.0, 2.0], [5.0, 5.0, f64::NAN, 5.0]), 2);
     }
 }

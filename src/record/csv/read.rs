@@ -46,7 +46,7 @@ impl CsvFile {
                     return Err(self.bad_cell(&table, t, &name, "t", sample, f64::NAN));
                 };
                 time = stamp;
-                if let Some(before) = clock.last().filter(|before| time <= *before) {
+                if let Some(before) = clock.last().filter(|before| time < *before) {
                     let problem = Error::TimeOrder { experiment: name, sample, before, time };
                     return Err(self.at_line(&table, problem));
                 }

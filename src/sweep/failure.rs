@@ -1,0 +1,145 @@
+//! [`FailureSearch`]: the cause of a simulation that fails, found in plain numbers.
+
+use crate::error::Failure;
+use crate::functions::Functions;
+use crate::integrate::{Duals, Method, Stuck};
+use crate::layout::Layout;
+use crate::predict::{Between, Plant, SlicePlant};
+use crate::record::Record;
+use core::cell::Cell;
+use core::sync::atomic::{AtomicBool, Ordering};
+
+/// Runs a record in plain numbers to find the cause of a failure.
+pub(crate) struct FailureSearch<'w> {
+    pub layout: &'w Layout,
+    pub values: &'w dyn Functions<f64>,
+    pub duals: &'w dyn Functions<Duals>,
+    pub method: &'w dyn Method,
+    pub record: &'w Record,
+}
+
+impl FailureSearch<'_> {
+    fn failure(&self, k: usize, signal: String, value: f64, hint: &'static str) -> Failure {
+        Failure { experiment: self.record.name().to_owned(), sample: k, time: self.record.time(k), signal, value, hint }
+    }
+
+    /// The cause of a failure in a simulation from this state, as an error; where nothing fails, the error of an output that is
+    /// largest relative to the noise.
+    pub fn locate(
+        &self,
+        state: &[f64],
+        p: &[f64],
+        sample: usize,
+        sigma: &[f64],
+        stops: &dyn Fn() -> bool,
+    ) -> Result<Failure, Failure> {
+        let broken = |k, signal, value, hint| Err(self.failure(k, signal, value, hint));
+        let unsound = |values: &[f64]| {
+            let i = values.iter().position(|v| !v.is_finite())?;
+            Some((i, values[i], if values[i].is_nan() { UNDEFINED } else { OVERFLOW }))
+        };
+        let runaway = |x: &[f64]| x.iter().copied().enumerate().find(|(_, x)| x.abs() >= RUNAWAY);
+        let name = |i: usize| &self.layout.states[i].name;
+        let mut x = state.to_vec();
+        let step = Cell::new(0.0);
+        let watched = Watched::new(self.values);
+        let mut y = vec![0.0; self.layout.outputs.len()];
+        let mut largest = (sample, 0, 0.0f64);
+        for k in 0..self.record.len() {
+            let between = Between::new(self.record, k);
+            let FailureSearch { layout, duals, method, .. } = *self;
+            let plant = SlicePlant { layout, functions: &watched, duals, method, between, p, step: &step };
+            watched.forget();
+            plant.output(&x, &mut y);
+            for (j, (&y, channel)) in y.iter().zip(self.record.outputs()).enumerate() {
+                let found = channel.values[k];
+                // An output that was not measured need not be finite, except at the sample where the failure was
+                // noticed.
+                if !y.is_finite() && (!found.is_nan() || k == sample) {
+                    let hint = if runaway(&x).is_none() { UNDEFINED } else { OVERFLOW };
+                    return broken(k, format!("output `{}`", self.layout.outputs[j].name), y, hint);
+                }
+                if ((found - y) / sigma[j]).abs() > (largest.2 / sigma[largest.1]).abs() {
+                    largest = (k, j, found - y);
+                }
+            }
+            if k + 1 == self.record.len() || stops() {
+                break;
+            }
+            let mut next = x.clone();
+            if plant.next(&mut next) == Err(Stuck) {
+                if let Some((i, value)) = runaway(&x) {
+                    return broken(k, format!("state `{}`", name(i)), value, OVERFLOW);
+                }
+                plant.derivative(0.0, &x, &mut next);
+                return match unsound(&next) {
+                    Some((i, value, hint)) => broken(k, format!("the derivative of state `{}`", name(i)), value, hint),
+                    None => broken(k, "the progress of the integrator".to_owned(), 0.0, STUCK),
+                };
+            }
+            if let Some((i, value, hint)) = unsound(&next) {
+                let hint = if watched.ran_away() { OVERFLOW } else { hint };
+                return broken(k + 1, format!("state `{}`", name(i)), value, hint);
+            }
+            x = next;
+        }
+        let (k, j, error) = largest;
+        Ok(self.failure(k, format!("the error of output `{}`", self.layout.outputs[j].name), error, HUGE))
+    }
+}
+
+/// From this magnitude of a state on, at a sample or within a step, a failure counts as overflow: an integrator may be stuck or have
+/// computed infinity minus infinity.
+const RUNAWAY: f64 = 1e30;
+
+const STUCK: &str = "; no step is short enough, or 100,000 of them do not reach the next sample: the model is too stiff for \
+                     the method, jumps, or leaves its domain (take Esdirk, or smooth the model)";
+const UNDEFINED: &str = "; the equations are undefined there (a division by zero, a root or logarithm out of its domain, \
+                         or the `derivative` or `next` that Model::KIND asks for was not written): bound the parameters, \
+                         or start elsewhere (parameters and initial states)";
+pub(crate) const OVERFLOW: &str = "; the simulation overflows (an unstable model, or a step too long for its dynamics): \
+                                   bound the parameters, take a shorter step or a stiff method, or predict over a shorter \
+                                   horizon";
+const HUGE: &str = ", whose square overflows: check the units of the record, the noise levels and the start";
+
+/// Equations that note whether they are asked at a state that has run away.
+struct Watched<'w> {
+    values: &'w dyn Functions<f64>,
+    ran_away: AtomicBool,
+}
+
+impl<'w> Watched<'w> {
+    fn new(values: &'w dyn Functions<f64>) -> Self {
+        Watched { values, ran_away: AtomicBool::new(false) }
+    }
+
+    /// Begins the next step.
+    fn forget(&self) {
+        self.ran_away.store(false, Ordering::Relaxed);
+    }
+
+    fn ran_away(&self) -> bool {
+        self.ran_away.load(Ordering::Relaxed)
+    }
+}
+
+impl Functions<f64> for Watched<'_> {
+    fn state(&self, t: f64, x: &[f64], u: &[f64], p: &[f64], to: &mut [f64]) {
+        if x.iter().any(|x| x.abs() >= RUNAWAY) {
+            self.ran_away.store(true, Ordering::Relaxed);
+        }
+        self.values.state(t, x, u, p, to);
+    }
+
+    fn output(&self, t: f64, x: &[f64], u: &[f64], p: &[f64], to: &mut [f64]) {
+        self.values.output(t, x, u, p, to);
+    }
+
+    fn diffusion(&self, p: &[f64], to: &mut [f64]) {
+        self.values.diffusion(p, to);
+    }
+
+    fn noise(&self, p: &[f64], to: &mut [f64]) {
+        self.values.noise(p, to);
+    }
+}
