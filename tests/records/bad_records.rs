@@ -174,7 +174,7 @@ fn vectors_that_make_no_record() {
     says(new(Time::Stamps(vec![0.0]), &[U], &[Y]), &["1 sample"]);
     says(new(EVEN, &[U; 3], &[Y; 2]), &["output has 2 rows", "input has 3"]);
     says(new(Time::Stamps(vec![0.0, 1.0]), &[U; 3], &[Y; 3]), &["time has 2 rows", "`ud` has 3"]);
-    says(new(Time::Stamps(vec![0.0, 1.0, 1.0]), &[U; 3], &[Y; 3]), &["sample 2", "1 s is followed by 1 s"]);
+    says(new(Time::Stamps(vec![0.0, 1.0, 0.5]), &[U; 3], &[Y; 3]), &["sample 2", "1 s is followed by 0.5 s"]);
     says(new(Time::Stamps(vec![0.0, f64::NAN, 1.0]), &[U; 3], &[Y; 3]), &["`t` is NaN at sample 1"]);
     says(new(Time::Uniform { start: f64::NAN, step: 0.1 }, &[U; 3], &[Y; 3]), &["`t` is NaN"]);
     says(

@@ -74,7 +74,8 @@ impl CsvFile {
             Some(step) => Time::Uniform { start: 0.0, step },
             None => match clock.uniform() {
                 Some(uniform) => uniform,
-                None => Time::Stamps(stamps.unwrap_or_else(|| clock.last().into_iter().collect())),
+                // No step at all was found: all stamps are alike.
+                None => Time::Stamps(stamps.unwrap_or_else(|| clock.last().into_iter().cycle().take(sample).collect())),
             },
         };
         let named = |(values, signal): (Vec<f64>, &&Quantity)| {
