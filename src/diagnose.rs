@@ -18,7 +18,7 @@ pub(crate) use bands::{Widths, widths};
 pub use bootstrap::{Bootstrap, Resampling, bootstrap};
 pub use compare::{Candidate, Validation, cross_validate, f_test, likelihood_ratio, validate};
 pub use convergence::Convergence;
-pub use derived::{Derived, derived};
+pub use derived::{Derived, derived, derived_by};
 pub use drift::{Drift, drift};
 pub use identifiability::{Collinear, Excitation, Identifiability, Segment, identifiability};
 pub(crate) use identifiability::{identifiability_beside_warnings, reworded};

@@ -2,7 +2,7 @@
 
 use crate::functions::Functions;
 use crate::graph::{Graph, Id, Leaf, Node, Symbol, Untraceable};
-use crate::layout::{Kind, Layout};
+use crate::layout::{InvalidLayout, Kind, Layout, Quantity};
 use crate::model::Model;
 use crate::scalar::Scalar;
 use crate::signals::Signals;
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// A model's quantities and its arithmetic, known at run time.
 ///
 /// A Rust model is read once ([`Equations::trace`]); equations from elsewhere are made of a graph
-/// ([`Equations::new`]), and fitted by [`EquationsFit`](crate::problem::EquationsFit).
+/// ([`Equations::new`]), and fitted by a [`Fit`](crate::Fit).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Parts", into = "Parts")]
 pub struct Equations {
@@ -42,6 +42,9 @@ struct Parts {
 /// A graph that does not make up equations of its layout.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidEquations {
+    /// A layout whose quantities cannot be told apart by their names.
+    #[error(transparent)]
+    Layout(#[from] InvalidLayout),
     /// Not one root per quantity.
     #[error("the layout has {expected} {role}, the equations {found}; give one node for each")]
     Count {
@@ -87,6 +90,7 @@ impl Equations {
             true => Ok(()),
             false => Err(InvalidEquations::Count { role, expected, found }),
         };
+        layout.check()?;
         let [state, output, diffusion, noise] = roots;
         count("states", if layout.kind == Kind::Static { 0 } else { layout.states.len() }, state.len())?;
         count("outputs", layout.outputs.len(), output.len())?;
@@ -217,18 +221,20 @@ impl Equations {
         });
         to.iter_mut().zip(found).for_each(|(to, found)| *to = found);
     }
+}
 
-    fn name(&self, leaf: Leaf) -> String {
-        let name = |of: &[crate::layout::Quantity], i: u32| {
-            of.get(i as usize).map_or_else(|| format!("{leaf:?}"), |quantity| quantity.name.clone())
-        };
-        match leaf {
-            Leaf::Time => "t".to_owned(),
-            Leaf::State(i) => name(&self.layout.states, i),
-            Leaf::Input(i) => name(&self.layout.inputs, i),
-            Leaf::Parameter(i) => name(&self.layout.parameters, i),
-            Leaf::Step | Leaf::NextInput(_) | Leaf::Measured(_) => format!("{leaf:?}"),
-        }
+/// The name of a leaf by a layout.
+pub(crate) fn name(layout: &Layout, leaf: Leaf) -> String {
+    let name = |of: &[Quantity], i: u32| {
+        of.get(i as usize).map_or_else(|| format!("{leaf:?}"), |quantity| quantity.name.clone())
+    };
+    match leaf {
+        Leaf::Time => "t".to_owned(),
+        Leaf::State(i) => name(&layout.states, i),
+        Leaf::Input(i) => name(&layout.inputs, i),
+        Leaf::Parameter(i) => name(&layout.parameters, i),
+        Leaf::Measured(i) => name(&layout.outputs, i),
+        Leaf::Step | Leaf::NextInput(_) => format!("{leaf:?}"),
     }
 }
 
@@ -316,6 +322,6 @@ impl Display for Equations {
         let outputs = self.layout.outputs.iter().zip(&self.output);
         let output = outputs.map(|(quantity, root)| (format!("output {}", quantity.name), *root));
         let roots: Vec<(String, Id)> = state.chain(output).collect();
-        self.graph.write(f, &|leaf| self.name(leaf), &roots)
+        self.graph.write(f, &|leaf| name(&self.layout, leaf), &roots)
     }
 }

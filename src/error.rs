@@ -155,6 +155,16 @@ pub enum Error {
         /// The names there are.
         available: Vec<String>,
     },
+    /// A name that is none of those there are.
+    #[error("there is no {what} `{name}`{}; there are: {}", meant(name, available), available.join(", "))]
+    Unknown {
+        /// The kind of thing that was named.
+        what: String,
+        /// The name given.
+        name: String,
+        /// The names there are.
+        available: Vec<String>,
+    },
     /// A cell that is not a number.
     #[error("{}, line {line}, column `{column}`: `{text}` is not a number{}", path.display(), number_hint(text))]
     NotANumber {
@@ -298,6 +308,32 @@ fn listed(columns: &[String], wanted: &str, signal: &str) -> String {
     names.sort_by(|a, b| b.0.total_cmp(&a.0));
     let nearest: Vec<&str> = names[..LISTED].iter().map(|(_, name)| *name).collect();
     format!("of its {} columns these are nearest: {}; {remedy}", columns.len(), nearest.join(", "))
+}
+
+/// Where a name stands among those there are.
+///
+/// # Errors
+/// [`Error::Unknown`], with the names that are nearest.
+pub(crate) fn find(what: &str, names: &[&str], name: &str) -> Result<usize, Error> {
+    names.iter().position(|known| *known == name).ok_or_else(|| Error::Unknown {
+        what: what.to_owned(),
+        name: name.to_owned(),
+        available: names.iter().map(|&name| name.to_owned()).collect(),
+    })
+}
+
+/// Names at least so similar, from zero to one, may have been meant.
+const SIMILAR: f64 = 0.6;
+
+/// The name that was probably meant.
+fn meant(name: &str, available: &[String]) -> String {
+    let name = name.to_lowercase();
+    let similar = |known: &String| strsim::normalized_damerau_levenshtein(&known.to_lowercase(), &name);
+    let nearest = available.iter().max_by(|a, b| similar(a).total_cmp(&similar(b)));
+    match nearest.filter(|nearest| similar(nearest) >= SIMILAR) {
+        Some(nearest) => format!(" (`{nearest}` is near)"),
+        None => String::new(),
+    }
 }
 
 /// A number without the hundreds of zeros that a large or small one would be printed with.

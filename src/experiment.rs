@@ -11,7 +11,7 @@ use crate::interval::Hold;
 use crate::layout::{Quantity, quantities};
 use crate::model::Model;
 use crate::parameter::Parameter;
-use crate::record::{Channel, Initial, Record, Stored, Time};
+use crate::record::{Channel, Holds, Initial, Record, Stored, Time};
 use crate::signals::{Of, Signals};
 use core::marker::PhantomData;
 use serde::de::Error as _;
@@ -135,9 +135,15 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
         self.map(|record| record.named(name))
     }
 
-    /// Says how the input behaves between samples.
+    /// Says how all inputs behave between samples.
     pub fn hold(self, hold: Hold) -> Self {
         self.map(|record| record.hold(hold))
+    }
+
+    /// Says how each input behaves between samples: a command of a controller is held, what was measured is a straight line.
+    pub fn holds(self, holds: Of<U, Hold>) -> Self {
+        let holds = Holds::each(U::into_array(holds).as_ref().to_vec());
+        self.map(|record| Record { holds, ..record })
     }
 
     /// Says what is known of the state at the first sample: `fixed` where given, `free` (with bounds or prior) where
@@ -222,9 +228,9 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
         (0..self.len()).map(|k| Sample { t: self.time(k), u: self.input(k), y: self.output(k) })
     }
 
-    /// How the input behaves between samples.
-    pub fn input_hold(&self) -> Hold {
-        self.record.input_hold()
+    /// How each input behaves between samples.
+    pub fn input_holds(&self) -> Of<U, Hold> {
+        U::from_fn(|i| self.record.input_hold(i))
     }
 
     /// Declarations of the state at the first sample.

@@ -2,7 +2,9 @@
 
 #[cfg(feature = "parallel")]
 mod ahead;
+mod by_name;
 mod elsewhere;
+mod fittable;
 mod fleet;
 mod lockstep;
 mod predict;
@@ -10,79 +12,53 @@ mod refine;
 mod run;
 mod search;
 mod sides;
+mod simulate;
 mod simulated;
 mod start_error;
 mod starts;
+mod weights;
 
+pub use fittable::Fittable;
 pub use fleet::Fleet;
 
-use crate::equations::Equations;
 use crate::error::Error;
-use crate::estimate::Estimate;
-use crate::experiment::{ExperimentOf, Sample};
 use crate::functions::Handle;
-use crate::integrate::{Automatic, Integrator, Method, Rk4, Stiff, automatic, stiff};
-use crate::layout::{Kind, Layout};
+use crate::graph::{Graph, Id};
+use crate::integrate::Integrator;
 use crate::loss::Loss;
 use crate::model::Model;
 use crate::optimize::LeastSquaresState;
 use crate::parameter::Parameter;
-use crate::predict::{Prediction, Predictor, simulation};
+use crate::predict::Predictor;
 use crate::prefilter::Butterworth;
-use crate::problem::{FinerSweeps, MakeSweep, Problem, SUBSTEPS, Search, Settings, Weights};
+use crate::problem::{Noise, Problem, Search, SearchPlan, Settings};
 use crate::record::Record;
-use crate::signals::{Of, Signals};
-use crate::sweep::{DualSweep, Loops, Narrow, Sweep, Typed, compiled};
 use crate::weighting::Weighting;
 use argmin::core::observers::{Observe, ObserverMode};
 use core::marker::PhantomData;
+use fittable::{Made, Predicting};
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
+use weights::{ByExpression, ByModel};
 
 /// A model and its records, before the parameters are declared.
-#[derive(Debug)]
-pub struct Records<'a, M: Model> {
+pub struct Records<'a, M> {
     model: &'a M,
-    experiments: &'a [ExperimentOf<M>],
+    records: Vec<Record>,
 }
 
-impl<'a, M: Model> Records<'a, M> {
-    /// Declares each parameter `free` (with its start, bounds and prior) or `fixed`.
-    pub fn parameters(self, parameters: Of<M::Parameters, Parameter>) -> Fit<'a, M> {
-        Fit {
-            model: self.model,
-            experiments: self.experiments,
-            parameters,
-            stepping: Stepping::automatic(1),
-            is_default: true,
-            predictor: simulation(),
-            settings: Settings::default(),
-        }
-    }
-}
-
-/// An integrator: compiled into the loop over a model's samples, and as a trait object.
-pub(crate) struct Stepping<M: Model> {
-    loops: Arc<dyn Loops<M>>,
-    method: Arc<dyn Method>,
-}
-
-impl<M: Model> Stepping<M> {
-    pub fn new(integrator: impl Integrator) -> Self {
-        Stepping { loops: Arc::new(integrator.clone()), method: Arc::new(integrator) }
+impl<'a, M: Made> Records<'a, M> {
+    /// Declares each parameter `free` (with its start, bounds and prior) or `fixed`: as the model's own struct, or, of
+    /// equations, in the order of their layout.
+    pub fn parameters(self, parameters: M::Declarations) -> Fit<'a, M> {
+        self.declared(M::declared(parameters))
     }
 
-    /// The default, with this number of steps per sample.
-    fn automatic(substeps: u32) -> Self {
-        Stepping { loops: Arc::new(Automatic { continuous: Rk4 { substeps } }), method: automatic(substeps) }
-    }
-}
-
-impl<M: Model> Clone for Stepping<M> {
-    fn clone(&self) -> Self {
-        Stepping { loops: self.loops.clone(), method: self.method.clone() }
+    fn declared(self, parameters: Vec<Parameter>) -> Fit<'a, M> {
+        let Records { model, records } = self;
+        Fit { model, records, parameters, stepping: None, predictor: None, settings: Settings::default() }
     }
 }
 
@@ -107,22 +83,62 @@ impl<M: Model> Clone for Stepping<M> {
 /// # Ok(())
 /// # }
 /// ```
-pub struct Fit<'a, M: Model> {
+///
+/// What is fitted may also be [`Equations`](crate::equations::Equations) that were read from a file or made at run time; then
+/// records are untyped, parameters and noise levels stand in the order of the layout or go by name, and the estimate is a
+/// [`Summary`](crate::Summary). Search, judgement, [`diagnose`](crate::diagnose) and [`Report`](crate::Report) are the same, and so
+/// are the answers. Equations are compiled where they can be; an integrator whose steps depend on the state evaluates them node by
+/// node, which is several times slower than a Rust model's own code.
+///
+/// ```
+/// use greybox::equations::Equations;
+/// use greybox::graph::{Graph, Leaf};
+/// use greybox::layout::{Layout, Quantity};
+/// use greybox::record::{Channel, Record};
+/// use greybox::{Fit, Kind, Time, free};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// // dx/dt = (u - x) / tau, y = x
+/// let named = |name: &str, unit: &str| Quantity { name: name.to_owned(), unit: unit.to_owned() };
+/// let layout = Layout {
+///     kind: Kind::Continuous,
+///     states: vec![named("x", "V")],
+///     inputs: vec![named("u", "V")],
+///     outputs: vec![named("y", "V")],
+///     parameters: vec![named("tau", "s")],
+/// };
+/// let mut graph = Graph::default();
+/// let [x, u, tau] = [Leaf::State(0), Leaf::Input(0), Leaf::Parameter(0)].map(|leaf| graph.leaf(leaf));
+/// let rest = graph.sub(u, x);
+/// let slope = graph.div(rest, tau);
+/// let equations = Equations::new(layout, &graph, &[slope], &[x])?;
+///
+/// // A step response of 0.5 s, sampled every 10 ms.
+/// let y: Vec<f64> = (0..200).map(|k| 1.0 - (-0.01 * f64::from(k) / 0.5).exp()).collect();
+/// let (time, states) = (Time::Uniform { start: 0.0, step: 0.01 }, equations.layout().states.clone());
+/// let inputs = vec![Channel::new("u", "V", vec![1.0; 200])];
+/// let record = Record::new(states, time, inputs, vec![Channel::new("y", "V", y)])?;
+///
+/// let found = Fit::new(&equations, &record).parameters_by_name([("tau", free(1.0))])?.run()?;
+/// assert!((found.parameters[0].value - 0.5).abs() < 1e-6);
+/// # Ok(())
+/// # }
+/// ```
+pub struct Fit<'a, M: Made> {
     model: &'a M,
-    experiments: &'a [ExperimentOf<M>],
-    parameters: Of<M::Parameters, Parameter>,
-    stepping: Stepping<M>,
-    /// Whether the integrator was not chosen.
-    is_default: bool,
-    predictor: Arc<dyn Prediction>,
+    records: Vec<Record>,
+    parameters: Vec<Parameter>,
+    /// `None` if it was not chosen.
+    stepping: Option<M::Stepping>,
+    /// `None` if it was not chosen.
+    predictor: Option<Predicting>,
     settings: Settings,
 }
 
-impl<'a, M: Model> Fit<'a, M> {
+impl<'a, M: Made> Fit<'a, M> {
     /// A fit of one record, or of several (`&[a, b]`, `&vec`) at once.
     #[expect(clippy::new_ret_no_self, reason = "a fit without parameters is not a fit yet")]
-    pub fn new<R: AsRef<[ExperimentOf<M>]> + ?Sized>(model: &'a M, records: &'a R) -> Records<'a, M> {
-        Records { model, experiments: records.as_ref() }
+    pub fn new<R: AsRef<[M::Record]> + ?Sized>(model: &'a M, records: &R) -> Records<'a, M> {
+        Records { model, records: records.as_ref().iter().map(|record| M::record(record).clone()).collect() }
     }
 
     /// Sets the integrator. It is kept, with a warning if its step moves the answer.
@@ -136,58 +152,46 @@ impl<'a, M: Model> Fit<'a, M> {
     /// search by one of the finer methods has at most 100 trial steps, and begins at the minima found, where there are several
     /// starts; a limit of the search's own holds for all methods together.
     pub fn integrator(self, integrator: impl Integrator) -> Self {
-        Fit { stepping: Stepping::new(integrator), is_default: false, ..self }
+        Fit { stepping: Some(M::stepping(integrator)), ..self }
     }
 
     /// Sets the predictor, whose prediction error is minimized.
     pub fn predictor(self, predictor: impl Predictor) -> Self {
-        Fit { predictor: Arc::new(predictor), ..self }
+        Fit { predictor: Some(Predicting::new(predictor)), ..self }
     }
 
     /// Sets the search and its settings.
     pub fn optimizer(self, optimizer: impl Search) -> Self {
-        self.set(|settings| settings.optimizer(optimizer))
+        self.set(|settings| settings.optimizer = Arc::new(optimizer))
     }
 
     /// Sets the standard deviation of the noise of each output, in its unit (after the pre-filter, if there is one).
     /// Without it, the noise is estimated from the errors.
-    pub fn noise(self, sigma: Of<M::Output, f64>) -> Self {
-        self.set(|settings| settings.noise(M::Output::into_array(sigma).as_ref().to_vec()))
+    pub fn noise(self, sigma: M::PerOutput) -> Self {
+        self.set(|settings| settings.noise = Noise::Given(M::per_output(sigma)))
     }
 
     /// Declares the standard deviation of the noise of each input, in its unit; zero for none. It changes neither the
     /// estimate nor its intervals: the bias that it causes is estimated (Cook and Stefanski 1994), and named by a warning
     /// where it is above a quarter of a standard error.
-    pub fn input_noise(self, sigma: Of<M::Input, f64>) -> Self {
-        self.set(|settings| settings.input_noise(M::Input::into_array(sigma).as_ref().to_vec()))
+    pub fn input_noise(self, sigma: M::PerInput) -> Self {
+        self.set(|settings| settings.input_noise = Some(M::per_input(sigma)))
     }
 
     /// Estimates the covariance of the noise of all outputs, instead of a standard deviation per output.
     pub fn noise_covariance(self) -> Self {
-        self.set(Settings::noise_covariance)
-    }
-
-    /// Multiplies the cost of each sample by a weight (at least zero), any function of the sample. It is not an inverse
-    /// variance: the covariance is that of the weighted estimate, whatever the noise (a sandwich).
-    ///
-    /// It is owned: a closure that captures takes its variables by `move`.
-    pub fn weighting(mut self, weighting: impl Weighting<M> + 'static) -> Self
-    where
-        M: 'static,
-    {
-        self.settings.weights = Some(Arc::new(ByModel { weighting, model: PhantomData::<fn(&M)> }));
-        self
+        self.set(|settings| settings.noise = Noise::Covariance)
     }
 
     /// Sets the loss, a function of the standardized errors.
     pub fn loss(self, loss: impl Loss + 'static) -> Self {
-        self.set(|settings| settings.loss(loss))
+        self.set(|settings| settings.loss = Some(Arc::new(loss)))
     }
 
     /// Filters the prediction errors and their slopes before the cost is computed. A missing sample enters the filter
     /// as zero.
     pub fn prefilter(self, filter: Butterworth) -> Self {
-        self.set(|settings| settings.prefilter(filter))
+        self.set(|settings| settings.prefilter = Some(filter))
     }
 
     /// Searches from `count` starts and keeps the best end. [`Summary::starts`](crate::Summary::starts) reports the minima that were
@@ -225,39 +229,47 @@ impl<'a, M: Model> Fit<'a, M> {
     /// # }
     /// ```
     pub fn starts(self, count: usize) -> Self {
-        self.set(|settings| settings.starts(count))
+        self.set(|settings| settings.searches = SearchPlan::All(count))
     }
 
     /// Stops the search at its best point so far when the flag is set (by another thread, a signal handler).
     pub fn cancel(self, flag: Arc<AtomicBool>) -> Self {
-        self.set(|settings| settings.cancel(flag))
+        self.set(|settings| settings.cancel = Some(flag))
     }
 
     /// Adds one to the counter whenever a refit of [`bootstrap`](crate::diagnose::bootstrap) has ended, for a display of
     /// progress by another thread.
     pub fn counter(self, counter: Arc<AtomicU64>) -> Self {
-        self.set(|settings| settings.counter(counter))
+        self.set(|settings| settings.counter = Some(counter))
     }
 
     /// Stops the search at its best point so far after this time. Of the tests that follow, those are left out that
     /// were not made by then, which a warning says ([`NotExamined`](crate::WarningCode::NotExamined)).
     pub fn time_limit(self, limit: Duration) -> Self {
-        self.set(|settings| settings.time_limit(limit))
+        self.set(|settings| settings.time_limit = Some(limit))
     }
 
     /// Calls an observer of argmin with the state of the search.
     pub fn observe(self, observer: impl Observe<LeastSquaresState> + Send + 'static, mode: ObserverMode) -> Self {
-        self.set(|settings| settings.observe(observer, mode))
+        self.set(|settings| settings.observers.push((Arc::new(Mutex::new(Box::new(observer))), mode)))
     }
 
     /// Saves the state of the search into a file every `every` iterations, and resumes from the file if it exists; a
     /// search with other settings, or of another kind, begins at the point that was reached. A file of another problem is refused.
     pub fn checkpoint(self, path: impl Into<PathBuf>, every: u64) -> Self {
-        self.set(|settings| settings.checkpoint(path, every))
+        self.set(|settings| settings.checkpoint = Some((path.into(), every)))
     }
 
-    fn set(self, change: impl FnOnce(Settings) -> Settings) -> Self {
-        Fit { settings: change(self.settings), ..self }
+    /// Multiplies the cost of each sample by a weight (at least zero): the root of a graph of time ([`Leaf::Time`](crate::graph::Leaf)),
+    /// inputs and measured outputs. Otherwise as [`weighting`](Fit::weighting).
+    pub fn weighting_by(self, graph: &Graph, root: Id) -> Self {
+        let weights = ByExpression::new(&self.model.layout(), graph, root);
+        self.set(|settings| settings.weights = Some(Arc::new(weights)))
+    }
+
+    fn set(mut self, change: impl FnOnce(&mut Settings)) -> Self {
+        change(&mut self.settings);
+        self
     }
 
     /// Estimates the parameters and their uncertainty.
@@ -270,17 +282,12 @@ impl<'a, M: Model> Fit<'a, M> {
     /// # Errors
     /// Invalid settings or records ([`Error`] names them), a start that cannot be simulated, a checkpoint that cannot
     /// be read.
-    pub fn run(self) -> Result<Estimate<M>, Error> {
+    pub fn run(self) -> Result<M::Estimate, Error> {
         let begin = std::time::Instant::now();
-        let sweep = sweep(Handle::Borrowed(self.model), &self.stepping, &self.predictor)?;
-        let (records, parameters) = (records::<M>(self.experiments), declared::<M>(self.parameters));
-        let finer = finer(Handle::Borrowed(self.model), self.is_default, &self.predictor);
-        let problem = Problem::new(sweep, records, &parameters, self.settings)?.refining(finer);
-        Estimate::of(problem.run_since(begin)?)
+        let model = self.model.lent();
+        M::estimate(self.problem_of(model)?.run_since(begin)?)
     }
-}
 
-impl<M: Model> Fit<'_, M> {
     /// The fit as an untyped [`Problem`]: for [`diagnose`](crate::diagnose), for [`Report`](crate::Report), for
     /// argmin's solvers, or to be run. It holds a copy of the model and shares the records' columns, so that it outlives both; `'m` is
     /// `'static` unless the model's type itself borrows.
@@ -292,78 +299,28 @@ impl<M: Model> Fit<'_, M> {
         M: Clone + 'm,
     {
         let model = Handle::Shared(Arc::new(self.model.clone()));
-        let sweep = sweep(model.clone(), &self.stepping, &self.predictor)?;
-        let (records, parameters) = (records::<M>(self.experiments), declared::<M>(self.parameters));
-        let problem = Problem::new(sweep, records, &parameters, self.settings)?;
-        Ok(problem.refining(finer(model, self.is_default, &self.predictor)))
+        self.problem_of(model)
+    }
+
+    fn problem_of<'m>(self, model: Handle<'m, M>) -> Result<Problem<'m>, Error>
+    where
+        M: 'm,
+    {
+        let sweep = M::sweep(model.clone(), self.stepping.as_ref(), self.predictor.as_ref())?;
+        let problem = Problem::new(sweep, self.records, &self.parameters, self.settings)?;
+        Ok(problem.refining(fittable::finer(model, self.stepping.as_ref(), self.predictor.as_ref())))
     }
 }
 
-/// The untyped records of experiments; columns are shared, not copied.
-fn records<M: Model>(experiments: &[ExperimentOf<M>]) -> Vec<Record> {
-    experiments.iter().map(|experiment| experiment.record().clone()).collect()
-}
-
-/// The declared parameters, in the model's order.
-fn declared<M: Model>(parameters: Of<M::Parameters, Parameter>) -> Vec<Parameter> {
-    M::Parameters::into_array(parameters).as_ref().to_vec()
-}
-
-/// The sweep of a model: a compiled program if the model can be traced, else dual numbers.
-pub(crate) fn sweep<'a, M: Model + 'a>(
-    model: Handle<'a, M>,
-    stepping: &Stepping<M>,
-    predictor: &Arc<dyn Prediction>,
-) -> Result<Arc<dyn Sweep + 'a>, Error> {
-    let Stepping { loops, method } = stepping.clone();
-    let layout = Arc::new(Layout::of::<M>());
-    method.check(layout.kind)?;
-    predictor.check(&layout)?;
-    let plain = |uncompiled| -> Arc<dyn Sweep + 'a> {
-        let code = Arc::new(Typed { model: model.clone(), loops: loops.clone() });
-        let (layout, method, predictor) = (layout.clone(), method.clone(), predictor.clone());
-        Arc::new(DualSweep { layout, code, method, predictor, uncompiled })
-    };
-    compiled(&|| Equations::trace(&*model).map(Arc::new), &method, predictor, &plain)
-}
-
-/// The sweeps by the methods that follow a default one that is too coarse.
-fn finer<'a, M: Model + 'a>(
-    model: Handle<'a, M>,
-    is_default: bool,
-    predictor: &Arc<dyn Prediction>,
-) -> Arc<FinerSweeps<'a>> {
-    if !is_default || M::KIND != Kind::Continuous {
-        return FinerSweeps::new(vec![]);
-    }
-    let by = |stepping: Stepping<M>| -> MakeSweep<'a> {
-        let (model, predictor) = (model.clone(), predictor.clone());
-        Arc::new(move || sweep(model.clone(), &stepping, &predictor))
-    };
-    let steps = SUBSTEPS.map(|substeps| by(Stepping::automatic(substeps)));
-    let stiff = by(Stepping { loops: Arc::new(Narrow(Stiff::default())), method: stiff() });
-    FinerSweeps::new(steps.into_iter().chain([stiff]).collect())
-}
-
-/// A typed weighting as untyped [`Weights`].
-struct ByModel<W, M> {
-    weighting: W,
-    model: PhantomData<fn(&M)>,
-}
-
-impl<M: Model, W: Weighting<M>> Weights for ByModel<W, M> {
-    fn weight(&self, record: &Record, k: usize) -> f64 {
-        let (t, inputs, outputs) = (record.time(k), record.inputs(), record.outputs());
-        let u = M::Input::from_fn(|i| inputs[i].values[k]);
-        let y = M::Output::from_fn(|j| outputs[j].values[k]);
-        self.weighting.weight(&Sample { t, u, y })
-    }
-
-    fn check(&self) -> Result<(), Error> {
-        self.weighting.check()
-    }
-
-    fn describe(&self) -> String {
-        self.weighting.describe()
+impl<M: Model> Fit<'_, M> {
+    /// Multiplies the cost of each sample by a weight (at least zero), any function of the sample. It is not an inverse
+    /// variance: the covariance is that of the weighted estimate, whatever the noise (a sandwich).
+    ///
+    /// It is owned: a closure that captures takes its variables by `move`.
+    pub fn weighting(self, weighting: impl Weighting<M> + 'static) -> Self
+    where
+        M: 'static,
+    {
+        self.set(|settings| settings.weights = Some(Arc::new(ByModel { weighting, model: PhantomData::<fn(&M)> })))
     }
 }

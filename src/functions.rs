@@ -24,7 +24,7 @@ pub trait Functions<S>: Send + Sync {
 
 /// A value that is borrowed or shared.
 #[derive(Debug)]
-pub(crate) enum Handle<'a, T> {
+pub enum Handle<'a, T> {
     Borrowed(&'a T),
     Shared(Arc<T>),
 }
@@ -34,6 +34,16 @@ impl<T> Clone for Handle<'_, T> {
         match self {
             Handle::Borrowed(value) => Handle::Borrowed(value),
             Handle::Shared(value) => Handle::Shared(value.clone()),
+        }
+    }
+}
+
+impl<T: Clone> Handle<'_, T> {
+    /// The value, shared; a copy of one that is borrowed.
+    pub fn shared(&self) -> Arc<T> {
+        match self {
+            Handle::Borrowed(value) => Arc::new((*value).clone()),
+            Handle::Shared(value) => value.clone(),
         }
     }
 }

@@ -70,6 +70,76 @@ impl Layout {
     }
 }
 
+/// A name in a layout that cannot stand.
+#[cfg(feature = "std")]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum InvalidLayout {
+    /// A name without a visible character.
+    #[error("{role} {} of the layout has no name; name it", place + 1)]
+    Unnamed {
+        /// The group.
+        role: &'static str,
+        /// Its place in the group, from zero.
+        place: usize,
+    },
+    /// Two quantities of one group that have the same name.
+    #[error("{role} `{name}` stands twice in the layout, in places {} and {}; rename one", first + 1, second + 1)]
+    Repeated {
+        /// The group.
+        role: &'static str,
+        /// The name.
+        name: String,
+        /// Place of the first in the group, from zero.
+        first: usize,
+        /// Place of the second.
+        second: usize,
+    },
+    /// A line end, a tab or another control character in a name or a unit.
+    #[error("the name or the unit of {role} {name:?} has the control character {character:?}; leave it out")]
+    Control {
+        /// The group.
+        role: &'static str,
+        /// The name.
+        name: String,
+        /// The character.
+        character: char,
+    },
+}
+
+#[cfg(feature = "std")]
+impl Layout {
+    /// Whether each quantity has a name of its own in its group, which can be printed in one line.
+    ///
+    /// # Errors
+    /// The first name that is empty, stands twice, or has a control character.
+    pub fn check(&self) -> Result<(), InvalidLayout> {
+        let groups = [
+            ("state", &self.states),
+            ("input", &self.inputs),
+            ("output", &self.outputs),
+            ("parameter", &self.parameters),
+        ];
+        groups.into_iter().try_for_each(|(role, quantities)| check_names(role, quantities))
+    }
+}
+
+#[cfg(feature = "std")]
+fn check_names(role: &'static str, quantities: &[Quantity]) -> Result<(), InvalidLayout> {
+    let mut places = std::collections::HashMap::new();
+    for (place, Quantity { name, unit }) in quantities.iter().enumerate() {
+        if name.trim().is_empty() {
+            return Err(InvalidLayout::Unnamed { role, place });
+        }
+        if let Some(character) = name.chars().chain(unit.chars()).find(|character| character.is_control()) {
+            return Err(InvalidLayout::Control { role, name: name.clone(), character });
+        }
+        if let Some(first) = places.insert(name.as_str(), place) {
+            return Err(InvalidLayout::Repeated { role, name: name.clone(), first, second: place });
+        }
+    }
+    Ok(())
+}
+
 /// The quantities of a vector of signals.
 #[cfg(feature = "std")]
 pub(crate) fn quantities<X: Signals>() -> Vec<Quantity> {

@@ -80,7 +80,7 @@
 //! | declare parameters | [`free`], [`fixed`], [`Parameter`], [`Prior`] |
 //! | fit one record or several together | [`Fit`] |
 //! | fit many records, each by itself | [`Fleet`] |
-//! | fit equations that are made at run time or read from a file | [`equations`], [`graph`], [`EquationsFit`](problem::EquationsFit) |
+//! | fit equations that are made at run time or read from a file | [`equations`], [`graph`], [`Fit`] |
 //! | choose an integrator | [`Automatic`], [`Rk4`], [`Rk45`], [`Esdirk`], [`Discrete`] |
 //! | choose what is predicted | [`FreeRun`], [`Horizon`], [`Kalman`], [`predict`] |
 //! | weigh or filter errors, limit outliers | [`weighting`], [`loss`], [`Butterworth`] |
@@ -214,7 +214,7 @@ pub use {
     error::{Error, Failure},
     estimate::{Estimate, Knowledge, Summary, Warning, WarningCode},
     experiment::{Experiment, ExperimentOf, Sample},
-    fit::{Fit, Fleet, Records},
+    fit::{Fit, Fittable, Fleet, Records},
     loss::{Huber, Loss},
     numeric::Numeric,
     outliers::hampel,

@@ -13,7 +13,6 @@ mod job;
 mod linearize;
 pub(crate) mod noise;
 mod objective;
-mod of_equations;
 mod pass;
 mod search;
 mod segments;
@@ -31,14 +30,12 @@ pub(crate) use control::Control;
 pub(crate) use finer::{Finer, FinerSweeps, MakeSweep, PARTS, SUBSTEPS};
 pub(crate) use fingerprint::Fingerprint;
 pub use objective::Objective;
-pub use of_equations::EquationsFit;
 pub(crate) use pass::Accumulate;
 pub use search::Search;
 pub(crate) use search::{Optimizer, Round, RoundError};
 use segments::Cuts;
 pub(crate) use segments::Memory;
-pub use settings::Settings;
-pub(crate) use settings::{Observer, SearchPlan, Weights};
+pub(crate) use settings::{Observer, SearchPlan, Settings, Weights};
 pub use simulate::Simulated;
 pub(crate) use together::{At, gather_together, linearize_together};
 pub use unknowns::Role;
@@ -81,7 +78,7 @@ impl<'a> Problem<'a> {
     /// # Errors
     /// No record, a record or parameters that do not fit the model, nothing free, an output that was never measured, settings out
     /// of range, a value per experiment where there is one experiment ([`Error`] names which).
-    pub fn new(
+    pub(crate) fn new(
         sweep: Arc<dyn Sweep + 'a>,
         records: Vec<Record>,
         parameters: &[Parameter],

@@ -5,6 +5,7 @@ mod column;
 mod csv;
 mod cycles;
 mod edit;
+mod holds;
 mod inspect;
 #[cfg(feature = "npy")]
 mod npy;
@@ -15,6 +16,7 @@ pub use column::{Channel, Column};
 #[cfg(feature = "csv")]
 pub use csv::CsvFile;
 pub use cycles::Gap;
+pub(crate) use holds::Holds;
 pub(crate) use inspect::Looked;
 pub use inspect::{ChannelInspection, Inspection, Suspicion};
 pub(crate) use stored::Stored;
@@ -54,7 +56,7 @@ pub struct Record {
     pub(crate) time: Time,
     pub(crate) inputs: Arc<[Channel]>,
     pub(crate) outputs: Arc<[Channel]>,
-    pub(crate) hold: Hold,
+    pub(crate) holds: Holds,
     pub(crate) initial: Initial,
     /// Result of the inspection of its channels, if there was one.
     pub(crate) looked: Arc<OnceLock<Looked>>,
@@ -67,19 +69,14 @@ impl Record {
     /// No signal at all, fewer than two samples (one, without state), lengths that differ, time that decreases or stands still, samples of
     /// one instant with different inputs, a time or input that is not finite, an infinite output.
     pub fn new(states: Vec<Quantity>, time: Time, inputs: Vec<Channel>, outputs: Vec<Channel>) -> Result<Self, Error> {
-        let (name, hold, initial) = ("record".to_owned(), Hold::default(), Initial::default());
+        let (name, holds, initial) = ("record".to_owned(), Holds::All(Hold::default()), Initial::default());
         let (states, inputs, outputs) = (states.into(), inputs.into(), outputs.into());
-        Record { name, states, time, inputs, outputs, hold, initial, looked: Arc::default() }.checked()
+        Record { name, states, time, inputs, outputs, holds, initial, looked: Arc::default() }.checked()
     }
 
     /// Names the record in reports and errors.
     pub fn named(self, name: impl Into<String>) -> Self {
         Record { name: name.into(), ..self }
-    }
-
-    /// Says how the input behaves between samples.
-    pub fn hold(self, hold: Hold) -> Self {
-        Record { hold, ..self }
     }
 
     /// Says what is known of the state at the first sample; of a given one, an entry per state.
@@ -140,11 +137,6 @@ impl Record {
     /// The measured outputs; NaN where missing.
     pub fn outputs(&self) -> &[Channel] {
         &self.outputs
-    }
-
-    /// How the input behaves between samples.
-    pub fn input_hold(&self) -> Hold {
-        self.hold
     }
 
     /// Declarations of the state at the first sample.
@@ -222,5 +214,12 @@ impl Record {
             return Err(Error::NotFinite { experiment, signal, value: channel.values[sample], sample, time });
         }
         Ok(self)
+    }
+}
+
+/// Records for a fit: one, or a slice or vector of them.
+impl AsRef<[Record]> for Record {
+    fn as_ref(&self) -> &[Record] {
+        std::slice::from_ref(self)
     }
 }

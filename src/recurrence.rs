@@ -5,6 +5,7 @@ use crate::graph::{Graph, Id, Leaf, Node, Symbol};
 use crate::integrate::{Method, Rate, SymbolicField};
 use crate::interval::Hold;
 use crate::layout::Kind;
+use crate::record::Holds;
 
 /// A recurrence: what it carries from sample to sample, what it expects of each output.
 ///
@@ -94,13 +95,14 @@ impl Recurrence {
 pub(crate) struct SymbolicInterval<'a> {
     pub equations: &'a Equations,
     pub method: &'a dyn Method,
-    pub hold: Hold,
+    /// Of each input.
+    pub holds: &'a Holds,
 }
 
 impl SymbolicInterval<'_> {
     fn input(&self, i: u32, position: f64) -> Symbol {
         let u0 = Symbol::leaf(Leaf::Input(i));
-        match self.hold {
+        match self.holds.of(i as usize) {
             Hold::First if position != 0.0 => u0 + (Symbol::leaf(Leaf::NextInput(i)) - u0) * position,
             _ => u0,
         }

@@ -1,7 +1,8 @@
 //! Delta method: how well a function of the parameters is known, by its exact slopes.
 
 use crate::dual::Dual;
-use crate::estimate::{Estimate, Unknown, student};
+use crate::estimate::{Estimate, Summary, Unknown, student};
+use crate::graph::{Graph, Id, Leaf};
 use crate::model::Model;
 use crate::parameter::Transform;
 use crate::problem::Role;
@@ -50,16 +51,50 @@ pub fn derived<M: Model>(
     name: &str,
     f: impl Fn(&Of<M::Parameters, Dual<LANES>>) -> Dual<LANES>,
 ) -> Derived {
-    let values = M::Parameters::into_array(estimate.parameters);
+    of(estimate, name, &|p| f(&M::Parameters::from_fn(|j| p[j])))
+}
+
+/// The same of the root of a graph of parameters: `tau` of [`Leaf::Parameter`] one over zero. Other leaves are not numbers.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, diagnose, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// use greybox::graph::{Graph, Leaf};
+/// let estimate = Fit::new(&model, &record).parameters(start).run()?;
+/// let mut graph = Graph::default();
+/// let [rs, ls] = [0, 1].map(|j| graph.leaf(Leaf::Parameter(j)));
+/// let tau = graph.div(ls, rs);
+/// let tau = diagnose::derived_by(&estimate, "tau", &graph, tau);
+/// assert_eq!(tau, diagnose::derived(&estimate, "tau", |p| p.ls / p.rs));
+/// # Ok(())
+/// # }
+/// ```
+pub fn derived_by(estimate: &Summary, name: &str, graph: &Graph, root: Id) -> Derived {
+    let unknown = Dual::from(f64::NAN);
+    of(estimate, name, &|p| {
+        let leaf = |leaf| match leaf {
+            Leaf::Parameter(j) => p.get(j as usize).copied().unwrap_or(unknown),
+            _ => unknown,
+        };
+        graph.evaluate(&[root], leaf).first().copied().unwrap_or(unknown)
+    })
+}
+
+fn of(estimate: &Summary, name: &str, f: &dyn Fn(&[Dual<LANES>]) -> Dual<LANES>) -> Derived {
+    let values: Vec<f64> = estimate.parameters.iter().map(|parameter| parameter.value).collect();
     let unknown = |j: usize| {
         let first = |u: &Unknown| u.role == Role::Parameter(j) && u.experiment.is_none_or(|e| e == 0);
         estimate.unknowns.iter().position(first)
     };
-    let parameters = estimate.layout.parameters.len();
+    let parameters = values.len();
     let mut gradient = vec![0.0; estimate.unknowns.len()];
     let (mut value, mut known) = (f64::NAN, true);
     for first in (0..parameters.max(1)).step_by(LANES) {
-        let seeded = M::Parameters::from_fn(|j| Dual::variable(values.as_ref()[j], j.wrapping_sub(first)));
+        let seeded: Vec<Dual<LANES>> =
+            values.iter().enumerate().map(|(j, &value)| Dual::variable(value, j.wrapping_sub(first))).collect();
         let result = f(&seeded);
         value = result.value;
         for lane in 0..LANES.min(parameters - first.min(parameters)) {

@@ -112,10 +112,10 @@ impl<'a> Scheduler<'a> {
     /// Slots of leaves, numbers and derived columns.
     fn place_leaves(&mut self) -> Result<(), TooLarge> {
         let needed = self.needed();
+        let derived: FxHashMap<Id, usize> = self.roots.derived.iter().copied().zip(0..).collect();
         for i in (0..needed.len()).filter(|i| needed[*i]) {
             let id = Id::new(i);
-            let derived = self.roots.derived.iter().position(|derived| *derived == id);
-            let slot = match (derived, self.roots.tape.graph.nodes()[i]) {
+            let slot = match (derived.get(&id).copied(), self.roots.tape.graph.nodes()[i]) {
                 (Some(number), _) => self.read(Column::Derived(number), false)?,
                 (_, Node::Constant(constant)) => self.constant(constant.value())?,
                 (_, Node::Leaf(leaf)) => self.place_leaf(leaf)?,

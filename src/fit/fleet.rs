@@ -3,14 +3,12 @@
 #[cfg(feature = "parallel")]
 use super::ahead::in_order;
 use super::lockstep::fit_together;
-use super::{Fit, Records, declared, finer, sweep};
+use super::fittable::{Made, finer};
+use super::{Fit, Records};
 use crate::error::Error;
-use crate::estimate::{Estimate, Summary};
-use crate::experiment::ExperimentOf;
-use crate::functions::Handle;
-use crate::model::Model;
+use crate::estimate::Summary;
 use crate::parameter::Parameter;
-use crate::problem::{EquationsFit, FinerSweeps, Problem, Settings};
+use crate::problem::{FinerSweeps, Problem, Settings};
 use crate::record::Record;
 use crate::sweep::Sweep;
 use core::marker::PhantomData;
@@ -28,7 +26,7 @@ const GROUP: usize = 32;
 /// vector lanes, groups of them on threads. Every answer is that of [`Fit::run`] of the record, up to rounding, finer steps
 /// of a default integrator included; a record that fails does not affect the others. Records that are fitted together share
 /// the sum of their time limits.
-pub struct Fleet<'a, M: Model> {
+pub struct Fleet<'a, M> {
     fits: Fits<'a>,
     model: PhantomData<fn() -> M>,
 }
@@ -42,41 +40,22 @@ struct Fits<'a> {
     settings: Settings,
 }
 
-impl<'a, M: Model> Fit<'a, M> {
+impl<'a, M: Made> Fit<'a, M> {
     /// A fleet with this fit's model and settings. The records of the fit are not used.
     ///
     /// # Errors
     /// An integrator or a predictor that does not support the model; settings that only a single fit can have (a
     /// checkpoint, observers).
     pub fn fleet(self) -> Result<Fleet<'a, M>, Error> {
-        let sweep = sweep(Handle::Borrowed(self.model), &self.stepping, &self.predictor)?;
-        let finer = finer(Handle::Borrowed(self.model), self.is_default, &self.predictor);
-        let fits = Fits { sweep, finer, parameters: declared::<M>(self.parameters), settings: self.settings };
+        let (model, stepping, predictor) = (self.model.lent(), self.stepping.as_ref(), self.predictor.as_ref());
+        let sweep = M::sweep(model.clone(), stepping, predictor)?;
+        let finer = finer(model, stepping, predictor);
+        let fits = Fits { sweep, finer, parameters: self.parameters, settings: self.settings };
         Ok(Fleet { fits: fits.checked()?, model: PhantomData })
     }
 }
 
-impl EquationsFit {
-    /// Fits many records, each by itself, as a [`Fleet`](crate::Fleet) does: in vector lanes and on threads, lazily, answers in the order
-    /// of the records.
-    ///
-    /// # Errors
-    /// As [`Fit::fleet`](crate::Fit::fleet); whatever is wrong with a record is its own answer.
-    pub fn fleet<R>(
-        &self,
-        parameters: &[Parameter],
-        settings: Settings,
-        records: R,
-    ) -> Result<impl Iterator<Item = Result<Summary, Error>> + use<R>, Error>
-    where
-        R: IntoIterator<Item = Record>,
-    {
-        let fits = Fits { sweep: self.sweep()?, finer: self.finer(), parameters: parameters.to_vec(), settings };
-        Ok(fits.checked()?.answers(records))
-    }
-}
-
-impl<'a, M: Model> Fleet<'a, M> {
+impl<'a, M: Made> Fleet<'a, M> {
     /// Begins the declaration of a fleet; parameters and settings follow.
     ///
     /// ```
@@ -97,25 +76,25 @@ impl<'a, M: Model> Fleet<'a, M> {
     /// ```
     #[expect(clippy::new_ret_no_self, reason = "a fleet without parameters is not a fleet yet")]
     pub fn new(model: &'a M) -> Records<'a, M> {
-        Records { model, experiments: &[] }
+        Records { model, records: vec![] }
     }
 
     /// Fits the records and returns an iterator of the answers in their order. It is lazy: 128 records per thread are read
     /// ahead, or up to 512 while the fit of an early one takes long and the others go on.
-    pub fn run<R>(&self, records: R) -> impl Iterator<Item = Result<Estimate<M>, Error>>
+    pub fn run<R>(&self, records: R) -> impl Iterator<Item = Result<M::Estimate, Error>>
     where
-        R: IntoIterator<Item = ExperimentOf<M>>,
+        R: IntoIterator<Item = M::Record>,
     {
-        let records = records.into_iter().map(|experiment| experiment.record().clone());
-        self.fits.clone().answers(records).map(|answer| Estimate::of(answer?))
+        let records = records.into_iter().map(|record| M::record(&record).clone());
+        self.fits.clone().answers(records).map(|answer| M::estimate(answer?))
     }
 
     /// Fits one record.
     ///
     /// # Errors
     /// As [`Fit::run`].
-    pub fn fit(&self, record: &ExperimentOf<M>) -> Result<Estimate<M>, Error> {
-        Estimate::of(self.fits.problem(record.record().clone())?.run()?)
+    pub fn fit(&self, record: &M::Record) -> Result<M::Estimate, Error> {
+        M::estimate(self.fits.problem(M::record(record).clone())?.run()?)
     }
 }
 

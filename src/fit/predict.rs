@@ -1,6 +1,7 @@
 //! Prediction of a record by an estimate: a fit of the initial state alone.
 
 use super::Fit;
+use super::fittable::{Made, finer};
 use super::search::search;
 use crate::error::Error;
 use crate::estimate::{Estimate, Prediction, Summary};
@@ -8,7 +9,7 @@ use crate::experiment::ExperimentOf;
 use crate::judge::output_fit;
 use crate::model::Model;
 use crate::parameter::fixed;
-use crate::problem::{Control, Problem, Settings, Simulated};
+use crate::problem::{Control, Noise, Problem, Settings, Simulated};
 use crate::record::Record;
 use crate::signals::Signals;
 use crate::sweep::Sweep;
@@ -20,7 +21,7 @@ pub(super) fn predict<'a>(sweep: Arc<dyn Sweep + 'a>, record: &Record, estimate:
     // An output without any error gives no noise level; it is then estimated from this record.
     let sigma = estimate.sigma();
     let noisy = sigma.iter().all(|sigma| *sigma > 0.0);
-    let settings = if noisy { Settings::default().noise(sigma) } else { Settings::default() };
+    let settings = if noisy { Settings { noise: Noise::Given(sigma), ..Settings::default() } } else { Settings::default() };
     let problem = Problem::unchecked(sweep, vec![record.clone()], &parameters, settings)?;
     let objective = problem.in_units(&Control::NEVER);
     let coordinates = match problem.unknowns.row.is_empty() {
@@ -40,11 +41,11 @@ impl<M: Model> Fit<'_, M> {
     /// # Errors
     /// As [`run`](Fit::run), and a simulation that fails.
     pub fn predict(&self, estimate: &Estimate<M>, record: &ExperimentOf<M>) -> Result<Prediction<M>, Error> {
-        let model = crate::functions::Handle::Borrowed(self.model);
-        let mut sweep = super::sweep(model.clone(), &self.stepping, &self.predictor)?;
+        let (stepping, predictor) = (self.stepping.as_ref(), self.predictor.as_ref());
+        let sweep = M::sweep(self.model.lent(), stepping, predictor)?;
         // The method of the estimate, where the fit would have come to it by itself.
-        let finer = super::finer(model, self.is_default, &self.predictor);
-        sweep = finer.by_number(estimate.method.refinement).unwrap_or(sweep);
+        let finer = finer(self.model.lent(), stepping, predictor);
+        let sweep = finer.by_number(estimate.method.refinement).unwrap_or(sweep);
         predict(sweep, record.record(), estimate).map(|found| typed(found, record))
     }
 }

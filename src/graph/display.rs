@@ -54,6 +54,16 @@ impl Graph {
     }
 }
 
+impl Graph {
+    /// A root in one line.
+    pub(crate) fn one_line(&self, root: Id, naming: Naming<'_>) -> String {
+        let mut text = String::new();
+        // A string takes what is written.
+        let _ = self.write(&mut text, naming, &[(String::new(), root)]);
+        text.lines().map(|line| line.trim_start_matches(" = ")).collect::<Vec<_>>().join("; ")
+    }
+}
+
 fn expression(node: &Node, naming: Naming<'_>, texts: &[Text]) -> Text {
     let plain = |id: Id| texts[id.index()].0.as_str();
     let within = |id: Id, least: Binding| {

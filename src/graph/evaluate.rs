@@ -17,25 +17,43 @@ impl Graph {
         values.clear();
         values.reserve(self.len());
         for node in self.nodes() {
-            let at = |id: Id| values[id.index()];
-            let value = match *node {
-                Node::Constant(constant) => S::from(constant.value()),
-                Node::Leaf(of) => leaf(of),
-                Node::Neg(a) => -at(a),
-                Node::Add(a, b) => at(a) + at(b),
-                Node::Sub(a, b) => at(a) - at(b),
-                Node::Mul(a, b) => at(a) * at(b),
-                Node::Div(a, b) => at(a) / at(b),
-                Node::MulAdd([a, b, c]) => at(a) * at(b) + at(c),
-                Node::Power(a, n) => at(a).powi(n),
-                Node::Function(function, a) => function.of(at(a)),
-                Node::Function2(function, a, b) => function.of(at(a), at(b), self.known(b)),
-                Node::Table { table, order, at: [a, b] } => {
-                    S::look_up(&self.tables()[table as usize].grid(), [at(a), at(b)], order)
-                }
-                Node::Select(comparison, [a, b, c, d]) => S::select(comparison, at(a), at(b), at(c), at(d)),
-            };
+            let value = self.compute(node, |id| values[id.index()], &mut leaf);
             values.push(value);
+        }
+    }
+
+    /// The value of one root, of a small graph without an allocation.
+    pub(crate) fn value(&self, root: Id, mut leaf: impl FnMut(Leaf) -> f64) -> f64 {
+        const SMALL: usize = 128;
+        if self.len() > SMALL {
+            return self.evaluate(&[root], leaf).first().copied().unwrap_or(f64::NAN);
+        }
+        let mut values = [f64::NAN; SMALL];
+        for (i, node) in self.nodes().iter().enumerate() {
+            values[i] = self.compute(node, |id| values[id.index()], &mut leaf);
+        }
+        values.get(root.index()).copied().unwrap_or(f64::NAN)
+    }
+
+    /// The value of a node, from those of its operands.
+    #[inline(always)]
+    fn compute<S: Scalar>(&self, node: &Node, at: impl Fn(Id) -> S, leaf: &mut impl FnMut(Leaf) -> S) -> S {
+        match *node {
+            Node::Constant(constant) => S::from(constant.value()),
+            Node::Leaf(of) => leaf(of),
+            Node::Neg(a) => -at(a),
+            Node::Add(a, b) => at(a) + at(b),
+            Node::Sub(a, b) => at(a) - at(b),
+            Node::Mul(a, b) => at(a) * at(b),
+            Node::Div(a, b) => at(a) / at(b),
+            Node::MulAdd([a, b, c]) => at(a) * at(b) + at(c),
+            Node::Power(a, n) => at(a).powi(n),
+            Node::Function(function, a) => function.of(at(a)),
+            Node::Function2(function, a, b) => function.of(at(a), at(b), self.known(b)),
+            Node::Table { table, order, at: [a, b] } => {
+                S::look_up(&self.tables()[table as usize].grid(), [at(a), at(b)], order)
+            }
+            Node::Select(comparison, [a, b, c, d]) => S::select(comparison, at(a), at(b), at(c), at(d)),
         }
     }
 }

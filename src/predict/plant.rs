@@ -58,7 +58,12 @@ impl Between {
         let (t0, u0) = (record.time(k), record.input(k));
         let last = k + 1 >= record.len();
         let length = if last { 0.0 } else { record.time(k + 1) - t0 };
-        let u1 = (record.input_hold() == Hold::First && !last).then(|| record.input(k + 1));
+        let at_end = |(i, u0): (usize, &f64)| match record.input_hold(i) {
+            Hold::Zero => *u0,
+            Hold::First => record.inputs()[i].values[k + 1],
+        };
+        let moves = !record.holds.all_zero() && !last;
+        let u1 = moves.then(|| u0.iter().enumerate().map(at_end).collect());
         Between { interval: (t0, length), u0, u1 }
     }
 

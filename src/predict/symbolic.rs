@@ -5,8 +5,8 @@ use crate::equations::Equations;
 use crate::functions::Functions;
 use crate::graph::{Graph, Leaf, Symbol, Untraceable};
 use crate::integrate::{Method, Stuck};
-use crate::interval::Hold;
 use crate::layout::{Kind, Layout};
+use crate::record::Holds;
 use crate::recurrence::{Recurrence, SymbolicInterval};
 use crate::scalar::{Comparison, Scalar};
 
@@ -18,7 +18,7 @@ pub(crate) fn recurrence(
     equations: &Equations,
     method: &dyn Method,
     predictor: &dyn Prediction,
-    hold: Hold,
+    holds: &Holds,
 ) -> Result<Recurrence, Untraceable> {
     let layout = equations.layout();
     let (carried, outputs) = (predictor.carry(layout), layout.outputs.len());
@@ -26,7 +26,7 @@ pub(crate) fn recurrence(
     let mut graph = Graph::default();
     let roots = graph.trace(|| {
         let plant = SymbolicPlant {
-            interval: SymbolicInterval { equations, method, hold },
+            interval: SymbolicInterval { equations, method, holds },
             p: (0..layout.parameters.len()).map(|j| Symbol::leaf(Leaf::Parameter(number(j)))).collect(),
         };
         let steps = predictor.symbols();

@@ -47,7 +47,7 @@ fn batches(jobs: &[Job<'_>]) -> Vec<Vec<usize>> {
     let alike = |a: &Job<'_>, b: &Job<'_>| {
         let (one, other) = (a.piece.record, b.piece.record);
         let uniform = |time: &Time| matches!(time, Time::Uniform { .. });
-        one.input_hold() == other.input_hold() && uniform(one.times()) == uniform(other.times()) && a.seeds == b.seeds
+        one.holds == other.holds && uniform(one.times()) == uniform(other.times()) && a.seeds == b.seeds
     };
     let mut kinds: Vec<Vec<usize>> = vec![];
     for (i, job) in jobs.iter().enumerate() {

@@ -129,7 +129,7 @@ fn hash(plain: &Objective<'_>) -> String {
     text(&format!("{:?}", settings.weights.as_ref().map(|weights| weights.describe())));
     text(&format!("{:?}", settings.loss.as_ref().map(|loss| loss.describe())));
     for record in &problem.records {
-        text(&format!("{}{:?}{:?}{}", record.name(), record.input_hold(), record.initial_state(), record.len()));
+        text(&format!("{}{:?}{:?}{}", record.name(), record.holds, record.initial_state(), record.len()));
     }
     problem.records.iter().for_each(|record| numbers(record, &mut hash));
     let bytes: [u8; 32] = hash.finalize().into();

@@ -1,6 +1,6 @@
 //! [`Settings`]: the settings of a fit besides model, records and parameters.
 
-use super::{Noise, Optimizer, Search};
+use super::{Noise, Optimizer};
 use crate::error::Error;
 use crate::layout::Layout;
 use crate::loss::Loss;
@@ -32,7 +32,7 @@ pub(crate) trait Weights: Send + Sync {
 
 /// The settings of a fit besides model, records and parameters; all have defaults.
 #[derive(Clone)]
-pub struct Settings {
+pub(crate) struct Settings {
     pub(crate) noise: Noise,
     pub(crate) input_noise: Option<Vec<f64>>,
     pub(crate) loss: Option<Arc<dyn Loss>>,
@@ -88,84 +88,6 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Sets the standard deviation of the noise of each output, in its unit (after the pre-filter, if there is one).
-    /// Without it, the noise is estimated from the errors.
-    pub fn noise(mut self, sigma: Vec<f64>) -> Self {
-        self.noise = Noise::Given(sigma);
-        self
-    }
-
-    /// Declares the standard deviation of the noise of each input, in its unit; zero for none. It changes neither the
-    /// estimate nor its intervals: the bias that it causes is estimated, and named by a warning.
-    pub fn input_noise(mut self, sigma: Vec<f64>) -> Self {
-        self.input_noise = Some(sigma);
-        self
-    }
-
-    /// Estimates the covariance of the noise of all outputs, instead of a standard deviation per output.
-    pub fn noise_covariance(mut self) -> Self {
-        self.noise = Noise::Covariance;
-        self
-    }
-
-    /// Sets the search and its settings.
-    pub fn optimizer(mut self, optimizer: impl Search) -> Self {
-        self.optimizer = Arc::new(optimizer);
-        self
-    }
-
-    /// Sets the loss, a function of the standardized errors.
-    pub fn loss(mut self, loss: impl Loss + 'static) -> Self {
-        self.loss = Some(Arc::new(loss));
-        self
-    }
-
-    /// Filters the prediction errors and their slopes before the cost is computed. A missing sample enters the filter
-    /// as zero.
-    pub fn prefilter(mut self, filter: Butterworth) -> Self {
-        self.prefilter = Some(filter);
-        self
-    }
-
-    /// Searches from so many starts and keeps the best end; the first is the declared one
-    /// ([`Fit::starts`](crate::Fit::starts)).
-    pub fn starts(mut self, count: usize) -> Self {
-        self.searches = SearchPlan::All(count);
-        self
-    }
-
-    /// Stops the search at its best point so far when the flag is set.
-    pub fn cancel(mut self, flag: Arc<AtomicBool>) -> Self {
-        self.cancel = Some(flag);
-        self
-    }
-
-    /// Adds one to the counter whenever a refit of a bootstrap has ended.
-    pub fn counter(mut self, counter: Arc<AtomicU64>) -> Self {
-        self.counter = Some(counter);
-        self
-    }
-
-    /// Stops the search at its best point so far after this time. Of the tests that follow, those are left out that
-    /// were not made by then, which a warning says ([`NotExamined`](crate::WarningCode::NotExamined)).
-    pub fn time_limit(mut self, limit: Duration) -> Self {
-        self.time_limit = Some(limit);
-        self
-    }
-
-    /// Calls an observer of argmin with the state of the search.
-    pub fn observe(mut self, observer: impl Observe<LeastSquaresState> + Send + 'static, mode: ObserverMode) -> Self {
-        self.observers.push((Arc::new(Mutex::new(Box::new(observer))), mode));
-        self
-    }
-
-    /// Saves the state of the search into a file every `every` iterations, and resumes from the file if it exists. A
-    /// file of another problem is refused.
-    pub fn checkpoint(mut self, path: impl Into<PathBuf>, every: u64) -> Self {
-        self.checkpoint = Some((path.into(), every));
-        self
-    }
-
     /// These settings, with the noise set to `Predicted` where the sweep predicts variances.
     pub(super) fn of(mut self, sweep: &dyn Sweep) -> Self {
         if sweep.predicts_variance() {

@@ -98,10 +98,12 @@ impl Record {
     /// # Errors
     /// A second record that begins before the first has ended, or with another hold.
     pub fn join(self, later: &Self) -> Result<Self, Error> {
-        if self.hold != later.hold {
+        let of = |i: usize| (self.holds.of(i), later.holds.of(i));
+        if let Some(i) = (0..self.inputs.len()).find(|i| of(*i).0 != of(*i).1) {
+            let ((own, other), input) = (of(i), &self.inputs[i].name);
             return Err(Error::Option(format!(
-                "experiments `{}` and `{}` cannot be joined: their holds are {:?} and {:?}",
-                self.name, later.name, self.hold, later.hold
+                "experiments `{}` and `{}` cannot be joined: their holds of `{input}` are {own:?} and {other:?}",
+                self.name, later.name
             )));
         }
         let stamps = (0..self.len()).map(|k| self.time(k)).chain((0..later.len()).map(|k| later.time(k)));
@@ -143,10 +145,11 @@ impl Record {
             let mean = |k: usize| self.mean(&channel.values, k..self.len().min(k.saturating_add(n)));
             channel.with(kept().map(mean).collect::<Vec<f64>>())
         };
-        let inputs = match self.hold {
-            Hold::Zero => self.inputs.iter().map(means).collect(),
-            Hold::First => self.inputs.iter().map(instants).collect(),
+        let thinned = |(i, channel): (usize, &Channel)| match self.holds.of(i) {
+            Hold::Zero => means(channel),
+            Hold::First => instants(channel),
         };
+        let inputs = self.inputs.iter().enumerate().map(thinned).collect();
         let outputs = self.outputs.iter().map(instants).collect();
         Record { time, inputs, outputs, looked: Arc::default(), ..self.clone() }.checked()
     }
@@ -192,7 +195,7 @@ impl Record {
             time: self.time.part(samples.clone()),
             inputs: self.inputs.iter().map(part).collect(),
             outputs: self.outputs.iter().map(part).collect(),
-            hold: self.hold,
+            holds: self.holds.clone(),
             initial,
             looked: Arc::default(),
         }

@@ -1,7 +1,7 @@
 //! Records in serde's data model: everything that was said of one, its signals as columns by name, a missing output as
 //! null. What is read is checked like any other record.
 
-use super::{Channel, Initial, Record, Time};
+use super::{Channel, Holds, Initial, Record, Time};
 use crate::by_name::Entries;
 use crate::interval::Hold;
 use crate::layout::Quantity;
@@ -15,7 +15,7 @@ impl Serialize for Record {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut record = serializer.serialize_struct("Experiment", 6)?;
         record.serialize_field("name", &self.name)?;
-        record.serialize_field("hold", &self.hold)?;
+        record.serialize_field("hold", &StoredHold::of(self))?;
         record.serialize_field("initial", &StoredInitial::of(&self.initial, &self.states))?;
         record.serialize_field("time", &self.time)?;
         record.serialize_field("inputs", &Columns(&self.inputs))?;
@@ -77,12 +77,39 @@ fn names(quantities: &[Quantity]) -> impl Iterator<Item = &str> + Clone {
     quantities.iter().map(|quantity| quantity.name.as_str())
 }
 
+/// One hold of all inputs, or one of each by name.
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+enum StoredHold {
+    All(Hold),
+    Each(Entries<Hold>),
+}
+
+impl StoredHold {
+    fn of(record: &Record) -> Self {
+        match &record.holds {
+            Holds::All(hold) => StoredHold::All(*hold),
+            Holds::Each(holds) => {
+                let names = record.inputs.iter().map(|channel| channel.name.clone());
+                StoredHold::Each(Entries(names.zip(holds.iter().copied()).collect()))
+            }
+        }
+    }
+
+    fn into_holds(self, inputs: &[Quantity]) -> Result<Holds, String> {
+        match self {
+            StoredHold::All(hold) => Ok(Holds::All(hold)),
+            StoredHold::Each(holds) => holds.in_order(names(inputs)).map(Holds::each),
+        }
+    }
+}
+
 /// Contents of a file, before they are checked against a model.
 #[derive(Deserialize)]
 #[serde(rename = "Experiment", deny_unknown_fields)]
 pub(crate) struct Stored {
     name: String,
-    hold: Hold,
+    hold: StoredHold,
     initial: StoredInitial,
     time: Time,
     inputs: Entries<Read<Vec<f64>>>,
@@ -97,7 +124,7 @@ impl Stored {
         inputs: &[Quantity],
         outputs: &[Quantity],
     ) -> Result<Record, String> {
-        let initial = self.initial.into_initial(&states)?;
+        let (initial, holds) = (self.initial.into_initial(&states)?, self.hold.into_holds(inputs)?);
         let channels = |columns: Entries<Read<Vec<f64>>>, quantities: &[Quantity]| {
             let columns = columns.in_order(names(quantities))?.into_iter().zip(quantities);
             let channel = |(Read(values), quantity): (Read<Vec<f64>>, &Quantity)| {
@@ -106,9 +133,9 @@ impl Stored {
             Ok::<_, String>(columns.map(channel).collect::<Vec<Channel>>())
         };
         let (inputs, outputs) = (channels(self.inputs, inputs)?, channels(self.outputs, outputs)?);
-        let Stored { name, hold, time, .. } = self;
+        let Stored { name, time, .. } = self;
         let (states, inputs, outputs) = (states.into(), inputs.into(), outputs.into());
-        Record { name, states, time, inputs, outputs, hold, initial, looked: Arc::default() }
+        Record { name, states, time, inputs, outputs, holds, initial, looked: Arc::default() }
             .checked()
             .map_err(|error| error.to_string())
     }

@@ -30,7 +30,7 @@ pub(super) struct Record {
     /// Times (s) between which samples are lost.
     pub gaps: Vec<(f64, f64)>,
     /// How the input behaves between samples.
-    pub hold: &'static str,
+    pub hold: String,
     /// The inputs and the measured outputs.
     pub signals: Vec<Signal>,
     /// The predictions of each output.

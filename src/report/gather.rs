@@ -84,11 +84,7 @@ impl<'a> Columns<'a> {
 
     fn gathered(&self, kind: Kind, examined: Vec<residuals::Residuals>, numbers: usize) -> Record {
         let record = self.record;
-        let hold = match (kind, record.input_hold()) {
-            (Kind::Static, _) => "none: the model has no state",
-            (_, Hold::Zero) => "inputs hold from sample to sample",
-            _ => "inputs are straight lines from sample to sample",
-        };
+        let hold = hold(kind, record);
         let Inspection { inputs, outputs } = record.inspect();
         let inputs = record.inputs().iter().zip(&inputs).map(|(channel, found)| signal(channel, found, "input"));
         let outputs = record.outputs().iter().zip(&outputs).map(|(channel, found)| signal(channel, found, "output"));
@@ -161,12 +157,12 @@ impl<'a> Columns<'a> {
     /// The outputs and, below them, the inputs.
     fn timeline(&self, numbers: usize) -> Timeline {
         let (inputs, outputs) = (self.record.inputs(), 0..self.record.outputs().len());
-        let held = self.record.input_hold() == Hold::Zero;
-        let input = |Channel { name, unit, .. }: &Channel| {
+        let input = |(i, Channel { name, unit, .. }): (usize, &Channel)| {
+            let held = self.record.input_hold(i) == Hold::Zero;
             let lines = vec![Line { style: Style::Input, name: name.clone(), held }];
             Panel { name: name.clone(), unit: unit.clone(), kind: PanelKind::Input, lines }
         };
-        let panels = outputs.clone().flat_map(|j| self.panels(j)).chain(inputs.iter().map(input)).collect();
+        let panels = outputs.clone().flat_map(|j| self.panels(j)).chain(inputs.iter().enumerate().map(input)).collect();
         let lines = outputs.flat_map(|j| self.lines(j));
         let lines = lines.chain(inputs.iter().map(|channel| (Keep::Extremes, &*channel.values)));
         let pieces: Vec<Range<usize>> = self.worst.iter().flatten().map(|&k| about(k, self.t.len())).collect();
@@ -216,5 +212,17 @@ fn thin(records: &mut [Record], outputs: usize) {
     for &record in order.iter().skip(keep) {
         records[record].timeline = None;
         records[record].fits.iter_mut().for_each(|fit| fit.closeup = None);
+    }
+}
+
+/// How the inputs behave between samples, in words.
+fn hold(kind: Kind, record: &Measured) -> String {
+    let lines = (0..record.inputs().len()).filter(|i| record.input_hold(*i) == Hold::First);
+    let lines: Vec<&str> = lines.map(|i| record.inputs()[i].name.as_str()).collect();
+    match kind {
+        Kind::Static => "none: the model has no state".to_owned(),
+        _ if lines.is_empty() => "inputs hold from sample to sample".to_owned(),
+        _ if lines.len() == record.inputs().len() => "inputs are straight lines from sample to sample".to_owned(),
+        _ => format!("inputs hold from sample to sample, but {} are straight lines", lines.join(", ")),
     }
 }

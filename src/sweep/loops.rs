@@ -144,7 +144,7 @@ impl<M: Model, I: Integrator> Loops<M> for I {
     ) -> Result<Reached, RunError> {
         let task = Task { model, integrator: self, piece, seeds, restart };
         // The AVX-512 loop is compiled for the zero-order hold only, which nearly all records have.
-        let wide = if piece.record.input_hold() == Hold::Zero { Avx512::detected() } else { None };
+        let wide = if piece.record.holds.all_zero() { Avx512::detected() } else { None };
         // Debug builds compile fewer variants, to save compile time: same numbers, more passes.
         #[cfg(debug_assertions)]
         let passes = match (seeds.len(), wide) {
@@ -304,9 +304,13 @@ impl<M: Model, I> Task<'_, M, I> {
         I: Integrator,
     {
         // A constant in the AVX-512 loop, so that the compiler moves out of the stages what depends on the input alone.
-        let hold = if <D::Slope as lanes::Number>::FUSED { Hold::Zero } else { self.piece.record.input_hold() };
+        let holds = &self.piece.record.holds;
+        let moves = !<D::Slope as lanes::Number>::FUSED && !holds.all_zero();
         let u0 = M::Input::from_array(rows.inputs[k]);
-        let u1 = if hold == Hold::First { M::Input::from_array(rows.inputs[k + 1]) } else { u0 };
+        // A straight line from one value to the same is a hold.
+        let end = |i: usize| rows.inputs[k + usize::from(holds.of(i) == Hold::First)].as_ref()[i];
+        let u1 = if moves { M::Input::from_fn(end) } else { u0 };
+        let hold = if moves { Hold::First } else { Hold::Zero };
         let interval = Interval { t0: rows.times[k], t1: rows.times[k + 1], u0, u1, hold };
         ModelSystem { model: self.model, interval: &interval, p }.step(self.integrator, x, step)
     }

@@ -8,7 +8,7 @@ mod run;
 mod workspace;
 
 use super::{Coupling, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
-use crate::engine::{Program, Sampling, Trajectories};
+use crate::engine::{Program, Sampling, TooLarge, Trajectories};
 use crate::equations::Equations;
 use crate::error::{Error, Failure};
 use crate::graph::Untraceable;
@@ -16,7 +16,7 @@ use crate::integrate::Method;
 use crate::interval::Hold;
 use crate::layout::{Kind, Layout};
 use crate::predict::{FreeRun, Guess, Prediction, recurrence};
-use crate::record::{Record, Time};
+use crate::record::{Holds, Record, Time};
 use crate::recurrence::Recurrence;
 pub(crate) use derived::Derived;
 pub(crate) use interleaved::Interleaved;
@@ -38,9 +38,10 @@ struct Programs {
     predictor: Arc<dyn Prediction>,
     coupling: Coupling,
     /// Parameters that decide a choice.
-    /// By hold: zero, first.
-    recurrences: [OnceLock<Arc<Recurrence>>; 2],
-    compiled: Mutex<Vec<(Key, Arc<Compiled>)>>,
+    /// By the holds of the inputs.
+    recurrences: Mutex<Vec<(Holds, Arc<Recurrence>)>>,
+    /// Those that were asked for, with the reason where there can be none.
+    compiled: Mutex<Vec<(Key, Result<Arc<Compiled>, TooLarge>)>>,
     /// The same with a finer step, if there is one.
     refined: OnceLock<Option<Arc<Programs>>>,
 }
@@ -51,7 +52,7 @@ const WORTH_COMPILING: usize = 4_000;
 /// Properties that a program depends on besides the recurrence.
 #[derive(Clone, Debug, PartialEq)]
 struct Key {
-    hold: Hold,
+    holds: Holds,
     sampling: Sampling,
     seeds: Vec<Seed>,
     purpose: Purpose,
@@ -94,10 +95,9 @@ impl Programs {
             None if predictor.is_simulation() && equations.is_affine() => Coupling::Affine,
             None => Coupling::Nonlinear,
         };
-        let recurrences = [OnceLock::new(), OnceLock::new()];
-        let (compiled, refined) = (Mutex::new(vec![]), OnceLock::new());
+        let (recurrences, compiled, refined) = (Mutex::new(vec![]), Mutex::new(vec![]), OnceLock::new());
         let programs = Programs { equations, method, predictor, coupling, recurrences, compiled, refined };
-        programs.recurrence(Hold::Zero)?;
+        programs.recurrence(&Holds::All(Hold::Zero))?;
         Ok(programs)
     }
 
@@ -110,13 +110,14 @@ impl Programs {
         self.refined.get_or_init(make).clone()
     }
 
-    fn recurrence(&self, hold: Hold) -> Result<Arc<Recurrence>, Untraceable> {
-        let known = &self.recurrences[usize::from(hold == Hold::First)];
-        if let Some(known) = known.get() {
+    fn recurrence(&self, holds: &Holds) -> Result<Arc<Recurrence>, Untraceable> {
+        let mut all = self.recurrences.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, known)) = all.iter().find(|(known, _)| known == holds) {
             return Ok(known.clone());
         }
-        let made = recurrence(&self.equations, &*self.method, &*self.predictor, hold)?;
-        Ok(known.get_or_init(|| Arc::new(made)).clone())
+        let made = Arc::new(recurrence(&self.equations, &*self.method, &*self.predictor, holds)?);
+        all.push((holds.clone(), made.clone()));
+        Ok(made)
     }
 
     /// The program for records like this one; `None` where there can be none.
@@ -125,19 +126,19 @@ impl Programs {
             Time::Uniform { .. } => Sampling::Uniform,
             Time::Stamps(_) => Sampling::Irregular,
         };
-        let key = Key { hold: record.input_hold(), sampling, seeds: seeds.to_vec(), purpose };
+        let key = Key { holds: record.holds.clone(), sampling, seeds: seeds.to_vec(), purpose };
         let mut compiled = self.compiled.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, program)) = compiled.iter().find(|(known, _)| *known == key) {
-            return Some(program.clone());
+            return program.clone().ok();
         }
-        let recurrence = self.recurrence(key.hold).ok()?;
+        let recurrence = self.recurrence(&key.holds).ok()?;
         let program = match purpose {
             Purpose::Rows => Program::compile(&recurrence, seeds, sampling, Trajectories::Many),
             Purpose::Carry => Program::compile(&recurrence.without_outputs(), &[], sampling, Trajectories::One),
         };
-        let program = Arc::new(Compiled::new(program.ok()?));
+        let program = program.map(|program| Arc::new(Compiled::new(program)));
         compiled.push((key, program.clone()));
-        Some(program)
+        program.ok()
     }
 }
 
@@ -254,9 +255,16 @@ impl Sweep for ProgramSweep<'_> {
 
     fn engine(&self) -> String {
         let compiled = self.programs.compiled.lock().unwrap_or_else(PoisonError::into_inner);
-        match compiled.iter().any(|(_, compiled)| compiled.program.machine_code() > 0) {
-            true => "read as a graph, run as machine code".to_owned(),
-            false => "read as a graph, run by the interpreter".to_owned(),
+        let made = || compiled.iter().filter_map(|(_, compiled)| compiled.as_ref().ok());
+        let engine = match made().any(|compiled| compiled.program.machine_code() > 0) {
+            true => "read as a graph, run as machine code",
+            false => "read as a graph, run by the interpreter",
+        };
+        // What is too large runs in dual numbers, and may be all of it.
+        match compiled.iter().find_map(|(_, compiled)| compiled.as_ref().err()) {
+            None => engine.to_owned(),
+            Some(reason) if made().next().is_none() => format!("dual numbers ({reason})"),
+            Some(reason) => format!("{engine}; slopes in dual numbers ({reason})"),
         }
     }
 

@@ -120,7 +120,7 @@ pub fn simulated<M: Model>(
 pub fn with_truth<M: Model>(model: &M, record: &ExperimentOf<M>, truth: Of<M::Parameters, f64>) -> ExperimentOf<M> {
     let Initial::Given(start) = record.initial_state() else { panic!("the initial state is not given") };
     let (start, inputs) = (M::State::from_fn(|i| start[i].start), record.inputs().collect::<Vec<_>>());
-    let simulator = Simulator::new(model).hold(record.input_hold());
+    let simulator = Simulator::new(model).hold(record.record().input_hold(0));
     let run = simulator.run(&truth, &start, record.times().clone(), &inputs).unwrap();
     with_outputs(model, record, run.outputs)
 }
@@ -132,7 +132,7 @@ pub fn with_outputs<M: Model>(
     outputs: Vec<Of<M::Output, f64>>,
 ) -> ExperimentOf<M> {
     let made = Experiment::new(model, record.times().clone(), record.inputs().collect(), outputs).unwrap();
-    let made = made.named(record.name()).hold(record.input_hold());
+    let made = made.named(record.name()).hold(record.record().input_hold(0));
     match record.initial_state() {
         Initial::Given(state) => made.initial(M::State::from_fn(|i| state[i])),
         Initial::FirstSample => made.initial_from_first_sample(),

@@ -1,11 +1,11 @@
 //! A second implementer of [`Sweep`]: closures with their Jacobians, of a number of states that is known at run time
 //! only. Search, judgement, diagnoses and report take it as they take a typed model, with the same answer.
 
+use crate::refused::says;
 use approx::assert_relative_eq;
 use greybox::diagnose::{identifiability, profile};
 use greybox::layout::{Layout, Quantity};
 use greybox::optimize::Severity;
-use greybox::problem::Settings;
 use greybox::record::{Channel, Initial, Record};
 use greybox::sweep::{Coupling, Piece, Reached, RunError, Seed, Sweep, Window};
 use greybox::*;
@@ -188,8 +188,20 @@ fn record(typed: &ExperimentOf<Three>, states: &[Quantity]) -> Record {
     record.initial(Initial::Given(initial)).unwrap()
 }
 
-fn start() -> [Parameter; 2] {
-    [free(0.5), free(1.0)]
+fn start() -> Vec<Parameter> {
+    vec![free(0.5), free(1.0)]
+}
+
+/// A sweep steps and predicts as it does: a choice of either is an error.
+#[test]
+fn a_sweep_has_its_own_integrator_and_predictor() {
+    let typed = typed_record();
+    let closures = cascade(3);
+    let untyped = record(&typed, &closures.layout.states);
+    let sweep: Arc<dyn Sweep> = Arc::new(closures);
+    let fit = || Fit::new(&sweep, &untyped).parameters(start());
+    says(fit().integrator(Discrete).problem(), &["integrator", "its own"]);
+    says(fit().predictor(Kalman).problem(), &["predictor", "its own"]);
 }
 
 #[test]
@@ -197,9 +209,10 @@ fn closures_and_a_typed_model_give_one_answer() {
     let typed = typed_record();
     let sweep = cascade(3);
     let untyped = record(&typed, &sweep.layout.states);
-    let problem = Problem::new(Arc::new(sweep), vec![untyped], &start(), Settings::default()).unwrap();
+    let sweep: Arc<dyn Sweep> = Arc::new(sweep);
+    let problem = Fit::new(&sweep, &untyped).parameters(start()).problem().unwrap();
     let found = problem.run().unwrap();
-    let parameters = Poles::from_array(start());
+    let parameters = Poles::from_array([free(0.5), free(1.0)]);
     let reference = Fit::new(&Three, &typed).parameters(parameters).problem().unwrap();
     let expected = reference.run().unwrap();
     assert_eq!(found.severity(), Severity::Usable, "{found}");
@@ -243,7 +256,8 @@ fn the_number_of_states_is_known_at_run_time() {
         let outputs = vec![Channel::new("y", "m", inputs.iter().map(output).collect::<Vec<f64>>())];
         let record = Record::new(states, time, vec![Channel::new("u", "V", inputs)], outputs).unwrap();
         let record = record.initial(Initial::Given(vec![fixed(0.0); n])).unwrap();
-        let found = Problem::new(Arc::new(sweep), vec![record], &start(), Settings::default()).unwrap().run().unwrap();
+        let sweep: Arc<dyn Sweep> = Arc::new(sweep);
+        let found = Fit::new(&sweep, &record).parameters(start()).run().unwrap();
         // Nothing but rounding is between model and record.
         assert_relative_eq!(found.parameters[0].value, 0.8, max_relative = 1e-9);
         assert_relative_eq!(found.parameters[1].value, 2.0, max_relative = 1e-9);

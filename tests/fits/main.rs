@@ -23,6 +23,7 @@ mod guessed_states;
 mod instants;
 mod interval_limits;
 mod judgements;
+mod holds;
 mod kalman;
 mod late_sensor;
 mod long_profile;

@@ -97,7 +97,7 @@ fn splits() {
 fn pieces_keep_the_hold_and_only_the_first_keeps_the_initial_state() {
     let given = even(10).hold(Hold::First).initial(Level { x: free(2.0) });
     let (first, second) = given.split(0.5).unwrap();
-    assert_eq!((first.input_hold(), second.input_hold()), (Hold::First, Hold::First));
+    assert_eq!((first.record().input_hold(0), second.record().input_hold(0)), (Hold::First, Hold::First));
     assert!(matches!(first.initial_state(), Initial::Given(given) if given[0].start == 2.0));
     assert!(matches!(second.initial_state(), Initial::Estimated));
     assert!(matches!(given.decimate(2).unwrap().initial_state(), Initial::Given(_)));

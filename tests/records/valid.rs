@@ -134,7 +134,7 @@ proptest! {
         let read: Record = serde_json::from_str(&text).unwrap();
         prop_assert!(same_signals(&record, &read));
         prop_assert_eq!(record.times(), read.times());
-        prop_assert_eq!((record.name(), record.input_hold()), (read.name(), read.input_hold()));
+        prop_assert_eq!((record.name(), record.input_holds()), (read.name(), read.input_holds()));
         prop_assert_eq!(serde_json::to_string(&read).unwrap(), text);
     }
 

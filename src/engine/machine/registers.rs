@@ -124,8 +124,10 @@ impl Registers {
 
     /// Nothing is in a register any more.
     pub fn clear(&mut self) {
-        self.slot_in.fill(None);
-        self.register_of.fill(None);
-        self.dirty.fill(false);
+        // Not all slots, of which there may be thousands: this follows each call of a function.
+        for slot in self.slot_in.iter_mut().filter_map(Option::take) {
+            self.register_of[usize::from(slot)] = None;
+            self.dirty[usize::from(slot)] = false;
+        }
     }
 }

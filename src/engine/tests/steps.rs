@@ -6,6 +6,7 @@ use greybox::{
     Dual, Hold, Interval, Model, Of, Rk4, Scalar, Signals,
     equations::Equations,
     integrate::{Integrator, ModelSystem},
+    record::Holds,
     recurrence::{Recurrence, SymbolicInterval},
     signals,
 };
@@ -43,7 +44,7 @@ pub fn simulation(equations: &Equations, integrator: &impl Integrator, hold: Hol
     let mut graph = Graph::default();
     let mean = graph.import(equations.graph(), equations.output(), Graph::leaf);
     let states = equations.layout().states.len() as u32;
-    let between = SymbolicInterval { equations, method: integrator, hold };
+    let between = SymbolicInterval { equations, method: integrator, holds: &Holds::All(hold) };
     let next = graph.trace(|| {
         let mut x: Vec<Symbol> = (0..states).map(|i| Symbol::leaf(Leaf::State(i))).collect();
         between.next(&mut x);

@@ -46,12 +46,14 @@ pub(super) fn varying_operands(node: &Node) -> impl Iterator<Item = Id> + use<> 
 pub(super) fn active(tape: &Tape, leaves: &[Id], roots: &[Id]) -> Vec<bool> {
     let mut varies = vec![false; tape.graph.len()];
     leaves.iter().for_each(|leaf| varies[leaf.index()] = true);
-    for (i, node) in tape.graph.nodes().iter().enumerate() {
+    // What was added after the last root, such as gradients of other roots, is not between.
+    let end = roots.iter().map(|root| root.index() + 1).max().unwrap_or(0);
+    for (i, node) in tape.graph.nodes()[..end].iter().enumerate() {
         varies[i] = varies[i] || varying_operands(node).any(|operand| varies[operand.index()]);
     }
     let mut needed = vec![false; tape.graph.len()];
     roots.iter().for_each(|root| needed[root.index()] = true);
-    for i in (0..tape.graph.len()).rev() {
+    for i in (0..end).rev() {
         needed[i] = needed[i] && varies[i];
         if needed[i] {
             varying_operands(&tape.graph.nodes()[i]).for_each(|operand| needed[operand.index()] = true);

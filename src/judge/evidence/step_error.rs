@@ -149,7 +149,7 @@ fn batches<'w>(
 ) -> Vec<&'w [(usize, &'w Sampled)]> {
     let kind = |(i, _): &(usize, &Sampled)| {
         let record = all[*i].record();
-        (record.input_hold(), matches!(record.times(), Time::Uniform { .. }))
+        (record.holds.clone(), matches!(record.times(), Time::Uniform { .. }))
     };
     let alike = windows.chunk_by(|a, b| kind(a) == kind(b));
     alike.flat_map(|alike| alike.chunks(finer.lanes(all[alike[0].0].record(), &[]).max(1))).collect()

@@ -5,7 +5,7 @@ use super::{Column, CsvFile};
 use crate::error::Error;
 use crate::interval::Hold;
 use crate::layout::{Kind, Layout, Quantity};
-use crate::record::{Channel, Clock, Initial, Record, Time};
+use crate::record::{Channel, Clock, Holds, Initial, Record, Time};
 use std::sync::Arc;
 
 /// Where the number of one signal comes from.
@@ -86,8 +86,8 @@ impl CsvFile {
         let mut inputs: Vec<Channel> = columns.into_iter().zip(&signals).map(named).collect();
         let outputs = inputs.split_off(layout.inputs.len());
         let (states, inputs, outputs) = (layout.states.clone().into(), inputs.into(), outputs.into());
-        let (hold, initial) = (Hold::default(), Initial::default());
-        Record { name, states, time, inputs, outputs, hold, initial, looked: Arc::default() }.checked()
+        let (holds, initial) = (Holds::All(Hold::default()), Initial::default());
+        Record { name, states, time, inputs, outputs, holds, initial, looked: Arc::default() }.checked()
     }
 
     /// The time stamps of the first rows, for a clock that turned out uneven.

@@ -45,7 +45,7 @@ fn kind(parameter: &Parameter) -> String {
 /// How the estimate was made.
 fn settings(facts: &Facts) -> Table {
     let m = &facts.estimate.method;
-    let mut holds: Vec<&str> = facts.records.iter().map(|record| record.hold).collect();
+    let mut holds: Vec<&str> = facts.records.iter().map(|record| record.hold.as_str()).collect();
     holds.dedup();
     let hold = match holds.as_slice() {
         [one] => (*one).to_owned(),
