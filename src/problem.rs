@@ -164,6 +164,12 @@ impl<'a> Problem<'a> {
         &self.unknowns.parameters
     }
 
+    /// The point where the search starts, for [`estimate`](Self::estimate): a coordinate for each unknown, of an unknown that is
+    /// estimated as a logarithm that.
+    pub fn start(&self) -> Vec<f64> {
+        self.unknowns.start()
+    }
+
     /// The names of the unknowns, in order.
     pub fn unknowns(&self) -> Vec<String> {
         self.unknowns.row.iter().map(|unknown| unknown.name.clone()).collect()

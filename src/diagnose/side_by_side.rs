@@ -1,8 +1,7 @@
 //! A record beside what several models make of it: data of the fit and data for validation, fit by fit.
 
 use crate::error::Error;
-use crate::estimate::Prediction;
-use crate::model::Model;
+use crate::problem::Simulated;
 use crate::record::{Channel, Record};
 use crate::section::{Cell, Keep, Line, Panel, PanelKind, Samples, Section, Style, Table, Timeline, identifier};
 use crate::section::{Drawing, Plot};
@@ -86,22 +85,24 @@ impl Compared {
     ///
     /// # Errors
     /// A prediction of another number of samples, or without one of the outputs.
-    pub fn with<M: Model>(mut self, model: &str, prediction: &Prediction<M>) -> Result<Self, Error> {
-        if prediction.t.len() != self.t.len() {
+    pub fn with(mut self, model: &str, prediction: &impl AsRef<Simulated>) -> Result<Self, Error> {
+        let prediction = prediction.as_ref();
+        let found = prediction.outputs.first().map_or(self.t.len(), Vec::len);
+        if found != self.t.len() {
             return Err(Error::Lengths {
                 experiment: self.record,
                 what: "the prediction".to_owned(),
-                found: prediction.t.len(),
+                found,
                 reference: "the record".to_owned(),
                 expected: self.t.len(),
             });
         }
         for output in &mut self.outputs {
-            let names = &prediction.columns.names;
+            let names = &prediction.names;
             let Some(j) = names.iter().position(|name| *name == output.name) else {
                 return Err(Error::UnknownSignal { signal: output.name.clone(), available: names.clone() });
             };
-            output.predicted.push((model.to_owned(), prediction.columns.outputs[j].clone()));
+            output.predicted.push((model.to_owned(), prediction.outputs[j].clone()));
         }
         Ok(self)
     }

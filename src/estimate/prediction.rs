@@ -21,3 +21,9 @@ pub struct Prediction<M: Model> {
     /// The same by columns.
     pub columns: Simulated,
 }
+
+impl<M: Model> AsRef<Simulated> for Prediction<M> {
+    fn as_ref(&self) -> &Simulated {
+        &self.columns
+    }
+}

@@ -109,7 +109,8 @@ impl<M: Made> Fit<'_, M> {
             0 => Fit { stepping: None, ..self },
             1 => self.integrator(Rk4 { substeps: whole("integrator `rk4`", number.unwrap_or(1.0))? }),
             2 => self.integrator(number.map_or_else(Rk45::default, |relative| Rk45 { relative, ..Rk45::default() })),
-            3 => self.integrator(number.map_or_else(Esdirk::default, |relative| Esdirk { relative, ..Esdirk::default() })),
+            3 => self
+                .integrator(number.map_or_else(Esdirk::default, |relative| Esdirk { relative, ..Esdirk::default() })),
             _ => self.integrator(Discrete),
         })
     }
@@ -189,7 +190,9 @@ fn in_order<T: Copy>(role: &str, quantities: &[Quantity], given: &[(&str, T)]) -
         }
     }
     let missing = |(quantity, entry): (&Quantity, Option<T>)| {
-        entry.ok_or_else(|| Error::Option(format!("{role} `{}` is not given; every {role} needs an entry", quantity.name)))
+        entry.ok_or_else(|| {
+            Error::Option(format!("{role} `{}` is not given; every {role} needs an entry", quantity.name))
+        })
     };
     quantities.iter().zip(entries).map(missing).collect()
 }

@@ -2,8 +2,8 @@
 
 #[cfg(feature = "parallel")]
 use super::ahead::in_order;
-use super::lockstep::fit_together;
 use super::fittable::{Made, finer};
+use super::lockstep::fit_together;
 use super::{Fit, Records};
 use crate::error::Error;
 use crate::estimate::Summary;

@@ -21,7 +21,8 @@ pub(super) fn predict<'a>(sweep: Arc<dyn Sweep + 'a>, record: &Record, estimate:
     // An output without any error gives no noise level; it is then estimated from this record.
     let sigma = estimate.sigma();
     let noisy = sigma.iter().all(|sigma| *sigma > 0.0);
-    let settings = if noisy { Settings { noise: Noise::Given(sigma), ..Settings::default() } } else { Settings::default() };
+    let settings =
+        if noisy { Settings { noise: Noise::Given(sigma), ..Settings::default() } } else { Settings::default() };
     let problem = Problem::unchecked(sweep, vec![record.clone()], &parameters, settings)?;
     let objective = problem.in_units(&Control::NEVER);
     let coordinates = match problem.unknowns.row.is_empty() {

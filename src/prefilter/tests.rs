@@ -237,7 +237,7 @@ fn a_record_is_filtered_on_both_sides() {
             assert!(filtered.output(k).z == 1.0 || k == 7);
         }
         assert!(filtered.output(7).z.is_nan());
-        assert_eq!((filtered.name(), filtered.input_hold(), filtered.len()), ("arm", Hold::First, 400));
+        assert_eq!((filtered.name(), filtered.record().input_hold(0), filtered.len()), ("arm", Hold::First, 400));
     }
 }
 

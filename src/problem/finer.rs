@@ -121,6 +121,7 @@ fn differ(this: f64, finer: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::problem::SearchPlan;
     use crate::tests::{Current, Gain, Line, Voltage};
     use crate::{Experiment, Fit, Model, Rk4, Scalar, Time, free};
 
@@ -171,7 +172,7 @@ mod tests {
         let made = problem.sweep.clone();
         let sweeps = || FinerSweeps::new(vec![Arc::new(|| Ok(made.clone())) as MakeSweep<'_>]);
         for (starts, trials) in [(1, 20), (2, 100)] {
-            let settings = problem.settings.clone().starts(starts);
+            let settings = Settings { searches: SearchPlan::All(starts), ..problem.settings.clone() };
             let refined = Problem { settings, ..problem.clone() }.refining(sweeps());
             let finer = refined.finer(0).unwrap();
             assert_eq!(finer.settings.optimizer.most(), trials);

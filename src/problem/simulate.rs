@@ -19,6 +19,12 @@ pub struct Simulated {
     pub initial_state: Vec<f64>,
 }
 
+impl AsRef<Simulated> for Simulated {
+    fn as_ref(&self) -> &Simulated {
+        self
+    }
+}
+
 impl Objective<'_> {
     /// Predicts the outputs of one record.
     pub(crate) fn predict(&self, e: usize, coordinates: &[f64]) -> Result<Simulated, Error> {

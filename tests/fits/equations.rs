@@ -221,7 +221,11 @@ fn what_does_not_fit_the_equations_is_refused() {
 fn equations_are_simulated_as_their_model() {
     let (truth, time) = (Pull { g: 9.81, d: 1.2, b: 2.0 }, Time::Uniform { start: 0.5, step: 0.02 });
     let push: Vec<f64> = (0..300).map(|k| (0.05 * f64::from(k)).sin()).collect();
-    let rows: Vec<Vec<f64>> = push.iter().map(|m| vec![*m]).collect();
+    let equations = read(&Pendulum);
+    let inputs = |m: &[f64]| {
+        let channels = vec![Channel::new("m", "N m", m.to_vec())];
+        Record::new(equations.layout().states.clone(), time.clone(), channels, vec![]).unwrap()
+    };
     let torques: Vec<Torque> = push.iter().map(|m| Torque { m: *m }).collect();
     let (from, start) = ([9.81, 1.2, 2.0], Swing { phi: 0.3, w: -0.1 });
     let close = |found: &Record, run: Simulation<Pendulum>| {
@@ -230,26 +234,28 @@ fn equations_are_simulated_as_their_model() {
             assert!((found[0] - y.phi).abs() < 1e-13 && (found[1] - y.w).abs() < 1e-13, "{k}: {found:?} {y:?}");
         }
     };
-    let equations = read(&Pendulum);
     let at = |p: &[f64]| Fleet::new(&equations).parameters(p.iter().copied().map(fixed).collect());
-    let found = at(&from).simulate(&[0.3, -0.1], time.clone(), Hold::Zero, &rows).unwrap();
+    let found = at(&from).simulate(&[0.3, -0.1], &inputs(&push)).unwrap();
     let run = simulate(&Pendulum, &truth, &start, time.clone(), &torques).unwrap();
     assert_eq!((found.len(), found.time(1), &found.inputs()[0].values[..]), (300, 0.52, &push[..]));
     close(&found.with_noise(&[0.02, 0.05], 4), run.clone().with_noise(Swing { phi: 0.02, w: 0.05 }, 4));
     close(&found, run);
     // A method that chooses its steps.
     for hold in [Hold::Zero, Hold::First] {
-        let found = at(&from).integrator(Rk45::default()).simulate(&[0.3, -0.1], time.clone(), hold, &rows).unwrap();
+        let found = at(&from).integrator(Rk45::default()).simulate(&[0.3, -0.1], &inputs(&push).hold(hold)).unwrap();
         let simulator = Simulator::new(&Pendulum).integrator(Rk45::default()).hold(hold);
         close(&found, simulator.run(&truth, &start, time.clone(), &torques).unwrap());
     }
-    let refused =
-        |p: &[f64], x: &[f64], rows: &[Vec<f64>]| at(p).simulate(x, time.clone(), Hold::Zero, rows);
-    says(refused(&from, &[0.3, -0.1], &[vec![0.0], vec![0.0, 1.0]]), &["sample 1 has 2 input(s)", "have 1"]);
-    says(refused(&from[..2], &[0.3, -0.1], &rows), &["2 parameter(s)", "has 3"]);
-    says(refused(&from, &[0.3], &rows), &["1 entries", "2 states"]);
-    says(refused(&[f64::NAN, 1.2, 2.0], &[0.3, -0.1], &rows), &["`g`", "not a number"]);
-    says(refused(&[9.81, -400.0, 2.0], &[0.3, -0.1], &rows), &["simulation"]);
+    let refused = |p: &[f64], x: &[f64], of: &Record| at(p).simulate(x, of);
+    let other = |channels: Vec<Channel>| {
+        Record::new(equations.layout().states.clone(), time.clone(), channels, vec![]).unwrap()
+    };
+    let given = inputs(&push);
+    says(refused(&from, &[0.3, -0.1], &other(vec![Channel::new("u", "N m", push.clone())])), &["inputs", "`u`", "`m`"]);
+    says(refused(&from[..2], &[0.3, -0.1], &given), &["2 parameter(s)", "has 3"]);
+    says(refused(&from, &[0.3], &given), &["1 entries", "2 states"]);
+    says(refused(&[f64::NAN, 1.2, 2.0], &[0.3, -0.1], &given), &["`g`", "not a number"]);
+    says(refused(&[9.81, -400.0, 2.0], &[0.3, -0.1], &given), &["simulation"]);
 }
 
 /// Decays of their own rates: each answer is that of the record alone, in the order of the records, beside one that is none of the
@@ -257,12 +263,14 @@ fn equations_are_simulated_as_their_model() {
 #[test]
 fn a_fleet_of_equations_is_each_fit_alone() {
     let equations = read(&Pendulum);
-    let rows: Vec<Vec<f64>> = (0..200).map(|k| vec![[1.0, -0.5][k / 40 % 2]]).collect();
+    let push: Vec<f64> = (0..200).map(|k| [1.0, -0.5][k / 40 % 2]).collect();
     let record = |i: usize| {
         let time = Time::Uniform { start: 0.0, step: 0.02 };
         let truth = [9.81, 0.8 + 0.02 * i as f64, 2.0].map(fixed).to_vec();
         let fit = Fleet::new(&equations).parameters(truth);
-        let swing = fit.simulate(&[0.2, 0.0], time, Hold::Zero, &rows).unwrap();
+        let inputs = vec![Channel::new("m", "N m", push.clone())];
+        let inputs = Record::new(equations.layout().states.clone(), time, inputs, vec![]).unwrap();
+        let swing = fit.simulate(&[0.2, 0.0], &inputs).unwrap();
         swing.with_noise(&[0.02, 0.05], i as u64).named(format!("{i}"))
     };
     let mut records: Vec<Record> = (0..40).map(record).collect();
