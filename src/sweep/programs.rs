@@ -41,10 +41,13 @@ struct Programs {
     /// By the holds of the inputs.
     recurrences: Mutex<Vec<(Holds, Arc<Recurrence>)>>,
     /// Those that were asked for, with the reason where there can be none.
-    compiled: Mutex<Vec<(Key, Result<Arc<Compiled>, TooLarge>)>>,
+    compiled: Mutex<Vec<(Key, MaybeCompiled)>>,
     /// The same with a finer step, if there is one.
     refined: OnceLock<Option<Arc<Programs>>>,
 }
+
+/// A program, or the reason why there is none.
+type MaybeCompiled = Result<Arc<Compiled>, TooLarge>;
 
 /// Number of samples that take as long in dual numbers as a program takes to be compiled.
 const WORTH_COMPILING: usize = 4_000;
