@@ -1,0 +1,40 @@
+"""Exceptions and warnings."""
+
+from __future__ import annotations
+
+__all__ = ["Error", "FitWarning", "TraceError"]
+
+
+class Error(ValueError):
+    """A call that cannot be served; its text names the thing, the number and the remedy."""
+
+
+class TraceError(Error, TypeError):
+    """Python code of a model that asks of a symbol what only a number has; its text names file, line and remedy."""
+
+
+class FitWarning(UserWarning):
+    """Something that the reader of an estimate must know.
+
+    The message begins with the code in brackets, so that a filter of `warnings` can name it::
+
+        warnings.filterwarnings("ignore", r"\\[colored_errors\\]", greybox.FitWarning)
+
+    Attributes
+    ----------
+    code : str
+        The kind of warning; it does not change from version to version, the words of `text` may.
+    severity : str
+        ``"usable"`` (a note), ``"usable_with_care"`` or ``"not_usable"``.
+    text : str
+        The warning in words, with the numbers and the remedy.
+    """
+
+    def __init__(self, code: str, severity: str, text: str) -> None:
+        super().__init__(code, severity, text)
+        self.code = code
+        self.severity = severity
+        self.text = text
+
+    def __str__(self) -> str:
+        return f"[{self.code}] {self.text}"

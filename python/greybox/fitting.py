@@ -1,0 +1,252 @@
+"""`fit`, and simulation."""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import numpy as np
+
+from greybox import _core
+from greybox.errors import Error, FitWarning
+from greybox.frames import Frame
+from greybox.model import Model
+from greybox.options import Noise, options
+from greybox.parameters import Parameter, declared
+from greybox.progress import Progress
+from greybox.records import Initial, Record, records
+from greybox.result import Fit
+from greybox.signals import named, near
+
+__all__ = ["fit", "simulate"]
+
+
+def fit(
+    model: Model,
+    data: Any,
+    /,
+    *,
+    parameters: Mapping[str, Parameter] | None = None,
+    time: str | None = None,
+    sample_time: float | None = None,
+    columns: Mapping[str, str] | None = None,
+    hold: Literal["zero", "first"] = "zero",
+    initial: Initial = "estimated",
+    noise: Noise | None = None,
+    input_noise: Mapping[str, float] | None = None,
+    loss: str | None = None,
+    prefilter: str | None = None,
+    integrator: str | None = None,
+    predictor: str | None = None,
+    starts: int | None = None,
+    time_limit: float | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
+    progress: bool = False,
+    **declarations: Parameter,
+) -> Fit:
+    """Find the parameters of a model from measured records, and how well they are known.
+
+    Parameters
+    ----------
+    model : Model
+        The equations.
+    data : frame, Record, or list of these
+        What was measured: columns of time, inputs and outputs by their names, as :class:`Record` describes. Several records share
+        the parameters and have an initial state each.
+    **declarations : Parameter
+        ``rs=gb.free(1.0, within=(0.01, 10))`` or ``rs=gb.fixed(0.6)`` for each parameter of the model.
+    parameters : mapping from str to Parameter, optional
+        The same as a mapping: for names that are those of an option, or no identifiers.
+    time, sample_time, columns, hold, initial
+        Of the frames, as in :class:`Record`, which can say them for each.
+    noise : mapping from str to float, or "covariance", optional
+        The standard deviation of the noise of each output, in its unit; without it, it is estimated. ``"covariance"`` estimates it
+        with the correlations between outputs.
+    input_noise : mapping from str to float, optional
+        The standard deviation of the noise of each input. It changes no estimate: the bias that it causes is estimated, and a
+        warning names it.
+    loss : str, optional
+        What errors cost: ``"squared"`` (the default), or, against outliers, ``"huber"``, ``"soft_l1"``, ``"cauchy"``, ``"tukey"``, each
+        with a tuning constant if wanted, ``"huber:1.345"``.
+    prefilter : str, optional
+        A Butterworth filter of errors and slopes: ``"low_pass:ORDER:HERTZ"`` or ``"high_pass:ORDER:HERTZ"``.
+    integrator : str, optional
+        ``"rk4"``, ``"rk4:4"`` (steps per sample), ``"rk45"`` (adaptive), ``"esdirk"`` (stiff). Without it, the step is refined until it
+        no longer matters.
+    predictor : str, optional
+        Which prediction error is minimized: of a ``"simulation"`` (the default), ``"horizon:5"`` (five samples ahead of a measured
+        state), or ``"kalman"`` (one-step errors; models that are affine in their state, with `diffusion` and `noise`).
+    starts : int, optional
+        Search from so many starts within the bounds.
+    time_limit : float, optional
+        Stop at the best point so far after this time (s).
+    checkpoint : path, optional
+        Save the search to this file and resume from it.
+    progress : bool
+        Show iterations and cost while it runs (needs tqdm).
+
+    Returns
+    -------
+    Fit
+        Ctrl-C stops the search and returns the best so far, which its verdict says.
+
+    Raises
+    ------
+    Error
+        If there is no result: the text names the thing, the number and the remedy.
+
+    Warns
+    -----
+    FitWarning
+        Everything that the reader of the estimate must know; each has a code.
+
+    Examples
+    --------
+    >>> import greybox as gb
+    >>> import numpy as np
+    >>> cooling = gb.model(
+    ...     lambda t, x, u, p: [p.k * (u.room - x.body)], states={"body": "K"}, inputs={"room": "K"}, outputs={"body": "K"},
+    ...     parameters={"k": "1/s"},
+    ... )
+    >>> t = np.arange(200) * 0.1
+    >>> noise = np.random.default_rng(1).normal(0.0, 0.05, 200)
+    >>> found = gb.fit(cooling, {"t": t, "room": 0 * t + 20, "body": 20 + 60 * np.exp(-0.3 * t) + noise}, k=gb.free(1.0))
+    >>> round(found.parameters.k, 3), found.verdict
+    (0.3, 'usable')
+    """
+    equations = _model(model).equations()
+    given = _declarations(parameters, declarations)
+    chosen = options(
+        named(equations.inputs, "inputs"),
+        named(equations.outputs, "outputs"),
+        noise=noise,
+        input_noise=input_noise,
+        loss=loss,
+        prefilter=prefilter,
+        integrator=integrator,
+        predictor=predictor,
+        starts=starts,
+        time_limit=time_limit,
+        checkpoint=checkpoint,
+    )
+    what = Record(None, None, time, sample_time, columns, hold, initial)
+    several = records(data, what)
+    cores = [one.core(equations, f"record {k + 1}" if len(several) > 1 else "record") for k, one in enumerate(several)]
+    declared_ = declared(given, named(equations.parameters, "parameters"))
+    problem = _core.Problem(equations.core, cores, declared_, chosen)
+    with Progress(progress, "fit") as shown:
+        estimate = problem.run(shown)
+    found = Fit(equations, cores, declared_, chosen, Frame(several[0].data).kind, estimate, problem)
+    warn(found.warnings)
+    return found
+
+
+def _model(model: Any) -> Model:
+    if isinstance(model, Model):
+        return model
+    if isinstance(model, type) and issubclass(model, Model):
+        raise Error(f"the model is the class {model.__name__}; make one of it: {model.__name__}()")
+    raise Error(f"the model is {type(model).__name__}; derive a class from gb.Model, or make one of functions by gb.model(f, states=..., ...)")
+
+
+def _declarations(parameters: Mapping[str, Parameter] | None, declarations: Mapping[str, Parameter]) -> dict[str, Parameter]:
+    given = dict(parameters or {})
+    for name, value in declarations.items():
+        if name in given:
+            raise Error(f"parameter `{name}` is declared twice, in parameters and by name; leave one out")
+        if not isinstance(value, Parameter) and name not in given:
+            _not_an_option(name, value)
+        given[name] = value
+    return given
+
+
+def _not_an_option(name: str, value: Any) -> None:
+    code = fit.__code__
+    known = code.co_varnames[2 : code.co_argcount + code.co_kwonlyargcount]
+    if not isinstance(value, (int, float)) and near(name, known).endswith("?"):
+        raise Error(f"there is neither an option nor a parameter `{name}`; options are: {near(name, known)}")
+
+
+def warn(all_: list[FitWarning]) -> None:
+    """Issue warnings at the line of the caller outside this package."""
+    frame, level = sys._getframe(1), 1
+    while frame.f_back is not None and str(frame.f_globals.get("__name__", "")).partition(".")[0] == "greybox":
+        frame, level = frame.f_back, level + 1
+    for warning in all_:
+        if warning.severity != "usable":
+            warnings.warn(warning, stacklevel=level)
+
+
+def simulate(
+    model: Model,
+    data: Any,
+    /,
+    *,
+    parameters: Mapping[str, float],
+    initial: Mapping[str, float] | None = None,
+    noise: Mapping[str, float] | None = None,
+    seed: int = 0,
+    time: str | None = None,
+    sample_time: float | None = None,
+    columns: Mapping[str, str] | None = None,
+    integrator: str | None = None,
+) -> Any:
+    """Simulate a model, its inputs held from sample to sample.
+
+    Parameters
+    ----------
+    model : Model
+        The equations.
+    data : frame
+        Columns of time and inputs, as in :class:`Record`.
+    parameters : mapping from str to float
+        The value of each parameter.
+    initial : mapping from str to float, optional
+        The state at the first sample; zero where it is left out.
+    noise : mapping from str to float, optional
+        The standard deviation of white noise that is added to each output; none where it is left out.
+    seed : int
+        Of the noise: the same seed gives the same noise.
+    time, sample_time, columns
+        Of the frame, as in :class:`Record`.
+    integrator : str, optional
+        As in :func:`fit`; one step of Runge-Kutta 4 per sample without it.
+
+    Returns
+    -------
+    frame
+        Of the kind that was handed over: ``t``, the inputs and the outputs.
+
+    Raises
+    ------
+    Error
+        If the simulation fails, or something that is given does not fit the model.
+    """
+    equations = _model(model).equations()
+    frame = Frame(data)
+    inputs, outputs = named(equations.inputs, "inputs"), named(equations.outputs, "outputs")
+    states, names = named(equations.states, "states"), named(equations.parameters, "parameters")
+    of = {name: (columns or {}).get(name, name) for name in inputs}
+    given = [frame.column(of[name], name) for name in inputs]
+    t = frame.time(time, sample_time, len(given[0]) if given else 0)
+    values = [_number("parameter", name, parameters, names) for name in names]
+    for what, mapping, known in (("parameters", parameters, names), ("initial", initial or {}, states), ("noise", noise or {}, outputs)):
+        unknown = [name for name in mapping if name not in known]
+        if unknown:
+            raise Error(f"{what} names `{unknown[0]}`, and the model has: {near(unknown[0], known)}")
+    start = [float((initial or {}).get(name, 0.0)) for name in states]
+    chosen = options(inputs, outputs, integrator=integrator)["integrator"]
+    found = equations.core.simulate(values, start, t, given, chosen)
+    if noise:
+        found = found.with_noise([float(noise.get(name, 0.0)) for name in outputs], seed)
+    columns_ = dict(zip([*inputs, *outputs], [*found.inputs(), *found.outputs()], strict=True))
+    return frame.kind({"t": np.asarray(t), **columns_})
+
+
+def _number(what: str, name: str, values: Mapping[str, float], names: Any) -> float:
+    if name not in values:
+        raise Error(f"{what} `{name}` has no value; give one for each of {', '.join(names)}")
+    return float(values[name])

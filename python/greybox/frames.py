@@ -1,0 +1,249 @@
+"""Frames: measured columns from pandas, polars, Arrow or arrays, and results as the caller's kind of frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from greybox.errors import Error
+from greybox.signals import near
+
+__all__ = ["Array", "Frame", "Kind"]
+
+Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
+
+#: Makes a frame of columns, of the kind that the caller handed over.
+Kind: TypeAlias = Callable[[Mapping[str, Any]], Any]
+
+_TIMES = ("t", "time", "Time", "TIME", "T", "timestamp", "Timestamp")
+
+
+class Frame:
+    """One measured record: columns by name, of any kind of frame."""
+
+    def __init__(self, data: Any) -> None:
+        self._arrays: Mapping[Any, Any] | None = None
+        self._frame: Any = None
+        if isinstance(data, np.ndarray) and data.dtype.names is not None:
+            self._arrays = {name: data[name] for name in data.dtype.names}
+        elif isinstance(data, Mapping):
+            self._arrays = data
+        else:
+            self._frame = _narwhals(data)
+        #: The index of a pandas frame, where it says more than the rows' numbers.
+        self.index = _index(data)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the columns."""
+        if self._arrays is not None:
+            # Of an xarray dataset, coordinates are columns, too.
+            return list(dict.fromkeys([*map(str, self._arrays), *map(str, getattr(self._arrays, "coords", ()))]))
+        return list(map(str, self._frame.columns))
+
+    @property
+    def kind(self) -> Kind:
+        """What makes a frame of the same kind."""
+        if self._frame is None:
+            return dict
+        import narwhals as nw
+
+        return Native(str(nw.get_native_namespace(self._frame).__name__))
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.names
+
+    def column(self, name: str, signal: str) -> Array:
+        """Give a column as floating-point numbers; what is missing is NaN.
+
+        Raises
+        ------
+        Error
+            If there is no such column, or it has no numbers.
+        """
+        if name not in self:
+            renamed = f" for `{signal}`" if signal != name else ""
+            hint = f'; name another by columns={{"{signal}": "..."}}'
+            raise Error(f"there is no column `{name}`{renamed}; the frame has: {near(name, self.names)}{hint}")
+        if self._arrays is None:
+            return _numbers(self._frame.get_column(name), name)
+        return _array_numbers(self._arrays[name], name)
+
+    def time(self, name: str | None, sample_time: float | None, rows: int) -> Array:
+        """Give the time of each row in seconds; of dates, since the first.
+
+        Raises
+        ------
+        Error
+            If there is no time, or it is neither numbers nor dates.
+        """
+        if sample_time is not None:
+            if not (np.isfinite(sample_time) and sample_time > 0.0):
+                raise Error(f"the sample time is {sample_time!r}; it must be positive and finite (s)")
+            return np.arange(rows) * float(sample_time)
+        if name is None:
+            found = next((one for one in _TIMES if one in self), None)
+            if found is None and self.index is not None:
+                return _seconds(self.index, "the index")
+            if found is None:
+                raise Error(
+                    f"there is no column `t` or `time`, and no index of times; the frame has: {near('t', self.names)}. Name the column "
+                    'by time="...", or give the time between samples (s) by sample_time=...'
+                )
+            name = found
+        elif name not in self and self.index is not None and name == getattr(self.index, "name", None):
+            return _seconds(self.index, f"the index `{name}`")
+        if name not in self:
+            raise Error(f"there is no column `{name}` for the time; the frame has: {near(name, self.names)}")
+        if self._arrays is None:
+            column = self._frame.get_column(name)
+            dated = _dated(column)
+            return _numbers(column, name) if dated is None else _since_first(dated, f"column `{name}`")
+        return _seconds(self._arrays[name], f"column `{name}`")
+
+
+class Native:
+    """Makes frames of a library of this name."""
+
+    def __init__(self, library: str) -> None:
+        self.library = library
+
+    def __call__(self, columns: Mapping[str, Any]) -> Any:
+        import narwhals as nw
+
+        return nw.from_dict(dict(columns), backend=self.library).to_native()
+
+
+def _narwhals(data: Any) -> Any:
+    import narwhals as nw
+
+    try:
+        frame = nw.from_native(data)
+    except TypeError:
+        if not hasattr(data, "__arrow_c_stream__"):
+            raise Error(
+                f"{type(data).__name__} is no frame; hand over one of pandas, polars or Arrow, or a dict of arrays by name"
+            ) from None
+        frame = nw.from_arrow(data, backend="pyarrow")
+    return frame.collect() if isinstance(frame, nw.LazyFrame) else frame
+
+
+def _index(data: Any) -> Any:
+    """Give the index of a pandas frame, unless it counts the rows."""
+    index = getattr(data, "index", None)
+    if index is None or callable(index) or type(data).__module__.partition(".")[0] not in ("pandas", "modin", "cudf"):
+        return None
+    return None if type(index).__name__ == "RangeIndex" else index
+
+
+def _dated(column: Any) -> Any:
+    """Give the nanoseconds of dates or durations; `None` where the column has others."""
+    import narwhals as nw
+
+    if column.dtype == nw.Datetime or column.dtype == nw.Date:
+        dates = column.cast(nw.Datetime("ns")) if column.dtype == nw.Date else column
+        missing, stamps = column.is_null().any(), dates.dt.timestamp("ns")
+    elif column.dtype == nw.Duration:
+        missing, stamps = column.is_null().any(), column.dt.total_nanoseconds()
+    else:
+        return None
+    if missing:
+        raise Error(f"column `{column.name}` has rows without a time; drop them")
+    return stamps.to_numpy()
+
+
+def _numbers(column: Any, name: str) -> Array:
+    import narwhals as nw
+
+    if not (column.dtype.is_numeric() or column.dtype == nw.Boolean):
+        values = column.drop_nulls().head(1).to_list()
+        if values:
+            raise _no_numbers(name, values[0], str(column.dtype))
+        return np.full(len(column), np.nan)
+    if column.dtype != nw.Float64:
+        column = column.cast(nw.Float64)
+    return _array_numbers(column.to_numpy(), name)
+
+
+def _no_numbers(name: str, value: Any, kind: str) -> Error:
+    hint = "; it has dates, which only the time may have" if "date" in kind.lower() else "; convert it first, such as by pandas.to_numeric"
+    return Error(f"column `{name}` has {value!r} ({kind}), which is no number{hint}")
+
+
+def _array_numbers(values: Any, name: str) -> Array:
+    array = np.ma.filled(values, np.nan) if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
+    if array.ndim != 1:
+        raise Error(f"column `{name}` has the shape {array.shape}; give one number per sample")
+    if array.dtype.kind not in "fiub":
+        try:
+            if array.dtype.kind != "O":
+                raise TypeError
+            return np.array([np.nan if one is None else float(one) for one in array.tolist() if not isinstance(one, str) or _refuse(one)])
+        except (TypeError, ValueError):
+            bad = next((one for one in array.tolist() if not isinstance(one, (int, float))), array[:1].tolist())
+            raise _no_numbers(name, bad, str(array.dtype)) from None
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def _refuse(text: str) -> bool:
+    raise TypeError(text)
+
+
+def _seconds(values: Any, what: str) -> Array:
+    """Give times in seconds: numbers as they are, dates since the first."""
+    if getattr(values, "tz", None) is not None:
+        values = values.tz_convert("UTC").tz_localize(None)
+    array = np.asarray(values)
+    if array.dtype.kind in "mM":
+        if np.isnat(array).any():
+            raise Error(f"{what} has rows without a time; drop them")
+        return _since_first(array.astype("datetime64[ns]" if array.dtype.kind == "M" else "timedelta64[ns]").astype(np.int64), what)
+    if array.dtype.kind not in "fiu":
+        first = array[:1].tolist()
+        raise Error(
+            f"{what} has {first[0]!r} ({array.dtype}), which is neither a number (s) nor a date; convert it first, such as by "
+            "pandas.to_datetime, or give the time between samples by sample_time=..."
+            if first
+            else f"{what} is empty"
+        )
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def _since_first(nanoseconds: Any, what: str) -> Array:
+    stamps = np.asarray(nanoseconds, dtype=np.int64)
+    if len(stamps) > 1 and (np.diff(stamps) <= 0).any():
+        k = int(np.argmax(np.diff(stamps) <= 0)) + 1
+        jump = (stamps[k] - stamps[k - 1]) / 1e9
+        raise Error(
+            f"{what} does not increase: row {k} (from zero) is {jump:g} s after the row before it. Sort the rows and drop repeated ones; "
+            "where clocks were set back for winter, give the times their zone (tz_localize)"
+        )
+    return (stamps - (stamps[0] if len(stamps) else 0)) / 1e9
+
+
+def is_readonly(array: Array) -> bool:
+    """Whether nothing in Python can write to the array, which may then be shared."""
+    owner: Any = array
+    while isinstance(owner, np.ndarray):
+        if owner.flags.writeable:
+            return False
+        owner = owner.base
+    return owner is not None and not isinstance(owner, (bytearray, memoryview))
+
+
+def rename(names: Iterable[str], columns: Mapping[str, str] | None) -> dict[str, str]:
+    """Give the column of each signal.
+
+    Raises
+    ------
+    Error
+        If a signal is renamed that the model does not have.
+    """
+    of = {name: name for name in names}
+    for signal, column in (columns or {}).items():
+        if signal not in of:
+            raise Error(f"columns names `{signal}`, which is no input or output of the model; it has: {near(signal, of)}")
+        of[signal] = column
+    return of

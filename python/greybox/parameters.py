@@ -1,0 +1,72 @@
+"""Declarations of parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from greybox._core import Parameter
+from greybox.errors import Error
+from greybox.signals import Signals, near
+
+__all__ = ["Parameter", "fixed", "free"]
+
+
+def free(
+    start: float,
+    *,
+    within: tuple[float, float] | None = None,
+    prior: tuple[float, float] | None = None,
+    log: bool = False,
+    positive: bool = False,
+    per_experiment: bool = False,
+) -> Parameter:
+    """Declare a quantity that is estimated.
+
+    Parameters
+    ----------
+    start : float
+        Where the search starts, in the quantity's unit.
+    within : (float, float), optional
+        Lower and upper bound; ``float("-inf")`` and ``float("inf")`` stand for none.
+    prior : (float, float), optional
+        Mean and standard deviation of knowledge from elsewhere, which counts as one more measurement.
+    log : bool
+        Estimate the logarithm: for positive quantities that are known to a factor rather than to a difference.
+    positive : bool
+        Only a positive value has a meaning: an estimate that is not positive is then not usable. The search is not bounded.
+    per_experiment : bool
+        Each record has a value of its own.
+
+    Examples
+    --------
+    >>> import greybox as gb
+    >>> gb.free(1.0, within=(0.01, 10))
+    free(1.0, within=(0.01, 10.0))
+    """
+    return Parameter(start, True, within, prior, log, positive, per_experiment)
+
+
+def fixed(value: float) -> Parameter:
+    """Declare a quantity that keeps its value."""
+    return Parameter(value, False)
+
+
+def declared(given: Mapping[str, Any], names: Signals, what: str = "parameter") -> list[Parameter]:
+    """Give the declaration of each quantity, in order.
+
+    Raises
+    ------
+    Error
+        If one is missing, unknown, or not declared by :func:`free` or :func:`fixed`.
+    """
+    for name, value in given.items():
+        if name not in names:
+            raise Error(f"there is no {what} `{name}`; the model has: {near(name, names)}")
+        if not isinstance(value, Parameter):
+            shown = f"{value!r}" if isinstance(value, (int, float)) else type(value).__name__
+            raise Error(f"{what} `{name}` is {shown}; write gb.free({shown}) to estimate it from there, or gb.fixed({shown}) to keep it")
+    missing = [name for name in names if name not in given]
+    if missing:
+        raise Error(f"{what} `{missing[0]}` is not declared; write {missing[0]}=gb.free(start) to estimate it, or gb.fixed(value)")
+    return [given[name] for name in names]

@@ -1,0 +1,27 @@
+"""Models of permanent magnet synchronous motors that ship with the library."""
+
+from __future__ import annotations
+
+from greybox import _core
+from greybox.errors import Error
+from greybox.model import Equations
+
+__all__ = ["surface"]
+
+
+def surface(*, pole_pairs: int) -> Equations:
+    """Give a motor with surface magnets, in the frame of its rotor.
+
+    ``Ls did/dt = ud - Rs id + we Ls iq``, ``Ls diq/dt = uq - Rs iq - we Ls id - sqrt(2/3) Ke w``, with ``we = np w``.
+
+    Inputs ``ud``, ``uq`` (V) and ``w`` (rad/s), states and outputs ``id`` and ``iq`` (A, phase peak), parameters ``rs`` (ohm), ``ls``
+    (H) and ``ke`` (V s/rad, line-to-line rms).
+
+    Raises
+    ------
+    Error
+        If there is not at least one pair of poles.
+    """
+    if not isinstance(pole_pairs, int):
+        raise Error(f"pole_pairs is {pole_pairs!r}; give a whole number")
+    return Equations(_core.surface(pole_pairs))

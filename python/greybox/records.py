@@ -1,0 +1,115 @@
+"""Records: a frame with what is said about it, as the compiled library takes it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from greybox import _core
+from greybox.errors import Error
+from greybox.frames import Array, Frame, is_readonly, rename
+from greybox.model import Equations
+from greybox.parameters import Parameter, declared
+from greybox.signals import Signals, named
+
+__all__ = ["Initial", "Record"]
+
+#: What is said of the state at the first sample.
+Initial: TypeAlias = "Literal['estimated', 'first'] | Mapping[str, Parameter]"
+
+
+@dataclass(frozen=True)
+class Record:
+    """A frame with what is said about it; a bare frame does where there is nothing to say.
+
+    Parameters
+    ----------
+    data : frame
+        pandas, polars, Arrow (or whatever hands over an Arrow stream), a mapping from names to arrays, an xarray dataset, or a
+        structured array. A row for each sample; further columns are ignored.
+    name : str, optional
+        The name in reports and errors.
+    time : str, optional
+        The column of the time: seconds, or dates, which count from the first. Without it, the column ``t`` or ``time``, or else the
+        index of a pandas frame.
+    sample_time : float, optional
+        The time between samples (s), where there is no column.
+    columns : mapping from str to str, optional
+        The column of a signal, where it has another name: ``{"w": "speed"}``.
+    hold : {"zero", "first"}
+        The inputs between samples: constant, as a digital controller commands them, or straight lines.
+    initial : {"estimated", "first"} or mapping from str to Parameter
+        The state at the first sample: estimated, computed from the first sample, or declared for each state by
+        :func:`~greybox.free` and :func:`~greybox.fixed`.
+    """
+
+    data: Any
+    name: str | None = None
+    time: str | None = None
+    sample_time: float | None = None
+    columns: Mapping[str, str] | None = None
+    hold: Literal["zero", "first"] = "zero"
+    initial: Initial = "estimated"
+
+    def core(self, equations: Equations, name: str, *, outputs: bool = True) -> _core.Record:
+        """Give the record as the library takes it. Without `outputs`, those that the frame lacks are missing measurements."""
+        frame = Frame(self.data)
+        inputs, measured = named(equations.inputs, "inputs"), named(equations.outputs, "outputs")
+        try:
+            of = rename([*inputs, *measured], self.columns)
+            columns = {signal: _column(frame, of[signal], signal) for signal in inputs}
+            rows = len(next(iter(columns.values()))) if columns else None
+            found: dict[str, Array] = {}
+            for signal in measured:
+                if outputs or of[signal] in frame:
+                    found[signal] = _column(frame, of[signal], signal)
+                    rows = len(found[signal])
+            rows = 0 if rows is None else rows
+            time = frame.time(self.time, self.sample_time, rows)
+            _check_lengths({**{of[signal]: column for signal, column in {**columns, **found}.items()}}, time)
+            missing = np.full(len(time), np.nan)
+            initial = self.initial
+            if not isinstance(initial, str):
+                initial = declared(initial, _states(equations), "initial state of")
+            return _core.Record(
+                equations.core,
+                self.name or name,
+                time,
+                [_shared(columns[signal]) for signal in inputs],
+                [_shared(found.get(signal, missing)) for signal in measured],
+                self.hold,
+                initial,
+            )
+        except Error as error:
+            if self.name and self.name not in str(error):
+                raise Error(f"record `{self.name}`: {error}") from None
+            raise
+
+
+def _states(equations: Equations) -> Signals:
+    return named(equations.states, "states")
+
+
+def _column(frame: Frame, column: str, signal: str) -> Array:
+    return frame.column(column, signal)
+
+
+def _shared(array: Array) -> tuple[Array, bool]:
+    return array, is_readonly(array)
+
+
+def _check_lengths(columns: Mapping[str, Array], time: Array) -> None:
+    for name, column in columns.items():
+        if len(column) != len(time):
+            raise Error(f"column `{name}` has {len(column)} rows, and there are {len(time)} times; every sample needs both")
+
+
+def records(data: Any, defaults: Record) -> list[Record]:
+    """Give one or several records; what is said for all holds for those that are bare frames."""
+    several = list(data) if isinstance(data, (list, tuple)) else [data]
+    if not several:
+        raise Error("there is no record; hand over a frame, or a list of at least one")
+    return [one if isinstance(one, Record) else replace(defaults, data=one) for one in several]

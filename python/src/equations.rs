@@ -1,0 +1,118 @@
+//! [`Equations`]: a model as data.
+
+use crate::convert::{name_of, named, raised};
+use crate::graph::{Graph, Node};
+use crate::record::Record;
+use crate::settings::stepping;
+use greybox::graph::Id;
+use greybox::layout::{Layout, Quantity};
+use greybox::problem::EquationsFit;
+use greybox::record::Time;
+use numpy::PyReadonlyArray1;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use std::sync::Arc;
+
+/// Names and units.
+pub type Names = Vec<(String, String)>;
+
+/// A model's quantities and its arithmetic.
+#[pyclass(frozen, eq, module = "greybox._core", from_py_object)]
+#[derive(Clone, PartialEq)]
+pub struct Equations(pub Arc<greybox::equations::Equations>);
+
+fn quantities(names: Names) -> Vec<Quantity> {
+    names.into_iter().map(|(name, unit)| Quantity { name, unit }).collect()
+}
+
+fn names(of: &[Quantity]) -> Names {
+    of.iter().map(|one| (one.name.clone(), one.unit.clone())).collect()
+}
+
+#[pymethods]
+impl Equations {
+    /// Equations of quantities (states, inputs, outputs, parameters) and roots of a graph (derivatives or next states, outputs,
+    /// diffusions, noises).
+    #[new]
+    #[expect(clippy::needless_pass_by_value, reason = "arguments of Python come as values")]
+    fn new(kind: &str, quantities_by_role: [Names; 4], graph: &Graph, roots: [Vec<PyRef<'_, Node>>; 4]) -> PyResult<Self> {
+        let [states, inputs, outputs, parameters] = quantities_by_role.map(quantities);
+        let layout = Layout { kind: named(kind)?, states, inputs, outputs, parameters };
+        let roots: Vec<Vec<Id>> = roots.iter().map(|nodes| nodes.iter().map(|node| node.0).collect()).collect();
+        let roots = [0, 1, 2, 3].map(|i| &*roots[i]);
+        let equations = greybox::equations::Equations::with_noise(layout, &graph.0, roots);
+        Ok(Equations(Arc::new(equations.map_err(raised)?)))
+    }
+
+    /// Equations from the bytes that pickle keeps.
+    #[staticmethod]
+    fn from_bytes(bytes: &[u8]) -> PyResult<Self> {
+        Ok(Equations(Arc::new(serde_json::from_slice(bytes).map_err(raised)?)))
+    }
+
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        Ok(PyBytes::new(py, &serde_json::to_vec(&*self.0).map_err(raised)?))
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let from = slf.get_type().getattr("from_bytes")?;
+        Ok((from, (slf.get().to_bytes(slf.py())?,)))
+    }
+
+    fn __str__(&self) -> String {
+        self.0.to_string()
+    }
+
+    #[getter]
+    fn kind(&self) -> String {
+        name_of(self.0.layout().kind)
+    }
+
+    #[getter]
+    fn states(&self) -> Names {
+        names(&self.0.layout().states)
+    }
+
+    #[getter]
+    fn inputs(&self) -> Names {
+        names(&self.0.layout().inputs)
+    }
+
+    #[getter]
+    fn outputs(&self) -> Names {
+        names(&self.0.layout().outputs)
+    }
+
+    #[getter]
+    fn parameters(&self) -> Names {
+        names(&self.0.layout().parameters)
+    }
+
+    /// Simulates; the inputs are columns.
+    fn simulate(
+        &self,
+        py: Python<'_>,
+        parameters: Vec<f64>,
+        initial: Vec<f64>,
+        time: PyReadonlyArray1<'_, f64>,
+        inputs: Vec<PyReadonlyArray1<'_, f64>>,
+        integrator: Option<(String, Vec<f64>)>,
+    ) -> PyResult<Record> {
+        let stamps = time.as_array().to_vec();
+        let columns: Vec<Vec<f64>> = inputs.iter().map(|column| column.as_array().to_vec()).collect();
+        let rows: Vec<Vec<f64>> = (0..stamps.len())
+            .map(|k| columns.iter().map(|column| column.get(k).copied().unwrap_or(f64::NAN)).collect())
+            .collect();
+        let fit = stepping(EquationsFit::new(self.0.clone()), integrator.as_ref(), None)?;
+        let simulated = py.detach(|| fit.simulate(&parameters, &initial, Time::from_stamps(stamps), &rows));
+        Ok(Record { record: simulated.map_err(raised)?, equations: self.clone() })
+    }
+}
+
+/// The equations of the library's motor with surface magnets.
+#[pyfunction]
+pub fn surface(pole_pairs: u32) -> PyResult<Equations> {
+    let model = greybox::pmsm::Surface::new(pole_pairs).map_err(raised)?;
+    let equations = greybox::equations::Equations::trace(&model).map_err(raised)?;
+    Ok(Equations(Arc::new(equations)))
+}

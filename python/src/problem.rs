@@ -1,0 +1,145 @@
+//! [`Problem`]: equations, records, parameters and settings; what is run.
+
+use crate::convert::raised;
+use crate::diagnose::Report;
+use crate::equations::Equations;
+use crate::estimate::Estimate;
+use crate::record::Record;
+use crate::run::{Progress, interruptible};
+use crate::settings::{Options, Parameter, stepping};
+use argmin::core::observers::{Observe, ObserverMode};
+use argmin::core::KV;
+use greybox::diagnose;
+use greybox::optimize::LeastSquaresState;
+use greybox::problem::EquationsFit;
+use numpy::PyArray1;
+use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::prelude::*;
+use std::sync::atomic::Ordering;
+
+/// A fit that can be run, and asked about its estimate.
+#[pyclass(frozen, module = "greybox._core")]
+pub struct Problem {
+    problem: greybox::Problem<'static>,
+    progress: Progress,
+}
+
+/// Columns of an output or an input.
+type Arrays<'py> = Vec<Bound<'py, PyArray1<f64>>>;
+
+/// An end of a profile: `at`, `bound` or `open`, and where.
+type End = (&'static str, f64);
+
+#[pymethods]
+impl Problem {
+    #[new]
+    #[expect(clippy::needless_pass_by_value, reason = "arguments of Python come as values")]
+    fn new(
+        equations: &Equations,
+        records: Vec<Record>,
+        parameters: Vec<Parameter>,
+        options: Options,
+    ) -> PyResult<Self> {
+        let fit = EquationsFit::new(equations.0.clone());
+        let fit = stepping(fit, options.integrator.as_ref(), options.predictor.as_ref())?;
+        let progress = Progress::default();
+        let settings = options.settings()?.cancel(progress.cancel.clone());
+        let settings = settings.observe(Watch(progress.clone()), ObserverMode::Always);
+        let records = records.into_iter().map(|record| record.record).collect();
+        let parameters: Vec<greybox::Parameter> = parameters.iter().map(|one| one.0).collect();
+        Ok(Problem { problem: fit.problem(records, &parameters, settings).map_err(raised)?, progress })
+    }
+
+    /// Searches. Where Ctrl-C ended it, the estimate is the best so far, and says so.
+    fn run(&self, py: Python<'_>, show: Option<&Bound<'_, PyAny>>) -> PyResult<Estimate> {
+        self.progress.cancel.store(false, Ordering::Relaxed);
+        let ended = interruptible(py, &self.progress, show, || self.problem.run())?;
+        match (ended.interrupted, ended.result) {
+            (None, result) => Ok(Estimate(result.map_err(raised)?)),
+            (Some(stop), Ok(best)) if stop.is_instance_of::<PyKeyboardInterrupt>(py) => Ok(Estimate(best)),
+            (Some(stop), _) => Err(stop),
+        }
+    }
+
+    /// The same work, which has no result if it is stopped.
+    fn report(&self, py: Python<'_>, estimate: &Estimate) -> PyResult<Report> {
+        let estimate = &estimate.0;
+        self.whole(py, || greybox::Report::new(&self.problem, estimate)).map(Report)
+    }
+
+    /// Predicted outputs and residuals of a record, a column per output, and the initial state. Of record `own` of the fit, with its own
+    /// parameters and estimated initial state.
+    #[expect(clippy::type_complexity, reason = "a tuple for Python")]
+    fn predict<'py>(
+        &self,
+        py: Python<'py>,
+        estimate: &Estimate,
+        record: &Record,
+        own: Option<usize>,
+    ) -> PyResult<(Arrays<'py>, Arrays<'py>, Vec<f64>)> {
+        let (mut summary, mut record) = (estimate.0.clone(), record.record.clone());
+        if let Some(one) = own.and_then(|own| estimate.0.experiments.get(own)) {
+            let initial = one.initial_state.iter().copied().map(greybox::fixed).collect();
+            record = record.initial(greybox::record::Initial::Given(initial)).map_err(raised)?;
+            let values = one.parameters.iter();
+            summary.parameters.iter_mut().zip(values).for_each(|(parameter, value)| parameter.value = *value);
+        }
+        let found = self.whole(py, || self.problem.predict(&summary, &record))?;
+        let arrays = |columns: Vec<Vec<f64>>| columns.into_iter().map(|one| PyArray1::from_vec(py, one)).collect();
+        Ok((arrays(found.outputs), arrays(found.residuals), found.initial_state))
+    }
+
+    /// The profile of an unknown: ends, values, rises, threshold, remark, and the profile as JSON.
+    #[expect(clippy::type_complexity, reason = "a tuple for Python")]
+    fn profile(
+        &self,
+        py: Python<'_>,
+        estimate: &Estimate,
+        name: &str,
+        probability: f64,
+    ) -> PyResult<(End, End, Vec<f64>, Vec<f64>, f64, String, String)> {
+        let found = self.whole(py, || diagnose::profile(&self.problem, &estimate.0, name, probability))?;
+        let end = |end: diagnose::End| match end {
+            diagnose::End::At(at) => ("at", at),
+            diagnose::End::Bound(at) => ("bound", at),
+            diagnose::End::Open(at) => ("open", at),
+        };
+        let json = serde_json::to_string(&found).map_err(raised)?;
+        let values = found.points.iter().map(|point| point.value).collect();
+        let rises = found.points.iter().map(|point| point.rise).collect();
+        Ok((end(found.lower), end(found.upper), values, rises, found.threshold, found.remark, json))
+    }
+
+    /// The half widths of the bands of a record of the fit: of the model alone, and of a new measurement.
+    fn bands<'py>(
+        &self,
+        py: Python<'py>,
+        estimate: &Estimate,
+        record: usize,
+        probability: f64,
+    ) -> PyResult<(Arrays<'py>, Arrays<'py>)> {
+        let found = self.whole(py, || diagnose::bands(&self.problem, &estimate.0, record, probability))?;
+        let arrays = |columns: Vec<Vec<f64>>| columns.into_iter().map(|one| PyArray1::from_vec(py, one)).collect();
+        Ok((arrays(found.confidence), arrays(found.prediction)))
+    }
+}
+
+impl Problem {
+    /// Work that is whole or an exception.
+    fn whole<T: Send>(&self, py: Python<'_>, work: impl FnOnce() -> Result<T, greybox::Error> + Send) -> PyResult<T> {
+        self.progress.cancel.store(false, Ordering::Relaxed);
+        let ended = interruptible(py, &self.progress, None, work)?;
+        ended.interrupted.map_or(ended.result.map_err(raised), Err)
+    }
+}
+
+/// Notes how far a search is.
+struct Watch(Progress);
+
+impl Observe<LeastSquaresState> for Watch {
+    fn observe_iter(&mut self, state: &LeastSquaresState, _: &KV) -> Result<(), argmin::core::Error> {
+        self.0.done.fetch_add(1, Ordering::Relaxed);
+        self.0.cost.store(state.get_best_cost().to_bits(), Ordering::Relaxed);
+        Ok(())
+    }
+}
