@@ -49,10 +49,11 @@ from numpy import (
     tanh,
 )
 
-from greybox import pmsm
+from greybox import dask, pmsm, spark
 from greybox._core import Parameter, __version__
 from greybox.errors import Error, FitWarning, TraceError
 from greybox.fitting import fit, simulate
+from greybox.fleets import fleet
 from greybox.model import Equations, Model, model
 from greybox.numpy_functions import interp, interp2
 from greybox.parameters import fixed, free
@@ -87,8 +88,10 @@ __all__ = [
     "clip",
     "cos",
     "cosh",
+    "dask",
     "exp",
     "fit",
+    "fleet",
     "fixed",
     "free",
     "hypot",
@@ -105,6 +108,7 @@ __all__ = [
     "simulate",
     "sin",
     "sinh",
+    "spark",
     "sqrt",
     "tan",
     "tanh",

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import sys
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -13,11 +14,11 @@ import numpy as np
 from greybox import _core
 from greybox.errors import Error, FitWarning
 from greybox.frames import Frame
-from greybox.model import Model
-from greybox.options import Noise, options
-from greybox.parameters import Parameter, declared
+from greybox.model import Model, checked
+from greybox.options import Noise, settings
+from greybox.parameters import Parameter, declared, together
 from greybox.progress import Progress
-from greybox.records import Initial, Record, records
+from greybox.records import Hold, Initial, Record, records
 from greybox.result import Fit
 from greybox.signals import named, near
 
@@ -33,14 +34,16 @@ def fit(
     time: str | None = None,
     sample_time: float | None = None,
     columns: Mapping[str, str] | None = None,
-    hold: Literal["zero", "first"] = "zero",
+    hold: Hold = "zero",
     initial: Initial = "estimated",
     noise: Noise | None = None,
     input_noise: Mapping[str, float] | None = None,
     loss: str | None = None,
+    weighting: Callable[..., Any] | None = None,
     prefilter: str | None = None,
     integrator: str | None = None,
     predictor: str | None = None,
+    optimizer: str | None = None,
     starts: int | None = None,
     time_limit: float | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
@@ -69,16 +72,21 @@ def fit(
         The standard deviation of the noise of each input. It changes no estimate: the bias that it causes is estimated, and a
         warning names it.
     loss : str, optional
-        What errors cost: ``"squared"`` (the default), or, against outliers, ``"huber"``, ``"soft_l1"``, ``"cauchy"``, ``"tukey"``, each
-        with a tuning constant if wanted, ``"huber:1.345"``.
+        What errors cost: ``"squared"`` (the default), or, against outliers, ``"huber"``, ``"soft-l1"``, ``"cauchy"``, ``"tukey"``, with
+        a tuning constant if wanted: ``"huber:1.345"``.
+    weighting : callable, optional
+        A weight for the cost of each sample, ``lambda t, u, y: abs(u.w)``: it is read with symbols of time, inputs and measured
+        outputs. It is not an inverse variance.
     prefilter : str, optional
-        A Butterworth filter of errors and slopes: ``"low_pass:ORDER:HERTZ"`` or ``"high_pass:ORDER:HERTZ"``.
+        A Butterworth filter of errors and slopes, with order and cut-off (Hz): ``"low-pass:4,100"`` or ``"high-pass:2,0.5"``.
     integrator : str, optional
-        ``"rk4"``, ``"rk4:4"`` (steps per sample), ``"rk45"`` (adaptive), ``"esdirk"`` (stiff). Without it, the step is refined until it
-        no longer matters.
+        ``"rk4:4"`` (steps per sample), ``"rk45:1e-8"`` (adaptive, relative tolerance), ``"esdirk"`` (stiff). Without it, the step is
+        refined until it no longer matters.
     predictor : str, optional
         Which prediction error is minimized: of a ``"simulation"`` (the default), ``"horizon:5"`` (five samples ahead of a measured
         state), or ``"kalman"`` (one-step errors; models that are affine in their state, with `diffusion` and `noise`).
+    optimizer : str, optional
+        ``"levenberg-marquardt"`` or ``"gauss-newton"``.
     starts : int, optional
         Search from so many starts within the bounds.
     time_limit : float, optional
@@ -117,20 +125,23 @@ def fit(
     >>> round(found.parameters.k, 3), found.verdict
     (0.3, 'usable')
     """
-    equations = _model(model).equations()
-    given = _declarations(parameters, declarations)
-    chosen = options(
-        named(equations.inputs, "inputs"),
-        named(equations.outputs, "outputs"),
-        noise=noise,
-        input_noise=input_noise,
-        loss=loss,
-        prefilter=prefilter,
-        integrator=integrator,
-        predictor=predictor,
-        starts=starts,
-        time_limit=time_limit,
-        checkpoint=checkpoint,
+    equations = checked(model).equations()
+    given = together(parameters, declarations, inspect.signature(fit).parameters)
+    chosen = settings(
+        equations,
+        {
+            "noise": noise,
+            "input_noise": input_noise,
+            "loss": loss,
+            "weighting": weighting,
+            "prefilter": prefilter,
+            "integrator": integrator,
+            "predictor": predictor,
+            "optimizer": optimizer,
+            "starts": starts,
+            "time_limit": time_limit,
+            "checkpoint": checkpoint,
+        },
     )
     what = Record(None, None, time, sample_time, columns, hold, initial)
     several = records(data, what)
@@ -142,32 +153,6 @@ def fit(
     found = Fit(equations, cores, declared_, chosen, Frame(several[0].data).kind, estimate, problem)
     warn(found.warnings)
     return found
-
-
-def _model(model: Any) -> Model:
-    if isinstance(model, Model):
-        return model
-    if isinstance(model, type) and issubclass(model, Model):
-        raise Error(f"the model is the class {model.__name__}; make one of it: {model.__name__}()")
-    raise Error(f"the model is {type(model).__name__}; derive a class from gb.Model, or make one of functions by gb.model(f, states=..., ...)")
-
-
-def _declarations(parameters: Mapping[str, Parameter] | None, declarations: Mapping[str, Parameter]) -> dict[str, Parameter]:
-    given = dict(parameters or {})
-    for name, value in declarations.items():
-        if name in given:
-            raise Error(f"parameter `{name}` is declared twice, in parameters and by name; leave one out")
-        if not isinstance(value, Parameter) and name not in given:
-            _not_an_option(name, value)
-        given[name] = value
-    return given
-
-
-def _not_an_option(name: str, value: Any) -> None:
-    code = fit.__code__
-    known = code.co_varnames[2 : code.co_argcount + code.co_kwonlyargcount]
-    if not isinstance(value, (int, float)) and near(name, known).endswith("?"):
-        raise Error(f"there is neither an option nor a parameter `{name}`; options are: {near(name, known)}")
 
 
 def warn(all_: list[FitWarning]) -> None:
@@ -192,9 +177,10 @@ def simulate(
     time: str | None = None,
     sample_time: float | None = None,
     columns: Mapping[str, str] | None = None,
+    hold: Literal["zero", "first"] = "zero",
     integrator: str | None = None,
 ) -> Any:
-    """Simulate a model, its inputs held from sample to sample.
+    """Simulate a model.
 
     Parameters
     ----------
@@ -210,7 +196,7 @@ def simulate(
         The standard deviation of white noise that is added to each output; none where it is left out.
     seed : int
         Of the noise: the same seed gives the same noise.
-    time, sample_time, columns
+    time, sample_time, columns, hold
         Of the frame, as in :class:`Record`.
     integrator : str, optional
         As in :func:`fit`; one step of Runge-Kutta 4 per sample without it.
@@ -225,7 +211,7 @@ def simulate(
     Error
         If the simulation fails, or something that is given does not fit the model.
     """
-    equations = _model(model).equations()
+    equations = checked(model).equations()
     frame = Frame(data)
     inputs, outputs = named(equations.inputs, "inputs"), named(equations.outputs, "outputs")
     states, names = named(equations.states, "states"), named(equations.parameters, "parameters")
@@ -238,8 +224,7 @@ def simulate(
         if unknown:
             raise Error(f"{what} names `{unknown[0]}`, and the model has: {near(unknown[0], known)}")
     start = [float((initial or {}).get(name, 0.0)) for name in states]
-    chosen = options(inputs, outputs, integrator=integrator)["integrator"]
-    found = equations.core.simulate(values, start, t, given, chosen)
+    found = equations.core.simulate(values, start, t, given, hold, integrator)
     if noise:
         found = found.with_noise([float(noise.get(name, 0.0)) for name in outputs], seed)
     columns_ = dict(zip([*inputs, *outputs], [*found.inputs(), *found.outputs()], strict=True))

@@ -71,37 +71,59 @@ class Frame:
             return _numbers(self._frame.get_column(name), name)
         return _array_numbers(self._arrays[name], name)
 
+    def values(self, name: str) -> Any:
+        """Give a column as it is."""
+        values = self._arrays[name] if self._arrays is not None else self._frame.get_column(name).to_numpy()
+        return np.asarray(values)
+
     def time(self, name: str | None, sample_time: float | None, rows: int) -> Array:
         """Give the time of each row in seconds; of dates, since the first.
 
         Raises
         ------
         Error
-            If there is no time, or it is neither numbers nor dates.
+            If there is no time, it is neither numbers nor dates, or dates do not increase.
         """
         if sample_time is not None:
             if not (np.isfinite(sample_time) and sample_time > 0.0):
                 raise Error(f"the sample time is {sample_time!r}; it must be positive and finite (s)")
-            return np.arange(rows) * float(sample_time)
+            return np.arange(rows, dtype=np.float64) * float(sample_time)
+        stamps, what = self.stamps(name)
+        return _since_first(stamps.astype(np.int64), what) if stamps.dtype.kind == "m" else stamps
+
+    def stamps(self, name: str | None) -> tuple[Any, str]:
+        """Give the time of each row as it stands, in seconds or as a duration in nanoseconds, and where it stands.
+
+        Raises
+        ------
+        Error
+            If there is none, or it is neither numbers nor dates.
+        """
+        index = getattr(self.index, "name", None)
         if name is None:
-            found = next((one for one in _TIMES if one in self), None)
-            if found is None and self.index is not None:
-                return _seconds(self.index, "the index")
-            if found is None:
+            name = time_column(self.names)
+            if name is None and self.index is None:
                 raise Error(
                     f"there is no column `t` or `time`, and no index of times; the frame has: {near('t', self.names)}. Name the column "
                     'by time="...", or give the time between samples (s) by sample_time=...'
                 )
-            name = found
-        elif name not in self and self.index is not None and name == getattr(self.index, "name", None):
-            return _seconds(self.index, f"the index `{name}`")
+        if name is None or (name not in self and name == index):
+            what = "the index" if index is None else f"the index `{index}`"
+            return _stamps(self.index, what), what
         if name not in self:
             raise Error(f"there is no column `{name}` for the time; the frame has: {near(name, self.names)}")
-        if self._arrays is None:
-            column = self._frame.get_column(name)
-            dated = _dated(column)
-            return _numbers(column, name) if dated is None else _since_first(dated, f"column `{name}`")
-        return _seconds(self._arrays[name], f"column `{name}`")
+        what = f"column `{name}`"
+        if self._arrays is not None:
+            return _stamps(self._arrays[name], what), what
+        column = self._frame.get_column(name)
+        dated = _dated(column)
+        return (_stamps(column.to_numpy(), what) if dated is None else dated), what
+
+
+def time_column(names: Iterable[str]) -> str | None:
+    """Give the column of the time by its usual names; `None` if there is none."""
+    there = set(names)
+    return next((one for one in _TIMES if one in there), None)
 
 
 class Native:
@@ -113,7 +135,8 @@ class Native:
     def __call__(self, columns: Mapping[str, Any]) -> Any:
         import narwhals as nw
 
-        return nw.from_dict(dict(columns), backend=self.library).to_native()
+        backend: Any = self.library
+        return nw.from_dict(dict(columns), backend=backend).to_native()
 
 
 def _narwhals(data: Any) -> Any:
@@ -151,7 +174,7 @@ def _dated(column: Any) -> Any:
         return None
     if missing:
         raise Error(f"column `{column.name}` has rows without a time; drop them")
-    return stamps.to_numpy()
+    return stamps.to_numpy().astype("timedelta64[ns]")
 
 
 def _numbers(column: Any, name: str) -> Array:
@@ -191,36 +214,35 @@ def _refuse(text: str) -> bool:
     raise TypeError(text)
 
 
-def _seconds(values: Any, what: str) -> Array:
-    """Give times in seconds: numbers as they are, dates since the first."""
+def _stamps(values: Any, what: str) -> Any:
+    """Give times as they stand: numbers (s), or durations since an instant (ns)."""
     if getattr(values, "tz", None) is not None:
         values = values.tz_convert("UTC").tz_localize(None)
     array = np.asarray(values)
     if array.dtype.kind in "mM":
         if np.isnat(array).any():
             raise Error(f"{what} has rows without a time; drop them")
-        return _since_first(array.astype("datetime64[ns]" if array.dtype.kind == "M" else "timedelta64[ns]").astype(np.int64), what)
-    if array.dtype.kind not in "fiu":
-        first = array[:1].tolist()
-        raise Error(
-            f"{what} has {first[0]!r} ({array.dtype}), which is neither a number (s) nor a date; convert it first, such as by "
-            "pandas.to_datetime, or give the time between samples by sample_time=..."
-            if first
-            else f"{what} is empty"
-        )
-    return np.ascontiguousarray(array, dtype=np.float64)
+        of = array.astype("datetime64[ns]") if array.dtype.kind == "M" else array.astype("timedelta64[ns]")
+        return of.astype(np.int64).astype("timedelta64[ns]")
+    if array.dtype.kind in "fiu":
+        return np.ascontiguousarray(array, dtype=np.float64)
+    shown = f"has {array.tolist()[0]!r} ({array.dtype})" if array.size else "is empty"
+    raise Error(
+        f"{what} {shown}, which is neither a number (s) nor a date; convert it first, such as by pandas.to_datetime, or give the time "
+        "between samples by sample_time=..."
+    )
 
 
-def _since_first(nanoseconds: Any, what: str) -> Array:
-    stamps = np.asarray(nanoseconds, dtype=np.int64)
-    if len(stamps) > 1 and (np.diff(stamps) <= 0).any():
+def _since_first(stamps: Any, what: str) -> Array:
+    if (np.diff(stamps) <= 0).any():
         k = int(np.argmax(np.diff(stamps) <= 0)) + 1
         jump = (stamps[k] - stamps[k - 1]) / 1e9
         raise Error(
             f"{what} does not increase: row {k} (from zero) is {jump:g} s after the row before it. Sort the rows and drop repeated ones; "
             "where clocks were set back for winter, give the times their zone (tz_localize)"
         )
-    return (stamps - (stamps[0] if len(stamps) else 0)) / 1e9
+    seconds: Array = (stamps - (stamps[0] if len(stamps) else 0)) / 1e9
+    return seconds
 
 
 def is_readonly(array: Array) -> bool:

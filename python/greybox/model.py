@@ -177,6 +177,21 @@ def model(
     return _Functions(given, {"states": states, "inputs": inputs, "outputs": outputs, "parameters": parameters})
 
 
+def checked(of: Any) -> Model:
+    """Give what is a model.
+
+    Raises
+    ------
+    Error
+        If it is none.
+    """
+    if isinstance(of, Model):
+        return of
+    if isinstance(of, type) and issubclass(of, Model):
+        raise Error(f"the model is the class {of.__name__}; make one of it: {of.__name__}()")
+    raise Error(f"the model is {type(of).__name__}; derive a class from gb.Model, or make one of functions: gb.model(f, states=..., ...)")
+
+
 def _roles(of: Model) -> list[tuple[str, SignalsLike]]:
     return [("states", of.states), ("inputs", of.inputs), ("outputs", of.outputs), ("parameters", of.parameters)]
 
@@ -265,3 +280,27 @@ def _returned(trace: Trace, found: Any, names: tuple[str, ...], where: str) -> l
         nodes.append(trace.node(entry))
     return nodes
 
+
+def of_sample(equations: Equations, function: Callable[..., Any]) -> _core.Expression:
+    """Read a function of time, inputs and measured outputs."""
+    return _expression(function, "the weighting", equations, [("inputs", "input"), ("outputs", "measured")], time=True)
+
+
+def of_parameters(equations: Equations, function: Callable[..., Any]) -> _core.Expression:
+    """Read a function of the parameters."""
+    return _expression(function, "the derived quantity", equations, [("parameters", "parameter")], time=False)
+
+
+def _expression(
+    function: Callable[..., Any], what: str, equations: Equations, roles: list[tuple[str, str]], *, time: bool
+) -> _core.Expression:
+    trace = Trace()
+    arguments: list[Any] = [Symbol(trace, trace.graph.time())] if time else []
+    for role, leaf in roles:
+        names = named(getattr(equations, role), role)
+        arguments.append(Vector(role, names, [Symbol(trace, getattr(trace.graph, leaf)(i)) for i in range(len(names))]))
+    try:
+        (node,) = _returned(trace, function(*arguments), ("value",), what)
+        return _core.Expression(trace.graph, node)
+    finally:
+        trace.open = False

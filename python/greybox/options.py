@@ -3,29 +3,23 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from typing import Any, Literal, TypeAlias
+from collections.abc import Callable, Mapping
+from typing import Any, Literal, TypeAlias, TypedDict
 
 from greybox.errors import Error
-from greybox.signals import Signals, near
+from greybox.model import Equations, of_sample
+from greybox.signals import Signals, named, near
 
-__all__ = ["Noise", "options"]
+__all__ = ["Noise", "Options", "settings"]
 
 #: What is said of the noise of the outputs: a standard deviation for each, or that the covariance of all is estimated.
 Noise: TypeAlias = "Mapping[str, float] | Literal['covariance']"
 
 
-def _named(what: str, text: str | None) -> tuple[str, list[float]] | None:
-    """Take ``"huber:1.345"`` apart."""
-    if text is None:
-        return None
-    if not isinstance(text, str):
+def _name(what: str, text: str | None) -> str | None:
+    if text is not None and not isinstance(text, str):
         raise Error(f"{what} is {text!r}; give its name as text")
-    name, *numbers = text.split(":")
-    try:
-        return name, [float(number) for number in numbers]
-    except ValueError:
-        raise Error(f"{what} is {text!r}; after the name and a colon there are numbers, as in \"huber:1.345\"") from None
+    return text
 
 
 def _levels(what: str, given: Mapping[str, float] | None, signals: Signals) -> list[float] | None:
@@ -40,34 +34,39 @@ def _levels(what: str, given: Mapping[str, float] | None, signals: Signals) -> l
     return [float(given[name]) for name in signals]
 
 
-def options(
-    inputs: Signals,
-    outputs: Signals,
-    *,
-    noise: Noise | None = None,
-    input_noise: Mapping[str, float] | None = None,
-    loss: str | None = None,
-    prefilter: str | None = None,
-    integrator: str | None = None,
-    predictor: str | None = None,
-    starts: int | None = None,
-    time_limit: float | None = None,
-    checkpoint: str | os.PathLike[str] | None = None,
-) -> dict[str, Any]:
-    """Give the settings by the names of the compiled library."""
+class Options(TypedDict, total=False):
+    """The options of a fit, as :func:`greybox.fit` describes them."""
+
+    noise: Noise | None
+    input_noise: Mapping[str, float] | None
+    loss: str | None
+    weighting: Callable[..., Any] | None
+    prefilter: str | None
+    integrator: str | None
+    predictor: str | None
+    optimizer: str | None
+    starts: int | None
+    time_limit: float | None
+    checkpoint: str | os.PathLike[str] | None
+
+
+def settings(equations: Equations, given: Options) -> dict[str, Any]:
+    """Give the options as the compiled library takes them."""
+    inputs, outputs = named(equations.inputs, "inputs"), named(equations.outputs, "outputs")
+    noise, starts = given.get("noise"), given.get("starts")
     if isinstance(noise, str) and noise != "covariance":
         raise Error(f'noise is {noise!r}; give a standard deviation for each output, {{"name": 0.1}}, or "covariance"')
     if starts is not None and (not isinstance(starts, int) or starts < 1):
         raise Error(f"starts is {starts!r}; take a whole number of 1 or more")
+    weighting, checkpoint = given.get("weighting"), given.get("checkpoint")
+    names = ("loss", "prefilter", "integrator", "predictor", "optimizer")
     return {
         "noise": None if isinstance(noise, str) else _levels("noise", noise, outputs),
         "noise_covariance": noise == "covariance",
-        "input_noise": _levels("input_noise", input_noise, inputs),
-        "loss": _named("loss", loss),
-        "prefilter": _named("prefilter", prefilter),
-        "integrator": _named("integrator", integrator),
-        "predictor": _named("predictor", predictor),
+        "input_noise": _levels("input_noise", given.get("input_noise"), inputs),
+        "weighting": None if weighting is None else of_sample(equations, weighting),
         "starts": starts,
-        "time_limit": time_limit,
+        "time_limit": given.get("time_limit"),
         "checkpoint": None if checkpoint is None else (os.fspath(checkpoint), 1),
+        **{name: _name(name, given.get(name)) for name in names},  # type: ignore[arg-type]
     }

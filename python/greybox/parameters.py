@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from greybox._core import Parameter
@@ -70,3 +70,21 @@ def declared(given: Mapping[str, Any], names: Signals, what: str = "parameter") 
     if missing:
         raise Error(f"{what} `{missing[0]}` is not declared; write {missing[0]}=gb.free(start) to estimate it, or gb.fixed(value)")
     return [given[name] for name in names]
+
+
+def together(parameters: Mapping[str, Parameter] | None, by_name: Mapping[str, Parameter], options: Iterable[str]) -> dict[str, Parameter]:
+    """Give the declarations of a mapping and those by name, which may be misspelled options.
+
+    Raises
+    ------
+    Error
+        If a parameter is declared twice, or what stands by name is no declaration.
+    """
+    given = dict(parameters or {})
+    for name, value in by_name.items():
+        if name in given:
+            raise Error(f"parameter `{name}` is declared twice, in parameters and by name; leave one out")
+        if not isinstance(value, (Parameter, int, float)):
+            raise Error(f"there is no option `{name}`, and {type(value).__name__} declares no parameter; options are: {near(name, options)}")
+        given[name] = value
+    return given

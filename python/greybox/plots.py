@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def _figure(rows: int, columns: int = 1, *, share: bool = True) -> tuple[Any, Any]:
+def _figure(rows: int, columns: int = 1, *, share: bool = True) -> tuple[Figure, Any]:
     try:
         import matplotlib.pyplot as plt
     except ImportError:

@@ -15,7 +15,10 @@ from greybox.model import Equations
 from greybox.parameters import Parameter, declared
 from greybox.signals import Signals, named
 
-__all__ = ["Initial", "Record"]
+__all__ = ["Hold", "Initial", "Record", "records"]
+
+#: The inputs between samples, of all or by the name of each.
+Hold: TypeAlias = "Literal['zero', 'first'] | Mapping[str, Literal['zero', 'first']]"
 
 #: What is said of the state at the first sample.
 Initial: TypeAlias = "Literal['estimated', 'first'] | Mapping[str, Parameter]"
@@ -39,8 +42,9 @@ class Record:
         The time between samples (s), where there is no column.
     columns : mapping from str to str, optional
         The column of a signal, where it has another name: ``{"w": "speed"}``.
-    hold : {"zero", "first"}
-        The inputs between samples: constant, as a digital controller commands them, or straight lines.
+    hold : {"zero", "first"}, or mapping from input to these
+        The inputs between samples: constant, as a digital controller commands them, or straight lines, as measured quantities go.
+        Inputs that a mapping leaves out are constant.
     initial : {"estimated", "first"} or mapping from str to Parameter
         The state at the first sample: estimated, computed from the first sample, or declared for each state by
         :func:`~greybox.free` and :func:`~greybox.fixed`.
@@ -51,7 +55,7 @@ class Record:
     time: str | None = None
     sample_time: float | None = None
     columns: Mapping[str, str] | None = None
-    hold: Literal["zero", "first"] = "zero"
+    hold: Hold = "zero"
     initial: Initial = "estimated"
 
     def core(self, equations: Equations, name: str, *, outputs: bool = True) -> _core.Record:
@@ -71,16 +75,15 @@ class Record:
             time = frame.time(self.time, self.sample_time, rows)
             _check_lengths({**{of[signal]: column for signal, column in {**columns, **found}.items()}}, time)
             missing = np.full(len(time), np.nan)
-            initial = self.initial
-            if not isinstance(initial, str):
-                initial = declared(initial, _states(equations), "initial state of")
+            given = self.initial
+            initial = given if isinstance(given, str) else declared(given, _states(equations), "initial state of")
             return _core.Record(
                 equations.core,
                 self.name or name,
                 time,
                 [_shared(columns[signal]) for signal in inputs],
                 [_shared(found.get(signal, missing)) for signal in measured],
-                self.hold,
+                self.hold if isinstance(self.hold, str) else dict(self.hold),
                 initial,
             )
         except Error as error:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import html
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,17 +14,28 @@ import numpy as np
 from greybox import _core
 from greybox.errors import Error, FitWarning
 from greybox.frames import Array, Kind
-from greybox.model import Equations
+from greybox.model import Equations, of_parameters
 from greybox.parameters import Parameter
 from greybox.profile import Profile
 from greybox.records import Record
 from greybox.report import Report
-from greybox.signals import Values, named, near
+from greybox.signals import Values, Vector, named, near
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Fit"]
+__all__ = ["Derived", "Fit"]
+
+@dataclass(frozen=True)
+class Derived:
+    """A quantity that was computed from the parameters, with its standard error and 95 % interval; NaN where there is none."""
+
+    name: str
+    value: float
+    standard_error: float
+    lower: float
+    upper: float
+
 
 VERDICTS = {"usable": "usable", "usable_with_care": "usable with care", "not_usable": "not usable"}
 
@@ -140,6 +152,20 @@ class Fit:
         if found is None:
             raise Error(f"`{name}` has no interval of probability {probability!r}; the printed fit says what is known of it")
         return found
+
+    def derived(self, name: str, function: Callable[[Vector], Any]) -> Derived:
+        """Compute a function of the parameters, with the interval that their covariance gives it.
+
+        Parameters
+        ----------
+        name : str
+            What it is called.
+        function : callable
+            Of the vector of parameters: ``lambda p: p.ls / p.rs``. It is read with symbols, as a model is.
+        """
+        value, error, interval = self._estimate.derived(name, of_parameters(self._equations, function))
+        lower, upper = interval or (float("nan"), float("nan"))
+        return Derived(name, value, _number(error), lower, upper)
 
     def to_dict(self) -> dict[str, Any]:
         """Give all that was found as dicts, lists and numbers; the JSON of ``schema/estimate.schema.json``."""

@@ -113,7 +113,8 @@ def each(function: Callable[..., Any], *operands: Any) -> Any:
         return function(*operands)
     together = np.broadcast(*arrays)
     results = np.empty(together.shape, dtype=object)
-    results.flat = [function(*entries) for entries in together]
+    for place, entries in enumerate(together):
+        results.flat[place] = function(*entries)
     return results
 
 

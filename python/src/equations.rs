@@ -2,12 +2,11 @@
 
 use crate::convert::{name_of, named, raised};
 use crate::graph::{Graph, Node};
-use crate::record::Record;
-use crate::settings::stepping;
+use crate::record::{Record, hold_of};
 use greybox::graph::Id;
 use greybox::layout::{Layout, Quantity};
-use greybox::problem::EquationsFit;
 use greybox::record::Time;
+use greybox::{Fit, fixed};
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -89,6 +88,8 @@ impl Equations {
     }
 
     /// Simulates; the inputs are columns.
+    #[expect(clippy::too_many_arguments, reason = "named in Python")]
+    #[expect(clippy::needless_pass_by_value, reason = "arguments of Python come as values")]
     fn simulate(
         &self,
         py: Python<'_>,
@@ -96,15 +97,20 @@ impl Equations {
         initial: Vec<f64>,
         time: PyReadonlyArray1<'_, f64>,
         inputs: Vec<PyReadonlyArray1<'_, f64>>,
-        integrator: Option<(String, Vec<f64>)>,
+        hold: &str,
+        integrator: Option<&str>,
     ) -> PyResult<Record> {
         let stamps = time.as_array().to_vec();
         let columns: Vec<Vec<f64>> = inputs.iter().map(|column| column.as_array().to_vec()).collect();
         let rows: Vec<Vec<f64>> = (0..stamps.len())
             .map(|k| columns.iter().map(|column| column.get(k).copied().unwrap_or(f64::NAN)).collect())
             .collect();
-        let fit = stepping(EquationsFit::new(self.0.clone()), integrator.as_ref(), None)?;
-        let simulated = py.detach(|| fit.simulate(&parameters, &initial, Time::from_stamps(stamps), &rows));
+        let hold = hold_of(hold)?;
+        let mut fit = Fit::new(&*self.0, &[]).parameters(parameters.into_iter().map(fixed).collect());
+        if let Some(name) = integrator {
+            fit = fit.integrator_by_name(name).map_err(raised)?;
+        }
+        let simulated = py.detach(|| fit.simulate(&initial, Time::from_stamps(stamps), hold, &rows));
         Ok(Record { record: simulated.map_err(raised)?, equations: self.clone() })
     }
 }

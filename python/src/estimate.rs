@@ -1,7 +1,9 @@
 //! [`Estimate`]: what a fit found.
 
 use crate::convert::{name_of, raised};
+use crate::graph::Expression;
 use greybox::Knowledge;
+use greybox::diagnose::derived_by;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -108,6 +110,13 @@ impl Estimate {
     /// Interval of an unknown with this probability.
     fn interval(&self, name: &str, probability: f64) -> Option<(f64, f64)> {
         self.0.interval(name, probability)
+    }
+
+    /// Value, standard error and interval of a function of the parameters.
+    #[expect(clippy::type_complexity, reason = "a tuple for Python")]
+    fn derived(&self, name: &str, expression: &Expression) -> (f64, Option<f64>, Option<(f64, f64)>) {
+        let found = derived_by(&self.0, name, &expression.graph, expression.root);
+        (found.value, found.standard_error, found.interval)
     }
 
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {

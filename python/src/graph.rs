@@ -4,11 +4,39 @@ use crate::convert::{named, raised};
 use greybox::graph::{Function, Function2, Id, Leaf};
 use greybox::scalar::{Comparison, Extrapolation, Interpolation};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use serde::{Deserialize, Serialize};
 
 /// A node of a graph.
 #[pyclass(frozen, module = "greybox._core")]
 #[derive(Clone, Copy)]
 pub struct Node(pub Id);
+
+/// A function of quantities: a graph and a root of it.
+#[pyclass(frozen, module = "greybox._core", from_py_object)]
+#[derive(Clone, Serialize, Deserialize)]
+pub struct Expression {
+    pub graph: greybox::graph::Graph,
+    pub root: Id,
+}
+
+#[pymethods]
+impl Expression {
+    #[new]
+    fn new(graph: &Graph, root: &Node) -> Self {
+        Expression { graph: graph.0.clone(), root: root.0 }
+    }
+
+    #[staticmethod]
+    fn from_bytes(bytes: &[u8]) -> PyResult<Self> {
+        serde_json::from_slice(bytes).map_err(raised)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let bytes = serde_json::to_vec(slf.get()).map_err(raised)?;
+        Ok((slf.get_type().getattr("from_bytes")?, (PyBytes::new(slf.py(), &bytes),)))
+    }
+}
 
 /// A function known at points, of one argument or two.
 #[pyclass(frozen, module = "greybox._core")]
@@ -63,6 +91,10 @@ impl Graph {
 
     fn input(&mut self, i: u32) -> Node {
         Node(self.0.leaf(Leaf::Input(i)))
+    }
+
+    fn measured(&mut self, i: u32) -> Node {
+        Node(self.0.leaf(Leaf::Measured(i)))
     }
 
     fn parameter(&mut self, i: u32) -> Node {

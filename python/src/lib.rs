@@ -21,6 +21,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<graph::Graph>()?;
     module.add_class::<graph::Node>()?;
     module.add_class::<graph::Table>()?;
+    module.add_class::<graph::Expression>()?;
     module.add_class::<equations::Equations>()?;
     module.add_class::<record::Record>()?;
     module.add_class::<settings::Parameter>()?;

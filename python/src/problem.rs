@@ -6,12 +6,11 @@ use crate::equations::Equations;
 use crate::estimate::Estimate;
 use crate::record::Record;
 use crate::run::{Progress, interruptible};
-use crate::settings::{Options, Parameter, stepping};
+use crate::settings::{Options, Parameter};
 use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::KV;
 use greybox::diagnose;
 use greybox::optimize::LeastSquaresState;
-use greybox::problem::EquationsFit;
 use numpy::PyArray1;
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
@@ -40,14 +39,11 @@ impl Problem {
         parameters: Vec<Parameter>,
         options: Options,
     ) -> PyResult<Self> {
-        let fit = EquationsFit::new(equations.0.clone());
-        let fit = stepping(fit, options.integrator.as_ref(), options.predictor.as_ref())?;
         let progress = Progress::default();
-        let settings = options.settings()?.cancel(progress.cancel.clone());
-        let settings = settings.observe(Watch(progress.clone()), ObserverMode::Always);
-        let records = records.into_iter().map(|record| record.record).collect();
-        let parameters: Vec<greybox::Parameter> = parameters.iter().map(|one| one.0).collect();
-        Ok(Problem { problem: fit.problem(records, &parameters, settings).map_err(raised)?, progress })
+        let records: Vec<_> = records.into_iter().map(|record| record.record).collect();
+        let fit = options.fit(&equations.0, &records, &parameters)?.cancel(progress.cancel.clone());
+        let fit = fit.observe(Watch(progress.clone()), ObserverMode::Always);
+        Ok(Problem { problem: fit.problem().map_err(raised)?, progress })
     }
 
     /// Searches. Where Ctrl-C ended it, the estimate is the best so far, and says so.

@@ -9,6 +9,7 @@ use greybox::record::{Channel, Column, Initial, Time};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
+use std::collections::BTreeMap;
 
 /// One measured record.
 #[pyclass(frozen, module = "greybox._core", from_py_object)]
@@ -32,6 +33,22 @@ impl Times<'_> {
             Times::Uniform((start, step)) => Time::Uniform { start: *start, step: *step },
             Times::Stamps(stamps) => Time::from_stamps(stamps.as_array().to_vec()),
         }
+    }
+}
+
+/// The hold of all inputs, or of each by its name.
+#[derive(FromPyObject)]
+enum Holds {
+    All(String),
+    Each(BTreeMap<String, String>),
+}
+
+/// The hold of this name.
+pub fn hold_of(name: &str) -> PyResult<Hold> {
+    match name {
+        "zero" => Ok(Hold::Zero),
+        "first" => Ok(Hold::First),
+        other => Err(raised(format!("there is no hold `{other}`; take zero (constant) or first (straight lines)"))),
     }
 }
 
@@ -85,7 +102,7 @@ type Columns<'py> = Vec<(Bound<'py, PyArray1<f64>>, bool)>;
 impl Record {
     /// A record for these equations: time, and a column per input and output, in their order.
     #[new]
-    #[pyo3(signature = (equations, name, time, inputs, outputs, hold="zero", initial=Start::Named("estimated".to_owned())))]
+    #[pyo3(signature = (equations, name, time, inputs, outputs, holds=Holds::All("zero".to_owned()), initial=Start::Named("estimated".to_owned())))]
     #[expect(clippy::needless_pass_by_value, reason = "arguments of Python come as values")]
     fn new(
         equations: Equations,
@@ -93,17 +110,12 @@ impl Record {
         time: Times<'_>,
         inputs: Columns<'_>,
         outputs: Columns<'_>,
-        hold: &str,
+        holds: Holds,
         initial: Start,
     ) -> PyResult<Self> {
         let layout = equations.0.layout();
         let (inputs, outputs) = (channels(&layout.inputs, &inputs), channels(&layout.outputs, &outputs));
         let record = greybox::record::Record::new(layout.states.clone(), time.time(), inputs, outputs);
-        let hold = match hold {
-            "zero" => Hold::Zero,
-            "first" => Hold::First,
-            other => return Err(raised(format!("there is no hold `{other}`; take zero (constant) or first (straight lines)"))),
-        };
         let initial = match initial {
             Start::Given(given) => Initial::Given(given.iter().map(|one| one.0).collect()),
             Start::Named(name) if name == "estimated" => Initial::Estimated,
@@ -113,7 +125,15 @@ impl Record {
                 return Err(raised(text));
             }
         };
-        let record = record.map_err(raised)?.named(name).hold(hold).initial(initial).map_err(raised)?;
+        let mut record = record.map_err(raised)?.named(name).initial(initial).map_err(raised)?;
+        match holds {
+            Holds::All(hold) => record = record.hold(hold_of(&hold)?),
+            Holds::Each(each) => {
+                for (input, hold) in &each {
+                    record = record.hold_of(input, hold_of(hold)?).map_err(raised)?;
+                }
+            }
+        }
         Ok(Record { record, equations })
     }
 
@@ -125,14 +145,18 @@ impl Record {
             Time::Uniform { start, step } => (*start, *step).into_pyobject(py)?.into_any(),
             Time::Stamps(stamps) => PyArray1::from_slice(py, stamps).into_any(),
         };
-        let hold = if record.input_hold() == Hold::First { "first" } else { "zero" };
+        let hold = |(i, channel): (usize, &Channel)| {
+            let hold = if record.input_hold(i) == Hold::First { "first" } else { "zero" };
+            (channel.name.clone(), hold)
+        };
+        let holds: BTreeMap<String, &str> = record.inputs().iter().enumerate().map(hold).collect();
         let initial = match record.initial_state() {
             Initial::Estimated => "estimated".into_pyobject(py)?.into_any(),
             Initial::FirstSample => "first".into_pyobject(py)?.into_any(),
             Initial::Given(given) => given.iter().map(|one| Parameter(*one)).collect::<Vec<_>>().into_pyobject(py)?,
         };
         let (inputs, outputs) = (shared(slf.get().inputs(py)), shared(slf.get().outputs(py)));
-        let state = (equations.clone(), record.name(), time, inputs, outputs, hold, initial);
+        let state = (equations.clone(), record.name(), time, inputs, outputs, holds, initial);
         Ok((slf.get_type().into_any(), state.into_pyobject(py)?))
     }
 

@@ -1,15 +1,14 @@
 //! What a fit is told: parameters, integrator, predictor, noise, loss.
 
 use crate::convert::raised;
-use greybox::loss::{Cauchy, Huber, SoftL1, Tukey};
-use greybox::problem::{EquationsFit, Settings};
-use greybox::{Butterworth, Discrete, Esdirk, Horizon, Kalman, Rk4, Rk45, fixed, free};
+use crate::graph::Expression;
+use greybox::equations::Equations;
+use greybox::record::Record;
+use greybox::{Error, Fit, fixed, free};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
+use std::path::PathBuf;
 use std::time::Duration;
-
-/// A name and its numbers: `("huber", [1.345])`.
-pub type Named = (String, Vec<f64>);
 
 /// What is known of a quantity before the fit.
 #[pyclass(frozen, eq, module = "greybox._core", from_py_object)]
@@ -108,120 +107,77 @@ impl Parameter {
     }
 }
 
-/// The settings of a fit, as Python hands them over.
+/// The settings of a fit, as Python hands them over; names as the library knows them.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Options {
     /// Standard deviation per output, where given.
-    pub noise: Option<Vec<f64>>,
+    noise: Option<Vec<f64>>,
     /// Whether the covariance of the noise of all outputs is estimated.
-    pub noise_covariance: bool,
-    pub input_noise: Option<Vec<f64>>,
-    pub loss: Option<Named>,
-    /// `low_pass` or `high_pass`, with order, cutoff (Hz) and sample time (s).
-    pub prefilter: Option<Named>,
-    pub integrator: Option<Named>,
-    pub predictor: Option<Named>,
-    pub starts: Option<usize>,
-    pub time_limit: Option<f64>,
-    pub checkpoint: Option<(std::path::PathBuf, u64)>,
-}
-
-/// A whole number among those of a name.
-fn whole(of: &Named, least: u32) -> PyResult<Option<u32>> {
-    let (name, numbers) = of;
-    match numbers[..] {
-        [] => Ok(None),
-        [n] if n.fract() == 0.0 && (f64::from(least)..=f64::from(u32::MAX)).contains(&n) => Ok(Some(n as u32)),
-        _ => Err(raised(format!("`{name}` takes one whole number of {least} or more, found {numbers:?}"))),
-    }
-}
-
-/// The number of a name, or its default.
-fn number(of: &Named, default: f64) -> PyResult<f64> {
-    let (name, numbers) = of;
-    match numbers[..] {
-        [] => Ok(default),
-        [x] => Ok(x),
-        _ => Err(raised(format!("`{name}` takes one number, found {numbers:?}"))),
-    }
-}
-
-/// A fit of equations with this integrator and predictor.
-pub fn stepping(fit: EquationsFit, integrator: Option<&Named>, predictor: Option<&Named>) -> PyResult<EquationsFit> {
-    let fit = match integrator {
-        None => fit,
-        Some(of) => match of.0.as_str() {
-            "rk4" => fit.integrator(Rk4 { substeps: whole(of, 1)?.unwrap_or(1) }),
-            "rk45" => fit.integrator(Rk45::default()),
-            "esdirk" => fit.integrator(Esdirk::default()),
-            "discrete" => fit.integrator(Discrete),
-            other => return Err(raised(format!("there is no integrator `{other}`; take rk4, rk4:4, rk45, esdirk or discrete"))),
-        },
-    };
-    Ok(match predictor {
-        None => fit,
-        Some(of) => match of.0.as_str() {
-            "simulation" => fit,
-            "horizon" => fit.predictor(Horizon::new(whole(of, 1)?.unwrap_or(1) as usize)),
-            "kalman" => fit.predictor(Kalman),
-            other => return Err(raised(format!("there is no predictor `{other}`; take simulation, horizon:5 or kalman"))),
-        },
-    })
+    noise_covariance: bool,
+    input_noise: Option<Vec<f64>>,
+    loss: Option<String>,
+    weighting: Option<Expression>,
+    prefilter: Option<String>,
+    integrator: Option<String>,
+    predictor: Option<String>,
+    optimizer: Option<String>,
+    starts: Option<usize>,
+    time_limit: Option<f64>,
+    checkpoint: Option<(PathBuf, u64)>,
 }
 
 impl Options {
-    /// The settings, without integrator and predictor.
-    pub fn settings(&self) -> PyResult<Settings> {
-        let mut settings = Settings::default();
+    /// A fit with these settings.
+    pub fn fit<'a>(
+        &self,
+        equations: &'a Equations,
+        records: &[Record],
+        parameters: &[Parameter],
+    ) -> PyResult<Fit<'a, Equations>> {
+        let parameters = parameters.iter().map(|one| one.0).collect();
+        let mut fit = Fit::new(equations, records).parameters(parameters);
         if let Some(sigma) = &self.noise {
-            settings = settings.noise(sigma.clone());
+            fit = fit.noise(sigma.clone());
         }
         if self.noise_covariance {
-            settings = settings.noise_covariance();
+            fit = fit.noise_covariance();
         }
         if let Some(sigma) = &self.input_noise {
-            settings = settings.input_noise(sigma.clone());
+            fit = fit.input_noise(sigma.clone());
         }
-        if let Some(of) = &self.loss {
-            settings = match of.0.as_str() {
-                "squared" => settings,
-                "huber" => settings.loss(Huber(number(of, Huber::default().0)?)),
-                "soft_l1" => settings.loss(SoftL1(number(of, SoftL1::default().0)?)),
-                "cauchy" => settings.loss(Cauchy(number(of, Cauchy::default().0)?)),
-                "tukey" => settings.loss(Tukey(number(of, Tukey::default().0)?)),
-                other => {
-                    let text = format!("there is no loss `{other}`; take squared, huber, soft_l1, cauchy or tukey");
-                    return Err(raised(text));
-                }
-            };
-        }
-        if let Some((name, numbers)) = &self.prefilter {
-            let [order, cutoff, sample_time] = numbers[..] else {
-                return Err(raised("a pre-filter takes an order, a cutoff (Hz) and the sample time (s)"));
-            };
-            let order = whole(&(name.clone(), vec![order]), 1)?.unwrap_or(1);
-            settings = settings.prefilter(
-                match name.as_str() {
-                    "low_pass" => Butterworth::low_pass(order, cutoff, sample_time),
-                    "high_pass" => Butterworth::high_pass(order, cutoff, sample_time),
-                    other => {
-                        return Err(raised(format!("there is no pre-filter `{other}`; take low_pass or high_pass")));
-                    }
-                }
-                .map_err(raised)?,
-            );
+        if let Some(Expression { graph, root }) = &self.weighting {
+            fit = fit.weighting_by(graph, *root);
         }
         if let Some(count) = self.starts {
-            settings = settings.starts(count);
+            fit = fit.starts(count);
         }
         if let Some(seconds) = self.time_limit {
             let limit = Duration::try_from_secs_f64(seconds);
-            settings = settings.time_limit(limit.map_err(|error| raised(format!("the time limit of {seconds} s: {error}")))?);
+            fit = fit.time_limit(limit.map_err(|error| raised(format!("the time limit of {seconds} s: {error}")))?);
         }
         if let Some((path, every)) = &self.checkpoint {
-            settings = settings.checkpoint(path, *every);
+            fit = fit.checkpoint(path, *every);
         }
-        Ok(settings)
+        self.named(fit).map_err(raised)
+    }
+
+    fn named<'a>(&self, mut fit: Fit<'a, Equations>) -> Result<Fit<'a, Equations>, Error> {
+        if let Some(name) = &self.loss {
+            fit = fit.loss_by_name(name)?;
+        }
+        if let Some(name) = &self.prefilter {
+            fit = fit.prefilter_by_name(name)?;
+        }
+        if let Some(name) = &self.integrator {
+            fit = fit.integrator_by_name(name)?;
+        }
+        if let Some(name) = &self.predictor {
+            fit = fit.predictor_by_name(name)?;
+        }
+        if let Some(name) = &self.optimizer {
+            fit = fit.optimizer_by_name(name)?;
+        }
+        Ok(fit)
     }
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import pytest
 
 import greybox as gb
 
-DATA = Path(__file__).parents[2] / "examples" / "data"
+DATA = Path(os.environ.get("GREYBOX_DATA", Path(__file__).parents[2] / "examples" / "data"))
 
 
 class Pmsm(gb.Model):

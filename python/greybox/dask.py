@@ -1,0 +1,77 @@
+"""Fleets on Dask."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from greybox.errors import Error
+from greybox.fleets import Plan, plan
+from greybox.model import Model
+from greybox.parameters import Parameter
+from greybox.records import Hold, Initial, Record
+from greybox.signals import near
+
+__all__ = ["fleet"]
+
+_TYPES = {float: "float64", int: "int64", str: "object"}
+
+
+def fleet(
+    model: Model,
+    frame: Any,
+    /,
+    by: str | Sequence[str],
+    *,
+    npartitions: int | None = None,
+    parameters: Mapping[str, Parameter] | None = None,
+    time: str | None = None,
+    columns: Mapping[str, str] | None = None,
+    hold: Hold = "zero",
+    initial: Initial = "estimated",
+    **given: Any,
+) -> Any:
+    """Fit many records, each by itself, on the workers of Dask.
+
+    The samples are shuffled by `by`, and each partition is one task. A task that is tried again gives the same bits.
+
+    Parameters
+    ----------
+    frame : dask.dataframe.DataFrame
+        The samples of all records, in any order.
+    npartitions : int, optional
+        Into how many parts the records are divided; as many as the frame has without it.
+    model, by, parameters, time, columns, hold, initial, **given
+        As in :func:`greybox.fleet`.
+
+    Returns
+    -------
+    dask.dataframe.DataFrame
+        Lazy, with the rows of :func:`greybox.fleet`, in no order.
+
+    Raises
+    ------
+    Error
+        If a column is missing, or a parameter is not declared. What is wrong with a record is the reason in its row.
+    """
+    import pandas as pd
+
+    if given.get("sample_time") is not None:
+        raise Error("a shuffle does not keep the order of samples, which sample_time needs; add a column of the time")
+    made = plan(model, by, parameters, Record(None, None, time, None, columns, hold, initial), given)
+    missing = [name for name in made.needed() if name not in frame.columns]
+    if missing:
+        raise Error(f"there is no column `{missing[0]}`; the frame has: {near(missing[0], frame.columns)}")
+    of = {name: pd.Series(dtype=frame.dtypes[name]) for name in made.by}
+    meta = pd.DataFrame(of | {name: pd.Series(dtype=_TYPES[kind]) for name, kind in made.columns().items()})
+    shuffled = frame.shuffle(on=made.by, npartitions=npartitions)
+    return shuffled.map_partitions(_fit, made, meta.dtypes.to_dict(), meta=meta)
+
+
+def _fit(part: Any, made: Plan, types: dict[str, Any]) -> Any:
+    import pandas as pd
+
+    # A thread of a worker has one core.
+    os.environ.setdefault("RAYON_NUM_THREADS", "1")
+    return pd.DataFrame(made.rows(part, ordered=True)).astype(types)

@@ -1,0 +1,104 @@
+"""Fleets on a Spark cluster (PySpark 4)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from greybox.errors import Error
+from greybox.fleets import Plan, plan
+from greybox.model import Model
+from greybox.parameters import Parameter
+from greybox.records import Hold, Initial, Record
+from greybox.signals import near
+
+__all__ = ["fleet"]
+
+#: Records that are handed to a worker together.
+_BATCH = 1000
+_COLUMN = "greybox_batch"
+_TYPES = {float: "double", int: "long", str: "string"}
+
+
+def fleet(
+    model: Model,
+    frame: Any,
+    /,
+    by: str | Sequence[str],
+    *,
+    batches: int | None = None,
+    parameters: Mapping[str, Parameter] | None = None,
+    time: str | None = None,
+    sample_time: float | None = None,
+    columns: Mapping[str, str] | None = None,
+    hold: Hold = "zero",
+    initial: Initial = "estimated",
+    **given: Any,
+) -> Any:
+    """Fit many records, each by itself, on the workers of a cluster.
+
+    The records are shuffled into batches by a hash of `by`, and each batch is one call of a worker, which uses one core. A task that is
+    tried again gives the same bits. The workers need the package greybox.
+
+    Parameters
+    ----------
+    frame : pyspark.sql.DataFrame
+        The samples of all records, in any order.
+    batches : int, optional
+        Into how many parts the records are divided; without it they are counted, for 1,000 records to a part and at least one part
+        for each core.
+    model, by, parameters, time, sample_time, columns, hold, initial, **given
+        As in :func:`greybox.fleet`.
+
+    Returns
+    -------
+    pyspark.sql.DataFrame
+        Lazy, with the rows of :func:`greybox.fleet`, in no order.
+
+    Raises
+    ------
+    Error
+        If a column is missing, or a parameter is not declared. What is wrong with a record is the reason in its row.
+    """
+    from pyspark.sql import functions
+
+    made = plan(model, by, parameters, Record(None, None, time, sample_time, columns, hold, initial), given)
+    needed = made.needed() + _time(made, frame.columns)
+    missing = [name for name in needed if name not in frame.columns]
+    if missing:
+        raise Error(f"there is no column `{missing[0]}`; the frame has: {near(missing[0], frame.columns)}")
+    if batches is None:
+        records = frame.select(*made.by).distinct().count()
+        batches = max(-(-records // _BATCH), frame.sparkSession.sparkContext.defaultParallelism)
+    batch = functions.pmod(functions.xxhash64(*made.by), functions.lit(batches))
+    # A number that is asked for is not changed by adaptive execution, which would make one task of many small parts.
+    parts = frame.select(*needed).withColumn(_COLUMN, batch).repartition(batches, _COLUMN)
+    keys = [f"`{name}` {frame.schema[name].dataType.simpleString()}" for name in made.by]
+    schema = ", ".join(keys + [f"`{name}` {_TYPES[kind]}" for name, kind in made.columns().items()])
+    return parts.groupBy(_COLUMN).applyInArrow(_worker(made), schema)
+
+
+def _time(made: Plan, names: Sequence[str]) -> list[str]:
+    """Give the column of the time, if there is one."""
+    from greybox.frames import time_column
+
+    if made.record.sample_time is not None:
+        raise Error("a shuffle does not keep the order of samples, which sample_time needs; add a column of the time")
+    name = made.record.time or time_column(names)
+    if name is None:
+        raise Error(f"there is no column `t` or `time`; the frame has: {near('t', names)}. Name the column by time=\"...\"")
+    return [name]
+
+
+def _worker(made: Plan) -> Callable[[Any], Any]:
+    def fit(table: Any) -> Any:
+        import pyarrow as pa
+
+        # A task of Spark has one core.
+        os.environ.setdefault("RAYON_NUM_THREADS", "1")
+        rows = made.rows(table.drop_columns([_COLUMN]), ordered=True)
+        keys = {name: pa.array(rows[name].tolist(), table.schema.field(name).type) for name in made.by}
+        return pa.table({**rows, **keys})
+
+    return fit

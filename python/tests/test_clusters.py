@@ -1,0 +1,136 @@
+"""Fleets on Spark and Dask: the rows of one machine, also where a worker is killed in the middle."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import cooled, cooling
+
+import greybox as gb
+
+SAID: dict[str, Any] = {"by": "which", "k": gb.free(1.0)}
+
+
+@pytest.fixture(scope="module")
+def bodies() -> pd.DataFrame:
+    """Samples of 24 bodies in random order; one has a missing input."""
+    parts = [pd.DataFrame(cooled(k=0.3 + 0.01 * k, seed=k)).assign(which=k) for k in range(24)]
+    parts[5].loc[7, "room"] = np.nan
+    return pd.concat(parts).sample(frac=1, random_state=1, ignore_index=True)
+
+
+@pytest.fixture(scope="module")
+def expected(bodies: pd.DataFrame) -> pd.DataFrame:
+    rows = gb.fleet(cooling(), bodies.sort_values(["which", "t"]), **SAID)
+    assert (rows["verdict"] == "failed").sum() == 1
+    return rows
+
+
+def check(found: pd.DataFrame, expected: pd.DataFrame) -> None:
+    """The same rows, to the last bit: nothing lost, nothing twice."""
+    found = found.sort_values("which", ignore_index=True)
+    pd.testing.assert_frame_equal(found.astype({"which": "int64"}), expected, check_exact=True, check_dtype=False)
+
+
+@pytest.fixture(scope="module")
+def spark() -> Iterator[Any]:
+    sql = pytest.importorskip("pyspark.sql")
+    if shutil.which("java") is None:
+        pytest.skip("Java is absent")
+    os.environ["PYSPARK_PYTHON"] = sys.executable
+    builder = sql.SparkSession.builder.master("local-cluster[2,1,1024]").appName("greybox")
+    for name, value in {"spark.ui.enabled": "false", "spark.sql.shuffle.partitions": "4", "spark.task.maxFailures": "8"}.items():
+        builder = builder.config(name, value)
+    session = builder.getOrCreate()
+    yield session
+    session.stop()
+
+
+def test_spark(spark: Any, bodies: pd.DataFrame, expected: pd.DataFrame) -> None:
+    frame = spark.createDataFrame(bodies)
+    check(gb.spark.fleet(cooling(), frame, batches=6, **SAID).toPandas(), expected)
+    check(gb.spark.fleet(cooling(), frame, **SAID).toPandas(), expected)
+    with pytest.raises(gb.Error, match="there is no column `Room`"):
+        gb.spark.fleet(cooling(), frame, columns={"room": "Room"}, **SAID)
+    with pytest.raises(gb.Error, match="no column `t` or `time`"):
+        gb.spark.fleet(cooling(), frame.drop("t"), **SAID)
+
+
+def test_spark_with_an_executor_killed(
+    spark: Any, bodies: pd.DataFrame, expected: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from greybox import spark as adapter
+
+    mark, make = str(tmp_path / "killed"), adapter._worker
+
+    def mortal(made: Any) -> Any:
+        fit = make(made)
+
+        def killing(table: Any) -> Any:
+            try:
+                os.close(os.open(mark, os.O_CREAT | os.O_EXCL))
+            except FileExistsError:
+                return fit(table)
+            # This process is the daemon's, which is the executor's.
+            with open(f"/proc/{os.getppid()}/stat") as stat:
+                os.kill(int(stat.read().rpartition(")")[2].split()[1]), signal.SIGKILL)
+            time.sleep(60)
+
+        return killing
+
+    monkeypatch.setattr(adapter, "_worker", mortal)
+    found = gb.spark.fleet(cooling(), spark.createDataFrame(bodies), batches=6, **SAID).toPandas()
+    assert os.path.exists(mark)
+    check(found, expected)
+
+
+@pytest.fixture(scope="module")
+def dask_client() -> Iterator[Any]:
+    distributed = pytest.importorskip("dask.distributed")
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield client
+
+
+def test_dask(dask_client: Any, bodies: pd.DataFrame, expected: pd.DataFrame) -> None:
+    import dask.dataframe as dd
+
+    frame = dd.from_pandas(bodies, npartitions=4)
+    check(gb.dask.fleet(cooling(), frame, **SAID).compute(), expected)
+    with pytest.raises(gb.Error, match="there is no column `Room`"):
+        gb.dask.fleet(cooling(), frame, columns={"room": "Room"}, **SAID)
+
+
+def test_dask_with_a_worker_killed(
+    dask_client: Any, bodies: pd.DataFrame, expected: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import dask.dataframe as dd
+
+    from greybox import dask as adapter
+
+    mark, fit = str(tmp_path / "killed"), adapter._fit
+
+    def killing(part: Any, made: Any, types: Any) -> Any:
+        try:
+            os.close(os.open(mark, os.O_CREAT | os.O_EXCL))
+        except FileExistsError:
+            return fit(part, made, types)
+        os.kill(os.getpid(), signal.SIGKILL)
+        return None
+
+    monkeypatch.setattr(adapter, "_fit", killing)
+    found = gb.dask.fleet(cooling(), dd.from_pandas(bodies, npartitions=4), **SAID).compute()
+    assert os.path.exists(mark)
+    check(found, expected)

@@ -1,0 +1,225 @@
+"""Fits: numbers, options, verdicts, errors."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+import warnings
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import DATA, Pmsm, cooled, cooling
+
+import greybox as gb
+
+TRUTH = {"rs": 0.63, "ls": 4e-3, "ke": 0.95}
+
+
+def test_the_motor_of_the_readme(fitted: gb.Fit) -> None:
+    # The numbers that the README of the library shows, to its digits.
+    assert f"{fitted.parameters.rs:.5f} {fitted.parameters.ls:.7f} {fitted.parameters.ke:.6f}" == "0.63032 0.0040005 0.949977"
+    assert fitted.verdict == "usable" and fitted.converged and fitted.outcome.startswith("converged")
+    for name, truth in TRUTH.items():
+        lower, upper = fitted.interval(name, 0.99)
+        assert lower < truth < upper
+    assert str(fitted).startswith("Verdict: usable.") and repr(fitted) == str(fitted)
+    assert fitted.engine.startswith("read as a graph")
+    assert fitted.unknowns == ["rs", "ls", "ke", "id(0)", "iq(0)"]
+
+
+def test_the_class_and_the_librarys_motor_have_the_same_bits(
+    fitted: gb.Fit, motor: pd.DataFrame, declared: dict[str, gb.Parameter]
+) -> None:
+    ours = gb.fit(gb.pmsm.surface(pole_pairs=4), motor, **declared)
+    a, b = fitted.to_dict(), ours.to_dict()
+    assert a.pop("seconds") != 0 and b.pop("seconds") != 0
+    assert a == b
+
+
+def test_covariance(fitted: gb.Fit) -> None:
+    errors = np.sqrt(np.diag(fitted.covariance))
+    assert errors[0] == pytest.approx(fitted.standard_errors.rs, rel=1e-12)
+    scaled = fitted.covariance / np.outer(errors, errors)
+    assert np.allclose(scaled, fitted.correlation, atol=1e-12)
+
+
+def test_options_reach_the_library(motor: pd.DataFrame, declared: dict[str, gb.Parameter]) -> None:
+    def method(**said: Any) -> dict[str, Any]:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", gb.FitWarning)
+            found: dict[str, Any] = gb.fit(Pmsm(4), motor, **declared, **said).to_dict()["method"]
+        return found
+
+    assert "Runge-Kutta 4, 2 steps" in method(integrator="rk4:2")["integrator"]
+    assert method(loss="huber:2")["loss"] == "Huber(2.0)"
+    assert method(noise={"id": 0.05, "iq": 0.05})["noise"] == "given"
+    assert method(noise="covariance")["noise"] == "covariance"
+    assert "5" in method(predictor="horizon:5")["predictor"]
+    assert "Gauss-Newton" in method(optimizer="gauss-newton")["optimizer"]
+    assert "Butterworth" in method(prefilter="low-pass:2,500")["prefilter"]
+    assert method(weighting=lambda t, u, y: abs(u.w))["weighting"] != "none"
+
+
+def test_weighting_is_an_expression() -> None:
+    """Samples of weight zero do not count, whatever they say."""
+    c = cooled()
+    wrong = {**c, "body": np.where(c["t"] > 10, c["body"] + 5, c["body"])}
+    half = {name: column[:101] for name, column in c.items()}
+    said: dict[str, Any] = {"k": gb.free(1.0), "initial": {"body": gb.fixed(80.0)}, "noise": {"body": 0.05}}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", gb.FitWarning)
+        weighted = gb.fit(cooling(), wrong, weighting=lambda t, u, y: gb.where(t <= 10, 1.0, 0.0), **said)
+        short = gb.fit(cooling(), half, **said)
+    # Two searches that each stop at a relative step of 1e-10.
+    assert weighted.parameters.k == pytest.approx(short.parameters.k, rel=1e-9)
+
+
+def test_several_records_and_their_own_parameters() -> None:
+    cold, warm = gb.Record(cooled(k=0.3), name="cold"), gb.Record(cooled(k=0.5, seed=2), name="warm")
+    found = gb.fit(cooling(), [cold, warm], k=gb.free(1.0, per_experiment=True))
+    values = [one["parameters"][0] for one in found.to_dict()["experiments"]]
+    assert values == pytest.approx([0.3, 0.5], rel=0.01)
+    frame = pd.DataFrame(found.to_dataframe())
+    assert frame["record"].unique().tolist() == ["cold", "warm"] and len(frame) == 400
+    assert np.allclose(frame["body"] - frame["body_predicted"], frame["body_residual"], atol=0)
+    assert frame["body_residual"].std() == pytest.approx(0.05, rel=0.1)
+
+
+def test_derived(fitted: gb.Fit) -> None:
+    tau = fitted.derived("tau", lambda p: p.ls / p.rs)
+    assert tau.value == fitted.parameters.ls / fitted.parameters.rs
+    g = np.array([-tau.value / fitted.parameters.rs, 1 / fitted.parameters.rs])
+    assert tau.standard_error == pytest.approx(float(np.sqrt(g @ fitted.covariance[:2, :2] @ g)), rel=1e-9)
+    assert tau.lower < tau.value < tau.upper
+
+
+def test_warnings_have_codes() -> None:
+    c = cooled()
+    c["body"] = c["body"] + np.sin(c["t"])
+    with pytest.warns(gb.FitWarning) as caught:
+        found = gb.fit(cooling(), c, k=gb.free(1.0))
+    assert all(one.filename == __file__ for one in caught)
+    codes = [one.message.code for one in caught]  # type: ignore[union-attr]
+    assert "colored_errors" in codes and found.verdict != "usable"
+    assert str(caught[0].message).startswith(f"[{codes[0]}] ")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", r"\[[a-z_]+\]", gb.FitWarning)
+        gb.fit(cooling(), c, k=gb.free(1.0))
+
+
+WRONG: list[tuple[dict[str, Any], str]] = [
+    ({}, "parameter `k` is not declared; write k=gb.free(start)"),
+    ({"k": 1.0}, "write gb.free(1.0) to estimate it from there, or gb.fixed(1.0)"),
+    ({"k": gb.free(1.0), "kk": gb.free(1.0)}, "there is no parameter `kk`; the model has: k"),
+    ({"k": gb.free(1.0), "parameters": {"k": gb.free(1.0)}}, "declared twice"),
+    ({"k": gb.free(1.0), "integrater": "rk4"}, "there is no option `integrater`"),
+    ({"k": gb.free(1.0), "integrator": "rk5"}, "rk4"),
+    ({"k": gb.free(1.0), "integrator": 4}, "give its name as text"),
+    ({"k": gb.free(1.0), "loss": "hubber"}, "huber"),
+    ({"k": gb.free(1.0), "predictor": "horizon"}, "whole number"),
+    ({"k": gb.free(1.0), "hold": "linear"}, "there is no hold `linear`"),
+    ({"k": gb.free(1.0), "hold": {"rom": "first"}}, "rom"),
+    ({"k": gb.free(1.0), "initial": "zero"}, "there is no initial state `zero`"),
+    ({"k": gb.free(1.0), "initial": {"body": 80.0}}, "write gb.free(80.0)"),
+    ({"k": gb.free(1.0), "initial": {"bdy": gb.fixed(80.0)}}, "there is no initial state of `bdy`"),
+    ({"k": gb.free(1.0), "noise": {"bdy": 0.1}}, "noise names `bdy`"),
+    ({"k": gb.free(1.0), "noise": "full"}, "covariance"),
+    ({"k": gb.free(1.0), "noise": {"body": -1.0}}, "must be positive"),
+    ({"k": gb.free(1.0), "starts": 0}, "starts is 0"),
+    ({"k": gb.free(1.0), "time_limit": -1.0}, "time limit"),
+    ({"k": gb.free(1.0), "columns": {"rom": "room"}}, "columns names `rom`"),
+    ({"k": gb.fixed(1.0), "initial": {"body": gb.fixed(80.0)}}, "nothing is free"),
+    ({"k": gb.free(float("nan"))}, "NaN"),
+    ({"k": gb.free(5.0, within=(0.0, 1.0))}, "k"),
+    ({"k": gb.free(1.0), "weighting": lambda t, u, y: -1.0}, "weighting"),
+    ({"k": gb.free(1.0), "weighting": lambda t, u, y: 1 if t > 3 else 0}, "gb.where"),
+]
+
+
+@pytest.mark.parametrize("said, says", WRONG)
+def test_what_is_wrong_with_options_is_named(said: dict[str, Any], says: str) -> None:
+    with pytest.raises(gb.Error) as raised:
+        gb.fit(cooling(), cooled(), **said)
+    assert says in str(raised.value), raised.value
+
+
+def test_a_parameter_with_the_name_of_an_option() -> None:
+    model = gb.model(
+        lambda t, x, u, p: [p.noise * (u.room - x.body)], states=["body"], inputs=["room"], outputs=["body"], parameters=["noise"]
+    )
+    found = gb.fit(model, cooled(), parameters={"noise": gb.free(1.0)})
+    assert found.parameters.noise == pytest.approx(0.3, rel=0.01)
+
+
+def test_pickles(fitted: gb.Fit, motor: pd.DataFrame) -> None:
+    again = pickle.loads(pickle.dumps(fitted))
+    assert str(again) == str(fitted)
+    assert again.predict().equals(fitted.predict())
+    assert again.predict(motor).equals(fitted.predict(motor))
+    assert str(again.report()) == str(fitted.report())
+    report = fitted.report()
+    assert pickle.loads(pickle.dumps(gb.free(1.0, within=(0, 2), log=True))) == gb.free(1.0, within=(0, 2), log=True)
+    assert pickle.loads(pickle.dumps(report)).to_html() == report.to_html()
+
+
+def test_pickles_of_irregular_time_and_given_states() -> None:
+    c = cooled()
+    c["t"] = c["t"] + 1e-3 * np.sin(np.arange(200))
+    found = gb.fit(
+        cooling(), c, hold={"room": "first"}, initial={"body": gb.free(80.0, prior=(80.0, 1.0))}, k=gb.free(1.0), weighting=lambda t, u, y: 1 + 0 * t
+    )
+    again = pickle.loads(pickle.dumps(found))
+    assert again.to_dataframe()["body_predicted"].tolist() == found.to_dataframe()["body_predicted"].tolist()
+
+
+def test_simulate_is_the_record_that_it_makes() -> None:
+    t = np.arange(0, 10, 0.05)
+    u = {"t": t, "room": 20 + 5 * np.sign(np.sin(t))}
+    clean = gb.simulate(cooling(), pd.DataFrame(u), parameters={"k": 0.3}, initial={"body": 80.0})
+    assert list(clean.columns) == ["t", "room", "body"] and clean["body"][0] == 80.0
+    noisy = gb.simulate(cooling(), u, parameters={"k": 0.3}, initial={"body": 80.0}, noise={"body": 0.1}, seed=7)
+    assert np.std(noisy["body"] - clean["body"]) == pytest.approx(0.1, rel=0.2)
+    assert gb.fit(cooling(), noisy, k=gb.free(1.0)).parameters.k == pytest.approx(0.3, rel=0.01)
+    for said, says in [
+        ({"parameters": {}}, "parameter `k` has no value"),
+        ({"parameters": {"k": 1.0, "l": 2.0}}, "parameters names `l`"),
+        ({"parameters": {"k": 1.0}, "initial": {"b": 2.0}}, "initial names `b`"),
+        ({"parameters": {"k": float("nan")}}, "NaN"),
+    ]:
+        with pytest.raises(gb.Error, match=says):
+            gb.simulate(cooling(), u, **said)
+
+
+INTERRUPTED = """
+import os, signal, threading, warnings
+import numpy as np
+import greybox as gb
+n = 400_000
+t = np.arange(n) * 1e-3
+u = np.sign(np.sin(t))
+# A pendulum whose integrator chooses its steps: each pass over the record takes a second or more.
+model = gb.model(lambda t, x, u, p: [x.w, p.a * np.sin(x.q) * -1 - p.b * x.w + u.u], states=["q", "w"], inputs=["u"], outputs=["q"],
+                 parameters=["a", "b"])
+record = gb.simulate(model, {"t": t, "u": u}, parameters={"a": 3.0, "b": 0.3}, noise={"q": 0.01})
+threading.Timer(SECONDS, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")
+    found = gb.fit(model, record, a=gb.free(2.0), b=gb.free(0.5), integrator="rk45:1e-10", starts=40)
+print(found.outcome, "|", found.verdict, "|", found.converged)
+"""
+
+
+def test_ctrl_c_returns_the_best_so_far() -> None:
+    program = INTERRUPTED.replace("SECONDS", "4.0")
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300, check=False)
+    # Where even the start was not evaluated, there is no best, and the interrupt is raised.
+    assert done.stdout.strip() == "cancelled | not usable | False" or "KeyboardInterrupt" in done.stderr, (done.stdout, done.stderr)
+
+
+def test_progress(capsys: pytest.CaptureFixture[str]) -> None:
+    gb.fit(Pmsm(4), pd.read_csv(DATA / "pmsm.csv"), rs=gb.free(1.0), ls=gb.free(2e-3), ke=gb.free(0.7), progress=True)
+    assert "fit" in capsys.readouterr().err

@@ -1,0 +1,97 @@
+"""Fleets: a row for each record."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pytest
+from conftest import cooled, cooling
+
+import greybox as gb
+
+
+def bodies(count: int = 40) -> pd.DataFrame:
+    """Bodies that cool down at 0.30, 0.31, ..., with three that cannot be fitted."""
+    parts = [pd.DataFrame(cooled(k=0.3 + 0.01 * k, seed=k)).assign(which=f"body {k}", place=k % 2) for k in range(count)]
+    parts[3] = parts[3].assign(room=np.nan)
+    parts[5] = parts[5].iloc[:1]
+    parts[7] = parts[7].assign(body=np.nan)
+    return pd.concat(parts, ignore_index=True)
+
+
+def test_a_row_for_each_record_and_failures_are_rows() -> None:
+    frame = bodies()
+    rows = gb.fleet(cooling(), frame, by="which", k=gb.free(1.0))
+    assert isinstance(rows, pd.DataFrame)
+    assert rows["which"].tolist() == [f"body {k}" for k in range(40)]
+    failed = rows["verdict"] == "failed"
+    assert np.flatnonzero(failed).tolist() == [3, 5, 7]
+    assert "only outputs may be missing" in rows["reason"][3]
+    assert "2 or more are needed" in rows["reason"][5] and "missing in every sample" in rows["reason"][7]
+    assert np.isnan(rows["k"][failed]).all()
+    good = rows[~failed]
+    truth = 0.3 + 0.01 * good.index.to_numpy()
+    # Of 37 intervals of 95 %, 35 are expected to cover; 31 or fewer are, by chance, one case in 100.
+    assert ((good["k_lower"] < truth) & (truth < good["k_upper"])).sum() >= 31
+    assert good["samples"].eq(200).all() and good["reason"].eq("").all()
+    assert good["body_rmse"].between(0.04, 0.06).all()
+
+
+def test_each_row_is_the_single_fit() -> None:
+    frame = bodies(6)
+    rows = gb.fleet(cooling(), frame, by="which", k=gb.free(1.0))
+    single = gb.fit(cooling(), frame[frame["which"] == "body 2"], k=gb.free(1.0))
+    # Up to rounding: both searches stop at a relative step of 1e-10.
+    assert rows["k"][2] == pytest.approx(single.parameters.k, rel=1e-9)
+    assert rows["k_error"][2] == pytest.approx(single.standard_errors.k, rel=1e-6)
+
+
+def test_kinds_orders_and_keys_give_the_same_bits() -> None:
+    frame = bodies()
+    rows = gb.fleet(cooling(), frame, by="which", k=gb.free(1.0))
+    polars = gb.fleet(cooling(), pl.from_pandas(frame), by="which", k=gb.free(1.0))
+    assert isinstance(polars, pl.DataFrame) and np.array_equal(polars["k"].to_numpy(), rows["k"], equal_nan=True)
+    mixed = frame.sort_values("t", kind="stable")
+    again = gb.fleet(cooling(), mixed, by="which", k=gb.free(1.0)).sort_values("which", ignore_index=True)
+    assert np.array_equal(again["k"], rows.sort_values("which")["k"], equal_nan=True)
+    two = gb.fleet(cooling(), frame, by=["place", "which"], k=gb.free(1.0))
+    assert np.array_equal(two["k"], rows["k"], equal_nan=True) and two["place"].tolist() == [k % 2 for k in range(40)]
+
+
+def test_dates_count_from_the_first_of_each_record() -> None:
+    frame = bodies(3)
+    start = pd.to_datetime("2025-03-20") + pd.to_timedelta(frame["which"].str[5:].astype(int) * 1000, unit="h")
+    dated = frame.assign(t=start + pd.to_timedelta((frame["t"] * 1000).round().astype(int), unit="ms"))
+    rows = gb.fleet(cooling(), dated, by="which", k=gb.free(1.0))
+    single = gb.fleet(cooling(), frame, by="which", k=gb.free(1.0))
+    # 0.1 is not a binary number: seconds of nanoseconds are rounded once more.
+    assert np.allclose(rows["k"], single["k"], rtol=1e-12)
+
+
+WRONG: list[tuple[dict[str, Any], str]] = [
+    ({"by": "what"}, "there is no column `what`"),
+    ({"by": "which"}, "parameter `k` is not declared"),
+    ({"by": "which", "k": gb.free(1.0), "columns": {"body": "bdy"}}, "there is no column `bdy`"),
+    ({"by": "which", "k": gb.free(1.0), "checkpoint": "c"}, "a fleet has no checkpoint"),
+    ({"by": "which", "k": gb.free(1.0), "loss": gb.free(1.0)}, "`loss` is an option"),
+]
+
+
+@pytest.mark.parametrize("said, says", WRONG)
+def test_what_is_wrong_with_all_records_is_an_error(said: dict[str, Any], says: str) -> None:
+    with pytest.raises(gb.Error) as raised:
+        gb.fleet(cooling(), bodies(2), **said)
+    assert says in str(raised.value), raised.value
+
+
+def test_a_plan_pickles() -> None:
+    from greybox.fleets import plan
+
+    made = plan(cooling(), "which", None, gb.Record(None), {"k": gb.free(1.0)})
+    again = pickle.loads(pickle.dumps(made))
+    frame = bodies(2)
+    assert again.rows(frame)["k"] == made.rows(frame)["k"]

@@ -1,0 +1,175 @@
+"""Frames: every kind gives the same numbers, times of every kind, and what is wrong is named."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pyarrow as pa
+import pytest
+from conftest import cooled, cooling
+
+import greybox as gb
+from greybox.frames import Frame, is_readonly
+
+
+def k_of(data: Any, **said: Any) -> float:
+    return float(gb.fit(cooling(), data, k=gb.free(1.0), **said).parameters.k)
+
+
+class Stream:
+    """Any object that hands over an Arrow stream."""
+
+    def __init__(self, table: pa.Table) -> None:
+        self.table = table
+
+    def __arrow_c_stream__(self, requested_schema: Any = None) -> Any:
+        return self.table.__arrow_c_stream__(requested_schema)
+
+
+def structured(columns: dict[str, Any]) -> Any:
+    array = np.zeros(len(columns["t"]), dtype=[(name, float) for name in columns])
+    for name, column in columns.items():
+        array[name] = column
+    return array
+
+
+KINDS: dict[str, tuple[Callable[[Any], Any], type]] = {
+    "dict": (dict, dict),
+    "lists": (lambda c: {name: column.tolist() for name, column in c.items()}, dict),
+    "structured": (structured, dict),
+    "pandas": (pd.DataFrame, pd.DataFrame),
+    "pandas with nullable numbers": (lambda c: pd.DataFrame(c).convert_dtypes(), pd.DataFrame),
+    "pandas with an index": (lambda c: pd.DataFrame(c).set_index("t"), pd.DataFrame),
+    "polars": (pl.DataFrame, pl.DataFrame),
+    "polars, lazy": (pl.LazyFrame, pl.DataFrame),
+    "pyarrow": (pa.table, pa.Table),
+    "a stream of Arrow": (lambda c: Stream(pa.table(c)), pa.Table),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_all_kinds_of_frames_give_the_same_bits_and_their_own_kind_back(kind: str) -> None:
+    make, result = KINDS[kind]
+    found = gb.fit(cooling(), make(cooled()), k=gb.free(1.0))
+    assert found.parameters.k == k_of(cooled())
+    assert isinstance(found.table(), result)
+    assert isinstance(found.predict(), result)
+    predicted = np.asarray(found.predict()["body"])
+    assert np.abs(predicted - (20 + 60 * np.exp(-found.parameters.k * cooled()["t"]))).max() < 0.2
+
+
+def test_xarray() -> None:
+    xarray = pytest.importorskip("xarray")
+    c = cooled()
+    data = xarray.Dataset({"room": ("t", c["room"]), "body": ("t", c["body"])}, coords={"t": c["t"]})
+    assert k_of(data) == k_of(c)
+
+
+START = pd.Timestamp("2025-03-20")
+TIMES: dict[str, Callable[[pd.TimedeltaIndex], Any]] = {
+    "dates": lambda d: START + d,
+    "dates with a zone, across summer time": lambda d: (pd.Timestamp("2025-03-30 00:59:50", tz="UTC") + d).tz_convert("Europe/Berlin"),
+    "dates across the end of summer time": lambda d: (pd.Timestamp("2025-10-26 00:59:50", tz="UTC") + d).tz_convert("Europe/Berlin"),
+    "durations": lambda d: d,
+}
+
+
+@pytest.mark.parametrize("times", TIMES)
+@pytest.mark.parametrize("place", ["column", "index", "polars", "arrow", "dict"])
+def test_dates_are_seconds_since_the_first(times: str, place: str) -> None:
+    c = cooled()
+    stamps = TIMES[times](pd.to_timedelta(np.arange(200) * 100, unit="ms"))
+    frame = pd.DataFrame({**c, "t": stamps})
+    data: Any = {
+        "column": lambda: frame,
+        "index": lambda: frame.set_index("t"),
+        "polars": lambda: pl.from_pandas(frame),
+        "arrow": lambda: pa.Table.from_pandas(frame),
+        "dict": lambda: {**c, "t": stamps},
+    }[place]()
+    # 0.1 is not a binary number: seconds of nanoseconds are rounded once more.
+    assert k_of(data) == pytest.approx(k_of(c), rel=1e-12)
+
+
+def test_time_by_name_and_by_rate() -> None:
+    c = cooled()
+    assert k_of({**c, "when": c["t"], "t": np.zeros(200)}, time="when") == k_of(c)
+    assert k_of(pd.DataFrame({**c}).rename(columns={"t": "Time"})) == k_of(c)
+    assert k_of({"room": c["room"], "body": c["body"]}, sample_time=0.1) == k_of(c)
+    assert k_of({**c, "T_body": c["body"], "body": np.zeros(200)}, columns={"body": "T_body"}) == k_of(c)
+
+
+def test_missing_outputs_are_left_out() -> None:
+    c = cooled()
+    c["body"][50:60] = np.nan
+    masked = {**c, "body": np.ma.masked_invalid(c["body"])}
+    with_null = pl.DataFrame(c).with_columns(pl.col("body").fill_nan(None))
+    assert k_of(c) == k_of(masked) == k_of(with_null) == k_of({**c, "body": [None if np.isnan(y) else y for y in c["body"]]})
+
+
+WRONG: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
+    (lambda c: pd.DataFrame(c).rename(columns={"body": "Body"}), "there is no column `body`; the frame has: t, room, Body; did you mean `Body`?"),
+    (lambda c: pd.DataFrame(c).drop(columns="room"), "there is no column `room`"),
+    (lambda c: pd.DataFrame(c).drop(columns="t"), "there is no column `t` or `time`"),
+    (lambda c: pd.DataFrame(c).astype({"body": str}), "which is no number"),
+    (lambda c: pl.DataFrame(c).cast({"body": pl.String}), "which is no number"),
+    (lambda c: {**c, "body": [str(y) for y in c["body"]]}, "which is no number"),
+    (lambda c: {**c, "body": c["body"] + 1j}, "which is no number"),
+    (lambda c: {**c, "body": pd.to_datetime(c["body"])}, "which is no number"),
+    (lambda c: {**c, "t": [str(t) for t in c["t"]]}, "neither a number (s) nor a date"),
+    (lambda c: {**c, "t": c["t"][::-1]}, "time does not increase at sample 1"),
+    (lambda c: {**c, "t": np.r_[0.0, c["t"][:-1]]}, "time does not increase at sample 1"),
+    (lambda c: {**c, "t": START + pd.to_timedelta(np.r_[0, c["t"][:-1]], unit="s")}, "row 1 (from zero) is 0 s after the row before"),
+    (lambda c: {**c, "t": [pd.NaT, *(START + pd.to_timedelta(c["t"][1:], unit="s"))]}, "neither a number (s) nor a date"),
+    (lambda c: pd.DataFrame({**c, "t": [pd.NaT, *(START + pd.to_timedelta(c["t"][1:], unit="s"))]}), "rows without a time"),
+    (lambda c: {**c, "room": np.where(c["t"] == c["t"][7], np.nan, c["room"])}, "only outputs may be missing"),
+    (lambda c: {**c, "body": np.full(200, np.nan)}, "missing in every sample"),
+    (lambda c: {**c, "body": c["body"][:100]}, "has 100 rows, and there are 200 times"),
+    (lambda c: {**c, "body": c["body"].reshape(2, 100)}, "has the shape (2, 100)"),
+    (lambda c: pd.DataFrame(c).iloc[:0], "2 or more are needed"),
+    (lambda c: pd.DataFrame(c).iloc[:1], "2 or more are needed"),
+    (lambda c: 3.0, "float is no frame"),
+    (lambda c: [], "there is no record"),
+]
+
+
+@pytest.mark.parametrize("make, says", WRONG)
+def test_what_is_wrong_with_a_frame_is_named(make: Callable[[dict[str, Any]], Any], says: str) -> None:
+    with pytest.raises(gb.Error) as raised:
+        k_of(make(cooled()))
+    assert says in str(raised.value), raised.value
+
+
+def test_clocks_set_back_without_a_zone_are_named() -> None:
+    zone = pd.Timestamp("2025-10-26 00:59:50", tz="UTC") + pd.to_timedelta(cooled()["t"], unit="s")
+    local = zone.tz_convert("Europe/Berlin").tz_localize(None)
+    with pytest.raises(gb.Error, match="-3599.9 s after the row before it.*tz_localize"):
+        k_of({**cooled(), "t": local})
+
+
+def test_dates_of_the_day_are_times() -> None:
+    days = [datetime.date(2025, 1, 1) + datetime.timedelta(days=k) for k in range(50)]
+    frame = pl.DataFrame({"t": days, "a": np.arange(50.0)})
+    assert Frame(frame).time(None, None, 50).tolist() == [86400.0 * k for k in range(50)]
+
+
+def test_numbers_that_nothing_writes_to_are_shared() -> None:
+    column = pl.DataFrame(cooled()).get_column("body").to_numpy()
+    assert is_readonly(column)
+    array = cooled()["body"]
+    assert not is_readonly(array)
+    array.flags.writeable = False
+    # Its owner could make it writable again.
+    assert not is_readonly(array) and not is_readonly(array[::2])
+
+
+def test_a_frame_that_is_changed_during_a_fit_does_not_matter() -> None:
+    c = cooled()
+    found = gb.fit(cooling(), c, k=gb.free(1.0))
+    c["body"][:] = 0.0
+    assert np.abs(np.asarray(found.residuals()["body"])).max() < 0.3

@@ -1,0 +1,100 @@
+"""Results: tables, predictions, reports, profiles, plots."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import cooled, cooling
+
+import greybox as gb
+
+
+def test_table(fitted: gb.Fit) -> None:
+    table = fitted.table()
+    assert isinstance(table, pd.DataFrame)
+    assert table["name"].tolist() == ["rs", "ls", "ke", "id(0)", "iq(0)"]
+    assert table["unit"].tolist() == ["ohm", "H", "V s/rad", "A", "A"]
+    assert table["value"][0] == fitted.parameters.rs and table["standard_error"][0] == fitted.standard_errors.rs
+    assert (table["lower"] < table["value"]).all() and (table["value"] < table["upper"]).all()
+    assert table["knowledge"].eq("known").all() and table["index_percent"][0] == pytest.approx(2.11, abs=0.005)
+
+
+def test_what_is_not_known_is_not_shown_as_known() -> None:
+    with pytest.warns(gb.FitWarning):
+        model = gb.model(
+            lambda t, x, u, p: [p.a * p.b * (u.room - x.body)], states=["body"], inputs=["room"], outputs=["body"], parameters=["a", "b", "c"]
+        )
+        found = gb.fit(model, cooled(), a=gb.free(1.0), b=gb.free(1.0), c=gb.fixed(2.0))
+    assert np.isnan([found.standard_errors.a, found.standard_errors.b, found.standard_errors.c]).all()
+    assert list(found.table()["knowledge"])[:3] == ["unidentified", "unidentified", "fixed"]
+    with pytest.raises(gb.Error, match="has no interval"):
+        found.interval("a")
+    with pytest.raises(gb.Error, match="there is no unknown `aa`"):
+        found.interval("aa")
+    with pytest.raises(AttributeError, match="there is no `aa` among the parameters: a, b, c"):
+        found.parameters.aa  # noqa: B018
+    assert "unidentified" in found._repr_html_()
+
+
+def test_predictions(fitted: gb.Fit, motor: pd.DataFrame) -> None:
+    frame = fitted.to_dataframe()
+    assert list(frame.columns) == ["t", "ud", "uq", "w", "id", "iq", "id_predicted", "iq_predicted", "id_residual", "iq_residual"]
+    assert (frame["id"] - frame["id_predicted"] == frame["id_residual"]).all()
+    assert np.sqrt((frame["id_residual"] ** 2).mean()) == pytest.approx(0.05024, abs=5e-6)
+    assert fitted.predict().equals(frame[["t", "id_predicted", "iq_predicted"]].rename(columns=lambda name: name.removesuffix("_predicted")))
+    # With the initial state estimated anew, which it is to the search's precision.
+    other = fitted.residuals(motor)
+    assert np.abs(other["id"] - frame["id_residual"]).max() < 1e-6
+    half = fitted.predict(motor.drop(columns=["id", "iq"]), initial={"id": gb.fixed(0.0), "iq": gb.fixed(0.0)})
+    assert len(half) == len(motor) and half["id"][0] == 0.0
+    with pytest.raises(gb.Error, match="missing in every sample"):
+        fitted.predict(motor.drop(columns=["id", "iq"]))
+
+
+def test_reports(fitted: gb.Fit, tmp_path: Path) -> None:
+    report = fitted.report(tmp_path / "r.html", title="Motor 7", profiles=["rs"])
+    page = (tmp_path / "r.html").read_text()
+    assert page == report.to_html() and "Motor 7" in page
+    assert "Motor 7" in str(report) and "Motor 7" in report.to_markdown() and "Motor 7" in report.to_json()
+    assert "Profile" in str(report) or "profile" in str(report)
+    assert report.reasons == [] and "<iframe" in report._repr_html_()
+    for name in ["r.md", "r.json", "r.txt"]:
+        report.save(tmp_path / name)
+        assert (tmp_path / name).stat().st_size > 1000
+    with pytest.raises(gb.Error, match="one of these endings"):
+        fitted.report(tmp_path / "r.pdf")
+    with pytest.raises(gb.Error, match="No such file"):
+        fitted.report(tmp_path / "nowhere" / "r.html")
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["r.html", "r.json", "r.md", "r.txt"]
+
+
+def test_notebooks_show_verdict_table_and_picture(fitted: gb.Fit) -> None:
+    shown = fitted._repr_html_()
+    assert "<b>Verdict: usable.</b>" in shown and "<td>rs</td><td>0.630317</td><td>ohm</td>" in shown and "<svg" in shown
+
+
+def test_profiles(fitted: gb.Fit) -> None:
+    profile = fitted.profile("rs")
+    lower, upper = fitted.interval("rs")
+    # The motor is nearly linear in its parameters: both intervals agree to a few percent of their width.
+    assert profile.lower == pytest.approx(lower, abs=0.05 * (upper - lower))
+    assert profile.upper == pytest.approx(upper, abs=0.05 * (upper - lower))
+    table = profile.table()
+    assert isinstance(table, pd.DataFrame) and table["rise"].min() == pytest.approx(0.0, abs=1e-9)
+    assert repr(profile).startswith("rs is within 0.62")
+    with pytest.raises(gb.Error, match="there is no unknown `r`"):
+        fitted.profile("r")
+
+
+def test_plots(fitted: gb.Fit, tmp_path: Path) -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    for name, figure in {"a": fitted.plot(), "b": fitted.plot_residuals(), "c": fitted.profile("ke").plot()}.items():
+        figure.savefig(tmp_path / f"{name}.png")
+        assert (tmp_path / f"{name}.png").stat().st_size > 5000
+    assert [axis.get_ylabel() for axis in fitted.plot().axes] == ["id (A)", "iq (A)", "ud (V)", "uq (V)", "w (rad/s)"]
+    two = gb.fit(cooling(), [gb.Record(cooled(), name="a"), gb.Record(cooled(seed=2), name="b")], k=gb.free(1.0))
+    assert len(two.plot().axes[0].lines) == 4
