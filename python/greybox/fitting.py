@@ -116,12 +116,11 @@ def fit(
     >>> import greybox as gb
     >>> import numpy as np
     >>> cooling = gb.model(
-    ...     lambda t, x, u, p: [p.k * (u.room - x.body)], states={"body": "K"}, inputs={"room": "K"}, outputs={"body": "K"},
-    ...     parameters={"k": "1/s"},
+    ...     lambda t, x, u, p: [p.k * (20 - x.body)], states={"body": "K"}, outputs={"body": "K"}, parameters={"k": "1/s"}
     ... )
     >>> t = np.arange(200) * 0.1
     >>> noise = np.random.default_rng(1).normal(0.0, 0.05, 200)
-    >>> found = gb.fit(cooling, {"t": t, "room": 0 * t + 20, "body": 20 + 60 * np.exp(-0.3 * t) + noise}, k=gb.free(1.0))
+    >>> found = gb.fit(cooling, {"t": t, "body": 20 + 60 * np.exp(-0.3 * t) + noise}, k=gb.free(1.0))
     >>> round(found.parameters.k, 3), found.verdict
     (0.3, 'usable')
     """
@@ -157,7 +156,7 @@ def fit(
 
 def warn(all_: list[FitWarning]) -> None:
     """Issue warnings at the line of the caller outside this package."""
-    frame, level = sys._getframe(1), 1
+    frame, level = sys._getframe(1), 2
     while frame.f_back is not None and str(frame.f_globals.get("__name__", "")).partition(".")[0] == "greybox":
         frame, level = frame.f_back, level + 1
     for warning in all_:

@@ -208,13 +208,12 @@ def fleet(
     >>> import greybox as gb
     >>> import numpy as np
     >>> cooling = gb.model(
-    ...     lambda t, x, u, p: [p.k * (u.room - x.body)], states={"body": "K"}, inputs={"room": "K"}, outputs={"body": "K"},
-    ...     parameters={"k": "1/s"},
+    ...     lambda t, x, u, p: [p.k * (20 - x.body)], states={"body": "K"}, outputs={"body": "K"}, parameters={"k": "1/s"}
     ... )
     >>> t = np.tile(np.arange(200) * 0.1, 2)
     >>> which = np.repeat(["a", "b"], 200)
     >>> body = 20 + 60 * np.exp(-np.where(which == "a", 0.3, 0.4) * t) + np.random.default_rng(1).normal(0.0, 0.05, 400)
-    >>> rows = gb.fleet(cooling, {"t": t, "body": body, "room": 0 * t + 20, "which": which}, by="which", k=gb.free(1.0))
+    >>> rows = gb.fleet(cooling, {"t": t, "body": body, "which": which}, by="which", k=gb.free(1.0))
     >>> [round(float(k), 2) for k in rows["k"]]
     [0.3, 0.4]
     """

@@ -52,7 +52,7 @@ class Model:
     ...     def derivative(self, t, x, u, p):
     ...         return x.like(h=(u.q - p.outlet * gb.sqrt(19.62 * x.h)) / p.area)
     >>> print(Tank().equations())
-    d(h)/dt = (q - outlet * sqrt(19.62 * h)) / area
+    d(h)/dt = (q - outlet * sqrt(h * 19.62)) / area
     output h = h
     """
 
@@ -122,7 +122,7 @@ class Equations(Model):
         return (Equations, (self.core,))
 
     def __str__(self) -> str:
-        return str(self.core)
+        return str(self.core).rstrip("\n")
 
     def __repr__(self) -> str:
         sizes = (f"{len(named(of, what))} {what}" for what, of in _roles(self))
@@ -264,19 +264,19 @@ def _returned(trace: Trace, found: Any, names: tuple[str, ...], where: str) -> l
         found = dict(zip(found.keys(), found, strict=True))
     if isinstance(found, Mapping):
         entries = in_order(found, names, where)
-    elif isinstance(found, Symbol) or np.ndim(found) == 0:
-        if found is None:
-            raise Error(f"{where} returns nothing; return a value for each of {', '.join(names)}")
-        entries = [found]
+    elif found is None:
+        raise Error(f"{where} returns nothing; return a value for each of {', '.join(names)}")
+    elif isinstance(found, np.ndarray):
+        entries = found.ravel().tolist()
     else:
-        entries = list(np.ravel(np.asarray(found, dtype=object))) if isinstance(found, np.ndarray) else list(found)
+        entries = found if isinstance(found, (list, tuple)) else [found]
     entries = list(entries)
     if len(entries) != len(names):
         raise Error(f"{where} returns {len(entries)} value(s), but there are {len(names)} to give: {', '.join(names)}")
     nodes: list[_core.Node] = []
     for name, entry in zip(names, entries, strict=True):
-        if np.ndim(entry) > 0 and not isinstance(entry, Symbol):
-            raise Error(f"{where}: the value of `{name}` is an array of shape {np.shape(entry)}; return one number for each")
+        if isinstance(entry, (list, tuple)) or (isinstance(entry, np.ndarray) and entry.ndim > 0):
+            raise Error(f"{where}: the value of `{name}` has the shape {np.shape(entry)}; return one number for each")
         nodes.append(trace.node(entry))
     return nodes
 

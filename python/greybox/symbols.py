@@ -321,7 +321,17 @@ class Symbol:
     def _value(self, *_: Any) -> NoReturn:
         refuse(_NO_VALUE)
 
-    __float__ = __int__ = __index__ = __complex__ = __round__ = __trunc__ = __floor__ = __ceil__ = _value
+    __float__ = __int__ = __index__ = __complex__ = __round__ = _value
+
+    # NumPy calls these for the entries of an array of symbols.
+    def __floor__(self) -> Symbol:
+        return function("Floor", self)
+
+    def __ceil__(self) -> Symbol:
+        return function("Ceil", self)
+
+    def __trunc__(self) -> Symbol:
+        return function("Trunc", self)
 
     def _length(self, *_: Any) -> NoReturn:
         refuse(_NO_LENGTH)

@@ -47,10 +47,13 @@ def cooling() -> gb.Model:
 
 
 def cooled(n: int = 200, k: float = 0.3, sigma: float = 0.05, seed: int = 1) -> dict[str, Any]:
-    """A record of it."""
+    """A record of it, in a room that is heated and not heated."""
     t = np.arange(n) * 0.1
-    noise = np.random.default_rng(seed).normal(0.0, sigma, n)
-    return {"t": t, "room": np.full(n, 20.0), "body": 20 + 60 * np.exp(-k * t) + noise}
+    room = 20 + 10 * np.sign(np.sin(0.9 * t))
+    body = np.full(n, 80.0)
+    for i in range(n - 1):
+        body[i + 1] = room[i] + (body[i] - room[i]) * np.exp(-k * 0.1)
+    return {"t": t, "room": room, "body": body + np.random.default_rng(seed).normal(0.0, sigma, n)}
 
 
 @pytest.fixture(scope="session")

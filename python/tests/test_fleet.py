@@ -17,10 +17,8 @@ import greybox as gb
 def bodies(count: int = 40) -> pd.DataFrame:
     """Bodies that cool down at 0.30, 0.31, ..., with three that cannot be fitted."""
     parts = [pd.DataFrame(cooled(k=0.3 + 0.01 * k, seed=k)).assign(which=f"body {k}", place=k % 2) for k in range(count)]
-    parts[3] = parts[3].assign(room=np.nan)
-    parts[5] = parts[5].iloc[:1]
-    parts[7] = parts[7].assign(body=np.nan)
-    return pd.concat(parts, ignore_index=True)
+    spoiled = {3: parts[3].assign(room=np.nan), 5: parts[5].iloc[:1], 7: parts[7].assign(body=np.nan)} if count > 7 else {}
+    return pd.concat([spoiled.get(k, part) for k, part in enumerate(parts)], ignore_index=True)
 
 
 def test_a_row_for_each_record_and_failures_are_rows() -> None:
@@ -73,7 +71,7 @@ def test_dates_count_from_the_first_of_each_record() -> None:
 
 
 WRONG: list[tuple[dict[str, Any], str]] = [
-    ({"by": "what"}, "there is no column `what`"),
+    ({"by": "what", "k": gb.free(1.0)}, "there is no column `what`"),
     ({"by": "which"}, "parameter `k` is not declared"),
     ({"by": "which", "k": gb.free(1.0), "columns": {"body": "bdy"}}, "there is no column `bdy`"),
     ({"by": "which", "k": gb.free(1.0), "checkpoint": "c"}, "a fleet has no checkpoint"),

@@ -60,7 +60,8 @@ def test_all_kinds_of_frames_give_the_same_bits_and_their_own_kind_back(kind: st
     assert isinstance(found.table(), result)
     assert isinstance(found.predict(), result)
     predicted = np.asarray(found.predict()["body"])
-    assert np.abs(predicted - (20 + 60 * np.exp(-found.parameters.k * cooled()["t"]))).max() < 0.2
+    # Noise of 0.05, of which 200 samples stay within five standard deviations.
+    assert np.abs(predicted - cooled()["body"]).max() < 0.25
 
 
 def test_xarray() -> None:

@@ -44,7 +44,7 @@ def test_models_pickle() -> None:
 )
 def test_all_ways_to_return_a_vector(returned: Any) -> None:
     model = gb.model(lambda t, x, u, p: returned(x), states=["a", "b"], outputs=["b"])
-    assert str(model.equations()) == "d(a)/dt = 1\nd(b)/dt = a\noutput b = b"
+    assert str(model.equations()) == "d(a)/dt = 1.0\nd(b)/dt = a\noutput b = b"
 
 
 def test_kinds() -> None:
@@ -61,7 +61,7 @@ REFUSED: list[tuple[Any, str]] = [
     (lambda x: [1.0], "returns 1 value(s), but there are 2 to give: a, b"),
     (lambda x: 1.0, "returns 1 value(s)"),
     (lambda x: None, "returns nothing"),
-    (lambda x: [1.0, np.zeros(3)], "the value of `b` is an array of shape (3,)"),
+    (lambda x: [1.0, np.zeros(3)], "the value of `b` has the shape (3,)"),
     (lambda x: [1.0, x.c], "there is no `c` among the states: a, b"),
     (lambda x: [1.0, x.a > 0], "gb.where(condition, 1.0, 0.0)"),
     (lambda x: [1.0, "x"], "'x'"),
