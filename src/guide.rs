@@ -20,6 +20,7 @@
 //! | [13](chapter_13_extensions) | writing an integrator, a loss, a predictor, a motor |
 //! | [14](chapter_14_coming_from) | coming from `idnlgrey`, lmfit, Ceres, CasADi |
 //! | [15](chapter_15_how_it_works) | how it works: duals, lanes, the triangle, segments |
+//! | [18](chapter_18_python) | Python: models, frames, results, options |
 
 /// A chapter: its text, after the pictures that it names. A picture is a link definition with the image in it, so that the
 /// page needs no other file; the chapter's own definitions, which come second, are for readers of the files.
@@ -46,3 +47,4 @@ chapter!(chapter_12_observers, "12_observers");
 chapter!(chapter_13_extensions, "13_extensions");
 chapter!(chapter_14_coming_from, "14_coming_from");
 chapter!(chapter_15_how_it_works, "15_how_it_works");
+chapter!(chapter_18_python, "18_python");

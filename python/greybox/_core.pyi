@@ -62,9 +62,7 @@ class Equations:
         self,
         parameters: list[float],
         initial: list[float],
-        time: _Array,
-        inputs: list[_Array],
-        hold: str,
+        inputs: Record,
         integrator: str | None,
     ) -> Record: ...
 

@@ -7,9 +7,7 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Mapping
-from typing import Any, Literal
-
-import numpy as np
+from typing import Any
 
 from greybox import _core
 from greybox.errors import Error, FitWarning
@@ -176,7 +174,7 @@ def simulate(
     time: str | None = None,
     sample_time: float | None = None,
     columns: Mapping[str, str] | None = None,
-    hold: Literal["zero", "first"] = "zero",
+    hold: Hold = "zero",
     integrator: str | None = None,
 ) -> Any:
     """Simulate a model.
@@ -211,23 +209,20 @@ def simulate(
         If the simulation fails, or something that is given does not fit the model.
     """
     equations = checked(model).equations()
-    frame = Frame(data)
     inputs, outputs = named(equations.inputs, "inputs"), named(equations.outputs, "outputs")
     states, names = named(equations.states, "states"), named(equations.parameters, "parameters")
-    of = {name: (columns or {}).get(name, name) for name in inputs}
-    given = [frame.column(of[name], name) for name in inputs]
-    t = frame.time(time, sample_time, len(given[0]) if given else 0)
     values = [_number("parameter", name, parameters, names) for name in names]
     for what, mapping, known in (("parameters", parameters, names), ("initial", initial or {}, states), ("noise", noise or {}, outputs)):
         unknown = [name for name in mapping if name not in known]
         if unknown:
             raise Error(f"{what} names `{unknown[0]}`, and the model has: {near(unknown[0], known)}")
     start = [float((initial or {}).get(name, 0.0)) for name in states]
-    found = equations.core.simulate(values, start, t, given, hold, integrator)
+    record = Record(data, None, time, sample_time, columns, hold).core(equations, "simulation", outputs=False)
+    found = equations.core.simulate(values, start, record, integrator)
     if noise:
         found = found.with_noise([float(noise.get(name, 0.0)) for name in outputs], seed)
     columns_ = dict(zip([*inputs, *outputs], [*found.inputs(), *found.outputs()], strict=True))
-    return frame.kind({"t": np.asarray(t), **columns_})
+    return Frame(data).kind({"t": found.time(), **columns_})
 
 
 def _number(what: str, name: str, values: Mapping[str, float], names: Any) -> float:

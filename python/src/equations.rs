@@ -2,12 +2,10 @@
 
 use crate::convert::{name_of, named, raised};
 use crate::graph::{Graph, Node};
-use crate::record::{Record, hold_of};
+use crate::record::Record;
 use greybox::graph::Id;
 use greybox::layout::{Layout, Quantity};
-use greybox::record::Time;
 use greybox::{Fit, fixed};
-use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::sync::Arc;
@@ -34,7 +32,12 @@ impl Equations {
     /// diffusions, noises).
     #[new]
     #[expect(clippy::needless_pass_by_value, reason = "arguments of Python come as values")]
-    fn new(kind: &str, quantities_by_role: [Names; 4], graph: &Graph, roots: [Vec<PyRef<'_, Node>>; 4]) -> PyResult<Self> {
+    fn new(
+        kind: &str,
+        quantities_by_role: [Names; 4],
+        graph: &Graph,
+        roots: [Vec<PyRef<'_, Node>>; 4],
+    ) -> PyResult<Self> {
         let [states, inputs, outputs, parameters] = quantities_by_role.map(quantities);
         let layout = Layout { kind: named(kind)?, states, inputs, outputs, parameters };
         let roots: Vec<Vec<Id>> = roots.iter().map(|nodes| nodes.iter().map(|node| node.0).collect()).collect();
@@ -87,30 +90,22 @@ impl Equations {
         names(&self.0.layout().parameters)
     }
 
-    /// Simulates; the inputs are columns.
-    #[expect(clippy::too_many_arguments, reason = "named in Python")]
+    /// Simulates with the inputs of a record, and gives it with the outputs.
     #[expect(clippy::needless_pass_by_value, reason = "arguments of Python come as values")]
     fn simulate(
         &self,
         py: Python<'_>,
         parameters: Vec<f64>,
         initial: Vec<f64>,
-        time: PyReadonlyArray1<'_, f64>,
-        inputs: Vec<PyReadonlyArray1<'_, f64>>,
-        hold: &str,
+        inputs: &Record,
         integrator: Option<&str>,
     ) -> PyResult<Record> {
-        let stamps = time.as_array().to_vec();
-        let columns: Vec<Vec<f64>> = inputs.iter().map(|column| column.as_array().to_vec()).collect();
-        let rows: Vec<Vec<f64>> = (0..stamps.len())
-            .map(|k| columns.iter().map(|column| column.get(k).copied().unwrap_or(f64::NAN)).collect())
-            .collect();
-        let hold = hold_of(hold)?;
-        let mut fit = Fit::new(&*self.0, &[]).parameters(parameters.into_iter().map(fixed).collect());
+        let none: [greybox::record::Record; 0] = [];
+        let mut fit = Fit::new(&*self.0, &none).parameters(parameters.into_iter().map(fixed).collect());
         if let Some(name) = integrator {
             fit = fit.integrator_by_name(name).map_err(raised)?;
         }
-        let simulated = py.detach(|| fit.simulate(&initial, Time::from_stamps(stamps), hold, &rows));
+        let simulated = py.detach(|| fit.simulate(&initial, &inputs.record));
         Ok(Record { record: simulated.map_err(raised)?, equations: self.clone() })
     }
 }

@@ -161,10 +161,7 @@ impl Estimate {
     }
 }
 
-fn square<'py>(
-    py: Python<'py>,
-    matrix: &greybox::information::SquareMatrix,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+fn square<'py>(py: Python<'py>, matrix: &greybox::information::SquareMatrix) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let n = matrix.size();
     let rows: Vec<Vec<f64>> = (0..n).map(|i| (0..n).map(|j| matrix[(i, j)]).collect()).collect();
     match n {

@@ -44,7 +44,7 @@ enum Holds {
 }
 
 /// The hold of this name.
-pub fn hold_of(name: &str) -> PyResult<Hold> {
+fn hold_of(name: &str) -> PyResult<Hold> {
     match name {
         "zero" => Ok(Hold::Zero),
         "first" => Ok(Hold::First),
@@ -121,7 +121,9 @@ impl Record {
             Start::Named(name) if name == "estimated" => Initial::Estimated,
             Start::Named(name) if name == "first" => Initial::FirstSample,
             Start::Named(name) => {
-                let text = format!("there is no initial state `{name}`; take estimated, first, or a declaration for each state");
+                let text = format!(
+                    "there is no initial state `{name}`; take estimated, first, or a declaration for each state"
+                );
                 return Err(raised(text));
             }
         };
@@ -140,7 +142,8 @@ impl Record {
     /// What a record is made of, for pickle.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
         let (py, Record { record, equations }) = (slf.py(), slf.get());
-        let shared = |columns: Vec<Bound<'py, PyArray1<f64>>>| columns.into_iter().map(|one| (one, false)).collect::<Vec<_>>();
+        let shared =
+            |columns: Vec<Bound<'py, PyArray1<f64>>>| columns.into_iter().map(|one| (one, false)).collect::<Vec<_>>();
         let time = match record.times() {
             Time::Uniform { start, step } => (*start, *step).into_pyobject(py)?.into_any(),
             Time::Stamps(stamps) => PyArray1::from_slice(py, stamps).into_any(),

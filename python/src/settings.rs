@@ -48,7 +48,9 @@ impl Parameter {
                 text += &format!(", {name}=({a:?}, {b:?})");
             }
         }
-        for (name, said) in [("log", self.log()), ("positive", self.positive()), ("per_experiment", self.per_experiment())] {
+        for (name, said) in
+            [("log", self.log()), ("positive", self.positive()), ("per_experiment", self.per_experiment())]
+        {
             if said {
                 text += &format!(", {name}=True");
             }
