@@ -1,10 +1,12 @@
 //! Records from NumPy files, mapped into memory.
 
+mod header;
+
 use super::{Channel, Column, Record, Time};
 use crate::error::Error;
 use crate::layout::{Layout, Quantity};
+use header::Header;
 use memmap2::Mmap;
-use npyz::{NpyHeader, Order, TypeChar};
 use std::fs::File;
 use std::path::Path;
 
@@ -50,29 +52,23 @@ impl Record {
 fn column(path: &Path) -> Result<Column, Error> {
     let failed = |source: Box<dyn std::error::Error + Send + Sync>| Error::File { path: path.to_owned(), source };
     let mut file = File::open(path).map_err(|error| failed(error.into()))?;
-    let header = NpyHeader::from_reader(&mut file).map_err(|error| failed(error.into()))?;
-    let begin = std::io::Seek::stream_position(&mut file).map_err(|error| failed(error.into()))?;
-    let begin = usize::try_from(begin).map_err(|error| failed(error.into()))?;
+    let header = Header::read(&mut file).map_err(|error| failed(error.into()))?;
     // SAFETY: nothing but numbers is read from the map, any bytes are numbers, and it is never written. That the file does
     // not change meanwhile is for its owner to see to, as the documentation says.
     let map = unsafe { Mmap::map(&file) }.map_err(|error| failed(error.into()))?;
-    let numbers: Option<&[f64]> = map.get(begin..).and_then(|bytes| bytemuck::try_cast_slice(bytes).ok());
-    let is_float = match header.dtype() {
-        npyz::DType::Plain(kind) => {
-            let native = if cfg!(target_endian = "little") { '<' } else { '>' };
-            kind.type_char() == TypeChar::Float && kind.size_field() == 8 && kind.to_string().contains(native)
-        }
-        _ => false,
-    };
-    let shape = header.shape();
+    let numbers: Option<&[f64]> = map.get(header.begin..).and_then(|bytes| bytemuck::try_cast_slice(bytes).ok());
+    let native = if cfg!(target_endian = "little") { "<f8" } else { ">f8" };
     match numbers {
-        Some(numbers) if is_float && shape == [numbers.len() as u64] => Ok(Column::new(Mapped { map, begin })),
+        Some(numbers) if header.kind == native && header.shape == [numbers.len() as u64] => {
+            Ok(Column::new(Mapped { map, begin: header.begin }))
+        }
         _ => Err(failed(
             format!(
-                "{} of shape {shape:?}{}: save one column of float64 in this machine's byte order, \
+                "{} of shape {:?}{}: save one column of float64 in this machine's byte order, \
                  numpy.save(\"NAME.npy\", numpy.ascontiguousarray(x, float))",
-                header.dtype().descr(),
-                if header.order() == Order::Fortran && shape.len() > 1 { " by columns" } else { "" }
+                header.kind,
+                header.shape,
+                if header.by_columns && header.shape.len() > 1 { " by columns" } else { "" }
             )
             .into(),
         )),

@@ -185,27 +185,11 @@ fn the_committed_example_still_reads() {
     assert!(other.contains("the format is \"greybox estimate\""), "{other}");
 }
 
-/// Every report keeps to the schema, with and without its drawings; a report that does not is refused by it.
+/// A report is read back with and without its drawings; tests/schema compares both with the schema.
 #[test]
-fn reports_keep_to_the_schema() {
-    let registry = crate::json::schemas();
-    let schema = crate::json::validator(&registry, "report");
+fn drawings_are_read_over() {
     let everything = with_everything();
-    let drawn = everything.to_json_with_drawings().unwrap();
-    for text in [everything.to_json().unwrap(), drawn.clone(), not_finite().to_json().unwrap()] {
-        let value = serde_json::from_str(&text).unwrap();
-        let wrong: Vec<String> = schema.iter_errors(&value).map(|e| format!("{}: {e}", e.instance_path())).collect();
-        assert!(wrong.is_empty(), "{wrong:#?}");
-    }
-    for (right, wrong) in [
-        ("\"severity\": \"usable_with_care\"", "\"severity\": \"Bad\""),
-        ("\"folded\": true", "\"folded\": 1"),
-        ("\"style\": \"measured\"", "\"style\": \"guessed\""),
-    ] {
-        let damaged = drawn.replacen(right, wrong, 1);
-        assert!(drawn != damaged && !schema.is_valid(&serde_json::from_str(&damaged).unwrap()), "{wrong}");
-    }
-    assert_eq!(Report::from_json(&drawn).unwrap(), everything);
+    assert_eq!(Report::from_json(&everything.to_json_with_drawings().unwrap()).unwrap(), everything);
 }
 
 /// A report with numbers that JSON has no value for.
