@@ -187,6 +187,6 @@ fn read_csv(bencher: Bencher) {
     let outputs = (0..SAMPLES).map(|k| ControlledAxisOutput { qm: value(k + 1), vir: value(k + 2) }).collect();
     let record = Experiment::new(&model, Time::Uniform { start: 0.0, step: STEP }, inputs, outputs).unwrap();
     record.to_csv(&path).unwrap();
-    bencher.counter(ItemsCount::new(SAMPLES)).bench_local(|| Experiment::from_csv(&model, &path).unwrap());
+    bencher.counter(ItemsCount::new(SAMPLES)).bench_local(|| Experiment::from_file(&model, &path).unwrap());
     std::fs::remove_file(path).unwrap();
 }

@@ -32,7 +32,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), greybox::Error> {
     let model = PositioningLoop::EMPS;
-    let record = Experiment::from_csv(&model, &arguments.file)?
+    let record = Experiment::from_file(&model, &arguments.file)?
         .named("EMPS")
         .hold(Hold::First) // the reference is a smooth curve, sampled
         .initial(ControlledAxisMotion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) }); // it starts at rest

@@ -177,6 +177,38 @@ pub enum Error {
         /// The text of the cell.
         text: String,
     },
+    /// Dates of a column that cannot be read as times.
+    #[error("{}, {}column `{column}`: {problem}", path.display(), place(*line, text))]
+    Dates {
+        /// The file.
+        path: PathBuf,
+        /// Line, from one; zero where it is no single one.
+        line: u64,
+        /// Name of the column.
+        column: String,
+        /// The text of the cell.
+        text: String,
+        /// The fault and the remedy.
+        problem: String,
+    },
+    /// A column in another unit than its signal.
+    #[error(
+        "{}: column `{column}` is in \"{file}\" and signal `{signal}` in \"{model}\"; give DataFile::factor(\"{signal}\", {factor}), or 1 if the file's unit is wrong", path.display()
+    )]
+    Unit {
+        /// The file.
+        path: PathBuf,
+        /// Name of the column.
+        column: String,
+        /// Its unit.
+        file: String,
+        /// Name of the signal.
+        signal: String,
+        /// Its unit.
+        model: String,
+        /// The factor from one to the other.
+        factor: f64,
+    },
     /// A file that could not be read or written.
     #[error("{}: {source}", path.display())]
     File {
@@ -288,12 +320,12 @@ const LISTED: usize = 10;
 fn listed(columns: &[String], wanted: &str, signal: &str) -> String {
     let remedy = match columns {
         [single] if single.contains([';', '\t', '|']) => {
-            "set what stands between cells with CsvFile::delimiter, or CsvFile::decimal_comma where numbers are written as 1,5"
+            "set what stands between cells with DataFile::delimiter, or DataFile::decimal_comma where numbers are written as 1,5"
         }
         _ if columns.iter().any(|name| name.contains('\u{FFFD}')) => "the file is not UTF-8; save it as UTF-8",
         _ if columns.iter().all(|name| name.parse::<f64>().is_ok()) => "its first line must hold the names",
-        _ if signal == "t" => "name another with CsvFile::column, or give CsvFile::sample_time",
-        _ => "name another with CsvFile::column",
+        _ if signal == "t" => "name another with DataFile::column, or give DataFile::sample_time",
+        _ => "name another with DataFile::column",
     };
     if columns.len() <= LISTED {
         return format!("the file has: {}; {remedy}", columns.join(", "));
@@ -342,17 +374,22 @@ fn short(value: f64) -> String {
     if plain { value.to_string() } else { format!("{value:e}") }
 }
 
+/// The line and the text of a cell.
+fn place(line: u64, text: &str) -> String {
+    if line == 0 { String::new() } else { format!("line {line}, `{text}`, ") }
+}
+
 /// A hint at the probable cause, from a text that is not a number.
 fn number_hint(text: &str) -> &'static str {
     let only = |letters: &str| text.chars().all(|letter| letter.is_ascii_digit() || letters.contains(letter));
     if text.replacen(',', ".", 1).parse::<f64>().is_ok() {
-        "; for decimal commas there is CsvFile::decimal_comma"
+        "; for decimal commas there is DataFile::decimal_comma"
     } else if !text.contains(|letter: char| letter.is_ascii_digit()) {
-        "; a row of units is skipped by CsvFile::units_row, and an output that is missing is empty, NaN, NA or null"
+        "; a row of units is skipped by DataFile::units_row, and an output that is missing is empty, NaN, NA or null"
     } else if only("+-.,' ") {
         "; numbers have no separators of thousands"
     } else if only("-/.:TZ+ ") {
-        "; time is a number, such as the seconds since the start: convert it, or give CsvFile::sample_time"
+        "; times are seconds, ISO 8601, 20.03.2025 14:05:00, 03/20/2025 2:05:00 PM or 14:05:00: convert it, or give DataFile::sample_time"
     } else {
         ""
     }

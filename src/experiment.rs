@@ -1,8 +1,8 @@
 //! [`Experiment`]: a record that knows its model's signals by their types.
 
-#[cfg(feature = "csv")]
-mod csv;
 mod edit;
+#[cfg(feature = "csv")]
+mod file;
 #[cfg(feature = "npy")]
 mod npy;
 
@@ -24,7 +24,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 /// input is held from sample to sample, and the initial state is estimated, from a start that the first measurements give.
 ///
 /// It is made of vectors ([`new`](Experiment::new)), of columns ([`from_columns`](Experiment::from_columns)) or of a CSV
-/// file (`from_csv`, `CsvFile`), and cut ([`slice`](Experiment::slice), [`between`](Experiment::between),
+/// file (`from_file`, `DataFile`), and cut ([`slice`](Experiment::slice), [`between`](Experiment::between),
 /// [`split`](Experiment::split), [`cycles`](Experiment::cycles), [`without_gaps`](Experiment::without_gaps)),
 /// [joined](Experiment::join) and [thinned](Experiment::decimate) into others; pieces share the columns of the whole. As
 /// JSON it keeps everything; what is read back is checked again.

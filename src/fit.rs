@@ -71,7 +71,7 @@ impl<'a, M: Made> Records<'a, M> {
 /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # let model = Surface::new(4)?;
-/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let record = Experiment::from_file(&model, "examples/data/pmsm.csv")?;
 /// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
 /// use greybox::{Huber, Rk4};
 /// let estimate = Fit::new(&model, &record)

@@ -75,7 +75,7 @@
 //! | to | see |
 //! |---|---|
 //! | write a model | [`Model`], [`signals!`], [`Scalar`], [`Table`]; [`Numeric`] for functions over `f64`; [`models`] and [`pmsm`] for those that ship |
-//! | read a record | [`Experiment`], [`CsvFile`], [`Time`], [`Hold`], [`units`] |
+//! | read a record | [`Experiment`], [`DataFile`], [`Time`], [`Hold`], [`units`] |
 //! | simulate | [`simulate()`], [`Simulator`] |
 //! | declare parameters | [`free`], [`fixed`], [`Parameter`], [`Prior`] |
 //! | fit one record or several together | [`Fit`] |
@@ -208,7 +208,7 @@ pub use scalar::Scalar;
 pub use signals::{Entry, Nothing, Of, Signals};
 
 #[cfg(feature = "csv")]
-pub use record::CsvFile;
+pub use record::{DataFile, DateOrder, Reading, TimeSource};
 #[cfg(feature = "std")]
 pub use {
     error::{Error, Failure},

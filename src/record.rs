@@ -1,10 +1,10 @@
 //! [`Record`]: measured inputs and outputs over time, by columns, valid by construction.
 
 mod column;
-#[cfg(feature = "csv")]
-mod csv;
 mod cycles;
 mod edit;
+#[cfg(feature = "csv")]
+mod file;
 mod holds;
 mod inspect;
 #[cfg(feature = "npy")]
@@ -13,9 +13,9 @@ mod stored;
 mod time;
 
 pub use column::{Channel, Column};
-#[cfg(feature = "csv")]
-pub use csv::CsvFile;
 pub use cycles::Gap;
+#[cfg(feature = "csv")]
+pub use file::{DataFile, DateOrder, Reading, TimeSource};
 pub(crate) use holds::Holds;
 pub(crate) use inspect::Looked;
 pub use inspect::{ChannelInspection, Inspection, Suspicion};
@@ -58,6 +58,9 @@ pub struct Record {
     pub(crate) outputs: Arc<[Channel]>,
     pub(crate) holds: Holds,
     pub(crate) initial: Initial,
+    /// How its file was read, if it is from one.
+    #[cfg(feature = "csv")]
+    pub(crate) reading: Option<Arc<Reading>>,
     /// Result of the inspection of its channels, if there was one.
     pub(crate) looked: Arc<OnceLock<Looked>>,
 }
@@ -71,7 +74,20 @@ impl Record {
     pub fn new(states: Vec<Quantity>, time: Time, inputs: Vec<Channel>, outputs: Vec<Channel>) -> Result<Self, Error> {
         let (name, holds, initial) = ("record".to_owned(), Holds::All(Hold::default()), Initial::default());
         let (states, inputs, outputs) = (states.into(), inputs.into(), outputs.into());
-        Record { name, states, time, inputs, outputs, holds, initial, looked: Arc::default() }.checked()
+        let looked = Arc::default();
+        let record = Record {
+            name,
+            states,
+            time,
+            inputs,
+            outputs,
+            holds,
+            initial,
+            #[cfg(feature = "csv")]
+            reading: None,
+            looked,
+        };
+        record.checked()
     }
 
     /// Names the record in reports and errors.
@@ -106,6 +122,12 @@ impl Record {
     /// Name in reports and errors.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// How its file was read, if it is from one: what was said, and what was guessed.
+    #[cfg(feature = "csv")]
+    pub fn reading(&self) -> Option<&Reading> {
+        self.reading.as_deref()
     }
 
     /// Number of samples.

@@ -7,7 +7,7 @@
 use crate::terminal;
 use greybox::pmsm::{Drive, ExactStep, ExactSurface, HeldIn, Surface, Winding};
 use greybox::report::{Cell, Section, Table};
-use greybox::{CsvFile, Experiment, ExperimentOf, Fit, Parameter, free, units};
+use greybox::{DataFile, Experiment, ExperimentOf, Fit, Parameter, free, units};
 use std::sync::atomic::AtomicBool;
 use std::{error::Error, path::Path, sync::Arc};
 
@@ -70,7 +70,7 @@ struct Tried {
 }
 
 pub fn found(path: &Path, columns: &[&str], said: &Settings, stop: &Arc<AtomicBool>) -> Result<Found, Box<dyn Error>> {
-    let file = NAMES.iter().fold(CsvFile::new(path), |file, (signal, names)| {
+    let file = NAMES.iter().fold(DataFile::new(path), |file, (signal, names)| {
         let there = names.iter().find(|name| columns.contains(name));
         there.map_or(file.clone(), |name| file.column(signal, name))
     });

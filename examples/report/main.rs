@@ -9,7 +9,7 @@ use clap::Parser;
 use greybox::diagnose::{Convergence, Resampling, bootstrap, profile};
 use greybox::models::{AxisParameters, ControlledAxisMotion, PositioningLoop};
 use greybox::report::{Origin, Section};
-use greybox::{CsvFile, ExperimentOf, Fit, Hold, Model, Of, Parameter, Report, fixed, free};
+use greybox::{DataFile, ExperimentOf, Fit, Hold, Model, Of, Parameter, Report, fixed, free};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::{error::Error, fs::File, io::BufRead, io::BufReader, path::PathBuf, process::ExitCode, sync::Arc};
 
@@ -58,7 +58,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let report = if ["qg", "vir"].iter().all(|name| columns.contains(name)) {
         let model = PositioningLoop::EMPS;
         let rest = ControlledAxisMotion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) };
-        let record = CsvFile::new(&arguments.file).read(&model)?.hold(Hold::First).initial(rest);
+        let record = DataFile::new(&arguments.file).read(&model)?.hold(Hold::First).initial(rest);
         let axis = AxisParameters { m: free(80.0), fv: free(150.0), fc: free(15.0), offset: free(0.0) };
         reported(&model, &record, axis, arguments, &stop, None)?
     } else {

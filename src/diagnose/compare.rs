@@ -58,7 +58,7 @@ impl Candidate {
 /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # let model = Surface::new(4)?;
-/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let record = Experiment::from_file(&model, "examples/data/pmsm.csv")?;
 /// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
 /// # let problem = Fit::new(&model, &record).parameters(start).problem()?;
 /// # let estimate = problem.run()?;
@@ -176,7 +176,7 @@ type NamedQualities = Vec<(String, OutputFit)>;
 /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # let model = Surface::new(4)?;
-/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let record = Experiment::from_file(&model, "examples/data/pmsm.csv")?;
 /// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
 /// let (first, second) = record.split(0.6)?;
 /// let estimate = Fit::new(&model, &first).parameters(start).run()?;
@@ -214,7 +214,7 @@ pub fn validate<M: Model>(
 /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # let model = Surface::new(4)?;
-/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let record = Experiment::from_file(&model, "examples/data/pmsm.csv")?;
 /// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
 /// let blocks: Vec<_> = (0..4).map(|k| record.slice(k * 500..(k + 1) * 500)).collect::<Result<_, _>>()?;
 /// let fit = |others: &[_]| Fit::new(&model, others).parameters(start).run();

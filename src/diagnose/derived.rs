@@ -37,7 +37,7 @@ pub struct Derived {
 /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # let model = Surface::new(4)?;
-/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let record = Experiment::from_file(&model, "examples/data/pmsm.csv")?;
 /// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
 /// let estimate = Fit::new(&model, &record).parameters(start).run()?;
 /// // The electrical time constant, with the correlation of both parameters.
@@ -60,7 +60,7 @@ pub fn derived<M: Model>(
 /// # use greybox::{Experiment, Fit, diagnose, free, pmsm::{Surface, Winding}};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # let model = Surface::new(4)?;
-/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let record = Experiment::from_file(&model, "examples/data/pmsm.csv")?;
 /// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
 /// use greybox::graph::{Graph, Leaf};
 /// let estimate = Fit::new(&model, &record).parameters(start).run()?;

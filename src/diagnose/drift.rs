@@ -36,7 +36,7 @@ pub struct Drift {
 /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # let model = Surface::new(4)?;
-/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let record = Experiment::from_file(&model, "examples/data/pmsm.csv")?;
 /// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
 /// let hours: Vec<_> = (0..4)
 ///     .map(|k| Ok(Fit::new(&model, &record.slice(k * 500..(k + 1) * 500)?).parameters(start).run()?.into_summary()))

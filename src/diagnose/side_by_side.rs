@@ -13,7 +13,7 @@ use crate::section::{Drawing, Plot};
 /// # use greybox::{Estimate, Experiment, ExperimentOf, Fit, Report, fixed, free, pmsm::{Surface, Winding}};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # let model = Surface::new(4)?;
-/// let (fitted, other) = Experiment::from_csv(&model, "examples/data/pmsm.csv")?.split(0.6)?;
+/// let (fitted, other) = Experiment::from_file(&model, "examples/data/pmsm.csv")?.split(0.6)?;
 /// let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
 /// let problem = Fit::new(&model, &fitted).parameters(start).problem()?;
 /// let free = Estimate::of(problem.run()?)?;

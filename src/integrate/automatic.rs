@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # let model = Surface::new(4)?;
-/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let record = Experiment::from_file(&model, "examples/data/pmsm.csv")?;
 /// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
 /// let four = greybox::Automatic { continuous: greybox::Rk4 { substeps: 4 } };
 /// let estimate = Fit::new(&model, &record).parameters(start).integrator(four).run()?;

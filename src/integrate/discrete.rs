@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// # use greybox::pmsm::{Currents, Drive, ExactStep, ExactSurface, HeldIn, Winding};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let model = ExactSurface(ExactStep::new(4, 0.25e-3, HeldIn::Rotor)?); // a discrete model
-/// # let record = greybox::Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let record = greybox::Experiment::from_file(&model, "examples/data/pmsm.csv")?;
 /// let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
 /// let estimate = Fit::new(&model, &record).parameters(start).integrator(Discrete).run()?; // the default for it
 /// assert!((estimate.parameters.ls / 4e-3 - 1.0).abs() < 0.002);

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # let model = Surface::new(4)?;
-/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let record = Experiment::from_file(&model, "examples/data/pmsm.csv")?;
 /// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
 /// let estimate = Fit::new(&model, &record).parameters(start).integrator(greybox::Rk4 { substeps: 2 }).run()?;
 /// assert_eq!(estimate.method.integrator, "Runge-Kutta 4, 2 steps per sample");

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # let model = Surface::new(4)?;
-/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let record = Experiment::from_file(&model, "examples/data/pmsm.csv")?;
 /// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
 /// use greybox::optimize::GaussNewton;
 /// let near = Winding { rs: free(0.6), ls: free(3.8e-3), ke: free(0.9) };

@@ -33,7 +33,7 @@ use stored::Stored;
 /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # let model = Surface::new(4)?;
-/// # let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+/// # let record = Experiment::from_file(&model, "examples/data/pmsm.csv")?;
 /// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
 /// use greybox::optimize::{LevenbergMarquardt, Stop, OwnSize};
 /// let quick = LevenbergMarquardt::new(Stop { iterations: 200, ..Stop::default() }, OwnSize);

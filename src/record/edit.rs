@@ -197,6 +197,8 @@ impl Record {
             outputs: self.outputs.iter().map(part).collect(),
             holds: self.holds.clone(),
             initial,
+            #[cfg(feature = "csv")]
+            reading: self.reading.clone(),
             looked: Arc::default(),
         }
     }

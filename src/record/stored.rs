@@ -135,8 +135,18 @@ impl Stored {
         let (inputs, outputs) = (channels(self.inputs, inputs)?, channels(self.outputs, outputs)?);
         let Stored { name, time, .. } = self;
         let (states, inputs, outputs) = (states.into(), inputs.into(), outputs.into());
-        Record { name, states, time, inputs, outputs, holds, initial, looked: Arc::default() }
-            .checked()
-            .map_err(|error| error.to_string())
+        let record = Record {
+            name,
+            states,
+            time,
+            inputs,
+            outputs,
+            holds,
+            initial,
+            #[cfg(feature = "csv")]
+            reading: None,
+            looked: Arc::default(),
+        };
+        record.checked().map_err(|error| error.to_string())
     }
 }

@@ -282,7 +282,7 @@ fn only_the_problem_of_the_fit_is_reported_on() {
 #[test]
 fn tests_that_may_fail_by_chance_are_called_so() {
     let model = Surface::new(4).unwrap();
-    let record = Experiment::from_csv(&model, "examples/data/pmsm.csv").unwrap();
+    let record = Experiment::from_file(&model, "examples/data/pmsm.csv").unwrap();
     let parameters = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
     let problem = Fit::new(&model, &record).parameters(parameters).problem().unwrap();
     let report = Report::new(&problem, &problem.run().unwrap()).unwrap();

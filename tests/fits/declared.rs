@@ -80,7 +80,7 @@ fn the_wrong_hold_of_the_benchmark_is_not_usable() {
         fc: free(15.0).positive(),
         offset: free(0.0),
     };
-    let record = Experiment::from_csv(&model, path).unwrap().initial(rest);
+    let record = Experiment::from_file(&model, path).unwrap().initial(rest);
     let wrong = Fit::new(&model, &record).parameters(axis).run().unwrap();
     assert!(wrong.severity() == Severity::NotUsable && wrong.parameters.fv < 0.0, "{wrong}");
     let right = Fit::new(&model, &record.hold(Hold::First)).parameters(axis).run().unwrap();

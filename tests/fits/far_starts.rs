@@ -224,7 +224,7 @@ fn the_second_derivative_of_a_fit_is_that_of_its_errors() {
 fn the_emps_record_is_fitted_in_open_loop_from_far() {
     let Some(path) = shared("emps/emps.csv") else { return };
     let model = Positioning::EMPS;
-    let record = Experiment::from_csv(&model, path).unwrap().initial(AxisMotion { q: free(0.0), v: fixed(0.0) });
+    let record = Experiment::from_file(&model, path).unwrap().initial(AxisMotion { q: free(0.0), v: fixed(0.0) });
     let start = AxisParameters {
         m: free(43.003797).log(),
         fv: free(170.22234).log(),

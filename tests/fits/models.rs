@@ -75,7 +75,7 @@ fn a_dc_motor_is_recovered() {
 fn the_emps_record_is_fitted_in_closed_loop() {
     let Some(path) = shared("emps/emps.csv") else { return };
     let model = PositioningLoop::EMPS;
-    let record = Experiment::from_csv(&model, path).unwrap().hold(Hold::First);
+    let record = Experiment::from_file(&model, path).unwrap().hold(Hold::First);
     let record = record.initial(ControlledAxisMotion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) });
     let start = AxisParameters { m: free(80.0), fv: free(150.0), fc: free(15.0), offset: free(0.0) };
     let estimate = Fit::new(&model, &record).parameters(start).run().unwrap();
@@ -96,7 +96,7 @@ fn the_emps_record_is_fitted_in_closed_loop() {
 fn an_independent_drive_is_fitted() {
     for (file, rs, ke) in [("motulator/spm_avg.csv", 1e-3, 5e-4), ("motulator/spm_pwm.csv", 1e-2, 2e-3)] {
         let Some(path) = shared(file) else { return };
-        let log = CsvFile::new(path).column("w", "omega_m").read(&Surface::new(3).unwrap()).unwrap();
+        let log = DataFile::new(path).column("w", "omega_m").read(&Surface::new(3).unwrap()).unwrap();
         let model = ExactSurface(ExactStep::new(3, log.sample_time(), HeldIn::Stationary).unwrap());
         let next = log.inputs().skip(1).chain(log.inputs().last());
         let inputs = log.inputs().zip(next).map(|(u, next)| Drive { w: (u.w + next.w) / 2.0, ..u }).collect();
@@ -113,7 +113,7 @@ fn an_independent_drive_is_fitted() {
 #[test]
 fn the_shipped_record_holds_its_truth() {
     let model = Surface::new(4).unwrap();
-    let record = Experiment::from_csv(&model, concat!(env!("CARGO_MANIFEST_DIR"), "/examples/data/pmsm.csv")).unwrap();
+    let record = Experiment::from_file(&model, concat!(env!("CARGO_MANIFEST_DIR"), "/examples/data/pmsm.csv")).unwrap();
     let start = Winding { rs: free(1.0).within(0.01, 10.0), ls: free(2e-3), ke: free(0.7) };
     let estimate = Fit::new(&model, &record).parameters(start).run().unwrap();
     for (unknown, truth) in estimate.unknowns.iter().zip([0.63, 4e-3, 0.95]) {

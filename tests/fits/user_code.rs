@@ -62,7 +62,7 @@ fn the_design_runs_as_written() -> Result<(), greybox::Error> {
 
     let model = Pmsm { pole_pairs: 4.0 };
     record(&model, &path);
-    let record = Experiment::from_csv(&model, &path)?;
+    let record = Experiment::from_file(&model, &path)?;
     let estimate = Fit::new(&model, &record)
         .parameters(Winding { rs: free(1.0).within(0.01, 10.0), ls: free(2e-3), ke: free(0.7) })
         .noise(Currents { id: 0.05, iq: 0.05 })

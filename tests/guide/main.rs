@@ -122,7 +122,7 @@ fn chapter_2_half_a_sample() -> Outcome {
 /// The small record of a motor, and where its fits start.
 fn motor() -> Result<Motor, Box<dyn std::error::Error>> {
     let model = Surface::new(4)?;
-    let record = Experiment::from_csv(&model, "examples/data/pmsm.csv")?;
+    let record = Experiment::from_file(&model, "examples/data/pmsm.csv")?;
     Ok((model, record, Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) }))
 }
 

@@ -4,7 +4,7 @@
 use crate::shared::shared;
 use greybox::pmsm::offline::{Axes, Extended, Form, Spans, Speed};
 use greybox::pmsm::{Compensated, CompensatedWinding, ExactStep, ExactSurface, HeldIn, PolePairs, Surface, Winding};
-use greybox::{CsvFile, Fit, fixed, free};
+use greybox::{DataFile, Fit, fixed, free};
 
 const TRUTH: Winding = Winding { rs: 3.6, ls: 42e-3, ke: 2.002_46 };
 
@@ -15,7 +15,7 @@ fn records() -> Vec<(&'static str, Spans)> {
         .filter_map(|name| {
             let path = shared(&format!("motulator/{name}"))?;
             let model = Surface::new(3).unwrap();
-            let record = CsvFile::new(path).column("w", "omega_m").read(&model).unwrap();
+            let record = DataFile::new(path).column("w", "omega_m").read(&model).unwrap();
             // The speed is that at the sample.
             Some((name, Spans::from_experiment(&record, PolePairs::new(3).unwrap(), Speed::AtSample, 0.0).unwrap()))
         })

@@ -3,7 +3,7 @@
 
 use crate::pmsm::{Currents, Drive, Pmsm, Winding};
 use crate::refused::says;
-use greybox::{CsvFile, Error, Experiment, Model, Scalar, Time};
+use greybox::{DataFile, Error, Experiment, Model, Scalar, Time};
 use std::path::PathBuf;
 
 const U: Drive = Drive { ud: 1.0, w: 2.0 };
@@ -24,16 +24,17 @@ fn file(name: &str, text: impl AsRef<[u8]>) -> PathBuf {
 /// Reads a file of this text and checks what the error says.
 #[track_caller]
 fn refused(name: &str, text: &str, parts: &[&str]) -> Error {
-    says(Experiment::from_csv(&Pmsm, file(name, text)), parts)
+    says(Experiment::from_file(&Pmsm, file(name, text)), parts)
 }
 
 #[test]
 fn missing_column() {
-    let error = refused("columns.csv", "time,ud,speed,id,iq\n", &["columns.csv", "`t`", "time, ud, speed, id, iq"]);
+    let error = refused("columns.csv", "time,ud,speed,id,iq\n", &["columns.csv", "`w`", "time, ud, speed, id, iq"]);
     assert!(matches!(error, Error::MissingColumn { .. }));
-    let renamed = CsvFile::new(file("renamed.csv", "t,ud,speed,id,iq\n")).column("w", "rpm").read(&Pmsm);
+    let renamed = DataFile::new(file("renamed.csv", "t,ud,speed,id,iq\n")).column("w", "rpm").read(&Pmsm);
     says(renamed, &["no column `rpm` for `w`", "t, ud, speed, id, iq"]);
-    refused("semicolon.csv", "t;ud;w;id;iq\n0;1;2;3;4\n", &["t;ud;w;id;iq", "CsvFile::delimiter"]);
+    let bars = DataFile::new(file("bars.csv", "t|ud|w|id|iq\n0|1|2|3|4\n")).delimiter(b',').read(&Pmsm);
+    says(bars, &["t|ud|w|id|iq", "DataFile::delimiter"]);
     refused("nameless.csv", "0,1,2,3,4\n1,1,2,3,4\n", &["no column `t`", "0, 1, 2, 3, 4", "must hold the names"]);
     // Of many columns the ten nearest.
     let many: Vec<String> = (0..40).map(|k| format!("channel{k}")).collect();
@@ -41,7 +42,7 @@ fn missing_column() {
     let parts = ["no column `ud`", "of its 46 columns these are nearest: UD, motor_ud, id, t"];
     let error = refused("many.csv", &header, &parts);
     assert_eq!(error.to_string().matches("channel").count(), 6, "{error}");
-    refused("capitals.csv", "Time,ud,w,id,iq\n", &["no column `t`", "CsvFile::column", "CsvFile::sample_time"]);
+    refused("clocks.csv", "Clock,ud,w,id,iq\n", &["no column `t`", "DataFile::column", "DataFile::sample_time"]);
 }
 
 #[test]
@@ -49,7 +50,7 @@ fn ambiguous_column() {
     let error = refused("twice.csv", "t,w,ud,w,id,iq\n", &["twice.csv", "`w`", "2 and 4"]);
     assert!(matches!(error, Error::AmbiguousColumn { .. }));
     // Twins that nobody asked for do no harm.
-    Experiment::from_csv(&Pmsm, file("twins.csv", "t,w,ud,a,a,id,iq\n0,1,2,,,3,4\n1,1,2,,,3,4\n")).unwrap();
+    Experiment::from_file(&Pmsm, file("twins.csv", "t,w,ud,a,a,id,iq\n0,1,2,,,3,4\n1,1,2,,,3,4\n")).unwrap();
 }
 
 #[test]
@@ -59,27 +60,27 @@ fn not_a_number() {
         let error = refused(name, &text, &[name, "line 5", "`id`", "`3 A`"]);
         assert!(matches!(error, Error::NotANumber { .. }));
     }
-    refused("clock.csv", "t,ud,w,id,iq\n12:30:00,1,2,3,4\n", &["line 2", "`t`", "`12:30:00`"]);
+    refused("clock.csv", "t,ud,w,id,iq\n12:30,1,2,3,4\n", &["line 2", "`t`", "`12:30`", "14:05:00"]);
     refused("last.csv", "t,ud,w,id,iq\n0,1,2,3,4\n1,x,2,3,4", &["line 3", "`ud`", "`x`"]);
-    let comma = CsvFile::new(file("comma.csv", "t;ud;w;id;iq\n0;1,5;2;3;4\n")).delimiter(b';').read(&Pmsm);
-    says(comma, &["line 2", "`ud`", "`1,5`", "CsvFile::decimal_comma"]);
-    let renamed = CsvFile::new(file("x.csv", "t,u,w,id,iq\n0,x,2,3,4\n")).column("ud", "u").read(&Pmsm);
+    refused("comma.csv", "t;ud;w;id;iq\n0;1.5;2;3;4\n1;1,5;2;3;4\n", &["line 3", "`1,5`", "DataFile::decimal_comma"]);
+    refused("point.csv", "t;ud;w;id;iq\n0;1,5;2;3;4\n1;1.5;2;3;4\n", &["line 3", "`ud`", "`1.5`"]);
+    refused("thousand.csv", "t,ud,w,id,iq\n0,\"1,500\",2,3,4\n", &["line 2", "`1,500`", "DataFile::decimal_comma"]);
+    let renamed = DataFile::new(file("x.csv", "t,u,w,id,iq\n0,x,2,3,4\n")).column("ud", "u").read(&Pmsm);
     says(renamed, &["line 2", "column `u`", "`x`"]);
-    let units = ["line 2", "`t`", "`s`", "CsvFile::units_row"];
-    refused("units.csv", "t,ud,w,id,iq\ns,V,rad/s,A,A\n0,1,2,3,4\n", &units);
+    let units = ["line 2", "`t`", "`a`", "DataFile::units_row"];
+    refused("units.csv", "t,ud,w,id,iq\na,b,c,d,e\ns,V,rad/s,A,A\n0,1,2,3,4\n", &units);
     refused("dash.csv", "t,ud,w,id,iq\n0,1,2,---,4\n", &["line 2", "`---`", "is empty, NaN, NA or null"]);
-    refused("date.csv", "t,ud,w,id,iq\n2026-03-01 12:00:00,1,2,3,4\n", &["line 2", "`t`", "CsvFile::sample_time"]);
-    let thousands = CsvFile::new(file("thousands.csv", "t;ud;w;id;iq\n0;1.234,5;2;3;4\n"));
+    let thousands = DataFile::new(file("thousands.csv", "t;ud;w;id;iq\n0;1.234,5;2;3;4\n"));
     says(thousands.decimal_comma().read(&Pmsm), &["line 2", "`1.234,5`", "separators of thousands"]);
-    let latin = Experiment::from_csv(&Pmsm, file("latin.csv", b"t,ud,w,F\xfcllstand,iq\n0,1,2,3,4\n"));
+    let latin = Experiment::from_file(&Pmsm, file("latin.csv", b"t,ud,w,F\xfcllstand,iq\n0,1,2,3,4\n"));
     says(latin, &["no column `id`", "not UTF-8"]);
-    let long = CsvFile::new(file("long.csv", format!("t;ud;w;id;iq\n0;{};2;3;4\n", "1".repeat(65))));
+    let long = DataFile::new(file("long.csv", format!("t;ud;w;id;iq\n0;{};2;3;4\n", "1".repeat(65))));
     says(long.decimal_comma().read(&Pmsm), &["line 2", "`ud`"]);
 }
 
 #[test]
 fn counts_lines_below_what_it_skips() {
-    let skipped = CsvFile::new(file("skipped.csv", "a\nb\nt,ud,w,id,iq\ns,V,,A,A\n0,1,2,3,4\n1,1,2,?,4\n"));
+    let skipped = DataFile::new(file("skipped.csv", "a\nb\nt,ud,w,id,iq\ns,V,,A,A\n0,1,2,3,4\n1,1,2,?,4\n"));
     says(skipped.preamble(2).units_row().read(&Pmsm), &["line 6", "`id`", "`?`"]);
     refused("numpy.csv", "# a\n# t,ud,w,id,iq\n0,1,2,3,4\n1,1,2,?,4\n", &["line 4", "`id`", "`?`"]);
 }
@@ -95,7 +96,7 @@ fn missing_inputs_and_time() {
         refused("time.csv", &format!("t,ud,w,id,iq\n0,1,2,3,4\n{cell},1,2,3,4\n"), &parts);
     }
     refused("output.csv", "t,ud,w,id,iq\n0,1,2,-inf,4\n", &["line 2", "`id`", "-inf", "sample 0"]);
-    let large = CsvFile::new(file("large.csv", "t,ud,w,id,iq\n0,1,2,1e200,4\n")).factor("id", 1e200).read(&Pmsm);
+    let large = DataFile::new(file("large.csv", "t,ud,w,id,iq\n0,1,2,1e200,4\n")).factor("id", 1e200).read(&Pmsm);
     says(large, &["line 2", "`id`", "inf"]);
 }
 
@@ -112,7 +113,7 @@ fn time_runs_backwards_or_stands_still() {
 /// Measurements may repeat at an instant, inputs may not.
 #[test]
 fn inputs_that_differ_at_one_instant() {
-    Experiment::from_csv(&Pmsm, file("instant.csv", "t,ud,w,id,iq\n0,1,2,3,4\n1,1,2,3,4\n1,1,2,5,4\n")).unwrap();
+    Experiment::from_file(&Pmsm, file("instant.csv", "t,ud,w,id,iq\n0,1,2,3,4\n1,1,2,3,4\n1,1,2,5,4\n")).unwrap();
     let parts = ["samples 1 and 2", "t = 1 s", "`w` is 2 and 2.5", "times of their own"];
     let error = refused("jump.csv", "t,ud,w,id,iq\n0,1,2,3,4\n1,1,2,3,4\n1,1,2.5,5,4\n", &parts);
     assert!(matches!(error, Error::InputsAtOneInstant { .. }));
@@ -128,16 +129,16 @@ fn unequal_rows() {
 
 #[test]
 fn unreadable() {
-    let error = says(Experiment::from_csv(&Pmsm, path("absent.csv")), &["absent.csv"]);
+    let error = says(Experiment::from_file(&Pmsm, path("absent.csv")), &["absent.csv"]);
     assert!(matches!(error, Error::File { .. }));
-    says(Experiment::from_csv(&Pmsm, env!("CARGO_TARGET_TMPDIR")), &[env!("CARGO_TARGET_TMPDIR")]);
+    says(Experiment::from_file(&Pmsm, env!("CARGO_TARGET_TMPDIR")), &[env!("CARGO_TARGET_TMPDIR")]);
     refused("empty.csv", "", &["empty.csv", "names of its columns"]);
     refused("comments.csv", "# only\n\n# talk\n", &["comments.csv", "names of its columns"]);
-    says(CsvFile::new(file("preamble.csv", "t,ud,w,id,iq\n")).preamble(3).read(&Pmsm), &["names of its columns"]);
+    says(DataFile::new(file("preamble.csv", "t,ud,w,id,iq\n")).preamble(3).read(&Pmsm), &["names of its columns"]);
     let wide: Vec<u8> = "\u{feff}t,ud\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
-    says(Experiment::from_csv(&Pmsm, file("wide.csv", wide)), &["wide.csv", "UTF-16", "UTF-8"]);
+    says(Experiment::from_file(&Pmsm, file("wide.csv", wide)), &["wide.csv", "UTF-16", "UTF-8"]);
     let bytes: Vec<u8> = (0..=255).collect();
-    says(Experiment::from_csv(&Pmsm, file("bytes.csv", bytes)), &["bytes.csv"]);
+    says(Experiment::from_file(&Pmsm, file("bytes.csv", bytes)), &["bytes.csv"]);
 }
 
 #[test]
@@ -151,7 +152,7 @@ fn too_few_samples() {
 
 #[test]
 fn settings_without_sense() {
-    let file = || CsvFile::new(file("fine.csv", "t,ud,w,id,iq\n0,1,2,3,4\n1,1,2,3,4\n"));
+    let file = || DataFile::new(file("fine.csv", "t,ud,w,id,iq\n0,1,2,3,4\n1,1,2,3,4\n"));
     for factor in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let error = says(file().factor("w", factor).read(&Pmsm), &["factor of `w`", &factor.to_string(), "reversed"]);
         assert!(matches!(error, Error::NotPositive { .. }));

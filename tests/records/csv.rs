@@ -3,7 +3,7 @@
 
 use crate::pmsm::{Currents, Drive, Pmsm, Winding};
 use crate::shared::shared;
-use greybox::{CsvFile, Experiment, Kind, Model, Nothing, Scalar, Time, signals, units};
+use greybox::{DataFile, Experiment, Kind, Model, Nothing, Scalar, Time, signals, units};
 use std::path::PathBuf;
 
 fn file(name: &str, text: impl AsRef<[u8]>) -> PathBuf {
@@ -15,7 +15,7 @@ fn file(name: &str, text: impl AsRef<[u8]>) -> PathBuf {
 #[test]
 fn columns_go_by_name() {
     let path = file("by_name.csv", "iq,extra,t,ud,id,w\n4,x,0,1,3,2\n40,,0.5,10,30,20\n");
-    let record = Experiment::from_csv(&Pmsm, path).unwrap();
+    let record = Experiment::from_file(&Pmsm, path).unwrap();
     assert_eq!(record.name(), "by_name");
     assert_eq!(record.len(), 2);
     assert_eq!([record.time(0), record.time(1)], [0.0, 0.5]);
@@ -26,7 +26,7 @@ fn columns_go_by_name() {
 #[test]
 fn renames_scales_shifts_and_reverses() {
     let path = file("bench.csv", "time (ms),speed,ud,id,iq\n0,60,1,3,4\n2,-30,1,3,4\n");
-    let record = CsvFile::new(path)
+    let record = DataFile::new(path)
         .column("t", "time (ms)")
         .factor("t", 1e-3)
         .column("w", "speed")
@@ -46,34 +46,34 @@ fn renames_scales_shifts_and_reverses() {
 fn reads_what_instruments_write() {
     let plain = "t,ud,w,id,iq\n0,1.5,2,3,4\n1,1.5,2,,4\n";
     let cases = [
-        ("plain", plain.to_owned(), CsvFile::new as fn(PathBuf) -> CsvFile),
-        ("crlf", plain.replace('\n', "\r\n"), CsvFile::new),
-        ("no_last_newline", plain.trim_end().to_owned(), CsvFile::new),
-        ("byte_order_mark", format!("\u{feff}{plain}"), CsvFile::new),
+        ("plain", plain.to_owned(), DataFile::new as fn(PathBuf) -> DataFile),
+        ("crlf", plain.replace('\n', "\r\n"), DataFile::new),
+        ("no_last_newline", plain.trim_end().to_owned(), DataFile::new),
+        ("byte_order_mark", format!("\u{feff}{plain}"), DataFile::new),
         ("spreadsheet", format!("\u{feff}sep=;\r\n{}", plain.replace(',', ";")), |path| {
-            CsvFile::new(path).delimiter(b';')
+            DataFile::new(path).delimiter(b';')
         }),
-        ("spaces", plain.replace(',', " ,  "), CsvFile::new),
-        ("quotes", plain.replace("1.5", "\" 1.5 \"").replace("ud", "\"ud\""), CsvFile::new),
-        ("missing_nan", plain.replace(",,", ",NaN,"), CsvFile::new),
-        ("missing_na", plain.replace(",,", ", NA ,"), CsvFile::new),
-        ("missing_null", plain.replace(",,", ",null,"), CsvFile::new),
+        ("spaces", plain.replace(',', " ,  "), DataFile::new),
+        ("quotes", plain.replace("1.5", "\" 1.5 \"").replace("ud", "\"ud\""), DataFile::new),
+        ("missing_nan", plain.replace(",,", ",NaN,"), DataFile::new),
+        ("missing_na", plain.replace(",,", ", NA ,"), DataFile::new),
+        ("missing_null", plain.replace(",,", ",null,"), DataFile::new),
         (
             "comments",
             format!("# bench 3\n\n{}\n# end\n", plain.replace("\n1,", "\n# pause, a \" quote\n\n1,")),
-            CsvFile::new,
+            DataFile::new,
         ),
-        ("numpy", format!("# bench 3\n# {plain}"), CsvFile::new),
-        ("numpy_gaps", format!("# note, {plain}").replace("\n0,", "\n,0,").replace("\n1,", "\nnan,1,"), CsvFile::new),
-        ("trailing_delimiter", plain.replace('\n', ",\n"), CsvFile::new),
-        ("signs", plain.replace("1.5", "+15e-1"), CsvFile::new),
-        ("tabs", plain.replace(',', "\t"), |p| CsvFile::new(p).delimiter(b'\t')),
-        ("semicolons", plain.replace(',', ";"), |p| CsvFile::new(p).delimiter(b';')),
-        ("decimal_comma", plain.replace(',', ";").replace('.', ","), |p| CsvFile::new(p).decimal_comma()),
-        ("percent", format!("% a\n{plain}"), |p| CsvFile::new(p).comment(b'%')),
-        ("preamble", format!("Scope\nt,ud,5\n{plain}"), |p| CsvFile::new(p).preamble(2)),
-        ("units_row", plain.replace("iq\n", "iq\ns,V,rad/s,A,A\n"), |p| CsvFile::new(p).units_row()),
-        ("sample_time", plain.replace("t,", "clock,"), |p| CsvFile::new(p).sample_time(1.0)),
+        ("numpy", format!("# bench 3\n# {plain}"), DataFile::new),
+        ("numpy_gaps", format!("# note, {plain}").replace("\n0,", "\n,0,").replace("\n1,", "\nnan,1,"), DataFile::new),
+        ("trailing_delimiter", plain.replace('\n', ",\n"), DataFile::new),
+        ("signs", plain.replace("1.5", "+15e-1"), DataFile::new),
+        ("tabs", plain.replace(',', "\t"), |p| DataFile::new(p).delimiter(b'\t')),
+        ("semicolons", plain.replace(',', ";"), |p| DataFile::new(p).delimiter(b';')),
+        ("decimal_comma", plain.replace(',', ";").replace('.', ","), |p| DataFile::new(p).decimal_comma()),
+        ("percent", format!("% a\n{plain}"), |p| DataFile::new(p).comment(b'%')),
+        ("preamble", format!("Scope\nt,ud,5\n{plain}"), |p| DataFile::new(p).preamble(2)),
+        ("units_row", plain.replace("iq\n", "iq\ns,V,rad/s,A,A\n"), |p| DataFile::new(p).units_row()),
+        ("sample_time", plain.replace("t,", "clock,"), |p| DataFile::new(p).sample_time(1.0)),
     ];
     for (name, text, read) in cases {
         let record = read(file(&format!("{name}.csv"), text)).read(&Pmsm).unwrap_or_else(|e| panic!("{name}: {e}"));
@@ -88,7 +88,7 @@ fn reads_what_instruments_write() {
 #[test]
 fn a_preamble_longer_than_the_file_ends_with_it() {
     let path = file("preamble_only.csv", "t,ud,w,id,iq\n0,1.5,2,3,4\n");
-    let error = CsvFile::new(path).preamble(usize::MAX).read(&Pmsm).unwrap_err().to_string();
+    let error = DataFile::new(path).preamble(usize::MAX).read(&Pmsm).unwrap_err().to_string();
     assert!(error.contains("the file ends before a line with the names of its columns"), "{error}");
 }
 
@@ -97,7 +97,7 @@ fn a_preamble_longer_than_the_file_ends_with_it() {
 fn time_is_uniform_only_where_it_is() {
     let record = |name: &str, stamps: &[f64]| {
         let rows: String = stamps.iter().map(|t| format!("{t},1,2,3,4\n")).collect();
-        Experiment::from_csv(&Pmsm, file(name, format!("t,ud,w,id,iq\n{rows}"))).unwrap()
+        Experiment::from_file(&Pmsm, file(name, format!("t,ud,w,id,iq\n{rows}"))).unwrap()
     };
     let even: Vec<f64> = (0..2000).map(|k| 5.0 + (k * 126) as f64 / 1e6).collect();
     let uniform = record("even.csv", &even);
@@ -130,7 +130,7 @@ fn reads_from_a_pipe() {
     for (last, even) in [(4, true), (5, false)] {
         let (to, text) = (pipe.clone(), format!("t,ud,w,id,iq\n0,1,2,3,4\n2,1,2,3,4\n{last},1,2,3,4\n"));
         let writer = std::thread::spawn(move || std::fs::write(to, text).unwrap());
-        let record = Experiment::from_csv(&Pmsm, &pipe).unwrap();
+        let record = Experiment::from_file(&Pmsm, &pipe).unwrap();
         writer.join().unwrap();
         assert_eq!([record.time(0), record.time(1), record.time(2)], [0.0, 2.0, last as f64]);
         assert_eq!(matches!(record.times(), Time::Uniform { .. }), even);
@@ -159,13 +159,13 @@ impl Model for Line {
 
 #[test]
 fn a_static_model_needs_no_time() {
-    let record = Experiment::from_csv(&Line, file("static.csv", "x,y\n7,8\n9,10\n")).unwrap();
+    let record = Experiment::from_file(&Line, file("static.csv", "x,y\n7,8\n9,10\n")).unwrap();
     assert_eq!(record.inputs().collect::<Vec<_>>(), [X { x: 7.0 }, X { x: 9.0 }]);
     assert_eq!([record.time(0), record.time(1)], [0.0, 1.0]);
-    let timed = Experiment::from_csv(&Line, file("static_t.csv", "x,t,y\n7,3,8\n")).unwrap();
+    let timed = Experiment::from_file(&Line, file("static_t.csv", "x,t,y\n7,3,8\n")).unwrap();
     assert_eq!(timed.time(0), 3.0);
     // A time that was asked for must be there.
-    let absent = CsvFile::new(file("static_absent.csv", "x,y\n7,8\n")).column("t", "clock").read(&Line);
+    let absent = DataFile::new(file("static_absent.csv", "x,y\n7,8\n")).column("t", "clock").read(&Line);
     assert!(absent.unwrap_err().to_string().contains("no column `clock` for `t`"));
 }
 
@@ -173,10 +173,10 @@ fn a_static_model_needs_no_time() {
 #[test]
 fn shared_records() {
     let (Some(path), Some(emps)) = (shared("motulator/spm_avg.csv"), shared("emps/emps.csv")) else { return };
-    let record = CsvFile::new(path).column("w", "omega_m").read(&Pmsm).unwrap();
+    let record = DataFile::new(path).column("w", "omega_m").read(&Pmsm).unwrap();
     assert_eq!(record.len(), 8000);
     assert_eq!(record.times(), &Time::Uniform { start: 0.0, step: 125e-6 });
-    let emps = CsvFile::new(emps).column("x", "vir").column("y", "qm").read(&Line).unwrap();
+    let emps = DataFile::new(emps).column("x", "vir").column("y", "qm").read(&Line).unwrap();
     assert_eq!(emps.len(), 24_841);
     // The clock of this instrument jitters by 2.4e-5 of a step.
     assert!(matches!(emps.times(), Time::Stamps(_)));

@@ -2,7 +2,9 @@
 
 mod bad_records;
 mod csv;
+mod dates;
 mod edits;
+mod guesses;
 mod inspect;
 mod npy;
 mod pmsm;

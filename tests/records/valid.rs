@@ -2,7 +2,7 @@
 #![cfg(feature = "csv")]
 
 use crate::pmsm::{Currents, Drive, Pmsm};
-use greybox::{CsvFile, Experiment, ExperimentOf, Hold, Sample, Time};
+use greybox::{DataFile, Experiment, ExperimentOf, Hold, Sample, Time};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use std::path::PathBuf;
@@ -74,7 +74,7 @@ proptest! {
     fn csv_gives_a_record_back(record in record(), id in any::<u32>()) {
         let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("round_trip_{id}.csv"));
         record.to_csv(&path).unwrap();
-        let read = Experiment::from_csv(&Pmsm, &path);
+        let read = Experiment::from_file(&Pmsm, &path);
         std::fs::remove_file(&path).unwrap();
         let read = read.unwrap();
         prop_assert!(same_signals(&record, &read));
@@ -104,7 +104,7 @@ proptest! {
             text.insert(place.index(text.len() + 1), noise);
         }
         std::fs::write(&path, text).unwrap();
-        let mut file = CsvFile::new(&path);
+        let mut file = DataFile::new(&path);
         if settings[0] {
             file = file.decimal_comma();
         }

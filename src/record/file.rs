@@ -1,8 +1,16 @@
-//! [`CsvFile`]: from a CSV file to a record, and back.
+//! [`DataFile`]: from a CSV file to a record, and back.
 
+mod dates;
+mod guess;
+mod numbers;
 mod read;
+mod reading;
+mod stamp;
 mod table;
+mod timing;
 mod write;
+
+pub use reading::{DateOrder, Reading, TimeSource};
 
 use super::Record;
 use crate::error::Error;
@@ -11,7 +19,7 @@ use std::path::{Path, PathBuf};
 /// A CSV file, and how it becomes a record.
 ///
 /// A file whose columns have the names and units of the model's signals, and `t` in seconds, needs no word:
-/// `Experiment::from_csv(&model, "record.csv")`. Of any other file, what differs is said. From
+/// `Experiment::from_file(&model, "record.csv")`. Of any other file, what differs is said. From
 ///
 /// ```text
 /// # bench 3, winding cold
@@ -35,9 +43,9 @@ use std::path::{Path, PathBuf};
 /// # let text = "# bench 3, winding cold\ntime (ms); speed; voltage; i;     remark\n0;         1500;  24,1;    -0,52;\n\
 /// # 1;         1500;  24,1;    ;      out of range\n2;         1498;  24,0;    -0,50;\n";
 /// # std::fs::write(&path, text).unwrap();
-/// use greybox::{CsvFile, Hold, Time, units};
+/// use greybox::{DataFile, Hold, Time, units};
 ///
-/// let record = CsvFile::new(&path)
+/// let record = DataFile::new(&path)
 ///     .decimal_comma()
 ///     .column("t", "time (ms)").factor("t", 1e-3)
 ///     .column("u", "voltage")
@@ -56,7 +64,7 @@ use std::path::{Path, PathBuf};
 /// ```
 ///
 /// **Columns** go by name. Each input and output of the model, and the time `t`, has a column of its own name unless
-/// [`column`](CsvFile::column) says another. States need none; further columns are ignored. A value is
+/// [`column`](DataFile::column) says another. States need none; further columns are ignored. A value is
 /// `factor * cell + offset`, in the unit of the signal.
 ///
 /// **Cells** stand between commas, may be quoted, and may have white space around them. An output that was not measured
@@ -76,23 +84,25 @@ use std::path::{Path, PathBuf};
 /// The file is read row by row and kept only as the record: ten million rows of five signals take 400 MB. Only where time
 /// turns out uneven, a regular file is read again up to there for its stamps.
 #[derive(Clone, Debug)]
-pub struct CsvFile {
+pub struct DataFile {
     path: PathBuf,
-    delimiter: u8,
+    separator: Option<u8>,
     comment: u8,
     decimal_comma: bool,
-    preamble: usize,
+    preamble: Option<usize>,
     units_row: bool,
     sample_time: Option<f64>,
+    dates: Option<DateOrder>,
+    zone: Option<String>,
     columns: Vec<Column>,
 }
 
-/// Settings of one signal.
+/// What was said of one signal.
 #[derive(Clone, Debug)]
 struct Column {
     signal: String,
-    name: String,
-    factor: f64,
+    name: Option<String>,
+    factor: Option<f64>,
     offset: f64,
     reversed: bool,
 }
@@ -100,33 +110,52 @@ struct Column {
 impl Column {
     fn new(signal: &str) -> Column {
         // Adding minus zero changes no number, not even minus zero.
-        Column { signal: signal.to_owned(), name: signal.to_owned(), factor: 1.0, offset: -0.0, reversed: false }
+        Column { signal: signal.to_owned(), name: None, factor: None, offset: -0.0, reversed: false }
+    }
+
+    fn name(&self) -> &str {
+        self.name.as_deref().unwrap_or(&self.signal)
     }
 }
 
-impl CsvFile {
-    /// The file at `path`: comma-separated, columns named as the signals and in their units.
+/// What a file or a column cannot be read for, and the line and text where that shows.
+#[derive(Clone, Debug, Default)]
+struct Fault {
+    line: u64,
+    text: String,
+    problem: String,
+}
+
+/// Whether a cell says that nothing was measured.
+fn is_missing(cell: &[u8]) -> bool {
+    [&b""[..], b"nan", b"na", b"null"].iter().any(|word| cell.eq_ignore_ascii_case(word))
+}
+
+impl DataFile {
+    /// The file at `path`: columns named as the signals and in their units, the rest as it is found.
     pub fn new(path: impl Into<PathBuf>) -> Self {
-        CsvFile {
+        DataFile {
             path: path.into(),
-            delimiter: b',',
+            separator: None,
             comment: b'#',
             decimal_comma: false,
-            preamble: 0,
+            preamble: None,
             units_row: false,
             sample_time: None,
+            dates: None,
+            zone: None,
             columns: Vec::new(),
         }
     }
 
     /// The column that holds `signal`: an input or output of the model, or the time `t`.
     pub fn column(self, signal: &str, name: &str) -> Self {
-        self.with(signal, |column| column.name = name.to_owned())
+        self.with(signal, |column| column.name = Some(name.to_owned()))
     }
 
     /// Factor of the cells of `signal`, such as [`units::RPM`](crate::units::RPM); positive.
     pub fn factor(self, signal: &str, factor: f64) -> Self {
-        self.with(signal, |column| column.factor = factor)
+        self.with(signal, |column| column.factor = Some(factor))
     }
 
     /// Offset added to `signal` after its factor, in the signal's unit.
@@ -141,32 +170,43 @@ impl CsvFile {
 
     /// Time from a constant sample time (s) instead of a column; it starts at zero.
     pub fn sample_time(self, step: f64) -> Self {
-        CsvFile { sample_time: Some(step), ..self }
+        DataFile { sample_time: Some(step), ..self }
+    }
+
+    /// Whether the day or the month stands first in dates such as 03/04/2025.
+    pub fn dates(self, order: DateOrder) -> Self {
+        DataFile { dates: Some(order), ..self }
+    }
+
+    /// Zone of dates that have none, such as `Europe/Berlin`: clocks that are set forward and back are then followed. `UTC` says
+    /// that the clock was never changed.
+    pub fn zone(self, zone: &str) -> Self {
+        DataFile { zone: Some(zone.to_owned()), ..self }
     }
 
     /// The byte between cells, such as `b';'` or `b'\t'`.
     pub fn delimiter(self, delimiter: u8) -> Self {
-        CsvFile { delimiter, ..self }
+        DataFile { separator: Some(delimiter), ..self }
     }
 
-    /// Numbers as `1,5`, and cells between semicolons (unless [`delimiter`](CsvFile::delimiter) says otherwise after this).
+    /// Numbers as `1,5`.
     pub fn decimal_comma(self) -> Self {
-        CsvFile { decimal_comma: true, delimiter: b';', ..self }
+        DataFile { decimal_comma: true, ..self }
     }
 
     /// The byte that a comment begins with, if not `b'#'`.
     pub fn comment(self, comment: u8) -> Self {
-        CsvFile { comment, ..self }
+        DataFile { comment, ..self }
     }
 
     /// How many lines to skip above the names.
     pub fn preamble(self, lines: usize) -> Self {
-        CsvFile { preamble: lines, ..self }
+        DataFile { preamble: Some(lines), ..self }
     }
 
     /// Skips the line below the names, where some instruments write the units.
     pub fn units_row(self) -> Self {
-        CsvFile { units_row: true, ..self }
+        DataFile { units_row: true, ..self }
     }
 
     fn with(mut self, signal: &str, say: impl FnOnce(&mut Column)) -> Self {
@@ -177,6 +217,15 @@ impl CsvFile {
         });
         say(&mut self.columns[at]);
         self
+    }
+
+    /// What was said of a signal.
+    fn said(&self, signal: &str) -> Column {
+        self.columns.iter().find(|column| column.signal == signal).cloned().unwrap_or_else(|| Column::new(signal))
+    }
+
+    fn cannot(&self, source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Error {
+        table::cannot(&self.path, source)
     }
 }
 

@@ -4,11 +4,11 @@ use super::{Experiment, ExperimentOf};
 use crate::error::Error;
 use crate::layout::Layout;
 use crate::model::Model;
-use crate::record::CsvFile;
+use crate::record::DataFile;
 use crate::signals::Signals;
 use std::path::{Path, PathBuf};
 
-impl CsvFile {
+impl DataFile {
     /// Reads the record of a model; it is named after the file.
     ///
     /// # Errors
@@ -22,15 +22,15 @@ impl CsvFile {
 
 impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     /// Reads a record from a CSV file whose columns are named as the signals of the model, and `t` for time (s), in their
-    /// units; see [`CsvFile`] for files that are not.
+    /// units; see [`DataFile`] for files that are not.
     ///
     /// # Errors
-    /// The errors of [`CsvFile::read`].
-    pub fn from_csv<M: Model<State = X, Input = U, Output = Y>>(
+    /// The errors of [`DataFile::read`].
+    pub fn from_file<M: Model<State = X, Input = U, Output = Y>>(
         model: &M,
         path: impl Into<PathBuf>,
     ) -> Result<Self, Error> {
-        CsvFile::new(path).read(model)
+        DataFile::new(path).read(model)
     }
 
     /// Writes `t`, inputs and outputs as columns under their names, a missing output as an empty cell. Reading the file

@@ -1,0 +1,158 @@
+//! Guesses at a text file from its first lines, as a person would make them: what stands between cells, which line has the names,
+//! whether units stand below it.
+
+use super::stamp::Stamp;
+use super::{DataFile, is_missing};
+use crate::error::Error;
+
+/// What stands between cells, the likelier first.
+const SEPARATORS: [u8; 5] = [b',', b';', b'\t', b'|', b' '];
+
+/// Lines that are looked at.
+const LOOKED_AT: usize = 200;
+
+/// How the text of a file stands.
+#[derive(Clone, Debug)]
+pub(super) struct Form {
+    pub(super) separator: u8,
+    pub(super) names: Vec<String>,
+    /// Units below the names.
+    pub(super) units: Option<Vec<String>>,
+    /// Lines above the names.
+    pub(super) preamble: usize,
+    /// Lines above the first row.
+    pub(super) skipped: usize,
+}
+
+/// A line of the file that is neither blank nor a comment.
+struct Line<'a> {
+    number: usize,
+    text: &'a [u8],
+}
+
+impl Form {
+    /// Guesses, from the first lines of a file, what was not said. The names are on the line that has all that are `wanted`, if there
+    /// is one.
+    ///
+    /// # Errors
+    /// No line that could have the names.
+    pub(super) fn guess(file: &DataFile, head: &[u8], wanted: &[&str]) -> Result<Form, Error> {
+        let mut separators = file.separator.map_or(SEPARATORS.to_vec(), |said| vec![said]);
+        let mut lines = Vec::new();
+        let mut remark = None;
+        for (number, text) in head.split(|byte| *byte == b'\n').enumerate().skip(file.preamble.unwrap_or(0)) {
+            let text = text.trim_ascii();
+            if text.first() == Some(&file.comment) {
+                if lines.is_empty() {
+                    remark = Some(Line { number, text: &text[1..] });
+                }
+            } else if text.len() <= 5 && text.get(..4).is_some_and(|begin| begin.eq_ignore_ascii_case(b"sep=")) {
+                if file.separator.is_none() {
+                    separators = text.get(4).map_or(separators, |separator| vec![*separator]);
+                }
+            } else if !text.is_empty() {
+                lines.push(Line { number, text });
+            }
+            if lines.len() == LOOKED_AT {
+                break;
+            }
+        }
+        if lines.is_empty() {
+            return Err(file.cannot("the file ends before a line with the names of its columns"));
+        }
+        let forms: Vec<Form> =
+            separators.iter().map(|separator| Form::under(file, *separator, &lines, remark.as_ref(), wanted)).collect();
+        let complete = forms.iter().filter(|form| form.has(wanted)).max_by_key(|form| form.names.len());
+        let likeliest = || forms.iter().rev().max_by_key(|form| form.score(file, &lines));
+        Ok(complete.or_else(likeliest).cloned().unwrap_or_else(|| forms[0].clone()))
+    }
+
+    /// The form of the file if this byte stands between its cells.
+    fn under(file: &DataFile, separator: u8, lines: &[Line], remark: Option<&Line>, wanted: &[&str]) -> Form {
+        let form = |line: &Line, at: usize| {
+            let names = cells(file, separator, line.text);
+            Form {
+                separator,
+                names,
+                units: None,
+                preamble: line.number,
+                skipped: lines.get(at).map_or(line.number + 1, |l| l.number),
+            }
+        };
+        let first = form(&lines[0], 1);
+        let numeric = |cells: &[String]| cells.iter().all(|cell| is_value(cell));
+        // Names in a comment right above the numbers, as numpy writes them.
+        if let Some(remark) = remark.filter(|_| numeric(&first.names)) {
+            return form(remark, 0);
+        }
+        // The first line with all names; with another preamble than was said, if none was.
+        let place = lines.iter().take(if file.preamble.is_some() { 1 } else { LOOKED_AT }).enumerate();
+        let found = place.map(|(at, line)| (at, form(line, at + 1))).find(|(_, form)| form.has(wanted));
+        let (at, mut found) = found.unwrap_or((0, first));
+        if let Some(below) = lines.get(at + 1) {
+            let units = cells(file, separator, below.text);
+            let texts = |cells: &[String]| {
+                let mut among =
+                    cells.iter().zip(&found.names).filter(|(_, name)| wanted.iter().any(|want| names(name, want)));
+                among.clone().next().is_some() && among.all(|(cell, _)| !cell.is_empty() && !is_value(cell))
+            };
+            let after = lines.get(at + 2).map(|line| cells(file, separator, line.text));
+            let guessed = units.len() == found.names.len() && texts(&units) && after.is_some_and(|row| !texts(&row));
+            if file.units_row || guessed {
+                found.units = Some(units);
+                found.skipped = lines.get(at + 2).map_or(below.number + 1, |line| line.number);
+            }
+        }
+        found
+    }
+
+    /// The unit below the name of a column.
+    pub(super) fn unit(&self, column: usize) -> Option<&str> {
+        Some(self.units.as_ref()?.get(column)?.trim_matches(['[', ']', '(', ')']))
+    }
+
+    fn has(&self, wanted: &[&str]) -> bool {
+        !wanted.is_empty() && wanted.iter().all(|want| self.names.iter().any(|name| names(name, want)))
+    }
+
+    /// How many cells of the lines below the names are values, in lines with as many cells as there are names.
+    fn score(&self, file: &DataFile, lines: &[Line]) -> usize {
+        if self.names.len() == 1 {
+            return 0;
+        }
+        let below = lines.iter().filter(|line| line.number >= self.skipped);
+        let rows = below.map(|line| cells(file, self.separator, line.text)).filter(|row| row.len() == self.names.len());
+        // Without a row below, the number of names decides.
+        rows.flatten().filter(|cell| is_value(cell)).count() * 1000 + self.names.len()
+    }
+}
+
+/// Whether a column of this name holds what is wanted: the name itself, or the name with a unit behind it.
+pub(super) fn names(column: &str, wanted: &str) -> bool {
+    column == wanted || (split_unit(column).0 == wanted)
+}
+
+/// A name and the unit behind it: `speed [rpm]`, `time (ms)`.
+pub(super) fn split_unit(name: &str) -> (&str, Option<&str>) {
+    for (open, close) in [('[', ']'), ('(', ')')] {
+        if let Some((before, unit)) = name.strip_suffix(close).and_then(|name| name.rsplit_once(open))
+            && !before.trim().is_empty()
+        {
+            return (before.trim_end(), Some(unit.trim()));
+        }
+    }
+    (name, None)
+}
+
+/// Whether a cell holds a number, in any notation, a date, or says that there is none.
+pub(super) fn is_value(cell: &str) -> bool {
+    is_missing(cell.as_bytes()) || cell.replacen(',', ".", 1).parse::<f64>().is_ok() || Stamp::read(cell).is_some()
+}
+
+/// The cells of one line.
+pub(super) fn cells(file: &DataFile, separator: u8, line: &[u8]) -> Vec<String> {
+    let mut record = csv::ByteRecord::new();
+    // A line in memory is read without an error.
+    let _ = super::table::format(file, separator).from_reader(line).read_byte_record(&mut record);
+    record.iter().map(|cell| String::from_utf8_lossy(cell.trim_ascii()).into_owned()).collect()
+}

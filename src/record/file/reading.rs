@@ -1,0 +1,177 @@
+//! [`Reading`]: how a file was read.
+
+use core::fmt;
+
+/// How a file was read: what was said of it, and what was guessed. Its text is one line:
+/// `cells between ";", decimal comma, 2 lines above the names, a row of units; time "Zeit": dates, day first, from 20.03.2025 00:00`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// What stands between the cells; none in a file that is no text.
+    pub separator: Option<char>,
+    /// Whether numbers are written as 1,5.
+    pub decimal_comma: bool,
+    /// Lines above the names of the columns, comments among them.
+    pub preamble: u64,
+    /// Whether a row of units was skipped.
+    pub units_row: bool,
+    /// Where time comes from.
+    pub time: TimeSource,
+    /// Signals for which the file has another unit than the model, one of them unknown: name, the file's unit, the model's. They
+    /// are not converted.
+    pub units: Vec<(String, String, String)>,
+}
+
+/// Where the time of a record comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TimeSource {
+    /// Even steps; there is no column.
+    Even {
+        /// The step (s).
+        step: f64,
+    },
+    /// A column of numbers.
+    Numbers {
+        /// Name of the column.
+        column: String,
+        /// Its unit in seconds.
+        unit: f64,
+        /// The number that became time zero, if the numbers count from long ago.
+        origin: f64,
+    },
+    /// A column of dates or of times of day; time is in seconds from the first.
+    Dates {
+        /// Name of the column.
+        column: String,
+        /// The first of them.
+        first: String,
+        /// Whether the day or the month stands first, where that matters.
+        order: Option<DateOrder>,
+        /// The zone they are in, if one was said.
+        zone: Option<String>,
+    },
+}
+
+/// Order of the numbers in a date.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DateOrder {
+    /// 20/03/2025.
+    DayFirst,
+    /// 03/20/2025.
+    MonthFirst,
+}
+
+impl fmt::Display for Reading {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.separator {
+            Some('\t') => write!(f, "cells between tabs, ")?,
+            Some(' ') => write!(f, "cells between spaces, ")?,
+            Some(separator) => write!(f, "cells between \"{separator}\", ")?,
+            None => {}
+        }
+        if self.decimal_comma {
+            write!(f, "decimal comma, ")?;
+        }
+        match self.preamble {
+            0 => {}
+            1 => write!(f, "1 line above the names, ")?,
+            lines => write!(f, "{lines} lines above the names, ")?,
+        }
+        if self.units_row {
+            write!(f, "a row of units, ")?;
+        }
+        write!(f, "{}", self.time)?;
+        for (signal, file, model) in &self.units {
+            write!(f, "; `{signal}` in \"{file}\" taken as \"{model}\"")?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for TimeSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            TimeSource::Even { step } => write!(f, "no column of time, {step} s per sample"),
+            TimeSource::Numbers { column, unit, origin } => {
+                write!(f, "time \"{column}\" in {}", unit_name(*unit))?;
+                if *origin == 0.0 { Ok(()) } else { write!(f, ", from {origin}") }
+            }
+            TimeSource::Dates { column, first, order, zone } => {
+                write!(f, "time \"{column}\": dates")?;
+                match order {
+                    Some(DateOrder::DayFirst) => write!(f, ", day first")?,
+                    Some(DateOrder::MonthFirst) => write!(f, ", month first")?,
+                    None => {}
+                }
+                if let Some(zone) = zone {
+                    write!(f, ", in {zone}")?;
+                }
+                write!(f, ", from {first}")
+            }
+        }
+    }
+}
+
+/// Units of time, their size (s) and how files write them, the first as it is shown.
+const TIMES: [(f64, &[&str]); 7] = [
+    (1.0, &["s", "sec", "secs", "second", "seconds", "sek", "sekunden"]),
+    (1e-3, &["ms", "msec", "millisecond", "milliseconds"]),
+    (1e-6, &["us", "µs", "μs", "usec", "microseconds"]),
+    (1e-9, &["ns", "nanoseconds"]),
+    (60.0, &["min", "minute", "minutes", "minuten"]),
+    (3600.0, &["h", "hr", "hrs", "hour", "hours", "stunden"]),
+    (86_400.0, &["d", "day", "days", "tage"]),
+];
+
+/// Size of a unit of time (s).
+pub(super) fn time_unit(text: &str) -> Option<f64> {
+    let text = text.to_lowercase();
+    TIMES.iter().find(|(_, names)| names.contains(&text.as_str())).map(|(size, _)| *size)
+}
+
+fn unit_name(size: f64) -> String {
+    let known = TIMES.iter().find(|(known, _)| *known == size);
+    known.map_or_else(|| format!("units of {size} s"), |(_, names)| names[0].to_owned())
+}
+
+/// Other units in which instruments write what models have in SI units: the unit, the model's, and the factor between them.
+const FACTORS: [(&[&str], &str, f64); 12] = [
+    (&["rpm", "1/min", "min-1", "u/min", "r/min", "rev/min"], "rad/s", core::f64::consts::PI / 30.0),
+    (&["hz", "1/s", "rps", "rev/s"], "rad/s", core::f64::consts::TAU),
+    (&["deg/s", "°/s"], "rad/s", core::f64::consts::PI / 180.0),
+    (&["deg", "°"], "rad", core::f64::consts::PI / 180.0),
+    (&["km/h"], "m/s", 1.0 / 3.6),
+    (&["bar"], "pa", 1e5),
+    (&["l/min"], "m^3/s", 1e-3 / 60.0),
+    (&["l/s"], "m^3/s", 1e-3),
+    (&["%"], "1", 1e-2),
+    (&["g"], "kg", 1e-3),
+    (&["min"], "s", 60.0),
+    (&["h"], "s", 3600.0),
+];
+
+/// Prefixes that occur in records, and their factors.
+const PREFIXES: [(char, f64); 6] = [('m', 1e-3), ('u', 1e-6), ('µ', 1e-6), ('k', 1e3), ('M', 1e6), ('n', 1e-9)];
+
+/// Units that take a prefix.
+const PREFIXED: [&str; 14] = ["V", "A", "W", "ohm", "H", "F", "N", "Nm", "N m", "m", "s", "Pa", "Hz", "J"];
+
+/// Factor from one unit to another, where both are known and differ: revolutions per minute to rad/s, mA to A.
+pub(super) fn factor(from: &str, to: &str) -> Option<f64> {
+    let lower = from.to_lowercase();
+    let listed =
+        |(units, model, _): &&(&[&str], &str, f64)| units.contains(&lower.as_str()) && *model == to.to_lowercase();
+    if let Some((.., factor)) = FACTORS.iter().find(listed) {
+        return Some(*factor);
+    }
+    let scaled = |unit: &str| {
+        if PREFIXED.contains(&unit) {
+            return Some((unit.to_owned(), 1.0));
+        }
+        let mut letters = unit.chars();
+        let (first, rest) = (letters.next()?, letters.as_str());
+        let (_, factor) = PREFIXES.iter().find(|(prefix, _)| *prefix == first)?;
+        PREFIXED.contains(&rest).then(|| (rest.to_owned(), *factor))
+    };
+    let ((from, size), (to, of)) = (scaled(from)?, scaled(to)?);
+    (from == to && size != of).then_some(size / of)
+}

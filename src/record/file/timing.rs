@@ -1,0 +1,207 @@
+//! [`Timing`]: the time of each row, from a column of numbers, from one of dates, or from a constant step.
+
+use super::dates::Dates;
+use super::guess::split_unit;
+use super::numbers::Numbers;
+use super::reading::time_unit;
+use super::stamp::Stamp;
+use super::table::Table;
+use super::{DataFile, TimeSource};
+use crate::error::Error;
+use crate::record::{Clock, Time};
+use jiff::tz::TimeZone;
+
+/// Names of columns of time, without spaces and in small letters.
+const NAMES: [&str; 9] =
+    ["time", "timestamp", "datetime", "dateandtime", "zeit", "zeitstempel", "uhrzeit", "elapsedtime", "temps"];
+/// Names of columns of dates.
+const DATES: [&str; 2] = ["date", "datum"];
+
+/// Numbers beyond these are no seconds: milliseconds, microseconds and nanoseconds since 1970.
+const SINCE_1970: [(f64, f64); 3] = [(1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3)];
+
+/// The time of the rows so far.
+pub(super) enum Timing {
+    /// A constant step (s).
+    Even(f64),
+    /// A column of numbers.
+    Numbers { ticks: Ticks, clock: Clock, stamps: Option<Vec<f64>> },
+    /// A column of dates, and a second one of the times of day.
+    Dates { column: usize, date: Option<usize>, dates: Box<Dates>, first: String },
+}
+
+/// How numbers become seconds.
+#[derive(Clone, Copy)]
+pub(super) struct Ticks {
+    column: usize,
+    unit: f64,
+    offset: f64,
+    origin: f64,
+}
+
+impl Ticks {
+    fn time(&self, number: f64) -> f64 {
+        (number - self.origin) * self.unit + self.offset
+    }
+}
+
+impl DataFile {
+    /// The column of time: the one that was said, `t`, or the only one of such a name.
+    pub(super) fn time_column(&self, table: &Table) -> Result<usize, Error> {
+        let names = table.names();
+        let plain = |name: &str| split_unit(name).0.to_lowercase().replace([' ', '_', '-'], "");
+        let called = |list: &[&str]| -> Vec<usize> {
+            (0..names.len()).filter(|at| list.contains(&plain(&names[*at]).as_str())).collect()
+        };
+        let found = self.place(names, "t");
+        if found.is_ok() || self.said("t").name.is_some() {
+            return found;
+        }
+        // Units stand behind an underscore, too.
+        let with_unit = || (0..names.len()).filter(|at| suffix(&names[*at]).is_some()).collect::<Vec<_>>();
+        for found in [called(&NAMES), with_unit(), called(&DATES)] {
+            if let [only] = found[..] {
+                return Ok(only);
+            }
+        }
+        // Unnamed, as pandas writes an index.
+        if names.first().is_some_and(String::is_empty) { Ok(0) } else { found }
+    }
+
+    /// Looks at the first row of the file.
+    pub(super) fn timing(&self, table: &Table, numbers: &mut Numbers, column: usize) -> Result<Timing, Error> {
+        let (name, cell) = (&table.names()[column], table.cell(column));
+        if let Some(number) = numbers.read(cell) {
+            if name.is_empty() && self.said("t").name.is_none() {
+                // Numbers of rows.
+                return self.place(table.names(), "t").map(|_| Timing::Even(1.0));
+            }
+            let said = self.said("t");
+            let written = split_unit(name).1.or_else(|| suffix(name));
+            let below = table.form().unit(column);
+            let unit = said.factor.or_else(|| written.or(below).and_then(time_unit));
+            let long_ago = SINCE_1970.iter().find(|(least, _)| unit.is_none() && number.abs() >= *least);
+            let (unit, origin) = long_ago.map_or((unit.unwrap_or(1.0), 0.0), |(_, unit)| (*unit, number));
+            let unit = if said.reversed { -unit } else { unit };
+            // A pipe cannot be read again, so that its stamps are kept until the end.
+            let stamps = if self.path.is_file() { None } else { Some(Vec::new()) };
+            let ticks = Ticks { column, unit, offset: said.offset, origin };
+            return Ok(Timing::Numbers { ticks, clock: Clock::default(), stamps });
+        }
+        let zone = self.zone.as_ref().map(|zone| {
+            TimeZone::get(zone).map_err(|error| Error::Option(format!("DataFile::zone(\"{zone}\"): {error}")))
+        });
+        let dates = Box::new(Dates::new(self.dates, zone.transpose()?));
+        let mut date = None;
+        let text = String::from_utf8_lossy(cell).into_owned();
+        if !matches!(Stamp::read(&text), Some(Stamp::Instant(_) | Stamp::Local(_))) {
+            let is_date = |at: &usize| {
+                let name = table.names()[*at].to_lowercase();
+                let cell = String::from_utf8_lossy(table.cell(*at));
+                DATES.contains(&name.as_str()) && matches!(Stamp::read(&cell), Some(Stamp::Local(_)))
+            };
+            date = (0..table.names().len()).find(is_date);
+        }
+        Ok(Timing::Dates { column, date, dates, first: String::new() })
+    }
+}
+
+/// A unit of time behind the name of a column of time: `time_ms`.
+fn suffix(name: &str) -> Option<&str> {
+    let (before, unit) = name.rsplit_once(['_', '/'])?;
+    let before = before.trim().to_lowercase();
+    (time_unit(unit).is_some() && (before == "t" || NAMES.contains(&before.as_str()))).then_some(unit)
+}
+
+impl Timing {
+    /// The time of the current row (s); zero for a date, whose column is read whole.
+    pub(super) fn tick(
+        &mut self,
+        file: &DataFile,
+        table: &Table,
+        numbers: &mut Numbers,
+        sample: usize,
+    ) -> Result<f64, Error> {
+        match self {
+            Timing::Even(step) => Ok(sample as f64 * *step),
+            Timing::Numbers { ticks, clock, stamps } => {
+                let number = numbers.read(table.cell(ticks.column)).map(|number| ticks.time(number));
+                let Some(time) = number.filter(|time| time.is_finite()) else {
+                    return Err(file.bad_cell(table, ticks.column, number, "t", sample, f64::NAN));
+                };
+                if let Some(before) = clock.last().filter(|before| time < *before) {
+                    let problem = Error::TimeOrder { experiment: file.name(), sample, before, time };
+                    return Err(file.at_line(table, problem));
+                }
+                let even = clock.tick(time);
+                if let Some(stamps) = stamps {
+                    stamps.push(time);
+                } else if !even {
+                    let mut all = stamps_of(file, table, numbers, *ticks, sample)?;
+                    all.push(time);
+                    *stamps = Some(all);
+                }
+                Ok(time)
+            }
+            Timing::Dates { column, date, dates, first } => {
+                let cell = |at: usize| String::from_utf8_lossy(table.cell(at));
+                let text = match date {
+                    Some(date) => format!("{} {}", cell(*date), cell(*column)),
+                    None => cell(*column).into_owned(),
+                };
+                let Some(stamp) = Stamp::read(&text) else {
+                    return Err(file.bad_cell(table, *column, None, "t", sample, f64::NAN));
+                };
+                let more = dates.push(stamp, &text, table.line());
+                if sample == 0 {
+                    *first = text;
+                }
+                if more { Ok(0.0) } else { Err(self.fault(file, table)) }
+            }
+        }
+    }
+
+    /// The fault of dates that cannot be read on.
+    #[cold]
+    fn fault(&mut self, file: &DataFile, table: &Table) -> Error {
+        match std::mem::replace(self, Timing::Even(1.0)).finish(file, table, 0) {
+            Err(error) => error,
+            Ok(_) => file.cannot("its dates cannot be read"),
+        }
+    }
+
+    /// The times of all rows, and where they are from.
+    pub(super) fn finish(self, file: &DataFile, table: &Table, rows: usize) -> Result<(Time, TimeSource), Error> {
+        let name = |column: usize| table.names()[column].clone();
+        match self {
+            Timing::Even(step) => Ok((Time::Uniform { start: 0.0, step }, TimeSource::Even { step })),
+            Timing::Numbers { ticks: Ticks { column, unit, origin, .. }, clock, stamps } => {
+                let time = clock.uniform().unwrap_or_else(|| {
+                    Time::Stamps(stamps.unwrap_or_else(|| clock.last().into_iter().cycle().take(rows).collect()))
+                });
+                Ok((time, TimeSource::Numbers { column: name(column), unit, origin }))
+            }
+            Timing::Dates { column, dates, first, .. } => {
+                let (seconds, order) = dates.finish().map_err(|fault| Error::Dates {
+                    path: file.path.clone(),
+                    line: fault.line,
+                    column: name(column),
+                    text: fault.text,
+                    problem: fault.problem,
+                })?;
+                let source = TimeSource::Dates { column: name(column), first, order, zone: file.zone.clone() };
+                Ok((Time::from_stamps(seconds), source))
+            }
+        }
+    }
+}
+
+/// The time stamps of the first rows, for a clock that turned out uneven.
+fn stamps_of(file: &DataFile, table: &Table, numbers: &Numbers, ticks: Ticks, rows: usize) -> Result<Vec<f64>, Error> {
+    let (mut table, mut numbers) = (table.again(file)?, numbers.clone());
+    let mut stamps = Vec::with_capacity(rows + 1);
+    while stamps.len() < rows && table.next()? {
+        stamps.extend(numbers.read(table.cell(ticks.column)).map(|number| ticks.time(number)));
+    }
+    Ok(stamps)
+}

@@ -1,0 +1,137 @@
+//! CSV files of which nothing is said: what a person would see is found, and said; what nobody could know is refused.
+#![cfg(feature = "csv")]
+
+use crate::pmsm::{Currents, Drive, Pmsm};
+use crate::refused::says;
+use greybox::{DataFile, Experiment, ExperimentOf, Time, TimeSource};
+use std::path::PathBuf;
+
+fn file(name: &str, text: impl AsRef<[u8]>) -> PathBuf {
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("guesses").join(format!("{name}.csv"));
+    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+fn read(name: &str, text: &str) -> ExperimentOf<Pmsm> {
+    Experiment::from_file(&Pmsm, file(name, text)).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+fn said(record: &ExperimentOf<Pmsm>) -> String {
+    record.record().reading().unwrap().to_string()
+}
+
+/// The same three rows as many programs write them.
+#[test]
+fn a_file_is_read_as_it_stands() {
+    let plain = "t,ud,w,id,iq\n0,1.5,2,3,4\n1,1.5,2,,4\n2,1.5,2,3,4\n";
+    let german = plain.replace(',', ";").replace('.', ",");
+    let german_time = "cells between \";\", decimal comma, ";
+    for (name, text, shown) in [
+        ("plain", plain.to_owned(), "cells between \",\", time \"t\" in s"),
+        ("semicolons", plain.replace(',', ";"), "cells between \";\", time \"t\" in s"),
+        ("tabs", plain.replace(',', "\t"), "cells between tabs, time \"t\" in s"),
+        ("bars", plain.replace(',', "|"), "cells between \"|\", time \"t\" in s"),
+        ("blanks", plain.replace(",,", ",nan,").replace(',', " "), "cells between spaces, time \"t\" in s"),
+        ("german", german.clone(), &format!("{german_time}time \"t\" in s")),
+        ("quoted", plain.replace("1.5", "\"1,5\""), "cells between \",\", decimal comma, time \"t\" in s"),
+        ("sep", format!("sep=;\r\n{german}"), &format!("{german_time}1 line above the names, time \"t\" in s")),
+        (
+            "preamble",
+            format!("Oscilloscope;4711\nt,ud\n\n{plain}"),
+            "cells between \",\", 3 lines above the names, time \"t\" in s",
+        ),
+        (
+            "units_row",
+            plain.replace("iq\n", "iq\ns,V,rad/s,A,A\n"),
+            "cells between \",\", a row of units, time \"t\" in s",
+        ),
+        (
+            "units_row_ms",
+            plain
+                .replace("iq\n", "iq\n[ms],[V],[rad/s],[A],[Ampere]\n")
+                .replace("\n1,", "\n1000,")
+                .replace("\n2,", "\n2000,"),
+            "cells between \",\", a row of units, time \"t\" in ms; `iq` in \"Ampere\" taken as \"A\"",
+        ),
+        (
+            "units_in_names",
+            plain.replace("t,ud,w,id,iq", "Time [s],ud [V],w (rad/s),id [A],iq [A]"),
+            "cells between \",\", time \"Time [s]\" in s",
+        ),
+        (
+            "milliseconds",
+            plain.replace("t,ud", "time_ms,ud").replace("\n1,", "\n1000,").replace("\n2,", "\n2000,"),
+            "cells between \",\", time \"time_ms\" in ms",
+        ),
+        (
+            "minutes",
+            plain
+                .replace("t,ud", "t (min),ud")
+                .replace("\n1,", "\n0.0166666666666666667,")
+                .replace("\n2,", "\n0.0333333333333333333,"),
+            "cells between \",\", time \"t (min)\" in min",
+        ),
+        (
+            "since_1970",
+            plain
+                .replace("\n0,", "\n1742428800000,")
+                .replace("\n1,", "\n1742428801000,")
+                .replace("\n2,", "\n1742428802000,"),
+            "cells between \",\", time \"t\" in ms, from 1742428800000",
+        ),
+        (
+            "other_columns",
+            plain
+                .replace("t,", "Zeit,note,")
+                .replace("\n0,", "\n0,\"a, b\",")
+                .replace("\n1,", "\n1,,")
+                .replace("\n2,", "\n2,c,"),
+            "cells between \",\", time \"Zeit\" in s",
+        ),
+    ] {
+        let record = read(name, &text);
+        assert_eq!(record.inputs().collect::<Vec<_>>(), [Drive { ud: 1.5, w: 2.0 }; 3], "{name}");
+        assert_eq!(record.output(2), Currents { id: 3.0, iq: 4.0 }, "{name}");
+        assert!(record.output(1).id.is_nan() && record.output(1).iq == 4.0, "{name}");
+        let Time::Uniform { start, step } = *record.times() else { panic!("{name}: {:?}", record.times()) };
+        // A third of a minute is rounded at its 17th digit.
+        assert!(start == 0.0 && (step - 1.0).abs() < 1e-15, "{name}: {step}");
+        assert_eq!(said(&record), shown, "{name}");
+    }
+}
+
+/// A decimal comma that first shows after thousands of rows; the clock turns uneven there, too, so that the file is read again.
+#[test]
+fn a_decimal_comma_may_show_late() {
+    let rows: String = (0..9_000).map(|k| format!("{k};1;2;3;4\n")).collect();
+    let record = read("late", &format!("t;ud;w;id;iq\n{rows}9000,5;1,25;2;3;4\n"));
+    assert_eq!((record.len(), record.input(9_000).ud, record.time(9_000)), (9_001, 1.25, 9000.5));
+    assert_eq!(record.time(8_999), 8999.0);
+}
+
+/// Units that are known and are not the model's are neither converted nor passed over.
+#[test]
+fn a_column_in_another_unit_is_refused() {
+    for (header, column, factor) in [
+        ("t,ud,w [rpm],id,iq", "w [rpm]", "DataFile::factor(\"w\", 0.10471975511965977)"),
+        ("t,ud [mV],w,id,iq", "ud [mV]", "DataFile::factor(\"ud\", 0.001)"),
+        ("t,ud,w,id (kA),iq", "id (kA)", "DataFile::factor(\"id\", 1000)"),
+    ] {
+        let path = file("units", format!("{header}\n0,1,2,3,4\n1,1,2,3,4\n"));
+        says(DataFile::new(&path).read(&Pmsm), &[&format!("column `{column}`"), factor]);
+    }
+    let path = file("units", "t,ud,w [rpm],id,iq\n0,1,2,3,4\n1,1,2,3,4\n");
+    assert_eq!(DataFile::new(path).factor("w", 0.5).read(&Pmsm).unwrap().input(0).w, 1.0);
+}
+
+#[test]
+fn two_columns_of_time_are_not_guessed() {
+    let path = file("two_times", "time,timestamp,ud,w,id,iq\n0,0,1,2,3,4\n1,1,1,2,3,4\n");
+    says(DataFile::new(&path).read(&Pmsm), &["no column `t`", "time, timestamp"]);
+    let record = DataFile::new(path).column("t", "timestamp").read(&Pmsm).unwrap();
+    let source = TimeSource::Numbers { column: "timestamp".into(), unit: 1.0, origin: 0.0 };
+    assert_eq!(record.record().reading().unwrap().time, source);
+    let none = DataFile::new(file("no_time", "ud,w,id,iq\n1,2,3,4\n1,2,3,4\n")).sample_time(0.5).read(&Pmsm).unwrap();
+    assert_eq!(none.record().reading().unwrap().time, TimeSource::Even { step: 0.5 });
+}
