@@ -13,7 +13,7 @@ impl DataFile {
     ///
     /// # Errors
     /// A file that cannot be read; a missing or ambiguous column (the message lists those there); a cell that is no
-    /// number, a missing input, time that does not increase, a row of another length (each with its line); a factor that
+    /// number, a missing input, time that runs backwards, dates that can be read in two ways, a unit that is not the signal's, a row of another length (each with its line); a factor that
     /// is not positive; a signal that the model does not have; whatever [`Experiment::new`] refuses.
     pub fn read<M: Model>(&self, _model: &M) -> Result<ExperimentOf<M>, Error> {
         self.read_record(&Layout::of::<M>()).map(Experiment::of)
@@ -21,8 +21,8 @@ impl DataFile {
 }
 
 impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
-    /// Reads a record from a CSV file whose columns are named as the signals of the model, and `t` for time (s), in their
-    /// units; see [`DataFile`] for files that are not.
+    /// Reads a record from a file whose columns are named as the signals of the model, in their units, and one of time; see
+    /// [`DataFile`] for what is found by itself, and for files that are otherwise.
     ///
     /// # Errors
     /// The errors of [`DataFile::read`].

@@ -1,4 +1,4 @@
-//! [`DataFile`]: from a CSV file to a record, and back.
+//! [`DataFile`]: from a file to a record, and from a record to a CSV file.
 
 mod dates;
 mod guess;
@@ -18,8 +18,9 @@ use std::path::{Path, PathBuf};
 
 /// A CSV file, and how it becomes a record.
 ///
-/// A file whose columns have the names and units of the model's signals, and `t` in seconds, needs no word:
-/// `Experiment::from_file(&model, "record.csv")`. Of any other file, what differs is said. From
+/// A file whose columns have the names of the model's signals, and one of time, needs no word:
+/// `Experiment::from_file(&model, "record.csv")`. Separator, decimal comma, the line with the names, a row of units and the column of
+/// time are found as a person would find them, and [`Record::reading`] says what was found. Of any other file, what differs is said. From
 ///
 /// ```text
 /// # bench 3, winding cold
@@ -46,8 +47,6 @@ use std::path::{Path, PathBuf};
 /// use greybox::{DataFile, Hold, Time, units};
 ///
 /// let record = DataFile::new(&path)
-///     .decimal_comma()
-///     .column("t", "time (ms)").factor("t", 1e-3)
 ///     .column("u", "voltage")
 ///     .column("w", "speed").factor("w", units::RPM)
 ///     .reversed("i")
@@ -55,6 +54,10 @@ use std::path::{Path, PathBuf};
 ///     .named("bench 3")
 ///     .hold(Hold::First);
 ///
+/// assert_eq!(
+///     record.record().reading().unwrap().to_string(),
+///     "cells between \";\", decimal comma, 1 line above the names, time \"time (ms)\" in ms"
+/// );
 /// assert_eq!(record.times(), &Time::Uniform { start: 0.0, step: 1e-3 });
 /// assert_eq!(record.input(0).w, 1500.0 * units::RPM);
 /// assert_eq!(record.output(0).i, 0.52);
@@ -63,20 +66,29 @@ use std::path::{Path, PathBuf};
 /// # Ok::<(), greybox::Error>(())
 /// ```
 ///
-/// **Columns** go by name. Each input and output of the model, and the time `t`, has a column of its own name unless
-/// [`column`](DataFile::column) says another. States need none; further columns are ignored. A value is
-/// `factor * cell + offset`, in the unit of the signal.
+/// **Columns** go by name. Each input and output of the model has a column of its own name, with a unit behind it or without
+/// (`ud [V]`), unless [`column`](DataFile::column) says another. States need none; further columns are ignored. A value is
+/// `factor * cell + offset`, in the unit of the signal. Where the file says a unit that is known and not the signal's (rpm for rad/s, mA for
+/// A), it is refused until a [`factor`](DataFile::factor) is given; nothing is converted.
 ///
-/// **Cells** stand between commas, may be quoted, and may have white space around them. An output that was not measured
-/// is empty, `NaN`, `NA` or `null`; inputs and time are always there.
+/// **Cells** stand between commas, semicolons, tabs, bars or single spaces, may be quoted, and may have white space around them. Numbers
+/// have a point or a comma, the same in the whole file. An output that was not measured is empty, `NaN`, `NA` or `null`; inputs and time
+/// are always there.
 ///
 /// **Lines** that begin with `#` are comments; they are passed over, as are blank lines, and a line such as `sep=;` above the
-/// names. The names stand on the first other line, or in the last comment if numbers follow it at once (as numpy writes
-/// them).
+/// names. The names stand on the first line that has all those wanted, or in the last comment if numbers follow it at once (as numpy
+/// writes them); a row of units may follow.
 ///
-/// **Time** increases. If evenly, up to a millionth of a step (see [`Time::from_stamps`](crate::Time::from_stamps)), it is
-/// stored as [`Time::Uniform`](crate::Time::Uniform) and costs no memory. A static model needs no time: without a column
-/// for it the rows are numbered.
+/// **Time** is the column `t`, or the only one called `time`, `timestamp`, `datetime`, `Zeit` or the like. It does not decrease. Numbers are
+/// seconds, unless a unit stands behind or below the name, or they can only be milli-, micro- or nanoseconds since 1970. Dates
+/// (`2025-03-20T14:05:00.5Z`, `2025-03-20 14:05`, `20.03.2025 14:05:00`, `03/20/2025 2:05:00 PM`, `20-Mar-2025 14:05:00`) and times of day
+/// (`14:05:00`) become seconds from the first. Whether day or month stands first is seen from numbers above 12, from time that must not
+/// decrease, and from even steps; where that does not tell, [`dates`](DataFile::dates) must. Clocks that are set forward or back are followed
+/// where the dates have a zone, or [`zone`](DataFile::zone) names theirs; without one, such a step is an error.
+///
+/// If time is even, up to a millionth of a step (see [`Time::from_stamps`](crate::Time::from_stamps)), it is
+/// stored as [`Time::Uniform`](crate::Time::Uniform) and costs no memory. A static model needs no time: without a column `t`
+/// the rows are numbered.
 ///
 /// **The record** is named after the file, its input is held from sample to sample, and its initial state is estimated,
 /// unless the [`Experiment`](crate::Experiment) is told otherwise.
