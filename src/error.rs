@@ -201,11 +201,11 @@ pub enum Error {
         /// Name of the column.
         column: String,
         /// Its unit.
-        file: String,
+        file: Box<str>,
         /// Name of the signal.
         signal: String,
         /// Its unit.
-        model: String,
+        model: Box<str>,
         /// The factor from one to the other.
         factor: f64,
     },

@@ -151,7 +151,7 @@ impl DataFile {
             let (file, model) = (file.to_owned(), signal.unit.clone());
             if let Some(factor) = reading::factor(&file, &model) {
                 let (path, column, signal) = (self.path.clone(), name.clone(), signal.name.clone());
-                return Err(Error::Unit { path, column, file, signal, model, factor });
+                return Err(Error::Unit { path, column, file: file.into(), signal, model: model.into(), factor });
             }
             if file != model && !file.is_empty() {
                 units.push((signal.name.clone(), file, model));
