@@ -152,8 +152,7 @@ impl Way {
         if let AmbiguousOffset::Gap { .. } = found.offset() {
             return Err("there is no such time in the zone: clocks were set forward over it".into());
         }
-        let instants =
-            [found.clone().earlier(), found.later()].map(|instant| instant.map_err(|error| error.to_string()));
+        let instants = [found.earlier(), found.later()].map(|instant| instant.map_err(|error| error.to_string()));
         let [earlier, later] = instants;
         let seconds = self.since(earlier?);
         if seconds >= self.last() {
