@@ -149,8 +149,8 @@ impl<'a, M: Made> Fit<'a, M> {
     /// names the method ([`Method::integrator`](crate::estimate::Method)), and is not usable if none is fine enough. A finer step
     /// stays where a coarser one explains the data better, or as well with other values, which is said. `Esdirk` is stopped where it
     /// needs 3,000 steps for a sample, or 1,000 for each: such a model is not stiff, but fast, or its state grows without bound. A
-    /// search by one of the finer methods has at most 100 trial steps, and begins at the minima found, where there are several
-    /// starts; a limit of the search's own holds for all methods together.
+    /// search by one of the finer methods goes on while each 20 trial steps lower `-2 ln` of the likelihood by 1 (from several starts, 100
+    /// steps), and begins at the minima found, where there are several starts; a limit of the search's own holds for all methods together.
     pub fn integrator(self, integrator: impl Integrator) -> Self {
         Fit { stepping: Some(M::stepping(integrator)), ..self }
     }
@@ -197,9 +197,9 @@ impl<'a, M: Made> Fit<'a, M> {
     /// Searches from `count` starts and keeps the best end. [`Summary::starts`](crate::Summary::starts) reports the minima that were
     /// found.
     ///
-    /// Unless set, a fit searches from the declared start. If it is not usable and the model explains none of the
-    /// outputs ([`WarningCode::Unexplained`](crate::WarningCode::Unexplained)), it goes on to search from 32 starts by itself, after
-    /// 75 evaluations of each from the best four only, and says so; with `starts(1)` it does not, nor with more than 20,000 samples
+    /// Unless set, a fit searches from the declared start. If it is not usable and the model leaves one of the
+    /// outputs unexplained ([`WarningCode::Unexplained`](crate::WarningCode::Unexplained)), it goes on to search from 32 starts by itself, after
+    /// 150 evaluations of each from the best four only, and says so; with `starts(1)` it does not, nor with more than 20,000 samples
     /// (2,000 where the model does not run in vector registers).
     ///
     /// The first start is the declared one. The others are a Latin hypercube (McKay, Beckman and Conover, Technometrics 21
@@ -276,7 +276,7 @@ impl<'a, M: Made> Fit<'a, M> {
     ///
     /// A search that does not converge is an outcome of the estimate, not an error. Where samples leave open at which of two
     /// frequencies the model oscillates ([`WarningCode::Aliased`](crate::WarningCode::Aliased)), further searches begin at the other
-    /// one; where the model explains nothing, they begin at further [`starts`](Fit::starts). Each has the
+    /// one; where an output is left unexplained, they begin at further [`starts`](Fit::starts). Each has the
     /// trial steps that the first one left of its limit, or a few times those it took; all of them end within the time limit.
     ///
     /// # Errors

@@ -60,6 +60,11 @@ pub(crate) fn p_value(p: f64) -> String {
     if p < 1e-15 { "p < 1e-15".to_owned() } else { format!("p = {}", number(p, 2)) }
 }
 
+/// A unit as it follows a number: after a space, and nothing for a ratio.
+pub(crate) fn unit_after(unit: &str) -> String {
+    if unit.is_empty() || unit == "1" { String::new() } else { format!(" {unit}") }
+}
+
 /// A number of things: `1 gap`, `3 gaps`, `24,841 samples`.
 pub(crate) fn counted(count: u64, thing: &str) -> String {
     format!("{} {thing}{}", whole(count), if count == 1 { "" } else { "s" })

@@ -1,5 +1,5 @@
 //! Searches that a fit runs by itself after its estimate was judged, since another minimum may be the right one: on the other side of
-//! half the frequency of sampling, and from further starts where the model explains nothing.
+//! half the frequency of sampling, and from further starts where an output is left unexplained.
 
 use super::refine::{Start, after, is_only_coarse, is_useless};
 use crate::estimate::{Summary, Warning, WarningCode};
@@ -8,7 +8,7 @@ use crate::optimize::Severity;
 use crate::problem::{Control, Noise, Problem, SearchPlan, Settings};
 use std::time::Instant;
 
-/// Starts of a fit whose first search ended where the model explains nothing, the declared one among them: of 138 records of predators
+/// Starts of a fit whose first search left an output unexplained, the declared one among them: of 138 records of predators
 /// and prey 16 starts led 118 to the right minimum, 24 led 133, 32 led 136.
 const STARTS: usize = 32;
 /// Most trial steps of a further search: so many, or so many times those of the search before, by where it begins.
@@ -53,7 +53,7 @@ impl Problem<'_> {
             return None;
         }
         let (begin, before, limit) = (Instant::now(), found.iterations, self.settings.optimizer.most());
-        let best = match explains_nothing(found, self.layout().outputs.len()) {
+        let best = match leaves_unexplained(found) {
             true => {
                 let trials = Trials::of(FROM_A_START, before, limit)?;
                 self.search_again(found, trials.most, begin, control)
@@ -84,7 +84,7 @@ impl Problem<'_> {
         if self.samples() > most {
             let mut only = found.clone();
             only.warnings.push(note(format!(
-                "the search from the declared start ended where the model explains nothing; with more than {} the fit does not search \
+                "the search from the declared start ended where an output is left unexplained; with more than {} the fit does not search \
                  from further starts by itself, so ask for Fit::starts({STARTS})",
                 counted(most as u64, "sample")
             )));
@@ -99,10 +99,10 @@ impl Problem<'_> {
         }
         let stopped = if control.stops() { "; limits of the fit stopped searches before their end" } else { "" };
         let text = format!(
-            "the search from the declared start ended where the model explains nothing, so that the fit searched from {STARTS} starts \
+            "the search from the declared start ended where an output is left unexplained, so that the fit searched from {STARTS} starts \
              by itself, and went on from the best of them{stopped}"
         );
-        let better = is_better(&again, found, self.layout().outputs.len());
+        let better = is_better(&again, found);
         let mut best = if better { after(found, again) } else { found.clone() };
         best.warnings.push(note(text));
         Some(best)
@@ -114,20 +114,20 @@ impl Problem<'_> {
     }
 }
 
-/// Whether an estimate is not usable and leaves every output unexplained. That may not be the reason by itself: where the loss is robust
-/// or measurements are weighted, it is a warning only. Where one output is explained, the search was near the right minimum.
-fn explains_nothing(found: &Summary, outputs: usize) -> bool {
+/// Whether an estimate is not usable and leaves an output unexplained. That may not be the reason by itself: where the loss is robust
+/// or measurements are weighted, it is a warning only.
+fn leaves_unexplained(found: &Summary) -> bool {
     let unexplained =
-        |warning: &&Warning| warning.code == WarningCode::Unexplained && warning.severity > Severity::Usable;
-    found.severity() == Severity::NotUsable && found.warnings.iter().filter(unexplained).count() == outputs
+        |warning: &Warning| warning.code == WarningCode::Unexplained && warning.severity > Severity::Usable;
+    found.severity() == Severity::NotUsable && found.warnings.iter().any(unexplained)
 }
 
-/// Whether further searches found a better estimate: one that explains an output, or one of no higher deviance. The first search had more
+/// Whether further searches found a better estimate: one that explains all outputs, or one of no higher deviance. The first search had more
 /// trial steps than most of theirs, and may have ended lower.
-fn is_better(again: &Summary, found: &Summary, outputs: usize) -> bool {
+fn is_better(again: &Summary, found: &Summary) -> bool {
     let lower = again.deviance.zip(found.deviance).is_some_and(|(again, found)| again <= found + SAME);
     let converged = again.outcome.converged() || !found.outcome.converged();
-    converged && (lower || !explains_nothing(again, outputs))
+    converged && (lower || !leaves_unexplained(again))
 }
 
 #[cfg(test)]
@@ -145,13 +145,13 @@ mod tests {
         let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
         let fit = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).starts(1);
         let found = fit.run().unwrap().summary().clone();
-        assert!(explains_nothing(&found, 1) && found.outcome.converged(), "{found:?}");
+        assert!(leaves_unexplained(&found) && found.outcome.converged(), "{found:?}");
         let of = |by: f64| Summary { deviance: found.deviance.map(|deviance| deviance + by), ..found.clone() };
-        assert_eq!([-1.0, 0.0, 1.0].map(|by| is_better(&of(by), &found, 1)), [true, true, false]);
+        assert_eq!([-1.0, 0.0, 1.0].map(|by| is_better(&of(by), &found)), [true, true, false]);
         let unended = Summary { outcome: Outcome::IterationLimit { iterations: 9 }, ..of(-1.0) };
-        assert!(!is_better(&unended, &found, 1) && is_better(&of(-1.0), &unended, 1));
+        assert!(!is_better(&unended, &found) && is_better(&of(-1.0), &unended));
         // A higher one that explains the output is better all the same: without its warnings it is usable.
-        assert!(is_better(&Summary { warnings: vec![], ..of(1.0) }, &found, 1));
+        assert!(is_better(&Summary { warnings: vec![], ..of(1.0) }, &found));
     }
 
     /// At least 100 steps, three times 50 or 60, as far as 200 leave them: 150 after 50, 140 after 60, none after 200.

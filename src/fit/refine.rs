@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::estimate::{Starts, Summary, Unknown, Warning, WarningCode};
-use crate::numeral::number;
+use crate::numeral::{number, unit_after};
 use crate::optimize::{Outcome, Severity};
 use crate::problem::{Control, PARTS, Problem};
 use std::time::Instant;
@@ -16,6 +16,9 @@ pub(super) const CERTAINLY_WORSE: f64 = 15.0;
 /// An unknown that a finer step moved by more than so many standard errors is worth a note, where the data do not tell the two
 /// apart.
 const MOVED: f64 = 1.0;
+
+/// A part of a search that lowers the deviance by less makes no progress.
+const LOWERED: f64 = 1.0;
 
 /// Where a search begins.
 #[derive(Clone)]
@@ -62,12 +65,14 @@ impl Attempt {
         Attempt { found, coarser: vec![] }
     }
 
-    /// Whether a finer method is to be tried: a finer step would move an unknown, or the start cannot be simulated.
+    /// Whether a finer method is to be tried: a finer step would move an unknown, or the start cannot be simulated, or one of several.
     pub fn is_coarse(&self) -> bool {
         match &self.found {
             // An output that is constant determines no parameter by any method.
             Ok(found) => {
-                is_coarse(found) && found.outcome != Outcome::Exact && !is_useless(found, WarningCode::ConstantOutput)
+                (is_coarse(found) || has_lost_starts(found))
+                    && found.outcome != Outcome::Exact
+                    && !is_useless(found, WarningCode::ConstantOutput)
             }
             Err(error) => matches!(error, Error::Start(_)),
         }
@@ -82,7 +87,7 @@ impl Attempt {
             return None;
         }
         match &self.found {
-            Ok(found) if is_only_coarse(found) => {
+            Ok(found) if is_only_coarse(found) || lacks_starts_only(found) => {
                 let within = |(x, (lower, upper)): (f64, (f64, f64))| x.max(lower).min(upper);
                 let coordinates = found.coordinates().into_iter().zip(finer.unknowns.bounds()).map(within).collect();
                 Some(Start { coordinates, trials, ends: found.starts.clone() })
@@ -128,7 +133,13 @@ impl Attempt {
             (Ok(before), Ok(again)) if no_finer(&before, &again) => {
                 return Attempt { found: Ok(with_work_of(before, &again)), coarser: self.coarser };
             }
+            // What was tried are the starts that this method could not simulate.
+            (Ok(before), Ok(again)) if lacks_starts_only(&before) && !is_lower(&again, &before) => {
+                return Attempt { found: Ok(with_starts_of(before, again)), coarser: self.coarser };
+            }
             (Ok(before), Ok(again)) if again.outcome.converged() || !before.outcome.converged() => (before, again),
+            // A coarse minimum that explains nothing is none of the equations.
+            (Ok(before), Ok(again)) if explains_more(&again, &before) => (before, again),
             (before, _) => return Attempt { found: before, coarser: self.coarser },
         };
         let mut coarser = self.coarser;
@@ -171,13 +182,13 @@ fn explains_as_well(coarser: &[Coarser], deviance: f64, found: &Summary) -> Opti
     let moved = close.filter_map(|coarser| Some((coarser, farthest(found, coarser.values.iter().copied())?)));
     let (coarser, (i, errors)) = moved.max_by(|a, b| a.1.1.total_cmp(&b.1.1)).filter(|(_, (_, e))| *e > MOVED)?;
     let text = format!(
-        "the step decides `{}`, and the data do not tell which one is right: {} gives {} {}, {} standard errors away, and explains \
+        "the step decides `{}`, and the data do not tell which one is right: {} gives {}{}, {} standard errors away, and explains \
          them as well (-2 ln of the likelihood differs by {}); the estimate is that of the finer step, which is closer to the \
          equations; for a record that was simulated, choose its step with Fit::integrator",
         found.unknowns[i].name,
         coarser.integrator,
         number(coarser.values[i], 5),
-        found.unknowns[i].unit,
+        unit_after(&found.unknowns[i].unit),
         number(errors, 2),
         number((coarser.deviance - deviance).abs(), 2)
     );
@@ -200,8 +211,8 @@ fn explains_better(coarser: &Coarser, better: f64, found: &Summary) -> Warning {
 }
 
 impl Problem<'_> {
-    /// Continues a search by this finer method that ended at the limit of a part, as long as the model explains the data better
-    /// than a constant, up to so many trial steps. Not for searches from several starts, which are not run in parts.
+    /// Continues a search by this finer method that ended at the limit of a part, as long as it makes progress, up to so many trial steps.
+    /// Not for searches from several starts, which are not run in parts.
     pub(super) fn run_on(
         &self,
         found: Result<Summary, Error>,
@@ -210,11 +221,14 @@ impl Problem<'_> {
         control: &Control,
     ) -> Result<Summary, Error> {
         let mut found = found?;
-        for _ in 1..PARTS {
+        let mut before = None;
+        for parts in 1.. {
             let trials = most.saturating_sub(found.iterations);
-            if trials == 0 || self.settings.searches.count() > 1 || !may_go_on(&found) || control.stops() {
+            if trials == 0 || self.settings.searches.count() > 1 || !may_go_on(&found, before, parts) || control.stops()
+            {
                 break;
             }
+            before = found.deviance;
             let start = Start { coordinates: found.coordinates(), trials, ends: None };
             found = after(&found, self.run_within(begin, control, start)?);
             if let Outcome::OwnLimit { iterations, .. } = &mut found.outcome {
@@ -225,21 +239,64 @@ impl Problem<'_> {
     }
 }
 
+/// Whether a search that did not end at a minimum explains the data better than a coarse minimum that leaves an output unexplained.
+fn explains_more(again: &Summary, before: &Summary) -> bool {
+    let lower = again.deviance.zip(before.deviance).is_some_and(|(again, before)| again < before);
+    is_useless(before, WarningCode::Unexplained) && (lower || !is_useless(again, WarningCode::Unexplained))
+}
+
 /// Whether nothing but the step makes an estimate not usable.
 pub(super) fn is_only_coarse(found: &Summary) -> bool {
     let wrong = |warning: &Warning| warning.severity == Severity::NotUsable && warning.code != WarningCode::CoarseStep;
     found.outcome.converged() && !found.warnings.iter().any(wrong)
 }
 
-/// Whether a search ended at a limit of trial steps where the model explains the data better than a constant.
-fn may_go_on(found: &Summary) -> bool {
-    matches!(found.outcome, Outcome::IterationLimit { .. } | Outcome::OwnLimit { .. })
-        && !is_useless(found, WarningCode::Unexplained)
+/// Whether a search that ended at a limit of trial steps goes on after so many parts: while each lowers the deviance, which before the last
+/// one was this; no further than some parts where an output is left unexplained, or where there is no deviance.
+fn may_go_on(found: &Summary, before: Option<f64>, parts: u64) -> bool {
+    let limited = matches!(found.outcome, Outcome::IterationLimit { .. } | Outcome::OwnLimit { .. });
+    let explains = !is_useless(found, WarningCode::Unexplained);
+    limited
+        && match (before, found.deviance) {
+            (Some(before), Some(now)) => now < before - LOWERED && (explains || parts < PARTS),
+            (None, Some(_)) => true,
+            (_, None) => explains && parts < PARTS,
+        }
 }
 
 /// Whether a finer step would move an unknown.
 fn is_coarse(found: &Summary) -> bool {
     found.warnings.iter().any(|warning| warning.code == WarningCode::CoarseStep)
+}
+
+/// Whether one of several starts could not be simulated.
+fn has_lost_starts(found: &Summary) -> bool {
+    found.starts.iter().flat_map(|starts| &starts.failed).any(|failed| !failed.evaluated)
+}
+
+/// Whether that is all for which a finer method is to be tried.
+fn lacks_starts_only(found: &Summary) -> bool {
+    has_lost_starts(found) && !is_coarse(found)
+}
+
+/// Whether a later estimate is a minimum that explains the data better, by more than the step may decide.
+fn is_lower(again: &Summary, before: &Summary) -> bool {
+    let lower = again.deviance.zip(before.deviance).is_some_and(|(again, before)| again < before - WORSE);
+    again.outcome.converged() && (lower || !before.outcome.converged())
+}
+
+/// An estimate with the work of later searches from its minima and other starts, and what they found.
+fn with_starts_of(found: Summary, again: Summary) -> Summary {
+    let about_starts = |warning: &Warning| {
+        matches!(
+            warning.code,
+            WarningCode::MinimumFoundOnce | WarningCode::RivalMinimum | WarningCode::DeclaredStartElsewhere
+        )
+    };
+    let mut found = with_work_of(found, &again);
+    found.warnings.retain(|warning| !about_starts(warning));
+    found.warnings.extend(again.warnings.into_iter().filter(about_starts));
+    Summary { starts: again.starts, ..found }
 }
 
 /// An estimate with the work of a later search that found no better one.

@@ -4,7 +4,7 @@ use super::elsewhere::Trials;
 use super::refine::{Start, farthest};
 use crate::estimate::{Summary, Unknown, Warning, WarningCode};
 use crate::judge::{Aliases, INDISTINGUISHABLE};
-use crate::numeral::number;
+use crate::numeral::{number, unit_after};
 use crate::optimize::{Outcome, Severity};
 use crate::problem::{Control, Problem, Settings};
 use std::time::Instant;
@@ -95,7 +95,7 @@ fn best(mut ends: Vec<End>, frequencies: &str, limits: Limits) -> Option<Summary
         None => (Severity::Usable, format!("{begun}: searches begun at each of them ended in one minimum")),
         Some((other, i)) => {
             let Unknown { name, unit, value, .. } = &other.1.unknowns[i];
-            let place = format!("`{name}` = {} {unit}", number(*value, 5));
+            let place = format!("`{name}` = {}{}", number(*value, 5), unit_after(unit));
             let better = number((other.0 - deviance).abs(), 2);
             if other.0 - deviance > INDISTINGUISHABLE {
                 let text = format!(

@@ -2,7 +2,7 @@
 
 use super::refine::{CERTAINLY_WORSE, Start, farthest, is_useless};
 use crate::estimate::{Summary, Unknown, Warning, WarningCode};
-use crate::numeral::number;
+use crate::numeral::{number, unit_after};
 use crate::optimize::Severity;
 use crate::problem::{Control, Problem, SearchPlan, Settings};
 use std::time::Instant;
@@ -37,10 +37,11 @@ impl Problem<'_> {
         let Unknown { name, unit, value, .. } = &simulated.unknowns[i];
         let text = format!(
             "a simulation explains the outputs better than predictions from measured states do (-2 ln of the likelihood is less by {}), \
-             with `{name}` = {} {unit}, {} standard errors away: these measurements are noisy, which biases what restarts from them; \
+             with `{name}` = {}{}, {} standard errors away: these measurements are noisy, which biases what restarts from them; \
              simulate (FreeRun, the default), or use Kalman with Model::noise",
             number(better, 3),
             number(*value, 4),
+            unit_after(unit),
             number(errors, 2)
         );
         let mut warned = found.clone();

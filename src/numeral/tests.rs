@@ -3,6 +3,11 @@
 use super::*;
 
 #[test]
+fn a_ratio_has_no_unit() {
+    assert_eq!(["", "1", "V", "1/s"].map(unit_after), ["", "", " V", " 1/s"]);
+}
+
+#[test]
 fn numbers_are_rounded() {
     for (value, digits, expected) in [
         (1.150_000_000_000_000_1, EXACT, "1.15"),

@@ -18,6 +18,7 @@ mod equations;
 mod extremes;
 mod far_starts;
 mod few_measurements;
+mod field;
 mod fleet;
 mod guessed_states;
 mod holds;

@@ -2,7 +2,7 @@
 
 use super::trace::HEIGHT;
 use super::{End, Profile, ProfilePoint};
-use crate::numeral::{number, percent, resolved};
+use crate::numeral::{number, percent, resolved, unit_after};
 use crate::section::{Axis, Cell, Curves, Drawing, Layer, Plot, Section, Style, Table};
 
 impl From<Vec<Profile>> for Section {
@@ -81,8 +81,8 @@ impl Profile {
              error",
             self.name
         );
-        let caption = format!("`{}`: {} {}", self.name, self.ends(), self.unit);
-        Plot::of(format!("profile-{}", self.name), caption.trim_end(), title, Drawing::Curves(drawing))
+        let caption = format!("`{}`: {}{}", self.name, self.ends(), unit_after(&self.unit));
+        Plot::of(format!("profile-{}", self.name), caption, title, Drawing::Curves(drawing))
     }
 
     /// The quadratic approximation over what the curve spans.

@@ -21,8 +21,8 @@ pub fn answer(integrator: &str, deviance: f64, value: f64, converged: bool) -> S
     found
 }
 
-/// A finer method begins at a minimum with which nothing but the step is wrong; a search goes on from the limit of its trial steps,
-/// unless the model explains nothing.
+/// A finer method begins at a minimum with which nothing but the step is wrong; a search goes on from the limit of its trial steps
+/// while it makes progress, not far where the model explains nothing.
 #[test]
 fn where_a_search_goes_on() {
     let warned = |converged: bool, code: WarningCode, severity: Severity| {
@@ -37,9 +37,20 @@ fn where_a_search_goes_on() {
         warned(false, CoarseStep, Severity::NotUsable),
     ];
     assert_eq!(cases.each_ref().map(is_only_coarse), [true, true, false, false]);
-    assert_eq!(cases.each_ref().map(may_go_on), [false; 4]);
+    let go_on = |cases: &[Summary; 4], before: Option<f64>, parts: u64| {
+        cases.each_ref().map(|found| may_go_on(found, before, parts))
+    };
+    assert_eq!(go_on(&cases, None, 1), [false; 4]);
+    // After the first part, after one that lowered the deviance to 10 by more than 1 and by less, and after many parts.
     let limited = cases.map(|one| Summary { outcome: Outcome::IterationLimit { iterations: 3 }, ..one });
-    assert_eq!(limited.each_ref().map(may_go_on), [true, true, false, true]);
+    assert_eq!(go_on(&limited, None, 1), [true; 4]);
+    assert_eq!(go_on(&limited, Some(11.1), 4), [true; 4]);
+    assert_eq!(go_on(&limited, Some(10.9), 4), [false; 4]);
+    assert_eq!(go_on(&limited, Some(11.1), 5), [true, true, false, true]);
+    // Where the loss has no deviance, no further than five parts, and not where an output is left unexplained.
+    let robust = limited.map(|one| Summary { deviance: None, ..one });
+    assert_eq!(go_on(&robust, None, 4), [true, true, false, true]);
+    assert_eq!(go_on(&robust, None, 5), [false; 4]);
 }
 
 /// A search that ended at a limit of trial steps goes on as long as any are left, and counts the work of all; one that ended at a
@@ -88,6 +99,43 @@ fn the_finer_answer_is_preferred() {
     assert!(Attempt::new(Err(failure())).or(Err(failure()), false).answer().is_err());
     let both = coarse(true).or(fine(true), false).answer().unwrap();
     assert_eq!((both.iterations, both.evaluations), (6, 10));
+}
+
+/// A coarse minimum that leaves an output unexplained gives way to a search by a finer method that is lower, wherever that ended; one that
+/// explains it does not.
+#[test]
+fn a_minimum_that_explains_nothing_gives_way() {
+    let unexplained = Warning { code: WarningCode::Unexplained, severity: Severity::NotUsable, text: String::new() };
+    for (deviance, warned, expected) in [(9.0, true, "fine"), (11.0, true, "coarse"), (9.0, false, "coarse")] {
+        let warnings = if warned { vec![unexplained.clone()] } else { vec![] };
+        let before = Summary { warnings: warnings.clone(), ..answer("coarse", 10.0, 1.0, true) };
+        let again = Summary { warnings, ..answer("fine", deviance, 1.0, false) };
+        let found = Attempt::new(Ok(before)).or(Ok(again), false).answer().unwrap();
+        assert_eq!(found.method.integrator, expected, "{deviance} {warned}");
+    }
+}
+
+/// Starts that could not be simulated are tried by finer methods. The estimate stays, unless they find a better minimum.
+#[test]
+fn lost_starts_are_tried_again() {
+    use crate::estimate::{FailedStart, Minimum};
+    let starts = |lost: bool| {
+        let minimum = Minimum { cost_ratio: 1.0, searches: 1, undetermined: vec![], unknowns: vec![] };
+        let failed = FailedStart { start: vec![], evaluated: false, reason: String::new() };
+        let failed = if lost { vec![failed] } else { vec![] };
+        Some(Starts { tried: 2, agreed: 1, minima: vec![minimum], declared: None, failed, evaluations: 5 })
+    };
+    let before = Summary { starts: starts(true), ..answer("coarse", 10.0, 1.0, true) };
+    for (deviance, expected) in [(9.0, "coarse"), (5.0, "fine")] {
+        let attempt = Attempt::new(Ok(before.clone()));
+        assert!(attempt.is_coarse());
+        let again = Summary { starts: starts(false), ..answer("fine", deviance, 2.0, true) };
+        let attempt = attempt.or(Ok(again), false);
+        assert!(!attempt.is_coarse());
+        let found = attempt.answer().unwrap();
+        assert_eq!((found.method.integrator.as_str(), found.iterations), (expected, 6));
+        assert!(found.starts.unwrap().failed.is_empty());
+    }
 }
 
 /// The warning about a coarser minimum: more than 15 lower in deviance is a warning, more than 4 a note; otherwise a note where

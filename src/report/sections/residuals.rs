@@ -3,7 +3,7 @@
 use super::quoted;
 use crate::diagnose::residuals::{Correlation, Residuals, SignalRole, Spread};
 use crate::diagnose::{self, LEVEL, Test};
-use crate::numeral::{self, counted, number, resolved, rounded};
+use crate::numeral::{self, counted, number, resolved, rounded, unit_after};
 use crate::optimize::Severity;
 use crate::report::facts::{Facts, OutputFit, Record};
 use crate::section::{Axis, Curves, Drawing, Layer, Plot, Section, Style};
@@ -96,10 +96,6 @@ pub(super) fn of_output(id: &str, record: &Record, fit: &OutputFit, shown: usize
     // Each failed test is said once, together with the others.
     section.severity = Severity::Usable;
     section
-}
-
-fn unit_after(unit: &str) -> String {
-    if unit.is_empty() || unit == "1" { String::new() } else { format!(" {unit}") }
 }
 
 fn outliers(record: &Record, of: &Residuals) -> Option<String> {
