@@ -198,6 +198,11 @@ impl Equations {
         &self.output
     }
 
+    /// The process noise of each state and the measurement noise of each output; empty where not said.
+    pub fn levels(&self) -> [&[Id]; 2] {
+        [&self.diffusion, &self.noise]
+    }
+
     /// Whether derivatives and outputs are affine in the states: then so is each step, and slopes do not depend on states.
     pub fn is_affine(&self) -> bool {
         self.not_affine().is_none()

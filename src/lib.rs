@@ -81,6 +81,7 @@
 //! | fit one record or several together | [`Fit`] |
 //! | fit many records, each by itself | [`Fleet`] |
 //! | fit equations that are made at run time or read from a file | [`equations`], [`graph`], [`Fit`] |
+//! | write a model as a text file, or read one | [`text`] |
 //! | choose an integrator | [`Automatic`], [`Rk4`], [`Rk45`], [`Esdirk`], [`Discrete`] |
 //! | choose what is predicted | [`FreeRun`], [`Horizon`], [`Kalman`], [`predict`] |
 //! | weigh or filter errors, limit outliers | [`weighting`], [`loss`], [`Butterworth`] |
@@ -95,7 +96,7 @@
 //!
 //! # Features
 //!
-//! `std`, `csv`, `jit` (machine code for models that can be traced) and `parallel` are on by default. Without `std`
+//! `std`, `csv`, `jit` (machine code for models that can be traced), `parallel` and `text` are on by default. Without `std`
 //! there are numbers, signals, models, integrators and [`online`] observers, without `alloc` too.
 #![cfg_attr(not(feature = "std"), no_std)]
 
@@ -188,6 +189,8 @@ mod section;
 mod simulate;
 #[cfg(feature = "std")]
 pub mod sweep;
+#[cfg(feature = "text")]
+pub mod text;
 #[cfg(feature = "std")]
 pub mod weighting;
 #[cfg(feature = "std")]

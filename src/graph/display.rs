@@ -1,4 +1,5 @@
-//! Graphs as text: infix expressions, what is used more than once under a name of its own.
+//! Graphs as text: infix expressions, what is used more than once under a name of its own. They are those of a text model
+//! (`crate::text`).
 
 use super::{Graph, Id, Leaf, Node};
 use crate::scalar::Comparison;
@@ -24,6 +25,18 @@ type Text = (String, Binding);
 impl Graph {
     /// Lines `name = expression`: first what the roots share, then the roots.
     pub(crate) fn write(&self, to: &mut dyn Write, naming: Naming<'_>, roots: &[(String, Id)]) -> fmt::Result {
+        let lines = self.lines(naming, ["_", "table"], roots);
+        lines.iter().try_for_each(|(name, expression)| writeln!(to, "{name} = {expression}"))
+    }
+
+    /// Names and expressions: first what the roots share, as `_1`, then the roots. Tables are called `table0`; both words are
+    /// given.
+    pub(crate) fn lines(
+        &self,
+        naming: Naming<'_>,
+        [shared, table]: [&str; 2],
+        roots: &[(String, Id)],
+    ) -> Vec<(String, String)> {
         let ids: Vec<Id> = roots.iter().map(|(_, id)| *id).collect();
         let reached = self.reached(&ids);
         let mut uses = vec![0u32; self.len()];
@@ -31,26 +44,28 @@ impl Graph {
             node.operands().for_each(|operand| uses[operand.index()] += 1);
         }
         let mut texts: Vec<Text> = Vec::with_capacity(self.len());
-        let mut named = 0;
+        let mut lines = vec![];
         for (i, node) in self.nodes().iter().enumerate() {
             if !reached[i] {
                 texts.push((String::new(), Binding::Atom));
                 continue;
             }
-            let (text, binding) = expression(node, naming, &texts);
+            let (text, binding) = expression(node, naming, table, &texts);
             let short = matches!(node, Node::Constant(_) | Node::Leaf(_) | Node::Neg(_));
             if !short && uses[i] > 0 && (uses[i] > 1 || text.len() > LONG) {
-                named += 1;
-                writeln!(to, "_{named} = {text}")?;
-                texts.push((format!("_{named}"), Binding::Atom));
+                let name = format!("{shared}{}", lines.len() + 1);
+                lines.push((name.clone(), text));
+                texts.push((name, Binding::Atom));
             } else {
                 texts.push((text, binding));
             }
         }
-        for (name, id) in roots {
-            writeln!(to, "{name} = {}", texts.get(id.index()).map_or("NaN", |(text, _)| text))?;
-        }
-        Ok(())
+        let root = |(name, id): &(String, Id)| {
+            let text = texts.get(id.index()).map_or("nan", |(text, _)| text);
+            (name.clone(), text.to_owned())
+        };
+        lines.extend(roots.iter().map(root));
+        lines
     }
 }
 
@@ -64,13 +79,14 @@ impl Graph {
     }
 }
 
-fn expression(node: &Node, naming: Naming<'_>, texts: &[Text]) -> Text {
+fn expression(node: &Node, naming: Naming<'_>, table_word: &str, texts: &[Text]) -> Text {
     let plain = |id: Id| texts[id.index()].0.as_str();
     let within = |id: Id, least: Binding| {
         let (text, binding) = &texts[id.index()];
         if *binding < least { format!("({text})") } else { text.clone() }
     };
     match *node {
+        Node::Constant(constant) if constant.value().is_nan() => ("nan".to_owned(), Binding::Atom),
         Node::Constant(constant) => (format!("{:?}", constant.value()), Binding::Atom),
         Node::Leaf(leaf) => (naming(leaf), Binding::Atom),
         Node::Neg(a) => (format!("-{}", within(a, Binding::Product)), Binding::Sum),
@@ -90,19 +106,19 @@ fn expression(node: &Node, naming: Naming<'_>, texts: &[Text]) -> Text {
         Node::Function(function, a) => (format!("{}({})", function.name(), plain(a)), Binding::Atom),
         Node::Function2(function, a, b) => (format!("{}({}, {})", function.name(), plain(a), plain(b)), Binding::Atom),
         Node::Table { table, order, at: [a, b] } => {
-            let primes = |order: u8, name: &str| name.repeat(order.into());
-            let name = format!("table{table}{}{}", primes(order[0], "_x"), primes(order[1], "_y"));
+            let slope = "x".repeat(order[0].into()) + &"y".repeat(order[1].into());
+            let name = format!("{table_word}{table}{}{slope}", if slope.is_empty() { "" } else { "." });
             let second = if a == b { String::new() } else { format!(", {}", plain(b)) };
             (format!("{name}({}{second})", plain(a)), Binding::Atom)
         }
         Node::Select(comparison, [a, b, c, d]) => {
-            let sign = match comparison {
-                Comparison::Less => "<",
-                Comparison::LessOrEqual => "<=",
-                Comparison::Equal => "==",
-            };
             let (a, b) = (within(a, Binding::Sum), within(b, Binding::Sum));
-            (format!("if {a} {sign} {b} then {} else {}", within(c, Binding::Sum), plain(d)), Binding::Condition)
+            let condition = match comparison {
+                Comparison::Less => format!("{a} < {b}"),
+                Comparison::LessOrEqual => format!("{a} <= {b}"),
+                Comparison::Equal => format!("{a} <= {b} and {b} <= {a}"),
+            };
+            (format!("if {condition} then {} else {}", within(c, Binding::Sum), plain(d)), Binding::Condition)
         }
     }
 }

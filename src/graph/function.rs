@@ -38,8 +38,8 @@ pub enum Function {
 }
 
 impl Function {
-    /// All of them; machine code calls them by number.
-    #[cfg(any(test, feature = "jit"))]
+    /// All of them; machine code calls them by number, texts by name.
+    #[cfg(any(test, feature = "jit", feature = "text"))]
     pub(crate) const ALL: [Function; 28] = [
         Function::Recip,
         Function::Sqrt,
@@ -160,8 +160,8 @@ pub enum Function2 {
 }
 
 impl Function2 {
-    /// All of them; machine code calls them by number.
-    #[cfg(feature = "jit")]
+    /// All of them; machine code calls them by number, texts by name.
+    #[cfg(any(feature = "jit", feature = "text"))]
     pub(crate) const ALL: [Function2; 7] = [
         Function2::Pow,
         Function2::Atan2,

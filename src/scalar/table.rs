@@ -140,6 +140,21 @@ impl<'a> Grid<'a> {
         [self.x, self.y]
     }
 
+    /// The values, for each point of the first argument those over the second.
+    pub fn values(&self) -> &'a [f64] {
+        self.values
+    }
+
+    /// How it is read between its points.
+    pub fn interpolation(&self) -> Interpolation {
+        self.interpolation
+    }
+
+    /// How it is read beyond its ends.
+    pub fn extrapolation(&self) -> Extrapolation {
+        self.extrapolation
+    }
+
     /// Whether it has two arguments.
     pub fn is_surface(&self) -> bool {
         !self.y.is_empty()

@@ -35,7 +35,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("results", &["diagnose", "check"]),
     // A report reads diagnoses.
     ("results: reports", &["report"]),
-    ("models", &["models", "pmsm"]),
+    ("models", &["models", "pmsm", "text"]),
     ("documentation", &["guide"]),
 ];
 

@@ -1,0 +1,337 @@
+//! From a [`Document`] to [`Equations`].
+
+use super::document::Document;
+use super::expression::{At, Expression, Operation, Relation, Sign};
+use super::names::{Callable, Meaning, Names, foreign, function, functions, items, names, order};
+use super::remark::{Remark, Source, nearest};
+use crate::equations::Equations;
+use crate::graph::{Function, Function2, Graph, Id, Leaf};
+use crate::layout::{Layout, Quantity};
+use crate::scalar::Comparison;
+use std::sync::Arc;
+
+/// The equations of a document, and the order of its items.
+pub(super) fn compile(document: &Document, source: &Arc<Source>) -> Result<Equations, Vec<Remark>> {
+    let mut compiler = Compiler::new(document, source)?;
+    let all = |expressions: Vec<&Expression>, compiler: &mut Compiler<'_>| -> Vec<Id> {
+        expressions.into_iter().filter_map(|one| compiler.lower(one)).collect()
+    };
+    let state = all(document.states.iter().map(|one| &one.rate).collect(), &mut compiler);
+    let output = all(document.outputs.iter().map(|one| &one.value).collect(), &mut compiler);
+    let diffusion = compiler.levels(document.states.iter().map(|one| one.diffusion.as_ref()), 0.0, "the diffusion");
+    let noise = compiler.levels(document.outputs.iter().map(|one| one.noise.as_ref()), f64::NAN, "the noise");
+    if !compiler.errors.is_empty() {
+        return Err(compiler.errors);
+    }
+    let roots: [&[Id]; 4] = [&state, &output, &diffusion, &noise];
+    let made = Equations::with_noise(layout(document), &compiler.graph, roots);
+    made.map_err(|wrong| vec![Remark::error(source, 0..0, wrong.to_string())])
+}
+
+fn layout(document: &Document) -> Layout {
+    let quantity =
+        |declared: &super::document::Declared| Quantity { name: declared.name.clone(), unit: declared.unit.clone() };
+    Layout {
+        kind: document.kind,
+        states: document.states.iter().map(|one| quantity(&one.quantity)).collect(),
+        inputs: document.inputs.iter().map(|one| quantity(&one.quantity)).collect(),
+        outputs: document.outputs.iter().map(|one| quantity(&one.quantity)).collect(),
+        parameters: document.parameters.iter().map(|one| quantity(&one.quantity)).collect(),
+    }
+}
+
+/// Reads expressions into a graph.
+pub(super) struct Compiler<'d> {
+    document: &'d Document,
+    source: &'d Arc<Source>,
+    pub names: Names<'d>,
+    /// The node of each constant and definition.
+    items: Vec<Option<Id>>,
+    pub graph: Graph,
+    pub errors: Vec<Remark>,
+}
+
+impl<'d> Compiler<'d> {
+    /// With the constants and the definitions of the document.
+    pub fn new(document: &'d Document, source: &'d Arc<Source>) -> Result<Self, Vec<Remark>> {
+        let names = names(document);
+        let order = order(document, &names, source).map_err(|circle| vec![circle])?;
+        let expressions = items(document);
+        let (items, graph, errors) = (vec![None; expressions.len()], Graph::default(), vec![]);
+        let mut compiler = Compiler { document, source, names, items, graph, errors };
+        for item in order {
+            let set = document.constants.get(item).and_then(|constant| constant.set);
+            let id = match set {
+                Some(value) => Some(compiler.graph.constant(value)),
+                None => compiler.lower(expressions[item]),
+            };
+            if let (Some(id), true) = (id, item < document.constants.len()) {
+                compiler.check_constant(item, id, expressions[item]);
+            }
+            compiler.items[item] = id;
+        }
+        match compiler.errors.is_empty() {
+            true => Ok(compiler),
+            // What names an item that is wrong is not wrong itself.
+            false => Err(compiler.errors),
+        }
+    }
+
+    /// The same for expressions of another text.
+    pub fn reading(self, source: &'d Arc<Source>) -> Self {
+        Compiler { source, ..self }
+    }
+
+    /// The value of a constant, by its number.
+    pub fn constant(&self, item: usize) -> Option<f64> {
+        self.graph.known(*self.items.get(item)?.as_ref()?)
+    }
+
+    fn check_constant(&mut self, item: usize, id: Id, expression: &Expression) {
+        let name = &self.document.constants[item].quantity.name;
+        let remark = |title: String| Remark::error(self.source, expression.whole(), title);
+        let remark = match self.graph.known(id) {
+            Some(value) if value.is_finite() => return,
+            Some(value) => remark(format!("constant `{name}` is {value}; it must be finite")),
+            None => remark(format!("constant `{name}` depends on a quantity that is not constant"))
+                .help("define it under [let]".to_owned()),
+        };
+        self.errors.push(remark);
+    }
+
+    /// One level for each, where one is given; they depend on parameters and constants only.
+    fn levels<'e>(
+        &mut self,
+        expressions: impl Iterator<Item = Option<&'e Expression>> + Clone,
+        unsaid: f64,
+        what: &str,
+    ) -> Vec<Id> {
+        if expressions.clone().all(|one| one.is_none()) {
+            return vec![];
+        }
+        let mut found = vec![];
+        for expression in expressions {
+            let Some(expression) = expression else {
+                found.push(self.graph.constant(unsaid));
+                continue;
+            };
+            let Some(id) = self.lower(expression) else { continue };
+            let reached = self.graph.reached(&[id]);
+            let mut nodes = self.graph.nodes().iter().zip(reached).filter(|(_, reached)| *reached);
+            let moves = |node: &crate::graph::Node| {
+                matches!(node, crate::graph::Node::Leaf(Leaf::State(_) | Leaf::Input(_) | Leaf::Time))
+            };
+            if nodes.any(|(node, _)| moves(node)) {
+                let title =
+                    format!("{what} depends on a state, an input or time; it may depend on parameters and constants");
+                self.errors.push(Remark::error(self.source, expression.whole(), title));
+            }
+            if self.graph.known(id).is_some_and(|level| !(level >= 0.0 && level.is_finite())) {
+                self.errors.push(Remark::error(
+                    self.source,
+                    expression.whole(),
+                    format!("{what} must be finite and not negative"),
+                ));
+            }
+            found.push(id);
+        }
+        found
+    }
+
+    /// The node of an expression, or an error among the others.
+    pub fn lower(&mut self, expression: &Expression) -> Option<Id> {
+        let mut values: Vec<Id> = Vec::with_capacity(expression.nodes.len());
+        for (at, node) in expression.nodes.iter().enumerate() {
+            let value = match &node.operation {
+                Operation::Number(value) => Ok(self.graph.constant(*value)),
+                Operation::Name(name) => self.named(name),
+                Operation::Negate(a) => Ok(self.graph.neg(values[*a])),
+                Operation::Binary(sign, a, b) => Ok(self.binary(*sign, values[*a], values[*b])),
+                Operation::Call { name, order, arguments } => {
+                    let arguments: Vec<Id> = arguments.iter().map(|at| values[*at]).collect();
+                    self.call(name, *order, &arguments)
+                }
+                Operation::If([condition, then, otherwise]) => {
+                    Ok(self.select(expression, &values, *condition, values[*then], values[*otherwise]))
+                }
+                // A condition is no number; a select reads its parts.
+                _ => Ok(Id::default()),
+            };
+            match value {
+                Ok(id) => values.push(id),
+                Err(wrong) => {
+                    let (title, help) = wrong?;
+                    let span = expression.span(&self.source.text, at);
+                    self.errors.push(Remark::error(self.source, span, title).help(help));
+                    return None;
+                }
+            }
+        }
+        values.pop()
+    }
+
+    /// A quantity by its name. The error is its sentence and the remedy, or nothing if there is an error already.
+    fn named(&mut self, name: &str) -> Result<Id, Option<Said>> {
+        let Some(meaning) = self.names.get(name).copied() else { return Err(Some(self.unknown(name))) };
+        Ok(match meaning {
+            Meaning::Number(value) => self.graph.constant(value),
+            Meaning::Time => self.graph.leaf(Leaf::Time),
+            Meaning::Input(i) => self.graph.leaf(Leaf::Input(i)),
+            Meaning::Parameter(i) => self.graph.leaf(Leaf::Parameter(i)),
+            Meaning::State(i) => self.graph.leaf(Leaf::State(i)),
+            Meaning::Measured(i) => self.graph.leaf(Leaf::Measured(i)),
+            Meaning::Item(item) => self.items[item].ok_or(None)?,
+            Meaning::Table(_) => {
+                return Err(Some((
+                    format!("`{name}` is a table"),
+                    Some(format!("call it with its argument: {name}(x)")),
+                )));
+            }
+        })
+    }
+
+    fn unknown(&self, name: &str) -> Said {
+        if function(name).is_some() {
+            return (format!("`{name}` is a function"), Some(format!("call it with its argument: {name}(x)")));
+        }
+        let near = nearest(name, self.names.keys().copied());
+        let help = match near {
+            Some(near) => Some(format!("did you mean `{near}`?")),
+            None => Some("declare it under [constants], [inputs], [parameters], [states] or [let]".to_owned()),
+        };
+        (format!("nothing is called `{name}`"), help)
+    }
+
+    fn binary(&mut self, sign: Sign, a: Id, b: Id) -> Id {
+        match sign {
+            Sign::Add => self.graph.add(a, b),
+            Sign::Sub => self.graph.sub(a, b),
+            Sign::Mul => self.graph.mul(a, b),
+            Sign::Div => self.graph.div(a, b),
+            Sign::Power => match self.graph.known(b) {
+                Some(n) if n.fract() == 0.0 && n.abs() <= 1024.0 => self.graph.power(a, n as i32),
+                _ => self.graph.function2(Function2::Pow, a, b),
+            },
+        }
+    }
+
+    fn call(&mut self, name: &str, order: [u8; 2], arguments: &[Id]) -> Result<Id, Option<Said>> {
+        let count = |expected: &str, is_right: bool| match is_right {
+            true => Ok(()),
+            false => Err(Some((format!("`{name}` takes {expected}, not {}", arguments.len()), None))),
+        };
+        if let Some(Meaning::Table(table)) = self.names.get(name) {
+            let table = &self.document.tables[*table].table;
+            return match (table.grid().is_surface(), arguments) {
+                (false, [x]) if order[1] == 0 => Ok(self.graph.table(table, order, [*x, *x])),
+                (true, [x, y]) => Ok(self.graph.table(table, order, [*x, *y])),
+                (false, [_]) => Err(Some((format!("table `{name}` has no `y`"), None))),
+                (is_surface, _) => {
+                    Err(count(if is_surface { "two arguments" } else { "one argument" }, false).unwrap_err())
+                }
+            };
+        }
+        if order != [0, 0] {
+            let help = "a slope `.x` is that of a table of [tables]".to_owned();
+            return Err(Some((format!("`{name}` is no table"), Some(help))));
+        }
+        let Some(callable) = function(name) else { return Err(Some(self.uncallable(name))) };
+        let joined = |graph: &mut Graph, function| {
+            arguments[1..].iter().fold(arguments[0], |a, b| graph.function2(function, a, *b))
+        };
+        match callable {
+            Callable::One(function) => {
+                count("one argument", arguments.len() == 1)?;
+                Ok(self.graph.function(function, arguments[0]))
+            }
+            Callable::Two(Function2::RemEuclid) => {
+                count("two arguments", arguments.len() == 2)?;
+                if self.graph.known(arguments[1]).is_none() {
+                    let help = "the period must be a number or a constant".to_owned();
+                    return Err(Some(("the period of `rem_euclid` is not constant".to_owned(), Some(help))));
+                }
+                Ok(self.graph.function2(Function2::RemEuclid, arguments[0], arguments[1]))
+            }
+            Callable::Two(function) => {
+                count("two arguments", arguments.len() == 2)?;
+                Ok(self.graph.function2(function, arguments[0], arguments[1]))
+            }
+            Callable::Max | Callable::Min => {
+                count("two arguments or more", arguments.len() >= 2)?;
+                let function = if callable == Callable::Max { Function2::Max } else { Function2::Min };
+                Ok(joined(&mut self.graph, function))
+            }
+            Callable::Clamp => {
+                count("three arguments", arguments.len() == 3)?;
+                let [x, low, high] = [arguments[0], arguments[1], arguments[2]];
+                // As `Scalar::clamp` of a symbol.
+                let above = self.graph.select(Comparison::Less, x, low, low, x);
+                Ok(self.graph.select(Comparison::Less, high, x, high, above))
+            }
+            Callable::Fract => {
+                count("one argument", arguments.len() == 1)?;
+                let whole = self.graph.function(Function::Trunc, arguments[0]);
+                Ok(self.graph.sub(arguments[0], whole))
+            }
+        }
+    }
+
+    fn uncallable(&self, name: &str) -> Said {
+        if let Some(help) = foreign(name) {
+            return (format!("there is no function `{name}`"), Some(help.to_owned()));
+        }
+        if self.names.contains_key(name) {
+            return (format!("`{name}` is no function"), Some(format!("for a product write {name}*(...)")));
+        }
+        let tables = self.document.tables.iter().map(|table| table.quantity.name.clone());
+        let known: Vec<String> = functions().map(str::to_owned).chain(tables).collect();
+        let near = nearest(name, known.iter().map(String::as_str));
+        let help = near.map_or_else(
+            || format!("functions: {}", functions().collect::<Vec<_>>().join(", ")),
+            |near| format!("did you mean `{near}`?"),
+        );
+        (format!("there is no function `{name}`"), Some(help))
+    }
+
+    /// `then` where a condition holds, else `otherwise`.
+    fn select(
+        &mut self,
+        expression: &Expression,
+        values: &[Id],
+        mut condition: At,
+        mut then: Id,
+        mut otherwise: Id,
+    ) -> Id {
+        // Chains of `and`, `or` and `not` lean to the left, where they may be long; to the right they nest, which is limited.
+        loop {
+            match expression.nodes[condition].operation {
+                Operation::And(a, b) => {
+                    then = self.select(expression, values, b, then, otherwise);
+                    condition = a;
+                }
+                Operation::Or(a, b) => {
+                    otherwise = self.select(expression, values, b, then, otherwise);
+                    condition = a;
+                }
+                Operation::Not(a) => {
+                    (then, otherwise) = (otherwise, then);
+                    condition = a;
+                }
+                Operation::Compare(relation, a, b) => {
+                    let (a, b) = (values[a], values[b]);
+                    let (comparison, a, b) = match relation {
+                        Relation::Less => (Comparison::Less, a, b),
+                        Relation::LessOrEqual => (Comparison::LessOrEqual, a, b),
+                        Relation::Greater => (Comparison::Less, b, a),
+                        Relation::GreaterOrEqual => (Comparison::LessOrEqual, b, a),
+                    };
+                    return self.graph.select(comparison, a, b, then, otherwise);
+                }
+                _ => return otherwise,
+            }
+        }
+    }
+}
+
+/// What is wrong, and the remedy.
+type Said = (String, Option<String>);

@@ -1,0 +1,115 @@
+//! [`Document`]: what a model file declares, as it is written.
+
+use super::expression::Expression;
+use super::remark::Span;
+use super::unit::Unit;
+use crate::interval::Hold;
+use crate::layout::Kind;
+use crate::parameter::Parameter;
+use crate::scalar::Table;
+
+/// A name with its place, its unit and a remark for readers.
+#[derive(Clone, Debug)]
+pub(super) struct Declared {
+    pub name: String,
+    pub at: Span,
+    /// As it is written; empty where it is not.
+    pub unit: String,
+    /// What was read of it; `None` where there is none or a symbol of it is unknown.
+    pub dimension: Option<Unit>,
+    pub description: String,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Constant {
+    pub quantity: Declared,
+    pub value: Expression,
+    /// The value that was set in place of the one that is written.
+    pub set: Option<f64>,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Input {
+    pub quantity: Declared,
+    pub hold: Option<(Hold, Span)>,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct DeclaredParameter {
+    pub quantity: Declared,
+    pub parameter: Parameter,
+}
+
+/// What `[let]` names.
+#[derive(Clone, Debug)]
+pub(super) struct Definition {
+    pub quantity: Declared,
+    pub value: Expression,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct NamedTable {
+    pub quantity: Declared,
+    pub table: Table,
+    /// Of its arguments.
+    pub axes: [Option<Unit>; 2],
+}
+
+/// What is known of a state at the first sample.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Begin {
+    Estimated,
+    FirstSample,
+    Given(Parameter),
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct State {
+    pub quantity: Declared,
+    /// The derivative, or the next state.
+    pub rate: Expression,
+    pub begin: Option<(Begin, Span)>,
+    pub diffusion: Option<Expression>,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Output {
+    pub quantity: Declared,
+    pub value: Expression,
+    pub noise: Option<Expression>,
+}
+
+/// How it is to be simulated and compared, where the file says so: names as `rk4:4` and `horizon:5`, with their places.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Solver {
+    pub integrator: Option<(String, Span)>,
+    pub predictor: Option<(String, Span)>,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Document {
+    pub name: String,
+    pub description: String,
+    pub kind: Kind,
+    pub constants: Vec<Constant>,
+    pub inputs: Vec<Input>,
+    pub parameters: Vec<DeclaredParameter>,
+    pub definitions: Vec<Definition>,
+    pub tables: Vec<NamedTable>,
+    pub states: Vec<State>,
+    pub outputs: Vec<Output>,
+    pub solver: Solver,
+}
+
+impl Document {
+    /// Everything that an expression may name, with its role in a sentence.
+    pub fn named(&self) -> impl Iterator<Item = (&'static str, &Declared)> {
+        let constants = self.constants.iter().map(|one| ("a constant", &one.quantity));
+        let inputs = self.inputs.iter().map(|one| ("an input", &one.quantity));
+        let parameters = self.parameters.iter().map(|one| ("a parameter", &one.quantity));
+        let tables = self.tables.iter().map(|one| ("a table", &one.quantity));
+        let definitions = self.definitions.iter().map(|one| ("a definition in [let]", &one.quantity));
+        let states = self.states.iter().map(|one| ("a state", &one.quantity));
+        constants.chain(inputs).chain(parameters).chain(tables).chain(definitions).chain(states)
+    }
+}

@@ -1,0 +1,80 @@
+//! What the entries of a file must have in common.
+
+use super::{RESERVED, Reader};
+use crate::text::document::{Begin, Document, Input, State};
+use crate::text::lex::{WORDS, is_name};
+use crate::text::remark::{Remark, Span};
+use std::collections::{BTreeMap, BTreeSet};
+
+impl Reader {
+    /// The first sample gives all states or none.
+    pub(super) fn check_begins(&mut self, states: &[State]) {
+        let first = states.iter().find_map(|state| state.begin.as_ref().filter(|begin| begin.0 == Begin::FirstSample));
+        let other = states.iter().find(|state| !matches!(state.begin, Some((Begin::FirstSample, _))));
+        if let Some(((_, at), other)) = first.zip(other) {
+            let name = &other.quantity.name;
+            let remark = Remark::error(
+                &self.values.source,
+                at.clone(),
+                format!("the first sample gives this state, but not `{name}`"),
+            );
+            let help = "write `initial = \"first\"` at all states, or give each a number or `{ start = ... }`";
+            let remark = remark.and_at(other.quantity.at.clone(), "this one");
+            self.values.errors.push(remark.help(help.to_owned()));
+        }
+    }
+
+    /// The inputs of a record have one hold.
+    pub(super) fn check_holds(&mut self, inputs: &[Input]) {
+        let mut said = inputs.iter().filter_map(|input| input.hold.as_ref());
+        let Some(first) = said.next() else { return };
+        if let Some(other) = said.find(|other| other.0 != first.0) {
+            let remark =
+                Remark::error(&self.values.source, other.1.clone(), "the inputs of a record are all held alike");
+            let remark = remark.and_at(first.1.clone(), "here held otherwise");
+            self.values
+                .errors
+                .push(remark.help("give all inputs the same `hold`, and say it of one at least".to_owned()));
+        }
+    }
+
+    /// Each name stands for one thing; outputs have names of their own.
+    pub(super) fn check_names(&mut self, document: &Document) {
+        let mut known: BTreeMap<&str, (&str, Span)> = BTreeMap::new();
+        for (role, quantity) in document.named() {
+            let (name, at) = (quantity.name.as_str(), quantity.at.clone());
+            if let Some((other, there)) = known.get(name) {
+                let remark = Remark::error(&self.values.source, at.clone(), format!("`{name}` is {role} and {other}"));
+                self.values
+                    .errors
+                    .push(remark.and_at(there.clone(), "declared here, too").help("rename one".to_owned()));
+            }
+            if RESERVED.contains(&name) || WORDS.contains(&name) {
+                let meaning = match name {
+                    "t" => "the time (s)",
+                    "pi" => "3.14159",
+                    _ => "a word of expressions",
+                };
+                self.values.error(at.clone(), format!("`{name}` is {meaning}, and can be no name of {role}"));
+            }
+            known.insert(name, (role, at));
+        }
+        let outputs = document.outputs.iter().map(|output| ("an output", &output.quantity));
+        for (role, quantity) in document.named().chain(outputs) {
+            let name = quantity.name.as_str();
+            if !is_name(name)
+                && (name.trim().is_empty() || name.contains(['`', '\n', '\r']) || name.chars().any(char::is_control))
+            {
+                let title = format!("`{}` can be no name of {role}: take letters, digits and `_`", name.escape_debug());
+                self.values.error(quantity.at.clone(), title);
+            }
+        }
+        let mut outputs = BTreeSet::new();
+        for output in &document.outputs {
+            if !outputs.insert(&output.quantity.name) {
+                self.values
+                    .error(output.quantity.at.clone(), format!("output `{}` stands twice", output.quantity.name));
+            }
+        }
+    }
+}

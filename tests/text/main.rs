@@ -1,0 +1,7 @@
+//! Text models: what they mean, what is said of wrong ones, and that they give the answers of Rust models.
+
+mod fuzz;
+mod meaning;
+mod twins;
+mod units;
+mod wrong;

@@ -1,0 +1,132 @@
+//! The meaning of a text: quantities, values of expressions, what is declared.
+
+use greybox::graph::Leaf;
+use greybox::layout::{Kind, Quantity};
+use greybox::text::Model;
+use greybox::{Hold, fixed, free, record::Initial};
+
+pub const PMSM: &str = r#"
+greybox = 1
+name = "PMSM with surface magnets"
+[constants]
+np = { value = 4, unit = "1" }
+[inputs]
+ud = { unit = "V", hold = "zero" }
+uq = "V"
+w = "rad/s"
+[parameters]
+rs = { unit = "ohm", start = 1.0, within = [0.01, 10] }
+ls = { unit = "H", start = 2e-3, positive = true }
+ke = { unit = "V s/rad", start = 0.7 }
+[let]
+we = "np*w"
+[states]
+id = { unit = "A", derivative = "(ud - rs*id)/ls + we*iq", initial = "first" }
+iq = { unit = "A", derivative = "(uq - rs*iq - ke*w*sqrt(2/3))/ls - we*id", initial = "first" }
+[outputs]
+id = "id"
+iq = { value = "iq", unit = "A", noise = 0.05 }
+"#;
+
+pub fn model(text: &str) -> Model {
+    Model::named("model.toml", text).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn a_motor() {
+    let model = model(PMSM);
+    assert!(model.warnings().is_empty(), "{:?}", model.warnings());
+    assert_eq!(model.name(), "PMSM with surface magnets");
+    let layout = model.equations().layout();
+    let named =
+        |all: &[Quantity]| all.iter().map(|one| format!("{} ({})", one.name, one.unit)).collect::<Vec<_>>().join(", ");
+    assert_eq!(layout.kind, Kind::Continuous);
+    assert_eq!(named(&layout.inputs), "ud (V), uq (V), w (rad/s)");
+    assert_eq!(named(&layout.parameters), "rs (ohm), ls (H), ke (V s/rad)");
+    assert_eq!(named(&layout.states), "id (A), iq (A)");
+    assert_eq!(model.parameters(), [free(1.0).within(0.01, 10.0), free(2e-3).positive(), free(0.7)]);
+    assert_eq!((model.hold(), model.initial()), (Some(Hold::Zero), Initial::FirstSample));
+    assert_eq!(model.constants(), [("np", 4.0, "1")]);
+    assert_eq!(model.to_toml(), PMSM);
+}
+
+/// The value of an expression of `x` (0.7), `y` (-1.3), `p` (2) and the time (3).
+fn value(expression: &str) -> f64 {
+    let text = format!(
+        "greybox = 1\n[inputs]\nx = \"\"\ny = \"\"\n[parameters]\np = {{ start = 1 }}\n[constants]\nn = 3\nhalf = \"n/6\"\n\
+         [tables.curve]\nx = [0, 1, 3]\nvalues = [0, 2, 3]\noutside = \"hold\"\n\
+         [tables.map]\nx = [0, 1]\ny = [-2, 0, 2]\nvalues = [[0, 1, 2], [3, 4, 5]]\noutside = \"linear\"\n\
+         [let]\nlater = \"2*sooner\"\nsooner = \"x + 1\"\n[outputs]\nvalue = '''{expression}'''"
+    );
+    let equations = model(&text).equations().clone();
+    equations.graph().evaluate::<f64>(equations.output(), |leaf| match leaf {
+        Leaf::Input(0) => 0.7,
+        Leaf::Input(_) => -1.3,
+        Leaf::Parameter(_) => 2.0,
+        _ => 3.0,
+    })[0]
+}
+
+/// Each expression has the value that the same arithmetic has in Rust: to the bit, for it is the same operations.
+#[test]
+fn expressions() {
+    let (x, y, p, t) = (0.7f64, -1.3f64, 2.0f64, 3.0f64);
+    #[rustfmt::skip]
+    let cases = [
+        ("2/3", 2.0 / 3.0), ("-x^2", -(x * x)), ("2^3^2", 512.0), ("x**3", x.powi(3)), ("2*x - y/p", 2.0 * x - y / p), ("x^-2", x.powi(-2)),
+        ("x^0.3", x.powf(0.3)), ("x^y", x.powf(y)), ("x^n", x.powi(3)), ("t*pi", t * core::f64::consts::PI), ("1e-3*x", 1e-3 * x),
+        ("later", 2.0 * (x + 1.0)), ("half", 0.5), ("min(x, y, t)", y), ("max(x, y, t)", t), ("clamp(y, -1, 1)", -1.0),
+        ("clamp(x, -1, 1)", x), ("if x < y then 1 else 2", 2.0), ("if x >= y and not y > 0 then 1 else 2", 1.0),
+        ("if x < y or x < 1 and y < 0 then 1 else if x < 2 then 2 else 3", 1.0), ("if not (x > 0 or y > 0) then 1 else 2", 2.0),
+        ("sqrt(x) + cbrt(x)", x.sqrt() + x.cbrt()), ("exp(x) + exp2(x) + exp_m1(x)", x.exp() + x.exp2() + x.exp_m1()),
+        ("ln(x) + ln_1p(x) + log2(x) + log10(x)", x.ln() + x.ln_1p() + x.log2() + x.log10()),
+        ("sin(x) + cos(x) + tan(x)", x.sin() + x.cos() + x.tan()), ("asin(x) + acos(x) + atan(x)", x.asin() + x.acos() + x.atan()),
+        ("sinh(x) + cosh(x) + tanh(x)", x.sinh() + x.cosh() + x.tanh()), ("asinh(x) + acosh(t) + atanh(x)", x.asinh() + t.acosh() + x.atanh()),
+        ("atan2(y, x)", y.atan2(x)), ("hypot(x, y)", x.hypot(y)), ("copysign(x, y)", -x), ("abs(y)", 1.3), ("signum(y)", -1.0),
+        ("floor(y)", -2.0), ("ceil(y)", -1.0), ("round(y)", -1.0), ("trunc(y)", -1.0), ("fract(y)", y + 1.0), ("recip(p)", 0.5),
+        ("rem_euclid(y, 1)", y.rem_euclid(1.0)), ("pow(x, 2)", x * x), ("curve(0.5)", 1.0), ("curve(9)", 3.0), ("curve.x(x)", 2.0),
+        ("map(0.5, x)", 1.5 + 1.0 + x / 2.0), ("map.x(x, y)", 3.0), ("map.y(x, y)", 0.5), ("map(2, 0)", 7.0), ("`x`", x),
+    ];
+    for (expression, expected) in cases {
+        let found = value(expression);
+        // A table's value is a weighted sum of its points; a whole power is multiplied in an order that the compiler chooses.
+        let close = if expression.contains("map") || expression.contains("curve") || expression.contains('^') {
+            1e-15
+        } else {
+            0.0
+        };
+        assert!((found - expected).abs() <= close * expected.abs(), "{expression}: {found} {expected}");
+    }
+}
+
+#[test]
+fn kinds_and_what_is_declared() {
+    let discrete = model(
+        "greybox = 1\noutputs = [\"x\"]\n[parameters]\na = { start = 0.5, log = true, prior = { mean = 0.4, sd = 0.1 } }\n\
+         b = { fixed = 2 }\nq = { start = 0.1, per_experiment = true }\n[inputs]\nu = { unit = \"V\", hold = \"linear\" }\n\
+         [states]\nx = { next = \"a*x + b*u\", initial = 0.3, diffusion = \"q\" }\nz = { next = \"z\", initial = { start = 1, within = [0, 2] } }",
+    );
+    assert_eq!(discrete.equations().layout().kind, Kind::Discrete);
+    assert_eq!(discrete.parameters(), [free(0.5).log().prior(0.4, 0.1), fixed(2.0), free(0.1).per_experiment()]);
+    assert_eq!(discrete.initial(), Initial::Given(vec![fixed(0.3), free(1.0).within(0.0, 2.0)]));
+    assert_eq!((discrete.hold(), discrete.noise()), (Some(Hold::First), None));
+    assert_eq!(discrete.equations().levels()[0].len(), 2);
+    let fixed_output =
+        model("greybox = 1\n[inputs]\nu = \"V\"\n[outputs]\ny = { value = \"2*u\", unit = \"V\", noise = 0.1 }");
+    assert_eq!(fixed_output.equations().layout().kind, Kind::Static);
+    assert_eq!((fixed_output.noise(), fixed_output.initial()), (Some(vec![0.1]), Initial::Estimated));
+}
+
+/// A constant that is set has its new value in the equations and in the file; comments stay.
+#[test]
+fn constants_are_set() {
+    let mut model = model(&PMSM.replace("[inputs]", "# of the rotor\n[inputs]"));
+    model.set_constant("np", 3.0).unwrap();
+    assert_eq!(model.constants(), [("np", 3.0, "1")]);
+    assert!(model.equations().to_string().contains("3.0 * w"), "{}", model.equations());
+    let text = model.to_toml();
+    assert!(text.contains("np = { value = 3.0, unit = \"1\" }\n# of the rotor"), "{text}");
+    let error = model.set_constant("npp", 1.0).unwrap_err().to_string();
+    assert_eq!(error, "there is no constant `npp`; did you mean `np`?");
+    assert_eq!(model.set_constant("np", f64::NAN).unwrap_err().to_string(), "constant `np` is NaN; it must be finite");
+}
