@@ -21,7 +21,7 @@ enum Of {
 }
 
 impl Of {
-    fn of(declared: &Declared) -> Of {
+    fn declared(declared: &Declared) -> Of {
         declared.dimension.clone().map_or(Of::Unknown, Of::Unit)
     }
 }
@@ -172,9 +172,9 @@ impl Checker<'_> {
         match self.names.get(name) {
             Some(Meaning::Number(_)) => Of::Number,
             Some(Meaning::Time) => Of::Unit(Unit::second()),
-            Some(Meaning::Input(i)) => Of::of(&self.document.inputs[*i as usize].quantity),
-            Some(Meaning::Parameter(i)) => Of::of(&self.document.parameters[*i as usize].quantity),
-            Some(Meaning::State(i)) => Of::of(&self.document.states[*i as usize].quantity),
+            Some(Meaning::Input(i)) => Of::declared(&self.document.inputs[*i as usize].quantity),
+            Some(Meaning::Parameter(i)) => Of::declared(&self.document.parameters[*i as usize].quantity),
+            Some(Meaning::State(i)) => Of::declared(&self.document.states[*i as usize].quantity),
             Some(Meaning::Item(item)) => self.items[*item].clone(),
             _ => Of::Unknown,
         }
@@ -254,7 +254,7 @@ impl Checker<'_> {
 
     fn table(&mut self, expression: &Expression, table: usize, order: [u8; 2], arguments: &[At], units: &[Of]) -> Of {
         let table = &self.document.tables[table];
-        let mut found = Of::of(&table.quantity);
+        let mut found = Of::declared(&table.quantity);
         for ((at, axis), order) in arguments.iter().zip(&table.axes).zip(order) {
             let Some(axis) = axis else {
                 found = if order > 0 { Of::Unknown } else { found };

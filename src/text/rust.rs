@@ -104,7 +104,7 @@ impl Module<'_> {
         if document.kind != Kind::Continuous {
             used.push("Kind");
         }
-        if !document.parameters.is_empty() || matches!(self.begin(), Some(_)) {
+        if !document.parameters.is_empty() || self.begin().is_some() {
             used.push("Parameter");
         }
         if !document.tables.is_empty() {

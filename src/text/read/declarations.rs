@@ -40,7 +40,7 @@ impl Reader {
         };
         if let Some(found) = field(fields, "within") {
             let [lower, upper] = self.values.pair(found, "two numbers, [lower, upper]")?;
-            if !(lower < upper) {
+            if lower >= upper || lower.is_nan() || upper.is_nan() {
                 self.values.error(
                     found.span.clone(),
                     format!("{what}: the lower bound {lower} is not below the upper bound {upper}"),
