@@ -48,6 +48,7 @@ pub use shipped::{Shipped, shipped};
 pub use unit::factor;
 
 use crate::equations::Equations;
+use crate::fit::Fit;
 use crate::interval::Hold;
 use crate::parameter::{Parameter, free};
 use crate::record::{Initial, Record};
@@ -90,7 +91,9 @@ impl Model {
         warnings.extend(dimension::check(&document, &source));
         warnings.extend(unused(&document, &source));
         let parameters = document.parameters.iter().map(|one| one.parameter).collect();
-        Ok(Model { source, document, equations, parameters, warnings })
+        let model = Model { source, document, equations, parameters, warnings };
+        model.check_solver()?;
+        Ok(model)
     }
 
     /// The model of equations that were made elsewhere, such as those of a Rust model that was traced, with a declaration for each
@@ -110,6 +113,19 @@ impl Model {
         set.sort_by_key(|(at, _)| std::cmp::Reverse(at.start));
         set.into_iter().for_each(|(at, value)| text.replace_range(at, &format!("{value:?}")));
         text
+    }
+
+    /// Whether there is an integrator and a predictor as the text asks for.
+    fn check_solver(&self) -> Result<(), Error> {
+        let solver = &self.document.solver;
+        let fit = || Fit::new(&*self.equations, &[] as &[Record]).parameters(self.parameters.clone());
+        let integrator = solver.integrator.as_ref().map(|(name, at)| (fit().integrator_by_name(name).err(), at));
+        let predictor = solver.predictor.as_ref().map(|(name, at)| (fit().predictor_by_name(name).err(), at));
+        let wrong = |(error, at): (Option<crate::Error>, &remark::Span)| {
+            Some(Remark::error(&self.source, at.clone(), error?.to_string()))
+        };
+        let wrong: Vec<Remark> = integrator.into_iter().chain(predictor).filter_map(wrong).collect();
+        if wrong.is_empty() { Ok(()) } else { Err(Error::Wrong(wrong)) }
     }
 
     /// The name that the text gives it; empty if it gives none.
@@ -164,9 +180,9 @@ impl Model {
         Ok(())
     }
 
-    /// How inputs behave between samples, where the text says so.
-    pub fn hold(&self) -> Option<Hold> {
-        self.document.inputs.iter().find_map(|input| input.hold.as_ref()).map(|(hold, _)| *hold)
+    /// How each input behaves between samples, where the text says so.
+    pub fn holds(&self) -> Vec<Option<Hold>> {
+        self.document.inputs.iter().map(|input| input.hold).collect()
     }
 
     /// What is known of the states at the first sample.
@@ -209,13 +225,37 @@ impl Model {
         self.document.solver.predictor.as_ref().map(|(name, _)| name.as_str())
     }
 
-    /// A record with the hold and the initial state that the text declares.
+    /// A record with the holds and the initial state that the text declares.
     ///
     /// # Errors
-    /// A record of another number of states.
+    /// A record without an input of the model, or with another number of states.
     pub fn prepare(&self, record: Record) -> Result<Record, crate::Error> {
-        let hold = self.hold().unwrap_or(record.input_hold());
-        record.hold(hold).initial(self.initial())
+        let said = self.document.inputs.iter().filter_map(|input| Some((input.quantity.name.as_str(), input.hold?)));
+        let record = said.into_iter().try_fold(record, |record, (name, hold)| record.hold_of(name, hold))?;
+        match self.initial() {
+            Initial::Estimated => Ok(record),
+            initial => record.initial(initial),
+        }
+    }
+
+    /// The fit of records with all that the text declares: parameters, holds, initial states, noise, integrator, predictor. What is
+    /// said of the fit afterwards stands in place of it.
+    ///
+    /// # Errors
+    /// As [`prepare`](Model::prepare); an integrator or a predictor that there is none of.
+    pub fn fit(&self, records: &[Record]) -> Result<Fit<'_, Equations>, crate::Error> {
+        let records = records.iter().map(|record| self.prepare(record.clone())).collect::<Result<Vec<Record>, _>>()?;
+        let mut fit = Fit::new(&*self.equations, &records).parameters(self.parameters.clone());
+        if let Some(noise) = self.noise() {
+            fit = fit.noise(noise);
+        }
+        if let Some(integrator) = self.integrator() {
+            fit = fit.integrator_by_name(integrator)?;
+        }
+        match self.predictor() {
+            Some(predictor) => fit.predictor_by_name(predictor),
+            None => Ok(fit),
+        }
     }
 }
 

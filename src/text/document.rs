@@ -31,7 +31,7 @@ pub(super) struct Constant {
 #[derive(Clone, Debug)]
 pub(super) struct Input {
     pub quantity: Declared,
-    pub hold: Option<(Hold, Span)>,
+    pub hold: Option<Hold>,
 }
 
 #[derive(Clone, Debug)]

@@ -5,7 +5,7 @@ mod declarations;
 mod quantities;
 mod tables;
 
-use super::document::{Declared, Document, Input, Solver, State};
+use super::document::{Declared, Document, Solver, State};
 use super::expression::Expression;
 use super::remark::{Remark, Source};
 use super::string::Place;
@@ -73,7 +73,7 @@ impl Reader {
         let [constants, inputs, parameters, tables, definitions, states, solver] =
             ["constants", "inputs", "parameters", "tables", "let", "states", "solver"].map(&mut all);
         let constants = constants.iter().filter_map(|entry| self.constant(entry)).collect();
-        let inputs: Vec<Input> = inputs.iter().filter_map(|entry| self.input(entry)).collect();
+        let inputs = inputs.iter().filter_map(|entry| self.input(entry)).collect();
         let parameters = parameters.iter().filter_map(|entry| self.parameter(entry)).collect();
         let tables = tables.iter().filter_map(|entry| self.table(entry)).collect();
         let definitions = definitions.iter().filter_map(|entry| self.definition(entry)).collect();
@@ -82,7 +82,6 @@ impl Reader {
         let outputs = self.outputs(group("outputs"), &states);
         let solver = self.solver(&solver);
         self.check_begins(&states);
-        self.check_holds(&inputs);
         let document = Document {
             name,
             description,

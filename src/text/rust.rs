@@ -137,9 +137,10 @@ impl Module<'_> {
         if !document.description.is_empty() {
             let _ = writeln!(text, "///\n/// {}", one_line(&document.description));
         }
-        if let Some(hold) = document.inputs.iter().find_map(|input| input.hold.as_ref()) {
-            let hold = if hold.0 == Hold::Zero { "Zero" } else { "First" };
-            let _ = writeln!(text, "///\n/// Records are to be held by `greybox::Hold::{hold}`.");
+        for input in &document.inputs {
+            let Some(hold) = input.hold else { continue };
+            let hold = if hold == Hold::Zero { "Zero" } else { "First" };
+            let _ = writeln!(text, "///\n/// Records are to hold `{}` by `Hold::{hold}`.", input.quantity.name);
         }
         let _ = writeln!(text, "#[derive(Clone, Debug, PartialEq)]\npub struct {name} {{");
         for constant in &document.constants {

@@ -45,7 +45,7 @@ fn a_motor() {
     assert_eq!(named(&layout.parameters), "rs (ohm), ls (H), ke (V s/rad)");
     assert_eq!(named(&layout.states), "id (A), iq (A)");
     assert_eq!(model.parameters(), [free(1.0).within(0.01, 10.0), free(2e-3).positive(), free(0.7)]);
-    assert_eq!((model.hold(), model.initial()), (Some(Hold::Zero), Initial::FirstSample));
+    assert_eq!((model.holds(), model.initial()), (vec![Some(Hold::Zero), None, None], Initial::FirstSample));
     assert_eq!(model.constants(), [("np", 4.0, "1")]);
     assert_eq!(model.to_toml(), PMSM);
 }
@@ -109,7 +109,7 @@ fn kinds_and_what_is_declared() {
     assert_eq!(discrete.equations().layout().kind, Kind::Discrete);
     assert_eq!(discrete.parameters(), [free(0.5).log().prior(0.4, 0.1), fixed(2.0), free(0.1).per_experiment()]);
     assert_eq!(discrete.initial(), Initial::Given(vec![fixed(0.3), free(1.0).within(0.0, 2.0)]));
-    assert_eq!((discrete.hold(), discrete.noise()), (Some(Hold::First), None));
+    assert_eq!((discrete.holds(), discrete.noise()), (vec![Some(Hold::First)], None));
     assert_eq!(discrete.equations().levels()[0].len(), 2);
     let fixed_output =
         model("greybox = 1\n[inputs]\nu = \"V\"\n[outputs]\ny = { value = \"2*u\", unit = \"V\", noise = 0.1 }");

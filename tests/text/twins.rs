@@ -3,10 +3,12 @@
 use approx::assert_relative_eq;
 use greybox::equations::Equations;
 use greybox::graph::Leaf;
+use greybox::layout::Quantity;
 use greybox::models::{Positioning, PositioningLoop};
 use greybox::pmsm::*;
-use greybox::signals;
+use greybox::record::{Channel, Record};
 use greybox::text::{Model, shipped};
+use greybox::{Fit, Kind, Parameter, Summary, Time, fixed, signals};
 
 signals! {
     struct Cable { rs: "ohm", ls: "H", ke: "V s/rad", r_cable: "ohm" }
@@ -75,6 +77,66 @@ fn texts_say_what_their_twins_say() {
             for (found, expected) in values(found, seed).into_iter().zip(values(&expected, seed)) {
                 assert_relative_eq!(found, expected, max_relative = 1e-12, epsilon = 1e-12);
             }
+        }
+    }
+}
+
+/// A record of some excitation, simulated with the declared starts as truth.
+fn record(text: &Model, noise: f64) -> Record {
+    let layout = text.equations().layout();
+    let scale = |name: &str| match name {
+        "ud" | "uq" => 20.0,
+        "w" => 80.0,
+        "theta" => 3.0,
+        "iq" => 4.0,
+        "vir" => 2.0,
+        "qg" => 0.1,
+        _ => 0.5,
+    };
+    let sample = |k: usize| -> Vec<f64> {
+        let value = |(i, name): (usize, &str)| {
+            let square = if (k / (11 + 6 * i)).is_multiple_of(2) { 1.0 } else { -0.6 };
+            scale(name) * (square + 0.3 * (0.13 * k as f64 * (i + 1) as f64).sin())
+        };
+        layout.inputs.iter().map(|one| one.name.as_str()).enumerate().map(value).collect()
+    };
+    let inputs: Vec<Vec<f64>> = (0..300).map(sample).collect();
+    let truth: Vec<f64> =
+        text.parameters().iter().map(|one| 1.1 * one.start + if one.start == 0.0 { 1e-4 } else { 0.0 }).collect();
+    let step = if layout.kind == Kind::Discrete { 1e-4 } else { 2e-4 };
+    let channel = |(i, one): (usize, &Quantity)| {
+        Channel::new(&one.name, &one.unit, inputs.iter().map(|row| row[i]).collect::<Vec<f64>>())
+    };
+    let channels: Vec<Channel> = layout.inputs.iter().enumerate().map(channel).collect();
+    let inputs = Record::new(layout.states.clone(), Time::Uniform { start: 0.0, step }, channels, vec![]).unwrap();
+    let truth: Vec<Parameter> = truth.into_iter().map(fixed).collect();
+    let fit = Fit::new(&**text.equations(), &[] as &[Record]).parameters(truth);
+    let made = fit.simulate(&vec![0.0; layout.states.len()], &inputs).unwrap();
+    let size = |j: usize| made.outputs()[j].values.iter().fold(0.0, |size: f64, y| size.max(y.abs()));
+    let sigma: Vec<f64> = (0..layout.outputs.len()).map(|j| noise * (size(j) + 1e-6)).collect();
+    text.prepare(made.with_noise(&sigma, 3)).unwrap()
+}
+
+fn fitted(equations: &Equations, record: &Record, parameters: &[Parameter]) -> Summary {
+    Fit::new(equations, record).parameters(parameters.to_vec()).run().unwrap()
+}
+
+/// Estimates, intervals, outcome, warnings and engine of a text are those of its twin.
+#[test]
+fn texts_fit_as_their_twins_fit() {
+    for one in shipped() {
+        let text = Model::named(one.name, one.text).unwrap();
+        let record = record(&text, 2e-3);
+        let found = text.fit(&[record.clone()]).unwrap().run().unwrap();
+        let expected = fitted(&twin(one.name), &record, text.parameters());
+        let codes = |summary: &Summary| summary.warnings.iter().map(|warning| warning.code).collect::<Vec<_>>();
+        assert_eq!(codes(&found), codes(&expected), "{}\n{found}\n{expected}", one.name);
+        assert_eq!(found.outcome.to_string(), expected.outcome.to_string(), "{}", one.name);
+        assert_eq!(found.method.engine, expected.method.engine, "{}", one.name);
+        for (a, b) in found.unknowns.iter().zip(&expected.unknowns) {
+            // Ten digits, or a millionth of what is known of it.
+            let error = b.knowledge.standard_error().unwrap_or(0.0);
+            assert_relative_eq!(a.value, b.value, max_relative = 1e-10, epsilon = 1e-6 * error);
         }
     }
 }

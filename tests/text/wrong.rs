@@ -30,7 +30,7 @@ const CASES: &[Case] = &[
     ("start = 0.7 }", "start = -0.7, log = true }", "parameter `ke` is -0.7; a logarithm needs a positive start", (13, 40), ""),
     ("start = 0.7 }", "start = 0.7, prior = { mean = 1 } }", "the prior of parameter `ke` needs `mean` and a positive `sd`", (13, 47), ""),
     ("hold = \"zero\"", "hold = \"cubic\"", "there is no hold `cubic`", (7, 27), "\"zero\": constant from sample to sample; \"linear\": a straight line to the next sample"),
-    ("uq = \"V\"", "uq = { unit = \"V\", hold = \"linear\" }", "the inputs of a record are all held alike", (8, 27), "give all inputs the same `hold`, and say it of one at least"),
+    ("[outputs]", "[solver]\nintegrator = \"rk5\"\n[outputs]", "there is no integrator `rk5`", (20, 14), ""),
     ("unit = \"1\"", "unit = \"V/\"", "the unit ends where a symbol should follow", (5, 26), ""),
     ("np = {", "id = {", "`id` is a state and a constant", (17, 1), "rename one"),
     ("np = {", "t = {", "`t` is the time (s), and can be no name of a constant", (5, 1), ""),

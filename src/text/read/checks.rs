@@ -1,7 +1,7 @@
 //! What the entries of a file must have in common.
 
 use super::{RESERVED, Reader};
-use crate::text::document::{Begin, Document, Input, State};
+use crate::text::document::{Begin, Document, State};
 use crate::text::lex::{WORDS, is_name};
 use crate::text::remark::{Remark, Span};
 use std::collections::{BTreeMap, BTreeSet};
@@ -21,20 +21,6 @@ impl Reader {
             let help = "write `initial = \"first\"` at all states, or give each a number or `{ start = ... }`";
             let remark = remark.and_at(other.quantity.at.clone(), "this one");
             self.values.errors.push(remark.help(help.to_owned()));
-        }
-    }
-
-    /// The inputs of a record have one hold.
-    pub(super) fn check_holds(&mut self, inputs: &[Input]) {
-        let mut said = inputs.iter().filter_map(|input| input.hold.as_ref());
-        let Some(first) = said.next() else { return };
-        if let Some(other) = said.find(|other| other.0 != first.0) {
-            let remark =
-                Remark::error(&self.values.source, other.1.clone(), "the inputs of a record are all held alike");
-            let remark = remark.and_at(first.1.clone(), "here held otherwise");
-            self.values
-                .errors
-                .push(remark.help("give all inputs the same `hold`, and say it of one at least".to_owned()));
         }
     }
 

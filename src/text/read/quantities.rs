@@ -30,8 +30,8 @@ impl Reader {
         let hold = match field(&fields, "hold") {
             None => None,
             Some(found) => match self.values.text(found)? {
-                "zero" => Some((Hold::Zero, found.span.clone())),
-                "linear" => Some((Hold::First, found.span.clone())),
+                "zero" => Some(Hold::Zero),
+                "linear" => Some(Hold::First),
                 other => {
                     let remark =
                         Remark::error(&self.values.source, found.span.clone(), format!("there is no hold `{other}`"));
