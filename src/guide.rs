@@ -1,4 +1,4 @@
-//! The guide: fifteen chapters for engineers who estimate parameters from records.
+//! The guide: chapters for engineers who estimate parameters from records.
 //!
 //! Each chapter is short, runs as it stands on small records, and ends with what it does not do. Numbers in the text are
 //! checked by its code.
@@ -20,6 +20,7 @@
 //! | [13](chapter_13_extensions) | writing an integrator, a loss, a predictor, a motor |
 //! | [14](chapter_14_coming_from) | coming from `idnlgrey`, lmfit, Ceres, CasADi |
 //! | [15](chapter_15_how_it_works) | how it works: duals, lanes, the triangle, segments |
+//! | [16](chapter_16_text_models) | models as text files |
 //! | [18](chapter_18_python) | Python: models, frames, results, options |
 
 /// A chapter: its text, after the pictures that it names. A picture is a link definition with the image in it, so that the
@@ -47,4 +48,6 @@ chapter!(chapter_12_observers, "12_observers");
 chapter!(chapter_13_extensions, "13_extensions");
 chapter!(chapter_14_coming_from, "14_coming_from");
 chapter!(chapter_15_how_it_works, "15_how_it_works");
+#[cfg(feature = "text")]
+chapter!(chapter_16_text_models, "16_text_models");
 chapter!(chapter_18_python, "18_python");

@@ -70,7 +70,7 @@
 //!
 //! # Where to find what
 //!
-//! The [`guide`] has fifteen short chapters, from a first fit to writing an integrator.
+//! The [`guide`] has short chapters, from a first fit to writing an integrator.
 //!
 //! | to | see |
 //! |---|---|
