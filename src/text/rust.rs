@@ -99,7 +99,7 @@ impl Module<'_> {
         let mut text = String::new();
         let (document, name) = (self.document, &self.name);
         let title = if document.name.is_empty() { "A model" } else { document.name.as_str() };
-        let _ = writeln!(text, "//! {}, written by greybox from a text model.", one_line(title));
+        let _ = writeln!(text, "// {}, written by greybox from a text model.", one_line(title));
         let mut used = vec!["Model", "Of", "Scalar", "signals"];
         if document.kind != Kind::Continuous {
             used.push("Kind");
