@@ -127,7 +127,7 @@ fn texts_fit_as_their_twins_fit() {
     for one in shipped() {
         let text = Model::named(one.name, one.text).unwrap();
         let record = record(&text, 2e-3);
-        let found = text.fit(&[record.clone()]).unwrap().run().unwrap();
+        let found = text.fit(std::slice::from_ref(&record)).unwrap().run().unwrap();
         let expected = fitted(&twin(one.name), &record, text.parameters());
         let codes = |summary: &Summary| summary.warnings.iter().map(|warning| warning.code).collect::<Vec<_>>();
         assert_eq!(codes(&found), codes(&expected), "{}\n{found}\n{expected}", one.name);
