@@ -7,7 +7,7 @@ mod format;
 mod json;
 mod method;
 mod prediction;
-mod quantities;
+pub(crate) mod quantities;
 mod starts;
 pub(crate) mod student;
 mod typed;
@@ -114,18 +114,27 @@ impl Summary {
     /// no such unknown or probability.
     pub fn interval(&self, name: &str, probability: f64) -> Option<(f64, f64)> {
         let unknown = self.unknowns.iter().find(|unknown| unknown.name == name)?;
-        let error = unknown.knowledge.standard_error()?;
         if !(probability > 0.0 && probability < 1.0) {
             return None;
         }
-        let Knowledge::Known { lower, upper, .. } = unknown.knowledge else { return None };
-        let (to_coordinate, slope) =
-            (|value| unknown.transform.to_coordinate(value), unknown.transform.slope(unknown.value));
-        // Next to an unknown that is held, an interval is not centered at the estimate.
-        let moved = 0.5 * (to_coordinate(lower) + to_coordinate(upper)) - to_coordinate(unknown.value);
-        let shift = if self.releases() && moved.is_finite() { moved } else { 0.0 };
-        let spread = student::Spread { standard_error: error / slope, degrees: unknown.degrees_of_freedom };
-        Some(spread.interval(to_coordinate(unknown.value) + shift, unknown.transform, probability))
+        let (center, spread) =
+            (unknown.transform.to_coordinate(unknown.value) + self.shift(unknown), unknown.spread()?);
+        Some(quantities::within(unknown.bounds, spread.interval(center, unknown.transform, probability)))
+    }
+
+    /// From the coordinate of an unknown to the center of its interval: next to an unknown that is held it is not centered at the
+    /// estimate. It is told by an end that is no bound.
+    fn shift(&self, unknown: &Unknown) -> f64 {
+        let Knowledge::Known { lower, upper, .. } = unknown.knowledge else { return 0.0 };
+        let Some(spread) = unknown.spread().filter(|_| self.releases()) else { return 0.0 };
+        let (value, reach) = (unknown.transform.to_coordinate(unknown.value), spread.reach(0.95));
+        let (least, greatest) = unknown.bounds;
+        let shift = match (lower > least, upper < greatest) {
+            (true, _) => unknown.transform.to_coordinate(lower) + reach - value,
+            (false, true) => unknown.transform.to_coordinate(upper) - reach - value,
+            (false, false) => 0.0,
+        };
+        if shift.is_finite() { shift } else { 0.0 }
     }
 
     /// Whether an unknown at a bound has an interval, for which those of all others allow.

@@ -41,9 +41,15 @@ pub enum CovarianceMethod {
     Sandwich,
     /// The sandwich, for errors that are white before the pre-filter.
     FilteredSandwich,
+    /// The sandwich with each record as one cluster, for errors that are correlated in any way within a record and independent from record
+    /// to record; of unknowns that one record has for itself as without clusters.
+    Clusters {
+        /// Number of records.
+        records: u64,
+    },
     /// For autocorrelated errors: of stationary ones, or, where it certainly says more, Newey and West's, prewhitened.
     Hac {
-        /// Lags over which correlation is allowed for.
+        /// Lags over which correlation is allowed for, beyond the autoregression; zero where all records are short.
         lags: u64,
     },
 }
@@ -54,6 +60,11 @@ impl fmt::Display for CovarianceMethod {
             CovarianceMethod::Classical => f.write_str("classical (white errors)"),
             CovarianceMethod::Sandwich => f.write_str("sandwich (errors independent from sample to sample)"),
             CovarianceMethod::FilteredSandwich => f.write_str("sandwich (white errors before the pre-filter)"),
+            CovarianceMethod::Clusters { records } => {
+                let records = counted(*records, "record");
+                write!(f, "sandwich ({records} as clusters: errors correlated within a record in any way)")
+            }
+            CovarianceMethod::Hac { lags: 0 } => f.write_str("by an autoregression of the errors (colored errors)"),
             CovarianceMethod::Hac { lags } => {
                 let lags = counted(*lags, "lag");
                 write!(f, "HAC (Newey-West over {lags}, prewhitened, for colored errors)")

@@ -1,5 +1,6 @@
 //! Results of a fit for each quantity: [`Unknown`], [`Knowledge`], parameters, outputs and experiments.
 
+use super::student::Spread;
 use super::{Warning, WarningCode};
 use crate::numeral::number;
 use crate::optimize::Severity;
@@ -69,6 +70,9 @@ pub struct Unknown {
     /// Where the search started.
     #[serde(with = "crate::real")]
     pub start: f64,
+    /// The bounds that were declared of it, infinite where there is none. No interval reaches beyond them.
+    #[serde(with = "crate::real", default = "none")]
+    pub bounds: (f64, f64),
     /// Knowledge of it.
     pub knowledge: Knowledge,
     /// Parametric error index (%), the others refitted: the relative change that doubles the sum of squares, in linear
@@ -84,6 +88,29 @@ pub struct Unknown {
     /// is itself an estimate from few independent stretches.
     #[serde(with = "crate::real")]
     pub degrees_of_freedom: f64,
+}
+
+/// No bounds.
+fn none() -> (f64, f64) {
+    (f64::NEG_INFINITY, f64::INFINITY)
+}
+
+impl Unknown {
+    /// How it scatters in its coordinate, where it is known.
+    pub(crate) fn spread(&self) -> Option<Spread> {
+        let standard_error = self.knowledge.standard_error()? / self.transform.slope(self.value);
+        Some(Spread { standard_error, degrees: self.degrees_of_freedom })
+    }
+
+    /// The 95 % interval that it would have without its bounds, by its own value.
+    pub(crate) fn unbounded(&self) -> Option<(f64, f64)> {
+        Some(self.spread()?.interval(self.transform.to_coordinate(self.value), self.transform, 0.95))
+    }
+}
+
+/// The part of an interval within bounds; an interval beyond them is the bound next to it.
+pub(crate) fn within((least, greatest): (f64, f64), (lower, upper): (f64, f64)) -> (f64, f64) {
+    (lower.max(least).min(greatest), upper.max(least).min(greatest))
 }
 
 /// A parameter of the model: what was declared of it, and what was found.

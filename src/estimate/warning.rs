@@ -38,6 +38,8 @@ pub enum WarningCode {
     HeldOutput,
     /// A block of an output, or a whole record, that occurs twice.
     Repeated,
+    /// A column that is a copy of another one.
+    IdenticalColumns,
     /// An output of few values.
     CoarseOutput,
     /// Most of an output was not measured.
@@ -46,7 +48,7 @@ pub enum WarningCode {
     Unexplained,
     /// Errors of another size than the given noise.
     GivenNoise,
-    /// Parameters that cannot be told from zero.
+    /// Parameters that cannot be told from zero, or whose logarithm is known to a factor only.
     HoldsZero,
     /// A standard error that is zero or not finite.
     NoStandardError,

@@ -3,6 +3,8 @@
 mod aliases;
 mod color;
 mod conditions;
+mod constant_inputs;
+mod copies;
 mod correlated_outputs;
 mod curved;
 mod data;
@@ -20,6 +22,7 @@ mod likelihood;
 mod not_examined;
 mod outliers;
 mod parts;
+mod restarts;
 mod rise;
 mod search;
 mod sensors;
@@ -43,12 +46,13 @@ use crate::judge::intervals::Intervals;
 pub(crate) const CHECKS: &[Check] = &[
     enough::ENOUGH,
     data::CONSTANT_OUTPUTS,
-    data::CONSTANT_INPUTS,
+    constant_inputs::CONSTANT_INPUTS,
     data::SUSPICIONS,
     data::COARSE,
     data::INPUT_SENTINELS,
     data::MISSING_PART,
     data::TWICE,
+    copies::COPIES,
     explained::UNEXPLAINED,
     explained::GIVEN_NOISE,
     shape::FOLLOWING,

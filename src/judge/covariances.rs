@@ -1,5 +1,6 @@
 //! The covariance of the unknowns: classical, a sandwich, or HAC, and its degrees of freedom.
 
+mod clusters;
 mod hac;
 mod predicted;
 pub(crate) mod sandwich;
@@ -16,6 +17,8 @@ use crate::judge::point::Point;
 use crate::optimize::Infeasible;
 use crate::problem::{Noise, Whitening};
 use crate::record::Time;
+use crate::whiteness::chi_squared_tail;
+use clusters::{Cluster, Clusters, clusters};
 use hac::hac;
 use predicted::{Dependence, dependence_of_variances};
 use sandwich::Robust;
@@ -26,6 +29,14 @@ const CORRELATED_SAMPLES: u64 = 12;
 /// there, and white errors that are taken as colored lose nothing (docs/intervals.md).
 const SHORT: u64 = 1_000;
 const SHORT_LEVEL: f64 = 0.05;
+
+/// Levels at which the variance by records as clusters is certainly larger than that by the errors: of colored errors, where the records
+/// have [`FEW`] degrees of freedom or more, and of white ones, or with fewer.
+const CLUSTERED: f64 = 0.05;
+const DIFFERENT: f64 = 1e-3;
+const FEW: f64 = 4.0;
+/// Colored errors of records with fewer measurements than this, on average, are taken by clusters if these have [`FEW`] degrees of freedom.
+const SHORT_RECORD: u64 = 100;
 
 /// The covariance of the unknowns in their own units, and how it was made.
 pub(crate) struct Covariances {
@@ -39,6 +50,20 @@ pub(crate) struct Covariances {
     pub shares: Option<Vec<Largest>>,
     /// The unknown for which noise that was estimated as of one size is of another.
     pub uneven: Option<Uneven>,
+    /// The unknown of which records say more different things than their errors do, if any.
+    pub differing: Option<Differing>,
+}
+
+/// An unknown that records share, and what they say of it differently than their errors explain.
+pub(crate) struct Differing {
+    pub unknown: usize,
+    pub records: usize,
+    /// The probability that errors alone make as much.
+    pub chance: f64,
+    /// The variance by the records relative to that by the errors.
+    pub ratio: f64,
+    /// As many equal records would tell as much.
+    pub equal: f64,
 }
 
 /// Whether a number can be a standard error.
@@ -56,20 +81,61 @@ struct CoordinateCovariance {
     uneven: Option<Uneven>,
 }
 
+impl CoordinateCovariance {
+    /// With the standard errors and degrees of freedom by records as clusters, of the unknowns where they say more by the level, or where the
+    /// correlation over time is told by fewer degrees of freedom than records have; and the unknown that differs most.
+    fn by_records(mut self, clusters: &Clusters, level: f64, short: bool) -> (Self, Option<Differing>) {
+        let Some(found) = self.covariance.take() else { return (self, None) };
+        let colored = matches!(self.method, CovarianceMethod::Hac { .. });
+        let mut factors = vec![1.0; clusters.of.len()];
+        let mut most: Option<Differing> = None;
+        for (i, cluster) in clusters.of.iter().enumerate() {
+            let Some(Cluster { standard_error, degrees }) = *cluster else { continue };
+            let own = found.standard_error(i) * self.factor.sqrt();
+            let ratio = (standard_error / own).powi(2);
+            if !(ratio.is_finite() && ratio > 0.0) {
+                continue;
+            }
+            let chance = chi_squared_tail(ratio * degrees, degrees);
+            let level = if degrees >= FEW { level } else { DIFFERENT };
+            let better = colored && (short && degrees >= FEW || degrees >= self.degrees[i]);
+            if chance < level || better {
+                (factors[i], self.degrees[i]) = (standard_error / own, degrees);
+                self.method = CovarianceMethod::Clusters { records: clusters.records as u64 };
+            }
+            if chance < DIFFERENT && most.as_ref().is_none_or(|most| chance < most.chance) {
+                let (records, equal) = (clusters.records, degrees + 1.0);
+                most = Some(Differing { unknown: i, records, chance, ratio, equal });
+            }
+        }
+        (CoordinateCovariance { covariance: Some(found.scaled(&factors)), ..self }, most)
+    }
+}
+
 pub(crate) fn covariances(evidence: &Evidence<'_>) -> Covariances {
     let unit = evidence.unit();
-    let found = uses_hac(evidence).then(|| for_colored_errors(evidence, unit?)).flatten();
-    let CoordinateCovariance { covariance, method, factor, degrees, shares, uneven } =
-        found.unwrap_or_else(|| for_white_errors(evidence, unit));
+    let colored = uses_hac(evidence).then(|| for_colored_errors(evidence, unit?)).flatten();
+    let level = if colored.is_some() { CLUSTERED } else { DIFFERENT };
+    let found = colored.unwrap_or_else(|| for_white_errors(evidence, unit));
+    let (found, differing) = match clusters(&evidence.point) {
+        Some(clusters) => found.by_records(&clusters, level, has_short_records(evidence)),
+        None => (found, None),
+    };
+    let CoordinateCovariance { covariance, method, factor, degrees, shares, uneven } = found;
     let seen = evidence.point.seen().into_iter().zip(&evidence.point.slopes);
     let in_units: Vec<f64> = seen.map(|(seen, slope)| if seen { *slope } else { 0.0 }).collect();
     let unknowns = covariance.map(|covariance| covariance.times(factor).scaled(&in_units));
     let dependence = unit.and_then(|unit| dependence_of_variances(&evidence.point, unit));
     let Some(Dependence { degrees: most, own }) = dependence else {
-        return Covariances { unknowns, method, degrees, own: vec![], shares, uneven };
+        return Covariances { unknowns, method, degrees, own: vec![], shares, uneven, differing };
     };
     let degrees = degrees.iter().zip(most).map(|(degrees, most)| degrees.min(most)).collect();
-    Covariances { unknowns, method, degrees, own, shares, uneven }
+    Covariances { unknowns, method, degrees, own, shares, uneven, differing }
+}
+
+/// Whether records are too short for the correlation of errors over time to be estimated in each.
+fn has_short_records(evidence: &Evidence<'_>) -> bool {
+    evidence.residuals.measured < SHORT_RECORD * evidence.point.objective.experiments() as u64
 }
 
 /// Whether the intervals allow for colored errors.

@@ -1,5 +1,6 @@
 //! [`Intervals`]: how well each unknown is known.
 
+use crate::estimate::quantities::within;
 use crate::estimate::student::Spread;
 use crate::estimate::{Direction, Knowledge, Unknown};
 use crate::information::Covariance;
@@ -34,6 +35,7 @@ fn unknowns(evidence: &Evidence<'_>, covariances: &Covariances) -> Vec<Unknown> 
     let one = |i: usize| {
         let (unknown, value) = (&free[i], evidence.point.values[i]);
         let transform = unknown.parameter.transform;
+        let bounds = (unknown.parameter.lower, unknown.parameter.upper);
         // The standard errors of unknowns that are not seen are zero.
         let known = |covariance: &Covariance| Some(covariance.standard_error(i)).filter(|error| is_error(*error));
         let error = covariances.unknowns.as_ref().filter(|_| evidence.has_noise()).and_then(known);
@@ -49,13 +51,14 @@ fn unknowns(evidence: &Evidence<'_>, covariances: &Covariances) -> Vec<Unknown> 
                 };
                 let spread = Spread { standard_error: standard_error / unit, degrees: degrees_of_freedom };
                 let release = evidence.point.unbounded_step[i] * evidence.point.slopes[i] / unit;
-                let (lower, upper) = spread.interval(center + release, transform, 0.95);
+                let unbounded = spread.interval(center + release, transform, 0.95);
+                let (lower, upper) = within(bounds, unbounded);
                 match held {
                     Some(bound) => {
                         let end = if bound == unknown.parameter.upper { lower } else { upper };
                         Knowledge::Held { bound, end: Some(end).filter(|end| end.is_finite()) }
                     }
-                    None if !has_ends((lower, upper), transform) => Knowledge::Unidentified,
+                    None if !has_ends(unbounded, transform) => Knowledge::Unidentified,
                     None => Knowledge::Known { standard_error, lower, upper },
                 }
             }
@@ -71,6 +74,7 @@ fn unknowns(evidence: &Evidence<'_>, covariances: &Covariances) -> Vec<Unknown> 
             experiment: unknown.experiment,
             value,
             start: unknown.parameter.start,
+            bounds,
             knowledge,
             error_index: evidence.unit().and_then(|unit| index(unit.standard_error(i))),
             error_index_held: index(1.0 / evidence.point.norms[i]),

@@ -183,6 +183,18 @@ impl ChannelInspection {
     }
 }
 
+impl Suspicion {
+    /// Whether a sample of the column is suspicious by it.
+    pub(crate) fn holds(&self, values: &[f64], sample: usize) -> bool {
+        match self {
+            Suspicion::Sentinel { value, .. } | Suspicion::Clipped { value, .. } => values[sample] == *value,
+            Suspicion::Frozen { samples, .. } => samples.contains(&sample),
+            Suspicion::Held { .. } => sample > 0 && values[sample] == values[sample - 1],
+            Suspicion::Repeated { samples, again } => (*again..again + samples.len()).contains(&sample),
+        }
+    }
+}
+
 impl fmt::Display for Suspicion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -125,7 +125,7 @@ fn an_unknown_without_influence_is_named() {
     assert!(report.severity >= Severity::UsableWithCare);
     let text = report.to_string();
     assert!(text.contains("The data do not determine 1 of the 3 unknowns."), "{text}");
-    assert!(text.contains("`idle` has no influence") && text.contains("`idle` moves no output at all"), "{text}");
+    assert!(text.contains("`idle` has no influence") && text.contains("`idle` moves no output by a slope"), "{text}");
 }
 
 /// What only a sum is known of does not make the rest look better known than it is: the gain has the standard error that it

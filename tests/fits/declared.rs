@@ -69,6 +69,28 @@ fn a_logarithm_that_vanishes_is_a_bound_at_zero() {
     assert!(logarithm.warnings.iter().any(|one| one.text.contains("its logarithm has no minimum")), "{logarithm}");
 }
 
+/// Bounds within the interval end it, at any probability; where the estimate is at one, its interval ends at the other.
+#[test]
+fn no_interval_reaches_beyond_bounds() {
+    let record = record(0.4);
+    let fit = |f: Parameter| Fit::new(&Rolling, &record).parameters(Cart { m: free(1.0), f }).run().unwrap();
+    let free_of_bounds = fit(free(0.3));
+    let (value, error) = (free_of_bounds.parameters.f, free_of_bounds.knowledge.f.standard_error().unwrap());
+    let at = |errors: f64| value + errors * error;
+    let inside = fit(free(value).within(at(-0.5), at(0.7)));
+    let Knowledge::Known { standard_error, lower, upper } = inside.knowledge.f else { panic!("{inside}") };
+    assert!((lower, upper) == (at(-0.5), at(0.7)) && (standard_error / error - 1.0).abs() < 1e-6, "{inside}");
+    assert_eq!(inside.interval("f", 0.999), Some((at(-0.5), at(0.7))));
+    // A tenth of a standard error to either side has a probability of 8 %.
+    let (lower, upper) = inside.interval("f", 0.07).unwrap();
+    assert!(lower > at(-0.1) && upper < at(0.1), "{lower} {upper}");
+    let one_side = fit(free(value).within(at(-0.5), f64::INFINITY));
+    let (lower, upper) = (one_side.interval("f", 0.95).unwrap(), free_of_bounds.interval("f", 0.95).unwrap());
+    assert!(lower.0 == at(-0.5) && (lower.1 - upper.1).abs() < 1e-6 * error, "{one_side}");
+    let held = fit(free(at(0.6)).within(at(0.5), at(0.6)));
+    assert_eq!(held.knowledge.f, Knowledge::Held { bound: at(0.5), end: Some(at(0.6)) }, "{held}");
+}
+
 #[test]
 fn the_wrong_hold_of_the_benchmark_is_not_usable() {
     let Some(path) = shared("emps/emps.csv") else { return };

@@ -2,6 +2,7 @@
 //! Where a verdict turns: errors, noise levels, sensors and records on either side of what is said of them.
 
 use crate::common::*;
+use crate::interval_limits::{Gains, Mixer};
 use greybox::optimize::{Outcome, Severity};
 use greybox::*;
 
@@ -115,15 +116,29 @@ fn errors_as_large_as_their_noise_are_explained() {
     assert!(filtered.warnings.iter().all(|warning| warning.code != WarningCode::GivenNoise), "{:?}", filtered.warnings);
 }
 
-/// A constant input is said, with care where its effect may be taken for an offset; one that moves in a second record is none.
+/// A constant input is said with care where a gain of its own may be taken for an offset; one that moves in a second record is none, nor
+/// one whose gain another input tells, too. A note tells of one that is zero.
 #[test]
 fn constant_inputs_are_said() {
-    let with = |w: f64| record(40, (2.0, 2.0), 0.01, move |k| Drive { w, ..moving(k) });
-    let of = |records: &[ExperimentOf<Twice>]| severity(&fit(records).run().unwrap(), WarningCode::ConstantInput);
-    assert_eq!(of(&[with(1.5)]), Some(Severity::UsableWithCare));
-    assert_eq!(of(&[with(1.5), with(1.5).named("again")]), Some(Severity::UsableWithCare));
+    let with = |w: f64| {
+        let inputs: Vec<Drive> = (0..40).map(|k| Drive { w, ..moving(k) }).collect();
+        let outputs = inputs.iter().map(|u| Current { i: 2.0 * u.u + 3.0 * u.w }).collect();
+        let clean = Experiment::new(&Mixer, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        noisy(&Mixer, &clean, Current { i: 0.01 }, &mut Noise(3))
+    };
+    let of = |records: &[ExperimentOf<Mixer>]| {
+        let parameters = Gains { u: free(1.0), w: free(1.0) };
+        let estimate = Fit::new(&Mixer, records).parameters(parameters).run().unwrap();
+        let mut found = estimate.warnings.iter().filter(|warning| warning.code == WarningCode::ConstantInput);
+        found.next().map(|warning| (warning.severity, warning.text.clone()))
+    };
+    let text = "the input `w` is 1.5 V throughout: if an output had an offset, `w`, which acts by way of it, would be unknown; vary it";
+    assert_eq!(of(&[with(1.5)]), Some((Severity::UsableWithCare, text.to_owned())));
+    assert!(of(&[with(1.5), with(1.5).named("again")]).is_some());
     assert_eq!(of(&[with(1.5), with(2.5).named("other")]), None);
-    assert_eq!(of(&[record(40, (2.0, 2.0), 0.01, moving)]), None);
+    assert_eq!(of(&[with(0.0)]).map(|(severity, _)| severity), Some(Severity::Usable));
+    let with = |w: f64| record(40, (2.0, 2.0), 0.01, move |k| Drive { w, ..moving(k) });
+    assert_eq!(severity(&fit(&[with(1.5)]).run().unwrap(), WarningCode::ConstantInput), None);
 }
 
 /// An output of which more than half is missing is said, with what is left of it in all records.

@@ -7,8 +7,10 @@ mod bad_models;
 mod checks;
 mod closed_forms;
 mod closure_sweep;
+mod columns;
 #[path = "../common/mod.rs"]
 mod common;
+mod conditions;
 mod contradictions;
 #[path = "../common/dc_motor.rs"]
 mod dc_motor;
@@ -28,6 +30,7 @@ mod judgements;
 mod kalman;
 mod late_sensor;
 mod long_profile;
+mod many_records;
 mod models;
 mod narrow_losses;
 mod nist;

@@ -3,9 +3,8 @@
 use super::together::together;
 use super::{Collinear, Excitation, Identifiability};
 use crate::estimate::{Direction, Unknown};
-use crate::numeral::{counted, exact, number, percent};
+use crate::numeral::{counted, number, percent};
 use crate::problem::Role;
-use crate::record::Record;
 use std::collections::BTreeSet;
 
 /// An output that holds so much of an unknown's information is the only one that determines it.
@@ -19,12 +18,7 @@ const ONCE: f64 = 0.9;
 const MENTIONED: usize = 3;
 
 /// The sets of unknowns of the directions `warned` are left out.
-pub(super) fn advice(
-    found: &Identifiability,
-    warned: &[Direction],
-    unknowns: &[Unknown],
-    records: &[Record],
-) -> Vec<String> {
+pub(super) fn advice(found: &Identifiability, warned: &[Direction], unknowns: &[Unknown]) -> Vec<String> {
     let mut advice = vec![];
     let n = unknowns.len() as u64;
     if found.generic_rank < n {
@@ -51,7 +45,8 @@ pub(super) fn advice(
     }
     for excited in &found.excitation {
         if excited.segments.iter().all(|segment| segment.share == 0.0) {
-            advice.push(format!("`{}` moves no output at all: fix it", excited.name));
+            advice
+                .push(format!("`{}` moves no output by a slope: fix it, unless it stands in conditions", excited.name));
         }
     }
     // The beginning of a record is where initial states are seen, and nothing helps that.
@@ -60,17 +55,6 @@ pub(super) fn advice(
     let of_parameters: Vec<&Excitation> = of_parameters.map(|(excited, _)| excited).collect();
     advice.extend(one_output(&of_parameters));
     advice.extend(of_parameters.iter().filter_map(|excited| one_moment(excited)));
-    let inputs = records.first().map_or(&[][..], |record| record.inputs());
-    for (i, input) in inputs.iter().enumerate() {
-        let Some(&first) = input.values.first() else { continue };
-        if records.iter().all(|record| record.inputs()[i].values.iter().all(|value| *value == first)) {
-            advice.push(format!(
-                "the input `{}` is {} throughout: what it drives cannot be told from an offset; vary it",
-                input.name,
-                exact(first)
-            ));
-        }
-    }
     advice
 }
 
@@ -143,15 +127,11 @@ mod tests {
     }
 
     /// Advice on these, at full rank or another one there and elsewhere, with so many collinear sets of `a`.
-    fn advised(ranks: (u64, u64), sets: usize, excitation: &[Excitation], inputs: [f64; 2]) -> Vec<String> {
-        let inputs = [inputs, [inputs[0]; 2]];
-        let record = |inputs: [f64; 2]| {
-            let outputs = (0..2).map(|k| Current { i: f64::from(k) }).collect();
-            let time = Time::Uniform { start: 0.0, step: 1.0 };
-            Experiment::new(&Line, time, inputs.map(|u| Voltage { u }).to_vec(), outputs).unwrap()
-        };
-        let records = [record(inputs[1]), record(inputs[0])];
-        let estimate = Fit::new(&Line, &records).parameters(Gain { a: free(1.0) }).run().unwrap();
+    fn advised(ranks: (u64, u64), sets: usize, excitation: &[Excitation]) -> Vec<String> {
+        let inputs = [1.0, 2.0].map(|u| Voltage { u }).to_vec();
+        let outputs = (0..2).map(|k| Current { i: f64::from(k) }).collect();
+        let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        let estimate = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).run().unwrap();
         let unknown = |excited: &Excitation| Unknown { name: excited.name.clone(), ..estimate.unknowns[0].clone() };
         let unknowns: Vec<Unknown> = excitation.iter().map(unknown).collect();
         let set = Collinear { index: None, moves: vec![("a".to_owned(), 1.0), ("b".to_owned(), 1.0)] };
@@ -164,14 +144,13 @@ mod tests {
             excitation: excitation.to_vec(),
             advice: vec![],
         };
-        let records: Vec<Record> = records.iter().map(|record| record.record().clone()).collect();
         // A direction of the same unknowns, in any order, takes the sets' place; one of others does not.
         let direction =
             |names: &[&str]| Direction { moves: names.iter().map(|name| ((*name).to_owned(), 1.0)).collect() };
-        let left = |names: &[&str]| advice(&found, &[direction(names)], &unknowns, &records).len();
-        let all = advice(&found, &[], &unknowns, &records).len();
+        let left = |names: &[&str]| advice(&found, &[direction(names)], &unknowns).len();
+        let all = advice(&found, &[], &unknowns).len();
         assert_eq!([left(&["a"]), left(&["a", "c"]), left(&["b", "a"])], [all, all, all - sets.min(MENTIONED)]);
-        advice(&found, &[], &unknowns, &records)
+        advice(&found, &[], &unknowns)
     }
 
     const EVEN: [f64; 4] = [0.25; 4];
@@ -179,18 +158,18 @@ mod tests {
     #[test]
     fn ranks_and_sets_are_advised_on() {
         let two = [excited("a", 0.5, EVEN), excited("b", 0.5, EVEN)];
-        assert_eq!(advised((2, 2), 0, &two, [1.0, 2.0]), Vec::<String>::new());
-        let said = advised((0, 1), 0, &two, [1.0, 2.0]);
+        assert_eq!(advised((2, 2), 0, &two), Vec::<String>::new());
+        let said = advised((0, 1), 0, &two);
         assert!(
             said.len() == 1 && said[0].contains("to the 2 unknowns have rank 1: ") && said[0].contains("fix 1 of them")
         );
-        let said = advised((1, 2), 0, &two, [1.0, 2.0]);
+        let said = advised((1, 2), 0, &two);
         assert!(
             said.len() == 1 && said[0].starts_with("at the estimate") && said[0].contains("have rank 1, elsewhere")
         );
         // Three sets are named and the others counted.
         for (sets, last) in [(3, "`a` and `b`"), (4, "1 more set of unknowns"), (6, "3 more sets of unknowns")] {
-            let said = advised((2, 2), sets, &two, [1.0, 2.0]);
+            let said = advised((2, 2), sets, &two);
             assert_eq!(said.len(), sets.min(4));
             assert!(said[said.len() - 1].starts_with(last), "{said:?}");
             assert!(said[..3].iter().all(|one| one.ends_with("; fix one, or excite them apart")), "{said:?}");
@@ -199,29 +178,27 @@ mod tests {
 
     #[test]
     fn excitation_is_advised_on() {
-        let said = advised((2, 2), 0, &[excited("a", 0.989, EVEN), excited("b", 0.011, EVEN)], [1.0, 2.0]);
+        let said = advised((2, 2), 0, &[excited("a", 0.989, EVEN), excited("b", 0.011, EVEN)]);
         assert_eq!(said, Vec::<String>::new());
-        let said = advised((2, 2), 0, &[excited("a", 0.992, EVEN), excited("b", 0.5, EVEN)], [1.0, 2.0]);
+        let said = advised((2, 2), 0, &[excited("a", 0.992, EVEN), excited("b", 0.5, EVEN)]);
         assert_eq!(
             said,
             [
                 "`a` is seen only through `y` (99.2 % of the information): `z` hardly depends on it, and cannot confirm it"
             ]
         );
-        let said = advised((2, 2), 0, &[excited("a", 0.993, EVEN), excited("b", 0.9995, EVEN)], [1.0, 2.0]);
+        let said = advised((2, 2), 0, &[excited("a", 0.993, EVEN), excited("b", 0.9995, EVEN)]);
         assert!(
             said.len() == 1 && said[0].starts_with("`a`, `b` are seen only through `y` (at least 99.3 % of"),
             "{said:?}"
         );
-        let said = advised((2, 2), 0, &[excited("a", 0.9992, EVEN), excited("b", 1.0, EVEN)], [1.0, 2.0]);
+        let said = advised((2, 2), 0, &[excited("a", 0.9992, EVEN), excited("b", 1.0, EVEN)]);
         assert!(said.len() == 1 && said[0].contains("`y` (more than 99.9 % of the information)"), "{said:?}");
-        let said = advised((1, 1), 0, &[excited("a", 0.5, [0.02, 0.04, 0.03, 0.91])], [1.0, 2.0]);
+        let said = advised((1, 1), 0, &[excited("a", 0.5, [0.02, 0.04, 0.03, 0.91])]);
         assert_eq!(said, ["`a` is known from one tenth of `two` alone, 5 s after its start (91 %)"]);
-        assert!(advised((1, 1), 0, &[excited("a", 0.5, [0.04, 0.04, 0.03, 0.89])], [1.0, 2.0]).is_empty());
-        let said = advised((1, 1), 0, &[excited("a", 0.5, [0.0; 4])], [1.0, 2.0]);
-        assert_eq!(said, ["`a` moves no output at all: fix it"]);
-        assert!(advised((1, 1), 0, &[excited("a", 0.5, [0.0, 0.0, 0.0, 0.5])], [1.0, 2.0]).is_empty());
-        let said = advised((1, 1), 0, &[excited("a", 0.5, EVEN)], [1.5, 1.5]);
-        assert!(said.len() == 1 && said[0].starts_with("the input `u` is 1.5 throughout"), "{said:?}");
+        assert!(advised((1, 1), 0, &[excited("a", 0.5, [0.04, 0.04, 0.03, 0.89])]).is_empty());
+        let said = advised((1, 1), 0, &[excited("a", 0.5, [0.0; 4])]);
+        assert_eq!(said, ["`a` moves no output by a slope: fix it, unless it stands in conditions"]);
+        assert!(advised((1, 1), 0, &[excited("a", 0.5, [0.0, 0.0, 0.0, 0.5])]).is_empty());
     }
 }

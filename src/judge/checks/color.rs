@@ -39,9 +39,14 @@ fn autocorrelation(evidence: &Evidence<'_>, covariances: &Covariances) -> Option
     if part > SMALL {
         text += &format!("; the colored part is {} of what an output moves", percent(part, 2));
     }
-    let CovarianceMethod::Hac { lags } = covariances.method else {
-        text += "; the intervals take them as white and are too narrow if the order of the samples matters";
-        return Some(Warning { code: WarningCode::ColoredErrors, severity, text });
+    let by = match covariances.method {
+        CovarianceMethod::Hac { lags: 0 } => "colored noise (an autoregression of the errors)".to_owned(),
+        CovarianceMethod::Hac { lags } => format!("colored noise (HAC over {}, prewhitened)", counted(lags, "lag")),
+        CovarianceMethod::Clusters { records } => format!("errors of any color ({records} records as clusters)"),
+        _ => {
+            text += "; the intervals take them as white and are too narrow if the order of the samples matters";
+            return Some(Warning { code: WarningCode::ColoredErrors, severity, text });
+        }
     };
     let white = |i: usize| {
         let unit = evidence.unit()?;
@@ -50,10 +55,7 @@ fn autocorrelation(evidence: &Evidence<'_>, covariances: &Covariances) -> Option
     };
     let widened = |i: usize| Some(covariances.unknowns.as_ref()?.standard_error(i) / white(i)?);
     let widest = (0..evidence.point.slopes.len()).filter_map(widened).fold(0.0, f64::max);
-    text += &format!(
-        "; the intervals allow for colored noise (HAC over {}, prewhitened), not for a wrong model",
-        counted(lags, "lag")
-    );
+    text += &format!("; the intervals allow for {by}, not for a wrong model");
     if widest > 1.0 {
         text += &format!("; they are up to {} times as wide as for white errors", number(widest, 3));
     }

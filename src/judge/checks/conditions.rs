@@ -1,5 +1,6 @@
-//! Whether the cost rises towards the ends of an interval as its slopes say, for parameters in a condition of the model. A limit that few
-//! samples reach is determined by those few; where it is beyond them all, the cost does not depend on it.
+//! Parameters in a condition of the model: whether the cost rises towards the ends of an interval as its slopes say, and whether one without
+//! slope changes the cost all the same. A limit that few samples reach is determined by those few; where it is beyond them all, the cost does
+//! not depend on it. The time of a switch changes the cost in steps.
 
 use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::judge::check::{Check, Examined, Level, Pass, ROUND_OFF};
@@ -33,6 +34,10 @@ const PLACES: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
 const LONGEST: u64 = 5_000;
 /// A cost that rises by less than this part of what its slopes say: an interval by the likelihood is longer by the root of two or more.
 const LITTLE: f64 = 0.5;
+/// Factors of a parameter's value at which the cost is compared.
+const FACTORS: [f64; 4] = [0.5, 2.0, 0.8, 1.25];
+/// A cost that changes by more than this part of itself is another one.
+const CHANGED: f64 = 1e-9;
 
 /// Why conditions are not examined.
 fn skipped(evidence: &Evidence<'_>) -> Option<&'static str> {
@@ -40,7 +45,6 @@ fn skipped(evidence: &Evidence<'_>) -> Option<&'static str> {
     let long = long.then_some("more than 5,000 measurements of a model that is not read as a graph");
     (evidence.rounding || evidence.point.is_exact()).then_some(ROUND_OFF).or(long)
 }
-
 /// The parameter along which the cost rises least, relative to what its slopes say.
 fn kinked(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
     let choosing = evidence.point.objective.sweep.choosing();
@@ -61,4 +65,47 @@ fn kinked(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covarianc
         percent(part.max(0.0), 2)
     );
     Some(Warning { code: WarningCode::CurvedInterval, severity: Severity::UsableWithCare, text })
+}
+
+/// What conditions have to do with an unknown that has no slope: `None` where no condition depends on it, or none of a model that is not read
+/// as a graph was found to.
+pub(crate) fn without_slope(evidence: &Evidence<'_>, i: usize) -> Option<&'static str> {
+    let objective = evidence.point.objective;
+    let Role::Parameter(p) = objective.problem.unknowns.row[i].role else { return None };
+    let choosing = objective.sweep.choosing();
+    if evidence.point.norms[i] != 0.0 || choosing.is_some_and(|choosing| !choosing.contains(&p)) {
+        return None;
+    }
+    match (changes_in_steps(evidence, i), choosing) {
+        (true, Some(_)) => Some(
+            "stands only in conditions of the model (an `if`, a comparison): the cost changes with it in steps and has no slope, so that \
+             the search cannot move it; write the condition in a smooth form (a ramp or a `tanh` over about a sample), or search by values \
+             (bounds, and Fit::starts)",
+        ),
+        (true, None) => Some(
+            "changes the cost, but without a slope: it stands only in conditions of the model (an `if`, a comparison), or where the model \
+             takes its value(), and the search cannot move it; write it in a smooth form, or search by values (bounds, and Fit::starts)",
+        ),
+        (false, Some(_)) => Some(
+            "has no influence on the outputs: the conditions of the model that depend on it (an `if`, a limit, a table) come out the same at \
+             every sample; fix it, or record where they do not",
+        ),
+        (false, None) => None,
+    }
+}
+
+/// Whether the cost is another one at other values of an unknown, without a slope there.
+fn changes_in_steps(evidence: &Evidence<'_>, i: usize) -> bool {
+    let parameter = evidence.point.objective.problem.unknowns.row[i].parameter;
+    let value = evidence.point.values[i];
+    let near = if value == 0.0 { [-1.0, 1.0, -0.1, 0.1] } else { FACTORS.map(|factor| factor * value) };
+    let inside = |at: &f64| at.is_finite() && (parameter.lower..=parameter.upper).contains(at);
+    let places = near.into_iter().chain([parameter.lower, parameter.upper]).filter(inside);
+    let mut costs = places.filter_map(|at| {
+        let mut place = evidence.point.end.coordinates.clone();
+        place[i] = parameter.transform.to_coordinate(at);
+        evidence.point.objective.evaluate(&place).ok().filter(|there| there.column_norms()[i] == 0.0)
+    });
+    let cost = evidence.point.linear.cost;
+    costs.any(|there| (there.cost - cost).abs() > CHANGED * cost.abs())
 }

@@ -22,15 +22,6 @@ pub(crate) const CONSTANT_OUTPUTS: Check = Check {
     examine: |evidence, _| constant_outputs(evidence, &inspected(evidence)).into(),
 };
 
-pub(crate) const CONSTANT_INPUTS: Check = Check {
-    name: "inputs move",
-    asks: "Has an input one value throughout, so that its effect cannot be told from an offset?",
-    codes: &[WarningCode::ConstantInput],
-    costs: &[],
-    levels: &[],
-    examine: |evidence, _| constant_inputs(evidence, &inspected(evidence)).into(),
-};
-
 pub(crate) const SUSPICIONS: Check = Check {
     name: "no stretch of an output was invented",
     asks: "Are the errors larger, or does the prediction move, where the columns look like sentinels, limits, stuck sensors, held values or blocks written twice?",
@@ -124,16 +115,16 @@ const INSTANTS: usize = 3;
 /// Missing part of an output from which on there is a note.
 const MISSING: f64 = 0.5;
 /// Warnings of one kind; more are counted.
-const NAMED: usize = 4;
+pub(crate) const NAMED: usize = 4;
 /// Of so many records each is compared with each other.
 const COMPARED: usize = 300;
 
-fn warning(code: WarningCode, severity: Severity, text: String) -> Warning {
+pub(crate) fn warning(code: WarningCode, severity: Severity, text: String) -> Warning {
     Warning { code, severity, text }
 }
 
 /// What the look at the columns of each record found.
-fn inspected(evidence: &Evidence<'_>) -> Vec<Arc<Inspection>> {
+pub(crate) fn inspected(evidence: &Evidence<'_>) -> Vec<Arc<Inspection>> {
     evidence.point.objective.problem.records.iter().map(Record::inspect_some).collect()
 }
 
@@ -149,7 +140,10 @@ fn of_experiment(evidence: &Evidence<'_>, e: usize) -> String {
 }
 
 /// The value of a channel that is the same in all records.
-fn constant<'i>(found: &'i [Arc<Inspection>], of: impl Fn(&'i Inspection) -> &'i ChannelInspection) -> Option<f64> {
+pub(crate) fn constant<'i>(
+    found: &'i [Arc<Inspection>],
+    of: impl Fn(&'i Inspection) -> &'i ChannelInspection,
+) -> Option<f64> {
     let mut values = found.iter().map(|one| of(one).constant());
     let first = values.next()??;
     values.all(|value| value == Some(first)).then_some(first)
@@ -187,41 +181,22 @@ fn instants(record: &Record, output: usize) -> usize {
     times.len()
 }
 
-fn constant_inputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
-    let inputs = &evidence.point.objective.problem.layout().inputs;
-    let one = |(i, input): (usize, &crate::layout::Quantity)| {
-        let value = constant(found, |one| &one.inputs[i])?;
-        // Nothing can be mistaken for the effect of an input that is zero.
-        let severity = if value == 0.0 { Severity::Usable } else { Severity::UsableWithCare };
-        let text = format!(
-            "the input `{}` is {} {} throughout: what it drives cannot be told from an offset; vary it",
-            input.name,
-            exact(value),
-            input.unit
-        );
-        Some(warning(WarningCode::ConstantInput, severity, text))
-    };
-    inputs.iter().enumerate().filter_map(one).collect()
-}
-
 /// Suspicious values of an output that the errors confirm.
 fn suspicions(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
-    let mut suspicions: Vec<(Suspect, &ChannelInspection, &Suspicion)> = vec![];
-    for (e, inspection) in found.iter().enumerate() {
-        for (j, channel) in inspection.outputs.iter().enumerate() {
-            for suspicion in &channel.suspicions {
-                suspicions.push((Suspect::new(e, j, suspicion), channel, suspicion));
-            }
+    let mut suspects: Vec<Suspect<'_>> = vec![];
+    for (experiment, inspection) in found.iter().enumerate() {
+        for (output, channel) in inspection.outputs.iter().enumerate() {
+            let of = |suspicion| Suspect { experiment, output, suspicion };
+            suspects.extend(channel.suspicions.iter().map(of));
         }
     }
-    if suspicions.is_empty() {
+    if suspects.is_empty() {
         return vec![];
     }
-    let (suspects, named): (Vec<Suspect>, Vec<_>) =
-        suspicions.into_iter().map(|(suspect, channel, suspicion)| (suspect, (channel, suspicion))).unzip();
     let splits = splits(evidence.point.objective, &evidence.point.end.coordinates, &suspects);
     let mut warnings = vec![];
-    for ((suspect, (channel, suspicion)), split) in suspects.iter().zip(named).zip(&splits) {
+    for (suspect, split) in suspects.iter().zip(&splits) {
+        let (channel, suspicion) = (&found[suspect.experiment].outputs[suspect.output], suspect.suspicion);
         let Some((code, severity, advice)) = confirmed(evidence, channel, suspicion, (suspect.output, split)) else {
             continue;
         };
@@ -237,6 +212,13 @@ fn suspicions(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning
         }
     }
     warnings
+}
+
+/// Whether a sample of an output is suspicious by the look at its column.
+pub(crate) fn is_named(evidence: &Evidence<'_>, e: usize, j: usize, sample: usize) -> bool {
+    let record = &evidence.point.objective.problem.records[e];
+    let suspicions = &record.inspect_some().outputs[j].suspicions;
+    suspicions.iter().any(|suspicion| suspicion.holds(&record.outputs()[j].values, sample))
 }
 
 /// Code, severity and remedy of a suspicion that the errors confirm.
@@ -286,11 +268,14 @@ fn confirmed(
 fn coarse(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
     let outputs = evidence.point.objective.problem.layout().outputs.iter().enumerate();
     let one = |(j, output): (usize, &crate::layout::Quantity)| {
-        let levels = found.iter().map(|one| one.outputs[j].levels).try_fold(0, |most, n| Some(most.max(n?)))?;
-        let step = found.iter().filter_map(|one| one.outputs[j].step).reduce(f64::min)?;
+        let few = |one: &Arc<Inspection>| one.outputs[j].levels.is_some_and(|levels| levels <= FEW);
+        let values =
+            found.iter().all(few).then(|| distinct(&evidence.point.objective.problem.records, j, FEW)).flatten()?;
+        let step = values.windows(2).map(|pair| pair[1] - pair[0]).reduce(f64::min)?;
+        let levels = values.len();
         let rmse = evidence.residuals.outputs[j].rmse;
         let often = evidence.residuals.outputs[j].samples >= (TIMES * levels) as u64;
-        (levels <= FEW && often && rmse > PART_OF_STEP * step).then(|| {
+        (often && rmse > PART_OF_STEP * step).then(|| {
             let text = format!(
                 "the output `{}` has {levels} values only, {} {} apart: its rounding is no noise, and parameters are off \
                  by it; measure it finer",
@@ -302,6 +287,21 @@ fn coarse(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
         })
     };
     outputs.filter_map(one).collect()
+}
+
+/// The values of an output in all records, in their order, if there are so many at most.
+pub(crate) fn distinct(records: &[Record], output: usize, most: usize) -> Option<Vec<f64>> {
+    let mut values: Vec<f64> = vec![];
+    let measured = records.iter().flat_map(|record| record.outputs()[output].values.iter());
+    for value in measured.filter(|value| !value.is_nan()) {
+        if let Err(at) = values.binary_search_by(|one| one.total_cmp(value)) {
+            values.insert(at, *value);
+            if values.len() > most {
+                return None;
+            }
+        }
+    }
+    Some(values)
 }
 
 fn sentinels_of_inputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
@@ -358,7 +358,7 @@ fn missing(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
 }
 
 /// Whether measurements are not all the same.
-fn moves(values: &[f64]) -> bool {
+pub(crate) fn moves(values: &[f64]) -> bool {
     let mut measured = values.iter().filter(|y| !y.is_nan());
     let first = measured.next();
     measured.any(|y| Some(y) != first)

@@ -10,6 +10,7 @@ use crate::error::Error;
 use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::judge::check::{Check, Level, Pass};
 use crate::judge::checks::feedback::Feedback;
+use crate::judge::checks::restarts;
 use crate::judge::evidence::Evidence;
 use crate::numeral::{number, p_value, percent};
 use crate::optimize::Severity;
@@ -20,12 +21,22 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 pub(crate) const RESTARTS: Check = Check {
     name: "measured states are without noise",
-    asks: "Where predictions restart and errors a horizon apart are negatively correlated: how far does the noise move an unknown (simulation and extrapolation, Cook and Stefanski 1994)?",
+    asks: "Where predictions restart: how far does noise move an unknown (simulation and extrapolation, Cook and Stefanski 1994) that errors a horizon apart show by a negative correlation beside all unknowns (Breusch 1978, Godfrey 1978), or do not exclude?",
     codes: &[WarningCode::RestartNoise],
-    costs: &[Pass::Slopes(8)],
+    costs: &[Pass::Slopes(9)],
     levels: &[
         Level { of: "the probability by chance", value: LEVEL, source: "one good record in a hundred" },
         Level { of: "the bias of care, in standard errors", value: NO_BIAS, source: "a tenth" },
+        Level {
+            of: "standard errors of the correlation that noise may hide in",
+            value: POSSIBLE,
+            source: "one-sided 95 %",
+        },
+        Level {
+            of: "the bias of care by noise that is not excluded",
+            value: NOT_EXCLUDED,
+            source: "a half: intervals of 95 % cover 92 %",
+        },
         Level { of: "the bias that is not usable", value: BIAS, source: "a quarter: intervals of 95 % cover 94 %" },
     ],
     examine: |evidence, intervals| restart_noise(evidence, &intervals.unknowns).into(),
@@ -51,6 +62,10 @@ const DRAWS: u64 = 4;
 const BIAS: f64 = 0.25;
 /// Below this many, noise in restarts is not mentioned.
 const NO_BIAS: f64 = 0.1;
+/// Noise in restarts that is not seen is taken as large as its error by so many standard errors allows (95 %), and is said if it would bias
+/// by more than the second.
+const POSSIBLE: f64 = 1.645;
+const NOT_EXCLUDED: f64 = 0.5;
 /// Significance level of the test for noise in restarts.
 const LEVEL: f64 = 0.01;
 
@@ -92,14 +107,15 @@ fn largest_bias<'p, 'u>(
 fn restart_noise(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
     let steps = evidence.point.objective.sweep.restarts()?;
     let outputs = &evidence.residuals.outputs;
-    let found = evidence.residuals.whiteness.iter().map(|white| white.at_restart);
+    let found = if evidence.rounding { None } else { restarts::correlations(evidence, steps) }?;
     let tail = |z: f64| outputs.len() as f64 * Normal::standard().cdf(z);
-    let least = found.clone().map(|(z, _)| tail(z)).fold(1.0, f64::min);
-    if least >= LEVEL || evidence.rounding {
-        return None;
-    }
-    let deviation = |((_, rho), fit): ((f64, f64), &crate::estimate::OutputFit)| fit.rmse * (-rho).max(0.0).sqrt();
-    let sigma: Vec<f64> = found.zip(outputs).map(deviation).collect();
+    let least = found.iter().map(|(_, z)| tail(*z)).fold(1.0, f64::min);
+    let seen = least < LEVEL;
+    // Found, or as large as it may be.
+    let most = |rho: f64, z: f64| if seen || z == 0.0 { rho } else { rho - POSSIBLE * (rho / z).abs() };
+    let deviation =
+        |((rho, z), fit): (&(f64, f64), &crate::estimate::OutputFit)| fit.rmse * (-most(*rho, *z)).max(0.0).sqrt();
+    let sigma: Vec<f64> = found.iter().zip(outputs).map(deviation).collect();
     let problem = evidence.point.objective.problem;
     let feedback = Feedback::of(evidence);
     let bias = largest_bias(evidence, unknowns, |sign, draw| {
@@ -115,8 +131,24 @@ fn restart_noise(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warnin
         Ok(Problem { records: compared, ..problem.with_records(noisy)? })
     })?;
     let Bias { unknown, errors, .. } = bias;
-    if errors < NO_BIAS {
+    if errors < if seen { NO_BIAS } else { NOT_EXCLUDED } {
         return None;
+    }
+    if !seen {
+        let j =
+            (0..sigma.len()).max_by(|&a, &b| (sigma[a] / outputs[a].rmse).total_cmp(&(sigma[b] / outputs[b].rmse)))?;
+        let output = &problem.layout().outputs[j];
+        let text = format!(
+            "predictions restart from measured states as if these were exact: the errors do not exclude noise of up to {} {} in `{}`, which \
+             would bias `{}` by {} standard errors; use Kalman with Model::noise, filter the restarts (Horizon::filtered), or take a longer \
+             horizon",
+            number(sigma[j], 2),
+            output.unit,
+            output.name,
+            unknown.name,
+            number(errors, 2)
+        );
+        return Some(Warning { code: WarningCode::RestartNoise, severity: Severity::UsableWithCare, text });
     }
     let severity = if errors > BIAS { Severity::NotUsable } else { Severity::UsableWithCare };
     let also = match feedback.names(problem.layout()) {

@@ -1,7 +1,8 @@
 //! Warnings about what was declared: times, initial states, bounds, signs; and what the data do not determine of it.
 
 use crate::estimate::{Direction, Knowledge, Unknown, Warning, WarningCode};
-use crate::judge::check::{Check, with_care};
+use crate::judge::check::{Check, Pass, with_care};
+use crate::judge::checks::conditions;
 use crate::judge::evidence::Evidence;
 use crate::layout::Kind;
 use crate::numeral::{counted, exact, number};
@@ -47,17 +48,16 @@ pub(crate) const POSITIVE: Check = Check {
 
 pub(crate) const IDENTIFIED: Check = Check {
     name: "all unknowns are identified",
-    asks: "Along which directions of the unknowns do the data say nothing, by the singular values of the slopes?",
+    asks: "Along which directions of the unknowns do the data say nothing, by the singular values of the slopes? Does a parameter without slope change the cost in steps?",
     codes: &[WarningCode::Unidentified],
-    costs: &[],
+    costs: &[Pass::EachUnknown(6)],
     levels: &[],
     examine: |evidence, intervals| {
-        intervals
-            .directions
-            .iter()
-            .map(|one| without_influence(evidence, one, &intervals.unknowns))
-            .collect::<Vec<_>>()
-            .into()
+        let directions = evidence.point.undetermined.directions.iter().zip(&intervals.directions);
+        let one = |(entries, named): (&Vec<(usize, f64)>, &Direction)| {
+            without_influence(evidence, entries, named, &intervals.unknowns)
+        };
+        directions.map(one).collect::<Vec<_>>().into()
     },
 };
 
@@ -109,7 +109,12 @@ fn not_positive(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
 }
 
 /// A direction that the data do not determine; a note for an initial state that has died out, which changes no other unknown.
-fn without_influence(evidence: &Evidence<'_>, direction: &Direction, unknowns: &[Unknown]) -> Warning {
+fn without_influence(
+    evidence: &Evidence<'_>,
+    entries: &[(usize, f64)],
+    direction: &Direction,
+    unknowns: &[Unknown],
+) -> Warning {
     if let [(name, _)] = direction.moves.as_slice()
         && evidence.point.linear.forgotten().iter().any(|i| unknowns[*i].name == *name)
     {
@@ -117,6 +122,11 @@ fn without_influence(evidence: &Evidence<'_>, direction: &Direction, unknowns: &
             "`{name}` has died out before the first measurement: it is not known, and no other unknown depends on it"
         );
         return Warning { code: WarningCode::Unidentified, severity: Severity::Usable, text };
+    }
+    if let [(i, _)] = entries
+        && let Some(what) = conditions::without_slope(evidence, *i)
+    {
+        return with_care(WarningCode::Unidentified, format!("`{}` {what}", unknowns[*i].name));
     }
     Direction::warning(direction.to_string())
 }

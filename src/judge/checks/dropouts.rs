@@ -3,7 +3,6 @@
 use crate::estimate::{Warning, WarningCode};
 use crate::judge::check::with_care;
 use crate::judge::evidence::Evidence;
-use crate::judge::evidence::first_errors::Errors as FirstErrors;
 use crate::numeral::{number, percent};
 
 /// The fewest measurements that are equal to the one before, and the part of them all, that are looked at.
@@ -48,14 +47,14 @@ fn split(runs: &[Vec<(f64, f64)>]) -> Option<[Errors; 2]> {
     (single && again * ROUNDED <= held.count).then_some(split)
 }
 
-/// The warning about an output.
-pub(crate) fn dropouts_of(evidence: &Evidence<'_>, j: usize) -> Option<Warning> {
+/// The warning about an output with these errors, one run per record, `None` where nothing was measured.
+pub(crate) fn dropouts_of(evidence: &Evidence<'_>, j: usize, errors: &[Vec<Option<f64>>]) -> Option<Warning> {
     let problem = evidence.point.objective.problem;
-    let run = |(record, errors): (&crate::record::Record, &FirstErrors)| {
-        let values = record.outputs()[j].values.iter().zip(&errors[j]);
+    let run = |(record, errors): (&crate::record::Record, &Vec<Option<f64>>)| {
+        let values = record.outputs()[j].values.iter().zip(errors);
         values.filter_map(|(y, error)| Some((*y, (*error)?))).collect()
     };
-    let runs: Vec<Vec<(f64, f64)>> = problem.records.iter().zip(evidence.first_errors()).map(run).collect();
+    let runs: Vec<Vec<(f64, f64)>> = problem.records.iter().zip(errors).map(run).collect();
     let [held, others] = split(&runs)?;
     are_larger(held, others).then(|| {
         let output = &problem.layout().outputs[j];

@@ -56,7 +56,7 @@ fn decided_by_few(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &C
     let (i, shares) = decided.max_by(|a, b| part(a.1).total_cmp(&part(b.1)))?;
     let noise = match assumed {
         true => "whose noise is taken to be that of all",
-        false => "and is so wide that it holds whatever the noise is there",
+        false => "whose noise is taken to be up to some three times that of all",
     };
     let text = format!(
         "the interval of `{}` rests by {} on {}, {noise}: errors there do not tell, since the fit passes through them; \

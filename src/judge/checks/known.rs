@@ -1,13 +1,14 @@
 //! Warnings about what is known of the parameters: standard errors that are none, intervals that hold zero, signs and
 //! sizes that are not those of the start.
 
+use crate::estimate::student::quantile;
 use crate::estimate::{Knowledge, Unknown, Warning, WarningCode};
 use crate::judge::check::{Check, Level, with_care};
 use crate::judge::covariances::{Covariances, is_error};
 use crate::judge::evidence::Evidence;
 use crate::numeral::{exact, number};
 use crate::optimize::Severity;
-use crate::parameter::Prior;
+use crate::parameter::{Prior, Transform};
 use crate::problem::{Free, Role};
 
 pub(crate) const NO_ERROR: Check = Check {
@@ -73,21 +74,18 @@ fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
     names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 
-/// Whether an interval is as wide as the value, so that it holds zero (or, of a logarithm, spans as much).
+/// Whether an interval is as wide as the value, so that it holds zero (or, of a logarithm, spans as much), whatever bounds say.
 fn holds_zero(unknown: &Unknown) -> bool {
-    match unknown.knowledge {
-        Knowledge::Known { lower, upper, .. } => upper - lower >= 2.0 * unknown.value.abs(),
-        _ => false,
-    }
+    unknown.unbounded().is_some_and(|(lower, upper)| upper - lower >= 2.0 * unknown.value.abs())
 }
 
 /// Whether the data tell an unknown from zero without its prior. What they say of it alone follows from both, as precisions add up.
 fn told_by_data(unknown: &Unknown, prior: Prior) -> bool {
-    let Knowledge::Known { standard_error, lower, upper } = unknown.knowledge else { return false };
+    let Some(standard_error) = unknown.knowledge.standard_error() else { return false };
     let (both, before) = (standard_error.powi(-2), prior.std.powi(-2));
     let alone = both - before;
     let value = (both * unknown.value - before * prior.mean) / alone;
-    let quantile = 0.5 * (upper - lower) / standard_error;
+    let quantile = quantile(0.975, unknown.degrees_of_freedom);
     alone > 0.0 && value.abs() > quantile / alone.sqrt()
 }
 
@@ -107,7 +105,23 @@ fn without_error(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Co
     Some(Warning { code: WarningCode::NoStandardError, severity: Severity::NotUsable, text })
 }
 
-/// Parameters that cannot be told from zero.
+/// What intervals as wide as their values mean: zero may be in them, and a logarithm is known to a factor.
+fn wide(unknowns: &[&Unknown]) -> String {
+    let names = |transform: Transform| {
+        let of = unknowns.iter().filter(|unknown| unknown.transform == transform);
+        listed(of.map(|unknown| unknown.name.as_str()))
+    };
+    let factor = |unknown: &&Unknown| unknown.unbounded().map_or(1.0, |(lower, upper)| (upper / lower).sqrt());
+    let factor = unknowns.iter().filter(|unknown| unknown.transform == Transform::Log).map(factor).fold(1.0, f64::max);
+    let said = [
+        (names(Transform::Identity), "cannot be told from zero: an interval is wider than its value".to_owned()),
+        (names(Transform::Log), format!("is known to a factor of {} only", number(factor, 2))),
+    ];
+    let said = said.into_iter().filter(|(names, _)| !names.is_empty()).map(|(names, what)| format!("{names} {what}"));
+    said.collect::<Vec<_>>().join(", and ")
+}
+
+/// Parameters that cannot be told from zero, or are known to a factor only.
 fn near_zero(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
     let rows = &evidence.point.objective.problem.unknowns.row;
     let parameters = || unknowns.iter().zip(rows).filter(|(unknown, _)| matches!(unknown.role, Role::Parameter(_)));
@@ -120,13 +134,11 @@ fn near_zero(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
         Some(prior) => !told_by_data(unknown, prior),
         None => holds_zero(unknown) || unknown.knowledge == Knowledge::Unidentified,
     });
-    let names = listed(unknown.iter().map(|unknown| unknown.name.as_str()));
     let text = match all {
-        false => format!(
-            "{names} cannot be told from zero: an interval is wider than its value; excite what depends on it, or fix it"
-        ),
+        false => format!("{}; excite what depends on it, or fix it", wide(&unknown)),
         true => format!(
-            "no parameter is known: the intervals of {names} are wider than their values; vary {} more, or measure longer",
+            "no parameter is known: {}; vary {} more, or measure longer",
+            wide(&unknown),
             match evidence.point.objective.problem.layout().inputs.as_slice() {
                 [] => "the initial state".to_owned(),
                 inputs => listed(inputs.iter().map(|input| input.name.as_str())),
@@ -215,7 +227,6 @@ fn far_from_start(unknowns: &[Unknown]) -> Vec<Warning> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parameter::Transform;
 
     fn unknown(value: f64, start: f64, width: f64) -> Unknown {
         Unknown {
@@ -225,8 +236,9 @@ mod tests {
             experiment: None,
             value,
             start,
+            bounds: (f64::NEG_INFINITY, f64::INFINITY),
             knowledge: Knowledge::Known {
-                standard_error: width / 4.0,
+                standard_error: width / 2.0 / quantile(0.975, 10.0),
                 lower: value - width / 2.0,
                 upper: value + width / 2.0,
             },
@@ -249,18 +261,18 @@ mod tests {
         );
     }
 
-    /// Prior 3 +- 1 and data 2 +- 0.5 make 2.2 +- 0.447: the data alone tell it from zero where their interval is below 2 wide to either
-    /// side, at a quantile below 4. Errors no smaller than the prior's are the prior's.
+    /// Prior 3 +- 1 and data 2 +- 0.5 make 2.2 +- 0.447: the data alone tell it from zero where Student's quantile is below 4, which is
+    /// 3.18 with three degrees of freedom and 4.30 with two. Errors no smaller than the prior's are the prior's.
     #[test]
     fn what_the_data_say_without_the_prior() {
         let error = 0.2f64.sqrt();
-        let told = |quantile: f64, error: f64| {
-            let (lower, upper) = (2.2 - quantile * error, 2.2 + quantile * error);
-            let knowledge = Knowledge::Known { standard_error: error, lower, upper };
-            told_by_data(&Unknown { knowledge, ..unknown(2.2, 1.0, 1.0) }, Prior { mean: 3.0, std: 1.0 })
+        let told = |degrees_of_freedom: f64, error: f64| {
+            let knowledge = Knowledge::Known { standard_error: error, lower: 2.0, upper: 2.4 };
+            let unknown = Unknown { knowledge, degrees_of_freedom, ..unknown(2.2, 1.0, 1.0) };
+            told_by_data(&unknown, Prior { mean: 3.0, std: 1.0 })
         };
-        assert!(told(3.99, error) && !told(4.01, error));
-        assert!(!told(1e-6, 1.0) && !told(1e-6, 1.1));
+        assert!(told(3.0, error) && !told(2.0, error));
+        assert!(!told(1e9, 1.0) && !told(1e9, 1.1));
     }
 
     /// More than 400 times the start or less than a 400th of it; not for a start of zero, nor for a value that is not known.

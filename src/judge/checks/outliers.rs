@@ -2,9 +2,10 @@
 
 use crate::estimate::{Warning, WarningCode};
 use crate::judge::check::{Check, Examined, Level, ROUND_OFF, with_care};
+use crate::judge::checks::data::is_named;
 use crate::judge::checks::dropouts;
 use crate::judge::evidence::Evidence;
-use crate::judge::evidence::first_errors;
+use crate::judge::evidence::first_errors::{self, Errors};
 use crate::judge::evidence::largest::chance;
 use crate::numeral::{exact, number, p_value, percent};
 use crate::optimize::Severity;
@@ -71,11 +72,21 @@ fn outliers(evidence: &Evidence<'_>) -> Vec<Warning> {
         return (0..objective.outputs()).filter_map(|j| extreme(evidence, j)).collect();
     }
     let of = |j: usize| {
-        let all: Vec<f64> = evidence.first_errors().iter().flat_map(|one| &one[j]).flatten().copied().collect();
-        dropouts::dropouts_of(evidence, j).or_else(|| outliers_of(evidence, j, &all))
+        let errors = unsuspected(evidence, j);
+        let all: Vec<f64> = errors.iter().flatten().flatten().copied().collect();
+        dropouts::dropouts_of(evidence, j, &errors).or_else(|| outliers_of(evidence, j, &all))
     };
     let of = |j: usize| if heavy[j] { of(j) } else { None };
     (0..objective.outputs()).filter_map(|j| of(j).or_else(|| extreme(evidence, j))).collect()
+}
+
+/// The first errors of an output, record by record, without those of samples that the look at its column names.
+fn unsuspected(evidence: &Evidence<'_>, j: usize) -> Vec<Vec<Option<f64>>> {
+    let of = |(e, one): (usize, &Errors)| {
+        let errors = one[j].iter().enumerate();
+        errors.map(|(k, error)| error.filter(|_| !is_named(evidence, e, j, k))).collect()
+    };
+    evidence.first_errors().iter().enumerate().map(of).collect()
 }
 
 fn outliers_of(evidence: &Evidence<'_>, j: usize, errors: &[f64]) -> Option<Warning> {
@@ -95,7 +106,8 @@ fn outliers_of(evidence: &Evidence<'_>, j: usize, errors: &[f64]) -> Option<Warn
 fn extreme(evidence: &Evidence<'_>, j: usize) -> Option<Warning> {
     let (fit, largest) = (&evidence.residuals.outputs[j], evidence.residuals.largest[j]);
     let count = fit.samples as f64;
-    if fit.rmse <= 0.0 || evidence.point.is_exact() {
+    let named = is_named(evidence, largest.experiment, j, largest.sample);
+    if fit.rmse <= 0.0 || named || evidence.point.is_exact() {
         return None;
     }
     // Errors that are divided by their predicted deviations.

@@ -7,6 +7,7 @@
 
 mod confirm;
 mod cut_off;
+mod offsets;
 mod rows;
 
 use crate::estimate::student::two_sided;
@@ -19,6 +20,7 @@ use crate::judge::leverage::prior_row;
 use crate::numeral::{number, p_value, percent};
 use crate::optimize::{Linearization, Severity};
 use crate::problem::{Objective, Role, Whitening};
+pub(crate) use offsets::growth_by_offsets;
 use rows::{KINDS, Kind, Triangle};
 
 pub(crate) const SENSORS: Check = Check {
@@ -94,7 +96,15 @@ fn sensors(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
 }
 
 impl<'j> Extended<'j> {
+    /// `None` with a pre-filter, predictions that restart, many unknowns, or without a minimum.
     fn new(evidence: &'j Evidence<'j>) -> Option<Self> {
+        let possible = evidence.point.objective.problem.settings.prefilter.is_none()
+            && evidence.point.objective.sweep.restarts().is_none()
+            && evidence.point.values.len() <= MOST
+            && evidence.point.end.outcome.converged();
+        if !possible {
+            return None;
+        }
         // Rows of single outputs.
         let sigma = Whitening::Diagonal(evidence.point.objective.whitening.sigma());
         let objective = evidence.point.objective.with(sigma);

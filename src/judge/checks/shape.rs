@@ -85,7 +85,7 @@ fn by_inputs(evidence: &Evidence<'_>) -> Option<Warning> {
             }
         }
     }
-    let white: Vec<Whiteness> = sums.iter().map(|(sum, errors)| Whiteness::of(sum, *errors, 0)).collect();
+    let white: Vec<Whiteness> = sums.iter().map(|(sum, errors)| Whiteness::of(sum, *errors)).collect();
     let chance = |number: usize| white[number].p_value * sums.len() as f64;
     let more = |a: &usize, b: &usize| white[*a].predicted.total_cmp(&white[*b].predicted);
     let number = (0..white.len()).filter(|number| chance(*number) < color::CERTAIN).max_by(more)?;

@@ -12,7 +12,8 @@
 //! that comes out is an estimate from few independent stretches of the record, so intervals take Student's t with the
 //! degrees of freedom that the errors of the autoregression and of the sums leave.
 //!
-//! Where these sums do not certainly say more, the standard errors are those of stationary errors ([`stationary`]).
+//! Where these sums do not certainly say more, the standard errors are those of stationary errors ([`stationary`]). A record of few
+//! measurements among several has no moving sums: its scores are those of stationary errors, with the autoregression of all.
 
 mod joined;
 mod scores;
@@ -50,7 +51,7 @@ pub(crate) struct Hac {
     /// The sizes of the errors that have them.
     pub(crate) sizes: Option<Sizes>,
     pub lags: usize,
-    runs: Vec<LongRun>,
+    runs: Vec<Run>,
 }
 
 /// Two passes with slopes; `inverse` is the inverse of the curvature. `None` where the scores of the unknowns that are not held are linearly dependent.
@@ -69,10 +70,6 @@ pub(crate) fn hac(
         let columns = unknowns.columns(e).enumerate();
         columns.filter(|(_, i)| !held[*i]).map(|(c, _)| c).collect()
     };
-    let runs = each(objective.experiments(), |e| {
-        LongRun::of(objective, e, coordinates, (kept(e), of_experiment(objective, inverse, e)))
-    });
-    let runs: Vec<LongRun> = runs.into_iter().collect::<Option<_>>()?;
     let with_priors = |mut scores: Vec<Information>| {
         for (i, slope, _) in unknowns.priors(coordinates) {
             let e = unknowns.row[i].experiment.unwrap_or(0);
@@ -81,13 +78,23 @@ pub(crate) fn hac(
         scores
     };
     let stationary = stationary::scores(objective, coordinates, inverse).ok()?;
+    let several = objective.experiments() > 1;
+    let short = |e: usize| stationary.as_ref().filter(|found| several && found.short[e]);
+    let runs = each(objective.experiments(), |e| match short(e) {
+        Some(found) => Some(Run::Short { triangle: found.triangles[e].clone(), uncertainty: found.uncertainty }),
+        None => {
+            let of_experiment = (kept(e), of_experiment(objective, inverse, e));
+            Some(Run::Long(LongRun::of(objective, e, coordinates, of_experiment)?))
+        }
+    });
+    let runs: Vec<Run> = runs.into_iter().collect::<Option<_>>()?;
+    let scores = runs.iter().enumerate().map(|(e, run)| run.triangle(unknowns.columns(e).count())).collect();
+    let lags = runs.iter().map(Run::lags).max().unwrap_or(0);
     let (stationary, shares, sizes) = match stationary {
-        Some((scores, shares, sizes)) => (Some(scores), Some(shares), Some(sizes)),
+        Some(found) => (Some(found.triangles), Some(found.shares), Some(found.sizes)),
         None => (None, None, None),
     };
     let stationary = stationary.map(|scores| found.with(with_priors(scores)));
-    let scores = runs.iter().enumerate().map(|(e, run)| run.triangle(unknowns.columns(e).count())).collect();
-    let lags = runs.iter().map(|run| run.window.saturating_sub(1)).max().unwrap_or(0);
     Some(Hac { sandwich: found.with(with_priors(scores)), stationary, shares, sizes, lags, runs })
 }
 
@@ -111,19 +118,65 @@ impl Hac {
     /// Degrees of freedom of the variance of each unknown, by Satterthwaite's rule over the experiments; `inverse` is
     /// the inverse of the curvature. Infinite for unknowns that are held.
     pub fn degrees(&self, objective: &Objective<'_>, inverse: &Covariance) -> Vec<f64> {
-        let mut variances = vec![(0.0, 0.0); objective.problem.unknowns.row.len()];
+        // Variances, their variances, and variances of which all are uncertain alike.
+        let mut variances = vec![(0.0, 0.0, 0.0); objective.problem.unknowns.row.len()];
         for (e, run) in self.runs.iter().enumerate() {
             let columns: Vec<usize> = objective.problem.unknowns.columns(e).collect();
             let inverse = inverse.dense(&columns);
             for (row, &i) in columns.iter().enumerate() {
-                let contrast: Vec<f64> = run.kept.iter().map(|&c| inverse[(row, c)]).collect();
+                let contrast: Vec<f64> = (0..columns.len()).map(|c| inverse[(row, c)]).collect();
                 let (variance, spread) = run.variance(&contrast);
-                variances[i].0 += variance;
-                variances[i].1 += spread;
+                let (all, spreads, alike) = &mut variances[i];
+                *all += variance;
+                match run {
+                    Run::Long(_) => *spreads += spread,
+                    Run::Short { .. } => *alike += spread.sqrt(),
+                }
             }
         }
-        let degrees = |(variance, spread): (f64, f64)| (2.0 * variance * variance / spread).max(FEWEST);
+        let degrees = |(variance, spread, alike): (f64, f64, f64)| {
+            (2.0 * variance * variance / (spread + alike * alike)).max(FEWEST)
+        };
         variances.into_iter().map(degrees).collect()
+    }
+}
+
+/// The scores of one experiment: their long-run covariance, or those of stationary errors.
+enum Run {
+    Long(LongRun),
+    Short {
+        triangle: Information,
+        /// Relative variance of its variances.
+        uncertainty: f64,
+    },
+}
+
+impl Run {
+    fn triangle(&self, columns: usize) -> Information {
+        match self {
+            Run::Long(run) => run.triangle(columns),
+            Run::Short { triangle, .. } => triangle.clone(),
+        }
+    }
+
+    fn lags(&self) -> usize {
+        match self {
+            Run::Long(run) => run.window.saturating_sub(1),
+            Run::Short { .. } => 0,
+        }
+    }
+
+    /// The variance of a combination of the scores of all columns, and the variance of this estimate of it.
+    fn variance(&self, contrast: &[f64]) -> (f64, f64) {
+        match self {
+            Run::Long(run) => run.variance(&run.kept.iter().map(|&c| contrast[c]).collect::<Vec<f64>>()),
+            Run::Short { triangle, uncertainty } => {
+                let n = triangle.columns();
+                let row = |i: usize| (i..n).map(|j| triangle.at(i, j) * contrast[j]).sum::<f64>();
+                let variance: f64 = (0..n).map(|i| row(i).powi(2)).sum();
+                (variance, uncertainty * variance * variance)
+            }
+        }
     }
 }
 

@@ -57,6 +57,11 @@ impl Sandwich {
         Sandwich { scores, scale: 1.0, ..self.clone() }
     }
 
+    /// The curvature without the mean curvature of the loss, and that.
+    pub fn bread(self) -> (Linearization, f64) {
+        (self.bread, self.curvature)
+    }
+
     /// `A^-1 B A^-1` over all unknowns that are not held.
     pub fn covariance(&self, held: &[bool]) -> Option<Covariance> {
         let scale = self.scale / (self.curvature * self.curvature);

@@ -14,7 +14,7 @@ pub(crate) const SHAPE: usize = 4;
 /// Regressors of a part of the data: a constant, the prediction, and its change from the sample before.
 const PART: usize = 3;
 /// More records than these are not compared one by one.
-pub(crate) const COMPARED: usize = 12;
+pub(crate) const COMPARED: usize = 100;
 /// With fewer degrees of freedom the errors are not examined: Fisher's distribution is that of normal errors.
 const FEWEST: f64 = 30.0;
 /// A regressor of which less than this part of its square is left beside the others is one of their combinations.

@@ -16,8 +16,6 @@ use crate::problem::noise::REPRODUCED;
 use crate::problem::{At, Objective, gather_together};
 use experiment::Sums;
 
-/// Longest horizon over which errors are correlated.
-const HORIZON: usize = 100;
 /// Results of a pass over the residuals.
 pub(crate) struct Residuals {
     pub outputs: Vec<OutputFit>,
@@ -141,7 +139,7 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>], s
         let unknowns = &objective.problem.unknowns;
         let own = if all.len() > 1 { unknowns.row.len() - unknowns.shared() } else { 0 };
         let count = sums[j].count;
-        Whiteness::of(&total.without(own as f64 / count.max(1) as f64), count, horizon(objective))
+        Whiteness::of(&total.without(own as f64 / count.max(1) as f64), count)
     };
     let whiteness: Vec<Whiteness> = (0..outputs).map(whiteness).collect();
     let shape = |j: usize| {
@@ -186,11 +184,6 @@ fn points(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -> V
         one.points.iter().map(at).collect()
     };
     (0..all.len()).map(begin).chain(all.iter().enumerate().flat_map(later)).collect()
-}
-
-/// The horizon of predictions that restart; zero where they do not, or from too far.
-fn horizon(objective: &Objective<'_>) -> usize {
-    objective.sweep.restarts().filter(|steps| *steps <= HORIZON).unwrap_or(0)
 }
 
 fn failed(objective: &Objective<'_>, coordinates: &[f64]) -> Error {

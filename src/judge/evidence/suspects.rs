@@ -4,19 +4,12 @@
 use crate::problem::{Accumulate, Objective};
 use crate::record::{Record, Suspicion};
 use crate::sweep::Window;
-use core::ops::Range;
 
 /// Samples of an output that may be wrong.
-pub(crate) struct Suspect {
+pub(crate) struct Suspect<'s> {
     pub experiment: usize,
     pub output: usize,
-    inside: Inside,
-}
-
-enum Inside {
-    Value(f64),
-    Samples(Range<usize>),
-    Again,
+    pub suspicion: &'s Suspicion,
 }
 
 /// Sums of errors and of their squares, and how many there were.
@@ -32,18 +25,6 @@ struct Errors {
 pub(crate) struct Split {
     inside: Errors,
     outside: Errors,
-}
-
-impl Suspect {
-    pub fn new(experiment: usize, output: usize, suspicion: &Suspicion) -> Self {
-        let inside = match suspicion {
-            Suspicion::Sentinel { value, .. } | Suspicion::Clipped { value, .. } => Inside::Value(*value),
-            Suspicion::Frozen { samples, .. } => Inside::Samples(samples.clone()),
-            Suspicion::Held { .. } => Inside::Again,
-            Suspicion::Repeated { samples, again } => Inside::Samples(*again..again + samples.len()),
-        };
-        Suspect { experiment, output, inside }
-    }
 }
 
 impl Split {
@@ -78,7 +59,7 @@ impl Split {
 
 struct Sums<'s> {
     record: &'s Record,
-    suspects: Vec<&'s Suspect>,
+    suspects: Vec<&'s Suspect<'s>>,
     splits: Vec<Split>,
 }
 
@@ -88,11 +69,7 @@ impl Accumulate for Sums<'_> {
             let values = &self.record.outputs()[suspect.output].values;
             for k in (0..window.samples[lane]).filter(|k| window.is_measured(*k, suspect.output, lane)) {
                 let sample = window.begin[lane] + k;
-                let inside = match &suspect.inside {
-                    Inside::Value(value) => values[sample] == *value,
-                    Inside::Samples(samples) => samples.contains(&sample),
-                    Inside::Again => sample > 0 && values[sample] == values[sample - 1],
-                };
+                let inside = suspect.suspicion.holds(values, sample);
                 let errors = if inside { &mut split.inside } else { &mut split.outside };
                 let error = window.error(k, suspect.output, lane);
                 errors.sum += error;
@@ -114,11 +91,11 @@ impl Accumulate for Sums<'_> {
 }
 
 /// The errors of each suspect, by one pass over the data; empty where they cannot be evaluated.
-pub(crate) fn splits(objective: &Objective<'_>, coordinates: &[f64], suspects: &[Suspect]) -> Vec<Split> {
+pub(crate) fn splits(objective: &Objective<'_>, coordinates: &[f64], suspects: &[Suspect<'_>]) -> Vec<Split> {
     let plain = objective.in_units();
     let of = |experiment: usize| suspects.iter().filter(move |suspect| suspect.experiment == experiment);
     let make = |experiment: usize| {
-        let suspects: Vec<&Suspect> = of(experiment).collect();
+        let suspects: Vec<&Suspect<'_>> = of(experiment).collect();
         let splits = vec![Split::default(); suspects.len()];
         Sums { record: &objective.problem.records[experiment], suspects, splits }
     };
@@ -139,12 +116,12 @@ mod tests {
     fn errors_inside_and_outside() {
         let channel = Channel::new("y", "", vec![9.0, 1.0, 2.0, 9.0, f64::NAN, 3.0]);
         let record = Record::new(vec![], Time::Uniform { start: 0.0, step: 1.0 }, vec![], vec![channel]).unwrap();
-        let suspect = |suspicion| Suspect::new(0, 0, &suspicion);
-        let suspects = [
-            suspect(Suspicion::Sentinel { value: 9.0, count: 2 }),
-            suspect(Suspicion::Frozen { value: 2.0, samples: 2..3 }),
-            suspect(Suspicion::Repeated { samples: 1..3, again: 4 }),
+        let suspicions = [
+            Suspicion::Sentinel { value: 9.0, count: 2 },
+            Suspicion::Frozen { value: 2.0, samples: 2..3 },
+            Suspicion::Repeated { samples: 1..3, again: 4 },
         ];
+        let suspects = suspicions.each_ref().map(|suspicion| Suspect { experiment: 0, output: 0, suspicion });
         let mut sums = Sums { record: &record, suspects: suspects.iter().collect(), splits: vec![Split::default(); 3] };
         let mut window = Window::new(1, 1, 0, 4, false);
         (window.begin, window.samples) = (vec![2], vec![4]);
@@ -163,7 +140,7 @@ mod tests {
     fn values_that_are_held() {
         let channel = Channel::new("y", "", vec![7.0, 7.0, 7.0, 8.0, 8.0, 9.0]);
         let record = Record::new(vec![], Time::Uniform { start: 0.0, step: 1.0 }, vec![], vec![channel]).unwrap();
-        let suspects = [Suspect::new(0, 0, &Suspicion::Held { samples: 2 })];
+        let suspects = [Suspect { experiment: 0, output: 0, suspicion: &Suspicion::Held { samples: 2 } }];
         let mut sums = Sums { record: &record, suspects: suspects.iter().collect(), splits: vec![Split::default()] };
         let mut window = Window::new(1, 1, 0, 5, false);
         (window.begin, window.samples) = (vec![1], vec![5]);

@@ -19,14 +19,11 @@ pub(crate) struct Whiteness {
     pub predicted: f64,
     /// How many errors have the information of one independent error on a slow signal.
     pub dependence: f64,
-    /// Standardized sum of products of errors a horizon apart, and their autocorrelation; zeros where predictions do not
-    /// restart, or from too far.
-    pub at_restart: (f64, f64),
 }
 
 impl Whiteness {
-    /// Of so many errors, with predictions that restart after so many samples (zero: never, or from too far).
-    pub fn of(errors: &Portmanteau, count: u64, restart: usize) -> Self {
+    /// Of so many errors.
+    pub fn of(errors: &Portmanteau, count: u64) -> Self {
         let correlations = std::array::from_fn(|k| errors.at(k + 1).1);
         let (predicted, dependence) = color(&correlations, count);
         let most = |lags: usize| lags.min(count as usize / 4).max(1);
@@ -36,7 +33,6 @@ impl Whiteness {
             correlations,
             predicted,
             dependence,
-            at_restart: if restart == 0 { (0.0, 0.0) } else { errors.at(restart) },
         }
     }
 }
@@ -91,7 +87,7 @@ mod tests {
             let mut errors = Portmanteau::new(LAGS);
             errors.add(&run);
             let least = lags.map(|lags| errors.p_value(lags)).into_iter().fold(errors.neighbors_p_value(), f64::min);
-            assert_eq!(Whiteness::of(&errors, count, 0).p_value, (3.0 * least).min(1.0));
+            assert_eq!(Whiteness::of(&errors, count).p_value, (3.0 * least).min(1.0));
         }
     }
 
@@ -101,7 +97,7 @@ mod tests {
         let of = |p_value: f64, first: f64| {
             let mut correlations = [0.0; LAGS];
             correlations[0] = first;
-            Whiteness { p_value, correlations, predicted: 0.0, dependence: 1.0, at_restart: (0.0, 0.0) }
+            Whiteness { p_value, correlations, predicted: 0.0, dependence: 1.0 }
         };
         let found = |all: &[Whiteness]| {
             let tested: Vec<(usize, Whiteness)> = all.iter().copied().enumerate().collect();

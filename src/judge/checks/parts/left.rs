@@ -3,11 +3,15 @@
 //! At the common estimate, a contradiction between parts makes the errors correlated by itself. How many errors have the information of
 //! one is therefore taken from those that remain without the contradiction.
 
-use super::Piece;
+use super::pieces::Piece;
+use super::spans::span;
 use crate::judge::evidence::whiteness::{LAGS, Whiteness};
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
 use crate::whiteness::Portmanteau;
+
+/// A piece with fewer errors of an output than these takes the correlations of all pieces together.
+const OWN: u64 = 100;
 
 /// Correlations and number of the errors of one output that remain in a piece.
 #[derive(Clone)]
@@ -29,11 +33,11 @@ struct Pass<'p> {
 impl Accumulate for Pass<'_> {
     fn add(&mut self, window: &Window, lane: usize) {
         let (e, begin) = (self.experiment, window.begin[lane]);
-        let middle = self.objective.problem.records[e].len() / 2;
+        let samples = self.objective.problem.records[e].len();
         for (piece, of) in self.pieces.iter().zip(&mut self.of) {
             for (j, left) in of.iter_mut().enumerate() {
                 let inside = |k: &usize| {
-                    piece.rows.contain(e, j, usize::from(begin + k >= middle))
+                    piece.rows.contain(e, j, span(begin + k, samples))
                         && window.is_measured(*k, j, lane)
                         && self.objective.weight(e, begin + k) > 0.0
                 };
@@ -60,7 +64,7 @@ impl Accumulate for Pass<'_> {
 /// How many errors have the information of one, by each piece: the most of its outputs.
 pub(crate) fn dependences(objective: &Objective<'_>, coordinates: &[f64], pieces: &[Piece]) -> Option<Vec<f64>> {
     let none = Left { sums: Portmanteau::new(LAGS), count: 0 };
-    let empty = vec![vec![none; objective.outputs()]; pieces.len()];
+    let empty = vec![vec![none.clone(); objective.outputs()]; pieces.len()];
     let make = |experiment: usize| Pass {
         objective,
         pieces,
@@ -77,7 +81,19 @@ pub(crate) fn dependences(objective: &Objective<'_>, coordinates: &[f64], pieces
             sum.count += own.count;
         }
     }
-    let dependence = |left: &Left| Whiteness::of(&left.sums, left.count, 0).dependence;
-    let most = |of: &Vec<Left>| of.iter().filter(|left| left.count > 0).map(dependence).fold(1.0, f64::max);
+    let mut together = vec![none; objective.outputs()];
+    for of in &sums {
+        for (all, own) in together.iter_mut().zip(of) {
+            all.sums.append(&own.sums);
+            all.count += own.count;
+        }
+    }
+    let dependence = |(left, all): (&Left, &Left)| {
+        let of = if left.count < OWN { all } else { left };
+        Whiteness::of(&of.sums, of.count).dependence
+    };
+    let most = |of: &Vec<Left>| {
+        of.iter().zip(&together).filter(|(left, _)| left.count > 0).map(dependence).fold(1.0, f64::max)
+    };
     Some(sums.iter().map(most).collect())
 }

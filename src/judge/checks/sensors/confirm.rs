@@ -109,7 +109,7 @@ impl Extended<'_> {
         let count = sums.counts.iter().sum::<u64>() as f64;
         let plain = sums.errors / free * sums.squares;
         let own = sums.products * count / free;
-        let white = errors.iter().zip(&sums.counts).map(|(errors, count)| Whiteness::of(errors, *count, 0));
+        let white = errors.iter().zip(&sums.counts).map(|(errors, count)| Whiteness::of(errors, *count));
         let colored = white.filter(|white| white.p_value < COLORED && !self.evidence.point.is_static());
         let dependence = colored.map(|white| white.dependence).fold(1.0, f64::max);
         let error = |variance: f64| (variance * dependence).sqrt() / sums.squares;

@@ -5,7 +5,7 @@
 
 use super::{Extended, KINDS, Kind};
 use crate::estimate::{Unknown, Warning, WarningCode};
-use crate::judge::checks::data::{FEW, PART_OF_STEP, TIMES};
+use crate::judge::checks::data::{FEW, PART_OF_STEP, TIMES, distinct};
 use crate::numeral::{number, percent};
 use crate::optimize::{Linearization, Severity};
 
@@ -23,8 +23,7 @@ impl Extended<'_> {
     pub(crate) fn cut_off(&self, unknowns: &[Unknown]) -> Vec<Warning> {
         let residuals = &self.evidence.residuals.outputs;
         let coarse = |j: usize| {
-            let records = self.objective.problem.records.iter();
-            let (count, step) = steps(records.flat_map(|record| record.outputs()[j].values.iter().copied()))?;
+            let (count, step) = steps(&distinct(&self.objective.problem.records, j, MOST)?)?;
             let often = residuals[j].samples >= (TIMES * count) as u64;
             (often && residuals[j].rmse > PART_OF_STEP * step && !self.evidence.rounded[j]).then_some((j, count, step))
         };
@@ -64,18 +63,8 @@ impl Extended<'_> {
     }
 }
 
-/// The number of distinct values and the quantization step, where there are more than [`FEW`] and at most [`MOST`], all multiples of one step
-/// apart.
-fn steps(measured: impl Iterator<Item = f64>) -> Option<(usize, f64)> {
-    let mut values: Vec<f64> = vec![];
-    for value in measured.filter(|value| !value.is_nan()) {
-        if let Err(at) = values.binary_search_by(|one| one.total_cmp(&value)) {
-            values.insert(at, value);
-            if values.len() > MOST {
-                return None;
-            }
-        }
-    }
+/// The number of values and the quantization step, where there are more than [`FEW`], all multiples of one step apart.
+fn steps(values: &[f64]) -> Option<(usize, f64)> {
     let apart = || values.windows(2).map(|pair| pair[1] - pair[0]);
     let step = apart().reduce(f64::min)?;
     let multiple = |apart: f64| (apart / step - (apart / step).round()).abs() < 1e-6;
@@ -84,12 +73,18 @@ fn steps(measured: impl Iterator<Item = f64>) -> Option<(usize, f64)> {
 
 #[cfg(test)]
 mod tests {
-    use super::steps;
+    use super::{MOST, distinct, steps};
+    use crate::Time;
+    use crate::record::{Channel, Record};
 
     /// Values a multiple of a quarter apart, with gaps; others have no step. Few and many values are left out.
     #[test]
     fn steps_of_a_sensor() {
-        let of = |count: usize, value: fn(usize) -> f64| steps((0..count).map(value));
+        let of = |count: usize, value: fn(usize) -> f64| {
+            let channel = Channel::new("y", "", (0..count).map(value).collect::<Vec<f64>>());
+            let record = Record::new(vec![], Time::Uniform { start: 0.0, step: 1.0 }, vec![], vec![channel]).unwrap();
+            steps(&distinct(&[record], 0, MOST)?)
+        };
         assert_eq!(of(40, |k| 3.0 + 0.25 * (k * k % 23) as f64), Some((12, 0.25)));
         assert_eq!(of(40, |k| (k % 12) as f64 + if k % 12 == 5 { 0.1 } else { 0.0 }), None);
         assert_eq!([64, 65].map(|count| of(count, |k| k as f64)), [Some((64, 1.0)), None]);

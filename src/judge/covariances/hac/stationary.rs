@@ -26,16 +26,25 @@ const LONGEST: usize = 1000;
 /// An experiment with fewer measurements of an output takes the autoregression of all experiments together.
 const OWN: u64 = 100;
 
-/// Triangles of scores, one per experiment, the largest shares of the unknowns, and the sizes of the errors that have them.
-type WithShares = (Vec<Information>, Vec<Largest>, Sizes);
+/// What stationary errors say.
+pub(crate) struct Stationary {
+    /// Triangles of scores, one per experiment over its columns.
+    pub triangles: Vec<Information>,
+    /// The largest shares of the unknowns, and the sizes of the errors that have them.
+    pub shares: Vec<Largest>,
+    pub sizes: Sizes,
+    /// Whether an experiment has too few measurements of an output for an autoregression of its own.
+    pub short: Vec<bool>,
+    /// Relative variance of a variance by the autoregression of all experiments together.
+    pub uncertainty: f64,
+}
 
-/// Triangles of such scores, one per experiment over its columns, by the inverse of the curvature; `None` where variances are
-/// predicted.
+/// Such scores, by the inverse of the curvature; `None` where variances are predicted.
 pub(crate) fn scores(
     objective: &Objective<'_>,
     coordinates: &[f64],
     inverse: &Covariance,
-) -> Result<Option<WithShares>, Infeasible> {
+) -> Result<Option<Stationary>, Infeasible> {
     if objective.sweep.predicts_variance() {
         return Ok(None);
     }
@@ -49,10 +58,13 @@ pub(crate) fn scores(
     };
     let all = objective.gather(coordinates, true, make)?;
     let together = joined(all.iter().map(|one| &one.sums[..]), outputs);
+    let of_all = together.iter().map(|(sums, count)| Autoregression::of(sums, *count).uncertainty(*count));
+    let uncertainty = of_all.fold(0.0, f64::max);
+    let is_short = |(_, count): &(Autocorrelation, u64)| *count < OWN;
     let one = |e: usize| {
         let own = all[e].sums.iter().zip(&together);
         let models: Vec<Autoregression> = own
-            .map(|(own, together)| if own.1 < OWN { together } else { own })
+            .map(|(own, together)| if is_short(own) { together } else { own })
             .map(|(sums, count)| Autoregression::of(sums, *count))
             .collect();
         let make = || FilteredSlopes::new(objective, e, &models);
@@ -61,7 +73,9 @@ pub(crate) fn scores(
     let triangles: Option<Vec<Information>> = each(all.len(), one).into_iter().collect();
     let shares = || all.iter().map(|one| &one.shares);
     let (largest, sizes) = (shares::of_all(objective, shares()), shares::sizes_of_all(objective, shares()));
-    Ok(triangles.map(|triangles| (triangles, largest, sizes)))
+    let short = all.iter().map(|one| one.sums.iter().any(is_short)).collect();
+    let found = |triangles| Stationary { triangles, shares: largest, sizes, short, uncertainty };
+    Ok(triangles.map(found))
 }
 
 /// The sums and counts of all experiments, output by output.
@@ -103,12 +117,20 @@ impl Autoregression {
     }
 }
 
+impl Autoregression {
+    /// Relative variance of the variance of a slow combination of so many errors: `2 / n` by the innovations, and by the coefficients as for
+    /// an autoregression of order one with the same long-run variance, `4 d / n` where `d` errors count for one.
+    fn uncertainty(&self, count: u64) -> f64 {
+        let whole: f64 = self.coefficients.iter().sum();
+        let response: f64 = response(&self.coefficients).iter().map(|r| r * r).sum();
+        let dependence = ((1.0 - whole).powi(-2) / response).max(1.0);
+        (2.0 + 4.0 * dependence) / count.max(1) as f64
+    }
+}
+
 /// The samples that hold an impulse response but for a small rest.
 fn length(coefficients: &[f64]) -> usize {
-    let mut response = vec![1.0];
-    for t in 1..LONGEST {
-        response.push(coefficients.iter().zip(response[..t].iter().rev()).map(|(a, before)| a * before).sum());
-    }
+    let response = response(coefficients);
     let whole: f64 = response.iter().map(|r| r * r).sum();
     let mut rest = 0.0;
     let short = |r: &&f64| {
@@ -116,6 +138,15 @@ fn length(coefficients: &[f64]) -> usize {
         rest <= REST * whole
     };
     LONGEST - response.iter().rev().take_while(short).count()
+}
+
+/// The response to one innovation.
+fn response(coefficients: &[f64]) -> Vec<f64> {
+    let mut response = vec![1.0];
+    for t in 1..LONGEST {
+        response.push(coefficients.iter().zip(response[..t].iter().rev()).map(|(a, before)| a * before).sum());
+    }
+    response
 }
 
 /// Autocorrelations of the influences of each output's measurements, one after the other, and their number. Errors of a fit
@@ -352,6 +383,16 @@ mod tests {
             assert!(Autoregression::of(&sums, count).coefficients.len() <= order, "{count}");
         }
         assert_eq!(Autoregression::of(&sums, 8).coefficients.len(), 1);
+    }
+
+    /// White errors, and an autoregression of 0.8, of whose errors `(1 + 0.8) / (1 - 0.8) = 9` count for one.
+    #[test]
+    fn the_variance_of_a_variance() {
+        let of = |coefficients: &[f64]| {
+            let coefficients = coefficients.to_vec();
+            Autoregression { length: 1, coefficients, innovation: 1.0 }.uncertainty(1000)
+        };
+        assert!((of(&[]) - 6e-3).abs() < 1e-15 && (of(&[0.8]) - 38e-3).abs() < 1e-12, "{} {}", of(&[]), of(&[0.8]));
     }
 
     /// The order is the first of the least `n ln(v) + 2 k`, where `v` is the part of the variance that the best of `k`

@@ -4,11 +4,14 @@
 //! for it, whose variance is `h / (1 - h)` times that of the noise at leverage `h`. Where a measurement determines an unknown, both
 //! are of one size and may cancel by chance: of straight lines with one far measurement, noisier than the others, 84 % were covered.
 //! [`CANCELED`] times the variance of that prediction, by the noise of all measurements, is therefore added to the square.
+//!
+//! Where the others predict a measurement with more than five times its noise, they say nothing of its noise, and the variance of that
+//! prediction nothing of the estimate. One less the leverage counts as [`LEAST`] there at least: of a measurement that alone determines an
+//! unknown the variance is then `CANCELED / LEAST`, ten times that of the noise of all, instead of growing without bound.
 
 use super::ROWS;
 use crate::information::{Block, Information};
 use crate::judge::evidence::shares::Shares;
-use crate::judge::leverage::ALONE;
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
 
@@ -16,6 +19,9 @@ use crate::sweep::Window;
 /// determines then covers 95.7 % of normal errors where that measurement's deviation is 2.2 times that of the prediction, and more
 /// where it is larger or smaller; with 0.35 it covered 93.8 % of 2,000 lines through 41 measurements.
 const CANCELED: f64 = 0.4;
+
+/// The least of one less the leverage, `1/26` for a prediction with five times the noise, rounded.
+const LEAST: f64 = 0.04;
 
 /// The triangle of the scores.
 pub(crate) struct Scores<'s> {
@@ -62,7 +68,7 @@ impl Accumulate for Scores<'_> {
                 slopes.iter_mut().zip(values).for_each(|(to, from)| *to = *from);
                 let z = window.error(k, j, lane);
                 let leverage = self.shares.take(weight, &slopes, z, (j, sample));
-                let less = (1.0 - leverage).max(ALONE);
+                let less = (1.0 - leverage).max(LEAST);
                 let influence = weight * loss.map_or(z, |loss| loss.psi(z)) / less;
                 self.row.iter_mut().zip(&slopes).for_each(|(row, slope)| *row += slope * influence);
                 for ([move_by, uncertain], moved) in self.moves.iter_mut().zip(self.shares.moved()) {

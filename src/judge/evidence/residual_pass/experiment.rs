@@ -1,6 +1,5 @@
 //! Sums over the errors of one experiment, window by window.
 
-use super::horizon;
 use crate::judge::evidence::coupling::Coupling;
 use crate::judge::evidence::largest::Largest;
 use crate::judge::evidence::output_sums::OutputSums;
@@ -30,8 +29,6 @@ pub(crate) struct Sums<'s> {
     pub coupling: Coupling,
     pub largest: Vec<Largest>,
     pub least_sigma: Vec<f64>,
-    /// Whether autocorrelations count samples, instead of measurements.
-    by_sample: bool,
     /// The windows to be simulated again, and of the others those with the most motion and with the longest intervals.
     again: Vec<Sampled>,
     moving: Extremes,
@@ -60,11 +57,10 @@ impl<'s> Sums<'s> {
             outputs: vec![OutputSums::default(); outputs],
             measured: 0,
             log_determinants: (objective.whitening.log_determinant(&all), 0.0),
-            portmanteaus: vec![Portmanteau::new(LAGS.max(horizon(objective))); outputs],
+            portmanteaus: vec![Portmanteau::new(LAGS); outputs],
             coupling: Coupling::new(outputs),
             largest: vec![Largest::default(); outputs],
             least_sigma: vec![f64::INFINITY; outputs],
-            by_sample: horizon(objective) > 0,
             again: vec![],
             moving: Extremes::default(),
             waiting: Extremes::default(),
@@ -115,11 +111,11 @@ impl<'s> Sums<'s> {
     fn follow(&mut self, window: &Window, j: usize, lane: usize) {
         let (weighted, samples) = (self.objective.is_weighted(), window.samples[lane]);
         let errors = &self.errors[j * samples..][..samples];
-        if !weighted && (self.by_sample || window.whole) {
+        if !weighted && window.whole {
             return self.portmanteaus[j].add(errors);
         }
         let weight = |k: usize| self.objective.weight(self.experiment, window.begin[lane] + k);
-        let counts = |k: usize| self.by_sample || window.is_measured(k, j, lane) && !(weighted && weight(k) == 0.0);
+        let counts = |k: usize| window.is_measured(k, j, lane) && !(weighted && weight(k) == 0.0);
         let weigh = |(k, error): (usize, &f64)| if weighted { error * weight(k).sqrt() } else { *error };
         self.tested.clear();
         self.tested.extend(errors.iter().enumerate().filter(|(k, _)| counts(*k)).map(weigh));
