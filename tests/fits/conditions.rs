@@ -65,7 +65,9 @@ where
 }
 
 fn text<M: Model>(estimate: &Estimate<M>) -> &str {
-    let mut of = estimate.warnings.iter().filter(|warning| warning.code == WarningCode::Unidentified);
+    let unidentified =
+        |warning: &&Warning| warning.code == WarningCode::Unidentified && warning.text.contains("`theta`");
+    let mut of = estimate.warnings.iter().filter(unidentified);
     &of.next().unwrap_or_else(|| panic!("{estimate}")).text
 }
 

@@ -92,7 +92,7 @@ fn halves_that_contradict_each_other_are_named() {
 }
 
 /// Two outputs, each known by eighty errors of 0.1 across its input of one: their gains differ by five standard errors of the
-/// difference, `0.1 sqrt(2 / 79)`. The chance of as much, chi-squared of 25 with one degree of freedom, is 5.7e-7.
+/// difference, `0.1 sqrt(2 / 79)`. The chance of as much, Fisher's F of 25 with 1 and 79 degrees of freedom, is 3.4e-6.
 #[test]
 fn outputs_contradict_by_their_difference() {
     let (u, e) = ([1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0], [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0]);
@@ -106,7 +106,7 @@ fn outputs_contradict_by_their_difference() {
     let record = Experiment::new(&Twice, time, inputs, (0..80).map(output).collect()).unwrap();
     let estimate = fit(std::slice::from_ref(&record)).run().unwrap();
     let warning = said(&estimate, WarningCode::OutputsContradict).unwrap();
-    assert!(warning.text.contains("chi-square p = 5.7e-7"), "{}", warning.text);
+    assert!(warning.text.contains("Chow's test p = 3.4e-6"), "{}", warning.text);
 }
 
 /// `y = a u`, `z = a w`, of samples in an order.
@@ -144,7 +144,7 @@ fn outputs_contradict_by_colored_and_by_white_errors() {
 }
 
 /// The same of two records, one of which is noisier: each counts by its own noise, `(0.1^2 + 0.3^2) / 79` for the difference,
-/// in whatever coordinate the gain is sought.
+/// in whatever coordinate the gain is sought; the chance is as above.
 #[test]
 fn records_contradict_by_their_own_noise() {
     let (u, e) = ([1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0], [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0]);
@@ -160,7 +160,7 @@ fn records_contradict_by_their_own_noise() {
         let warning = estimate.warnings.iter().find(|warning| warning.code == WarningCode::RecordsContradict);
         let text = &warning.unwrap_or_else(|| panic!("{estimate}")).text;
         // By a regression of each, with `apart` = 0.178, `0.1 / sqrt(79)` = 0.0113 and three times that.
-        for words in ["chi-square p = 5.7e-7", "2 +- 0.011 by `one` alone", "2.178 +- 0.034 by `two` alone"] {
+        for words in ["Chow's test p = 3.4e-6", "2 +- 0.011 by `one` alone", "2.178 +- 0.034 by `two` alone"] {
             assert!(text.contains(words), "{text}");
         }
     }

@@ -186,7 +186,7 @@ fn differing(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covari
     let apart = error * (differing.equal * (1.0 - differing.ratio.recip())).sqrt();
     let part = apart / unknown.value.abs().max(f64::MIN_POSITIVE);
     let text = format!(
-        "`{}` differs from record to record by more than the errors do ({} records, chi-square {}): by about {} {} ({} of itself, one standard \
+        "`{}` differs from record to record by more than the errors do ({} records, {}): by about {} {} ({} of itself, one standard \
          deviation); its interval is that of a mean over such records; give each record its own (Parameter::per_experiment), check whether all \
          are of one plant, and what the model leaves out",
         unknown.name,
@@ -253,7 +253,7 @@ fn warning(
     };
     let said = |piece: &Piece| format!("{} +- {} by {}", number(value(piece), 4), number(error(piece), 2), name(piece));
     let text = format!(
-        "`{}` is {} and {} ({} apart; chi-square {}): check gains, signs and delays of the sensors, whether all data are of \
+        "`{}` is {} and {} ({} apart; Chow's test {}): check gains, signs and delays of the sensors, whether all data are of \
          one plant, and what the model leaves out",
         unknown.name,
         said(one),
