@@ -81,7 +81,7 @@ pub struct Report {
     pub version: Version,
     /// The heading.
     pub title: String,
-    /// The worst that is said of the estimate.
+    /// That of the estimate, and of what was added ([`with`](Report::with)) if that is worse.
     pub severity: Severity,
     /// The estimate, for programs.
     pub estimate: Summary,
@@ -92,15 +92,13 @@ pub struct Report {
 impl Report {
     /// The report that these values make.
     fn of(facts: &Facts) -> Report {
-        let sections = sections::all(facts);
-        let said = sections.iter().map(|section| section.severity);
         Report {
             format: Format,
             version: Version,
             title: "Parameter estimation".to_owned(),
-            severity: said.fold(facts.estimate.severity(), Severity::max),
+            severity: facts.estimate.severity(),
             estimate: facts.estimate.clone(),
-            sections,
+            sections: sections::all(facts),
         }
     }
 

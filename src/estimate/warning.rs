@@ -56,7 +56,7 @@ pub enum WarningCode {
     SignChanged,
     /// A parameter of another order of magnitude than its start.
     FarFromStart,
-    /// Errors that follow from the prediction or, of a static model, from an input.
+    /// Errors that follow from the prediction, or from an input.
     WrongShape,
     /// Parameters that differ from record to record.
     RecordsContradict,

@@ -27,8 +27,10 @@ mod rise;
 mod search;
 mod sensors;
 mod shape;
+mod signals_before;
 mod step;
 mod step_accumulation;
+mod step_shift;
 #[cfg(test)]
 mod tests;
 mod uneven_errors;
@@ -56,6 +58,7 @@ pub(crate) const CHECKS: &[Check] = &[
     explained::UNEXPLAINED,
     explained::GIVEN_NOISE,
     shape::FOLLOWING,
+    signals_before::SIGNALS_BEFORE,
     outliers::OUTLIERS,
     parts::PARTS,
     sensors::SENSORS,

@@ -74,7 +74,7 @@ impl<'e> Evidence<'e> {
     }
 
     /// The outputs whose errors are tested for whiteness, all but those that are round-off.
-    fn tested(&self) -> Vec<(usize, Whiteness)> {
+    pub fn tested(&self) -> Vec<(usize, Whiteness)> {
         let whiteness = self.residuals.whiteness.iter().copied().enumerate();
         whiteness.filter(|(j, _)| !self.rounded[*j]).collect()
     }

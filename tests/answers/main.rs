@@ -7,6 +7,7 @@ mod filters;
 mod gallery;
 mod identifiability;
 mod json;
+mod one_verdict;
 mod pages;
 #[path = "../common/random.rs"]
 mod random;

@@ -287,10 +287,9 @@ fn tests_that_may_fail_by_chance_are_called_so() {
     let problem = Fit::new(&model, &record).parameters(parameters).problem().unwrap();
     let report = Report::new(&problem, &problem.run().unwrap()).unwrap();
     let section = report.sections.iter().find(|section| section.id == "residuals").unwrap();
-    assert_eq!(section.severity, Severity::Usable);
-    let reason = "2 of 32 tests of the residuals failed, none clearly: among so many that may be chance";
-    assert_eq!(section.all_reasons()[0].1, reason);
-    assert_eq!(section.sentences[0], "Of 32 tests so many may fail by chance. If it is none:");
+    assert!(section.severity == Severity::Usable && section.all_reasons().is_empty());
+    let says = "2 of 32 tests failed, none clearly: so many may fail by chance. If it is none:";
+    assert_eq!(section.sentences[0], says);
 }
 
 #[test]

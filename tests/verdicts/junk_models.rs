@@ -75,7 +75,7 @@ fn plants() -> Vec<Junk> {
         seen("speed in revolutions per minute", |s| {
             spoil(Box::new(surface()), s, |c, _| c.u[2].iter_mut().for_each(|w| *w *= 60.0 / std::f64::consts::TAU))
         }),
-        seen("wrong pole pairs", |s| {
+        named("wrong pole pairs", WrongShape, |s| {
             let plant = surface();
             let record = plant.record(s, SAMPLES).noisy(NOISE, 0.0, s);
             let wrong = Bench { model: Surface::new(8).unwrap(), ..surface() };

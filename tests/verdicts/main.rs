@@ -6,6 +6,7 @@ mod extremes;
 mod further;
 mod good;
 mod good_processes;
+mod growing;
 mod initial;
 mod junk;
 mod junk_inputs;

@@ -72,13 +72,20 @@ pub(super) fn between(residuals: &Series, own: &[f64], role: SignalRole, signal:
     // Where the largest of so many has the probability of the level.
     let one_lag = -((-LEVEL).ln_1p() / count.max(1.0)).exp_m1();
     let band = -Normal::standard().inverse_cdf(one_lag / 2.0) * deviation;
-    let failed = match is_output {
-        false => format!(
-            "the residuals follow from the input `{0}`: what it does to `{1}` is missing or wrong in the model (a term, a \
-             delay, a nonlinearity)",
+    // An input that only goes with the residuals of its own sample may have been computed from the measurement.
+    let before = tested[usize::from(!is_output)..].iter().any(|r| r.abs() > band);
+    let failed = match (is_output, before) {
+        (false, true) => format!(
+            "the residuals follow from the input `{0}` of the samples before: what it does to `{1}` is missing or wrong in the model (a \
+             term, a delay, a nonlinearity), or colored noise is fed back to it",
             signal.name, residuals.name
         ),
-        true => format!(
+        (false, false) => format!(
+            "the residuals go with the input `{0}` of the same sample: a controller computed it from the measurement of `{1}`, or it acts \
+             on `{1}` without delay otherwise than the model says",
+            signal.name, residuals.name
+        ),
+        (true, _) => format!(
             "the residuals follow from `{}` measured before: the model misses dynamics of `{}`, or its noise is colored",
             signal.name, residuals.name
         ),

@@ -18,8 +18,8 @@ pub(super) fn mean(residuals: &Series, effective: f64) -> Test {
 }
 
 const NORMAL: &str = "the residuals may be normal, as least squares wants them for its best";
-const NOT_NORMAL: &str = "the residuals are not normal: outliers (use a robust loss), switching between regimes, or steps \
-                          of a converter; estimates stand, but are not the most precise there are";
+const NOT_NORMAL: &str = "the residuals are not normal: outliers (whose influence a robust loss bounds), switching between \
+                          regimes, or steps of a converter; estimates stand, but squared errors do not give the most precise ones";
 
 /// Jarque and Bera's test (International Statistical Review 55 (1987) 163) and Anderson and Darling's with Stephens'
 /// p-values (D'Agostino and Stephens, *Goodness-of-Fit Techniques*, 1986, table 4.9). Both take the residuals to be

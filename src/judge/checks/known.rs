@@ -52,15 +52,24 @@ pub(crate) const SIGNS: Check = Check {
 
 pub(crate) const SIZES: Check = Check {
     name: "parameters are of the size of their start",
-    asks: "Is a parameter so many times its start, or one such part of it, that a unit is another?",
+    asks: "Is a parameter so many times its start, or one such part of it, that a unit is another, or that the search ran away along a direction that the data do not determine?",
     codes: &[WarningCode::FarFromStart],
     costs: &[],
-    levels: &[Level { of: "the ratio", value: ANOTHER_UNIT, source: "beyond 360 degrees in a turn, below 1,000" }],
+    levels: &[
+        Level { of: "the ratio", value: ANOTHER_UNIT, source: "beyond 360 degrees in a turn, below 1,000" },
+        Level {
+            of: "the ratio of a parameter that is not determined, which is not usable",
+            value: RUN_AWAY,
+            source: "no start is that far off",
+        },
+    ],
     examine: |_, intervals| far_from_start(&intervals.unknowns).into(),
 };
 
 /// A parameter so many times its start, or one such part of it, is in another unit.
 const ANOTHER_UNIT: f64 = 400.0;
+/// The same ratio of a parameter that the data do not determine: the search has run along a direction in which it changes nothing.
+const RUN_AWAY: f64 = 1e4;
 
 /// Standard deviations of their difference between estimate and prior mean from which on an estimate is with care (chance exceeds them in
 /// 0.1 %), and not usable.
@@ -180,13 +189,14 @@ fn distance(unknown: &Unknown, prior: Prior) -> Option<f64> {
 }
 
 /// The parameters that a start was given for, with the ratio of value and start.
+fn all_started(unknowns: &[Unknown]) -> impl Iterator<Item = (&Unknown, f64)> {
+    let started = |unknown: &&Unknown| matches!(unknown.role, Role::Parameter(_)) && unknown.start != 0.0;
+    unknowns.iter().filter(started).map(|unknown| (unknown, unknown.value / unknown.start))
+}
+
+/// Those of them that are known.
 fn started(unknowns: &[Unknown]) -> impl Iterator<Item = (&Unknown, f64)> {
-    let known = |unknown: &&Unknown| {
-        matches!(unknown.role, Role::Parameter(_))
-            && unknown.start != 0.0
-            && unknown.knowledge.standard_error().is_some()
-    };
-    unknowns.iter().filter(known).map(|unknown| (unknown, unknown.value / unknown.start))
+    all_started(unknowns).filter(|(unknown, _)| unknown.knowledge.standard_error().is_some())
 }
 
 /// Parameters of the opposite sign than their start.
@@ -221,7 +231,22 @@ fn far_from_start(unknowns: &[Unknown]) -> Vec<Warning> {
         );
         with_care(WarningCode::FarFromStart, text)
     };
-    far.map(one).collect()
+    let ran = all_started(unknowns).filter(|(unknown, ratio)| {
+        let size = ratio.abs();
+        unknown.knowledge == Knowledge::Unidentified && (size > RUN_AWAY || size < RUN_AWAY.recip())
+    });
+    let away = |(unknown, ratio): (&Unknown, f64)| {
+        let Unknown { name, value, start, unit, .. } = unknown;
+        let text = format!(
+            "`{name}` is {} {unit}, {} times its start {}, and the data do not determine it: the search has run along a direction that \
+             changes nothing; check signals and units, fix it, or give it a bound or a prior",
+            number(*value, 4),
+            number(ratio, 2),
+            exact(*start)
+        );
+        Warning { code: WarningCode::FarFromStart, severity: Severity::NotUsable, text }
+    };
+    far.map(one).chain(ran.map(away)).collect()
 }
 
 #[cfg(test)]
@@ -287,6 +312,10 @@ mod tests {
         assert!(
             far_from_start(&[Unknown { knowledge: Knowledge::Unidentified, ..unknown(401.0, 1.0, 1.0) }]).is_empty()
         );
+        let lost = |value: f64| Unknown { knowledge: Knowledge::Unidentified, ..unknown(value, 1.0, 1.0) };
+        let severities = |value: f64| far_from_start(&[lost(value)]).iter().map(|one| one.severity).collect::<Vec<_>>();
+        assert_eq!([severities(-1.01e4), severities(0.99e-4)], [[Severity::NotUsable], [Severity::NotUsable]]);
+        assert!(severities(0.99e4).is_empty() && severities(1.01e-4).is_empty());
         let state = Unknown { role: Role::InitialState(0), ..unknown(-401.0, 1.0, 1.0) };
         assert!(far_from_start(std::slice::from_ref(&state)).is_empty() && opposite(&[state]).is_empty());
         let text = &far_from_start(&[unknown(500.0, 1.0, 1.0)])[0].text;

@@ -3,15 +3,15 @@
 use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::judge::check::{Check, Level, Pass};
 use crate::judge::checks::step_accumulation::windows_add_up;
+use crate::judge::checks::step_shift::{Shift, shift};
 use crate::judge::directions::{taking_part, undetermined};
 use crate::judge::evidence::Evidence;
 use crate::numeral::{number, percent};
 use crate::optimize::{Outcome, Severity};
-use crate::problem::Objective;
 
 pub(crate) const STEP: Check = Check {
     name: "a finer step changes nothing",
-    asks: "Where some windows change with a finer step: by how many standard errors would an unknown move, or is there no minimum with it?",
+    asks: "Where some windows change with a finer step: by how many standard errors would an unknown move, or what the data determine of several together, or is there no minimum with it?",
     codes: &[WarningCode::CoarseStep, WarningCode::NotAtMinimum],
     costs: &[Pass::Finer],
     levels: &[
@@ -68,28 +68,28 @@ fn step(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
         coarse.then(|| evidence.point.objective.sweep.refined(evidence.point.objective.problem.samples())).flatten();
     let Some(finer) = finer else { return vec![] };
     let objective = evidence.point.objective.of(evidence.point.objective.problem, &*finer);
-    let Some((name, shift, part)) = shift(&objective, &evidence.point.end.coordinates, unknowns) else {
-        return diverges(unknowns, change, &finer.integrator());
+    let Some(Shift { of, errors, part }) = shift(evidence, &objective, unknowns) else {
+        return diverges(evidence, change, &finer.integrator());
     };
     let finer = finer.integrator();
-    let wrong = refines && shift > STEP_SHIFT && part >= DIGITS;
+    let wrong = refines && errors > STEP_SHIFT && part >= DIGITS;
     let severity = if wrong { Severity::NotUsable } else { Severity::UsableWithCare };
     let warning = || {
-        let (part, errors) = (percent(part, 2), number(shift, 2));
+        let (part, errors) = (percent(part, 2), number(errors, 2));
         let tried = if refines { "no method that was tried steps finely enough" } else { "the step is too coarse" };
         let text = format!(
-            "{tried}: with {finer} `{name}` would move by {part} of itself ({errors} standard errors); use a finer step, \
+            "{tried}: with {finer} {of} would move by {part} of itself ({errors} standard errors); use a finer step, \
              or smooth the model"
         );
         Warning { code: WarningCode::CoarseStep, severity, text }
     };
-    if shift > most { vec![warning()] } else { vec![] }
+    if errors > most { vec![warning()] } else { vec![] }
 }
 
 /// Warnings where the simulation with a finer step fails at the estimate, or grows until its slopes determine no step: a coarse step damps
 /// oscillations by itself, so that parameters of an unstable plant may fit. These are no minimum with the finer step.
-fn diverges(unknowns: &[Unknown], change: f64, finer: &str) -> Vec<Warning> {
-    if unknowns.iter().all(|unknown| unknown.knowledge.standard_error().is_none()) {
+fn diverges(evidence: &Evidence<'_>, change: f64, finer: &str) -> Vec<Warning> {
+    if evidence.point.undetermined.held.iter().all(|held| *held) {
         return vec![];
     }
     let by = match change.is_finite() {
@@ -113,10 +113,9 @@ fn diverges(unknowns: &[Unknown], change: f64, finer: &str) -> Vec<Warning> {
 fn exact_with_this_step(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
     let finer = evidence.point.objective.sweep.refined(evidence.point.objective.problem.samples())?;
     let objective = evidence.point.objective.of(evidence.point.objective.problem, &*finer);
-    let (name, _, part) =
-        shift(&objective, &evidence.point.end.coordinates, unknowns).filter(|(.., part)| *part >= DIGITS)?;
+    let Shift { of, part, .. } = shift(evidence, &objective, unknowns).filter(|shift| shift.part >= DIGITS)?;
     let text = format!(
-        "the data are reproduced to their rounding by {}; {} would change `{name}` by {} of itself: right for a record that was \
+        "the data are reproduced to their rounding by {}; {} would change {of} by {} of itself: right for a record that was \
          simulated with this step, else choose a finer one (Fit::integrator)",
         evidence.point.objective.sweep.integrator(),
         finer.integrator(),
@@ -173,43 +172,4 @@ fn step_decides_the_search(evidence: &Evidence<'_>) -> Option<Warning> {
         evidence.point.objective.sweep.refined(evidence.point.objective.problem.samples())?.integrator()
     );
     Some(Warning { code: WarningCode::CoarseStep, severity: Severity::NotUsable, text })
-}
-
-/// By how many standard errors, and by which part of itself, an unknown would move at most towards the minimum of an
-/// objective.
-fn shift(objective: &Objective<'_>, coordinates: &[f64], unknowns: &[Unknown]) -> Option<(String, f64, f64)> {
-    let linear = objective.evaluate(coordinates).ok()?;
-    let held: Vec<bool> = unknowns.iter().map(|row| row.knowledge.standard_error().is_none()).collect();
-    let step = linear.step(&vec![0.0; unknowns.len()], &held)?;
-    let shift = |i: usize| {
-        let unknown = &unknowns[i];
-        let change = (step[i] * unknown.transform.slope(unknown.value)).abs();
-        let error = unknown.knowledge.standard_error()?;
-        Some((unknown.name.clone(), change / error, change / unknown.value.abs()))
-    };
-    (0..unknowns.len()).filter_map(shift).max_by(|a, b| a.1.total_cmp(&b.1))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::shift;
-    use crate::estimate::Knowledge;
-    use crate::tests::{Current, Gain, Line, Voltage};
-    use crate::{Experiment, Fit, Time, free};
-
-    /// At a gain of two, where a record has three: the whole way in the gain itself; in its logarithm half of it by the slope,
-    /// which is one of the gain. Errors of 0.5.
-    #[test]
-    fn an_unknown_moves_in_its_own_unit() {
-        let time = Time::Uniform { start: 0.0, step: 1.0 };
-        let record = Experiment::new(&Line, time, vec![Voltage { u: 1.0 }; 4], vec![Current { i: 3.0 }; 4]).unwrap();
-        for (a, coordinate) in [(free(2.0), 2.0), (free(2.0).log(), 2f64.ln())] {
-            let fit = Fit::new(&Line, &record).parameters(Gain { a }).noise(Current { i: 1.0 });
-            let problem = fit.problem().unwrap();
-            let mut unknowns = problem.estimate(&[coordinate]).unwrap().unknowns;
-            unknowns[0].knowledge = Knowledge::Known { standard_error: 0.5, lower: 1.0, upper: 3.0 };
-            let (_, errors, part) = shift(&problem.objective().unwrap(), &[coordinate], &unknowns).unwrap();
-            assert!((errors - 2.0).abs() < 1e-12 && (part - 0.5).abs() < 1e-12, "{errors} {part}");
-        }
-    }
 }

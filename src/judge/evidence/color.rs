@@ -12,7 +12,8 @@ const MUCH: f64 = 0.05;
 /// above the second the model is wrong or noise dominates the output.
 pub(crate) const SMALL: f64 = 1e-4;
 pub(crate) const LARGE: f64 = 0.5;
-/// The same part from which on a minimum that was found once is taken as wrong: driven pendulums fitted with a wrong natural frequency had
+/// The same part from which on a minimum that was found once is taken as wrong, and a model whose errors certainly follow from its
+/// signals: driven pendulums fitted with a wrong natural frequency had
 /// 0.3, right models with colored noise of 5 % of the output less than 0.05.
 pub(crate) const LEFT: f64 = 0.1;
 
@@ -21,6 +22,11 @@ pub(crate) const LEFT: f64 = 0.1;
 pub(crate) fn is_certain(p_value: f64, outputs: usize, part: f64) -> bool {
     let chance = p_value * outputs as f64;
     chance < CERTAIN || chance < LIKELY && part > MUCH
+}
+
+/// How severe it is that such a part of an output's movement is an error that certainly is the model's, and no noise.
+pub(crate) fn severity_of_misfit(part: f64) -> Severity {
+    if part > LEFT { Severity::NotUsable } else { severity(part) }
 }
 
 /// How severe it is that such a part of an output's movement is an error that follows from others.
@@ -45,5 +51,6 @@ mod tests {
         let levels = [0.501, 0.5, 1.01e-4, 1e-4].map(severity);
         use Severity::{NotUsable, Usable, UsableWithCare};
         assert_eq!(levels, [NotUsable, UsableWithCare, UsableWithCare, Usable]);
+        assert_eq!([0.101, 0.1, 1e-4].map(severity_of_misfit), [NotUsable, UsableWithCare, Usable]);
     }
 }

@@ -151,7 +151,7 @@ pub(crate) fn parts_by_chance(parts: &[Powers]) -> f64 {
 }
 
 /// Fisher's test of a gain with so many degrees of freedom, beside errors of the others.
-fn by_chance(gain: f64, degrees: f64, squares: f64, free: f64) -> f64 {
+pub(crate) fn by_chance(gain: f64, degrees: f64, squares: f64, free: f64) -> f64 {
     let ratio = gain / degrees / (squares / free);
     if !(degrees >= 1.0 && free >= FEWEST && ratio.is_finite()) {
         return 1.0;

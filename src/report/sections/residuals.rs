@@ -1,10 +1,9 @@
-//! The residuals: what their tests say together, and those of each output.
+//! The residuals: the tests that failed together, and those of each output.
 
 use super::quoted;
 use crate::diagnose::residuals::{Correlation, Residuals, SignalRole, Spread};
 use crate::diagnose::{self, LEVEL, Test};
 use crate::numeral::{self, counted, number, resolved, rounded, unit_after};
-use crate::optimize::Severity;
 use crate::report::facts::{Facts, OutputFit, Record};
 use crate::section::{Axis, Curves, Drawing, Layer, Plot, Section, Style};
 
@@ -18,24 +17,20 @@ fn tests(facts: &Facts) -> impl Iterator<Item = (String, &Test)> {
     })
 }
 
-/// The joint meaning of the failed tests; `None` if none failed.
+/// The failed tests with what each may mean; `None` if none failed. They are no reasons: the verdict is that of the estimate's warnings.
 pub(super) fn section(facts: &Facts) -> Option<Section> {
     let failed: Vec<_> = tests(facts).filter(|(_, test)| !test.passed).collect();
-    let (of, clearest) = failed.iter().min_by(|a, b| a.1.p_value.total_cmp(&b.1.p_value))?;
+    let least = failed.iter().map(|(_, test)| test.p_value).reduce(f64::min)?;
     let (count, all) = (failed.len(), tests(facts).count());
-    let section = Section::new("residuals", "Tests of the residuals that failed");
-    // Of many tests some fail by chance, so one must fail at its part of the level (Bonferroni) to count.
-    let section = if clearest.p_value * all as f64 >= LEVEL {
-        let text =
-            format!("{count} of {all} tests of the residuals failed, none clearly: among so many that may be chance");
-        section
-            .because(Severity::Usable, text)
-            .says(format!("Of {all} tests so many may fail by chance. If it is none:"))
-    } else {
-        let Test { name, meaning, .. } = clearest;
-        let text = format!("{count} of {all} tests of the residuals failed, clearest {name} on {of}: {meaning}");
-        section.because(Severity::UsableWithCare, text)
+    // Of many tests some fail by chance: one counts that fails at its part of the level (Bonferroni).
+    let text = match least * all as f64 >= LEVEL {
+        true => format!("{count} of {all} tests failed, none clearly: so many may fail by chance. If it is none:"),
+        false => format!(
+            "{count} of {all} tests failed. They are no part of the verdict, whose own tests allow for the size of what is found, for \
+             feedback, for colored noise and for the loss. What a failed test may mean:"
+        ),
     };
+    let section = Section::new("residuals", "Tests of the residuals that failed").says(text);
     Some(meanings(&failed).into_iter().fold(section, Section::says))
 }
 
@@ -87,15 +82,12 @@ pub(super) fn of_output(id: &str, record: &Record, fit: &OutputFit, shown: usize
     let title = format!("The residuals of {} against each signal", fit.name);
     let against = Section::new(format!("{id}-{}-signals", fit.name), title).folded();
     let against = against_signals(id, record, fit).into_iter().take(shown).fold(against, Section::plot);
-    let mut section = section
+    section
         .plot(fit.closeup.clone())
         .plot(histogram(id, record, fit))
         .plot(autocorrelation(id, record, fit))
         .plot(spectrum(id, record, fit))
-        .part(Some(against).filter(|part| !part.is_empty()));
-    // Each failed test is said once, together with the others.
-    section.severity = Severity::Usable;
-    section
+        .part(Some(against).filter(|part| !part.is_empty()))
 }
 
 fn outliers(record: &Record, of: &Residuals) -> Option<String> {
