@@ -13,9 +13,13 @@ use rayon::prelude::*;
 const NOISE: f64 = 0.02;
 
 /// The verdicts on a fault of each of these sizes, the smallest first.
-fn grows<T: Sync>(sizes: &[T], judged: impl Fn(&T) -> Found + Sync) -> Vec<Found> {
+fn grows<T: Sync>(sizes: &[T], judged: impl Fn(&T) -> Found + Sync + Send) -> Vec<Found> {
     let all: Vec<Found> = sizes.par_iter().map(judged).collect();
-    assert!(all.windows(2).all(|pair| pair[0].severity <= pair[1].severity), "{}", all.iter().map(|one| &*one.text).collect::<String>());
+    assert!(
+        all.windows(2).all(|pair| pair[0].severity <= pair[1].severity),
+        "{}",
+        all.iter().map(|one| &*one.text).collect::<String>()
+    );
     all
 }
 

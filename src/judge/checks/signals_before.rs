@@ -37,7 +37,9 @@ pub(crate) const SIGNALS_BEFORE: Check = Check {
             source: "wrong pole pairs, gains and delays move parameters by a quarter or more from there on",
         },
     ],
-    examine: |evidence, _| Examined::unless(skipped(evidence), || by_signals_before(evidence)).without(left_out(evidence)),
+    examine: |evidence, _| {
+        Examined::unless(skipped(evidence), || by_signals_before(evidence)).without(left_out(evidence))
+    },
 };
 
 /// Why it is not made.
@@ -83,7 +85,8 @@ fn by_signals_before(evidence: &Evidence<'_>) -> Option<Warning> {
     }
     let (objective, all) = (evidence.point.objective, evidence.first_errors());
     let most = MOST / all.len().max(1);
-    let series: Vec<Series> = all.iter().enumerate().map(|(e, errors)| Series::new(evidence, e, errors, most)).collect();
+    let series: Vec<Series> =
+        all.iter().enumerate().map(|(e, errors)| Series::new(evidence, e, errors, most)).collect();
     let tested = evidence.tested();
     let regression = Regression::new(&series)?;
     let found = tested.iter().filter_map(|(j, white)| {
