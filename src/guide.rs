@@ -50,4 +50,5 @@ chapter!(chapter_14_coming_from, "14_coming_from");
 chapter!(chapter_15_how_it_works, "15_how_it_works");
 #[cfg(feature = "text")]
 chapter!(chapter_16_text_models, "16_text_models");
+chapter!(chapter_17_command, "17_command");
 chapter!(chapter_18_python, "18_python");

@@ -82,6 +82,7 @@
 //! | fit many records, each by itself | [`Fleet`] |
 //! | fit equations that are made at run time or read from a file | [`equations`], [`graph`], [`Fit`] |
 //! | write a model as a text file, or read one | [`text`] |
+//! | fit from a shell, without Rust | the command `greybox`: [`guide::chapter_17_command`] |
 //! | choose an integrator | [`Automatic`], [`Rk4`], [`Rk45`], [`Esdirk`], [`Discrete`] |
 //! | choose what is predicted | [`FreeRun`], [`Horizon`], [`Kalman`], [`predict`] |
 //! | weigh or filter errors, limit outliers | [`weighting`], [`loss`], [`Butterworth`] |

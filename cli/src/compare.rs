@@ -1,0 +1,99 @@
+//! `compare`: several models or estimates on the same records, on one page.
+
+use crate::arguments::Compare;
+use crate::fitting::{Loaded, declared, estimate, model, watched};
+use crate::terminal::Terminal;
+use crate::{Failure, Verdict, fit, output, records};
+use greybox::diagnose::Compared;
+use greybox::problem::Problem;
+use greybox::record::Record;
+use greybox::report::{Cell, Section, Table};
+use greybox::{Report, Summary};
+use std::path::PathBuf;
+
+/// A model with its estimate.
+struct Entrant {
+    title: String,
+    loaded: Loaded,
+    problem: Problem<'static>,
+    estimate: Summary,
+}
+
+pub fn run(one: &Compare, terminal: &Terminal) -> Result<Verdict, Failure> {
+    if one.records.is_empty() {
+        return Err("no record is named; those before --validation are fitted, those after it predicted".into());
+    }
+    let entrants = one.models.iter().map(|name| entrant(name, one, terminal)).collect::<Result<Vec<_>, _>>()?;
+    let Some(first) = entrants.first() else { return Err("no model is named: --model MODEL".into()) };
+    let mut compared = vec![];
+    for (k, record) in first.loaded.records.iter().enumerate() {
+        compared.push(predicted(Compared::estimation(record), &entrants, |entrant| Ok(entrant.loaded.records[k].clone()))?);
+    }
+    for path in &one.validation {
+        let read = |entrant: &Entrant| {
+            records::one(path, &entrant.loaded.model, &one.of_records, &one.of_model.initial, &terminal.silent())
+        };
+        compared.push(predicted(Compared::validation(&read(first)?), &entrants, read)?);
+    }
+    let report = fit::report(&first.problem, &first.estimate, &first.loaded, &[])?;
+    let mut short = Report { sections: vec![], severity: first.estimate.severity(), ..report.clone() };
+    let sections = [Section::from(compared), summary(&entrants)];
+    let mut whole = report;
+    for section in sections {
+        short = short.with(section.clone());
+        whole = whole.with(section);
+    }
+    output::line(if terminal.colored() { short.to_colored_text() } else { short.to_string() })?;
+    if let Some(path) = &one.report {
+        whole.titled("Comparison of models").save(path)?;
+        terminal.remark(format_args!("report: {}", path.display()));
+    }
+    // The verdict is that of the best one.
+    let best = entrants.iter().map(|one| one.estimate.severity()).min();
+    Ok(best.map_or(Verdict::NotUsable, Verdict::from))
+}
+
+/// Reads a model, with its estimate or fitted.
+fn entrant(name: &str, one: &Compare, terminal: &Terminal) -> Result<Entrant, Failure> {
+    let (name, stored) = match name.rsplit_once(':') {
+        Some((name, stored)) if stored.ends_with(".json") => (name, Some(PathBuf::from(stored))),
+        _ => (name, None),
+    };
+    let model = model(Some(name), &one.of_model.constant, terminal)?;
+    let parameters = declared(&model, &one.of_model)?;
+    let records = records::all(&one.records, &model, &one.of_records, &one.of_model.initial, terminal)?;
+    let loaded = Loaded { model, files: one.records.clone(), records, parameters };
+    let problem = watched(&loaded, &one.of_fit, terminal)?.problem()?;
+    let estimate = match &stored {
+        Some(path) => estimate(path)?,
+        None => problem.run()?,
+    };
+    let title = match &stored {
+        Some(path) => format!("{name} ({})", path.display()),
+        None => name.to_owned(),
+    };
+    Ok(Entrant { title, loaded, problem, estimate })
+}
+
+/// A record with what each model predicts of it.
+fn predicted(
+    compared: Compared,
+    entrants: &[Entrant],
+    record: impl Fn(&Entrant) -> Result<Record, Failure>,
+) -> Result<Compared, Failure> {
+    let with = |compared: Compared, entrant: &Entrant| {
+        let prediction = entrant.problem.predict(&entrant.estimate, &record(entrant)?)?;
+        Ok::<_, Failure>(compared.with(&entrant.title, &prediction)?)
+    };
+    entrants.iter().try_fold(compared, with)
+}
+
+/// Criteria of each model.
+fn summary(entrants: &[Entrant]) -> Section {
+    let row = |one: &Entrant| {
+        let unknowns = Cell::from(one.estimate.unknowns.len() as u64);
+        [Cell::from(one.title.as_str()), unknowns, Cell::number(one.estimate.cost, 6), Cell::optional(one.estimate.aic(), 6)]
+    };
+    let table = Table::new("Criteria", ["model", "unknowns", "cost", "AIC"]).rows(entrants.iter().map(row));
+    Section::new("criteria", "Criteria of each model").table(table)
+}

@@ -1,0 +1,57 @@
+//! A fit or a stored estimate, from which commands that examine it go on.
+
+use crate::arguments::Refit;
+use crate::fitting::{Loaded, estimate, load, watched};
+use crate::terminal::Terminal;
+use crate::{Failure, Verdict, fit, output};
+use greybox::problem::Problem;
+use greybox::report::Section;
+use greybox::{Report, Summary};
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+
+/// A problem and its estimate.
+pub struct Examined {
+    pub loaded: Loaded,
+    pub problem: Problem<'static>,
+    pub estimate: Summary,
+    /// Counts refits.
+    pub counter: Arc<AtomicU64>,
+}
+
+/// Fits, or takes the estimate that is named.
+pub fn examined(refit: &Refit, terminal: &Terminal) -> Result<Examined, Failure> {
+    let loaded = load(&refit.fitting, terminal)?;
+    let counter = Arc::new(AtomicU64::new(0));
+    let problem = watched(&loaded, &refit.fitting.of_fit, terminal)?.counter(counter.clone()).problem()?;
+    let estimate = match &refit.estimate {
+        Some(path) => estimate(path)?,
+        None => problem.run()?,
+    };
+    Ok(Examined { loaded, problem, estimate, counter })
+}
+
+/// Prints sections, and writes the report that is asked for with them.
+pub fn said(
+    refit: &Refit,
+    examined: &Examined,
+    sections: Vec<Section>,
+    terminal: &Terminal,
+) -> Result<Verdict, Failure> {
+    let Examined { loaded, problem, estimate, .. } = examined;
+    let report = fit::report(problem, estimate, loaded, &[])?;
+    let severity = sections.iter().map(|section| section.severity).fold(estimate.severity(), Ord::max);
+    // What is said of the sections alone, without the rest of the report.
+    let mut short = Report { sections: vec![], severity, ..report.clone() };
+    let mut whole = report;
+    for section in sections {
+        short = short.with(section.clone());
+        whole = whole.with(section);
+    }
+    output::line(if terminal.colored() { short.to_colored_text() } else { short.to_string() })?;
+    if let Some(path) = &refit.report {
+        whole.save(path)?;
+        terminal.remark(format_args!("report: {}", path.display()));
+    }
+    Ok(severity.into())
+}

@@ -1,0 +1,92 @@
+//! `fit`: parameters, with their intervals.
+
+use crate::arguments::Fit;
+use crate::fitting::{Loaded, load, watched};
+use crate::terminal::Terminal;
+use crate::{Failure, Verdict, output};
+use greybox::diagnose::{Derived, derived_by};
+use greybox::problem::Problem;
+use greybox::report::{Cell, Origin, Section, Table};
+use greybox::{Report, Summary};
+
+pub fn run(one: &Fit, terminal: &Terminal) -> Result<Verdict, Failure> {
+    let loaded = load(&one.fitting, terminal)?;
+    let derived: Vec<_> = one
+        .derived
+        .iter()
+        .map(|(name, text)| loaded.model.derived(text).map(|(graph, root)| (name, graph, root)))
+        .collect::<Result<_, _>>()?;
+    let problem = watched(&loaded, &one.fitting.of_fit, terminal)?.problem()?;
+    let estimate = problem.run()?;
+    if terminal.stopped() {
+        terminal.remark("ended by Ctrl-C: this is the best so far");
+    }
+    let derived: Vec<Derived> =
+        derived.iter().map(|(name, graph, root)| derived_by(&estimate, name, graph, *root)).collect();
+    if let Some(path) = &one.json {
+        output::write(Some(path), estimate.to_json()?.as_bytes())?;
+    }
+    let wanted = one.full || one.report.is_some() || one.plot.is_some();
+    let report = if wanted { Some(report(&problem, &estimate, &loaded, &derived)?) } else { None };
+    match &report {
+        Some(report) if one.full => {
+            output::line(if terminal.colored() { report.to_colored_text() } else { report.to_string() })?
+        }
+        _ => {
+            output::line(&estimate)?;
+            for Derived { name, value, standard_error, interval } in &derived {
+                let known = match (standard_error, interval) {
+                    (Some(error), Some((lower, upper))) => {
+                        format!("std. error {error:.2e}, 95 % interval {lower:.6} … {upper:.6}")
+                    }
+                    _ => "not known: it depends on a parameter that is not".to_owned(),
+                };
+                output::line(format!("{name} = {value:.6}, {known}"))?;
+            }
+        }
+    }
+    if let (Some(report), Some(path)) = (&report, &one.report) {
+        report.save(path)?;
+        terminal.remark(format_args!("report: {}", path.display()));
+    }
+    if let (Some(report), Some(path)) = (&report, &one.plot) {
+        let plot = report.plots().into_iter().find(|plot| plot.name.starts_with("record-"));
+        plot.ok_or("the report has no drawing of a record")?.save(path)?;
+        terminal.remark(format_args!("plot: {}", path.display()));
+    }
+    let said = report.map_or(estimate.severity(), |report| report.severity.max(estimate.severity()));
+    Ok(said.into())
+}
+
+/// The report of a fit, with where it came from.
+pub fn report(
+    problem: &Problem<'_>,
+    estimate: &Summary,
+    loaded: &Loaded,
+    derived: &[Derived],
+) -> Result<Report, Failure> {
+    let mut origin = Origin::new().command(std::env::args()).at(std::time::SystemTime::now());
+    for path in &loaded.files {
+        origin = origin.file(path)?;
+    }
+    let title = match loaded.model.name() {
+        "" => "Parameter estimation".to_owned(),
+        name => name.to_owned(),
+    };
+    let report = Report::new(problem, estimate)?.titled(title).made_from(origin);
+    if derived.is_empty() {
+        return Ok(report);
+    }
+    let row = |one: &Derived| {
+        let (lower, upper) = one.interval.map_or((None, None), |(lower, upper)| (Some(lower), Some(upper)));
+        [
+            Cell::from(one.name.as_str()),
+            Cell::number(one.value, 6),
+            Cell::optional(one.standard_error, 2),
+            Cell::optional(lower, 6),
+            Cell::optional(upper, 6),
+        ]
+    };
+    let table = Table::new("", ["quantity", "value", "std. error", "from", "to"]).rows(derived.iter().map(row));
+    Ok(report.with(Section::new("derived", "Quantities computed from the parameters").table(table)))
+}

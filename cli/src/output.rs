@@ -1,0 +1,41 @@
+//! Results: files that are whole or not there, and standard output.
+
+use crate::Failure;
+use std::io::Write;
+use std::path::Path;
+
+/// Writes beside the file first and then renames, so that there is never half a file; without a path, to standard output.
+pub fn write(path: Option<&Path>, content: &[u8]) -> Result<(), Failure> {
+    let Some(path) = path else { return print(content) };
+    let failed = |error: std::io::Error| format!("{}: {error}", path.display());
+    // A pipe or a device is written to as it stands.
+    if path.exists() && !path.is_file() {
+        return Ok(std::fs::write(path, content).map_err(failed)?);
+    }
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".part");
+    let written = std::fs::write(&beside, content).and_then(|()| std::fs::rename(&beside, path));
+    Ok(written.map_err(|error| {
+        // The error to report is that of writing, not one of removing the part.
+        let _ = std::fs::remove_file(&beside);
+        failed(error)
+    })?)
+}
+
+/// Prints. A reader that has seen enough, such as `head`, is no error.
+pub fn print(content: &[u8]) -> Result<(), Failure> {
+    match std::io::stdout().write_all(content).and_then(|()| std::io::stdout().flush()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(format!("standard output: {error}").into()),
+        _ => Ok(()),
+    }
+}
+
+/// Prints a text and ends its line.
+pub fn line(text: impl std::fmt::Display) -> Result<(), Failure> {
+    print(format!("{}\n", text.to_string().trim_end()).as_bytes())
+}
+
+/// The ending of a path, in small letters.
+pub fn ending(path: &Path) -> String {
+    path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default()
+}

@@ -1,0 +1,117 @@
+//! Files of records.
+
+use crate::Failure;
+use crate::arguments::RecordOptions;
+use crate::fitting::{expanded, initial, number, range};
+use crate::terminal::Terminal;
+use greybox::layout::Layout;
+use greybox::record::Record;
+use greybox::text::{self, Model};
+use greybox::{CsvFile, Hold};
+use std::path::{Path, PathBuf};
+
+/// Reads the records of a model, with the holds and the initial state that the model and the command line say.
+pub fn all(
+    paths: &[PathBuf],
+    model: &Model,
+    options: &RecordOptions,
+    of_initial: &[String],
+    terminal: &Terminal,
+) -> Result<Vec<Record>, Failure> {
+    expanded(paths)?.iter().map(|path| one(path, model, options, of_initial, terminal)).collect()
+}
+
+/// Reads one record.
+pub fn one(
+    path: &Path,
+    model: &Model,
+    options: &RecordOptions,
+    of_initial: &[String],
+    terminal: &Terminal,
+) -> Result<Record, Failure> {
+    let layout = model.equations().layout();
+    prepared(read(path, layout, options, terminal)?, model, options, of_initial)
+}
+
+/// Reads the inputs alone, of a model that has any.
+pub fn inputs(
+    path: &Path,
+    model: &Model,
+    options: &RecordOptions,
+    of_initial: &[String],
+    terminal: &Terminal,
+) -> Result<Record, Failure> {
+    let mut layout = model.equations().layout().clone();
+    if !layout.inputs.is_empty() {
+        layout.outputs = vec![];
+    }
+    prepared(read(path, &layout, options, terminal)?, model, options, of_initial)
+}
+
+/// The record with what is declared of its inputs and of the initial state, and the part of it that is used.
+fn prepared(
+    record: Record,
+    model: &Model,
+    options: &RecordOptions,
+    of_initial: &[String],
+) -> Result<Record, Failure> {
+    let layout = model.equations().layout();
+    let record = model.prepare(record)?;
+    let said = initial(layout, of_initial, record.initial_state())?;
+    let mut record = match said {
+        Some(said) => record.initial(said)?,
+        None => record,
+    };
+    for (input, hold) in &options.hold {
+        let hold = match hold.as_str() {
+            "zero" => Hold::Zero,
+            "first" => Hold::First,
+            other => return Err(format!("--hold {input}: `{other}` is none; there are zero and first").into()),
+        };
+        record = record.hold_of(input, hold)?;
+    }
+    if let Some(text) = &options.between {
+        let (from, to) = range("--between", text)?;
+        record = record.between(from.unwrap_or(f64::NEG_INFINITY)..to.unwrap_or(f64::INFINITY))?;
+    }
+    Ok(match options.every {
+        Some(n) => record.decimate(n)?,
+        None => record,
+    })
+}
+
+/// Reads the columns of a layout.
+fn read(path: &Path, layout: &Layout, options: &RecordOptions, terminal: &Terminal) -> Result<Record, Failure> {
+    let mut file = CsvFile::new(path);
+    for (signal, column) in &options.column {
+        file = file.column(signal, column);
+    }
+    if let Some(column) = &options.time {
+        file = file.column("t", column);
+    }
+    for (signal, unit) in &options.unit {
+        file = file.factor(signal, factor(signal, unit, layout)?);
+    }
+    if let Some(unit) = &options.time_unit {
+        file = file.factor("t", text::factor(unit, "s")?);
+    }
+    if let Some(step) = options.sample_time {
+        file = file.sample_time(step);
+    }
+    let record = file.read_record(layout)?;
+    terminal.remark(format_args!("{}: {} samples", path.display(), record.len()));
+    Ok(record)
+}
+
+/// What the numbers of a file are multiplied by.
+fn factor(signal: &str, unit: &str, layout: &Layout) -> Result<f64, Failure> {
+    if let Ok(factor) = number("", unit) {
+        return Ok(factor);
+    }
+    let all: Vec<_> = layout.inputs.iter().chain(&layout.outputs).collect();
+    let Some(quantity) = all.iter().find(|quantity| quantity.name == signal) else {
+        let available = all.iter().map(|quantity| quantity.name.clone()).collect();
+        return Err(greybox::Error::Unknown { what: "signal".into(), name: signal.into(), available }.into());
+    };
+    Ok(text::factor(unit, &quantity.unit)?)
+}

@@ -1,0 +1,257 @@
+//! The command as a shell sees it: what it prints, what it leaves behind, and its exit codes.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// The shipped record of a motor with four pole pairs.
+fn record() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/data/pmsm.csv")
+}
+
+const MODEL: &str = r#"
+greybox = 1
+name = "PMSM"
+[constants]
+np = 4
+[inputs]
+ud = "V"
+uq = "V"
+w = "rad/s"
+[parameters]
+rs = { unit = "ohm", start = 1.0, within = [0.01, 10] }
+ls = { unit = "H", start = 2e-3, positive = true }
+ke = { unit = "V s/rad", start = 0.7 }
+[let]
+we = "np*w"
+[states]
+id = { unit = "A", derivative = "(ud - rs*id)/ls + we*iq" }
+iq = { unit = "A", derivative = "(uq - rs*iq - ke*w*sqrt(2/3))/ls - we*id" }
+[outputs]
+id = "id"
+iq = "iq"
+"#;
+
+/// A folder with the model, in which the command runs.
+struct Bench(PathBuf);
+
+impl Drop for Bench {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+impl Bench {
+    fn new() -> Self {
+        static COUNT: AtomicUsize = AtomicUsize::new(0);
+        let number = COUNT.fetch_add(1, Ordering::Relaxed);
+        let bench = Bench(std::env::temp_dir().join(format!("greybox_command_{}_{number}", std::process::id())));
+        std::fs::create_dir_all(&bench.0).unwrap();
+        std::fs::write(bench.path("pmsm.toml"), MODEL).unwrap();
+        std::fs::copy(record(), bench.path("record.csv")).unwrap();
+        bench
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+
+    fn run(&self, words: &[&str]) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_greybox"));
+        command.args(words).current_dir(&self.0).env_remove("NO_COLOR").output().unwrap()
+    }
+
+    /// What a command prints that ends with this code.
+    fn ends(&self, code: i32, words: &[&str]) -> (String, String) {
+        let Output { status, stdout, stderr } = self.run(words);
+        let [out, error] = [stdout, stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+        assert_eq!(status.code(), Some(code), "{words:?}\n{out}\n{error}");
+        (out, error)
+    }
+
+    fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(&self.0).unwrap();
+        let mut names: Vec<String> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+}
+
+/// A parameter's value in a table of an estimate.
+fn value(out: &str, name: &str) -> f64 {
+    let line = out.lines().find(|line| line.split_whitespace().next() == Some(name));
+    let line = line.unwrap_or_else(|| panic!("no row `{name}` in\n{out}"));
+    line.split_whitespace().nth(1).unwrap().parse().unwrap()
+}
+
+#[test]
+fn fit_prints_the_estimate_and_writes_what_is_asked_for() {
+    let bench = Bench::new();
+    let words = ["fit", "pmsm.toml", "record.csv", "--json", "e.json", "--report", "r.html", "--plot", "fit.svg"];
+    let (out, error) = bench.ends(0, &words);
+    // The truth is 0.63, 4e-3 and 0.95; standard errors are 2e-4, 1.4e-6 and 2.5e-5.
+    assert!((value(&out, "rs") - 0.63).abs() < 1e-3 && (value(&out, "ke") - 0.95).abs() < 1e-4, "{out}");
+    assert!(out.starts_with("Verdict: usable"), "{out}");
+    assert!(out.lines().all(|line| line.chars().count() <= 80), "{out}");
+    assert!(!out.contains('\u{1b}') && !error.contains('\u{1b}'), "color and progress are for terminals");
+    assert!(error.contains("record.csv: "), "what was guessed of the file: {error}");
+    let text = |name: &str| std::fs::read_to_string(bench.path(name)).unwrap();
+    assert!(text("r.html").contains("PMSM") && text("fit.svg").starts_with("<svg"));
+    let estimate = greybox::Summary::from_json(&text("e.json")).unwrap();
+    assert_eq!(estimate.parameters[2].name, "ke");
+    assert_eq!(bench.names(), ["e.json", "fit.svg", "pmsm.toml", "r.html", "record.csv"], "nothing half-written");
+    let (_, error) = bench.ends(0, &["fit", "-q", "pmsm.toml", "record.csv"]);
+    assert_eq!(error, "");
+}
+
+#[test]
+fn declarations_are_changed_by_name() {
+    let bench = Bench::new();
+    let (out, _) = bench.ends(0, &["fit", "pmsm.toml", "record.csv", "--fix", "ls=4e-3", "--set", "rs=0.5"]);
+    assert!(out.contains("fixed") && (value(&out, "rs") - 0.63).abs() < 1e-3, "{out}");
+    let (out, _) = bench.ends(0, &["fit", "pmsm.toml", "record.csv", "--derived", "tau=ls/rs", "--loss", "huber"]);
+    assert!(out.contains("tau = 0.00634") && out.contains("loss Huber"), "{out}");
+    let (out, _) = bench.ends(0, &["fit", "pmsm.toml", "record.csv", "--weight", "abs(w)", "--predictor", "horizon:20"]);
+    assert!(out.contains("20 sample(s) ahead"), "{out}");
+    // Two pole pairs instead of four: the model explains the record no more.
+    let (out, _) = bench.ends(3, &["fit", "pmsm.toml", "record.csv", "--constant", "np=2"]);
+    assert!(out.starts_with("Verdict: not usable"), "{out}");
+}
+
+#[test]
+fn exit_codes_tell_how_far_an_estimate_is_usable() {
+    let bench = Bench::new();
+    // A bound that holds a parameter asks for care.
+    let held = ["fit", "pmsm.toml", "record.csv", "--bounds", "ke=0.96..2"];
+    let (out, _) = bench.ends(bench.run(&held).status.code().unwrap(), &held);
+    assert!(!out.starts_with("Verdict: usable"), "{out}");
+    assert_ne!(bench.run(&held).status.code(), Some(0));
+    let strict: Vec<&str> = held.iter().copied().chain(["--strict"]).collect();
+    bench.ends(3, &strict);
+}
+
+#[test]
+fn mistakes_are_sentences_with_the_remedy() {
+    let bench = Bench::new();
+    let says = |words: &[&str], parts: &[&str]| {
+        let (_, error) = bench.ends(1, words);
+        parts.iter().for_each(|part| assert!(error.contains(part), "{part} in\n{error}"));
+    };
+    says(&["fit", "motor.toml", "record.csv"], &["no file `motor.toml`", "ship"]);
+    says(&["fit", "pmsm.toml", "other.csv"], &["other.csv"]);
+    says(&["fit", "pmsm.toml"], &["no record is named"]);
+    says(&["fit", "pmsm.toml", "record.csv", "--set", "rss=1"], &["no parameter `rss` (`rs` is near)", "rs, ls, ke"]);
+    says(&["fit", "pmsm.toml", "record.csv", "--set", "rs=one"], &["--set rs", "`one` is not a number"]);
+    says(&["fit", "pmsm.toml", "record.csv", "--loss", "hubber"], &["no loss `hubber` (`huber` is near)"]);
+    says(&["fit", "pmsm.toml", "record.csv", "--column", "w=speed"], &["no column `speed`", "ud"]);
+    says(&["fit", "pmsm.toml", "record.csv", "--weight", "abs(v)"], &["v"]);
+    says(&["fit", "pmsm.toml", "record.csv", "--report", "r.pdf"], &[".html, .md, .json or .txt"]);
+    says(&["fit", "pmsm.toml", "record.csv", "--json", "nowhere/e.json"], &["nowhere/e.json"]);
+    says(&["fit", "pmsm.toml", "record.csv", "--no-such"], &["--no-such"]);
+    says(&["fit", "pmsm.toml", "record.csv", "--bounds", "rs=1"], &["two points"]);
+    assert_eq!(bench.names(), ["pmsm.toml", "record.csv"]);
+}
+
+#[test]
+fn a_project_file_repeats_a_fit() {
+    let bench = Bench::new();
+    let project = "model = 'pmsm.toml'\nrecords = ['record.csv']\nfix = { ls = 4e-3 }\nbounds = { rs = [0.01, 5] }\nloss = 'huber'\n";
+    std::fs::write(bench.path("greybox.toml"), project).unwrap();
+    let (out, _) = bench.ends(0, &["fit"]);
+    assert!(out.contains("loss Huber") && out.contains("fixed"), "{out}");
+    // The command line comes after it.
+    let (out, _) = bench.ends(0, &["fit", "--loss", "squared"]);
+    assert!(out.contains("loss squared"), "{out}");
+    std::fs::write(bench.path("greybox.toml"), "model = 'pmsm.toml'\nlos = 'huber'\n").unwrap();
+    let (_, error) = bench.ends(1, &["fit"]);
+    assert!(error.contains("greybox.toml: there is no option `los`"), "{error}");
+}
+
+#[test]
+fn a_simulation_is_a_record_that_gives_its_parameters_back() {
+    let bench = Bench::new();
+    let truth = ["--fix", "rs=0.63", "--fix", "ls=4e-3", "--fix", "ke=0.95"];
+    let words: Vec<&str> =
+        ["simulate", "pmsm.toml", "record.csv", "--noise", "id=0.05", "--noise", "iq=0.05", "-o", "made.csv"]
+            .into_iter()
+            .chain(truth)
+            .collect();
+    bench.ends(0, &words);
+    let (out, _) = bench.ends(0, &["fit", "pmsm.toml", "made.csv", "--json", "e.json"]);
+    assert!((value(&out, "rs") - 0.63).abs() < 1e-3, "{out}");
+    let (out, _) = bench.ends(0, &["simulate", "pmsm.toml", "record.csv", "--estimate", "e.json"]);
+    assert!(out.starts_with("t,ud,uq,w,id,iq\n") && out.lines().count() == 2001, "{}", out.lines().count());
+}
+
+#[test]
+fn a_fleet_is_a_table_that_goes_on_where_it_was() {
+    let bench = Bench::new();
+    for name in ["a.csv", "b.csv", "c.csv"] {
+        std::fs::copy(record(), bench.path(name)).unwrap();
+    }
+    std::fs::write(bench.path("b.csv"), "t,ud,uq,w,id,iq\n0,1,2\n").unwrap();
+    let (_, error) = bench.ends(3, &["fleet", "pmsm.toml", "[abc].csv", "--out", "motors.csv"]);
+    assert!(error.contains("b.csv"), "{error}");
+    let table = std::fs::read_to_string(bench.path("motors.csv")).unwrap();
+    let rows: Vec<&str> = table.lines().collect();
+    assert_eq!(rows.len(), 4, "{table}");
+    assert!(rows[0].starts_with("record,verdict,rs,rs_std,rs_lower,rs_upper,ls,"), "{table}");
+    assert!(rows[1].starts_with("a.csv,usable,0.63") && rows[2].starts_with("b.csv,error,"), "{table}");
+    // A row that is there is kept as it stands.
+    std::fs::write(bench.path("motors.csv"), table.replace("a.csv,usable", "a.csv,kept")).unwrap();
+    bench.ends(3, &["fleet", "pmsm.toml", "[abc].csv", "--out", "motors.csv"]);
+    let again = std::fs::read_to_string(bench.path("motors.csv")).unwrap();
+    assert!(again.contains("a.csv,kept") && again.lines().count() == 4, "{again}");
+}
+
+#[test]
+fn models_new_check_and_export_work_together() {
+    let bench = Bench::new();
+    bench.ends(0, &["new", "tank.toml"]);
+    let (_, error) = bench.ends(1, &["new", "tank.toml"]);
+    assert!(error.contains("there already"), "{error}");
+    let (out, _) = bench.ends(0, &["check", "tank.toml"]);
+    assert!(out.contains("Draining tank") && out.contains("area (m^2)"), "{out}");
+    let (out, _) = bench.ends(0, &["models"]);
+    assert!(out.lines().any(|line| line.starts_with("pmsm ")), "{out}");
+    let (text, _) = bench.ends(0, &["models", "pmsm"]);
+    std::fs::write(bench.path("copy.toml"), text).unwrap();
+    let (own, _) = bench.ends(0, &["fit", "-q", "copy.toml", "record.csv"]);
+    let (shipped, _) = bench.ends(0, &["fit", "-q", "pmsm", "record.csv", "--constant", "np=4"]);
+    assert_eq!(value(&own, "rs"), value(&shipped, "rs"));
+    let (out, _) = bench.ends(0, &["check", "pmsm.toml", "record.csv"]);
+    assert!(out.contains("2000 samples") && out.contains("told apart"), "{out}");
+    for (language, part) in [("toml", "[parameters]"), ("rust", "impl Model for"), ("json", "layout")] {
+        let (out, _) = bench.ends(0, &["export", "pmsm.toml", "--language", language]);
+        assert!(out.contains(part), "{language}: {out}");
+    }
+}
+
+#[test]
+fn estimates_are_examined_and_compared() {
+    let bench = Bench::new();
+    bench.ends(0, &["fit", "pmsm.toml", "record.csv", "--json", "e.json"]);
+    let (out, _) = bench.ends(0, &["profile", "pmsm.toml", "record.csv", "--estimate", "e.json", "--of", "rs"]);
+    assert!(out.contains("rs") && out.contains("95 %"), "{out}");
+    let (out, _) = bench.ends(0, &["residuals", "pmsm.toml", "record.csv", "--estimate", "e.json"]);
+    assert!(out.contains("esiduals"), "{out}");
+    let (out, _) = bench.ends(0, &["bootstrap", "pmsm.toml", "record.csv", "--estimate", "e.json", "--refits", "20"]);
+    assert!(out.contains("20"), "{out}");
+    std::fs::write(bench.path("wrong.toml"), MODEL.replace("we*iq", "0.5*we*iq")).unwrap();
+    let words = ["compare", "--model", "pmsm.toml:e.json", "--model", "wrong.toml", "record.csv", "--report", "c.html"];
+    let (out, _) = bench.ends(0, &words);
+    assert!(out.contains("pmsm.toml") && out.contains("wrong.toml"), "{out}");
+    assert!(std::fs::read_to_string(bench.path("c.html")).unwrap().contains("wrong.toml"));
+}
+
+#[test]
+fn shells_and_manuals_know_the_command() {
+    let bench = Bench::new();
+    let (out, _) = bench.ends(0, &["completions", "bash"]);
+    assert!(out.contains("--time-limit"), "{out}");
+    let (out, _) = bench.ends(0, &["man"]);
+    assert!(out.contains(".TH greybox"), "{out}");
+    let (out, _) = bench.ends(0, &["help"]);
+    assert!(out.contains("Exit codes: 0 usable, 2 usable with care, 3 not usable, 1 error"), "{out}");
+    bench.ends(1, &["fitt"]);
+}
