@@ -22,6 +22,7 @@
 //! | [15](chapter_15_how_it_works) | how it works: duals, lanes, the triangle, segments |
 //! | [16](chapter_16_text_models) | models as text files |
 //! | [18](chapter_18_python) | Python: models, frames, results, options |
+//! | [19](chapter_19_clusters) | fleets on Spark and Dask |
 
 /// A chapter: its text, after the pictures that it names. A picture is a link definition with the image in it, so that the
 /// page needs no other file; the chapter's own definitions, which come second, are for readers of the files.
@@ -52,3 +53,4 @@ chapter!(chapter_15_how_it_works, "15_how_it_works");
 chapter!(chapter_16_text_models, "16_text_models");
 chapter!(chapter_17_command, "17_command");
 chapter!(chapter_18_python, "18_python");
+chapter!(chapter_19_clusters, "19_clusters");
