@@ -51,7 +51,7 @@ from numpy import (
 
 from greybox import dask, pmsm, spark
 from greybox._core import Parameter, __version__
-from greybox.errors import Error, FitWarning, TraceError
+from greybox.errors import Error, FitWarning, ModelWarning, TraceError
 from greybox.fitting import fit, simulate
 from greybox.fleets import fleet
 from greybox.model import Equations, Model, model
@@ -63,6 +63,7 @@ from greybox.report import Report
 from greybox.result import Fit
 from greybox.signals import Signals, Values, Vector, signals
 from greybox.symbols import Condition, Symbol, where
+from greybox.text import TextModel, load
 
 __all__ = [
     "Condition",
@@ -71,12 +72,14 @@ __all__ = [
     "Fit",
     "FitWarning",
     "Model",
+    "ModelWarning",
     "Parameter",
     "Profile",
     "Record",
     "Report",
     "Signals",
     "Symbol",
+    "TextModel",
     "TraceError",
     "Values",
     "Vector",
@@ -97,6 +100,7 @@ __all__ = [
     "hypot",
     "interp",
     "interp2",
+    "load",
     "log",
     "log10",
     "maximum",

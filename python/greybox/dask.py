@@ -28,8 +28,8 @@ def fleet(
     parameters: Mapping[str, Parameter] | None = None,
     time: str | None = None,
     columns: Mapping[str, str] | None = None,
-    hold: Hold = "zero",
-    initial: Initial = "estimated",
+    hold: Hold | None = None,
+    initial: Initial | None = None,
     **given: Any,
 ) -> Any:
     """Fit many records, each by itself, on the workers of Dask.

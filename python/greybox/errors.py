@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["Error", "FitWarning", "TraceError"]
+__all__ = ["Error", "FitWarning", "ModelWarning", "TraceError"]
 
 
 class Error(ValueError):
@@ -11,6 +11,10 @@ class Error(ValueError):
 
 class TraceError(Error, TypeError):
     """Python code of a model that asks of a symbol what only a number has; its text names file, line and remedy."""
+
+
+class ModelWarning(UserWarning):
+    """Something odd in a model file: a unit that does not fit, a quantity that is not used."""
 
 
 class FitWarning(UserWarning):

@@ -32,8 +32,8 @@ def fit(
     time: str | None = None,
     sample_time: float | None = None,
     columns: Mapping[str, str] | None = None,
-    hold: Hold = "zero",
-    initial: Initial = "estimated",
+    hold: Hold | None = None,
+    initial: Initial | None = None,
     noise: Noise | None = None,
     input_noise: Mapping[str, float] | None = None,
     loss: str | None = None,
@@ -123,7 +123,7 @@ def fit(
     (0.3, 'usable')
     """
     equations = checked(model).equations()
-    given = together(parameters, declarations, inspect.signature(fit).parameters)
+    given = {**equations.declared, **together(parameters, declarations, inspect.signature(fit).parameters)}
     chosen = settings(
         equations,
         {
@@ -174,7 +174,7 @@ def simulate(
     time: str | None = None,
     sample_time: float | None = None,
     columns: Mapping[str, str] | None = None,
-    hold: Hold = "zero",
+    hold: Hold | None = None,
     integrator: str | None = None,
 ) -> Any:
     """Simulate a model.

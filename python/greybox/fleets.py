@@ -48,7 +48,7 @@ class Plan:
             raise Error("a fleet has no checkpoint; fit the records in parts, and keep the rows of each")
         self.equations = checked(model).equations()
         self.by = [by] if isinstance(by, str) else list(by)
-        self.declared = declared(parameters, named(self.equations.parameters, "parameters"))
+        self.declared = declared({**self.equations.declared, **parameters}, named(self.equations.parameters, "parameters"))
         self.options = settings(self.equations, options)
         self.record = record
         taken = [name for name in self.by if name in self.columns()]
@@ -70,7 +70,7 @@ class Plan:
             of[f"{name}_rmse"] = float
         return of | {"verdict": str, "outcome": str, "warnings": str, "reason": str}
 
-    def rows(self, data: Any, *, ordered: bool = False, show: Progress | None = None) -> dict[str, Any]:
+    def rows(self, data: Any, *, ordered: bool = False, progress: bool = False) -> dict[str, Any]:
         """Fit the records of a frame and give a row for each, in the order of their first samples.
 
         Parameters
@@ -79,6 +79,8 @@ class Plan:
             The samples of all records, one below the other.
         ordered : bool
             Whether the samples of a record are brought into the order of their time first, as after a shuffle.
+        progress : bool
+            Show how many records are done (needs tqdm).
         """
         frame = Frame(data)
         missing = [name for name in self.needed() if name not in frame]
@@ -102,7 +104,7 @@ class Plan:
                 records.append(said.core(self.equations, label))
             except Error as error:
                 failed[k] = str(error)
-        with show or Progress(False, "") as shown:
+        with Progress(progress, "fleet", len(records)) as shown:
             answers = iter(_core.fleet(self.equations.core, records, self.declared, self.options, shown))
         found: dict[str, list[Any]] = {name: [] for name in self.columns()}
         for k, rows in enumerate(places):
@@ -167,8 +169,8 @@ def fleet(
     time: str | None = None,
     sample_time: float | None = None,
     columns: Mapping[str, str] | None = None,
-    hold: Hold = "zero",
-    initial: Initial = "estimated",
+    hold: Hold | None = None,
+    initial: Initial | None = None,
     progress: bool = False,
     **given: Any,
 ) -> Any:
@@ -218,6 +220,4 @@ def fleet(
     [0.3, 0.4]
     """
     made = plan(model, by, parameters, Record(None, None, time, sample_time, columns, hold, initial), given)
-    frame = Frame(data)
-    rows = made.rows(data, show=Progress(progress, "fleet", None))
-    return frame.kind(rows)
+    return Frame(data).kind(made.rows(data, progress=progress))

@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from greybox import _core
+from greybox._core import Parameter
 from greybox.errors import Error
 from greybox.signals import Signals, SignalsLike, Vector, in_order, named
 from greybox.symbols import Number, Symbol, Trace
@@ -112,6 +113,19 @@ class Equations(Model):
     def equations(self) -> Equations:
         """Give the equations themselves."""
         return self
+
+    @property
+    def declared(self) -> dict[str, Parameter]:
+        """The declarations of parameters that come with the model: those of a model file."""
+        return {}
+
+    def defaults(self) -> dict[str, Any]:
+        """Give the options that come with the model."""
+        return {}
+
+    def prepared(self, record: _core.Record) -> _core.Record:
+        """Give a record with what the model says of holds and initial states."""
+        return record
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Equations) and self.core == other.core

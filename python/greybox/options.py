@@ -51,7 +51,8 @@ class Options(TypedDict, total=False):
 
 
 def settings(equations: Equations, given: Options) -> dict[str, Any]:
-    """Give the options as the compiled library takes them."""
+    """Give the options as the compiled library takes them; those that are not given are the model's."""
+    given = Options(**{**equations.defaults(), **{name: value for name, value in given.items() if value is not None}})  # type: ignore[typeddict-item]
     inputs, outputs = named(equations.inputs, "inputs"), named(equations.outputs, "outputs")
     noise, starts = given.get("noise"), given.get("starts")
     if isinstance(noise, str) and noise != "covariance":

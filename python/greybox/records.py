@@ -44,10 +44,10 @@ class Record:
         The column of a signal, where it has another name: ``{"w": "speed"}``.
     hold : {"zero", "first"}, or mapping from input to these
         The inputs between samples: constant, as a digital controller commands them, or straight lines, as measured quantities go.
-        Inputs that a mapping leaves out are constant.
+        Inputs that a mapping leaves out, and all without one, are as a model file says, or constant.
     initial : {"estimated", "first"} or mapping from str to Parameter
         The state at the first sample: estimated, computed from the first sample, or declared for each state by
-        :func:`~greybox.free` and :func:`~greybox.fixed`.
+        :func:`~greybox.free` and :func:`~greybox.fixed`. Without it, as a model file says, or estimated.
     """
 
     data: Any
@@ -55,8 +55,8 @@ class Record:
     time: str | None = None
     sample_time: float | None = None
     columns: Mapping[str, str] | None = None
-    hold: Hold = "zero"
-    initial: Initial = "estimated"
+    hold: Hold | None = None
+    initial: Initial | None = None
 
     def core(self, equations: Equations, name: str, *, outputs: bool = True) -> _core.Record:
         """Give the record as the library takes it. Without `outputs`, those that the frame lacks are missing measurements."""
@@ -76,16 +76,16 @@ class Record:
             _check_lengths({**{of[signal]: column for signal, column in {**columns, **found}.items()}}, time)
             missing = np.full(len(time), np.nan)
             given = self.initial
-            initial = given if isinstance(given, str) else declared(given, _states(equations), "initial state of")
-            return _core.Record(
+            initial = given if given is None or isinstance(given, str) else declared(given, _states(equations), "initial state of")
+            hold = self.hold if self.hold is None or isinstance(self.hold, str) else dict(self.hold)
+            record = _core.Record(
                 equations.core,
                 self.name or name,
                 time,
                 [_shared(columns[signal]) for signal in inputs],
                 [_shared(found.get(signal, missing)) for signal in measured],
-                self.hold if isinstance(self.hold, str) else dict(self.hold),
-                initial,
             )
+            return equations.prepared(record).said(hold, initial)
         except Error as error:
             if self.name and self.name not in str(error):
                 raise Error(f"record `{self.name}`: {error}") from None

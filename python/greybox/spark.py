@@ -32,8 +32,8 @@ def fleet(
     time: str | None = None,
     sample_time: float | None = None,
     columns: Mapping[str, str] | None = None,
-    hold: Hold = "zero",
-    initial: Initial = "estimated",
+    hold: Hold | None = None,
+    initial: Initial | None = None,
     **given: Any,
 ) -> Any:
     """Fit many records, each by itself, on the workers of a cluster.

@@ -12,6 +12,7 @@ mod problem;
 mod record;
 mod run;
 mod settings;
+mod text;
 
 use pyo3::prelude::*;
 
@@ -24,6 +25,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<graph::Expression>()?;
     module.add_class::<equations::Equations>()?;
     module.add_class::<record::Record>()?;
+    module.add_class::<text::TextModel>()?;
     module.add_class::<settings::Parameter>()?;
     module.add_class::<problem::Problem>()?;
     module.add_class::<estimate::Estimate>()?;

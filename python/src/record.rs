@@ -95,6 +95,19 @@ fn channels(of: &[Quantity], columns: &[(Bound<'_, PyArray1<f64>>, bool)]) -> Ve
     of.iter().zip(columns).map(channel).collect()
 }
 
+impl Start {
+    fn initial(&self) -> PyResult<Initial> {
+        match self {
+            Start::Given(given) => Ok(Initial::Given(given.iter().map(|one| one.0).collect())),
+            Start::Named(name) if name == "estimated" => Ok(Initial::Estimated),
+            Start::Named(name) if name == "first" => Ok(Initial::FirstSample),
+            Start::Named(name) => Err(raised(format!(
+                "there is no initial state `{name}`; take estimated, first, or a declaration for each state"
+            ))),
+        }
+    }
+}
+
 /// Arrays, each with whether nothing can write to it.
 type Columns<'py> = Vec<(Bound<'py, PyArray1<f64>>, bool)>;
 
@@ -102,7 +115,7 @@ type Columns<'py> = Vec<(Bound<'py, PyArray1<f64>>, bool)>;
 impl Record {
     /// A record for these equations: time, and a column per input and output, in their order.
     #[new]
-    #[pyo3(signature = (equations, name, time, inputs, outputs, holds=Holds::All("zero".to_owned()), initial=Start::Named("estimated".to_owned())))]
+    #[pyo3(signature = (equations, name, time, inputs, outputs, holds=None, initial=None))]
     #[expect(clippy::needless_pass_by_value, reason = "arguments of Python come as values")]
     fn new(
         equations: Equations,
@@ -110,33 +123,33 @@ impl Record {
         time: Times<'_>,
         inputs: Columns<'_>,
         outputs: Columns<'_>,
-        holds: Holds,
-        initial: Start,
+        holds: Option<Holds>,
+        initial: Option<Start>,
     ) -> PyResult<Self> {
         let layout = equations.0.layout();
         let (inputs, outputs) = (channels(&layout.inputs, &inputs), channels(&layout.outputs, &outputs));
         let record = greybox::record::Record::new(layout.states.clone(), time.time(), inputs, outputs);
-        let initial = match initial {
-            Start::Given(given) => Initial::Given(given.iter().map(|one| one.0).collect()),
-            Start::Named(name) if name == "estimated" => Initial::Estimated,
-            Start::Named(name) if name == "first" => Initial::FirstSample,
-            Start::Named(name) => {
-                let text = format!(
-                    "there is no initial state `{name}`; take estimated, first, or a declaration for each state"
-                );
-                return Err(raised(text));
-            }
-        };
-        let mut record = record.map_err(raised)?.named(name).initial(initial).map_err(raised)?;
+        let record = record.map_err(raised)?.named(name);
+        Record { record, equations }.said(holds, initial)
+    }
+
+    /// The same with holds and initial state, where they are given.
+    #[pyo3(signature = (holds, initial))]
+    fn said(&self, holds: Option<Holds>, initial: Option<Start>) -> PyResult<Self> {
+        let mut record = self.record.clone();
         match holds {
-            Holds::All(hold) => record = record.hold(hold_of(&hold)?),
-            Holds::Each(each) => {
+            None => {}
+            Some(Holds::All(hold)) => record = record.hold(hold_of(&hold)?),
+            Some(Holds::Each(each)) => {
                 for (input, hold) in &each {
                     record = record.hold_of(input, hold_of(hold)?).map_err(raised)?;
                 }
             }
         }
-        Ok(Record { record, equations })
+        if let Some(initial) = initial {
+            record = record.initial(initial.initial()?).map_err(raised)?;
+        }
+        Ok(Record { record, equations: self.equations.clone() })
     }
 
     /// What a record is made of, for pickle.

@@ -86,6 +86,11 @@ def test_what_is_wrong_with_all_records_is_an_error(said: dict[str, Any], says: 
     assert says in str(raised.value), raised.value
 
 
+def test_progress(capsys: pytest.CaptureFixture[str]) -> None:
+    gb.fleet(cooling(), bodies(4), by="which", k=gb.free(1.0), progress=True)
+    assert "fleet" in capsys.readouterr().err
+
+
 def test_a_plan_pickles() -> None:
     from greybox.fleets import plan
 
