@@ -7,7 +7,7 @@ use crate::terminal::Terminal;
 use greybox::layout::Layout;
 use greybox::record::Record;
 use greybox::text::{self, Model};
-use greybox::{CsvFile, Hold};
+use greybox::{DataFile, Hold};
 use std::path::{Path, PathBuf};
 
 /// Reads the records of a model, with the holds and the initial state that the model and the command line say.
@@ -82,7 +82,7 @@ fn prepared(
 
 /// Reads the columns of a layout.
 fn read(path: &Path, layout: &Layout, options: &RecordOptions, terminal: &Terminal) -> Result<Record, Failure> {
-    let mut file = CsvFile::new(path);
+    let mut file = DataFile::new(path);
     for (signal, column) in &options.column {
         file = file.column(signal, column);
     }
