@@ -41,7 +41,7 @@ fn fit(records: &[ExperimentOf<Decay>]) -> Estimate<Decay> {
     Fit::new(&Decay, records).parameters(Rate { k: free(1.0) }).run().unwrap()
 }
 
-fn said<'e>(estimate: &'e Estimate<Decay>, code: WarningCode) -> Option<&'e Warning> {
+fn said(estimate: &Estimate<Decay>, code: WarningCode) -> Option<&Warning> {
     estimate.warnings.iter().find(|warning| warning.code == code)
 }
 
@@ -84,7 +84,7 @@ fn few_and_many_records_that_differ_are_named() {
         for seed in 1..=10 {
             let mut noise = Noise(100 * seed + count);
             // A scatter that no chance makes small.
-            let rate = |i: u64| 0.5 * (1.0 + if i % 2 == 0 { 0.3 } else { -0.3 });
+            let rate = |i: u64| 0.5 * (1.0 + if i.is_multiple_of(2) { 0.3 } else { -0.3 });
             let records: Vec<_> = (0..count).map(|i| record(rate(i), samples, 0.0, &mut noise)).collect();
             let estimate = fit(&records);
             assert!(said(&estimate, WarningCode::RecordsContradict).is_some(), "{count} {seed} {estimate}");
