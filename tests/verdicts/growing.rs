@@ -97,7 +97,8 @@ fn noise_that_is_fed_back_is_no_fault_of_the_model() {
             for reference in reference {
                 let measured = x + NOISE * clean * random.normal();
                 let input = reference - gain * measured;
-                (y.push(measured), u.push(input));
+                y.push(measured);
+                u.push(input);
                 let disturbance = part * clean * (1.0 - stays * stays).sqrt() * random.normal();
                 x = stays * x + (1.0 - stays) * truth[0] * input + disturbance;
             }
