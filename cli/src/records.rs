@@ -99,7 +99,9 @@ fn read(path: &Path, layout: &Layout, options: &RecordOptions, terminal: &Termin
         file = file.sample_time(step);
     }
     let record = file.read_record(layout)?;
-    terminal.remark(format_args!("{}: {} samples", path.display(), record.len()));
+    if let Some(reading) = record.reading() {
+        terminal.remark(format_args!("{}: {reading}", path.display()));
+    }
     Ok(record)
 }
 
