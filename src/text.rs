@@ -121,7 +121,7 @@ impl Model {
         let fit = || Fit::new(&*self.equations, &[] as &[Record]).parameters(self.parameters.clone());
         let integrator = solver.integrator.as_ref().map(|(name, at)| (fit().integrator_by_name(name).err(), at));
         let predictor = solver.predictor.as_ref().map(|(name, at)| (fit().predictor_by_name(name).err(), at));
-        let wrong = |(error, at): (Option<crate::Error>, &remark::Span)| {
+        let wrong = |(error, at): (Option<crate::error::Error>, &remark::Span)| {
             Some(Remark::error(&self.source, at.clone(), error?.to_string()))
         };
         let wrong: Vec<Remark> = integrator.into_iter().chain(predictor).filter_map(wrong).collect();
@@ -229,7 +229,7 @@ impl Model {
     ///
     /// # Errors
     /// A record without an input of the model, or with another number of states.
-    pub fn prepare(&self, record: Record) -> Result<Record, crate::Error> {
+    pub fn prepare(&self, record: Record) -> Result<Record, crate::error::Error> {
         let said = self.document.inputs.iter().filter_map(|input| Some((input.quantity.name.as_str(), input.hold?)));
         let record = said.into_iter().try_fold(record, |record, (name, hold)| record.hold_of(name, hold))?;
         match self.initial() {
@@ -243,7 +243,7 @@ impl Model {
     ///
     /// # Errors
     /// As [`prepare`](Model::prepare); an integrator or a predictor that there is none of.
-    pub fn fit(&self, records: &[Record]) -> Result<Fit<'_, Equations>, crate::Error> {
+    pub fn fit(&self, records: &[Record]) -> Result<Fit<'_, Equations>, crate::error::Error> {
         let records = records.iter().map(|record| self.prepare(record.clone())).collect::<Result<Vec<Record>, _>>()?;
         let mut fit = Fit::new(&*self.equations, &records).parameters(self.parameters.clone());
         if let Some(noise) = self.noise() {
