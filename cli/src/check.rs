@@ -71,7 +71,8 @@ fn looked_at(record: &Record) -> (String, bool) {
     }
     let inspection = record.inspect();
     let mut odd = !gaps.is_empty();
-    let channels = record.inputs().iter().zip(&inspection.inputs).chain(record.outputs().iter().zip(&inspection.outputs));
+    let channels =
+        record.inputs().iter().zip(&inspection.inputs).chain(record.outputs().iter().zip(&inspection.outputs));
     for (channel, found) in channels {
         let found: &ChannelInspection = found;
         let range = found.range.map_or("nothing".to_owned(), |(least, greatest)| format!("{least} to {greatest}"));

@@ -27,7 +27,8 @@ pub fn run(one: &Compare, terminal: &Terminal) -> Result<Verdict, Failure> {
     let Some(first) = entrants.first() else { return Err("no model is named: --model MODEL".into()) };
     let mut compared = vec![];
     for (k, record) in first.loaded.records.iter().enumerate() {
-        compared.push(predicted(Compared::estimation(record), &entrants, |entrant| Ok(entrant.loaded.records[k].clone()))?);
+        compared
+            .push(predicted(Compared::estimation(record), &entrants, |entrant| Ok(entrant.loaded.records[k].clone()))?);
     }
     for path in &one.validation {
         let read = |entrant: &Entrant| {
@@ -92,7 +93,12 @@ fn predicted(
 fn summary(entrants: &[Entrant]) -> Section {
     let row = |one: &Entrant| {
         let unknowns = Cell::from(one.estimate.unknowns.len() as u64);
-        [Cell::from(one.title.as_str()), unknowns, Cell::number(one.estimate.cost, 6), Cell::optional(one.estimate.aic(), 6)]
+        [
+            Cell::from(one.title.as_str()),
+            unknowns,
+            Cell::number(one.estimate.cost, 6),
+            Cell::optional(one.estimate.aic(), 6),
+        ]
     };
     let table = Table::new("Criteria", ["model", "unknowns", "cost", "AIC"]).rows(entrants.iter().map(row));
     Section::new("criteria", "Criteria of each model").table(table)

@@ -21,7 +21,10 @@ pub fn write(record: &Record, path: Option<&Path>) -> Result<(), Failure> {
         Some(path) => match output::ending(path).as_str() {
             "csv" => Ok(record.to_csv(path)?),
             "json" => output::write(Some(path), serde_json::to_string(record)?.as_bytes()),
-            _ => Err(format!("{}: a record is written as .csv or .json; give the path that ending", path.display()).into()),
+            _ => {
+                Err(format!("{}: a record is written as .csv or .json; give the path that ending", path.display())
+                    .into())
+            }
         },
         None => {
             let file = std::env::temp_dir().join(format!("greybox_{}.csv", std::process::id()));

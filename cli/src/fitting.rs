@@ -109,7 +109,8 @@ pub fn declared(model: &Model, options: &ModelOptions) -> Result<Vec<Parameter>,
 fn position(layout: &Layout, name: &str) -> Result<usize, Failure> {
     let names = layout.parameters.iter().map(|one| one.name.clone());
     let place = layout.parameters.iter().position(|one| one.name == name);
-    let unknown = || greybox::Error::Unknown { what: "parameter".into(), name: name.into(), available: names.collect() };
+    let unknown =
+        || greybox::Error::Unknown { what: "parameter".into(), name: name.into(), available: names.collect() };
     Ok(place.ok_or_else(unknown)?)
 }
 
@@ -195,7 +196,11 @@ pub fn fit<'a>(
 }
 
 /// The same that shows its progress and ends by Ctrl-C.
-pub fn watched<'a>(loaded: &'a Loaded, options: &FitOptions, terminal: &Terminal) -> Result<Fit<'a, Equations>, Failure> {
+pub fn watched<'a>(
+    loaded: &'a Loaded,
+    options: &FitOptions,
+    terminal: &Terminal,
+) -> Result<Fit<'a, Equations>, Failure> {
     let fit = fit(&loaded.model, &loaded.records, &loaded.parameters, options)?;
     let search = terminal.search(time_limit(options)?);
     Ok(fit.cancel(terminal.stop()).observe(search, ObserverMode::Always))

@@ -25,7 +25,11 @@ pub fn run(one: &Fleet, terminal: &Terminal) -> Result<Verdict, Failure> {
     let fleet = fit(&model, &[], &parameters, &one.of_fit)?.cancel(terminal.stop()).fleet()?;
     let left: Vec<&PathBuf> = paths.iter().filter(|path| !table.has(path)).collect();
     if left.len() < paths.len() {
-        terminal.remark(format_args!("{} of {} records are in the table already", paths.len() - left.len(), paths.len()));
+        terminal.remark(format_args!(
+            "{} of {} records are in the table already",
+            paths.len() - left.len(),
+            paths.len()
+        ));
     }
     let bar = terminal.steps(left.len(), "records");
     let quiet = terminal.silent();
@@ -87,7 +91,11 @@ impl Table {
                 table.rows.push(row.map_err(failed)?.iter().map(str::to_owned).collect());
             }
             if table.rows.first() != Some(&header) {
-                return Err(format!("{}: the file is there and is no table of this model; name another", path.display()).into());
+                return Err(format!(
+                    "{}: the file is there and is no table of this model; name another",
+                    path.display()
+                )
+                .into());
             }
             for row in &table.rows[1..] {
                 table.there.insert(row[0].clone());
@@ -109,7 +117,9 @@ impl Table {
 
     fn add(&mut self, path: &Path, row: Result<&Summary, &String>, layout: &Layout) {
         let (verdict, word, cells, remarks) = match row {
-            Err(error) => (Verdict::NotUsable, "error", vec![String::new(); 4 * layout.parameters.len()], error.clone()),
+            Err(error) => {
+                (Verdict::NotUsable, "error", vec![String::new(); 4 * layout.parameters.len()], error.clone())
+            }
             Ok(found) => {
                 let word = match found.severity() {
                     Severity::Usable => "usable",

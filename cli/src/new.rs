@@ -40,7 +40,10 @@ fn asked() -> Result<String, Failure> {
                 "inputs" => text += &format!("{name} = {unit:?}\n"),
                 _ => {
                     let start = ask(&format!("Where the search for {name} starts ({unit})"))?;
-                    text += &format!("{name} = {{ unit = {unit:?}, start = {} }}\n", crate::fitting::number(&name, &start)?);
+                    text += &format!(
+                        "{name} = {{ unit = {unit:?}, start = {} }}\n",
+                        crate::fitting::number(&name, &start)?
+                    );
                 }
             }
         }

@@ -49,12 +49,7 @@ pub fn inputs(
 }
 
 /// The record with what is declared of its inputs and of the initial state, and the part of it that is used.
-fn prepared(
-    record: Record,
-    model: &Model,
-    options: &RecordOptions,
-    of_initial: &[String],
-) -> Result<Record, Failure> {
+fn prepared(record: Record, model: &Model, options: &RecordOptions, of_initial: &[String]) -> Result<Record, Failure> {
     let layout = model.equations().layout();
     let record = model.prepare(record)?;
     let said = initial(layout, of_initial, record.initial_state())?;

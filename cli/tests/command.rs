@@ -111,7 +111,8 @@ fn declarations_are_changed_by_name() {
     assert!(out.contains("fixed") && (value(&out, "rs") - 0.63).abs() < 1e-3, "{out}");
     let (out, _) = bench.ends(0, &["fit", "pmsm.toml", "record.csv", "--derived", "tau=ls/rs", "--loss", "huber"]);
     assert!(out.contains("tau = 0.00634") && out.contains("loss Huber"), "{out}");
-    let (out, _) = bench.ends(0, &["fit", "pmsm.toml", "record.csv", "--weight", "abs(w)", "--predictor", "horizon:20"]);
+    let (out, _) =
+        bench.ends(0, &["fit", "pmsm.toml", "record.csv", "--weight", "abs(w)", "--predictor", "horizon:20"]);
     assert!(out.contains("20 sample(s) ahead"), "{out}");
     // Two pole pairs instead of four: the model explains the record no more.
     let (out, _) = bench.ends(3, &["fit", "pmsm.toml", "record.csv", "--constant", "np=2"]);
