@@ -100,7 +100,7 @@ fn record(text: &Model, noise: f64) -> Record {
         };
         layout.inputs.iter().map(|one| one.name.as_str()).enumerate().map(value).collect()
     };
-    let inputs: Vec<Vec<f64>> = (0..300).map(sample).collect();
+    let inputs: Vec<Vec<f64>> = (0..160).map(sample).collect();
     let truth: Vec<f64> =
         text.parameters().iter().map(|one| 1.1 * one.start + if one.start == 0.0 { 1e-4 } else { 0.0 }).collect();
     let step = if layout.kind == Kind::Discrete { 1e-4 } else { 2e-4 };
