@@ -234,11 +234,11 @@ def _stamps(values: Any, what: str) -> Any:
 
 
 def _since_first(stamps: Any, what: str) -> Array:
-    if (np.diff(stamps) <= 0).any():
-        k = int(np.argmax(np.diff(stamps) <= 0)) + 1
+    if (np.diff(stamps) < 0).any():
+        k = int(np.argmax(np.diff(stamps) < 0)) + 1
         jump = (stamps[k] - stamps[k - 1]) / 1e9
         raise Error(
-            f"{what} does not increase: row {k} (from zero) is {jump:g} s after the row before it. Sort the rows and drop repeated ones; "
+            f"{what} does not increase: row {k} (from zero) is {jump:g} s after the row before it. Sort the rows; "
             "where clocks were set back for winter, give the times their zone (tz_localize)"
         )
     seconds: Array = (stamps - (stamps[0] if len(stamps) else 0)) / 1e9

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from conftest import Pmsm
 
 import greybox as gb
 
@@ -90,9 +89,3 @@ def test_units_that_do_not_fit_are_warned_of(path: Path) -> None:
     path.write_text(PMSM.replace("ud - rs*id", "ud - rs*w"))
     with pytest.warns(gb.ModelWarning, match="ud"):
         gb.load(path)
-
-
-def test_the_class_is_the_same_model(path: Path) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", gb.ModelWarning)
-        assert sorted(str(gb.load(path, np=4)).split()) == sorted(str(Pmsm(4).equations()).split())
