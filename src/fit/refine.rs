@@ -222,10 +222,12 @@ impl Problem<'_> {
     ) -> Result<Summary, Error> {
         let mut found = found?;
         let mut before = None;
+        // An adaptive method takes ever more steps for a plant that explodes.
+        let most_parts = if self.sweep.is_adaptive() { 1 } else { PARTS };
         for parts in 1.. {
             let trials = most.saturating_sub(found.iterations);
-            if trials == 0 || self.settings.searches.count() > 1 || !may_go_on(&found, before, parts) || control.stops()
-            {
+            let goes_on = self.settings.searches.count() == 1 && may_go_on(&found, before, (parts, most_parts));
+            if trials == 0 || !goes_on || control.stops() {
                 break;
             }
             before = found.deviance;
@@ -252,14 +254,14 @@ pub(super) fn is_only_coarse(found: &Summary) -> bool {
 }
 
 /// Whether a search that ended at a limit of trial steps goes on after so many parts: while each lowers the deviance, which before the last
-/// one was this; no further than some parts where an output is left unexplained, or where there is no deviance.
-fn may_go_on(found: &Summary, before: Option<f64>, parts: u64) -> bool {
+/// one was this; no further than `most` parts where an output is left unexplained, and than some where there is no deviance.
+fn may_go_on(found: &Summary, before: Option<f64>, (parts, most): (u64, u64)) -> bool {
     let limited = matches!(found.outcome, Outcome::IterationLimit { .. } | Outcome::OwnLimit { .. });
     let explains = !is_useless(found, WarningCode::Unexplained);
     limited
         && match (before, found.deviance) {
-            (Some(before), Some(now)) => now < before - LOWERED && (explains || parts < PARTS),
-            (None, Some(_)) => true,
+            (Some(before), Some(now)) => now < before - LOWERED && (explains || parts < most),
+            (None, Some(_)) => explains || parts < most,
             (_, None) => explains && parts < PARTS,
         }
 }

@@ -44,7 +44,8 @@ pub(super) fn start_error(objective: &Objective<'_>, coordinates: &[f64], error:
 /// sign, such as a quantity that cannot be negative but was measured so.
 fn taken_from_outputs(objective: &Objective<'_>, e: usize, coordinates: &[f64]) -> Option<Failure> {
     let problem = objective.problem;
-    if *problem.records[e].initial_state() != Initial::Estimated {
+    let fails = |x: &[f64]| !objective.cost_of(e, x).is_ok_and(f64::is_finite);
+    if *problem.records[e].initial_state() != Initial::Estimated || !fails(coordinates) {
         return None;
     }
     let taken = |i: &usize| {
@@ -54,7 +55,7 @@ fn taken_from_outputs(objective: &Objective<'_>, e: usize, coordinates: &[f64]) 
     let succeeds = |i: &usize| {
         let mut other = coordinates.to_vec();
         other[*i] = -other[*i];
-        objective.cost_of(e, &other).is_ok_and(f64::is_finite)
+        !fails(&other)
     };
     let i = problem.unknowns.columns(e).filter(taken).find(succeeds)?;
     Some(Failure {

@@ -7,8 +7,11 @@ use crate::interval::Hold;
 use crate::layout::Quantity;
 use crate::parameter::Parameter;
 use crate::real::{Read, Written};
+use core::fmt;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{Error, IntoDeserializer, MapAccess, Visitor};
 use serde::ser::SerializeStruct;
-use serde::{Deserialize, Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::sync::Arc;
 
 impl Serialize for Record {
@@ -78,7 +81,7 @@ fn names(quantities: &[Quantity]) -> impl Iterator<Item = &str> + Clone {
 }
 
 /// One hold of all inputs, or one of each by name.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize)]
 #[serde(untagged)]
 enum StoredHold {
     All(Hold),
@@ -101,6 +104,30 @@ impl StoredHold {
             StoredHold::All(hold) => Ok(Holds::All(hold)),
             StoredHold::Each(holds) => holds.in_order(names(inputs)).map(Holds::each),
         }
+    }
+}
+
+impl<'de> Deserialize<'de> for StoredHold {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(HoldOrEach)
+    }
+}
+
+struct HoldOrEach;
+
+impl<'de> Visitor<'de> for HoldOrEach {
+    type Value = StoredHold;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a hold of all inputs, or a map of holds by name")
+    }
+
+    fn visit_str<E: Error>(self, name: &str) -> Result<StoredHold, E> {
+        Hold::deserialize(name.into_deserializer()).map(StoredHold::All)
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<StoredHold, A::Error> {
+        Entries::deserialize(MapAccessDeserializer::new(map)).map(StoredHold::Each)
     }
 }
 

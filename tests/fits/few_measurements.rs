@@ -108,8 +108,8 @@ fn initial_states_only_with_a_sandwich() {
 fn a_logarithm_is_known_to_a_factor() {
     let summary = |a: Parameter| {
         let inputs: Vec<Voltage> = (0..40).map(|k| Voltage { u: (0.7 * f64::from(k)).sin() }).collect();
-        let error = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
-        let outputs = inputs.iter().enumerate().map(|(k, u)| Current { i: 0.3 * u.u + error(k) }).collect();
+        let mut noise = Noise(4);
+        let outputs = inputs.iter().map(|u| Current { i: 0.3 * u.u + noise.gauss() }).collect();
         let record = Experiment::new(&Gain, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
         let fit = Fit::new(&Gain, &record).parameters(Factor { a }).noise(Current { i: 1.0 });
         fit.run().unwrap().into_summary()

@@ -38,12 +38,14 @@ fn where_a_search_goes_on() {
     ];
     assert_eq!(cases.each_ref().map(is_only_coarse), [true, true, false, false]);
     let go_on = |cases: &[Summary; 4], before: Option<f64>, parts: u64| {
-        cases.each_ref().map(|found| may_go_on(found, before, parts))
+        cases.each_ref().map(|found| may_go_on(found, before, (parts, PARTS)))
     };
     assert_eq!(go_on(&cases, None, 1), [false; 4]);
     // After the first part, after one that lowered the deviance to 10 by more than 1 and by less, and after many parts.
     let limited = cases.map(|one| Summary { outcome: Outcome::IterationLimit { iterations: 3 }, ..one });
     assert_eq!(go_on(&limited, None, 1), [true; 4]);
+    // By an adaptive method, one part where an output is left unexplained.
+    assert_eq!(limited.each_ref().map(|found| may_go_on(found, None, (1, 1))), [true, true, false, true]);
     assert_eq!(go_on(&limited, Some(11.1), 4), [true; 4]);
     assert_eq!(go_on(&limited, Some(10.9), 4), [false; 4]);
     assert_eq!(go_on(&limited, Some(11.1), 5), [true, true, false, true]);

@@ -32,11 +32,7 @@ pub(crate) const RESTARTS: Check = Check {
             value: POSSIBLE,
             source: "one-sided 95 %",
         },
-        Level {
-            of: "the bias of care by noise that is not excluded",
-            value: NOT_EXCLUDED,
-            source: "a quarter: intervals of 95 % cover 94 %",
-        },
+        Level { of: "the bias of care by noise that is not excluded", value: NOT_EXCLUDED, source: "a tenth" },
         Level { of: "the bias that is not usable", value: BIAS, source: "a quarter: intervals of 95 % cover 94 %" },
     ],
     examine: |evidence, intervals| restart_noise(evidence, &intervals.unknowns).into(),
@@ -65,7 +61,7 @@ const NO_BIAS: f64 = 0.1;
 /// Noise in restarts that is not seen is taken as large as its error by so many standard errors allows (95 %), and is said if it would bias
 /// by more than the second.
 const POSSIBLE: f64 = 1.645;
-const NOT_EXCLUDED: f64 = 0.25;
+const NOT_EXCLUDED: f64 = 0.1;
 /// Significance level of the test for noise in restarts.
 const LEVEL: f64 = 0.01;
 
