@@ -61,7 +61,7 @@ const NO_BIAS: f64 = 0.1;
 /// Noise in restarts that is not seen is taken as large as its error by so many standard errors allows (95 %), and is said if it would bias
 /// by more than the second.
 const POSSIBLE: f64 = 1.645;
-const NOT_EXCLUDED: f64 = 0.1;
+const NOT_EXCLUDED: f64 = 0.15;
 /// Significance level of the test for noise in restarts.
 const LEVEL: f64 = 0.01;
 
