@@ -1,17 +1,17 @@
 //! [`Fit`]: from a model and its records to an estimate.
 
-#[cfg(feature = "parallel")]
-mod ahead;
+mod alias_search;
 mod by_name;
 mod elsewhere;
 mod fittable;
 mod fleet;
 mod lockstep;
 mod predict;
+#[cfg(feature = "parallel")]
+mod prefetch;
 mod refine;
 mod run;
 mod search;
-mod sides;
 mod simulate;
 mod simulated;
 mod start_error;

@@ -11,6 +11,8 @@ mod intervals;
 mod leverage;
 mod point;
 mod summary;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use checks::{Aliases, INDISTINGUISHABLE};
 pub(crate) use conclude::{conclude, conclude_from};

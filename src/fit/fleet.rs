@@ -1,9 +1,9 @@
 //! [`Fleet`]: the same fit of many records, each by itself.
 
-#[cfg(feature = "parallel")]
-use super::ahead::in_order;
 use super::fittable::{Made, finer};
 use super::lockstep::fit_together;
+#[cfg(feature = "parallel")]
+use super::prefetch::in_order;
 use super::{Fit, Records};
 use crate::error::Error;
 use crate::estimate::Summary;

@@ -6,10 +6,6 @@ use crate::judge::intervals::Intervals;
 use crate::optimize::Severity;
 use std::borrow::Cow;
 
-/// The reason of checks of errors that are none.
-pub(crate) const ROUND_OFF: &str = "the errors are round-off";
-pub(crate) const PREFILTER: &str = "a pre-filter";
-
 /// A question that the verdict asks of an estimate.
 pub(crate) struct Check {
     /// What holds where it finds nothing, in a few words.

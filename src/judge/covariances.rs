@@ -1,7 +1,7 @@
 //! The covariance of the unknowns: classical, a sandwich, or HAC, and its degrees of freedom.
 
 mod clusters;
-mod hac;
+pub(crate) mod hac;
 mod predicted;
 pub(crate) mod sandwich;
 
@@ -10,9 +10,8 @@ use crate::estimate::student::Spread;
 use crate::information::Covariance;
 use crate::judge::evidence::Evidence;
 use crate::judge::evidence::color;
-use crate::judge::evidence::shares::{Largest, shares};
+use crate::judge::evidence::shares::Largest;
 use crate::judge::evidence::sizes::{Sizes, Uneven};
-use crate::judge::evidence::whiteness::WHITENESS_LEVEL;
 use crate::judge::point::Point;
 use crate::optimize::Infeasible;
 use crate::problem::{Noise, Whitening};
@@ -22,13 +21,6 @@ use clusters::{Cluster, Clusters, clusters};
 use hac::hac;
 use predicted::{Dependence, dependence_of_variances};
 use sandwich::Robust;
-
-/// Below this number of measurements the covariance is the classical one, whether the errors are autocorrelated, or of one size, or not.
-const CORRELATED_SAMPLES: u64 = 12;
-/// Records of up to so many measurements are tested for color at this level before their intervals are made: the tests see little
-/// there, and white errors that are taken as colored lose nothing (docs/intervals.md).
-const SHORT: u64 = 1_000;
-const SHORT_LEVEL: f64 = 0.05;
 
 /// Levels at which the variance by records as clusters is certainly larger than that by the errors: of colored errors, where the records
 /// have [`FEW`] degrees of freedom or more, and of white ones, or with fewer.
@@ -114,7 +106,7 @@ impl CoordinateCovariance {
 
 pub(crate) fn covariances(evidence: &Evidence<'_>) -> Covariances {
     let unit = evidence.unit();
-    let colored = uses_hac(evidence).then(|| for_colored_errors(evidence, unit?)).flatten();
+    let colored = evidence.uses_hac().then(|| for_colored_errors(evidence, unit?)).flatten();
     let level = if colored.is_some() { CLUSTERED } else { DIFFERENT };
     let found = colored.unwrap_or_else(|| for_white_errors(evidence, unit));
     let (found, differing) = match clusters(&evidence.point) {
@@ -138,32 +130,24 @@ fn has_short_records(evidence: &Evidence<'_>) -> bool {
     evidence.residuals.measured < SHORT_RECORD * evidence.point.objective.experiments() as u64
 }
 
-/// Whether the intervals allow for colored errors.
-fn uses_hac(evidence: &Evidence<'_>) -> bool {
-    let level = match evidence.residuals.measured {
-        ..CORRELATED_SAMPLES => return false,
-        CORRELATED_SAMPLES..=SHORT => SHORT_LEVEL,
-        _ => WHITENESS_LEVEL,
-    };
-    !evidence.point.is_static() && evidence.autocorrelated_at(level).is_some()
-}
-
 fn for_colored_errors(evidence: &Evidence<'_>, unit: &Covariance) -> Option<CoordinateCovariance> {
     let Point { objective, end, linear, held_for_covariance: held, .. } = &evidence.point;
-    let hac = hac(objective, &end.coordinates, linear, (held, unit))?;
+    let (frames, first) = evidence.rows().colored.as_ref()?;
+    let hac = hac(objective, &end.coordinates, linear, (frames, first))?;
     let degrees = hac.degrees(objective, unit);
     let covariance = hac.covariance(held, &degrees, evidence.coupled().is_some())?;
     let degrees = degrees.into_iter().map(|degrees| degrees.min(evidence.point.degrees)).collect();
     let method = CovarianceMethod::Hac { lags: hac.lags as u64 };
+    let shares = evidence.rows().shares.as_ref();
     let found = CoordinateCovariance {
         covariance: Some(covariance),
         method,
         factor: 1.0,
         degrees,
-        shares: hac.shares,
+        shares: shares.map(|(largest, _)| largest.clone()),
         uneven: None,
     };
-    let differ = hac.sizes.as_ref().is_some_and(|sizes| takes_one_size(evidence) && sizes.differ(held));
+    let differ = evidence.takes_one_size() && shares.is_some_and(|(_, sizes)| sizes.differ(held));
     let certain = evidence.autocorrelated_at(color::CERTAIN).is_some();
     if certain && !differ {
         return Some(found);
@@ -179,15 +163,15 @@ fn for_white_errors(evidence: &Evidence<'_>, unit: Option<&Covariance>) -> Coord
     let x = &end.coordinates;
     let (factor, degrees) = estimated_weights(evidence);
     let degrees = vec![degrees; evidence.point.slopes.len()];
-    let tested = unit.filter(|_| takes_one_size(evidence)).and_then(|unit| shares(objective, x, unit));
-    let uneven = tested.as_ref().and_then(|(_, sizes)| sizes.uneven(held));
+    let tested = evidence.takes_one_size().then(|| evidence.rows().shares.as_ref()).flatten();
+    let uneven = tested.and_then(|(_, sizes)| sizes.uneven(held));
     // Of models without states it is only said: classical standard errors are what certified ones are compared with. A noise that was
     // given is replaced only where the errors certainly are of another size.
     let given = matches!(objective.problem.settings.noise, Noise::Given(_));
     let differ = |(_, sizes): &(Vec<Largest>, Sizes)| if given { uneven.is_some() } else { sizes.differ(held) };
-    let sized = !evidence.point.is_static() && tested.as_ref().is_some_and(differ);
-    let shares = tested.map(|(shares, _)| shares);
-    if sandwich::is_needed(objective) || evidence.coupled().is_some() || sized || spans_differ(evidence) {
+    let sized = !evidence.point.is_static() && tested.is_some_and(differ);
+    let shares = tested.map(|(shares, _)| shares.clone());
+    if objective.needs_sandwich() || evidence.coupled().is_some() || sized || spans_differ(evidence) {
         let filtered = objective.problem.settings.prefilter.is_some();
         let method = if filtered { CovarianceMethod::FilteredSandwich } else { CovarianceMethod::Sandwich };
         let none = Robust { covariance: None, shares: None, degrees: vec![f64::INFINITY; degrees.len()] };
@@ -209,14 +193,6 @@ fn for_white_errors(evidence: &Evidence<'_>, unit: Option<&Covariance>) -> Coord
     }
     let factor = factor * widening * widening;
     CoordinateCovariance { covariance: unit.cloned(), method, factor, degrees, shares, uneven }
-}
-
-/// Whether the classical covariance takes noise, estimated or given, to be of one size per output.
-fn takes_one_size(evidence: &Evidence<'_>) -> bool {
-    let objective = evidence.point.objective;
-    let predicted = matches!(objective.problem.settings.noise, Noise::Predicted);
-    let exact = evidence.rounding || evidence.point.is_exact() || !evidence.has_noise();
-    !predicted && !exact && !sandwich::is_needed(objective) && evidence.residuals.measured >= CORRELATED_SAMPLES
 }
 
 /// Whether errors are those of predictions ahead over intervals that are not equal: what disturbs the plant grows with them.

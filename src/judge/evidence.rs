@@ -9,6 +9,8 @@ pub(crate) mod output_sums;
 pub(crate) mod powers;
 pub(crate) mod products;
 pub(crate) mod residual_pass;
+pub(crate) mod rows;
+pub(crate) mod sensors;
 pub(crate) mod shares;
 pub(crate) mod sizes;
 mod step_error;
@@ -20,11 +22,22 @@ use crate::judge::point::Point;
 use crate::problem::{Noise, Whitening};
 use color::is_certain;
 use coupling::Coupled;
-use first_errors::Errors;
 use residual_pass::Residuals;
+use rows::{Asked, Rows, rows};
 use std::cell::OnceCell;
 use whiteness::{WHITENESS_LEVEL, Whiteness, least_white};
 
+/// The reason of checks of errors that are none, and of checks that a pre-filter rules out.
+pub(crate) const ROUND_OFF: &str = "the errors are round-off";
+pub(crate) const PREFILTER: &str = "a pre-filter";
+/// Sensors are not tested beside more unknowns than these.
+const MOST: usize = 200;
+/// Below this number of measurements the covariance is the classical one, whether the errors are autocorrelated, or of one size, or not.
+const CORRELATED_SAMPLES: u64 = 12;
+/// Records of up to so many measurements are tested for color at this level before their intervals are made: the tests see little
+/// there, and white errors that are taken as colored lose nothing (docs/intervals.md).
+const SHORT: u64 = 1_000;
+const SHORT_LEVEL: f64 = 0.05;
 /// Errors below this fraction of a given noise are round-off: no whiteness test, no HAC.
 const ROUNDING: f64 = 0.1;
 
@@ -36,7 +49,7 @@ pub(crate) struct Evidence<'e> {
     pub rounded: Vec<bool>,
     pub rounding: bool,
     unit: OnceCell<Option<Covariance>>,
-    first_errors: OnceCell<Vec<Errors>>,
+    rows: OnceCell<Rows>,
 }
 
 impl<'e> Evidence<'e> {
@@ -50,7 +63,7 @@ impl<'e> Evidence<'e> {
         };
         let rounded: Vec<bool> = sigma.iter().enumerate().map(rounded).collect();
         let rounding = rounded.iter().all(|rounded| *rounded);
-        Evidence { point, residuals, rounded, rounding, unit: OnceCell::new(), first_errors: OnceCell::new() }
+        Evidence { point, residuals, rounded, rounding, unit: OnceCell::new(), rows: OnceCell::new() }
     }
 
     /// The covariance of unit noise in coordinates.
@@ -58,9 +71,42 @@ impl<'e> Evidence<'e> {
         self.unit.get_or_init(|| self.point.linear.covariance(&self.point.held_for_covariance)).as_ref()
     }
 
-    /// The first errors of the first records: one pass in values.
-    pub fn first_errors(&self) -> &[Errors] {
-        self.first_errors.get_or_init(|| first_errors::of_all(self.point.objective, &self.point.end.coordinates))
+    /// What a pass with slopes sums up for the covariance and the checks of this estimate.
+    pub fn rows(&self) -> &Rows {
+        let Point { objective, end, held_for_covariance: held, .. } = &self.point;
+        let colored = || self.unit().filter(|_| self.uses_hac()).map(|unit| (&held[..], unit));
+        let shares = || self.unit().filter(|_| self.takes_one_size());
+        let asked = || Asked { shares: shares(), colored: colored(), sensors: self.without_sensors().is_none() };
+        self.rows.get_or_init(|| rows(objective, &end.coordinates, asked()))
+    }
+
+    /// Whether the intervals allow for colored errors.
+    pub fn uses_hac(&self) -> bool {
+        let level = match self.residuals.measured {
+            ..CORRELATED_SAMPLES => return false,
+            CORRELATED_SAMPLES..=SHORT => SHORT_LEVEL,
+            _ => WHITENESS_LEVEL,
+        };
+        !self.point.is_static() && self.autocorrelated_at(level).is_some()
+    }
+
+    /// Whether the classical covariance takes noise, estimated or given, to be of one size per output.
+    pub fn takes_one_size(&self) -> bool {
+        let objective = self.point.objective;
+        let predicted = matches!(objective.problem.settings.noise, Noise::Predicted);
+        let exact = self.rounding || self.point.is_exact() || !self.has_noise();
+        !predicted && !exact && !objective.needs_sandwich() && self.residuals.measured >= CORRELATED_SAMPLES
+    }
+
+    /// Why the rows of sensors are not summed up.
+    pub fn without_sensors(&self) -> Option<&'static str> {
+        let Point { objective, end, .. } = &self.point;
+        match () {
+            _ if objective.problem.settings.prefilter.is_some() => Some(PREFILTER),
+            _ if objective.sweep.restarts().is_some() => Some("predictions that restart from measurements"),
+            _ if objective.problem.unknowns.row.len() > MOST => Some("more than 200 unknowns"),
+            _ => (!end.outcome.converged()).then_some("no minimum"),
+        }
     }
 
     /// The errors' autocorrelation; not computed where residuals are round-off.

@@ -112,6 +112,11 @@ impl<'p> Objective<'p> {
         self.loss().is_some_and(|loss| loss.weight(1e3) < 1.0)
     }
 
+    /// Whether weights, a pre-filter or a robust loss make the classical covariance wrong, whatever the data.
+    pub(crate) fn needs_sandwich(&self) -> bool {
+        self.is_weighted() || self.problem.settings.prefilter.is_some() || self.is_robust()
+    }
+
     pub(crate) fn is_weighted(&self) -> bool {
         self.problem.settings.weights.is_some()
     }

@@ -16,6 +16,30 @@ pub(crate) trait Accumulate: Send + Sized {
     fn append(&mut self, later: Self);
 }
 
+/// Two accumulators in one pass.
+impl<A: Accumulate, B: Accumulate> Accumulate for (A, B) {
+    fn add(&mut self, window: &Window, lane: usize) {
+        self.0.add(window, lane);
+        self.1.add(window, lane);
+    }
+
+    fn append(&mut self, later: Self) {
+        self.0.append(later.0);
+        self.1.append(later.1);
+    }
+}
+
+/// An accumulator that a pass may leave out, in all segments alike.
+impl<A: Accumulate> Accumulate for Option<A> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        self.iter_mut().for_each(|one| one.add(window, lane));
+    }
+
+    fn append(&mut self, later: Self) {
+        self.iter_mut().zip(later).for_each(|(one, later)| one.append(later));
+    }
+}
+
 impl Objective<'_> {
     /// Initial state and parameters of each experiment.
     pub(super) fn values(&self, coordinates: &[f64]) -> Vec<Values> {

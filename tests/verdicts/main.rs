@@ -68,6 +68,18 @@ fn print(title: &str, rows: &[Row]) {
     }
 }
 
+/// With `GREYBOX_WRITE_CHECKS`, writes how many good records each code was said of, for `docs/checks.md`.
+fn write_flagged(rows: &[Row]) {
+    if std::env::var_os("GREYBOX_WRITE_CHECKS").is_none() {
+        return;
+    }
+    let mut flagged: BTreeMap<&str, usize> = BTreeMap::new();
+    rows.iter().flat_map(|row| &row.codes).for_each(|(code, count)| *flagged.entry(code).or_default() += count);
+    let mut text = format!("code,records\nall,{}\n", rows.len() as u64 * SEEDS);
+    flagged.iter().for_each(|(code, count)| text += &format!("{code},{count}\n"));
+    std::fs::write(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/flagged.csv"), text).unwrap();
+}
+
 #[test]
 fn junk_is_never_usable() {
     let kinds: Vec<_> = [junk_sensors::all(), junk_inputs::all(), junk_models::all(), junk_processes::all()]
@@ -100,6 +112,7 @@ fn good_records_are_usable() {
     };
     let rows: Vec<Row> = kinds.par_iter().map(judged).collect();
     print("good", &rows);
+    write_flagged(&rows);
     let not: usize = rows.iter().map(|row| row.counts[2]).sum();
     let all = rows.len() * SEEDS as usize;
     let wrong: Vec<&str> = rows.iter().filter(|row| !row.worst.is_empty()).map(|row| &*row.worst).collect();

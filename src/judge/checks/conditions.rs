@@ -3,11 +3,11 @@
 //! not depend on it. The time of a switch changes the cost in steps.
 
 use crate::estimate::{Unknown, Warning, WarningCode};
-use crate::judge::check::{Check, Examined, Level, Pass, ROUND_OFF};
+use crate::judge::check::{Check, Examined, Level, Pass};
 use crate::judge::checks::curved::QUANTILE;
 use crate::judge::checks::rise::{Place, least_rise};
 use crate::judge::covariances::Covariances;
-use crate::judge::evidence::Evidence;
+use crate::judge::evidence::{Evidence, ROUND_OFF};
 use crate::numeral::percent;
 use crate::optimize::Severity;
 use crate::problem::Role;

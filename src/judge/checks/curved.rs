@@ -6,10 +6,10 @@
 //! direction). The ends of the profile's interval solve `t + t^2/2 a_i / s_i = -+z`; those of the linear one are `-+z`.
 
 use crate::estimate::{Unknown, WarningCode};
-use crate::judge::check::{Check, Examined, Level, Pass, ROUND_OFF, with_care};
+use crate::judge::check::{Check, Examined, Level, Pass, with_care};
 use crate::judge::checks::rise::{Place, least_rise};
 use crate::judge::covariances::Covariances;
-use crate::judge::evidence::Evidence;
+use crate::judge::evidence::{Evidence, ROUND_OFF};
 use crate::numeral::{number, percent};
 use crate::parameter::Transform;
 use crate::problem::Role;
@@ -144,9 +144,9 @@ fn along(evidence: &Evidence<'_>, i: usize, covariances: &Covariances) -> Option
     Some((0..evidence.point.slopes.len()).map(of).collect())
 }
 
-/// How much predictions are bent along the profile of an unknown, by one standard error of it, in standard deviations of the noise,
-/// if they are so in each unknown as a power or an exponential is: half the square of its change relative to itself, times what
-/// its logarithm moves them by. What unknowns that replace each other move cancels to first order only.
+/// The expected curvature of the predictions along the profile of an unknown, by one standard error of it, in standard deviations of the
+/// noise, if predictions depend on each unknown exponentially: half the square of its relative change, times what its logarithm moves
+/// them by. What unknowns that replace each other move cancels to first order only.
 fn expected_curvature(
     evidence: &Evidence<'_>,
     i: usize,

@@ -103,7 +103,7 @@ const LARGER: f64 = 2.0;
 /// Suspicious samples that make so much of the sum of squares decide the estimate.
 const DECIDE: f64 = 0.5;
 /// A prediction that moves by more than this part of what the output moves, while that stands still, confirms that it should have moved;
-/// one that stands still for more than the second part of the samples decides the estimate.
+/// one that stands still for more than `LONG` of the samples decides the estimate.
 const MOVES: f64 = 0.1;
 const LONG: f64 = 0.25;
 /// Outputs with so few values are coarse, where each occurs so many times and the errors are larger than this part of a step.

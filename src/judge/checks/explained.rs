@@ -48,7 +48,7 @@ const LITTLE: f64 = 5.0;
 const MUCH: f64 = 0.5;
 /// An output stands at a level, and the model gives that level, if movement and errors are below this part of it.
 const LEVEL_PART: f64 = 0.1;
-/// Errors of such times the given noise, either way, say that it is wrong; beyond the second, or below the third where the
+/// Errors of `DIFFERENT` times the given noise, either way, say that it is wrong; beyond `FAR`, or below one in `FAR_BELOW` where the
 /// noise is larger than all that the output moves, that intervals mean nothing.
 const DIFFERENT: f64 = 2.0;
 /// From this ratio on intervals by a noise that was given cover 90 % or less.

@@ -31,7 +31,7 @@ impl Feedback {
         let (inputs, outputs) = (problem.layout().inputs.len(), evidence.point.objective.outputs());
         let controls = 1 + BEFORE * (inputs + outputs);
         let mut found = vec![Information::new(controls + outputs); inputs];
-        for (record, errors) in problem.records.iter().zip(evidence.first_errors()) {
+        for (record, errors) in problem.records.iter().zip(&evidence.residuals.first_errors) {
             let rows = (BEFORE..errors[0].len()).filter_map(|k| {
                 let now: Option<Vec<f64>> = errors.iter().map(|errors| errors[k]).collect();
                 Some((k, [before(record, k), now?].concat()))
@@ -83,7 +83,7 @@ impl Feedback {
         }
         let objective = evidence.point.objective.of(&driven, evidence.point.objective.sweep);
         let respond = |(e, record): (usize, &Record)| {
-            let all = |objective| errors(objective, &evidence.point.end.coordinates, e, usize::MAX);
+            let all = |objective| errors(objective, &evidence.point.end.coordinates, e);
             let (before, after) = (all(evidence.point.objective), all(&objective));
             let outputs = record.outputs.iter().zip(before.iter().zip(&after)).map(|(output, (before, after))| {
                 let change =

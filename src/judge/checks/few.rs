@@ -1,10 +1,11 @@
 //! Warnings about unknowns whose intervals rest on one or two measurements.
 
 use crate::estimate::{CovarianceMethod, Unknown, Warning, WarningCode};
-use crate::judge::check::{Check, Examined, Level, PREFILTER, Pass, ROUND_OFF};
+use crate::judge::check::{Check, Examined, Level, Pass};
 use crate::judge::covariances::Covariances;
-use crate::judge::evidence::Evidence;
-use crate::judge::evidence::shares::{self, DECIDES, Share, part};
+use crate::judge::evidence::rows::{Asked, rows};
+use crate::judge::evidence::shares::{DECIDES, Share, part};
+use crate::judge::evidence::{Evidence, PREFILTER, ROUND_OFF};
 use crate::judge::intervals::Intervals;
 use crate::numeral::{exact, percent};
 use crate::optimize::Severity;
@@ -44,7 +45,13 @@ fn decided_by_few(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &C
     let largest = match (&covariances.shares, evidence.unit()) {
         (Some(largest), _) => largest,
         (None, Some(unit)) if evidence.residuals.measured <= MOST => {
-            examined = shares::shares(evidence.point.objective, &evidence.point.end.coordinates, unit)?.0;
+            examined = rows(
+                evidence.point.objective,
+                &evidence.point.end.coordinates,
+                Asked { shares: Some(unit), ..Asked::default() },
+            )
+            .shares?
+            .0;
             &examined
         }
         _ => return None,

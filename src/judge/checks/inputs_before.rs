@@ -33,7 +33,7 @@ pub(crate) fn by_inputs_before(evidence: &Evidence<'_>) -> Option<Warning> {
     };
     let scales: Vec<Scale> = (0..layout.inputs.len()).map(|i| scale(evidence, i)).collect();
     let mut sums = vec![Before::default(); outputs * layout.inputs.len()];
-    for (e, errors) in evidence.first_errors().iter().enumerate() {
+    for (e, errors) in evidence.residuals.first_errors.iter().enumerate() {
         let inputs = objective.problem.records[e].inputs().iter().zip(&scales);
         for ((input, scale), sums) in inputs.zip(sums.chunks_mut(outputs)) {
             let u = &input.values;

@@ -1,12 +1,12 @@
 //! Whether a few errors far beyond the others decide a fit with a squared loss.
 
 use crate::estimate::{Warning, WarningCode};
-use crate::judge::check::{Check, Examined, Level, ROUND_OFF, with_care};
+use crate::judge::check::{Check, Examined, Level, with_care};
 use crate::judge::checks::data::is_named;
 use crate::judge::checks::dropouts;
-use crate::judge::evidence::Evidence;
 use crate::judge::evidence::first_errors::{self, Errors};
 use crate::judge::evidence::largest::chance;
+use crate::judge::evidence::{Evidence, ROUND_OFF};
 use crate::numeral::{exact, number, p_value, percent};
 use crate::optimize::Severity;
 use crate::outliers::{center_and_deviation, hampel};
@@ -39,7 +39,7 @@ const HEAVY: f64 = 5.0;
 const FAR: f64 = 5.0;
 /// Samples to either side with which an error is compared, too, so that slow changes of the noise level count as none.
 const NEIGHBORS: usize = 10;
-/// A warning if outliers make more than the first part of the sum of squares, a note if they make more than the second.
+/// Outliers that make more than `DECIDE` of the sum of squares are with care, those that make more than `LITTLE` a note.
 const DECIDE: f64 = 0.5;
 const LITTLE: f64 = 0.1;
 /// Level of the test of the largest error.
@@ -86,7 +86,7 @@ fn unsuspected(evidence: &Evidence<'_>, j: usize) -> Vec<Vec<Option<f64>>> {
         let errors = one[j].iter().enumerate();
         errors.map(|(k, error)| error.filter(|_| !is_named(evidence, e, j, k))).collect()
     };
-    evidence.first_errors().iter().enumerate().map(of).collect()
+    evidence.residuals.first_errors.iter().enumerate().map(of).collect()
 }
 
 fn outliers_of(evidence: &Evidence<'_>, j: usize, errors: &[f64]) -> Option<Warning> {

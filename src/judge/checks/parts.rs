@@ -13,10 +13,10 @@ mod spans;
 
 use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::information::Information;
-use crate::judge::check::{Check, Examined, Level, PREFILTER, Pass};
+use crate::judge::check::{Check, Examined, Level, Pass};
 use crate::judge::covariances::Covariances;
-use crate::judge::evidence::Evidence;
 use crate::judge::evidence::powers::COMPARED;
+use crate::judge::evidence::{Evidence, PREFILTER};
 use crate::numeral::{number, p_value, percent};
 use crate::optimize::{Linearization, Severity};
 use crate::problem::{Objective, Role};

@@ -8,20 +8,18 @@
 mod confirm;
 mod cut_off;
 mod offsets;
-mod rows;
 
 use crate::estimate::student::two_sided;
 use crate::estimate::{Unknown, Warning, WarningCode};
-use crate::information::Information;
-use crate::judge::check::{Check, Examined, Level, PREFILTER, Pass, ROUND_OFF};
+use crate::judge::check::{Check, Examined, Level, Pass};
 use crate::judge::directions;
-use crate::judge::evidence::Evidence;
+use crate::judge::evidence::sensors::{KINDS, Kind};
+use crate::judge::evidence::{Evidence, ROUND_OFF};
 use crate::judge::leverage::prior_row;
 use crate::numeral::{number, p_value, percent};
 use crate::optimize::{Linearization, Severity};
 use crate::problem::{Objective, Role, Whitening};
 pub(crate) use offsets::growth_by_offsets;
-use rows::{KINDS, Kind, Triangle};
 
 pub(crate) const SENSORS: Check = Check {
     name: "sensors have the model's gain, offset and delay",
@@ -42,11 +40,9 @@ pub(crate) const SENSORS: Check = Check {
 
 /// Level of the test, divided by the number of regressors.
 const LEVEL: f64 = 1e-4;
-/// The estimate is not usable where the fault moves a parameter by more than this part of itself; below the second part it is a note.
+/// The estimate is not usable where the fault moves a parameter by more than `FAR` of itself; below `NOTHING` it is a note.
 const FAR: f64 = 0.25;
 const NOTHING: f64 = 1e-4;
-/// More unknowns than these are not examined.
-const MOST: usize = 200;
 /// Part of a regressor's norm that must be orthogonal to the slopes of the unknowns: below it, curvature and rounding decide.
 const LEFT: f64 = 1e-4;
 /// Regressors whose sum of squares is within this many variances of the least (a chance of 0.002) explain the errors as well: of the gains of
@@ -75,15 +71,8 @@ struct Extended<'j> {
 
 /// Why sensors are not tested.
 fn skipped(evidence: &Evidence<'_>) -> Option<&'static str> {
-    let objective = evidence.point.objective;
-    match () {
-        _ if objective.problem.settings.prefilter.is_some() => Some(PREFILTER),
-        _ if objective.sweep.restarts().is_some() => Some("predictions that restart from measurements"),
-        _ if objective.problem.unknowns.row.len() > MOST => Some("more than 200 unknowns"),
-        _ if evidence.point.degrees <= 1.0 => Some("no degrees of freedom"),
-        _ if evidence.rounding => Some(ROUND_OFF),
-        _ => (!evidence.point.end.outcome.converged()).then_some("no minimum"),
-    }
+    let degrees = (evidence.point.degrees <= 1.0).then_some("no degrees of freedom");
+    evidence.without_sensors().or(degrees).or(evidence.rounding.then_some(ROUND_OFF))
 }
 
 /// What is wrong with outputs, or may be.
@@ -98,20 +87,11 @@ fn sensors(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
 impl<'j> Extended<'j> {
     /// `None` with a pre-filter, predictions that restart, many unknowns, or without a minimum.
     fn new(evidence: &'j Evidence<'j>) -> Option<Self> {
-        let possible = evidence.point.objective.problem.settings.prefilter.is_none()
-            && evidence.point.objective.sweep.restarts().is_none()
-            && evidence.point.values.len() <= MOST
-            && evidence.point.end.outcome.converged();
-        if !possible {
-            return None;
-        }
         // Rows of single outputs.
         let sigma = Whitening::Diagonal(evidence.point.objective.whitening.sigma());
         let objective = evidence.point.objective.with(sigma);
         let outputs = objective.outputs();
-        let make = |e: usize| Triangle::new(&objective, e);
-        let all = objective.gather(&evidence.point.end.coordinates, true, make).ok()?;
-        let mut triangles: Vec<Information> = all.into_iter().map(Triangle::of_all_outputs).collect();
+        let mut triangles = evidence.rows().sensors.clone()?;
         let unknowns = &objective.problem.unknowns;
         for (i, slope, error) in unknowns.priors(&evidence.point.end.coordinates) {
             let e = unknowns.row[i].experiment.unwrap_or(0);

@@ -4,14 +4,14 @@
 //! are uncorrelated with powers of its prediction, and with the inputs of the samples before.
 
 use crate::estimate::{Warning, WarningCode};
-use crate::judge::check::{Check, Examined, Level, PREFILTER, Pass, ROUND_OFF};
+use crate::judge::check::{Check, Examined, Level, Pass};
 use crate::judge::checks::inputs_before::by_inputs_before;
-use crate::judge::evidence::Evidence;
 use crate::judge::evidence::color;
 use crate::judge::evidence::first_errors;
 use crate::judge::evidence::powers::{SHAPE, Scale, scales};
 use crate::judge::evidence::products::Products;
 use crate::judge::evidence::whiteness::{LAGS, Whiteness};
+use crate::judge::evidence::{Evidence, PREFILTER, ROUND_OFF};
 use crate::numeral::{p_value, percent};
 use crate::problem::Accumulate;
 use crate::record::Record;
@@ -71,7 +71,7 @@ fn by_inputs(evidence: &Evidence<'_>) -> Option<Warning> {
         return None;
     }
     let mut sums = vec![(Portmanteau::new(LAGS), 0); count * layout.inputs.len()];
-    for (e, errors) in evidence.first_errors().iter().enumerate() {
+    for (e, errors) in evidence.residuals.first_errors.iter().enumerate() {
         for (i, input) in objective.problem.records[e].inputs().iter().enumerate() {
             let mut order: Vec<usize> = (0..errors[0].len()).collect();
             order.sort_by(|a, b| input.values[*a].total_cmp(&input.values[*b]));

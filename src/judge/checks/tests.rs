@@ -1,9 +1,10 @@
 //! The table of checks against `docs/checks.md` and the schema of an estimate's JSON.
 
 use super::*;
+use crate::estimate::WarningCode;
 use crate::judge::check::{Level, Pass};
 use crate::numeral::{counted, exact};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 fn code(code: impl serde::Serialize) -> String {
@@ -22,14 +23,28 @@ fn pass(pass: &Pass) -> String {
     }
 }
 
+/// Of how many good records each code was said, as measured by the table of verdicts.
+fn flagged() -> BTreeMap<String, usize> {
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/flagged.csv")).unwrap();
+    let row = |line: &str| line.split_once(',').map(|(code, count)| (code.to_owned(), count.parse().unwrap())).unwrap();
+    text.lines().skip(1).map(row).collect()
+}
+
 /// The page about all checks.
 fn page() -> String {
     let mut page = "# Checks of an estimate\n\nWritten from the table `CHECKS` in `src/judge/checks.rs` by \
                     `GREYBOX_WRITE_CHECKS=1 cargo test --lib checks`; a test compares it. The checks stand in the order in which their \
-                    warnings are shown. Passes over the data are counted beside the one in values that every estimate takes.\n"
+                    warnings are shown. Passes over the data are counted beside the one in values that every estimate takes.\n\n"
         .to_owned();
+    let flagged = flagged();
+    page += &format!(
+        "Behind each code stands of how many of {} good records of the table of verdicts it was said, most of them as a note \
+         (`GREYBOX_WRITE_CHECKS=1 cargo test --release --test verdicts good` measures that). A code of several checks has one number.\n",
+        flagged["all"]
+    );
     for (number, Check { name, asks, codes, costs, levels, .. }) in CHECKS.iter().enumerate() {
-        let codes: Vec<String> = codes.iter().map(|one| format!("`{}`", code(one))).collect();
+        let named = |one: &WarningCode| format!("`{}` ({})", code(one), flagged.get(&format!("{one:?}")).unwrap_or(&0));
+        let codes: Vec<String> = codes.iter().map(named).collect();
         let costs: Vec<String> = costs.iter().map(pass).collect();
         let costs = if costs.is_empty() { "none".to_owned() } else { costs.join("; ") };
         page += &format!("\n## {}. {name}\n\n{asks}\n\nCodes: {}. Passes: {costs}.\n", number + 1, codes.join(", "));

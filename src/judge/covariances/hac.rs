@@ -5,7 +5,7 @@
 //! Bartlett's weights (Newey and West, Econometrica 55 (1987) 703) at Andrews' bandwidth (Econometrica 59 (1991) 817,
 //! eqs. 6.2 and 6.4), and recolored (Andrews and Monahan, Econometrica 60 (1992) 953). Newey and West's sum is the sum
 //! of squares of moving sums, which a triangle absorbs like any other rows; so two passes over the data serve, and no
-//! score is kept longer than the bandwidth.
+//! score is kept longer than the bandwidth. The first of them is the pass that all checks share ([`Frame::first`]).
 //!
 //! The autoregression works on scores of unit covariance: so its singular values are below one, and the result does not
 //! depend on the choice of units or parameters. Its coefficients are corrected for the bias of least squares. The variance
@@ -21,14 +21,13 @@ mod stationary;
 
 use crate::information::{Covariance, Information};
 use crate::judge::covariances::sandwich::{self, Sandwich};
-use crate::judge::evidence::shares::Largest;
-use crate::judge::evidence::sizes::Sizes;
 use crate::judge::leverage::{of_experiment, prior_row};
 use crate::optimize::Linearization;
-use crate::problem::{Objective, each};
+use crate::problem::Objective;
 use joined::joined;
 use nalgebra::{Complex, DMatrix, DVector};
 use scores::{EachScore, Lagged, MovingSums};
+use stationary::{ErrorSums, Errors, FilteredSlopes, Stationary};
 
 /// Largest singular value of the autoregression (Andrews and Monahan 1992, section 3).
 const LARGEST: f64 = 0.97;
@@ -46,56 +45,102 @@ pub(crate) struct Hac {
     sandwich: Sandwich,
     /// The same with the scores of stationary errors, if they have such.
     stationary: Option<Sandwich>,
-    /// The largest shares of measurements in the variances of white errors.
-    pub(crate) shares: Option<Vec<Largest>>,
-    /// The sizes of the errors that have them.
-    pub(crate) sizes: Option<Sizes>,
     pub lags: usize,
     runs: Vec<Run>,
 }
 
-/// Two passes with slopes; `inverse` is the inverse of the curvature. `None` where the scores of the unknowns that are not held are linearly dependent.
+/// The unknowns of an experiment whose scores are summed, as columns, and the inverse of the curvature in all columns.
+pub(crate) struct Frame {
+    kept: Vec<usize>,
+    inverse: DMatrix<f64>,
+}
+
+/// What the first pass sums up of an experiment.
+pub(crate) type First<'f> = (EachScore<'f, Lagged>, Option<Errors<'f>>);
+
+/// Its sums: of products of the scores over time and, but where variances are predicted, of the errors.
+pub(crate) struct Sums {
+    lagged: Lagged,
+    pub errors: Option<ErrorSums>,
+}
+
+impl Frame {
+    /// Of all experiments, by the inverse of the curvature.
+    pub fn of_all(objective: &Objective<'_>, held: &[bool], inverse: &Covariance) -> Vec<Self> {
+        let frame = |e: usize| {
+            let columns = objective.problem.unknowns.columns(e).enumerate();
+            let kept = columns.filter(|(_, i)| !held[*i]).map(|(c, _)| c).collect();
+            Frame { kept, inverse: of_experiment(objective, inverse, e) }
+        };
+        (0..objective.experiments()).map(frame).collect()
+    }
+
+    fn scores<'f, T>(&'f self, objective: &'f Objective<'f>, experiment: usize, into: T) -> EachScore<'f, T> {
+        EachScore::new(objective, experiment, (&self.kept, &self.inverse), into)
+    }
+
+    /// The accumulators of the first pass.
+    pub fn first<'f>(&'f self, objective: &'f Objective<'f>, experiment: usize) -> First<'f> {
+        let stationary = !objective.sweep.predicts_variance();
+        let errors = stationary.then(|| Errors::new(objective, experiment, self.inverse.clone()));
+        (self.scores(objective, experiment, Lagged::new(self.kept.len())), errors)
+    }
+}
+
+impl Sums {
+    pub fn of((scores, errors): First<'_>) -> Self {
+        Sums { lagged: scores.into.complete(), errors: errors.map(|errors| errors.into) }
+    }
+}
+
+/// By the sums of the first pass, with one more pass with slopes. `None` where the scores of the unknowns that are not held are linearly
+/// dependent.
 pub(crate) fn hac(
     objective: &Objective<'_>,
     coordinates: &[f64],
     linear: &Linearization,
-    (held, inverse): (&[bool], &Covariance),
+    (frames, first): (&[Frame], &[Sums]),
 ) -> Option<Hac> {
-    let found = match sandwich::is_needed(objective) {
+    let found = match objective.needs_sandwich() {
         true => sandwich::curvature(objective, coordinates).ok()?,
         false => Sandwich::plain(linear),
     };
-    let unknowns = &objective.problem.unknowns;
-    let kept = |e: usize| -> Vec<usize> {
-        let columns = unknowns.columns(e).enumerate();
-        columns.filter(|(_, i)| !held[*i]).map(|(c, _)| c).collect()
+    let errors: Option<Vec<&ErrorSums>> = first.iter().map(|one| one.errors.as_ref()).collect();
+    let stationary = errors.map(|errors| Stationary::of(objective.outputs(), &errors));
+    let several = first.len() > 1;
+    let is_short = |e: usize| several && stationary.as_ref().is_some_and(|found| found.short[e]);
+    let prewhitened = |(e, sums): (usize, &Sums)| match is_short(e) {
+        true => Some(None),
+        false => Some(Some(Prewhitened::of(&sums.lagged)?)),
     };
+    let prewhitened: Vec<Option<Prewhitened>> = first.iter().enumerate().map(prewhitened).collect::<Option<_>>()?;
+    let make = |e: usize| {
+        let moving = prewhitened[e].as_ref();
+        let moving = moving.map(|by| frames[e].scores(objective, e, MovingSums::new(&by.w, &by.a, by.window)));
+        (moving, stationary.as_ref().map(|found| FilteredSlopes::new(objective, e, &found.models[e])))
+    };
+    let all = objective.gather(coordinates, true, make).ok()?.into_iter();
+    let (moving, filtered): (Vec<Option<Information>>, Vec<Option<Information>>) = all
+        .map(|(moving, filtered)| (moving.map(|one| one.into.triangle()), filtered.map(FilteredSlopes::triangle)))
+        .unzip();
+    let uncertainty = stationary.map_or(0.0, |found| found.uncertainty);
+    let run = |(e, by): (usize, &Option<Prewhitened>)| match (by, &moving[e], &filtered[e]) {
+        (Some(by), Some(sums), _) => Some(Run::Long(by.run(frames[e].kept.clone(), sums)?)),
+        (_, _, filtered) => Some(Run::Short { triangle: filtered.clone()?, uncertainty }),
+    };
+    let runs: Vec<Run> = prewhitened.iter().enumerate().map(run).collect::<Option<_>>()?;
+    let unknowns = &objective.problem.unknowns;
     let with_priors = |mut scores: Vec<Information>| {
         for (i, slope, _) in unknowns.priors(coordinates) {
             let e = unknowns.row[i].experiment.unwrap_or(0);
             scores[e].absorb_row(&prior_row(objective, e, i, slope), 0.0);
         }
-        scores
+        found.with(scores)
     };
-    let stationary = stationary::scores(objective, coordinates, inverse).ok()?;
-    let several = objective.experiments() > 1;
-    let short = |e: usize| stationary.as_ref().filter(|found| several && found.short[e]);
-    let runs = each(objective.experiments(), |e| match short(e) {
-        Some(found) => Some(Run::Short { triangle: found.triangles[e].clone(), uncertainty: found.uncertainty }),
-        None => {
-            let of_experiment = (kept(e), of_experiment(objective, inverse, e));
-            Some(Run::Long(LongRun::of(objective, e, coordinates, of_experiment)?))
-        }
-    });
-    let runs: Vec<Run> = runs.into_iter().collect::<Option<_>>()?;
     let scores = runs.iter().enumerate().map(|(e, run)| run.triangle(unknowns.columns(e).count())).collect();
     let lags = runs.iter().map(Run::lags).max().unwrap_or(0);
-    let (stationary, shares, sizes) = match stationary {
-        Some(found) => (Some(found.triangles), Some(found.shares), Some(found.sizes)),
-        None => (None, None, None),
-    };
-    let stationary = stationary.map(|scores| found.with(with_priors(scores)));
-    Some(Hac { sandwich: found.with(with_priors(scores)), stationary, shares, sizes, lags, runs })
+    let stationary = filtered.into_iter().collect::<Option<_>>().map(with_priors);
+    Some(Hac { sandwich: with_priors(scores), stationary, lags, runs })
 }
 
 impl Hac {
@@ -197,19 +242,22 @@ struct LongRun {
     innovations: DMatrix<f64>,
 }
 
-impl LongRun {
-    fn of(
-        objective: &Objective<'_>,
-        e: usize,
-        coordinates: &[f64],
-        (kept, inverse): (Vec<usize>, DMatrix<f64>),
-    ) -> Option<Self> {
-        let n = kept.len();
-        let each_score = || EachScore::new(objective, e, (&kept, &inverse), Lagged::new(n));
-        let lagged = objective.gather_one(coordinates, e, true, each_score).ok()?.into;
-        let Lagged { count, mut triangle, mut block, products, .. } = lagged;
-        triangle.absorb(&mut block);
-        let length = count as f64;
+/// What the products of the scores over time say of their prewhitening.
+struct Prewhitened {
+    count: f64,
+    window: usize,
+    root: DMatrix<f64>,
+    /// From scores to standardized ones.
+    w: DMatrix<f64>,
+    /// The autoregression of these.
+    a: DMatrix<f64>,
+    innovations: DMatrix<f64>,
+}
+
+impl Prewhitened {
+    fn of(lagged: &Lagged) -> Option<Self> {
+        let Lagged { count, triangle, products, .. } = lagged;
+        let (n, length) = (triangle.columns(), *count as f64);
         // To scores of unit covariance: z = s w.
         let root = DMatrix::from_fn(n, n, |i, j| triangle.at(i, j)) / length.sqrt();
         let w = root.solve_upper_triangular(&DMatrix::identity(n, n))?;
@@ -220,19 +268,27 @@ impl LongRun {
             return None;
         }
         let a = stable(&one + bias(&one)? / length)?;
-        let window = bandwidth(&one, &two, &a, count);
-        let each_score = || EachScore::new(objective, e, (&kept, &inverse), MovingSums::new(&w, &a, window));
-        let sums = objective.gather_one(coordinates, e, true, each_score).ok()?.into.triangle();
-        // Scores that sum to zero have moving sums that are smaller by their part of the record.
-        let part = window as f64 / length;
-        let sums = DMatrix::from_fn(n, n, |i, j| sums.at(i, j)) / (1.0 - part + part * part / 3.0).sqrt();
-        let recolor = (DMatrix::identity(n, n) - &a).try_inverse()?;
+        let window = bandwidth(&one, &two, &a, *count);
         let innovations = DMatrix::identity(n, n) - &a * one.transpose() - &one * a.transpose() + &a * a.transpose();
-        let finite = |m: &DMatrix<f64>| m.iter().all(|value| value.is_finite());
-        let sound = finite(&sums) && finite(&recolor);
-        sound.then_some(LongRun { kept, count: length, window, root, sums, recolor, innovations })
+        Some(Prewhitened { count: length, window, root, w, a, innovations })
     }
 
+    /// With the triangle of the moving sums.
+    fn run(&self, kept: Vec<usize>, sums: &Information) -> Option<LongRun> {
+        let Prewhitened { count, window, root, a, innovations, .. } = self;
+        let n = a.nrows();
+        // Scores that sum to zero have moving sums that are smaller by their part of the record.
+        let part = *window as f64 / count;
+        let sums = DMatrix::from_fn(n, n, |i, j| sums.at(i, j)) / (1.0 - part + part * part / 3.0).sqrt();
+        let recolor = (DMatrix::identity(n, n) - a).try_inverse()?;
+        let finite = |m: &DMatrix<f64>| m.iter().all(|value| value.is_finite());
+        let sound = finite(&sums) && finite(&recolor);
+        let (root, innovations) = (root.clone(), innovations.clone());
+        sound.then_some(LongRun { kept, count: *count, window: *window, root, sums, recolor, innovations })
+    }
+}
+
+impl LongRun {
     /// Its rows among all columns of the experiment.
     fn triangle(&self, columns: usize) -> Information {
         let rows = &self.sums * self.recolor.transpose() * &self.root;

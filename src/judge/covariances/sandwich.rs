@@ -109,11 +109,6 @@ impl Tally {
     }
 }
 
-/// Whether the settings make the classical covariance wrong, independent of the data.
-pub(crate) fn is_needed(objective: &Objective<'_>) -> bool {
-    objective.is_weighted() || objective.problem.settings.prefilter.is_some() || objective.is_robust()
-}
-
 /// The sandwich over all unknowns that are not held, in two more passes with slopes.
 pub(crate) fn sandwich(objective: &Objective<'_>, coordinates: &[f64], held: &[bool]) -> Result<Robust, Infeasible> {
     Passes { objective, coordinates }.sandwich(held)

@@ -5,11 +5,11 @@ use crate::optimize::Severity;
 /// Level of the test of whiteness below which the color is no chance; between this and the level at which intervals are
 /// widened it is a note.
 pub(crate) const CERTAIN: f64 = 1e-4;
-/// A level that is enough where the colored part is above the second.
+/// A level that is enough where the colored part is above `MUCH`.
 pub(crate) const LIKELY: f64 = 1e-3;
 const MUCH: f64 = 0.05;
-/// The part of an output's movement that is an error, and follows from the errors before: below the first it is a note,
-/// above the second the model is wrong or noise dominates the output.
+/// The part of an output's movement that is an error, and follows from the errors before: below `SMALL` it is a note,
+/// above `LARGE` the model is wrong or noise dominates the output.
 pub(crate) const SMALL: f64 = 1e-4;
 pub(crate) const LARGE: f64 = 0.5;
 /// The same part from which on a minimum that was found once is taken as wrong, and a model whose errors certainly follow from its

@@ -57,8 +57,8 @@ fn pairs(outputs: usize) -> impl Iterator<Item = (usize, usize)> {
     (1..outputs).flat_map(|j| (0..j).map(move |i| (i, j)))
 }
 
-/// Errors of an output that are as white as this by chance are taken as white: their autocorrelations are chance, and an inflation by
-/// them hides correlated outputs in short records.
+/// Above this p-value of the whiteness test no inflation is applied: the autocorrelations are chance, and an inflation by them hides
+/// correlated outputs in short records.
 const WHITE: f64 = 0.05;
 /// The largest ratio of the sums over the second and the first half of the known lags that is extrapolated.
 const SLOWEST: f64 = 0.99;

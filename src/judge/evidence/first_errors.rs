@@ -1,18 +1,44 @@
-//! Errors of single experiments at the estimate, for tests that need them sample by sample.
+//! The first errors of the first experiments, for tests that need them sample by sample.
 
 use crate::problem::Objective;
 use crate::sweep::Window;
 
-/// Records that are looked at, and samples of each: the first ones.
+/// Records that are looked at, and samples of each.
 const RECORDS: usize = 8;
 const SAMPLES: usize = 16_384;
 
 /// Errors of an experiment, output by output, sample by sample; `None` where nothing was measured.
 pub(crate) type Errors = Vec<Vec<Option<f64>>>;
 
-/// The first errors of the first records.
-pub(crate) fn of_all(objective: &Objective<'_>, coordinates: &[f64]) -> Vec<Errors> {
-    (0..objective.experiments().min(RECORDS)).map(|e| errors(objective, coordinates, e, SAMPLES)).collect()
+/// The first errors of an experiment, in the units of the outputs.
+pub(crate) struct FirstErrors {
+    /// Windows that begin at this sample or later are left out.
+    end: usize,
+    pub errors: Errors,
+}
+
+impl FirstErrors {
+    pub fn new(experiment: usize, outputs: usize) -> Self {
+        FirstErrors { end: if experiment < RECORDS { SAMPLES } else { 0 }, errors: vec![vec![]; outputs] }
+    }
+
+    /// Takes a window with its errors, output by output.
+    pub fn add(&mut self, window: &Window, lane: usize, errors: &[f64]) {
+        let samples = window.samples[lane];
+        if window.begin[lane] >= self.end {
+            return;
+        }
+        for (j, (kept, errors)) in self.errors.iter_mut().zip(errors.chunks_exact(samples)).enumerate() {
+            let in_units = |(k, error): (usize, &f64)| {
+                window.is_measured(k, j, lane).then(|| error * window.variance_root(k, j, lane))
+            };
+            kept.extend(errors.iter().enumerate().map(in_units));
+        }
+    }
+
+    pub fn append(&mut self, later: FirstErrors) {
+        self.errors.iter_mut().zip(later.errors).for_each(|(errors, later)| errors.extend(later));
+    }
 }
 
 /// What is left out, if something is.
@@ -22,8 +48,8 @@ pub(crate) fn left_out(objective: &Objective<'_>) -> Option<&'static str> {
         .then_some("records beyond the first 8, and samples beyond the first 16,384")
 }
 
-/// Errors of an experiment, in the units of the outputs, as far as this many samples or somewhat beyond.
-pub(crate) fn errors(objective: &Objective<'_>, coordinates: &[f64], e: usize, samples: usize) -> Errors {
+/// All errors of an experiment.
+pub(crate) fn errors(objective: &Objective<'_>, coordinates: &[f64], e: usize) -> Errors {
     let mut errors = vec![vec![]; objective.outputs()];
     let visit = &mut |window: &mut Window| {
         for k in 0..window.samples[0] {
@@ -32,9 +58,9 @@ pub(crate) fn errors(objective: &Objective<'_>, coordinates: &[f64], e: usize, s
                 errors.push((window.is_measured(k, j, 0) && error.is_finite()).then_some(error));
             }
         }
-        errors[0].len() < samples
+        true
     };
-    // It stops early where there are enough.
+    // Those up to where it fails.
     let _ = objective.run_alone(e, coordinates, false, visit);
     errors
 }

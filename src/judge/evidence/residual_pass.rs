@@ -5,6 +5,7 @@ mod experiment;
 use crate::error::Error;
 use crate::estimate::OutputFit;
 use crate::judge::evidence::coupling::Coupled;
+use crate::judge::evidence::first_errors::Errors;
 use crate::judge::evidence::largest::Largest;
 use crate::judge::evidence::modes::StateAt;
 use crate::judge::evidence::output_sums::OutputSums;
@@ -46,6 +47,8 @@ pub(crate) struct Residuals {
     /// The least probability that errors of the halves of the records, or of several records, follow from the prediction in ways
     /// that differ as much by chance.
     pub parts: f64,
+    /// The first errors of the first experiments.
+    pub first_errors: Vec<Errors>,
 }
 
 impl Residuals {
@@ -97,10 +100,10 @@ pub(crate) fn residual_pass(objective: &Objective<'_>, coordinates: &[f64]) -> R
     let scales = scales(objective);
     let make = |experiment: usize| Sums::new(objective, experiment, &scales);
     let all = plain.gather(coordinates, false, make).map_err(|_| failed(objective, coordinates))?;
-    let all: Vec<Sums<'_>> = all.into_iter().map(Sums::complete).collect();
+    let mut all: Vec<Sums<'_>> = all.into_iter().map(Sums::complete).collect();
     let windows: Vec<Compared<'_>> = all.iter().map(|one| one.compared(coordinates)).collect();
     let step_error = step_errors(&windows).into_iter().sum::<f64>();
-    Ok(residuals(objective, coordinates, &all, step_error))
+    Ok(residuals(objective, coordinates, &mut all, step_error))
 }
 
 /// The same of several objectives of one record each, at points of their own, whatever their stop conditions; `None` for one that fails.
@@ -109,20 +112,22 @@ pub(crate) fn residuals_together(points: &[At<'_>]) -> Vec<Option<Residuals>> {
     let in_units: Vec<At<'_>> = plain.iter().zip(points).map(|(plain, (_, x))| (plain, *x)).collect();
     let scales: Vec<Vec<Scale>> = points.iter().map(|(objective, _)| scales(objective)).collect();
     let all = gather_together(&in_units, |i| Sums::new(points[i].0, 0, &scales[i]));
-    let all: Vec<Option<Sums<'_>>> = all.into_iter().map(|sums| sums.map(Sums::complete)).collect();
+    let mut all: Vec<Option<Sums<'_>>> = all.into_iter().map(|sums| sums.map(Sums::complete)).collect();
     let present = all.iter().zip(points).filter_map(|(sums, (_, x))| Some(sums.as_ref()?.compared(x)));
     let windows: Vec<Compared<'_>> = present.collect();
     let mut step_errors = step_errors(&windows).into_iter();
-    let finish = |(sums, (objective, x)): (&Option<Sums<'_>>, &At<'_>)| {
-        let sums = std::slice::from_ref(sums.as_ref()?);
+    let finish = |(sums, (objective, x)): (&mut Option<Sums<'_>>, &At<'_>)| {
+        let sums = std::slice::from_mut(sums.as_mut()?);
         Some(residuals(objective, x, sums, step_errors.next()?))
     };
-    all.iter().zip(points).map(finish).collect()
+    all.iter_mut().zip(points).map(finish).collect()
 }
 
 /// Results from the sums of all experiments, and the sum of the squared changes with a finer step.
-fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>], step_error: f64) -> Residuals {
-    let outputs = objective.outputs();
+fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &mut [Sums<'_>], step_error: f64) -> Residuals {
+    let first_errors = all.iter_mut().map(|one| std::mem::take(&mut one.first_errors.errors));
+    let first_errors = first_errors.filter(|errors| !errors[0].is_empty()).collect();
+    let (all, outputs) = (&*all, objective.outputs());
     let mut sums = vec![OutputSums::default(); outputs];
     let (mut measured, mut log_determinant) = (0, 0.0);
     for one in all {
@@ -150,6 +155,7 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>], s
     Residuals {
         shape: (0..all[0].powers.len()).map(shape).collect(),
         parts: parts(all),
+        first_errors,
         outputs: sums.iter().map(OutputSums::fit).collect(),
         levels: sums.iter().map(OutputSums::level).collect(),
         kurtosis: sums.iter().map(OutputSums::kurtosis).collect(),

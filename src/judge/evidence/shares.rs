@@ -7,12 +7,11 @@
 
 mod pass;
 
-use crate::information::Covariance;
 use crate::judge::evidence::sizes::Sizes;
-use crate::judge::leverage::{ALONE, of_experiment};
+use crate::judge::leverage::ALONE;
 use crate::problem::Objective;
 use nalgebra::DMatrix;
-use pass::Pass;
+pub(crate) use pass::Pass;
 
 /// Part of the variance from which on one measurement, or two together, decide.
 pub(crate) const DECIDES: f64 = 0.9;
@@ -121,18 +120,6 @@ pub(crate) fn sizes_of_all<'s>(objective: &Objective<'_>, all: impl Iterator<Ite
     let mut sizes = Sizes::new(unknowns.row.len());
     all.enumerate().for_each(|(e, one)| sizes.append_to(unknowns.columns(e), &one.sizes));
     sizes
-}
-
-/// The largest shares, and the sizes of the errors that have them, with the inverse curvature.
-pub(crate) fn shares(
-    objective: &Objective<'_>,
-    coordinates: &[f64],
-    unit: &Covariance,
-) -> Option<(Vec<Largest>, Sizes)> {
-    let make = |e: usize| Pass::new(objective, Shares::new(e, of_experiment(objective, unit, e)));
-    let all = objective.gather(coordinates, true, make).ok()?;
-    let each = || all.iter().map(|one| &one.shares);
-    Some((of_all(objective, each()), sizes_of_all(objective, each())))
 }
 
 /// The part that these measurements have together.

@@ -1,8 +1,8 @@
 //! The test of one regressor that allows for errors of changing variance and for autocorrelated ones.
 
-use super::rows::{KINDS, Measurement, Measurements};
 use super::{Extended, Released};
 use crate::estimate::student::two_sided;
+use crate::judge::evidence::sensors::{KINDS, Measurement, Measurements};
 use crate::judge::evidence::whiteness::{LAGS, Whiteness};
 use crate::problem::Accumulate;
 use crate::sweep::Window;

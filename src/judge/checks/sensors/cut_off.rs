@@ -3,9 +3,10 @@
 //! Truncation puts an offset of half a quantization step, on average, into an output, of which the unknowns take a part. The fit with that
 //! offset is compared with the fit without it, by the slopes at the estimate.
 
-use super::{Extended, KINDS, Kind};
+use super::Extended;
 use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::judge::checks::data::{FEW, PART_OF_STEP, TIMES, distinct};
+use crate::judge::evidence::sensors::{KINDS, Kind};
 use crate::numeral::{number, percent};
 use crate::optimize::{Linearization, Severity};
 

@@ -1,8 +1,9 @@
 //! What is known of the unknowns if each output may have an offset.
 
-use super::{Extended, KINDS, Kind};
+use super::Extended;
 use crate::judge::directions::{taking_part, undetermined};
 use crate::judge::evidence::Evidence;
+use crate::judge::evidence::sensors::{KINDS, Kind};
 
 /// By how much the standard error of each unknown grows where each output may have an offset; infinite where an offset then replaces it, one
 /// where it is held anyway. `None` where that is not examined.

@@ -103,6 +103,12 @@ impl Lagged {
         }
     }
 
+    /// With the last rows absorbed.
+    pub fn complete(mut self) -> Self {
+        self.triangle.absorb(&mut self.block);
+        self
+    }
+
     /// Products of a score with those before it.
     fn multiply(&mut self, score: &[f64]) {
         for (product, before) in self.products.iter_mut().zip(&self.before) {

@@ -1,21 +1,20 @@
 //! The covariance of the scores where the errors are stationary and unrelated to the slopes, whatever the slopes are.
 //!
-//! Sums of scores over moving windows need many independent stretches of a record. An unknown of which only a part of it
-//! tells, such as an initial state, has one: its scores sum to zero there, and so do the windows that hold that part. The
+//! Sums of scores over moving windows need many independent stretches of a record. An unknown that only part of the record
+//! informs, such as an initial state, has one: its scores sum to zero there, and so do the windows that hold that part. The
 //! errors' own autocorrelation, of which the whole record tells, serves instead: the errors of each output are an
 //! autoregression (Yule and Walker's equations, order by Akaike's criterion), and the variance of `sum g[t] e[t]` is that of
 //! the innovations times the sum of squares of the slopes `g`, filtered by the autoregression and beyond the end of the
 //! record. (In which direction does not matter: a stationary sequence has the same covariances backward.)
 
 use super::ROWS;
-use crate::information::{Block, Covariance, Information};
-use crate::judge::evidence::shares::{self, Largest, Shares};
-use crate::judge::evidence::sizes::Sizes;
-use crate::judge::leverage::{ALONE, of_experiment};
-use crate::optimize::Infeasible;
-use crate::problem::{Accumulate, Objective, each};
+use crate::information::{Block, Information};
+use crate::judge::evidence::shares::Shares;
+use crate::judge::leverage::ALONE;
+use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
 use crate::whiteness::{Autocorrelation, levinson_durbin};
+use nalgebra::DMatrix;
 use std::collections::VecDeque;
 
 /// Highest order.
@@ -26,56 +25,31 @@ const LONGEST: usize = 1000;
 /// An experiment with fewer measurements of an output takes the autoregression of all experiments together.
 const OWN: u64 = 100;
 
-/// What stationary errors say.
+/// What the errors say of autoregressions, by the sums of all experiments.
 pub(crate) struct Stationary {
-    /// Triangles of scores, one per experiment over its columns.
-    pub triangles: Vec<Information>,
-    /// The largest shares of the unknowns, and the sizes of the errors that have them.
-    pub shares: Vec<Largest>,
-    pub sizes: Sizes,
+    /// The autoregressions of each experiment's outputs.
+    pub models: Vec<Vec<Autoregression>>,
     /// Whether an experiment has too few measurements of an output for an autoregression of its own.
     pub short: Vec<bool>,
     /// Relative variance of a variance by the autoregression of all experiments together.
     pub uncertainty: f64,
 }
 
-/// Such scores, by the inverse of the curvature; `None` where variances are predicted.
-pub(crate) fn scores(
-    objective: &Objective<'_>,
-    coordinates: &[f64],
-    inverse: &Covariance,
-) -> Result<Option<Stationary>, Infeasible> {
-    if objective.sweep.predicts_variance() {
-        return Ok(None);
+impl Stationary {
+    pub fn of(outputs: usize, all: &[&ErrorSums]) -> Self {
+        let together = joined(all.iter().map(|one| &one.sums[..]), outputs);
+        let of_all = together.iter().map(|(sums, count)| Autoregression::of(sums, *count).uncertainty(*count));
+        let uncertainty = of_all.fold(0.0, f64::max);
+        let is_short = |(_, count): &(Autocorrelation, u64)| *count < OWN;
+        let models = |one: &&ErrorSums| -> Vec<Autoregression> {
+            let own = one.sums.iter().zip(&together);
+            own.map(|(own, together)| if is_short(own) { together } else { own })
+                .map(|(sums, count)| Autoregression::of(sums, *count))
+                .collect()
+        };
+        let short = all.iter().map(|one| one.sums.iter().any(is_short)).collect();
+        Stationary { models: all.iter().map(models).collect(), short, uncertainty }
     }
-    let outputs = objective.outputs();
-    let make = |experiment: usize| Errors {
-        objective,
-        experiment,
-        shares: Shares::new(experiment, of_experiment(objective, inverse, experiment)),
-        sums: vec![(Autocorrelation::new(ORDER), 0); outputs],
-        run: vec![],
-    };
-    let all = objective.gather(coordinates, true, make)?;
-    let together = joined(all.iter().map(|one| &one.sums[..]), outputs);
-    let of_all = together.iter().map(|(sums, count)| Autoregression::of(sums, *count).uncertainty(*count));
-    let uncertainty = of_all.fold(0.0, f64::max);
-    let is_short = |(_, count): &(Autocorrelation, u64)| *count < OWN;
-    let one = |e: usize| {
-        let own = all[e].sums.iter().zip(&together);
-        let models: Vec<Autoregression> = own
-            .map(|(own, together)| if is_short(own) { together } else { own })
-            .map(|(sums, count)| Autoregression::of(sums, *count))
-            .collect();
-        let make = || FilteredSlopes::new(objective, e, &models);
-        Some(objective.gather_one(coordinates, e, true, make).ok()?.triangle())
-    };
-    let triangles: Option<Vec<Information>> = each(all.len(), one).into_iter().collect();
-    let shares = || all.iter().map(|one| &one.shares);
-    let (largest, sizes) = (shares::of_all(objective, shares()), shares::sizes_of_all(objective, shares()));
-    let short = all.iter().map(|one| one.sums.iter().any(is_short)).collect();
-    let found = |triangles| Stationary { triangles, shares: largest, sizes, short, uncertainty };
-    Ok(triangles.map(found))
 }
 
 /// The sums and counts of all experiments, output by output.
@@ -91,7 +65,7 @@ fn joined<'s>(all: impl Iterator<Item = &'s [(Autocorrelation, u64)]>, outputs: 
 }
 
 /// `e[t] = sum over k of a[k] e[t - 1 - k]`, and an innovation.
-struct Autoregression {
+pub(crate) struct Autoregression {
     coefficients: Vec<f64>,
     /// Standard deviation of the innovations.
     innovation: f64,
@@ -149,26 +123,46 @@ fn response(coefficients: &[f64]) -> Vec<f64> {
     response
 }
 
-/// Autocorrelations of the influences of each output's measurements, one after the other, and their number. Errors of a fit
-/// are smaller than the noise, their variance by one less their leverage, by whose root each is divided.
-struct Errors<'e> {
+/// Autocorrelations of the influences of each output's measurements, one after the other, and their number; the largest shares of the
+/// unknowns and the sizes of the errors that have them. Errors of a fit are smaller than the noise, their variance by one less their
+/// leverage, by whose root each is divided.
+pub(crate) struct ErrorSums {
+    pub shares: Shares,
+    sums: Vec<(Autocorrelation, u64)>,
+}
+
+/// The same while it is summed up.
+pub(crate) struct Errors<'e> {
     objective: &'e Objective<'e>,
     experiment: usize,
-    shares: Shares,
-    sums: Vec<(Autocorrelation, u64)>,
+    pub into: ErrorSums,
     run: Vec<f64>,
+}
+
+impl<'e> Errors<'e> {
+    /// By the inverse of the curvature.
+    pub fn new(objective: &'e Objective<'e>, experiment: usize, inverse: DMatrix<f64>) -> Self {
+        let sums = vec![(Autocorrelation::new(ORDER), 0); objective.outputs()];
+        Errors {
+            objective,
+            experiment,
+            into: ErrorSums { shares: Shares::new(experiment, inverse), sums },
+            run: vec![],
+        }
+    }
 }
 
 impl Accumulate for Errors<'_> {
     fn add(&mut self, window: &Window, lane: usize) {
         let (objective, loss) = (self.objective, self.objective.loss());
-        let mut slopes = vec![0.0; self.shares.columns()];
-        for (j, (sums, count)) in self.sums.iter_mut().enumerate() {
+        let ErrorSums { shares, sums } = &mut self.into;
+        let mut slopes = vec![0.0; shares.columns()];
+        for (j, (sums, count)) in sums.iter_mut().enumerate() {
             let mut influence = |k: usize| {
                 let sample = window.begin[lane] + k;
                 let (z, weight) = (window.error(k, j, lane), objective.weight(self.experiment, sample));
                 slopes.iter_mut().enumerate().for_each(|(c, slope)| *slope = window.at(k, j, c, lane));
-                raised(weight, self.shares.take(weight, &slopes, z, (j, sample))) * loss.map_or(z, |loss| loss.psi(z))
+                raised(weight, shares.take(weight, &slopes, z, (j, sample))) * loss.map_or(z, |loss| loss.psi(z))
             };
             self.run.clear();
             let measured = (0..window.samples[lane]).filter(|&k| window.is_measured(k, j, lane));
@@ -179,8 +173,8 @@ impl Accumulate for Errors<'_> {
     }
 
     fn append(&mut self, later: Self) {
-        self.shares.append(&later.shares);
-        for ((sums, count), (later, more)) in self.sums.iter_mut().zip(&later.sums) {
+        self.into.shares.append(&later.into.shares);
+        for ((sums, count), (later, more)) in self.into.sums.iter_mut().zip(&later.into.sums) {
             sums.follow(later);
             *count += more;
         }
@@ -188,7 +182,7 @@ impl Accumulate for Errors<'_> {
 }
 
 /// The triangle of the slopes, filtered by the autoregressions of their outputs.
-struct FilteredSlopes<'p> {
+pub(crate) struct FilteredSlopes<'p> {
     objective: &'p Objective<'p>,
     experiment: usize,
     models: &'p [Autoregression],
@@ -208,7 +202,7 @@ struct Recent {
 }
 
 impl<'p> FilteredSlopes<'p> {
-    fn new(objective: &'p Objective<'p>, experiment: usize, models: &'p [Autoregression]) -> Self {
+    pub fn new(objective: &'p Objective<'p>, experiment: usize, models: &'p [Autoregression]) -> Self {
         let columns = objective.problem.unknowns.columns(experiment).count();
         let rows = |model: &Autoregression| Recent {
             first: vec![],
@@ -240,7 +234,7 @@ impl<'p> FilteredSlopes<'p> {
     }
 
     /// The triangle, from rest before the first row until nothing is left of the last one.
-    fn triangle(self) -> Information {
+    pub fn triangle(self) -> Information {
         let mut whole = FilteredSlopes::new(self.objective, self.experiment, self.models);
         whole.outputs.iter_mut().zip(self.models).for_each(|(rows, model)| rows.first = vec![vec![]; model.length]);
         whole.append(self);

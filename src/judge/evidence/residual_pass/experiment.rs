@@ -1,6 +1,7 @@
 //! Sums over the errors of one experiment, window by window.
 
 use crate::judge::evidence::coupling::Coupling;
+use crate::judge::evidence::first_errors::FirstErrors;
 use crate::judge::evidence::largest::Largest;
 use crate::judge::evidence::output_sums::OutputSums;
 use crate::judge::evidence::powers::{Powers, Scale};
@@ -37,6 +38,7 @@ pub(crate) struct Sums<'s> {
     first: Option<(usize, Vec<f64>)>,
     sigma: Vec<f64>,
     pub points: Vec<(usize, Vec<f64>)>,
+    pub first_errors: FirstErrors,
     /// The errors of a window, output by output, then the logarithms of their variances, and those of one output that are tested for
     /// whiteness.
     errors: Vec<f64>,
@@ -67,6 +69,7 @@ impl<'s> Sums<'s> {
             first: None,
             sigma: objective.whitening.sigma(),
             points: vec![],
+            first_errors: FirstErrors::new(experiment, outputs),
             errors: vec![],
             tested: vec![],
             scales,
@@ -222,6 +225,7 @@ impl Accumulate for Sums<'_> {
             false => self.coupling.add(window, lane, objective.is_weighted().then_some(&weight)),
         }
         self.add_powers(window, lane);
+        self.first_errors.add(window, lane, &self.errors);
         let record = &self.objective.problem.records[self.experiment];
         for j in 0..outputs {
             let errors = &self.errors[j * samples..][..samples];
@@ -261,6 +265,7 @@ impl Accumulate for Sums<'_> {
         self.moving.append(later.moving);
         self.waiting.append(later.waiting);
         self.points.extend(later.points);
+        self.first_errors.append(later.first_errors);
         for (powers, later) in self.powers.iter_mut().flatten().zip(later.powers.iter().flatten()) {
             powers.append(later);
         }

@@ -1,0 +1,132 @@
+//! How many passes over the data the verdict takes, counted by a sweep that counts its samples.
+
+use super::{SearchEnd, conclude};
+use crate::error::{Error, Failure};
+use crate::estimate::{CovarianceMethod, Summary};
+use crate::layout::Layout;
+use crate::optimize::LeastSquares;
+use crate::problem::{Memory, Problem};
+use crate::random::Random;
+use crate::record::Record;
+use crate::sweep::{Coupling, Guess, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
+use crate::{Experiment, Fit, Model, Scalar, Time, free, signals, simulate};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Samples in values, and samples with slopes.
+type Counts = Arc<[AtomicUsize; 2]>;
+
+/// A sweep that counts its samples.
+struct Counting<'c> {
+    sweep: Arc<dyn Sweep + 'c>,
+    counts: Counts,
+}
+
+#[rustfmt::skip]
+impl Sweep for Counting<'_> {
+    fn layout(&self) -> &Layout { self.sweep.layout() }
+    fn carry(&self) -> usize { self.sweep.carry() }
+    fn predicts_variance(&self) -> bool { self.sweep.predicts_variance() }
+    fn restarts(&self) -> Option<usize> { self.sweep.restarts() }
+    fn lanes(&self, record: &Record, seeds: &[Seed]) -> usize { self.sweep.lanes(record, seeds) }
+    fn coupling(&self) -> Coupling { self.sweep.coupling() }
+    fn choosing(&self) -> Option<&[usize]> { self.sweep.choosing() }
+    fn prepare(&self, record: &Record, p: &[f64]) -> Result<Prepared, Error> { self.sweep.prepare(record, p) }
+    fn start(&self, record: &Record, state: &[f64], p: &[f64]) -> Reached { self.sweep.start(record, state, p) }
+    fn run(&self, pieces: &[Piece<'_>], seeds: &[Seed], visit: Visit<'_>) -> Vec<Result<Reached, RunError>> {
+        let samples = pieces.iter().map(|piece| piece.samples.len()).sum();
+        self.counts[usize::from(!seeds.is_empty())].fetch_add(samples, Ordering::Relaxed);
+        self.sweep.run(pieces, seeds, visit)
+    }
+    fn guessed_state(&self, record: &Record, p: &[f64]) -> Result<Guess, String> { self.sweep.guessed_state(record, p) }
+    fn state_slopes(&self, record: &Record, sample: usize, state: &[f64], p: &[f64]) -> Option<Vec<f64>> {
+        self.sweep.state_slopes(record, sample, state, p)
+    }
+    fn locate(
+        &self, record: &Record, state: &[f64], p: &[f64], sample: usize, sigma: &[f64], stops: &dyn Fn() -> bool,
+    ) -> Option<Result<Failure, Failure>> {
+        self.sweep.locate(record, state, p, sample, sigma, stops)
+    }
+    fn is_adaptive(&self) -> bool { self.sweep.is_adaptive() }
+    fn refined<'s>(&'s self, samples: usize) -> Option<Arc<dyn Sweep + 's>> { self.sweep.refined(samples) }
+    fn integrator(&self) -> String { self.sweep.integrator() }
+    fn predictor(&self) -> String { self.sweep.predictor() }
+    fn engine(&self) -> String { self.sweep.engine() }
+    fn identity(&self) -> String { self.sweep.identity() }
+}
+
+signals! { struct Voltage { u: "V" } }
+signals! { struct Current { i: "A" } }
+signals! { struct Rates { a: "1/s", b: "A/(V s)" } }
+
+#[derive(Clone)]
+struct Decay;
+
+impl Model for Decay {
+    type State = Current;
+    type Input = Voltage;
+    type Output = Current;
+    type Parameters = Rates;
+
+    fn derivative<S: Scalar>(&self, _t: S, x: &Current<S>, u: &Voltage<S>, p: &Rates<S>) -> Current<S> {
+        Current { i: p.b * u.u - p.a * x.i }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, _p: &Rates<S>) -> Current<S> {
+        *x
+    }
+}
+
+const SAMPLES: usize = 400;
+
+/// The verdict on a record whose errors are an autoregression of order one, with the passes that it takes in values and with slopes.
+fn judged(autoregression: f64) -> (Summary, [usize; 2]) {
+    let time = Time::Uniform { start: 0.0, step: 0.1 };
+    let inputs: Vec<Voltage> = (0..SAMPLES).map(|k| Voltage { u: if k / 25 % 2 == 0 { 1.0 } else { -1.0 } }).collect();
+    let clean =
+        simulate(&Decay, &Rates { a: 1.0, b: 2.0 }, &Current { i: 0.5 }, time.clone(), &inputs).unwrap().outputs;
+    let (mut random, mut error) = (Random::stream(36, 0), 0.0);
+    let mut noisy = |y: &Current| {
+        error = autoregression * error + 0.05 * random.normal();
+        Current { i: y.i + error }
+    };
+    let outputs = clean.iter().map(&mut noisy).collect();
+    let record = Experiment::new(&Decay, time, inputs, outputs).unwrap();
+    let problem = Fit::new(&Decay, &record).parameters(Rates { a: free(0.8), b: free(1.5) }).problem().unwrap();
+    let found = problem.run().unwrap();
+    let counts = Counts::default();
+    let counting = Counting { sweep: problem.sweep.clone(), counts: counts.clone() };
+    let problem = Problem { sweep: Arc::new(counting), ..problem.clone() };
+    let (objective, coordinates) = problem.at(&found).unwrap();
+    let linear = Some(objective.evaluate(&coordinates).unwrap());
+    let end = SearchEnd {
+        coordinates,
+        whitening: objective.whitening.clone(),
+        linear,
+        outcome: found.outcome,
+        iterations: 0,
+        evaluations: 0,
+        name: String::new(),
+        write_error: None,
+        memory: Memory::default(),
+        starts: None,
+    };
+    counts.iter().for_each(|count| count.store(0, Ordering::Relaxed));
+    let summary = conclude(&objective, &end, 0.0).unwrap();
+    (summary, [0, 1].map(|kind: usize| counts[kind].load(Ordering::Relaxed)))
+}
+
+/// White errors take one pass in values and one with slopes.
+#[test]
+fn white_errors_take_two_passes() {
+    let (summary, passes) = judged(0.0);
+    assert_eq!(summary.method.covariance, CovarianceMethod::Classical);
+    assert_eq!(passes, [SAMPLES, SAMPLES]);
+}
+
+/// Colored ones take two more with slopes.
+#[test]
+fn colored_errors_take_two_passes_more() {
+    let (summary, [values, slopes]) = judged(0.8);
+    assert!(matches!(summary.method.covariance, CovarianceMethod::Hac { .. }), "{}", summary.method.covariance);
+    assert!(values == SAMPLES && slopes <= 3 * SAMPLES, "{values} {slopes}");
+}
