@@ -13,6 +13,7 @@ pub(crate) mod rows;
 pub(crate) mod sensors;
 pub(crate) mod shares;
 pub(crate) mod sizes;
+pub(crate) mod spans;
 mod step_error;
 pub(crate) mod suspects;
 pub(crate) mod whiteness;
@@ -24,13 +25,14 @@ use color::is_certain;
 use coupling::Coupled;
 use residual_pass::Residuals;
 use rows::{Asked, Rows, rows};
+use spans::records_by_chance;
 use std::cell::OnceCell;
 use whiteness::{WHITENESS_LEVEL, Whiteness, least_white};
 
 /// The reason of checks of errors that are none, and of checks that a pre-filter rules out.
 pub(crate) const ROUND_OFF: &str = "the errors are round-off";
 pub(crate) const PREFILTER: &str = "a pre-filter";
-/// Sensors are not tested beside more unknowns than these.
+/// Sensors are not tested, and parts not compared, with more unknowns than these.
 const MOST: usize = 200;
 /// Below this number of measurements the covariance is the classical one, whether the errors are autocorrelated, or of one size, or not.
 const CORRELATED_SAMPLES: u64 = 12;
@@ -50,6 +52,7 @@ pub(crate) struct Evidence<'e> {
     pub rounding: bool,
     unit: OnceCell<Option<Covariance>>,
     rows: OnceCell<Rows>,
+    suspicious: OnceCell<bool>,
 }
 
 impl<'e> Evidence<'e> {
@@ -63,7 +66,8 @@ impl<'e> Evidence<'e> {
         };
         let rounded: Vec<bool> = sigma.iter().enumerate().map(rounded).collect();
         let rounding = rounded.iter().all(|rounded| *rounded);
-        Evidence { point, residuals, rounded, rounding, unit: OnceCell::new(), rows: OnceCell::new() }
+        let (unit, rows, suspicious) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
+        Evidence { point, residuals, rounded, rounding, unit, rows, suspicious }
     }
 
     /// The covariance of unit noise in coordinates.
@@ -76,7 +80,13 @@ impl<'e> Evidence<'e> {
         let Point { objective, end, held_for_covariance: held, .. } = &self.point;
         let colored = || self.unit().filter(|_| self.uses_hac()).map(|unit| (&held[..], unit));
         let shares = || self.unit().filter(|_| self.takes_one_size());
-        let asked = || Asked { shares: shares(), colored: colored(), sensors: self.without_sensors().is_none() };
+        let parts = || self.without_parts().is_none() && self.is_suspicious();
+        let asked = || Asked {
+            shares: shares(),
+            colored: colored(),
+            sensors: self.without_sensors().is_none(),
+            parts: parts(),
+        };
         self.rows.get_or_init(|| rows(objective, &end.coordinates, asked()))
     }
 
@@ -107,6 +117,34 @@ impl<'e> Evidence<'e> {
             _ if objective.problem.unknowns.row.len() > MOST => Some("more than 200 unknowns"),
             _ => (!end.outcome.converged()).then_some("no minimum"),
         }
+    }
+
+    /// Why parts of the data are not compared.
+    pub fn without_parts(&self) -> Option<&'static str> {
+        let Point { objective, end, degrees, .. } = &self.point;
+        match () {
+            _ if objective.problem.settings.prefilter.is_some() => Some(PREFILTER),
+            _ if objective.problem.unknowns.row.len() > MOST => Some("more than 200 unknowns"),
+            _ if *degrees <= 0.0 => Some("no degrees of freedom"),
+            _ => (!end.outcome.converged()).then_some("no minimum"),
+        }
+    }
+
+    /// Whether there is a reason to compare parts of the data, which takes slopes: where errors are correlated over time or with the
+    /// prediction, or records differ. Always of filters, which estimate what contradicts them as process noise, so that their errors stay
+    /// white; of static models, whose samples have no order; and with a loss, weights or restarts, where errors are not tested against
+    /// powers of the prediction.
+    pub fn is_suspicious(&self) -> bool {
+        let objective = self.point.objective;
+        let examine = || {
+            let least = self.residuals.shape.iter().copied().fold(self.residuals.parts, f64::min);
+            let follow = least * (objective.outputs() as f64) < spans::LEVEL && !self.rounding;
+            let unseen = self.residuals.shape.is_empty() && !self.rounding;
+            let apart = || !self.rounding && records_by_chance(&self.point) < spans::LEVEL;
+            let always = self.point.is_static() || objective.sweep.predicts_variance();
+            follow || unseen || self.is_colored() || always || apart()
+        };
+        *self.suspicious.get_or_init(examine)
     }
 
     /// The errors' autocorrelation; not computed where residuals are round-off.

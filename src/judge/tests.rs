@@ -4,7 +4,6 @@ use super::{SearchEnd, conclude};
 use crate::error::{Error, Failure};
 use crate::estimate::{CovarianceMethod, Summary};
 use crate::layout::Layout;
-use crate::optimize::LeastSquares;
 use crate::problem::{Memory, Problem};
 use crate::random::Random;
 use crate::record::Record;

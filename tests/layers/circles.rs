@@ -72,9 +72,12 @@ impl Files {
         found.into_iter().filter_map(|(path, name)| Some((name, self.absolute(file, &path)?))).collect()
     }
 
-    /// The file that defines what a path names.
+    /// The file that defines what a path names; `None` of a module, of which what is used names its own path.
     fn definer(&self, imports: &BTreeMap<Name, BTreeMap<String, Name>>, path: &[String], depth: usize) -> Option<Name> {
-        let length = (1..path.len()).rev().find(|&length| self.0.contains_key(&path[..length]))?;
+        let length = (1..=path.len()).rev().find(|&length| self.0.contains_key(&path[..length]))?;
+        if length == path.len() {
+            return None;
+        }
         let (file, rest) = path.split_at(length);
         match imports[file].get(&rest[0]).filter(|other| *other != path) {
             Some(other) if depth < 8 => self.definer(imports, &[&other[..], &rest[1..]].concat(), depth + 1),

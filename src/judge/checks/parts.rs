@@ -9,20 +9,19 @@
 
 mod left;
 mod pieces;
-mod spans;
 
 use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::information::Information;
 use crate::judge::check::{Check, Examined, Level, Pass};
 use crate::judge::covariances::Covariances;
+use crate::judge::evidence::Evidence;
 use crate::judge::evidence::powers::COMPARED;
-use crate::judge::evidence::{Evidence, PREFILTER};
+use crate::judge::evidence::spans::{LEVEL, SPANS, Spans, span};
 use crate::numeral::{number, p_value, percent};
 use crate::optimize::{Linearization, Severity};
 use crate::problem::{Objective, Role};
 use crate::whiteness::chi_squared_tail;
-use pieces::{Piece, pieces};
-use spans::{Rows, SPANS, Spans, span};
+use pieces::{Piece, Rows, pieces};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 pub(crate) const PARTS: Check = Check {
@@ -40,7 +39,7 @@ pub(crate) const PARTS: Check = Check {
         Level { of: "the distance, in parts of the value, that is not usable", value: FAR_APART, source: "a quarter" },
     ],
     examine: |evidence, intervals| {
-        Examined::unless(skipped(evidence), || {
+        Examined::unless(evidence.without_parts(), || {
             let mut found = contradictions(evidence, &intervals.unknowns);
             if found.iter().all(|warning| warning.code != WarningCode::RecordsContradict) {
                 found.extend(differing(evidence, &intervals.unknowns, &intervals.covariances));
@@ -51,86 +50,29 @@ pub(crate) const PARTS: Check = Check {
     },
 };
 
-/// Level of the test.
-const LEVEL: f64 = 1e-4;
 /// A parameter is named if its values from two parts of the data differ by more than this many standard errors, where the test above
 /// has found a difference. If they differ by more than the second (relative), the estimate is not usable.
 const APART: f64 = 3.0;
 const FAR_APART: f64 = 0.25;
 /// The fewest of the parts of a record before and after a time at which all may have changed.
 const FEWEST: usize = 2;
-/// A pivot below this part of its column is rounding.
-const ROUNDING: f64 = 1e-11;
 /// From so many degrees of freedom of the noise on, Fisher's F is chi squared.
 const MANY: f64 = 1e5;
-/// More unknowns than these are not compared: the triangles of all parts are kept.
-const MOST: usize = 200;
-
-/// The probability that records of one plant gain as much by steps of their own, by the slopes that a fit has of each.
-fn records_by_chance(evidence: &Evidence<'_>) -> f64 {
-    let (mut gain, mut left, mut own, mut rows) = (0.0, 0.0, 0.0, 0.0);
-    for (triangle, columns) in evidence.point.linear.columns() {
-        let kept: Vec<usize> = (0..columns.len()).filter(|&c| !evidence.point.undetermined.held[columns[c]]).collect();
-        let triangle = triangle.select(&kept);
-        let norms = triangle.column_norms();
-        let told = (0..kept.len()).filter(|&c| triangle.at(c, c).abs() > ROUNDING * norms[c]).count();
-        gain += triangle.residual_at_zero() - triangle.residual();
-        left += triangle.residual();
-        own += told as f64;
-        rows += triangle.rows() as f64;
-    }
-    let common = evidence.point.undetermined.held.iter().filter(|held| !**held).count() as f64;
-    let (steps, free) = (own - common, rows - own);
-    if steps < 1.0 || free < 1.0 || left <= 0.0 {
-        return 1.0;
-    }
-    let statistic = (gain / steps) / (left / free);
-    FisherSnedecor::new(steps, free).map_or(1.0, |fisher| fisher.sf(statistic.max(0.0)))
-}
-
-/// Whether parts of the data are compared, which takes slopes: where errors are correlated over time or with the prediction, or records
-/// differ. Always of filters, which estimate what contradicts them as process noise, so that their errors stay white; of static models,
-/// whose samples have no order; and with a loss, weights or restarts, where errors are not tested against powers of the prediction.
-fn is_suspicious(evidence: &Evidence<'_>) -> bool {
-    let least = evidence.residuals.shape.iter().copied().fold(evidence.residuals.parts, f64::min);
-    let follow = least * (evidence.point.objective.outputs() as f64) < LEVEL && !evidence.rounding;
-    let unseen = evidence.residuals.shape.is_empty() && !evidence.rounding;
-    let apart = !evidence.rounding && records_by_chance(evidence) < LEVEL;
-    follow
-        || unseen
-        || apart
-        || evidence.is_colored()
-        || evidence.point.is_static()
-        || evidence.point.objective.sweep.predicts_variance()
-}
-
-/// Why parts are not compared.
-fn skipped(evidence: &Evidence<'_>) -> Option<&'static str> {
-    let problem = evidence.point.objective.problem;
-    match () {
-        _ if problem.settings.prefilter.is_some() => Some(PREFILTER),
-        _ if problem.unknowns.row.len() > MOST => Some("more than 200 unknowns"),
-        _ if evidence.point.degrees <= 0.0 => Some("no degrees of freedom"),
-        _ => (!evidence.point.end.outcome.converged()).then_some("no minimum"),
-    }
-}
 
 /// Which parts are not compared though others are.
 fn left_out(evidence: &Evidence<'_>) -> Option<&'static str> {
     let many = evidence.point.objective.experiments() > COMPARED;
-    (many && is_suspicious(evidence)).then_some("pairs of records, of which there are more than 100")
+    (many && evidence.is_suspicious()).then_some("pairs of records, of which there are more than 100")
 }
 
 /// Parameters that differ between outputs, records or times.
 fn contradictions(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
     let objective = evidence.point.objective;
-    if !is_suspicious(evidence) {
+    if !evidence.is_suspicious() {
         return vec![];
     }
     let diagonal = objective.with(crate::problem::Whitening::Diagonal(objective.whitening.sigma()));
-    let gathered = diagonal.gather(&evidence.point.end.coordinates, true, |e| Spans::new(objective, e));
-    let Ok(mut all) = gathered else { return vec![] };
-    all.iter_mut().for_each(Spans::complete);
+    let Some(all) = &evidence.rows().spans else { return vec![] };
     // Of each kind the ways in which the data may be taken apart. Where one run was joined to another, the part behind may be of neither: it
     // is left out in a second group of ways.
     let mut kinds: Vec<(WarningCode, Vec<Vec<Vec<Rows>>>)> = vec![];
@@ -149,7 +91,7 @@ fn contradictions(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning>
     }
     let of = |(code, groups): (WarningCode, Vec<Vec<Vec<Rows>>>)| {
         let tests = groups.iter().map(Vec::len).sum::<usize>() as f64;
-        groups.into_iter().find_map(|ways| contradiction(evidence, (&diagonal, &all), unknowns, code, (ways, tests)))
+        groups.into_iter().find_map(|ways| contradiction(evidence, (&diagonal, all), unknowns, code, (ways, tests)))
     };
     kinds.into_iter().filter_map(of).collect()
 }
@@ -157,7 +99,7 @@ fn contradictions(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning>
 /// What differs between pieces, by the way of these that gains most; of so many that are tested.
 fn contradiction(
     evidence: &Evidence<'_>,
-    (diagonal, all): (&Objective<'_>, &[Spans<'_>]),
+    (diagonal, all): (&Objective<'_>, &[Spans]),
     unknowns: &[Unknown],
     code: WarningCode,
     (ways, tests): (Vec<Vec<Rows>>, f64),

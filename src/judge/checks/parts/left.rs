@@ -4,7 +4,7 @@
 //! one is therefore taken from those that remain without the contradiction.
 
 use super::pieces::Piece;
-use super::spans::span;
+use crate::judge::evidence::spans::span;
 use crate::judge::evidence::whiteness::{LAGS, Whiteness};
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;

@@ -1,13 +1,34 @@
 //! Parts of the data with steps of their own.
 
-use super::spans::{Rows, Spans};
 use crate::information::Information;
 use crate::judge::directions;
 use crate::judge::evidence::Evidence;
+use crate::judge::evidence::spans::Spans;
 use crate::optimize::Linearization;
 
 /// A record with fewer degrees of freedom than this has the noise of all records.
 const OWN: f64 = 30.0;
+
+/// Which rows a piece has.
+#[derive(Clone, Copy)]
+pub(crate) enum Rows {
+    Record(usize),
+    Output(usize),
+    /// The first parts of each record, so many of them.
+    Before(usize),
+    After(usize),
+}
+
+impl Rows {
+    pub fn contain(self, experiment: usize, output: usize, part: usize) -> bool {
+        match self {
+            Rows::Record(e) => e == experiment,
+            Rows::Output(j) => j == output,
+            Rows::Before(parts) => part < parts,
+            Rows::After(parts) => part >= parts,
+        }
+    }
+}
 
 /// A part of the data: a triangle per experiment, in units of its own noise.
 pub(crate) struct Piece {
@@ -44,12 +65,12 @@ struct OfOutput {
 }
 
 /// The rows of a piece, output by output; `None` where a step of its own is not determined.
-fn of_outputs(evidence: &Evidence<'_>, all: &[Spans<'_>], rows: Rows) -> Option<Vec<OfOutput>> {
+fn of_outputs(evidence: &Evidence<'_>, all: &[Spans], rows: Rows) -> Option<Vec<OfOutput>> {
     let shared = evidence.point.objective.problem.unknowns.shared();
     let held = &evidence.point.undetermined.held;
     let mut found = vec![];
     for j in 0..evidence.point.objective.outputs() {
-        let mut triangles: Vec<Information> = all.iter().map(|parts| Information::new(parts.columns())).collect();
+        let mut triangles: Vec<Information> = all.iter().map(|parts| Information::new(parts.columns)).collect();
         let (mut squares, mut fourths, mut count) = (0.0, 0.0, 0);
         for (e, parts) in all.iter().enumerate() {
             for (_, part) in parts.of[j].iter().enumerate().filter(|(number, _)| rows.contain(e, j, *number)) {
@@ -75,7 +96,7 @@ fn of_outputs(evidence: &Evidence<'_>, all: &[Spans<'_>], rows: Rows) -> Option<
 
 /// The pieces with these rows, those of each output divided by the noise that is left when its own step is taken; of short records, when
 /// all of them have taken theirs.
-pub(crate) fn pieces(evidence: &Evidence<'_>, all: &[Spans<'_>], rows: &[Rows]) -> Vec<Piece> {
+pub(crate) fn pieces(evidence: &Evidence<'_>, all: &[Spans], rows: &[Rows]) -> Vec<Piece> {
     let of = |rows: &Rows| Some((*rows, of_outputs(evidence, all, *rows)?));
     let found: Vec<(Rows, Vec<OfOutput>)> = rows.iter().filter_map(of).collect();
     let sum = |part: fn(&OfOutput) -> f64| found.iter().flat_map(|(_, of)| of).map(part).sum::<f64>();

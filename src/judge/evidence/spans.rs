@@ -1,20 +1,33 @@
 //! The rows of each record in parts of equal length, output by output.
 
 use crate::information::{Block, Information};
+use crate::judge::point::Point;
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use std::f64::consts::FRAC_1_SQRT_2;
 
+/// Level of the test.
+pub(crate) const LEVEL: f64 = 1e-4;
+/// A pivot below this part of its column is rounding.
+const ROUNDING: f64 = 1e-11;
 /// Spans of equal length of each record.
 pub(crate) const SPANS: usize = 16;
 /// Rows that are absorbed together.
 const ROWS: usize = 64;
 
 /// The triangles of one experiment: output by output, each of the parts of equal length.
-pub(crate) struct Spans<'h> {
+pub(crate) struct Spans {
+    pub of: Vec<Vec<Span>>,
+    /// The number of columns of its triangles.
+    pub columns: usize,
+}
+
+/// The same while it is summed up.
+pub(crate) struct SumSpans<'h> {
     objective: &'h Objective<'h>,
     experiment: usize,
-    pub of: Vec<Vec<Span>>,
+    spans: Spans,
     row: Vec<f64>,
 }
 
@@ -53,32 +66,29 @@ impl Span {
     }
 }
 
-impl<'h> Spans<'h> {
+impl<'h> SumSpans<'h> {
     pub fn new(objective: &'h Objective<'h>, experiment: usize) -> Self {
         let columns = objective.problem.unknowns.columns(experiment).count();
         let parts = |_| (0..SPANS).map(|_| Span::new(columns)).collect();
-        Spans { objective, experiment, of: (0..objective.outputs()).map(parts).collect(), row: vec![0.0; columns] }
+        let spans = Spans { of: (0..objective.outputs()).map(parts).collect(), columns };
+        SumSpans { objective, experiment, spans, row: vec![0.0; columns] }
     }
 
-    /// The number of columns of its triangles.
-    pub fn columns(&self) -> usize {
-        self.row.len()
-    }
-
-    /// Absorbs the last rows.
-    pub fn complete(&mut self) {
-        self.of.iter_mut().flatten().for_each(|part| part.triangle.absorb(&mut part.block));
+    /// With the last rows absorbed.
+    pub fn complete(mut self) -> Spans {
+        self.spans.of.iter_mut().flatten().for_each(|part| part.triangle.absorb(&mut part.block));
+        self.spans
     }
 }
 
-impl Accumulate for Spans<'_> {
+impl Accumulate for SumSpans<'_> {
     fn add(&mut self, window: &Window, lane: usize) {
         let samples = self.objective.problem.records[self.experiment].len();
         for k in 0..window.samples[lane] {
             let number = span(window.begin[lane] + k, samples);
             let weight = self.objective.weight(self.experiment, window.begin[lane] + k);
             for j in (0..window.outputs()).filter(|&j| window.is_measured(k, j, lane) && weight > 0.0) {
-                let part = &mut self.of[j][number];
+                let part = &mut self.spans.of[j][number];
                 let values = window.row(k, j).iter().skip(lane).step_by(window.lanes());
                 let error = window.error(k, j, lane);
                 // As in iteratively reweighted least squares, whose minimum is that of the loss.
@@ -101,31 +111,32 @@ impl Accumulate for Spans<'_> {
     }
 
     fn append(&mut self, mut later: Self) {
-        for (part, later) in self.of.iter_mut().flatten().zip(later.of.iter_mut().flatten()) {
+        for (part, later) in self.spans.of.iter_mut().flatten().zip(later.spans.of.iter_mut().flatten()) {
             part.append(later);
         }
     }
 }
 
-/// Which rows a piece has.
-#[derive(Clone, Copy)]
-pub(crate) enum Rows {
-    Record(usize),
-    Output(usize),
-    /// The first parts of each record, so many of them.
-    Before(usize),
-    After(usize),
-}
-
-impl Rows {
-    pub fn contain(self, experiment: usize, output: usize, part: usize) -> bool {
-        match self {
-            Rows::Record(e) => e == experiment,
-            Rows::Output(j) => j == output,
-            Rows::Before(parts) => part < parts,
-            Rows::After(parts) => part >= parts,
-        }
+/// The probability that records of one plant gain as much by steps of their own, by the slopes that a fit has of each.
+pub(crate) fn records_by_chance(point: &Point<'_>) -> f64 {
+    let (mut gain, mut left, mut own, mut rows) = (0.0, 0.0, 0.0, 0.0);
+    for (triangle, columns) in point.linear.columns() {
+        let kept: Vec<usize> = (0..columns.len()).filter(|&c| !point.undetermined.held[columns[c]]).collect();
+        let triangle = triangle.select(&kept);
+        let norms = triangle.column_norms();
+        let told = (0..kept.len()).filter(|&c| triangle.at(c, c).abs() > ROUNDING * norms[c]).count();
+        gain += triangle.residual_at_zero() - triangle.residual();
+        left += triangle.residual();
+        own += told as f64;
+        rows += triangle.rows() as f64;
     }
+    let common = point.undetermined.held.iter().filter(|held| !**held).count() as f64;
+    let (steps, free) = (own - common, rows - own);
+    if steps < 1.0 || free < 1.0 || left <= 0.0 {
+        return 1.0;
+    }
+    let statistic = (gain / steps) / (left / free);
+    FisherSnedecor::new(steps, free).map_or(1.0, |fisher| fisher.sf(statistic.max(0.0)))
 }
 
 #[cfg(test)]
