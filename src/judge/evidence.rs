@@ -52,7 +52,7 @@ pub(crate) struct Evidence<'e> {
     pub rounding: bool,
     unit: OnceCell<Option<Covariance>>,
     rows: OnceCell<Rows>,
-    suspicious: OnceCell<bool>,
+    compare_parts: OnceCell<bool>,
 }
 
 impl<'e> Evidence<'e> {
@@ -66,8 +66,8 @@ impl<'e> Evidence<'e> {
         };
         let rounded: Vec<bool> = sigma.iter().enumerate().map(rounded).collect();
         let rounding = rounded.iter().all(|rounded| *rounded);
-        let (unit, rows, suspicious) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
-        Evidence { point, residuals, rounded, rounding, unit, rows, suspicious }
+        let (unit, rows, compare_parts) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
+        Evidence { point, residuals, rounded, rounding, unit, rows, compare_parts }
     }
 
     /// The covariance of unit noise in coordinates.
@@ -80,7 +80,7 @@ impl<'e> Evidence<'e> {
         let Point { objective, end, held_for_covariance: held, .. } = &self.point;
         let colored = || self.unit().filter(|_| self.uses_hac()).map(|unit| (&held[..], unit));
         let shares = || self.unit().filter(|_| self.takes_one_size());
-        let parts = || self.without_parts().is_none() && self.is_suspicious();
+        let parts = || self.without_parts().is_none() && self.compare_parts();
         let asked = || Asked {
             shares: shares(),
             colored: colored(),
@@ -134,7 +134,7 @@ impl<'e> Evidence<'e> {
     /// prediction, or records differ. Always of filters, which estimate what contradicts them as process noise, so that their errors stay
     /// white; of static models, whose samples have no order; and with a loss, weights or restarts, where errors are not tested against
     /// powers of the prediction.
-    pub fn is_suspicious(&self) -> bool {
+    pub fn compare_parts(&self) -> bool {
         let objective = self.point.objective;
         let examine = || {
             let least = self.residuals.shape.iter().copied().fold(self.residuals.parts, f64::min);
@@ -144,7 +144,7 @@ impl<'e> Evidence<'e> {
             let always = self.point.is_static() || objective.sweep.predicts_variance();
             follow || unseen || self.is_colored() || always || apart()
         };
-        *self.suspicious.get_or_init(examine)
+        *self.compare_parts.get_or_init(examine)
     }
 
     /// The errors' autocorrelation; not computed where residuals are round-off.

@@ -77,13 +77,13 @@ impl Model for Decay {
 
 const SAMPLES: usize = 400;
 
-/// The verdict on a record whose errors are an autoregression of order one, with the passes that it takes in values and with slopes.
-fn judged(autoregression: f64) -> (Summary, [usize; 2]) {
+/// The verdict on a record whose errors are an autoregression of order one, with the samples that it takes in values and with slopes.
+fn judged(autoregression: f64, seed: u64) -> (Summary, [usize; 2]) {
     let time = Time::Uniform { start: 0.0, step: 0.1 };
     let inputs: Vec<Voltage> = (0..SAMPLES).map(|k| Voltage { u: if k / 25 % 2 == 0 { 1.0 } else { -1.0 } }).collect();
     let clean =
         simulate(&Decay, &Rates { a: 1.0, b: 2.0 }, &Current { i: 0.5 }, time.clone(), &inputs).unwrap().outputs;
-    let (mut random, mut error) = (Random::stream(36, 0), 0.0);
+    let (mut random, mut error) = (Random::stream(36, seed), 0.0);
     let mut noisy = |y: &Current| {
         error = autoregression * error + 0.05 * random.normal();
         Current { i: y.i + error }
@@ -117,15 +117,21 @@ fn judged(autoregression: f64) -> (Summary, [usize; 2]) {
 /// White errors take one pass in values and one with slopes.
 #[test]
 fn white_errors_take_two_passes() {
-    let (summary, passes) = judged(0.0);
+    let (summary, passes) = judged(0.0, 0);
     assert_eq!(summary.method.covariance, CovarianceMethod::Classical);
     assert_eq!(passes, [SAMPLES, SAMPLES]);
 }
 
-/// Colored ones take two more with slopes.
+/// Colored ones take one more with slopes, for the moving sums of their scores; those of which parts seem to differ another one, and those
+/// whose sizes differ the two of a sandwich.
 #[test]
-fn colored_errors_take_two_passes_more() {
-    let (summary, [values, slopes]) = judged(0.8);
-    assert!(matches!(summary.method.covariance, CovarianceMethod::Hac { .. }), "{}", summary.method.covariance);
-    assert!(values == SAMPLES && slopes <= 3 * SAMPLES, "{values} {slopes}");
+fn colored_errors_take_a_pass_more() {
+    let mut least = usize::MAX;
+    for seed in 0..12 {
+        let (summary, [values, slopes]) = judged(0.8, seed);
+        assert!(matches!(summary.method.covariance, CovarianceMethod::Hac { .. }), "{}", summary.method.covariance);
+        assert!(values == SAMPLES && slopes <= 5 * SAMPLES, "{seed}: {values} {slopes}");
+        least = least.min(slopes);
+    }
+    assert!(least <= 3 * SAMPLES, "{least}");
 }

@@ -62,13 +62,13 @@ const MANY: f64 = 1e5;
 /// Which parts are not compared though others are.
 fn left_out(evidence: &Evidence<'_>) -> Option<&'static str> {
     let many = evidence.point.objective.experiments() > COMPARED;
-    (many && evidence.is_suspicious()).then_some("pairs of records, of which there are more than 100")
+    (many && evidence.compare_parts()).then_some("pairs of records, of which there are more than 100")
 }
 
 /// Parameters that differ between outputs, records or times.
 fn contradictions(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
     let objective = evidence.point.objective;
-    if !evidence.is_suspicious() {
+    if !evidence.compare_parts() {
         return vec![];
     }
     let diagonal = objective.with(crate::problem::Whitening::Diagonal(objective.whitening.sigma()));
@@ -165,7 +165,7 @@ fn compared(evidence: &Evidence<'_>, pieces: &[Piece], unknowns: &[Unknown], tes
     let degrees = pieces.iter().map(free).sum::<f64>() - free(&whole);
     let gain = pieces.iter().map(|piece| piece.gain).sum::<f64>() - whole.gain;
     let of_noise = pieces.iter().map(|piece| piece.degrees).fold(f64::INFINITY, f64::min) / dependence;
-    let chance = no_chance(gain / dependence, degrees, of_noise, tests)?;
+    let chance = significant(gain / dependence, degrees, of_noise, tests)?;
     let (unknown, a, b, _) = furthest(pieces, unknowns)?;
     Some(Difference { chance, gain, unknown, pieces: [a, b] })
 }
@@ -243,7 +243,7 @@ fn furthest(pieces: &[Piece], unknowns: &[Unknown]) -> Option<(usize, usize, usi
 
 /// Probability that pieces of one plant gain as much by steps of their own in one of so many ways, if it is below the level: by Fisher's F with
 /// the degrees of freedom of the steps and of the noise.
-fn no_chance(gain: f64, degrees: f64, of_noise: f64, tests: f64) -> Option<f64> {
+fn significant(gain: f64, degrees: f64, of_noise: f64, tests: f64) -> Option<f64> {
     if degrees < 1.0 || of_noise.is_nan() || of_noise < 1.0 {
         return None;
     }
@@ -262,7 +262,7 @@ mod tests {
     #[test]
     fn contradictions_begin_at_their_level() {
         let said =
-            |gain: f64, degrees: f64, of_noise: f64, tests: f64| no_chance(gain, degrees, of_noise, tests).is_some();
+            |gain: f64, degrees: f64, of_noise: f64, tests: f64| significant(gain, degrees, of_noise, tests).is_some();
         let all = f64::INFINITY;
         assert!(said(15.14, 1.0, all, 1.0) && !said(15.13, 1.0, all, 1.0));
         assert!(said(18.43, 2.0, all, 1.0) && !said(18.41, 2.0, all, 1.0) && !said(99.0, 0.0, all, 1.0));

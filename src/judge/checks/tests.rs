@@ -37,13 +37,19 @@ fn page() -> String {
                     warnings are shown. Passes over the data are counted beside the one in values that every estimate takes.\n\n"
         .to_owned();
     let flagged = flagged();
-    page += &format!(
-        "Behind each code stands of how many of {} good records of the table of verdicts it was said, most of them as a note \
-         (`GREYBOX_WRITE_CHECKS=1 cargo test --release --test verdicts good` measures that). A code of several checks has one number.\n",
-        flagged["all"]
-    );
+    page += &match flagged["all"] {
+        0 => "How many good records of the table of verdicts each code was said of is not measured yet".to_owned(),
+        all => format!(
+            "Behind each code stands of how many of {all} good records of the table of verdicts it was said, most of them as a note; a code \
+             of several checks has one number"
+        ),
+    };
+    page += " (`GREYBOX_WRITE_CHECKS=1 cargo test --release --test verdicts good` measures that).\n";
     for (number, Check { name, asks, codes, costs, levels, .. }) in CHECKS.iter().enumerate() {
-        let named = |one: &WarningCode| format!("`{}` ({})", code(one), flagged.get(&format!("{one:?}")).unwrap_or(&0));
+        let named = |one: &WarningCode| match flagged["all"] {
+            0 => format!("`{}`", code(one)),
+            _ => format!("`{}` ({})", code(one), flagged.get(&format!("{one:?}")).unwrap_or(&0)),
+        };
         let codes: Vec<String> = codes.iter().map(named).collect();
         let costs: Vec<String> = costs.iter().map(pass).collect();
         let costs = if costs.is_empty() { "none".to_owned() } else { costs.join("; ") };
