@@ -28,7 +28,7 @@ pub(crate) const PARTS: Check = Check {
     name: "parts of the data agree",
     asks: "Where errors are colored or follow from the prediction, where records differ, or where that is not examined: do outputs, records and what lies before and after a time give one set of parameters (Chow 1960, Quandt 1960)? Do records scatter more than their errors explain?",
     codes: &[WarningCode::RecordsContradict, WarningCode::OutputsContradict, WarningCode::HalvesContradict],
-    costs: &[Pass::Slopes(1), Pass::Slopes(4)],
+    costs: &[Pass::Rows, Pass::Slopes(4)],
     levels: &[
         Level { of: "the probability by chance", value: LEVEL, source: "one good record in ten thousand" },
         Level {
