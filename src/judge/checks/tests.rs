@@ -3,7 +3,7 @@
 use super::*;
 use crate::estimate::WarningCode;
 use crate::judge::check::{Level, Pass};
-use crate::numeral::{counted, exact};
+use crate::numeral::exact;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -12,13 +12,12 @@ fn code(code: impl serde::Serialize) -> String {
 }
 
 fn pass(pass: &Pass) -> String {
+    let passes = |count: &usize| format!("{count} pass{}", if *count == 1 { "" } else { "es" });
     match pass {
         Pass::Rows => "the pass with slopes that checks share".to_owned(),
-        Pass::Values(count) => format!("up to {} in values, where there is a reason", counted(*count as u64, "pass")),
-        Pass::Slopes(count) => format!("up to {} with slopes, where there is a reason", counted(*count as u64, "pass")),
-        Pass::EachUnknown(count) => {
-            format!("{} or more for each unknown with a reason", counted(*count as u64, "pass"))
-        }
+        Pass::Values(count) => format!("up to {} in values, where there is a reason", passes(count)),
+        Pass::Slopes(count) => format!("up to {} with slopes, where there is a reason", passes(count)),
+        Pass::EachUnknown(count) => format!("{} or more for each unknown with a reason", passes(count)),
         Pass::Finer => "a pass by a finer method, where there is a reason".to_owned(),
     }
 }
