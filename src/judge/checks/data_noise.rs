@@ -32,7 +32,11 @@ pub(crate) const RESTARTS: Check = Check {
             value: POSSIBLE,
             source: "one-sided 95 %",
         },
-        Level { of: "the bias of care by noise that is not excluded", value: NOT_EXCLUDED, source: "0.24 or more in 20 records whose noise is half of what disturbs the plant, 0.11 or less in 20 without noise" },
+        Level {
+            of: "the bias of care by noise that is not excluded",
+            value: NOT_EXCLUDED,
+            source: "0.24 or more in 20 records whose noise is half of what disturbs the plant, 0.11 or less in 20 without noise",
+        },
         Level { of: "the bias that is not usable", value: BIAS, source: "a quarter: intervals of 95 % cover 94 %" },
     ],
     examine: |evidence, intervals| restart_noise(evidence, &intervals.unknowns).into(),

@@ -7,11 +7,11 @@
 
 use crate::estimate::{Warning, WarningCode};
 use crate::information::{Block, Information};
-use crate::judge::check::{Check, Examined, Level, PREFILTER, Pass, ROUND_OFF};
-use crate::judge::evidence::Evidence;
+use crate::judge::check::{Check, Examined, Level};
 use crate::judge::evidence::color;
 use crate::judge::evidence::first_errors::Errors;
 use crate::judge::evidence::powers::by_chance;
+use crate::judge::evidence::{Evidence, PREFILTER, ROUND_OFF};
 use crate::numeral::{p_value, percent};
 use crate::record::Record;
 
@@ -19,7 +19,7 @@ pub(crate) const SIGNALS_BEFORE: Check = Check {
     name: "colored errors follow from their own past only",
     asks: "Do inputs and predictions of the samples before explain more of colored errors than the errors before do (Granger 1969)?",
     codes: &[WarningCode::WrongShape],
-    costs: &[Pass::Values(1)],
+    costs: &[],
     levels: &[
         Level {
             of: "the probability by chance, over all outputs",
@@ -83,10 +83,11 @@ fn by_signals_before(evidence: &Evidence<'_>) -> Option<Warning> {
     if !evidence.is_colored() {
         return None;
     }
-    let (objective, all) = (evidence.point.objective, evidence.first_errors());
-    let most = MOST / all.len().max(1);
-    let series: Vec<Series> =
-        all.iter().enumerate().map(|(e, errors)| Series::new(evidence, e, errors, most)).collect();
+    let (objective, all) = (evidence.point.objective, &evidence.residuals.first_errors);
+    // Of further records none are kept.
+    let kept = || all.iter().enumerate().filter(|(_, errors)| errors.iter().any(|of| !of.is_empty()));
+    let most = MOST / kept().count().max(1);
+    let series: Vec<Series> = kept().map(|(e, errors)| Series::new(evidence, e, errors, most)).collect();
     let tested = evidence.tested();
     let regression = Regression::new(&series)?;
     let found = tested.iter().filter_map(|(j, white)| {
