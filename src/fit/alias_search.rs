@@ -61,7 +61,8 @@ impl Problem<'_> {
 /// nor where the cost is too rough for a minimum, nor where another frequency would not make it usable.
 fn has_rivals(found: &Summary) -> bool {
     let useless = |warning: &Warning| {
-        let cured = matches!(warning.code, WarningCode::NotAtMinimum | WarningCode::CoarseStep);
+        let cured =
+            matches!(warning.code, WarningCode::NotAtMinimum | WarningCode::CoarseStep | WarningCode::WrongShape);
         warning.severity == Severity::NotUsable && !cured
     };
     let rough = matches!(found.outcome, Outcome::Rough { .. }) && !found.outcome.converged();

@@ -253,16 +253,15 @@ pub(super) fn is_only_coarse(found: &Summary) -> bool {
     found.outcome.converged() && !found.warnings.iter().any(wrong)
 }
 
-/// Whether a search that ended at a limit of trial steps goes on after so many parts: while each lowers the deviance, which before the last
-/// one was this; no further than `most` parts where an output is left unexplained, and than some where there is no deviance.
+/// Whether a search that ended at a limit of trial steps goes on after so many parts: up to some, and further while each lowers the deviance,
+/// which before the last one was this. Where an output is left unexplained, while each lowers it, and no further than `most` parts.
 fn may_go_on(found: &Summary, before: Option<f64>, (parts, most): (u64, u64)) -> bool {
     let limited = matches!(found.outcome, Outcome::IterationLimit { .. } | Outcome::OwnLimit { .. });
-    let explains = !is_useless(found, WarningCode::Unexplained);
+    let lowers = found.deviance.is_some_and(|now| before.is_none_or(|before| now < before - LOWERED));
     limited
-        && match (before, found.deviance) {
-            (Some(before), Some(now)) => now < before - LOWERED && (explains || parts < most),
-            (None, Some(_)) => explains || parts < most,
-            (_, None) => explains && parts < PARTS,
+        && match is_useless(found, WarningCode::Unexplained) {
+            true => lowers && parts < most,
+            false => lowers || parts < PARTS,
         }
 }
 

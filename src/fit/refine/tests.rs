@@ -47,7 +47,8 @@ fn where_a_search_goes_on() {
     // By an adaptive method, one part where an output is left unexplained.
     assert_eq!(limited.each_ref().map(|found| may_go_on(found, None, (1, 1))), [true, true, false, true]);
     assert_eq!(go_on(&limited, Some(11.1), 4), [true; 4]);
-    assert_eq!(go_on(&limited, Some(10.9), 4), [false; 4]);
+    assert_eq!(go_on(&limited, Some(10.9), 4), [true, true, false, true]);
+    assert_eq!(go_on(&limited, Some(10.9), 5), [false; 4]);
     assert_eq!(go_on(&limited, Some(11.1), 5), [true, true, false, true]);
     // Where the loss has no deviance, no further than five parts, and not where an output is left unexplained.
     let robust = limited.map(|one| Summary { deviance: None, ..one });
