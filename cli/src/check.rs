@@ -71,14 +71,15 @@ fn looked_at(record: &Record) -> (String, bool) {
     }
     let inspection = record.inspect();
     let mut odd = !gaps.is_empty();
-    let channels =
-        record.inputs().iter().zip(&inspection.inputs).chain(record.outputs().iter().zip(&inspection.outputs));
-    for (channel, found) in channels {
+    let inputs = record.inputs().iter().zip(&inspection.inputs).map(|one| (one, true));
+    let outputs = record.outputs().iter().zip(&inspection.outputs).map(|one| (one, false));
+    for ((channel, found), is_input) in inputs.chain(outputs) {
         let found: &ChannelInspection = found;
+        // An input may well have few values, a square wave for one.
+        odd |= !found.suspicions.is_empty() || !is_input && !found.remarks().is_empty();
         let range = found.range.map_or("nothing".to_owned(), |(least, greatest)| format!("{least} to {greatest}"));
         text += &format!("\n  {}: {range} {}", channel.name, channel.unit);
         for remark in found.remarks() {
-            odd = true;
             text += &format!("\n    {remark}");
         }
     }
