@@ -143,7 +143,7 @@ impl<'a, M: Made> Fit<'a, M> {
 
     /// Sets the integrator. It is kept, with a warning if its step moves the answer.
     ///
-    /// Without it, a fit of a continuous model begins with [`Rk4`], one step per sample. While a finer step would move an
+    /// Without it, a fit of a continuous model begins with [`Rk4`](crate::Rk4), one step per sample. While a finer step would move an
     /// unknown by more than a tenth of its standard error, where the start cannot be simulated, or where a search that did not
     /// converge had a cost that a finer step changes, it takes 4, 16 and 64 steps per sample, then [`Esdirk`](crate::Esdirk); the estimate
     /// names the method ([`Method::integrator`](crate::estimate::Method)), and is not usable if none is fine enough. A finer step
