@@ -155,7 +155,7 @@ fn constant_outputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<W
     let all = still.iter().all(Option::is_some);
     let records = &evidence.point.objective.problem.records;
     let one = |(j, value): (usize, &Option<f64>)| {
-        if records.iter().map(|record| instants(record, j)).sum::<usize>() < INSTANTS {
+        if records.iter().flat_map(|record| instants(record, j)).take(INSTANTS).count() < INSTANTS {
             return None;
         }
         let (value, rmse) = ((*value)?, evidence.residuals.outputs[j].rmse);
@@ -173,12 +173,12 @@ fn constant_outputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<W
     still.iter().enumerate().filter_map(one).collect()
 }
 
-/// The number of instants at which an output was measured.
-fn instants(record: &Record, output: usize) -> usize {
+/// The instants at which an output was measured, each once.
+fn instants(record: &Record, output: usize) -> impl Iterator<Item = f64> {
     let values = &record.outputs()[output].values;
-    let mut times: Vec<f64> = (0..record.len()).filter(|&k| !values[k].is_nan()).map(|k| record.time(k)).collect();
-    times.dedup();
-    times.len()
+    let measured = (0..record.len()).filter(|&k| !values[k].is_nan()).map(|k| record.time(k));
+    let mut before = f64::NAN;
+    measured.filter(move |&time| std::mem::replace(&mut before, time) != time)
 }
 
 /// Suspicious values of an output that the errors confirm.
@@ -381,7 +381,8 @@ mod tests {
     fn instants_of_measurements() {
         let of = |stamps: [f64; 4], values: [f64; 4]| {
             let channel = Channel::new("y", "", values.to_vec());
-            instants(&Record::new(vec![], Time::Stamps(stamps.to_vec()), vec![], vec![channel]).unwrap(), 0)
+            let record = Record::new(vec![], Time::Stamps(stamps.to_vec()), vec![], vec![channel]).unwrap();
+            instants(&record, 0).count()
         };
         assert_eq!(of([0.0, 0.0, 1.0, 2.0], [5.0; 4]), 3);
         assert_eq!(of([0.0, 0.0, 1.0, 2.0], [5.0, 5.0, f64::NAN, 5.0]), 2);
