@@ -1,5 +1,9 @@
 //! [`Equations`]: a model as data.
 
+mod slopes;
+
+pub(crate) use slopes::{Jacobian, Slopes};
+
 use crate::functions::Functions;
 use crate::graph::{Graph, Id, Leaf, Node, Symbol, Untraceable};
 use crate::layout::{InvalidLayout, Kind, Layout, Quantity};
@@ -205,13 +209,8 @@ impl Equations {
 
     /// Whether derivatives and outputs are affine in the states: then so is each step, and slopes do not depend on states.
     pub fn is_affine(&self) -> bool {
-        self.not_affine().is_none()
-    }
-
-    /// The first of derivatives (next states) and outputs that is not affine in the states, by its number among them, if there is one.
-    pub(crate) fn not_affine(&self) -> Option<usize> {
         let degrees = degrees(&self.graph);
-        self.state.iter().chain(&self.output).position(|root| degrees[root.index()] > Degree::One)
+        self.state.iter().chain(&self.output).all(|root| degrees[root.index()] <= Degree::One)
     }
 
     /// The values of roots; without time, states and inputs for what depends on parameters alone.

@@ -243,9 +243,9 @@ pub enum Error {
         /// The kind that it serves.
         serves: &'static str,
     },
-    /// A predictor for models that are affine in their state, and a model that is not.
+    /// A predictor that asks for slopes with respect to the state, and functions that are neither read as a graph nor affine in the state.
     #[error(
-        "{what} is not affine in the state, as {predictor} needs it; simulate the record (FreeRun, the default), predict from measured states (Horizon), or estimate state and parameters online by the extended filter (online::Ekf)"
+        "{what} is not affine in the state, and cannot be differentiated for {predictor}, because the model is not read as a graph; write it as a Model of arithmetic alone, simulate the record (FreeRun, the default), or predict from measured states (Horizon)"
     )]
     NotAffine {
         /// The equation: a derivative, a next state or an output.

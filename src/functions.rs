@@ -20,6 +20,42 @@ pub trait Functions<S>: Send + Sync {
 
     /// Measurement noise of each output, as [`Model::noise`].
     fn noise(&self, p: &[S], to: &mut [S]);
+
+    /// The slopes of [`state`](Functions::state) with respect to the states, row by row: unless written, by secants, which are exact of
+    /// functions that are affine.
+    fn state_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S])
+    where
+        S: Scalar,
+    {
+        secants(x.len(), to, &|x, to| self.state(t, x, u, p, to));
+    }
+
+    /// Those of the outputs.
+    fn output_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S])
+    where
+        S: Scalar,
+    {
+        secants(x.len(), to, &|x, to| self.output(t, x, u, p, to));
+    }
+}
+
+/// The length of a vector by which the column of an affine function is found: so large that its value at zero, which is subtracted, takes
+/// no digits from the difference. A power of two, by which a number is multiplied without rounding.
+pub(crate) const LONG: f64 = (1u64 << 60) as f64;
+
+/// The slopes of an affine function of `n` numbers, row by row: what each unit vector adds to its value at zero.
+fn secants<S: Scalar>(n: usize, to: &mut [S], f: &dyn Fn(&[S], &mut [S])) {
+    let rows = to.len() / n.max(1);
+    let (zero, mut origin) = (vec![S::from(0.0); n], vec![S::from(0.0); rows]);
+    f(&zero, &mut origin);
+    for j in 0..n {
+        let (mut long, mut end) = (zero.clone(), origin.clone());
+        long[j] = S::from(LONG);
+        f(&long, &mut end);
+        for (row, (end, origin)) in end.iter().zip(&origin).enumerate() {
+            to[row * n + j] = (*end - *origin) * LONG.recip();
+        }
+    }
 }
 
 /// A value that is borrowed or shared.
@@ -84,5 +120,23 @@ impl<M: Model, S: Scalar> Functions<S> for Handle<'_, M> {
     fn noise(&self, p: &[S], to: &mut [S]) {
         let p = M::Parameters::from_fn(|i| p[i]);
         to.copy_from_slice(M::Output::into_array(Model::noise(&**self, &p)).as_ref());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::secants;
+
+    /// A value at zero that is 1e13 times what a unit of the state adds takes no digit from it.
+    #[test]
+    fn secants_beside_a_large_offset() {
+        let mut found = [f64::NAN; 4];
+        secants(2, &mut found, &|x: &[f64], to: &mut [f64]| {
+            to[0] = 0.1 * x[0] + 1e12;
+            to[1] = 3.0 * x[1] - 2e-5 * x[0];
+        });
+        for (found, expected) in found.iter().zip([0.1, 0.0, -2e-5, 3.0]) {
+            assert!((found - expected).abs() <= 1e-15 * expected.abs(), "{found} {expected}");
+        }
     }
 }

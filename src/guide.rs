@@ -24,6 +24,7 @@
 //! | [17](chapter_17_command) | the command: models and records from a shell |
 //! | [18](chapter_18_python) | Python: models, frames, results, options |
 //! | [19](chapter_19_clusters) | fleets on Spark and Dask |
+//! | [20](chapter_20_process_noise) | a plant that is disturbed: process noise |
 
 /// A chapter: its text, after the pictures that it names. A picture is a link definition with the image in it, so that the
 /// page needs no other file; the chapter's own definitions, which come second, are for readers of the files.
@@ -55,3 +56,4 @@ chapter!(chapter_16_text_models, "16_text_models");
 chapter!(chapter_17_command, "17_command");
 chapter!(chapter_18_python, "18_python");
 chapter!(chapter_19_clusters, "19_clusters");
+chapter!(chapter_20_process_noise, "20_process_noise");

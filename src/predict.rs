@@ -10,7 +10,6 @@ mod symbolic;
 pub use free_run::FreeRun;
 pub use horizon::Horizon;
 pub use kalman::Kalman;
-pub(crate) use kalman::LONG;
 pub use measured::Guess;
 pub(crate) use measured::Place;
 pub use plant::Plant;
@@ -50,9 +49,9 @@ pub trait Predictor: Debug + Clone + Send + Sync + 'static {
         None
     }
 
-    /// Whether it predicts only models whose derivatives (next states) and outputs are affine in the state. Others are refused
-    /// ([`Error::NotAffine`]).
-    fn needs_affine(&self) -> bool {
+    /// Whether it asks for slopes with respect to the state ([`Plant::state_slopes`], [`Plant::output_slopes`]). A model that cannot be read as
+    /// a graph has them only if it is affine in its state; others are refused ([`Error::NotAffine`]).
+    fn needs_slopes(&self) -> bool {
         false
     }
 
@@ -106,7 +105,7 @@ pub(crate) trait Prediction: Debug + Send + Sync {
     fn predicts_variance(&self) -> bool;
     fn restarts(&self) -> Option<Horizon>;
     fn is_simulation(&self) -> bool;
-    fn needs_affine(&self) -> bool;
+    fn needs_slopes(&self) -> bool;
     fn check(&self, layout: &Layout) -> Result<(), Error>;
     fn describe(&self) -> String;
     fn values(&self) -> &dyn Steps<f64>;
@@ -157,8 +156,8 @@ impl<P: Predictor> Prediction for P {
         std::any::TypeId::of::<P>() == std::any::TypeId::of::<FreeRun>()
     }
 
-    fn needs_affine(&self) -> bool {
-        Predictor::needs_affine(self)
+    fn needs_slopes(&self) -> bool {
+        Predictor::needs_slopes(self)
     }
 
     fn check(&self, layout: &Layout) -> Result<(), Error> {

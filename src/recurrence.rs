@@ -108,10 +108,11 @@ impl SymbolicInterval<'_> {
         }
     }
 
-    fn at(&self, roots: &[Id], position: f64, x: &[Symbol]) -> Vec<Symbol> {
+    /// Roots of a graph of the equations' quantities, at a fraction of the interval.
+    pub fn at(&self, graph: &Graph, roots: &[Id], position: f64, x: &[Symbol]) -> Vec<Symbol> {
         let begin = Symbol::leaf(Leaf::Time);
         let t = if position == 0.0 { begin } else { begin + Symbol::leaf(Leaf::Step) * position };
-        self.equations.graph().evaluate(roots, |leaf| match leaf {
+        graph.evaluate(roots, |leaf| match leaf {
             Leaf::Time => t,
             Leaf::State(i) => x.get(i as usize).copied().unwrap_or_default(),
             Leaf::Input(i) => self.input(i, position),
@@ -121,13 +122,13 @@ impl SymbolicInterval<'_> {
 
     /// `dx/dt`, or the next state of discrete equations.
     pub fn rate(&self, position: f64, x: &[Symbol], to: &mut [Symbol]) {
-        let found = self.at(self.equations.state(), position, x);
+        let found = self.at(self.equations.graph(), self.equations.state(), position, x);
         to.iter_mut().zip(found).for_each(|(to, found)| *to = found);
     }
 
     /// The outputs at the sample.
     pub fn output(&self, x: &[Symbol]) -> Vec<Symbol> {
-        self.at(self.equations.output(), 0.0, x)
+        self.at(self.equations.graph(), self.equations.output(), 0.0, x)
     }
 
     /// The state at the next sample.

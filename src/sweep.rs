@@ -17,7 +17,7 @@ pub(crate) use duals::DualSweep;
 pub(crate) use failure::OVERFLOW;
 pub(crate) use loops::{Loops, Narrow};
 pub(crate) use made::{compiled, of_equations};
-pub(crate) use model_code::{ModelCode, Typed};
+pub(crate) use model_code::{Evaluated, ModelCode, Typed};
 pub(crate) use programs::{Derived, Interleaved, ProgramSweep};
 pub use window::Window;
 

@@ -82,7 +82,7 @@ def fit(
         refined until it no longer matters.
     predictor : str, optional
         Which prediction error is minimized: of a ``"simulation"`` (the default), ``"horizon:5"`` (five samples ahead of a measured
-        state), or ``"kalman"`` (one-step errors; models that are affine in their state, with `diffusion` and `noise`).
+        state), or ``"kalman"`` (one-step errors of a filter, for disturbed plants; the model has `diffusion` and `noise`).
     optimizer : str, optional
         ``"levenberg-marquardt"`` or ``"gauss-newton"``.
     starts : int, optional

@@ -200,7 +200,7 @@ impl<M: Model> Made for M {
             let (layout, method, predictor) = (layout.clone(), method.clone(), predictor.clone());
             Arc::new(DualSweep { layout, code, method, predictor, uncompiled })
         };
-        compiled(&|| Equations::trace(&*model).map(Arc::new), &method, &predictor, &plain)
+        Ok(compiled(&|| Equations::trace(&*model).map(Arc::new), &method, &predictor, &plain))
     }
 }
 

@@ -1,4 +1,4 @@
-//! [`Kalman`]: one-step prediction of a linear plant with process noise.
+//! [`Kalman`]: one-step prediction of a plant with process noise.
 
 use super::{Plant, Predictor};
 use crate::error::Error;
@@ -7,22 +7,36 @@ use crate::layout::{Kind, Layout};
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
-/// The Kalman filter of a model that is affine in its state (R. E. Kalman, Journal of Basic Engineering 82 (1960)
-/// 35-45; for the likelihood F. C. Schweppe, IEEE Transactions on Information Theory 11 (1965) 61-70): each output is
-/// predicted from all measurements before it, with its variance.
+/// The Kalman filter (R. E. Kalman, Journal of Basic Engineering 82 (1960) 35-45; for the likelihood F. C. Schweppe, IEEE Transactions on
+/// Information Theory 11 (1965) 61-70): each output is predicted from all measurements before it, with its variance. Right where the plant
+/// is disturbed between the samples: wind, load, sun, a friction that the model lacks.
 ///
-/// A model that is not affine in its state is refused by name ([`Error::NotAffine`]). One that cannot be read as a graph (closures in
-/// [`Numeric`](crate::Numeric)) is tested by its values: at some samples of each record, at states of a thousandth to a thousand times the
+/// Mean `x` and covariance `P` of the state are exact for a model that is affine in its state. For others it is the extended filter: they
+/// follow the model and its slopes to the first order (A. H. Jazwinski, *Stochastic Processes and Filtering Theory*, 1970, section 9.3),
+///
+/// ```text
+/// dx/dt = f(x)        dP/dt = A P + P A' + Q        A = df/dx at x
+/// ```
+///
+/// by the steps of the fit's integrator, and an output is linearized at the state that the outputs before it have corrected. That is right
+/// where the state's standard deviation is short against the model's curvature, as it is with measurements that are frequent and precise
+/// against the disturbance. `A` is found by differentiating the model's graph, so that gradients of the likelihood are exact. A model that
+/// cannot be read as a graph (closures in [`Numeric`](crate::Numeric)) has to be affine, and is refused by the name of the equation that is
+/// not ([`Error::NotAffine`]): it is tested by its values at some samples of each record, at states of a thousandth to a thousand times the
 /// largest measurement, and at far larger ones.
 ///
 /// The noise is part of the model, [`Model::diffusion`](crate::Model::diffusion) and
 /// [`Model::noise`](crate::Model::noise), so that noise levels are parameters like others. The state at the first
-/// sample is what the fit takes it to be; its covariance is zero, because the fit estimates it or is given it.
+/// sample is what the fit takes it to be; its covariance is zero, because the fit estimates it or is given it. Without diffusion the
+/// filter predicts what a simulation does.
 ///
 /// The outputs of a sample are taken in one by one, which for independent measurement noises is the same as all at
 /// once. The covariance is corrected in Joseph's form (R. S. Bucy, P. D. Joseph, *Filtering for Stochastic Processes with Applications to
 /// Guidance*, 1968), a sum of squares: two sensors of one quantity whose noise is a part of 1e-9 of the process noise leave nine digits of
 /// the likelihood.
+///
+/// A level of noise is found by its logarithm (`free(0.1).log()`); start the diffusion large rather than small: a filter that trusts a wrong
+/// start of the model has nothing to correct it by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Kalman;
 
@@ -30,24 +44,6 @@ pub struct Kalman;
 fn entry(n: usize, i: usize, j: usize) -> usize {
     let (i, j) = (i.min(j), i.max(j));
     i * (2 * n - i + 1) / 2 + j - i
-}
-
-/// The length of a vector by which the column of an affine function is found: so large that its value at zero, which is subtracted, takes
-/// no digits from the difference. A power of two, by which a number is multiplied without rounding.
-pub(crate) const LONG: f64 = (1u64 << 60) as f64;
-
-/// The columns of a function that is affine: what each unit vector adds to its value at zero.
-fn columns<S: Scalar, E>(n: usize, m: usize, f: impl Fn(&[S], &mut [S]) -> Result<(), E>) -> Result<Vec<Vec<S>>, E> {
-    let (zero, mut origin) = (vec![S::from(0.0); n], vec![S::from(0.0); m]);
-    f(&zero, &mut origin)?;
-    (0..n)
-        .map(|j| {
-            let (mut long, mut to) = (zero.clone(), origin.clone());
-            long[j] = S::from(LONG);
-            f(&long, &mut to)?;
-            Ok(to.iter().zip(&origin).map(|(a, b)| (*a - *b) * LONG.recip()).collect())
-        })
-        .collect()
 }
 
 /// What the filter knows of an output before it is taken in.
@@ -65,11 +61,9 @@ struct Expected<S> {
 impl Kalman {
     fn expected<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &[S], output: usize) -> Expected<S> {
         let (n, outputs) = (plant.layout().states.len(), plant.layout().outputs.len());
-        let at = |x: &[S], y: &mut [S]| {
-            plant.output(x, y);
-            Ok::<(), Stuck>(())
-        };
-        let c: Vec<S> = columns(n, outputs, at).unwrap_or_default().iter().map(|column| column[output]).collect();
+        let mut slopes = vec![S::from(0.0); outputs * n];
+        plant.output_slopes(&carry[..n], &mut slopes);
+        let c = slopes[output * n..][..n].to_vec();
         let covariance = &carry[n..];
         let times = |i: usize| (0..n).map(|j| covariance[entry(n, i, j)] * c[j]).sum::<S>();
         let gain: Vec<S> = (0..n).map(times).collect();
@@ -91,7 +85,7 @@ impl Predictor for Kalman {
         true
     }
 
-    fn needs_affine(&self) -> bool {
+    fn needs_slopes(&self) -> bool {
         true
     }
 
@@ -137,17 +131,15 @@ impl Predictor for Kalman {
         let mut noise = vec![S::from(0.0); n];
         plant.diffusion(&mut noise);
         if plant.layout().kind == Kind::Discrete {
-            let a = columns(n, n, |x: &[S], to: &mut [S]| {
-                to.copy_from_slice(x);
-                plant.next(to)
-            })?;
             let (x, covariance) = carry.split_at_mut(n);
+            let mut a = vec![S::from(0.0); n * n];
+            plant.state_slopes(0.0, x, &mut a);
             plant.next(x)?;
             let before = covariance.to_vec();
             for i in 0..n {
                 for j in i..n {
                     let pairs = (0..n).flat_map(|k| (0..n).map(move |l| (k, l)));
-                    let moved: S = pairs.map(|(k, l)| a[k][i] * before[entry(n, k, l)] * a[l][j]).sum();
+                    let moved: S = pairs.map(|(k, l)| a[i * n + k] * before[entry(n, k, l)] * a[j * n + l]).sum();
                     covariance[entry(n, i, j)] = if i == j { moved + noise[i] * noise[i] } else { moved };
                 }
             }
@@ -156,13 +148,10 @@ impl Predictor for Kalman {
         // dx/dt = f(x), dP/dt = A P + P A' + Q.
         plant.integrate(carry, &|position, z, to| {
             let (x, covariance) = z.split_at(n);
+            let mut a = vec![S::from(0.0); n * n];
             plant.derivative(position, x, &mut to[..n]);
-            let at = |x: &[S], to: &mut [S]| {
-                plant.derivative(position, x, to);
-                Ok::<(), Stuck>(())
-            };
-            let a = columns(n, n, at).unwrap_or_default();
-            let flow = |i: usize, j: usize| (0..n).map(|k| a[k][i] * covariance[entry(n, k, j)]).sum::<S>();
+            plant.state_slopes(position, x, &mut a);
+            let flow = |i: usize, j: usize| (0..n).map(|k| a[i * n + k] * covariance[entry(n, k, j)]).sum::<S>();
             for i in 0..n {
                 for j in i..n {
                     let moved = flow(i, j) + flow(j, i);
@@ -174,25 +163,5 @@ impl Predictor for Kalman {
 
     fn describe(&self) -> String {
         "one-step prediction by a Kalman filter".to_owned()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::columns;
-
-    /// A value at zero that is 1e13 times what a unit of the state adds takes no digit from it.
-    #[test]
-    fn columns_beside_a_large_offset() {
-        let f = |x: &[f64], to: &mut [f64]| {
-            to[0] = 0.1 * x[0] + 1e12;
-            to[1] = 3.0 * x[1] - 2e-5 * x[0];
-            Ok::<(), ()>(())
-        };
-        let found = columns(2, 2, f).unwrap();
-        let expected = [[0.1, -2e-5], [0.0, 3.0]];
-        for (found, expected) in found.iter().flatten().zip(expected.iter().flatten()) {
-            assert!((found - expected).abs() <= 1e-15 * expected.abs(), "{found} {expected}");
-        }
     }
 }

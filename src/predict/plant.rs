@@ -29,6 +29,13 @@ pub trait Plant<S> {
     /// Of a continuous model: `dx/dt` at the fraction `position` of the interval.
     fn derivative(&self, position: f64, x: &[S], to: &mut [S]);
 
+    /// The slopes of the derivative of a continuous model at the fraction `position` of the interval, or of the next state of a discrete one,
+    /// with respect to the state, row by row. They have slopes of their own.
+    fn state_slopes(&self, position: f64, x: &[S], to: &mut [S]);
+
+    /// The slopes of the outputs at the sample with respect to the state, row by row.
+    fn output_slopes(&self, x: &[S], to: &mut [S]);
+
     /// Integrates any vector to the next sample by the integrator of the fit: `rate(position, z, to)` writes `dz/dt`
     /// (per second) at a fraction of the interval.
     ///
@@ -151,6 +158,15 @@ impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
     fn derivative(&self, position: f64, x: &[S], to: &mut [S]) {
         let (t, u) = (S::from(self.between.time(position)), self.between.input(position));
         self.functions.state(t, x, &u, self.p, to);
+    }
+
+    fn state_slopes(&self, position: f64, x: &[S], to: &mut [S]) {
+        let (t, u) = (S::from(self.between.time(position)), self.between.input(position));
+        self.functions.state_slopes(t, x, &u, self.p, to);
+    }
+
+    fn output_slopes(&self, x: &[S], to: &mut [S]) {
+        self.functions.output_slopes(S::from(self.between.time(0.0)), x, &self.between.input(0.0), self.p, to);
     }
 
     fn integrate(&self, z: &mut [S], rate: Rate<'_, S>) -> Result<(), Stuck> {

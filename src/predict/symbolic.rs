@@ -1,7 +1,7 @@
 //! A predictor and the equations that it predicts, traced as one graph.
 
 use super::{Plant, Prediction};
-use crate::equations::Equations;
+use crate::equations::{Equations, Jacobian, Slopes};
 use crate::functions::Functions;
 use crate::graph::{Graph, Leaf, Symbol, Untraceable};
 use crate::integrate::{Method, Stuck};
@@ -22,11 +22,13 @@ pub(crate) fn recurrence(
 ) -> Result<Recurrence, Untraceable> {
     let layout = equations.layout();
     let (carried, outputs) = (predictor.carry(layout), layout.outputs.len());
+    let slopes = predictor.needs_slopes().then(|| Slopes::of(equations));
     let number = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
     let mut graph = Graph::default();
     let roots = graph.trace(|| {
         let plant = SymbolicPlant {
             interval: SymbolicInterval { equations, method, holds },
+            slopes: slopes.as_ref(),
             p: (0..layout.parameters.len()).map(|j| Symbol::leaf(Leaf::Parameter(number(j)))).collect(),
         };
         let steps = predictor.symbols();
@@ -57,7 +59,18 @@ pub(crate) fn recurrence(
 /// A plant in symbols.
 struct SymbolicPlant<'a> {
     interval: SymbolicInterval<'a>,
+    /// Of a predictor that asks for them.
+    slopes: Option<&'a Slopes>,
     p: Vec<Symbol>,
+}
+
+impl SymbolicPlant<'_> {
+    fn jacobian(&self, of: impl Fn(&Slopes) -> &Jacobian, position: f64, x: &[Symbol], to: &mut [Symbol]) {
+        let Some(Jacobian { graph, entries }) = self.slopes.map(of) else {
+            return Symbol::fail("its predictor asks for slopes and does not say so (`Predictor::needs_slopes`)");
+        };
+        to.copy_from_slice(&self.interval.at(graph, entries, position, x));
+    }
 }
 
 impl Plant<Symbol> for SymbolicPlant<'_> {
@@ -81,6 +94,14 @@ impl Plant<Symbol> for SymbolicPlant<'_> {
 
     fn derivative(&self, position: f64, x: &[Symbol], to: &mut [Symbol]) {
         self.interval.rate(position, x, to);
+    }
+
+    fn state_slopes(&self, position: f64, x: &[Symbol], to: &mut [Symbol]) {
+        self.jacobian(|slopes| &slopes.state, position, x, to);
+    }
+
+    fn output_slopes(&self, x: &[Symbol], to: &mut [Symbol]) {
+        self.jacobian(|slopes| &slopes.output, 0.0, x, to);
     }
 
     fn integrate(&self, z: &mut [Symbol], rate: &dyn Fn(f64, &[Symbol], &mut [Symbol])) -> Result<(), Stuck> {

@@ -1,8 +1,7 @@
 //! Whether equations that are not read as a graph are affine in the state: tested by their values.
 
-use crate::functions::Functions;
+use crate::functions::{Functions, LONG};
 use crate::layout::{Kind, Layout};
-use crate::predict::LONG;
 use crate::record::Record;
 
 /// Samples at whose time and inputs they are tested.

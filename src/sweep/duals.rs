@@ -69,7 +69,7 @@ impl Sweep for DualSweep<'_> {
 
     fn prepare(&self, record: &Record, parameters: &[f64]) -> Result<Prepared, Error> {
         // Equations that are read as a graph have been examined as such.
-        if self.predictor.needs_affine()
+        if self.predictor.needs_slopes()
             && self.uncompiled.choosing.is_none()
             && let Some(number) = not_affine(&self.layout, self.code.values(), record, parameters)
         {
@@ -166,7 +166,11 @@ impl Sweep for DualSweep<'_> {
     }
 
     fn predictor(&self) -> String {
-        self.predictor.describe()
+        let predictor = self.predictor.describe();
+        match self.predictor.needs_slopes() && !self.code.is_affine() {
+            true => format!("{predictor}, extended: by the model's slopes at the state (first order)"),
+            false => predictor,
+        }
     }
 
     fn engine(&self) -> String {

@@ -1,7 +1,7 @@
 //! Sweeps made of equations: compiled where they can be, else in dual numbers.
 
 use super::duals::Uncompiled;
-use super::{DualSweep, ProgramSweep, Sweep};
+use super::{DualSweep, Evaluated, ProgramSweep, Sweep};
 use crate::engine::only_duals;
 use crate::equations::Equations;
 use crate::error::Error;
@@ -11,33 +11,50 @@ use crate::predict::Prediction;
 use std::sync::Arc;
 
 /// A compiled program of the equations that `trace` reads, if there can be one, else what `plain` makes of the reason.
-///
-/// # Errors
-/// Equations that are not affine in the state, for a predictor that needs that.
 pub(crate) fn compiled<'a>(
     trace: &dyn Fn() -> Result<Arc<Equations>, Untraceable>,
     method: &Arc<dyn Method>,
     predictor: &Arc<dyn Prediction>,
     plain: &dyn Fn(Uncompiled) -> Arc<dyn Sweep + 'a>,
-) -> Result<Arc<dyn Sweep + 'a>, Error> {
-    if only_duals() {
-        return Ok(plain(Uncompiled { reason: "dual numbers are asked for".to_owned(), choosing: None }));
+) -> Arc<dyn Sweep + 'a> {
+    let asked = only_duals().then(|| "dual numbers are asked for".to_owned());
+    if let Some(reason) = &asked
+        && !predictor.needs_slopes()
+    {
+        return plain(Uncompiled { reason: reason.clone(), choosing: None });
     }
     let equations = match trace() {
         Ok(equations) => equations,
-        Err(Untraceable { reason, .. }) => return Ok(plain(Uncompiled { reason, choosing: None })),
+        Err(Untraceable { reason, .. }) => return plain(Uncompiled { reason, choosing: None }),
     };
-    if predictor.needs_affine()
-        && let Some(number) = equations.not_affine()
-    {
-        return Err(Error::NotAffine { what: equations.layout().equation(number), predictor: predictor.describe() });
-    }
     let choosing = Some(choosing(equations.graph()));
-    let beside = plain(Uncompiled { reason: String::new(), choosing: choosing.clone() });
-    Ok(match ProgramSweep::new(equations, method.clone(), predictor.clone(), beside) {
+    let in_duals = |reason: String| {
+        let uncompiled = Uncompiled { reason, choosing: choosing.clone() };
+        match predictor.needs_slopes() && !equations.is_affine() {
+            // The model's own code in duals has no slopes whose slopes are known.
+            true => evaluated(&equations, method, predictor, uncompiled),
+            false => plain(uncompiled),
+        }
+    };
+    if let Some(reason) = asked {
+        return in_duals(reason);
+    }
+    match ProgramSweep::new(equations.clone(), method.clone(), predictor.clone(), in_duals(String::new())) {
         Ok(sweep) => Arc::new(sweep),
-        Err(Untraceable { reason, .. }) => plain(Uncompiled { reason, choosing }),
-    })
+        Err(Untraceable { reason, .. }) => in_duals(reason),
+    }
+}
+
+/// Equations in dual numbers, node by node.
+fn evaluated(
+    equations: &Arc<Equations>,
+    method: &Arc<dyn Method>,
+    predictor: &Arc<dyn Prediction>,
+    uncompiled: Uncompiled,
+) -> Arc<dyn Sweep> {
+    let (method, predictor) = (method.clone(), predictor.clone());
+    let (layout, code) = (Arc::new(equations.layout().clone()), Arc::new(Evaluated::new(equations.clone())));
+    Arc::new(DualSweep { layout, code, method, predictor, uncompiled })
 }
 
 /// The sweep of equations.
@@ -49,12 +66,8 @@ pub(crate) fn of_equations(
     method: &Arc<dyn Method>,
     predictor: &Arc<dyn Prediction>,
 ) -> Result<Arc<dyn Sweep>, Error> {
-    let layout = Arc::new(equations.layout().clone());
-    method.check(layout.kind)?;
-    predictor.check(&layout)?;
-    let plain = |uncompiled| -> Arc<dyn Sweep> {
-        let (layout, method, predictor) = (layout.clone(), method.clone(), predictor.clone());
-        Arc::new(DualSweep { layout, code: Arc::new(equations.clone()), method, predictor, uncompiled })
-    };
-    compiled(&|| Ok(equations.clone()), method, predictor, &plain)
+    method.check(equations.layout().kind)?;
+    predictor.check(equations.layout())?;
+    let plain = |uncompiled| evaluated(equations, method, predictor, uncompiled);
+    Ok(compiled(&|| Ok(equations.clone()), method, predictor, &plain))
 }

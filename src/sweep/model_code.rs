@@ -2,12 +2,13 @@
 
 use super::filtered::Filter;
 use super::{Loops, Piece, Reached, RunError, Seed, Visit};
-use crate::equations::Equations;
+use crate::equations::{Equations, Slopes};
 use crate::functions::{Functions, Handle};
 use crate::integrate::Duals;
 use crate::layout::Kind;
 use crate::model::Model;
-use std::sync::Arc;
+use crate::scalar::Scalar;
+use std::sync::{Arc, OnceLock};
 
 /// A model's equations on vectors, and its loop over the samples.
 pub(crate) trait ModelCode: Send + Sync {
@@ -26,6 +27,9 @@ pub(crate) trait ModelCode: Send + Sync {
 
     /// The same for a finer step, if there is one.
     fn refined<'s>(&'s self, kind: Kind) -> Option<Arc<dyn ModelCode + 's>>;
+
+    /// Whether derivatives (next states) and outputs are affine in the state, as far as slopes with respect to it are asked for.
+    fn is_affine(&self) -> bool;
 
     /// Text that identifies the equations.
     fn identity(&self) -> String;
@@ -61,19 +65,66 @@ impl<M: Model> ModelCode for Typed<'_, M> {
         Some(Arc::new(Typed { model: self.model.clone(), loops: self.loops.refined(kind)? }))
     }
 
+    /// Others are evaluated from their graph, or refused.
+    fn is_affine(&self) -> bool {
+        true
+    }
+
     fn identity(&self) -> String {
         std::any::type_name::<M>().to_owned()
     }
 }
 
 /// Equations, evaluated node by node.
-impl ModelCode for Arc<Equations> {
+pub(crate) struct Evaluated {
+    equations: Arc<Equations>,
+    /// Made when a predictor asks for them.
+    slopes: OnceLock<Slopes>,
+}
+
+impl Evaluated {
+    pub fn new(equations: Arc<Equations>) -> Self {
+        Evaluated { equations, slopes: OnceLock::new() }
+    }
+
+    fn slopes(&self) -> &Slopes {
+        self.slopes.get_or_init(|| Slopes::of(&self.equations))
+    }
+}
+
+impl<S: Scalar> Functions<S> for Evaluated {
+    fn state(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        Functions::state(&*self.equations, t, x, u, p, to);
+    }
+
+    fn output(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        Functions::output(&*self.equations, t, x, u, p, to);
+    }
+
+    fn diffusion(&self, p: &[S], to: &mut [S]) {
+        self.equations.diffusion(p, to);
+    }
+
+    fn noise(&self, p: &[S], to: &mut [S]) {
+        self.equations.noise(p, to);
+    }
+
+    fn state_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        self.slopes().state.at(t, x, u, p, to);
+    }
+
+    fn output_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        self.slopes().output.at(t, x, u, p, to);
+    }
+}
+
+impl ModelCode for Evaluated {
     fn values(&self) -> &dyn Functions<f64> {
-        &**self
+        self
     }
 
     fn duals(&self) -> &dyn Functions<Duals> {
-        &**self
+        self
     }
 
     fn run(
@@ -88,11 +139,15 @@ impl ModelCode for Arc<Equations> {
     }
 
     fn refined<'s>(&'s self, _kind: Kind) -> Option<Arc<dyn ModelCode + 's>> {
-        Some(Arc::new(self.clone()))
+        Some(Arc::new(Evaluated::new(self.equations.clone())))
+    }
+
+    fn is_affine(&self) -> bool {
+        self.equations.is_affine()
     }
 
     /// The equations as they are written to a file.
     fn identity(&self) -> String {
-        serde_json::to_string(&**self).unwrap_or_else(|_| self.to_string())
+        serde_json::to_string(&*self.equations).unwrap_or_else(|_| self.equations.to_string())
     }
 }

@@ -27,7 +27,6 @@ mod holds;
 mod instants;
 mod interval_limits;
 mod judgements;
-mod kalman;
 mod late_sensor;
 mod long_profile;
 mod many_records;

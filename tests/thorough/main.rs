@@ -9,6 +9,11 @@ mod common;
 #[cfg(not(debug_assertions))]
 mod coverage;
 #[cfg(not(debug_assertions))]
+mod filters;
+#[cfg(not(debug_assertions))]
+#[path = "../common/hardening.rs"]
+mod hardening;
+#[cfg(not(debug_assertions))]
 mod intervals;
 #[cfg(not(debug_assertions))]
 mod monte_carlo;

@@ -6,7 +6,7 @@ use crate::predict::{FreeRun, Horizon, Kalman, Predictor};
 use crate::record::{Channel, Column};
 use crate::scalar::Scalar;
 use crate::signals;
-use crate::sweep::{DualSweep, Typed, Window};
+use crate::sweep::{DualSweep, Evaluated, Typed, Window};
 
 signals! {
     struct Angle { phi: "rad", w: "rad/s" }
@@ -84,7 +84,7 @@ fn rows(sweep: &dyn Sweep, pieces: &[Piece<'_>], seeds: &[Seed]) -> (Vec<Vec<f64
     (all, reached.into_iter().map(Result::unwrap).collect())
 }
 
-/// The model's own code in duals, its equations in duals, and programs.
+/// The model's own code in duals (its equations, where slopes are asked for that it does not have), its equations in duals, and programs.
 fn sweeps<M: Model>(model: &M, predictor: impl Predictor) -> [Arc<dyn Sweep + '_>; 3] {
     let (method, predictor): (Arc<dyn Method>, Arc<dyn Prediction>) = (Arc::new(Rk4::default()), Arc::new(predictor));
     let equations = Arc::new(Equations::trace(model).unwrap());
@@ -92,8 +92,11 @@ fn sweeps<M: Model>(model: &M, predictor: impl Predictor) -> [Arc<dyn Sweep + '_
         let (layout, method, predictor) = (Arc::new(Layout::of::<M>()), method.clone(), predictor.clone());
         Arc::new(DualSweep { layout, code, method, predictor, uncompiled: Default::default() })
     };
-    let typed = duals(Arc::new(Typed { model: Handle::Borrowed(model), loops: Arc::new(Rk4::default()) }));
-    let evaluated = duals(Arc::new(equations.clone()));
+    let evaluated = duals(Arc::new(Evaluated::new(equations.clone())));
+    let typed = match predictor.needs_slopes() && !equations.is_affine() {
+        true => evaluated.clone(),
+        false => duals(Arc::new(Typed { model: Handle::Borrowed(model), loops: Arc::new(Rk4::default()) })),
+    };
     let programs = ProgramSweep::new(equations, method.clone(), predictor.clone(), typed.clone()).unwrap();
     [typed, evaluated, Arc::new(programs)]
 }
@@ -154,6 +157,7 @@ fn programs_predict_what_duals_predict() {
         for uniform in [true, false] {
             compare(&Pendulum { linear: false }, FreeRun, uniform, hold);
             compare(&Pendulum { linear: true }, Kalman, uniform, hold);
+            compare(&Pendulum { linear: false }, Kalman, uniform, hold);
         }
         compare(&Pendulum { linear: false }, Horizon::new(1), true, hold);
         compare(&Pendulum { linear: false }, Horizon::new(35), true, hold);

@@ -1,4 +1,4 @@
-//! [`Kalman`] against exact likelihoods: of an independent scalar filter, and of all measurements at once as one Gaussian
+//! [`Kalman`] of models that are affine in their state, against exact likelihoods: of an independent scalar filter, and of all measurements at once as one Gaussian
 //! vector. Noise levels are among the unknowns.
 
 use crate::common::Noise;
@@ -487,62 +487,6 @@ fn what_cannot_be_filtered_is_refused() {
     );
     let why = refused(&Stateless, Nothing);
     assert!(why.contains("no state to filter"), "{why}");
-}
-
-signals! { pub struct Swing { phi: "rad", w: "rad/s" } }
-signals! { pub struct Angle { phi: "rad" } }
-signals! { pub struct Hanging { g: "1/s^2", d: "1/s" } }
-
-/// A pendulum, whose output may be bent, too.
-#[derive(Clone)]
-struct Pendulum {
-    bent: bool,
-}
-
-impl Model for Pendulum {
-    type State = Swing;
-    type Input = Push;
-    type Output = Angle;
-    type Parameters = Hanging;
-    fn derivative<S: Scalar>(&self, _t: S, x: &Swing<S>, u: &Push<S>, p: &Hanging<S>) -> Swing<S> {
-        let pull = if self.bent { x.phi } else { x.phi.sin() };
-        Swing { phi: x.w, w: u.u - p.g * pull - p.d * x.w }
-    }
-    fn output<S: Scalar>(&self, _t: S, x: &Swing<S>, _u: &Push<S>, _p: &Hanging<S>) -> Angle<S> {
-        Angle { phi: if self.bent { x.phi + x.phi.powi(2) } else { x.phi } }
-    }
-}
-
-/// The equation is named, of models that are read as a graph and of functions that are not; functions that are affine are filtered.
-#[test]
-fn models_that_are_not_affine_are_refused() {
-    fn fitted<M>(model: &M) -> Result<Estimate<M>, Error>
-    where
-        M: Model<State = Swing, Input = Push, Output = Angle, Parameters = Hanging>,
-    {
-        let outputs = (0..20).map(|k| Angle { phi: (0.3 * f64::from(k)).cos() }).collect();
-        let time = Time::Uniform { start: 0.0, step: 0.1 };
-        let record = Experiment::new(model, time, vec![Push { u: 0.2 }; 20], outputs)?;
-        Fit::new(model, &record).parameters(Hanging { g: free(9.0), d: free(0.1) }).predictor(Kalman).run()
-    }
-    let refused = |found: Result<(), Error>, equation: &str| {
-        let error = found.unwrap_err();
-        assert!(matches!(&error, Error::NotAffine { what, .. } if what == equation), "{error}");
-        assert!(error.to_string().contains("Horizon"), "{error}");
-    };
-    refused(fitted(&Pendulum { bent: false }).map(|_| ()), "the derivative of state `w`");
-    refused(fitted(&Pendulum { bent: true }).map(|_| ()), "output `phi`");
-    let numeric = |power: i32| {
-        let derivative = move |_: f64, x: &Swing, u: &Push, p: &Hanging| Swing {
-            phi: x.w,
-            w: u.u - p.g * x.phi.powi(power) - p.d * x.w,
-        };
-        Numeric::continuous(derivative, |_, x: &Swing, _: &Push, _: &Hanging| Angle { phi: x.phi })
-    };
-    refused(fitted(&numeric(3)).map(|_| ()), "the derivative of state `w`");
-    // It says nothing of its noise, which is the next thing to be missed.
-    let error = fitted(&numeric(1)).unwrap_err().to_string();
-    assert!(error.contains("write Model::noise"), "{error}");
 }
 
 /// Of 20 errors of size `s` the deviance rises by `20 (ln(s'^2 / s^2) + s^2 / s'^2 - 1)` where the level is `s'`: by the square of

@@ -1,0 +1,58 @@
+//! A spring that hardens, driven by noise: the plant of tests of filters.
+#![allow(dead_code, reason = "each test uses some of it")]
+
+use crate::common::Noise;
+use greybox::*;
+
+signals! { pub struct Deflection { x: "m" } }
+signals! { pub struct Pull { u: "N" } }
+signals! { pub struct Gauges { y: "m", z: "m" } }
+signals! { pub struct Spring { a: "1/s", b: "1/(m^2 s)", c: "m/(N s)", q: "m/s^0.5", r: "m" } }
+
+pub const TRUTH: Spring = Spring { a: 1.0, b: 0.5, c: 1.0, q: 0.3, r: 0.1 };
+
+/// `dx = (c u - a x - b x^3) dt + q dw`, seen as `y = x + e` with an error of size `r`; `z = x + x^2 / 2`, twice as noisy, is a second gauge.
+#[derive(Clone)]
+pub struct Hardening;
+
+impl Model for Hardening {
+    type State = Deflection;
+    type Input = Pull;
+    type Output = Gauges;
+    type Parameters = Spring;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Deflection<S>, u: &Pull<S>, p: &Spring<S>) -> Deflection<S> {
+        Deflection { x: p.c * u.u - p.a * x.x - p.b * x.x.powi(3) }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Deflection<S>, _u: &Pull<S>, _p: &Spring<S>) -> Gauges<S> {
+        Gauges { y: x.x, z: x.x + x.x * x.x * 0.5 }
+    }
+    fn diffusion<S: Scalar>(&self, p: &Spring<S>) -> Deflection<S> {
+        Deflection { x: p.q }
+    }
+    fn noise<S: Scalar>(&self, p: &Spring<S>) -> Gauges<S> {
+        Gauges { y: p.r, z: p.r * 2.0 }
+    }
+}
+
+/// A record of the plant by Euler's method in steps of a fiftieth of a sample, which err by less than a hundredth of a standard error; the
+/// second gauge is read at one sample in `every`. The state at the first sample is zero.
+pub fn disturbed(time: Time, samples: usize, every: usize, noise: &mut Noise) -> ExperimentOf<Hardening> {
+    const STEPS: usize = 50;
+    let (mut x, mut inputs, mut outputs) = (0.0, vec![], vec![]);
+    for k in 0..samples {
+        let u = [2.0, -1.0, 0.5, -2.0, 1.0][k / 15 % 5];
+        let (y, z) = (x + TRUTH.r * noise.gauss(), x + 0.5 * x * x + 2.0 * TRUTH.r * noise.gauss());
+        outputs.push(Gauges { y, z: if k % every == 0 { z } else { f64::NAN } });
+        inputs.push(Pull { u });
+        let h = (time.at(k + 1) - time.at(k)) / STEPS as f64;
+        for _ in 0..STEPS {
+            x += h * (TRUTH.c * u - TRUTH.a * x - TRUTH.b * x * x * x) + TRUTH.q * h.sqrt() * noise.gauss();
+        }
+    }
+    Experiment::new(&Hardening, time, inputs, outputs).unwrap().initial(Deflection { x: fixed(0.0) })
+}
+
+/// A start at some distance, levels by their logarithms.
+pub fn start() -> Spring<Parameter> {
+    Spring { a: free(0.7), b: free(0.8), c: free(0.8), q: free(0.6).log(), r: free(0.2).log() }
+}

@@ -1,0 +1,8 @@
+//! Filters of plants with process noise: likelihoods, gradients, estimates.
+
+mod affine;
+#[path = "../common/mod.rs"]
+mod common;
+mod extended;
+#[path = "../common/hardening.rs"]
+mod hardening;
