@@ -32,6 +32,8 @@ pub(crate) enum Pass {
     Values(usize),
     /// So many more with slopes, where the pass in values or the rows give a reason.
     Slopes(usize),
+    /// One with slopes that parts of the data and sensors share, where the rows give a reason.
+    Left,
     /// So many with slopes for each unknown that is examined, where its expected curvature or a condition of the model gives a reason.
     EachUnknown(usize),
     /// Some windows, or the whole, by a finer method, where the step gives a reason.

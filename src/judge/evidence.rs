@@ -2,10 +2,14 @@
 
 pub(crate) mod color;
 pub(crate) mod coupling;
+pub(crate) mod extended;
 pub(crate) mod first_errors;
 pub(crate) mod largest;
+pub(crate) mod left;
 pub(crate) mod modes;
 pub(crate) mod output_sums;
+pub(crate) mod parts;
+pub(crate) mod pieces;
 pub(crate) mod powers;
 pub(crate) mod products;
 pub(crate) mod residual_pass;
@@ -19,10 +23,12 @@ pub(crate) mod suspects;
 pub(crate) mod whiteness;
 
 use crate::information::Covariance;
+use crate::judge::covariances::sandwich::Bread;
 use crate::judge::point::Point;
 use crate::problem::{Noise, Whitening};
 use color::is_certain;
 use coupling::Coupled;
+use left::{Left, left};
 use residual_pass::Residuals;
 use rows::{Asked, Rows, rows};
 use spans::records_by_chance;
@@ -51,8 +57,10 @@ pub(crate) struct Evidence<'e> {
     pub rounded: Vec<bool>,
     pub rounding: bool,
     unit: OnceCell<Option<Covariance>>,
+    bread: OnceCell<Option<Bread>>,
     rows: OnceCell<Rows>,
     compare_parts: OnceCell<bool>,
+    left: OnceCell<Left>,
 }
 
 impl<'e> Evidence<'e> {
@@ -66,13 +74,28 @@ impl<'e> Evidence<'e> {
         };
         let rounded: Vec<bool> = sigma.iter().enumerate().map(rounded).collect();
         let rounding = rounded.iter().all(|rounded| *rounded);
-        let (unit, rows, compare_parts) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
-        Evidence { point, residuals, rounded, rounding, unit, rows, compare_parts }
+        let (unit, bread, rows) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
+        Evidence {
+            point,
+            residuals,
+            rounded,
+            rounding,
+            unit,
+            bread,
+            rows,
+            compare_parts: OnceCell::new(),
+            left: OnceCell::new(),
+        }
     }
 
     /// The covariance of unit noise in coordinates.
     pub fn unit(&self) -> Option<&Covariance> {
         self.unit.get_or_init(|| self.point.linear.covariance(&self.point.held_for_covariance)).as_ref()
+    }
+
+    /// The curvature of the cost, for weights and losses by a pass with slopes.
+    pub fn bread(&self) -> Option<&Bread> {
+        self.bread.get_or_init(|| Bread::of(&self.point, self.residuals.measured)).as_ref()
     }
 
     /// What a pass with slopes sums up for the covariance and the checks of this estimate.
@@ -88,6 +111,11 @@ impl<'e> Evidence<'e> {
             parts: parts(),
         };
         self.rows.get_or_init(|| rows(objective, &end.coordinates, asked()))
+    }
+
+    /// What remains after the steps that parts of the data and sensors ask for.
+    pub fn left(&self) -> &Left {
+        self.left.get_or_init(|| left(self))
     }
 
     /// Whether the intervals allow for colored errors.

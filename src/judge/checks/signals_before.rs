@@ -6,7 +6,7 @@
 //! innovations, which no misfit widens: a larger one is only more certain.
 
 use crate::estimate::{Warning, WarningCode};
-use crate::information::{Block, Information};
+use crate::information::Gathering;
 use crate::judge::check::{Check, Examined, Level};
 use crate::judge::evidence::color;
 use crate::judge::evidence::first_errors::Errors;
@@ -75,8 +75,6 @@ const MOST: usize = 16_384;
 const RECORDS: usize = 8;
 /// The least part of the innovations' variance that inputs and predictions explain.
 const LEAST: f64 = 0.05;
-/// Rows that are absorbed together.
-const ROWS: usize = 256;
 
 /// The output whose colored errors certainly follow from inputs and predictions before; of several that with the largest colored part.
 fn by_signals_before(evidence: &Evidence<'_>) -> Option<Warning> {
@@ -186,8 +184,7 @@ impl Regression {
     fn test(&self, series: &[Series], j: usize) -> Option<(f64, f64)> {
         let (longest, own) = (self.spans.last()?.1, 1 + self.errors);
         let regressors = self.signals.len() * self.spans.len();
-        let mut information = Information::new(own + regressors);
-        let mut block = Block::new(own + regressors, ROWS);
+        let mut rows = Gathering::new(own + regressors);
         let mut row = vec![1.0; own + regressors];
         for one in series {
             let mut before: Vec<f64> = vec![];
@@ -201,12 +198,12 @@ impl Regression {
                         let sums = &one.sums[i];
                         *to = (sums[k + 1 - from] - sums[k - until]) / (until + 1 - from) as f64;
                     }
-                    information.gather(&mut block, &row, error);
+                    rows.take(&row, error);
                 }
                 before.push(error);
             }
         }
-        information.absorb(&mut block);
+        let information = rows.triangle();
         let (free, degrees) = (information.rows() as f64 - row.len() as f64, regressors as f64);
         let beyond = information.eliminate(own);
         let (without, with) = (beyond.residual_at_zero(), beyond.residual());

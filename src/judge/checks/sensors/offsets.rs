@@ -1,8 +1,8 @@
 //! What is known of the unknowns if each output may have an offset.
 
-use super::Extended;
 use crate::judge::directions::{taking_part, undetermined};
 use crate::judge::evidence::Evidence;
+use crate::judge::evidence::extended::Extended;
 use crate::judge::evidence::sensors::{KINDS, Kind};
 
 /// By how much the standard error of each unknown grows where each output may have an offset; infinite where an offset then replaces it, one
@@ -11,7 +11,7 @@ pub(crate) fn growth_by_offsets(evidence: &Evidence<'_>) -> Option<Vec<f64>> {
     let extended = Extended::new(evidence)?;
     let without = extended.held(None);
     let mut with = without.clone();
-    for j in 0..extended.objective.outputs() {
+    for j in 0..evidence.point.objective.outputs() {
         let number = j * KINDS + Kind::ALL.iter().position(|kind| *kind == Kind::Offset)?;
         with[extended.place(number)] = false;
     }
