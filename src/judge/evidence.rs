@@ -14,6 +14,7 @@ pub(crate) mod powers;
 pub(crate) mod products;
 pub(crate) mod residual_pass;
 pub(crate) mod rows;
+pub(crate) mod ruled_out;
 pub(crate) mod sensors;
 pub(crate) mod shares;
 pub(crate) mod sizes;
@@ -35,11 +36,6 @@ use spans::records_by_chance;
 use std::cell::OnceCell;
 use whiteness::{WHITENESS_LEVEL, Whiteness, least_white};
 
-/// The reason of checks of errors that are none, and of checks that a pre-filter rules out.
-pub(crate) const ROUND_OFF: &str = "the errors are round-off";
-pub(crate) const PREFILTER: &str = "a pre-filter";
-/// Sensors are not tested, and parts not compared, with more unknowns than these.
-const MOST: usize = 200;
 /// Below this number of measurements the covariance is the classical one, whether the errors are autocorrelated, or of one size, or not.
 const CORRELATED_SAMPLES: u64 = 12;
 /// Records of up to so many measurements are tested for color at this level before their intervals are made: the tests see little
@@ -103,13 +99,9 @@ impl<'e> Evidence<'e> {
         let Point { objective, end, held_for_covariance: held, .. } = &self.point;
         let colored = || self.unit().filter(|_| self.uses_hac()).map(|unit| (&held[..], unit));
         let shares = || self.unit().filter(|_| self.takes_one_size());
-        let parts = || self.without_parts().is_none() && self.compare_parts();
-        let asked = || Asked {
-            shares: shares(),
-            colored: colored(),
-            sensors: self.without_sensors().is_none(),
-            parts: parts(),
-        };
+        let parts = || self.ruled_out(parts::UNLESS).is_none() && self.compare_parts();
+        let sensors = || self.ruled_out(sensors::UNLESS).is_none();
+        let asked = || Asked { shares: shares(), colored: colored(), sensors: sensors(), parts: parts() };
         self.rows.get_or_init(|| rows(objective, &end.coordinates, asked()))
     }
 
@@ -134,28 +126,6 @@ impl<'e> Evidence<'e> {
         let predicted = matches!(objective.problem.settings.noise, Noise::Predicted);
         let exact = self.rounding || self.point.is_exact() || !self.has_noise();
         !predicted && !exact && !objective.needs_sandwich() && self.residuals.measured >= CORRELATED_SAMPLES
-    }
-
-    /// Why the rows of sensors are not summed up.
-    pub fn without_sensors(&self) -> Option<&'static str> {
-        let Point { objective, end, .. } = &self.point;
-        match () {
-            _ if objective.problem.settings.prefilter.is_some() => Some(PREFILTER),
-            _ if objective.sweep.restarts().is_some() => Some("predictions that restart from measurements"),
-            _ if objective.problem.unknowns.row.len() > MOST => Some("more than 200 unknowns"),
-            _ => (!end.outcome.converged()).then_some("no minimum"),
-        }
-    }
-
-    /// Why parts of the data are not compared.
-    pub fn without_parts(&self) -> Option<&'static str> {
-        let Point { objective, end, degrees, .. } = &self.point;
-        match () {
-            _ if objective.problem.settings.prefilter.is_some() => Some(PREFILTER),
-            _ if objective.problem.unknowns.row.len() > MOST => Some("more than 200 unknowns"),
-            _ if *degrees <= 0.0 => Some("no degrees of freedom"),
-            _ => (!end.outcome.converged()).then_some("no minimum"),
-        }
     }
 
     /// Whether there is a reason to compare parts of the data, which takes slopes: where errors are correlated over time or with the

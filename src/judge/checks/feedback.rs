@@ -3,9 +3,9 @@
 //! Each input is regressed on the prediction errors of the same sample, after the inputs and measurements of the samples before. A
 //! significant coefficient is the gain of a controller that acts without delay (instantaneous causality: Granger, Econometrica 37 (1969) 424).
 
+use super::*;
 use crate::estimate::student::quantile;
 use crate::information::{Gathering, Information};
-use crate::judge::evidence::Evidence;
 use crate::judge::evidence::first_errors::errors;
 use crate::layout::Layout;
 use crate::problem::Problem;

@@ -1,41 +1,30 @@
 //! The same parameters from parts of the data: from each output, from each record, from before and after a time in the records.
 
-use crate::estimate::{Unknown, Warning, WarningCode};
-use crate::judge::check::{Check, Examined, Level, Pass};
-use crate::judge::covariances::Covariances;
-use crate::judge::evidence::Evidence;
-use crate::judge::evidence::parts::{APART, Difference, Into, Parts};
+use super::*;
+use crate::judge::evidence::parts::{APART, Difference, Into, Parts, UNLESS};
 use crate::judge::evidence::pieces::{Piece, Rows};
 use crate::judge::evidence::powers::COMPARED;
 use crate::judge::evidence::spans::{LEVEL, SPANS, span};
-use crate::numeral::{number, p_value, percent};
-use crate::optimize::Severity;
 
-pub(crate) const PARTS: Check = Check {
-    name: "parts of the data agree",
-    asks: "Where errors are colored or follow from the prediction, where records differ, or where that is not examined: do outputs, records and what lies before and after a time give one set of parameters (Chow 1960, Quandt 1960)? Do records scatter more than their errors explain?",
-    codes: &[WarningCode::RecordsContradict, WarningCode::OutputsContradict, WarningCode::HalvesContradict],
-    costs: &[Pass::Rows, Pass::Left],
-    levels: &[
-        Level { of: "the probability by chance", value: LEVEL, source: "one good record in ten thousand" },
-        Level {
-            of: "the distance of two values of a parameter, in standard errors",
-            value: APART,
-            source: "beside the test above",
-        },
-        Level { of: "the distance, in parts of the value, that is not usable", value: FAR_APART, source: "a quarter" },
-    ],
-    examine: |evidence, intervals| {
-        Examined::unless(evidence.without_parts(), || {
-            let mut found = contradictions(evidence, &intervals.unknowns);
-            if found.iter().all(|warning| warning.code != WarningCode::RecordsContradict) {
-                found.extend(differing(evidence, &intervals.unknowns, &intervals.covariances));
-            }
-            found
-        })
-        .without(left_out(evidence))
+pub(crate) const PARTS: Check = Check::new(
+    "parts of the data agree",
+    "Where errors are colored or follow from the prediction, where records differ, or where that is not examined: do outputs, records and what lies before and after a time give one set of parameters (Chow 1960, Quandt 1960)? Do records scatter more than their errors explain?",
+    &[WarningCode::RecordsContradict, WarningCode::OutputsContradict, WarningCode::HalvesContradict],
+    |evidence, intervals| {
+        let mut found = contradictions(evidence, &intervals.unknowns);
+        if found.iter().all(|warning| warning.code != WarningCode::RecordsContradict) {
+            found.extend(differing(evidence, &intervals.unknowns, &intervals.covariances));
+        }
+        Examined::from(found).without(left_out(evidence))
     },
-};
+)
+.unless(UNLESS)
+.costs(&[Pass::Rows, Pass::Left])
+.levels(&[
+        level("the probability by chance", LEVEL, "one good record in ten thousand"),
+        level("the distance of two values of a parameter, in standard errors", APART, "beside the test above"),
+        level("the distance, in parts of the value, that is not usable", FAR_APART, "a quarter"),
+    ]);
 
 /// Values that differ by more than this part are not usable.
 const FAR_APART: f64 = 0.25;

@@ -5,11 +5,11 @@
 //! plain autocorrelation is small where they are drawn off most. The error a horizon before is therefore one more unknown beside all
 //! others (Breusch, Australian Economic Papers 17 (1978) 334; Godfrey, Econometrica 46 (1978) 1293).
 
+use super::*;
 use crate::information::{Gathering, Information};
 use crate::judge::directions::undetermined;
-use crate::judge::evidence::Evidence;
 use crate::optimize::Linearization;
-use crate::problem::{Accumulate, Objective};
+use crate::problem::Accumulate;
 use crate::sweep::Window;
 use std::collections::VecDeque;
 

@@ -1,34 +1,25 @@
 //! Whether a sensor has a gain, an offset or a delay that the model does not have.
 
 mod cut_off;
-mod offsets;
 
-use crate::estimate::{Unknown, Warning, WarningCode};
-use crate::judge::check::{Check, Examined, Level, Pass};
-use crate::judge::evidence::Evidence;
-use crate::judge::evidence::extended::{Extended, LEVEL, Released, skipped};
+use super::*;
+use crate::judge::evidence::extended::{Extended, LEVEL, Released};
 use crate::judge::evidence::left::Sensor;
-use crate::judge::evidence::sensors::{KINDS, Kind};
-use crate::numeral::{number, p_value, percent};
-use crate::optimize::Severity;
-pub(crate) use offsets::growth_by_offsets;
+use crate::judge::evidence::sensors::{KINDS, Kind, UNTESTED};
 
-pub(crate) const SENSORS: Check = Check {
-    name: "sensors have the model's gain, offset and delay",
-    asks: "Does a gain, an offset or a delay of an output, as one more unknown, explain the errors (score test, Rao 1948; confirmed by White 1980 and for autocorrelated errors), or may a quantized output have been truncated?",
-    codes: &[WarningCode::SensorContradicts, WarningCode::CoarseOutput],
-    costs: &[Pass::Rows, Pass::Left],
-    levels: &[
-        Level {
-            of: "the probability by chance, over all regressors",
-            value: LEVEL,
-            source: "one good record in ten thousand",
-        },
-        Level { of: "the part of a parameter that is a note", value: NOTHING, source: "no digit of it changes" },
-        Level { of: "the part of a parameter that is not usable", value: FAR, source: "a quarter" },
-    ],
-    examine: |evidence, intervals| Examined::unless(skipped(evidence), || sensors(evidence, &intervals.unknowns)),
-};
+pub(crate) const SENSORS: Check = Check::new(
+    "sensors have the model's gain, offset and delay",
+    "Does a gain, an offset or a delay of an output, as one more unknown, explain the errors (score test, Rao 1948; confirmed by White 1980 and for autocorrelated errors), or may a quantized output have been truncated?",
+    &[WarningCode::SensorContradicts, WarningCode::CoarseOutput],
+    |evidence, intervals| sensors(evidence, &intervals.unknowns).into(),
+)
+.unless(UNTESTED)
+.costs(&[Pass::Rows, Pass::Left])
+.levels(&[
+        level("the probability by chance, over all regressors", LEVEL, "one good record in ten thousand"),
+        level("the part of a parameter that is a note", NOTHING, "no digit of it changes"),
+        level("the part of a parameter that is not usable", FAR, "a quarter"),
+    ]);
 
 /// The estimate is not usable where the fault moves a parameter by more than `FAR` of itself; below `NOTHING` it is a note.
 const FAR: f64 = 0.25;

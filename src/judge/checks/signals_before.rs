@@ -5,54 +5,25 @@
 //! measurements that were made. A delay, an inertia, a gain or a curve that the model lacks does. Fisher's test compares variances of
 //! innovations, which no misfit widens: a larger one is only more certain.
 
-use crate::estimate::{Warning, WarningCode};
+use super::*;
 use crate::information::Gathering;
-use crate::judge::check::{Check, Examined, Level};
 use crate::judge::evidence::color;
 use crate::judge::evidence::first_errors::Errors;
 use crate::judge::evidence::powers::by_chance;
-use crate::judge::evidence::{Evidence, PREFILTER, ROUND_OFF};
-use crate::numeral::{p_value, percent};
 use crate::record::Record;
 
-pub(crate) const SIGNALS_BEFORE: Check = Check {
-    name: "colored errors follow from their own past only",
-    asks: "Do inputs and predictions of the samples before explain more of colored errors than the errors before do (Granger 1969)?",
-    codes: &[WarningCode::WrongShape],
-    costs: &[],
-    levels: &[
-        Level {
-            of: "the probability by chance, over all outputs",
-            value: color::CERTAIN,
-            source: "one good record in ten thousand",
-        },
-        Level {
-            of: "the part of the innovations' variance that they explain",
-            value: LEAST,
-            source: "five times what a closed loop leaves by too short an autoregression",
-        },
-        Level {
-            of: "the colored part of what an output moves that is not usable",
-            value: color::LEFT,
-            source: "wrong pole pairs, gains and delays move parameters by a quarter or more from there on",
-        },
-    ],
-    examine: |evidence, _| {
-        Examined::unless(skipped(evidence), || by_signals_before(evidence)).without(left_out(evidence))
-    },
-};
-
-/// Why it is not made.
-fn skipped(evidence: &Evidence<'_>) -> Option<&'static str> {
-    let objective = evidence.point.objective;
-    match () {
-        _ if evidence.point.is_static() => Some("a model without states"),
-        _ if evidence.rounding || evidence.point.is_exact() => Some(ROUND_OFF),
-        _ if objective.problem.settings.prefilter.is_some() => Some(PREFILTER),
-        _ if objective.sweep.restarts().is_some() => Some("predictions that restart from measurements"),
-        _ => None,
-    }
-}
+pub(crate) const SIGNALS_BEFORE: Check = Check::new(
+    "colored errors follow from their own past only",
+    "Do inputs and predictions of the samples before explain more of colored errors than the errors before do (Granger 1969)?",
+    &[WarningCode::WrongShape],
+    |evidence, _| Examined::from(by_signals_before(evidence)).without(left_out(evidence)),
+)
+.unless(&[Unless::Static, Unless::RoundOff, Unless::Prefilter, Unless::Restarts])
+.levels(&[
+        level("the probability by chance, over all outputs", color::CERTAIN, "one good record in ten thousand"),
+        level("the part of the innovations' variance that they explain", LEAST, "five times what a closed loop leaves by too short an autoregression"),
+        level("the colored part of what an output moves that is not usable", color::LEFT, "wrong pole pairs, gains and delays move parameters by a quarter or more from there on"),
+    ]);
 
 /// What is not examined of colored errors.
 fn left_out(evidence: &Evidence<'_>) -> Option<&'static str> {

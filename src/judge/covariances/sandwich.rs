@@ -79,6 +79,12 @@ impl Bread {
         Some(Bread { linear, curvature, noise, tally })
     }
 
+    /// Sums of `psi'` and of its squares over all measurements, and the number of these.
+    pub fn slopes_of_influence(&self) -> [f64; 3] {
+        let Tally { slopes: [sum, squares], count, .. } = self.tally;
+        [sum, squares, count]
+    }
+
     /// The accumulator of the scores of an experiment, by the inverse of the curvature.
     pub fn scores<'o>(&self, objective: &'o Objective<'o>, inverse: &Covariance, e: usize) -> Scores<'o> {
         Scores::new(objective, e, of_experiment(objective, inverse, e), self.noise)
@@ -101,6 +107,8 @@ struct Tally {
     /// Sum of the squared influences times their weights, and their number.
     squares: f64,
     count: f64,
+    /// Sums of `psi'` and of its squares.
+    slopes: [f64; 2],
 }
 
 impl Tally {
@@ -112,6 +120,7 @@ impl Tally {
             expected: vec![0.0; outputs],
             squares: 0.0,
             count: 0.0,
+            slopes: [0.0; 2],
         }
     }
 
@@ -122,6 +131,7 @@ impl Tally {
         self.expected.iter_mut().zip(other.expected).for_each(|(sum, other)| *sum += other);
         self.squares += other.squares;
         self.count += other.count;
+        self.slopes.iter_mut().zip(other.slopes).for_each(|(sum, other)| *sum += other);
     }
 }
 
@@ -206,7 +216,9 @@ impl Accumulate for Curvature<'_> {
                 let z = window.error(k, j, lane);
                 psi[j] = loss.map_or(z, |loss| loss.psi(z));
                 self.tally.weights += w;
-                self.tally.curvature += w * loss.map_or(1.0, |loss| loss.slope(z));
+                let slope = loss.map_or(1.0, |loss| loss.slope(z));
+                self.tally.curvature += w * slope;
+                self.tally.slopes.iter_mut().zip([slope, slope * slope]).for_each(|(sum, one)| *sum += one);
                 self.tally.expected[j] += expected;
                 self.tally.squares += w * psi[j] * psi[j];
                 self.tally.count += 1.0;

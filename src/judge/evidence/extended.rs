@@ -4,8 +4,8 @@
 //! therefore tested one by one as one more unknown beside all others, by the slopes at the estimate (score test: Rao, Proc. Cambridge
 //! Philosophical Society 44 (1948) 50).
 
+use super::Evidence;
 use super::sensors::{KINDS, Kind};
-use super::{Evidence, ROUND_OFF};
 use crate::estimate::Unknown;
 use crate::estimate::student::two_sided;
 use crate::judge::directions;
@@ -33,12 +33,6 @@ pub(crate) struct Released {
 pub(crate) struct Extended<'j> {
     pub evidence: &'j Evidence<'j>,
     pub linear: Linearization,
-}
-
-/// Why sensors are not tested.
-pub(crate) fn skipped(evidence: &Evidence<'_>) -> Option<&'static str> {
-    let degrees = (evidence.point.degrees <= 1.0).then_some("no degrees of freedom");
-    evidence.without_sensors().or(degrees).or(evidence.rounding.then_some(ROUND_OFF))
 }
 
 impl<'j> Extended<'j> {

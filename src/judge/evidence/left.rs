@@ -8,9 +8,10 @@ mod of_pieces;
 mod of_sensor;
 
 use super::Evidence;
-use super::extended::{Extended, Released, skipped};
+use super::extended::{Extended, Released};
 use super::parts::{Parts, parts};
 use super::pieces::Piece;
+use super::sensors::UNTESTED;
 use crate::problem::Whitening;
 use of_pieces::{OfPieces, dependences};
 use of_sensor::{OfSensor, Steps, confirm};
@@ -38,7 +39,7 @@ pub(crate) fn left(evidence: &Evidence<'_>) -> Left {
     let point = &evidence.point;
     let single = point.objective.with(Whitening::Diagonal(point.objective.whitening.sigma()));
     let mut parts = parts(evidence);
-    let extended = if skipped(evidence).is_none() { Extended::new(evidence) } else { None };
+    let extended = if evidence.ruled_out(UNTESTED).is_none() { Extended::new(evidence) } else { None };
     let suspects = extended.as_ref().and_then(|extended| Some((extended, extended.suspects()?)));
     let steps = suspects.as_ref().and_then(|(extended, (found, _))| Steps::of(extended, found.first()?));
     // Samples of static models have no order.

@@ -10,6 +10,7 @@
 use super::Evidence;
 use super::pieces::{Piece, Rows, pieces};
 use super::powers::COMPARED;
+use super::ruled_out::Unless;
 use super::spans::{LEVEL, SPANS};
 use crate::information::{Covariance, Information};
 use crate::judge::point::Point;
@@ -18,6 +19,9 @@ use crate::problem::Role;
 use crate::whiteness::chi_squared_tail;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+/// What rules out that parts are compared.
+pub(crate) const UNLESS: &[Unless] =
+    &[Unless::Prefilter, Unless::ManyUnknowns, Unless::NoFreedom(0.0), Unless::NoMinimum];
 /// The parameter that differs most between two pieces differs by so many standard errors at least, where the test has found a difference.
 pub(crate) const APART: f64 = 3.0;
 /// The fewest of the parts of a record before and after a time at which all may have changed.
@@ -55,7 +59,7 @@ pub(crate) struct Difference {
 /// may be of neither: it is left out in a second group of ways.
 pub(crate) fn parts(evidence: &Evidence<'_>) -> Vec<Parts> {
     let (point, outputs) = (&evidence.point, evidence.point.objective.outputs());
-    let compared = evidence.without_parts().is_none() && evidence.compare_parts();
+    let compared = evidence.ruled_out(UNLESS).is_none() && evidence.compare_parts();
     let Some(all) = evidence.rows().spans.as_ref().filter(|_| compared) else { return vec![] };
     let mut groups: Vec<(Into, Vec<Vec<Rows>>)> = vec![];
     if (2..=COMPARED).contains(&all.len()) {

@@ -1,5 +1,6 @@
 //! The rows of each output, extended by its gain, offset and delay.
 
+use super::ruled_out::Unless;
 use crate::information::{Gathering, Information};
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
@@ -17,6 +18,17 @@ impl Kind {
 }
 
 pub(crate) const KINDS: usize = 3;
+
+/// What rules out that rows are extended, and that sensors are tested.
+pub(crate) const UNLESS: &[Unless] = &[Unless::Prefilter, Unless::Restarts, Unless::ManyUnknowns, Unless::NoMinimum];
+pub(crate) const UNTESTED: &[Unless] = &[
+    Unless::Prefilter,
+    Unless::Restarts,
+    Unless::ManyUnknowns,
+    Unless::NoMinimum,
+    Unless::NoFreedom(1.0),
+    Unless::RoundOff,
+];
 
 /// The measurements of an experiment, one after the other.
 pub(crate) struct Measurements<'o> {

@@ -3,12 +3,11 @@
 //! Truncation puts an offset of half a quantization step, on average, into an output, of which the unknowns take a part. The fit with that
 //! offset is compared with the fit without it, by the slopes at the estimate.
 
-use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::judge::checks::data::{FEW, PART_OF_STEP, TIMES, distinct};
+use crate::judge::checks::*;
 use crate::judge::evidence::extended::Extended;
 use crate::judge::evidence::sensors::{KINDS, Kind};
-use crate::numeral::{number, percent};
-use crate::optimize::{Linearization, Severity};
+use crate::optimize::Linearization;
 
 /// With more values than these (6 bits) the offset of half a step is below a hundredth of the range.
 const MOST: usize = 64;
@@ -59,7 +58,7 @@ fn if_cut_off(extended: &Extended<'_>, unknowns: &[Unknown], (j, count, size): (
         percent(part, 2),
         number(errors, 2)
     );
-    Some(Warning { code: WarningCode::CoarseOutput, severity: Severity::UsableWithCare, text })
+    Some(with_care(WarningCode::CoarseOutput, text))
 }
 
 /// The number of values and the quantization step, where there are more than [`FEW`], all multiples of one step apart.
