@@ -7,11 +7,6 @@ use nalgebra::DMatrix;
 /// One less the leverage of a measurement that alone determines an unknown: its error is rounding.
 pub(crate) const ALONE: f64 = 1e-6;
 
-/// The row of a prior on unknown `i` among the columns of experiment `e`.
-pub(crate) fn prior_row(objective: &Objective<'_>, e: usize, i: usize, slope: f64) -> Vec<f64> {
-    objective.problem.unknowns.columns(e).map(|c| if c == i { slope } else { 0.0 }).collect()
-}
-
 /// The rows and columns of one experiment.
 pub(crate) fn of_experiment(objective: &Objective<'_>, covariance: &Covariance, e: usize) -> DMatrix<f64> {
     let columns: Vec<usize> = objective.problem.unknowns.columns(e).collect();

@@ -69,7 +69,18 @@ impl Files {
                 paths(&[], &statement[at + 4..], &mut found);
             }
         }
-        found.into_iter().filter_map(|(path, name)| Some((name, self.absolute(file, &path)?))).collect()
+        let mut imports = BTreeMap::new();
+        for (path, name) in found {
+            let Some(mut path) = self.absolute(file, &path) else { continue };
+            if name == "*" {
+                path.pop();
+                // What the other file names, this one names by it.
+                imports.extend(self.imports(&path));
+            } else {
+                imports.insert(name, path);
+            }
+        }
+        imports
     }
 
     /// The file that defines what a path names; `None` of a module, of which what is used names its own path.

@@ -1,100 +1,71 @@
 //! Warnings about the data themselves: what the look at the columns found, where the errors confirm it.
 
-use crate::estimate::{Warning, WarningCode};
-use crate::judge::check::{Check, Examined, Level, Pass};
-use crate::judge::evidence::Evidence;
+use super::*;
 use crate::judge::evidence::suspects::{Split, Suspect, splits};
-use crate::numeral::{counted, exact, number, percent};
-use crate::optimize::Severity;
 use crate::record::{ChannelInspection, Inspection, Record, Suspicion};
 use std::sync::Arc;
 
-pub(crate) const CONSTANT_OUTPUTS: Check = Check {
-    name: "outputs move",
-    asks: "Has an output one value throughout? A note where a controller holds it and the model gives the same.",
-    codes: &[WarningCode::ConstantOutput],
-    costs: &[],
-    levels: &[Level {
-        of: "the error of an output that the model holds, in parts of its value",
-        value: REPRODUCED,
-        source: "rounding of records with six digits",
-    }],
-    examine: |evidence, _| constant_outputs(evidence, &inspected(evidence)).into(),
-};
+pub(crate) const CONSTANT_OUTPUTS: Check = Check::new(
+    "outputs move",
+    "Has an output one value throughout? A note where a controller holds it and the model gives the same.",
+    &[WarningCode::ConstantOutput],
+    |evidence, _| constant_outputs(evidence, &inspected(evidence)).into(),
+)
+.levels(&[level(
+    "the error of an output that the model holds, in parts of its value",
+    REPRODUCED,
+    "rounding of records with six digits",
+)]);
 
-pub(crate) const SUSPICIONS: Check = Check {
-    name: "no stretch of an output was invented",
-    asks: "Are the errors larger, or does the prediction move, where the columns look like sentinels, limits, stuck sensors, held values or blocks written twice?",
-    codes: &[
+pub(crate) const SUSPICIONS: Check = Check::new(
+    "no stretch of an output was invented",
+    "Are the errors larger, or does the prediction move, where the columns look like sentinels, limits, stuck sensors, held values or blocks written twice?",
+    &[
         WarningCode::Sentinel,
         WarningCode::Clipped,
         WarningCode::Frozen,
         WarningCode::HeldOutput,
         WarningCode::Repeated,
     ],
-    costs: &[Pass::Values(1)],
-    levels: &[
-        Level {
-            of: "the mean squared error there, in those elsewhere",
-            value: LARGER,
-            source: "one in 34 of stretches of ten good errors",
-        },
-        Level { of: "the part of the sum of squares that decides the estimate", value: DECIDE, source: "a half" },
-        Level {
-            of: "the movement of the prediction where the output stands still, in parts of that of the output",
-            value: MOVES,
-            source: "noise of a tenth of an output moves it less",
-        },
-        Level { of: "the part of the samples that decides the estimate", value: LONG, source: "a quarter" },
-    ],
-    examine: |evidence, _| {
+    |evidence, _| {
         let pieces = has_long(evidence).then_some("samples between pieces of columns of more than 16,384");
         Examined::from(suspicions(evidence, &inspected(evidence))).without(pieces)
     },
-};
+)
+.costs(&[Pass::Values(1)])
+.levels(&[
+        level("the mean squared error there, in those elsewhere", LARGER, "one in 34 of stretches of ten good errors"),
+        level("the part of the sum of squares that decides the estimate", DECIDE, "a half"),
+        level("the movement of the prediction where the output stands still, in parts of that of the output", MOVES, "noise of a tenth of an output moves it less"),
+        level("the part of the samples that decides the estimate", LONG, "a quarter"),
+    ]);
 
-pub(crate) const COARSE: Check = Check {
-    name: "outputs have more than a few values",
-    asks: "Has an output few values, and errors that are not far below the step between them?",
-    codes: &[WarningCode::CoarseOutput],
-    costs: &[],
-    levels: &[
-        Level { of: "the number of values", value: FEW as f64, source: "three bits" },
-        Level { of: "how often each occurs", value: TIMES as f64, source: "fewer say nothing of the sensor" },
-        Level { of: "the error, in steps", value: PART_OF_STEP, source: "rounding alone is 0.29" },
-    ],
-    examine: |evidence, _| coarse(evidence, &inspected(evidence)).into(),
-};
+pub(crate) const COARSE: Check = Check::new(
+    "outputs have more than a few values",
+    "Has an output few values, and errors that are not far below the step between them?",
+    &[WarningCode::CoarseOutput],
+    |evidence, _| coarse(evidence, &inspected(evidence)).into(),
+)
+.levels(&[
+    level("the number of values", FEW as f64, "three bits"),
+    level("how often each occurs", TIMES as f64, "fewer say nothing of the sensor"),
+    level("the error, in steps", PART_OF_STEP, "rounding alone is 0.29"),
+]);
 
-pub(crate) const INPUT_SENTINELS: Check = Check {
-    name: "no input has sentinels",
-    asks: "Has an input one exact value far from all others?",
-    codes: &[WarningCode::Sentinel],
-    costs: &[],
-    levels: &[],
-    examine: |evidence, _| sentinels_of_inputs(evidence, &inspected(evidence)).into(),
-};
+pub(crate) const INPUT_SENTINELS: Check = Check::new(
+    "no input has sentinels",
+    "Has an input one exact value far from all others?",
+    &[WarningCode::Sentinel],
+    |evidence, _| sentinels_of_inputs(evidence, &inspected(evidence)).into(),
+);
 
-pub(crate) const MISSING_PART: Check = Check {
-    name: "outputs are measured",
-    asks: "Is most of an output missing?",
-    codes: &[WarningCode::MissingMeasurements],
-    costs: &[],
-    levels: &[Level { of: "the missing part", value: MISSING, source: "a half" }],
-    examine: |evidence, _| missing(evidence, &inspected(evidence)).into(),
-};
-
-pub(crate) const TWICE: Check = Check {
-    name: "no record counts twice",
-    asks: "Do two records hold the same measurements?",
-    codes: &[WarningCode::Repeated],
-    costs: &[],
-    levels: &[],
-    examine: |evidence, _| {
-        let more = evidence.point.objective.experiments() > COMPARED;
-        Examined::from(twice(evidence)).without(more.then_some("records beyond the first 300"))
-    },
-};
+pub(crate) const MISSING_PART: Check = Check::new(
+    "outputs are measured",
+    "Is most of an output missing?",
+    &[WarningCode::MissingMeasurements],
+    |evidence, _| missing(evidence, &inspected(evidence)).into(),
+)
+.levels(&[level("the missing part", MISSING, "a half")]);
 
 /// Errors below this part of an output's range or level are rounding: the model reproduces what is suspicious.
 const REPRODUCED: f64 = 1e-6;
@@ -116,12 +87,6 @@ const INSTANTS: usize = 3;
 const MISSING: f64 = 0.5;
 /// Warnings of one kind; more are counted.
 pub(crate) const NAMED: usize = 4;
-/// Of so many records each is compared with each other.
-const COMPARED: usize = 300;
-
-pub(crate) fn warning(code: WarningCode, severity: Severity, text: String) -> Warning {
-    Warning { code, severity, text }
-}
 
 /// What the look at the columns of each record found.
 pub(crate) fn inspected(evidence: &Evidence<'_>) -> Vec<Arc<Inspection>> {
@@ -168,7 +133,7 @@ fn constant_outputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<W
             exact(value)
         );
         let severity = if held { Severity::Usable } else { Severity::NotUsable };
-        Some(warning(WarningCode::ConstantOutput, severity, text))
+        Some(Warning { code: WarningCode::ConstantOutput, severity, text })
     };
     still.iter().enumerate().filter_map(one).collect()
 }
@@ -208,7 +173,7 @@ fn suspicions(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning
                 number(split.rms(), 2),
                 evidence.point.objective.problem.layout().outputs[suspect.output].unit
             );
-            warnings.push(warning(code, severity, text));
+            warnings.push(Warning { code, severity, text });
         }
     }
     warnings
@@ -283,7 +248,7 @@ fn coarse(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
                 number(step, 3),
                 output.unit
             );
-            warning(WarningCode::CoarseOutput, Severity::UsableWithCare, text)
+            with_care(WarningCode::CoarseOutput, text)
         })
     };
     outputs.filter_map(one).collect()
@@ -314,28 +279,9 @@ fn sentinels_of_inputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Ve
             channel.name,
             of_experiment(evidence, e)
         );
-        Some(warning(WarningCode::Sentinel, Severity::UsableWithCare, text))
+        Some(with_care(WarningCode::Sentinel, text))
     };
     channels.filter_map(one).take(NAMED).collect()
-}
-
-/// Whether two records hold the same measurements.
-fn twice(evidence: &Evidence<'_>) -> Option<Warning> {
-    let (records, labels) =
-        (&evidence.point.objective.problem.records, &evidence.point.objective.problem.unknowns.labels);
-    let same = |a: &Record, b: &Record| {
-        let columns = || a.outputs().iter().zip(b.outputs()).map(|(a, b)| (&a.values[..], &b.values[..]));
-        let equal = |(a, b): (&f64, &f64)| a == b || a.is_nan() && b.is_nan();
-        a.len() == b.len() && columns().all(|(a, b)| a.iter().zip(b).all(equal)) && columns().any(|(a, _)| moves(a))
-    };
-    let pairs = (1..records.len().min(COMPARED)).flat_map(|b| (0..b).map(move |a| (a, b)));
-    let (a, b) = pairs.into_iter().find(|&(a, b)| same(&records[a], &records[b]))?;
-    let text = format!(
-        "the experiments `{}` and `{}` hold the same measurements, which count twice: intervals are too narrow; leave one \
-         out",
-        labels[a], labels[b]
-    );
-    Some(warning(WarningCode::Repeated, Severity::UsableWithCare, text))
 }
 
 fn missing(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
@@ -351,30 +297,16 @@ fn missing(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
                 output.name,
                 counted(evidence.residuals.outputs[j].samples, "measurement")
             );
-            warning(WarningCode::MissingMeasurements, Severity::Usable, text)
+            note(WarningCode::MissingMeasurements, text)
         })
     };
     outputs.filter_map(one).collect()
 }
 
-/// Whether measurements are not all the same.
-pub(crate) fn moves(values: &[f64]) -> bool {
-    let mut measured = values.iter().filter(|y| !y.is_nan());
-    let first = measured.next();
-    measured.any(|y| Some(y) != first)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{instants, moves};
+    use super::instants;
     use crate::record::{Channel, Record, Time};
-
-    #[test]
-    fn a_missing_measurement_is_no_movement() {
-        let nan = f64::NAN;
-        assert_eq!([&[][..], &[nan], &[3.0, nan, 3.0], &[nan, 3.0, 3.0]].map(moves), [false; 4]);
-        assert_eq!([&[3.0, 4.0][..], &[nan, 3.0, nan, 4.0], &[0.0, 0.0, 1.0]].map(moves), [true; 3]);
-    }
 
     /// Several measurements at one instant count once.
     #[test]

@@ -1,9 +1,6 @@
 //! Whether single measurements are missing and the one before stands in their place.
 
-use crate::estimate::{Warning, WarningCode};
-use crate::judge::check::with_care;
-use crate::judge::evidence::Evidence;
-use crate::numeral::{number, percent};
+use super::*;
 
 /// The fewest measurements that are equal to the one before, and the part of them all, that are looked at.
 const FEWEST: usize = 4;

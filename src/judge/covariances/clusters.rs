@@ -7,8 +7,8 @@
 //! multiplied by `(I - H)^(-1/2)` (CR2: Bell and McCaffrey, Survey Methodology 28 (2002) 169). What each record has for itself is
 //! minimized out before; of such unknowns this says nothing.
 
-use super::sandwich;
 use crate::information::Information;
+use crate::judge::evidence::Evidence;
 use crate::judge::leverage::ALONE;
 use crate::judge::point::Point;
 use crate::optimize::Linearization;
@@ -82,8 +82,8 @@ fn variances(parts: &[Part], beside: &DMatrix<f64>) -> Option<Vec<(f64, f64)>> {
 }
 
 /// What the scores of the records say, at a minimum of several that share unknowns.
-pub(crate) fn clusters(point: &Point<'_>) -> Option<Clusters> {
-    let Point { objective, linear, held_for_covariance: held, end, .. } = point;
+pub(crate) fn clusters(evidence: &Evidence<'_>) -> Option<Clusters> {
+    let Point { objective, linear, held_for_covariance: held, end, .. } = &evidence.point;
     let unknowns = &objective.problem.unknowns;
     let (records, all) = (objective.experiments(), unknowns.shared());
     let free: Vec<usize> = (0..all).filter(|&i| !held[i]).collect();
@@ -99,8 +99,8 @@ pub(crate) fn clusters(point: &Point<'_>) -> Option<Clusters> {
     let (bread, factor) = match objective.is_robust() {
         false => (None, 1.0),
         true => {
-            let (bread, factor) = sandwich::curvature(objective, &end.coordinates).ok()?.bread();
-            (Some(of(&bread)), factor)
+            let bread = evidence.bread()?;
+            (Some(of(&bread.linear)), bread.curvature)
         }
     };
     let curvatures = bread.as_ref().unwrap_or(&scores).iter().map(|one| curvature(one) * factor);

@@ -20,9 +20,9 @@ mod scores;
 mod stationary;
 
 use crate::information::{Covariance, Information};
-use crate::judge::covariances::sandwich::{self, Sandwich};
-use crate::judge::leverage::{of_experiment, prior_row};
-use crate::optimize::Linearization;
+use crate::judge::covariances::sandwich::{Bread, Robust, of_scores};
+use crate::judge::leverage::of_experiment;
+use crate::judge::point::Point;
 use crate::problem::Objective;
 use joined::joined;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -37,14 +37,14 @@ const LONGEST: f64 = 500.0;
 const CERTAIN: f64 = 2.0;
 /// The fewest degrees of freedom: Satterthwaite's rule knows none of less than a square of one normal number.
 const FEWEST: f64 = 1.0;
-/// Rows that are absorbed together.
-const ROWS: usize = 256;
 
 /// The sandwich for autocorrelated errors, and over how many samples they are correlated beyond the autoregression.
 pub(crate) struct Hac {
-    sandwich: Sandwich,
+    covariance: Covariance,
     /// The same with the scores of stationary errors, if they have such.
-    stationary: Option<Sandwich>,
+    stationary: Option<Covariance>,
+    /// The sandwich of independent errors, if it was asked for.
+    pub robust: Option<Robust>,
     pub lags: usize,
     runs: Vec<Run>,
 }
@@ -60,7 +60,9 @@ pub(crate) type First<'f> = (EachScore<'f, Lagged>, Option<Errors<'f>>);
 
 /// Its sums: of products of the scores over time and, but where variances are predicted, of the errors.
 pub(crate) struct Sums {
-    lagged: Lagged,
+    count: usize,
+    triangle: Information,
+    products: [DMatrix<f64>; 2],
     pub errors: Option<ErrorSums>,
 }
 
@@ -89,75 +91,72 @@ impl Frame {
 
 impl Sums {
     pub fn of((scores, errors): First<'_>) -> Self {
-        Sums { lagged: scores.into.complete(), errors: errors.map(|errors| errors.into) }
+        let Lagged { count, scores, products, .. } = scores.into;
+        Sums { count, triangle: scores.triangle(), products, errors: errors.map(|errors| errors.into) }
     }
 }
 
-/// By the sums of the first pass, with one more pass with slopes. `None` where the scores of the unknowns that are not held are linearly
-/// dependent.
+/// By the sums of the first pass, with one more pass with slopes; in which the sandwich of plain least squares is made, too, where its inverse
+/// curvature is given. `None` where the scores of the unknowns that are not held are linearly dependent.
 pub(crate) fn hac(
-    objective: &Objective<'_>,
-    coordinates: &[f64],
-    linear: &Linearization,
+    point: &Point<'_>,
+    bread: &Bread,
     (frames, first): (&[Frame], &[Sums]),
+    robust: Option<&Covariance>,
 ) -> Option<Hac> {
-    let found = match objective.needs_sandwich() {
-        true => sandwich::curvature(objective, coordinates).ok()?,
-        false => Sandwich::plain(linear),
-    };
+    let (objective, x) = (point.objective, &point.end.coordinates);
     let errors: Option<Vec<&ErrorSums>> = first.iter().map(|one| one.errors.as_ref()).collect();
     let stationary = errors.map(|errors| Stationary::of(objective.outputs(), &errors));
     let several = first.len() > 1;
     let is_short = |e: usize| several && stationary.as_ref().is_some_and(|found| found.short[e]);
-    let prewhitened = |(e, sums): (usize, &Sums)| match is_short(e) {
-        true => Some(None),
-        false => Some(Some(Prewhitened::of(&sums.lagged)?)),
-    };
+    let prewhitened =
+        |(e, sums): (usize, &Sums)| if is_short(e) { Some(None) } else { Some(Some(Prewhitened::of(sums)?)) };
     let prewhitened: Vec<Option<Prewhitened>> = first.iter().enumerate().map(prewhitened).collect::<Option<_>>()?;
     let make = |e: usize| {
         let moving = prewhitened[e].as_ref();
         let moving = moving.map(|by| frames[e].scores(objective, e, MovingSums::new(&by.w, &by.a, by.window)));
-        (moving, stationary.as_ref().map(|found| FilteredSlopes::new(objective, e, &found.models[e])))
+        let filtered = stationary.as_ref().map(|found| FilteredSlopes::new(objective, e, &found.models[e]));
+        (moving, (filtered, robust.map(|inverse| bread.scores(objective, inverse, e))))
     };
-    let all = objective.gather(coordinates, true, make).ok()?.into_iter();
-    let (moving, filtered): (Vec<Option<Information>>, Vec<Option<Information>>) = all
-        .map(|(moving, filtered)| (moving.map(|one| one.into.triangle()), filtered.map(FilteredSlopes::triangle)))
-        .unzip();
-    let uncertainty = stationary.map_or(0.0, |found| found.uncertainty);
-    let run = |(e, by): (usize, &Option<Prewhitened>)| match (by, &moving[e], &filtered[e]) {
-        (Some(by), Some(sums), _) => Some(Run::Long(by.run(frames[e].kept.clone(), sums)?)),
-        (_, _, filtered) => Some(Run::Short { triangle: filtered.clone()?, uncertainty }),
+    let (moving, others): (Vec<_>, Vec<_>) = objective.gather(x, true, make).ok()?.into_iter().unzip();
+    let (filtered, scores): (Vec<_>, Vec<_>) = others.into_iter().unzip();
+    let filtered: Vec<Option<Information>> =
+        filtered.into_iter().map(|one| one.map(FilteredSlopes::triangle)).collect();
+    let uncertainty = stationary.as_ref().map_or(0.0, |found| found.uncertainty);
+    let run = |(e, moving): (usize, Option<EachScore<'_, MovingSums<'_>>>)| match (&prewhitened[e], moving) {
+        (Some(by), Some(moving)) => Some(Run::Long(by.run(frames[e].kept.clone(), &moving.into.triangle())?)),
+        _ => Some(Run::Short { triangle: filtered[e].clone()?, uncertainty }),
     };
-    let runs: Vec<Run> = prewhitened.iter().enumerate().map(run).collect::<Option<_>>()?;
+    let runs: Vec<Run> = moving.into_iter().enumerate().map(run).collect::<Option<_>>()?;
     let unknowns = &objective.problem.unknowns;
     let with_priors = |mut scores: Vec<Information>| {
-        for (i, slope, _) in unknowns.priors(coordinates) {
-            let e = unknowns.row[i].experiment.unwrap_or(0);
-            scores[e].absorb_row(&prior_row(objective, e, i, slope), 0.0);
-        }
-        found.with(scores)
+        unknowns.add_priors(x, 1.0, &mut scores);
+        bread.sandwich(&point.held_for_covariance, &scores, 1.0)
     };
-    let scores = runs.iter().enumerate().map(|(e, run)| run.triangle(unknowns.columns(e).count())).collect();
-    let lags = runs.iter().map(Run::lags).max().unwrap_or(0);
-    let stationary = filtered.into_iter().collect::<Option<_>>().map(with_priors);
-    Some(Hac { sandwich: with_priors(scores), stationary, lags, runs })
+    let of_runs = runs.iter().enumerate().map(|(e, run)| run.triangle(unknowns.columns(e).count())).collect();
+    let scores: Vec<_> = scores.into_iter().flatten().collect();
+    Some(Hac {
+        covariance: with_priors(of_runs)?,
+        stationary: filtered.into_iter().collect::<Option<_>>().and_then(with_priors),
+        robust: (!scores.is_empty()).then(|| of_scores(point, bread, scores)),
+        lags: runs.iter().map(Run::lags).max().unwrap_or(0),
+        runs,
+    })
 }
 
 impl Hac {
     /// The covariance of all unknowns that are not held. The standard errors are those of stationary errors, but where the moving
     /// sums say more by over [`CERTAIN`] standard deviations of what they say (`degrees` of freedom), as they do for errors
     /// whose size follows the slopes; or by anything at all, where the errors of several outputs are `coupled`.
-    pub fn covariance(&self, held: &[bool], degrees: &[f64], coupled: bool) -> Option<Covariance> {
-        let found = self.sandwich.covariance(held)?;
-        let Some(stationary) = self.stationary.as_ref().and_then(|sandwich| sandwich.covariance(held)) else {
-            return Some(found);
-        };
-        let factor = |i: usize| {
-            let certain = if coupled { 0.0 } else { certain(degrees[i]) };
+    pub fn covariance(&self, degrees: &[f64], coupled: bool) -> Covariance {
+        let found = self.covariance.clone();
+        let Some(stationary) = &self.stationary else { return found };
+        let factor = |(i, degrees): (usize, &f64)| {
+            let certain = if coupled { 0.0 } else { certain(*degrees) };
             joined(stationary.standard_error(i) / found.standard_error(i), certain)
         };
-        let factors: Vec<f64> = (0..held.len()).map(factor).collect();
-        Some(found.scaled(&factors))
+        let factors: Vec<f64> = degrees.iter().enumerate().map(factor).collect();
+        found.scaled(&factors)
     }
 
     /// Degrees of freedom of the variance of each unknown, by Satterthwaite's rule over the experiments; `inverse` is
@@ -255,8 +254,8 @@ struct Prewhitened {
 }
 
 impl Prewhitened {
-    fn of(lagged: &Lagged) -> Option<Self> {
-        let Lagged { count, triangle, products, .. } = lagged;
+    fn of(sums: &Sums) -> Option<Self> {
+        let Sums { count, triangle, products, .. } = sums;
         let (n, length) = (triangle.columns(), *count as f64);
         // To scores of unit covariance: z = s w.
         let root = DMatrix::from_fn(n, n, |i, j| triangle.at(i, j)) / length.sqrt();

@@ -12,18 +12,16 @@
 
 mod scores;
 
-use crate::information::{Block, Covariance, Information};
-use crate::judge::evidence::shares::{self, Largest, Shares};
-use crate::judge::leverage::{form, of_experiment, prior_row};
-use crate::optimize::{Infeasible, Linearization};
+use crate::information::{Covariance, Gathering, Information};
+use crate::judge::evidence::shares::{self, Largest};
+use crate::judge::leverage::{form, of_experiment};
+use crate::judge::point::Point;
+use crate::optimize::Linearization;
 use crate::prefilter::Butterworth;
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
 use nalgebra::DMatrix;
 use scores::Scores;
-
-/// Rows that are absorbed together.
-const ROWS: usize = 256;
 
 /// A sandwich covariance.
 pub(crate) struct Robust {
@@ -35,42 +33,71 @@ pub(crate) struct Robust {
     pub degrees: Vec<f64>,
 }
 
-/// Curvature of the cost and triangles of the scores, a pair per experiment.
-#[derive(Clone)]
-pub(crate) struct Sandwich {
-    bread: Linearization,
-    scores: Vec<Information>,
-    /// Mean of `psi'`, by which the curvature is to be multiplied.
-    curvature: f64,
-    /// By which the squares of the scores are to be multiplied.
-    scale: f64,
+/// The curvature of the cost.
+pub(crate) struct Bread {
+    /// Without the mean curvature of the loss.
+    pub linear: Linearization,
+    /// Mean of `psi'`, by which it is to be multiplied.
+    pub curvature: f64,
+    /// The variance of errors times the roots of their weights, by their influences.
+    noise: f64,
+    tally: Tally,
 }
 
-impl Sandwich {
-    /// The curvature of plain least squares, still without scores.
-    pub fn plain(linear: &Linearization) -> Self {
-        Sandwich { bread: linear.clone(), scores: vec![], curvature: 1.0, scale: 1.0 }
+impl Bread {
+    /// That of plain least squares, by the slopes of the search and the number of measurements; that of weights and losses, by a pass with
+    /// slopes.
+    pub fn of(point: &Point<'_>, measured: u64) -> Option<Self> {
+        let Point { objective, end, linear, .. } = point;
+        if objective.needs_sandwich() {
+            return Bread::weighted(objective, &end.coordinates);
+        }
+        let priors: f64 = objective.problem.unknowns.priors(&end.coordinates).map(|(_, _, error)| error * error).sum();
+        let noise = (linear.sum_of_squares() - priors) / measured.max(1) as f64;
+        Some(Bread { linear: (*linear).clone(), curvature: 1.0, noise, tally: Tally::new(objective.outputs()) })
     }
 
-    /// The same curvature, with these scores.
-    pub fn with(&self, scores: Vec<Information>) -> Self {
-        Sandwich { scores, scale: 1.0, ..self.clone() }
+    fn weighted(objective: &Objective<'_>, coordinates: &[f64]) -> Option<Self> {
+        let unknowns = &objective.problem.unknowns;
+        let make = |experiment: usize| {
+            let columns = unknowns.columns(experiment).count();
+            let impulse = objective.problem.settings.prefilter.as_ref().map(ImpulseResponse::new);
+            let (tally, rows) = (Tally::new(objective.outputs()), Gathering::new(columns));
+            Curvature { objective, experiment, tally, rows, impulse, row: vec![0.0; columns] }
+        };
+        let mut tally = Tally::new(objective.outputs());
+        let mut triangles = vec![];
+        for one in objective.gather(coordinates, true, make).ok()? {
+            triangles.push(one.rows.triangle());
+            tally.add(one.tally);
+        }
+        let curvature = tally.curvature / tally.weights;
+        // A prior is a measurement of unit variance; all is multiplied by the mean curvature later.
+        unknowns.add_priors(coordinates, curvature.max(f64::MIN_POSITIVE).sqrt().recip(), &mut triangles);
+        let linear = Linearization::new(0.0, unknowns.shared(), triangles);
+        let noise = tally.squares / tally.count.max(1.0) / (curvature * curvature);
+        Some(Bread { linear, curvature, noise, tally })
     }
 
-    /// The curvature without the mean curvature of the loss, and that.
-    pub fn bread(self) -> (Linearization, f64) {
-        (self.bread, self.curvature)
+    /// Sums of `psi'` and of its squares over all measurements, and the number of these.
+    pub fn slopes_of_influence(&self) -> [f64; 3] {
+        let Tally { slopes: [sum, squares], count, .. } = self.tally;
+        [sum, squares, count]
     }
 
-    /// `A^-1 B A^-1` over all unknowns that are not held.
-    pub fn covariance(&self, held: &[bool]) -> Option<Covariance> {
-        let scale = self.scale / (self.curvature * self.curvature);
-        Some(self.bread.sandwich(held, &self.scores)?.times(scale))
+    /// The accumulator of the scores of an experiment, by the inverse of the curvature.
+    pub fn scores<'o>(&self, objective: &'o Objective<'o>, inverse: &Covariance, e: usize) -> Scores<'o> {
+        Scores::new(objective, e, of_experiment(objective, inverse, e), self.noise)
+    }
+
+    /// `A^-1 B A^-1` over all unknowns that are not held, of scores of which the squares are to be multiplied by a number.
+    pub fn sandwich(&self, held: &[bool], scores: &[Information], scale: f64) -> Option<Covariance> {
+        Some(self.linear.sandwich(held, scores)?.times(scale / (self.curvature * self.curvature)))
     }
 }
 
-/// What the first pass sums up over all measurements.
-pub(crate) struct Tally {
+/// What the pass for the curvature sums up over all measurements.
+struct Tally {
     weights: f64,
     curvature: f64,
     /// Sums of the products of two outputs' influences.
@@ -80,6 +107,8 @@ pub(crate) struct Tally {
     /// Sum of the squared influences times their weights, and their number.
     squares: f64,
     count: f64,
+    /// Sums of `psi'` and of its squares.
+    slopes: [f64; 2],
 }
 
 impl Tally {
@@ -91,6 +120,7 @@ impl Tally {
             expected: vec![0.0; outputs],
             squares: 0.0,
             count: 0.0,
+            slopes: [0.0; 2],
         }
     }
 
@@ -101,134 +131,66 @@ impl Tally {
         self.expected.iter_mut().zip(other.expected).for_each(|(sum, other)| *sum += other);
         self.squares += other.squares;
         self.count += other.count;
-    }
-
-    /// The variance of errors times the roots of their weights, by their influences.
-    fn noise(&self) -> f64 {
-        self.squares / self.count.max(1.0) * (self.weights / self.curvature).powi(2)
+        self.slopes.iter_mut().zip(other.slopes).for_each(|(sum, other)| *sum += other);
     }
 }
 
-/// The sandwich over all unknowns that are not held, in two more passes with slopes.
-pub(crate) fn sandwich(objective: &Objective<'_>, coordinates: &[f64], held: &[bool]) -> Result<Robust, Infeasible> {
-    Passes { objective, coordinates }.sandwich(held)
+/// The sandwich over all unknowns that are not held, in one more pass with slopes. `None` where that fails.
+pub(crate) fn sandwich(point: &Point<'_>, bread: &Bread) -> Option<Robust> {
+    let Point { objective, end, held_for_covariance: held, .. } = point;
+    let x = &end.coordinates;
+    let degrees = vec![f64::INFINITY; held.len()];
+    let Some(inverse) = bread.linear.covariance(held) else {
+        return Some(Robust { covariance: None, shares: None, degrees });
+    };
+    let Some(filter) = &objective.problem.settings.prefilter else {
+        let all = objective.gather(x, true, |e| bread.scores(objective, &inverse, e)).ok()?;
+        return Some(of_scores(point, bread, all));
+    };
+    let (mut scores, scale) = filtered_scores(objective, x, (&inverse, &bread.tally), filter)?;
+    objective.problem.unknowns.add_priors(x, scale.sqrt().recip(), &mut scores);
+    Some(Robust { covariance: bread.sandwich(held, &scores, scale), shares: None, degrees })
 }
 
-/// The curvature for the weights and the loss of a fit, in one pass with slopes; its scores are still missing.
-pub(crate) fn curvature(objective: &Objective<'_>, coordinates: &[f64]) -> Result<Sandwich, Infeasible> {
-    Ok(Passes { objective, coordinates }.without_scores()?.0)
+/// The sandwich of the scores of all experiments.
+pub(crate) fn of_scores(point: &Point<'_>, bread: &Bread, all: Vec<Scores<'_>>) -> Robust {
+    let Point { objective, end, held_for_covariance: held, .. } = point;
+    let shares = shares::of_all(objective, all.iter().map(|one| &one.shares));
+    let degrees = scores::degrees(objective, &all);
+    let mut triangles: Vec<Information> = all.into_iter().map(|one| one.scores.triangle()).collect();
+    objective.problem.unknowns.add_priors(&end.coordinates, 1.0, &mut triangles);
+    Robust { covariance: bread.sandwich(held, &triangles, 1.0), shares: Some(shares), degrees }
 }
 
-/// Passes over the data at a point.
-struct Passes<'p> {
-    objective: &'p Objective<'p>,
-    coordinates: &'p [f64],
-}
-
-impl Passes<'_> {
-    fn sandwich(&self, held: &[bool]) -> Result<Robust, Infeasible> {
-        let (sandwich, tally) = self.without_scores()?;
-        let degrees = vec![f64::INFINITY; held.len()];
-        let Some(inverse) = sandwich.bread.covariance(held) else {
-            return Ok(Robust { covariance: None, shares: None, degrees });
+/// The triangle of each experiment's scores where a filter correlated white errors, and the factor for all of them by which the noise is
+/// larger than the errors. Holds the slopes of one experiment at a time.
+fn filtered_scores(
+    objective: &Objective<'_>,
+    coordinates: &[f64],
+    (inverse, tally): (&Covariance, &Tally),
+    filter: &Butterworth,
+) -> Option<(Vec<Information>, f64)> {
+    let expected = |i: usize| tally.expected[i].max(f64::MIN_POSITIVE);
+    let outputs = objective.outputs();
+    let noise = DMatrix::from_fn(outputs, outputs, |i, j| tally.influence[(i, j)] / (expected(i) * expected(j)).sqrt());
+    let deviations = DMatrix::from_diagonal(&noise.diagonal().map(f64::sqrt));
+    let factor = noise.cholesky().map_or(deviations, |cholesky| cholesky.l());
+    let (mut scores, mut taken) = (vec![], 0.0);
+    for experiment in 0..objective.experiments() {
+        let columns = objective.problem.unknowns.columns(experiment).count();
+        let samples = objective.problem.records[experiment].len();
+        let make = || {
+            let (slopes, measured) = (vec![0.0; columns * outputs * samples], vec![false; outputs * samples]);
+            Backward { objective, experiment, columns, samples, slopes, measured }
         };
-        let (mut scores, scale, shares, degrees) = match &self.objective.problem.settings.prefilter {
-            Some(filter) => {
-                let (scores, scale) = self.filtered_scores(&inverse, filter, &tally)?;
-                (scores, scale, None, degrees)
-            }
-            None => {
-                let all = self.scores(&inverse, tally.noise())?;
-                let largest = shares::of_all(self.objective, all.iter().map(|one| &one.shares));
-                let degrees = scores::degrees(self.objective, &all);
-                (all.into_iter().map(|one| one.scores).collect(), 1.0, Some(largest), degrees)
-            }
-        };
-        for (i, slope, _) in self.objective.problem.unknowns.priors(self.coordinates) {
-            let e = self.objective.problem.unknowns.row[i].experiment.unwrap_or(0);
-            scores[e].absorb_row(&prior_row(self.objective, e, i, slope / scale.sqrt()), 0.0);
-        }
-        let covariance = Sandwich { scores, scale, ..sandwich }.covariance(held);
-        Ok(Robust { covariance, shares, degrees })
+        let mut gathered = objective.gather_one(coordinates, experiment, true, make).ok()?;
+        let inverse = of_experiment(objective, inverse, experiment);
+        let (triangle, part) = gathered.scores(filter, &factor, &inverse, outputs);
+        scores.push(triangle);
+        taken += part;
     }
-
-    /// The curvature for the weights and the loss of this fit, in one pass with slopes; its scores are still missing.
-    fn without_scores(&self) -> Result<(Sandwich, Tally), Infeasible> {
-        let outputs = self.objective.outputs();
-        let make = |experiment: usize| {
-            let columns = self.objective.problem.unknowns.columns(experiment).count();
-            let tally = Tally::new(outputs);
-            let (bread, block) = (Information::new(columns), Block::new(columns, ROWS));
-            let impulse = self.objective.problem.settings.prefilter.as_ref().map(ImpulseResponse::new);
-            Curvature { objective: self.objective, experiment, tally, bread, block, impulse, row: vec![0.0; columns] }
-        };
-        let all = self.objective.gather(self.coordinates, true, make)?;
-        let mut tally = Tally::new(outputs);
-        let mut blocks = Vec::with_capacity(all.len());
-        for mut one in all {
-            one.bread.absorb(&mut one.block);
-            blocks.push(one.bread);
-            tally.add(one.tally);
-        }
-        let curvature = tally.curvature / tally.weights;
-        for (i, slope, _) in self.objective.problem.unknowns.priors(self.coordinates) {
-            let e = self.objective.problem.unknowns.row[i].experiment.unwrap_or(0);
-            // A prior is a measurement of unit variance; the bread is multiplied by the mean curvature later.
-            blocks[e]
-                .absorb_row(&prior_row(self.objective, e, i, slope / curvature.max(f64::MIN_POSITIVE).sqrt()), 0.0);
-        }
-        let bread = Linearization::new(0.0, self.objective.problem.unknowns.shared(), blocks);
-        Ok((Sandwich { bread, scores: vec![], curvature, scale: 1.0 }, tally))
-    }
-
-    /// The scores of each experiment, with the variance of all errors.
-    fn scores(&self, inverse: &Covariance, noise: f64) -> Result<Vec<Scores<'_>>, Infeasible> {
-        let make = |experiment: usize| {
-            let shares = Shares::new(experiment, of_experiment(self.objective, inverse, experiment));
-            Scores::new(self.objective, experiment, shares, noise)
-        };
-        let mut all = self.objective.gather(self.coordinates, true, make)?;
-        all.iter_mut().for_each(Scores::complete);
-        Ok(all)
-    }
-
-    /// The triangle of each experiment's scores where a filter correlated white errors, and the factor for all of them
-    /// by which the noise is larger than the errors. Holds the slopes of one experiment at a time.
-    fn filtered_scores(
-        &self,
-        inverse: &Covariance,
-        filter: &Butterworth,
-        tally: &Tally,
-    ) -> Result<(Vec<Information>, f64), Infeasible> {
-        let expected = |i: usize| tally.expected[i].max(f64::MIN_POSITIVE);
-        let outputs = self.objective.outputs();
-        let noise =
-            DMatrix::from_fn(outputs, outputs, |i, j| tally.influence[(i, j)] / (expected(i) * expected(j)).sqrt());
-        let deviations = DMatrix::from_diagonal(&noise.diagonal().map(f64::sqrt));
-        let factor = noise.cholesky().map_or(deviations, |cholesky| cholesky.l());
-        let make = |experiment: usize| {
-            let columns = self.objective.problem.unknowns.columns(experiment).count();
-            let samples = self.objective.problem.records[experiment].len();
-            Backward {
-                objective: self.objective,
-                experiment,
-                columns,
-                samples,
-                slopes: vec![0.0; columns * outputs * samples],
-                measured: vec![false; outputs * samples],
-            }
-        };
-        let (mut scores, mut taken) = (vec![], 0.0);
-        for e in 0..self.objective.experiments() {
-            let mut gathered = self.objective.gather_one(self.coordinates, e, true, || make(e))?;
-            let (triangle, part) =
-                gathered.scores(filter, &factor, &of_experiment(self.objective, inverse, e), outputs);
-            scores.push(triangle);
-            taken += part;
-        }
-        let expected: f64 = tally.expected.iter().sum();
-        Ok((scores, expected / (expected - taken).max(f64::MIN_POSITIVE)))
-    }
+    let expected: f64 = tally.expected.iter().sum();
+    Some((scores, expected / (expected - taken).max(f64::MIN_POSITIVE)))
 }
 
 /// The triangle of `sqrt(w) g`, and sums of the errors.
@@ -236,8 +198,7 @@ struct Curvature<'c> {
     objective: &'c Objective<'c>,
     experiment: usize,
     tally: Tally,
-    bread: Information,
-    block: Block,
+    rows: Gathering,
     impulse: Option<ImpulseResponse<'c>>,
     row: Vec<f64>,
 }
@@ -255,13 +216,15 @@ impl Accumulate for Curvature<'_> {
                 let z = window.error(k, j, lane);
                 psi[j] = loss.map_or(z, |loss| loss.psi(z));
                 self.tally.weights += w;
-                self.tally.curvature += w * loss.map_or(1.0, |loss| loss.slope(z));
+                let slope = loss.map_or(1.0, |loss| loss.slope(z));
+                self.tally.curvature += w * slope;
+                self.tally.slopes.iter_mut().zip([slope, slope * slope]).for_each(|(sum, one)| *sum += one);
                 self.tally.expected[j] += expected;
                 self.tally.squares += w * psi[j] * psi[j];
                 self.tally.count += 1.0;
                 let values = window.row(k, j).iter().skip(lane).step_by(lanes);
                 self.row.iter_mut().zip(values).for_each(|(to, from)| *to = from * w.sqrt());
-                self.bread.gather(&mut self.block, &self.row, 0.0);
+                self.rows.take(&self.row, 0.0);
             }
             for (i, j) in (0..outputs).flat_map(|i| (0..outputs).map(move |j| (i, j))) {
                 self.tally.influence[(i, j)] += psi[i] * psi[j];
@@ -269,10 +232,8 @@ impl Accumulate for Curvature<'_> {
         }
     }
 
-    fn append(&mut self, mut later: Self) {
-        later.bread.absorb(&mut later.block);
-        self.bread.absorb(&mut self.block);
-        self.bread.merge(&later.bread);
+    fn append(&mut self, later: Self) {
+        self.rows.append(later.rows);
         self.tally.add(later.tally);
     }
 }
@@ -320,8 +281,7 @@ impl Backward<'_> {
         let Backward { columns, samples, slopes, measured, .. } = self;
         let (columns, samples) = (*columns, *samples);
         filter.filter_rows(slopes, columns * outputs, &mut vec![]);
-        let (mut scores, mut block) = (Information::new(columns), Block::new(columns, ROWS));
-        let (mut score, mut taken) = (vec![0.0; columns], 0.0);
+        let (mut scores, mut score, mut taken) = (Gathering::new(columns), vec![0.0; columns], 0.0);
         for k in 0..samples {
             let at = |c: usize, j: usize| {
                 if measured[j * samples + k] { slopes[(k * columns + c) * outputs + j] } else { 0.0 }
@@ -332,11 +292,10 @@ impl Backward<'_> {
                 score.iter_mut().enumerate().for_each(|(c, score)| {
                     *score = (j..outputs).map(|i| factor[(i, j)] * at(c, i)).sum();
                 });
-                scores.gather(&mut block, &score, 0.0);
+                scores.take(&score, 0.0);
             }
         }
-        scores.absorb(&mut block);
-        (scores, taken)
+        (scores.triangle(), taken)
     }
 }
 

@@ -15,21 +15,8 @@ pub(crate) struct OutputSums {
 }
 
 impl OutputSums {
-    pub fn add(&mut self, y: f64, error: f64) {
-        if self.count == 0 {
-            self.first = y;
-        }
-        // Relative to the first value, so that a large mean loses no digits.
-        let y = y - self.first;
-        self.count += 1;
-        self.sum += y;
-        self.squares += y * y;
-        self.errors += error * error;
-        self.fourth += (error * error).powi(2);
-    }
-
-    /// Adds values, all of which were measured.
-    pub fn add_all(&mut self, values: &[f64], errors: &[f64]) {
+    /// Adds measured values and their errors. Relative to the first value, so that a large mean loses no digits.
+    pub fn add(&mut self, values: &[f64], errors: &[f64]) {
         let Some(first) = values.first() else { return };
         if self.count == 0 {
             self.first = *first;
@@ -102,10 +89,10 @@ impl Terms<2, 4> for Moments {
 
 /// The fit of an output from its measured values and their errors; NaN where missing.
 pub(crate) fn output_fit(measured: &[f64], residuals: &[f64]) -> OutputFit {
+    let pairs = measured.iter().zip(residuals).filter(|(_, error)| !error.is_nan());
+    let (values, errors): (Vec<f64>, Vec<f64>) = pairs.unzip();
     let mut sums = OutputSums::default();
-    for (&y, &error) in measured.iter().zip(residuals).filter(|(_, error)| !error.is_nan()) {
-        sums.add(y, error);
-    }
+    sums.add(&values, &errors);
     sums.fit()
 }
 
@@ -127,10 +114,10 @@ mod tests {
         let values: Vec<f64> = (0..21).map(|k| 1000.0 + f64::from(k * k % 13)).collect();
         let errors: Vec<f64> = (0..21).map(|k| f64::from(k * 7 % 5) - 1.5).collect();
         let mut one_by_one = OutputSums::default();
-        values.iter().zip(&errors).for_each(|(y, e)| one_by_one.add(*y, *e));
+        values.iter().zip(&errors).for_each(|(y, e)| one_by_one.add(&[*y], &[*e]));
         let all = |from: usize, to: usize| {
             let mut sums = OutputSums::default();
-            sums.add_all(&values[from..to], &errors[from..to]);
+            sums.add(&values[from..to], &errors[from..to]);
             sums
         };
         let mut pieces = OutputSums::default();

@@ -6,6 +6,7 @@
 //! nominal one.
 
 use crate::problem::Objective;
+use crate::record::Record;
 use crate::wide::{Terms, Wide, sums};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -28,8 +29,13 @@ pub(crate) struct Scale {
 }
 
 impl Scale {
-    /// Of an output's least and greatest value.
-    pub fn new((least, greatest): (f64, f64)) -> Self {
+    /// Of a channel with these ranges in the records.
+    pub fn over(ranges: impl Iterator<Item = Option<(f64, f64)>>) -> Self {
+        let nothing = (f64::INFINITY, f64::NEG_INFINITY);
+        Scale::new(ranges.flatten().fold(nothing, |(low, high), (a, b)| (low.min(a), high.max(b))))
+    }
+
+    fn new((least, greatest): (f64, f64)) -> Self {
         let inverse = (0.5 * (greatest - least)).recip();
         Scale { center: 0.5 * (least + greatest), inverse: if inverse.is_finite() { inverse } else { 0.0 } }
     }
@@ -187,15 +193,8 @@ pub(crate) fn scales(objective: &Objective<'_>) -> Vec<Scale> {
     if !all || objective.sweep.restarts().is_some() {
         return vec![];
     }
-    let nothing = (f64::INFINITY, f64::NEG_INFINITY);
-    let mut ranges = vec![nothing; objective.outputs()];
-    for record in &objective.problem.records {
-        for (range, output) in ranges.iter_mut().zip(&record.inspect_some().outputs) {
-            let (least, greatest) = output.range.unwrap_or(nothing);
-            *range = (range.0.min(least), range.1.max(greatest));
-        }
-    }
-    ranges.into_iter().map(Scale::new).collect()
+    let found: Vec<_> = objective.problem.records.iter().map(Record::inspect_some).collect();
+    (0..objective.outputs()).map(|j| Scale::over(found.iter().map(|one| one.outputs[j].range))).collect()
 }
 
 #[cfg(test)]

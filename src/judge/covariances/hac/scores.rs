@@ -1,7 +1,6 @@
 //! Accumulators of scores in order of time.
 
-use super::ROWS;
-use crate::information::{Block, Information};
+use crate::information::{Gathering, Information};
 use crate::judge::leverage::{ALONE, form};
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
@@ -82,8 +81,7 @@ impl<T: AccumulateScores> Accumulate for EachScore<'_, T> {
 /// Sums of products of the scores with those one and two samples before, and the triangle of the scores themselves.
 pub(crate) struct Lagged {
     pub count: usize,
-    pub triangle: Information,
-    pub block: Block,
+    pub scores: Gathering,
     pub products: [DMatrix<f64>; 2],
     /// The last two scores, the last one first.
     before: [Vec<f64>; 2],
@@ -95,18 +93,11 @@ impl Lagged {
     pub fn new(n: usize) -> Self {
         Lagged {
             count: 0,
-            triangle: Information::new(n),
-            block: Block::new(n, ROWS),
+            scores: Gathering::new(n),
             products: [DMatrix::zeros(n, n), DMatrix::zeros(n, n)],
             before: [vec![0.0; n], vec![0.0; n]],
             first: vec![],
         }
-    }
-
-    /// With the last rows absorbed.
-    pub fn complete(mut self) -> Self {
-        self.triangle.absorb(&mut self.block);
-        self
     }
 
     /// Products of a score with those before it.
@@ -129,11 +120,11 @@ impl AccumulateScores for Lagged {
             self.first.push(score.to_vec());
         }
         self.multiply(score);
-        self.triangle.gather(&mut self.block, score, 0.0);
+        self.scores.take(score, 0.0);
         self.count += 1;
     }
 
-    fn append(&mut self, mut later: Self) {
+    fn append(&mut self, later: Self) {
         // The products of its first scores among themselves are those of both: they are counted once, here.
         let nothing = || vec![0.0; later.before[0].len()];
         let mut alone = Lagged { before: [nothing(), nothing()], ..Lagged::new(later.before[0].len()) };
@@ -150,9 +141,7 @@ impl AccumulateScores for Lagged {
         if later.count >= 2 {
             self.before = later.before;
         }
-        self.triangle.absorb(&mut self.block);
-        later.triangle.absorb(&mut later.block);
-        self.triangle.merge(&later.triangle);
+        self.scores.append(later.scores);
         self.count += later.count;
     }
 }
@@ -168,8 +157,7 @@ pub(crate) struct MovingSums<'m> {
     recent: VecDeque<Vec<f64>>,
     sums: Vec<f64>,
     before: Vec<f64>,
-    triangle: Information,
-    block: Block,
+    rows: Gathering,
 }
 
 impl<'m> MovingSums<'m> {
@@ -183,8 +171,7 @@ impl<'m> MovingSums<'m> {
             recent: (0..window).map(|_| vec![0.0; n]).collect(),
             sums: vec![0.0; n],
             before: vec![0.0; n],
-            triangle: Information::new(n),
-            block: Block::new(n, ROWS),
+            rows: Gathering::new(n),
         }
     }
 
@@ -207,7 +194,7 @@ impl<'m> MovingSums<'m> {
         self.recent.push_back(oldest);
         if counts {
             let row: Vec<f64> = self.sums.iter().map(|sum| sum * part).collect();
-            self.triangle.gather(&mut self.block, &row, 0.0);
+            self.rows.take(&row, 0.0);
         }
     }
 
@@ -220,8 +207,7 @@ impl<'m> MovingSums<'m> {
         for _ in 1..whole.window {
             whole.slide(&nothing, true);
         }
-        whole.triangle.absorb(&mut whole.block);
-        whole.triangle
+        whole.rows.triangle()
     }
 }
 
@@ -235,7 +221,7 @@ impl AccumulateScores for MovingSums<'_> {
         self.slide(&prewhitened, counts);
     }
 
-    fn append(&mut self, mut later: Self) {
+    fn append(&mut self, later: Self) {
         for score in &later.first {
             self.take(score);
         }
@@ -243,9 +229,7 @@ impl AccumulateScores for MovingSums<'_> {
         if later.first.len() == later.window {
             (self.recent, self.sums, self.before) = (later.recent, later.sums, later.before);
         }
-        self.triangle.absorb(&mut self.block);
-        later.triangle.absorb(&mut later.block);
-        self.triangle.merge(&later.triangle);
+        self.rows.append(later.rows);
     }
 }
 

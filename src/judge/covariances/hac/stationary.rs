@@ -7,8 +7,7 @@
 //! the innovations times the sum of squares of the slopes `g`, filtered by the autoregression and beyond the end of the
 //! record. (In which direction does not matter: a stationary sequence has the same covariances backward.)
 
-use super::ROWS;
-use crate::information::{Block, Information};
+use crate::information::{Gathering, Information};
 use crate::judge::evidence::shares::Shares;
 use crate::judge::leverage::ALONE;
 use crate::problem::{Accumulate, Objective};
@@ -188,8 +187,7 @@ pub(crate) struct FilteredSlopes<'p> {
     models: &'p [Autoregression],
     outputs: Vec<Recent>,
     row: Vec<f64>,
-    triangle: Information,
-    block: Block,
+    rows: Gathering,
 }
 
 /// The slopes of an output.
@@ -214,8 +212,7 @@ impl<'p> FilteredSlopes<'p> {
             models,
             outputs: models.iter().map(rows).collect(),
             row: vec![0.0; columns],
-            triangle: Information::new(columns),
-            block: Block::new(columns, ROWS),
+            rows: Gathering::new(columns),
         }
     }
 
@@ -229,7 +226,7 @@ impl<'p> FilteredSlopes<'p> {
         filter(&model.coefficients, filtered, &mut self.row);
         if counts {
             self.row.iter_mut().for_each(|row| *row *= model.innovation);
-            self.triangle.gather(&mut self.block, &self.row, 0.0);
+            self.rows.take(&self.row, 0.0);
         }
     }
 
@@ -244,8 +241,7 @@ impl<'p> FilteredSlopes<'p> {
                 whole.take(j);
             }
         }
-        whole.triangle.absorb(&mut whole.block);
-        whole.triangle
+        whole.rows.triangle()
     }
 }
 
@@ -260,7 +256,7 @@ impl Accumulate for FilteredSlopes<'_> {
         }
     }
 
-    fn append(&mut self, mut later: Self) {
+    fn append(&mut self, later: Self) {
         for (j, rows) in later.outputs.iter().enumerate() {
             for row in &rows.first {
                 self.row.copy_from_slice(row);
@@ -273,9 +269,7 @@ impl Accumulate for FilteredSlopes<'_> {
                 rows.filtered = later.filtered;
             }
         }
-        self.triangle.absorb(&mut self.block);
-        later.triangle.absorb(&mut later.block);
-        self.triangle.merge(&later.triangle);
+        self.rows.append(later.rows);
     }
 }
 

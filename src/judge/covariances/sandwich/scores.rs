@@ -9,11 +9,11 @@
 //! prediction nothing of the estimate. One less the leverage counts as [`LEAST`] there at least: of a measurement that alone determines an
 //! unknown the variance is then `CANCELED / LEAST`, ten times that of the noise of all, instead of growing without bound.
 
-use super::ROWS;
-use crate::information::{Block, Information};
+use crate::information::Gathering;
 use crate::judge::evidence::shares::Shares;
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
+use nalgebra::DMatrix;
 
 /// Part of a prediction's variance that is added to the square of the error. An interval of an unknown that one measurement alone
 /// determines then covers 95.7 % of normal errors where that measurement's deviation is 2.2 times that of the prediction, and more
@@ -30,8 +30,7 @@ pub(crate) struct Scores<'s> {
     pub shares: Shares,
     /// Variance of all errors times the roots of their weights.
     noise: f64,
-    pub scores: Information,
-    block: Block,
+    pub scores: Gathering,
     row: Vec<f64>,
     /// By what the errors of a sample move each unknown; the second less the part of them that is certain.
     moves: Vec<[f64; 2]>,
@@ -40,17 +39,12 @@ pub(crate) struct Scores<'s> {
 }
 
 impl<'s> Scores<'s> {
-    pub fn new(objective: &'s Objective<'s>, experiment: usize, shares: Shares, noise: f64) -> Self {
-        let columns = shares.columns();
-        let (scores, block) = (Information::new(columns), Block::new(columns, ROWS));
+    /// By the inverse of the curvature of the experiment's unknowns.
+    pub fn new(objective: &'s Objective<'s>, experiment: usize, inverse: DMatrix<f64>, noise: f64) -> Self {
+        let columns = inverse.nrows();
         let none = || vec![[0.0; 2]; columns];
-        let row = vec![0.0; columns];
-        Scores { objective, experiment, shares, noise, scores, block, row, moves: none(), variances: none() }
-    }
-
-    /// Absorbs the last rows.
-    pub fn complete(&mut self) {
-        self.scores.absorb(&mut self.block);
+        let (shares, scores, row) = (Shares::new(experiment, inverse), Gathering::new(columns), vec![0.0; columns]);
+        Scores { objective, experiment, shares, noise, scores, row, moves: none(), variances: none() }
     }
 }
 
@@ -77,9 +71,9 @@ impl Accumulate for Scores<'_> {
                 }
                 let canceled = (CANCELED * weight * self.noise * leverage / less).sqrt();
                 slopes.iter_mut().for_each(|slope| *slope *= canceled);
-                self.scores.gather(&mut self.block, &slopes, 0.0);
+                self.scores.take(&slopes, 0.0);
             }
-            self.scores.gather(&mut self.block, &self.row, 0.0);
+            self.scores.take(&self.row, 0.0);
             for ([variance, spread], [move_by, uncertain]) in self.variances.iter_mut().zip(&self.moves) {
                 *variance += move_by * move_by;
                 *spread += uncertain.powi(4);
@@ -87,11 +81,9 @@ impl Accumulate for Scores<'_> {
         }
     }
 
-    fn append(&mut self, mut later: Self) {
+    fn append(&mut self, later: Self) {
         self.shares.append(&later.shares);
-        later.complete();
-        self.complete();
-        self.scores.merge(&later.scores);
+        self.scores.append(later.scores);
         for (own, later) in self.variances.iter_mut().zip(&later.variances) {
             own.iter_mut().zip(later).for_each(|(own, later)| *own += later);
         }

@@ -232,17 +232,15 @@ impl Accumulate for Sums<'_> {
             self.largest[j].add(errors, self.experiment, begin);
             let values = &record.outputs()[j].values[begin..begin + samples];
             if window.whole && !window.has_variances() {
-                self.outputs[j].add_all(values, errors);
-                self.follow(window, j, lane);
-                continue;
-            }
-            for (k, (&y, &error)) in values.iter().zip(errors).enumerate() {
-                if window.is_measured(k, j, lane) {
-                    let unit = window.variance_root(k, j, lane);
-                    self.outputs[j].add(y, error * unit);
-                    if window.has_variances() {
-                        self.least_sigma[j] = self.least_sigma[j].min(unit);
-                    }
+                self.outputs[j].add(values, errors);
+            } else {
+                let measured = || (0..samples).filter(|k| window.is_measured(*k, j, lane));
+                let unit = |k: usize| window.variance_root(k, j, lane);
+                let (values, in_units): (Vec<f64>, Vec<f64>) =
+                    measured().map(|k| (values[k], errors[k] * unit(k))).unzip();
+                self.outputs[j].add(&values, &in_units);
+                if window.has_variances() {
+                    self.least_sigma[j] = measured().map(unit).fold(self.least_sigma[j], f64::min);
                 }
             }
             self.follow(window, j, lane);

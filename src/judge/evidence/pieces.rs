@@ -2,8 +2,8 @@
 
 use crate::information::Information;
 use crate::judge::directions;
-use crate::judge::evidence::Evidence;
 use crate::judge::evidence::spans::Spans;
+use crate::judge::point::Point;
 use crate::optimize::Linearization;
 
 /// A record with fewer degrees of freedom than this has the noise of all records.
@@ -56,68 +56,65 @@ impl Piece {
 /// The rows of an output in a piece: a triangle per experiment, and what its own step leaves.
 struct OfOutput {
     triangles: Vec<Information>,
-    squares: f64,
-    fourths: f64,
-    count: f64,
+    /// Of the squared errors, of their squares, and the number of errors.
+    sums: [f64; 3],
     /// The sum of squares without what its own step gains, and its degrees of freedom.
     left: f64,
     degrees: f64,
 }
 
 /// The rows of a piece, output by output; `None` where a step of its own is not determined.
-fn of_outputs(evidence: &Evidence<'_>, all: &[Spans], rows: Rows) -> Option<Vec<OfOutput>> {
-    let shared = evidence.point.objective.problem.unknowns.shared();
-    let held = &evidence.point.undetermined.held;
+fn of_outputs(point: &Point<'_>, all: &[Spans], rows: Rows) -> Option<Vec<OfOutput>> {
+    let unknowns = &point.objective.problem.unknowns;
     let mut found = vec![];
-    for j in 0..evidence.point.objective.outputs() {
-        let mut triangles: Vec<Information> = all.iter().map(|parts| Information::new(parts.columns)).collect();
-        let (mut squares, mut fourths, mut count) = (0.0, 0.0, 0);
+    for j in 0..point.objective.outputs() {
+        let empty = |e: usize| Information::new(unknowns.columns(e).count());
+        let (mut triangles, mut sums): (Vec<_>, _) = ((0..all.len()).map(empty).collect(), [0.0; 3]);
         for (e, parts) in all.iter().enumerate() {
-            for (_, part) in parts.of[j].iter().enumerate().filter(|(number, _)| rows.contain(e, j, *number)) {
-                triangles[e].merge(&part.triangle);
-                squares += part.squares;
-                fourths += part.fourths;
-                count += part.count;
+            for (_, part) in parts[j].iter().enumerate().filter(|(number, _)| rows.contain(e, j, *number)) {
+                triangles[e].merge(&part.rows);
+                sums.iter_mut().zip(part.sums).for_each(|(sum, part)| *sum += part);
             }
         }
-        if count == 0 {
+        let [squares, _, count] = sums;
+        if count == 0.0 {
             continue;
         }
-        let linear = Linearization::new(0.0, shared, triangles);
-        let own = directions::undetermined(&linear, held).held;
+        let linear = Linearization::new(0.0, unknowns.shared(), triangles);
+        let own = directions::undetermined(&linear, &point.undetermined.held).held;
         let step = linear.step(&vec![0.0; own.len()], &own)?;
         let free = own.iter().filter(|held| !**held).count() as f64;
-        let (left, count) = (squares - 2.0 * linear.predicted_reduction(&step), count as f64);
+        let left = squares - 2.0 * linear.predicted_reduction(&step);
         let triangles = linear.columns().map(|(triangle, _)| triangle.clone()).collect();
-        found.push(OfOutput { triangles, squares, fourths, count, left, degrees: count - free });
+        found.push(OfOutput { triangles, sums, left, degrees: count - free });
     }
     Some(found)
 }
 
 /// The pieces with these rows, those of each output divided by the noise that is left when its own step is taken; of short records, when
 /// all of them have taken theirs.
-pub(crate) fn pieces(evidence: &Evidence<'_>, all: &[Spans], rows: &[Rows]) -> Vec<Piece> {
-    let of = |rows: &Rows| Some((*rows, of_outputs(evidence, all, *rows)?));
+pub(crate) fn pieces(point: &Point<'_>, all: &[Spans], rows: &[Rows]) -> Vec<Piece> {
+    let of = |rows: &Rows| Some((*rows, of_outputs(point, all, *rows)?));
     let found: Vec<(Rows, Vec<OfOutput>)> = rows.iter().filter_map(of).collect();
     let sum = |part: fn(&OfOutput) -> f64| found.iter().flat_map(|(_, of)| of).map(part).sum::<f64>();
     let together = (sum(|of| of.left), sum(|of| of.degrees));
     // Outputs have noise of their own.
-    let joined = evidence.point.objective.outputs() == 1;
+    let joined = point.objective.outputs() == 1;
     let one = |(rows, of): &(Rows, Vec<OfOutput>)| {
         let short = |of: &OfOutput| joined && matches!(rows, Rows::Record(_)) && of.degrees < OWN;
-        piece(evidence, *rows, of, |of| if short(of) { together } else { (of.left, of.degrees) })
+        piece(point, *rows, of, |of| if short(of) { together } else { (of.left, of.degrees) })
     };
     found.iter().filter_map(one).collect()
 }
 
 /// A piece, with the sum of squares by which its noise is estimated and the degrees of freedom of that.
 fn piece(
-    evidence: &Evidence<'_>,
+    point: &Point<'_>,
     rows: Rows,
     outputs: &[OfOutput],
     noise: impl Fn(&OfOutput) -> (f64, f64),
 ) -> Option<Piece> {
-    let predicted = evidence.point.objective.sweep.predicts_variance();
+    let predicted = point.objective.sweep.predicts_variance();
     let empty = |triangle: &Information| Information::new(triangle.columns());
     let mut merged: Vec<Information> = outputs.first()?.triangles.iter().map(empty).collect();
     let (mut dependence, mut fewest) = (1.0f64, f64::INFINITY);
@@ -130,47 +127,14 @@ fn piece(
         }
         fewest = fewest.min(degrees);
         let root = variance.sqrt().recip();
-        merged.iter_mut().zip(&of.triangles).for_each(|(all, triangle)| all.merge(&scaled(triangle, root)));
-        if predicted || evidence.point.objective.is_weighted() {
+        merged.iter_mut().zip(&of.triangles).for_each(|(all, triangle)| all.merge(&triangle.times(root)));
+        if predicted || point.objective.is_weighted() {
             // Squares of errors with heavy tails, or of several sizes, vary more than those of normal ones.
-            dependence = dependence.max(0.5 * (of.count * of.fourths / (of.squares * of.squares) - 1.0));
+            let [squares, fourths, count] = of.sums;
+            dependence = dependence.max(0.5 * (count * fourths / (squares * squares) - 1.0));
         }
     }
-    let shared = evidence.point.objective.problem.unknowns.shared();
-    let piece = Piece::new(rows, Linearization::new(0.0, shared, merged), &evidence.point.undetermined.held)?;
+    let shared = point.objective.problem.unknowns.shared();
+    let piece = Piece::new(rows, Linearization::new(0.0, shared, merged), &point.undetermined.held)?;
     Some(Piece { dependence, degrees: fewest, ..piece })
-}
-
-/// A triangle with all its rows multiplied by a number.
-fn scaled(triangle: &Information, factor: f64) -> Information {
-    let n = triangle.columns();
-    let mut scaled = Information::new(n);
-    for i in 0..=n {
-        let row: Vec<f64> = (0..n).map(|c| if c < i { 0.0 } else { factor * triangle.at(i, c) }).collect();
-        scaled.absorb_row(&row, factor * triangle.at(i, n));
-    }
-    scaled
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The same solution and three times the rows, so a ninth of the covariance.
-    #[test]
-    fn scaled_triangles() {
-        let mut triangle = Information::new(2);
-        for (row, right) in [([1.0, 2.0], 3.0), ([0.5, -1.0], 1.0), ([2.0, 0.3], -1.0)] {
-            triangle.absorb_row(&row, right);
-        }
-        let scaled = scaled(&triangle, 3.0);
-        for (i, c) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)] {
-            let (found, expected) = (scaled.at(i, c).abs(), 3.0 * triangle.at(i, c).abs());
-            assert!((found - expected).abs() < 1e-14, "{i} {c}: {found} {expected}");
-        }
-        // Signs of whole rows mean nothing, those within a row do.
-        let sign = |of: &Information| (of.at(0, 0) * of.at(0, 1), of.at(0, 0) * of.at(0, 2), of.at(1, 1) * of.at(1, 2));
-        let ((a, b, c), (d, e, f)) = (sign(&scaled), sign(&triangle));
-        assert!((a - 9.0 * d).abs() < 1e-13 && (b - 9.0 * e).abs() < 1e-13 && (c - 9.0 * f).abs() < 1e-13);
-    }
 }
