@@ -57,7 +57,7 @@ pub(crate) fn left(evidence: &Evidence<'_>) -> Left {
         (0..ordered.len()).map(|number| dependences(of_pieces.iter().map(|one| &one[number]))).collect();
     let of_sensor: Option<Vec<OfSensor<'_>>> = of_sensor.into_iter().collect();
     let sensor = suspects.zip(of_sensor).and_then(|((extended, (found, tests)), all)| {
-        let (standard_error, chance) = confirm(&extended, found.first()?, all)?;
+        let (standard_error, chance) = confirm(extended, found.first()?, all)?;
         Some(Sensor { found, tests, standard_error, chance })
     });
     for (parts, dependences) in parts.iter_mut().zip(dependences) {
