@@ -151,6 +151,10 @@ class _Functions(Model):
         for role, of in quantities.items():
             setattr(self, role, named(of, role))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Functions without a name of their own, such as lambdas, have no pickle; the equations that they are read as have.
+        return self.equations().__reduce__()
+
 
 def model(
     derivative: Callable[..., Returned] | None = None,
