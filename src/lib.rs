@@ -129,6 +129,8 @@ mod by_name;
 #[cfg(feature = "std")]
 pub mod check;
 #[cfg(feature = "std")]
+mod covariance;
+#[cfg(feature = "std")]
 pub mod diagnose;
 #[cfg(feature = "std")]
 mod engine;
@@ -182,6 +184,8 @@ mod recurrence;
 pub mod regress;
 #[cfg(feature = "std")]
 pub mod report;
+#[cfg(feature = "std")]
+mod residuals;
 #[cfg(feature = "std")]
 mod scaling;
 #[cfg(feature = "std")]

@@ -24,6 +24,7 @@ mod sensors;
 mod shape;
 mod signals_before;
 mod step;
+mod suspicions;
 #[cfg(test)]
 mod tests;
 mod within_loss;
@@ -47,9 +48,9 @@ pub(crate) const CHECKS: &[Check] = &[
     search::ENOUGH,
     data::CONSTANT_OUTPUTS,
     constant_inputs::CONSTANT_INPUTS,
-    data::SUSPICIONS,
+    suspicions::SUSPICIONS,
     data::COARSE,
-    data::INPUT_SENTINELS,
+    suspicions::INPUT_SENTINELS,
     data::MISSING_PART,
     copies::TWICE,
     copies::COPIES,

@@ -1,25 +1,20 @@
 //! The covariance of the unknowns: classical, a sandwich, or HAC, and its degrees of freedom.
 
-mod clusters;
-pub(crate) mod hac;
-mod predicted;
-pub(crate) mod sandwich;
-
+use crate::covariance::clusters::{Cluster, Clusters, clusters};
+use crate::covariance::hac::hac;
+use crate::covariance::point::Point;
+use crate::covariance::predicted::{Dependence, dependence_of_variances};
+use crate::covariance::sandwich::{Robust, sandwich};
+use crate::covariance::shares::Largest;
+use crate::covariance::sizes::{Sizes, Uneven};
 use crate::estimate::CovarianceMethod;
 use crate::estimate::student::Spread;
 use crate::information::Covariance;
 use crate::judge::evidence::Evidence;
 use crate::judge::evidence::color;
-use crate::judge::evidence::shares::Largest;
-use crate::judge::evidence::sizes::{Sizes, Uneven};
-use crate::judge::point::Point;
 use crate::problem::{Noise, Whitening};
 use crate::record::Time;
 use crate::whiteness::chi_squared_tail;
-use clusters::{Cluster, Clusters, clusters};
-use hac::hac;
-use predicted::{Dependence, dependence_of_variances};
-use sandwich::{Robust, sandwich};
 
 /// Levels at which the variance by records as clusters is certainly larger than that by the errors: of colored errors, where the records
 /// have [`FEW`] degrees of freedom or more, and of white ones, or with fewer.
@@ -108,7 +103,7 @@ pub(crate) fn covariances(evidence: &Evidence<'_>) -> Covariances {
     let colored = evidence.uses_hac().then(|| for_colored_errors(evidence, unit?)).flatten();
     let level = if colored.is_some() { CLUSTERED } else { DIFFERENT };
     let found = colored.unwrap_or_else(|| for_white_errors(evidence, unit, None));
-    let (found, differing) = match clusters(evidence) {
+    let (found, differing) = match clusters(&evidence.point, || evidence.bread()) {
         Some(clusters) => found.by_records(&clusters, level, has_short_records(evidence)),
         None => (found, None),
     };

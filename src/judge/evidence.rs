@@ -1,40 +1,28 @@
 //! [`Evidence`]: what passes over the data say of a point, each made once, when it is first asked for.
 
 pub(crate) mod color;
-pub(crate) mod coupling;
 pub(crate) mod extended;
-pub(crate) mod first_errors;
-pub(crate) mod largest;
 pub(crate) mod left;
-pub(crate) mod modes;
-pub(crate) mod output_sums;
 pub(crate) mod parts;
 pub(crate) mod pieces;
-pub(crate) mod powers;
-pub(crate) mod products;
-pub(crate) mod residual_pass;
 pub(crate) mod rows;
 pub(crate) mod ruled_out;
 pub(crate) mod sensors;
-pub(crate) mod shares;
-pub(crate) mod sizes;
 pub(crate) mod spans;
-mod step_error;
 pub(crate) mod suspects;
-pub(crate) mod whiteness;
 
+use crate::covariance::point::Point;
+use crate::covariance::sandwich::Bread;
 use crate::information::Covariance;
-use crate::judge::covariances::sandwich::Bread;
-use crate::judge::point::Point;
 use crate::problem::{Noise, Whitening};
+use crate::residuals::Residuals;
+use crate::residuals::coupling::Coupled;
+use crate::residuals::whiteness::{WHITENESS_LEVEL, Whiteness, least_white};
 use color::is_certain;
-use coupling::Coupled;
 use left::{Left, left};
-use residual_pass::Residuals;
 use rows::{Asked, Rows, rows};
 use spans::records_by_chance;
 use std::cell::OnceCell;
-use whiteness::{WHITENESS_LEVEL, Whiteness, least_white};
 
 /// Below this number of measurements the covariance is the classical one, whether the errors are autocorrelated, or of one size, or not.
 const CORRELATED_SAMPLES: u64 = 12;

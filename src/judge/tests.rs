@@ -1,6 +1,7 @@
 //! How many passes over the data the verdict takes, counted by a sweep that counts its samples.
 
-use super::{SearchEnd, conclude};
+use super::conclude;
+use crate::covariance::SearchEnd;
 use crate::error::{Error, Failure};
 use crate::estimate::{CovarianceMethod, Summary};
 use crate::layout::Layout;

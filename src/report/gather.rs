@@ -7,10 +7,10 @@ use crate::diagnose::{self, Widths};
 use crate::error::Error;
 use crate::estimate::Summary;
 use crate::interval::Hold;
-use crate::judge::output_fit;
 use crate::layout::Kind;
 use crate::problem::{Problem, Simulated};
 use crate::record::{Channel, ChannelInspection, Inspection, Record as Measured};
+use crate::residuals::output_fit;
 use crate::section::{Drawing, Keep, Line, Panel, PanelKind, Plot, Samples, Style, Timeline, identifier};
 use core::ops::Range;
 

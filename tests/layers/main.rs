@@ -30,6 +30,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("estimation: the problem", &["problem"]),
     ("estimation: sections of a report", &["section"]),
     ("estimation: the result", &["estimate"]),
+    ("estimation: sums over the data", &["residuals", "covariance"]),
     ("estimation: judgement", &["judge"]),
     ("estimation: the fit", &["fit"]),
     ("results", &["diagnose", "check"]),

@@ -4,21 +4,22 @@
 //! samples tells the two apart, but each of them has a minimum of its own, and a search ends in that on its side of `pi/h`.
 
 use super::*;
-use crate::judge::evidence::modes::{StateAt, eigenvalues, some};
-use crate::judge::evidence::residual_pass::residual_pass;
 use crate::record::{Record, Time, steps};
+use crate::residuals::modes::{StateAt, eigenvalues, some};
+use crate::residuals::residual_pass;
 use std::f64::consts::{PI, TAU};
 
 pub(crate) const ALIASES: Check = Check::new(
     "oscillations are resolved",
-    "Are there fewer than 2.5 samples a period of an oscillation that parameters within their bounds turn into its alias?",
+    "Are there fewer than 2.5 samples a period of an oscillation that parameters within their bounds turn into \
+     its alias?",
     &[WarningCode::Aliased],
     |evidence, _| aliased(evidence).into(),
 )
 .levels(&[
-        level("samples a period", SAMPLES, "below it an alias is within a factor of 1.5"),
-        level("the amplitude that is left after a sample", LEFT, "a tenth shows"),
-    ]);
+    level("samples a period", SAMPLES, "below it an alias is within a factor of 1.5"),
+    level("the amplitude that is left after a sample", LEFT, "a tenth shows"),
+]);
 
 /// An oscillation with fewer samples a period than this can be taken for its alias, whose frequency is then within a factor of 1.5.
 const SAMPLES: f64 = 2.5;

@@ -8,7 +8,8 @@ use crate::judge::checks::rise::{Place, least_rise};
 
 pub(crate) const CONDITIONS: Check = Check::new(
     "intervals do not end at a condition",
-    "For parameters in a condition of the model: does the cost rise towards the ends of the interval as the slopes say?",
+    "For parameters in a condition of the model: does the cost rise towards the ends of the interval as the \
+     slopes say?",
     &[WarningCode::CurvedInterval],
     |evidence, intervals| {
         let long = evidence.residuals.measured > LONGEST && evidence.point.objective.sweep.choosing().is_none();
@@ -18,7 +19,11 @@ pub(crate) const CONDITIONS: Check = Check::new(
 )
 .unless(&[Unless::RoundOff])
 .costs(&[Pass::EachUnknown(4)])
-.levels(&[level("the rise of the cost, in what the slopes say", LITTLE, "an interval by the likelihood is longer by the root of two")]);
+.levels(&[level(
+    "the rise of the cost, in what the slopes say",
+    LITTLE,
+    "an interval by the likelihood is longer by the root of two",
+)]);
 
 /// Half widths of the interval at which the cost is compared: at its ends, and as far again, where a limit is beyond the few samples that
 /// reach it though an end is not.

@@ -1,8 +1,8 @@
 //! Inputs that never move.
 
 use super::*;
+use crate::covariance::directions::{taking_part, undetermined};
 use crate::judge::checks::data::{constant, inspected};
-use crate::judge::directions::{taking_part, undetermined};
 use crate::judge::evidence::extended::Extended;
 use crate::judge::evidence::sensors::{KINDS, Kind};
 use crate::record::{Inspection, Record};
@@ -10,15 +10,16 @@ use std::sync::Arc;
 
 pub(crate) const CONSTANT_INPUTS: Check = Check::new(
     "inputs move",
-    "Has an input one value throughout, and would a parameter that acts by way of it be far less known if each output might have an offset?",
+    "Has an input one value throughout, and would a parameter that acts by way of it be far less known if each \
+     output might have an offset?",
     &[WarningCode::ConstantInput],
     |evidence, _| constant_inputs(evidence, &inspected(evidence)).into(),
 )
 .costs(&[Pass::Slopes(2)])
 .levels(&[
-        level("the slopes of such a parameter without the input, in those with it", NO_EFFECT, "a tenth"),
-        level("its standard error with offsets, in that without", REPLACED, "a tenth of the information"),
-    ]);
+    level("the slopes of such a parameter without the input, in those with it", NO_EFFECT, "a tenth"),
+    level("its standard error with offsets, in that without", REPLACED, "a tenth of the information"),
+]);
 
 /// A parameter whose slopes are below this part of themselves without an input acts by way of that input; one whose standard error is so many
 /// times larger where an output may have an offset can hardly be told from it.

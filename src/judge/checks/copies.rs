@@ -1,7 +1,7 @@
 //! Columns and records that are copies of another one.
 
 use super::*;
-use crate::judge::checks::data::NAMED;
+use crate::judge::checks::suspicions::NAMED;
 use crate::record::Record;
 
 pub(crate) const COPIES: Check = Check::new(

@@ -12,7 +12,8 @@ use crate::sweep::Coupling;
 
 pub(crate) const CURVED: Check = Check::new(
     "intervals may be symmetric",
-    "Of unknowns of which curvature is expected: by how much do the ends of the interval move by the curvature along it (Bates and Watts 1980), and does the cost rise towards them as the slopes say?",
+    "Of unknowns of which curvature is expected: by how much do the ends of the interval move by the curvature \
+     along it (Bates and Watts 1980), and does the cost rise towards them as the slopes say?",
     &[WarningCode::CurvedInterval],
     |evidence, intervals| {
         let long = (evidence.residuals.measured > LONGEST).then_some("more than 200,000 measurements");
@@ -22,10 +23,14 @@ pub(crate) const CURVED: Check = Check::new(
 .unless(&[Unless::RoundOff, Unless::Variances])
 .costs(&[Pass::EachUnknown(1)])
 .levels(&[
-        level("the expected curvature of an unknown that is examined", SMALL, "a standard error of 15 %"),
-        level("the part of the half width by which an end moves", ASYMMETRY, "a quarter"),
-        level("the rise of the cost at the end, in what the slopes say", FLAT[0].1, "an interval by the likelihood is longer by the root of two"),
-    ]);
+    level("the expected curvature of an unknown that is examined", SMALL, "a standard error of 15 %"),
+    level("the part of the half width by which an end moves", ASYMMETRY, "a quarter"),
+    level(
+        "the rise of the cost at the end, in what the slopes say",
+        FLAT[0].1,
+        "an interval by the likelihood is longer by the root of two",
+    ),
+]);
 
 /// Unknowns of which a smaller curvature is to be expected are not examined: two passes over the data each. It is reached by a standard
 /// error of 15 % of an unknown that no other replaces, and by smaller ones of unknowns that replace each other.

@@ -17,18 +17,25 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 pub(crate) const RESTARTS: Check = Check::new(
     "measured states are without noise",
-    "Where predictions restart: how far does noise move an unknown (simulation and extrapolation, Cook and Stefanski 1994) that errors a horizon apart show by a negative correlation beside all unknowns (Breusch 1978, Godfrey 1978), or do not exclude?",
+    "Where predictions restart: how far does noise move an unknown (simulation and extrapolation, Cook and \
+     Stefanski 1994) that errors a horizon apart show by a negative correlation beside all unknowns (Breusch \
+     1978, Godfrey 1978), or do not exclude?",
     &[WarningCode::RestartNoise],
     |evidence, intervals| restart_noise(evidence, &intervals.unknowns).into(),
 )
 .costs(&[Pass::Slopes(9)])
 .levels(&[
-        level("the probability by chance", LEVEL, "one good record in a hundred"),
-        level("the bias of care, in standard errors", NO_BIAS, "a tenth"),
-        level("standard errors of the correlation that noise may hide in", POSSIBLE, "one-sided 95 %"),
-        level("the bias of care by noise that is not excluded", NOT_EXCLUDED, "0.24 or more in 20 records whose noise is half of what disturbs the plant, 0.11 or less in 20 without noise"),
-        level("the bias that is not usable", BIAS, "a quarter: intervals of 95 % cover 94 %"),
-    ]);
+    level("the probability by chance", LEVEL, "one good record in a hundred"),
+    level("the bias of care, in standard errors", NO_BIAS, "a tenth"),
+    level("standard errors of the correlation that noise may hide in", POSSIBLE, "one-sided 95 %"),
+    level(
+        "the bias of care by noise that is not excluded",
+        NOT_EXCLUDED,
+        "0.24 or more in 20 records whose noise is half of what disturbs the plant, 0.11 or less in 20 without \
+         noise",
+    ),
+    level("the bias that is not usable", BIAS, "a quarter: intervals of 95 % cover 94 %"),
+]);
 
 pub(crate) const INPUT_NOISE: Check = Check::new(
     "noise of the inputs moves nothing",

@@ -37,7 +37,8 @@ pub(crate) const POSITIVE: Check = Check::new(
 
 pub(crate) const IDENTIFIED: Check = Check::new(
     "all unknowns are identified",
-    "Along which directions of the unknowns do the data say nothing, by the singular values of the slopes? Does a parameter without slope change the cost in steps?",
+    "Along which directions of the unknowns do the data say nothing, by the singular values of the slopes? Does a \
+     parameter without slope change the cost in steps?",
     &[WarningCode::Unidentified],
     |evidence, intervals| {
         let directions = evidence.point.undetermined.directions.iter().zip(&intervals.directions);

@@ -1,16 +1,17 @@
 //! Warnings about errors that are correlated, over time or between outputs, and about errors and standard errors of several sizes.
 
 use super::*;
+use crate::covariance::sizes::{SAID, Uneven};
 use crate::estimate::CovarianceMethod;
 use crate::judge::evidence::color::{LARGE, SMALL, severity};
-use crate::judge::evidence::coupling::{Coupled, LEVEL};
-use crate::judge::evidence::sizes::{SAID, Uneven};
-use crate::judge::evidence::whiteness::WHITENESS_LEVEL;
 use crate::parameter::Transform;
+use crate::residuals::coupling::{Coupled, LEVEL};
+use crate::residuals::whiteness::WHITENESS_LEVEL;
 
 pub(crate) const GROWING: Check = Check::new(
     "standard errors do not grow with their unknown",
-    "Where variances are predicted: does the standard error of an unknown, such as a noise level, grow along its interval?",
+    "Where variances are predicted: does the standard error of an unknown, such as a noise level, grow along its \
+     interval?",
     &[WarningCode::CurvedInterval],
     |evidence, intervals| {
         let many = intervals.covariances.own.is_empty() && evidence.point.objective.sweep.predicts_variance();
@@ -19,7 +20,11 @@ pub(crate) const GROWING: Check = Check::new(
         })
     },
 )
-.levels(&[level("the change of the logarithm of its variance over a standard error", UNEVEN, "a relative standard error of 15 %")]);
+.levels(&[level(
+    "the change of the logarithm of its variance over a standard error",
+    UNEVEN,
+    "a relative standard error of 15 %",
+)]);
 
 /// Change of the logarithm of an unknown's variance over one standard error of the unknown, from which on a symmetric interval is
 /// named. For a noise level the change is twice its relative standard error, so that 0.3 is 15 % (see docs/intervals.md).
@@ -87,15 +92,16 @@ fn uneven_errors(unknowns: &[Unknown], covariances: &Covariances) -> Option<Warn
 
 pub(crate) const COLOR: Check = Check::new(
     "errors are white",
-    "Are errors autocorrelated (portmanteau tests over 3 and 20 lags, and of neighbors), and how much of the output is that?",
+    "Are errors autocorrelated (portmanteau tests over 3 and 20 lags, and of neighbors), and how much of the \
+     output is that?",
     &[WarningCode::ColoredErrors],
     |evidence, intervals| autocorrelation(evidence, &intervals.covariances).into(),
 )
 .levels(&[
-        level("the probability by chance, over all outputs", WHITENESS_LEVEL, "one good record in a hundred, a note"),
-        level("the part of what an output moves of care", SMALL, "no parameter moves by more"),
-        level("the part that is not usable", LARGE, "a half"),
-    ]);
+    level("the probability by chance, over all outputs", WHITENESS_LEVEL, "one good record in a hundred, a note"),
+    level("the part of what an output moves of care", SMALL, "no parameter moves by more"),
+    level("the part that is not usable", LARGE, "a half"),
+]);
 
 /// Whether the errors are autocorrelated, how much of the output that is, and what of it the intervals allow for.
 fn autocorrelation(evidence: &Evidence<'_>, covariances: &Covariances) -> Option<Warning> {

@@ -9,14 +9,15 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 pub(crate) const UNEXPLAINED: Check = Check::new(
     "the model explains its outputs",
-    "Is the sum of squares smaller than that about the mean of the output, by Fisher's test with as many measurements as are independent?",
+    "Is the sum of squares smaller than that about the mean of the output, by Fisher's test with as many \
+     measurements as are independent?",
     &[WarningCode::Unexplained],
     |evidence, _| unexplained(evidence).into(),
 )
 .levels(&[
-        level("the probability by chance", LEVEL, "one good output in a thousand"),
-        level("the fit (%) that explains nothing, whatever its significance", LITTLE, "5 %"),
-    ]);
+    level("the probability by chance", LEVEL, "one good output in a thousand"),
+    level("the fit (%) that explains nothing, whatever its significance", LITTLE, "5 %"),
+]);
 
 pub(crate) const GIVEN_NOISE: Check = Check::new(
     "the given noise is that of the errors",

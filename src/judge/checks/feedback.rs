@@ -6,10 +6,10 @@
 use super::*;
 use crate::estimate::student::quantile;
 use crate::information::{Gathering, Information};
-use crate::judge::evidence::first_errors::errors;
 use crate::layout::Layout;
 use crate::problem::Problem;
 use crate::record::{Channel, Record};
+use crate::residuals::first_errors::errors;
 
 /// Samples before that are regressors, too: two tell level and trend of an input.
 const BEFORE: usize = 2;

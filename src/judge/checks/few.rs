@@ -1,9 +1,9 @@
 //! Warnings about unknowns whose intervals rest on one or two measurements.
 
 use super::*;
+use crate::covariance::shares::{DECIDES, Share, part};
 use crate::estimate::CovarianceMethod;
 use crate::judge::evidence::rows::{Asked, rows};
-use crate::judge::evidence::shares::{DECIDES, Share, part};
 
 pub(crate) const DECIDED: Check = Check::new(
     "no measurement decides an interval",

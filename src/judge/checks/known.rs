@@ -41,14 +41,15 @@ pub(crate) const SIGNS: Check = Check::new(
 
 pub(crate) const SIZES: Check = Check::new(
     "parameters are of the size of their start",
-    "Is a parameter so many times its start, or one such part of it, that a unit is another, or that the search ran away along a direction that the data do not determine?",
+    "Is a parameter so many times its start, or one such part of it, that a unit is another, or that the search \
+     ran away along a direction that the data do not determine?",
     &[WarningCode::FarFromStart],
     |_, intervals| far_from_start(&intervals.unknowns).into(),
 )
 .levels(&[
-        level("the ratio", ANOTHER_UNIT, "beyond 360 degrees in a turn, below 1,000"),
-        level("the ratio of a parameter that is not determined, which is not usable", RUN_AWAY, "no start is that far off"),
-    ]);
+    level("the ratio", ANOTHER_UNIT, "beyond 360 degrees in a turn, below 1,000"),
+    level("the ratio of a parameter that is not determined, which is not usable", RUN_AWAY, "no start is that far off"),
+]);
 
 /// A parameter so many times its start, or one such part of it, is in another unit.
 const ANOTHER_UNIT: f64 = 400.0;

@@ -1,29 +1,32 @@
 //! Whether a few errors far beyond the others decide a fit with a squared loss.
 
 use super::*;
-use crate::judge::checks::data::is_named;
 use crate::judge::checks::dropouts;
-use crate::judge::evidence::first_errors::{self, Errors};
-use crate::judge::evidence::largest::chance;
+use crate::judge::checks::suspicions::is_named;
 use crate::outliers::{center_and_deviation, hampel};
+use crate::residuals::first_errors::{self, Errors};
+use crate::residuals::largest::chance;
 
 pub(crate) const OUTLIERS: Check = Check::new(
     "no error is far beyond the others",
-    "Where the kurtosis is that of heavy tails: do errors far from all and from their neighbors make a part of the sum of squares (Hampel's test), or were values held where none arrived? Else: is the largest error no chance among normal ones (Grubbs 1950)?",
+    "Where the kurtosis is that of heavy tails: do errors far from all and from their neighbors make a part of \
+     the sum of squares (Hampel's test), or were values held where none arrived? Else: is the largest error no \
+     chance among normal ones (Grubbs 1950)?",
     &[WarningCode::Outliers, WarningCode::Frozen],
     |evidence, _| {
-        let without = heavy(evidence).contains(&true).then(|| first_errors::left_out(evidence.point.objective)).flatten();
+        let without =
+            heavy(evidence).contains(&true).then(|| first_errors::left_out(evidence.point.objective)).flatten();
         Examined::from(outliers(evidence)).without(without)
     },
 )
 .unless(&[Unless::Weighed, Unless::RoundOff])
 .levels(&[
-        level("the kurtosis, in its standard deviations", HEAVY, "one in two million"),
-        level("robust standard deviations of an outlier", FAR, "one in two million normal errors"),
-        level("the part of the sum of squares of a note", LITTLE, "a tenth"),
-        level("the part of care", DECIDE, "a half"),
-        level("the probability of the largest error", LEVEL, "one good output in a thousand"),
-    ]);
+    level("the kurtosis, in its standard deviations", HEAVY, "one in two million"),
+    level("robust standard deviations of an outlier", FAR, "one in two million normal errors"),
+    level("the part of the sum of squares of a note", LITTLE, "a tenth"),
+    level("the part of care", DECIDE, "a half"),
+    level("the probability of the largest error", LEVEL, "one good output in a thousand"),
+]);
 
 /// Single errors are examined if the kurtosis exceeds that of a normal distribution by this many of its standard deviations.
 const HEAVY: f64 = 5.0;

@@ -3,12 +3,14 @@
 use super::*;
 use crate::judge::evidence::parts::{APART, Difference, Into, Parts, UNLESS};
 use crate::judge::evidence::pieces::{Piece, Rows};
-use crate::judge::evidence::powers::COMPARED;
 use crate::judge::evidence::spans::{LEVEL, SPANS, span};
+use crate::residuals::powers::COMPARED;
 
 pub(crate) const PARTS: Check = Check::new(
     "parts of the data agree",
-    "Where errors are colored or follow from the prediction, where records differ, or where that is not examined: do outputs, records and what lies before and after a time give one set of parameters (Chow 1960, Quandt 1960)? Do records scatter more than their errors explain?",
+    "Where errors are colored or follow from the prediction, where records differ, or where that is not examined: \
+     do outputs, records and what lies before and after a time give one set of parameters (Chow 1960, Quandt \
+     1960)? Do records scatter more than their errors explain?",
     &[WarningCode::RecordsContradict, WarningCode::OutputsContradict, WarningCode::HalvesContradict],
     |evidence, intervals| {
         let mut found = contradictions(evidence, &intervals.unknowns);
@@ -21,10 +23,10 @@ pub(crate) const PARTS: Check = Check::new(
 .unless(UNLESS)
 .costs(&[Pass::Rows, Pass::Left])
 .levels(&[
-        level("the probability by chance", LEVEL, "one good record in ten thousand"),
-        level("the distance of two values of a parameter, in standard errors", APART, "beside the test above"),
-        level("the distance, in parts of the value, that is not usable", FAR_APART, "a quarter"),
-    ]);
+    level("the probability by chance", LEVEL, "one good record in ten thousand"),
+    level("the distance of two values of a parameter, in standard errors", APART, "beside the test above"),
+    level("the distance, in parts of the value, that is not usable", FAR_APART, "a quarter"),
+]);
 
 /// Values that differ by more than this part are not usable.
 const FAR_APART: f64 = 0.25;

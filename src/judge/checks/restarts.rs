@@ -6,8 +6,8 @@
 //! others (Breusch, Australian Economic Papers 17 (1978) 334; Godfrey, Econometrica 46 (1978) 1293).
 
 use super::*;
+use crate::covariance::directions::undetermined;
 use crate::information::{Gathering, Information};
-use crate::judge::directions::undetermined;
 use crate::optimize::Linearization;
 use crate::problem::Accumulate;
 use crate::sweep::Window;

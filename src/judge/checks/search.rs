@@ -14,14 +14,15 @@ pub(crate) const MINIMUM: Check = Check::new(
 
 pub(crate) const STARTS: Check = Check::new(
     "searches from other starts agree",
-    "Did other starts lead to the estimate, to another minimum that explains the data as well, or the declared start elsewhere?",
+    "Did other starts lead to the estimate, to another minimum that explains the data as well, or the declared \
+     start elsewhere?",
     &[WarningCode::MinimumFoundOnce, WarningCode::RivalMinimum, WarningCode::DeclaredStartElsewhere],
     |evidence, _| starts(evidence).into(),
 )
 .levels(&[
-        level("the difference of deviances that tells two minima apart", INDISTINGUISHABLE, "one of 150 records"),
-        level("searches of which a minimum is found more than once", MANY as f64, "one of twenty cases"),
-    ]);
+    level("the difference of deviances that tells two minima apart", INDISTINGUISHABLE, "one of 150 records"),
+    level("searches of which a minimum is found more than once", MANY as f64, "one of twenty cases"),
+]);
 
 pub(crate) const CHECKPOINT: Check = Check::new(
     "the checkpoint was written",
@@ -157,7 +158,8 @@ fn not_examined(evidence: &Evidence<'_>, early: bool) -> Option<Warning> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::judge::{SearchEnd, conclude};
+    use crate::covariance::SearchEnd;
+    use crate::judge::conclude;
     use crate::optimize::Outcome;
     use crate::problem::{Control, Memory};
     use crate::tests::{Current, Gain, Line, Voltage};

@@ -9,17 +9,18 @@ use crate::judge::evidence::sensors::{KINDS, Kind, UNTESTED};
 
 pub(crate) const SENSORS: Check = Check::new(
     "sensors have the model's gain, offset and delay",
-    "Does a gain, an offset or a delay of an output, as one more unknown, explain the errors (score test, Rao 1948; confirmed by White 1980 and for autocorrelated errors), or may a quantized output have been truncated?",
+    "Does a gain, an offset or a delay of an output, as one more unknown, explain the errors (score test, Rao \
+     1948; confirmed by White 1980 and for autocorrelated errors), or may a quantized output have been truncated?",
     &[WarningCode::SensorContradicts, WarningCode::CoarseOutput],
     |evidence, intervals| sensors(evidence, &intervals.unknowns).into(),
 )
 .unless(UNTESTED)
 .costs(&[Pass::Rows, Pass::Left])
 .levels(&[
-        level("the probability by chance, over all regressors", LEVEL, "one good record in ten thousand"),
-        level("the part of a parameter that is a note", NOTHING, "no digit of it changes"),
-        level("the part of a parameter that is not usable", FAR, "a quarter"),
-    ]);
+    level("the probability by chance, over all regressors", LEVEL, "one good record in ten thousand"),
+    level("the part of a parameter that is a note", NOTHING, "no digit of it changes"),
+    level("the part of a parameter that is not usable", FAR, "a quarter"),
+]);
 
 /// The estimate is not usable where the fault moves a parameter by more than `FAR` of itself; below `NOTHING` it is a note.
 const FAR: f64 = 0.25;

@@ -5,26 +5,32 @@
 //! samples after each change of an input, a curve that it lacks in the powers of the input.
 
 use super::*;
-use crate::judge::evidence::powers::{SHAPE, Scale, scales};
-use crate::judge::evidence::products::{Change, Products};
-use crate::judge::evidence::whiteness::{LAGS, Whiteness};
-use crate::judge::evidence::{color, first_errors};
+use crate::judge::evidence::color;
 use crate::problem::Accumulate;
 use crate::record::Record;
+use crate::residuals::first_errors;
+use crate::residuals::powers::{SHAPE, Scale, scales};
+use crate::residuals::products::{Change, Products};
+use crate::residuals::whiteness::{LAGS, Whiteness};
 use crate::sweep::Window;
 use crate::whiteness::Portmanteau;
 
 pub(crate) const FOLLOWING: Check = Check::new(
     "errors follow from nothing that is known",
-    "Do the errors follow from the size of an input (static models), from the inputs of four samples before, or from powers of the prediction (Ramsey 1969; White 1980)?",
+    "Do the errors follow from the size of an input (static models), from the inputs of four samples before, or \
+     from powers of the prediction (Ramsey 1969; White 1980)?",
     &[WarningCode::WrongShape],
     |evidence, _| Examined::unless(skipped(evidence), || shape(evidence)).without(left_out(evidence)),
 )
 .costs(&[Pass::Values(1)])
 .levels(&[
-        level("the probability by chance, over all outputs and inputs", color::CERTAIN, "one good record in ten thousand; for inputs before 1e-3"),
-        level("the part of what an output moves that is a note", color::SMALL, "no parameter moves by more"),
-    ]);
+    level(
+        "the probability by chance, over all outputs and inputs",
+        color::CERTAIN,
+        "one good record in ten thousand; for inputs before 1e-3",
+    ),
+    level("the part of what an output moves that is a note", color::SMALL, "no parameter moves by more"),
+]);
 
 /// Number of samples before an error whose inputs are regressors.
 const BEFORE: usize = 4;

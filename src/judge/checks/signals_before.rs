@@ -8,22 +8,31 @@
 use super::*;
 use crate::information::Gathering;
 use crate::judge::evidence::color;
-use crate::judge::evidence::first_errors::Errors;
-use crate::judge::evidence::powers::by_chance;
 use crate::record::Record;
+use crate::residuals::first_errors::Errors;
+use crate::residuals::powers::by_chance;
 
 pub(crate) const SIGNALS_BEFORE: Check = Check::new(
     "colored errors follow from their own past only",
-    "Do inputs and predictions of the samples before explain more of colored errors than the errors before do (Granger 1969)?",
+    "Do inputs and predictions of the samples before explain more of colored errors than the errors before do \
+     (Granger 1969)?",
     &[WarningCode::WrongShape],
     |evidence, _| Examined::from(by_signals_before(evidence)).without(left_out(evidence)),
 )
 .unless(&[Unless::Static, Unless::RoundOff, Unless::Prefilter, Unless::Restarts])
 .levels(&[
-        level("the probability by chance, over all outputs", color::CERTAIN, "one good record in ten thousand"),
-        level("the part of the innovations' variance that they explain", LEAST, "five times what a closed loop leaves by too short an autoregression"),
-        level("the colored part of what an output moves that is not usable", color::LEFT, "wrong pole pairs, gains and delays move parameters by a quarter or more from there on"),
-    ]);
+    level("the probability by chance, over all outputs", color::CERTAIN, "one good record in ten thousand"),
+    level(
+        "the part of the innovations' variance that they explain",
+        LEAST,
+        "five times what a closed loop leaves by too short an autoregression",
+    ),
+    level(
+        "the colored part of what an output moves that is not usable",
+        color::LEFT,
+        "wrong pole pairs, gains and delays move parameters by a quarter or more from there on",
+    ),
+]);
 
 /// What is not examined of colored errors.
 fn left_out(evidence: &Evidence<'_>) -> Option<&'static str> {

@@ -4,23 +4,28 @@
 //! persists in the next ones until the state has decayed: the phase errors of a resonator of high quality add up over the whole record.
 
 use super::*;
-use crate::judge::directions::{taking_part, undetermined};
-use crate::judge::evidence::modes::{eigenvalues, some};
+use crate::covariance::directions::{taking_part, undetermined};
 use crate::optimize::{Linearization, Outcome};
 use crate::record::{Record, Time};
+use crate::residuals::modes::{eigenvalues, some};
 
 pub(crate) const STEP: Check = Check::new(
     "a finer step changes nothing",
-    "Where some windows change with a finer step: by how many standard errors would an unknown move, or what the data determine of several together, or is there no minimum with it?",
+    "Where some windows change with a finer step: by how many standard errors would an unknown move, or what the \
+     data determine of several together, or is there no minimum with it?",
     &[WarningCode::CoarseStep, WarningCode::NotAtMinimum],
     |evidence, intervals| step(evidence, &intervals.unknowns).into(),
 )
 .costs(&[Pass::Finer])
 .levels(&[
-        level("standard errors, with a method that was chosen", STEP_SHIFT, "half of one: intervals of 95 % then cover 92 %"),
-        level("standard errors, with one of the library's choice", REFINED_SHIFT, "a tenth: nothing is lost"),
-        level("the part of a value that moves, where the data are reproduced", DIGITS, "a millionth"),
-    ]);
+    level(
+        "standard errors, with a method that was chosen",
+        STEP_SHIFT,
+        "half of one: intervals of 95 % then cover 92 %",
+    ),
+    level("standard errors, with one of the library's choice", REFINED_SHIFT, "a tenth: nothing is lost"),
+    level("the part of a value that moves, where the data are reproduced", DIGITS, "a millionth"),
+]);
 
 /// Largest change of a parameter with a finer step, in standard errors, without a warning: with a method that was chosen, and
 /// with one of the library's choice (beyond the former it makes the estimate unusable).

@@ -33,10 +33,10 @@ fn flagged() -> BTreeMap<String, usize> {
 /// The page about all checks.
 fn page() -> String {
     let mut page = "# Checks of an estimate\n\nWritten from the table `CHECKS` in `src/judge/checks.rs` by \
-                    `GREYBOX_WRITE_CHECKS=1 cargo test --lib checks`; a test compares it. The checks stand in the order in which their \
-                    warnings are shown. Passes over the data are counted beside the one in values that every estimate takes. The covariance takes the pass with \
-                    slopes that checks share, too; one more with slopes for colored errors, or for a sandwich; and one more for weights, a \
-                    loss or a pre-filter.\n\n"
+                    `GREYBOX_WRITE_CHECKS=1 cargo test --lib checks`; a test compares it. The checks stand in the order in \
+                    which their warnings are shown. Passes over the data are counted beside the one in values that every \
+                    estimate takes. The covariance takes the pass with slopes that checks share, too; one more with slopes for \
+                    colored errors, or for a sandwich; and one more for weights, a loss or a pre-filter.\n\n"
         .to_owned();
     let flagged = flagged();
     page += &match flagged["all"] {

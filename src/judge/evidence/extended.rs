@@ -6,9 +6,9 @@
 
 use super::Evidence;
 use super::sensors::{KINDS, Kind};
+use crate::covariance::directions;
 use crate::estimate::Unknown;
 use crate::estimate::student::two_sided;
-use crate::judge::directions;
 use crate::optimize::Linearization;
 use crate::problem::Role;
 

@@ -9,13 +9,13 @@
 
 use super::Evidence;
 use super::pieces::{Piece, Rows, pieces};
-use super::powers::COMPARED;
 use super::ruled_out::Unless;
 use super::spans::{LEVEL, SPANS};
+use crate::covariance::point::Point;
 use crate::information::{Covariance, Information};
-use crate::judge::point::Point;
 use crate::optimize::Linearization;
 use crate::problem::Role;
+use crate::residuals::powers::COMPARED;
 use crate::whiteness::chi_squared_tail;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 

@@ -1,9 +1,9 @@
 //! Parts of the data with steps of their own.
 
+use crate::covariance::directions;
+use crate::covariance::point::Point;
 use crate::information::Information;
-use crate::judge::directions;
 use crate::judge::evidence::spans::Spans;
-use crate::judge::point::Point;
 use crate::optimize::Linearization;
 
 /// A record with fewer degrees of freedom than this has the noise of all records.

@@ -1,7 +1,7 @@
 //! The rows of each record in parts of equal length, output by output.
 
+use crate::covariance::point::Point;
 use crate::information::{Gathering, Information};
-use crate::judge::point::Point;
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};

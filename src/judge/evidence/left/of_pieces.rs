@@ -2,8 +2,8 @@
 
 use crate::judge::evidence::pieces::Piece;
 use crate::judge::evidence::spans::span;
-use crate::judge::evidence::whiteness::{LAGS, Whiteness};
 use crate::problem::{Accumulate, Objective};
+use crate::residuals::whiteness::{LAGS, Whiteness};
 use crate::sweep::Window;
 use crate::whiteness::Portmanteau;
 

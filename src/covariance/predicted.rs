@@ -5,8 +5,8 @@
 //! with `var(v)` by the slopes of `v` along the unknowns, weighed by their covariance (Fai and Cornelius, J. Statistical
 //! Computation and Simulation 54 (1996) 363).
 
+use crate::covariance::point::Point;
 use crate::information::Covariance;
-use crate::judge::point::Point;
 use crate::parameter::{Parameter, Transform};
 use nalgebra::{Cholesky, DMatrix};
 

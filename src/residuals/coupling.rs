@@ -1,6 +1,6 @@
 //! Whether the errors of several outputs are correlated at the same sample.
 
-use crate::judge::evidence::whiteness::Whiteness;
+use crate::residuals::whiteness::Whiteness;
 use crate::sweep::Window;
 use crate::whiteness::chi_squared_tail;
 use crate::wide::{Terms, Wide, sums};
@@ -131,7 +131,7 @@ impl Coupling {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::judge::evidence::whiteness::LAGS;
+    use crate::residuals::whiteness::LAGS;
 
     const PLAIN: Whiteness = Whiteness { p_value: 1.0, correlations: [0.0; LAGS], predicted: 0.0, dependence: 1.0 };
 

@@ -12,10 +12,10 @@
 
 mod scores;
 
+use crate::covariance::leverage::{form, of_experiment};
+use crate::covariance::point::Point;
+use crate::covariance::shares::{self, Largest};
 use crate::information::{Covariance, Gathering, Information};
-use crate::judge::evidence::shares::{self, Largest};
-use crate::judge::leverage::{form, of_experiment};
-use crate::judge::point::Point;
 use crate::optimize::Linearization;
 use crate::prefilter::Butterworth;
 use crate::problem::{Accumulate, Objective};

@@ -1,21 +1,31 @@
 //! One pass over the data without slopes: the residuals at the estimate.
 
+pub(crate) mod coupling;
 mod experiment;
+pub(crate) mod first_errors;
+pub(crate) mod largest;
+pub(crate) mod modes;
+mod output_sums;
+pub(crate) mod powers;
+pub(crate) mod products;
+mod step_error;
+pub(crate) mod whiteness;
 
 use crate::error::Error;
 use crate::estimate::OutputFit;
-use crate::judge::evidence::coupling::Coupled;
-use crate::judge::evidence::first_errors::Errors;
-use crate::judge::evidence::largest::Largest;
-use crate::judge::evidence::modes::StateAt;
-use crate::judge::evidence::output_sums::OutputSums;
-use crate::judge::evidence::powers::{COMPARED, Powers, Scale, parts_by_chance, scales};
-use crate::judge::evidence::step_error::{Compared, step_errors};
-use crate::judge::evidence::whiteness::Whiteness;
 use crate::optimize::Infeasible;
 use crate::problem::noise::REPRODUCED;
 use crate::problem::{At, Objective, gather_together};
+use crate::residuals::coupling::Coupled;
+use crate::residuals::first_errors::Errors;
+use crate::residuals::largest::Largest;
+use crate::residuals::modes::StateAt;
+use crate::residuals::powers::{COMPARED, Powers, Scale, parts_by_chance, scales};
+use crate::residuals::step_error::{Compared, step_errors};
+use crate::residuals::whiteness::Whiteness;
 use experiment::Sums;
+use output_sums::OutputSums;
+pub(crate) use output_sums::output_fit;
 
 /// Results of a pass over the residuals.
 pub(crate) struct Residuals {

@@ -1,7 +1,7 @@
 //! Products of errors with what they may follow from.
 
 use crate::estimate::student::two_sided;
-use crate::judge::evidence::powers::explained;
+use crate::residuals::powers::explained;
 use crate::whiteness::chi_squared_tail;
 
 /// Sums over errors `e` and regressors `z`.

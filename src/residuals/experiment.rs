@@ -1,14 +1,14 @@
 //! Sums over the errors of one experiment, window by window.
 
-use crate::judge::evidence::coupling::Coupling;
-use crate::judge::evidence::first_errors::FirstErrors;
-use crate::judge::evidence::largest::Largest;
-use crate::judge::evidence::output_sums::OutputSums;
-use crate::judge::evidence::powers::{Powers, Scale};
-use crate::judge::evidence::step_error::{Compared, Extremes, Sampled};
-use crate::judge::evidence::whiteness::LAGS;
 use crate::problem::{Accumulate, Objective};
 use crate::record::{Channel, Record, Time};
+use crate::residuals::coupling::Coupling;
+use crate::residuals::first_errors::FirstErrors;
+use crate::residuals::largest::Largest;
+use crate::residuals::output_sums::OutputSums;
+use crate::residuals::powers::{Powers, Scale};
+use crate::residuals::step_error::{Compared, Extremes, Sampled};
+use crate::residuals::whiteness::LAGS;
 use crate::sweep::Window;
 use crate::whiteness::Portmanteau;
 use std::ops::Range;

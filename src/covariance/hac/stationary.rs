@@ -7,9 +7,9 @@
 //! the innovations times the sum of squares of the slopes `g`, filtered by the autoregression and beyond the end of the
 //! record. (In which direction does not matter: a stationary sequence has the same covariances backward.)
 
+use crate::covariance::leverage::ALONE;
+use crate::covariance::shares::Shares;
 use crate::information::{Gathering, Information};
-use crate::judge::evidence::shares::Shares;
-use crate::judge::leverage::ALONE;
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
 use crate::whiteness::{Autocorrelation, levinson_durbin};

@@ -7,8 +7,8 @@
 
 mod pass;
 
-use crate::judge::evidence::sizes::Sizes;
-use crate::judge::leverage::ALONE;
+use crate::covariance::leverage::ALONE;
+use crate::covariance::sizes::Sizes;
 use crate::problem::Objective;
 use nalgebra::DMatrix;
 pub(crate) use pass::Pass;

@@ -5,9 +5,9 @@
 //! intervals are those of the estimate without bounds: they cover as often as they say, whether the truth is at the
 //! bound or within it. What the unknown at the bound keeps of its own is the part within the bounds.
 
+use crate::covariance::directions::undetermined;
 use crate::estimate::student::Spread;
 use crate::information::Undetermined;
-use crate::judge::directions::undetermined;
 use crate::optimize::Linearization;
 
 /// Which unknowns remain held, of those at bounds and those held for null directions, and the step from the estimate to

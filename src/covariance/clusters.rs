@@ -7,10 +7,10 @@
 //! multiplied by `(I - H)^(-1/2)` (CR2: Bell and McCaffrey, Survey Methodology 28 (2002) 169). What each record has for itself is
 //! minimized out before; of such unknowns this says nothing.
 
+use crate::covariance::leverage::ALONE;
+use crate::covariance::point::Point;
+use crate::covariance::sandwich::Bread;
 use crate::information::Information;
-use crate::judge::evidence::Evidence;
-use crate::judge::leverage::ALONE;
-use crate::judge::point::Point;
 use crate::optimize::Linearization;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -82,8 +82,8 @@ fn variances(parts: &[Part], beside: &DMatrix<f64>) -> Option<Vec<(f64, f64)>> {
 }
 
 /// What the scores of the records say, at a minimum of several that share unknowns.
-pub(crate) fn clusters(evidence: &Evidence<'_>) -> Option<Clusters> {
-    let Point { objective, linear, held_for_covariance: held, end, .. } = &evidence.point;
+pub(crate) fn clusters<'b>(point: &Point<'_>, bread: impl FnOnce() -> Option<&'b Bread>) -> Option<Clusters> {
+    let Point { objective, linear, held_for_covariance: held, end, .. } = point;
     let unknowns = &objective.problem.unknowns;
     let (records, all) = (objective.experiments(), unknowns.shared());
     let free: Vec<usize> = (0..all).filter(|&i| !held[i]).collect();
@@ -99,7 +99,7 @@ pub(crate) fn clusters(evidence: &Evidence<'_>) -> Option<Clusters> {
     let (bread, factor) = match objective.is_robust() {
         false => (None, 1.0),
         true => {
-            let bread = evidence.bread()?;
+            let bread = bread()?;
             (Some(of(&bread.linear)), bread.curvature)
         }
     };

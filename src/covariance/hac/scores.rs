@@ -1,7 +1,7 @@
 //! Accumulators of scores in order of time.
 
+use crate::covariance::leverage::{ALONE, form};
 use crate::information::{Gathering, Information};
-use crate::judge::leverage::{ALONE, form};
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
 use core::f64::consts::FRAC_1_SQRT_2;

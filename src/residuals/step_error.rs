@@ -189,7 +189,7 @@ fn changes(finer: &dyn Sweep, all: &[Compared<'_>], windows: &[(usize, &Sampled)
 
 #[cfg(test)]
 mod tests {
-    use crate::judge::evidence::residual_pass::residual_pass;
+    use crate::residuals::residual_pass;
     use crate::{Experiment, Fit, Kalman, Model, Rk4, Scalar, Time, fixed, free, signals, simulate};
 
     signals! { struct Voltage { u: "V" } }

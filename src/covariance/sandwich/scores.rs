@@ -9,8 +9,8 @@
 //! prediction nothing of the estimate. One less the leverage counts as [`LEAST`] there at least: of a measurement that alone determines an
 //! unknown the variance is then `CANCELED / LEAST`, ten times that of the noise of all, instead of growing without bound.
 
+use crate::covariance::shares::Shares;
 use crate::information::Gathering;
-use crate::judge::evidence::shares::Shares;
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
 use nalgebra::DMatrix;

@@ -1,9 +1,9 @@
 //! [`Point`]: the end of a search, and what follows from its slopes without a pass over the data.
 
+use crate::covariance::{bounds, directions};
 use crate::estimate::Starts;
 use crate::estimate::student::Spread;
 use crate::information::Undetermined;
-use crate::judge::{bounds, directions};
 use crate::layout::Kind;
 use crate::optimize::{LeastSquares, Linearization, Outcome, is_negligible};
 use crate::problem::{Memory, Noise, Objective, Whitening, noise};
