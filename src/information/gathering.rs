@@ -63,4 +63,20 @@ mod tests {
             assert!((a - b).abs() < 1e-12 * expected.at(0, 0), "{i} {j}: {a} {b}");
         }
     }
+
+    /// Rows times a number give the triangle times it, and as many rows.
+    #[test]
+    fn rows_times_a_number() {
+        let row = |k: u32| ([f64::from(k % 7), f64::from(k * k % 11) - 5.0], f64::from(k % 3));
+        let of = |factor: f64| {
+            let mut rows = Gathering::new(2);
+            (0..30).map(row).for_each(|(phi, y)| rows.take(&phi.map(|phi| factor * phi), factor * y));
+            rows.triangle()
+        };
+        let (found, expected) = (of(1.0).times(3.0), of(3.0));
+        assert_eq!(found.rows(), 30);
+        for (i, j) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)] {
+            assert!((found.at(i, j) - expected.at(i, j)).abs() < 1e-12 * expected.at(0, 0), "{i} {j}");
+        }
+    }
 }

@@ -60,6 +60,8 @@ pub(crate) enum Pass {
     Values(usize),
     /// So many more with slopes, where the pass in values or the rows give a reason.
     Slopes(usize),
+    /// The pass with slopes for the curvature of a loss.
+    Curvature,
     /// One with slopes that parts of the data and sensors share, where the rows give a reason.
     Left,
     /// So many with slopes for each unknown that is examined, where its expected curvature or a condition of the model gives a reason.

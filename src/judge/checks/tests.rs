@@ -17,6 +17,7 @@ fn pass(pass: &Pass) -> String {
         Pass::Rows => "the pass with slopes that checks share".to_owned(),
         Pass::Values(count) => format!("up to {} in values, where there is a reason", passes(count)),
         Pass::Slopes(count) => format!("up to {} with slopes, where there is a reason", passes(count)),
+        Pass::Curvature => "the pass with slopes for the curvature of a loss".to_owned(),
         Pass::Left => "one with slopes that parts and sensors share, where there is a reason".to_owned(),
         Pass::EachUnknown(count) => format!("{} or more for each unknown with a reason", passes(count)),
         Pass::Finer => "a pass by a finer method, where there is a reason".to_owned(),

@@ -11,7 +11,7 @@ pub(crate) const LOSS: Check = Check::new(
     &[WarningCode::NarrowLoss],
     |evidence, _| few_within_the_loss(evidence).into(),
 )
-.costs(&[Pass::Rows])
+.costs(&[Pass::Curvature])
 .levels(&[
     level("the relative standard deviation of care", CARE, "standard errors are off by as much"),
     level("that is not usable", NONE, "a half"),
