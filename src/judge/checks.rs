@@ -13,6 +13,7 @@ mod errors;
 mod explained;
 mod feedback;
 mod few;
+mod filter_order;
 mod known;
 mod likelihood;
 mod outliers;
@@ -72,6 +73,7 @@ pub(crate) const CHECKS: &[Check] = &[
     declared::POSITIVE,
     declared::IDENTIFIED,
     step::STEP,
+    filter_order::FILTER_ORDER,
     aliases::ALIASES,
     search::MINIMUM,
     search::STARTS,
