@@ -1,7 +1,9 @@
 //! [`Equations`]: a model as data.
 
+mod moments;
 mod slopes;
 
+pub(crate) use moments::MomentsOf;
 pub(crate) use slopes::{Jacobian, Slopes};
 
 use crate::functions::Functions;
@@ -211,6 +213,12 @@ impl Equations {
     pub fn is_affine(&self) -> bool {
         let degrees = degrees(&self.graph);
         self.state.iter().chain(&self.output).all(|root| degrees[root.index()] <= Degree::One)
+    }
+
+    /// Moments of derivatives (next states), and of outputs, of a Gaussian state.
+    pub(crate) fn moments(&self) -> (MomentsOf, MomentsOf) {
+        let of = |roots: &[Id]| MomentsOf::of(&self.graph, roots, self.layout.states.len());
+        (of(&self.state), of(&self.output))
     }
 
     /// The values of roots; without time, states and inputs for what depends on parameters alone.

@@ -84,7 +84,7 @@
 //! | write a model as a text file, or read one | [`text`] |
 //! | fit from a shell, without Rust | the command `greybox`: [`guide::chapter_17_command`] |
 //! | choose an integrator | [`Automatic`], [`Rk4`], [`Rk45`], [`Esdirk`], [`Discrete`] |
-//! | choose what is predicted | [`FreeRun`], [`Horizon`], [`Kalman`], [`predict`] |
+//! | choose what is predicted | [`FreeRun`], [`Horizon`], [`Kalman`], [`SecondOrder`], [`predict`] |
 //! | weigh or filter errors, limit outliers | [`weighting`], [`loss`], [`Butterworth`] |
 //! | choose a search | [`optimize`]; argmin's solvers by [`Problem::objective`] |
 //! | read the result | [`Estimate`], [`Knowledge`], [`Warning`], [`WarningCode`], [`Summary`], [`estimate`] |
@@ -226,7 +226,7 @@ pub use {
     loss::{Huber, Loss},
     numeric::Numeric,
     outliers::hampel,
-    predict::{FreeRun, Horizon, Kalman},
+    predict::{FreeRun, Horizon, Kalman, SecondOrder},
     prefilter::Butterworth,
     problem::{Problem, Search},
     record::{Initial, Time},

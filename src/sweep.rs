@@ -228,6 +228,11 @@ pub trait Sweep: Send + Sync {
         None
     }
 
+    /// Of a filter of first order, where the model is not affine in its state: the same to the second order.
+    fn second_order<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
+        None
+    }
+
     /// Description of the integrator and its settings.
     fn integrator(&self) -> String;
 

@@ -30,7 +30,7 @@ impl Slopes {
 }
 
 impl Jacobian {
-    fn of(graph: &Graph, roots: &[Id], states: usize) -> Self {
+    pub fn of(graph: &Graph, roots: &[Id], states: usize) -> Self {
         let mut tape = Tape::new(true);
         let values = tape.import(graph, roots);
         let (zero, one) = (tape.constant(0.0), tape.constant(1.0));

@@ -13,6 +13,7 @@ mod errors;
 mod explained;
 mod feedback;
 mod few;
+mod filter_order;
 mod known;
 mod likelihood;
 mod outliers;
@@ -73,6 +74,7 @@ pub(crate) const CHECKS: &[Check] = &[
     declared::POSITIVE,
     declared::IDENTIFIED,
     step::STEP,
+    filter_order::FILTER_ORDER,
     aliases::ALIASES,
     search::MINIMUM,
     search::STARTS,

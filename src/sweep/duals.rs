@@ -161,13 +161,19 @@ impl Sweep for DualSweep<'_> {
         }))
     }
 
+    fn second_order<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
+        let predictor = self.predictor.second_order().filter(|_| !self.code.is_affine())?;
+        let (layout, code, method) = (self.layout.clone(), self.code.clone(), self.method.clone());
+        Some(Arc::new(DualSweep { layout, code, method, predictor, uncompiled: self.uncompiled.clone() }))
+    }
+
     fn integrator(&self) -> String {
         self.method.describe(self.layout.kind)
     }
 
     fn predictor(&self) -> String {
         let predictor = self.predictor.describe();
-        match self.predictor.needs_slopes() && !self.code.is_affine() {
+        match self.predictor.second_order().is_some() && !self.code.is_affine() {
             true => format!("{predictor}, extended: by the model's slopes at the state (first order)"),
             false => predictor,
         }

@@ -248,6 +248,15 @@ impl Sweep for ProgramSweep<'_> {
         })
     }
 
+    fn second_order<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
+        let (plain, predictor) = (self.plain.second_order()?, self.programs.predictor.second_order()?);
+        let (equations, method) = (self.programs.equations.clone(), self.programs.method.clone());
+        Some(match ProgramSweep::new(equations, method, predictor, plain.clone()) {
+            Ok(sweep) => Arc::new(sweep),
+            Err(_) => plain,
+        })
+    }
+
     fn integrator(&self) -> String {
         self.plain.integrator()
     }

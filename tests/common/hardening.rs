@@ -10,6 +10,8 @@ signals! { pub struct Gauges { y: "m", z: "m" } }
 signals! { pub struct Spring { a: "1/s", b: "1/(m^2 s)", c: "m/(N s)", q: "m/s^0.5", r: "m" } }
 
 pub const TRUTH: Spring = Spring { a: 1.0, b: 0.5, c: 1.0, q: 0.3, r: 0.1 };
+/// Noise by which the state strays as far as the spring bends.
+pub const STRONG: Spring = Spring { a: 1.0, b: 0.5, c: 1.0, q: 1.0, r: 0.3 };
 
 /// `dx = (c u - a x - b x^3) dt + q dw`, seen as `y = x + e` with an error of size `r`; `z = x + x^2 / 2`, twice as noisy, is a second gauge.
 #[derive(Clone)]
@@ -37,16 +39,21 @@ impl Model for Hardening {
 /// A record of the plant by Euler's method in steps of a fiftieth of a sample, which err by less than a hundredth of a standard error; the
 /// second gauge is read at one sample in `every`. The state at the first sample is zero.
 pub fn disturbed(time: Time, samples: usize, every: usize, noise: &mut Noise) -> ExperimentOf<Hardening> {
+    driven(&TRUTH, time, samples, every, noise)
+}
+
+/// The same by other parameters.
+pub fn driven(truth: &Spring, time: Time, samples: usize, every: usize, noise: &mut Noise) -> ExperimentOf<Hardening> {
     const STEPS: usize = 50;
     let (mut x, mut inputs, mut outputs) = (0.0, vec![], vec![]);
     for k in 0..samples {
         let u = [2.0, -1.0, 0.5, -2.0, 1.0][k / 15 % 5];
-        let (y, z) = (x + TRUTH.r * noise.gauss(), x + 0.5 * x * x + 2.0 * TRUTH.r * noise.gauss());
+        let (y, z) = (x + truth.r * noise.gauss(), x + 0.5 * x * x + 2.0 * truth.r * noise.gauss());
         outputs.push(Gauges { y, z: if k % every == 0 { z } else { f64::NAN } });
         inputs.push(Pull { u });
         let h = (time.at(k + 1) - time.at(k)) / STEPS as f64;
         for _ in 0..STEPS {
-            x += h * (TRUTH.c * u - TRUTH.a * x - TRUTH.b * x * x * x) + TRUTH.q * h.sqrt() * noise.gauss();
+            x += h * (truth.c * u - truth.a * x - truth.b * x * x * x) + truth.q * h.sqrt() * noise.gauss();
         }
     }
     Experiment::new(&Hardening, time, inputs, outputs).unwrap().initial(Deflection { x: fixed(0.0) })

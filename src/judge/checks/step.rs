@@ -171,17 +171,17 @@ fn step_decides_the_search(evidence: &Evidence<'_>) -> Option<Warning> {
 }
 
 /// A move towards the minimum of another objective.
-struct Shift {
+pub(super) struct Shift {
     /// What moves, for a sentence.
-    of: String,
+    pub of: String,
     /// By how many standard errors.
-    errors: f64,
+    pub errors: f64,
     /// By which part of itself.
     part: f64,
 }
 
 /// The largest move of an unknown, or of what the data determine of several unknowns together.
-fn shift(evidence: &Evidence<'_>, objective: &Objective<'_>, unknowns: &[Unknown]) -> Option<Shift> {
+pub(super) fn shift(evidence: &Evidence<'_>, objective: &Objective<'_>, unknowns: &[Unknown]) -> Option<Shift> {
     let linear = objective.evaluate(&evidence.point.end.coordinates).ok()?;
     let found = [of_one(&linear, unknowns), of_several(evidence, &linear, unknowns)];
     found.into_iter().flatten().max_by(|a, b| a.errors.total_cmp(&b.errors))
