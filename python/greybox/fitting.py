@@ -79,7 +79,8 @@ def fit(
         refined until it no longer matters.
     predictor : str, optional
         Which prediction error is minimized: of a ``"simulation"`` (the default), ``"horizon:5"`` (five samples ahead of a measured
-        state), or ``"kalman"`` (one-step errors of a filter, for disturbed plants; the model has `diffusion` and `noise`).
+        state), ``"kalman"`` (one-step errors of a filter, for disturbed plants; the model has `diffusion` and `noise`), or
+        ``"second-order"`` (a filter for strong noise).
     optimizer : str, optional
         ``"levenberg-marquardt"`` or ``"gauss-newton"``.
     starts : int, optional
