@@ -2,7 +2,7 @@
 
 use crate::layout::{Kind, Layout};
 use crate::model::Model;
-use crate::predict::Moments;
+use crate::moments::Moments;
 use crate::scalar::Scalar;
 use crate::signals::Signals;
 use core::ops::Deref;

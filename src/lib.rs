@@ -161,6 +161,8 @@ mod judge;
 #[cfg(feature = "std")]
 pub mod loss;
 #[cfg(feature = "std")]
+mod moments;
+#[cfg(feature = "std")]
 mod numeral;
 #[cfg(feature = "std")]
 mod numeric;

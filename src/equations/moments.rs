@@ -2,7 +2,7 @@
 
 use super::slopes::Jacobian;
 use crate::graph::{Graph, Id, Leaf};
-use crate::predict::{Moments, entry};
+use crate::moments::{Moments, entry};
 use crate::scalar::Scalar;
 
 /// The moments of some functions of a Gaussian state to the second order, as a graph of its mean and, as further states, its covariance.
@@ -35,7 +35,7 @@ impl MomentsOf {
     }
 
     /// Moments from the values of the roots.
-    pub fn from_roots<S: Scalar>(&self, mut found: Vec<S>) -> Moments<S> {
+    pub fn moments<S: Scalar>(&self, mut found: Vec<S>) -> Moments<S> {
         let pairs = self.functions * (self.functions + 1) / 2;
         let spread = found.split_off(found.len() - pairs);
         let slopes = found.split_off(self.functions);
@@ -51,7 +51,7 @@ impl MomentsOf {
             Leaf::Parameter(i) => p[i as usize],
             Leaf::Step | Leaf::NextInput(_) | Leaf::Measured(_) => S::from(f64::NAN),
         });
-        self.from_roots(found)
+        self.moments(found)
     }
 }
 

@@ -1,11 +1,11 @@
 //! The filter of a state that is taken as Gaussian, by the moments of the model's functions: what [`Kalman`](super::Kalman) and
 //! [`SecondOrder`](super::SecondOrder) share.
 
-use super::moments::entry;
 use super::{Moments, Plant};
 use crate::error::Error;
 use crate::integrate::Stuck;
 use crate::layout::{Kind, Layout};
+use crate::moments::entry;
 use crate::scalar::Scalar;
 
 /// How a filter finds the moments of the model's functions, from a state and the covariance after it.

@@ -83,7 +83,7 @@ impl SymbolicPlant<'_> {
     }
 
     fn moments(&self, of: &MomentsOf, position: f64, carry: &[Symbol]) -> Moments<Symbol> {
-        of.from_roots(self.interval.at(&of.graph, &of.roots, position, carry))
+        of.moments(self.interval.at(&of.graph, &of.roots, position, carry))
     }
 }
 

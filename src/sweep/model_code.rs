@@ -7,7 +7,7 @@ use crate::functions::{Functions, Handle};
 use crate::integrate::Duals;
 use crate::layout::{Kind, Layout};
 use crate::model::Model;
-use crate::predict::Moments;
+use crate::moments::Moments;
 use crate::scalar::Scalar;
 use std::sync::{Arc, OnceLock};
 
