@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -82,7 +83,10 @@ class Plan:
         progress : bool
             Show how many records are done (needs tqdm).
         """
-        frame = Frame(opened(data))
+        data = opened(data)
+        if isinstance(data, Path):
+            raise Error(f"{data}: text files of many records are read by pandas: gb.fleet(model, pandas.read_csv({str(data)!r}), ...)")
+        frame = Frame(data)
         missing = [name for name in self.needed() if name not in frame]
         if missing:
             raise Error(f"there is no column `{missing[0]}`; the frame has: {near(missing[0], frame.names)}")

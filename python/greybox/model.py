@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
@@ -264,6 +265,11 @@ def _roots(
     def nodes(role: str, function: Callable[..., Returned] | None, name: str, *args: Any) -> list[_core.Node]:
         if function is None:
             return []
+        try:
+            inspect.signature(function).bind(*args)
+        except TypeError as error:
+            given = "p" if len(args) == 1 else "t, x, u, p"
+            raise Error(f"{name} of {title} cannot be called with ({given}), which are handed over: {error}") from None
         return _returned(trace, function(*args), tuple(quantities[role]), f"{name} of {title}")
 
     name = "derivative" if _written(of, "derivative") else "next"

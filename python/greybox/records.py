@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -68,7 +69,10 @@ class Record:
         data = opened(self.data)
         if isinstance(data, Path):
             columns_ = {**(self.columns or {}), **({} if self.time is None else {"t": self.time})}
-            record = _core.Record.from_csv(equations.core, self.name or data.name, data, columns_, self.sample_time)
+            try:
+                record = _core.Record.from_csv(equations.core, self.name or data.name, data, columns_, self.sample_time)
+            except Error as error:
+                raise Error(_in_python(str(error))) from None
             return self._said(equations, record)
         frame = Frame(data)
         try:
@@ -103,6 +107,18 @@ class Record:
         initial = given if given is None or isinstance(given, str) else declared(given, _states(equations), "initial state of")
         hold = self.hold if self.hold is None or isinstance(self.hold, str) else dict(self.hold)
         return equations.prepared(record).said(hold, initial)
+
+
+def _in_python(text: str) -> str:
+    """Give an error of the library's reader with the remedies that there are in Python."""
+    for theirs, ours in (
+        (r'DataFile::factor\("(\w+)", ([^)]*)\), or 1 if', r"a frame in which `\1` is multiplied by \2, or by 1 if"),
+        (r"DataFile::column", 'columns={"signal": "column"}, or time="column"'),
+        (r"DataFile::sample_time", "sample_time"),
+        (r"DataFile::(\w+)", r"pandas.read_csv (here is no option \1)"),
+    ):
+        text = re.sub(theirs, ours, text)
+    return text
 
 
 def opened(data: Any) -> Any:

@@ -89,8 +89,19 @@ def test_several_files_and_what_is_said_of_each(tmp_path: Path) -> None:
     found = gb.fit(cooling(), paths, k=gb.free(1.0, per_experiment=True), time="when", columns={"body": "T"})
     assert [one["name"] for one in found.to_dict()["experiments"]] == ["cold.csv", "warm.csv"]
     assert found.parameters.k == pytest.approx(0.3, rel=0.01)
-    with pytest.raises(gb.Error, match="body"):
+    with pytest.raises(gb.Error, match="no column `body`; the file has: when, room, T; name another with columns="):
         gb.fit(cooling(), paths[0], k=gb.free(1.0), time="when")
+    with pytest.raises(gb.Error, match="read by pandas: gb.fleet"):
+        gb.fleet(cooling(), paths[0], by="which", k=gb.free(1.0))
+
+
+def test_a_unit_that_is_not_the_signals_is_refused_with_the_factor(tmp_path: Path, declared: dict[str, gb.Parameter]) -> None:
+    frame = pd.read_csv(DATA / "pmsm.csv")
+    text = frame.to_csv(index=False).splitlines()
+    units = {"t": "s", "ud": "V", "uq": "V", "w": "rpm", "id": "A", "iq": "A"}
+    (tmp_path / "a.csv").write_text("\n".join([text[0], ",".join(units[name] for name in frame.columns), *text[1:]]))
+    with pytest.raises(gb.Error, match="give a frame in which `w` is multiplied by 0.1047.*, or by 1 if the file's unit is wrong"):
+        gb.fit(Pmsm(4), tmp_path / "a.csv", **declared)
 
 
 def test_the_librarys_record_needs_no_frame(declared: dict[str, gb.Parameter], fitted: gb.Fit) -> None:
