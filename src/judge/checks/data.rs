@@ -4,7 +4,7 @@ use crate::estimate::{Warning, WarningCode};
 use crate::judge::check::{Check, Examined, Level, Pass};
 use crate::judge::evidence::Evidence;
 use crate::judge::evidence::suspects::{Split, Suspect, splits};
-use crate::numeral::{counted, exact, number, percent};
+use crate::numeral::{counted, exact, number, percent, unit_after};
 use crate::optimize::Severity;
 use crate::record::{ChannelInspection, Inspection, Record, Suspicion};
 use std::sync::Arc;
@@ -161,9 +161,9 @@ fn constant_outputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<W
         let (value, rmse) = ((*value)?, evidence.residuals.outputs[j].rmse);
         // A controller may hold an output; the model then gives the same.
         let held = !all && rmse <= REPRODUCED * value.abs();
-        let (name, unit) = (&outputs[j].name, &outputs[j].unit);
+        let (name, unit) = (&outputs[j].name, unit_after(&outputs[j].unit));
         let text = format!(
-            "the output `{name}` is {} {unit} throughout: it never moves and says nothing of the parameters; check the \
+            "the output `{name}` is {}{unit} throughout: it never moves and says nothing of the parameters; check the \
              sensor, or excite the plant",
             exact(value)
         );
@@ -203,10 +203,10 @@ fn suspicions(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning
         if warnings.len() < NAMED {
             let of = of_experiment(evidence, suspect.experiment);
             let text = format!(
-                "the output `{}`{of} {suspicion}, and the model differs there by {} {}: {advice}",
+                "the output `{}`{of} {suspicion}, and the model differs there by {}{}: {advice}",
                 channel.name,
                 number(split.rms(), 2),
-                evidence.point.objective.problem.layout().outputs[suspect.output].unit
+                unit_after(&evidence.point.objective.problem.layout().outputs[suspect.output].unit)
             );
             warnings.push(warning(code, severity, text));
         }
@@ -277,11 +277,11 @@ fn coarse(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
         let often = evidence.residuals.outputs[j].samples >= (TIMES * levels) as u64;
         (often && rmse > PART_OF_STEP * step).then(|| {
             let text = format!(
-                "the output `{}` has {levels} values only, {} {} apart: its rounding is no noise, and parameters are off \
+                "the output `{}` has {levels} values only, {}{} apart: its rounding is no noise, and parameters are off \
                  by it; measure it finer",
                 output.name,
                 number(step, 3),
-                output.unit
+                unit_after(&output.unit)
             );
             warning(WarningCode::CoarseOutput, Severity::UsableWithCare, text)
         })

@@ -16,7 +16,7 @@ use crate::judge::directions;
 use crate::judge::evidence::sensors::{KINDS, Kind};
 use crate::judge::evidence::{Evidence, ROUND_OFF};
 use crate::judge::leverage::prior_row;
-use crate::numeral::{number, p_value, percent};
+use crate::numeral::{number, p_value, percent, unit_after};
 use crate::optimize::{Linearization, Severity};
 use crate::problem::{Objective, Role, Whitening};
 pub(crate) use offsets::growth_by_offsets;
@@ -45,6 +45,9 @@ const FAR: f64 = 0.25;
 const NOTHING: f64 = 1e-4;
 /// Part of a regressor's norm that must be orthogonal to the slopes of the unknowns: below it, curvature and rounding decide.
 const LEFT: f64 = 1e-4;
+/// Norm of the prediction, or of its changes, in standard deviations of the noise, below which its gain or delay has a standard error of more
+/// than one by itself: a current that a controller holds at zero.
+const ACTS: f64 = 1.0;
 /// Regressors whose sum of squares is within this many variances of the least (a chance of 0.002) explain the errors as well: of the gains of
 /// two sensors, often only the ratio is determined. At most so many are said.
 const AS_WELL: f64 = 10.0;
@@ -131,10 +134,12 @@ impl<'j> Extended<'j> {
         if unknown < shared { unknown } else { unknown + self.objective.outputs() * KINDS }
     }
 
-    /// Whether an output has noise to tell it by, and its samples an order where it is asked for a delay.
+    /// Whether an output has noise to tell it by, its samples an order where it is asked for a delay, and its prediction anything that a gain
+    /// or a delay changes.
     fn is_examined(&self, number: usize) -> bool {
         let (j, kind) = (number / KINDS, Kind::ALL[number % KINDS]);
-        !(self.evidence.rounded[j] || kind == Kind::Delay && self.evidence.point.is_static())
+        let acts = kind == Kind::Offset || self.linear.column_norms()[self.place(number)] > ACTS;
+        acts && !(self.evidence.rounded[j] || kind == Kind::Delay && self.evidence.point.is_static())
     }
 
     /// Which unknowns and regressors are held, one of the latter released.
@@ -191,7 +196,7 @@ impl<'j> Extended<'j> {
         let is = match Kind::ALL[found.number % KINDS] {
             Kind::Gain => format!("is {} +- {error} times what the model predicts", number(1.0 + value, 4)),
             Kind::Offset => {
-                format!("lies {} +- {error} {} beside what the model predicts", number(value, 3), output.unit)
+                format!("lies {} +- {error}{} beside what the model predicts", number(value, 3), unit_after(&output.unit))
             }
             Kind::Delay => {
                 let order = if value > 0.0 { "after" } else { "before" };

@@ -7,7 +7,7 @@ use super::Extended;
 use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::judge::checks::data::{FEW, PART_OF_STEP, TIMES, distinct};
 use crate::judge::evidence::sensors::{KINDS, Kind};
-use crate::numeral::{number, percent};
+use crate::numeral::{number, percent, unit_after};
 use crate::optimize::{Linearization, Severity};
 
 /// With more values than these (6 bits) the offset of half a step is below a hundredth of the range.
@@ -52,11 +52,11 @@ impl Extended<'_> {
         let (name, part, errors) = self.furthest(&step, unknowns).filter(|(.., errors)| *errors > FAR)?;
         let output = &self.objective.problem.layout().outputs[j];
         let text = format!(
-            "the output `{}` has {count} values, {} {} apart: if the sensor truncates instead of rounding, which the record does not \
+            "the output `{}` has {count} values, {}{} apart: if the sensor truncates instead of rounding, which the record does not \
              exclude, `{name}` is {} ({} standard errors) away from this estimate; add half a step to truncated values, or measure it finer",
             output.name,
             number(size, 3),
-            output.unit,
+            unit_after(&output.unit),
             percent(part, 2),
             number(errors, 2)
         );
