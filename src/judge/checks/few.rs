@@ -7,7 +7,7 @@ use crate::judge::evidence::rows::{Asked, rows};
 use crate::judge::evidence::shares::{DECIDES, Share, part};
 use crate::judge::evidence::{Evidence, PREFILTER, ROUND_OFF};
 use crate::judge::intervals::Intervals;
-use crate::numeral::{exact, percent};
+use crate::numeral::percent;
 use crate::optimize::Severity;
 use crate::problem::Role;
 
@@ -80,9 +80,9 @@ fn places(evidence: &Evidence<'_>, shares: &[Share]) -> String {
     let problem = evidence.point.objective.problem;
     let place = |share: &Share| {
         format!(
-            "`{}` at t = {} s of `{}`",
+            "`{}` at t = {} of `{}`",
             problem.layout().outputs[share.output].name,
-            exact(problem.records[share.experiment].time(share.sample)),
+            problem.records[share.experiment].moment(share.sample),
             problem.unknowns.labels[share.experiment]
         )
     };

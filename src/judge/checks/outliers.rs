@@ -7,7 +7,7 @@ use crate::judge::checks::dropouts;
 use crate::judge::evidence::first_errors::{self, Errors};
 use crate::judge::evidence::largest::chance;
 use crate::judge::evidence::{Evidence, ROUND_OFF};
-use crate::numeral::{exact, number, p_value, percent};
+use crate::numeral::{number, p_value, percent};
 use crate::optimize::Severity;
 use crate::outliers::{center_and_deviation, hampel};
 
@@ -118,10 +118,10 @@ fn extreme(evidence: &Evidence<'_>, j: usize) -> Option<Warning> {
     }
     let problem = evidence.point.objective.problem;
     let text = format!(
-        "the error of `{}` at t = {} s of `{}` is {} times the deviation of all others ({} for the largest of {count} normal \
+        "the error of `{}` at t = {} of `{}` is {} times the deviation of all others ({} for the largest of {count} normal \
          errors): look at this measurement, and mark it as missing if it is wrong",
         problem.layout().outputs[j].name,
-        exact(problem.records[largest.experiment].time(largest.sample)),
+        problem.records[largest.experiment].moment(largest.sample),
         problem.unknowns.labels[largest.experiment],
         number(ratio, 3),
         p_value(chance)

@@ -196,7 +196,11 @@ impl<'j> Extended<'j> {
         let is = match Kind::ALL[found.number % KINDS] {
             Kind::Gain => format!("is {} +- {error} times what the model predicts", number(1.0 + value, 4)),
             Kind::Offset => {
-                format!("lies {} +- {error}{} beside what the model predicts", number(value, 3), unit_after(&output.unit))
+                format!(
+                    "lies {} +- {error}{} beside what the model predicts",
+                    number(value, 3),
+                    unit_after(&output.unit)
+                )
             }
             Kind::Delay => {
                 let order = if value > 0.0 { "after" } else { "before" };
