@@ -78,7 +78,8 @@ fn looked_at(record: &Record) -> (String, bool) {
         // An input may well have few values, a square wave for one.
         odd |= !found.suspicions.is_empty() || !is_input && !found.remarks().is_empty();
         let range = found.range.map_or("nothing".to_owned(), |(least, greatest)| format!("{least} to {greatest}"));
-        text += &format!("\n  {}: {range} {}", channel.name, channel.unit);
+        let unit = if channel.unit == "1" { "" } else { &channel.unit };
+        text += format!("\n  {}: {range} {unit}", channel.name).trim_end();
         for remark in found.remarks() {
             text += &format!("\n    {remark}");
         }

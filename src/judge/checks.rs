@@ -40,7 +40,7 @@ use crate::judge::covariances::Covariances;
 use crate::judge::evidence::Evidence;
 use crate::judge::evidence::ruled_out::Unless;
 use crate::judge::intervals::Intervals;
-use crate::numeral::{counted, exact, number, p_value, percent};
+use crate::numeral::{counted, exact, number, p_value, percent, unit_after};
 use crate::optimize::Severity;
 use crate::problem::{Objective, Role};
 

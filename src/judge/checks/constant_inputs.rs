@@ -35,7 +35,7 @@ fn constant_inputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Wa
     let acts = constant.iter().any(|(_, _, value)| *value != 0.0);
     let growth = if acts { growth_by_offsets(evidence) } else { None };
     let one = |&(i, input, value): &(usize, &crate::layout::Quantity, f64)| {
-        let is = format!("the input `{}` is {} {} throughout", input.name, exact(value), input.unit);
+        let is = format!("the input `{}` is {}{} throughout", input.name, exact(value), unit_after(&input.unit));
         let (severity, what) = match (value == 0.0, &growth) {
             (true, _) => (Severity::Usable, "what it does is not seen".to_owned()),
             (_, None) => (Severity::UsableWithCare, "what it drives may not be told from an offset".to_owned()),

@@ -74,9 +74,9 @@ fn constant_outputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<W
         let (value, rmse) = ((*value)?, evidence.residuals.outputs[j].rmse);
         // A controller may hold an output; the model then gives the same.
         let held = !all && rmse <= REPRODUCED * value.abs();
-        let (name, unit) = (&outputs[j].name, &outputs[j].unit);
+        let (name, unit) = (&outputs[j].name, unit_after(&outputs[j].unit));
         let text = format!(
-            "the output `{name}` is {} {unit} throughout: it never moves and says nothing of the parameters; check the \
+            "the output `{name}` is {}{unit} throughout: it never moves and says nothing of the parameters; check the \
              sensor, or excite the plant",
             exact(value)
         );
@@ -107,11 +107,11 @@ fn coarse(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
         let often = evidence.residuals.outputs[j].samples >= (TIMES * levels) as u64;
         (often && rmse > PART_OF_STEP * step).then(|| {
             let text = format!(
-                "the output `{}` has {levels} values only, {} {} apart: its rounding is no noise, and parameters are off \
+                "the output `{}` has {levels} values only, {}{} apart: its rounding is no noise, and parameters are off \
                  by it; measure it finer",
                 output.name,
                 number(step, 3),
-                output.unit
+                unit_after(&output.unit)
             );
             with_care(WarningCode::CoarseOutput, text)
         })

@@ -130,11 +130,11 @@ fn restart_noise(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warnin
             (0..sigma.len()).max_by(|&a, &b| (sigma[a] / outputs[a].rmse).total_cmp(&(sigma[b] / outputs[b].rmse)))?;
         let output = &problem.layout().outputs[j];
         let text = format!(
-            "predictions restart from measured states as if these were exact: the errors do not exclude noise of up to {} {} in `{}`, which \
+            "predictions restart from measured states as if these were exact: the errors do not exclude noise of up to {}{} in `{}`, which \
              would bias `{}` by {} standard errors; use Kalman with Model::noise, filter the restarts (Horizon::filtered), or take a longer \
              horizon",
             number(sigma[j], 2),
-            output.unit,
+            unit_after(&output.unit),
             output.name,
             unknown.name,
             number(errors, 2)
@@ -174,11 +174,11 @@ fn input_noise(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning>
         return None;
     }
     let text = format!(
-        "the noise declared for the inputs biases `{}` by about {} {} ({} of it, {} standard errors), which no interval \
+        "the noise declared for the inputs biases `{}` by about {}{} ({} of it, {} standard errors), which no interval \
          allows for; measure the inputs better, filter record and outputs alike, or average over periods",
         unknown.name,
         number(change, 2),
-        unknown.unit,
+        unit_after(&unknown.unit),
         percent((change / unknown.value).abs(), 2),
         number(errors, 2)
     );

@@ -58,17 +58,17 @@ fn held_at_bound(unknowns: &[Unknown]) -> Vec<Warning> {
     let mut warnings = vec![];
     for unknown in unknowns {
         if let Knowledge::Held { bound, end } = unknown.knowledge {
-            let Unknown { name, unit, .. } = unknown;
+            let (name, unit) = (&unknown.name, unit_after(&unknown.unit));
             let place = match (unknown.transform, bound) {
                 (Transform::Log, 0.0) => {
                     "is held where it changes nothing: its logarithm has no minimum, the cost falls towards zero"
                         .to_owned()
                 }
-                _ => format!("is held at its bound {} {unit}: the cost falls beyond it", exact(bound)),
+                _ => format!("is held at its bound {}{unit}: the cost falls beyond it", exact(bound)),
             };
             let reaches = match end {
                 Some(end) => {
-                    format!("; its 95 % interval reaches from {} to {} {unit}", exact(bound), number(end, 3))
+                    format!("; its 95 % interval reaches from {} to {}{unit}", exact(bound), number(end, 3))
                 }
                 None => String::new(),
             };
@@ -90,8 +90,8 @@ fn not_positive(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
             }
             false => "model and record contradict each other; check units, signs and the hold of the inputs",
         };
-        let (value, unit) = (number(unknown.value, 4), &unknown.unit);
-        let text = format!("`{}` is {value} {unit}, but was declared positive: {means}", unknown.name);
+        let (value, unit) = (number(unknown.value, 4), unit_after(&unknown.unit));
+        let text = format!("`{}` is {value}{unit}, but was declared positive: {means}", unknown.name);
         not_usable(WarningCode::NotPositive, text)
     };
     wrong.map(warning).collect()

@@ -126,12 +126,12 @@ fn given_noise(evidence: &Evidence<'_>, method: CovarianceMethod) -> Vec<Warning
             _ => "intervals are by the errors",
         };
         let text = format!(
-            "the noise of `{}` was given as {} {unit}, but the errors are {} {unit} (rms): {intervals}; leave the noise out to \
+            "the noise of `{}` was given as {}{unit}, but the errors are {}{unit} (rms): {intervals}; leave the noise out to \
              have it estimated",
             output.name,
             number(sigma[j], 3),
             number(found.rmse, 3),
-            unit = output.unit
+            unit = unit_after(&output.unit)
         );
         Some(Warning { code: WarningCode::GivenNoise, severity, text })
     };

@@ -149,9 +149,10 @@ fn against_priors(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning>
     let one = |(row, unknown): (&Free, &Unknown)| {
         let prior = row.parameter.prior?;
         let distance = distance(unknown, prior).filter(|distance| *distance > UNLIKELY)?;
-        let (Unknown { name, unit, value, .. }, Prior { mean, std }) = (unknown, prior);
+        let (Unknown { name, value, .. }, Prior { mean, std }) = (unknown, prior);
+        let unit = unit_after(&unknown.unit);
         let text = format!(
-            "the data contradict the prior of `{name}`, {} +- {} {unit}: with it `{name}` is {} {unit}, {} standard deviations of \
+            "the data contradict the prior of `{name}`, {} +- {}{unit}: with it `{name}` is {}{unit}, {} standard deviations of \
              that difference from its mean; check prior, model and units, or leave the prior out",
             exact(mean),
             exact(std),
@@ -188,9 +189,9 @@ fn started(unknowns: &[Unknown]) -> impl Iterator<Item = (&Unknown, f64)> {
 fn opposite(unknowns: &[Unknown]) -> Vec<Warning> {
     let turned = started(unknowns).filter(|(unknown, ratio)| ratio.is_sign_negative() && !holds_zero(unknown));
     let one = |(unknown, _): (&Unknown, f64)| {
-        let Unknown { name, value, start, unit, .. } = unknown;
+        let (Unknown { name, value, start, .. }, unit) = (unknown, unit_after(&unknown.unit));
         let text = format!(
-            "`{name}` is {} {unit}, but its start was {}: the sign has changed; check the signs of the signals, or give a \
+            "`{name}` is {}{unit}, but its start was {}: the sign has changed; check the signs of the signals, or give a \
              bound",
             number(*value, 4),
             exact(*start)
@@ -207,9 +208,9 @@ fn far_from_start(unknowns: &[Unknown]) -> Vec<Warning> {
         !holds_zero(unknown) && (size > ANOTHER_UNIT || size < ANOTHER_UNIT.recip())
     });
     let one = |(unknown, ratio): (&Unknown, f64)| {
-        let Unknown { name, value, start, unit, .. } = unknown;
+        let (Unknown { name, value, start, .. }, unit) = (unknown, unit_after(&unknown.unit));
         let text = format!(
-            "`{name}` is {} {unit}, {} times its start {}: check the units of signals and time",
+            "`{name}` is {}{unit}, {} times its start {}: check the units of signals and time",
             number(*value, 4),
             number(ratio, 2),
             exact(*start)
@@ -221,9 +222,9 @@ fn far_from_start(unknowns: &[Unknown]) -> Vec<Warning> {
         unknown.knowledge == Knowledge::Unidentified && (size > RUN_AWAY || size < RUN_AWAY.recip())
     });
     let away = |(unknown, ratio): (&Unknown, f64)| {
-        let Unknown { name, value, start, unit, .. } = unknown;
+        let (Unknown { name, value, start, .. }, unit) = (unknown, unit_after(&unknown.unit));
         let text = format!(
-            "`{name}` is {} {unit}, {} times its start {}, and the data do not determine it: the search has run along a direction that \
+            "`{name}` is {}{unit}, {} times its start {}, and the data do not determine it: the search has run along a direction that \
              changes nothing; check signals and units, fix it, or give it a bound or a prior",
             number(*value, 4),
             number(ratio, 2),

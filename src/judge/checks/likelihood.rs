@@ -25,12 +25,12 @@ fn unbounded(evidence: &Evidence<'_>) -> Option<Warning> {
         false => ("such as a first one that equals the initial state", "leave out what is predicted exactly (NaN)"),
     };
     let text = format!(
-        "a measurement of `{}` is predicted with a standard deviation of {} {unit}, beside errors of {} {unit}: the \
+        "a measurement of `{}` is predicted with a standard deviation of {}{unit}, beside errors of {}{unit}: the \
          likelihood grows without bound ({cause}); give the noise a lower bound, or {remedy}",
         output.name,
         number(least_sigma, 2),
         number(rmse, 2),
-        unit = output.unit
+        unit = unit_after(&output.unit)
     );
     Some(not_usable(WarningCode::UnboundedLikelihood, text))
 }

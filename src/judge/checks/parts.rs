@@ -56,14 +56,14 @@ fn differing(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covari
     let apart = error * (differing.equal * (1.0 - differing.ratio.recip())).sqrt();
     let part = apart / unknown.value.abs().max(f64::MIN_POSITIVE);
     let text = format!(
-        "`{}` differs from record to record by more than the errors do ({} records, {}): by about {} {} ({} of itself, one standard \
+        "`{}` differs from record to record by more than the errors do ({} records, {}): by about {}{} ({} of itself, one standard \
          deviation); its interval is that of a mean over such records; give each record its own (Parameter::per_experiment), check whether all \
          are of one plant, and what the model leaves out",
         unknown.name,
         differing.records,
         p_value(differing.chance),
         number(apart, 2),
-        unknown.unit,
+        unit_after(&unknown.unit),
         percent(part, 2)
     );
     let severity = if part > FAR_APART { Severity::NotUsable } else { Severity::UsableWithCare };

@@ -65,7 +65,7 @@ fn said(extended: &Extended<'_>, found: &Released, wider: f64, unknowns: &[Unkno
     let is = match Kind::ALL[found.number % KINDS] {
         Kind::Gain => format!("is {} +- {error} times what the model predicts", number(1.0 + value, 4)),
         Kind::Offset => {
-            format!("lies {} +- {error} {} beside what the model predicts", number(value, 3), output.unit)
+            format!("lies {} +- {error}{} beside what the model predicts", number(value, 3), unit_after(&output.unit))
         }
         Kind::Delay => {
             let order = if value > 0.0 { "after" } else { "before" };

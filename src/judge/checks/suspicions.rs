@@ -79,10 +79,10 @@ fn suspicions(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning
         if warnings.len() < NAMED {
             let of = of_experiment(evidence, suspect.experiment);
             let text = format!(
-                "the output `{}`{of} {suspicion}, and the model differs there by {} {}: {advice}",
+                "the output `{}`{of} {suspicion}, and the model differs there by {}{}: {advice}",
                 channel.name,
                 number(split.rms(), 2),
-                evidence.point.objective.problem.layout().outputs[suspect.output].unit
+                unit_after(&evidence.point.objective.problem.layout().outputs[suspect.output].unit)
             );
             warnings.push(Warning { code, severity, text });
         }

@@ -16,6 +16,9 @@ use crate::problem::Role;
 pub(crate) const LEVEL: f64 = 1e-4;
 /// Part of a regressor's norm that must be orthogonal to the slopes of the unknowns: below it, curvature and rounding decide.
 const LEFT: f64 = 1e-4;
+/// Norm of the prediction, or of its changes, in standard deviations of the noise, below which its gain or delay has a standard error of more
+/// than one by itself: a current that a controller holds at zero.
+const ACTS: f64 = 1.0;
 
 /// A regressor that was estimated beside the unknowns.
 pub(crate) struct Released {
@@ -75,10 +78,12 @@ impl<'j> Extended<'j> {
         if unknown < shared { unknown } else { unknown + self.regressors() }
     }
 
-    /// Whether an output has noise to tell it by, and its samples an order where it is asked for a delay.
+    /// Whether an output has noise to tell it by, its samples an order where it is asked for a delay, and its prediction anything that a gain
+    /// or a delay changes.
     fn is_examined(&self, number: usize) -> bool {
         let (j, kind) = (number / KINDS, Kind::ALL[number % KINDS]);
-        !(self.evidence.rounded[j] || kind == Kind::Delay && self.evidence.point.is_static())
+        let acts = kind == Kind::Offset || self.linear.column_norms()[self.place(number)] > ACTS;
+        acts && !(self.evidence.rounded[j] || kind == Kind::Delay && self.evidence.point.is_static())
     }
 
     /// Which unknowns and regressors are held, one of the latter released.

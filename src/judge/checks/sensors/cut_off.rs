@@ -50,11 +50,11 @@ fn if_cut_off(extended: &Extended<'_>, unknowns: &[Unknown], (j, count, size): (
     let (name, part, errors) = extended.furthest(&step, unknowns).filter(|(.., errors)| *errors > FAR)?;
     let output = &extended.evidence.point.objective.problem.layout().outputs[j];
     let text = format!(
-        "the output `{}` has {count} values, {} {} apart: if the sensor truncates instead of rounding, which the record does not \
+        "the output `{}` has {count} values, {}{} apart: if the sensor truncates instead of rounding, which the record does not \
          exclude, `{name}` is {} ({} standard errors) away from this estimate; add half a step to truncated values, or measure it finer",
         output.name,
         number(size, 3),
-        output.unit,
+        unit_after(&output.unit),
         percent(part, 2),
         number(errors, 2)
     );
