@@ -226,6 +226,7 @@ pub use {
     experiment::{Experiment, ExperimentOf, Sample},
     fit::{Fit, Fittable, Fleet, Records},
     loss::{Huber, Loss},
+    numeral::{Moment, TimeUnit},
     numeric::Numeric,
     outliers::hampel,
     predict::{FreeRun, Horizon, Kalman, SecondOrder},

@@ -81,7 +81,8 @@ mod tests {
         }
     }
 
-    /// `a` of 0.9 under steps of the input, with these standard deviations of the measurements and of what disturbs the state.
+    /// `a` of 0.9 under steps of the input, which move the state by some 10 A, with these standard deviations of the measurements and of what
+    /// disturbs the state.
     fn record(noise: f64, disturbance: f64) -> crate::ExperimentOf<Discrete> {
         let (mut random, mut x) = (Random::stream(3, 0), 0.0);
         let inputs: Vec<Voltage> = (0..300).map(|k| Voltage { u: f64::from(k / 12 * 7 % 5) - 2.0 }).collect();
@@ -105,7 +106,7 @@ mod tests {
             let found = change(Summary { warnings: vec![], ..found });
             (problem.compared_with_simulation(&found, control), found)
         };
-        let (noisy, never) = (record(0.5, 0.0), Control::NEVER);
+        let (noisy, never) = (record(6.0, 0.0), Control::NEVER);
         let (warned, found) = said(&noisy, |found| found, &never);
         let warned = warned.unwrap();
         let simulated = Fit::new(&Discrete, &noisy).parameters(Recursion { a: free(0.7), b: free(1.2) }).run().unwrap();

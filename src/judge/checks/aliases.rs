@@ -98,12 +98,14 @@ fn aliased(evidence: &Evidence<'_>) -> Option<Warning> {
     let compared = evidence.point.end.starts.is_some();
     let severity = if compared { Severity::Usable } else { Severity::UsableWithCare };
     let tried = if compared { "searches were started on both sides" } else { "no search was started there" };
+    let unit = evidence.point.objective.problem.records[0].time_unit();
+    let per = unit.angular_frequency();
     let text = format!(
-        "the model oscillates at {} rad/s, of which the samples, {} s apart, take {} a period: an oscillation at {} rad/s gives \
+        "the model oscillates at {} {per}, of which the samples, {} apart, take {} a period: an oscillation at {} {per} gives \
          the same samples, with other parameters ({tried}); sample faster, search from several starts (Fit::starts), or bound \
          `{name}`",
         number(frequency, 3),
-        number(interval, 3),
+        unit.say(interval, 3),
         number(TAU / (frequency * interval), 2),
         number(alias, 3)
     );

@@ -59,9 +59,9 @@ fn places(evidence: &Evidence<'_>, shares: &[Share]) -> String {
     let problem = evidence.point.objective.problem;
     let place = |share: &Share| {
         format!(
-            "`{}` at t = {} s of `{}`",
+            "`{}` at t = {} of `{}`",
             problem.layout().outputs[share.output].name,
-            exact(problem.records[share.experiment].time(share.sample)),
+            problem.records[share.experiment].moment(share.sample),
             problem.unknowns.labels[share.experiment]
         )
     };

@@ -306,6 +306,8 @@ mod tests {
         assert!(far_from_start(std::slice::from_ref(&state)).is_empty() && opposite(&[state]).is_empty());
         let text = &far_from_start(&[unknown(500.0, 1.0, 1.0)])[0].text;
         assert_eq!(text, "`a` is 500 V, 500 times its start 1: check the units of signals and time");
+        let ratio = Unknown { unit: "1".to_owned(), ..unknown(500.0, 1.0, 1.0) };
+        assert!(far_from_start(&[ratio])[0].text.starts_with("`a` is 500, 500 times its start 1"));
     }
 
     #[test]

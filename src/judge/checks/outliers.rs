@@ -97,10 +97,10 @@ fn extreme(evidence: &Evidence<'_>, j: usize) -> Option<Warning> {
     }
     let problem = evidence.point.objective.problem;
     let text = format!(
-        "the error of `{}` at t = {} s of `{}` is {} times the deviation of all others ({} for the largest of {count} normal \
+        "the error of `{}` at t = {} of `{}` is {} times the deviation of all others ({} for the largest of {count} normal \
          errors): look at this measurement, and mark it as missing if it is wrong",
         problem.layout().outputs[j].name,
-        exact(problem.records[largest.experiment].time(largest.sample)),
+        problem.records[largest.experiment].moment(largest.sample),
         problem.unknowns.labels[largest.experiment],
         number(ratio, 3),
         p_value(chance)

@@ -112,7 +112,7 @@ fn time(evidence: &Evidence<'_>, parts: usize, [half, side]: [&str; 2]) -> Strin
         _ if 2 * parts == SPANS => format!("the {half} half of the data"),
         [record] => {
             let sample = (0..record.len()).find(|&sample| span(sample, record.len()) >= parts).unwrap_or(0);
-            format!("the data {side} t = {}", number(record.time(sample), 4))
+            format!("the data {side} t = {}", record.time_unit().say(record.time(sample), 4))
         }
         _ => format!("the data {side} {} of each record", percent(parts as f64 / SPANS as f64, 2)),
     }

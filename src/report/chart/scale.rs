@@ -181,6 +181,9 @@ mod tests {
             labels(-2e-4, 3e-4),
             ("y (1e-6 m)".into(), ["−200", "−100", "0", "100", "200", "300"].map(String::from).into())
         );
+        // A ratio has no unit.
+        let ratio = |to: f64| Scale::new(&Axis::new("gain", "1"), Some((0.0, to))).title();
+        assert_eq!([ratio(2.0), ratio(2e6)], ["gain", "gain (1e6)"]);
         for (from, to) in [
             (0.0, 0.0),
             (3.0, 3.0),
