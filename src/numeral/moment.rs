@@ -3,32 +3,32 @@
 use super::{EXACT, number, unit_after};
 use core::fmt;
 use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
 
 /// The unit in which the times of a record are shown. They are kept in the time of the model's equations, mostly seconds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TimeUnit {
-    name: Cow<'static, str>,
+    name: Box<str>,
     size: f64,
 }
 
 impl Default for TimeUnit {
     /// Seconds, as those of the model.
     fn default() -> Self {
-        TimeUnit { name: Cow::Borrowed("s"), size: 1.0 }
+        TimeUnit { name: "s".into(), size: 1.0 }
     }
 }
 
 impl TimeUnit {
     /// The unit of the model's time itself, where that is not the second: minutes of a model whose rates are per minute.
     pub fn of_model(name: impl Into<String>) -> Self {
-        TimeUnit { name: Cow::Owned(name.into()), size: 1.0 }
+        let name: String = name.into();
+        TimeUnit { name: name.into(), size: 1.0 }
     }
 
     /// A unit by its name, of so many seconds of the model's time.
     pub(crate) fn of_seconds(name: &'static str, size: f64) -> Self {
-        TimeUnit { name: Cow::Borrowed(name), size }
+        TimeUnit { name: name.into(), size }
     }
 
     /// Its name.
