@@ -87,7 +87,7 @@ impl Cells {
 fn vector(sizes: &[u64]) -> Result<u64, String> {
     // Empty ones have a size of zero.
     let length = sizes.iter().copied().max().unwrap_or(1);
-    match sizes.iter().any(|size| *size == 0) {
+    match sizes.contains(&0) {
         true => Ok(0),
         false if sizes.iter().filter(|size| **size != 1).count() <= 1 => Ok(length),
         false => {
