@@ -28,7 +28,7 @@ fn covered(runs: u64, truth: &Spring, step: f64, predictor: impl predict::Predic
     covered
 }
 
-/// Where the state strays by a tenth of the plant's curvature, the extended filter shows no bias. 95 % of 1,000 records scatter by 0.7 %:
+/// With weak noise the extended filter shows no bias. 95 % of 1,000 records scatter by 0.7 %:
 /// 93 to 97 % is three standard deviations.
 #[test]
 fn extended_filter() {
@@ -36,7 +36,7 @@ fn extended_filter() {
     assert!(covered.iter().all(|covered| (930..=970).contains(covered)), "{covered:?}");
 }
 
-/// Where it strays as far as the plant bends, that of second order covers 93.5 to 97.8 % (1,000 records), the extended one 63 % of `a`. Three
+/// With strong noise that of second order covers 93.5 to 97.8 % (1,000 records), the extended one 63 % of `a`. Three
 /// standard deviations of 400 records are 3 %.
 #[test]
 fn filter_of_second_order() {

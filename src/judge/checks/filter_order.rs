@@ -30,19 +30,16 @@ fn filter_order(evidence: &Evidence<'_>, intervals: &Intervals) -> Examined {
     let advice = "fit with SecondOrder, or measure more often";
     let warning = match shift(evidence, &objective.of(objective.problem, &*closer), &intervals.unknowns) {
         Some(Shift { errors, .. }) if errors < CARE => None,
-        Some(Shift { of, errors, .. }) => {
+        Some(Shift { of, errors, .. }) if errors.is_finite() => {
+            let warning = if errors >= FAR { not_usable } else { with_care };
             let text = format!(
-                "the model bends within the spread of its state, which the extended filter does not see: a filter of second order would \
-                 change {of} by {} standard errors; {advice}",
+                "the model is curved within the standard deviation of its state, which the extended filter does not take into account: a \
+                 filter of second order would change {of} by {} standard errors; {advice}",
                 number(errors, 2)
             );
-            Some(if errors >= FAR {
-                not_usable(WarningCode::FilterOrder, text)
-            } else {
-                with_care(WarningCode::FilterOrder, text)
-            })
+            Some(warning(WarningCode::FilterOrder, text))
         }
-        None => {
+        _ => {
             let text = format!("a filter of second order fails at the estimate of the extended filter; {advice}");
             Some(with_care(WarningCode::FilterOrder, text))
         }
