@@ -1,7 +1,7 @@
 //! [`SecondOrder`]: against a filter that is written out for its plant, against [`Kalman`], and where the order of the filter decides.
 
 use crate::common::Noise;
-use crate::hardening::{Hardening, STRONG, Spring, TRUTH, disturbed, driven, runge_kutta, start};
+use crate::hardening::{Hardening, Pull, STRONG, Spring, TRUTH, disturbed, driven, runge_kutta, start};
 use argmin::core::{CostFunction, Gradient};
 use core::f64::consts::TAU;
 use greybox::optimize::Severity;
@@ -180,4 +180,68 @@ fn moments_of_coupled_states() {
         ];
     }
     assert!((found / sum - 1.0).abs() < 1e-12, "{found} {sum}");
+}
+
+signals! { pub struct Slide { a: "1/s", f: "m/s^2", c: "m/(N s)", q: "m/s^1.5", r: "m/s" } }
+signals! { pub struct Speed { v: "m/s" } }
+
+/// `dv = (c u - a v - f sign(v)) dt + q dw`, or with `tanh(v / 0.2)` for the sign.
+#[derive(Clone)]
+struct Dry {
+    smooth: bool,
+}
+
+impl Model for Dry {
+    type State = Speed;
+    type Input = Pull;
+    type Output = Speed;
+    type Parameters = Slide;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Speed<S>, u: &Pull<S>, p: &Slide<S>) -> Speed<S> {
+        let direction = if self.smooth { (x.v * 5.0).tanh() } else { x.v.signum() };
+        Speed { v: p.c * u.u - p.a * x.v - p.f * direction }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Speed<S>, _u: &Pull<S>, _p: &Slide<S>) -> Speed<S> {
+        *x
+    }
+    fn diffusion<S: Scalar>(&self, p: &Slide<S>) -> Speed<S> {
+        Speed { v: p.q }
+    }
+    fn noise<S: Scalar>(&self, p: &Slide<S>) -> Speed<S> {
+        Speed { v: p.r }
+    }
+}
+
+/// Dry friction has no curvature where the state is, so that a filter of either order takes its sign for certain: no fit of it is usable
+/// without care. In a smooth form its curvature is compared.
+#[test]
+fn choices_by_the_state_ask_for_care() {
+    let said = |smooth: bool, seed: u64, second: bool| {
+        let (mut noise, mut v, mut inputs, mut outputs) = (Noise(seed), 0.0f64, vec![], vec![]);
+        for k in 0..1000 {
+            let u = [2.0, -1.0, 0.5, -2.0, 1.0][k / 15 % 5];
+            outputs.push(Speed { v: v + 0.1 * noise.gauss() });
+            inputs.push(Pull { u });
+            for _ in 0..50 {
+                let direction = if smooth { (v * 5.0).tanh() } else { v.signum() };
+                v += 0.002 * (u - v - 0.8 * direction) + 0.3 * 0.002f64.sqrt() * noise.gauss();
+            }
+        }
+        let model = Dry { smooth };
+        let record = Experiment::new(&model, even(0.1), inputs, outputs).unwrap().initial(Speed { v: fixed(0.0) });
+        let start = Slide { a: free(0.7), f: free(0.5), c: free(0.8), q: free(0.6).log(), r: free(0.2).log() };
+        let fit = Fit::new(&model, &record).parameters(start).integrator(Rk4 { substeps: 4 });
+        let fit = if second { fit.predictor(SecondOrder) } else { fit.predictor(Kalman) };
+        let estimate = fit.run().unwrap();
+        let said = estimate.warnings.iter().any(|warning| warning.code == WarningCode::FilterOrder);
+        (said, estimate.severity())
+    };
+    for seed in 1..=3 {
+        for second in [false, true] {
+            let (said, severity) = said(false, seed, second);
+            assert!(said && severity > Severity::Usable);
+        }
+        let (kalman, second) = (said(true, seed, false), said(true, seed, true));
+        assert!(kalman.0 && kalman.1 > Severity::Usable);
+        assert!(!second.0);
+    }
 }
