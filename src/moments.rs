@@ -1,13 +1,13 @@
 //! [`Moments`]: mean and covariance of functions of a state that is uncertain.
 
-/// Moments of some functions of a Gaussian state.
+/// Moments of `m` functions of a Gaussian state of `n` quantities, in the units of the functions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moments<S> {
-    /// The mean of each function.
+    /// The mean of each function: `m`.
     pub mean: Vec<S>,
-    /// The mean of their slopes with respect to the state, row by row.
+    /// The means of their slopes with respect to the state, row by row: `m n`.
     pub slopes: Vec<S>,
-    /// The covariance that their curvature adds, upper triangle row by row; empty to the first order.
+    /// The covariance that their curvature adds, upper triangle row by row: `m (m + 1) / 2`; empty to the first order.
     pub spread: Vec<S>,
 }
 

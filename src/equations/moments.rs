@@ -1,5 +1,6 @@
 //! [`MomentsOf`]: the moments of equations of a Gaussian state, as graphs.
 
+use super::evaluate;
 use super::slopes::Jacobian;
 use crate::graph::{Graph, Id, Leaf};
 use crate::moments::{Moments, entry};
@@ -44,14 +45,7 @@ impl MomentsOf {
 
     /// The moments at a time, inputs and parameters, of a state and the covariance after it.
     pub fn at<S: Scalar>(&self, t: S, carry: &[S], u: &[S], p: &[S]) -> Moments<S> {
-        let found = self.graph.evaluate(&self.roots, |leaf| match leaf {
-            Leaf::Time => t,
-            Leaf::State(i) => carry[i as usize],
-            Leaf::Input(i) => u[i as usize],
-            Leaf::Parameter(i) => p[i as usize],
-            Leaf::Step | Leaf::NextInput(_) | Leaf::Measured(_) => S::from(f64::NAN),
-        });
-        self.moments(found)
+        self.moments(evaluate(&self.graph, &self.roots, Some((t, carry, u)), p))
     }
 }
 

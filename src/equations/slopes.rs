@@ -1,6 +1,6 @@
 //! [`Slopes`]: the slopes of equations with respect to the states, as graphs.
 
-use super::Equations;
+use super::{Equations, evaluate};
 use crate::graph::{Graph, Id, Leaf, Tape, Variables, Way, slopes};
 use crate::scalar::Scalar;
 
@@ -45,13 +45,7 @@ impl Jacobian {
 
     /// The entries at a time, a state, inputs and parameters.
     pub fn at<S: Scalar>(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
-        let found = self.graph.evaluate(&self.entries, |leaf| match leaf {
-            Leaf::Time => t,
-            Leaf::State(i) => x[i as usize],
-            Leaf::Input(i) => u[i as usize],
-            Leaf::Parameter(i) => p[i as usize],
-            Leaf::Step | Leaf::NextInput(_) | Leaf::Measured(_) => S::from(f64::NAN),
-        });
+        let found = evaluate(&self.graph, &self.entries, Some((t, x, u)), p);
         to.iter_mut().zip(found).for_each(|(to, found)| *to = found);
     }
 }

@@ -31,6 +31,8 @@ impl Sweep for Counting<'_> {
     fn lanes(&self, record: &Record, seeds: &[Seed]) -> usize { self.sweep.lanes(record, seeds) }
     fn coupling(&self) -> Coupling { self.sweep.coupling() }
     fn choosing(&self) -> Option<&[usize]> { self.sweep.choosing() }
+    fn linearizes_choices(&self) -> bool { self.sweep.linearizes_choices() }
+    fn second_order<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> { self.sweep.second_order() }
     fn prepare(&self, record: &Record, p: &[f64]) -> Result<Prepared, Error> { self.sweep.prepare(record, p) }
     fn start(&self, record: &Record, state: &[f64], p: &[f64]) -> Reached { self.sweep.start(record, state, p) }
     fn run(&self, pieces: &[Piece<'_>], seeds: &[Seed], visit: Visit<'_>) -> Vec<Result<Reached, RunError>> {

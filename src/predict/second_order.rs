@@ -1,4 +1,4 @@
-//! [`SecondOrder`]: a filter for plants that bend within the spread of their state.
+//! [`SecondOrder`]: a filter for plants that are curved within a standard deviation of their state.
 
 use super::gaussian::{Order, filter};
 use super::{Moments, Plant};
@@ -13,9 +13,10 @@ use serde::{Deserialize, Serialize};
 /// E g(x) = g + 1/2 sum_ij P_ij d2g/dx_i dx_j        dx/dt = E f        dP/dt = A P + P A' + Q,  A = E df/dx
 /// ```
 ///
-/// which is exact for cubic models. An output has the variance that its curvature adds, `1/2 tr(H P H P)`. Models that are affine in their
-/// state give what [`Kalman`](super::Kalman) gives. Derivatives are those of the model's graph; a choice (friction, a limit) has no
-/// curvature, so that what it does within the spread of the state is not seen.
+/// which is exact of polynomials up to the third degree; the state itself is Gaussian by assumption. An output has the variance that its
+/// curvature adds, `1/2 tr(H P H P)` with `H = d2g/dx2`. Models that are affine in their state give what [`Kalman`](super::Kalman) gives, to
+/// rounding. Derivatives are those of the model's graph; a choice (dry friction, a limit) has no curvature where it is not taken, so that what
+/// it does within the spread of the state is not seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SecondOrder;
 

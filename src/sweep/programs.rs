@@ -177,6 +177,10 @@ impl Sweep for ProgramSweep<'_> {
         self.plain.choosing()
     }
 
+    fn linearizes_choices(&self) -> bool {
+        self.plain.linearizes_choices()
+    }
+
     fn prepare(&self, record: &Record, parameters: &[f64]) -> Result<Prepared, Error> {
         self.plain.prepare(record, parameters)
     }

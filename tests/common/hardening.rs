@@ -10,7 +10,7 @@ signals! { pub struct Gauges { y: "m", z: "m" } }
 signals! { pub struct Spring { a: "1/s", b: "1/(m^2 s)", c: "m/(N s)", q: "m/s^0.5", r: "m" } }
 
 pub const TRUTH: Spring = Spring { a: 1.0, b: 0.5, c: 1.0, q: 0.3, r: 0.1 };
-/// Noise by which the state strays as far as the spring bends.
+/// Noise by which the slopes of the spring change by their own size within a standard deviation of the state.
 pub const STRONG: Spring = Spring { a: 1.0, b: 0.5, c: 1.0, q: 1.0, r: 0.3 };
 
 /// `dx = (c u - a x - b x^3) dt + q dw`, seen as `y = x + e` with an error of size `r`; `z = x + x^2 / 2`, twice as noisy, is a second gauge.
@@ -62,4 +62,18 @@ pub fn driven(truth: &Spring, time: Time, samples: usize, every: usize, noise: &
 /// A start at some distance, levels by their logarithms.
 pub fn start() -> Spring<Parameter> {
     Spring { a: free(0.7), b: free(0.8), c: free(0.8), q: free(0.6).log(), r: free(0.2).log() }
+}
+
+/// Mean and variance after so many steps of Runge-Kutta's method, each `h` long.
+pub fn runge_kutta<S: Scalar>(mut z: [S; 2], h: f64, steps: u32, rate: impl Fn([S; 2]) -> [S; 2]) -> [S; 2] {
+    for _ in 0..steps {
+        let along = |k: [S; 2], h: f64| [z[0] + k[0] * h, z[1] + k[1] * h];
+        let k1 = rate(z);
+        let k2 = rate(along(k1, h / 2.0));
+        let k3 = rate(along(k2, h / 2.0));
+        let k4 = rate(along(k3, h));
+        let sum = |i: usize| (k1[i] + (k2[i] + k3[i]) * 2.0 + k4[i]) * (h / 6.0);
+        z = [z[0] + sum(0), z[1] + sum(1)];
+    }
+    z
 }

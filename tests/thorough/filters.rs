@@ -28,15 +28,15 @@ fn covered(runs: u64, truth: &Spring, step: f64, predictor: impl predict::Predic
     covered
 }
 
-/// Where the state strays by a tenth of the plant's curvature, the extended filter shows no bias: it covers 94.3 to 95.6 % (1,000 records).
-/// Three standard deviations of 400 records are 3 %.
+/// With weak noise the extended filter shows no bias: it covers 94.3 to 95.6 % (1,000 records). Three standard deviations of 400 records
+/// are 3 %.
 #[test]
 fn extended_filter() {
     let covered = covered(400, &TRUTH, 0.1, Kalman);
     assert!(covered.iter().all(|covered| (367..=393).contains(covered)), "{covered:?}");
 }
 
-/// Where it strays as far as the plant bends, that of second order covers 93.5 to 97.8 % (1,000 records), the extended one 63 % of `a`. Three
+/// With strong noise that of second order covers 93.5 to 97.8 % (1,000 records), the extended one 63 % of `a`. Three
 /// standard deviations of 400 records are 3 %.
 #[test]
 fn filter_of_second_order() {

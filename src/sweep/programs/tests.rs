@@ -1,6 +1,6 @@
 use super::*;
 use crate::functions::Handle;
-use crate::graph::choosing;
+use crate::graph::choices;
 use crate::integrate::Rk4;
 use crate::model::Model;
 use crate::predict::{FreeRun, Horizon, Kalman, Predictor};
@@ -92,7 +92,7 @@ fn sweeps<M: Model>(model: &M, predictor: impl Predictor) -> [Arc<dyn Sweep + '_
     let equations = Arc::new(Equations::trace(model).unwrap());
     let duals = |code| -> Arc<dyn Sweep + '_> {
         let (layout, method, predictor) = (Arc::new(Layout::of::<M>()), method.clone(), predictor.clone());
-        let uncompiled = Uncompiled { reason: String::new(), choosing: Some(choosing(equations.graph())) };
+        let uncompiled = Uncompiled { reason: String::new(), choices: Some(choices(equations.graph())) };
         Arc::new(DualSweep { layout, code, method, predictor, uncompiled })
     };
     let evaluated = duals(Arc::new(Evaluated::new(equations.clone())));
