@@ -75,6 +75,9 @@ fn prepared(record: Record, model: &Model, options: &RecordOptions, of_initial: 
     })
 }
 
+/// The name of a record of a file, and the record or why there is none.
+pub type Group = (String, Result<Record, String>);
+
 /// Reads the records of a file, which a column tells apart.
 pub fn groups(
     path: &Path,
@@ -82,7 +85,7 @@ pub fn groups(
     options: &RecordOptions,
     of_initial: &[String],
     by: &str,
-) -> Result<Vec<(String, Result<Record, String>)>, Failure> {
+) -> Result<Vec<Group>, Failure> {
     let layout = model.equations().layout();
     let record = |record: Result<Record, greybox::Error>| {
         prepared(record.map_err(|error| error.to_string())?, model, options, of_initial)
