@@ -69,14 +69,20 @@ fn a_column_tells_the_records_of_a_file_apart() {
 #[test]
 fn a_killed_fleet_goes_on_with_nothing_twice() {
     let bench = Bench::new();
-    motors(&bench, "motors.csv", 60);
+    motors(&bench, "motors.csv", 200);
     let words = |out: &'static str| ["fleet", "pmsm.toml", "motors.csv", "motors.csv", "--by", "motor", "--out", out];
     bench.run(&words("whole.csv"));
     let whole = std::fs::read_to_string(bench.path("whole.csv")).unwrap();
-    assert_eq!(whole.lines().count(), 61);
+    assert_eq!(whole.lines().count(), 201);
     let journal = bench.path("t.csv.journal");
-    let (mut kills, mut rows) = (0, 0);
-    while !bench.path("t.csv").exists() {
+    let (mut kills, mut rows, mut tables) = (0, 0, 0);
+    // A run may end before it is killed; then once more from the start.
+    while kills == 0 || !bench.path("t.csv").exists() {
+        if bench.path("t.csv").exists() {
+            std::fs::remove_file(bench.path("t.csv")).unwrap();
+            tables += 1;
+            assert!(tables < 50, "no run was killed before its end");
+        }
         let quiet = |words: &[&str]| bench.command(words).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
         let mut run = quiet(&words("t.csv"));
         let begin = Instant::now();
@@ -87,7 +93,7 @@ fn a_killed_fleet_goes_on_with_nothing_twice() {
                 break;
             }
             assert!(begin.elapsed() < Duration::from_secs(300), "{there} lines");
-            std::thread::sleep(Duration::from_millis(1));
+            std::thread::yield_now();
         }
         run.kill().unwrap();
         run.wait().unwrap();
@@ -99,7 +105,6 @@ fn a_killed_fleet_goes_on_with_nothing_twice() {
         }
         assert!(kills < 100);
     }
-    assert!(kills > 0);
     assert_eq!(std::fs::read_to_string(bench.path("t.csv")).unwrap(), whole);
     assert!(!journal.exists());
     // Killed between writing the table and removing the journal, which has all rows again.

@@ -4,6 +4,7 @@ mod bench;
 mod fleet;
 
 use bench::{Bench, MODEL, value};
+use std::path::Path;
 use std::process::Output;
 
 #[test]
@@ -28,6 +29,20 @@ fn fit_prints_the_estimate_and_writes_what_is_asked_for() {
     assert_eq!(bench.names(), ["e.json", "fit.svg", "pmsm.toml", "r.html", "record.csv"], "nothing half-written");
     let (_, error) = bench.ends(0, &["fit", "-q", "pmsm.toml", "record.csv"]);
     assert_eq!(error, "");
+}
+
+/// But for what depends on the processor and its load: the search's last step, its iterations and its time.
+#[test]
+fn the_readme_shows_what_is_printed() {
+    let readme = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md")).unwrap();
+    let shown = readme.split("```").find(|block| block.starts_with("text\nVerdict")).unwrap();
+    let (out, _) = Bench::new().ends(0, &["fit", "pmsm", "record.csv", "--constant", "np=4"]);
+    let fixed = |text: &str| -> Vec<String> {
+        let lines = text.lines().skip_while(|line| !line.starts_with("parameter"));
+        lines.filter(|line| !line.contains(" iterations, ")).map(str::to_string).collect()
+    };
+    assert_eq!(fixed(shown), fixed(&out));
+    assert!(fixed(shown).len() > 10 && out.starts_with("Verdict: usable. Search: converged"), "{out}");
 }
 
 #[test]
