@@ -145,10 +145,11 @@ impl<'a, M: Made> Fit<'a, M> {
     ///
     /// Without it, a fit of a continuous model begins with [`Rk4`](crate::Rk4), one step per sample. While a finer step would move an
     /// unknown by more than a tenth of its standard error, where the start cannot be simulated, or where a search that did not
-    /// converge had a cost that a finer step changes, it takes 4, 16 and 64 steps per sample, then [`Esdirk`](crate::Esdirk); the estimate
+    /// converge had a cost that a finer step changes, it takes 4, 16, 64 and 256 steps per sample, then [`Esdirk`](crate::Esdirk); the estimate
     /// names the method ([`Method::integrator`](crate::estimate::Method)), and is not usable if none is fine enough. A finer step
     /// stays where a coarser one explains the data better, or as well with other values, which is said. `Esdirk` is stopped where it
-    /// needs 3,000 steps for a sample, or 1,000 for each: such a model is not stiff, but fast, or its state grows without bound. A
+    /// needs 3,000 steps for a sample, or 1,000 for each: such a model is not stiff, but fast, or its state grows without bound. It is not
+    /// tried where two steps leave an output unexplained at the same deviance. A
     /// search by one of the finer methods goes on while each 20 trial steps lower `-2 ln` of the likelihood by 1 (from several starts, 100
     /// steps), and begins at the minima found, where there are several starts; a limit of the search's own holds for all methods together.
     pub fn integrator(self, integrator: impl Integrator) -> Self {

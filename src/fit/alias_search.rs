@@ -242,7 +242,7 @@ mod tests {
         let never = Control::NEVER;
         let found = problem.run_within(Instant::now(), &never, Start::declared(&problem)).unwrap();
         let long = Summary { seconds: 1e9, ..found };
-        let found = problem.searched_elsewhere(&long, &never).unwrap();
+        let found = problem.searched_elsewhere(&long, None, &never).unwrap();
         assert!((found.seconds / 1e9 - 1.0).abs() < 1e-3 && found.seconds > 1e9, "{}", found.seconds);
         assert!(found.evaluations > long.evaluations, "{found}");
     }

@@ -40,56 +40,104 @@ impl Trials {
     }
 }
 
+/// What searches from further starts found.
+pub(super) enum Further {
+    Found {
+        best: Box<Summary>,
+        /// Whether limits of the fit stopped searches before their end.
+        stopped: bool,
+        seconds: f64,
+    },
+    /// Records are longer than so many samples, which would take too long.
+    TooLong(usize),
+}
+
+impl Further {
+    /// The best minimum, if it is usable, in place of the estimate before it.
+    pub fn usable(&self, before: &Summary) -> Option<Summary> {
+        match self {
+            Further::Found { best, .. } => (best.severity() < Severity::NotUsable).then(|| self.or(before)),
+            Further::TooLong(_) => None,
+        }
+    }
+
+    /// The better one of the best minimum and another estimate, with a note.
+    fn or(&self, found: &Summary) -> Summary {
+        let (mut best, seconds, text) = match self {
+            Further::Found { best, stopped, seconds } => (
+                if is_better(best, found) { after(found, (**best).clone()) } else { found.clone() },
+                *seconds,
+                format!(
+                    "the search from the declared start ended where an output is left unexplained, so that the fit searched from \
+                     {STARTS} starts by itself, and went on from the best of them{}",
+                    if *stopped { "; limits of the fit stopped searches before their end" } else { "" }
+                ),
+            ),
+            Further::TooLong(most) => (
+                found.clone(),
+                0.0,
+                format!(
+                    "the search from the declared start ended where an output is left unexplained; with more than {} the fit does not \
+                     search from further starts by itself, so ask for Fit::starts({STARTS})",
+                    counted(*most as u64, "sample")
+                ),
+            ),
+        };
+        best.warnings.push(Warning { code: WarningCode::Unexplained, severity: Severity::Usable, text });
+        Summary { seconds: found.seconds + seconds, ..best }
+    }
+}
+
 impl Problem<'_> {
     /// The estimate after further searches from other starts, with their time and evaluations; `None` if it needs none, or if the fit's
-    /// limits of time and trial steps are used up.
-    pub(super) fn searched_elsewhere(&self, found: &Summary, control: &Control) -> Option<Summary> {
-        let searched = self.searched(found, control);
+    /// limits of time and trial steps are used up. `further` is what searches from further starts found before, if there were any.
+    pub(super) fn searched_elsewhere(
+        &self,
+        found: &Summary,
+        further: Option<&Further>,
+        control: &Control,
+    ) -> Option<Summary> {
+        let searched = self.searched(found, further, control);
         self.compared_with_simulation(searched.as_ref().unwrap_or(found), control).or(searched)
     }
 
-    fn searched(&self, found: &Summary, control: &Control) -> Option<Summary> {
+    fn searched(&self, found: &Summary, further: Option<&Further>, control: &Control) -> Option<Summary> {
+        if leaves_unexplained(found) {
+            return match further {
+                Some(further) => Some(further.or(found)),
+                None => Some(self.search_further(found, control)?.or(found)),
+            };
+        }
         if control.stops() {
             return None;
         }
-        let (begin, before, limit) = (Instant::now(), found.iterations, self.settings.optimizer.most());
-        let best = match leaves_unexplained(found) {
-            true => {
-                let trials = Trials::of(FROM_A_START, before, limit)?;
-                self.search_again(found, trials.most, begin, control)
-            }
-            false => {
-                let trials = Trials::of(FROM_THE_OTHER_SIDE, before, limit)?;
-                self.on_both_sides(found, trials, begin, control)
-            }
-        }?;
+        let (begin, limit) = (Instant::now(), self.settings.optimizer.most());
+        let trials = Trials::of(FROM_THE_OTHER_SIDE, found.iterations, limit)?;
+        let best = self.on_both_sides(found, trials, begin, control)?;
         Some(Summary { seconds: found.seconds + begin.elapsed().as_secs_f64(), ..best })
     }
 
-    /// The best minimum of searches from further starts, or the estimate itself if they found none or records are too long for them; with
-    /// a note. They run by the default method; the best goes on by finer ones where only the step is wrong with it. `None` where a number
-    /// of starts was asked for, where the measurements tell nothing by any parameters, and where the variance is predicted: that
-    /// likelihood has no bound at noise levels of zero, which some start would find.
-    fn search_again(&self, found: &Summary, trials: u64, begin: Instant, control: &Control) -> Option<Summary> {
+    /// Searches from further starts where an estimate leaves an output unexplained. They run by the default method; the best minimum goes
+    /// on by finer ones where only the step is wrong with it. `None` where a number of starts was asked for, where the measurements tell
+    /// nothing by any parameters, and where the variance is predicted: that likelihood has no bound at noise levels of zero, which some
+    /// start would find.
+    pub(super) fn search_further(&self, found: &Summary, control: &Control) -> Option<Further> {
         let hopeless = [WarningCode::ConstantOutput, WarningCode::TooFewMeasurements];
         let predicted = self.settings.noise == Noise::Predicted;
-        if self.settings.searches != SearchPlan::Single
+        if control.stops()
+            || !leaves_unexplained(found)
+            || self.settings.searches != SearchPlan::Single
             || predicted
             || hopeless.into_iter().any(|code| is_useless(found, code))
         {
             return None;
         }
-        let note = |text: String| Warning { code: WarningCode::Unexplained, severity: Severity::Usable, text };
+        let trials = Trials::of(FROM_A_START, found.iterations, self.settings.optimizer.most())?.most;
         let most = if self.runs_in_lanes() { LONGEST_IN_LANES } else { LONGEST };
         if self.samples() > most {
-            let mut only = found.clone();
-            only.warnings.push(note(format!(
-                "the search from the declared start ended where an output is left unexplained; with more than {} the fit does not search \
-                 from further starts by itself, so ask for Fit::starts({STARTS})",
-                counted(most as u64, "sample")
-            )));
-            return Some(only);
+            return Some(Further::TooLong(most));
         }
+        let begin = Instant::now();
         let settings = Settings { checkpoint: None, searches: SearchPlan::Best(STARTS), ..self.settings.clone() };
         let problem = Problem { settings, finer: None, ..self.clone() };
         let start = Start { trials, ..Start::declared(&problem) };
@@ -97,15 +145,7 @@ impl Problem<'_> {
         if is_only_coarse(&again) {
             again = self.refined(Ok(again), 0, begin, control).ok()?;
         }
-        let stopped = if control.stops() { "; limits of the fit stopped searches before their end" } else { "" };
-        let text = format!(
-            "the search from the declared start ended where an output is left unexplained, so that the fit searched from {STARTS} starts \
-             by itself, and went on from the best of them{stopped}"
-        );
-        let better = is_better(&again, found);
-        let mut best = if better { after(found, again) } else { found.clone() };
-        best.warnings.push(note(text));
-        Some(best)
+        Some(Further::Found { best: Box::new(again), stopped: control.stops(), seconds: begin.elapsed().as_secs_f64() })
     }
 
     /// Whether several pieces of records like the first one run together in vector registers.

@@ -1,5 +1,6 @@
 //! Fits of single records in lockstep: one evaluation of all of them is one pass over lanes.
 
+use super::elsewhere::Further;
 use super::refine::{Attempt, Start};
 use super::search::{Rounds, at_end, ended, settled};
 use crate::covariance::SearchEnd;
@@ -135,9 +136,16 @@ impl<'p> Search<'p> {
 pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Error>> {
     let Some(control) = problems.first().map(|first| control(first, problems.len())) else { return vec![] };
     let all: Vec<From<'_>> = problems.iter().map(|problem| (problem, Start::declared(problem))).collect();
-    let mut attempts: Vec<Attempt> = by_one_method(&all, &control).into_iter().map(Attempt::new).collect();
+    let found = by_one_method(&all, &control);
+    let further = each(found.len(), |i| problems[i].search_further(found[i].as_ref().ok()?, &control));
+    let usable = |(further, found): (&Option<Further>, &Result<Summary, Error>)| {
+        further.as_ref().zip(found.as_ref().ok()).and_then(|(further, found)| further.usable(found))
+    };
+    let usable: Vec<Option<Summary>> = further.iter().zip(&found).map(usable).collect();
+    let mut attempts: Vec<Attempt> = found.into_iter().map(Attempt::new).collect();
     for number in 0.. {
-        let coarse: Vec<bool> = attempts.iter().map(Attempt::is_coarse).collect();
+        let coarse: Vec<bool> =
+            attempts.iter().zip(&usable).map(|(attempt, usable)| usable.is_none() && attempt.is_coarse()).collect();
         let finer =
             coarse.iter().zip(problems).map(|(coarse, problem)| if *coarse { problem.finer(number) } else { None });
         let finer: Vec<Option<&Problem<'_>>> = finer.collect();
@@ -168,8 +176,10 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
         };
         attempts = attempts.into_iter().zip(coarse).zip(problems).map(next).collect();
     }
-    let found: Vec<Result<Summary, Error>> = attempts.into_iter().map(Attempt::answer).collect();
-    let searched = each(found.len(), |i| problems[i].searched_elsewhere(found[i].as_ref().ok()?, &control));
+    let answer = |(attempt, usable): (Attempt, Option<Summary>)| usable.map_or_else(|| attempt.answer(), Ok);
+    let found: Vec<Result<Summary, Error>> = attempts.into_iter().zip(usable).map(answer).collect();
+    let searched =
+        each(found.len(), |i| problems[i].searched_elsewhere(found[i].as_ref().ok()?, further[i].as_ref(), &control));
     found.into_iter().zip(searched).map(|(found, searched)| searched.map_or(found, Ok)).collect()
 }
 

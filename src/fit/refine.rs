@@ -17,6 +17,9 @@ pub(super) const CERTAINLY_WORSE: f64 = 15.0;
 /// apart.
 const MOVED: f64 = 1.0;
 
+/// Minima whose deviances differ by less for each measurement, half a percent of their errors, are alike.
+const ALIKE: f64 = 0.01;
+
 /// A part of a search that lowers the deviance by less makes no progress.
 const LOWERED: f64 = 1.0;
 
@@ -79,11 +82,11 @@ impl Attempt {
     }
 
     /// Where the search by a finer method begins: at the end of this one if the step is all that is wrong with it, else at the
-    /// start of the problem; `None` if that method's step would decide the cost there, too, and where no trial step is left of so
-    /// many for all methods.
+    /// start of the problem; `None` if that method's step would decide the cost there, too, where no trial step is left of so
+    /// many for all methods, and for an adaptive method, the slowest, where no step seems to be the reason.
     pub fn start(&self, finer: &Problem<'_>, most: u64, control: &Control) -> Option<Start> {
         let trials = most.saturating_sub(self.found.as_ref().map_or(0, |found| found.iterations));
-        if trials == 0 {
+        if trials == 0 || finer.sweep.is_adaptive() && self.is_unexplained_by_any_step() {
             return None;
         }
         match &self.found {
@@ -94,6 +97,14 @@ impl Attempt {
             }
             _ => declared_start(finer, trials, control),
         }
+    }
+
+    /// Whether an output is left unexplained at minima alike by this step and by the next coarser one.
+    fn is_unexplained_by_any_step(&self) -> bool {
+        let Ok(found) = &self.found else { return false };
+        let deviances = found.deviance.zip(self.coarser.last().map(|coarser| coarser.deviance));
+        let alike = |(this, coarser): (f64, f64)| (this - coarser).abs() < ALIKE * found.measurements as f64;
+        found.outcome.converged() && is_useless(found, WarningCode::Unexplained) && deviances.is_some_and(alike)
     }
 
     /// The result `again` of a finer method's search from [`start`](Self::start). If that search began at the end of this one and did not

@@ -30,8 +30,15 @@ impl Problem<'_> {
     pub(super) fn run_since(&self, begin: Instant) -> Result<Summary, Error> {
         let control = self.control(begin);
         let found = self.run_within(begin, &control, Start::declared(self));
-        let found = self.refined(found, 0, begin, &control)?;
-        Ok(self.searched_elsewhere(&found, &control).unwrap_or(found))
+        // Before finer methods, each of which takes several times as long.
+        let further = found.as_ref().ok().and_then(|found| self.search_further(found, &control));
+        let usable = further.as_ref().zip(found.as_ref().ok()).and_then(|(further, found)| further.usable(found));
+        let found = match usable {
+            Some(usable) => usable,
+            None => self.refined(found, 0, begin, &control)?,
+        };
+        let found = self.searched_elsewhere(&found, further.as_ref(), &control).unwrap_or(found);
+        Ok(Summary { seconds: begin.elapsed().as_secs_f64(), ..found })
     }
 
     /// The estimate by a method, numbered as in [`by_method`](Self::by_method), or by a finer one, as long as a finer step would

@@ -44,7 +44,7 @@ const TRIALS: u64 = 20;
 pub(crate) const PARTS: u64 = 5;
 
 /// Steps per sample of the methods that follow the default one; after them comes one for stiff models.
-pub(crate) const SUBSTEPS: [u32; 3] = [4, 16, 64];
+pub(crate) const SUBSTEPS: [u32; 4] = [4, 16, 64, 256];
 
 /// The problem by each method is made when it is first needed.
 struct ByMethods<'a> {
@@ -144,7 +144,7 @@ mod tests {
         }
     }
 
-    /// Three finer steps and a method for stiff models follow the default method of a continuous model; nothing follows a
+    /// Four finer steps and a method for stiff models follow the default method of a continuous model; nothing follows a
     /// method that was chosen, and a static model has none.
     #[test]
     fn what_follows_a_default_method() {
@@ -155,7 +155,7 @@ mod tests {
         let line = Experiment::new(&Line, time, inputs(), outputs()).unwrap();
         let gain = || Gain { a: free(1.0) };
         let methods = |problem: &Problem<'_>| problem.by_method().count() - 1;
-        assert_eq!(methods(&Fit::new(&Charge, &charge).parameters(gain()).problem().unwrap()), 4);
+        assert_eq!(methods(&Fit::new(&Charge, &charge).parameters(gain()).problem().unwrap()), 5);
         let chosen = Fit::new(&Charge, &charge).parameters(gain()).integrator(Rk4::default());
         assert_eq!(methods(&chosen.problem().unwrap()), 0);
         assert_eq!(methods(&Fit::new(&Line, &line).parameters(gain()).problem().unwrap()), 0);

@@ -118,6 +118,22 @@ fn a_minimum_that_explains_nothing_gives_way() {
     }
 }
 
+/// Two steps whose minima leave an output unexplained and differ by less than 0.01 in deviance for each of 8 measurements: no adaptive method
+/// follows. One follows where the finer step lowers the deviance, where it explains the output, and after one minimum only.
+#[test]
+fn no_step_is_the_reason() {
+    let unexplained = Warning { code: WarningCode::Unexplained, severity: Severity::NotUsable, text: String::new() };
+    let of = |deviance: f64, warned: bool, converged: bool| {
+        let warnings = if warned { vec![unexplained.clone()] } else { vec![] };
+        Summary { warnings, ..answer("steps", deviance, 1.0, converged) }
+    };
+    let after =
+        |finer: Summary| Attempt::new(Ok(of(10.0, true, true))).or(Ok(finer), false).is_unexplained_by_any_step();
+    assert!(after(of(10.07, true, true)) && after(of(9.93, true, true)));
+    assert!(!after(of(9.91, true, true)) && !after(of(10.0, false, true)) && !after(of(9.95, true, false)));
+    assert!(!Attempt::new(Ok(of(10.0, true, true))).is_unexplained_by_any_step());
+}
+
 /// Starts that could not be simulated are tried by finer methods. The estimate stays, unless they find a better minimum.
 #[test]
 fn lost_starts_are_tried_again() {
