@@ -5,8 +5,7 @@ use crate::fitting::{declared, expanded, fit, model};
 use crate::terminal::Terminal;
 use crate::{Failure, Verdict, output, records};
 use greybox::layout::Layout;
-use greybox::optimize::Severity;
-use greybox::{Knowledge, Summary};
+use greybox::{Knowledge, Severity, Summary};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 

@@ -3,9 +3,9 @@
 use super::student::Spread;
 use super::{Warning, WarningCode};
 use crate::numeral::number;
-use crate::optimize::Severity;
 use crate::parameter::{Parameter, Transform};
 use crate::problem::Role;
+use crate::severity::Severity;
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
@@ -172,7 +172,7 @@ impl Direction {
     /// The warning about a direction, of which `what` says what it is.
     pub(crate) fn warning(what: String) -> Warning {
         let text = what + "; fix one, add a prior, or excite the system differently";
-        Warning { code: WarningCode::Unidentified, severity: Severity::UsableWithCare, text }
+        Warning::new(WarningCode::Unidentified, Severity::UsableWithCare, text)
     }
 }
 

@@ -2,10 +2,10 @@
 //! half the frequency of sampling, and from further starts where an output is left unexplained.
 
 use super::refine::{Start, after, is_only_coarse, is_useless};
-use crate::estimate::{Summary, Warning, WarningCode};
+use crate::estimate::{About, Summary, Warning, WarningCode};
 use crate::numeral::counted;
-use crate::optimize::Severity;
 use crate::problem::{Control, Noise, Problem, SearchPlan, Settings};
+use crate::severity::Severity;
 use std::time::Instant;
 
 /// Starts of a fit whose first search left an output unexplained, the declared one among them: of 138 records of predators
@@ -79,7 +79,7 @@ impl Problem<'_> {
         {
             return None;
         }
-        let note = |text: String| Warning { code: WarningCode::Unexplained, severity: Severity::Usable, text };
+        let note = |text: String| Warning::new(WarningCode::Unexplained, Severity::Usable, text).about(About::Search);
         let most = if self.runs_in_lanes() { LONGEST_IN_LANES } else { LONGEST };
         if self.samples() > most {
             let mut only = found.clone();
@@ -117,8 +117,8 @@ impl Problem<'_> {
 /// Whether an estimate is not usable and leaves an output unexplained. That may not be the reason by itself: where the loss is robust
 /// or measurements are weighted, it is a warning only.
 fn leaves_unexplained(found: &Summary) -> bool {
-    let unexplained =
-        |warning: &Warning| warning.code == WarningCode::Unexplained && warning.severity > Severity::Usable;
+    let of_an_output = |warning: &Warning| matches!(warning.about, About::Output(_));
+    let unexplained = |warning: &Warning| warning.code == WarningCode::Unexplained && of_an_output(warning);
     found.severity() == Severity::NotUsable && found.warnings.iter().any(unexplained)
 }
 

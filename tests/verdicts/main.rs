@@ -22,7 +22,7 @@ mod records;
 mod sampling;
 mod stiff;
 
-use greybox::optimize::Severity;
+use greybox::Severity;
 use rayon::prelude::*;
 use records::Found;
 use std::collections::BTreeMap;

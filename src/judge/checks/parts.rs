@@ -67,7 +67,7 @@ fn differing(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covari
         percent(part, 2)
     );
     let severity = if part > FAR_APART { Severity::NotUsable } else { Severity::UsableWithCare };
-    Some(Warning { code: WarningCode::RecordsContradict, severity, text })
+    Some(Warning::new(WarningCode::RecordsContradict, severity, text).about(About::Unknown(differing.unknown)))
 }
 
 fn warning(evidence: &Evidence<'_>, parts: &Parts, unknowns: &[Unknown], difference: Difference) -> Warning {
@@ -103,7 +103,7 @@ fn warning(evidence: &Evidence<'_>, parts: &Parts, unknowns: &[Unknown], differe
         Into::Times => WarningCode::HalvesContradict,
     };
     let severity = if part > FAR_APART { Severity::NotUsable } else { Severity::UsableWithCare };
-    Warning { code, severity, text }
+    Warning::new(code, severity, text).about(About::Unknown(i))
 }
 
 /// What lies before or after a time in each record.

@@ -1,6 +1,6 @@
 //! Levels of correlation over time.
 
-use crate::optimize::Severity;
+use crate::severity::Severity;
 
 /// Level of the test of whiteness below which the color is no chance; between this and the level at which intervals are
 /// widened it is a note.
