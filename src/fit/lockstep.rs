@@ -30,7 +30,7 @@ pub(super) struct Measuring<'p> {
 
 impl<'p> Measuring<'p> {
     pub fn place(&self) -> At<'_> {
-        (&self.objective, &self.round.coordinates)
+        (&self.objective, self.round.place())
     }
 
     /// Passes on the noise there.
@@ -115,13 +115,14 @@ impl<'p> Search<'p> {
         let outcome = objective.control.named(outcome);
         let found = Round {
             coordinates: machine.place().to_vec(),
+            ahead: None,
             linear: machine.linearization().cloned(),
             outcome,
             iterations,
             evaluations,
             name,
         };
-        let round = ended(&objective, found);
+        let round = rounds.with_step(&objective, ended(&objective, found));
         if rounds.asks_noise(&round) {
             return Stage::Measuring(Box::new(Measuring { rounds, objective, round }));
         }
