@@ -124,6 +124,7 @@ impl<'p> Search<'p> {
         };
         let round = rounds.with_step(&objective, ended(&objective, found));
         if rounds.asks_noise(&round) {
+            let objective = Objective { extrapolates: round.ahead.is_some(), ..objective };
             return Stage::Measuring(Box::new(Measuring { rounds, objective, round }));
         }
         let end = rounds.take(objective, round, None);

@@ -136,7 +136,10 @@ impl<'r> Rounds<'r> {
                 })?,
             };
             let round = self.with_step(&objective, ended(&objective, result));
-            let noise = self.asks_noise(&round).then(|| noise::estimate(&objective, round.place()));
+            let noise = self.asks_noise(&round).then(|| {
+                let there = Objective { extrapolates: round.ahead.is_some(), ..objective.clone() };
+                noise::estimate(&there, round.place())
+            });
             if let Some(mut end) = self.take(objective, round, noise) {
                 end.write_error = file.and_then(|file| file.write_error());
                 return Ok(end);
@@ -245,6 +248,9 @@ impl<'r> Rounds<'r> {
         let next = if self.rough { self.optimizer.rough() } else { self.optimizer.clone() };
         self.next = next.limited(self.left);
         self.memory = objective.memory;
+        if !settled {
+            self.memory.forget_costs();
+        }
         let end = SearchEnd {
             coordinates: round.coordinates,
             whitening: self.whitening.clone(),

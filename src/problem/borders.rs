@@ -63,6 +63,9 @@ impl Objective<'_> {
                 return Ok(Some(found));
             }
         }
+        if let Some(best) = self.memory.best().filter(|_| self.extrapolates) {
+            return Ok(Some(Arc::new(self.extrapolated(coordinates, values, &best))));
+        }
         let found = Arc::new(self.simulated_borders(coordinates, values)?);
         self.memory.keep(found.clone());
         Ok(Some(found))
@@ -116,7 +119,7 @@ impl Objective<'_> {
     }
 
     /// Triangles of a nonlinear model from guessed borders, which are corrected and simulated from anew until the correction
-    /// no longer matters for a comparison with the best cost.
+    /// no longer matters for a comparison with the best cost; to rounding where that is not known.
     pub(super) fn repaired(
         &self,
         coordinates: &[f64],
@@ -132,7 +135,7 @@ impl Objective<'_> {
                 Err(Infeasible::Cancelled) => return Err(Infeasible::Cancelled),
                 Err(Infeasible::Failed(_)) => break,
             };
-            let difference = (found.cost - best).abs();
+            let difference = if best.is_finite() { (found.cost - best).abs() } else { 0.0 };
             if found.moved <= (MOVED_NONLINEAR * difference).max(MOVED_ROUNDING * found.cost) {
                 return Ok(found);
             }

@@ -3,10 +3,10 @@
 use super::{Rounds, roughness};
 use crate::optimize::{Infeasible, JacobianColumns, LevenbergMarquardt, Outcome, SearchLimit, Stop};
 use crate::pmsm::{Currents, Drive, SQRT_2_3, Surface, Winding};
-use crate::problem::{Control, Round, Whitening};
+use crate::problem::{Control, Objective, Round, Whitening, noise};
 use crate::random::Random;
 use crate::tests::{Current, Gain, Line, Voltage};
-use crate::{Estimate, Experiment, ExperimentOf, Fit, Huber, Time, free, simulate};
+use crate::{Experiment, ExperimentOf, Fit, Huber, Parameter, Time, free, simulate};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -105,9 +105,8 @@ fn roughness_is_the_larger_change() {
     assert_eq!([roughness(-3.0, None), roughness(-3.0, Some(4.0)), roughness(3.0, Some(4.0))], [3.0, 7.0, 3.0]);
 }
 
-/// A motor's currents over 2,000 samples with noise of 0.05 and 0.1 A, and the fit from a start that is far off.
-fn motor(noise: Option<Currents>) -> Estimate<Surface> {
-    let model = Surface::new(4).unwrap();
+/// A motor's currents over 2,000 samples with noise of 0.05 and 0.1 A.
+fn motor(model: &Surface) -> ExperimentOf<Surface> {
     let mut random = Random::stream(36, 1);
     let time = Time::Uniform { start: 0.0, step: 0.25e-3 };
     let input = |k: usize| {
@@ -116,29 +115,50 @@ fn motor(noise: Option<Currents>) -> Estimate<Surface> {
     };
     let inputs: Vec<Drive> = (0..2000).map(input).collect();
     let truth = Winding { rs: 0.63, ls: 4e-3, ke: 0.95 };
-    let clean = simulate(&model, &truth, &Currents { id: 0.0, iq: 0.0 }, time.clone(), &inputs).unwrap().outputs;
+    let clean = simulate(model, &truth, &Currents { id: 0.0, iq: 0.0 }, time.clone(), &inputs).unwrap().outputs;
     let mut noisy = |y: &Currents| Currents { id: y.id + 0.05 * random.normal(), iq: y.iq + 0.1 * random.normal() };
     let outputs = clean.iter().map(&mut noisy).collect();
-    let record = Experiment::new(&model, time, inputs, outputs).unwrap();
-    let fit = Fit::new(&model, &record).parameters(Winding { rs: free(1.2), ls: free(1.75e-3), ke: free(0.63) });
-    match noise {
-        Some(noise) => fit.noise(noise).run().unwrap(),
-        None => fit.run().unwrap(),
-    }
+    Experiment::new(model, time, inputs, outputs).unwrap()
+}
+
+/// From a start that is far off.
+fn far() -> Winding<Parameter> {
+    Winding { rs: free(1.2), ls: free(1.75e-3), ke: free(0.63) }
 }
 
 /// The estimate with the noise estimated is that with this noise given, to a thousandth of the tolerance of the noise in standard errors; and takes two
 /// evaluations more at most: one for the noise where the first round ended, and one as its weights have moved the minimum.
 #[test]
 fn noise_is_estimated_in_two_evaluations() {
-    let estimated = motor(None);
-    // What was used is of the sum of squares by its number, what is shown is by the degrees of freedom.
+    let model = Surface::new(4).unwrap();
+    let record = motor(&model);
+    let fit = || Fit::new(&model, &record).parameters(far());
+    let estimated = fit().run().unwrap();
     let [id, iq] = [0, 1].map(|j| estimated.outputs[j].fit.rmse);
-    let given = motor(Some(Currents { id, iq }));
+    let given = fit().noise(Currents { id, iq }).run().unwrap();
     assert!(estimated.evaluations <= given.evaluations + 2, "{} {}", estimated.evaluations, given.evaluations);
     for (one, other) in estimated.unknowns.iter().zip(&given.unknowns) {
         let error = other.knowledge.standard_error().unwrap();
         assert!((one.value - other.value).abs() < 1e-6 * error, "{}: {} {}", one.name, one.value, other.value);
+    }
+}
+
+/// Noise next to a point with slopes is that of segments which begin where these lead to: off by the square of the distance, a part of 1e-4 of each parameter,
+/// times what the currents are of their noise, 200 at most.
+#[test]
+fn noise_next_to_the_best_point_needs_no_simulation_of_its_own() {
+    let model = Surface::new(4).unwrap();
+    let record = motor(&model);
+    let problem = Fit::new(&model, &record).parameters(far()).problem().unwrap();
+    let objective = problem.objective().unwrap();
+    let best = [0.63, 4e-3, 0.95, 0.0, 0.0];
+    objective.evaluate(&best).unwrap();
+    let next = best.map(|x| x * (1.0 + 1e-4));
+    let near = Objective { extrapolates: true, ..objective.clone() };
+    let [near, exact] = [&near, &objective].map(|objective| noise::estimate(objective, &next).unwrap().sigma());
+    for (near, exact) in near.iter().zip(&exact) {
+        let part = (near / exact - 1.0).abs();
+        assert!(part < 2e-6 && part > 0.0, "{part:e}");
     }
 }
 
