@@ -53,7 +53,7 @@ pub struct Profile {
     pub inflation: f64,
     /// Severity of the problems met during the computation.
     pub severity: Severity,
-    /// The same in words; empty if nothing did.
+    /// What stopped it in words; empty if nothing did.
     pub remark: String,
 }
 

@@ -79,7 +79,7 @@ pub struct Unknown {
     /// approximation (Tenerz 2011, eq. 5.14). Low is well excited. `None` where there is no interval, or the value is 0.
     #[serde(with = "crate::real")]
     pub error_index: Option<f64>,
-    /// The same with the others held.
+    /// The standard error with the others held.
     #[serde(with = "crate::real")]
     pub error_index_held: Option<f64>,
     /// The coordinate that the optimizer worked in.

@@ -102,7 +102,7 @@ impl Examined {
         skipped.map_or_else(|| examine().into(), Examined::skipped)
     }
 
-    /// The same without a part, if there is one.
+    /// Made without a part, if there is one.
     pub fn without(mut self, part: Option<impl Into<Cow<'static, str>>>) -> Self {
         if let (Extent::Whole, Some(part)) = (&self.extent, part) {
             self.extent = Extent::Part { without: part.into() };

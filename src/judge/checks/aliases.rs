@@ -121,7 +121,7 @@ fn unresolved<'p>(objective: &Objective<'_>, coordinates: &[f64], points: &'p [S
     found.max_by(|a, b| a.mode.1.total_cmp(&b.mode.1))
 }
 
-/// The same at one of these points.
+/// Such an oscillation at one of these points.
 fn unresolved_at<'p>(
     objective: &Objective<'_>,
     coordinates: &[f64],

@@ -53,7 +53,7 @@ pub(crate) const SIZES: Check = Check::new(
 
 /// A parameter so many times its start, or one such part of it, is in another unit.
 const ANOTHER_UNIT: f64 = 400.0;
-/// The same ratio of a parameter that the data do not determine: the search has run along a direction in which it changes nothing.
+/// The ratio to its start of a parameter that the data do not determine: the search has run along a direction in which it changes nothing.
 const RUN_AWAY: f64 = 1e4;
 
 /// Standard deviations of their difference between estimate and prior mean from which on an estimate is with care (chance exceeds them in

@@ -34,7 +34,7 @@ const REFINED_SHIFT: f64 = 0.1;
 /// Smallest part of an unknown's value that a finer step must move it by for a warning about data that are reproduced, and about a
 /// step that is too coarse to be used: of values that are right to more digits only the intervals are wrong.
 const DIGITS: f64 = 1e-6;
-/// The same from which on a fit without errors is not usable without care.
+/// The part from which on a fit without errors is not usable without care.
 const MUCH: f64 = 1e-3;
 /// Samples of the shortest windows that are compared.
 const WINDOW: f64 = 64.0;
