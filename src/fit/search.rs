@@ -13,8 +13,8 @@ use std::sync::Arc;
 /// fraction of its standard error.
 const NOISE_TOLERANCE: f64 = 1e-6;
 const NOISE_ROUNDS: u32 = 100;
-/// Rounds determine three digits of the unknowns, or of the cost, until the noise changes by less than this from one to the next, relatively: the next
-/// change is then some 1e-4 of that, and below the tolerance.
+/// Rounds determine three digits of the unknowns, or of the cost, until the noise changes by less than this from one to the next,
+/// relatively: the next change is then some 1e-4 of that, and below the tolerance.
 const NEARLY_SETTLED: f64 = 1e-3;
 
 /// Searches from a start, or from a checkpoint. `plain` leaves errors in the units of the outputs.
@@ -163,8 +163,8 @@ impl<'r> Rounds<'r> {
         self.last.clone().map(|last| SearchEnd { outcome, ..last })
     }
 
-    /// A round with the step on to where the next one begins, which is not evaluated before: the noise is to be estimated there, and with that the cost
-    /// is another one.
+    /// A round with the step on to where the next one begins. That is not evaluated before: the noise is to be estimated there, and with
+    /// that the cost is another one.
     pub fn with_step(&self, objective: &Objective<'_>, mut round: Round) -> Round {
         if self.rough && matches!(round.outcome, Outcome::Converged { .. } | Outcome::CostUnchanged { .. }) {
             let linear = round.linear.take();

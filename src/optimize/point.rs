@@ -234,7 +234,8 @@ impl Point {
     }
 }
 
-/// Where the undamped step from a point leads, if slopes hold along it as they do within an interval: over three standard errors, or a tenth of each unknown.
+/// Where the undamped step from a point leads, if slopes hold along it as they do within an interval: over three standard errors, or a
+/// tenth of each unknown.
 pub(crate) fn ahead(x: &[f64], linear: Linearization, domain: &Domain) -> Option<Vec<f64>> {
     let point = Point::new(x.to_vec(), linear, domain, &Seen::default())?;
     let near = point.errors() <= 3.0 || point.relative_step() <= 0.1;

@@ -126,7 +126,7 @@ fn far() -> Winding<Parameter> {
     Winding { rs: free(1.2), ls: free(1.75e-3), ke: free(0.63) }
 }
 
-/// The estimate with the noise estimated is that with this noise given, to a thousandth of the tolerance of the noise in standard errors; and takes two
+/// The estimate with the noise estimated is that with this noise given, to the tolerance of the noise in standard errors; and takes two
 /// evaluations more at most: one for the noise where the first round ended, and one as its weights have moved the minimum.
 #[test]
 fn noise_is_estimated_in_two_evaluations() {
@@ -143,8 +143,8 @@ fn noise_is_estimated_in_two_evaluations() {
     }
 }
 
-/// Noise next to a point with slopes is that of segments which begin where these lead to: off by the square of the distance, a part of 1e-4 of each parameter,
-/// times what the currents are of their noise, 200 at most.
+/// Noise next to a point with slopes is that of segments which begin where these lead to: off by the square of the distance, a part of
+/// 1e-4 of each parameter, times what the currents are of their noise, 200 at most.
 #[test]
 fn noise_next_to_the_best_point_needs_no_simulation_of_its_own() {
     let model = Surface::new(4).unwrap();
