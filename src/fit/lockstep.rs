@@ -30,7 +30,7 @@ pub(super) struct Measuring<'p> {
 
 impl<'p> Measuring<'p> {
     pub fn place(&self) -> At<'_> {
-        (&self.objective, self.round.place())
+        (&self.objective, &self.round.coordinates)
     }
 
     /// Passes on the noise there.
@@ -115,16 +115,14 @@ impl<'p> Search<'p> {
         let outcome = objective.control.named(outcome);
         let found = Round {
             coordinates: machine.place().to_vec(),
-            ahead: None,
             linear: machine.linearization().cloned(),
             outcome,
             iterations,
             evaluations,
             name,
         };
-        let round = rounds.with_step(&objective, ended(&objective, found));
+        let round = ended(&objective, found);
         if rounds.asks_noise(&round) {
-            let objective = Objective { extrapolates: round.ahead.is_some(), ..objective };
             return Stage::Measuring(Box::new(Measuring { rounds, objective, round }));
         }
         let end = rounds.take(objective, round, None);

@@ -3,7 +3,7 @@
 use super::start_error::start_error;
 use crate::covariance::SearchEnd;
 use crate::error::Error;
-use crate::optimize::{Domain, Infeasible, LeastSquares, Outcome, SearchLimit, ahead, within_tolerance};
+use crate::optimize::{Domain, Infeasible, LeastSquares, Outcome, SearchLimit, within_tolerance};
 use crate::problem::{
     CheckpointFile, Fingerprint, Memory, Objective, Optimizer, Round, RoundError, SearchPlan, Whitening, noise,
 };
@@ -13,9 +13,6 @@ use std::sync::Arc;
 /// fraction of its standard error.
 const NOISE_TOLERANCE: f64 = 1e-6;
 const NOISE_ROUNDS: u32 = 100;
-/// Rounds determine three digits of the unknowns, or of the cost, until the noise changes by less than this from one to the next,
-/// relatively: the next change is then some 1e-4 of that, and below the tolerance.
-const NEARLY_SETTLED: f64 = 1e-3;
 
 /// Searches from a start, or from a checkpoint. `plain` leaves errors in the units of the outputs.
 pub(super) fn search(
@@ -60,8 +57,6 @@ pub(super) struct Rounds<'r> {
     optimizer: Arc<dyn Optimizer>,
     /// The search of the next round.
     pub next: Arc<dyn Optimizer>,
-    /// Whether that determines three digits only.
-    rough: bool,
     /// The start of the next round.
     pub coordinates: Vec<f64>,
     whitening: Whitening,
@@ -90,9 +85,8 @@ impl<'r> Rounds<'r> {
         start: Vec<f64>,
         whitening: Whitening,
     ) -> Self {
-        let rough = noise::is_estimated(plain);
-        let first = rough.then(|| optimizer.rough());
-        Rounds { rough, ..Rounds::from(plain, optimizer, start, first, whitening) }
+        let first = noise::is_estimated(plain).then(|| optimizer.rough());
+        Rounds::from(plain, optimizer, start, first, whitening)
     }
 
     /// From a point; `first` is the search of the first round, if it differs.
@@ -107,7 +101,6 @@ impl<'r> Rounds<'r> {
             plain,
             optimizer: optimizer.clone(),
             next: first.unwrap_or_else(|| optimizer.clone()),
-            rough: false,
             coordinates,
             whitening,
             memory: plain.memory.clone(),
@@ -129,17 +122,13 @@ impl<'r> Rounds<'r> {
                     let write_error = file.and_then(|file| file.write_error());
                     return Ok(SearchEnd { write_error, ..end });
                 }
-                (Err(RoundError::Start(Infeasible::Failed(_))), _) if self.steps_back() => continue,
                 (result, _) => result.map_err(|error| match error {
                     RoundError::Start(error) => start_error(self.plain, &self.coordinates, error),
                     RoundError::Optimizer(text) => Error::Optimizer(text),
                 })?,
             };
-            let round = self.with_step(&objective, ended(&objective, result));
-            let noise = self.asks_noise(&round).then(|| {
-                let there = Objective { extrapolates: round.ahead.is_some(), ..objective.clone() };
-                noise::estimate(&there, round.place())
-            });
+            let round = ended(&objective, result);
+            let noise = self.asks_noise(&round).then(|| noise::estimate(&objective, &round.coordinates));
             if let Some(mut end) = self.take(objective, round, noise) {
                 end.write_error = file.and_then(|file| file.write_error());
                 return Ok(end);
@@ -161,24 +150,6 @@ impl<'r> Rounds<'r> {
     pub fn stopped(&self) -> Option<SearchEnd> {
         let outcome = self.plain.control.named(Outcome::Cancelled);
         self.last.clone().map(|last| SearchEnd { outcome, ..last })
-    }
-
-    /// A round with the step on to where the next one begins. That is not evaluated before: the noise is to be estimated there, and with
-    /// that the cost is another one.
-    pub fn with_step(&self, objective: &Objective<'_>, mut round: Round) -> Round {
-        if self.rough && matches!(round.outcome, Outcome::Converged { .. } | Outcome::CostUnchanged { .. }) {
-            let linear = round.linear.take();
-            round.ahead = linear.and_then(|linear| ahead(&round.coordinates, linear, &Domain::of(objective)));
-        }
-        round
-    }
-
-    /// Goes back to where the last round ended, if the next one was to begin a step ahead of that.
-    fn steps_back(&mut self) -> bool {
-        let Some(last) = self.last.as_ref().filter(|last| last.coordinates != self.coordinates) else { return false };
-        (self.coordinates, self.next, self.rough) =
-            (last.coordinates.clone(), self.optimizer.limited(self.left), false);
-        true
     }
 
     /// What the limit of this search is of, where it is not that of the user.
@@ -208,10 +179,7 @@ impl<'r> Rounds<'r> {
         self.iterations += round.iterations;
         self.left = self.left.saturating_sub(round.iterations);
         self.evaluations += round.evaluations;
-        self.coordinates = match (&noise, round.ahead) {
-            (Some(Ok(_)), Some(ahead)) => ahead,
-            _ => round.coordinates.clone(),
-        };
+        self.coordinates = round.coordinates;
         let (mut outcome, mut linear) = (round.outcome, round.linear);
         let noise = match noise {
             Some(Err(Infeasible::Cancelled)) => {
@@ -224,9 +192,7 @@ impl<'r> Rounds<'r> {
         if let Some(found) = noise {
             let found = found.unwrap_or_else(|_| self.whitening.clone());
             let changes = found.sigma().into_iter().zip(self.whitening.sigma()).map(|(a, b)| (a / b).ln().abs());
-            let change = changes.fold(0.0, f64::max);
-            settled = self.round > 1 && !self.rough && change < NOISE_TOLERANCE;
-            self.rough = change > NEARLY_SETTLED;
+            settled = self.round > 1 && changes.fold(0.0, f64::max) < NOISE_TOLERANCE;
             if !settled {
                 (self.whitening, linear) = (found, None);
             }
@@ -245,14 +211,10 @@ impl<'r> Rounds<'r> {
             }
             (outcome, _) => outcome,
         };
-        let next = if self.rough { self.optimizer.rough() } else { self.optimizer.clone() };
-        self.next = next.limited(self.left);
+        self.next = self.optimizer.limited(self.left);
         self.memory = objective.memory;
-        if !settled {
-            self.memory.forget_costs();
-        }
         let end = SearchEnd {
-            coordinates: round.coordinates,
+            coordinates: self.coordinates.clone(),
             whitening: self.whitening.clone(),
             linear,
             outcome,
@@ -336,4 +298,106 @@ fn roughness(here: f64, there: Option<f64>) -> f64 {
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::{Rounds, roughness};
+    use crate::optimize::{Infeasible, JacobianColumns, LevenbergMarquardt, Outcome, SearchLimit, Stop};
+    use crate::problem::{Control, Round, Whitening};
+    use crate::tests::{Current, Gain, Line, Voltage};
+    use crate::{Experiment, ExperimentOf, Fit, Huber, Time, free};
+    use std::sync::Arc;
+    use std::sync::atomic::AtomicBool;
+
+    /// A gain of two, and errors that are no line.
+    fn record() -> ExperimentOf<Line> {
+        let inputs: Vec<Voltage> = (0..40).map(|k| Voltage { u: f64::from(k) }).collect();
+        let outputs = (0..40).map(|k| Current { i: 2.0 * f64::from(k) + f64::from(k * 37 % 21) }).collect();
+        Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap()
+    }
+
+    /// The first of several rounds determines three digits. From a start that is right to three digits, the estimate equals that from a
+    /// far start to ten times the tolerance of the noise.
+    #[test]
+    fn the_first_round_is_not_the_last() {
+        let record = record();
+        let from = |start: f64| {
+            let fit = Fit::new(&Line, &record).parameters(Gain { a: free(start) }).loss(Huber::default());
+            fit.run().unwrap().parameters.a
+        };
+        let far = from(1.0);
+        let near = from(far * (1.0 + 1e-4));
+        assert!((near / far - 1.0).abs() < 1e-5, "{near} {far}");
+    }
+
+    /// The limit of trial steps is that of all rounds together, also where one ends just there.
+    #[test]
+    fn a_limit_is_that_of_all_rounds() {
+        let record = record();
+        let within = |iterations: u64| {
+            let optimizer = LevenbergMarquardt::new(Stop { iterations, ..Stop::default() }, JacobianColumns);
+            let fit = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).loss(Huber::default());
+            fit.optimizer(optimizer).run().unwrap()
+        };
+        let needed = within(1000).iterations;
+        for limit in 1..needed {
+            let found = within(limit);
+            assert_eq!(found.outcome, Outcome::IterationLimit { iterations: limit });
+            assert_eq!(found.iterations, limit);
+        }
+        assert!(needed > 3 && within(needed).outcome.converged(), "{needed}");
+    }
+
+    /// Noise that doubles from round to round never settles: the hundredth round is the last, at a limit, not at a minimum.
+    #[test]
+    fn rounds_of_noise_that_does_not_settle_end() {
+        let record = record();
+        let problem = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).problem().unwrap();
+        let plain = problem.in_units(&Control::NEVER);
+        let mut rounds = Rounds::with(&plain, &problem.settings.optimizer, vec![1.0], Whitening::none(1));
+        let mut take = || {
+            let outcome = Outcome::CostUnchanged { decrease: 0.0 };
+            let (coordinates, name) = (vec![1.0], String::new());
+            let round = Round { coordinates, linear: None, outcome, iterations: 2, evaluations: 3, name };
+            let (objective, noise) = (rounds.objective(), rounds.whitening.widened(2.0));
+            rounds.take(objective, round, Some(Ok(noise))).map(|end| (end.outcome, end.iterations, end.evaluations))
+        };
+        assert!((1..100).all(|_| take().is_none()));
+        let limit = SearchLimit::NoiseRounds;
+        assert_eq!(take(), Some((Outcome::OwnLimit { iterations: 200, limit }, 200, 300)));
+    }
+
+    /// A flag that is set while noise is estimated, or before the first evaluation of the next round, leaves the end of the last round.
+    #[test]
+    fn a_stop_between_rounds_leaves_an_end() {
+        let record = record();
+        let problem = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).problem().unwrap();
+        let control = Control { cancel: Some(Arc::new(AtomicBool::new(true))), deadline: None };
+        let plain = problem.in_units(&control);
+        let rounds = || {
+            let mut rounds = Rounds::with(&plain, &problem.settings.optimizer, vec![1.0], Whitening::none(1));
+            rounds.known = false;
+            rounds
+        };
+        let ended = || Round {
+            coordinates: vec![1.5],
+            linear: None,
+            outcome: Outcome::CostUnchanged { decrease: 0.0 },
+            iterations: 2,
+            evaluations: 3,
+            name: String::new(),
+        };
+        assert!(rounds().stopped().is_none() && rounds().run(None).is_err());
+        let mut next = rounds();
+        assert!(next.take(next.objective(), ended(), Some(Ok(Whitening::none(1).widened(2.0)))).is_none());
+        let end = next.run(None).unwrap();
+        assert_eq!((end.outcome, end.coordinates, end.iterations), (Outcome::Cancelled, vec![1.5], 2));
+        assert_eq!(end.whitening.sigma(), [2.0]);
+        let mut measuring = rounds();
+        let end = measuring.take(measuring.objective(), ended(), Some(Err(Infeasible::Cancelled))).unwrap();
+        assert_eq!((end.outcome, end.coordinates), (Outcome::Cancelled, vec![1.5]));
+    }
+
+    #[test]
+    fn roughness_is_the_larger_change() {
+        assert_eq!([roughness(-3.0, None), roughness(-3.0, Some(4.0)), roughness(3.0, Some(4.0))], [3.0, 7.0, 3.0]);
+    }
+}

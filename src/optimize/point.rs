@@ -225,21 +225,10 @@ impl Point {
     }
 
     fn rough(&self, noise: f64) -> Outcome {
-        Outcome::Rough { noise, errors: self.errors() }
+        let left = self.potential / self.cost_size();
+        // A step of `d` standard errors gains `d^2 / (2 rows)` of the sum of squares.
+        Outcome::Rough { noise, errors: (left.max(0.0) * self.linear.rows() as f64).sqrt() }
     }
-
-    /// The length of the full step in standard errors: one of `d` gains `d^2 / rows` of the cost.
-    fn errors(&self) -> f64 {
-        ((self.potential / self.cost_size()).max(0.0) * self.linear.rows() as f64).sqrt()
-    }
-}
-
-/// Where the undamped step from a point leads, if slopes hold along it as they do within an interval: over three standard errors, or a
-/// tenth of each unknown.
-pub(crate) fn ahead(x: &[f64], linear: Linearization, domain: &Domain) -> Option<Vec<f64>> {
-    let point = Point::new(x.to_vec(), linear, domain, &Seen::default())?;
-    let near = point.errors() <= 3.0 || point.relative_step() <= 0.1;
-    point.full.as_ref().filter(|_| near).map(|step| point.towards(step))
 }
 
 /// The outcome of a search that stopped at a point because no step lowers its cost, from cost and slopes there:

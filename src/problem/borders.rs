@@ -63,9 +63,6 @@ impl Objective<'_> {
                 return Ok(Some(found));
             }
         }
-        if let Some(best) = self.memory.best().filter(|_| self.extrapolates) {
-            return Ok(Some(Arc::new(self.extrapolated(coordinates, values, &best))));
-        }
         let found = Arc::new(self.simulated_borders(coordinates, values)?);
         self.memory.keep(found.clone());
         Ok(Some(found))
@@ -119,7 +116,7 @@ impl Objective<'_> {
     }
 
     /// Triangles of a nonlinear model from guessed borders, which are corrected and simulated from anew until the correction
-    /// no longer matters for a comparison with the best cost; to rounding where that is not known.
+    /// no longer matters for a comparison with the best cost.
     pub(super) fn repaired(
         &self,
         coordinates: &[f64],
@@ -135,7 +132,7 @@ impl Objective<'_> {
                 Err(Infeasible::Cancelled) => return Err(Infeasible::Cancelled),
                 Err(Infeasible::Failed(_)) => break,
             };
-            let difference = if best.is_finite() { (found.cost - best).abs() } else { 0.0 };
+            let difference = (found.cost - best).abs();
             if found.moved <= (MOVED_NONLINEAR * difference).max(MOVED_ROUNDING * found.cost) {
                 return Ok(found);
             }

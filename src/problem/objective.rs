@@ -32,8 +32,6 @@ pub struct Objective<'p> {
     pub(crate) left_out: Vec<bool>,
     /// Carries at the begins of segments, at points that were evaluated.
     pub(crate) memory: Memory,
-    /// Whether values may be simulated from carries that are extrapolated from the best point: for noise that a later point replaces.
-    pub(crate) extrapolates: bool,
 }
 
 impl<'p> Objective<'p> {
@@ -55,7 +53,7 @@ impl<'p> Objective<'p> {
     ) -> Objective<'p> {
         let (left_out, memory) = (vec![], Memory::default());
         let squares: Vec<f64> = (0..problem.layout().outputs.len()).map(|j| squares(problem, j)).collect();
-        Objective { problem, sweep, whitening, control, squares: squares.into(), left_out, memory, extrapolates: false }
+        Objective { problem, sweep, whitening, control, squares: squares.into(), left_out, memory }
     }
 
     /// This objective without the slopes of the unknowns on their bounds, which may be infinite there (the root of an initial

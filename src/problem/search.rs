@@ -86,20 +86,11 @@ impl Search for GaussNewton {
 /// How one round of a search ended.
 pub(crate) struct Round {
     pub coordinates: Vec<f64>,
-    /// Where the next step leads, if the next round is to begin there.
-    pub ahead: Option<Vec<f64>>,
     pub linear: Option<Linearization>,
     pub outcome: Outcome,
     pub iterations: u64,
     pub evaluations: u64,
     pub name: String,
-}
-
-impl Round {
-    /// Where the noise is to be estimated and the next round begins.
-    pub fn place(&self) -> &[f64] {
-        self.ahead.as_deref().unwrap_or(&self.coordinates)
-    }
 }
 
 /// Why a round did not begin.
@@ -209,7 +200,6 @@ impl<S: Search> Optimizer for S {
         }
         Ok(Round {
             coordinates: state.get_param().cloned().unwrap_or(start),
-            ahead: None,
             linear: result.solver().linearization().cloned(),
             outcome,
             iterations: state.get_iter(),

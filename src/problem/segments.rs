@@ -112,17 +112,11 @@ impl Memory {
     /// Keeps the borders of a point.
     pub fn keep(&self, borders: Arc<Borders>) {
         let [last, best] = &mut *self.points();
+        // Costs with different noise levels cannot be compared; the point is then the same as the best one.
         if best.as_ref().is_none_or(|best| borders.cost <= best.cost || borders.point == best.point) {
             *best = Some(borders.clone());
         }
         *last = Some(borders);
-    }
-
-    /// For another noise, with which costs cannot be compared with those before: the next point is the best one.
-    pub fn forget_costs(&self) {
-        for borders in self.points().iter_mut().flatten() {
-            *borders = Arc::new(Borders { cost: f64::INFINITY, ..(**borders).clone() });
-        }
     }
 
     /// The borders at exactly this point.
