@@ -27,11 +27,10 @@ pub use side_by_side::Compared;
 
 use crate::error::Error;
 use crate::numeral::p_value;
-use crate::optimize::{
-    Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization, Machine, Severity,
-};
+use crate::optimize::{Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization, Machine};
 use crate::problem::{Control, Objective, Problem};
 use crate::section::{Cell, Section, Table};
+use crate::severity::Severity;
 use argmin::core::{Executor, State};
 use serde::{Deserialize, Serialize};
 

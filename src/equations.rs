@@ -86,7 +86,7 @@ impl Equations {
         Equations::with_noise(layout, graph, [state, output, &[], &[]])
     }
 
-    /// The same with process noise and measurement noise, as [`Model::diffusion`] and [`Model::noise`] say them: roots of
+    /// These equations with process noise and measurement noise, as [`Model::diffusion`] and [`Model::noise`] say them: roots of
     /// the states, the outputs, the diffusion of each state and the noise of each output. Either may be left empty.
     ///
     /// # Errors

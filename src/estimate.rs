@@ -23,11 +23,12 @@ pub use quantities::{Direction, ExperimentEstimate, Knowledge, OutputEstimate, O
 pub(crate) use starts::times_the_cost;
 pub use starts::{FailedStart, Minimum, Starts};
 pub use typed::{Estimate, Values};
-pub use warning::{Warning, WarningCode};
+pub use warning::{About, Warning, WarningCode};
 
 use crate::information::{Covariance, SquareMatrix};
 use crate::layout::Layout;
-use crate::optimize::{Outcome, Severity};
+use crate::optimize::Outcome;
+use crate::severity::Severity;
 use serde::{Deserialize, Serialize};
 
 /// The result of a fit with its uncertainty, quantities by name. It borrows nothing.

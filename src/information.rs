@@ -121,7 +121,7 @@ impl Information {
         }
     }
 
-    /// The same, said to be made of so many rows.
+    /// This triangle, said to be made of so many rows.
     pub(crate) fn of_rows(self, rows: u64) -> Self {
         Information { rows, ..self }
     }

@@ -53,7 +53,7 @@ pub trait Integrator: Clone + Debug + Send + Sync + 'static {
     /// Whether the method serves models of this kind.
     fn serves(&self, kind: Kind) -> bool;
 
-    /// The same method with half the step or a far smaller tolerance, to see whether the answer moves; `None` if the step
+    /// This method with half the step or a far smaller tolerance, to see whether the answer moves; `None` if the step
     /// is exact for models of this kind.
     fn refined(&self, kind: Kind) -> Option<Self>;
 

@@ -73,7 +73,7 @@ impl Pair {
         }
     }
 
-    /// The same number twice.
+    /// One number twice.
     #[inline(always)]
     pub fn splat<T: Number>(value: T) -> Self {
         // SAFETY: laid out as an `f64`.

@@ -87,7 +87,7 @@
 //! | choose what is predicted | [`FreeRun`], [`Horizon`], [`Kalman`], [`SecondOrder`], [`predict`] |
 //! | weigh or filter errors, limit outliers | [`weighting`], [`loss`], [`Butterworth`] |
 //! | choose a search | [`optimize`]; argmin's solvers by [`Problem::objective`] |
-//! | read the result | [`Estimate`], [`Knowledge`], [`Warning`], [`WarningCode`], [`Summary`], [`estimate`] |
+//! | read the result | [`Estimate`], [`Severity`], [`Knowledge`], [`Warning`], [`WarningCode`], [`Summary`], [`estimate`] |
 //! | judge it | [`diagnose`], [`Report`] |
 //! | test a model | [`check`] |
 //! | estimate online | [`online`] |
@@ -193,6 +193,8 @@ mod scaling;
 #[cfg(feature = "std")]
 mod section;
 #[cfg(feature = "std")]
+mod severity;
+#[cfg(feature = "std")]
 mod simulate;
 #[cfg(feature = "std")]
 pub mod sweep;
@@ -235,6 +237,7 @@ pub use {
     record::{Initial, Time},
     report::Report,
     scalar::Table,
+    severity::Severity,
     simulate::{Simulation, Simulator, simulate},
     weighting::Weighting,
 };

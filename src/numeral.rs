@@ -38,7 +38,7 @@ pub(crate) fn resolved(value: f64, error: f64) -> String {
     if first < last && last < 0 { format!("{:.*}", -last as usize, value) } else { text }
 }
 
-/// The same without zeros at its end: a number that is not known better than to `step`.
+/// [`number`] without zeros at its end: a number that is not known better than to `step`.
 pub(crate) fn rounded(value: f64, step: f64) -> String {
     trimmed(&resolved(value, step)).to_owned()
 }

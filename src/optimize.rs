@@ -17,7 +17,7 @@ pub use gauss_newton::GaussNewton;
 pub use levenberg_marquardt::LevenbergMarquardt;
 pub use linearization::Linearization;
 pub use machine::{Domain, Machine, Request};
-pub use outcome::{Outcome, SearchLimit, Severity};
+pub use outcome::{Outcome, SearchLimit};
 pub(crate) use point::{is_negligible, within_tolerance};
 
 use crate::error::Error;

@@ -110,7 +110,7 @@ pub(crate) trait Prediction: Debug + Send + Sync {
     fn restarts(&self) -> Option<Horizon>;
     fn is_simulation(&self) -> bool;
     fn needs_slopes(&self) -> bool;
-    /// The same to the second order, of a filter of first order.
+    /// This predictor to the second order, of a filter of first order.
     fn second_order(&self) -> Option<Arc<dyn Prediction>>;
     fn check(&self, layout: &Layout) -> Result<(), Error>;
     fn describe(&self) -> String;

@@ -93,7 +93,7 @@ impl<'a> Problem<'a> {
         Ok(problem)
     }
 
-    /// The same without the check that something is free and that all outputs were measured.
+    /// A problem without the check that something is free and that all outputs were measured.
     pub(crate) fn unchecked(
         sweep: Arc<dyn Sweep + 'a>,
         records: Vec<Record>,
@@ -126,7 +126,7 @@ impl<'a> Problem<'a> {
         records.iter().map(|record| sweep.prepare(record, &start)).collect()
     }
 
-    /// The same problem with other measurements of the same experiments.
+    /// This problem with other measurements of its experiments.
     pub(crate) fn with_records(&self, records: Vec<Record>) -> Result<Self, Error> {
         let prepared = Problem::prepared(&*self.sweep, &records, &self.unknowns.parameters)?;
         Ok(Problem { records, prepared, finer: None, ..self.clone() })

@@ -114,7 +114,7 @@ impl Record {
         }
     }
 
-    /// The same record with other signals.
+    /// This record with other signals.
     ///
     /// # Errors
     /// As [`new`](Self::new).

@@ -43,7 +43,7 @@ pub enum InvalidRecurrence {
 }
 
 impl Recurrence {
-    /// The same that carries no outputs.
+    /// A recurrence that carries no outputs.
     pub(crate) fn without_outputs(&self) -> Self {
         let (graph, next) = self.graph.pruned(&self.next);
         Recurrence { graph, next, mean: vec![], variance: vec![] }

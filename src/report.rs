@@ -59,7 +59,7 @@ pub use origin::Origin;
 
 use crate::error::Error;
 use crate::estimate::Summary;
-use crate::optimize::Severity;
+use crate::severity::Severity;
 use core::fmt;
 use facts::Facts;
 use format::{Format, Version};

@@ -116,7 +116,7 @@ pub(crate) fn residual_pass(objective: &Objective<'_>, coordinates: &[f64]) -> R
     Ok(residuals(objective, coordinates, &mut all, step_error))
 }
 
-/// The same of several objectives of one record each, at points of their own, whatever their stop conditions; `None` for one that fails.
+/// The residuals of several objectives of one record each, at points of their own, whatever their stop conditions; `None` for one that fails.
 pub(crate) fn residuals_together(points: &[At<'_>]) -> Vec<Option<Residuals>> {
     let plain: Vec<Objective<'_>> = points.iter().map(|(objective, _)| objective.in_units().unlimited()).collect();
     let in_units: Vec<At<'_>> = plain.iter().zip(points).map(|(plain, (_, x))| (plain, *x)).collect();

@@ -11,7 +11,7 @@ pub(crate) use plot::{Curves, Drawing, Forest, Heat, Interval};
 pub use table::{Cell, Table};
 pub(crate) use timeline::{Keep, Line, Panel, PanelKind, Samples, Stretch, Timeline, Trace};
 
-use crate::optimize::Severity;
+use crate::severity::Severity;
 use serde::{Deserialize, Serialize};
 
 /// One part of a report: what it says, and the tables and plots that it rests on.

@@ -14,7 +14,7 @@ pub type Of<S, T> = <S as Signals>::Of<T>;
 
 /// A named vector. Implemented by [`signals!`](crate::signals!), for the struct with `f64` entries.
 pub trait Signals: Copy + Debug + Default + PartialEq + Send + Sync + 'static {
-    /// The same vector with entries of type `T`.
+    /// This vector with entries of type `T`.
     type Of<T: Entry>: Entry;
     /// `[T; LEN]`.
     type Array<T: Entry>: Entry + AsRef<[T]> + AsMut<[T]> + IntoIterator<Item = T>;

@@ -60,7 +60,7 @@ pub struct Piece<'a> {
 }
 
 impl Piece<'_> {
-    /// The same piece, its carry lent.
+    /// This piece, with its carry lent.
     pub(crate) fn lent(&self) -> Piece<'_> {
         let (carry, slopes) = (Cow::Borrowed(&*self.carry), Cow::Borrowed(&*self.slopes));
         Piece { samples: self.samples.clone(), carry, slopes, ..*self }
@@ -216,7 +216,7 @@ pub trait Sweep: Send + Sync {
         false
     }
 
-    /// The same with a finer step, if there is one, to run so many samples: whether its equations are worth compiling depends on
+    /// This sweep with a finer step, if there is one, to run so many samples: whether its equations are worth compiling depends on
     /// their number.
     fn refined<'s>(&'s self, samples: usize) -> Option<Arc<dyn Sweep + 's>> {
         let _ = samples;

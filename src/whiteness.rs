@@ -150,7 +150,7 @@ impl Portmanteau {
         self.neighbors.follow(&next.neighbors);
     }
 
-    /// The same with the autocorrelation at each lag reduced in size by this much, to zero at least.
+    /// These sums with the autocorrelation at each lag reduced in size by this much, to zero at least.
     pub fn without(mut self, correlation: f64) -> Self {
         let sums = &mut self.errors.sums;
         let part = correlation * sums[0];

@@ -25,7 +25,7 @@ pub(crate) trait Wide: Copy + Send + Sync + 'static {
     /// How many.
     const LANES: usize;
 
-    /// The same number in every lane.
+    /// One number in every lane.
     fn splat(x: f64) -> Self;
     /// The first `LANES` numbers of a slice, which must have as many.
     fn load(from: &[f64]) -> Self;
@@ -64,9 +64,9 @@ pub(crate) trait Wide: Copy + Send + Sync + 'static {
 
     /// `then` in the lanes where `self < than`, else `otherwise`; a NaN on either side takes `otherwise`.
     fn select_lt(self, than: Self, then: Self, otherwise: Self) -> Self;
-    /// The same with `<=`.
+    /// A choice by `<=`.
     fn select_le(self, than: Self, then: Self, otherwise: Self) -> Self;
-    /// The same with `==`.
+    /// A choice by `==`.
     fn select_eq(self, to: Self, then: Self, otherwise: Self) -> Self;
 
     /// Rows and columns of the first `LANES` by `LANES` numbers changed over.

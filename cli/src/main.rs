@@ -25,7 +25,7 @@ mod simulate;
 mod terminal;
 
 use arguments::{Arguments, Command};
-use greybox::optimize::Severity;
+use greybox::Severity;
 use std::process::ExitCode;
 use terminal::Terminal;
 

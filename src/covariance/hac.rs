@@ -39,7 +39,7 @@ const FEWEST: f64 = 1.0;
 /// The sandwich for autocorrelated errors, and over how many samples they are correlated beyond the autoregression.
 pub(crate) struct Hac {
     covariance: Covariance,
-    /// The same with the scores of stationary errors, if they have such.
+    /// The covariance by the scores of stationary errors, if they have such.
     stationary: Option<Covariance>,
     /// The sandwich of independent errors, if it was asked for.
     pub robust: Option<Robust>,

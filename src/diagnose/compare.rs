@@ -80,7 +80,7 @@ pub fn likelihood_ratio(restricted: &Candidate, full: &Candidate) -> Result<Test
     Ok(verdict(format!("likelihood ratio, {more} more unknown(s)"), statistic, p_value, restricted, full))
 }
 
-/// The same by the F test on the sums of squares (Seber and Wild, *Nonlinear Regression*, 1989, section 5.3): for one
+/// Nested models compared by the F test on the sums of squares (Seber and Wild, *Nonlinear Regression*, 1989, section 5.3): for one
 /// output, noise estimated; better than the likelihood ratio on short records.
 ///
 /// # Errors

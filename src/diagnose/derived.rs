@@ -54,7 +54,7 @@ pub fn derived<M: Model>(
     of(estimate, name, &|p| f(&M::Parameters::from_fn(|j| p[j])))
 }
 
-/// The same of the root of a graph of parameters: `tau` of [`Leaf::Parameter`] one over zero. Other leaves are not numbers.
+/// The derived quantity at the root of a graph of parameters: `tau` of [`Leaf::Parameter`] one over zero. Other leaves are not numbers.
 ///
 /// ```
 /// # use greybox::{Experiment, Fit, diagnose, free, pmsm::{Surface, Winding}};

@@ -113,7 +113,7 @@ pub fn identifiability(problem: &Problem<'_>, estimate: &Summary) -> Result<Iden
     examine(problem, estimate, &[])
 }
 
-/// The same without advice on sets of unknowns that the estimate's directions name, of which its warnings speak.
+/// [`identifiability`] without advice on sets of unknowns that the estimate's directions name, of which its warnings speak.
 pub(crate) fn identifiability_beside_warnings(
     problem: &Problem<'_>,
     estimate: &Summary,

@@ -11,9 +11,9 @@ use crate::covariance::undetermined;
 use crate::error::Error;
 use crate::estimate::{Knowledge, Summary, student};
 use crate::numeral::number;
-use crate::optimize::Severity;
 use crate::parameter::Transform;
 use crate::problem::Problem;
+use crate::severity::Severity;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 use trace::Trace;
@@ -53,7 +53,7 @@ pub struct Profile {
     pub inflation: f64,
     /// Severity of the problems met during the computation.
     pub severity: Severity,
-    /// The same in words; empty if nothing did.
+    /// What stopped it in words; empty if nothing did.
     pub remark: String,
 }
 

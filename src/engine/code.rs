@@ -68,7 +68,7 @@ impl Instruction {
         Instruction { operation, count: 0, signs: 0, scaled: false, to, init: 0, factor: 0, pairs }
     }
 
-    /// The same with other slots in the place of those that it reads and of the one that it writes. Unused operands are slot zero.
+    /// This instruction with other slots in the place of those that it reads and of the one that it writes. Unused operands are slot zero.
     pub fn renamed(mut self, read: impl Fn(Slot) -> Slot, write: impl Fn(Slot) -> Slot) -> Self {
         self.pairs.iter_mut().flatten().for_each(|slot| *slot = read(*slot));
         // A table is named by `init`.

@@ -45,7 +45,7 @@ impl Step {
         Step { tape: attempt.tape, next: values, rows, pattern }.lowered()
     }
 
-    /// The same step in operations that registers have.
+    /// This step in operations that registers have.
     fn lowered(self) -> Self {
         let roots: Vec<Id> = self.next.iter().chain(self.rows.iter().flatten()).copied().collect();
         let (tape, new) = lowered(&self.tape, &roots);

@@ -3,19 +3,9 @@
 use super::examination::described;
 use super::{Knowledge, ParameterEstimate, Summary, Unknown};
 use crate::numeral::{counted, error_size, exact, number, resolved};
-use crate::optimize::Severity;
 use crate::section::{Cell, Table, wrapped};
+use crate::severity::Severity;
 use core::fmt;
-
-impl fmt::Display for Severity {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Severity::Usable => "usable",
-            Severity::UsableWithCare => "usable with care",
-            Severity::NotUsable => "not usable",
-        })
-    }
-}
 
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -18,7 +18,7 @@ pub struct Prediction<M: Model> {
     pub initial_state: Of<M::State, f64>,
     /// How well each output is reproduced.
     pub quality: Of<M::Output, OutputFit>,
-    /// The same by columns.
+    /// The predictions by columns.
     pub columns: Simulated,
 }
 

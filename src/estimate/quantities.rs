@@ -3,9 +3,9 @@
 use super::student::Spread;
 use super::{Warning, WarningCode};
 use crate::numeral::number;
-use crate::optimize::Severity;
 use crate::parameter::{Parameter, Transform};
 use crate::problem::Role;
+use crate::severity::Severity;
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
@@ -79,7 +79,7 @@ pub struct Unknown {
     /// approximation (Tenerz 2011, eq. 5.14). Low is well excited. `None` where there is no interval, or the value is 0.
     #[serde(with = "crate::real")]
     pub error_index: Option<f64>,
-    /// The same with the others held.
+    /// The standard error with the others held.
     #[serde(with = "crate::real")]
     pub error_index_held: Option<f64>,
     /// The coordinate that the optimizer worked in.
@@ -172,7 +172,7 @@ impl Direction {
     /// The warning about a direction, of which `what` says what it is.
     pub(crate) fn warning(what: String) -> Warning {
         let text = what + "; fix one, add a prior, or excite the system differently";
-        Warning { code: WarningCode::Unidentified, severity: Severity::UsableWithCare, text }
+        Warning::new(WarningCode::Unidentified, Severity::UsableWithCare, text)
     }
 }
 

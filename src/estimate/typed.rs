@@ -77,7 +77,7 @@ impl<M: Model> Estimate<M> {
         &self.summary
     }
 
-    /// The same, without the model's names.
+    /// The estimate without the model's names.
     pub fn into_summary(self) -> Summary {
         self.summary
     }

@@ -1,7 +1,10 @@
 //! [`Warning`]: something the reader of an estimate must know.
 
-use crate::optimize::Severity;
+use crate::severity::Severity;
 use serde::{Deserialize, Serialize};
+
+#[cfg(doc)]
+use super::Summary;
 
 /// Something the reader of an estimate must know.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -11,8 +14,50 @@ pub struct Warning {
     pub code: WarningCode,
     /// How bad it is.
     pub severity: Severity,
+    /// What of the estimate it is about.
+    pub about: About,
     /// The warning in words, with the numbers and the remedy.
     pub text: String,
+}
+
+impl Warning {
+    /// About the estimate as a whole.
+    pub(crate) fn new(code: WarningCode, severity: Severity, text: String) -> Self {
+        Warning { code, severity, about: About::Estimate, text }
+    }
+
+    /// About this instead.
+    pub(crate) fn about(self, about: About) -> Self {
+        Warning { about, ..self }
+    }
+}
+
+/// What of an estimate a [`Warning`] is about. Numbers are places in the lists of a [`Summary`] and of its layout, from zero on; in
+/// JSON `"step"`, or `{"unknown": 0}`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum About {
+    /// The estimate as a whole, or several of its quantities.
+    Estimate,
+    /// One of [`Summary::unknowns`].
+    Unknown(usize),
+    /// One of [`Summary::outputs`].
+    Output(usize),
+    /// One of the model's inputs.
+    Input(usize),
+    /// One of [`Summary::experiments`].
+    Experiment(usize),
+    /// One of [`Summary::directions`].
+    Direction(usize),
+    /// The step of the integrator, with which the estimate is another one.
+    Step,
+    /// The search: how it ended, and what it went on to.
+    Search,
+    /// The frequency of an oscillation, which the samples do not tell from another one.
+    Frequency,
+    /// Other minima: of other starts, other steps or other frequencies.
+    Minimum,
 }
 
 /// The subject of a [`Warning`]; in JSON in small letters with underscores (`held_at_bound`).

@@ -2,11 +2,12 @@
 
 use super::elsewhere::Trials;
 use super::refine::{Start, farthest};
-use crate::estimate::{Summary, Unknown, Warning, WarningCode};
+use crate::estimate::{About, Summary, Unknown, Warning, WarningCode};
 use crate::judge::{Aliases, INDISTINGUISHABLE};
 use crate::numeral::{number, unit_after};
-use crate::optimize::{Outcome, Severity};
+use crate::optimize::Outcome;
 use crate::problem::{Control, Problem, Settings};
+use crate::severity::Severity;
 use std::time::Instant;
 
 /// Ends whose unknowns differ by less than this part of a standard error are the same.
@@ -73,7 +74,7 @@ fn has_rivals(found: &Summary) -> bool {
 
 /// Whether a warning leaves open which of two frequencies is right.
 fn is_open(warning: &Warning) -> bool {
-    warning.code == WarningCode::Aliased && warning.severity > Severity::Usable
+    warning.about == About::Frequency
 }
 
 /// Chooses among the ends of searches that began where the model has these frequencies: the first minimum whose deviance is
@@ -120,7 +121,7 @@ fn best(mut ends: Vec<End>, frequencies: &str, limits: Limits) -> Option<Summary
         false => (severity, text),
     };
     best.warnings.retain(|warning| !is_open(warning));
-    best.warnings.push(Warning { code: WarningCode::Aliased, severity, text });
+    best.warnings.push(Warning::new(WarningCode::Aliased, severity, text).about(About::Minimum));
     Some(Summary { iterations, evaluations, ..best })
 }
 
@@ -134,7 +135,7 @@ mod tests {
 
     /// Ends of these deviances, values (of a standard error of one) and convergence: the deviance of the best, with what is said.
     fn judged(ends: &[(f64, f64, bool)], limits: Limits) -> Option<(f64, Severity, String)> {
-        let open = Warning { code: WarningCode::Aliased, severity: Severity::UsableWithCare, text: String::new() };
+        let open = Warning::new(WarningCode::Aliased, Severity::UsableWithCare, String::new()).about(About::Frequency);
         let end = |&(deviance, value, converged): &(f64, f64, bool)| {
             let end = answer("fine", deviance, value, converged);
             (deviance, Summary { warnings: vec![open.clone()], ..end })
@@ -149,7 +150,8 @@ mod tests {
     #[test]
     fn what_has_rivals() {
         let with = |codes: &[(WarningCode, Severity)]| {
-            let warning = |&(code, severity)| Warning { code, severity, text: String::new() };
+            let about = |code| if code == WarningCode::Aliased { About::Frequency } else { About::Estimate };
+            let warning = |&(code, severity)| Warning::new(code, severity, String::new()).about(about(code));
             Summary { warnings: codes.iter().map(warning).collect(), ..answer("fine", 100.0, 1.0, true) }
         };
         let open = (WarningCode::Aliased, Severity::UsableWithCare);

@@ -2,10 +2,10 @@
 //! half the frequency of sampling, and from further starts where an output is left unexplained.
 
 use super::refine::{Start, after, is_only_coarse, is_useless};
-use crate::estimate::{Summary, Warning, WarningCode};
+use crate::estimate::{About, Summary, Warning, WarningCode};
 use crate::numeral::counted;
-use crate::optimize::Severity;
 use crate::problem::{Control, Noise, Problem, SearchPlan, Settings};
+use crate::severity::Severity;
 use std::time::Instant;
 
 /// Starts of a fit whose first search left an output unexplained, the declared one among them: of 138 records of predators
@@ -83,7 +83,7 @@ impl Further {
                 ),
             ),
         };
-        best.warnings.push(Warning { code: WarningCode::Unexplained, severity: Severity::Usable, text });
+        best.warnings.push(Warning::new(WarningCode::Unexplained, Severity::Usable, text).about(About::Search));
         Summary { seconds: found.seconds + seconds, ..best }
     }
 }
@@ -157,8 +157,8 @@ impl Problem<'_> {
 /// Whether an estimate is not usable and leaves an output unexplained. That may not be the reason by itself: where the loss is robust
 /// or measurements are weighted, it is a warning only.
 fn leaves_unexplained(found: &Summary) -> bool {
-    let unexplained =
-        |warning: &Warning| warning.code == WarningCode::Unexplained && warning.severity > Severity::Usable;
+    let of_an_output = |warning: &Warning| matches!(warning.about, About::Output(_));
+    let unexplained = |warning: &Warning| warning.code == WarningCode::Unexplained && of_an_output(warning);
     found.severity() == Severity::NotUsable && found.warnings.iter().any(unexplained)
 }
 

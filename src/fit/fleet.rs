@@ -20,7 +20,7 @@ use std::sync::Arc;
 /// ended.
 const GROUP: usize = 32;
 
-/// The same fit of many records, each by itself: motors on a test bench, drives in the field.
+/// One fit of many records, each by itself: motors on a test bench, drives in the field.
 ///
 /// The model is compiled once. Records with the same hold and the same kind of time (uniform or not) run in parallel
 /// vector lanes, groups of them on threads. Every answer is that of [`Fit::run`] of the record, up to rounding, finer steps
@@ -31,7 +31,7 @@ pub struct Fleet<'a, M> {
     model: PhantomData<fn() -> M>,
 }
 
-/// The same fit of many records, quantities known by position.
+/// A fleet whose quantities are known by position.
 #[derive(Clone)]
 struct Fits<'a> {
     sweep: Arc<dyn Sweep + 'a>,

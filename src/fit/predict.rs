@@ -62,7 +62,7 @@ impl<M: Model> Estimate<M> {
         Fit::new(model, record).parameters(parameters).predict(self, record)
     }
 
-    /// The same with the local parameters of an experiment of the fit and its estimated initial state; `None` if the
+    /// [`predict`](Self::predict) with the local parameters of an experiment of the fit and its estimated initial state; `None` if the
     /// fit had no experiment of this index.
     ///
     /// # Errors

@@ -1,10 +1,11 @@
 //! Fits whose integrator was not chosen: finer methods, as long as a finer step would move an unknown.
 
 use crate::error::Error;
-use crate::estimate::{Starts, Summary, Unknown, Warning, WarningCode};
+use crate::estimate::{About, Starts, Summary, Unknown, Warning, WarningCode};
 use crate::numeral::{number, unit_after};
-use crate::optimize::{Outcome, Severity};
+use crate::optimize::Outcome;
 use crate::problem::{Control, PARTS, Problem};
+use crate::severity::Severity;
 use std::time::Instant;
 
 /// A deviance that is larger by this is worth a note; by the second, a warning. If both methods had the same fixed parameters, a
@@ -203,7 +204,7 @@ fn explains_as_well(coarser: &[Coarser], deviance: f64, found: &Summary) -> Opti
         number(errors, 2),
         number((coarser.deviance - deviance).abs(), 2)
     );
-    Some(Warning { code: WarningCode::CoarseStep, severity: Severity::Usable, text })
+    Some(Warning::new(WarningCode::CoarseStep, Severity::Usable, text).about(About::Minimum))
 }
 
 /// The warning where a coarser step explains the data better than that of the estimate, by so much.
@@ -218,7 +219,7 @@ fn explains_better(coarser: &Coarser, better: f64, found: &Summary) -> Warning {
         number(better, 2)
     );
     let severity = if certain { Severity::UsableWithCare } else { Severity::Usable };
-    Warning { code: WarningCode::CoarseStep, severity, text }
+    Warning::new(WarningCode::CoarseStep, severity, text).about(About::Minimum)
 }
 
 impl Problem<'_> {
@@ -260,7 +261,7 @@ fn explains_more(again: &Summary, before: &Summary) -> bool {
 
 /// Whether nothing but the step makes an estimate not usable.
 pub(super) fn is_only_coarse(found: &Summary) -> bool {
-    let wrong = |warning: &Warning| warning.severity == Severity::NotUsable && warning.code != WarningCode::CoarseStep;
+    let wrong = |warning: &Warning| warning.severity == Severity::NotUsable && warning.about != About::Step;
     found.outcome.converged() && !found.warnings.iter().any(wrong)
 }
 
@@ -278,7 +279,7 @@ fn may_go_on(found: &Summary, before: Option<f64>, (parts, most): (u64, u64)) ->
 
 /// Whether a finer step would move an unknown.
 fn is_coarse(found: &Summary) -> bool {
-    found.warnings.iter().any(|warning| warning.code == WarningCode::CoarseStep)
+    found.warnings.iter().any(|warning| warning.about == About::Step)
 }
 
 /// Whether one of several starts could not be simulated.
@@ -299,12 +300,7 @@ fn is_lower(again: &Summary, before: &Summary) -> bool {
 
 /// An estimate with the work of later searches from its minima and other starts, and what they found.
 fn with_starts_of(found: Summary, again: Summary) -> Summary {
-    let about_starts = |warning: &Warning| {
-        matches!(
-            warning.code,
-            WarningCode::MinimumFoundOnce | WarningCode::RivalMinimum | WarningCode::DeclaredStartElsewhere
-        )
-    };
+    let about_starts = |warning: &Warning| warning.about == About::Minimum;
     let mut found = with_work_of(found, &again);
     found.warnings.retain(|warning| !about_starts(warning));
     found.warnings.extend(again.warnings.into_iter().filter(about_starts));

@@ -25,7 +25,7 @@ impl Problem<'_> {
         self.run_since(Instant::now())
     }
 
-    /// The same; the time limit counts from `begin`. A default method whose step moves the answer, or with which the start
+    /// [`run`](Self::run) with a time limit that counts from `begin`. A default method whose step moves the answer, or with which the start
     /// cannot be simulated, is followed by finer ones.
     pub(super) fn run_since(&self, begin: Instant) -> Result<Summary, Error> {
         let control = self.control(begin);
@@ -66,7 +66,7 @@ impl Problem<'_> {
         attempt.answer()
     }
 
-    /// The same by this method alone, from this start.
+    /// The estimate by this method alone, from this start.
     pub(super) fn run_within(&self, begin: Instant, control: &Control, start: Start) -> Result<Summary, Error> {
         let settings = &self.settings;
         settings.optimizer.check()?;
@@ -140,7 +140,7 @@ impl Problem<'_> {
         self.at_within(estimate, &NEVER)
     }
 
-    /// The same for further searches, with their own stop conditions.
+    /// [`at`](Self::at) for further searches, with their own stop conditions.
     ///
     /// # Errors
     /// An estimate of another problem.

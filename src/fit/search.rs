@@ -78,7 +78,7 @@ impl<'r> Rounds<'r> {
         Ok(Rounds::with(plain, optimizer, start, whitening))
     }
 
-    /// The same with the noise at the start.
+    /// From a start, with the noise there.
     pub fn with(
         plain: &'r Objective<'r>,
         optimizer: &Arc<dyn Optimizer>,

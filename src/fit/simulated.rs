@@ -1,10 +1,10 @@
 //! Predictions that restart from measured states, against a simulation of the whole record.
 
 use super::refine::{CERTAINLY_WORSE, Start, farthest, is_useless};
-use crate::estimate::{Summary, Unknown, Warning, WarningCode};
+use crate::estimate::{About, Summary, Unknown, Warning, WarningCode};
 use crate::numeral::{number, unit_after};
-use crate::optimize::Severity;
 use crate::problem::{Control, Problem, SearchPlan, Settings};
+use crate::severity::Severity;
 use std::time::Instant;
 
 /// Most trial steps of the simulation's search: from a start that led the predictions to a minimum, tens are usual.
@@ -45,7 +45,9 @@ impl Problem<'_> {
             number(errors, 2)
         );
         let mut warned = found.clone();
-        warned.warnings.push(Warning { code: WarningCode::RestartNoise, severity: Severity::NotUsable, text });
+        warned
+            .warnings
+            .push(Warning::new(WarningCode::RestartNoise, Severity::NotUsable, text).about(About::Unknown(i)));
         let (evaluations, seconds) =
             (found.evaluations + simulated.evaluations, found.seconds + begin.elapsed().as_secs_f64());
         Some(Summary { evaluations, seconds, ..warned })
@@ -130,7 +132,7 @@ mod tests {
         assert!(said(&noisy, unended, &never).0.is_none());
         let named = |mut found: Summary| {
             let (code, severity) = (WarningCode::RestartNoise, Severity::NotUsable);
-            found.warnings.push(Warning { code, severity, text: String::new() });
+            found.warnings.push(Warning::new(code, severity, String::new()));
             found
         };
         assert!(said(&noisy, named, &never).0.is_none());

@@ -189,7 +189,7 @@ impl Graph {
         self.look_up(number, order, at)
     }
 
-    /// The same by the table's number among those of this graph.
+    /// A look-up by the table's number among those of this graph.
     pub(crate) fn look_up(&mut self, number: usize, order: [u8; 2], at: [Id; 2]) -> Id {
         let Some(table) = self.tables.get(number).cloned() else { return self.constant(f64::NAN) };
         let [x, y] = at.map(|id| self.own(id));

@@ -111,7 +111,7 @@ impl Node {
         operands.into_iter().take(count)
     }
 
-    /// The same operation on other operands.
+    /// This operation on other operands.
     pub(crate) fn with_operands(&self, mut f: impl FnMut(Id) -> Id) -> Node {
         match *self {
             Node::Constant(_) | Node::Leaf(_) => *self,

@@ -37,7 +37,7 @@ impl Triangles {
         Self::with(Width::widest(), columns, lanes)
     }
 
-    /// The same for these registers.
+    /// Triangles for these registers.
     pub(crate) fn with(width: Width, columns: usize, lanes: usize) -> Self {
         let all = columns + 1;
         // The lanes of a single register are absorbed where they stand.

@@ -130,7 +130,7 @@ pub(crate) trait Method: Debug + Send + Sync {
     fn advance_duals(&self, field: &Field<'_, Duals>, x: Vec<Duals>, step: &mut f64) -> Result<Vec<Duals>, Stuck>;
     fn advance_symbols(&self, field: &SymbolicField<'_>, x: Vec<Symbol>) -> Result<Vec<Symbol>, Stuck>;
     fn is_fixed(&self) -> bool;
-    /// The same with a finer step, if there is one.
+    /// This method with a finer step, if there is one.
     fn refined(&self, kind: Kind) -> Option<Arc<dyn Method>>;
     /// Refuses models of a kind that the method does not serve, and settings that make no sense.
     fn check(&self, kind: Kind) -> Result<(), Error>;

@@ -4,7 +4,7 @@ use crate::estimate::{Extent, Warning, WarningCode};
 use crate::judge::evidence::Evidence;
 use crate::judge::evidence::ruled_out::Unless;
 use crate::judge::intervals::Intervals;
-use crate::optimize::Severity;
+use crate::severity::Severity;
 use std::borrow::Cow;
 
 /// A question that the verdict asks of an estimate.
@@ -102,7 +102,7 @@ impl Examined {
         skipped.map_or_else(|| examine().into(), Examined::skipped)
     }
 
-    /// The same without a part, if there is one.
+    /// Made without a part, if there is one.
     pub fn without(mut self, part: Option<impl Into<Cow<'static, str>>>) -> Self {
         if let (Extent::Whole, Some(part)) = (&self.extent, part) {
             self.extent = Extent::Part { without: part.into() };
@@ -124,14 +124,14 @@ impl From<Option<Warning>> for Examined {
 }
 
 pub(crate) fn note(code: WarningCode, text: String) -> Warning {
-    Warning { code, severity: Severity::Usable, text }
+    Warning::new(code, Severity::Usable, text)
 }
 
 pub(crate) fn not_usable(code: WarningCode, text: String) -> Warning {
-    Warning { code, severity: Severity::NotUsable, text }
+    Warning::new(code, Severity::NotUsable, text)
 }
 
 /// A warning that asks for care.
 pub(crate) fn with_care(code: WarningCode, text: String) -> Warning {
-    Warning { code, severity: Severity::UsableWithCare, text }
+    Warning::new(code, Severity::UsableWithCare, text)
 }

@@ -34,15 +34,15 @@ pub(crate) use aliases::Aliases;
 pub(crate) use search::INDISTINGUISHABLE;
 
 // What the files of the checks name, which they take from here.
-use crate::estimate::{Examination, Extent, Knowledge, Unknown, Warning, WarningCode};
+use crate::estimate::{About, Examination, Extent, Knowledge, Unknown, Warning, WarningCode};
 use crate::judge::check::{Check, Examined, Pass, level, not_usable, note, with_care};
 use crate::judge::covariances::Covariances;
 use crate::judge::evidence::Evidence;
 use crate::judge::evidence::ruled_out::Unless;
 use crate::judge::intervals::Intervals;
 use crate::numeral::{counted, exact, number, p_value, percent, unit_after};
-use crate::optimize::Severity;
 use crate::problem::{Objective, Role};
+use crate::severity::Severity;
 
 /// All checks, in the order in which their warnings are shown.
 pub(crate) const CHECKS: &[Check] = &[

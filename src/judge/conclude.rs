@@ -19,7 +19,7 @@ pub(crate) fn conclude(objective: &Objective<'_>, end: &SearchEnd, seconds: f64)
     conclude_from(objective, end, residuals, seconds)
 }
 
-/// The same from the residuals there.
+/// The summary from the residuals there.
 pub(crate) fn conclude_from(
     objective: &Objective<'_>,
     end: &SearchEnd,

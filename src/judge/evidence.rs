@@ -138,7 +138,7 @@ impl<'e> Evidence<'e> {
         self.autocorrelated_at(WHITENESS_LEVEL)
     }
 
-    /// The same at another level.
+    /// The errors' autocorrelation at another level.
     pub fn autocorrelated_at(&self, level: f64) -> Option<(usize, Whiteness)> {
         least_white(&self.tested()).filter(|(_, white)| white.p_value < level)
     }
@@ -183,7 +183,7 @@ impl<'e> Evidence<'e> {
 
     /// How many errors have the information of one independent error.
     fn variance_inflation(&self, j: usize) -> f64 {
-        if self.point.is_static() { 1.0 } else { self.residuals.whiteness[j].dependence }
+        if self.point.is_static() { 1.0 } else { self.residuals.whiteness[j].variance_inflation }
     }
 
     /// How many independent errors an output has the information of, one at least.

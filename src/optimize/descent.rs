@@ -204,9 +204,8 @@ impl Descent {
     fn gain_by_slope(&self, point: &Point, trial: &Trial, next: &Point) -> f64 {
         let again = next.linear.step_within(&trial.damping, &next.held, &next.limits);
         let part = again.map_or(f64::INFINITY, |again| next.slope(&again) / point.slope(&trial.step));
-        let rounding = COST_ROUNDING.max(point.linear.roughness());
         match part {
-            _ if next.cost() > point.cost() + rounding * point.cost_size() => 0.0,
+            _ if next.cost() > point.cost() + COST_ROUNDING * point.cost_size() => 0.0,
             part if part < 0.25 => 1.0,
             part if part < 1.0 => GOOD,
             _ => 0.0,

@@ -10,7 +10,6 @@ pub struct Linearization {
     pub cost: f64,
     slopes: Elimination,
     data_norm: Option<f64>,
-    roughness: f64,
     forgotten: Vec<usize>,
 }
 
@@ -24,17 +23,12 @@ impl Linearization {
 
     /// From the cost and the slopes.
     pub fn of(cost: f64, slopes: Elimination) -> Self {
-        Linearization { cost, slopes, data_norm: None, roughness: 0.0, forgotten: vec![] }
+        Linearization { cost, slopes, data_norm: None, forgotten: vec![] }
     }
 
     /// With the norm of the data themselves, weighted as the rows are: what residuals are small against.
     pub fn with_data_norm(self, norm: f64) -> Self {
         Linearization { data_norm: Some(norm), ..self }
-    }
-
-    /// With a part of the cost by which it may jump from point to point: that of an integrator with a tolerance.
-    pub fn with_roughness(self, roughness: f64) -> Self {
-        Linearization { roughness, ..self }
     }
 
     /// With the numbers of unknowns whose slopes were set to zero because they are below the rounding of the residual. A search that ends where
@@ -51,11 +45,6 @@ impl Linearization {
     /// Norm of the data, if it was said.
     pub fn data_norm(&self) -> Option<f64> {
         self.data_norm
-    }
-
-    /// By which part of itself the cost may jump; zero unless said otherwise.
-    pub fn roughness(&self) -> f64 {
-        self.roughness
     }
 }
 

@@ -115,18 +115,6 @@ impl fmt::Display for SearchLimit {
     }
 }
 
-/// Whether to trust what a search found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Severity {
-    /// No check contradicts it.
-    Usable,
-    /// Read the warnings first.
-    UsableWithCare,
-    /// Do not use the numbers.
-    NotUsable,
-}
-
 /// Where the cost resolves no more, three digits of each unknown make a minimum.
 const DIGITS: f64 = 1e-3;
 /// Where the cost is rough, a tenth of a standard error does.

@@ -125,7 +125,7 @@ impl Point {
 
     /// The smallest difference that the cost resolves, in its own unit.
     pub fn resolution(&self) -> f64 {
-        RESOLUTION.max(self.linear.roughness()) * self.cost_size()
+        RESOLUTION * self.cost_size()
     }
 
     /// The directions, of unknowns that are not on a bound nor forgotten, that have no influence.
@@ -211,7 +211,7 @@ impl Point {
     /// off what the slopes predicted; `rough` says that they were off however short.
     pub fn stuck(&self, failed: u64, noise: f64, rough: bool) -> Outcome {
         let (step, gradient) = (self.relative_step(), self.cosine());
-        let noise = noise.max(self.linear.roughness()).max(self.rounding());
+        let noise = noise.max(self.rounding());
         let left = self.potential / self.cost_size();
         if self.is_next_to_data() {
             Outcome::Exact

@@ -98,7 +98,7 @@ impl Between {
 pub(crate) struct SlicePlant<'a, S> {
     pub layout: &'a Layout,
     pub functions: &'a dyn Functions<S>,
-    /// The same in numbers with slopes, for Jacobians.
+    /// These functions in numbers with slopes, for Jacobians.
     pub duals: &'a dyn Functions<Duals>,
     pub method: &'a dyn Method,
     pub between: Between,

@@ -60,7 +60,7 @@ impl Butterworth {
 impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     /// The record with every input and output filtered by [`Butterworth::zero_phase`].
     ///
-    /// The same filter on both sides leaves a linear model with constant coefficients as it is, but for what the input does
+    /// One filter on both sides leaves a linear model with constant coefficients as it is, but for what the input does
     /// between samples; where coefficients vary (with speed, say), keep the cut-off well above the variation.
     ///
     /// # Errors
@@ -70,7 +70,7 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     }
 }
 
-/// The same of a record whose signals are known by name.
+/// A filtered record whose signals are known by name.
 pub(crate) fn filtered(record: &Record, filter: &Butterworth) -> Result<Record, Error> {
     let step = filter.design.sample_time;
     let other = match record.times() {

@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// The corrected errors are exact; slopes with respect to parameters are off by as much, relatively, as the guesses
 /// are.
 const MOVED: f64 = 0.1;
-/// The same at the first point, where no slopes exist to extrapolate borders from: slopes are then right to the root of it,
+/// That part at the first point, where no slopes exist to extrapolate borders from: slopes are then right to the root of it,
 /// 1e-3, which leaves the first step of a search as it is.
 const MOVED_FIRST: f64 = 1e-6;
 /// The correction for a nonlinear model is exact to the first order only. No further pass is made where it changes the squared

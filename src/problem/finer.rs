@@ -60,7 +60,7 @@ impl Finer for ByMethods<'_> {
 }
 
 impl<'a> Problem<'a> {
-    /// The same problem with finer methods. A run continues with the next of them as long as a finer step would move an unknown.
+    /// This problem with finer methods. A run continues with the next of them as long as a finer step would move an unknown.
     pub(crate) fn refining(self, sweeps: Arc<FinerSweeps<'a>>) -> Self {
         if sweeps.make.is_empty() {
             return self;

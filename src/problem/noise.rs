@@ -97,7 +97,7 @@ fn moments(((objective, coordinates), clip): Asked<'_>) -> Result<SquareMatrix, 
     covariance(&plain.gather(coordinates, false, |experiment| Moments::new(&plain, experiment, clip))?)
 }
 
-/// The same of several objectives of one record each. One that fails in lanes is asked alone.
+/// The moments of several objectives of one record each. One that fails in lanes is asked alone.
 fn moments_together(asked: &[Asked<'_>]) -> Vec<Result<SquareMatrix, Infeasible>> {
     let plain: Vec<Objective<'_>> = asked.iter().map(|((objective, _), _)| objective.in_units()).collect();
     let points: Vec<At<'_>> = plain.iter().zip(asked).map(|(plain, ((_, x), _))| (plain, *x)).collect();
@@ -142,7 +142,7 @@ pub(crate) fn first_whitening(objective: &Objective<'_>, coordinates: &[f64]) ->
     given(objective).map_or_else(|| estimate(objective, coordinates), Ok)
 }
 
-/// The same of several objectives of one record each.
+/// The noise of several objectives of one record each, as given or estimated.
 pub(crate) fn first_together(points: &[At<'_>]) -> Vec<Result<Whitening, Infeasible>> {
     let asked: Vec<At<'_>> = points.iter().copied().filter(|(objective, _)| given(objective).is_none()).collect();
     let mut estimated = estimate_together(&asked).into_iter();
@@ -173,7 +173,7 @@ pub(crate) fn estimate(objective: &Objective<'_>, coordinates: &[f64]) -> Result
     Ok(level.whitening(objective))
 }
 
-/// The same at a point of each of several objectives of one record each, in parallel lanes.
+/// The noise estimated at a point of each of several objectives of one record each, in parallel lanes.
 pub(crate) fn estimate_together(points: &[At<'_>]) -> Vec<Result<Whitening, Infeasible>> {
     let plain: Vec<Asked<'_>> = points.iter().map(|point| (*point, None)).collect();
     let first = moments_together(&plain).into_iter().zip(points);
@@ -265,7 +265,14 @@ pub(crate) fn rounding(objective: &Objective<'_>) -> f64 {
 
 /// Largest measured magnitude of each output.
 fn magnitudes(objective: &Objective<'_>) -> Vec<f64> {
-    let largest = |values: &[f64]| values.iter().fold(0.0f64, |largest, y| largest.max(y.abs()));
+    let largest = |values: &[f64]| {
+        // Eight of them, so that no comparison waits for the one before.
+        let mut largest = [0.0f64; 8];
+        for eight in values.chunks(8) {
+            largest.iter_mut().zip(eight).for_each(|(largest, y)| *largest = largest.max(y.abs()));
+        }
+        largest.into_iter().fold(0.0, f64::max)
+    };
     let of = |j: usize| {
         let records = objective.problem.records.iter();
         records.map(|record| largest(&record.outputs()[j].values)).fold(0.0, f64::max)

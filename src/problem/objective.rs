@@ -56,7 +56,7 @@ impl<'p> Objective<'p> {
         Objective { problem, sweep, whitening, control, squares: squares.into(), left_out, memory }
     }
 
-    /// The same without the slopes of the unknowns on their bounds, which may be infinite there (the root of an initial
+    /// This objective without the slopes of the unknowns on their bounds, which may be infinite there (the root of an initial
     /// level of zero); `None` where none is, or where they have been left out already.
     pub(super) fn inside_bounds(&self, coordinates: &[f64]) -> Option<Self> {
         let bounds = self.problem.unknowns.bounds();
@@ -66,17 +66,17 @@ impl<'p> Objective<'p> {
         some.then(|| Objective { left_out, ..self.clone() })
     }
 
-    /// The same with errors and slopes in the units of the outputs.
+    /// This objective with errors and slopes in the units of the outputs.
     pub(crate) fn in_units(&self) -> Self {
         self.with(Whitening::none(self.outputs()))
     }
 
-    /// The same with errors standardized otherwise.
+    /// This objective with errors standardized otherwise.
     pub(crate) fn with(&self, whitening: Whitening) -> Self {
         Objective { whitening, ..self.clone() }
     }
 
-    /// The same without stop conditions: for passes that an answer cannot do without.
+    /// This objective without stop conditions: for passes that an answer cannot do without.
     pub(crate) fn unlimited(&self) -> Self {
         Objective { control: &NEVER, ..self.clone() }
     }
@@ -87,7 +87,7 @@ impl<'p> Objective<'p> {
         (!self.sweep.predicts_variance()).then(|| squares.sum::<f64>().sqrt())
     }
 
-    /// The same with another sweep, or records that differ in what was measured.
+    /// This objective with another sweep, or records that differ in what was measured.
     pub(crate) fn of<'q>(&'q self, problem: &'q Problem<'q>, sweep: &'q dyn Sweep) -> Objective<'q> {
         let whitening = self.whitening.clone();
         Objective::new(problem, sweep, whitening, self.control)

@@ -111,7 +111,7 @@ impl Objective<'_> {
         Ok(all)
     }
 
-    /// The same of one experiment.
+    /// One pass over the data of one experiment, with its accumulator.
     pub(crate) fn gather_one<A: Accumulate>(
         &self,
         coordinates: &[f64],

@@ -24,10 +24,10 @@ pub trait Search:
     + for<'p> Solver<&'p Objective<'p>, LeastSquaresState>
     + 'static
 {
-    /// The same search with loose tolerances (three digits), for a cost that changes in the next round.
+    /// This search with loose tolerances (three digits), for a cost that changes in the next round.
     fn rough(&self) -> Self;
 
-    /// The same search with at most so many trial steps, or the search itself if it has no such limit.
+    /// This search with at most so many trial steps, or the search itself if it has no such limit.
     fn limited(&self, iterations: u64) -> Self {
         let _ = iterations;
         self.clone()

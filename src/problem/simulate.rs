@@ -68,7 +68,7 @@ impl Objective<'_> {
 }
 
 impl Problem<'_> {
-    /// The same problem with outputs that were measured as zero throughout.
+    /// A problem with outputs that were measured as zero throughout.
     pub(crate) fn against_zero(&self) -> Self {
         let zero = |record: &Record| {
             let zeros = Column::from(vec![0.0; record.len()]);

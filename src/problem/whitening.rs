@@ -66,7 +66,7 @@ impl Whitening {
         }
     }
 
-    /// The same with all standard deviations multiplied by a factor.
+    /// This whitening with all standard deviations multiplied by a factor.
     pub fn widened(&self, factor: f64) -> Self {
         match self {
             Whitening::Diagonal(sigma) => Whitening::Diagonal(sigma.iter().map(|s| s * factor).collect()),
@@ -113,7 +113,7 @@ fn inverse_factor(covariance: &SquareMatrix) -> Option<SquareMatrix> {
     Some(SquareMatrix::from_fn(n, |i, j| inverse[(i, j)]))
 }
 
-/// The same of the rows and columns of some outputs.
+/// The covariance of some outputs.
 fn factor_of_part(covariance: &SquareMatrix, here: &[usize]) -> SquareMatrix {
     let part = SquareMatrix::from_fn(here.len(), |a, b| covariance[(here[a], here[b])]);
     // A part of a positive definite matrix is one.

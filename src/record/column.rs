@@ -71,12 +71,12 @@ impl Channel {
         Channel { name: name.into(), unit: unit.into(), values: values.into() }
     }
 
-    /// The same signal with other values.
+    /// This signal with other values.
     pub fn with(&self, values: impl Into<Column>) -> Self {
         Channel { name: self.name.clone(), unit: self.unit.clone(), values: values.into() }
     }
 
-    /// The same signal over a part of the samples.
+    /// This signal over a part of the samples.
     pub(crate) fn part(&self, range: Range<usize>) -> Self {
         self.with(self.values.part(range))
     }

@@ -101,7 +101,7 @@ impl Record {
         self.inspect_within(self.len())
     }
 
-    /// The same at a cost that does not grow beyond some length, once for all copies of the record.
+    /// An inspection at a cost that does not grow beyond some length, once for all copies of the record.
     pub(crate) fn inspect_some(&self) -> Arc<Inspection> {
         let is_of_this =
             |looked: &&Looked| Arc::ptr_eq(&looked.inputs, &self.inputs) && Arc::ptr_eq(&looked.outputs, &self.outputs);

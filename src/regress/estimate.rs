@@ -48,7 +48,7 @@ pub struct LinearEstimate<P: Signals> {
     /// relative to the parameter: `100 sqrt(E2 ((sum phi phi^T)^-1)_ii) / |theta_i|` (M. Tenerz,
     /// LiTH-ISY-EX--11/4495--SE, 2011, eq. 5.12 to 5.14). Low is well excited; infinite for a parameter that is zero.
     pub index: Of<P, f64>,
-    /// The same with the other parameters held: `100 sqrt(E2 / (sum phi phi^T)_ii) / |theta_i|`.
+    /// The index with the other parameters held: `100 sqrt(E2 / (sum phi phi^T)_ii) / |theta_i|`.
     pub index_others_held: Of<P, f64>,
     /// Covariance of the parameters, in the order of their declaration.
     pub covariance: SquareMatrix,

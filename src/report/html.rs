@@ -8,8 +8,8 @@ mod terms;
 use super::chart::{self, COLUMNS, PALETTE, STYLE, Size};
 use super::markup::{Attributes, Markup};
 use super::{Report, words};
-use crate::optimize::Severity;
 use crate::section::{Drawing, Plot, Section, Table};
+use crate::severity::Severity;
 use core::fmt::Display;
 use prose::Prose;
 

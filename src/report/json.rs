@@ -15,7 +15,7 @@ impl Report {
         Report { title, estimate, sections, ..*self }.to_json_with_drawings()
     }
 
-    /// The same with the numbers of all drawings, which take some megabytes.
+    /// JSON with the numbers of all drawings, which take some megabytes.
     ///
     /// # Errors
     /// None for a report that this library made.

@@ -1,8 +1,8 @@
 //! A report for a terminal of 80 columns.
 
 use super::{Report, words};
-use crate::optimize::Severity;
 use crate::section::{Drawing, PanelKind, Section, Timeline, Trace, visible, wrapped};
+use crate::severity::Severity;
 use core::fmt::Write;
 
 /// Cells of a sparkline.

@@ -2,7 +2,7 @@
 
 use super::Report;
 use crate::estimate::Knowledge;
-use crate::optimize::Severity;
+use crate::severity::Severity;
 
 /// The verdict in a word or three.
 pub(super) fn verdict(severity: Severity) -> &'static str {

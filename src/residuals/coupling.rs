@@ -133,7 +133,8 @@ mod tests {
     use super::*;
     use crate::residuals::whiteness::LAGS;
 
-    const PLAIN: Whiteness = Whiteness { p_value: 1.0, correlations: [0.0; LAGS], predicted: 0.0, dependence: 1.0 };
+    const PLAIN: Whiteness =
+        Whiteness { p_value: 1.0, correlations: [0.0; LAGS], predicted: 0.0, variance_inflation: 1.0 };
 
     /// By hand, two outputs with errors (1, 2), (1, 1), (-1, -1): products 2, 1, 1; squares 3 and 6; a sum of squared products
     /// of 6. The statistic is 16/6, whose tail with one degree of freedom is 0.102470; not below the level. Four times the

@@ -102,7 +102,7 @@ impl Powers {
         self.high.iter_mut().zip(other.high).for_each(|(sum, other)| *sum += other);
     }
 
-    /// The same with errors and regressors multiplied by a number.
+    /// These sums with errors and regressors multiplied by a number.
     fn times(&self, factor: f64) -> Self {
         let square = factor * factor;
         Powers {

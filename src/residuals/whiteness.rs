@@ -18,21 +18,21 @@ pub(crate) struct Whiteness {
     /// what white errors show by chance.
     pub predicted: f64,
     /// How many errors have the information of one independent error on a slow signal.
-    pub dependence: f64,
+    pub variance_inflation: f64,
 }
 
 impl Whiteness {
     /// Of so many errors.
     pub fn of(errors: &Portmanteau, count: u64) -> Self {
         let correlations = std::array::from_fn(|k| errors.at(k + 1).1);
-        let (predicted, dependence) = color(&correlations, count);
+        let (predicted, inflation) = color(&correlations, count);
         let most = |lags: usize| lags.min(count as usize / 4).max(1);
         let over = |lags: usize| errors.p_value(most(lags));
         Whiteness {
             p_value: (3.0 * over(FEW).min(over(LAGS)).min(errors.neighbors_p_value())).min(1.0),
             correlations,
             predicted,
-            dependence,
+            variance_inflation: inflation,
         }
     }
 }
@@ -71,10 +71,10 @@ mod tests {
     fn an_autoregression_is_predicted() {
         for r in [0.0, 0.3, 0.9f64] {
             let coefficients: Vec<f64> = (1..=20).map(|k| r.powi(k)).collect();
-            let (predicted, dependence) = color(&coefficients, 1_000_000_000);
+            let (predicted, inflation) = color(&coefficients, 1_000_000_000);
             // The adjustment for 20 lags of so many errors is 2e-8.
             assert!((predicted - r * r).abs() < 1e-7, "{r}: {predicted}");
-            assert!((dependence - (1.0 + r) / (1.0 - r)).abs() < 1e-9, "{r}: {dependence}");
+            assert!((inflation - (1.0 + r) / (1.0 - r)).abs() < 1e-9, "{r}: {inflation}");
         }
     }
 
@@ -97,7 +97,7 @@ mod tests {
         let of = |p_value: f64, first: f64| {
             let mut correlations = [0.0; LAGS];
             correlations[0] = first;
-            Whiteness { p_value, correlations, predicted: 0.0, dependence: 1.0 }
+            Whiteness { p_value, correlations, predicted: 0.0, variance_inflation: 1.0 }
         };
         let found = |all: &[Whiteness]| {
             let tested: Vec<(usize, Whiteness)> = all.iter().copied().enumerate().collect();
@@ -135,10 +135,10 @@ mod tests {
     #[test]
     fn dependence_counts_positive_lags() {
         for coefficients in [[0.1, 0.3, 0.2, -0.5, 0.4], [0.1, 0.3, 0.2, 0.0, 0.4]] {
-            let (_, dependence) = color(&coefficients, 1000);
-            assert!((dependence - 2.2).abs() < 1e-12, "{dependence}");
+            let (_, inflation) = color(&coefficients, 1000);
+            assert!((inflation - 2.2).abs() < 1e-12, "{inflation}");
         }
-        let (_, dependence) = color(&[-0.3, 0.2], 1000);
-        assert_eq!(dependence, 1.0);
+        let (_, inflation) = color(&[-0.3, 0.2], 1000);
+        assert_eq!(inflation, 1.0);
     }
 }

@@ -205,11 +205,6 @@ impl Plot {
         }
     }
 
-    /// Whether it has its drawing: a report read from JSON may have none.
-    pub fn is_drawn(&self) -> bool {
-        self.drawing.is_some()
-    }
-
     /// A plot of any kind.
     pub(crate) fn of(
         name: impl AsRef<str>,

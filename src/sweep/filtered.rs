@@ -12,7 +12,7 @@ use core::cell::Cell;
 
 /// Samples per window.
 const WINDOW: usize = 128;
-/// The same where a single sample may take many steps: after each window a fit looks at its time limit.
+/// Samples per window where a single one may take many steps: after each window a fit looks at its time limit.
 const ADAPTIVE_WINDOW: usize = 8;
 /// Slopes of a pass.
 const SLOPES: usize = 8;

@@ -22,7 +22,7 @@ use std::sync::Arc;
 
 /// Samples per window: two outputs with eight slopes fit into the first-level cache.
 const WINDOW: usize = 128;
-/// The same where a single sample may take many steps: after each window a fit looks at its time limit.
+/// Samples per window where a single one may take many steps: after each window a fit looks at its time limit.
 const ADAPTIVE_WINDOW: usize = 8;
 
 /// The type of a slope.
@@ -129,7 +129,7 @@ pub(crate) trait Loops<M: Model>: Send + Sync {
         visit: Visit<'_>,
     ) -> Result<Reached, RunError>;
 
-    /// The same with a finer step, if there is one.
+    /// These loops with a finer step, if there is one.
     fn refined(&self, kind: Kind) -> Option<Arc<dyn Loops<M>>>;
 }
 

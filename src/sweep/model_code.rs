@@ -26,7 +26,7 @@ pub(crate) trait ModelCode: Send + Sync {
         visit: Visit<'_>,
     ) -> Result<Reached, RunError>;
 
-    /// The same for a finer step, if there is one.
+    /// This code for a finer step, if there is one.
     fn refined<'s>(&'s self, kind: Kind) -> Option<Arc<dyn ModelCode + 's>>;
 
     /// Whether derivatives (next states) and outputs are affine in the state, as far as slopes with respect to it are asked for.

@@ -27,7 +27,7 @@ use workspace::Compiled;
 /// Equations run by compiled programs.
 pub(crate) struct ProgramSweep<'a> {
     programs: Arc<Programs>,
-    /// The same equations in dual numbers, for all that is not a pass over many samples.
+    /// These equations in dual numbers, for all that is not a pass over many samples.
     plain: Arc<dyn Sweep + 'a>,
 }
 
@@ -42,7 +42,7 @@ struct Programs {
     recurrences: Mutex<Vec<(Holds, Arc<Recurrence>)>>,
     /// Those that were asked for, with the reason where there can be none.
     compiled: Mutex<Vec<(Key, MaybeCompiled)>>,
-    /// The same with a finer step, if there is one.
+    /// This sweep with a finer step, if there is one.
     refined: OnceLock<Option<Arc<Programs>>>,
 }
 

@@ -104,7 +104,7 @@ impl Window {
         &mut self.values[..used]
     }
 
-    /// The same of the variances.
+    /// The rows of the variances.
     pub fn variance_rows_mut(&mut self) -> &mut [f64] {
         let used = self.len() * self.outputs * self.columns * self.lanes;
         &mut self.variances[..used]
@@ -128,7 +128,7 @@ impl Window {
         &self.values[(sample * self.outputs + output) * width..][..width]
     }
 
-    /// The same to be written.
+    /// The row of an output of a sample, to be written.
     #[inline(always)]
     pub fn row_mut(&mut self, sample: usize, output: usize) -> &mut [f64] {
         let width = self.columns * self.lanes;
@@ -141,7 +141,7 @@ impl Window {
         &self.variances[(sample * self.outputs + output) * width..][..width]
     }
 
-    /// The same to be written.
+    /// The row of an output's variance, to be written.
     pub fn variance_row_mut(&mut self, sample: usize, output: usize) -> &mut [f64] {
         let width = self.columns * self.lanes;
         &mut self.variances[(sample * self.outputs + output) * width..][..width]

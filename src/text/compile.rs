@@ -79,7 +79,7 @@ impl<'d> Compiler<'d> {
         }
     }
 
-    /// The same for expressions of another text.
+    /// This compiler for expressions of another text.
     pub fn reading(self, source: &'d Arc<Source>) -> Self {
         Compiler { source, ..self }
     }

@@ -78,7 +78,7 @@ impl Unit {
         Unit { powers, factor: self.factor.map(|factor| factor.powf(n)) }
     }
 
-    /// The same dimension in a size that is not known.
+    /// This dimension in a size that is not known.
     pub fn of_any_size(self) -> Unit {
         Unit { factor: None, ..self }
     }

@@ -4,9 +4,9 @@ use crate::random::Random;
 use greybox::diagnose::{
     Candidate, Resampling, Test, bootstrap, cross_validate, derived, drift, f_test, likelihood_ratio, tested, validate,
 };
-use greybox::optimize::Severity;
 use greybox::{
-    Error, Estimate, Experiment, Fit, Kind, Model, Nothing, Parameter, Scalar, Summary, Time, fixed, free, signals,
+    Error, Estimate, Experiment, Fit, Kind, Model, Nothing, Parameter, Scalar, Severity, Summary, Time, fixed, free,
+    signals,
 };
 
 signals! { struct Input { u: "V" } }

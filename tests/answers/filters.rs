@@ -3,10 +3,9 @@
 use crate::pages::{Branch, Lag, Response, record};
 use crate::random::Random;
 use greybox::diagnose::{bands, identifiability};
-use greybox::optimize::Severity;
 use greybox::{
-    Experiment, ExperimentOf, Fit, Kalman, Kind, Knowledge, Model, Parameter, Report, Scalar, Time, fixed, free,
-    signals,
+    Experiment, ExperimentOf, Fit, Kalman, Kind, Knowledge, Model, Parameter, Report, Scalar, Severity, Time, fixed,
+    free, signals,
 };
 
 signals! { pub struct Level { x: "V" } }

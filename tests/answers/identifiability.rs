@@ -3,8 +3,7 @@
 use crate::random::Random;
 use crate::shared::shared;
 use greybox::diagnose::{End, bands, derived, identifiability, profile};
-use greybox::optimize::Severity;
-use greybox::{Butterworth, Horizon};
+use greybox::{Butterworth, Horizon, Severity};
 use greybox::{
     Estimate, Experiment, Fit, Kind, Knowledge, Model, Nothing, Parameter, Sample, Scalar, Time, Transform,
     WarningCode, fixed, free, signals,

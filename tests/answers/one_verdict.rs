@@ -1,8 +1,8 @@
 //! The verdict of a report is that of its estimate, whatever the tests of the residuals show.
 
 use crate::random::Random;
-use greybox::optimize::Severity;
-use greybox::{Experiment, Fit, Huber, Kind, Model, Report, Scalar, Time, free, signals};
+use greybox::estimate::About;
+use greybox::{Experiment, Fit, Huber, Kind, Model, Report, Scalar, Severity, Time, WarningCode, free, signals};
 
 signals! { struct Level { y: "V" } }
 signals! { struct Drive { u: "V" } }
@@ -96,4 +96,32 @@ fn a_bad_record_has_one_verdict() {
     let outputs = (0..600).map(|_| Level { y: random.normal() }).collect();
     columns = Experiment::new(&Recursion, columns.times().clone(), inputs, outputs).unwrap();
     assert_eq!(judged(&columns, false).0, Severity::NotUsable);
+}
+
+/// A bound that the cost falls beyond, an input that never moves, a jump of time in the second of two records, and a start of another sign:
+/// programs read which unknown, input and record these are.
+#[test]
+fn warnings_say_what_they_are_about() {
+    let first = record(1, 0.0, usize::MAX);
+    let still = vec![Drive { u: 0.0 }; 600];
+    let outputs: Vec<Level> = first.outputs().collect();
+    let stamps = (0..600).map(|k| f64::from(k) + if k < 300 { 0.0 } else { 50.0 }).collect();
+    let second = Experiment::new(&Recursion, Time::Stamps(stamps), first.inputs().collect(), outputs.clone()).unwrap();
+    let of = |records: &[Experiment<Level, Drive, Level>], b: f64, most: f64| {
+        let start = Poles { a: free(0.5), b: free(b).within(-1.0, most) };
+        Fit::new(&Recursion, records).parameters(start).run().unwrap()
+    };
+    let about = |found: &greybox::Estimate<Recursion>, code: WarningCode| {
+        found.warnings.iter().find(|warning| warning.code == code).map(|warning| warning.about)
+    };
+    let held = of(&[first.clone(), second], 0.1, 0.2);
+    assert_eq!(about(&held, WarningCode::HeldAtBound), Some(About::Unknown(1)), "{held}");
+    assert_eq!(about(&held, WarningCode::TimeGaps), Some(About::Experiment(1)), "{held}");
+    let turned = of(&[first.clone()], -0.1, 1.0);
+    assert_eq!(about(&turned, WarningCode::SignChanged), Some(About::Unknown(1)), "{turned}");
+    let undriven = Experiment::new(&Recursion, first.times().clone(), still, outputs).unwrap();
+    let unknown = of(&[undriven], 0.1, 1.0);
+    assert_eq!(about(&unknown, WarningCode::ConstantInput), Some(About::Input(0)), "{unknown}");
+    let direction = |warning: &greybox::Warning| warning.about == About::Direction(0) && warning.text.contains("`b`");
+    assert!(unknown.directions.len() == 1 && unknown.warnings.iter().any(direction), "{unknown}");
 }

@@ -3,9 +3,8 @@
 use crate::random::Random;
 use greybox::diagnose::residuals::examine;
 use greybox::diagnose::{Compared, Convergence, bands, profile};
-use greybox::optimize::Severity;
 use greybox::report::{Layer, Plot, Section, Style};
-use greybox::{Error, Experiment, ExperimentOf, Fit, Model, Report, Scalar, Time, free, signals};
+use greybox::{Error, Experiment, ExperimentOf, Fit, Model, Report, Scalar, Severity, Time, free, signals};
 
 signals! { pub struct Drive { u: "V" } }
 signals! { pub struct Response { y: "A" } }

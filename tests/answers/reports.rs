@@ -1,11 +1,11 @@
 //! Reports: that every form of one is whole, safe against what stands in names, and says what is missing.
 
 use greybox::diagnose::{Resampling, Test, bootstrap, profile, tested};
-use greybox::optimize::Severity;
 use greybox::pmsm::{Surface, Winding};
 use greybox::report::{Cell, Origin, Section, Table};
 use greybox::{
-    Error, Experiment, ExperimentOf, Fit, Kind, Model, Nothing, Report, Scalar, Signals, Time, fixed, free, signals,
+    Error, Experiment, ExperimentOf, Fit, Kind, Model, Nothing, Report, Scalar, Severity, Signals, Time, fixed, free,
+    signals,
 };
 use std::fs;
 use std::path::PathBuf;

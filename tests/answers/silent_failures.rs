@@ -2,9 +2,9 @@
 
 use crate::common::{Branch, Current, Lag, Voltage};
 use greybox::diagnose::{Resampling, bootstrap};
-use greybox::optimize::Severity;
 use greybox::{
-    Error, Estimate, Experiment, Fit, Kind, Knowledge, Model, Nothing, Report, Scalar, Time, fixed, free, signals,
+    Error, Estimate, Experiment, Fit, Kind, Knowledge, Model, Nothing, Report, Scalar, Severity, Time, fixed, free,
+    signals,
 };
 
 /// Steps of 0.01 s with `gain = 2 A/V`, `tau = 0.05 s` and a little noise; the samples in `lost` are cut out.

@@ -4,7 +4,6 @@ use crate::common::Noise;
 use crate::hardening::{Hardening, Pull, STRONG, Spring, TRUTH, disturbed, driven, runge_kutta, start};
 use argmin::core::{CostFunction, Gradient};
 use core::f64::consts::TAU;
-use greybox::optimize::Severity;
 use greybox::*;
 
 /// `-ln` of the likelihood by moments of a Gaussian state, by hand: `E x^3 = m^3 + 3 m P`, `E 3 x^2 = 3 (m^2 + P)`, `E x^2 = m^2 + P`, of

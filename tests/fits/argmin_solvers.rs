@@ -281,7 +281,7 @@ fn a_flag_stops_the_search() {
     let observer = Raise(flag.clone());
     let estimate = fit(&record).cancel(flag).observe(observer, ObserverMode::Always).run().unwrap();
     assert_eq!(estimate.outcome, Outcome::Cancelled);
-    assert_eq!(estimate.severity(), optimize::Severity::NotUsable);
+    assert_eq!(estimate.severity(), Severity::NotUsable);
     let raised = Arc::new(AtomicBool::new(true));
     assert!(fit(&record).cancel(raised).run().is_err());
 }

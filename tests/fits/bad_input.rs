@@ -4,7 +4,7 @@
 use crate::common::{Coil, Current, Rl, Voltage};
 use crate::refused::says;
 use approx::assert_relative_eq;
-use greybox::optimize::{GaussNewton, LevenbergMarquardt, Outcome, Severity, Stop};
+use greybox::optimize::{GaussNewton, LevenbergMarquardt, Outcome, Stop};
 use greybox::optimize::{JacobianColumns, Scaling, Seen};
 use greybox::*;
 use greybox::{

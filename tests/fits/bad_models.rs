@@ -3,7 +3,6 @@
 
 use crate::refused::says;
 use approx::assert_relative_eq;
-use greybox::optimize::Severity;
 use greybox::*;
 
 signals! { pub struct Position { x: "m" } }

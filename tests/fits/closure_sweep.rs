@@ -5,7 +5,6 @@ use crate::refused::says;
 use approx::assert_relative_eq;
 use greybox::diagnose::{identifiability, profile};
 use greybox::layout::{Layout, Quantity};
-use greybox::optimize::Severity;
 use greybox::record::{Channel, Initial, Record};
 use greybox::sweep::{Coupling, Piece, Reached, RunError, Seed, Sweep, Window};
 use greybox::*;

@@ -2,7 +2,6 @@
 //! What single columns of a record make of a verdict: constant inputs, clipped outputs, copies.
 
 use crate::common::*;
-use greybox::optimize::Severity;
 use greybox::*;
 
 signals! { pub struct Filter { il: "A", vc: "V" } }

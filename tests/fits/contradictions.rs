@@ -4,7 +4,7 @@
 use crate::common::*;
 use crate::interval_limits::{Gains, Mixer};
 use crate::judgements::{Drive, Factor, Gain, Twice, edited, fit, moving, record, said};
-use greybox::optimize::{JacobianColumns, LevenbergMarquardt, Severity, Stop};
+use greybox::optimize::{JacobianColumns, LevenbergMarquardt, Stop};
 use greybox::*;
 
 /// Outputs with gains that differ by 30 %: the parameter of each alone is named, by its regression, and how far they are apart.

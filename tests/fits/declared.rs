@@ -2,7 +2,6 @@
 
 use crate::shared::shared;
 use greybox::models::{AxisParameters, ControlledAxisMotion, PositioningLoop};
-use greybox::optimize::Severity;
 use greybox::*;
 
 signals! { pub struct Push { u: "N" } }

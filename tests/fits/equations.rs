@@ -6,7 +6,6 @@ use approx::assert_relative_eq;
 use greybox::equations::Equations;
 use greybox::graph::{Function, Graph, Id, Leaf};
 use greybox::layout::{Layout, Quantity};
-use greybox::optimize::Severity;
 use greybox::record::{Channel, Record};
 use greybox::*;
 

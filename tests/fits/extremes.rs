@@ -1,6 +1,6 @@
 //! Numbers near the ends of what an `f64` can hold: an answer or an error, and nothing known that is not finite.
 
-use greybox::optimize::{GaussNewton, LevenbergMarquardt, Outcome, Severity};
+use greybox::optimize::{GaussNewton, LevenbergMarquardt, Outcome};
 use greybox::*;
 
 signals! {

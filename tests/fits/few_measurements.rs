@@ -4,7 +4,6 @@
 use crate::common::*;
 use crate::sandwiches::{Factor, Gain};
 use greybox::estimate::CovarianceMethod;
-use greybox::optimize::Severity;
 use greybox::*;
 
 /// Inputs of -1 and 1 in turn, but for these; errors are autoregressive with `rho`.

@@ -2,7 +2,6 @@
 
 use crate::common::Noise;
 use crate::shared::shared;
-use greybox::optimize::Severity;
 use greybox::*;
 
 signals! { pub struct Sugars { x: "g", f: "g" } }

@@ -2,7 +2,6 @@
 
 use crate::common::{Branch, Current, Lag, Voltage, levels};
 use crate::refused::says;
-use greybox::optimize::Severity;
 use greybox::*;
 
 signals! { pub struct Motion { x: "m", v: "m/s" } }

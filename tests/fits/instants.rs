@@ -1,7 +1,6 @@
 //! Several measurements at one instant.
 
 use crate::common::Noise;
-use greybox::optimize::Severity;
 use greybox::*;
 
 signals! { pub struct Amount { a: "mol/l" } }

@@ -202,7 +202,7 @@ fn noise_in_restarts_is_named() {
     };
     let noise = noisy(&Lag, &clean, Current { i: 0.1 }, &mut Noise(8));
     let named = fit(&noise);
-    assert!(has(&named, WarningCode::RestartNoise) && named.severity() == optimize::Severity::NotUsable);
+    assert!(has(&named, WarningCode::RestartNoise) && named.severity() == Severity::NotUsable);
     // Noise in the state, which is measured exactly: dx = (k u - x)/tau dt + dw.
     let (mut x, mut process) = (0.0, Noise(9));
     let decay = (-5e-3f64 / 0.05).exp();
@@ -252,7 +252,7 @@ fn noise_in_restarts_that_is_not_excluded_is_said() {
         fit.predictor(Horizon::new(1)).run().unwrap().severity()
     };
     let usable = |disturbance: f64, sigma: f64| {
-        (1..=20).filter(|seed| run(*seed, disturbance, sigma) == optimize::Severity::Usable).count()
+        (1..=20).filter(|seed| run(*seed, disturbance, sigma) == Severity::Usable).count()
     };
     assert_eq!(usable(1.0, 0.3), 0);
     assert!(usable(0.1, 1e-4) >= 19);
@@ -295,7 +295,7 @@ fn noise_of_restarts_that_is_fed_back_is_named() {
         let (named, bias) = run(0, seed);
         let warning = named.warnings.iter().find(|warning| warning.code == WarningCode::RestartNoise).unwrap();
         let error = named.unknowns[0].knowledge.standard_error().unwrap();
-        assert_eq!(warning.severity, optimize::Severity::NotUsable);
+        assert_eq!(warning.severity, Severity::NotUsable);
         assert!(warning.text.contains("standard errors, `u` being fed back"), "{}", warning.text);
         let by = warning.text.split("`b` by about ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
         said += by.parse::<f64>().unwrap() * error;
@@ -329,9 +329,9 @@ fn noise_of_restarts_that_leaves_white_errors_is_named() {
         let fit = || Fit::new(&Lag, &record).parameters(Branch { gain: free(4.0), tau: free(1.2) });
         let ahead = fit().predictor(Horizon::new(1)).run().unwrap();
         let off = (ahead.parameters.tau - truth.tau) / ahead.knowledge.tau.standard_error().unwrap();
-        assert!(off.abs() > 10.0 && ahead.severity() == optimize::Severity::NotUsable, "{off} {ahead}");
+        assert!(off.abs() > 10.0 && ahead.severity() == Severity::NotUsable, "{off} {ahead}");
         assert!(ahead.warnings.iter().any(|warning| warning.code == WarningCode::RestartNoise), "{ahead}");
-        assert_eq!(fit().run().unwrap().severity(), optimize::Severity::Usable);
+        assert_eq!(fit().run().unwrap().severity(), Severity::Usable);
     }
 }
 

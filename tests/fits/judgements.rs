@@ -3,7 +3,7 @@
 
 use crate::common::*;
 use crate::interval_limits::{Gains, Mixer};
-use greybox::optimize::{Outcome, Severity};
+use greybox::optimize::Outcome;
 use greybox::*;
 
 signals! { pub struct Factor { a: "1" } }

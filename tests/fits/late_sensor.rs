@@ -2,7 +2,6 @@
 //! Records whose sensor begins to measure when the initial state has died out.
 
 use crate::common::{Noise, levels};
-use greybox::optimize::Severity;
 use greybox::*;
 
 signals! { pub struct Level { x: "1" } }

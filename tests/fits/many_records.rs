@@ -74,7 +74,7 @@ fn records_that_differ_are_clusters() {
     let alike: Vec<_> = RATES.iter().map(|_| record(0.5, 11, 0.0, &mut noise)).collect();
     assert_eq!(fit(&alike).method.covariance, CovarianceMethod::Classical);
     let each = Fit::new(&Decay, &fixed).parameters(Rate { k: free(1.0).per_experiment() }).run().unwrap();
-    assert_eq!(each.severity(), optimize::Severity::Usable, "{each}");
+    assert_eq!(each.severity(), Severity::Usable, "{each}");
 }
 
 /// Three short records, and forty of six samples, that scatter by 30 %: each kind named in all of ten draws.
@@ -88,7 +88,7 @@ fn few_and_many_records_that_differ_are_named() {
             let records: Vec<_> = (0..count).map(|i| record(rate(i), samples, 0.0, &mut noise)).collect();
             let estimate = fit(&records);
             assert!(said(&estimate, WarningCode::RecordsContradict).is_some(), "{count} {seed} {estimate}");
-            assert!(estimate.severity() > optimize::Severity::Usable);
+            assert!(estimate.severity() > Severity::Usable);
         }
     }
 }
@@ -117,7 +117,7 @@ fn values_are_those_of_all_records() {
         let mut noise = Noise(count);
         let records: Vec<_> = (0..count).map(|_| record(0.5, 6, 0.0, &mut noise)).collect();
         let estimate = fit(&records);
-        assert_eq!(estimate.severity(), optimize::Severity::Usable, "{estimate}");
+        assert_eq!(estimate.severity(), Severity::Usable, "{estimate}");
         let rounded = |one: &ExperimentOf<Decay>| {
             let outputs = one.outputs().map(|y| Current { i: if y.i > 2.0 { 4.0 } else { 1.0 } }).collect();
             with_outputs(&Decay, one, outputs)

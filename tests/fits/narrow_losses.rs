@@ -2,7 +2,6 @@
 
 use crate::common::{Branch, Current, Lag, Noise, Voltage, levels};
 use greybox::loss::{Loss, Tukey};
-use greybox::optimize::Severity;
 use greybox::*;
 
 fn said_of(samples: usize, loss: impl Loss + Clone + 'static, seed: u64) -> Option<Severity> {

@@ -3,7 +3,7 @@
 use crate::common::{Branch, Current, Lag, Noise, Voltage, levels};
 use crate::far_starts::{Coupled, Coupling, coupled};
 use approx::assert_relative_eq;
-use greybox::optimize::{JacobianColumns, LevenbergMarquardt, Outcome, Severity, Stop};
+use greybox::optimize::{JacobianColumns, LevenbergMarquardt, Outcome, Stop};
 use greybox::*;
 
 /// Steps of 1 ms; a stiffness of `c` turns by `sqrt(150 c) / 1000` rad in one. Without friction.

@@ -4,7 +4,6 @@
 use crate::common::*;
 use crate::dc_motor::{Armature, DcMotor, Feed, Rotation};
 use crate::judgements::{Drive, Twice, fit};
-use greybox::optimize::Severity;
 use greybox::*;
 
 fn said<M: Model>(estimate: &Estimate<M>) -> Option<&Warning> {

@@ -2,7 +2,6 @@
 
 use approx::assert_relative_eq;
 use greybox::estimate::FailedStart;
-use greybox::optimize::Severity;
 use greybox::*;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;

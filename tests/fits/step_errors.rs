@@ -1,7 +1,7 @@
 //! Steps whose errors a single window does not show, or no window does.
 
 use crate::common::{Branch, Current, Lag, Noise, Voltage, levels};
-use greybox::optimize::{Outcome, Severity};
+use greybox::optimize::Outcome;
 use greybox::*;
 
 signals! { pub struct Motion { x: "m", v: "m/s" } }

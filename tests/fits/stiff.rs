@@ -1,7 +1,6 @@
 //! Plants with a mode far faster than their samples, by default settings: a fit takes the implicit method by itself, and gives
 //! it up soon where a model explodes.
 
-use greybox::optimize::Severity;
 use greybox::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

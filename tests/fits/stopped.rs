@@ -1,6 +1,5 @@
 //! Fits that are cancelled at any of their evaluations: what was left out is said.
 
-use greybox::optimize::Severity;
 use greybox::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};

@@ -3,7 +3,6 @@
 //! same behind a filter.
 
 use crate::common::Noise;
-use greybox::optimize::Severity;
 use greybox::*;
 
 signals! { pub struct Level { x: "1" } }

@@ -4,11 +4,12 @@ use crate::models::{Broken, Lag, Line, Oscillator, Pendulum, Regression};
 use crate::random::Random;
 use crate::values::{Draw, parameter, record};
 use greybox::diagnose::{Resampling, bootstrap, profile, validate};
-use greybox::optimize::{GaussNewton, LevenbergMarquardt, Outcome, Severity, Stop};
+use greybox::estimate::About;
+use greybox::optimize::{GaussNewton, LevenbergMarquardt, Outcome, Stop};
 use greybox::pmsm::Surface;
 use greybox::{
     Automatic, Butterworth, Error, Esdirk, Estimate, ExperimentOf, Fit, Fleet, Horizon, Huber, Kind, Knowledge, Model,
-    Parameter, Problem, Report, Rk4, Rk45, Sample, Signals, Summary,
+    Parameter, Problem, Report, Rk4, Rk45, Sample, Severity, Signals, Summary, Warning,
     loss::{Cauchy, SoftL1, Tukey},
     optimize::{JacobianColumns, OwnSize},
 };
@@ -179,6 +180,7 @@ fn judged(draw: &mut Draw, problem: &Problem<'_>, summary: &Summary, tally: &mut
     tally.fits = 1;
     tally.converged = u64::from(summary.outcome.converged());
     known(summary)?;
+    named(summary)?;
     in_words("estimate", &summary.to_string())?;
     let text = summary.to_json().map_err(|error| error.to_string())?;
     let again = Summary::from_json(&text).and_then(|read| read.to_json()).map_err(|error| error.to_string())?;
@@ -247,6 +249,23 @@ fn known(summary: &Summary) -> Result<(), String> {
             }
             Knowledge::Fixed | Knowledge::Unidentified => {}
         }
+    }
+    Ok(())
+}
+
+/// A warning about one of several things has its name in its words.
+fn named(summary: &Summary) -> Result<(), String> {
+    for Warning { about, text, .. } in &summary.warnings {
+        let name = match *about {
+            About::Unknown(i) => summary.unknowns.get(i).map(|one| &one.name),
+            About::Output(j) => summary.outputs.get(j).map(|one| &one.name),
+            About::Input(i) => summary.layout.inputs.get(i).map(|one| &one.name),
+            About::Experiment(e) => summary.experiments.get(e).map(|one| &one.name),
+            About::Direction(d) => summary.directions.get(d).and_then(|one| Some(&one.moves.first()?.0)),
+            _ => continue,
+        };
+        let said = name.is_some_and(|name| text.contains(&format!("`{name}`")));
+        check(said, || format!("{about:?} is {name:?}, but the warning is: {text}"))?;
     }
     Ok(())
 }

@@ -26,7 +26,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("one step: as a program", &["engine"]),
     ("one record", &["predict", "simulate"]),
     ("one record: in pieces", &["sweep"]),
-    ("estimation: parts", &["loss", "weighting", "outliers", "optimize", "regress", "numeric", "online"]),
+    ("estimation: parts", &["loss", "weighting", "outliers", "optimize", "regress", "numeric", "online", "severity"]),
     ("estimation: the problem", &["problem"]),
     ("estimation: sections of a report", &["section"]),
     ("estimation: the result", &["estimate"]),

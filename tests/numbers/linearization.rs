@@ -103,13 +103,6 @@ fn the_predicted_reduction_is_that_of_the_rows() {
 }
 
 #[test]
-fn shared_information_is_what_the_blocks_leave() {
-    let (arrow, dense, _) = problem();
-    let full = dense.step(&[0.0; UNKNOWNS], &[false; UNKNOWNS]).expect("it is determined");
-    close(&arrow.shared_information().solve().expect("it is determined"), &full[..SHARED]);
-}
-
-#[test]
 fn what_is_not_determined_has_no_step() {
     let mut block = Information::new(2);
     block.absorb_row(&[1.0, 1.0], 2.0);

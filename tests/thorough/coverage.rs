@@ -8,8 +8,7 @@ mod few;
 mod models;
 
 use crate::random::Random;
-use greybox::optimize::Severity;
-use greybox::{Knowledge, Summary, WarningCode};
+use greybox::{Knowledge, Severity, Summary, WarningCode};
 use rayon::prelude::*;
 
 /// What one fit said, and the truth of each unknown that is examined.

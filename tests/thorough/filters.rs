@@ -19,7 +19,7 @@ fn covered(runs: u64, truth: &Spring, step: f64, predictor: impl predict::Predic
             let Knowledge::Known { lower, upper, .. } = unknown.knowledge else { panic!("{estimate}") };
             *covered += u64::from(lower <= truth && truth <= upper);
         }
-        usable += u64::from(estimate.severity() == optimize::Severity::Usable);
+        usable += u64::from(estimate.severity() == Severity::Usable);
         iterations.push(estimate.iterations);
     }
     iterations.sort_unstable();

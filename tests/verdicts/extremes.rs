@@ -1,9 +1,9 @@
 //! Settings and values at the limits of numbers: nothing is known with a standard error that is none.
 
 use crate::plants::*;
-use greybox::optimize::Severity;
 use greybox::{
-    Experiment, ExperimentOf, Fit, Knowledge, Report, Signals, Summary, Time, WarningCode, fixed, free, loss::Tukey,
+    Experiment, ExperimentOf, Fit, Knowledge, Report, Severity, Signals, Summary, Time, WarningCode, fixed, free,
+    loss::Tukey,
 };
 
 fn record() -> ExperimentOf<FirstOrder> {

@@ -5,8 +5,8 @@ use crate::processes::*;
 use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::{Error, KV};
 use greybox::estimate::WarningCode::{self, Unexplained};
-use greybox::optimize::{LeastSquaresState, LevenbergMarquardt, OwnSize, Severity, Stop};
-use greybox::{Estimate, Experiment, Fit, Fleet, Nothing, Parameter, free};
+use greybox::optimize::{LeastSquaresState, LevenbergMarquardt, OwnSize, Stop};
+use greybox::{Estimate, Experiment, Fit, Fleet, Nothing, Parameter, Severity, free};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 

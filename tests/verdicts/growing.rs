@@ -4,8 +4,8 @@ use crate::junk::{SAMPLES, delayed};
 use crate::plants::*;
 use crate::processes::*;
 use crate::random::Random;
+use greybox::Severity;
 use greybox::WarningCode;
-use greybox::optimize::Severity;
 use greybox::pmsm::Surface;
 use rayon::prelude::*;
 

@@ -22,13 +22,17 @@ mod records;
 mod sampling;
 mod stiff;
 
-use greybox::optimize::Severity;
+use greybox::Severity;
 use rayon::prelude::*;
 use records::Found;
 use std::collections::BTreeMap;
 
-/// Records of each kind; in a debug build fewer, for its time (`.ci/run` takes the optimized one, too).
-const SEEDS: u64 = if cfg!(debug_assertions) { 1 } else { 10 };
+/// Records of each kind; in a debug build fewer, for its time (`.ci/run` takes the optimized one, too), and for measurements as many as
+/// `GREYBOX_SEEDS` says.
+fn seeds() -> u64 {
+    let asked = std::env::var("GREYBOX_SEEDS").ok().and_then(|seeds| seeds.parse().ok());
+    asked.unwrap_or(if cfg!(debug_assertions) { 1 } else { 10 })
+}
 
 /// The first seed; other seeds (`GREYBOX_SEED`) are for measurements.
 fn first() -> u64 {
@@ -46,7 +50,7 @@ struct Row {
 
 fn row(name: &'static str, judged: fn(u64) -> Found, bad: impl Fn(&Found) -> bool) -> Row {
     let mut row = Row { name, counts: [0; 3], codes: BTreeMap::new(), worst: String::new(), errors: 0.0 };
-    for seed in first()..first() + SEEDS {
+    for seed in first()..first() + seeds() {
         let found = judged(seed);
         row.counts[found.severity as usize] += 1;
         for code in &found.codes {
@@ -68,14 +72,14 @@ fn print(title: &str, rows: &[Row]) {
     }
 }
 
-/// With `GREYBOX_WRITE_CHECKS`, writes how many good records each code was said of, for `docs/checks.md`.
+/// With `GREYBOX_WRITE_CHECKS`, writes of how many good records each code was said as more than a note, for `docs/checks.md`.
 fn write_flagged(rows: &[Row]) {
     if std::env::var_os("GREYBOX_WRITE_CHECKS").is_none() {
         return;
     }
     let mut flagged: BTreeMap<&str, usize> = BTreeMap::new();
     rows.iter().flat_map(|row| &row.codes).for_each(|(code, count)| *flagged.entry(code).or_default() += count);
-    let mut text = format!("code,records\nall,{}\n", rows.len() as u64 * SEEDS);
+    let mut text = format!("code,records\nall,{}\n", rows.len() as u64 * seeds());
     flagged.iter().for_each(|(code, count)| text += &format!("{code},{count}\n"));
     std::fs::write(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/flagged.csv"), text).unwrap();
 }
@@ -114,7 +118,7 @@ fn good_records_are_usable() {
     print("good", &rows);
     write_flagged(&rows);
     let not: usize = rows.iter().map(|row| row.counts[2]).sum();
-    let all = rows.len() * SEEDS as usize;
+    let all = rows.len() * seeds() as usize;
     let wrong: Vec<&str> = rows.iter().filter(|row| !row.worst.is_empty()).map(|row| &*row.worst).collect();
     assert!(100 * not <= all, "{not} of {all} are not usable:\n{}", wrong.join("\n\n"));
     assert!(wrong.is_empty(), "{} kinds with a reason that is not true:\n{}", wrong.len(), wrong.join("\n\n"));

@@ -1,10 +1,9 @@
 //! How records are made and judged.
 
 use crate::random::Random;
-use greybox::optimize::Severity;
 use greybox::{
-    Experiment, ExperimentOf, Fit, Hold, Horizon, Huber, Kind, Model, Of, Parameter, Rk45, Signals, Simulator, Time,
-    WarningCode, free,
+    Experiment, ExperimentOf, Fit, Hold, Horizon, Huber, Kind, Model, Of, Parameter, Rk45, Severity, Signals,
+    Simulator, Time, WarningCode, free,
 };
 
 /// The columns of a record.

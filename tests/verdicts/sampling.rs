@@ -3,9 +3,9 @@
 use crate::records::*;
 use approx::assert_relative_eq;
 use greybox::estimate::WarningCode;
-use greybox::optimize::{LevenbergMarquardt, OwnSize, Severity, Stop};
+use greybox::optimize::{LevenbergMarquardt, OwnSize, Stop};
 use greybox::pmsm::Surface;
-use greybox::{Estimate, Fit, Fleet, Model, Parameter, Scalar, free, signals};
+use greybox::{Estimate, Fit, Fleet, Model, Parameter, Scalar, Severity, free, signals};
 
 signals! { pub struct Car { xs: "m", vs: "m/s", xu: "m", vu: "m/s" } }
 signals! { pub struct Road { z: "m" } }

@@ -1,10 +1,9 @@
 //! What is called converged is a minimum, of a stiff model from far starts, too.
 
 use crate::random::Random;
-use greybox::optimize::Severity;
 use greybox::{
-    Esdirk, Estimate, ExperimentOf, Fit, Model, Nothing, Of, Parameter, Scalar, Signals, Simulator, Time, fixed, free,
-    signals,
+    Esdirk, Estimate, ExperimentOf, Fit, Model, Nothing, Of, Parameter, Scalar, Severity, Signals, Simulator, Time,
+    fixed, free, signals,
 };
 
 signals! { pub struct Species { y1: "1", y2: "1", y3: "1", y4: "1", y5: "1", y6: "1", y7: "1", y8: "1" } }

@@ -2,7 +2,7 @@
 
 use crate::{Failure, Verdict};
 use greybox::layout::Layout;
-use greybox::optimize::Severity;
+use greybox::Severity;
 use greybox::{Knowledge, Summary};
 
 /// Which record it is.

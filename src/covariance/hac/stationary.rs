@@ -130,7 +130,7 @@ pub(crate) struct ErrorSums {
     sums: Vec<(Autocorrelation, u64)>,
 }
 
-/// The same while it is summed up.
+/// These sums while errors are added.
 pub(crate) struct Errors<'e> {
     objective: &'e Objective<'e>,
     experiment: usize,

@@ -1,6 +1,6 @@
 //! Words for unknowns that are known only together: a common shift, a common factor, a ratio, a product.
 
-use crate::estimate::{Direction, Unknown, Warning, WarningCode};
+use crate::estimate::{About, Direction, Unknown, Warning};
 use crate::numeral::{number, percent, unit_after};
 
 /// Moves are the same if they differ by less than this part.
@@ -62,13 +62,12 @@ fn listed(mut names: Vec<String>) -> String {
     }
 }
 
-/// The warnings, those about directions saying what kind of direction it is. There is one for each direction, in the same order.
+/// The warnings, those about directions saying what kind of direction it is.
 pub(crate) fn reworded(warnings: &[Warning], directions: &[Direction], unknowns: &[Unknown]) -> Vec<Warning> {
-    let mut directions = directions.iter();
     let reworded = |warning: &Warning| {
-        let direction = if warning.code == WarningCode::Unidentified { directions.next() } else { None };
+        let direction = if let About::Direction(d) = warning.about { directions.get(d) } else { None };
         let kind = direction.and_then(|direction| together(&absolute(direction, unknowns), 0.0, unknowns));
-        kind.map_or_else(|| warning.clone(), Direction::warning)
+        kind.map_or_else(|| warning.clone(), |kind| Direction::warning(kind).about(warning.about))
     };
     warnings.iter().map(reworded).collect()
 }

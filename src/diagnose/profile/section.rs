@@ -103,8 +103,8 @@ impl Profile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::optimize::Severity;
     use crate::parameter::Transform;
+    use crate::severity::Severity;
 
     /// Of a parabola, both curves are that parabola, from end to end and as far as the drawing is high; the interval's ends and the
     /// levels stand beside it.

@@ -26,7 +26,8 @@ pub fn answer(integrator: &str, deviance: f64, value: f64, converged: bool) -> S
 #[test]
 fn where_a_search_goes_on() {
     let warned = |converged: bool, code: WarningCode, severity: Severity| {
-        let warning = Warning { code, severity, text: String::new() };
+        let about = if code == WarningCode::CoarseStep { About::Step } else { About::Output(0) };
+        let warning = Warning::new(code, severity, String::new()).about(about);
         Summary { warnings: vec![warning], ..answer("coarse", 10.0, 1.0, converged) }
     };
     use WarningCode::{CoarseStep, Unexplained};
@@ -108,7 +109,7 @@ fn the_finer_answer_is_preferred() {
 /// explains it does not.
 #[test]
 fn a_minimum_that_explains_nothing_gives_way() {
-    let unexplained = Warning { code: WarningCode::Unexplained, severity: Severity::NotUsable, text: String::new() };
+    let unexplained = Warning::new(WarningCode::Unexplained, Severity::NotUsable, String::new());
     for (deviance, warned, expected) in [(9.0, true, "fine"), (11.0, true, "coarse"), (9.0, false, "coarse")] {
         let warnings = if warned { vec![unexplained.clone()] } else { vec![] };
         let before = Summary { warnings: warnings.clone(), ..answer("coarse", 10.0, 1.0, true) };
@@ -122,7 +123,7 @@ fn a_minimum_that_explains_nothing_gives_way() {
 /// follows. One follows where the finer step lowers the deviance, where it explains the output, and after one minimum only.
 #[test]
 fn no_step_is_the_reason() {
-    let unexplained = Warning { code: WarningCode::Unexplained, severity: Severity::NotUsable, text: String::new() };
+    let unexplained = Warning::new(WarningCode::Unexplained, Severity::NotUsable, String::new());
     let of = |deviance: f64, warned: bool, converged: bool| {
         let warnings = if warned { vec![unexplained.clone()] } else { vec![] };
         Summary { warnings, ..answer("steps", deviance, 1.0, converged) }
@@ -196,7 +197,7 @@ fn the_farthest_of_several_is_said() {
 #[test]
 fn an_adaptive_method_that_is_no_finer() {
     let of = |name: &str, refinement: usize, severity: Option<Severity>| {
-        let coarse = |severity| Warning { code: WarningCode::CoarseStep, severity, text: String::new() };
+        let coarse = |severity| Warning::new(WarningCode::CoarseStep, severity, String::new()).about(About::Step);
         let mut found = answer(name, 10.0, 1.0, true);
         found.method.refinement = refinement;
         Summary { warnings: severity.map(coarse).into_iter().collect(), ..found }

@@ -152,11 +152,6 @@ impl Elimination {
         }
         Some(Reduced { own: n, columns: Cow::Borrowed(&piece.columns), triangle: Cow::Owned(damped) })
     }
-
-    /// The information on the shared unknowns alone, all others minimized out.
-    pub fn shared_information(&self) -> Information {
-        self.reduce(Terms::default()).total.triangle.into_owned()
-    }
 }
 
 impl Terms<'_> {

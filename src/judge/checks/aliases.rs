@@ -98,6 +98,7 @@ fn aliased(evidence: &Evidence<'_>) -> Option<Warning> {
     let compared = evidence.point.end.starts.is_some();
     let severity = if compared { Severity::Usable } else { Severity::UsableWithCare };
     let tried = if compared { "searches were started on both sides" } else { "no search was started there" };
+    let about = if compared { About::Minimum } else { About::Frequency };
     let unit = evidence.point.objective.problem.records[0].time_unit();
     let per = unit.angular_frequency();
     let text = format!(
@@ -109,7 +110,7 @@ fn aliased(evidence: &Evidence<'_>) -> Option<Warning> {
         number(TAU / (frequency * interval), 2),
         number(alias, 3)
     );
-    Some(Warning { code: WarningCode::Aliased, severity, text })
+    Some(Warning::new(WarningCode::Aliased, severity, text).about(about))
 }
 
 /// The fastest oscillation of which there are too few samples, where parameters within their bounds reach another one with the
@@ -120,7 +121,7 @@ fn unresolved<'p>(objective: &Objective<'_>, coordinates: &[f64], points: &'p [S
     found.max_by(|a, b| a.mode.1.total_cmp(&b.mode.1))
 }
 
-/// The same at one of these points.
+/// Such an oscillation at one of these points.
 fn unresolved_at<'p>(
     objective: &Objective<'_>,
     coordinates: &[f64],

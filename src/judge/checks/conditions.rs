@@ -56,7 +56,7 @@ fn kinked(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covarianc
         if choosing.is_some() { "depends" } else { "may depend" },
         percent(part.max(0.0), 2)
     );
-    Some(with_care(WarningCode::CurvedInterval, text))
+    Some(with_care(WarningCode::CurvedInterval, text).about(About::Unknown(place.unknown)))
 }
 
 /// What conditions have to do with an unknown that has no slope: `None` where no condition depends on it, or none of a model that is not read

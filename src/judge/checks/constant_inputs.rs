@@ -52,7 +52,9 @@ fn constant_inputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Wa
                 )
             }
         };
-        Some(Warning { code: WarningCode::ConstantInput, severity, text: format!("{is}: {what}; vary it") })
+        Some(
+            Warning::new(WarningCode::ConstantInput, severity, format!("{is}: {what}; vary it")).about(About::Input(i)),
+        )
     };
     constant.iter().filter_map(one).collect()
 }

@@ -64,9 +64,10 @@ fn curved(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covarianc
     examined.sort_by(|a, b| b.0.total_cmp(&a.0));
     examined.truncate(MOST);
     let examined: Vec<usize> = examined.into_iter().map(|(_, i)| i).collect();
-    let text =
+    let found =
         bent(evidence, unknowns, &examined, covariances).or_else(|| flat(evidence, unknowns, &examined, covariances));
-    Examined::from(text.map(|text| with_care(WarningCode::CurvedInterval, text))).without(without)
+    let warning = |(i, text)| with_care(WarningCode::CurvedInterval, text).about(About::Unknown(i));
+    Examined::from(found.map(warning)).without(without)
 }
 
 /// The unknown whose interval the curvature at the estimate moves most.
@@ -75,7 +76,7 @@ fn bent(
     unknowns: &[Unknown],
     examined: &[usize],
     covariances: &Covariances,
-) -> Option<String> {
+) -> Option<(usize, String)> {
     let of = |&i: &usize| Some((i, asymmetry(evidence, i, covariances)?));
     let (i, asymmetry) = examined.iter().filter_map(of).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
     if asymmetry.abs() <= ASYMMETRY {
@@ -83,13 +84,14 @@ fn bent(
     }
     let unknown = &unknowns[i];
     let (by_logarithm, side) = (by_logarithm(unknown.transform, unknown.value), side(asymmetry));
-    Some(format!(
+    let text = format!(
         "the interval of `{}` is linear where the model is not: by its curvature it should reach {} further {side} than \
          it says ({} standard errors of curvature); {by_logarithm}take diagnose::profile",
         unknown.name,
         percent(asymmetry.abs(), 2),
         number(2.0 * asymmetry.abs() / QUANTILE, 2)
-    ))
+    );
+    Some((i, text))
 }
 
 /// The unknown towards whose end the cost rises too little. The curvature at the estimate may be small where that further on is not, and its
@@ -99,12 +101,12 @@ fn flat(
     unknowns: &[Unknown],
     examined: &[usize],
     covariances: &Covariances,
-) -> Option<String> {
+) -> Option<(usize, String)> {
     let place = |unknown, (halves, little)| Place { unknown, standard_errors: halves * QUANTILE, little };
     let places = examined.iter().flat_map(|&i| FLAT.map(|at| place(i, at)));
     let (place, part) = least_rise(evidence, places, covariances)?;
     let unknown = &unknowns[place.unknown];
-    Some(format!(
+    let text = format!(
         "the interval of `{}` is too short {}: {} the cost rises by {} of what the slopes at the estimate say; {}take \
          diagnose::profile",
         unknown.name,
@@ -112,7 +114,8 @@ fn flat(
         if place.standard_errors.abs() > QUANTILE { "twice as far" } else { "at its end" },
         percent(part.max(0.0), 2),
         by_logarithm(unknown.transform, unknown.value)
-    ))
+    );
+    Some((place.unknown, text))
 }
 
 /// The change of all coordinates along the profile of an unknown, by one standard error of it.

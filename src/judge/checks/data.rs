@@ -81,7 +81,7 @@ fn constant_outputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<W
             exact(value)
         );
         let severity = if held { Severity::Usable } else { Severity::NotUsable };
-        Some(Warning { code: WarningCode::ConstantOutput, severity, text })
+        Some(Warning::new(WarningCode::ConstantOutput, severity, text).about(About::Output(j)))
     };
     still.iter().enumerate().filter_map(one).collect()
 }
@@ -113,7 +113,7 @@ fn coarse(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
                 number(step, 3),
                 unit_after(&output.unit)
             );
-            with_care(WarningCode::CoarseOutput, text)
+            with_care(WarningCode::CoarseOutput, text).about(About::Output(j))
         })
     };
     outputs.filter_map(one).collect()
@@ -147,7 +147,7 @@ fn missing(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
                 output.name,
                 counted(evidence.residuals.outputs[j].samples, "measurement")
             );
-            note(WarningCode::MissingMeasurements, text)
+            note(WarningCode::MissingMeasurements, text).about(About::Output(j))
         })
     };
     outputs.filter_map(one).collect()

@@ -154,7 +154,7 @@ fn restart_noise(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warnin
         unknown.name,
         number(errors, 2)
     );
-    Some(Warning { code: WarningCode::RestartNoise, severity, text })
+    Some(Warning::new(WarningCode::RestartNoise, severity, text))
 }
 
 /// The bias by the noise of inputs that was declared.

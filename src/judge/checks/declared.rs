@@ -5,7 +5,6 @@ use crate::estimate::Direction;
 use crate::judge::checks::conditions;
 use crate::layout::Kind;
 use crate::parameter::Transform;
-use crate::problem::Free;
 
 pub(crate) const GAPS: Check = Check::new(
     "time has no gaps",
@@ -41,9 +40,9 @@ pub(crate) const IDENTIFIED: Check = Check::new(
      parameter without slope change the cost in steps?",
     &[WarningCode::Unidentified],
     |evidence, intervals| {
-        let directions = evidence.point.undetermined.directions.iter().zip(&intervals.directions);
-        let one = |(entries, named): (&Vec<(usize, f64)>, &Direction)| {
-            without_influence(evidence, entries, named, &intervals.unknowns)
+        let directions = evidence.point.undetermined.directions.iter().zip(&intervals.directions).enumerate();
+        let one = |(d, (entries, named)): (usize, (&Vec<(usize, f64)>, &Direction))| {
+            without_influence(evidence, entries, named, &intervals.unknowns).about(About::Direction(d))
         };
         directions.map(one).collect::<Vec<_>>().into()
     },
@@ -56,7 +55,7 @@ const NAMED: usize = 4;
 /// Unknowns that are held at a bound.
 fn held_at_bound(unknowns: &[Unknown]) -> Vec<Warning> {
     let mut warnings = vec![];
-    for unknown in unknowns {
+    for (i, unknown) in unknowns.iter().enumerate() {
         if let Knowledge::Held { bound, end } = unknown.knowledge {
             let (name, unit) = (&unknown.name, unit_after(&unknown.unit));
             let place = match (unknown.transform, bound) {
@@ -72,7 +71,8 @@ fn held_at_bound(unknowns: &[Unknown]) -> Vec<Warning> {
                 }
                 None => String::new(),
             };
-            warnings.push(with_care(WarningCode::HeldAtBound, format!("`{name}` {place}{reaches}")));
+            let text = format!("`{name}` {place}{reaches}");
+            warnings.push(with_care(WarningCode::HeldAtBound, text).about(About::Unknown(i)));
         }
     }
     warnings
@@ -80,9 +80,9 @@ fn held_at_bound(unknowns: &[Unknown]) -> Vec<Warning> {
 
 /// Parameters that were declared positive and are not.
 fn not_positive(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
-    let rows = evidence.point.objective.problem.unknowns.row.iter().zip(unknowns);
-    let wrong = rows.filter(|(row, unknown)| row.parameter.positive && unknown.value <= 0.0);
-    let warning = |(_, unknown): (&Free, &Unknown)| {
+    let rows = &evidence.point.objective.problem.unknowns.row;
+    let wrong = |(i, unknown): &(usize, &Unknown)| rows[*i].parameter.positive && unknown.value <= 0.0;
+    let warning = |(i, unknown): (usize, &Unknown)| {
         let consistent = matches!(unknown.knowledge, Knowledge::Known { upper, .. } if upper > 0.0);
         let means = match consistent {
             true => {
@@ -92,9 +92,9 @@ fn not_positive(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
         };
         let (value, unit) = (number(unknown.value, 4), unit_after(&unknown.unit));
         let text = format!("`{}` is {value}{unit}, but was declared positive: {means}", unknown.name);
-        not_usable(WarningCode::NotPositive, text)
+        not_usable(WarningCode::NotPositive, text).about(About::Unknown(i))
     };
-    wrong.map(warning).collect()
+    unknowns.iter().enumerate().filter(wrong).map(warning).collect()
 }
 
 /// A direction that the data do not determine; a note for an initial state that has died out, which changes no other unknown.
@@ -142,17 +142,15 @@ fn gaps(evidence: &Evidence<'_>) -> Vec<Warning> {
     if problem.layout().kind == Kind::Static || problem.layout().inputs.is_empty() {
         return vec![];
     }
-    let records = problem.records.iter().zip(&problem.unknowns.labels);
-    let gaps = |(record, label): (&crate::record::Record, &String)| {
+    let records = problem.records.iter().zip(&problem.unknowns.labels).enumerate();
+    let gaps = |(e, (record, label)): (usize, (&crate::record::Record, &String))| {
         let gaps = record.gaps();
         let (count, first) = (counted(gaps.len() as u64, "gap"), gaps.first()?);
-        Some(with_care(
-            WarningCode::TimeGaps,
-            format!(
-                "time jumps in experiment `{label}` ({count}, the first: {first}): the input is taken as held meanwhile, \
+        let text = format!(
+            "time jumps in experiment `{label}` ({count}, the first: {first}): the input is taken as held meanwhile, \
              which is seldom what happened; fit the pieces between (Experiment::without_gaps)"
-            ),
-        ))
+        );
+        Some(with_care(WarningCode::TimeGaps, text).about(About::Experiment(e)))
     };
     records.filter_map(gaps).collect()
 }

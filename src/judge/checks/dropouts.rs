@@ -64,7 +64,7 @@ pub(crate) fn dropouts_of(evidence: &Evidence<'_>, j: usize, errors: &[Vec<Optio
             number(others.mean().sqrt(), 2),
             unit = unit_after(&output.unit)
         );
-        with_care(WarningCode::Frozen, text)
+        with_care(WarningCode::Frozen, text).about(About::Output(j))
     })
 }
 

@@ -46,7 +46,7 @@ fn uneven(unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
         unknown.name,
         percent(0.5 * own, 2)
     );
-    Some(note(WarningCode::CurvedInterval, text))
+    Some(note(WarningCode::CurvedInterval, text).about(About::Unknown(i)))
 }
 
 pub(crate) const UNEVEN_ERRORS: Check = Check::new(
@@ -87,7 +87,9 @@ fn uneven_errors(unknowns: &[Unknown], covariances: &Covariances) -> Option<Warn
             Severity::Usable,
         ),
     };
-    Some(Warning { code: WarningCode::UnevenErrors, severity, text: format!("{found}: {allowed}") })
+    Some(
+        Warning::new(WarningCode::UnevenErrors, severity, format!("{found}: {allowed}")).about(About::Unknown(unknown)),
+    )
 }
 
 pub(crate) const COLOR: Check = Check::new(
@@ -105,10 +107,10 @@ pub(crate) const COLOR: Check = Check::new(
 
 /// Whether the errors are autocorrelated, how much of the output that is, and what of it the intervals allow for.
 fn autocorrelation(evidence: &Evidence<'_>, covariances: &Covariances) -> Option<Warning> {
-    let (output, white) = evidence.autocorrelated()?;
+    let (j, white) = evidence.autocorrelated()?;
     let part = evidence.colored_part();
     let severity = severity(part);
-    let output = &evidence.point.objective.problem.layout().outputs[output].name;
+    let output = &evidence.point.objective.problem.layout().outputs[j].name;
     let (probability, first) = (p_value(white.p_value.min(1.0)), number(white.correlations[0], 2));
     let mut text = format!(
         "the errors of `{output}` are not white ({probability}, correlation with the error before \
@@ -123,7 +125,7 @@ fn autocorrelation(evidence: &Evidence<'_>, covariances: &Covariances) -> Option
         CovarianceMethod::Clusters { records } => format!("errors of any color ({records} records as clusters)"),
         _ => {
             text += "; the intervals take them as white and are too narrow if the order of the samples matters";
-            return Some(Warning { code: WarningCode::ColoredErrors, severity, text });
+            return Some(Warning::new(WarningCode::ColoredErrors, severity, text).about(About::Output(j)));
         }
     };
     let white = |i: usize| {
@@ -137,7 +139,7 @@ fn autocorrelation(evidence: &Evidence<'_>, covariances: &Covariances) -> Option
     if widest > 1.0 {
         text += &format!("; they are up to {} times as wide as for white errors", number(widest, 3));
     }
-    Some(Warning { code: WarningCode::ColoredErrors, severity, text })
+    Some(Warning::new(WarningCode::ColoredErrors, severity, text).about(About::Output(j)))
 }
 
 pub(crate) const COUPLED: Check = Check::new(

@@ -96,7 +96,7 @@ fn unexplained(evidence: &Evidence<'_>) -> Vec<Warning> {
              (Fit::starts searches from more), or excite the plant; if noise is all that is left, give its size",
             fit(fit_percent)
         );
-        warnings.push(Warning { code: WarningCode::Unexplained, severity, text });
+        warnings.push(Warning::new(WarningCode::Unexplained, severity, text).about(About::Output(j)));
     }
     warnings
 }
@@ -132,7 +132,7 @@ fn given_noise(evidence: &Evidence<'_>, method: CovarianceMethod) -> Vec<Warning
             number(found.rmse, 3),
             unit = unit_after(&output.unit)
         );
-        Some(Warning { code: WarningCode::GivenNoise, severity, text })
+        Some(Warning::new(WarningCode::GivenNoise, severity, text).about(About::Output(j)))
     };
     outputs.filter_map(one).collect()
 }

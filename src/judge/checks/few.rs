@@ -51,7 +51,7 @@ fn decided_by_few(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &C
         percent(part(shares), 2),
         places(evidence, shares)
     );
-    Some(note(WarningCode::DecidedByFew, text))
+    Some(note(WarningCode::DecidedByFew, text).about(About::Unknown(i)))
 }
 
 /// Outputs, times and experiments of measurements.

@@ -53,7 +53,7 @@ pub(crate) const SIZES: Check = Check::new(
 
 /// A parameter so many times its start, or one such part of it, is in another unit.
 const ANOTHER_UNIT: f64 = 400.0;
-/// The same ratio of a parameter that the data do not determine: the search has run along a direction in which it changes nothing.
+/// The ratio to its start of a parameter that the data do not determine: the search has run along a direction in which it changes nothing.
 const RUN_AWAY: f64 = 1e4;
 
 /// Standard deviations of their difference between estimate and prior mean from which on an estimate is with care (chance exceeds them in
@@ -140,13 +140,13 @@ fn near_zero(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
         ),
     };
     let severity = if all { Severity::NotUsable } else { Severity::UsableWithCare };
-    Some(Warning { code: WarningCode::HoldsZero, severity, text })
+    Some(Warning::new(WarningCode::HoldsZero, severity, text))
 }
 
 /// Unknowns whose estimate differs from the mean of their prior by more than chance.
 fn against_priors(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
-    let rows = evidence.point.objective.problem.unknowns.row.iter().zip(unknowns);
-    let one = |(row, unknown): (&Free, &Unknown)| {
+    let rows = evidence.point.objective.problem.unknowns.row.iter().zip(unknowns).enumerate();
+    let one = |(i, (row, unknown)): (usize, (&Free, &Unknown))| {
         let prior = row.parameter.prior?;
         let distance = distance(unknown, prior).filter(|distance| *distance > UNLIKELY)?;
         let (Unknown { name, value, .. }, Prior { mean, std }) = (unknown, prior);
@@ -160,7 +160,7 @@ fn against_priors(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning>
             number(distance, 2)
         );
         let severity = if distance > CONTRADICTS { Severity::NotUsable } else { Severity::UsableWithCare };
-        Some(Warning { code: WarningCode::PriorContradicts, severity, text })
+        Some(Warning::new(WarningCode::PriorContradicts, severity, text).about(About::Unknown(i)))
     };
     rows.filter_map(one).collect()
 }
@@ -174,21 +174,24 @@ fn distance(unknown: &Unknown, prior: Prior) -> Option<f64> {
     (variance > LITTLE * prior.std * prior.std).then(|| (unknown.value - prior.mean).abs() / variance.sqrt())
 }
 
-/// The parameters that a start was given for, with the ratio of value and start.
-fn all_started(unknowns: &[Unknown]) -> impl Iterator<Item = (&Unknown, f64)> {
-    let started = |unknown: &&Unknown| matches!(unknown.role, Role::Parameter(_)) && unknown.start != 0.0;
-    unknowns.iter().filter(started).map(|unknown| (unknown, unknown.value / unknown.start))
+/// An unknown, its place, and the ratio of its value to its start.
+type Started<'u> = (usize, &'u Unknown, f64);
+
+/// The parameters that a start was given for.
+fn all_started(unknowns: &[Unknown]) -> impl Iterator<Item = Started<'_>> {
+    let started = |(_, unknown): &(usize, &Unknown)| matches!(unknown.role, Role::Parameter(_)) && unknown.start != 0.0;
+    unknowns.iter().enumerate().filter(started).map(|(i, unknown)| (i, unknown, unknown.value / unknown.start))
 }
 
 /// Those of them that are known.
-fn started(unknowns: &[Unknown]) -> impl Iterator<Item = (&Unknown, f64)> {
-    all_started(unknowns).filter(|(unknown, _)| unknown.knowledge.standard_error().is_some())
+fn started(unknowns: &[Unknown]) -> impl Iterator<Item = Started<'_>> {
+    all_started(unknowns).filter(|(_, unknown, _)| unknown.knowledge.standard_error().is_some())
 }
 
 /// Parameters of the opposite sign than their start.
 fn opposite(unknowns: &[Unknown]) -> Vec<Warning> {
-    let turned = started(unknowns).filter(|(unknown, ratio)| ratio.is_sign_negative() && !holds_zero(unknown));
-    let one = |(unknown, _): (&Unknown, f64)| {
+    let turned = started(unknowns).filter(|(_, unknown, ratio)| ratio.is_sign_negative() && !holds_zero(unknown));
+    let one = |(i, unknown, _): Started<'_>| {
         let (Unknown { name, value, start, .. }, unit) = (unknown, unit_after(&unknown.unit));
         let text = format!(
             "`{name}` is {}{unit}, but its start was {}: the sign has changed; check the signs of the signals, or give a \
@@ -196,18 +199,18 @@ fn opposite(unknowns: &[Unknown]) -> Vec<Warning> {
             number(*value, 4),
             exact(*start)
         );
-        with_care(WarningCode::SignChanged, text)
+        with_care(WarningCode::SignChanged, text).about(About::Unknown(i))
     };
     turned.map(one).collect()
 }
 
 /// Parameters of another order of magnitude than their start.
 fn far_from_start(unknowns: &[Unknown]) -> Vec<Warning> {
-    let far = started(unknowns).filter(|(unknown, ratio)| {
+    let far = started(unknowns).filter(|(_, unknown, ratio)| {
         let size = ratio.abs();
         !holds_zero(unknown) && (size > ANOTHER_UNIT || size < ANOTHER_UNIT.recip())
     });
-    let one = |(unknown, ratio): (&Unknown, f64)| {
+    let one = |(i, unknown, ratio): Started<'_>| {
         let (Unknown { name, value, start, .. }, unit) = (unknown, unit_after(&unknown.unit));
         let text = format!(
             "`{name}` is {}{unit}, {} times its start {}: check the units of signals and time",
@@ -215,13 +218,13 @@ fn far_from_start(unknowns: &[Unknown]) -> Vec<Warning> {
             number(ratio, 2),
             exact(*start)
         );
-        with_care(WarningCode::FarFromStart, text)
+        with_care(WarningCode::FarFromStart, text).about(About::Unknown(i))
     };
-    let ran = all_started(unknowns).filter(|(unknown, ratio)| {
+    let ran = all_started(unknowns).filter(|(_, unknown, ratio)| {
         let size = ratio.abs();
         unknown.knowledge == Knowledge::Unidentified && (size > RUN_AWAY || size < RUN_AWAY.recip())
     });
-    let away = |(unknown, ratio): (&Unknown, f64)| {
+    let away = |(i, unknown, ratio): Started<'_>| {
         let (Unknown { name, value, start, .. }, unit) = (unknown, unit_after(&unknown.unit));
         let text = format!(
             "`{name}` is {}{unit}, {} times its start {}, and the data do not determine it: the search has run along a direction that \
@@ -230,7 +233,7 @@ fn far_from_start(unknowns: &[Unknown]) -> Vec<Warning> {
             number(ratio, 2),
             exact(*start)
         );
-        not_usable(WarningCode::FarFromStart, text)
+        not_usable(WarningCode::FarFromStart, text).about(About::Unknown(i))
     };
     far.map(one).chain(ran.map(away)).collect()
 }

@@ -32,7 +32,7 @@ fn unbounded(evidence: &Evidence<'_>) -> Option<Warning> {
         number(rmse, 2),
         unit = unit_after(&output.unit)
     );
-    Some(not_usable(WarningCode::UnboundedLikelihood, text))
+    Some(not_usable(WarningCode::UnboundedLikelihood, text).about(About::Output(j)))
 }
 
 /// Whether a predicted standard deviation is nothing beside the root mean square of the errors.

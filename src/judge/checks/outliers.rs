@@ -78,7 +78,7 @@ fn outliers_of(evidence: &Evidence<'_>, j: usize, errors: &[f64]) -> Option<Warn
         percent(share, 2)
     );
     let severity = if share > DECIDE { Severity::UsableWithCare } else { Severity::Usable };
-    Some(Warning { severity, ..with_care(WarningCode::Outliers, text) })
+    Some(Warning::new(WarningCode::Outliers, severity, text).about(About::Output(j)))
 }
 
 /// The largest error of an output, if normal ones are hardly so large.
@@ -105,7 +105,7 @@ fn extreme(evidence: &Evidence<'_>, j: usize) -> Option<Warning> {
         number(ratio, 3),
         p_value(chance)
     );
-    Some(note(WarningCode::Outliers, text))
+    Some(note(WarningCode::Outliers, text).about(About::Output(j)))
 }
 
 /// How many errors are far from the others and from their neighbors, and their part of the sum of squares, if it is no little.

@@ -1,4 +1,4 @@
-//! The same parameters from parts of the data: from each output, from each record, from before and after a time in the records.
+//! Whether parameters agree between parts of the data: from each output, from each record, from before and after a time in the records.
 
 use super::*;
 use crate::judge::evidence::parts::{APART, Difference, Into, Parts, UNLESS};
@@ -67,7 +67,7 @@ fn differing(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covari
         percent(part, 2)
     );
     let severity = if part > FAR_APART { Severity::NotUsable } else { Severity::UsableWithCare };
-    Some(Warning { code: WarningCode::RecordsContradict, severity, text })
+    Some(Warning::new(WarningCode::RecordsContradict, severity, text).about(About::Unknown(differing.unknown)))
 }
 
 fn warning(evidence: &Evidence<'_>, parts: &Parts, unknowns: &[Unknown], difference: Difference) -> Warning {
@@ -77,7 +77,7 @@ fn warning(evidence: &Evidence<'_>, parts: &Parts, unknowns: &[Unknown], differe
     let value = |piece: &Piece| unknown.value + slope * piece.step[i];
     let error = |piece: &Piece| {
         let unit = piece.linear.covariance(&piece.held).map_or(f64::NAN, |covariance| covariance.standard_error(i));
-        (slope * unit).abs() * piece.dependence.sqrt()
+        (slope * unit).abs() * piece.variance_inflation.sqrt()
     };
     let (one, two) = (&parts.pieces[a], &parts.pieces[b]);
     let part = (value(one) - value(two)).abs() / unknown.value.abs().max(f64::MIN_POSITIVE);
@@ -103,7 +103,7 @@ fn warning(evidence: &Evidence<'_>, parts: &Parts, unknowns: &[Unknown], differe
         Into::Times => WarningCode::HalvesContradict,
     };
     let severity = if part > FAR_APART { Severity::NotUsable } else { Severity::UsableWithCare };
-    Warning { code, severity, text }
+    Warning::new(code, severity, text).about(About::Unknown(i))
 }
 
 /// What lies before or after a time in each record.

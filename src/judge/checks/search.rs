@@ -42,14 +42,15 @@ const MANY: u64 = 8;
 fn not_at_minimum(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
     let known = unknowns.iter().any(|row| row.knowledge.standard_error().is_some());
     let text = "standard errors and intervals are those of a minimum, where the search did not arrive";
-    (known && !evidence.point.end.outcome.converged()).then(|| not_usable(WarningCode::NotAtMinimum, text.to_owned()))
+    (known && !evidence.point.end.outcome.converged())
+        .then(|| not_usable(WarningCode::NotAtMinimum, text.to_owned()).about(About::Search))
 }
 
 /// A checkpoint that could not be written.
 fn checkpoint(evidence: &Evidence<'_>) -> Option<Warning> {
     let write_error = evidence.point.end.write_error.as_ref()?;
     let text = format!("the checkpoint could not be written ({write_error}); the search went on without it");
-    Some(note(WarningCode::CheckpointNotWritten, text))
+    Some(note(WarningCode::CheckpointNotWritten, text).about(About::Search))
 }
 
 /// Searches from other starts, if there were any.
@@ -76,7 +77,7 @@ fn warnings(starts: &Starts, measurements: u64, asked: bool, colored: bool) -> V
             "only one of {tried} starts led to this minimum (others found: {others}; searches without one: {none}){left}: there may be \
              a better one; try more starts, or give bounds"
         );
-        warnings.push(Warning { code: WarningCode::MinimumFoundOnce, severity, text });
+        warnings.push(Warning::new(WarningCode::MinimumFoundOnce, severity, text).about(About::Minimum));
     }
     let at = |minimum: &Minimum| {
         let places = minimum.unknowns.iter().map(|(name, value)| format!("`{name}` = {}", number(*value, 5)));
@@ -89,7 +90,7 @@ fn warnings(starts: &Starts, measurements: u64, asked: bool, colored: bool) -> V
             times_the_cost(rival.cost_ratio),
             at(rival)
         );
-        warnings.push(with_care(WarningCode::RivalMinimum, text));
+        warnings.push(with_care(WarningCode::RivalMinimum, text).about(About::Minimum));
     }
     if let Some(declared) = declared.filter(|declared| *declared > 0).and_then(|declared| minima.get(declared)) {
         let text = format!(
@@ -97,7 +98,7 @@ fn warnings(starts: &Starts, measurements: u64, asked: bool, colored: bool) -> V
             times_the_cost(declared.cost_ratio),
             at(declared)
         );
-        warnings.push(note(WarningCode::DeclaredStartElsewhere, text));
+        warnings.push(note(WarningCode::DeclaredStartElsewhere, text).about(About::Minimum));
     }
     warnings
 }
@@ -152,7 +153,7 @@ fn not_examined(evidence: &Evidence<'_>, early: bool) -> Option<Warning> {
             Severity::UsableWithCare,
         ),
     };
-    Some(Warning { code: WarningCode::NotExamined, severity, text })
+    Some(Warning::new(WarningCode::NotExamined, severity, text))
 }
 
 #[cfg(test)]

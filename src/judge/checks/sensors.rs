@@ -54,7 +54,7 @@ fn contradiction(extended: &Extended<'_>, sensor: &Sensor, unknowns: &[Unknown])
         said.join(", or "),
         p_value(chance)
     );
-    Some(Warning { code: WarningCode::SensorContradicts, severity, text })
+    Some(Warning::new(WarningCode::SensorContradicts, severity, text))
 }
 
 /// What is wrong with a sensor, by so many times its standard error, and how far that moves a parameter; and how severe that is.

@@ -94,7 +94,7 @@ fn by_inputs(evidence: &Evidence<'_>) -> Option<Warning> {
             p_value(chance),
             percent(part, 2)
         );
-        Warning { code: WarningCode::WrongShape, severity: color::severity(part), text }
+        Warning::new(WarningCode::WrongShape, color::severity(part), text).about(About::Output(j))
     })
 }
 
@@ -146,7 +146,7 @@ fn by_inputs_before(evidence: &Evidence<'_>) -> Option<Warning> {
         p_value(chance),
         percent(part, 2)
     );
-    Some(Warning { code: WarningCode::WrongShape, severity: color::severity(part), text })
+    Some(Warning::new(WarningCode::WrongShape, color::severity(part), text).about(About::Output(j)))
 }
 
 /// Center and width of an input over all records.
@@ -212,7 +212,7 @@ fn by_predictions(evidence: &Evidence<'_>) -> Option<Warning> {
         p_value(chance),
         percent(part, 2)
     );
-    Some(Warning { code: WarningCode::WrongShape, severity: color::severity(part), text })
+    Some(Warning::new(WarningCode::WrongShape, color::severity(part), text).about(About::Output(j)))
 }
 
 /// Products of an output's errors and of the powers of its prediction, for one experiment.

@@ -84,7 +84,7 @@ fn by_signals_before(evidence: &Evidence<'_>) -> Option<Warning> {
         p_value(chance),
         percent(part, 2)
     );
-    Some(Warning { code: WarningCode::WrongShape, severity: color::severity_of_misfit(part), text })
+    Some(Warning::new(WarningCode::WrongShape, color::severity_of_misfit(part), text).about(About::Output(j)))
 }
 
 /// Signals of one record, each with the sums of its values up to each sample, and its errors.

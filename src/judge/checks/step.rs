@@ -34,7 +34,7 @@ const REFINED_SHIFT: f64 = 0.1;
 /// Smallest part of an unknown's value that a finer step must move it by for a warning about data that are reproduced, and about a
 /// step that is too coarse to be used: of values that are right to more digits only the intervals are wrong.
 const DIGITS: f64 = 1e-6;
-/// The same from which on a fit without errors is not usable without care.
+/// The part from which on a fit without errors is not usable without care.
 const MUCH: f64 = 1e-3;
 /// Samples of the shortest windows that are compared.
 const WINDOW: f64 = 64.0;
@@ -77,7 +77,7 @@ fn step(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
             "{tried}: with {finer} {of} would move by {part} of itself ({errors} standard errors); use a finer step, \
              or smooth the model"
         );
-        Warning { code: WarningCode::CoarseStep, severity, text }
+        Warning::new(WarningCode::CoarseStep, severity, text).about(About::Step)
     };
     if errors > most { vec![warning()] } else { vec![] }
 }
@@ -92,16 +92,14 @@ fn diverges(evidence: &Evidence<'_>, change: f64, finer: &str) -> Vec<Warning> {
         true => format!("changes by {} standard deviations", number(change, 2)),
         false => "fails".to_owned(),
     };
-    let texts = [
-        (
-            WarningCode::CoarseStep,
-            format!(
-                "the step is too coarse: with {finer} the simulation at the estimate {by}; use a finer step, or smooth the model"
-            ),
-        ),
-        (WarningCode::NotAtMinimum, "the estimate is a minimum with the coarse step only".to_owned()),
-    ];
-    texts.map(|(code, text)| Warning { code, severity: Severity::NotUsable, text }).into()
+    let text = format!(
+        "the step is too coarse: with {finer} the simulation at the estimate {by}; use a finer step, or smooth the model"
+    );
+    let minimum = "the estimate is a minimum with the coarse step only".to_owned();
+    vec![
+        not_usable(WarningCode::CoarseStep, text).about(About::Step),
+        not_usable(WarningCode::NotAtMinimum, minimum).about(About::Search),
+    ]
 }
 
 /// Data that are reproduced to their rounding may have been made with this step. But a step with held inputs is exact for a linear
@@ -118,7 +116,7 @@ fn exact_with_this_step(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option
         percent(part, 2)
     );
     let severity = if part >= MUCH { Severity::UsableWithCare } else { Severity::Usable };
-    Some(Warning { code: WarningCode::CoarseStep, severity, text })
+    Some(Warning::new(WarningCode::CoarseStep, severity, text).about(About::Step))
 }
 
 /// Of a fit with null directions: whether there are fewer with a finer step. The factor by which a method multiplies a state from step
@@ -147,7 +145,7 @@ fn determined_by_a_finer_step(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> 
         finer.integrator(),
         names.collect::<Vec<_>>().join(", ")
     );
-    Some(not_usable(WarningCode::CoarseStep, text))
+    Some(not_usable(WarningCode::CoarseStep, text).about(About::Step))
 }
 
 /// Of a search that ended without a minimum: whether a finer step changes the cost at its start or at its end, so that the
@@ -167,7 +165,7 @@ fn step_decides_the_search(evidence: &Evidence<'_>) -> Option<Warning> {
          smooth the model",
         evidence.point.objective.sweep.refined(evidence.point.objective.problem.samples())?.integrator()
     );
-    Some(not_usable(WarningCode::CoarseStep, text))
+    Some(not_usable(WarningCode::CoarseStep, text).about(About::Step))
 }
 
 /// A move towards the minimum of another objective.

@@ -84,7 +84,7 @@ fn suspicions(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning
                 number(split.rms(), 2),
                 unit_after(&evidence.point.objective.problem.layout().outputs[suspect.output].unit)
             );
-            warnings.push(Warning { code, severity, text });
+            warnings.push(Warning::new(code, severity, text).about(About::Output(suspect.output)));
         }
     }
     warnings
@@ -141,8 +141,10 @@ fn confirmed(
 }
 
 fn sentinels_of_inputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
-    let channels = found.iter().enumerate().flat_map(|(e, one)| one.inputs.iter().map(move |channel| (e, channel)));
-    let one = |(e, channel): (usize, &ChannelInspection)| {
+    let inputs = evidence.point.objective.problem.layout().inputs.len();
+    let channels = (0..found.len()).flat_map(|e| (0..inputs).map(move |i| (e, i)));
+    let one = |(e, i): (usize, usize)| {
+        let channel = &found[e].inputs[i];
         let suspicion = channel.suspicions.first()?;
         let text = format!(
             "the input `{}`{} {suspicion}: if it stands for a missing measurement, give the value that acted on the \
@@ -150,7 +152,7 @@ fn sentinels_of_inputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Ve
             channel.name,
             of_experiment(evidence, e)
         );
-        Some(with_care(WarningCode::Sentinel, text))
+        Some(with_care(WarningCode::Sentinel, text).about(About::Input(i)))
     };
     channels.filter_map(one).take(NAMED).collect()
 }

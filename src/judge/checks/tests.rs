@@ -24,7 +24,7 @@ fn pass(pass: &Pass) -> String {
     }
 }
 
-/// Of how many good records each code was said, as measured by the table of verdicts.
+/// Of how many good records each code was said as more than a note, as measured by the table of verdicts.
 fn flagged() -> BTreeMap<String, usize> {
     let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/flagged.csv")).unwrap();
     let row = |line: &str| line.split_once(',').map(|(code, count)| (code.to_owned(), count.parse().unwrap())).unwrap();
@@ -43,8 +43,8 @@ fn page() -> String {
     page += &match flagged["all"] {
         0 => "How many good records of the table of verdicts each code was said of is not measured yet".to_owned(),
         all => format!(
-            "Behind each code stands of how many of {all} good records of the table of verdicts it was said, most of them as a note; a code \
-             of several checks has one number"
+            "Behind each code stands of how many of {all} good records of the table of verdicts it was said as a reason for care, or against \
+             the estimate; notes do not count, and a code of several checks has one number"
         ),
     };
     page += " (`GREYBOX_WRITE_CHECKS=1 cargo test --release --test verdicts good` measures that).\n";

@@ -44,7 +44,7 @@ fn few_within_the_loss(evidence: &Evidence<'_>) -> Option<Warning> {
         percent(sum / count, 2),
         if deviation.is_finite() { format!("to {} only", percent(deviation, 2)) } else { "not at all".to_owned() }
     );
-    Some(Warning { code: WarningCode::NarrowLoss, severity, text })
+    Some(Warning::new(WarningCode::NarrowLoss, severity, text))
 }
 
 /// The relative standard deviation of a mean of so many numbers of one at most, from their sum and that of their squares, less the

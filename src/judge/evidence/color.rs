@@ -1,6 +1,6 @@
 //! Levels of correlation over time.
 
-use crate::optimize::Severity;
+use crate::severity::Severity;
 
 /// Level of the test of whiteness below which the color is no chance; between this and the level at which intervals are
 /// widened it is a note.
@@ -12,7 +12,7 @@ const MUCH: f64 = 0.05;
 /// above `LARGE` the model is wrong or noise dominates the output.
 pub(crate) const SMALL: f64 = 1e-4;
 pub(crate) const LARGE: f64 = 0.5;
-/// The same part from which on a minimum that was found once is taken as wrong, and a model whose errors certainly follow from its
+/// The colored part from which on a minimum that was found once is taken as wrong, and a model whose errors certainly follow from its
 /// signals: driven pendulums fitted with a wrong natural frequency had
 /// 0.3, right models with colored noise of 5 % of the output less than 0.05.
 pub(crate) const LEFT: f64 = 0.1;

@@ -13,13 +13,13 @@ use super::parts::{Parts, parts};
 use super::pieces::Piece;
 use super::sensors::UNTESTED;
 use crate::problem::Whitening;
-use of_pieces::{OfPieces, dependences};
+use of_pieces::{OfPieces, inflations};
 use of_sensor::{OfSensor, Steps, confirm};
 
 /// What remains after the steps that are asked for.
 #[derive(Default)]
 pub(crate) struct Left {
-    /// Parts of the data that seem to differ, with the dependence of their errors.
+    /// Parts of the data that seem to differ, with the inflation of their errors.
     pub parts: Vec<Parts>,
     pub sensor: Option<Sensor>,
 }
@@ -53,15 +53,15 @@ pub(crate) fn left(evidence: &Evidence<'_>) -> Left {
     };
     let Ok(all) = single.gather(&point.end.coordinates, true, make) else { return Left::default() };
     let (of_pieces, of_sensor): (Vec<Vec<OfPieces<'_>>>, Vec<Option<OfSensor<'_>>>) = all.into_iter().unzip();
-    let dependences: Vec<Vec<f64>> =
-        (0..ordered.len()).map(|number| dependences(of_pieces.iter().map(|one| &one[number]))).collect();
+    let inflations: Vec<Vec<f64>> =
+        (0..ordered.len()).map(|number| inflations(of_pieces.iter().map(|one| &one[number]))).collect();
     let of_sensor: Option<Vec<OfSensor<'_>>> = of_sensor.into_iter().collect();
     let sensor = suspects.zip(of_sensor).and_then(|((extended, (found, tests)), all)| {
         let (standard_error, chance) = confirm(extended, found.first()?, all)?;
         Some(Sensor { found, tests, standard_error, chance })
     });
-    for (parts, dependences) in parts.iter_mut().zip(dependences) {
-        parts.pieces.iter_mut().zip(dependences).for_each(|(piece, of_errors)| piece.dependence *= of_errors);
+    for (parts, inflations) in parts.iter_mut().zip(inflations) {
+        parts.pieces.iter_mut().zip(inflations).for_each(|(piece, of_errors)| piece.variance_inflation *= of_errors);
     }
     Left { parts, sensor }
 }

@@ -88,7 +88,7 @@ impl Parts {
     pub fn difference(&self, point: &Point<'_>) -> Option<Difference> {
         let pieces = &self.pieces;
         let first = pieces.first().filter(|_| pieces.len() > 1)?;
-        let dependence = pieces.iter().map(|piece| piece.dependence).fold(1.0, f64::max);
+        let inflation = pieces.iter().map(|piece| piece.variance_inflation).fold(1.0, f64::max);
         let shared = point.objective.problem.unknowns.shared();
         let mut whole: Vec<Information> = first.linear.columns().map(|(triangle, _)| triangle.clone()).collect();
         for piece in &pieces[1..] {
@@ -98,8 +98,8 @@ impl Parts {
         let free = |piece: &Piece| piece.held.iter().filter(|held| !**held).count() as f64;
         let degrees = pieces.iter().map(free).sum::<f64>() - free(&whole);
         let gain = pieces.iter().map(|piece| piece.gain).sum::<f64>() - whole.gain;
-        let of_noise = pieces.iter().map(|piece| piece.degrees).fold(f64::INFINITY, f64::min) / dependence;
-        let chance = significant(gain / dependence, degrees, of_noise, self.ways)?;
+        let of_noise = pieces.iter().map(|piece| piece.degrees).fold(f64::INFINITY, f64::min) / inflation;
+        let chance = significant(gain / inflation, degrees, of_noise, self.ways)?;
         let (unknown, pieces) = furthest(pieces, point)?;
         Some(Difference { chance, gain, unknown, pieces })
     }
@@ -117,7 +117,7 @@ fn furthest(pieces: &[Piece], point: &Point<'_>) -> Option<(usize, [usize; 2])> 
             if pieces[a].held[i] || pieces[b].held[i] {
                 continue;
             }
-            let error = |of: &Covariance, piece: usize| of.standard_error(i) * pieces[piece].dependence.sqrt();
+            let error = |of: &Covariance, piece: usize| of.standard_error(i) * pieces[piece].variance_inflation.sqrt();
             let apart = (pieces[a].step[i] - pieces[b].step[i]).abs() / error(first, a).hypot(error(second, b));
             if apart > found.map_or(APART, |(.., most)| most) {
                 found = Some((i, [a, b], apart));

@@ -39,7 +39,7 @@ pub(crate) struct Piece {
     pub gain: f64,
     pub step: Vec<f64>,
     /// How many errors have the information of one.
-    pub dependence: f64,
+    pub variance_inflation: f64,
     /// Degrees of freedom of its noise, those of the output that has fewest.
     pub degrees: f64,
 }
@@ -49,7 +49,7 @@ impl Piece {
         let held = directions::undetermined(&linear, held).held;
         let step = linear.step(&vec![0.0; held.len()], &held)?;
         let gain = 2.0 * linear.predicted_reduction(&step);
-        Some(Piece { rows, linear, held, gain, step, dependence: 1.0, degrees: f64::INFINITY })
+        Some(Piece { rows, linear, held, gain, step, variance_inflation: 1.0, degrees: f64::INFINITY })
     }
 }
 
@@ -117,7 +117,7 @@ fn piece(
     let predicted = point.objective.sweep.predicts_variance();
     let empty = |triangle: &Information| Information::new(triangle.columns());
     let mut merged: Vec<Information> = outputs.first()?.triangles.iter().map(empty).collect();
-    let (mut dependence, mut fewest) = (1.0f64, f64::INFINITY);
+    let (mut inflation, mut fewest) = (1.0f64, f64::INFINITY);
     for of in outputs {
         let (left, degrees) = noise(of);
         // Predicted noise levels are among the unknowns.
@@ -131,10 +131,10 @@ fn piece(
         if predicted || point.objective.is_weighted() {
             // Squares of errors with heavy tails, or of several sizes, vary more than those of normal ones.
             let [squares, fourths, count] = of.sums;
-            dependence = dependence.max(0.5 * (count * fourths / (squares * squares) - 1.0));
+            inflation = inflation.max(0.5 * (count * fourths / (squares * squares) - 1.0));
         }
     }
     let shared = point.objective.problem.unknowns.shared();
     let piece = Piece::new(rows, Linearization::new(0.0, shared, merged), &point.undetermined.held)?;
-    Some(Piece { dependence, degrees: fewest, ..piece })
+    Some(Piece { variance_inflation: inflation, degrees: fewest, ..piece })
 }

@@ -14,7 +14,7 @@ use crate::problem::{Objective, Whitening};
 pub(crate) struct Asked<'a> {
     /// The inverse of the curvature, where shares of measurements are asked for.
     pub shares: Option<&'a Covariance>,
-    /// The same with the unknowns that are held, where scores of colored errors are asked for.
+    /// The covariance of unit noise with the unknowns that are held, where scores of colored errors are asked for.
     pub colored: Option<(&'a [bool], &'a Covariance)>,
     /// Whether sensors are tested, and parts of the data compared.
     pub sensors: bool,

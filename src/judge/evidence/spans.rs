@@ -26,7 +26,7 @@ pub(crate) struct Span<R = Information> {
 /// The parts of equal length of one experiment, output by output.
 pub(crate) type Spans = Vec<Vec<Span>>;
 
-/// The same while it is summed up.
+/// These parts while they are summed up.
 pub(crate) struct SumSpans<'h> {
     objective: &'h Objective<'h>,
     experiment: usize,

@@ -46,7 +46,7 @@ impl Table {
         Ok(Table::with(file, form, head, bytes))
     }
 
-    /// The same file once more, from its first row.
+    /// This file once more, from its first row.
     pub(super) fn again(&self, file: &DataFile) -> Result<Table, Error> {
         let failed = |source: io::Error| file.cannot(source);
         let mut bytes = File::open(&file.path).map_err(failed)?;

@@ -55,7 +55,7 @@ impl Scale {
         Scale { name: axis.name.clone(), unit, logarithmic: axis.logarithmic, from, to }
     }
 
-    /// The same with some room at both ends.
+    /// This scale with some room at both ends.
     pub fn with_room(self) -> Scale {
         let room = 0.05 * (self.to - self.from);
         Scale { from: self.from - room, to: self.to + room, ..self }

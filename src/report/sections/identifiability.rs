@@ -87,7 +87,7 @@ fn matrix(facts: &Facts) -> Option<Plot> {
     (shown.len() > 1).then_some(plot)
 }
 
-/// The same as numbers.
+/// The rows as numbers.
 fn numbers(facts: &Facts) -> Option<Section> {
     let shown = shown(facts);
     let columns = ["parameter".to_owned()].into_iter().chain((1..=shown.len()).map(|j| j.to_string())).collect();

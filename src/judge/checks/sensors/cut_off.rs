@@ -58,7 +58,7 @@ fn if_cut_off(extended: &Extended<'_>, unknowns: &[Unknown], (j, count, size): (
         percent(part, 2),
         number(errors, 2)
     );
-    Some(with_care(WarningCode::CoarseOutput, text))
+    Some(with_care(WarningCode::CoarseOutput, text).about(About::Output(j)))
 }
 
 /// The number of values and the quantization step, where there are more than [`FEW`], all multiples of one step apart.

@@ -90,7 +90,7 @@ impl Accumulate for OfPieces<'_> {
 }
 
 /// How many errors have the information of one, by each piece: the most of its outputs.
-pub(super) fn dependences<'p>(all: impl Iterator<Item = &'p OfPieces<'p>>) -> Vec<f64> {
+pub(super) fn inflations<'p>(all: impl Iterator<Item = &'p OfPieces<'p>>) -> Vec<f64> {
     let mut sums: Vec<Vec<Run>> = vec![];
     for one in all {
         match sums.is_empty() {
@@ -100,8 +100,8 @@ pub(super) fn dependences<'p>(all: impl Iterator<Item = &'p OfPieces<'p>>) -> Ve
     }
     let mut together = vec![Run::new(); sums.first().map_or(0, Vec::len)];
     sums.iter().for_each(|of| together.iter_mut().zip(of).for_each(|(all, own)| all.append(own)));
-    let dependence = |(own, all): (&Run, &Run)| if own.count < OWN { all } else { own }.whiteness().dependence;
+    let inflation = |(own, all): (&Run, &Run)| if own.count < OWN { all } else { own }.whiteness().variance_inflation;
     let most =
-        |of: &Vec<Run>| of.iter().zip(&together).filter(|(own, _)| own.count > 0).map(dependence).fold(1.0, f64::max);
+        |of: &Vec<Run>| of.iter().zip(&together).filter(|(own, _)| own.count > 0).map(inflation).fold(1.0, f64::max);
     sums.iter().map(most).collect()
 }

@@ -93,11 +93,11 @@ pub(super) fn confirm(extended: &Extended<'_>, found: &Released, all: Vec<OfSens
     let (plain, own) = (of_errors / free * squares, products * count / free);
     let colored = errors.iter().map(Run::whiteness);
     let colored = colored.filter(|white| white.p_value < COLORED && !extended.evidence.point.is_static());
-    let dependence = colored.map(|white| white.dependence).fold(1.0, f64::max);
-    let error = |variance: f64| (variance * dependence).sqrt() / squares;
+    let inflation = colored.map(|white| white.variance_inflation).fold(1.0, f64::max);
+    let error = |variance: f64| (variance * inflation).sqrt() / squares;
     // The effective number of rows, by the fourth powers of `z`.
-    let degrees = (squares * squares / fourths - 1.0).min(free) / dependence;
+    let degrees = (squares * squares / fourths - 1.0).min(free) / inflation;
     let by_own = two_sided(found.value / error(own), degrees);
-    let chance = two_sided(found.value / error(plain), free / dependence);
+    let chance = two_sided(found.value / error(plain), free / inflation);
     (by_own < OWN).then(|| (error(own.max(plain)), chance))
 }
