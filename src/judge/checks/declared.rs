@@ -40,11 +40,12 @@ pub(crate) const IDENTIFIED: Check = Check::new(
      parameter without slope change the cost in steps?",
     &[WarningCode::Unidentified],
     |evidence, intervals| {
-        let directions = evidence.point.undetermined.directions.iter().zip(&intervals.directions).enumerate();
-        let one = |(d, (entries, named)): (usize, (&Vec<(usize, f64)>, &Direction))| {
+        let directions = &evidence.point.undetermined.directions;
+        let one = |d: usize| {
+            let (entries, named) = (&directions[d], &intervals.directions[d]);
             without_influence(evidence, entries, named, &intervals.unknowns).about(About::Direction(d))
         };
-        directions.map(one).collect::<Vec<_>>().into()
+        (0..directions.len().min(intervals.directions.len())).map(one).collect::<Vec<_>>().into()
     },
 )
 .costs(&[Pass::EachUnknown(6)]);
