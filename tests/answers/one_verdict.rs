@@ -117,7 +117,7 @@ fn warnings_say_what_they_are_about() {
     let held = of(&[first.clone(), second], 0.1, 0.2);
     assert_eq!(about(&held, WarningCode::HeldAtBound), Some(About::Unknown(1)), "{held}");
     assert_eq!(about(&held, WarningCode::TimeGaps), Some(About::Experiment(1)), "{held}");
-    let turned = of(&[first.clone()], -0.1, 1.0);
+    let turned = of(std::slice::from_ref(&first), -0.1, 1.0);
     assert_eq!(about(&turned, WarningCode::SignChanged), Some(About::Unknown(1)), "{turned}");
     let undriven = Experiment::new(&Recursion, first.times().clone(), still, outputs).unwrap();
     let unknown = of(&[undriven], 0.1, 1.0);

@@ -1,8 +1,8 @@
 //! The row of one record.
 
 use crate::{Failure, Verdict};
-use greybox::layout::Layout;
 use greybox::Severity;
+use greybox::layout::Layout;
 use greybox::{Knowledge, Summary};
 
 /// Which record it is.
