@@ -37,7 +37,6 @@ struct Programs {
     method: Arc<dyn Method>,
     predictor: Arc<dyn Prediction>,
     coupling: Coupling,
-    /// Parameters that decide a choice.
     /// By the holds of the inputs.
     recurrences: Mutex<Vec<(Holds, Arc<Recurrence>)>>,
     /// Those that were asked for, with the reason where there can be none.
@@ -92,6 +91,9 @@ impl Programs {
         method: Arc<dyn Method>,
         predictor: Arc<dyn Prediction>,
     ) -> Result<Self, Untraceable> {
+        if equations.late().contains(&true) {
+            return Err(Untraceable::new("inputs have dead times"));
+        }
         let coupling = match predictor.restarts() {
             Some(_) => Coupling::Restarted,
             None if equations.layout().kind == Kind::Static => Coupling::Restarted,
