@@ -1,8 +1,10 @@
 //! [`Equations`]: a model as data.
 
 mod degree;
+mod moments;
 mod slopes;
 
+pub(crate) use moments::MomentsOf;
 pub(crate) use slopes::{Jacobian, Slopes};
 
 use crate::functions::Functions;
@@ -237,18 +239,28 @@ impl Equations {
         self.state.iter().chain(&self.output).all(|root| degrees[root.index()] <= Degree::One)
     }
 
+    /// Moments of derivatives (next states), and of outputs, of a Gaussian state.
+    pub(crate) fn moments(&self) -> (MomentsOf, MomentsOf) {
+        let of = |roots: &[Id]| MomentsOf::of(&self.graph, roots, self.layout.states.len());
+        (of(&self.state), of(&self.output))
+    }
+
     /// The values of roots; without time, states and inputs for what depends on parameters alone.
     fn values<S: Scalar>(&self, roots: &[Id], at: Option<(S, &[S], &[S])>, p: &[S], to: &mut [S]) {
-        let unknown = || S::from(f64::NAN);
-        let found = self.graph.evaluate(roots, |leaf| match (leaf, at) {
-            (Leaf::Parameter(i), _) => p[i as usize],
-            (Leaf::Time, Some((t, ..))) => t,
-            (Leaf::State(i), Some((_, x, _))) => x[i as usize],
-            (Leaf::Input(i), Some((_, _, u))) => u[i as usize],
-            _ => unknown(),
-        });
+        let found = evaluate(&self.graph, roots, at, p);
         to.iter_mut().zip(found).for_each(|(to, found)| *to = found);
     }
+}
+
+/// The values of a graph's roots at a time, a state and inputs, and at parameters; NaN of what is not given.
+fn evaluate<S: Scalar>(graph: &Graph, roots: &[Id], at: Option<(S, &[S], &[S])>, p: &[S]) -> Vec<S> {
+    graph.evaluate(roots, |leaf| match (leaf, at) {
+        (Leaf::Parameter(i), _) => p[i as usize],
+        (Leaf::Time, Some((t, ..))) => t,
+        (Leaf::State(i), Some((_, x, _))) => x[i as usize],
+        (Leaf::Input(i), Some((_, _, u))) => u[i as usize],
+        _ => S::from(f64::NAN),
+    })
 }
 
 /// The name of a leaf by a layout.

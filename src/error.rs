@@ -1,6 +1,6 @@
 //! [`Error`]: the cause where a call has no result. A fit that ends badly has a result: its [`Outcome`](crate::optimize::Outcome).
 
-use crate::numeral::exact;
+use crate::numeral::Moment;
 use std::path::PathBuf;
 
 /// A call that could not be served, with the thing, the number and the remedy.
@@ -37,7 +37,7 @@ pub enum Error {
     },
     /// A time or input that is not a finite number.
     #[error(
-        "experiment `{experiment}`: `{signal}` is {} at sample {sample} (t = {} s); only outputs may be missing (NaN)", short(*value), exact(*time)
+        "experiment `{experiment}`: `{signal}` is {} at sample {sample} (t = {time}); only outputs may be missing (NaN)", short(*value)
     )]
     NotFinite {
         /// Name of the experiment.
@@ -48,34 +48,34 @@ pub enum Error {
         value: f64,
         /// Index of the sample, from zero.
         sample: usize,
-        /// Its time (s).
-        time: f64,
+        /// Its time.
+        time: Moment,
     },
     /// Time that runs backwards, or that no sample is at another instant of.
     #[error(
-        "experiment `{experiment}`: time does not increase at sample {sample}: {} s is followed by {} s; sort the record, which may hold several measurements of one instant, but not of one only", exact(*before), exact(*time)
+        "experiment `{experiment}`: time does not increase at sample {sample}: {before} is followed by {time}; sort the record, which may hold several measurements of one instant, but not of one only"
     )]
     TimeOrder {
         /// Name of the experiment.
         experiment: String,
         /// Index of the second of the two samples.
         sample: usize,
-        /// Time of the first (s).
-        before: f64,
-        /// Time of the second (s).
-        time: f64,
+        /// Time of the first.
+        before: Moment,
+        /// Time of the second.
+        time: Moment,
     },
     /// Two samples of one instant whose inputs differ.
     #[error(
-        "experiment `{experiment}`: samples {} and {sample} are at one instant (t = {} s), where `{input}` is {} and {}; measurements may repeat at an instant, inputs may not: give the samples times of their own", sample - 1, exact(*time), short(*before), short(*value)
+        "experiment `{experiment}`: samples {} and {sample} are at one instant (t = {time}), where `{input}` is {} and {}; measurements may repeat at an instant, inputs may not: give the samples times of their own", sample - 1, short(*before), short(*value)
     )]
     InputsAtOneInstant {
         /// Name of the experiment.
         experiment: String,
         /// Index of the second of the two samples.
         sample: usize,
-        /// Their time (s).
-        time: f64,
+        /// Their time.
+        time: Moment,
         /// Name of the input.
         input: String,
         /// Its value at the first.
@@ -297,14 +297,14 @@ impl core::fmt::Debug for Error {
 
 /// Where and how a simulation failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("experiment `{experiment}`, sample {sample} (t = {} s): {signal} is {}{hint}", exact(*time), short(*value))]
+#[error("experiment `{experiment}`, sample {sample} (t = {time}): {signal} is {}{hint}", short(*value))]
 pub struct Failure {
     /// Name of the experiment.
     pub experiment: String,
     /// Index of the sample, from zero.
     pub sample: usize,
-    /// Its time (s).
-    pub time: f64,
+    /// Its time.
+    pub time: Moment,
     /// The quantity that failed: `state id`, `output iq`, `slope of output iq with respect to rs`, ...
     pub signal: String,
     /// Its value there.

@@ -10,6 +10,7 @@ use crate::error::Error;
 use crate::interval::Hold;
 use crate::layout::{Quantity, quantities};
 use crate::model::Model;
+use crate::numeral::TimeUnit;
 use crate::parameter::Parameter;
 use crate::record::{Channel, Holds, Initial, Record, Stored, Time};
 use crate::signals::{Of, Signals};
@@ -177,6 +178,11 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     /// Whether there is no sample; never so for an experiment that was made.
     pub fn is_empty(&self) -> bool {
         self.record.is_empty()
+    }
+
+    /// Says in which unit times are shown; the numbers stay.
+    pub fn time_in(self, unit: TimeUnit) -> Self {
+        Self::of(self.record.time_in(unit))
     }
 
     /// Time of sample `k` (s).

@@ -1,7 +1,8 @@
 //! [`Functions`]: a model's equations on vectors whose lengths are known at run time only.
 
-use crate::layout::Kind;
+use crate::layout::{Kind, Layout};
 use crate::model::Model;
+use crate::moments::Moments;
 use crate::scalar::Scalar;
 use crate::signals::Signals;
 use core::ops::Deref;
@@ -39,6 +40,31 @@ pub trait Functions<S>: Send + Sync {
         S: Scalar,
     {
         secants(x.len(), to, &|x, to| self.output(t, x, u, p, to));
+    }
+
+    /// Moments of [`state`](Functions::state) where the state is Gaussian, its covariance after its mean in `carry`: unless written, those of
+    /// functions that are affine.
+    fn state_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], layout: &Layout) -> Moments<S>
+    where
+        S: Scalar,
+    {
+        let n = layout.states.len();
+        let (mut mean, mut slopes) = (vec![S::from(0.0); n], vec![S::from(0.0); n * n]);
+        self.state(t, &carry[..n], u, p, &mut mean);
+        self.state_slopes(t, &carry[..n], u, p, &mut slopes);
+        Moments { mean, slopes, spread: vec![] }
+    }
+
+    /// Those of the outputs.
+    fn output_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], layout: &Layout) -> Moments<S>
+    where
+        S: Scalar,
+    {
+        let (n, outputs) = (layout.states.len(), layout.outputs.len());
+        let (mut mean, mut slopes) = (vec![S::from(0.0); outputs], vec![S::from(0.0); outputs * n]);
+        self.output(t, &carry[..n], u, p, &mut mean);
+        self.output_slopes(t, &carry[..n], u, p, &mut slopes);
+        Moments { mean, slopes, spread: vec![] }
     }
 }
 

@@ -31,7 +31,7 @@ mod symbol;
 mod tape;
 mod trace;
 
-pub(crate) use choices::choosing;
+pub(crate) use choices::{Choices, choices};
 pub use differentiate::Seed;
 pub(crate) use differentiate::{Pattern, Tangent, Variables, Way, slopes};
 pub use function::{Function, Function2};

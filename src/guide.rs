@@ -21,6 +21,7 @@
 //! | [14](chapter_14_coming_from) | coming from `idnlgrey`, lmfit, Ceres, CasADi |
 //! | [15](chapter_15_how_it_works) | how it works: duals, lanes, the triangle, segments |
 //! | [16](chapter_16_text_models) | models as text files |
+//! | [17](chapter_17_command) | the command: models and records from a shell |
 //! | [18](chapter_18_python) | Python: models, frames, results, options |
 //! | [19](chapter_19_clusters) | fleets on Spark and Dask |
 //! | [20](chapter_20_process_noise) | a plant that is disturbed: process noise |

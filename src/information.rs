@@ -14,6 +14,7 @@ mod block;
 mod chain;
 mod covariance;
 mod elimination;
+mod gathering;
 mod inverse;
 mod matrix;
 mod reflect;
@@ -25,6 +26,7 @@ pub use block::Block;
 pub(crate) use chain::Chain;
 pub use covariance::Covariance;
 pub use elimination::{BadPiece, Elimination, Undetermined};
+pub(crate) use gathering::Gathering;
 pub use matrix::SquareMatrix;
 pub use solve::RankDeficient;
 pub use spectrum::{NoSpectrum, Spectrum};
@@ -122,6 +124,11 @@ impl Information {
     /// The same, said to be made of so many rows.
     pub(crate) fn of_rows(self, rows: u64) -> Self {
         Information { rows, ..self }
+    }
+
+    /// The triangle of the same rows, all of them times a positive number.
+    pub(crate) fn times(&self, factor: f64) -> Self {
+        Information { triangle: self.triangle.iter().map(|entry| factor * entry).collect(), ..*self }
     }
 
     /// Whether all its numbers are finite.

@@ -84,7 +84,7 @@
 //! | write a model as a text file, or read one | [`text`] |
 //! | fit from a shell, without Rust | the command `greybox`: [`guide::chapter_17_command`] |
 //! | choose an integrator | [`Automatic`], [`Rk4`], [`Rk45`], [`Esdirk`], [`Discrete`] |
-//! | choose what is predicted | [`FreeRun`], [`Horizon`], [`Kalman`], [`predict`] |
+//! | choose what is predicted | [`FreeRun`], [`Horizon`], [`Kalman`], [`SecondOrder`], [`predict`] |
 //! | weigh or filter errors, limit outliers | [`weighting`], [`loss`], [`Butterworth`] |
 //! | choose a search | [`optimize`]; argmin's solvers by [`Problem::objective`] |
 //! | read the result | [`Estimate`], [`Knowledge`], [`Warning`], [`WarningCode`], [`Summary`], [`estimate`] |
@@ -129,6 +129,8 @@ mod by_name;
 #[cfg(feature = "std")]
 pub mod check;
 #[cfg(feature = "std")]
+mod covariance;
+#[cfg(feature = "std")]
 pub mod diagnose;
 #[cfg(feature = "std")]
 mod engine;
@@ -159,6 +161,8 @@ mod judge;
 #[cfg(feature = "std")]
 pub mod loss;
 #[cfg(feature = "std")]
+mod moments;
+#[cfg(feature = "std")]
 mod numeral;
 #[cfg(feature = "std")]
 mod numeric;
@@ -182,6 +186,8 @@ mod recurrence;
 pub mod regress;
 #[cfg(feature = "std")]
 pub mod report;
+#[cfg(feature = "std")]
+mod residuals;
 #[cfg(feature = "std")]
 mod scaling;
 #[cfg(feature = "std")]
@@ -220,9 +226,10 @@ pub use {
     experiment::{Experiment, ExperimentOf, Sample},
     fit::{Fit, Fittable, Fleet, Records},
     loss::{Huber, Loss},
+    numeral::{Moment, TimeUnit},
     numeric::Numeric,
     outliers::hampel,
-    predict::{FreeRun, Horizon, Kalman},
+    predict::{FreeRun, Horizon, Kalman, SecondOrder},
     prefilter::Butterworth,
     problem::{Problem, Search},
     record::{Initial, Time},

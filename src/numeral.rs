@@ -1,7 +1,10 @@
 //! How numbers are written for readers.
 
+mod moment;
 #[cfg(test)]
 mod tests;
+
+pub use moment::{Moment, TimeUnit};
 
 /// Digits that every `f64` can be trusted with; one more would show the rounding to binary (`1.1500000000000001`).
 const EXACT: usize = 15;

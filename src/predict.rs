@@ -1,12 +1,15 @@
 //! [`Predictor`]: mean and variance of each output, and the state from which they are computed.
 
 mod free_run;
+mod gaussian;
 mod horizon;
 mod kalman;
 mod measured;
 mod plant;
+mod second_order;
 mod symbolic;
 
+pub use crate::moments::Moments;
 pub use free_run::FreeRun;
 pub use horizon::Horizon;
 pub use kalman::Kalman;
@@ -14,6 +17,7 @@ pub use measured::Guess;
 pub(crate) use measured::Place;
 pub use plant::Plant;
 pub(crate) use plant::{Between, SlicePlant, Stepped};
+pub use second_order::SecondOrder;
 pub(crate) use symbolic::recurrence;
 
 use crate::error::Error;
@@ -106,6 +110,8 @@ pub(crate) trait Prediction: Debug + Send + Sync {
     fn restarts(&self) -> Option<Horizon>;
     fn is_simulation(&self) -> bool;
     fn needs_slopes(&self) -> bool;
+    /// The same to the second order, of a filter of first order.
+    fn second_order(&self) -> Option<Arc<dyn Prediction>>;
     fn check(&self, layout: &Layout) -> Result<(), Error>;
     fn describe(&self) -> String;
     fn values(&self) -> &dyn Steps<f64>;
@@ -158,6 +164,11 @@ impl<P: Predictor> Prediction for P {
 
     fn needs_slopes(&self) -> bool {
         Predictor::needs_slopes(self)
+    }
+
+    fn second_order(&self) -> Option<Arc<dyn Prediction>> {
+        let is_first = std::any::TypeId::of::<P>() == std::any::TypeId::of::<Kalman>();
+        is_first.then(|| Arc::new(SecondOrder) as Arc<dyn Prediction>)
     }
 
     fn check(&self, layout: &Layout) -> Result<(), Error> {

@@ -30,6 +30,7 @@ pub(crate) use time::steps;
 use crate::error::Error;
 use crate::interval::Hold;
 use crate::layout::Quantity;
+use crate::numeral::{Moment, TimeUnit};
 use crate::parameter::Parameter;
 use std::sync::{Arc, OnceLock};
 
@@ -56,6 +57,7 @@ pub struct Record {
     pub(crate) name: String,
     pub(crate) states: Arc<[Quantity]>,
     pub(crate) time: Time,
+    pub(crate) time_unit: TimeUnit,
     pub(crate) inputs: Arc<[Channel]>,
     pub(crate) outputs: Arc<[Channel]>,
     pub(crate) holds: Holds,
@@ -81,6 +83,7 @@ impl Record {
             name,
             states,
             time,
+            time_unit: TimeUnit::default(),
             inputs,
             outputs,
             holds,
@@ -121,6 +124,11 @@ impl Record {
         Record { inputs: inputs.into(), outputs: outputs.into(), looked: Arc::default(), ..self }.checked()
     }
 
+    /// Says in which unit its times are shown; the numbers stay.
+    pub fn time_in(self, time_unit: TimeUnit) -> Self {
+        Record { time_unit, ..self }
+    }
+
     /// Name in reports and errors.
     pub fn name(&self) -> &str {
         &self.name
@@ -151,6 +159,21 @@ impl Record {
     #[inline(always)]
     pub fn time(&self, k: usize) -> f64 {
         self.time.at(k)
+    }
+
+    /// The unit in which its times are shown: that of its file, seconds where none is said.
+    pub fn time_unit(&self) -> &TimeUnit {
+        &self.time_unit
+    }
+
+    /// Time of sample `k`, as it is shown.
+    pub fn moment(&self, k: usize) -> Moment {
+        self.shown(self.time(k))
+    }
+
+    /// A time, or a length of time, as it is shown.
+    pub(crate) fn shown(&self, time: f64) -> Moment {
+        Moment { time, unit: self.time_unit.clone() }
     }
 
     /// The inputs.
@@ -192,20 +215,20 @@ impl Record {
     fn check_instants(&self) -> Result<(), Error> {
         let Time::Stamps(stamps) = &self.time else { return Ok(()) };
         for (sample, pair) in (1..).zip(stamps.windows(2)) {
-            let [before, time] = [pair[0], pair[1]];
             let changed = |channel: &&Channel| channel.values[sample - 1] != channel.values[sample];
-            if before == time
+            if pair[0] == pair[1]
                 && let Some(channel) = self.inputs.iter().find(changed)
             {
                 let (experiment, input) = (self.name.clone(), channel.name.clone());
-                let (before, value) = (channel.values[sample - 1], channel.values[sample]);
+                let (before, value, time) = (channel.values[sample - 1], channel.values[sample], self.moment(sample));
                 return Err(Error::InputsAtOneInstant { experiment, sample, time, input, before, value });
             }
         }
         match stamps.as_slice() {
             [first, .., last] if first == last && !self.states.is_empty() => {
                 let (experiment, sample) = (self.name.clone(), stamps.len() - 1);
-                Err(Error::TimeOrder { experiment, sample, before: *first, time: *last })
+                let (before, time) = (self.shown(*first), self.shown(*last));
+                Err(Error::TimeOrder { experiment, sample, before, time })
             }
             _ => Ok(()),
         }
@@ -223,7 +246,7 @@ impl Record {
             let (experiment, reference) = (self.name.clone(), format!("`{}`", first.name));
             return Err(Error::Lengths { experiment, what, found, reference, expected: samples });
         }
-        self.time.check(&self.name, samples, &first.name)?;
+        self.time.check(&self.name, samples, &first.name, &self.time_unit)?;
         let needed = self.least();
         if samples < needed {
             return Err(Error::TooFewSamples { experiment: self.name, samples, needed, purpose: "for a fit" });
@@ -234,7 +257,7 @@ impl Record {
         let inputs = self.inputs.iter().filter_map(|channel| Some((bad_input(channel)?, channel)));
         let outputs = self.outputs.iter().filter_map(|channel| Some((bad_output(channel)?, channel)));
         if let Some((sample, channel)) = inputs.chain(outputs).min_by_key(|(sample, _)| *sample) {
-            let (experiment, signal, time) = (self.name.clone(), channel.name.clone(), self.time(sample));
+            let (experiment, signal, time) = (self.name.clone(), channel.name.clone(), self.moment(sample));
             return Err(Error::NotFinite { experiment, signal, value: channel.values[sample], sample, time });
         }
         Ok(self)

@@ -6,6 +6,7 @@ use crate::integrate::{Automatic, Integrator, Method, ModelSystem, Stuck};
 use crate::interval::{Hold, Interval};
 use crate::layout::Kind;
 use crate::model::Model;
+use crate::numeral::TimeUnit;
 use crate::random::Random;
 use crate::record::{Channel, Part, Record, Time};
 use crate::signals::{Of, Signals};
@@ -140,12 +141,12 @@ impl<'a, M: Model, I: Integrator> Simulator<'a, M, I> {
             let (experiment, purpose) = ("simulation".to_owned(), "of inputs, to simulate");
             return Err(Error::TooFewSamples { experiment, samples: 0, needed: 1, purpose });
         }
-        time.check("simulation", inputs.len(), "the inputs")?;
+        time.check("simulation", inputs.len(), "the inputs", &TimeUnit::default())?;
         let bad = |u: &Of<M::Input, f64>| M::Input::into_array(*u).as_ref().iter().position(|u| !u.is_finite());
         if let Some((sample, i)) = inputs.iter().enumerate().find_map(|(k, u)| Some((k, bad(u)?))) {
             let (experiment, signal) = ("simulation".to_owned(), M::Input::NAMES[i].to_owned());
             let value = M::Input::into_array(inputs[sample]).as_ref()[i];
-            return Err(Error::NotFinite { experiment, signal, value, sample, time: time.at(sample) });
+            return Err(Error::NotFinite { experiment, signal, value, sample, time: time.at(sample).into() });
         }
         Method::check(&self.integrator, M::KIND)
     }
@@ -185,7 +186,7 @@ fn failure(signal: String, value: f64, sample: usize, time: &Time) -> Error {
     Error::Simulation(Failure {
         experiment: "simulation".to_owned(),
         sample,
-        time: time.at(sample),
+        time: time.at(sample).into(),
         signal,
         value,
         hint,

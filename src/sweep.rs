@@ -228,6 +228,16 @@ pub trait Sweep: Send + Sync {
         None
     }
 
+    /// Whether it is a filter that takes a model by its slopes at a state on which choices of the model depend.
+    fn linearizes_choices(&self) -> bool {
+        false
+    }
+
+    /// Of a filter of first order, where the model is not affine in its state: the same to the second order.
+    fn second_order<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
+        None
+    }
+
     /// Description of the integrator and its settings.
     fn integrator(&self) -> String;
 

@@ -55,16 +55,18 @@ fn described(model: &Model, parameters: &[Parameter]) -> String {
 
 /// A record in a few lines, and whether something about it is odd.
 fn looked_at(record: &Record) -> (String, bool) {
-    let (from, to) = (record.time(0), record.time(record.len() - 1));
+    let (unit, last) = (record.time_unit(), record.moment(record.len() - 1));
     let mut text = format!(
-        "\nrecord {}: {} samples, {from} to {to} s, {:.4e} s from sample to sample",
+        "\nrecord {}: {} samples, {} to {last}, {:.4e} {} from sample to sample",
         record.name(),
         record.len(),
-        record.sample_time()
+        unit.convert(record.time(0)),
+        unit.convert(record.sample_time()),
+        unit.name()
     );
     let gaps = record.gaps();
     for gap in gaps.iter().take(5) {
-        text += &format!("\n  gap: from {} to {} s nothing was recorded", gap.from, gap.to);
+        text += &format!("\n  gap: from {} to {} nothing was recorded", gap.from, gap.to);
     }
     if gaps.len() > 5 {
         text += &format!("\n  and {} gaps more", gaps.len() - 5);
@@ -78,7 +80,8 @@ fn looked_at(record: &Record) -> (String, bool) {
         // An input may well have few values, a square wave for one.
         odd |= !found.suspicions.is_empty() || !is_input && !found.remarks().is_empty();
         let range = found.range.map_or("nothing".to_owned(), |(least, greatest)| format!("{least} to {greatest}"));
-        text += &format!("\n  {}: {range} {}", channel.name, channel.unit);
+        let unit = if channel.unit == "1" { "" } else { &channel.unit };
+        text += format!("\n  {}: {range} {unit}", channel.name).trim_end();
         for remark in found.remarks() {
             text += &format!("\n    {remark}");
         }

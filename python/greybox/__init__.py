@@ -51,7 +51,10 @@ from numpy import (
 
 from greybox import dask, pmsm, spark
 from greybox._core import Parameter, __version__
-from greybox.errors import Error, FitWarning, ModelWarning, TraceError
+from greybox.align import align
+from greybox.bootstrap import Bootstrap
+from greybox.errors import Error, FitWarning, ModelWarning, RecordWarning, TraceError
+from greybox.files import read
 from greybox.fitting import fit, simulate
 from greybox.fleets import fleet
 from greybox.model import Equations, Model, model
@@ -66,6 +69,7 @@ from greybox.symbols import Condition, Symbol, where
 from greybox.text import TextModel, load
 
 __all__ = [
+    "Bootstrap",
     "Condition",
     "Equations",
     "Error",
@@ -76,6 +80,7 @@ __all__ = [
     "Parameter",
     "Profile",
     "Record",
+    "RecordWarning",
     "Report",
     "Signals",
     "Symbol",
@@ -84,6 +89,7 @@ __all__ = [
     "Values",
     "Vector",
     "__version__",
+    "align",
     "arccos",
     "arcsin",
     "arctan",
@@ -107,6 +113,7 @@ __all__ = [
     "minimum",
     "model",
     "pmsm",
+    "read",
     "sign",
     "signals",
     "simulate",

@@ -25,6 +25,7 @@ def fleet(
     by: str | Sequence[str],
     *,
     npartitions: int | None = None,
+    whole: bool = False,
     parameters: Mapping[str, Parameter] | None = None,
     time: str | None = None,
     columns: Mapping[str, str] | None = None,
@@ -34,7 +35,7 @@ def fleet(
 ) -> Any:
     """Fit many records, each by itself, on the workers of Dask.
 
-    The samples are shuffled by `by`, and each partition is one task. A task that is tried again gives the same bits.
+    The samples are shuffled by `by`, unless they lie in whole partitions, and each partition is one task. A task that is tried again gives the same bits.
 
     Parameters
     ----------
@@ -42,6 +43,9 @@ def fleet(
         The samples of all records, in any order.
     npartitions : int, optional
         Into how many parts the records are divided; as many as the frame has without it.
+    whole : bool
+        The samples of each record lie in one partition of the frame already, such as one file of whole records: nothing is shuffled, which
+        costs more than the fits. A record that lies in two partitions would be fitted twice, in parts.
     model, by, parameters, time, columns, hold, initial, **given
         As in :func:`greybox.fleet`.
 
@@ -65,8 +69,8 @@ def fleet(
         raise Error(f"there is no column `{missing[0]}`; the frame has: {near(missing[0], frame.columns)}")
     of = {name: pd.Series(dtype=frame.dtypes[name]) for name in made.by}
     meta = pd.DataFrame(of | {name: pd.Series(dtype=_TYPES[kind]) for name, kind in made.columns().items()})
-    shuffled = frame.shuffle(on=made.by, npartitions=npartitions)
-    return shuffled.map_partitions(_fit, made, meta.dtypes.to_dict(), meta=meta)
+    parts = frame if whole else frame.shuffle(on=made.by, npartitions=npartitions)
+    return parts.map_partitions(_fit, made, meta.dtypes.to_dict(), meta=meta)
 
 
 def _fit(part: Any, made: Plan, types: dict[str, Any]) -> Any:

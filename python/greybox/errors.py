@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-__all__ = ["Error", "FitWarning", "ModelWarning", "TraceError"]
+import sys
+import warnings
+
+__all__ = ["Error", "FitWarning", "ModelWarning", "RecordWarning", "TraceError", "warn"]
 
 
 class Error(ValueError):
@@ -15,6 +18,10 @@ class TraceError(Error, TypeError):
 
 class ModelWarning(UserWarning):
     """Something odd in a model file: a unit that does not fit, a quantity that is not used."""
+
+
+class RecordWarning(UserWarning):
+    """Something that was done to signals of a file and matters to a fit."""
 
 
 class FitWarning(UserWarning):
@@ -42,3 +49,11 @@ class FitWarning(UserWarning):
 
     def __str__(self) -> str:
         return f"[{self.code}] {self.text}"
+
+
+def warn(warning: Warning) -> None:
+    """Issue a warning at the line of the caller outside this package."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back is not None and str(frame.f_globals.get("__name__", "")).partition(".")[0] == "greybox":
+        frame, level = frame.f_back, level + 1
+    warnings.warn(warning, stacklevel=level)

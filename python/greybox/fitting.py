@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import inspect
 import os
-import sys
-import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from greybox import _core
-from greybox.errors import Error, FitWarning
-from greybox.frames import Frame
+from greybox.errors import Error, warn
 from greybox.model import Model, checked
 from greybox.options import Noise, settings
 from greybox.parameters import Parameter, declared, together
 from greybox.progress import Progress
-from greybox.records import Hold, Initial, Record, records
+from greybox.records import Hold, Initial, Record, kind_of, records
 from greybox.result import Fit
 from greybox.signals import named, near
 
@@ -54,8 +51,8 @@ def fit(
     ----------
     model : Model
         The equations.
-    data : frame, Record, or list of these
-        What was measured: columns of time, inputs and outputs by their names, as :class:`Record` describes. Several records share
+    data : frame, path, Record, or list of these
+        What was measured: columns of time, inputs and outputs by their names, as :class:`Record` describes; or a file of it. Several records share
         the parameters and have an initial state each.
     **declarations : Parameter
         ``rs=gb.free(1.0, within=(0.01, 10))`` or ``rs=gb.fixed(0.6)`` for each parameter of the model.
@@ -82,7 +79,8 @@ def fit(
         refined until it no longer matters.
     predictor : str, optional
         Which prediction error is minimized: of a ``"simulation"`` (the default), ``"horizon:5"`` (five samples ahead of a measured
-        state), or ``"kalman"`` (one-step errors of a filter, for disturbed plants; the model has `diffusion` and `noise`).
+        state), ``"kalman"`` (one-step errors of a filter, for disturbed plants; the model has `diffusion` and `noise`), or
+        ``"second-order"`` (a filter for strong noise).
     optimizer : str, optional
         ``"levenberg-marquardt"`` or ``"gauss-newton"``.
     starts : int, optional
@@ -147,19 +145,11 @@ def fit(
     problem = _core.Problem(equations.core, cores, declared_, chosen)
     with Progress(progress, "fit") as shown:
         estimate = problem.run(shown)
-    found = Fit(equations, cores, declared_, chosen, Frame(several[0].data).kind, estimate, problem)
-    warn(found.warnings)
-    return found
-
-
-def warn(all_: list[FitWarning]) -> None:
-    """Issue warnings at the line of the caller outside this package."""
-    frame, level = sys._getframe(1), 2
-    while frame.f_back is not None and str(frame.f_globals.get("__name__", "")).partition(".")[0] == "greybox":
-        frame, level = frame.f_back, level + 1
-    for warning in all_:
+    found = Fit(equations, cores, declared_, chosen, kind_of(several[0].data), estimate, problem)
+    for warning in found.warnings:
         if warning.severity != "usable":
-            warnings.warn(warning, stacklevel=level)
+            warn(warning)
+    return found
 
 
 def simulate(
@@ -222,7 +212,7 @@ def simulate(
     if noise:
         found = found.with_noise([float(noise.get(name, 0.0)) for name in outputs], seed)
     columns_ = dict(zip([*inputs, *outputs], [*found.inputs(), *found.outputs()], strict=True))
-    return Frame(data).kind({"t": found.time(), **columns_})
+    return kind_of(data)({"t": found.time(), **columns_})
 
 
 def _number(what: str, name: str, values: Mapping[str, float], names: Any) -> float:

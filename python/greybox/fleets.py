@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from greybox import _core
 from greybox.errors import Error
-from greybox.frames import Frame
+from greybox.estimate import VERDICTS
+from greybox.frames import Frame, is_readonly, seconds
 from greybox.model import Model, checked
 from greybox.options import Options, settings
 from greybox.parameters import Parameter, declared, together
 from greybox.progress import Progress
-from greybox.records import Hold, Initial, Record
-from greybox.result import VERDICTS
+from greybox.records import Hold, Initial, Record, kind_of, opened
 from greybox.signals import named, near
 
 __all__ = ["Plan", "fleet"]
@@ -82,6 +83,9 @@ class Plan:
         progress : bool
             Show how many records are done (needs tqdm).
         """
+        data = opened(data)
+        if isinstance(data, Path):
+            raise Error(f"{data}: text files of many records are read by pandas: gb.fleet(model, pandas.read_csv({str(data)!r}), ...)")
         frame = Frame(data)
         missing = [name for name in self.needed() if name not in frame]
         if missing:
@@ -89,19 +93,21 @@ class Plan:
         keys = [frame.values(name) for name in self.by]
         places, firsts = _groups(keys)
         columns = {name: frame.column(name, name) for name in self.needed() if name not in self.by}
-        times = None if self.record.sample_time else frame.stamps(self.record.time)[0]
+        readonly = {name: is_readonly(column) for name, column in columns.items()}
+        step = self.record.sample_time
+        times, what = (np.zeros(0), "") if step is not None else frame.stamps(self.record.time)
         records: list[_core.Record] = []
         failed: dict[int, str] = {}
         for k, rows in enumerate(places):
-            if ordered and times is not None:
-                rows = rows[np.argsort(times[rows], kind="stable")]
-            part: dict[str, Any] = {name: column[rows] for name, column in columns.items()}
-            if times is not None:
-                part["t"] = times[rows]
+            here = np.arange(_length(rows)) * step if step is not None else times[rows]
+            if ordered and step is None and (here[1:] < here[:-1]).any():
+                order = np.argsort(here, kind="stable")
+                rows, here = (np.arange(rows.start, rows.stop) if isinstance(rows, slice) else rows)[order], here[order]
             label = ", ".join(str(key[firsts[k]]) for key in keys)
-            said = Record(part, label, None, self.record.sample_time, self.record.columns, self.record.hold, self.record.initial)
+            # A part of an array that nothing writes to is shared; rows that are gathered are a copy already.
+            part = {name: (column[rows], readonly[name] or not isinstance(rows, slice)) for name, column in columns.items()}
             try:
-                records.append(said.core(self.equations, label))
+                records.append(self.record.of(self.equations, label, seconds(here, what), part))
             except Error as error:
                 failed[k] = str(error)
         with Progress(progress, "fleet", len(records)) as shown:
@@ -109,7 +115,7 @@ class Plan:
         found: dict[str, list[Any]] = {name: [] for name in self.columns()}
         for k, rows in enumerate(places):
             estimate, reason = (None, failed[k]) if k in failed else next(answers)
-            for name, value in self._row(estimate, reason, len(rows)).items():
+            for name, value in self._row(estimate, reason, _length(rows)).items():
                 found[name].append(value)
         return {**{name: key[firsts] for name, key in zip(self.by, keys, strict=True)}, **found}
 
@@ -129,18 +135,53 @@ class Plan:
         return row
 
 
-def _groups(keys: list[Any]) -> tuple[list[Any], Any]:
+#: The rows of one record: a part of the frame, or here and there.
+_Rows: TypeAlias = "slice | np.ndarray[Any, np.dtype[np.int64]]"
+
+
+def _length(rows: _Rows) -> int:
+    return rows.stop - rows.start if isinstance(rows, slice) else len(rows)
+
+
+def _groups(keys: list[Any]) -> tuple[list[_Rows], Any]:
     """Give the rows of each record, in the order of its first row, and these first rows."""
-    codes = np.zeros(len(keys[0]), dtype=np.int64)
-    for key in keys:
-        _, inverse = np.unique(np.asarray(key).astype(str) if np.asarray(key).dtype == object else key, return_inverse=True)
-        codes = codes * (int(inverse.max(initial=0)) + 1) + inverse
-    _, first, inverse = np.unique(codes, return_index=True, return_inverse=True)
-    if len(codes) == 0:
+    if len(keys[0]) == 0:
         return [], np.zeros(0, dtype=np.int64)
-    together = np.split(np.argsort(inverse, kind="stable"), np.cumsum(np.bincount(inverse))[:-1])
-    order = np.argsort(first, kind="stable")
-    return [together[k] for k in order], first[order]
+    # Rows of one record mostly follow each other: only the first of each run is looked up.
+    new = np.ones(len(keys[0]), dtype=bool)
+    new[1:] = np.any([_differs(key) for key in keys], axis=0)
+    starts = np.flatnonzero(new)
+    codes: Any = None
+    for key in keys:
+        own = key[starts]
+        _, inverse = np.unique(own.astype(str) if own.dtype == object else own, return_inverse=True)
+        if codes is not None:
+            _, inverse = np.unique(codes * (int(inverse.max()) + 1) + inverse, return_inverse=True)
+        codes = inverse
+    # Numbers of 16 bits are sorted in one pass.
+    of = np.repeat(codes.astype(np.min_scalar_type(int(codes.max()))), np.diff(starts, append=len(new)))
+    order = np.argsort(of, kind="stable")
+    ends = np.cumsum(np.bincount(of))
+    firsts = order[np.concatenate([[0], ends[:-1]])]
+    lasts = order[ends - 1]
+
+    def rows(k: int) -> _Rows:
+        length = ends[k] - (ends[k - 1] if k else 0)
+        first, last = int(firsts[k]), int(lasts[k])
+        return slice(first, last + 1) if last - first + 1 == length else order[ends[k] - length : ends[k]]
+
+    turn = np.argsort(firsts, kind="stable")
+    return [rows(k) for k in turn.tolist()], firsts[turn]
+
+
+def _differs(key: Any) -> Any:
+    """Whether each entry but the first differs from the one before."""
+    try:
+        return (key[1:] != key[:-1]).astype(bool)
+    except TypeError:
+        # pandas' NA, whose comparison is no answer.
+        key = key.astype(str)
+        return key[1:] != key[:-1]
 
 
 def plan(
@@ -182,8 +223,8 @@ def fleet(
     ----------
     model : Model
         The equations.
-    data : frame
-        The samples of all records, one below the other.
+    data : frame or path
+        The samples of all records, one below the other, or a file of them that :func:`greybox.read` reads.
     by : str or sequence of str
         The columns that tell the records apart.
     parameters, time, sample_time, columns, hold, initial
@@ -220,4 +261,4 @@ def fleet(
     [0.3, 0.4]
     """
     made = plan(model, by, parameters, Record(None, None, time, sample_time, columns, hold, initial), given)
-    return Frame(data).kind(made.rows(data, progress=progress))
+    return kind_of(data)(made.rows(data, progress=progress))

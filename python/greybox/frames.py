@@ -10,7 +10,7 @@ import numpy as np
 from greybox.errors import Error
 from greybox.signals import near
 
-__all__ = ["Array", "Frame", "Kind"]
+__all__ = ["Array", "Frame", "Kind", "is_readonly", "rename", "seconds", "time_column"]
 
 Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
 
@@ -88,8 +88,7 @@ class Frame:
             if not (np.isfinite(sample_time) and sample_time > 0.0):
                 raise Error(f"the sample time is {sample_time!r}; it must be positive and finite (s)")
             return np.arange(rows, dtype=np.float64) * float(sample_time)
-        stamps, what = self.stamps(name)
-        return _since_first(stamps.astype(np.int64), what) if stamps.dtype.kind == "m" else stamps
+        return seconds(*self.stamps(name))
 
     def stamps(self, name: str | None) -> tuple[Any, str]:
         """Give the time of each row as it stands, in seconds or as a duration in nanoseconds, and where it stands.
@@ -231,6 +230,11 @@ def _stamps(values: Any, what: str) -> Any:
         f"{what} {shown}, which is neither a number (s) nor a date; convert it first, such as by pandas.to_datetime, or give the time "
         "between samples by sample_time=..."
     )
+
+
+def seconds(stamps: Any, what: str) -> Array:
+    """Give times in seconds; durations in nanoseconds count from the first."""
+    return _since_first(stamps.astype(np.int64), what) if stamps.dtype.kind == "m" else stamps
 
 
 def _since_first(stamps: Any, what: str) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
@@ -156,6 +157,10 @@ class _Functions(Model):
         for role, of in quantities.items():
             setattr(self, role, named(of, role))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Functions without a name of their own, such as lambdas, have no pickle; the equations that they are read as have.
+        return self.equations().__reduce__()
+
 
 def model(
     derivative: Callable[..., Returned] | None = None,
@@ -267,6 +272,11 @@ def _roots(
     def nodes(role: str, function: Callable[..., Returned] | None, name: str, *args: Any) -> list[_core.Node]:
         if function is None:
             return []
+        try:
+            inspect.signature(function).bind(*args)
+        except TypeError as error:
+            given = "p" if len(args) == 1 else "t, x, u, p"
+            raise Error(f"{name} of {title} cannot be called with ({given}), which are handed over: {error}") from None
         return _returned(trace, function(*args), tuple(quantities[role]), f"{name} of {title}")
 
     name = "derivative" if _written(of, "derivative") else "next"

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
 from greybox import _core
 from greybox.errors import Error
-from greybox.frames import Array, Frame, is_readonly, rename
+from greybox.files import TEXT, read
+from greybox.frames import Array, Frame, Kind, is_readonly, rename
 from greybox.model import Equations
 from greybox.parameters import Parameter, declared
 from greybox.signals import Signals, named
 
-__all__ = ["Hold", "Initial", "Record", "records"]
+__all__ = ["Hold", "Initial", "Record", "kind_of", "opened", "records"]
 
 #: The inputs between samples, of all or by the name of each.
 Hold: TypeAlias = "Literal['zero', 'first'] | Mapping[str, Literal['zero', 'first']]"
@@ -32,9 +36,10 @@ class Record:
     ----------
     data : frame
         pandas, polars, Arrow (or whatever hands over an Arrow stream), a mapping from names to arrays, an xarray dataset, or a
-        structured array. A row for each sample; further columns are ignored.
+        structured array. A row for each sample; further columns are ignored. Or the path of a file: of text with columns (``.csv``), in
+        which what is not said is found, or of a kind that :func:`greybox.read` reads.
     name : str, optional
-        The name in reports and errors.
+        The name in reports and errors; that of the file without it.
     time : str, optional
         The column of the time: seconds, or dates, which count from the first. Without it, the column ``t`` or ``time``, or else the
         index of a pandas frame.
@@ -60,8 +65,16 @@ class Record:
 
     def core(self, equations: Equations, name: str, *, outputs: bool = True) -> _core.Record:
         """Give the record as the library takes it. Without `outputs`, those that the frame lacks are missing measurements."""
-        frame = Frame(self.data)
         inputs, measured = named(equations.inputs, "inputs"), named(equations.outputs, "outputs")
+        data = opened(self.data)
+        if isinstance(data, Path):
+            columns_ = {**(self.columns or {}), **({} if self.time is None else {"t": self.time})}
+            try:
+                record = _core.Record.from_csv(equations.core, self.name or data.name, data, columns_, self.sample_time)
+            except Error as error:
+                raise Error(_in_python(str(error))) from None
+            return self._said(equations, record)
+        frame = Frame(data)
         try:
             of = rename([*inputs, *measured], self.columns)
             columns = {signal: _column(frame, of[signal], signal) for signal in inputs}
@@ -75,21 +88,50 @@ class Record:
             time = frame.time(self.time, self.sample_time, rows)
             _check_lengths({**{of[signal]: column for signal, column in {**columns, **found}.items()}}, time)
             missing = np.full(len(time), np.nan)
-            given = self.initial
-            initial = given if given is None or isinstance(given, str) else declared(given, _states(equations), "initial state of")
-            hold = self.hold if self.hold is None or isinstance(self.hold, str) else dict(self.hold)
-            record = _core.Record(
-                equations.core,
-                self.name or name,
-                time,
-                [_shared(columns[signal]) for signal in inputs],
-                [_shared(found.get(signal, missing)) for signal in measured],
-            )
-            return equations.prepared(record).said(hold, initial)
+            given = {**columns, **{signal: found.get(signal, missing) for signal in measured}}
+            return self.of(equations, self.name or name, time, {of[signal]: _shared(one) for signal, one in given.items()})
         except Error as error:
             if self.name and self.name not in str(error):
                 raise Error(f"record `{self.name}`: {error}") from None
             raise
+
+    def of(self, equations: Equations, name: str, time: Array, columns: Mapping[str, tuple[Array, bool]]) -> _core.Record:
+        """Give the record of columns, each with whether it may be shared, and with what is said here."""
+        of = rename([*named(equations.inputs, "inputs"), *named(equations.outputs, "outputs")], self.columns)
+        inputs = [columns[of[signal]] for signal in named(equations.inputs, "inputs")]
+        outputs = [columns[of[signal]] for signal in named(equations.outputs, "outputs")]
+        return self._said(equations, _core.Record(equations.core, name, time, inputs, outputs))
+
+    def _said(self, equations: Equations, record: _core.Record) -> _core.Record:
+        given = self.initial
+        initial = given if given is None or isinstance(given, str) else declared(given, _states(equations), "initial state of")
+        hold = self.hold if self.hold is None or isinstance(self.hold, str) else dict(self.hold)
+        return equations.prepared(record).said(hold, initial)
+
+
+def _in_python(text: str) -> str:
+    """Give an error of the library's reader with the remedies that there are in Python."""
+    for theirs, ours in (
+        (r'DataFile::factor\("(\w+)", ([^)]*)\), or 1 if', r"a frame in which `\1` is multiplied by \2, or by 1 if"),
+        (r"DataFile::column", 'columns={"signal": "column"}, or time="column"'),
+        (r"DataFile::sample_time", "sample_time"),
+        (r"DataFile::(\w+)", r"pandas.read_csv (here is no option \1)"),
+    ):
+        text = re.sub(theirs, ours, text)
+    return text
+
+
+def opened(data: Any) -> Any:
+    """Give the frame in a file, where a path stands in its place; of a text file the path, which the compiled library reads."""
+    if not isinstance(data, (str, os.PathLike)):
+        return data
+    path = Path(data)
+    return path if path.suffix.lower() in TEXT else read(path)
+
+
+def kind_of(data: Any) -> Kind:
+    """Give what makes a frame of the same kind; dicts where the data are a path."""
+    return dict if isinstance(data, (str, os.PathLike)) else Frame(data).kind
 
 
 def _states(equations: Equations) -> Signals:

@@ -28,6 +28,7 @@ def fleet(
     by: str | Sequence[str],
     *,
     batches: int | None = None,
+    whole: bool = False,
     parameters: Mapping[str, Parameter] | None = None,
     time: str | None = None,
     sample_time: float | None = None,
@@ -38,8 +39,8 @@ def fleet(
 ) -> Any:
     """Fit many records, each by itself, on the workers of a cluster.
 
-    The records are shuffled into batches by a hash of `by`, and each batch is one call of a worker, which uses one core. A task that is
-    tried again gives the same bits. The workers need the package greybox.
+    The records are shuffled into batches by a hash of `by`, unless they lie in whole partitions, and each batch is one call of a worker,
+    which uses one core. A task that is tried again gives the same bits. The workers need the package greybox.
 
     Parameters
     ----------
@@ -48,6 +49,9 @@ def fleet(
     batches : int, optional
         Into how many parts the records are divided; without it they are counted, for 1,000 records to a part and at least one part
         for each core.
+    whole : bool
+        The samples of each record lie in one partition of the frame already, such as one file of whole records: nothing is shuffled, which
+        costs more than the fits, and a partition is one call. A record that lies in two partitions would be fitted twice, in parts.
     model, by, parameters, time, sample_time, columns, hold, initial, **given
         As in :func:`greybox.fleet`.
 
@@ -68,15 +72,18 @@ def fleet(
     missing = [name for name in needed if name not in frame.columns]
     if missing:
         raise Error(f"there is no column `{missing[0]}`; the frame has: {near(missing[0], frame.columns)}")
+    keys = [f"`{name}` {frame.schema[name].dataType.simpleString()}" for name in made.by]
+    schema = ", ".join(keys + [f"`{name}` {_TYPES[kind]}" for name, kind in made.columns().items()])
+    fit = _worker(made)
+    if whole:
+        return frame.select(*needed).mapInArrow(_partition(fit), schema)
     if batches is None:
         records = frame.select(*made.by).distinct().count()
         batches = max(-(-records // _BATCH), frame.sparkSession.sparkContext.defaultParallelism)
     batch = functions.pmod(functions.xxhash64(*made.by), functions.lit(batches))
     # A number that is asked for is not changed by adaptive execution, which would make one task of many small parts.
     parts = frame.select(*needed).withColumn(_COLUMN, batch).repartition(batches, _COLUMN)
-    keys = [f"`{name}` {frame.schema[name].dataType.simpleString()}" for name in made.by]
-    schema = ", ".join(keys + [f"`{name}` {_TYPES[kind]}" for name, kind in made.columns().items()])
-    return parts.groupBy(_COLUMN).applyInArrow(_worker(made), schema)
+    return parts.groupBy(_COLUMN).applyInArrow(lambda table: fit(table.drop_columns([_COLUMN])), schema)
 
 
 def _time(made: Plan, names: Sequence[str]) -> list[str]:
@@ -97,8 +104,19 @@ def _worker(made: Plan) -> Callable[[Any], Any]:
 
         # A task of Spark has one core.
         os.environ.setdefault("RAYON_NUM_THREADS", "1")
-        rows = made.rows(table.drop_columns([_COLUMN]), ordered=True)
+        rows = made.rows(table, ordered=True)
         keys = {name: pa.array(rows[name].tolist(), table.schema.field(name).type) for name in made.by}
         return pa.table({**rows, **keys})
 
     return fit
+
+
+def _partition(fit: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    def fitted(batches: Any) -> Any:
+        import pyarrow as pa
+
+        parts = list(batches)
+        if parts:
+            yield from fit(pa.Table.from_batches(parts)).to_batches()
+
+    return fitted

@@ -35,6 +35,7 @@ def refuse(what: str) -> NoReturn:
         frame = frame.f_back
     name, line = frame.f_code.co_filename, frame.f_lineno
     text = linecache.getline(name, line).strip()
+    text = text if len(text) <= 100 else text[:97] + "..."
     raise TraceError(f"{name}, line {line}{f', in `{text}`' if text else ''}: {what}")
 
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-import warnings
 from typing import Any
 
 from greybox import _core
 from greybox._core import Parameter
-from greybox.errors import ModelWarning
+from greybox.errors import ModelWarning, warn
 from greybox.model import Equations
 from greybox.signals import named
 
@@ -79,5 +78,5 @@ def load(path: str | os.PathLike[str], **constants: float) -> TextModel:
     """
     file = _core.TextModel.read(path, [(name, float(value)) for name, value in constants.items()])
     for remark in file.warnings:
-        warnings.warn(remark, ModelWarning, stacklevel=2)
+        warn(ModelWarning(remark))
     return TextModel(file)

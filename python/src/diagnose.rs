@@ -1,7 +1,7 @@
 //! [`Report`]: an estimate as something to read.
 
 use crate::convert::{name_of, raised};
-use greybox::diagnose::Profile;
+use greybox::diagnose::{Bootstrap, Profile};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::path::PathBuf;
@@ -23,9 +23,9 @@ impl Report {
         Ok((slf.get_type().getattr("from_bytes")?, (PyBytes::new(slf.py(), text.as_bytes()),)))
     }
 
-    /// The report with a title and with the sections of these profiles, which are JSON.
+    /// The report with a title and with the sections of these profiles and of this bootstrap, which are JSON.
     #[expect(clippy::needless_pass_by_value, reason = "arguments of Python come as values")]
-    fn extended(&self, title: Option<&str>, profiles: Vec<String>) -> PyResult<Self> {
+    fn extended(&self, title: Option<&str>, profiles: Vec<String>, bootstrap: Option<&str>) -> PyResult<Self> {
         let mut report = self.0.clone();
         if let Some(title) = title {
             report = report.titled(title);
@@ -33,6 +33,10 @@ impl Report {
         for profile in &profiles {
             let profile: Profile = serde_json::from_str(profile).map_err(raised)?;
             report = report.with(profile);
+        }
+        if let Some(bootstrap) = bootstrap {
+            let bootstrap: Bootstrap = serde_json::from_str(bootstrap).map_err(raised)?;
+            report = report.with(bootstrap);
         }
         Ok(Report(report))
     }
@@ -70,7 +74,6 @@ impl Report {
     }
 
     /// Writes the report, whole or not at all, as the path ends in `.html`, `.md`, `.json` or `.txt`.
-    #[expect(clippy::needless_pass_by_value, reason = "arguments of Python come as values")]
     fn save(&self, path: PathBuf) -> PyResult<()> {
         self.0.save(path).map_err(raised)
     }

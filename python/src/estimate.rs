@@ -113,7 +113,6 @@ impl Estimate {
     }
 
     /// Value, standard error and interval of a function of the parameters.
-    #[expect(clippy::type_complexity, reason = "a tuple for Python")]
     fn derived(&self, name: &str, expression: &Expression) -> (f64, Option<f64>, Option<(f64, f64)>) {
         let found = derived_by(&self.0, name, &expression.graph, expression.root);
         (found.value, found.standard_error, found.interval)

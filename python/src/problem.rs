@@ -9,7 +9,7 @@ use crate::run::{Progress, interruptible};
 use crate::settings::{Options, Parameter};
 use argmin::core::KV;
 use argmin::core::observers::{Observe, ObserverMode};
-use greybox::diagnose;
+use greybox::diagnose::{self, Resampling};
 use greybox::optimize::LeastSquaresState;
 use numpy::PyArray1;
 use pyo3::exceptions::PyKeyboardInterrupt;
@@ -42,13 +42,13 @@ impl Problem {
         let progress = Progress::default();
         let records: Vec<_> = records.into_iter().map(|record| record.record).collect();
         let fit = options.fit(&equations.0, &records, &parameters)?.cancel(progress.cancel.clone());
-        let fit = fit.observe(Watch(progress.clone()), ObserverMode::Always);
+        let fit = fit.observe(Watch(progress.clone()), ObserverMode::Always).counter(progress.done.clone());
         Ok(Problem { problem: fit.problem().map_err(raised)?, progress })
     }
 
     /// Searches. Where Ctrl-C ended it, the estimate is the best so far, and says so.
     fn run(&self, py: Python<'_>, show: Option<&Bound<'_, PyAny>>) -> PyResult<Estimate> {
-        self.progress.cancel.store(false, Ordering::Relaxed);
+        self.progress.begin();
         let ended = interruptible(py, &self.progress, show, || self.problem.run())?;
         match (ended.interrupted, ended.result) {
             (None, result) => Ok(Estimate(result.map_err(raised)?)),
@@ -57,15 +57,14 @@ impl Problem {
         }
     }
 
-    /// The same work, which has no result if it is stopped.
+    /// The report, which has no result if it is stopped; nor have the diagnoses below.
     fn report(&self, py: Python<'_>, estimate: &Estimate) -> PyResult<Report> {
         let estimate = &estimate.0;
-        self.whole(py, || greybox::Report::new(&self.problem, estimate)).map(Report)
+        self.whole(py, None, || greybox::Report::new(&self.problem, estimate)).map(Report)
     }
 
     /// Predicted outputs and residuals of a record, a column per output, and the initial state. Of record `own` of the fit, with its own
     /// parameters and estimated initial state.
-    #[expect(clippy::type_complexity, reason = "a tuple for Python")]
     fn predict<'py>(
         &self,
         py: Python<'py>,
@@ -80,7 +79,7 @@ impl Problem {
             let values = one.parameters.iter();
             summary.parameters.iter_mut().zip(values).for_each(|(parameter, value)| parameter.value = *value);
         }
-        let found = self.whole(py, || self.problem.predict(&summary, &record))?;
+        let found = self.whole(py, None, || self.problem.predict(&summary, &record))?;
         let arrays = |columns: Vec<Vec<f64>>| columns.into_iter().map(|one| PyArray1::from_vec(py, one)).collect();
         Ok((arrays(found.outputs), arrays(found.residuals), found.initial_state))
     }
@@ -94,7 +93,7 @@ impl Problem {
         name: &str,
         probability: f64,
     ) -> PyResult<(End, End, Vec<f64>, Vec<f64>, f64, String, String)> {
-        let found = self.whole(py, || diagnose::profile(&self.problem, &estimate.0, name, probability))?;
+        let found = self.whole(py, None, || diagnose::profile(&self.problem, &estimate.0, name, probability))?;
         let end = |end: diagnose::End| match end {
             diagnose::End::At(at) => ("at", at),
             diagnose::End::Bound(at) => ("bound", at),
@@ -106,6 +105,25 @@ impl Problem {
         Ok((end(found.lower), end(found.upper), values, rises, found.threshold, found.remark, json))
     }
 
+    /// Refits of resampled records: standard errors, biases and intervals of the unknowns, refits that ended, and all of it as JSON. In
+    /// blocks of so many residuals; without, one by one.
+    #[expect(clippy::type_complexity, reason = "a tuple for Python")]
+    fn bootstrap(
+        &self,
+        py: Python<'_>,
+        estimate: &Estimate,
+        blocks: Option<usize>,
+        count: usize,
+        seed: u64,
+        show: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<(Vec<f64>, Vec<f64>, Vec<(f64, f64)>, u64, String)> {
+        let resampling = blocks.map_or(Resampling::Residuals, Resampling::Blocks);
+        let work = || diagnose::bootstrap(&self.problem, &estimate.0, resampling, count, seed);
+        let found = self.whole(py, show, work)?;
+        let json = serde_json::to_string(&found).map_err(raised)?;
+        Ok((found.standard_errors, found.bias, found.intervals, found.converged, json))
+    }
+
     /// The half widths of the bands of a record of the fit: of the model alone, and of a new measurement.
     fn bands<'py>(
         &self,
@@ -114,7 +132,7 @@ impl Problem {
         record: usize,
         probability: f64,
     ) -> PyResult<(Arrays<'py>, Arrays<'py>)> {
-        let found = self.whole(py, || diagnose::bands(&self.problem, &estimate.0, record, probability))?;
+        let found = self.whole(py, None, || diagnose::bands(&self.problem, &estimate.0, record, probability))?;
         let arrays = |columns: Vec<Vec<f64>>| columns.into_iter().map(|one| PyArray1::from_vec(py, one)).collect();
         Ok((arrays(found.confidence), arrays(found.prediction)))
     }
@@ -122,9 +140,14 @@ impl Problem {
 
 impl Problem {
     /// Work that is whole or an exception.
-    fn whole<T: Send>(&self, py: Python<'_>, work: impl FnOnce() -> Result<T, greybox::Error> + Send) -> PyResult<T> {
-        self.progress.cancel.store(false, Ordering::Relaxed);
-        let ended = interruptible(py, &self.progress, None, work)?;
+    fn whole<T: Send>(
+        &self,
+        py: Python<'_>,
+        show: Option<&Bound<'_, PyAny>>,
+        work: impl FnOnce() -> Result<T, greybox::Error> + Send,
+    ) -> PyResult<T> {
+        self.progress.begin();
+        let ended = interruptible(py, &self.progress, show, work)?;
         ended.interrupted.map_or(ended.result.map_err(raised), Err)
     }
 }

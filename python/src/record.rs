@@ -3,13 +3,14 @@
 use crate::convert::raised;
 use crate::equations::Equations;
 use crate::settings::Parameter;
-use greybox::Hold;
 use greybox::layout::Quantity;
 use greybox::record::{Channel, Column, Initial, Time};
+use greybox::{DataFile, Hold};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 /// One measured record.
 #[pyclass(frozen, module = "greybox._core", from_py_object)]
@@ -131,6 +132,25 @@ impl Record {
         let record = greybox::record::Record::new(layout.states.clone(), time.time(), inputs, outputs);
         let record = record.map_err(raised)?.named(name);
         Record { record, equations }.said(holds, initial)
+    }
+
+    /// A record from a text file, of which the library finds what is not said; `columns` has the column of a signal or of the time `t`
+    /// where it has another name.
+    #[staticmethod]
+    #[pyo3(signature = (equations, name, path, columns, sample_time))]
+    fn from_csv(
+        equations: Equations,
+        name: &str,
+        path: PathBuf,
+        columns: BTreeMap<String, String>,
+        sample_time: Option<f64>,
+    ) -> PyResult<Self> {
+        let mut file = columns.iter().fold(DataFile::new(path), |file, (signal, column)| file.column(signal, column));
+        if let Some(step) = sample_time {
+            file = file.sample_time(step);
+        }
+        let record = file.read_record(equations.0.layout()).map_err(raised)?.named(name);
+        Ok(Record { record, equations })
     }
 
     /// The same with holds and initial state, where they are given.

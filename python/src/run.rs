@@ -18,10 +18,18 @@ const STACK: usize = 8 << 20;
 #[derive(Clone, Default)]
 pub struct Progress {
     pub cancel: Arc<AtomicBool>,
-    /// Iterations, or records done.
+    /// Iterations, records or refits done.
     pub done: Arc<AtomicU64>,
     /// The cost so far, by its bits.
     pub cost: Arc<AtomicU64>,
+}
+
+impl Progress {
+    /// Nothing is done yet, and nothing is to stop.
+    pub fn begin(&self) {
+        self.cancel.store(false, Ordering::Relaxed);
+        self.done.store(0, Ordering::Relaxed);
+    }
 }
 
 /// A result, and the exception of the signal that stopped the work, if one did.

@@ -59,7 +59,8 @@ def spark() -> Iterator[Any]:
 def test_spark(spark: Any, bodies: pd.DataFrame, expected: pd.DataFrame) -> None:
     frame = spark.createDataFrame(bodies)
     check(gb.spark.fleet(cooling(), frame, batches=6, **SAID).toPandas(), expected)
-    check(gb.spark.fleet(cooling(), frame, **SAID).toPandas(), expected)
+    whole = frame.repartition(3, "which")
+    check(gb.spark.fleet(cooling(), whole, whole=True, **SAID).toPandas(), expected)
     with pytest.raises(gb.Error, match="there is no column `Room`"):
         gb.spark.fleet(cooling(), frame, columns={"room": "Room"}, **SAID)
     with pytest.raises(gb.Error, match="no column `t` or `time`"):
@@ -109,6 +110,8 @@ def test_dask(dask_client: Any, bodies: pd.DataFrame, expected: pd.DataFrame) ->
 
     frame = dd.from_pandas(bodies, npartitions=4)
     check(gb.dask.fleet(cooling(), frame, **SAID).compute(), expected)
+    whole = dd.from_pandas(bodies.sort_values("which", ignore_index=True), npartitions=1)
+    check(gb.dask.fleet(cooling(), whole, whole=True, **SAID).compute(), expected)
     with pytest.raises(gb.Error, match="there is no column `Room`"):
         gb.dask.fleet(cooling(), frame, columns={"room": "Room"}, **SAID)
 

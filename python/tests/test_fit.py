@@ -166,6 +166,15 @@ def test_pickles(fitted: gb.Fit, motor: pd.DataFrame) -> None:
     assert pickle.loads(pickle.dumps(report)).to_html() == report.to_html()
 
 
+def test_models_of_functions_are_pickled_as_what_they_are_read_as() -> None:
+    model = cooling()
+    again = pickle.loads(pickle.dumps(model))
+    assert again == model.equations()
+    assert gb.fit(again, cooled(), k=gb.free(1.0)).parameters.k == gb.fit(model, cooled(), k=gb.free(1.0)).parameters.k
+    same = pickle.loads(pickle.dumps(Pmsm(4)))
+    assert isinstance(same, Pmsm) and same.equations() == Pmsm(4).equations()
+
+
 def test_pickles_of_irregular_time_and_given_states() -> None:
     t = np.arange(200) * 0.1 + 1e-3 * np.sin(np.arange(200))
     c = {"t": t, "room": 20 + 10 * np.sin(0.9 * t)}
@@ -213,7 +222,8 @@ print(found.outcome, "|", found.verdict, "|", found.converged)
 """
 
 
-def test_ctrl_c_returns_the_best_so_far() -> None:
+def test_ctrl_c_returns_the_best_so_far_and_other_threads_run_meanwhile() -> None:
+    """The timer that interrupts is a thread of Python, which runs because a fit does not hold Python's lock."""
     program = INTERRUPTED.replace("SECONDS", "4.0")
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300, check=False)
     # Where even the start was not evaluated, there is no best, and the interrupt is raised.

@@ -89,6 +89,8 @@ def test_wrong_declarations_are_named() -> None:
         gb.model(lambda t, x, u, p: [x.a], states=["a"], outputs=["y"]).equations()
     with pytest.raises(gb.Error, match="write one"):
         gb.model(lambda t, x, u, p: [x.a], next=lambda t, x, u, p: [x.a], states=["a"], outputs=["a"]).equations()
+    with pytest.raises(gb.Error, match="derivative of the model cannot be called with .t, x, u, p., which are handed over: too many"):
+        gb.model(lambda t, x: [x.a], states=["a"], outputs=["a"]).equations()
     with pytest.raises(gb.Error, match="make one of it"):
         gb.fit(Pmsm, {})  # type: ignore[arg-type]
     with pytest.raises(gb.Error, match="derive a class"):

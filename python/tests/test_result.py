@@ -89,6 +89,40 @@ def test_profiles(fitted: gb.Fit) -> None:
         fitted.profile("r")
 
 
+def test_bootstrap(fitted: gb.Fit, tmp_path: Path) -> None:
+    drawn = fitted.bootstrap(200, seed=3)
+    assert drawn.unknowns == fitted.unknowns and drawn.converged == drawn.tried == 200
+    for name in ("rs", "ls", "ke"):
+        # The standard deviation of 200 draws is known to 5 %; four times that.
+        assert drawn.standard_error(name) == pytest.approx(fitted.standard_errors[name], rel=0.2)
+        lower, upper = drawn.interval(name)
+        assert lower < fitted.parameters[name] < upper
+    table = drawn.table()
+    assert isinstance(table, pd.DataFrame) and table["upper"][0] == drawn.interval("rs")[1]
+    assert fitted.bootstrap(200, seed=3).to_json() == drawn.to_json() != fitted.bootstrap(200, seed=4).to_json()
+    assert repr(drawn).startswith("200 of 200 refits ended; seed 3\nrs ")
+    report = fitted.report(tmp_path / "r.html", bootstrap=drawn)
+    assert "200 of 200 refits ended" in str(report) and "Bootstrap" in (tmp_path / "r.html").read_text()
+    for said, says in [({"count": 0}, "count is 0"), ({"blocks": -1}, "blocks is -1"), ({"count": 10}, "twenty are the least"),
+                       ({"blocks": 3000}, "block")]:  # fmt: skip
+        with pytest.raises(gb.Error, match=says):
+            fitted.bootstrap(**said)
+    with pytest.raises(gb.Error, match="there is no unknown `r`"):
+        drawn.interval("r")
+
+
+def test_bands(fitted: gb.Fit) -> None:
+    bands = fitted.bands(0.95)
+    assert list(bands.columns) == ["t", "id_confidence", "iq_confidence", "id_prediction", "iq_prediction"]
+    # A new measurement is within 1.96 standard deviations of noise and model together; the noise is 0.05 A.
+    assert bands["id_prediction"].mean() == pytest.approx(1.96 * 0.0503, rel=0.01)
+    assert (bands["id_confidence"] < 0.3 * bands["id_prediction"]).mean() > 0.95
+    residuals = fitted.residuals()
+    inside = (residuals["id"].abs() < bands["id_prediction"]).mean()
+    # Of 2,000 samples, 95 % within three binomial standard deviations.
+    assert inside == pytest.approx(0.95, abs=3 * (0.95 * 0.05 / 2000) ** 0.5)
+
+
 def test_plots(fitted: gb.Fit, tmp_path: Path) -> None:
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("Agg")

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
+import os
 import pickle
+import subprocess
 import warnings
 from pathlib import Path
 
 import pandas as pd
 import pytest
+from conftest import DATA
 
 import greybox as gb
 
@@ -57,6 +61,20 @@ def test_a_file_is_fitted_as_it_declares(path: Path, motor: pd.DataFrame, declar
     assert held.parameters.ke == 0.95
     rows = gb.fleet(model, motor.assign(motor=1), by="motor")
     assert rows["rs"][0] == pytest.approx(fitted.parameters.rs, rel=1e-9)
+
+
+def test_a_fit_has_the_bits_of_the_command_in_rust(path: Path, tmp_path: Path) -> None:
+    command = os.environ.get("GREYBOX_COMMAND", "")
+    if not os.access(command, os.X_OK):
+        pytest.skip("the command greybox was not built: cargo build -p greybox-cli, and its path as GREYBOX_COMMAND")
+    path.write_text(PMSM.replace("value = 3", "value = 4"))
+    stored = tmp_path / "estimate.json"
+    subprocess.run([command, "fit", path, DATA / "pmsm.csv", "--json", stored], check=True, capture_output=True)
+    rust = json.loads(stored.read_text())
+    for data in (DATA / "pmsm.csv", pd.read_csv(DATA / "pmsm.csv")):
+        found = gb.fit(gb.load(path), gb.Record(data, name=rust["experiments"][0]["name"])).to_dict()
+        assert found.pop("seconds") > 0
+        assert found == {name: value for name, value in rust.items() if name != "seconds"}
 
 
 def test_a_file_says_noise_holds_and_initial_states(path: Path, motor: pd.DataFrame) -> None:

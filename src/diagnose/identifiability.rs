@@ -151,7 +151,7 @@ fn examine(problem: &Problem<'_>, estimate: &Summary, warned: &[Direction]) -> R
         excitation,
         advice: vec![],
     };
-    result.advice = advice::advice(&result, warned, &estimate.unknowns);
+    result.advice = advice::advice(&result, warned, &estimate.unknowns, problem.records[0].time_unit());
     Ok(result)
 }
 

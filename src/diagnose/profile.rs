@@ -7,9 +7,9 @@ mod section;
 mod trace;
 
 use super::{check_complete, linearize};
+use crate::covariance::undetermined;
 use crate::error::Error;
 use crate::estimate::{Knowledge, Summary, student};
-use crate::judge::undetermined;
 use crate::numeral::number;
 use crate::optimize::Severity;
 use crate::parameter::Transform;

@@ -133,14 +133,14 @@ pub fn examine(prediction: &Simulated, record: &Record) -> Result<Vec<Residuals>
                     signal: format!("residual of {}", channel.name),
                     value: residuals[k],
                     sample: k,
-                    time: record.time(k),
+                    time: record.moment(k),
                 });
             }
             let output = series(channel, residuals);
             let mut result = output.examine(record.name(), &inputs, &outputs, &predicted, &time);
             if result.samples >= FEWEST && output.deviation > 0.0 {
                 if even {
-                    let (spectrum, period, test) = period::find(&output, record.sample_time());
+                    let (spectrum, period, test) = period::find(&output, record.sample_time(), record.time_unit());
                     (result.spectrum, result.period) = (spectrum, period);
                     result.tests.push(test);
                 }

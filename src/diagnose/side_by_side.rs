@@ -37,8 +37,9 @@ pub struct Compared {
     record: String,
     /// Its use: estimation or validation.
     data: &'static str,
-    /// Time of each sample (s).
+    /// Time of each sample, and its unit.
     t: Vec<f64>,
+    time_unit: String,
     /// Samples before which time jumps.
     gaps: Vec<usize>,
     outputs: Vec<Output>,
@@ -75,7 +76,8 @@ impl Compared {
         Compared {
             record: record.name().to_owned(),
             data,
-            t: (0..record.len()).map(|k| record.time(k)).collect(),
+            t: (0..record.len()).map(|k| record.time_unit().convert(record.time(k))).collect(),
+            time_unit: record.time_unit().name().to_owned(),
             gaps: record.gaps().iter().map(|gap| gap.sample).collect(),
             outputs: record.outputs().iter().map(output).collect(),
         }
@@ -184,7 +186,7 @@ impl Compared {
             let predicted = output.predicted.iter().map(|(_, values)| values.as_slice());
             [output.measured.as_slice()].into_iter().chain(predicted).map(|values| (Keep::Extremes, values))
         });
-        let samples = Samples { t: &self.t, gaps: &self.gaps, lines: lines.collect() };
+        let samples = Samples { t: &self.t, time_unit: &self.time_unit, gaps: &self.gaps, lines: lines.collect() };
         let timeline = Timeline::new(self.outputs.iter().map(panel).collect(), &samples, NUMBERS, &[]);
         let title = format!("Measured and predicted outputs of {} over time, model by model", self.record);
         let name = identifier(&format!("compare-{}", self.record));
@@ -211,8 +213,14 @@ mod tests {
             ],
         };
         assert_eq!(output.fit_percent(), [Some(50.0), None]);
-        let all =
-            Compared { record: String::new(), data: "validation", t: vec![], gaps: vec![], outputs: vec![output] };
+        let all = Compared {
+            record: String::new(),
+            data: "validation",
+            t: vec![],
+            time_unit: "s".to_owned(),
+            gaps: vec![],
+            outputs: vec![output],
+        };
         assert_eq!(all.fit_percent(), [("y", vec![Some(50.0), None])]);
     }
 }

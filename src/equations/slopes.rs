@@ -1,6 +1,6 @@
 //! [`Slopes`]: the slopes of equations with respect to the states, as graphs.
 
-use super::Equations;
+use super::{Equations, evaluate};
 use crate::graph::{Graph, Id, Leaf, Tape, Variables, Way, slopes};
 use crate::scalar::Scalar;
 
@@ -30,7 +30,7 @@ impl Slopes {
 }
 
 impl Jacobian {
-    fn of(graph: &Graph, roots: &[Id], states: usize) -> Self {
+    pub fn of(graph: &Graph, roots: &[Id], states: usize) -> Self {
         let mut tape = Tape::new(true);
         let values = tape.import(graph, roots);
         let (zero, one) = (tape.constant(0.0), tape.constant(1.0));
@@ -45,13 +45,7 @@ impl Jacobian {
 
     /// The entries at a time, a state, inputs and parameters.
     pub fn at<S: Scalar>(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
-        let found = self.graph.evaluate(&self.entries, |leaf| match leaf {
-            Leaf::Time => t,
-            Leaf::State(i) => x[i as usize],
-            Leaf::Input(i) => u[i as usize],
-            Leaf::Parameter(i) => p[i as usize],
-            Leaf::Step | Leaf::NextInput(_) | Leaf::Measured(_) => S::from(f64::NAN),
-        });
+        let found = evaluate(&self.graph, &self.entries, Some((t, x, u)), p);
         to.iter_mut().zip(found).for_each(|(to, found)| *to = found);
     }
 }

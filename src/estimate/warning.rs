@@ -96,6 +96,8 @@ pub enum WarningCode {
     Unidentified,
     /// A finer step would move an unknown.
     CoarseStep,
+    /// A filter of second order would move an unknown of a fit by the extended one.
+    FilterOrder,
     /// An oscillation with fewer than 2.5 samples a period, so that one of another frequency gives the same samples.
     Aliased,
     /// Intervals of a search that did not end at a minimum.

@@ -53,7 +53,8 @@ impl Problem<'_> {
         let ends = std::iter::once(found.clone()).chain(others.into_iter().filter_map(search));
         let ends: Vec<End> = ends.filter_map(|end| Some((end.deviance?, end))).collect();
         let limits = Limits { fewer: short, stop: control.stops() };
-        best(ends, &frequencies.join(" or "), limits)
+        let per = self.records[0].time_unit().angular_frequency();
+        best(ends, &format!("{} {per}", frequencies.join(" or ")), limits)
     }
 }
 
@@ -75,7 +76,7 @@ fn is_open(warning: &Warning) -> bool {
     warning.code == WarningCode::Aliased && warning.severity > Severity::Usable
 }
 
-/// Chooses among the ends of searches that began where the model has these frequencies (rad/s): the first minimum whose deviance is
+/// Chooses among the ends of searches that began where the model has these frequencies: the first minimum whose deviance is
 /// within [`INDISTINGUISHABLE`] of the least. `None` if there is one end only, or no minimum. Where limits of the fit ended a
 /// search early, a better minimum may have been missed, which is said.
 fn best(mut ends: Vec<End>, frequencies: &str, limits: Limits) -> Option<Summary> {
@@ -91,7 +92,7 @@ fn best(mut ends: Vec<End>, frequencies: &str, limits: Limits) -> Option<Summary
     let (deviance, mut best) = ends.remove(kept);
     let rival = ends.iter().filter(|end| !is_at(&best, end)).min_by(|a, b| a.0.total_cmp(&b.0));
     let rival = rival.and_then(|rival| Some((rival, distance(&best, rival)?.0)));
-    let begun = format!("the samples do not show whether the plant oscillates at {frequencies} rad/s");
+    let begun = format!("the samples do not show whether the plant oscillates at {frequencies}");
     let (severity, text) = match rival {
         None => (Severity::Usable, format!("{begun}: searches begun at each of them ended in one minimum")),
         Some((other, i)) => {

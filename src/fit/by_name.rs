@@ -8,7 +8,7 @@ use crate::layout::Quantity;
 use crate::loss::{Cauchy, Huber, SoftL1, Tukey};
 use crate::optimize::{GaussNewton, LevenbergMarquardt};
 use crate::parameter::Parameter;
-use crate::predict::{FreeRun, Horizon, Kalman};
+use crate::predict::{FreeRun, Horizon, Kalman, SecondOrder};
 use crate::prefilter::Butterworth;
 use crate::problem::Noise;
 use crate::scaling::{JacobianColumns, OwnSize, Unscaled};
@@ -85,16 +85,17 @@ impl<M: Made> Fit<'_, M> {
         })
     }
 
-    /// Sets the predictor by its name: `simulation`, `horizon:5` (samples), `kalman`.
+    /// Sets the predictor by its name: `simulation`, `horizon:5` (samples), `kalman`, `second-order`.
     ///
     /// # Errors
     /// A name that is none of these, a horizon that is not a whole number of samples.
     pub fn predictor_by_name(self, text: &str) -> Result<Self, Error> {
         let (name, [steps]) = options("predictor", text)?;
-        match find("predictor", &["simulation", "horizon", "kalman"], name)? {
+        match find("predictor", &["simulation", "horizon", "kalman", "second-order"], name)? {
             0 => Ok(self.predictor(FreeRun)),
             1 => Ok(self.predictor(Horizon::new(whole("predictor `horizon`", steps.unwrap_or(f64::NAN))? as usize))),
-            _ => Ok(self.predictor(Kalman)),
+            2 => Ok(self.predictor(Kalman)),
+            _ => Ok(self.predictor(SecondOrder)),
         }
     }
 

@@ -2,11 +2,13 @@
 
 use super::refine::{Attempt, Start};
 use super::search::{Rounds, at_end, ended, settled};
+use crate::covariance::SearchEnd;
 use crate::error::Error;
 use crate::estimate::Summary;
-use crate::judge::{SearchEnd, conclude, conclude_from, residuals_together};
+use crate::judge::{conclude, conclude_from};
 use crate::optimize::{Domain, Infeasible, LeastSquares, Linearization, Machine, Outcome, Request};
 use crate::problem::{At, Control, Objective, Problem, Round, Whitening, each, linearize_together, noise};
+use crate::residuals::residuals_together;
 use std::time::Instant;
 
 /// A search that has not ended.

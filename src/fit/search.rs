@@ -1,8 +1,8 @@
 //! The search: rounds of an optimizer, with the noise estimated between them.
 
 use super::start_error::start_error;
+use crate::covariance::SearchEnd;
 use crate::error::Error;
-use crate::judge::SearchEnd;
 use crate::optimize::{Domain, Infeasible, LeastSquares, Outcome, SearchLimit, within_tolerance};
 use crate::problem::{
     CheckpointFile, Fingerprint, Memory, Objective, Optimizer, Round, RoundError, SearchPlan, Whitening, noise,

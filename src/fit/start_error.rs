@@ -61,7 +61,7 @@ fn taken_from_outputs(objective: &Objective<'_>, e: usize, coordinates: &[f64]) 
     Some(Failure {
         experiment: problem.unknowns.labels[e].clone(),
         sample: 0,
-        time: problem.records[e].time(0),
+        time: problem.records[e].moment(0),
         signal: format!("`{}`", problem.unknowns.row[i].name),
         value: coordinates[i],
         hint: TAKEN,

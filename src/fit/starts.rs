@@ -8,10 +8,10 @@ mod progress;
 use super::lockstep::{Search, Stage};
 use super::search::{Rounds, checkpoint};
 use super::start_error::start_error;
+use crate::covariance::SearchEnd;
 use crate::error::{Error, Failure};
 use crate::estimate::Starts;
-use crate::judge::SearchEnd;
-use crate::numeral::{exact, number};
+use crate::numeral::number;
 use crate::optimize::{Infeasible, LeastSquares, Linearization};
 use crate::problem::{At, CheckpointFile, Objective, Optimizer, SearchPlan, each, linearize_together, noise};
 use minima::{Comparison, End};
@@ -60,8 +60,7 @@ impl NoEnd {
             Error::Start(Failure { experiment, sample, time, signal, value, .. }) => NoEnd::new(
                 false,
                 format!(
-                    "the start cannot be evaluated: experiment `{experiment}`, sample {sample} (t = {} s): {signal} is {}",
-                    exact(time),
+                    "the start cannot be evaluated: experiment `{experiment}`, sample {sample} (t = {time}): {signal} is {}",
                     number(value, 3)
                 ),
             ),

@@ -1,11 +1,21 @@
-//! Which parameters the conditions of a graph depend on.
+//! [`Choices`]: what the conditions of a graph depend on.
 
 use super::{Function, Function2, Graph, Leaf, Node};
 use std::collections::BTreeSet;
 
-/// The parameters on which a comparison, an absolute value, a rounding or the place in a table depends, other than by way of a state.
-pub(crate) fn choosing(graph: &Graph) -> Vec<usize> {
-    let (mut of, mut found) = (Vec::<BTreeSet<usize>>::with_capacity(graph.len()), BTreeSet::new());
+/// What a comparison, an absolute value, a rounding or the place in a table depends on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Choices {
+    /// The parameters, other than by way of a state.
+    pub parameters: Vec<usize>,
+    /// Whether a state is among it.
+    pub states: bool,
+}
+
+pub(crate) fn choices(graph: &Graph) -> Choices {
+    // A state is none of the parameters.
+    let mut of: Vec<BTreeSet<Option<usize>>> = Vec::with_capacity(graph.len());
+    let mut found: BTreeSet<Option<usize>> = BTreeSet::new();
     for node in graph.nodes() {
         let choice = match node {
             Node::Select(..) => 2,
@@ -21,23 +31,36 @@ pub(crate) fn choosing(graph: &Graph) -> Vec<usize> {
             _ => 0,
         };
         for operand in node.operands().take(choice) {
-            found.extend(&of[operand.index()]);
+            found.extend(of[operand.index()].iter().copied());
         }
-        let mut own: BTreeSet<usize> =
+        let mut own: BTreeSet<Option<usize>> =
             node.operands().flat_map(|operand| of[operand.index()].iter().copied()).collect();
-        if let Node::Leaf(Leaf::Parameter(i)) = node {
-            own.insert(*i as usize);
-        }
+        match node {
+            Node::Leaf(Leaf::Parameter(i)) => own.insert(Some(*i as usize)),
+            Node::Leaf(Leaf::State(_)) => own.insert(None),
+            _ => false,
+        };
         of.push(own);
     }
-    found.into_iter().collect()
+    Choices { states: found.contains(&None), parameters: found.into_iter().flatten().collect() }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::choosing;
+    use super::{Choices, choices};
     use crate::graph::{Function, Function2, Graph, Leaf};
     use crate::scalar::Comparison;
+
+    /// Of `u x + |p0 u|` no choice depends on the state.
+    #[test]
+    fn states_beside_conditions() {
+        let mut graph = Graph::default();
+        let (p, u, x) = (graph.leaf(Leaf::Parameter(0)), graph.leaf(Leaf::Input(0)), graph.leaf(Leaf::State(0)));
+        let (product, scaled) = (graph.mul(u, x), graph.mul(p, u));
+        let size = graph.function(Function::Abs, scaled);
+        graph.add(product, size);
+        assert_eq!(choices(&graph), Choices { parameters: vec![0], states: false });
+    }
 
     /// Of `u < p0 ? u : p0`, `p1 |x|`, `|p2 u|` and `max(p3, u)` all parameters but the second decide a choice.
     #[test]
@@ -54,6 +77,6 @@ mod tests {
         let sum = graph.add(least, scaled);
         let sum = graph.add(sum, second);
         graph.add(sum, greatest);
-        assert_eq!(choosing(&graph), [0, 2, 3]);
+        assert_eq!(choices(&graph), Choices { parameters: vec![0, 2, 3], states: true });
     }
 }

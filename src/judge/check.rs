@@ -2,6 +2,7 @@
 
 use crate::estimate::{Extent, Warning, WarningCode};
 use crate::judge::evidence::Evidence;
+use crate::judge::evidence::ruled_out::Unless;
 use crate::judge::intervals::Intervals;
 use crate::optimize::Severity;
 use std::borrow::Cow;
@@ -15,12 +16,39 @@ pub(crate) struct Check {
     pub asks: &'static str,
     /// The codes of its warnings.
     pub codes: &'static [WarningCode],
+    examine: Examine,
+    /// What rules it out.
+    pub unless: &'static [Unless],
     /// The passes over the data that it may take.
     pub costs: &'static [Pass],
     /// The numbers by which it decides.
     #[cfg_attr(not(test), expect(dead_code, reason = "docs/checks.md shows them"))]
     pub levels: &'static [Level],
-    pub examine: fn(&Evidence<'_>, &Intervals) -> Examined,
+}
+
+type Examine = fn(&Evidence<'_>, &Intervals) -> Examined;
+
+impl Check {
+    /// One that is always made, without a pass of its own.
+    pub const fn new(name: &'static str, asks: &'static str, codes: &'static [WarningCode], examine: Examine) -> Self {
+        Check { name, asks, codes, examine, unless: &[], costs: &[], levels: &[] }
+    }
+
+    pub const fn unless(self, unless: &'static [Unless]) -> Self {
+        Check { unless, ..self }
+    }
+
+    pub const fn costs(self, costs: &'static [Pass]) -> Self {
+        Check { costs, ..self }
+    }
+
+    pub const fn levels(self, levels: &'static [Level]) -> Self {
+        Check { levels, ..self }
+    }
+
+    pub fn examine(&self, evidence: &Evidence<'_>, intervals: &Intervals) -> Examined {
+        Examined::unless(evidence.ruled_out(self.unless), || (self.examine)(evidence, intervals))
+    }
 }
 
 /// What a check needs of passes over the data, beside the one in values that every estimate takes.
@@ -32,6 +60,10 @@ pub(crate) enum Pass {
     Values(usize),
     /// So many more with slopes, where the pass in values or the rows give a reason.
     Slopes(usize),
+    /// The pass with slopes for the curvature of a loss.
+    Curvature,
+    /// One with slopes that parts of the data and sensors share, where the rows give a reason.
+    Left,
     /// So many with slopes for each unknown that is examined, where its expected curvature or a condition of the model gives a reason.
     EachUnknown(usize),
     /// Some windows, or the whole, by a finer method, where the step gives a reason.
@@ -46,6 +78,11 @@ pub(crate) struct Level {
     pub value: f64,
     /// Where the number comes from.
     pub source: &'static str,
+}
+
+/// A level: what it limits, its value, and where that comes from.
+pub(crate) const fn level(of: &'static str, value: f64, source: &'static str) -> Level {
+    Level { of, value, source }
 }
 
 /// What a check found, and how far it was made.
@@ -84,6 +121,14 @@ impl From<Option<Warning>> for Examined {
     fn from(warning: Option<Warning>) -> Self {
         Vec::from_iter(warning).into()
     }
+}
+
+pub(crate) fn note(code: WarningCode, text: String) -> Warning {
+    Warning { code, severity: Severity::Usable, text }
+}
+
+pub(crate) fn not_usable(code: WarningCode, text: String) -> Warning {
+    Warning { code, severity: Severity::NotUsable, text }
 }
 
 /// A warning that asks for care.

@@ -1,25 +1,21 @@
 //! The questions that the verdict asks of an estimate: [`CHECKS`] is their only list.
 
 mod aliases;
-mod color;
 mod conditions;
 mod constant_inputs;
 mod copies;
-mod correlated_outputs;
 mod curved;
 mod data;
 mod data_noise;
 mod declared;
 mod dropouts;
-mod enough;
+mod errors;
 mod explained;
 mod feedback;
 mod few;
-mod growing_errors;
-mod inputs_before;
+mod filter_order;
 mod known;
 mod likelihood;
-mod not_examined;
 mod outliers;
 mod parts;
 mod restarts;
@@ -29,31 +25,35 @@ mod sensors;
 mod shape;
 mod signals_before;
 mod step;
-mod step_accumulation;
-mod step_shift;
+mod suspicions;
 #[cfg(test)]
 mod tests;
-mod uneven_errors;
 mod within_loss;
 
 pub(crate) use aliases::Aliases;
 pub(crate) use search::INDISTINGUISHABLE;
 
-use crate::estimate::{Examination, Extent, Warning};
-use crate::judge::check::Check;
+// What the files of the checks name, which they take from here.
+use crate::estimate::{Examination, Extent, Knowledge, Unknown, Warning, WarningCode};
+use crate::judge::check::{Check, Examined, Pass, level, not_usable, note, with_care};
+use crate::judge::covariances::Covariances;
 use crate::judge::evidence::Evidence;
+use crate::judge::evidence::ruled_out::Unless;
 use crate::judge::intervals::Intervals;
+use crate::numeral::{counted, exact, number, p_value, percent, unit_after};
+use crate::optimize::Severity;
+use crate::problem::{Objective, Role};
 
 /// All checks, in the order in which their warnings are shown.
 pub(crate) const CHECKS: &[Check] = &[
-    enough::ENOUGH,
+    search::ENOUGH,
     data::CONSTANT_OUTPUTS,
     constant_inputs::CONSTANT_INPUTS,
-    data::SUSPICIONS,
+    suspicions::SUSPICIONS,
     data::COARSE,
-    data::INPUT_SENTINELS,
+    suspicions::INPUT_SENTINELS,
     data::MISSING_PART,
-    data::TWICE,
+    copies::TWICE,
     copies::COPIES,
     explained::UNEXPLAINED,
     explained::GIVEN_NOISE,
@@ -74,28 +74,29 @@ pub(crate) const CHECKS: &[Check] = &[
     declared::POSITIVE,
     declared::IDENTIFIED,
     step::STEP,
+    filter_order::FILTER_ORDER,
     aliases::ALIASES,
     search::MINIMUM,
     search::STARTS,
     search::CHECKPOINT,
     curved::CURVED,
     conditions::CONDITIONS,
-    growing_errors::GROWING,
+    errors::GROWING,
     few::DECIDED,
-    uneven_errors::UNEVEN_ERRORS,
+    errors::UNEVEN_ERRORS,
     within_loss::LOSS,
     data_noise::RESTARTS,
     data_noise::INPUT_NOISE,
-    color::COLOR,
-    correlated_outputs::COUPLED,
-    not_examined::TIME,
+    errors::COLOR,
+    errors::COUPLED,
+    search::TIME,
 ];
 
 /// The warnings of all checks, and how far each was made.
 pub(crate) fn examine(evidence: &Evidence<'_>, intervals: &Intervals) -> (Vec<Warning>, Vec<Examination>) {
     let (control, mut warnings, mut examined) = (evidence.point.objective.control, vec![], vec![]);
     for check in CHECKS {
-        let mut found = (check.examine)(evidence, intervals);
+        let mut found = check.examine(evidence, intervals);
         debug_assert!(found.warnings.iter().all(|warning| check.codes.contains(&warning.code)), "{}", check.name);
         // Passes that are ended find nothing.
         if !check.costs.is_empty() && control.stops() {

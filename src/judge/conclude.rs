@@ -2,15 +2,15 @@
 
 use super::checks::examine;
 use super::evidence::Evidence;
-use super::evidence::residual_pass::{Residuals, reason, residual_pass};
 use super::intervals::Intervals;
-use super::point::{Point, SearchEnd};
 use super::summary;
+use crate::covariance::point::{Point, SearchEnd};
 use crate::error::Error;
 use crate::estimate::{Format, Summary, Version};
 use crate::information::Covariance;
 use crate::optimize::Outcome;
 use crate::problem::{Objective, Whitening};
+use crate::residuals::{Residuals, reason, residual_pass};
 
 /// The summary at the end of a search; the objective has the whitening that it ended with. Cost, slopes and residuals there are computed
 /// whatever the objective's stop conditions. These end every further pass, and a warning tells that something was left out.

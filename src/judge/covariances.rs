@@ -1,26 +1,20 @@
 //! The covariance of the unknowns: classical, a sandwich, or HAC, and its degrees of freedom.
 
-mod clusters;
-pub(crate) mod hac;
-mod predicted;
-pub(crate) mod sandwich;
-
+use crate::covariance::clusters::{Cluster, Clusters, clusters};
+use crate::covariance::hac::hac;
+use crate::covariance::point::Point;
+use crate::covariance::predicted::{Dependence, dependence_of_variances};
+use crate::covariance::sandwich::{Robust, sandwich};
+use crate::covariance::shares::Largest;
+use crate::covariance::sizes::{Sizes, Uneven};
 use crate::estimate::CovarianceMethod;
 use crate::estimate::student::Spread;
 use crate::information::Covariance;
 use crate::judge::evidence::Evidence;
 use crate::judge::evidence::color;
-use crate::judge::evidence::shares::Largest;
-use crate::judge::evidence::sizes::{Sizes, Uneven};
-use crate::judge::point::Point;
-use crate::optimize::Infeasible;
 use crate::problem::{Noise, Whitening};
 use crate::record::Time;
 use crate::whiteness::chi_squared_tail;
-use clusters::{Cluster, Clusters, clusters};
-use hac::hac;
-use predicted::{Dependence, dependence_of_variances};
-use sandwich::Robust;
 
 /// Levels at which the variance by records as clusters is certainly larger than that by the errors: of colored errors, where the records
 /// have [`FEW`] degrees of freedom or more, and of white ones, or with fewer.
@@ -108,8 +102,8 @@ pub(crate) fn covariances(evidence: &Evidence<'_>) -> Covariances {
     let unit = evidence.unit();
     let colored = evidence.uses_hac().then(|| for_colored_errors(evidence, unit?)).flatten();
     let level = if colored.is_some() { CLUSTERED } else { DIFFERENT };
-    let found = colored.unwrap_or_else(|| for_white_errors(evidence, unit));
-    let (found, differing) = match clusters(&evidence.point) {
+    let found = colored.unwrap_or_else(|| for_white_errors(evidence, unit, None));
+    let (found, differing) = match clusters(&evidence.point, || evidence.bread()) {
         Some(clusters) => found.by_records(&clusters, level, has_short_records(evidence)),
         None => (found, None),
     };
@@ -131,62 +125,80 @@ fn has_short_records(evidence: &Evidence<'_>) -> bool {
 }
 
 fn for_colored_errors(evidence: &Evidence<'_>, unit: &Covariance) -> Option<CoordinateCovariance> {
-    let Point { objective, end, linear, held_for_covariance: held, .. } = &evidence.point;
+    let Point { objective, held_for_covariance: held, .. } = &evidence.point;
     let (frames, first) = evidence.rows().colored.as_ref()?;
-    let hac = hac(objective, &end.coordinates, linear, (frames, first))?;
+    let certain = evidence.autocorrelated_at(color::CERTAIN).is_some();
+    let shares = evidence.rows().shares.as_ref();
+    let differ = evidence.takes_one_size() && shares.is_some_and(|(_, sizes)| sizes.differ(held));
+    let alone = certain && !differ;
+    // The scores of independent errors on the way.
+    let robust = !alone && !objective.needs_sandwich() && takes_sandwich(evidence);
+    let mut hac = hac(&evidence.point, evidence.bread()?, (frames, first), robust.then_some(unit))?;
     let degrees = hac.degrees(objective, unit);
-    let covariance = hac.covariance(held, &degrees, evidence.coupled().is_some())?;
+    let covariance = hac.covariance(&degrees, evidence.coupled().is_some());
     let degrees = degrees.into_iter().map(|degrees| degrees.min(evidence.point.degrees)).collect();
     let method = CovarianceMethod::Hac { lags: hac.lags as u64 };
-    let shares = evidence.rows().shares.as_ref();
-    let found = CoordinateCovariance {
-        covariance: Some(covariance),
-        method,
-        factor: 1.0,
-        degrees,
-        shares: shares.map(|(largest, _)| largest.clone()),
-        uneven: None,
-    };
-    let differ = evidence.takes_one_size() && shares.is_some_and(|(_, sizes)| sizes.differ(held));
-    let certain = evidence.autocorrelated_at(color::CERTAIN).is_some();
-    if certain && !differ {
+    let shares = shares.map(|(largest, _)| largest.clone());
+    let covariance = Some(covariance);
+    let found = CoordinateCovariance { covariance, method, factor: 1.0, degrees, shares, uneven: None };
+    if alone {
         return Some(found);
     }
-    let white = for_white_errors(evidence, Some(unit));
+    let white = for_white_errors(evidence, Some(unit), hac.robust.take());
     // The squares of colored errors are correlated, which the test of their sizes does not allow for.
     let uneven = white.uneven.filter(|_| !certain);
     Some(CoordinateCovariance { uneven, ..no_shorter(found, white) })
 }
 
-fn for_white_errors(evidence: &Evidence<'_>, unit: Option<&Covariance>) -> CoordinateCovariance {
+/// The shares of the measurements and the sizes of their errors, where the classical covariance takes these to be of one size.
+fn tested<'e>(evidence: &'e Evidence<'_>) -> Option<&'e (Vec<Largest>, Sizes)> {
+    evidence.takes_one_size().then(|| evidence.rows().shares.as_ref()).flatten()
+}
+
+/// Whether white errors take a sandwich. Of models without states it is only said that their errors are of several sizes: classical standard
+/// errors are what certified ones are compared with. A noise that was given is replaced only where the errors certainly are of another size.
+fn takes_sandwich(evidence: &Evidence<'_>) -> bool {
+    let Point { objective, held_for_covariance: held, .. } = &evidence.point;
+    let given = matches!(objective.problem.settings.noise, Noise::Given(_));
+    let differ =
+        |(_, sizes): &(Vec<Largest>, Sizes)| if given { sizes.uneven(held).is_some() } else { sizes.differ(held) };
+    let sized = || !evidence.point.is_static() && tested(evidence).is_some_and(differ);
+    objective.needs_sandwich() || evidence.coupled().is_some() || sized() || spans_differ(evidence)
+}
+
+/// The covariance for white errors, by a sandwich that was made on the way, if there is one.
+fn for_white_errors(
+    evidence: &Evidence<'_>,
+    unit: Option<&Covariance>,
+    robust: Option<Robust>,
+) -> CoordinateCovariance {
     let Point { objective, end, held_for_covariance: held, widening, .. } = &evidence.point;
     let x = &end.coordinates;
     let (factor, degrees) = estimated_weights(evidence);
     let degrees = vec![degrees; evidence.point.slopes.len()];
-    let tested = evidence.takes_one_size().then(|| evidence.rows().shares.as_ref()).flatten();
-    let uneven = tested.and_then(|(_, sizes)| sizes.uneven(held));
-    // Of models without states it is only said: classical standard errors are what certified ones are compared with. A noise that was
-    // given is replaced only where the errors certainly are of another size.
-    let given = matches!(objective.problem.settings.noise, Noise::Given(_));
-    let differ = |(_, sizes): &(Vec<Largest>, Sizes)| if given { uneven.is_some() } else { sizes.differ(held) };
-    let sized = !evidence.point.is_static() && tested.is_some_and(differ);
-    let shares = tested.map(|(shares, _)| shares.clone());
-    if objective.needs_sandwich() || evidence.coupled().is_some() || sized || spans_differ(evidence) {
+    let uneven = tested(evidence).and_then(|(_, sizes)| sizes.uneven(held));
+    let shares = tested(evidence).map(|(shares, _)| shares.clone());
+    // Where stop conditions ended a pass, the classical covariance, which needs none, takes its place.
+    let stopped = || objective.control.stops();
+    if takes_sandwich(evidence) {
         let filtered = objective.problem.settings.prefilter.is_some();
         let method = if filtered { CovarianceMethod::FilteredSandwich } else { CovarianceMethod::Sandwich };
-        let none = Robust { covariance: None, shares: None, degrees: vec![f64::INFINITY; degrees.len()] };
-        if let Some(found) = unless_stopped(sandwich::sandwich(objective, x, held)) {
-            let found = found.unwrap_or(none);
-            let degrees = degrees.iter().zip(found.degrees).map(|(most, own)| own.min(*most)).collect();
-            let Robust { covariance, shares, .. } = found;
-            return CoordinateCovariance { covariance, method, factor, degrees, shares, uneven };
+        match robust.or_else(|| sandwich(&evidence.point, evidence.bread()?)) {
+            Some(Robust { covariance, shares, degrees: own }) => {
+                let degrees = degrees.iter().zip(own).map(|(most, own)| own.min(*most)).collect();
+                return CoordinateCovariance { covariance, method, factor, degrees, shares, uneven };
+            }
+            None if !stopped() => {
+                return CoordinateCovariance { covariance: None, method, factor, degrees, shares: None, uneven };
+            }
+            None => {}
         }
     }
     let method = CovarianceMethod::Classical;
     // The widening applies to the errors, not to the priors.
     if *widening != 1.0 && objective.problem.unknowns.priors(x).next().is_some() {
-        let widened = objective.with(objective.whitening.widened(*widening));
-        if let Some(linear) = unless_stopped(widened.evaluate(x)) {
+        let linear = objective.with(objective.whitening.widened(*widening)).evaluate(x).ok();
+        if linear.is_some() || !stopped() {
             let covariance = linear.and_then(|linear| linear.covariance(held));
             return CoordinateCovariance { covariance, method, factor, degrees, shares, uneven };
         }
@@ -213,15 +225,6 @@ fn estimated_weights(evidence: &Evidence<'_>) -> (f64, f64) {
     let degrees = evidence.point.degrees / outputs;
     let left = (degrees - outputs).max(1.0);
     (degrees / (left + 1.0) * (degrees - 1.0) / left, left + 1.0)
-}
-
-/// The result of a pass, if it has one; `None` where stop conditions ended it: the classical covariance, which needs no pass, then takes its
-/// place.
-fn unless_stopped<T>(found: Result<T, Infeasible>) -> Option<Option<T>> {
-    match found {
-        Err(Infeasible::Cancelled) => None,
-        found => Some(found.ok()),
-    }
 }
 
 /// Probability by which the lengths of intervals are compared.

@@ -1,39 +1,29 @@
 //! [`Evidence`]: what passes over the data say of a point, each made once, when it is first asked for.
 
 pub(crate) mod color;
-pub(crate) mod coupling;
-pub(crate) mod first_errors;
-pub(crate) mod largest;
-pub(crate) mod modes;
-pub(crate) mod output_sums;
-pub(crate) mod powers;
-pub(crate) mod products;
-pub(crate) mod residual_pass;
+pub(crate) mod extended;
+pub(crate) mod left;
+pub(crate) mod parts;
+pub(crate) mod pieces;
 pub(crate) mod rows;
+pub(crate) mod ruled_out;
 pub(crate) mod sensors;
-pub(crate) mod shares;
-pub(crate) mod sizes;
 pub(crate) mod spans;
-mod step_error;
 pub(crate) mod suspects;
-pub(crate) mod whiteness;
 
+use crate::covariance::point::Point;
+use crate::covariance::sandwich::Bread;
 use crate::information::Covariance;
-use crate::judge::point::Point;
 use crate::problem::{Noise, Whitening};
+use crate::residuals::Residuals;
+use crate::residuals::coupling::Coupled;
+use crate::residuals::whiteness::{WHITENESS_LEVEL, Whiteness, least_white};
 use color::is_certain;
-use coupling::Coupled;
-use residual_pass::Residuals;
+use left::{Left, left};
 use rows::{Asked, Rows, rows};
 use spans::records_by_chance;
 use std::cell::OnceCell;
-use whiteness::{WHITENESS_LEVEL, Whiteness, least_white};
 
-/// The reason of checks of errors that are none, and of checks that a pre-filter rules out.
-pub(crate) const ROUND_OFF: &str = "the errors are round-off";
-pub(crate) const PREFILTER: &str = "a pre-filter";
-/// Sensors are not tested, and parts not compared, with more unknowns than these.
-const MOST: usize = 200;
 /// Below this number of measurements the covariance is the classical one, whether the errors are autocorrelated, or of one size, or not.
 const CORRELATED_SAMPLES: u64 = 12;
 /// Records of up to so many measurements are tested for color at this level before their intervals are made: the tests see little
@@ -51,8 +41,10 @@ pub(crate) struct Evidence<'e> {
     pub rounded: Vec<bool>,
     pub rounding: bool,
     unit: OnceCell<Option<Covariance>>,
+    bread: OnceCell<Option<Bread>>,
     rows: OnceCell<Rows>,
     compare_parts: OnceCell<bool>,
+    left: OnceCell<Left>,
 }
 
 impl<'e> Evidence<'e> {
@@ -66,8 +58,18 @@ impl<'e> Evidence<'e> {
         };
         let rounded: Vec<bool> = sigma.iter().enumerate().map(rounded).collect();
         let rounding = rounded.iter().all(|rounded| *rounded);
-        let (unit, rows, compare_parts) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
-        Evidence { point, residuals, rounded, rounding, unit, rows, compare_parts }
+        let (unit, bread, rows) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
+        Evidence {
+            point,
+            residuals,
+            rounded,
+            rounding,
+            unit,
+            bread,
+            rows,
+            compare_parts: OnceCell::new(),
+            left: OnceCell::new(),
+        }
     }
 
     /// The covariance of unit noise in coordinates.
@@ -75,19 +77,25 @@ impl<'e> Evidence<'e> {
         self.unit.get_or_init(|| self.point.linear.covariance(&self.point.held_for_covariance)).as_ref()
     }
 
+    /// The curvature of the cost, for weights and losses by a pass with slopes.
+    pub fn bread(&self) -> Option<&Bread> {
+        self.bread.get_or_init(|| Bread::of(&self.point, self.residuals.measured)).as_ref()
+    }
+
     /// What a pass with slopes sums up for the covariance and the checks of this estimate.
     pub fn rows(&self) -> &Rows {
         let Point { objective, end, held_for_covariance: held, .. } = &self.point;
         let colored = || self.unit().filter(|_| self.uses_hac()).map(|unit| (&held[..], unit));
         let shares = || self.unit().filter(|_| self.takes_one_size());
-        let parts = || self.without_parts().is_none() && self.compare_parts();
-        let asked = || Asked {
-            shares: shares(),
-            colored: colored(),
-            sensors: self.without_sensors().is_none(),
-            parts: parts(),
-        };
+        let parts = || self.ruled_out(parts::UNLESS).is_none() && self.compare_parts();
+        let sensors = || self.ruled_out(sensors::UNLESS).is_none();
+        let asked = || Asked { shares: shares(), colored: colored(), sensors: sensors(), parts: parts() };
         self.rows.get_or_init(|| rows(objective, &end.coordinates, asked()))
+    }
+
+    /// What remains after the steps that parts of the data and sensors ask for.
+    pub fn left(&self) -> &Left {
+        self.left.get_or_init(|| left(self))
     }
 
     /// Whether the intervals allow for colored errors.
@@ -106,28 +114,6 @@ impl<'e> Evidence<'e> {
         let predicted = matches!(objective.problem.settings.noise, Noise::Predicted);
         let exact = self.rounding || self.point.is_exact() || !self.has_noise();
         !predicted && !exact && !objective.needs_sandwich() && self.residuals.measured >= CORRELATED_SAMPLES
-    }
-
-    /// Why the rows of sensors are not summed up.
-    pub fn without_sensors(&self) -> Option<&'static str> {
-        let Point { objective, end, .. } = &self.point;
-        match () {
-            _ if objective.problem.settings.prefilter.is_some() => Some(PREFILTER),
-            _ if objective.sweep.restarts().is_some() => Some("predictions that restart from measurements"),
-            _ if objective.problem.unknowns.row.len() > MOST => Some("more than 200 unknowns"),
-            _ => (!end.outcome.converged()).then_some("no minimum"),
-        }
-    }
-
-    /// Why parts of the data are not compared.
-    pub fn without_parts(&self) -> Option<&'static str> {
-        let Point { objective, end, degrees, .. } = &self.point;
-        match () {
-            _ if objective.problem.settings.prefilter.is_some() => Some(PREFILTER),
-            _ if objective.problem.unknowns.row.len() > MOST => Some("more than 200 unknowns"),
-            _ if *degrees <= 0.0 => Some("no degrees of freedom"),
-            _ => (!end.outcome.converged()).then_some("no minimum"),
-        }
     }
 
     /// Whether there is a reason to compare parts of the data, which takes slopes: where errors are correlated over time or with the

@@ -1,13 +1,13 @@
 //! [`Intervals`]: how well each unknown is known.
 
+use crate::covariance::directions;
+use crate::covariance::point::Point;
 use crate::estimate::quantities::within;
 use crate::estimate::student::Spread;
 use crate::estimate::{Direction, Knowledge, Unknown};
 use crate::information::Covariance;
 use crate::judge::covariances::{Covariances, covariances, is_error};
-use crate::judge::directions;
 use crate::judge::evidence::Evidence;
-use crate::judge::point::Point;
 use crate::parameter::Transform;
 
 /// What is known of the unknowns.

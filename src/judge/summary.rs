@@ -1,14 +1,14 @@
 //! The parts of a [`Summary`](crate::estimate::Summary) beside the unknowns: parameters, experiments, outputs, noise, method.
 
+use crate::covariance::point::Point;
 use crate::error::Error;
 use crate::estimate::{
     CovarianceMethod, ExperimentEstimate, Knowledge, Method, NoiseModel, OutputEstimate, ParameterEstimate, Unknown,
 };
 use crate::judge::evidence::Evidence;
-use crate::judge::evidence::residual_pass::reason;
-use crate::judge::point::Point;
 use crate::layout::Quantity;
 use crate::problem::{Noise, Objective, Role, Whitening, noise};
+use crate::residuals::reason;
 
 pub(super) fn method(objective: &Objective<'_>, optimizer: String, covariance: CovarianceMethod) -> Method {
     let (settings, sweep) = (&objective.problem.settings, objective.sweep);

@@ -112,7 +112,7 @@ impl Spans {
                 signal: if outputs[sample].id.is_finite() { "iq" } else { "id" }.to_owned(),
                 value: f64::NAN,
                 sample,
-                time: experiment.time(sample),
+                time: experiment.record().moment(sample),
             });
         }
         let jump = (1..experiment.len()).find(|&k| {

@@ -1,9 +1,7 @@
 //! [`Kalman`]: one-step prediction of a plant with process noise.
 
-use super::{Plant, Predictor};
-use crate::error::Error;
-use crate::integrate::Stuck;
-use crate::layout::{Kind, Layout};
+use super::gaussian::{Order, filter};
+use super::{Moments, Plant};
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
@@ -20,9 +18,10 @@ use serde::{Deserialize, Serialize};
 ///
 /// by the steps of the fit's integrator, and an output is linearized at the state that the outputs before it have corrected. That is right
 /// where the state's standard deviation is short against the model's curvature, as it is with measurements that are frequent and precise
-/// against the disturbance. `A` is found by differentiating the model's graph, so that gradients of the likelihood are exact. A model that
-/// cannot be read as a graph (closures in [`Numeric`](crate::Numeric)) has to be affine, and is refused by the name of the equation that is
-/// not ([`Error::NotAffine`]): it is tested by its values at some samples of each record, at states of a thousandth to a thousand times the
+/// against the disturbance; where [`SecondOrder`](super::SecondOrder) would move an estimate, a warning says so
+/// ([`FilterOrder`](crate::WarningCode::FilterOrder)). `A` is found by differentiating the model's graph, so that gradients of the
+/// likelihood are exact. A model that cannot be read as a graph (closures in [`Numeric`](crate::Numeric)) has to be affine, and is refused by the name of the equation that is
+/// not ([`Error::NotAffine`](crate::Error::NotAffine)): it is tested by its values at some samples of each record, at states of a thousandth to a thousand times the
 /// largest measurement, and at far larger ones.
 ///
 /// The noise is part of the model, [`Model::diffusion`](crate::Model::diffusion) and
@@ -40,128 +39,22 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Kalman;
 
-/// Where entry `(i, j)` of a symmetric matrix of `n` rows stands, its upper triangle row by row.
-fn entry(n: usize, i: usize, j: usize) -> usize {
-    let (i, j) = (i.min(j), i.max(j));
-    i * (2 * n - i + 1) / 2 + j - i
-}
+filter!(Kalman, "one-step prediction by a Kalman filter");
 
-/// What the filter knows of an output before it is taken in.
-struct Expected<S> {
-    /// The output's row of slopes.
-    c: Vec<S>,
-    /// Covariance of the state times that row.
-    gain: Vec<S>,
-    /// Variance of the measurement noise.
-    noise: S,
-    /// Variance of the output.
-    variance: S,
-}
+impl Order for Kalman {
+    fn state<S: Scalar>(plant: &dyn Plant<S>, position: f64, carry: &[S]) -> Moments<S> {
+        let n = plant.layout().states.len();
+        let (mut mean, mut slopes) = (carry[..n].to_vec(), vec![S::from(0.0); n * n]);
+        plant.state_slopes(position, &carry[..n], &mut slopes);
+        plant.derivative(position, &carry[..n], &mut mean);
+        Moments { mean, slopes, spread: vec![] }
+    }
 
-impl Kalman {
-    fn expected<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &[S], output: usize) -> Expected<S> {
+    fn outputs<S: Scalar>(plant: &dyn Plant<S>, carry: &[S]) -> Moments<S> {
         let (n, outputs) = (plant.layout().states.len(), plant.layout().outputs.len());
-        let mut slopes = vec![S::from(0.0); outputs * n];
+        let (mut mean, mut slopes) = (vec![S::from(0.0); outputs], vec![S::from(0.0); outputs * n]);
+        plant.output(&carry[..n], &mut mean);
         plant.output_slopes(&carry[..n], &mut slopes);
-        let c = slopes[output * n..][..n].to_vec();
-        let covariance = &carry[n..];
-        let times = |i: usize| (0..n).map(|j| covariance[entry(n, i, j)] * c[j]).sum::<S>();
-        let gain: Vec<S> = (0..n).map(times).collect();
-        let mut noise = vec![S::from(0.0); outputs];
-        plant.noise(&mut noise);
-        let noise = noise[output] * noise[output];
-        let variance = gain.iter().zip(&c).map(|(g, c)| *g * *c).sum::<S>() + noise;
-        Expected { c, gain, noise, variance }
-    }
-}
-
-impl Predictor for Kalman {
-    fn carry(&self, layout: &Layout) -> usize {
-        let n = layout.states.len();
-        n + n * (n + 1) / 2
-    }
-
-    fn predicts_variance(&self) -> bool {
-        true
-    }
-
-    fn needs_slopes(&self) -> bool {
-        true
-    }
-
-    fn check(&self, layout: &Layout) -> Result<(), Error> {
-        if layout.kind == Kind::Static {
-            return Err(Error::Option("a static model has no state to filter; leave the predictor out".to_owned()));
-        }
-        Ok(())
-    }
-
-    fn start<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S]) {
-        carry[plant.layout().states.len()..].fill(S::from(0.0));
-    }
-
-    fn predict<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &[S], output: usize) -> (S, S) {
-        (super::mean(plant, carry, output), self.expected(plant, carry, output).variance)
-    }
-
-    fn correct<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S], output: usize, error: S) {
-        let n = plant.layout().states.len();
-        let Expected { c, gain, noise, variance } = self.expected(plant, carry, output);
-        let part: Vec<S> = gain.iter().map(|gain| *gain / variance).collect();
-        let (x, covariance) = carry.split_at_mut(n);
-        x.iter_mut().zip(&part).for_each(|(x, part)| *x += *part * error);
-        // (I - k c) P (I - k c)' + k r k'
-        let rest = |i: usize, j: usize| {
-            let taken = -(part[i] * c[j]);
-            if i == j { taken + 1.0 } else { taken }
-        };
-        let rest: Vec<Vec<S>> = (0..n).map(|i| (0..n).map(|j| rest(i, j)).collect()).collect();
-        let product = |i: usize, j: usize| (0..n).map(|l| rest[i][l] * covariance[entry(n, l, j)]).sum::<S>();
-        let product: Vec<Vec<S>> = (0..n).map(|i| (0..n).map(|j| product(i, j)).collect()).collect();
-        for i in 0..n {
-            for j in i..n {
-                let left = (0..n).map(|l| product[i][l] * rest[j][l]).sum::<S>();
-                covariance[entry(n, i, j)] = left + part[i] * noise * part[j];
-            }
-        }
-    }
-
-    fn advance<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S]) -> Result<(), Stuck> {
-        let n = plant.layout().states.len();
-        let mut noise = vec![S::from(0.0); n];
-        plant.diffusion(&mut noise);
-        if plant.layout().kind == Kind::Discrete {
-            let (x, covariance) = carry.split_at_mut(n);
-            let mut a = vec![S::from(0.0); n * n];
-            plant.state_slopes(0.0, x, &mut a);
-            plant.next(x)?;
-            let before = covariance.to_vec();
-            for i in 0..n {
-                for j in i..n {
-                    let pairs = (0..n).flat_map(|k| (0..n).map(move |l| (k, l)));
-                    let moved: S = pairs.map(|(k, l)| a[i * n + k] * before[entry(n, k, l)] * a[j * n + l]).sum();
-                    covariance[entry(n, i, j)] = if i == j { moved + noise[i] * noise[i] } else { moved };
-                }
-            }
-            return Ok(());
-        }
-        // dx/dt = f(x), dP/dt = A P + P A' + Q.
-        plant.integrate(carry, &|position, z, to| {
-            let (x, covariance) = z.split_at(n);
-            let mut a = vec![S::from(0.0); n * n];
-            plant.derivative(position, x, &mut to[..n]);
-            plant.state_slopes(position, x, &mut a);
-            let flow = |i: usize, j: usize| (0..n).map(|k| a[i * n + k] * covariance[entry(n, k, j)]).sum::<S>();
-            for i in 0..n {
-                for j in i..n {
-                    let moved = flow(i, j) + flow(j, i);
-                    to[n + entry(n, i, j)] = if i == j { moved + noise[i] * noise[i] } else { moved };
-                }
-            }
-        })
-    }
-
-    fn describe(&self) -> String {
-        "one-step prediction by a Kalman filter".to_owned()
+        Moments { mean, slopes, spread: vec![] }
     }
 }

@@ -56,9 +56,7 @@ impl Place<'_> {
         if found < n {
             let (states, outputs) = (names(&self.layout.states), names(&self.layout.outputs));
             let t = exact(self.t);
-            return Err(format!(
-                "{n} state(s), {states}, but {found} measured of the output(s) {outputs} at t = {t} s"
-            ));
+            return Err(format!("{n} state(s), {states}, but {found} measured of the output(s) {outputs} at t = {t}"));
         }
         let Guess { state, open, .. } = self.nearest(y, 0.0)?;
         match open.iter().position(|open| *open) {

@@ -1,5 +1,6 @@
 //! [`Plant`]: the interface of a predictor to the model between two samples.
 
+use super::Moments;
 use crate::dual::Dual;
 use crate::functions::Functions;
 use crate::integrate::{Duals, Field, Method, Rate, Slopes, Stuck};
@@ -27,7 +28,7 @@ pub trait Plant<S> {
     /// Where the integrator is [`Stuck`].
     fn next(&self, x: &mut [S]) -> Result<(), Stuck>;
 
-    /// Of a continuous model: `dx/dt` at the fraction `position` of the interval.
+    /// Of a continuous model: `dx/dt` at the fraction `position` of the interval; of a discrete one the next state.
     fn derivative(&self, position: f64, x: &[S], to: &mut [S]);
 
     /// The slopes of the derivative of a continuous model at the fraction `position` of the interval, or of the next state of a discrete one,
@@ -36,6 +37,13 @@ pub trait Plant<S> {
 
     /// The slopes of the outputs at the sample with respect to the state, row by row.
     fn output_slopes(&self, x: &[S], to: &mut [S]);
+
+    /// Moments of the same functions as [`state_slopes`](Plant::state_slopes), of a state that is Gaussian, to the second order: the carry is
+    /// its mean, and after it its covariance, upper triangle row by row.
+    fn state_moments(&self, position: f64, carry: &[S]) -> Moments<S>;
+
+    /// Those of the outputs at the sample.
+    fn output_moments(&self, carry: &[S]) -> Moments<S>;
 
     /// Integrates any vector to the next sample by the integrator of the fit: `rate(position, z, to)` writes `dz/dt`
     /// (per second) at a fraction of the interval.
@@ -211,6 +219,16 @@ impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
 
     fn output_slopes(&self, x: &[S], to: &mut [S]) {
         self.functions.output_slopes(self.between.time(0.0), x, &self.between.input(0.0), self.p, to);
+    }
+
+    fn state_moments(&self, position: f64, carry: &[S]) -> Moments<S> {
+        let (t, u) = (self.between.time(position), self.between.input(position));
+        self.functions.state_moments(t, carry, &u, self.p, self.layout)
+    }
+
+    fn output_moments(&self, carry: &[S]) -> Moments<S> {
+        let (t, u) = (self.between.time(0.0), self.between.input(0.0));
+        self.functions.output_moments(t, carry, &u, self.p, self.layout)
     }
 
     fn integrate(&self, z: &mut [S], rate: Rate<'_, S>) -> Result<(), Stuck> {

@@ -1,7 +1,7 @@
 //! A predictor and the equations that it predicts, traced as one graph.
 
-use super::{Plant, Prediction};
-use crate::equations::{Equations, Jacobian, Slopes};
+use super::{Moments, Plant, Prediction};
+use crate::equations::{Equations, Jacobian, MomentsOf, Slopes};
 use crate::functions::Functions;
 use crate::graph::{Graph, Leaf, Symbol, Untraceable};
 use crate::integrate::{Method, Stuck};
@@ -9,6 +9,7 @@ use crate::layout::{Kind, Layout};
 use crate::record::Holds;
 use crate::recurrence::{Recurrence, SymbolicInterval};
 use crate::scalar::{Comparison, Scalar};
+use core::cell::OnceCell;
 
 /// The recurrence of a predictor: one sample and the interval to the next.
 ///
@@ -23,12 +24,14 @@ pub(crate) fn recurrence(
     let layout = equations.layout();
     let (carried, outputs) = (predictor.carry(layout), layout.outputs.len());
     let slopes = predictor.needs_slopes().then(|| Slopes::of(equations));
+    let moments = OnceCell::new();
     let number = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
     let mut graph = Graph::default();
     let roots = graph.trace(|| {
         let plant = SymbolicPlant {
             interval: SymbolicInterval { equations, method, holds },
             slopes: slopes.as_ref(),
+            moments: &moments,
             p: (0..layout.parameters.len()).map(|j| Symbol::leaf(Leaf::Parameter(number(j)))).collect(),
         };
         let steps = predictor.symbols();
@@ -61,6 +64,8 @@ struct SymbolicPlant<'a> {
     interval: SymbolicInterval<'a>,
     /// Of a predictor that asks for them.
     slopes: Option<&'a Slopes>,
+    /// Made when a predictor asks for them.
+    moments: &'a OnceCell<(MomentsOf, MomentsOf)>,
     p: Vec<Symbol>,
 }
 
@@ -70,6 +75,15 @@ impl SymbolicPlant<'_> {
             return Symbol::fail("its predictor asks for slopes and does not say so (`Predictor::needs_slopes`)");
         };
         to.copy_from_slice(&self.interval.at(graph, entries, position, x));
+    }
+
+    /// Of the state and of the outputs.
+    fn equations_moments(&self) -> &(MomentsOf, MomentsOf) {
+        self.moments.get_or_init(|| self.interval.equations.moments())
+    }
+
+    fn moments(&self, of: &MomentsOf, position: f64, carry: &[Symbol]) -> Moments<Symbol> {
+        of.moments(self.interval.at(&of.graph, &of.roots, position, carry))
     }
 }
 
@@ -102,6 +116,14 @@ impl Plant<Symbol> for SymbolicPlant<'_> {
 
     fn output_slopes(&self, x: &[Symbol], to: &mut [Symbol]) {
         self.jacobian(|slopes| &slopes.output, 0.0, x, to);
+    }
+
+    fn state_moments(&self, position: f64, carry: &[Symbol]) -> Moments<Symbol> {
+        self.moments(&self.equations_moments().0, position, carry)
+    }
+
+    fn output_moments(&self, carry: &[Symbol]) -> Moments<Symbol> {
+        self.moments(&self.equations_moments().1, 0.0, carry)
     }
 
     fn integrate(&self, z: &mut [Symbol], rate: &dyn Fn(f64, &[Symbol], &mut [Symbol])) -> Result<(), Stuck> {

@@ -3,7 +3,6 @@
 use super::{Butterworth, Design, warped};
 use crate::error::Error;
 use crate::experiment::Experiment;
-use crate::numeral::exact;
 use crate::record::{Channel, Record, Time};
 use crate::signals::Signals;
 
@@ -40,11 +39,11 @@ impl Butterworth {
             return Ok(());
         }
         Err(Error::Filter(format!(
-            "it is made for samples every {} s, but those of experiment `{}` are {} s apart; make it for that sample time, or \
+            "it is made for samples every {}, but those of experiment `{}` are {} apart; make it for that sample time, or \
              resample the record",
-            exact(step),
+            record.shown(step),
             record.name(),
-            exact(found)
+            record.shown(found)
         )))
     }
 
@@ -80,11 +79,11 @@ pub(crate) fn filtered(record: &Record, filter: &Butterworth) -> Result<Record, 
     };
     if let Some((sample, found)) = other.filter(|(_, found)| !close(*found, step)) {
         return Err(Error::Filter(format!(
-            "it is made for samples every {} s, but in experiment `{}` the sample after number {sample} comes {} s later; make it \
+            "it is made for samples every {}, but in experiment `{}` the sample after number {sample} comes {} later; make it \
              for that sample time, or resample the record",
-            exact(step),
+            record.shown(step),
             record.name(),
-            exact(found)
+            record.shown(found)
         )));
     }
     let smooth = |channel: &Channel| {

@@ -1,14 +1,12 @@
 //! The second derivative of the errors along a direction.
 
 use super::{Accumulate, Objective, Weighing};
-use crate::information::{Block, Information};
+use crate::information::{Gathering, Information};
 use crate::optimize::{Infeasible, Linearization};
 use crate::sweep::Window;
 
 /// Step of the finite difference, as a fraction of the direction (Transtrum and Sethna 2012, section 4).
 const FAR: f64 = 0.1;
-/// Rows that are absorbed together.
-const ROWS: usize = 256;
 
 /// Standardized errors of an experiment, sample by sample, output by output.
 struct Errors(Vec<f64>);
@@ -31,8 +29,7 @@ struct SecondRows<'o> {
     beyond: &'o [f64],
     outputs: usize,
     row: Vec<f64>,
-    block: Block,
-    triangle: Information,
+    rows: Gathering,
 }
 
 impl Accumulate for SecondRows<'_> {
@@ -45,14 +42,13 @@ impl Accumulate for SecondRows<'_> {
                 let beyond = self.beyond[(window.begin[lane] + k) * self.outputs + j];
                 let second = second(window.error(k, j, lane), beyond, &self.row, &self.along);
                 self.row.iter_mut().for_each(|slope| *slope *= root);
-                self.triangle.gather(&mut self.block, &self.row, root * second);
+                self.rows.take(&self.row, root * second);
             }
         }
     }
 
-    fn append(&mut self, mut later: Self) {
-        later.triangle.absorb(&mut later.block);
-        self.triangle.merge(&later.triangle);
+    fn append(&mut self, later: Self) {
+        self.rows.append(later.rows);
     }
 }
 
@@ -79,15 +75,11 @@ impl Objective<'_> {
                 beyond: &beyond[e].0,
                 outputs: self.outputs(),
                 row: vec![0.0; columns],
-                block: Block::new(columns, ROWS),
-                triangle: Information::new(columns),
+                rows: Gathering::new(columns),
             }
         };
-        let mut blocks = vec![];
-        for mut rows in self.gather(x, true, make)? {
-            rows.triangle.absorb(&mut rows.block);
-            blocks.push(rows.triangle);
-        }
+        let all = self.gather(x, true, make)?.into_iter();
+        let mut blocks: Vec<Information> = all.map(|one| one.rows.triangle()).collect();
         for ((i, slope, error), (_, _, beyond)) in unknowns.priors(x).zip(unknowns.priors(&far)) {
             let e = unknowns.row[i].experiment.unwrap_or(0);
             let row: Vec<f64> = unknowns.columns(e).map(|c| if c == i { slope } else { 0.0 }).collect();

@@ -108,13 +108,10 @@ impl Objective<'_> {
 
     fn with_priors(&self, coordinates: &[f64], mut cost: f64, mut blocks: Vec<Information>) -> Linearization {
         let forgotten = self.without_forgotten(coordinates, &mut blocks);
-        for (i, slope, error) in self.problem.unknowns.priors(coordinates) {
-            let e = self.problem.unknowns.row[i].experiment.unwrap_or(0);
-            let row: Vec<f64> = self.problem.unknowns.columns(e).map(|c| if c == i { slope } else { 0.0 }).collect();
-            blocks[e].absorb_row(&row, error);
-            cost += 0.5 * error * error;
-        }
-        let linear = Linearization::new(cost, self.problem.unknowns.shared(), blocks).with_forgotten(forgotten);
+        let unknowns = &self.problem.unknowns;
+        unknowns.add_priors(coordinates, 1.0, &mut blocks);
+        unknowns.priors(coordinates).for_each(|(_, _, error)| cost += 0.5 * error * error);
+        let linear = Linearization::new(cost, unknowns.shared(), blocks).with_forgotten(forgotten);
         match self.data_norm() {
             Some(norm) => linear.with_data_norm(norm),
             None => linear,

@@ -148,7 +148,7 @@ impl<'p> Objective<'p> {
         let failure = |signal: String, value: f64, hint| Failure {
             experiment: label.clone(),
             sample,
-            time: record.time(sample),
+            time: record.moment(sample),
             signal,
             value,
             hint,
@@ -191,7 +191,7 @@ impl<'p> Objective<'p> {
         let _ = self.run_alone(e, coordinates, true, visit);
         let (sample, signal, value, hint) = first?;
         let experiment = self.problem.unknowns.labels[e].clone();
-        let time = self.problem.records[e].time(sample);
+        let time = self.problem.records[e].moment(sample);
         Some(Failure { experiment, sample, time, signal, value, hint })
     }
 }

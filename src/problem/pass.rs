@@ -40,6 +40,17 @@ impl<A: Accumulate> Accumulate for Option<A> {
     }
 }
 
+/// As many accumulators in all segments.
+impl<A: Accumulate> Accumulate for Vec<A> {
+    fn add(&mut self, window: &Window, lane: usize) {
+        self.iter_mut().for_each(|one| one.add(window, lane));
+    }
+
+    fn append(&mut self, later: Self) {
+        self.iter_mut().zip(later).for_each(|(one, later)| one.append(later));
+    }
+}
+
 impl Objective<'_> {
     /// Initial state and parameters of each experiment.
     pub(super) fn values(&self, coordinates: &[f64]) -> Vec<Values> {

@@ -144,9 +144,9 @@ impl Settings {
             for k in 0..record.len() {
                 let weight = weights.weight(record, k);
                 if !(weight >= 0.0 && weight.is_finite()) {
-                    let (name, t) = (record.name(), exact(record.time(k)));
+                    let (name, t) = (record.name(), record.moment(k));
                     return Err(Error::Option(format!(
-                        "weighting: the weight of sample {k} (t = {t} s) of experiment `{name}` is {}; weights must \
+                        "weighting: the weight of sample {k} (t = {t}) of experiment `{name}` is {}; weights must \
                          be finite and not negative",
                         exact(weight)
                     )));

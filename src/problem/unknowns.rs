@@ -4,6 +4,7 @@
 //! local parameters. The optimizer works on coordinates: values, or their logarithms.
 
 use crate::error::Error;
+use crate::information::Information;
 use crate::layout::{Layout, Quantity};
 use crate::numeral::exact;
 use crate::parameter::{Parameter, Transform, fixed, free};
@@ -194,6 +195,15 @@ impl Unknowns {
             let value = transform.to_value(c);
             prior.map(|prior| (i, transform.slope(value) / prior.std, (prior.mean - value) / prior.std))
         })
+    }
+
+    /// Adds the priors to the triangles of the experiments that they count with, as rows times a factor.
+    pub fn add_priors(&self, coordinates: &[f64], factor: f64, triangles: &mut [Information]) {
+        for (i, slope, error) in self.priors(coordinates) {
+            let e = self.row[i].experiment.unwrap_or(0);
+            let row: Vec<f64> = self.columns(e).map(|c| if c == i { factor * slope } else { 0.0 }).collect();
+            triangles[e].absorb_row(&row, factor * error);
+        }
     }
 }
 

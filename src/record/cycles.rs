@@ -1,24 +1,24 @@
 //! Parts of a record: operating cycles, gaps, and how much of each output was measured.
 
 use super::{Record, Time, steps};
-use crate::numeral::exact;
+use crate::numeral::Moment;
 use core::fmt;
 use std::ops::Range;
 
 /// A time without samples, inside a record.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Gap {
     /// Index of the first sample after it.
     pub sample: usize,
-    /// Time of the last sample before it (s).
-    pub from: f64,
-    /// Time of the first sample after it (s).
-    pub to: f64,
+    /// Time of the last sample before it.
+    pub from: Moment,
+    /// Time of the first sample after it.
+    pub to: Moment,
 }
 
 impl fmt::Display for Gap {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "no sample from {} s to {} s (before sample {})", exact(self.from), exact(self.to), self.sample)
+        write!(f, "no sample from {} to {} (before sample {})", self.from, self.to, self.sample)
     }
 }
 
@@ -96,7 +96,8 @@ impl Record {
         let Time::Stamps(stamps) = &self.time else { return Vec::new() };
         let longest = longest_step(stamps);
         let steps = stamps.windows(2).enumerate();
-        steps.filter(|(_, t)| t[1] - t[0] > longest).map(|(k, t)| Gap { sample: k + 1, from: t[0], to: t[1] }).collect()
+        let gap = |(k, t): (usize, &[f64])| Gap { sample: k + 1, from: self.shown(t[0]), to: self.shown(t[1]) };
+        steps.filter(|(_, t)| t[1] - t[0] > longest).map(gap).collect()
     }
 
     /// The share of the samples, from 0 to 1, in which each output was measured.

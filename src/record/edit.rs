@@ -193,6 +193,7 @@ impl Record {
             name,
             states: self.states.clone(),
             time: self.time.part(samples.clone()),
+            time_unit: self.time_unit.clone(),
             inputs: self.inputs.iter().map(part).collect(),
             outputs: self.outputs.iter().map(part).collect(),
             holds: self.holds.clone(),

@@ -5,6 +5,7 @@ use super::{Channel, Holds, Initial, Record, Time};
 use crate::by_name::Entries;
 use crate::interval::Hold;
 use crate::layout::Quantity;
+use crate::numeral::TimeUnit;
 use crate::parameter::Parameter;
 use crate::real::{Read, Written};
 use core::fmt;
@@ -16,11 +17,12 @@ use std::sync::Arc;
 
 impl Serialize for Record {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut record = serializer.serialize_struct("Experiment", 6)?;
+        let mut record = serializer.serialize_struct("Experiment", 7)?;
         record.serialize_field("name", &self.name)?;
         record.serialize_field("hold", &StoredHold::of(self))?;
         record.serialize_field("initial", &StoredInitial::of(&self.initial, &self.states))?;
         record.serialize_field("time", &self.time)?;
+        record.serialize_field("time_unit", &self.time_unit)?;
         record.serialize_field("inputs", &Columns(&self.inputs))?;
         record.serialize_field("outputs", &Columns(&self.outputs))?;
         record.end()
@@ -139,6 +141,8 @@ pub(crate) struct Stored {
     hold: StoredHold,
     initial: StoredInitial,
     time: Time,
+    #[serde(default)]
+    time_unit: TimeUnit,
     inputs: Entries<Read<Vec<f64>>>,
     outputs: Entries<Read<Vec<f64>>>,
 }
@@ -160,12 +164,13 @@ impl Stored {
             Ok::<_, String>(columns.map(channel).collect::<Vec<Channel>>())
         };
         let (inputs, outputs) = (channels(self.inputs, inputs)?, channels(self.outputs, outputs)?);
-        let Stored { name, time, .. } = self;
+        let Stored { name, time, time_unit, .. } = self;
         let (states, inputs, outputs) = (states.into(), inputs.into(), outputs.into());
         let record = Record {
             name,
             states,
             time,
+            time_unit,
             inputs,
             outputs,
             holds,

@@ -1,6 +1,7 @@
 //! [`Time`]: when the samples were taken, and whether that was evenly.
 
 use crate::error::Error;
+use crate::numeral::{Moment, TimeUnit};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -75,7 +76,14 @@ impl Time {
     }
 
     /// Refuses time that is not finite, decreases, or does not go with the samples of the channel `reference`.
-    pub(crate) fn check(&self, experiment: &str, samples: usize, reference: &str) -> Result<(), Error> {
+    pub(crate) fn check(
+        &self,
+        experiment: &str,
+        samples: usize,
+        reference: &str,
+        unit: &TimeUnit,
+    ) -> Result<(), Error> {
+        let shown = |time: f64| Moment { time, unit: unit.clone() };
         if let Time::Stamps(stamps) = self
             && stamps.len() != samples
         {
@@ -99,11 +107,12 @@ impl Time {
                 let time = self.at(sample);
                 if !time.is_finite() {
                     let (experiment, signal) = (experiment.to_owned(), "t".to_owned());
-                    return Err(Error::NotFinite { experiment, signal, value: time, sample, time });
+                    return Err(Error::NotFinite { experiment, signal, value: time, sample, time: shown(time) });
                 }
                 // Stamps may repeat; those of an even grid do where they have no more digits.
                 if time < before || time == before && matches!(self, Time::Uniform { .. }) {
-                    return Err(Error::TimeOrder { experiment: experiment.to_owned(), sample, before, time });
+                    let (experiment, before, time) = (experiment.to_owned(), shown(before), shown(time));
+                    return Err(Error::TimeOrder { experiment, sample, before, time });
                 }
                 before = time;
             }

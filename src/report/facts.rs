@@ -4,6 +4,7 @@ use crate::diagnose::Identifiability;
 use crate::diagnose::residuals::Residuals;
 use crate::estimate::{Summary, Unknown};
 use crate::information::SquareMatrix;
+use crate::numeral::TimeUnit;
 use crate::problem::Role;
 use crate::section::Plot;
 
@@ -22,12 +23,14 @@ pub(super) struct Facts {
 pub(super) struct Record {
     pub name: String,
     pub samples: u64,
-    /// Times of the first and last sample (s).
+    /// The unit of its times, which are all in this one.
+    pub time_unit: TimeUnit,
+    /// Times of the first and last sample.
     pub begin: f64,
     pub end: f64,
-    /// Median time from sample to sample (s).
+    /// Median time from sample to sample.
     pub sample_time: f64,
-    /// Times (s) between which samples are lost.
+    /// Times between which samples are lost.
     pub gaps: Vec<(f64, f64)>,
     /// How the input behaves between samples.
     pub hold: String,
@@ -60,7 +63,7 @@ pub(super) struct OutputFit {
     /// Samples for which the method has no prediction.
     pub unpredicted: u64,
     pub residuals: Residuals,
-    /// The largest residual in size, with its sign, and its time (s).
+    /// The largest residual in size, with its sign, and its time.
     pub largest: f64,
     pub largest_at: f64,
     pub histogram: Histogram,

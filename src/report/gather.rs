@@ -7,10 +7,10 @@ use crate::diagnose::{self, Widths};
 use crate::error::Error;
 use crate::estimate::Summary;
 use crate::interval::Hold;
-use crate::judge::output_fit;
 use crate::layout::Kind;
 use crate::problem::{Problem, Simulated};
 use crate::record::{Channel, ChannelInspection, Inspection, Record as Measured};
+use crate::residuals::output_fit;
 use crate::section::{Drawing, Keep, Line, Panel, PanelKind, Plot, Samples, Style, Timeline, identifier};
 use core::ops::Range;
 
@@ -74,7 +74,7 @@ impl<'a> Columns<'a> {
         Columns {
             name,
             record,
-            t: (0..record.len()).map(|k| record.time(k)).collect(),
+            t: (0..record.len()).map(|k| record.time_unit().convert(record.time(k))).collect(),
             gaps: record.gaps().iter().map(|gap| gap.sample).collect(),
             prediction,
             bands,
@@ -100,7 +100,7 @@ impl<'a> Columns<'a> {
                 unpredicted: predicted.iter().filter(|value| !value.is_finite()).count() as u64,
                 residuals,
                 largest: worst.map_or(0.0, |k| errors[k]),
-                largest_at: record.time(worst.unwrap_or(0)),
+                largest_at: self.t[worst.unwrap_or(0)],
                 histogram: Histogram::new(errors),
                 closeup: worst.filter(|_| !single || self.t.len() > 4 * CLOSE).map(|worst| self.closeup(j, worst)),
             }
@@ -108,10 +108,11 @@ impl<'a> Columns<'a> {
         Record {
             name: self.name.to_owned(),
             samples: record.len() as u64,
-            begin: record.time(0),
-            end: record.time(record.len().saturating_sub(1)),
-            sample_time: record.sample_time(),
-            gaps: record.gaps().iter().map(|gap| (gap.from, gap.to)).collect(),
+            time_unit: record.time_unit().clone(),
+            begin: self.t[0],
+            end: self.t[self.t.len() - 1],
+            sample_time: record.time_unit().convert(record.sample_time()),
+            gaps: self.gaps.iter().map(|&k| (self.t[k - 1], self.t[k])).collect(),
             hold,
             signals: inputs.chain(outputs).collect(),
             fits: fits.collect(),
@@ -154,6 +155,10 @@ impl<'a> Columns<'a> {
         bands.map(|widths| (Keep::Median, widths.as_slice())).chain(rest)
     }
 
+    fn samples<'s>(&'s self, lines: Vec<(Keep, &'s [f64])>) -> Samples<'s> {
+        Samples { t: &self.t, time_unit: self.record.time_unit().name(), gaps: &self.gaps, lines }
+    }
+
     /// The outputs and, below them, the inputs.
     fn timeline(&self, numbers: usize) -> Timeline {
         let (inputs, outputs) = (self.record.inputs(), 0..self.record.outputs().len());
@@ -166,16 +171,17 @@ impl<'a> Columns<'a> {
         let lines = outputs.flat_map(|j| self.lines(j));
         let lines = lines.chain(inputs.iter().map(|channel| (Keep::Extremes, &*channel.values)));
         let pieces: Vec<Range<usize>> = self.worst.iter().flatten().map(|&k| about(k, self.t.len())).collect();
-        Timeline::new(panels, &Samples { t: &self.t, gaps: &self.gaps, lines: lines.collect() }, numbers, &pieces)
+        Timeline::new(panels, &self.samples(lines.collect()), numbers, &pieces)
     }
 
     /// One output about its largest residual.
     fn closeup(&self, j: usize, worst: usize) -> Plot {
         let (record, output) = (self.name, &self.record.outputs()[j].name);
-        let samples = Samples { t: &self.t, gaps: &self.gaps, lines: self.lines(j).collect() };
+        let samples = self.samples(self.lines(j).collect());
         let start = self.t.first().copied().unwrap_or(0.0);
         let stretches = vec![samples.stretch(about(worst, self.t.len()), CLOSE, start)];
-        let drawing = Drawing::Timeline(Timeline { start, panels: self.panels(j).to_vec(), stretches });
+        let (time_unit, panels) = (samples.time_unit.to_owned(), self.panels(j).to_vec());
+        let drawing = Drawing::Timeline(Timeline { time_unit, start, panels, stretches });
         let title = format!("Output {output} of {record} about its largest residual");
         Plot::of(identifier(&format!("closeup-{record}-{output}")), "About the largest residual", title, drawing)
     }

@@ -11,7 +11,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Timeline {
-    /// Time of the record's first sample (s), which all others count from.
+    /// The unit of all times.
+    pub time_unit: String,
+    /// Time of the record's first sample, which all others count from.
     #[serde(with = "crate::real")]
     pub start: f64,
     /// The panels, from top to bottom.
@@ -101,8 +103,9 @@ pub(crate) enum Keep {
 
 /// A record as a timeline reads it; not a number where missing.
 pub(crate) struct Samples<'a> {
-    /// Time of each sample (s).
+    /// Time of each sample, and its unit.
     pub t: &'a [f64],
+    pub time_unit: &'a str,
     /// Samples before which time jumps.
     pub gaps: &'a [usize],
     /// The lines, panel by panel.
@@ -124,7 +127,7 @@ impl Timeline {
         if stretches[0].samples_per_column > 1 {
             stretches.extend(pieces.iter().map(|piece| samples.stretch(piece.clone(), piece.len(), start)));
         }
-        Timeline { start, panels, stretches }
+        Timeline { time_unit: samples.time_unit.to_owned(), start, panels, stretches }
     }
 
     /// The lines in the order of the traces.
@@ -213,7 +216,7 @@ mod tests {
     use super::*;
 
     fn samples<'a>(t: &'a [f64], gaps: &'a [usize], keep: Keep, values: &'a [f64]) -> Samples<'a> {
-        Samples { t, gaps, lines: vec![(keep, values)] }
+        Samples { t, time_unit: "s", gaps, lines: vec![(keep, values)] }
     }
 
     /// The one sample that matters survives, whatever the column it falls into.
@@ -257,7 +260,7 @@ mod tests {
         let t: Vec<f64> = (0..10_000).map(f64::from).collect();
         let (sine, widths): (Vec<f64>, Vec<f64>) = t.iter().map(|t| (t.sin(), 1e-3)).unzip();
         let lines = vec![(Keep::ExtremesAndMean, sine.as_slice()), (Keep::Median, widths.as_slice())];
-        let stretch = Samples { t: &t, gaps: &[], lines }.stretch(0..t.len(), 50, 0.0);
+        let stretch = Samples { t: &t, time_unit: "s", gaps: &[], lines }.stretch(0..t.len(), 50, 0.0);
         let [predicted, half] = &stretch.traces[..] else { panic!("two lines") };
         assert_eq!(half.low, vec![Some(1e-3); 50]);
         // The mean of 200 samples of a sine is at most about 1 / 100 of its amplitude.

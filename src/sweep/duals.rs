@@ -6,6 +6,7 @@ use super::filtered::Filter;
 use super::{ModelCode, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit, unmoved};
 use crate::error::{Error, Failure};
 use crate::functions::delays;
+use crate::graph::Choices;
 use crate::integrate::Method;
 use crate::layout::{Kind, Layout};
 use crate::predict::{FreeRun, Guess, Place, Prediction};
@@ -17,8 +18,8 @@ use std::sync::Arc;
 pub(crate) struct Uncompiled {
     /// Why they were not compiled.
     pub reason: String,
-    /// The parameters that decide a choice of theirs; `None` where they are not read as a graph.
-    pub choosing: Option<Vec<usize>>,
+    /// What their choices depend on; `None` where they are not read as a graph.
+    pub choices: Option<Choices>,
 }
 
 /// A model run in dual numbers.
@@ -74,13 +75,17 @@ impl Sweep for DualSweep<'_> {
     }
 
     fn choosing(&self) -> Option<&[usize]> {
-        self.uncompiled.choosing.as_deref()
+        self.uncompiled.choices.as_ref().map(|choices| &*choices.parameters)
+    }
+
+    fn linearizes_choices(&self) -> bool {
+        self.predictor.needs_slopes() && self.uncompiled.choices.as_ref().is_some_and(|choices| choices.states)
     }
 
     fn prepare(&self, record: &Record, parameters: &[f64]) -> Result<Prepared, Error> {
         // Equations that are read as a graph have been examined as such.
         if self.predictor.needs_slopes()
-            && self.uncompiled.choosing.is_none()
+            && self.uncompiled.choices.is_none()
             && let Some(number) = not_affine(&self.layout, self.code.values(), record, parameters)
         {
             return Err(Error::NotAffine { what: self.layout.equation(number), predictor: self.predictor.describe() });
@@ -172,13 +177,19 @@ impl Sweep for DualSweep<'_> {
         }))
     }
 
+    fn second_order<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
+        let predictor = self.predictor.second_order().filter(|_| !self.code.is_affine())?;
+        let (layout, code, method) = (self.layout.clone(), self.code.clone(), self.method.clone());
+        Some(Arc::new(DualSweep { layout, code, method, predictor, uncompiled: self.uncompiled.clone() }))
+    }
+
     fn integrator(&self) -> String {
         self.method.describe(self.layout.kind)
     }
 
     fn predictor(&self) -> String {
         let predictor = self.predictor.describe();
-        match self.predictor.needs_slopes() && !self.code.is_affine() {
+        match self.predictor.second_order().is_some() && !self.code.is_affine() {
             true => format!("{predictor}, extended: by the model's slopes at the state (first order)"),
             false => predictor,
         }

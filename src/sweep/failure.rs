@@ -22,7 +22,14 @@ pub(crate) struct FailureSearch<'w> {
 
 impl FailureSearch<'_> {
     fn failure(&self, k: usize, signal: String, value: f64, hint: &'static str) -> Failure {
-        Failure { experiment: self.record.name().to_owned(), sample: k, time: self.record.time(k), signal, value, hint }
+        Failure {
+            experiment: self.record.name().to_owned(),
+            sample: k,
+            time: self.record.moment(k),
+            signal,
+            value,
+            hint,
+        }
     }
 
     /// The cause of a failure in a simulation from this state, as an error; where nothing fails, the error of an output that is

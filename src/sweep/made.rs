@@ -5,7 +5,7 @@ use super::{DualSweep, Evaluated, ProgramSweep, Sweep};
 use crate::engine::only_duals;
 use crate::equations::Equations;
 use crate::error::Error;
-use crate::graph::{Untraceable, choosing};
+use crate::graph::{Untraceable, choices};
 use crate::integrate::Method;
 use crate::predict::Prediction;
 use std::sync::Arc;
@@ -21,15 +21,15 @@ pub(crate) fn compiled<'a>(
     if let Some(reason) = &asked
         && !predictor.needs_slopes()
     {
-        return plain(Uncompiled { reason: reason.clone(), choosing: None });
+        return plain(Uncompiled { reason: reason.clone(), choices: None });
     }
     let equations = match trace() {
         Ok(equations) => equations,
-        Err(Untraceable { reason, .. }) => return plain(Uncompiled { reason, choosing: None }),
+        Err(Untraceable { reason, .. }) => return plain(Uncompiled { reason, choices: None }),
     };
-    let choosing = Some(choosing(equations.graph()));
+    let choices = Some(choices(equations.graph()));
     let in_duals = |reason: String| {
-        let uncompiled = Uncompiled { reason, choosing: choosing.clone() };
+        let uncompiled = Uncompiled { reason, choices: choices.clone() };
         // The model's own code in duals has no slopes whose slopes are known, and does not say which inputs are never late.
         match predictor.needs_slopes() && !equations.is_affine() || equations.late().contains(&true) {
             true => evaluated(&equations, method, predictor, uncompiled),

@@ -3,11 +3,12 @@
 use super::filtered::Filter;
 use super::{Loops, Piece, Reached, RunError, Seed, Visit};
 use crate::dual::Dual;
-use crate::equations::{Equations, Slopes};
+use crate::equations::{Equations, MomentsOf, Slopes};
 use crate::functions::{Functions, Handle};
 use crate::integrate::Duals;
-use crate::layout::Kind;
+use crate::layout::{Kind, Layout};
 use crate::model::Model;
+use crate::moments::Moments;
 use crate::scalar::Scalar;
 use crate::signals::Signals;
 use std::sync::{Arc, OnceLock};
@@ -102,15 +103,21 @@ pub(crate) struct Evaluated {
     equations: Arc<Equations>,
     /// Made when a predictor asks for them.
     slopes: OnceLock<Slopes>,
+    moments: OnceLock<(MomentsOf, MomentsOf)>,
 }
 
 impl Evaluated {
     pub fn new(equations: Arc<Equations>) -> Self {
-        Evaluated { equations, slopes: OnceLock::new() }
+        Evaluated { equations, slopes: OnceLock::new(), moments: OnceLock::new() }
     }
 
     fn slopes(&self) -> &Slopes {
         self.slopes.get_or_init(|| Slopes::of(&self.equations))
+    }
+
+    /// Of the state and of the outputs.
+    fn moments(&self) -> &(MomentsOf, MomentsOf) {
+        self.moments.get_or_init(|| self.equations.moments())
     }
 }
 
@@ -141,6 +148,14 @@ impl<S: Scalar> Functions<S> for Evaluated {
 
     fn output_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
         self.slopes().output.at(t, x, u, p, to);
+    }
+
+    fn state_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], _layout: &Layout) -> Moments<S> {
+        self.moments().0.at(t, carry, u, p)
+    }
+
+    fn output_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], _layout: &Layout) -> Moments<S> {
+        self.moments().1.at(t, carry, u, p)
     }
 }
 

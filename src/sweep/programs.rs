@@ -179,6 +179,10 @@ impl Sweep for ProgramSweep<'_> {
         self.plain.choosing()
     }
 
+    fn linearizes_choices(&self) -> bool {
+        self.plain.linearizes_choices()
+    }
+
     fn prepare(&self, record: &Record, parameters: &[f64]) -> Result<Prepared, Error> {
         self.plain.prepare(record, parameters)
     }
@@ -245,6 +249,15 @@ impl Sweep for ProgramSweep<'_> {
         let plain = self.plain.simulating()?;
         let (equations, method) = (self.programs.equations.clone(), self.programs.method.clone());
         Some(match ProgramSweep::new(equations, method, Arc::new(FreeRun), plain.clone()) {
+            Ok(sweep) => Arc::new(sweep),
+            Err(_) => plain,
+        })
+    }
+
+    fn second_order<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
+        let (plain, predictor) = (self.plain.second_order()?, self.programs.predictor.second_order()?);
+        let (equations, method) = (self.programs.equations.clone(), self.programs.method.clone());
+        Some(match ProgramSweep::new(equations, method, predictor, plain.clone()) {
             Ok(sweep) => Arc::new(sweep),
             Err(_) => plain,
         })

@@ -72,7 +72,10 @@ fn a_guess_far_off_arrives_or_is_named() {
 fn no_success_on_what_is_not_a_number() {
     let parameters = Branch { gain: free(1.0), tau: fixed(-1e-3) };
     let error = Fit::new(&Lag, &record(0..0)).parameters(parameters).run().unwrap_err();
-    assert!(matches!(&error, Error::Start(failure) if failure.signal == "state `i`" && failure.time > 0.0), "{error}");
+    assert!(
+        matches!(&error, Error::Start(failure) if failure.signal == "state `i`" && failure.time.time > 0.0),
+        "{error}"
+    );
 }
 
 /// Of blocks as long as the record there is one resample only, whose refits do not scatter.

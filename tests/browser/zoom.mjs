@@ -18,7 +18,7 @@ const state = (page) =>
 
 const same = (a, b) => a.paths.every((path, k) => path === b.paths[k]);
 const span = ({ shown }) => {
-  const found = shown.match(/([-−\d.e]+) s to ([-−\d.e]+) s/);
+  const found = shown.match(/([-−\d.e]+) to ([-−\d.e]+) s/);
   return found ? found.slice(1).map((text) => Number(text.replaceAll("−", "-"))) : null;
 };
 

@@ -2,7 +2,7 @@
 //! differences, and against simulations.
 
 use crate::common::Noise;
-use crate::hardening::{Deflection, Gauges, Hardening, Pull, Spring, disturbed, start};
+use crate::hardening::{Deflection, Gauges, Hardening, Pull, Spring, disturbed, runge_kutta, start};
 use argmin::core::{CostFunction, Gradient};
 use core::f64::consts::TAU;
 use greybox::*;
@@ -34,15 +34,7 @@ fn written_out(record: &ExperimentOf<Hardening>, at: [D; 6], steps: u32) -> D {
         }
         let h = (record.time(k + 1) - record.time(k)) / f64::from(steps);
         let rate = |[x, p]: [D; 2]| [c * u.u - a * x - b * x * x * x, (-a - b * x * x * 3.0) * p * 2.0 + q];
-        for _ in 0..steps {
-            let along = |k: [D; 2], h: f64| [x + k[0] * h, p + k[1] * h];
-            let k1 = rate([x, p]);
-            let k2 = rate(along(k1, h / 2.0));
-            let k3 = rate(along(k2, h / 2.0));
-            let k4 = rate(along(k3, h));
-            let sum = |i: usize| (k1[i] + (k2[i] + k3[i]) * 2.0 + k4[i]) * (h / 6.0);
-            (x, p) = (x + sum(0), p + sum(1));
-        }
+        [x, p] = runge_kutta([x, p], h, steps, rate);
     }
     sum
 }

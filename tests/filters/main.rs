@@ -6,3 +6,4 @@ mod common;
 mod extended;
 #[path = "../common/hardening.rs"]
 mod hardening;
+mod second_order;

@@ -193,7 +193,7 @@ fn a_start_where_the_model_is_undefined() {
     let fit = |a: f64| Fit::new(&Rooted, &rooted).parameters(free_pair(a, 1.0));
     let error = says(fit(1.0).run(), &["sample 1 (t = 0.01 s)", "state `x` is NaN", "root", "start elsewhere"]);
     let Error::Start(failure) = error else { panic!("{error}") };
-    assert_eq!((failure.sample, failure.time, failure.signal.as_str()), (1, 0.01, "state `x`"));
+    assert_eq!((failure.sample, failure.time.time, failure.signal.as_str()), (1, 0.01, "state `x`"));
     // Where the value is finite and its slope is not.
     let steep = record(&Steep, H, &lag(1.2, 1.0, H, 300, 1e-3));
     let error = Fit::new(&Steep, &steep).parameters(free_pair(0.0, 1.0)).run();

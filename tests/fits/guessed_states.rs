@@ -223,7 +223,7 @@ fn a_first_sample_that_is_missing_looks_at_the_next_ones() {
     let first = Fit::new(&Together, &record.initial_from_first_sample()).parameters(start()).run();
     says(
         first,
-        &["2 state(s), x, v, but 0 measured of the output(s) a, b at t = 0 s", "leave initial_from_first_sample out"],
+        &["2 state(s), x, v, but 0 measured of the output(s) a, b at t = 0)", "leave initial_from_first_sample out"],
     );
 }
 

@@ -42,6 +42,20 @@ fn a_gain_is_that_of_a_regression() {
     assert_eq!(warning.severity, Severity::UsableWithCare);
 }
 
+/// A current that a controller holds at zero: its prediction is rounding, which the errors happen to follow. A gain of 5e15 is none.
+#[test]
+fn an_output_that_is_not_predicted_has_no_gain() {
+    let (u, e) = ([1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0], [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0]);
+    let mut noise = Noise(2);
+    let inputs = (0..80).map(|k| Drive { u: u[k % 8], w: 1e-17 * e[k % 8] }).collect();
+    let mut output =
+        |k: usize| Pair { y: 2.0 * u[k % 8] + 0.1 * noise.gauss(), z: 0.1 * e[k % 8] + 0.02 * noise.gauss() };
+    let time = Time::Uniform { start: 0.0, step: 1.0 };
+    let record = Experiment::new(&Twice, time, inputs, (0..80).map(&mut output).collect()).unwrap();
+    let estimate = fit(std::slice::from_ref(&record)).run().unwrap();
+    assert!(said(&estimate).is_none(), "{estimate}");
+}
+
 const STEP: f64 = 1e-3;
 
 /// A motor of known inertia that is switched every 15 samples, without noise.

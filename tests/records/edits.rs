@@ -188,7 +188,8 @@ fn finds_gaps() {
     let jitter = [0.0, 1.0, 2.1, 3.0, 5.0, 6.0, 9.0, 12.0, 12.9, 14.0, 15.0, 16.0];
     let record = record(Time::Stamps(jitter.to_vec()), 12);
     let gaps = record.gaps();
-    let all = [(4, 3.0, 5.0), (6, 6.0, 9.0), (7, 9.0, 12.0)].map(|(sample, from, to)| Gap { sample, from, to });
+    let gap = |(sample, from, to)| Gap { sample, from: f64::into(from), to: f64::into(to) };
+    let all = [(4, 3.0, 5.0), (6, 6.0, 9.0), (7, 9.0, 12.0)].map(gap);
     assert_eq!(gaps, all);
     assert_eq!(gaps[0].to_string(), "no sample from 3 s to 5 s (before sample 4)");
     let pieces: Vec<_> = record.without_gaps().iter().map(u).collect();
@@ -215,7 +216,7 @@ fn json_is_readable() {
     }}});
     let expected = serde_json::json!({
         "name": "record", "hold": "Zero", "initial": initial,
-        "time": {"Uniform": {"start": 0.0, "step": 0.1}},
+        "time": {"Uniform": {"start": 0.0, "step": 0.1}}, "time_unit": {"name": "s", "size": 1.0},
         "inputs": {"u": [0.0, 1.0, 2.0]},
         "outputs": {"y": [-0.0, -1.0, -2.0], "z": [1.0, null, null]},
     });

@@ -12,4 +12,5 @@ mod pmsm;
 mod refused;
 #[path = "../common/shared.rs"]
 mod shared;
+mod time_units;
 mod valid;

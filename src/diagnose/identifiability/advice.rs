@@ -3,7 +3,7 @@
 use super::together::together;
 use super::{Collinear, Excitation, Identifiability};
 use crate::estimate::{Direction, Unknown};
-use crate::numeral::{counted, number, percent};
+use crate::numeral::{TimeUnit, counted, percent};
 use crate::problem::Role;
 use std::collections::BTreeSet;
 
@@ -18,7 +18,12 @@ const ONCE: f64 = 0.9;
 const MENTIONED: usize = 3;
 
 /// The sets of unknowns of the directions `warned` are left out.
-pub(super) fn advice(found: &Identifiability, warned: &[Direction], unknowns: &[Unknown]) -> Vec<String> {
+pub(super) fn advice(
+    found: &Identifiability,
+    warned: &[Direction],
+    unknowns: &[Unknown],
+    time_unit: &TimeUnit,
+) -> Vec<String> {
     let mut advice = vec![];
     let n = unknowns.len() as u64;
     if found.generic_rank < n {
@@ -54,7 +59,7 @@ pub(super) fn advice(found: &Identifiability, warned: &[Direction], unknowns: &[
     let of_parameters = of_parameters.filter(|(_, unknown)| matches!(unknown.role, Role::Parameter(_)));
     let of_parameters: Vec<&Excitation> = of_parameters.map(|(excited, _)| excited).collect();
     advice.extend(one_output(&of_parameters));
-    advice.extend(of_parameters.iter().filter_map(|excited| one_moment(excited)));
+    advice.extend(of_parameters.iter().filter_map(|excited| one_moment(excited, time_unit)));
     advice
 }
 
@@ -90,15 +95,15 @@ fn one_output(parameters: &[&Excitation]) -> Vec<String> {
     if outputs.len() < 2 { vec![] } else { (0..outputs.len()).filter_map(sentence).collect() }
 }
 
-fn one_moment(excited: &Excitation) -> Option<String> {
+fn one_moment(excited: &Excitation, time_unit: &TimeUnit) -> Option<String> {
     let segment = excited.segments.iter().find(|segment| segment.share > ONCE)?;
     let begin = excited.segments.iter().find(|first| first.experiment == segment.experiment)?.from;
     (excited.segments.len() > 1).then(|| {
         format!(
-            "`{}` is known from one tenth of `{}` alone, {} s after its start ({})",
+            "`{}` is known from one tenth of `{}` alone, {} after its start ({})",
             excited.name,
             segment.experiment,
-            number(segment.from - begin, 3),
+            time_unit.say(segment.from - begin, 3),
             percent(segment.share, 3)
         )
     })
@@ -147,10 +152,10 @@ mod tests {
         // A direction of the same unknowns, in any order, takes the sets' place; one of others does not.
         let direction =
             |names: &[&str]| Direction { moves: names.iter().map(|name| ((*name).to_owned(), 1.0)).collect() };
-        let left = |names: &[&str]| advice(&found, &[direction(names)], &unknowns).len();
-        let all = advice(&found, &[], &unknowns).len();
+        let left = |names: &[&str]| advice(&found, &[direction(names)], &unknowns, &TimeUnit::default()).len();
+        let all = advice(&found, &[], &unknowns, &TimeUnit::default()).len();
         assert_eq!([left(&["a"]), left(&["a", "c"]), left(&["b", "a"])], [all, all, all - sets.min(MENTIONED)]);
-        advice(&found, &[], &unknowns)
+        advice(&found, &[], &unknowns, &TimeUnit::default())
     }
 
     const EVEN: [f64; 4] = [0.25; 4];

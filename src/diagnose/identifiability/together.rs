@@ -1,7 +1,7 @@
 //! Words for unknowns that are known only together: a common shift, a common factor, a ratio, a product.
 
 use crate::estimate::{Direction, Unknown, Warning, WarningCode};
-use crate::numeral::{number, percent};
+use crate::numeral::{number, percent, unit_after};
 
 /// Moves are the same if they differ by less than this part.
 const SAME: f64 = 0.02;
@@ -35,8 +35,8 @@ pub(super) fn together(moves: &[(String, f64)], left: f64, unknowns: &[Unknown])
     let part = |((unknown, _), by): (&(&Unknown, f64), &f64)| {
         let sign = if *by < 0.0 { '−' } else { '+' };
         let size = number(by.abs() / largest, 3);
-        let unit = if in_units { unknown.unit.as_str() } else { "%" };
-        format!("`{}` {sign}{size} {unit}", unknown.name).trim_end().to_owned()
+        let unit = unit_after(if in_units { &unknown.unit } else { "%" });
+        format!("`{}` {sign}{size}{unit}", unknown.name)
     };
     let steps = listed(moves.iter().zip(&sizes).map(part).collect());
     Some(match left > 0.0 {

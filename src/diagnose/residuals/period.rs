@@ -6,7 +6,7 @@
 
 use super::Series;
 use crate::diagnose::Test;
-use crate::numeral::resolved;
+use crate::numeral::{TimeUnit, resolved, unit_after};
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -70,7 +70,7 @@ fn gathered(power: &[f64], grid: usize, samples: usize, step: f64) -> Spectrum {
     spectrum
 }
 
-pub(super) fn find(residuals: &Series, step: f64) -> (Spectrum, Option<Period>, Test) {
+pub(super) fn find(residuals: &Series, step: f64, unit: &TimeUnit) -> (Spectrum, Option<Period>, Test) {
     let n = residuals.values.len();
     let mut spectrum: Vec<Complex<f64>> = residuals.values.iter().map(|&e| Complex::new(e, 0.0)).collect();
     let grid = n.next_power_of_two();
@@ -116,10 +116,12 @@ pub(super) fn find(residuals: &Series, step: f64) -> (Spectrum, Option<Period>, 
     let lines = (n as f64 * step).recip();
     let last_digit = 10.0 * lines;
     let failed = format!(
-        "the residuals repeat every {} s ({} Hz): look for what turns or switches at that rate (cogging, eccentricity, \
+        "the residuals repeat every {}{} ({} {}): look for what turns or switches at that rate (cogging, eccentricity, \
          sampling, mains) and model it, or leave it out with a pre-filter",
-        resolved(period.seconds, last_digit * period.seconds.powi(2)),
-        resolved(period.frequency, last_digit)
+        resolved(unit.convert(period.seconds), unit.convert(last_digit * period.seconds.powi(2))),
+        unit_after(unit.name()),
+        resolved(period.frequency, last_digit),
+        unit.frequency()
     );
     let test = Test::new("periodogram", excess, p_value, "no period stands out", &failed);
     (gathered(&power, grid, n, step), (!test.passed && k > 0).then_some(period), test)
@@ -179,7 +181,7 @@ mod tests {
         };
         let raw: Vec<f64> = (0..4096).map(|_| noise()).collect();
         let series = Series::new("y", "V", &raw);
-        let (spectrum, period, _) = find(&series, 0.01);
+        let (spectrum, period, _) = find(&series, 0.01, &TimeUnit::default());
         let width = 50.0 / BANDS as f64;
         let power: f64 = spectrum.density.iter().map(|density| density * width).sum();
         // The lines at zero and at 50 Hz are left out: two of 2048.
@@ -243,7 +245,7 @@ mod tests {
                 raw.push(low + amplitude * (TAU * (k * line) as f64 / samples as f64).sin());
             }
             let series = Series::new("y", "V", &raw);
-            let (_, period, test) = find(&series, 0.01);
+            let (_, period, test) = find(&series, 0.01, &TimeUnit::default());
             let power = |f: usize| {
                 let turn = |k: usize| -TAU * (f * k % samples) as f64 / samples as f64;
                 let term = |k: usize| Complex::from_polar(series.values[k], turn(k));
@@ -273,7 +275,7 @@ mod tests {
         let (samples, step, frequency) = (1024, 0.01, 12.3);
         let sine = |k: usize| 0.5 * (TAU * frequency * k as f64 * step + 0.4).sin();
         let raw: Vec<f64> = noise(samples).enumerate().map(|(k, e)| sine(k) + 1e-3 * e).collect();
-        let (spectrum, period, _) = find(&Series::new("y", "V", &raw), step);
+        let (spectrum, period, _) = find(&Series::new("y", "V", &raw), step, &TimeUnit::default());
         let period = period.unwrap();
         // Lines are 0.098 Hz apart; the top of the parabola is within a tenth of that. 12.3 Hz is 0.05 lines off one, which
         // takes sinc(0.05)^2, less than a hundredth.

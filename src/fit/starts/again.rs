@@ -1,9 +1,9 @@
 //! Searches from the minima that earlier ones found by a coarser method.
 
 use super::{Comparison, NoEnd, Run, Searches, begin, is_wide, minima};
+use crate::covariance::SearchEnd;
 use crate::error::Error;
 use crate::estimate::{FailedStart, Starts};
-use crate::judge::SearchEnd;
 use crate::problem::{Objective, Optimizer, each};
 use std::sync::Arc;
 

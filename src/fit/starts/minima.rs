@@ -1,8 +1,8 @@
 //! Which ends of searches are the same minimum, and which is the best.
 
 use super::NoEnd;
+use crate::covariance::{SearchEnd, in_null_directions};
 use crate::estimate::{FailedStart, Minimum, Starts};
-use crate::judge::{SearchEnd, in_null_directions};
 use crate::optimize::{LeastSquares, Linearization, Outcome};
 use crate::problem::{Noise, Objective, each, noise};
 

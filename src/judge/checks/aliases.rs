@@ -3,28 +3,23 @@
 //! Samples `h` apart of an oscillation at the frequency `w` are those of one at `2 pi/h - w`, too. What the inputs do between
 //! samples tells the two apart, but each of them has a minimum of its own, and a search ends in that on its side of `pi/h`.
 
-use crate::estimate::{Warning, WarningCode};
-use crate::judge::check::{Check, Level};
-use crate::judge::evidence::Evidence;
-use crate::judge::evidence::modes::{StateAt, eigenvalues, some};
-use crate::judge::evidence::residual_pass::residual_pass;
-use crate::numeral::number;
-use crate::optimize::Severity;
-use crate::problem::{Objective, Role};
+use super::*;
 use crate::record::{Record, Time, steps};
+use crate::residuals::modes::{StateAt, eigenvalues, some};
+use crate::residuals::residual_pass;
 use std::f64::consts::{PI, TAU};
 
-pub(crate) const ALIASES: Check = Check {
-    name: "oscillations are resolved",
-    asks: "Are there fewer than 2.5 samples a period of an oscillation that parameters within their bounds turn into its alias?",
-    codes: &[WarningCode::Aliased],
-    costs: &[],
-    levels: &[
-        Level { of: "samples a period", value: SAMPLES, source: "below it an alias is within a factor of 1.5" },
-        Level { of: "the amplitude that is left after a sample", value: LEFT, source: "a tenth shows" },
-    ],
-    examine: |evidence, _| aliased(evidence).into(),
-};
+pub(crate) const ALIASES: Check = Check::new(
+    "oscillations are resolved",
+    "Are there fewer than 2.5 samples a period of an oscillation that parameters within their bounds turn into \
+     its alias?",
+    &[WarningCode::Aliased],
+    |evidence, _| aliased(evidence).into(),
+)
+.levels(&[
+    level("samples a period", SAMPLES, "below it an alias is within a factor of 1.5"),
+    level("the amplitude that is left after a sample", LEFT, "a tenth shows"),
+]);
 
 /// An oscillation with fewer samples a period than this can be taken for its alias, whose frequency is then within a factor of 1.5.
 const SAMPLES: f64 = 2.5;
@@ -103,12 +98,14 @@ fn aliased(evidence: &Evidence<'_>) -> Option<Warning> {
     let compared = evidence.point.end.starts.is_some();
     let severity = if compared { Severity::Usable } else { Severity::UsableWithCare };
     let tried = if compared { "searches were started on both sides" } else { "no search was started there" };
+    let unit = evidence.point.objective.problem.records[0].time_unit();
+    let per = unit.angular_frequency();
     let text = format!(
-        "the model oscillates at {} rad/s, of which the samples, {} s apart, take {} a period: an oscillation at {} rad/s gives \
+        "the model oscillates at {} {per}, of which the samples, {} apart, take {} a period: an oscillation at {} {per} gives \
          the same samples, with other parameters ({tried}); sample faster, search from several starts (Fit::starts), or bound \
          `{name}`",
         number(frequency, 3),
-        number(interval, 3),
+        unit.say(interval, 3),
         number(TAU / (frequency * interval), 2),
         number(alias, 3)
     );

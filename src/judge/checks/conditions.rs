@@ -2,30 +2,28 @@
 //! slope changes the cost all the same. A limit that few samples reach is determined by those few; where it is beyond them all, the cost does
 //! not depend on it. The time of a switch changes the cost in steps.
 
-use crate::estimate::{Unknown, Warning, WarningCode};
-use crate::judge::check::{Check, Examined, Level, Pass};
+use super::*;
 use crate::judge::checks::curved::QUANTILE;
 use crate::judge::checks::rise::{Place, least_rise};
-use crate::judge::covariances::Covariances;
-use crate::judge::evidence::{Evidence, ROUND_OFF};
-use crate::numeral::percent;
-use crate::optimize::Severity;
-use crate::problem::Role;
 
-pub(crate) const CONDITIONS: Check = Check {
-    name: "intervals do not end at a condition",
-    asks: "For parameters in a condition of the model: does the cost rise towards the ends of the interval as the slopes say?",
-    codes: &[WarningCode::CurvedInterval],
-    costs: &[Pass::EachUnknown(4)],
-    levels: &[Level {
-        of: "the rise of the cost, in what the slopes say",
-        value: LITTLE,
-        source: "an interval by the likelihood is longer by the root of two",
-    }],
-    examine: |evidence, intervals| {
-        Examined::unless(skipped(evidence), || kinked(evidence, &intervals.unknowns, &intervals.covariances))
+pub(crate) const CONDITIONS: Check = Check::new(
+    "intervals do not end at a condition",
+    "For parameters in a condition of the model: does the cost rise towards the ends of the interval as the \
+     slopes say?",
+    &[WarningCode::CurvedInterval],
+    |evidence, intervals| {
+        let long = evidence.residuals.measured > LONGEST && evidence.point.objective.sweep.choosing().is_none();
+        let long = long.then_some("more than 5,000 measurements of a model that is not read as a graph");
+        Examined::unless(long, || kinked(evidence, &intervals.unknowns, &intervals.covariances))
     },
-};
+)
+.unless(&[Unless::RoundOff])
+.costs(&[Pass::EachUnknown(4)])
+.levels(&[level(
+    "the rise of the cost, in what the slopes say",
+    LITTLE,
+    "an interval by the likelihood is longer by the root of two",
+)]);
 
 /// Half widths of the interval at which the cost is compared: at its ends, and as far again, where a limit is beyond the few samples that
 /// reach it though an end is not.
@@ -39,12 +37,6 @@ const FACTORS: [f64; 4] = [0.5, 2.0, 0.8, 1.25];
 /// A cost that changes by more than this part of itself is another one.
 const CHANGED: f64 = 1e-9;
 
-/// Why conditions are not examined.
-fn skipped(evidence: &Evidence<'_>) -> Option<&'static str> {
-    let long = evidence.residuals.measured > LONGEST && evidence.point.objective.sweep.choosing().is_none();
-    let long = long.then_some("more than 5,000 measurements of a model that is not read as a graph");
-    (evidence.rounding || evidence.point.is_exact()).then_some(ROUND_OFF).or(long)
-}
 /// The parameter along which the cost rises least, relative to what its slopes say.
 fn kinked(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
     let choosing = evidence.point.objective.sweep.choosing();
@@ -64,7 +56,7 @@ fn kinked(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covarianc
         if choosing.is_some() { "depends" } else { "may depend" },
         percent(part.max(0.0), 2)
     );
-    Some(Warning { code: WarningCode::CurvedInterval, severity: Severity::UsableWithCare, text })
+    Some(with_care(WarningCode::CurvedInterval, text))
 }
 
 /// What conditions have to do with an unknown that has no slope: `None` where no condition depends on it, or none of a model that is not read

@@ -1,35 +1,25 @@
 //! Inputs that never move.
 
-use crate::estimate::{Warning, WarningCode};
-use crate::judge::check::{Check, Level, Pass};
-use crate::judge::checks::data::{constant, inspected, warning};
-use crate::judge::checks::sensors::growth_by_offsets;
-use crate::judge::evidence::Evidence;
-use crate::numeral::{exact, number};
-use crate::optimize::Severity;
-use crate::problem::Role;
+use super::*;
+use crate::covariance::directions::{taking_part, undetermined};
+use crate::judge::checks::data::{constant, inspected};
+use crate::judge::evidence::extended::Extended;
+use crate::judge::evidence::sensors::{KINDS, Kind};
 use crate::record::{Inspection, Record};
 use std::sync::Arc;
 
-pub(crate) const CONSTANT_INPUTS: Check = Check {
-    name: "inputs move",
-    asks: "Has an input one value throughout, and would a parameter that acts by way of it be far less known if each output might have an offset?",
-    codes: &[WarningCode::ConstantInput],
-    costs: &[Pass::Slopes(2)],
-    levels: &[
-        Level {
-            of: "the slopes of such a parameter without the input, in those with it",
-            value: NO_EFFECT,
-            source: "a tenth",
-        },
-        Level {
-            of: "its standard error with offsets, in that without",
-            value: REPLACED,
-            source: "a tenth of the information",
-        },
-    ],
-    examine: |evidence, _| constant_inputs(evidence, &inspected(evidence)).into(),
-};
+pub(crate) const CONSTANT_INPUTS: Check = Check::new(
+    "inputs move",
+    "Has an input one value throughout, and would a parameter that acts by way of it be far less known if each \
+     output might have an offset?",
+    &[WarningCode::ConstantInput],
+    |evidence, _| constant_inputs(evidence, &inspected(evidence)).into(),
+)
+.costs(&[Pass::Slopes(2)])
+.levels(&[
+    level("the slopes of such a parameter without the input, in those with it", NO_EFFECT, "a tenth"),
+    level("its standard error with offsets, in that without", REPLACED, "a tenth of the information"),
+]);
 
 /// A parameter whose slopes are below this part of themselves without an input acts by way of that input; one whose standard error is so many
 /// times larger where an output may have an offset can hardly be told from it.
@@ -45,7 +35,7 @@ fn constant_inputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Wa
     let acts = constant.iter().any(|(_, _, value)| *value != 0.0);
     let growth = if acts { growth_by_offsets(evidence) } else { None };
     let one = |&(i, input, value): &(usize, &crate::layout::Quantity, f64)| {
-        let is = format!("the input `{}` is {} {} throughout", input.name, exact(value), input.unit);
+        let is = format!("the input `{}` is {}{} throughout", input.name, exact(value), unit_after(&input.unit));
         let (severity, what) = match (value == 0.0, &growth) {
             (true, _) => (Severity::Usable, "what it does is not seen".to_owned()),
             (_, None) => (Severity::UsableWithCare, "what it drives may not be told from an offset".to_owned()),
@@ -62,7 +52,7 @@ fn constant_inputs(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Wa
                 )
             }
         };
-        Some(warning(WarningCode::ConstantInput, severity, format!("{is}: {what}; vary it")))
+        Some(Warning { code: WarningCode::ConstantInput, severity, text: format!("{is}: {what}; vary it") })
     };
     constant.iter().filter_map(one).collect()
 }
@@ -87,4 +77,26 @@ fn most_by_offsets<'j>(evidence: &'j Evidence<'_>, input: usize, growth: &[f64])
     let parameters =
         rows.filter(|(i, row)| matches!(row.role, Role::Parameter(_)) && growth[*i] > REPLACED && by_way(*i));
     parameters.map(|(i, row)| (row.name.as_str(), growth[i])).max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// By how much the standard error of each unknown grows where each output may have an offset; infinite where an offset then replaces it, one
+/// where it is held anyway. `None` where that is not examined.
+fn growth_by_offsets(evidence: &Evidence<'_>) -> Option<Vec<f64>> {
+    let extended = Extended::new(evidence)?;
+    let without = extended.held(None);
+    let mut with = without.clone();
+    for j in 0..evidence.point.objective.outputs() {
+        let number = j * KINDS + Kind::ALL.iter().position(|kind| *kind == Kind::Offset)?;
+        with[extended.place(number)] = false;
+    }
+    let found = undetermined(&extended.linear, &with);
+    let replaced: Vec<usize> =
+        found.directions.iter().flat_map(|direction| taking_part(direction)).map(|(place, _)| place).collect();
+    let (before, after) = (extended.linear.covariance(&without)?, extended.linear.covariance(&found.held)?);
+    let growth = |i: usize| match extended.place_of(i) {
+        place if without[place] => 1.0,
+        place if replaced.contains(&place) => f64::INFINITY,
+        place => after.standard_error(place) / before.standard_error(place),
+    };
+    Some((0..evidence.point.values.len()).map(growth).collect())
 }

@@ -1,20 +1,28 @@
-//! Columns that are copies of another one.
+//! Columns and records that are copies of another one.
 
-use crate::estimate::{Warning, WarningCode};
-use crate::judge::check::Check;
-use crate::judge::checks::data::{NAMED, moves, warning};
-use crate::judge::evidence::Evidence;
-use crate::optimize::Severity;
+use super::*;
+use crate::judge::checks::suspicions::NAMED;
 use crate::record::Record;
 
-pub(crate) const COPIES: Check = Check {
-    name: "no column is a copy",
-    asks: "Is an input or an output another column sample by sample, in all records?",
-    codes: &[WarningCode::IdenticalColumns],
-    costs: &[],
-    levels: &[],
-    examine: |evidence, _| copies(evidence).into(),
-};
+pub(crate) const COPIES: Check = Check::new(
+    "no column is a copy",
+    "Is an input or an output another column sample by sample, in all records?",
+    &[WarningCode::IdenticalColumns],
+    |evidence, _| copies(evidence).into(),
+);
+
+pub(crate) const TWICE: Check = Check::new(
+    "no record counts twice",
+    "Do two records hold the same measurements?",
+    &[WarningCode::Repeated],
+    |evidence, _| {
+        let more = evidence.point.objective.experiments() > COMPARED;
+        Examined::from(twice(evidence)).without(more.then_some("records beyond the first 300"))
+    },
+);
+
+/// Of so many records each is compared with each other.
+const COMPARED: usize = 300;
 
 /// The values of an input, or behind these of an output.
 fn column(record: &Record, i: usize) -> &[f64] {
@@ -27,11 +35,7 @@ fn copies(evidence: &Evidence<'_>) -> Vec<Warning> {
     let records = &evidence.point.objective.problem.records;
     let Some(first) = records.first() else { return vec![] };
     let (inputs, outputs) = (first.inputs().len(), first.outputs().len());
-    let same = |a: usize, b: usize| {
-        let equal = |(a, b): (&f64, &f64)| a == b || a.is_nan() && b.is_nan();
-        let pairs = || records.iter().map(|record| (column(record, a), column(record, b)));
-        pairs().all(|(a, b)| a.iter().zip(b.iter()).all(equal)) && pairs().any(|(a, _)| moves(a))
-    };
+    let same = |a: usize, b: usize| are_same(records.iter().map(|record| (column(record, a), column(record, b))));
     let name = |i: usize| match i.checked_sub(inputs) {
         None => format!("the input `{}`", first.inputs()[i].name),
         Some(j) => format!("the output `{}`", first.outputs()[j].name),
@@ -48,7 +52,50 @@ fn copies(evidence: &Evidence<'_>) -> Vec<Warning> {
             name(b),
             name(a)
         );
-        Some(warning(WarningCode::IdenticalColumns, Severity::UsableWithCare, text))
+        Some(with_care(WarningCode::IdenticalColumns, text))
     };
     (1..inputs + outputs).filter_map(one).take(NAMED).collect()
+}
+
+/// Whether two records hold the same measurements.
+fn twice(evidence: &Evidence<'_>) -> Option<Warning> {
+    let (records, labels) =
+        (&evidence.point.objective.problem.records, &evidence.point.objective.problem.unknowns.labels);
+    let same = |a: &Record, b: &Record| {
+        are_same(a.outputs().iter().zip(b.outputs()).map(|(a, b)| (&a.values[..], &b.values[..])))
+    };
+    let pairs = (1..records.len().min(COMPARED)).flat_map(|b| (0..b).map(move |a| (a, b)));
+    let (a, b) = pairs.into_iter().find(|&(a, b)| same(&records[a], &records[b]))?;
+    let text = format!(
+        "the experiments `{}` and `{}` hold the same measurements, which count twice: intervals are too narrow; leave one \
+         out",
+        labels[a], labels[b]
+    );
+    Some(with_care(WarningCode::Repeated, text))
+}
+
+/// Whether pairs of columns are the same, and any of them moves.
+fn are_same<'c>(mut pairs: impl Iterator<Item = (&'c [f64], &'c [f64])> + Clone) -> bool {
+    let equal = |(a, b): (&f64, &f64)| a == b || a.is_nan() && b.is_nan();
+    let all = pairs.clone().all(|(a, b)| a.len() == b.len() && a.iter().zip(b).all(equal));
+    all && pairs.any(|(a, _)| moves(a))
+}
+
+/// Whether measurements are not all the same.
+fn moves(values: &[f64]) -> bool {
+    let mut measured = values.iter().filter(|y| !y.is_nan());
+    let first = measured.next();
+    measured.any(|y| Some(y) != first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::moves;
+
+    #[test]
+    fn a_missing_measurement_is_no_movement() {
+        let nan = f64::NAN;
+        assert_eq!([&[][..], &[nan], &[3.0, nan, 3.0], &[nan, 3.0, 3.0]].map(moves), [false; 4]);
+        assert_eq!([&[3.0, 4.0][..], &[nan, 3.0, nan, 4.0], &[0.0, 0.0, 1.0]].map(moves), [true; 3]);
+    }
 }

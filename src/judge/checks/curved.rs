@@ -5,38 +5,32 @@
 //! slopes (the parameter-effects curvature of Bates and Watts, J. Royal Statistical Society B 42 (1980) 1, in that
 //! direction). The ends of the profile's interval solve `t + t^2/2 a_i / s_i = -+z`; those of the linear one are `-+z`.
 
-use crate::estimate::{Unknown, WarningCode};
-use crate::judge::check::{Check, Examined, Level, Pass, with_care};
+use super::*;
 use crate::judge::checks::rise::{Place, least_rise};
-use crate::judge::covariances::Covariances;
-use crate::judge::evidence::{Evidence, ROUND_OFF};
-use crate::numeral::{number, percent};
 use crate::parameter::Transform;
-use crate::problem::Role;
 use crate::sweep::Coupling;
 
-pub(crate) const CURVED: Check = Check {
-    name: "intervals may be symmetric",
-    asks: "Of unknowns of which curvature is expected: by how much do the ends of the interval move by the curvature along it (Bates and Watts 1980), and does the cost rise towards them as the slopes say?",
-    codes: &[WarningCode::CurvedInterval],
-    costs: &[Pass::EachUnknown(1)],
-    levels: &[
-        Level {
-            of: "the expected curvature of an unknown that is examined",
-            value: SMALL,
-            source: "a standard error of 15 %",
-        },
-        Level { of: "the part of the half width by which an end moves", value: ASYMMETRY, source: "a quarter" },
-        Level {
-            of: "the rise of the cost at the end, in what the slopes say",
-            value: FLAT[0].1,
-            source: "an interval by the likelihood is longer by the root of two",
-        },
-    ],
-    examine: |evidence, intervals| {
-        Examined::unless(skipped(evidence), || curved(evidence, &intervals.unknowns, &intervals.covariances))
+pub(crate) const CURVED: Check = Check::new(
+    "intervals may be symmetric",
+    "Of unknowns of which curvature is expected: by how much do the ends of the interval move by the curvature \
+     along it (Bates and Watts 1980), and does the cost rise towards them as the slopes say?",
+    &[WarningCode::CurvedInterval],
+    |evidence, intervals| {
+        let long = (evidence.residuals.measured > LONGEST).then_some("more than 200,000 measurements");
+        Examined::unless(long, || curved(evidence, &intervals.unknowns, &intervals.covariances))
     },
-};
+)
+.unless(&[Unless::RoundOff, Unless::Variances])
+.costs(&[Pass::EachUnknown(1)])
+.levels(&[
+    level("the expected curvature of an unknown that is examined", SMALL, "a standard error of 15 %"),
+    level("the part of the half width by which an end moves", ASYMMETRY, "a quarter"),
+    level(
+        "the rise of the cost at the end, in what the slopes say",
+        FLAT[0].1,
+        "an interval by the likelihood is longer by the root of two",
+    ),
+]);
 
 /// Unknowns of which a smaller curvature is to be expected are not examined: two passes over the data each. It is reached by a standard
 /// error of 15 % of an unknown that no other replaces, and by smaller ones of unknowns that replace each other.
@@ -52,15 +46,6 @@ const ASYMMETRY: f64 = 0.25;
 const FLAT: [(f64, f64); 4] = [(-1.0, 0.5), (1.0, 0.5), (-2.0, 0.25), (2.0, 0.25)];
 /// Quantile of the normal distribution for an interval of 95 %.
 pub(crate) const QUANTILE: f64 = 1.96;
-
-/// Why curvature is not examined.
-fn skipped(evidence: &Evidence<'_>) -> Option<&'static str> {
-    match () {
-        _ if evidence.rounding || evidence.point.is_exact() => Some(ROUND_OFF),
-        _ if evidence.point.objective.sweep.predicts_variance() => Some("variances are predicted"),
-        _ => (evidence.residuals.measured > LONGEST).then_some("more than 200,000 measurements"),
-    }
-}
 
 /// The unknown whose interval is bent most, if that matters.
 fn curved(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Examined {

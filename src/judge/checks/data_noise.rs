@@ -6,54 +6,45 @@
 //! Stefanski, J. American Statistical Association 89 (1994) 1314). One Gauss-Newton step measures it, as the mean of noise
 //! added and subtracted, in which all but the second order cancels.
 
+use super::*;
 use crate::error::Error;
-use crate::estimate::{Unknown, Warning, WarningCode};
-use crate::judge::check::{Check, Level, Pass};
 use crate::judge::checks::feedback::Feedback;
 use crate::judge::checks::restarts;
-use crate::judge::evidence::Evidence;
-use crate::numeral::{number, p_value, percent};
-use crate::optimize::Severity;
 use crate::problem::Problem;
 use crate::random::Random;
 use crate::record::{Channel, Record};
 use statrs::distribution::{ContinuousCDF, Normal};
 
-pub(crate) const RESTARTS: Check = Check {
-    name: "measured states are without noise",
-    asks: "Where predictions restart: how far does noise move an unknown (simulation and extrapolation, Cook and Stefanski 1994) that errors a horizon apart show by a negative correlation beside all unknowns (Breusch 1978, Godfrey 1978), or do not exclude?",
-    codes: &[WarningCode::RestartNoise],
-    costs: &[Pass::Slopes(9)],
-    levels: &[
-        Level { of: "the probability by chance", value: LEVEL, source: "one good record in a hundred" },
-        Level { of: "the bias of care, in standard errors", value: NO_BIAS, source: "a tenth" },
-        Level {
-            of: "standard errors of the correlation that noise may hide in",
-            value: POSSIBLE,
-            source: "one-sided 95 %",
-        },
-        Level {
-            of: "the bias of care by noise that is not excluded",
-            value: NOT_EXCLUDED,
-            source: "0.24 or more in 20 records whose noise is half of what disturbs the plant, 0.11 or less in 20 without noise",
-        },
-        Level { of: "the bias that is not usable", value: BIAS, source: "a quarter: intervals of 95 % cover 94 %" },
-    ],
-    examine: |evidence, intervals| restart_noise(evidence, &intervals.unknowns).into(),
-};
+pub(crate) const RESTARTS: Check = Check::new(
+    "measured states are without noise",
+    "Where predictions restart: how far does noise move an unknown (simulation and extrapolation, Cook and \
+     Stefanski 1994) that errors a horizon apart show by a negative correlation beside all unknowns (Breusch \
+     1978, Godfrey 1978), or do not exclude?",
+    &[WarningCode::RestartNoise],
+    |evidence, intervals| restart_noise(evidence, &intervals.unknowns).into(),
+)
+.costs(&[Pass::Slopes(9)])
+.levels(&[
+    level("the probability by chance", LEVEL, "one good record in a hundred"),
+    level("the bias of care, in standard errors", NO_BIAS, "a tenth"),
+    level("standard errors of the correlation that noise may hide in", POSSIBLE, "one-sided 95 %"),
+    level(
+        "the bias of care by noise that is not excluded",
+        NOT_EXCLUDED,
+        "0.24 or more in 20 records whose noise is half of what disturbs the plant, 0.11 or less in 20 without \
+         noise",
+    ),
+    level("the bias that is not usable", BIAS, "a quarter: intervals of 95 % cover 94 %"),
+]);
 
-pub(crate) const INPUT_NOISE: Check = Check {
-    name: "noise of the inputs moves nothing",
-    asks: "How far does the noise that was declared for the inputs move an unknown, by the same?",
-    codes: &[WarningCode::InputNoise],
-    costs: &[Pass::Slopes(8)],
-    levels: &[Level {
-        of: "the bias, in standard errors",
-        value: BIAS,
-        source: "a quarter: intervals of 95 % cover 94 %",
-    }],
-    examine: |evidence, intervals| input_noise(evidence, &intervals.unknowns).into(),
-};
+pub(crate) const INPUT_NOISE: Check = Check::new(
+    "noise of the inputs moves nothing",
+    "How far does the noise that was declared for the inputs move an unknown, by the same?",
+    &[WarningCode::InputNoise],
+    |evidence, intervals| input_noise(evidence, &intervals.unknowns).into(),
+)
+.costs(&[Pass::Slopes(8)])
+.levels(&[level("the bias, in standard errors", BIAS, "a quarter: intervals of 95 % cover 94 %")]);
 
 /// Draws of noise, each added and subtracted.
 const DRAWS: u64 = 4;
@@ -139,16 +130,16 @@ fn restart_noise(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warnin
             (0..sigma.len()).max_by(|&a, &b| (sigma[a] / outputs[a].rmse).total_cmp(&(sigma[b] / outputs[b].rmse)))?;
         let output = &problem.layout().outputs[j];
         let text = format!(
-            "predictions restart from measured states as if these were exact: the errors do not exclude noise of up to {} {} in `{}`, which \
+            "predictions restart from measured states as if these were exact: the errors do not exclude noise of up to {}{} in `{}`, which \
              would bias `{}` by {} standard errors; use Kalman with Model::noise, filter the restarts (Horizon::filtered), or take a longer \
              horizon",
             number(sigma[j], 2),
-            output.unit,
+            unit_after(&output.unit),
             output.name,
             unknown.name,
             number(errors, 2)
         );
-        return Some(Warning { code: WarningCode::RestartNoise, severity: Severity::UsableWithCare, text });
+        return Some(with_care(WarningCode::RestartNoise, text));
     }
     let severity = if errors > BIAS { Severity::NotUsable } else { Severity::UsableWithCare };
     let also = match feedback.names(problem.layout()) {
@@ -183,15 +174,15 @@ fn input_noise(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning>
         return None;
     }
     let text = format!(
-        "the noise declared for the inputs biases `{}` by about {} {} ({} of it, {} standard errors), which no interval \
+        "the noise declared for the inputs biases `{}` by about {}{} ({} of it, {} standard errors), which no interval \
          allows for; measure the inputs better, filter record and outputs alike, or average over periods",
         unknown.name,
         number(change, 2),
-        unknown.unit,
+        unit_after(&unknown.unit),
         percent((change / unknown.value).abs(), 2),
         number(errors, 2)
     );
-    Some(Warning { code: WarningCode::InputNoise, severity: Severity::UsableWithCare, text })
+    Some(with_care(WarningCode::InputNoise, text))
 }
 
 /// The channels with Gaussian noise of these standard deviations, times a sign.

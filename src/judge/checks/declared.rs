@@ -1,65 +1,54 @@
 //! Warnings about what was declared: times, initial states, bounds, signs; and what the data do not determine of it.
 
-use crate::estimate::{Direction, Knowledge, Unknown, Warning, WarningCode};
-use crate::judge::check::{Check, Pass, with_care};
+use super::*;
+use crate::estimate::Direction;
 use crate::judge::checks::conditions;
-use crate::judge::evidence::Evidence;
 use crate::layout::Kind;
-use crate::numeral::{counted, exact, number};
-use crate::optimize::Severity;
 use crate::parameter::Transform;
 use crate::problem::Free;
 
-pub(crate) const GAPS: Check = Check {
-    name: "time has no gaps",
-    asks: "Does time jump within a record whose inputs are held meanwhile?",
-    codes: &[WarningCode::TimeGaps],
-    costs: &[],
-    levels: &[],
-    examine: |evidence, _| gaps(evidence).into(),
-};
+pub(crate) const GAPS: Check = Check::new(
+    "time has no gaps",
+    "Does time jump within a record whose inputs are held meanwhile?",
+    &[WarningCode::TimeGaps],
+    |evidence, _| gaps(evidence).into(),
+);
 
-pub(crate) const GUESSED: Check = Check {
-    name: "initial states have a start",
-    asks: "Does neither the user nor an output give a start for an initial state?",
-    codes: &[WarningCode::GuessedStart],
-    costs: &[],
-    levels: &[],
-    examine: |evidence, _| guessed_starts(evidence).into(),
-};
+pub(crate) const GUESSED: Check = Check::new(
+    "initial states have a start",
+    "Does neither the user nor an output give a start for an initial state?",
+    &[WarningCode::GuessedStart],
+    |evidence, _| guessed_starts(evidence).into(),
+);
 
-pub(crate) const HELD: Check = Check {
-    name: "no unknown is at a bound",
-    asks: "Is an unknown held at a bound, beyond which the cost falls?",
-    codes: &[WarningCode::HeldAtBound],
-    costs: &[],
-    levels: &[],
-    examine: |_, intervals| held_at_bound(&intervals.unknowns).into(),
-};
+pub(crate) const HELD: Check = Check::new(
+    "no unknown is at a bound",
+    "Is an unknown held at a bound, beyond which the cost falls?",
+    &[WarningCode::HeldAtBound],
+    |_, intervals| held_at_bound(&intervals.unknowns).into(),
+);
 
-pub(crate) const POSITIVE: Check = Check {
-    name: "positive parameters are positive",
-    asks: "Is a parameter that was declared positive zero or below?",
-    codes: &[WarningCode::NotPositive],
-    costs: &[],
-    levels: &[],
-    examine: |evidence, intervals| not_positive(evidence, &intervals.unknowns).into(),
-};
+pub(crate) const POSITIVE: Check = Check::new(
+    "positive parameters are positive",
+    "Is a parameter that was declared positive zero or below?",
+    &[WarningCode::NotPositive],
+    |evidence, intervals| not_positive(evidence, &intervals.unknowns).into(),
+);
 
-pub(crate) const IDENTIFIED: Check = Check {
-    name: "all unknowns are identified",
-    asks: "Along which directions of the unknowns do the data say nothing, by the singular values of the slopes? Does a parameter without slope change the cost in steps?",
-    codes: &[WarningCode::Unidentified],
-    costs: &[Pass::EachUnknown(6)],
-    levels: &[],
-    examine: |evidence, intervals| {
+pub(crate) const IDENTIFIED: Check = Check::new(
+    "all unknowns are identified",
+    "Along which directions of the unknowns do the data say nothing, by the singular values of the slopes? Does a \
+     parameter without slope change the cost in steps?",
+    &[WarningCode::Unidentified],
+    |evidence, intervals| {
         let directions = evidence.point.undetermined.directions.iter().zip(&intervals.directions);
         let one = |(entries, named): (&Vec<(usize, f64)>, &Direction)| {
             without_influence(evidence, entries, named, &intervals.unknowns)
         };
         directions.map(one).collect::<Vec<_>>().into()
     },
-};
+)
+.costs(&[Pass::EachUnknown(6)]);
 
 /// Guessed initial states that are named; more are counted.
 const NAMED: usize = 4;
@@ -69,17 +58,17 @@ fn held_at_bound(unknowns: &[Unknown]) -> Vec<Warning> {
     let mut warnings = vec![];
     for unknown in unknowns {
         if let Knowledge::Held { bound, end } = unknown.knowledge {
-            let Unknown { name, unit, .. } = unknown;
+            let (name, unit) = (&unknown.name, unit_after(&unknown.unit));
             let place = match (unknown.transform, bound) {
                 (Transform::Log, 0.0) => {
                     "is held where it changes nothing: its logarithm has no minimum, the cost falls towards zero"
                         .to_owned()
                 }
-                _ => format!("is held at its bound {} {unit}: the cost falls beyond it", exact(bound)),
+                _ => format!("is held at its bound {}{unit}: the cost falls beyond it", exact(bound)),
             };
             let reaches = match end {
                 Some(end) => {
-                    format!("; its 95 % interval reaches from {} to {} {unit}", exact(bound), number(end, 3))
+                    format!("; its 95 % interval reaches from {} to {}{unit}", exact(bound), number(end, 3))
                 }
                 None => String::new(),
             };
@@ -101,9 +90,9 @@ fn not_positive(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
             }
             false => "model and record contradict each other; check units, signs and the hold of the inputs",
         };
-        let (value, unit) = (number(unknown.value, 4), &unknown.unit);
-        let text = format!("`{}` is {value} {unit}, but was declared positive: {means}", unknown.name);
-        Warning { code: WarningCode::NotPositive, severity: Severity::NotUsable, text }
+        let (value, unit) = (number(unknown.value, 4), unit_after(&unknown.unit));
+        let text = format!("`{}` is {value}{unit}, but was declared positive: {means}", unknown.name);
+        not_usable(WarningCode::NotPositive, text)
     };
     wrong.map(warning).collect()
 }
@@ -121,7 +110,7 @@ fn without_influence(
         let text = format!(
             "`{name}` has died out before the first measurement: it is not known, and no other unknown depends on it"
         );
-        return Warning { code: WarningCode::Unidentified, severity: Severity::Usable, text };
+        return note(WarningCode::Unidentified, text);
     }
     if let [(i, _)] = entries
         && let Some(what) = conditions::without_slope(evidence, *i)
@@ -144,7 +133,7 @@ fn guessed_starts(evidence: &Evidence<'_>) -> Option<Warning> {
         names.join(", "),
         exact(first.parameter.start)
     );
-    Some(Warning { code: WarningCode::GuessedStart, severity: Severity::Usable, text })
+    Some(note(WarningCode::GuessedStart, text))
 }
 
 fn gaps(evidence: &Evidence<'_>) -> Vec<Warning> {

@@ -1,9 +1,6 @@
 //! Whether single measurements are missing and the one before stands in their place.
 
-use crate::estimate::{Warning, WarningCode};
-use crate::judge::check::with_care;
-use crate::judge::evidence::Evidence;
-use crate::numeral::{number, percent};
+use super::*;
 
 /// The fewest measurements that are equal to the one before, and the part of them all, that are looked at.
 const FEWEST: usize = 4;
@@ -59,13 +56,13 @@ pub(crate) fn dropouts_of(evidence: &Evidence<'_>, j: usize, errors: &[Vec<Optio
     are_larger(held, others).then(|| {
         let output = &problem.layout().outputs[j];
         let text = format!(
-            "{} of the measurements of `{}` are equal to the one before, and the model differs there by {} {unit}, elsewhere by \
-             {} {unit}: the last value was held where none arrived; mark these samples as missing",
+            "{} of the measurements of `{}` are equal to the one before, and the model differs there by {}{unit}, elsewhere by \
+             {}{unit}: the last value was held where none arrived; mark these samples as missing",
             percent(held.count as f64 / (held.count + others.count) as f64, 2),
             output.name,
             number(held.mean().sqrt(), 2),
             number(others.mean().sqrt(), 2),
-            unit = output.unit
+            unit = unit_after(&output.unit)
         );
         with_care(WarningCode::Frozen, text)
     })

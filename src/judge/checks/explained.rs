@@ -1,43 +1,36 @@
 //! Warnings about outputs that the model does not explain, and about a given noise that the errors contradict.
 
-use crate::estimate::{CovarianceMethod, Warning, WarningCode};
-use crate::judge::check::{Check, Level};
-use crate::judge::evidence::Evidence;
-use crate::numeral::{fit, number};
-use crate::optimize::Severity;
+use super::*;
+use crate::estimate::CovarianceMethod;
+use crate::numeral::fit;
 use crate::problem::Noise;
 use crate::whiteness::chi_squared_tail;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-pub(crate) const UNEXPLAINED: Check = Check {
-    name: "the model explains its outputs",
-    asks: "Is the sum of squares smaller than that about the mean of the output, by Fisher's test with as many measurements as are independent?",
-    codes: &[WarningCode::Unexplained],
-    costs: &[],
-    levels: &[
-        Level { of: "the probability by chance", value: LEVEL, source: "one good output in a thousand" },
-        Level { of: "the fit (%) that explains nothing, whatever its significance", value: LITTLE, source: "5 %" },
-    ],
-    examine: |evidence, _| unexplained(evidence).into(),
-};
+pub(crate) const UNEXPLAINED: Check = Check::new(
+    "the model explains its outputs",
+    "Is the sum of squares smaller than that about the mean of the output, by Fisher's test with as many \
+     measurements as are independent?",
+    &[WarningCode::Unexplained],
+    |evidence, _| unexplained(evidence).into(),
+)
+.levels(&[
+    level("the probability by chance", LEVEL, "one good output in a thousand"),
+    level("the fit (%) that explains nothing, whatever its significance", LITTLE, "5 %"),
+]);
 
-pub(crate) const GIVEN_NOISE: Check = Check {
-    name: "the given noise is that of the errors",
-    asks: "Are the errors of the size that was given, by chi-squared with as many errors as are independent?",
-    codes: &[WarningCode::GivenNoise],
-    costs: &[],
-    levels: &[
-        Level { of: "the probability by chance", value: LEVEL, source: "one good output in a thousand" },
-        Level {
-            of: "the ratio from which on intervals are too narrow",
-            value: NARROW,
-            source: "they cover 90 % or less",
-        },
-        Level { of: "the ratio of care", value: DIFFERENT, source: "twice or half" },
-        Level { of: "the ratio beyond which intervals mean nothing", value: FAR, source: "ten times" },
-    ],
-    examine: |evidence, intervals| given_noise(evidence, intervals.covariances.method).into(),
-};
+pub(crate) const GIVEN_NOISE: Check = Check::new(
+    "the given noise is that of the errors",
+    "Are the errors of the size that was given, by chi-squared with as many errors as are independent?",
+    &[WarningCode::GivenNoise],
+    |evidence, intervals| given_noise(evidence, intervals.covariances.method).into(),
+)
+.levels(&[
+    level("the probability by chance", LEVEL, "one good output in a thousand"),
+    level("the ratio from which on intervals are too narrow", NARROW, "they cover 90 % or less"),
+    level("the ratio of care", DIFFERENT, "twice or half"),
+    level("the ratio beyond which intervals mean nothing", FAR, "ten times"),
+]);
 
 /// Level of the tests against the mean and of a given noise.
 const LEVEL: f64 = 1e-3;
@@ -133,12 +126,12 @@ fn given_noise(evidence: &Evidence<'_>, method: CovarianceMethod) -> Vec<Warning
             _ => "intervals are by the errors",
         };
         let text = format!(
-            "the noise of `{}` was given as {} {unit}, but the errors are {} {unit} (rms): {intervals}; leave the noise out to \
+            "the noise of `{}` was given as {}{unit}, but the errors are {}{unit} (rms): {intervals}; leave the noise out to \
              have it estimated",
             output.name,
             number(sigma[j], 3),
             number(found.rmse, 3),
-            unit = output.unit
+            unit = unit_after(&output.unit)
         );
         Some(Warning { code: WarningCode::GivenNoise, severity, text })
     };

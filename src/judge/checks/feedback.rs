@@ -3,20 +3,18 @@
 //! Each input is regressed on the prediction errors of the same sample, after the inputs and measurements of the samples before. A
 //! significant coefficient is the gain of a controller that acts without delay (instantaneous causality: Granger, Econometrica 37 (1969) 424).
 
+use super::*;
 use crate::estimate::student::quantile;
-use crate::information::{Block, Information};
-use crate::judge::evidence::Evidence;
-use crate::judge::evidence::first_errors::errors;
+use crate::information::{Gathering, Information};
 use crate::layout::Layout;
 use crate::problem::Problem;
 use crate::record::{Channel, Record};
+use crate::residuals::first_errors::errors;
 
 /// Samples before that are regressors, too: two tell level and trend of an input.
 const BEFORE: usize = 2;
 /// Significance level of a gain; one that is not significant counts as zero.
 const LEVEL: f64 = 0.01;
-/// Rows that are absorbed together.
-const ROWS: usize = 256;
 
 /// By how much each input follows the measurement of each output, at the same sample.
 pub(crate) struct Feedback {
@@ -30,20 +28,19 @@ impl Feedback {
         let problem = evidence.point.objective.problem;
         let (inputs, outputs) = (problem.layout().inputs.len(), evidence.point.objective.outputs());
         let controls = 1 + BEFORE * (inputs + outputs);
-        let mut found = vec![Information::new(controls + outputs); inputs];
+        let mut found: Vec<Gathering> = (0..inputs).map(|_| Gathering::new(controls + outputs)).collect();
         for (record, errors) in problem.records.iter().zip(&evidence.residuals.first_errors) {
             let rows = (BEFORE..errors[0].len()).filter_map(|k| {
                 let now: Option<Vec<f64>> = errors.iter().map(|errors| errors[k]).collect();
                 Some((k, [before(record, k), now?].concat()))
             });
             let rows: Vec<_> = rows.filter(|(_, row)| row.iter().all(|value| value.is_finite())).collect();
-            for (information, input) in found.iter_mut().zip(record.inputs.iter()) {
-                let mut block = Block::new(controls + outputs, ROWS);
-                rows.iter().for_each(|(k, row)| information.gather(&mut block, row, input.values[*k]));
-                information.absorb(&mut block);
+            for (found, input) in found.iter_mut().zip(record.inputs.iter()) {
+                rows.iter().for_each(|(k, row)| found.take(row, input.values[*k]));
             }
         }
-        let gains = found.iter().map(|all| significant(&all.eliminate(controls), controls)).collect();
+        let gains = |all: Gathering| significant(&all.triangle().eliminate(controls), controls);
+        let gains = found.into_iter().map(gains).collect();
         Feedback { gains }
     }
 

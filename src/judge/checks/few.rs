@@ -1,57 +1,36 @@
 //! Warnings about unknowns whose intervals rest on one or two measurements.
 
-use crate::estimate::{CovarianceMethod, Unknown, Warning, WarningCode};
-use crate::judge::check::{Check, Examined, Level, Pass};
-use crate::judge::covariances::Covariances;
+use super::*;
+use crate::covariance::shares::{DECIDES, Share, part};
+use crate::estimate::CovarianceMethod;
 use crate::judge::evidence::rows::{Asked, rows};
-use crate::judge::evidence::shares::{DECIDES, Share, part};
-use crate::judge::evidence::{Evidence, PREFILTER, ROUND_OFF};
-use crate::judge::intervals::Intervals;
-use crate::numeral::{exact, percent};
-use crate::optimize::Severity;
-use crate::problem::Role;
 
-pub(crate) const DECIDED: Check = Check {
-    name: "no measurement decides an interval",
-    asks: "Does one measurement, or do two together, make most of the variance of an unknown?",
-    codes: &[WarningCode::DecidedByFew],
-    costs: &[Pass::Rows],
-    levels: &[Level { of: "the part of the variance", value: DECIDES, source: "nine tenths" }],
-    examine: |evidence, intervals| {
-        Examined::unless(skipped(evidence, intervals), || {
+pub(crate) const DECIDED: Check = Check::new(
+    "no measurement decides an interval",
+    "Does one measurement, or do two together, make most of the variance of an unknown?",
+    &[WarningCode::DecidedByFew],
+    |evidence, intervals| {
+        let long = intervals.covariances.shares.is_none() && evidence.residuals.measured > MOST;
+        Examined::unless(long.then_some("more than 200 measurements"), || {
             decided_by_few(evidence, &intervals.unknowns, &intervals.covariances)
         })
     },
-};
+)
+.unless(&[Unless::Prefilter, Unless::RoundOff, Unless::Variances])
+.costs(&[Pass::Rows])
+.levels(&[level("the part of the variance", DECIDES, "nine tenths")]);
 
 /// Fits of more measurements are not examined if that takes a pass of its own.
 const MOST: u64 = 200;
-
-/// Why that is not examined.
-fn skipped(evidence: &Evidence<'_>, intervals: &Intervals) -> Option<&'static str> {
-    let objective = evidence.point.objective;
-    let long = intervals.covariances.shares.is_none() && evidence.residuals.measured > MOST;
-    match () {
-        _ if objective.problem.settings.prefilter.is_some() => Some(PREFILTER),
-        _ if evidence.rounding || evidence.point.is_exact() => Some(ROUND_OFF),
-        _ if objective.sweep.predicts_variance() => Some("variances are predicted"),
-        _ => long.then_some("more than 200 measurements"),
-    }
-}
 
 /// The unknown whose interval rests most on one or two measurements: a parameter, or with a sandwich any.
 fn decided_by_few(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covariances) -> Option<Warning> {
     let examined;
     let largest = match (&covariances.shares, evidence.unit()) {
         (Some(largest), _) => largest,
-        (None, Some(unit)) if evidence.residuals.measured <= MOST => {
-            examined = rows(
-                evidence.point.objective,
-                &evidence.point.end.coordinates,
-                Asked { shares: Some(unit), ..Asked::default() },
-            )
-            .shares?
-            .0;
+        (None, Some(unit)) => {
+            let asked = Asked { shares: Some(unit), ..Asked::default() };
+            (examined, _) = rows(evidence.point.objective, &evidence.point.end.coordinates, asked).shares?;
             &examined
         }
         _ => return None,
@@ -72,7 +51,7 @@ fn decided_by_few(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &C
         percent(part(shares), 2),
         places(evidence, shares)
     );
-    Some(Warning { code: WarningCode::DecidedByFew, severity: Severity::Usable, text })
+    Some(note(WarningCode::DecidedByFew, text))
 }
 
 /// Outputs, times and experiments of measurements.
@@ -80,9 +59,9 @@ fn places(evidence: &Evidence<'_>, shares: &[Share]) -> String {
     let problem = evidence.point.objective.problem;
     let place = |share: &Share| {
         format!(
-            "`{}` at t = {} s of `{}`",
+            "`{}` at t = {} of `{}`",
             problem.layout().outputs[share.output].name,
-            exact(problem.records[share.experiment].time(share.sample)),
+            problem.records[share.experiment].moment(share.sample),
             problem.unknowns.labels[share.experiment]
         )
     };

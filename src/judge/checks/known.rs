@@ -1,70 +1,55 @@
 //! Warnings about what is known of the parameters: standard errors that are none, intervals that hold zero, signs and
 //! sizes that are not those of the start.
 
+use super::*;
 use crate::estimate::student::quantile;
-use crate::estimate::{Knowledge, Unknown, Warning, WarningCode};
-use crate::judge::check::{Check, Level, with_care};
-use crate::judge::covariances::{Covariances, is_error};
-use crate::judge::evidence::Evidence;
-use crate::numeral::{exact, number};
-use crate::optimize::Severity;
+use crate::judge::covariances::is_error;
 use crate::parameter::{Prior, Transform};
-use crate::problem::{Free, Role};
+use crate::problem::Free;
 
-pub(crate) const NO_ERROR: Check = Check {
-    name: "standard errors are numbers",
-    asks: "Is a standard error zero, infinite or no number?",
-    codes: &[WarningCode::NoStandardError],
-    costs: &[],
-    levels: &[],
-    examine: |evidence, intervals| without_error(evidence, &intervals.unknowns, &intervals.covariances).into(),
-};
+pub(crate) const NO_ERROR: Check = Check::new(
+    "standard errors are numbers",
+    "Is a standard error zero, infinite or no number?",
+    &[WarningCode::NoStandardError],
+    |evidence, intervals| without_error(evidence, &intervals.unknowns, &intervals.covariances).into(),
+);
 
-pub(crate) const ZERO: Check = Check {
-    name: "parameters are told from zero",
-    asks: "Is an interval wider than its value? Not usable where it is so for all parameters.",
-    codes: &[WarningCode::HoldsZero],
-    costs: &[],
-    levels: &[],
-    examine: |evidence, intervals| near_zero(evidence, &intervals.unknowns).into(),
-};
+pub(crate) const ZERO: Check = Check::new(
+    "parameters are told from zero",
+    "Is an interval wider than its value? Not usable where it is so for all parameters.",
+    &[WarningCode::HoldsZero],
+    |evidence, intervals| near_zero(evidence, &intervals.unknowns).into(),
+);
 
-pub(crate) const PRIORS: Check = Check {
-    name: "the data agree with the priors",
-    asks: "Is the estimate as far from the mean of its prior as chance allows (Hausman 1978)?",
-    codes: &[WarningCode::PriorContradicts],
-    costs: &[],
-    levels: &[
-        Level { of: "the distance of care, in standard deviations", value: UNLIKELY, source: "one in a thousand" },
-        Level { of: "the distance that is not usable", value: CONTRADICTS, source: "one in two million" },
-    ],
-    examine: |evidence, intervals| against_priors(evidence, &intervals.unknowns).into(),
-};
+pub(crate) const PRIORS: Check = Check::new(
+    "the data agree with the priors",
+    "Is the estimate as far from the mean of its prior as chance allows (Hausman 1978)?",
+    &[WarningCode::PriorContradicts],
+    |evidence, intervals| against_priors(evidence, &intervals.unknowns).into(),
+)
+.levels(&[
+    level("the distance of care, in standard deviations", UNLIKELY, "one in a thousand"),
+    level("the distance that is not usable", CONTRADICTS, "one in two million"),
+]);
 
-pub(crate) const SIGNS: Check = Check {
-    name: "parameters have the sign of their start",
-    asks: "Has a parameter that is told from zero the opposite sign of its start?",
-    codes: &[WarningCode::SignChanged],
-    costs: &[],
-    levels: &[],
-    examine: |_, intervals| opposite(&intervals.unknowns).into(),
-};
+pub(crate) const SIGNS: Check = Check::new(
+    "parameters have the sign of their start",
+    "Has a parameter that is told from zero the opposite sign of its start?",
+    &[WarningCode::SignChanged],
+    |_, intervals| opposite(&intervals.unknowns).into(),
+);
 
-pub(crate) const SIZES: Check = Check {
-    name: "parameters are of the size of their start",
-    asks: "Is a parameter so many times its start, or one such part of it, that a unit is another, or that the search ran away along a direction that the data do not determine?",
-    codes: &[WarningCode::FarFromStart],
-    costs: &[],
-    levels: &[
-        Level { of: "the ratio", value: ANOTHER_UNIT, source: "beyond 360 degrees in a turn, below 1,000" },
-        Level {
-            of: "the ratio of a parameter that is not determined, which is not usable",
-            value: RUN_AWAY,
-            source: "no start is that far off",
-        },
-    ],
-    examine: |_, intervals| far_from_start(&intervals.unknowns).into(),
-};
+pub(crate) const SIZES: Check = Check::new(
+    "parameters are of the size of their start",
+    "Is a parameter so many times its start, or one such part of it, that a unit is another, or that the search \
+     ran away along a direction that the data do not determine?",
+    &[WarningCode::FarFromStart],
+    |_, intervals| far_from_start(&intervals.unknowns).into(),
+)
+.levels(&[
+    level("the ratio", ANOTHER_UNIT, "beyond 360 degrees in a turn, below 1,000"),
+    level("the ratio of a parameter that is not determined, which is not usable", RUN_AWAY, "no start is that far off"),
+]);
 
 /// A parameter so many times its start, or one such part of it, is in another unit.
 const ANOTHER_UNIT: f64 = 400.0;
@@ -111,7 +96,7 @@ fn without_error(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Co
         listed(wrong.iter().map(|(_, unknown)| unknown.name.as_str())),
         number(covariance.standard_error(first), 2)
     );
-    Some(Warning { code: WarningCode::NoStandardError, severity: Severity::NotUsable, text })
+    Some(not_usable(WarningCode::NoStandardError, text))
 }
 
 /// What intervals as wide as their values mean: zero may be in them, and a logarithm is known to a factor.
@@ -164,9 +149,10 @@ fn against_priors(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning>
     let one = |(row, unknown): (&Free, &Unknown)| {
         let prior = row.parameter.prior?;
         let distance = distance(unknown, prior).filter(|distance| *distance > UNLIKELY)?;
-        let (Unknown { name, unit, value, .. }, Prior { mean, std }) = (unknown, prior);
+        let (Unknown { name, value, .. }, Prior { mean, std }) = (unknown, prior);
+        let unit = unit_after(&unknown.unit);
         let text = format!(
-            "the data contradict the prior of `{name}`, {} +- {} {unit}: with it `{name}` is {} {unit}, {} standard deviations of \
+            "the data contradict the prior of `{name}`, {} +- {}{unit}: with it `{name}` is {}{unit}, {} standard deviations of \
              that difference from its mean; check prior, model and units, or leave the prior out",
             exact(mean),
             exact(std),
@@ -203,9 +189,9 @@ fn started(unknowns: &[Unknown]) -> impl Iterator<Item = (&Unknown, f64)> {
 fn opposite(unknowns: &[Unknown]) -> Vec<Warning> {
     let turned = started(unknowns).filter(|(unknown, ratio)| ratio.is_sign_negative() && !holds_zero(unknown));
     let one = |(unknown, _): (&Unknown, f64)| {
-        let Unknown { name, value, start, unit, .. } = unknown;
+        let (Unknown { name, value, start, .. }, unit) = (unknown, unit_after(&unknown.unit));
         let text = format!(
-            "`{name}` is {} {unit}, but its start was {}: the sign has changed; check the signs of the signals, or give a \
+            "`{name}` is {}{unit}, but its start was {}: the sign has changed; check the signs of the signals, or give a \
              bound",
             number(*value, 4),
             exact(*start)
@@ -222,9 +208,9 @@ fn far_from_start(unknowns: &[Unknown]) -> Vec<Warning> {
         !holds_zero(unknown) && (size > ANOTHER_UNIT || size < ANOTHER_UNIT.recip())
     });
     let one = |(unknown, ratio): (&Unknown, f64)| {
-        let Unknown { name, value, start, unit, .. } = unknown;
+        let (Unknown { name, value, start, .. }, unit) = (unknown, unit_after(&unknown.unit));
         let text = format!(
-            "`{name}` is {} {unit}, {} times its start {}: check the units of signals and time",
+            "`{name}` is {}{unit}, {} times its start {}: check the units of signals and time",
             number(*value, 4),
             number(ratio, 2),
             exact(*start)
@@ -236,15 +222,15 @@ fn far_from_start(unknowns: &[Unknown]) -> Vec<Warning> {
         unknown.knowledge == Knowledge::Unidentified && (size > RUN_AWAY || size < RUN_AWAY.recip())
     });
     let away = |(unknown, ratio): (&Unknown, f64)| {
-        let Unknown { name, value, start, unit, .. } = unknown;
+        let (Unknown { name, value, start, .. }, unit) = (unknown, unit_after(&unknown.unit));
         let text = format!(
-            "`{name}` is {} {unit}, {} times its start {}, and the data do not determine it: the search has run along a direction that \
+            "`{name}` is {}{unit}, {} times its start {}, and the data do not determine it: the search has run along a direction that \
              changes nothing; check signals and units, fix it, or give it a bound or a prior",
             number(*value, 4),
             number(ratio, 2),
             exact(*start)
         );
-        Warning { code: WarningCode::FarFromStart, severity: Severity::NotUsable, text }
+        not_usable(WarningCode::FarFromStart, text)
     };
     far.map(one).chain(ran.map(away)).collect()
 }
@@ -320,6 +306,8 @@ mod tests {
         assert!(far_from_start(std::slice::from_ref(&state)).is_empty() && opposite(&[state]).is_empty());
         let text = &far_from_start(&[unknown(500.0, 1.0, 1.0)])[0].text;
         assert_eq!(text, "`a` is 500 V, 500 times its start 1: check the units of signals and time");
+        let ratio = Unknown { unit: "1".to_owned(), ..unknown(500.0, 1.0, 1.0) };
+        assert!(far_from_start(&[ratio])[0].text.starts_with("`a` is 500, 500 times its start 1"));
     }
 
     #[test]

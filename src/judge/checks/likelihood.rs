@@ -1,20 +1,14 @@
 //! Warnings about a likelihood without a maximum.
 
-use crate::estimate::{Warning, WarningCode};
-use crate::judge::check::{Check, Level};
-use crate::judge::evidence::Evidence;
-use crate::numeral::number;
-use crate::optimize::Severity;
-use crate::problem::Role;
+use super::*;
 
-pub(crate) const LIKELIHOOD: Check = Check {
-    name: "the likelihood is bounded",
-    asks: "Is a predicted standard deviation nothing beside the errors?",
-    codes: &[WarningCode::UnboundedLikelihood],
-    costs: &[],
-    levels: &[Level { of: "the standard deviation, in errors", value: ZERO_DEVIATION, source: "a millionth" }],
-    examine: |evidence, _| unbounded(evidence).into(),
-};
+pub(crate) const LIKELIHOOD: Check = Check::new(
+    "the likelihood is bounded",
+    "Is a predicted standard deviation nothing beside the errors?",
+    &[WarningCode::UnboundedLikelihood],
+    |evidence, _| unbounded(evidence).into(),
+)
+.levels(&[level("the standard deviation, in errors", ZERO_DEVIATION, "a millionth")]);
 
 /// A predicted standard deviation below this fraction of the errors counts as zero.
 const ZERO_DEVIATION: f64 = 1e-6;
@@ -31,14 +25,14 @@ fn unbounded(evidence: &Evidence<'_>) -> Option<Warning> {
         false => ("such as a first one that equals the initial state", "leave out what is predicted exactly (NaN)"),
     };
     let text = format!(
-        "a measurement of `{}` is predicted with a standard deviation of {} {unit}, beside errors of {} {unit}: the \
+        "a measurement of `{}` is predicted with a standard deviation of {}{unit}, beside errors of {}{unit}: the \
          likelihood grows without bound ({cause}); give the noise a lower bound, or {remedy}",
         output.name,
         number(least_sigma, 2),
         number(rmse, 2),
-        unit = output.unit
+        unit = unit_after(&output.unit)
     );
-    Some(Warning { code: WarningCode::UnboundedLikelihood, severity: Severity::NotUsable, text })
+    Some(not_usable(WarningCode::UnboundedLikelihood, text))
 }
 
 /// Whether a predicted standard deviation is nothing beside the root mean square of the errors.

@@ -1,37 +1,32 @@
 //! Whether a few errors far beyond the others decide a fit with a squared loss.
 
-use crate::estimate::{Warning, WarningCode};
-use crate::judge::check::{Check, Examined, Level, with_care};
-use crate::judge::checks::data::is_named;
+use super::*;
 use crate::judge::checks::dropouts;
-use crate::judge::evidence::first_errors::{self, Errors};
-use crate::judge::evidence::largest::chance;
-use crate::judge::evidence::{Evidence, ROUND_OFF};
-use crate::numeral::{exact, number, p_value, percent};
-use crate::optimize::Severity;
+use crate::judge::checks::suspicions::is_named;
 use crate::outliers::{center_and_deviation, hampel};
+use crate::residuals::first_errors::{self, Errors};
+use crate::residuals::largest::chance;
 
-pub(crate) const OUTLIERS: Check = Check {
-    name: "no error is far beyond the others",
-    asks: "Where the kurtosis is that of heavy tails: do errors far from all and from their neighbors make a part of the sum of squares (Hampel's test), or were values held where none arrived? Else: is the largest error no chance among normal ones (Grubbs 1950)?",
-    codes: &[WarningCode::Outliers, WarningCode::Frozen],
-    costs: &[],
-    levels: &[
-        Level { of: "the kurtosis, in its standard deviations", value: HEAVY, source: "one in two million" },
-        Level {
-            of: "robust standard deviations of an outlier",
-            value: FAR,
-            source: "one in two million normal errors",
-        },
-        Level { of: "the part of the sum of squares of a note", value: LITTLE, source: "a tenth" },
-        Level { of: "the part of care", value: DECIDE, source: "a half" },
-        Level { of: "the probability of the largest error", value: LEVEL, source: "one good output in a thousand" },
-    ],
-    examine: |evidence, _| {
-        let without = is_any_heavy(evidence).then(|| first_errors::left_out(evidence.point.objective)).flatten();
-        Examined::unless(skipped(evidence), || outliers(evidence)).without(without)
+pub(crate) const OUTLIERS: Check = Check::new(
+    "no error is far beyond the others",
+    "Where the kurtosis is that of heavy tails: do errors far from all and from their neighbors make a part of \
+     the sum of squares (Hampel's test), or were values held where none arrived? Else: is the largest error no \
+     chance among normal ones (Grubbs 1950)?",
+    &[WarningCode::Outliers, WarningCode::Frozen],
+    |evidence, _| {
+        let without =
+            heavy(evidence).contains(&true).then(|| first_errors::left_out(evidence.point.objective)).flatten();
+        Examined::from(outliers(evidence)).without(without)
     },
-};
+)
+.unless(&[Unless::Weighed, Unless::RoundOff])
+.levels(&[
+    level("the kurtosis, in its standard deviations", HEAVY, "one in two million"),
+    level("robust standard deviations of an outlier", FAR, "one in two million normal errors"),
+    level("the part of the sum of squares of a note", LITTLE, "a tenth"),
+    level("the part of care", DECIDE, "a half"),
+    level("the probability of the largest error", LEVEL, "one good output in a thousand"),
+]);
 
 /// Single errors are examined if the kurtosis exceeds that of a normal distribution by this many of its standard deviations.
 const HEAVY: f64 = 5.0;
@@ -45,39 +40,23 @@ const LITTLE: f64 = 0.1;
 /// Level of the test of the largest error.
 const LEVEL: f64 = 1e-3;
 
-/// Why outliers are not looked for.
-fn skipped(evidence: &Evidence<'_>) -> Option<&'static str> {
-    let objective = evidence.point.objective;
-    match () {
-        _ if objective.loss().is_some() || objective.is_weighted() => Some("a robust loss or weights"),
-        _ => (evidence.rounding || evidence.point.is_exact()).then_some(ROUND_OFF),
-    }
-}
-
 /// Which outputs have errors with heavy tails.
 fn heavy(evidence: &Evidence<'_>) -> Vec<bool> {
     let of = |j: usize| is_heavy(evidence.residuals.kurtosis[j], evidence.residuals.outputs[j].samples);
     (0..evidence.point.objective.outputs()).map(of).collect()
 }
 
-fn is_any_heavy(evidence: &Evidence<'_>) -> bool {
-    heavy(evidence).contains(&true)
-}
-
 /// Outputs whose errors have outliers, or measurements that were held, of a fit by their squares.
 fn outliers(evidence: &Evidence<'_>) -> Vec<Warning> {
     let objective = evidence.point.objective;
     let heavy = heavy(evidence);
-    if !heavy.contains(&true) {
-        return (0..objective.outputs()).filter_map(|j| extreme(evidence, j)).collect();
-    }
     let of = |j: usize| {
         let errors = unsuspected(evidence, j);
         let all: Vec<f64> = errors.iter().flatten().flatten().copied().collect();
         dropouts::dropouts_of(evidence, j, &errors).or_else(|| outliers_of(evidence, j, &all))
     };
-    let of = |j: usize| if heavy[j] { of(j) } else { None };
-    (0..objective.outputs()).filter_map(|j| of(j).or_else(|| extreme(evidence, j))).collect()
+    let heavy = |j: usize| if heavy[j] { of(j) } else { None };
+    (0..objective.outputs()).filter_map(|j| heavy(j).or_else(|| extreme(evidence, j))).collect()
 }
 
 /// The first errors of an output, record by record, without those of samples that the look at its column names.
@@ -107,7 +86,7 @@ fn extreme(evidence: &Evidence<'_>, j: usize) -> Option<Warning> {
     let (fit, largest) = (&evidence.residuals.outputs[j], evidence.residuals.largest[j]);
     let count = fit.samples as f64;
     let named = is_named(evidence, largest.experiment, j, largest.sample);
-    if fit.rmse <= 0.0 || named || evidence.point.is_exact() {
+    if fit.rmse <= 0.0 || named {
         return None;
     }
     // Errors that are divided by their predicted deviations.
@@ -118,15 +97,15 @@ fn extreme(evidence: &Evidence<'_>, j: usize) -> Option<Warning> {
     }
     let problem = evidence.point.objective.problem;
     let text = format!(
-        "the error of `{}` at t = {} s of `{}` is {} times the deviation of all others ({} for the largest of {count} normal \
+        "the error of `{}` at t = {} of `{}` is {} times the deviation of all others ({} for the largest of {count} normal \
          errors): look at this measurement, and mark it as missing if it is wrong",
         problem.layout().outputs[j].name,
-        exact(problem.records[largest.experiment].time(largest.sample)),
+        problem.records[largest.experiment].moment(largest.sample),
         problem.unknowns.labels[largest.experiment],
         number(ratio, 3),
         p_value(chance)
     );
-    Some(Warning { code: WarningCode::Outliers, severity: Severity::Usable, text })
+    Some(note(WarningCode::Outliers, text))
 }
 
 /// How many errors are far from the others and from their neighbors, and their part of the sum of squares, if it is no little.

@@ -5,19 +5,16 @@
 //! plain autocorrelation is small where they are drawn off most. The error a horizon before is therefore one more unknown beside all
 //! others (Breusch, Australian Economic Papers 17 (1978) 334; Godfrey, Econometrica 46 (1978) 1293).
 
-use crate::information::{Block, Information};
-use crate::judge::directions::undetermined;
-use crate::judge::evidence::Evidence;
-use crate::judge::leverage::prior_row;
+use super::*;
+use crate::covariance::directions::undetermined;
+use crate::information::{Gathering, Information};
 use crate::optimize::Linearization;
-use crate::problem::{Accumulate, Objective};
+use crate::problem::Accumulate;
 use crate::sweep::Window;
 use std::collections::VecDeque;
 
 /// Longest horizon over which errors are correlated.
 const LONGEST: usize = 100;
-/// Rows that are absorbed together.
-const ROWS: usize = 256;
 
 /// The rows of an experiment, each with the error of the same output a horizon before behind the slopes.
 struct Rows<'r> {
@@ -26,8 +23,7 @@ struct Rows<'r> {
     steps: usize,
     /// The last errors of each output, a horizon long; missing ones are not numbers.
     before: Vec<VecDeque<f64>>,
-    triangle: Information,
-    block: Block,
+    rows: Gathering,
     row: Vec<f64>,
 }
 
@@ -36,8 +32,7 @@ impl<'r> Rows<'r> {
         let (outputs, unknowns) = (objective.outputs(), objective.problem.unknowns.columns(experiment).count());
         let columns = unknowns + outputs;
         let before = vec![VecDeque::with_capacity(steps + 1); outputs];
-        let (triangle, block) = (Information::new(columns), Block::new(columns, ROWS));
-        Rows { objective, experiment, steps, before, triangle, block, row: vec![0.0; columns] }
+        Rows { objective, experiment, steps, before, rows: Gathering::new(columns), row: vec![0.0; columns] }
     }
 }
 
@@ -60,14 +55,12 @@ impl Accumulate for Rows<'_> {
             of_unknowns.iter_mut().enumerate().for_each(|(c, to)| *to = root * window.at(k, j, c, lane));
             of_errors.fill(0.0);
             of_errors[j] = root * last;
-            self.triangle.gather(&mut self.block, &self.row, root * error);
+            self.rows.take(&self.row, root * error);
         }
     }
 
-    fn append(&mut self, mut later: Self) {
-        self.triangle.absorb(&mut self.block);
-        later.triangle.absorb(&mut later.block);
-        self.triangle.merge(&later.triangle);
+    fn append(&mut self, later: Self) {
+        self.rows.append(later.rows);
         self.before = later.before;
     }
 }
@@ -81,15 +74,8 @@ pub(crate) fn correlations(evidence: &Evidence<'_>, steps: usize) -> Option<Vec<
         return None;
     }
     let all = objective.gather(&evidence.point.end.coordinates, true, |e| Rows::new(objective, e, steps)).ok()?;
-    let complete = |mut rows: Rows<'_>| {
-        rows.triangle.absorb(&mut rows.block);
-        rows.triangle
-    };
-    let mut triangles: Vec<Information> = all.into_iter().map(complete).collect();
-    for (i, slope, error) in unknowns.priors(&evidence.point.end.coordinates) {
-        let e = unknowns.row[i].experiment.unwrap_or(0);
-        triangles[e].absorb_row(&prior_row(objective, e, i, slope), error);
-    }
+    let mut triangles: Vec<Information> = all.into_iter().map(|one| one.rows.triangle()).collect();
+    unknowns.add_priors(&evidence.point.end.coordinates, 1.0, &mut triangles);
     let linear = Linearization::new(0.0, unknowns.shared() + outputs, triangles);
     // The coefficients stand behind the shared unknowns.
     let mut held = evidence.point.undetermined.held.clone();

@@ -1,9 +1,7 @@
 //! How the cost rises away from the minimum, against what the slopes at the minimum say.
 
-use crate::judge::covariances::Covariances;
-use crate::judge::directions;
-use crate::judge::evidence::Evidence;
-use crate::problem::Objective;
+use super::*;
+use crate::covariance::directions;
 
 /// Steps of the other unknowns; each takes two passes over the data. Where a model is close to linear none is taken.
 const STEPS: usize = 10;

@@ -1,49 +1,35 @@
-//! Warnings about the search: its end, searches from other starts, its checkpoint.
+//! Warnings about what the estimate rests on: enough measurements, the end of the search, searches from other starts, the checkpoint, and time
+//! for all checks.
 
-use crate::estimate::{Minimum, Starts, Unknown, Warning, WarningCode, times_the_cost};
-use crate::judge::check::{Check, Level};
-use crate::judge::evidence::Evidence;
-use crate::numeral::number;
-use crate::optimize::Severity;
+use super::*;
+use crate::estimate::{Minimum, Starts, times_the_cost};
 use crate::problem::SearchPlan;
 
-pub(crate) const MINIMUM: Check = Check {
-    name: "the search ended at a minimum",
-    asks: "Are intervals given where the search did not arrive at a minimum?",
-    codes: &[WarningCode::NotAtMinimum],
-    costs: &[],
-    levels: &[],
-    examine: |evidence, intervals| not_at_minimum(evidence, &intervals.unknowns).into(),
-};
+pub(crate) const MINIMUM: Check = Check::new(
+    "the search ended at a minimum",
+    "Are intervals given where the search did not arrive at a minimum?",
+    &[WarningCode::NotAtMinimum],
+    |evidence, intervals| not_at_minimum(evidence, &intervals.unknowns).into(),
+);
 
-pub(crate) const STARTS: Check = Check {
-    name: "searches from other starts agree",
-    asks: "Did other starts lead to the estimate, to another minimum that explains the data as well, or the declared start elsewhere?",
-    codes: &[WarningCode::MinimumFoundOnce, WarningCode::RivalMinimum, WarningCode::DeclaredStartElsewhere],
-    costs: &[],
-    levels: &[
-        Level {
-            of: "the difference of deviances that tells two minima apart",
-            value: INDISTINGUISHABLE,
-            source: "one of 150 records",
-        },
-        Level {
-            of: "searches of which a minimum is found more than once",
-            value: MANY as f64,
-            source: "one of twenty cases",
-        },
-    ],
-    examine: |evidence, _| starts(evidence).into(),
-};
+pub(crate) const STARTS: Check = Check::new(
+    "searches from other starts agree",
+    "Did other starts lead to the estimate, to another minimum that explains the data as well, or the declared \
+     start elsewhere?",
+    &[WarningCode::MinimumFoundOnce, WarningCode::RivalMinimum, WarningCode::DeclaredStartElsewhere],
+    |evidence, _| starts(evidence).into(),
+)
+.levels(&[
+    level("the difference of deviances that tells two minima apart", INDISTINGUISHABLE, "one of 150 records"),
+    level("searches of which a minimum is found more than once", MANY as f64, "one of twenty cases"),
+]);
 
-pub(crate) const CHECKPOINT: Check = Check {
-    name: "the checkpoint was written",
-    asks: "Was there an error in writing the checkpoint?",
-    codes: &[WarningCode::CheckpointNotWritten],
-    costs: &[],
-    levels: &[],
-    examine: |evidence, _| checkpoint(evidence).into(),
-};
+pub(crate) const CHECKPOINT: Check = Check::new(
+    "the checkpoint was written",
+    "Was there an error in writing the checkpoint?",
+    &[WarningCode::CheckpointNotWritten],
+    |evidence, _| checkpoint(evidence).into(),
+);
 
 /// Minima whose deviances differ by less cannot be told apart: if both had the same number of fixed parameters, the wrong one would
 /// be better by more in less than `exp(-10 / 2)`, one of 150 records.
@@ -55,18 +41,15 @@ const MANY: u64 = 8;
 /// Intervals of a search that did not end at a minimum.
 fn not_at_minimum(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
     let known = unknowns.iter().any(|row| row.knowledge.standard_error().is_some());
-    (known && !evidence.point.end.outcome.converged()).then(|| Warning {
-        code: WarningCode::NotAtMinimum,
-        severity: Severity::NotUsable,
-        text: "standard errors and intervals are those of a minimum, where the search did not arrive".to_owned(),
-    })
+    let text = "standard errors and intervals are those of a minimum, where the search did not arrive";
+    (known && !evidence.point.end.outcome.converged()).then(|| not_usable(WarningCode::NotAtMinimum, text.to_owned()))
 }
 
 /// A checkpoint that could not be written.
 fn checkpoint(evidence: &Evidence<'_>) -> Option<Warning> {
     let write_error = evidence.point.end.write_error.as_ref()?;
     let text = format!("the checkpoint could not be written ({write_error}); the search went on without it");
-    Some(Warning { code: WarningCode::CheckpointNotWritten, severity: Severity::Usable, text })
+    Some(note(WarningCode::CheckpointNotWritten, text))
 }
 
 /// Searches from other starts, if there were any.
@@ -106,7 +89,7 @@ fn warnings(starts: &Starts, measurements: u64, asked: bool, colored: bool) -> V
             times_the_cost(rival.cost_ratio),
             at(rival)
         );
-        warnings.push(Warning { code: WarningCode::RivalMinimum, severity: Severity::UsableWithCare, text });
+        warnings.push(with_care(WarningCode::RivalMinimum, text));
     }
     if let Some(declared) = declared.filter(|declared| *declared > 0).and_then(|declared| minima.get(declared)) {
         let text = format!(
@@ -114,14 +97,75 @@ fn warnings(starts: &Starts, measurements: u64, asked: bool, colored: bool) -> V
             times_the_cost(declared.cost_ratio),
             at(declared)
         );
-        warnings.push(Warning { code: WarningCode::DeclaredStartElsewhere, severity: Severity::Usable, text });
+        warnings.push(note(WarningCode::DeclaredStartElsewhere, text));
     }
     warnings
+}
+
+pub(crate) const ENOUGH: Check = Check::new(
+    "measurements determine the unknowns",
+    "Are there more measurements than unknowns, and does one unknown at least have an interval?",
+    &[WarningCode::TooFewMeasurements, WarningCode::NothingDetermined],
+    |evidence, intervals| of_the_data(evidence, &intervals.unknowns).into(),
+);
+
+/// Whether there are too few measurements, or none that determine an unknown.
+fn of_the_data(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
+    let measured = evidence.residuals.measured;
+    if measured <= unknowns.len() as u64 {
+        let text = format!(
+            "{measured} measurement(s) for {} unknown(s) leave nothing to tell the accuracy by; fix some, or record more",
+            unknowns.len()
+        );
+        return Some(not_usable(WarningCode::TooFewMeasurements, text));
+    }
+    let none = unknowns.iter().all(|row| row.knowledge == Knowledge::Unidentified);
+    none.then(|| not_usable(WarningCode::NothingDetermined, "the data determine none of the unknowns".to_owned()))
+}
+
+pub(crate) const TIME: Check = Check::new(
+    "there was time for all checks",
+    "Did the time limit or a flag end passes before all checks had been made?",
+    &[WarningCode::NotExamined],
+    |evidence, intervals| not_examined(evidence, intervals.stopped).into(),
+);
+
+/// Whether stop conditions ended passes over the data before all tests had been made; `early` if already those for the intervals.
+fn not_examined(evidence: &Evidence<'_>, early: bool) -> Option<Warning> {
+    let control = evidence.point.objective.control;
+    if !control.stops() {
+        return None;
+    }
+    let stop = control.reason();
+    let (text, severity) = match early {
+        true => (
+            format!(
+                "{stop} before intervals had been examined: they are those of white errors of one size, and tests of errors, of the \
+                 step and of parts of the data were left out; allow more time"
+            ),
+            Severity::NotUsable,
+        ),
+        false => (
+            format!(
+                "{stop} before all tests of the estimate had been made: what the others would find is not said; allow more time"
+            ),
+            Severity::UsableWithCare,
+        ),
+    };
+    Some(Warning { code: WarningCode::NotExamined, severity, text })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::covariance::SearchEnd;
+    use crate::judge::conclude;
+    use crate::optimize::Outcome;
+    use crate::problem::{Control, Memory};
+    use crate::tests::{Current, Gain, Line, Voltage};
+    use crate::{Experiment, Fit, Huber, Time, free};
+    use std::sync::Arc;
+    use std::sync::atomic::AtomicBool;
 
     fn codes(tried: u64, agreed: u64, rival: f64, declared: usize) -> Vec<WarningCode> {
         let minimum = |cost_ratio| Minimum { cost_ratio, searches: 1, undetermined: vec![], unknowns: vec![] };
@@ -167,5 +211,43 @@ mod tests {
         let colored = colored.map(|(tried, asked)| severity(tried, asked, true));
         assert_eq!(colored, [NotUsable, NotUsable, UsableWithCare, Usable]);
         assert!(said(8, 2, true, true).is_empty());
+    }
+
+    /// A minimum that is judged after the flag was set: cost, noise and value are those of the whole evidence, the intervals are classical
+    /// instead of a sandwich, and it is said. A flag that is not set changes nothing.
+    #[test]
+    fn a_minimum_that_is_not_examined() {
+        let inputs: Vec<Voltage> = (0..40).map(|k| Voltage { u: f64::from(k) }).collect();
+        let outputs = (0..40).map(|k| Current { i: 2.0 * f64::from(k) + f64::from(k * 37 % 21) - 10.0 }).collect();
+        let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        let fit = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).loss(Huber::default());
+        let problem = fit.problem().unwrap();
+        let whole = problem.run().unwrap();
+        let judged = |flag: bool| {
+            let control = Control { cancel: Some(Arc::new(AtomicBool::new(flag))), deadline: None };
+            let (objective, coordinates) = problem.at_within(&whole, &control).unwrap();
+            let end = SearchEnd {
+                coordinates,
+                whitening: objective.whitening.clone(),
+                linear: None,
+                outcome: Outcome::CostUnchanged { decrease: 0.0 },
+                iterations: 1,
+                evaluations: 1,
+                name: String::new(),
+                write_error: None,
+                memory: Memory::default(),
+                starts: None,
+            };
+            conclude(&objective, &end, 0.0).unwrap()
+        };
+        let (stopped, complete) = (judged(true), judged(false));
+        assert_eq!((stopped.cost, &stopped.outputs), (complete.cost, &complete.outputs));
+        assert_eq!(stopped.unknowns[0].value, complete.unknowns[0].value);
+        assert!(stopped.unknowns[0].knowledge.standard_error().is_some());
+        assert_ne!(stopped.method.covariance, complete.method.covariance);
+        let said = |code: WarningCode| stopped.warnings.iter().any(|warning| warning.code == code);
+        assert!(said(WarningCode::NotExamined) && !said(WarningCode::NothingDetermined), "{:?}", stopped.warnings);
+        assert_eq!(stopped.severity(), Severity::NotUsable);
+        assert!(complete.warnings.iter().all(|warning| warning.code != WarningCode::NotExamined));
     }
 }

@@ -1,53 +1,47 @@
 //! Whether errors follow from the inputs or from the prediction, which those of a model of the right shape do not.
 //!
 //! The errors of a static model are white in order of an input's size, whatever the order of the samples in time. Those of any model
-//! are uncorrelated with powers of its prediction, and with the inputs of the samples before.
+//! are uncorrelated with powers of its prediction, and with every input that has acted. A delay or a lag that the model lacks shows at the
+//! samples after each change of an input, a curve that it lacks in the powers of the input.
 
-use crate::estimate::{Warning, WarningCode};
-use crate::judge::check::{Check, Examined, Level, Pass};
-use crate::judge::checks::inputs_before::by_inputs_before;
+use super::*;
 use crate::judge::evidence::color;
-use crate::judge::evidence::first_errors;
-use crate::judge::evidence::powers::{SHAPE, Scale, scales};
-use crate::judge::evidence::products::Products;
-use crate::judge::evidence::whiteness::{LAGS, Whiteness};
-use crate::judge::evidence::{Evidence, PREFILTER, ROUND_OFF};
-use crate::numeral::{p_value, percent};
 use crate::problem::Accumulate;
 use crate::record::Record;
+use crate::residuals::first_errors;
+use crate::residuals::powers::{SHAPE, Scale, scales};
+use crate::residuals::products::{Change, Products};
+use crate::residuals::whiteness::{LAGS, Whiteness};
 use crate::sweep::Window;
 use crate::whiteness::Portmanteau;
 
-pub(crate) const FOLLOWING: Check = Check {
-    name: "errors follow from nothing that is known",
-    asks: "Do the errors follow from the size of an input (static models), from the inputs of four samples before, or from powers of the prediction (Ramsey 1969; White 1980)?",
-    codes: &[WarningCode::WrongShape],
-    costs: &[Pass::Values(1)],
-    levels: &[
-        Level {
-            of: "the probability by chance, over all outputs and inputs",
-            value: color::CERTAIN,
-            source: "one good record in ten thousand; for inputs before 1e-3",
-        },
-        Level {
-            of: "the part of what an output moves that is a note",
-            value: color::SMALL,
-            source: "no parameter moves by more",
-        },
-    ],
-    examine: |evidence, _| Examined::unless(skipped(evidence), || shape(evidence)).without(left_out(evidence)),
-};
+pub(crate) const FOLLOWING: Check = Check::new(
+    "errors follow from nothing that is known",
+    "Do the errors follow from the size of an input (static models), from the inputs of four samples before, or \
+     from powers of the prediction (Ramsey 1969; White 1980)?",
+    &[WarningCode::WrongShape],
+    |evidence, _| Examined::unless(skipped(evidence), || shape(evidence)).without(left_out(evidence)),
+)
+.costs(&[Pass::Values(1)])
+.levels(&[
+    level(
+        "the probability by chance, over all outputs and inputs",
+        color::CERTAIN,
+        "one good record in ten thousand; for inputs before 1e-3",
+    ),
+    level("the part of what an output moves that is a note", color::SMALL, "no parameter moves by more"),
+]);
+
+/// Number of samples before an error whose inputs are regressors.
+const BEFORE: usize = 4;
 
 /// Why none of the tests below is made.
 fn skipped(evidence: &Evidence<'_>) -> Option<&'static str> {
-    let objective = evidence.point.objective;
-    match () {
-        _ if evidence.point.is_static() => None,
-        _ if evidence.rounding || evidence.point.is_exact() => Some(ROUND_OFF),
-        _ if objective.problem.settings.prefilter.is_some() => Some(PREFILTER),
-        _ if objective.sweep.restarts().is_some() => Some("predictions that restart from measurements"),
-        _ => evidence.autocorrelated_at(color::CERTAIN).map(|_| "errors that are correlated over time"),
+    if evidence.point.is_static() {
+        return None;
     }
+    let colored = || evidence.autocorrelated_at(color::CERTAIN).map(|_| "errors that are correlated over time");
+    evidence.ruled_out(&[Unless::RoundOff, Unless::Prefilter, Unless::Restarts]).or_else(colored)
 }
 
 /// Which of them are not made.
@@ -104,14 +98,93 @@ fn by_inputs(evidence: &Evidence<'_>) -> Option<Warning> {
     })
 }
 
+/// The output whose errors certainly follow from an input: from powers of its value at the sample before, or from one of its changes. The
+/// input of the same sample is left out, since a controller may have computed it from the measurement. White errors only: correlated
+/// ones follow from an input that a controller has computed from earlier ones.
+fn by_inputs_before(evidence: &Evidence<'_>) -> Option<Warning> {
+    let objective = evidence.point.objective;
+    let (layout, outputs) = (objective.problem.layout(), objective.outputs());
+    if evidence.point.is_static() {
+        return None;
+    }
+    let sigma = objective.whitening.sigma();
+    // What the minimum makes orthogonal to the slopes: errors times their weights.
+    let weight = |e: usize, j: usize, k: usize, error: f64| {
+        let by_loss = objective.loss().map_or(1.0, |loss| loss.weight(error / sigma[j]));
+        objective.weight(e, k) * by_loss
+    };
+    let scales: Vec<Scale> = (0..layout.inputs.len()).map(|i| scale(evidence, i)).collect();
+    let mut sums = vec![Before::default(); outputs * layout.inputs.len()];
+    for (e, errors) in evidence.residuals.first_errors.iter().enumerate() {
+        let inputs = objective.problem.records[e].inputs().iter().zip(&scales);
+        for ((input, scale), sums) in inputs.zip(sums.chunks_mut(outputs)) {
+            let u = &input.values;
+            for k in BEFORE..errors[0].len() {
+                let before = std::array::from_fn(|lag| scale.one(u[k - 1 - lag]));
+                for (j, (sums, errors)) in sums.iter_mut().zip(errors).enumerate() {
+                    if let Some(error) = errors[k] {
+                        sums.take(before, error * weight(e, j, k, error));
+                    }
+                }
+            }
+        }
+    }
+    let of = |number: usize| {
+        let (i, j) = (number / outputs, number % outputs);
+        let (part, chance) = sums[number].follows();
+        let part = part * evidence.residuals.outputs[j].rmse / evidence.residuals.levels[j].1;
+        (i, j, part, chance * sums.len() as f64)
+    };
+    let certain = (0..sums.len()).map(of).filter(|(.., chance)| *chance < color::LIKELY);
+    let (i, j, part, chance) = certain.max_by(|a, b| a.2.total_cmp(&b.2))?;
+    let text = format!(
+        "the errors of `{}` follow from what the input `{}` was at the samples before ({}): the model lacks a delay, an inertia or a \
+         curve, the signals are not of the same moments, or correlated noise is fed back, by {} of what the output moves, and no \
+         interval allows for that",
+        layout.outputs[j].name,
+        layout.inputs[i].name,
+        p_value(chance),
+        percent(part, 2)
+    );
+    Some(Warning { code: WarningCode::WrongShape, severity: color::severity(part), text })
+}
+
+/// Center and width of an input over all records.
+fn scale(evidence: &Evidence<'_>, i: usize) -> Scale {
+    Scale::over(evidence.point.objective.problem.records.iter().map(|record| record.inspect_some().inputs[i].range))
+}
+
+/// Sums over errors and an input at the samples before: with powers of the last one, and with each of its changes. These may be few and
+/// far between, so that each is tested alone.
+#[derive(Clone, Copy, Default)]
+struct Before {
+    powers: Products<SHAPE>,
+    changes: [Change; BEFORE - 1],
+}
+
+impl Before {
+    fn take(&mut self, before: [f64; BEFORE], error: f64) {
+        self.powers.take(std::array::from_fn(|i| before[0].powi(i as i32)), error);
+        self.changes.iter_mut().zip(before.windows(2)).for_each(|(sums, pair)| sums.take(pair[0] - pair[1], error));
+    }
+
+    /// The root of the part of the squared errors that follows most certainly, and the probability by chance.
+    fn follows(&self) -> (f64, f64) {
+        let squares = self.powers.sum_of_squares();
+        let changes = self.changes.iter().map(|one| (one.explained_part(squares), one.by_chance()));
+        let all = std::iter::once((self.powers.explained_part(), self.powers.by_chance())).chain(changes);
+        let (part, chance) = all.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0.0, 1.0));
+        (part, chance * BEFORE as f64)
+    }
+}
+
 /// The output whose errors certainly follow from its prediction; of several that with the largest part of what it moves. White errors
 /// only: correlated ones follow from a prediction that is as slow as they are.
 fn by_predictions(evidence: &Evidence<'_>) -> Option<Warning> {
     let (objective, chances) = (evidence.point.objective, &evidence.residuals.shape);
     let count = chances.len() as f64;
     let suspicious = chances.iter().any(|chance| chance * count < color::CERTAIN);
-    let examined = suspicious && !evidence.rounding && !evidence.point.is_exact();
-    if !examined || evidence.autocorrelated_at(color::CERTAIN).is_some() {
+    if !suspicious || evidence.rounding || evidence.autocorrelated_at(color::CERTAIN).is_some() {
         return None;
     }
     let scales = scales(objective);

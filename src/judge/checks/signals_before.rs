@@ -5,54 +5,34 @@
 //! measurements that were made. A delay, an inertia, a gain or a curve that the model lacks does. Fisher's test compares variances of
 //! innovations, which no misfit widens: a larger one is only more certain.
 
-use crate::estimate::{Warning, WarningCode};
-use crate::information::{Block, Information};
-use crate::judge::check::{Check, Examined, Level};
+use super::*;
+use crate::information::Gathering;
 use crate::judge::evidence::color;
-use crate::judge::evidence::first_errors::Errors;
-use crate::judge::evidence::powers::by_chance;
-use crate::judge::evidence::{Evidence, PREFILTER, ROUND_OFF};
-use crate::numeral::{p_value, percent};
 use crate::record::Record;
+use crate::residuals::first_errors::Errors;
+use crate::residuals::powers::by_chance;
 
-pub(crate) const SIGNALS_BEFORE: Check = Check {
-    name: "colored errors follow from their own past only",
-    asks: "Do inputs and predictions of the samples before explain more of colored errors than the errors before do (Granger 1969)?",
-    codes: &[WarningCode::WrongShape],
-    costs: &[],
-    levels: &[
-        Level {
-            of: "the probability by chance, over all outputs",
-            value: color::CERTAIN,
-            source: "one good record in ten thousand",
-        },
-        Level {
-            of: "the part of the innovations' variance that they explain",
-            value: LEAST,
-            source: "five times what a closed loop leaves by too short an autoregression",
-        },
-        Level {
-            of: "the colored part of what an output moves that is not usable",
-            value: color::LEFT,
-            source: "wrong pole pairs, gains and delays move parameters by a quarter or more from there on",
-        },
-    ],
-    examine: |evidence, _| {
-        Examined::unless(skipped(evidence), || by_signals_before(evidence)).without(left_out(evidence))
-    },
-};
-
-/// Why it is not made.
-fn skipped(evidence: &Evidence<'_>) -> Option<&'static str> {
-    let objective = evidence.point.objective;
-    match () {
-        _ if evidence.point.is_static() => Some("a model without states"),
-        _ if evidence.rounding || evidence.point.is_exact() => Some(ROUND_OFF),
-        _ if objective.problem.settings.prefilter.is_some() => Some(PREFILTER),
-        _ if objective.sweep.restarts().is_some() => Some("predictions that restart from measurements"),
-        _ => None,
-    }
-}
+pub(crate) const SIGNALS_BEFORE: Check = Check::new(
+    "colored errors follow from their own past only",
+    "Do inputs and predictions of the samples before explain more of colored errors than the errors before do \
+     (Granger 1969)?",
+    &[WarningCode::WrongShape],
+    |evidence, _| Examined::from(by_signals_before(evidence)).without(left_out(evidence)),
+)
+.unless(&[Unless::Static, Unless::RoundOff, Unless::Prefilter, Unless::Restarts])
+.levels(&[
+    level("the probability by chance, over all outputs", color::CERTAIN, "one good record in ten thousand"),
+    level(
+        "the part of the innovations' variance that they explain",
+        LEAST,
+        "five times what a closed loop leaves by too short an autoregression",
+    ),
+    level(
+        "the colored part of what an output moves that is not usable",
+        color::LEFT,
+        "wrong pole pairs, gains and delays move parameters by a quarter or more from there on",
+    ),
+]);
 
 /// What is not examined of colored errors.
 fn left_out(evidence: &Evidence<'_>) -> Option<&'static str> {
@@ -75,8 +55,6 @@ const MOST: usize = 16_384;
 const RECORDS: usize = 8;
 /// The least part of the innovations' variance that inputs and predictions explain.
 const LEAST: f64 = 0.05;
-/// Rows that are absorbed together.
-const ROWS: usize = 256;
 
 /// The output whose colored errors certainly follow from inputs and predictions before; of several that with the largest colored part.
 fn by_signals_before(evidence: &Evidence<'_>) -> Option<Warning> {
@@ -186,8 +164,7 @@ impl Regression {
     fn test(&self, series: &[Series], j: usize) -> Option<(f64, f64)> {
         let (longest, own) = (self.spans.last()?.1, 1 + self.errors);
         let regressors = self.signals.len() * self.spans.len();
-        let mut information = Information::new(own + regressors);
-        let mut block = Block::new(own + regressors, ROWS);
+        let mut rows = Gathering::new(own + regressors);
         let mut row = vec![1.0; own + regressors];
         for one in series {
             let mut before: Vec<f64> = vec![];
@@ -201,12 +178,12 @@ impl Regression {
                         let sums = &one.sums[i];
                         *to = (sums[k + 1 - from] - sums[k - until]) / (until + 1 - from) as f64;
                     }
-                    information.gather(&mut block, &row, error);
+                    rows.take(&row, error);
                 }
                 before.push(error);
             }
         }
-        information.absorb(&mut block);
+        let information = rows.triangle();
         let (free, degrees) = (information.rows() as f64 - row.len() as f64, regressors as f64);
         let beyond = information.eliminate(own);
         let (without, with) = (beyond.residual_at_zero(), beyond.residual());

@@ -17,6 +17,8 @@ fn pass(pass: &Pass) -> String {
         Pass::Rows => "the pass with slopes that checks share".to_owned(),
         Pass::Values(count) => format!("up to {} in values, where there is a reason", passes(count)),
         Pass::Slopes(count) => format!("up to {} with slopes, where there is a reason", passes(count)),
+        Pass::Curvature => "the pass with slopes for the curvature of a loss".to_owned(),
+        Pass::Left => "one with slopes that parts and sensors share, where there is a reason".to_owned(),
         Pass::EachUnknown(count) => format!("{} or more for each unknown with a reason", passes(count)),
         Pass::Finer => "a pass by a finer method, where there is a reason".to_owned(),
     }
@@ -32,8 +34,10 @@ fn flagged() -> BTreeMap<String, usize> {
 /// The page about all checks.
 fn page() -> String {
     let mut page = "# Checks of an estimate\n\nWritten from the table `CHECKS` in `src/judge/checks.rs` by \
-                    `GREYBOX_WRITE_CHECKS=1 cargo test --lib checks`; a test compares it. The checks stand in the order in which their \
-                    warnings are shown. Passes over the data are counted beside the one in values that every estimate takes.\n\n"
+                    `GREYBOX_WRITE_CHECKS=1 cargo test --lib checks`; a test compares it. The checks stand in the order in \
+                    which their warnings are shown. Passes over the data are counted beside the one in values that every \
+                    estimate takes. The covariance takes the pass with slopes that checks share, too; one more with slopes for \
+                    colored errors, or for a sandwich; and one more for weights, a loss or a pre-filter.\n\n"
         .to_owned();
     let flagged = flagged();
     page += &match flagged["all"] {
@@ -44,7 +48,7 @@ fn page() -> String {
         ),
     };
     page += " (`GREYBOX_WRITE_CHECKS=1 cargo test --release --test verdicts good` measures that).\n";
-    for (number, Check { name, asks, codes, costs, levels, .. }) in CHECKS.iter().enumerate() {
+    for (number, Check { name, asks, codes, unless, costs, levels, .. }) in CHECKS.iter().enumerate() {
         let named = |one: &WarningCode| match flagged["all"] {
             0 => format!("`{}`", code(one)),
             _ => format!("`{}` ({})", code(one), flagged.get(&format!("{one:?}")).unwrap_or(&0)),
@@ -52,7 +56,9 @@ fn page() -> String {
         let codes: Vec<String> = codes.iter().map(named).collect();
         let costs: Vec<String> = costs.iter().map(pass).collect();
         let costs = if costs.is_empty() { "none".to_owned() } else { costs.join("; ") };
-        page += &format!("\n## {}. {name}\n\n{asks}\n\nCodes: {}. Passes: {costs}.\n", number + 1, codes.join(", "));
+        page += &format!("\n## {}. {name}\n\n{asks}\n\nCodes: {}. Passes: {costs}.", number + 1, codes.join(", "));
+        let unless: Vec<&str> = unless.iter().map(|one| one.reason()).collect();
+        page += &if unless.is_empty() { "\n".to_owned() } else { format!(" Skipped for: {}.\n", unless.join("; ")) };
         if !levels.is_empty() {
             page += "\n| level | value | where it comes from |\n|---|---|---|\n";
         }

@@ -3,29 +3,19 @@
 //! The curvature of the cost is the mean of `psi'` over all errors times that of the squares. With a constant far below the noise few
 //! errors are within it, or positive and negative slopes cancel: then the mean depends on few errors, and so do the standard errors.
 
-use crate::estimate::{Warning, WarningCode};
-use crate::judge::check::{Check, Level, Pass};
-use crate::judge::evidence::Evidence;
-use crate::numeral::percent;
-use crate::optimize::Severity;
-use crate::problem::{Accumulate, Objective};
-use crate::sweep::Window;
+use super::*;
 
-pub(crate) const LOSS: Check = Check {
-    name: "the loss is wide enough",
-    asks: "How well do the errors within a robust loss determine its mean curvature?",
-    codes: &[WarningCode::NarrowLoss],
-    costs: &[Pass::Values(1)],
-    levels: &[
-        Level {
-            of: "the relative standard deviation of care",
-            value: CARE,
-            source: "standard errors are off by as much",
-        },
-        Level { of: "that is not usable", value: NONE, source: "a half" },
-    ],
-    examine: |evidence, _| few_within_the_loss(evidence).into(),
-};
+pub(crate) const LOSS: Check = Check::new(
+    "the loss is wide enough",
+    "How well do the errors within a robust loss determine its mean curvature?",
+    &[WarningCode::NarrowLoss],
+    |evidence, _| few_within_the_loss(evidence).into(),
+)
+.costs(&[Pass::Curvature])
+.levels(&[
+    level("the relative standard deviation of care", CARE, "standard errors are off by as much"),
+    level("that is not usable", NONE, "a half"),
+]);
 
 /// Relative standard deviation of the curvature above which standard errors are not usable without care, and not at all.
 const CARE: f64 = 0.15;
@@ -34,44 +24,11 @@ const NONE: f64 = 0.5;
 /// A loss with a larger mean curvature is not narrow: in a few measurements that mean is uncertain with any loss.
 const NARROW: f64 = 0.5;
 
-/// Sums of the slopes of `psi` and of their squares, and their number.
-struct Slopes<'s> {
-    objective: &'s Objective<'s>,
-    experiment: usize,
-    sum: f64,
-    squares: f64,
-    count: f64,
-}
-
-impl Accumulate for Slopes<'_> {
-    fn add(&mut self, window: &Window, lane: usize) {
-        let Some(loss) = self.objective.loss() else { return };
-        for k in 0..window.samples[lane] {
-            let weight = self.objective.weight(self.experiment, window.begin[lane] + k);
-            for j in (0..window.outputs()).filter(|&j| weight > 0.0 && window.is_measured(k, j, lane)) {
-                let slope = loss.slope(window.error(k, j, lane));
-                self.sum += slope;
-                self.squares += slope * slope;
-                self.count += 1.0;
-            }
-        }
-    }
-
-    fn append(&mut self, later: Self) {
-        self.sum += later.sum;
-        self.squares += later.squares;
-        self.count += later.count;
-    }
-}
-
 /// A warning of a loss whose mean curvature at these errors is too uncertain for standard errors.
 fn few_within_the_loss(evidence: &Evidence<'_>) -> Option<Warning> {
     let objective = evidence.point.objective;
-    objective.loss()?;
-    let new = |experiment: usize| Slopes { objective, experiment, sum: 0.0, squares: 0.0, count: 0.0 };
-    let all = objective.gather(&evidence.point.end.coordinates, false, new).ok()?;
-    let total = |of: fn(&Slopes<'_>) -> f64| all.iter().map(of).sum::<f64>();
-    let (sum, squares, count) = (total(|one| one.sum), total(|one| one.squares), total(|one| one.count));
+    // That of a loss which is not robust is one.
+    let [sum, squares, count] = evidence.bread().filter(|_| objective.is_robust())?.slopes_of_influence();
     if sum / count >= NARROW {
         return None;
     }

@@ -1,12 +1,12 @@
 //! [`Rows`]: what one pass with slopes sums up for the covariance and several checks.
 
+use crate::covariance::hac::{First, Frame, Sums};
+use crate::covariance::leverage::of_experiment;
+use crate::covariance::shares::{Largest, Pass, Shares, of_all, sizes_of_all};
+use crate::covariance::sizes::Sizes;
 use crate::information::{Covariance, Information};
-use crate::judge::covariances::hac::{First, Frame, Sums};
 use crate::judge::evidence::sensors::Triangle;
-use crate::judge::evidence::shares::{Largest, Pass, Shares, of_all, sizes_of_all};
-use crate::judge::evidence::sizes::Sizes;
 use crate::judge::evidence::spans::{Spans, SumSpans};
-use crate::judge::leverage::of_experiment;
 use crate::problem::{Objective, Whitening};
 
 /// What is asked of the pass.

@@ -1,6 +1,7 @@
 //! The rows of each output, extended by its gain, offset and delay.
 
-use crate::information::{Block, Information};
+use super::ruled_out::Unless;
+use crate::information::{Gathering, Information};
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
 
@@ -17,8 +18,17 @@ impl Kind {
 }
 
 pub(crate) const KINDS: usize = 3;
-/// Rows that are absorbed together.
-const ROWS: usize = 256;
+
+/// What rules out that rows are extended, and that sensors are tested.
+pub(crate) const UNLESS: &[Unless] = &[Unless::Prefilter, Unless::Restarts, Unless::ManyUnknowns, Unless::NoMinimum];
+pub(crate) const UNTESTED: &[Unless] = &[
+    Unless::Prefilter,
+    Unless::Restarts,
+    Unless::ManyUnknowns,
+    Unless::NoMinimum,
+    Unless::NoFreedom(1.0),
+    Unless::RoundOff,
+];
 
 /// The measurements of an experiment, one after the other.
 pub(crate) struct Measurements<'o> {
@@ -75,28 +85,23 @@ impl<'o> Measurements<'o> {
 /// The triangle of each output's rows, of one experiment: slopes of the unknowns, then of gain, offset and delay.
 pub(crate) struct Triangle<'o> {
     measurements: Measurements<'o>,
-    of: Vec<(Information, Block)>,
+    of: Vec<Gathering>,
     row: Vec<f64>,
 }
 
 impl<'o> Triangle<'o> {
     pub fn new(objective: &'o Objective<'o>, experiment: usize) -> Self {
         let columns = objective.problem.unknowns.columns(experiment).count() + KINDS;
-        let empty = |_| (Information::new(columns), Block::new(columns, ROWS));
-        Triangle {
-            measurements: Measurements::new(objective, experiment),
-            of: (0..objective.outputs()).map(empty).collect(),
-            row: vec![0.0; columns],
-        }
+        let of = (0..objective.outputs()).map(|_| Gathering::new(columns)).collect();
+        Triangle { measurements: Measurements::new(objective, experiment), of, row: vec![0.0; columns] }
     }
 
     /// One triangle, with the regressors of each output in columns of their own.
-    pub fn of_all_outputs(mut self) -> Information {
+    pub fn of_all_outputs(self) -> Information {
         let unknowns = self.row.len() - KINDS;
         let outputs = self.of.len();
         let mut all = Information::new(unknowns + outputs * KINDS);
-        for (j, (triangle, block)) in self.of.iter_mut().enumerate() {
-            triangle.absorb(block);
+        for (j, triangle) in self.of.into_iter().map(Gathering::triangle).enumerate() {
             for i in 0..=triangle.columns() {
                 let mut row = vec![0.0; all.columns()];
                 let place = |c: usize| if c < unknowns { c } else { c + j * KINDS };
@@ -117,17 +122,12 @@ impl Accumulate for Triangle<'_> {
             let own = window.row(k, output).chunks_exact(window.lanes());
             of_unknowns.iter_mut().zip(own).for_each(|(to, lanes)| *to = root * lanes[lane]);
             of_sensor.iter_mut().zip(slopes).for_each(|(to, slope)| *to = root * slope);
-            let (triangle, block) = &mut of[output];
-            triangle.gather(block, row, root * window.error(k, output, lane));
+            of[output].take(row, root * window.error(k, output, lane));
         });
     }
 
     fn append(&mut self, later: Self) {
-        for ((triangle, block), (other, mut rows)) in self.of.iter_mut().zip(later.of) {
-            triangle.absorb(block);
-            triangle.absorb(&mut rows);
-            triangle.merge(&other);
-        }
+        self.of.iter_mut().zip(later.of).for_each(|(rows, later)| rows.append(later));
         self.measurements.append(later.measurements);
     }
 }

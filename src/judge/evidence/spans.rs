@@ -1,7 +1,7 @@
 //! The rows of each record in parts of equal length, output by output.
 
-use crate::information::{Block, Information};
-use crate::judge::point::Point;
+use crate::covariance::point::Point;
+use crate::information::{Gathering, Information};
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -13,21 +13,24 @@ pub(crate) const LEVEL: f64 = 1e-4;
 const ROUNDING: f64 = 1e-11;
 /// Spans of equal length of each record.
 pub(crate) const SPANS: usize = 16;
-/// Rows that are absorbed together.
+/// Rows that are absorbed together, in each of many triangles.
 const ROWS: usize = 64;
 
-/// The triangles of one experiment: output by output, each of the parts of equal length.
-pub(crate) struct Spans {
-    pub of: Vec<Vec<Span>>,
-    /// The number of columns of its triangles.
-    pub columns: usize,
+/// Rows of a part of an experiment.
+pub(crate) struct Span<R = Information> {
+    pub rows: R,
+    /// Of the squared errors, of their squares, and the number of errors.
+    pub sums: [f64; 3],
 }
+
+/// The parts of equal length of one experiment, output by output.
+pub(crate) type Spans = Vec<Vec<Span>>;
 
 /// The same while it is summed up.
 pub(crate) struct SumSpans<'h> {
     objective: &'h Objective<'h>,
     experiment: usize,
-    spans: Spans,
+    of: Vec<Vec<Span<Gathering>>>,
     row: Vec<f64>,
 }
 
@@ -36,48 +39,17 @@ pub(crate) fn span(sample: usize, samples: usize) -> usize {
     sample * SPANS / samples.max(1)
 }
 
-/// Rows of a part of an experiment.
-pub(crate) struct Span {
-    pub triangle: Information,
-    block: Block,
-    pub squares: f64,
-    pub fourths: f64,
-    pub count: u64,
-}
-
-impl Span {
-    fn new(columns: usize) -> Self {
-        Span {
-            triangle: Information::new(columns),
-            block: Block::new(columns, ROWS),
-            squares: 0.0,
-            fourths: 0.0,
-            count: 0,
-        }
-    }
-
-    fn append(&mut self, later: &mut Span) {
-        self.triangle.absorb(&mut self.block);
-        later.triangle.absorb(&mut later.block);
-        self.triangle.merge(&later.triangle);
-        self.squares += later.squares;
-        self.fourths += later.fourths;
-        self.count += later.count;
-    }
-}
-
 impl<'h> SumSpans<'h> {
     pub fn new(objective: &'h Objective<'h>, experiment: usize) -> Self {
         let columns = objective.problem.unknowns.columns(experiment).count();
-        let parts = |_| (0..SPANS).map(|_| Span::new(columns)).collect();
-        let spans = Spans { of: (0..objective.outputs()).map(parts).collect(), columns };
-        SumSpans { objective, experiment, spans, row: vec![0.0; columns] }
+        let part = || Span { rows: Gathering::in_blocks(columns, ROWS), sums: [0.0; 3] };
+        let of = (0..objective.outputs()).map(|_| (0..SPANS).map(|_| part()).collect()).collect();
+        SumSpans { objective, experiment, of, row: vec![0.0; columns] }
     }
 
-    /// With the last rows absorbed.
-    pub fn complete(mut self) -> Spans {
-        self.spans.of.iter_mut().flatten().for_each(|part| part.triangle.absorb(&mut part.block));
-        self.spans
+    pub fn complete(self) -> Spans {
+        let part = |Span { rows, sums }: Span<Gathering>| Span { rows: rows.triangle(), sums };
+        self.of.into_iter().map(|parts| parts.into_iter().map(part).collect()).collect()
     }
 }
 
@@ -88,7 +60,7 @@ impl Accumulate for SumSpans<'_> {
             let number = span(window.begin[lane] + k, samples);
             let weight = self.objective.weight(self.experiment, window.begin[lane] + k);
             for j in (0..window.outputs()).filter(|&j| window.is_measured(k, j, lane) && weight > 0.0) {
-                let part = &mut self.spans.of[j][number];
+                let part = &mut self.of[j][number];
                 let values = window.row(k, j).iter().skip(lane).step_by(window.lanes());
                 let error = window.error(k, j, lane);
                 // As in iteratively reweighted least squares, whose minimum is that of the loss.
@@ -96,23 +68,22 @@ impl Accumulate for SumSpans<'_> {
                 let root = (weight * by_loss).sqrt();
                 self.row.iter_mut().zip(values).for_each(|(to, from)| *to = root * from);
                 let error = root * error;
-                part.squares += error * error;
-                part.fourths += error.powi(4);
-                part.count += 1;
-                part.triangle.gather(&mut part.block, &self.row, error);
+                part.sums.iter_mut().zip([error * error, error.powi(4), 1.0]).for_each(|(sum, one)| *sum += one);
+                part.rows.take(&self.row, error);
                 if window.has_variances() {
                     let slope = |column: usize| window.variance_at(k, j, column, lane);
                     self.row.iter_mut().enumerate().for_each(|(c, to)| *to = slope(c));
                     let second = (error * error - 1.0) * FRAC_1_SQRT_2;
-                    part.triangle.gather(&mut part.block, &self.row, second);
+                    part.rows.take(&self.row, second);
                 }
             }
         }
     }
 
-    fn append(&mut self, mut later: Self) {
-        for (part, later) in self.spans.of.iter_mut().flatten().zip(later.spans.of.iter_mut().flatten()) {
-            part.append(later);
+    fn append(&mut self, later: Self) {
+        for (part, later) in self.of.iter_mut().flatten().zip(later.of.into_iter().flatten()) {
+            part.rows.append(later.rows);
+            part.sums.iter_mut().zip(later.sums).for_each(|(sum, later)| *sum += later);
         }
     }
 }

@@ -8,6 +8,7 @@ use super::{Column, DataFile, Reading, reading};
 use crate::error::Error;
 use crate::interval::Hold;
 use crate::layout::{Kind, Layout, Quantity};
+use crate::numeral::Moment;
 use crate::record::{Channel, Holds, Initial, Record};
 use std::sync::Arc;
 
@@ -57,12 +58,14 @@ impl DataFile {
                 // An output may be missing, an input may not.
                 let good = |value: &f64| if i < layout.inputs.len() { value.is_finite() } else { !value.is_infinite() };
                 let Some(value) = value.filter(good) else {
+                    let time = Moment { time, unit: timing.unit() };
                     return Err(self.bad_cell(&table, source.column, value, &signals[i].name, sample, time));
                 };
                 column.push(value);
             }
             sample += 1;
         }
+        let time_unit = timing.unit();
         let (time, source) = timing.finish(self, &table, sample)?;
         let form = table.form();
         let reading = Reading {
@@ -83,7 +86,7 @@ impl DataFile {
         let (states, inputs, outputs) = (layout.states.clone().into(), inputs.into(), outputs.into());
         let (name, holds, initial) = (self.name(), Holds::All(Hold::default()), Initial::default());
         let (reading, looked) = (Some(Arc::new(reading)), Arc::default());
-        Record { name, states, time, inputs, outputs, holds, initial, reading, looked }.checked()
+        Record { name, states, time, time_unit, inputs, outputs, holds, initial, reading, looked }.checked()
     }
 
     /// The record's name: the file's.
@@ -170,7 +173,7 @@ impl DataFile {
         value: Option<f64>,
         signal: &str,
         sample: usize,
-        time: f64,
+        time: Moment,
     ) -> Error {
         let Some(value) = value else {
             let (path, line, name) = (self.path.clone(), table.line(), table.names()[column].clone());

@@ -1,5 +1,6 @@
 //! [`Reading`]: how a file was read.
 
+use crate::numeral::TimeUnit;
 use core::fmt;
 
 /// How a file was read: what was said of it, and what was guessed. Its text is one line:
@@ -122,15 +123,21 @@ const TIMES: [(f64, &[&str]); 7] = [
     (86_400.0, &["d", "day", "days", "tage"]),
 ];
 
-/// Size of a unit of time (s).
-pub(super) fn time_unit(text: &str) -> Option<f64> {
+/// A unit of time by one of its names.
+pub(super) fn time_unit(text: &str) -> Option<TimeUnit> {
     let text = text.to_lowercase();
-    TIMES.iter().find(|(_, names)| names.contains(&text.as_str())).map(|(size, _)| *size)
+    let known = TIMES.iter().find(|(_, names)| names.contains(&text.as_str()));
+    known.map(|(size, names)| TimeUnit::of_seconds(names[0], *size))
+}
+
+/// The unit of time of so many seconds.
+pub(super) fn of_size(size: f64) -> Option<TimeUnit> {
+    let known = TIMES.iter().find(|(known, _)| *known == size);
+    known.map(|(size, names)| TimeUnit::of_seconds(names[0], *size))
 }
 
 fn unit_name(size: f64) -> String {
-    let known = TIMES.iter().find(|(known, _)| *known == size);
-    known.map_or_else(|| format!("units of {size} s"), |(_, names)| names[0].to_owned())
+    of_size(size).map_or_else(|| format!("units of {size} s"), |unit| unit.name().to_owned())
 }
 
 /// Other units in which instruments write what models have in SI units: the unit, the model's, and the factor between them.

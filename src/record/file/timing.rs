@@ -3,11 +3,12 @@
 use super::dates::Dates;
 use super::guess::split_unit;
 use super::numbers::Numbers;
-use super::reading::time_unit;
+use super::reading::{of_size, time_unit};
 use super::stamp::Stamp;
 use super::table::Table;
 use super::{DataFile, TimeSource};
 use crate::error::Error;
+use crate::numeral::{Moment, TimeUnit};
 use crate::record::{Clock, Time};
 use jiff::tz::TimeZone;
 
@@ -31,10 +32,12 @@ pub(super) enum Timing {
 }
 
 /// How numbers become seconds.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(super) struct Ticks {
     column: usize,
     unit: f64,
+    /// The unit in which they are shown.
+    shown: TimeUnit,
     offset: f64,
     origin: f64,
 }
@@ -79,13 +82,15 @@ impl DataFile {
             let said = self.said("t");
             let written = split_unit(name).1.or_else(|| suffix(name));
             let below = table.form().unit(column);
-            let unit = said.factor.or_else(|| written.or(below).and_then(time_unit));
+            let named = written.or(below).and_then(time_unit);
+            let unit = said.factor.or_else(|| named.as_ref().map(TimeUnit::seconds));
             let long_ago = SINCE_1970.iter().find(|(least, _)| unit.is_none() && number.abs() >= *least);
             let (unit, origin) = long_ago.map_or((unit.unwrap_or(1.0), 0.0), |(_, unit)| (*unit, number));
+            let shown = shown(named, unit);
             let unit = if said.reversed { -unit } else { unit };
             // A pipe cannot be read again, so that its stamps are kept until the end.
             let stamps = if self.path.is_file() { None } else { Some(Vec::new()) };
-            let ticks = Ticks { column, unit, offset: said.offset, origin };
+            let ticks = Ticks { column, unit, shown, offset: said.offset, origin };
             return Ok(Timing::Numbers { ticks, clock: Clock::default(), stamps });
         }
         let zone = self.zone.as_ref().map(|zone| {
@@ -106,6 +111,16 @@ impl DataFile {
     }
 }
 
+/// The unit in which times are shown that were multiplied by `factor`: the one that the file names, if it is of that size or they were not
+/// converted; else the one of that size, or seconds.
+fn shown(named: Option<TimeUnit>, factor: f64) -> TimeUnit {
+    match named {
+        Some(named) if named.seconds() == factor => named,
+        Some(named) if factor == 1.0 => TimeUnit::of_model(named.name()),
+        _ => of_size(factor).unwrap_or_default(),
+    }
+}
+
 /// A unit of time behind the name of a column of time: `time_ms`.
 fn suffix(name: &str) -> Option<&str> {
     let (before, unit) = name.rsplit_once(['_', '/'])?;
@@ -114,6 +129,14 @@ fn suffix(name: &str) -> Option<&str> {
 }
 
 impl Timing {
+    /// The unit in which the times are shown.
+    pub(super) fn unit(&self) -> TimeUnit {
+        match self {
+            Timing::Numbers { ticks, .. } => ticks.shown.clone(),
+            _ => TimeUnit::default(),
+        }
+    }
+
     /// The time of the current row (s); zero for a date, whose column is read whole.
     pub(super) fn tick(
         &mut self,
@@ -127,9 +150,11 @@ impl Timing {
             Timing::Numbers { ticks, clock, stamps } => {
                 let number = numbers.read(table.cell(ticks.column)).map(|number| ticks.time(number));
                 let Some(time) = number.filter(|time| time.is_finite()) else {
-                    return Err(file.bad_cell(table, ticks.column, number, "t", sample, f64::NAN));
+                    let time = Moment { time: f64::NAN, unit: ticks.shown.clone() };
+                    return Err(file.bad_cell(table, ticks.column, number, "t", sample, time));
                 };
                 if let Some(before) = clock.last().filter(|before| time < *before) {
+                    let [before, time] = [before, time].map(|time| Moment { time, unit: ticks.shown.clone() });
                     let problem = Error::TimeOrder { experiment: file.name(), sample, before, time };
                     return Err(file.at_line(table, problem));
                 }
@@ -137,7 +162,7 @@ impl Timing {
                 if let Some(stamps) = stamps {
                     stamps.push(time);
                 } else if !even {
-                    let mut all = stamps_of(file, table, numbers, *ticks, sample)?;
+                    let mut all = stamps_of(file, table, numbers, ticks, sample)?;
                     all.push(time);
                     *stamps = Some(all);
                 }
@@ -150,7 +175,7 @@ impl Timing {
                     None => cell(*column).into_owned(),
                 };
                 let Some(stamp) = Stamp::read(&text) else {
-                    return Err(file.bad_cell(table, *column, None, "t", sample, f64::NAN));
+                    return Err(file.bad_cell(table, *column, None, "t", sample, f64::NAN.into()));
                 };
                 let more = dates.push(stamp, &text, table.line());
                 if sample == 0 {
@@ -197,7 +222,7 @@ impl Timing {
 }
 
 /// The time stamps of the first rows, for a clock that turned out uneven.
-fn stamps_of(file: &DataFile, table: &Table, numbers: &Numbers, ticks: Ticks, rows: usize) -> Result<Vec<f64>, Error> {
+fn stamps_of(file: &DataFile, table: &Table, numbers: &Numbers, ticks: &Ticks, rows: usize) -> Result<Vec<f64>, Error> {
     let (mut table, mut numbers) = (table.again(file)?, numbers.clone());
     let mut stamps = Vec::with_capacity(rows + 1);
     while stamps.len() < rows && table.next()? {

@@ -1,7 +1,7 @@
 //! [`Scale`]: an axis with its range, round numbers in it, and how they are written.
 
 use super::cut;
-use crate::numeral::exact;
+use crate::numeral::{exact, unit_after};
 use crate::section::Axis;
 
 /// An axis and what it shows.
@@ -51,7 +51,8 @@ impl Scale {
             false if size <= SMALLEST => (-1.0, 1.0),
             false => (from - 0.1 * from.abs(), to + 0.1 * to.abs()),
         };
-        Scale { name: axis.name.clone(), unit: axis.unit.clone(), logarithmic: axis.logarithmic, from, to }
+        let unit = unit_after(&axis.unit).trim_start().to_owned();
+        Scale { name: axis.name.clone(), unit, logarithmic: axis.logarithmic, from, to }
     }
 
     /// The same with some room at both ends.
@@ -180,6 +181,9 @@ mod tests {
             labels(-2e-4, 3e-4),
             ("y (1e-6 m)".into(), ["−200", "−100", "0", "100", "200", "300"].map(String::from).into())
         );
+        // A ratio has no unit.
+        let ratio = |to: f64| Scale::new(&Axis::new("gain", "1"), Some((0.0, to))).title();
+        assert_eq!([ratio(2.0), ratio(2e6)], ["gain", "gain (1e6)"]);
         for (from, to) in [
             (0.0, 0.0),
             (3.0, 3.0),

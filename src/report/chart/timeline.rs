@@ -3,7 +3,7 @@
 use super::curves::{Along, is_band, path, surface};
 use super::scale::Scale;
 use super::{Frame, Short, Size, class};
-use crate::numeral::exact;
+use crate::numeral::{exact, unit_after};
 use crate::report::markup::Markup;
 use crate::section::{Axis, Line, Panel, PanelKind, Stretch, Style, Timeline, Trace};
 use core::fmt::{Display, Write};
@@ -105,8 +105,11 @@ fn panel(timeline: &Timeline, panel: &Panel, first: usize, to: &mut Markup, size
 /// Time since the start of the record, which is named where it is not zero.
 pub(in crate::report) fn time_axis(timeline: &Timeline) -> Axis {
     match timeline.start {
-        0.0 => Axis::new("time", "s"),
-        start => Axis::new(format!("time since t = {} s", exact(start)), "s"),
+        0.0 => Axis::new("time", &timeline.time_unit),
+        start => {
+            let name = format!("time since t = {}{}", exact(start), unit_after(&timeline.time_unit));
+            Axis::new(name, &timeline.time_unit)
+        }
     }
 }
 

@@ -24,7 +24,7 @@ const axisOf = (from, to) => {
     ticks.push({ at: (i * step - first) / (last - first), label });
   }
   const title = (name, unit) => {
-    const scaled = `${exponent ? `1e${exponent} ` : ""}${unit}`.trim();
+    const scaled = `${exponent ? `1e${exponent} ` : ""}${unit === "1" ? "" : unit}`.trim();
     const short = name.length > 36 ? `${name.slice(0, 35)}…` : name;
     return `${short}${base ? `, above ${digitsOf(base, 15)}` : ""}${scaled ? ` (${scaled})` : ""}`;
   };

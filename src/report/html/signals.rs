@@ -13,6 +13,7 @@ use serde::Serialize;
 struct Numbers<'a> {
     /// Label of the axis of time.
     time: String,
+    time_unit: &'a str,
     panels: &'a [crate::section::Panel],
     stretches: Vec<Packed>,
 }
@@ -54,6 +55,7 @@ pub(super) fn draw(to: &mut Markup, plot: &Plot, timeline: &Timeline, size: Size
 fn numbers(timeline: &Timeline) -> String {
     let numbers = Numbers {
         time: time_axis(timeline).name,
+        time_unit: &timeline.time_unit,
         panels: &timeline.panels,
         stretches: timeline.stretches.iter().map(packed).collect(),
     };

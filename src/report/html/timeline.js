@@ -98,9 +98,10 @@ const isBand = ({ style }) => style === "confidence" || style === "prediction";
 
 class Timeline {
   constructor(root) {
-    const { panels, stretches, time } = JSON.parse(root.querySelector("script").textContent);
+    const { panels, stretches, time, time_unit: unit } = JSON.parse(root.querySelector("script").textContent);
     this.root = root;
     this.time = time;
+    this.unit = unit;
     this.stretches = stretches.map(unpacked);
     let first = 0;
     this.panels = [...root.querySelectorAll(".panel")].map((node, k) => {
@@ -181,7 +182,7 @@ class Timeline {
       if (numbered) svgNode(along, "text", { class: "tick middle", x, y: height + 16, text: label });
     }
     titles[0].textContent = upwards.title(name, unit);
-    if (titles[1]) titles[1].textContent = across.title(this.time, "s");
+    if (titles[1]) titles[1].textContent = across.title(this.time, this.unit);
   }
 
   // The values of a panel nearest to a time.

@@ -13,7 +13,7 @@ const zoomable = (root) => {
     const [from, to] = timeline.shown;
     const { per } = timeline.stretch();
     const detail = per > 1 ? `each column ${per} samples` : "sample by sample";
-    const range = to - from < last - first ? `${digitsOf(from, 7)} s to ${digitsOf(to, 7)} s` : "all";
+    const range = to - from < last - first ? `${digitsOf(from, 7)} to ${digitsOf(to, 7)} ${timeline.unit}` : "all";
     status.textContent = `Shown: ${range}, ${detail}`;
     buttons.forEach(([button, , possible]) => button.setAttribute("aria-disabled", String(!possible())));
   };
@@ -74,7 +74,7 @@ const zoomable = (root) => {
     });
     readout.replaceChildren();
     const row = (tag, text) => readout.append(Object.assign(document.createElement(tag), { textContent: text }));
-    row("b", `${digitsOf(found.t, 8)} s`);
+    row("b", `${digitsOf(found.t, 8)} ${timeline.unit}`);
     found.values.forEach(([name, value]) => row("span", `${name} ${value}`));
     readout.hidden = false;
     const [inner, outer] = [box(panel), root.getBoundingClientRect()];

@@ -1,7 +1,7 @@
 //! How well the outputs are reproduced, over all records and record by record.
 
 use crate::estimate::OutputEstimate;
-use crate::numeral::{counted, exact, number, rounded};
+use crate::numeral::{counted, exact, number, rounded, unit_after};
 use crate::report::facts::{Facts, Record};
 use crate::section::{Axis, Cell, Curves, Drawing, Layer, Plot, Section, Style, Table};
 
@@ -34,14 +34,16 @@ fn records(facts: &Facts) -> Table {
     let named = facts.records.iter().take(1).flat_map(|record| &record.fits).take(OUTPUTS);
     let fits = named.map(|fit| format!("fit of {}", fit.name));
     let more = (outputs > OUTPUTS).then(|| "worst fit".to_owned());
-    let length = ["samples", "duration (s)"];
+    let length = ["samples", "duration"];
     let columns = ["record".to_owned()].into_iter().chain(fits).chain(more).chain(length.map(str::to_owned)).collect();
     let mut order: Vec<&Record> = facts.records.iter().collect();
     order.sort_by(|a, b| worst(a).total_cmp(&worst(b)));
     let row = |record: &&Record| {
         let fits = record.fits.iter().take(OUTPUTS).map(|fit| Cell::fit(fit.fit_percent));
         let more = (outputs > OUTPUTS).then(|| Cell::fit(Some(worst(record)).filter(|fit| fit.is_finite())));
-        let length = [record.samples.into(), Cell::number(record.end - record.begin, 4)];
+        let duration = record.end - record.begin;
+        let text = format!("{}{}", number(duration, 4), unit_after(record.time_unit.name()));
+        let length = [record.samples.into(), Cell::Number { value: duration, text }];
         [record.name.as_str().into()].into_iter().chain(fits).chain(more).chain(length).collect::<Vec<_>>()
     };
     let table = Table { columns, ..Table::new("Records, the worst first", []) };
@@ -72,16 +74,18 @@ fn overview(facts: &Facts) -> Option<Plot> {
 /// A record in one sentence.
 pub(super) fn extent(record: &Record) -> String {
     let Record { samples, begin, end, sample_time, gaps, .. } = record;
+    let unit = unit_after(record.time_unit.name());
     let gaps = match gaps.len() {
         0 => "no gap in time".to_owned(),
         count => format!("{} in time", counted(count as u64, "gap")),
     };
+    let day = if record.time_unit.name() == "s" { date(*begin) } else { String::new() };
     let start = match begin {
         0.0 => String::new(),
-        begin => format!(" from t = {} s{}", exact(*begin), date(*begin)),
+        begin => format!(" from t = {}{unit}{day}", exact(*begin)),
     };
     let (duration, step) = (rounded(end - begin, *sample_time), number(*sample_time, 4));
-    format!("{} over {duration} s{start}, every {step} s; {gaps}", counted(*samples, "sample"))
+    format!("{} over {duration}{unit}{start}, every {step}{unit}; {gaps}", counted(*samples, "sample"))
 }
 
 /// The day of a time that counts from 1970 (POSIX time), if it is in this half of the century.

@@ -2,7 +2,7 @@
 
 use super::outputs::extent;
 use super::{quoted, residuals};
-use crate::numeral::{counted, rounded};
+use crate::numeral::{counted, rounded, unit_after};
 use crate::report::facts::{Facts, Record};
 use crate::section::{Drawing, Section};
 
@@ -59,9 +59,9 @@ fn sentences(record: &Record) -> Vec<String> {
     }
     if !record.gaps.is_empty() {
         let after = |t: f64| rounded(t - record.begin, record.sample_time);
-        let named =
-            record.gaps.iter().take(NAMED).map(|(from, to)| format!("from {} s to {} s", after(*from), after(*to)));
-        let named: Vec<String> = named.collect();
+        let unit = unit_after(record.time_unit.name());
+        let one = |(from, to): &(f64, f64)| format!("from {}{unit} to {}{unit}", after(*from), after(*to));
+        let named: Vec<String> = record.gaps.iter().take(NAMED).map(one).collect();
         let more = match record.gaps.len().saturating_sub(NAMED) {
             0 => String::new(),
             more => format!("; {more} more"),

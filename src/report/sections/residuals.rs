@@ -64,9 +64,9 @@ pub(super) fn of_output(id: &str, record: &Record, fit: &OutputFit, shown: usize
     let fits = fit.fit_percent.map_or(String::new(), |fit| format!(", reproduced to {} %", numeral::fit(fit)));
     let section = Section::new(format!("{id}-{}", fit.name), format!("Residuals of {}{fits}", fit.name)).folded();
     let at = rounded(fit.largest_at - record.begin, record.sample_time);
-    let unit = unit_after(&fit.unit);
+    let (unit, time_unit) = (unit_after(&fit.unit), unit_after(record.time_unit.name()));
     let section = section.says(format!(
-        "Mean {}{unit}, standard deviation {}{unit}; the largest is {}{unit}, {at} s after the start.",
+        "Mean {}{unit}, standard deviation {}{unit}; the largest is {}{unit}, {at}{time_unit} after the start.",
         resolved(of.mean, of.standard_deviation / of.effective_samples.max(1.0).sqrt()),
         number(of.standard_deviation, 3),
         number(fit.largest, 3),
@@ -92,10 +92,11 @@ pub(super) fn of_output(id: &str, record: &Record, fit: &OutputFit, shown: usize
 
 fn outliers(record: &Record, of: &Residuals) -> Option<String> {
     const NAMED: usize = 5;
-    let unit = unit_after(&of.unit);
+    let (unit, time_unit) = (unit_after(&of.unit), unit_after(record.time_unit.name()));
     let named = of.outliers.iter().take(NAMED).map(|outlier| {
-        let (residual, time) = (number(outlier.residual, 3), rounded(outlier.time - record.begin, record.sample_time));
-        format!("{residual}{unit} at {time} s (sample {})", outlier.sample)
+        let after = record.time_unit.convert(outlier.time) - record.begin;
+        let (residual, time) = (number(outlier.residual, 3), rounded(after, record.sample_time));
+        format!("{residual}{unit} at {time}{time_unit} (sample {})", outlier.sample)
     });
     let named: Vec<String> = named.collect();
     let beyond = "further out than a normal distribution allows";
@@ -145,7 +146,7 @@ fn autocorrelation(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
     let caption =
         format!("Autocorrelation; of white residuals, each lag for itself is between the lines in 99 of 100{verdict}");
     let title = format!("Autocorrelation of the residual of {} of {}", fit.name, record.name);
-    let drawing = lags("autocorrelation", record.sample_time, 1, 1, &of.autocorrelation, of.autocorrelation_band)?;
+    let drawing = lags("autocorrelation", record, 1, 1, &of.autocorrelation, of.autocorrelation_band)?;
     Some(Plot::of(format!("autocorrelation-{id}-{}", fit.name), caption, title, drawing))
 }
 
@@ -158,7 +159,7 @@ fn cross_correlation(id: &str, record: &Record, fit: &OutputFit, with: &Correlat
         "Correlation with {role} `{signal}` before it; the test fails where a colored bar leaves the lines, gray ones are not \
          tested"
     );
-    let drawing = lags("correlation", record.sample_time, *first_lag, *tested_from, values, *band)?;
+    let drawing = lags("correlation", record, *first_lag, *tested_from, values, *band)?;
     Some(Plot::of(format!("correlation-{id}-{}-{signal}-{role}", fit.name), caption, title, drawing))
 }
 
@@ -174,8 +175,8 @@ fn against_signals(id: &str, record: &Record, fit: &OutputFit) -> Vec<Plot> {
 }
 
 /// Bars over lags in seconds; those before `tested_from` (samples) are not tested.
-fn lags(name: &str, step: f64, first: i64, tested_from: i64, values: &[f64], band: f64) -> Option<Drawing> {
-    let step = if step > 0.0 { step } else { 1.0 };
+fn lags(name: &str, record: &Record, first: i64, tested_from: i64, values: &[f64], band: f64) -> Option<Drawing> {
+    let step = if record.sample_time > 0.0 { record.sample_time } else { 1.0 };
     let untested = (tested_from - first).clamp(0, values.len() as i64) as usize;
     let bars = |style, from: usize, values: &[f64]| Layer::Bars {
         style,
@@ -189,32 +190,35 @@ fn lags(name: &str, step: f64, first: i64, tested_from: i64, values: &[f64], ban
     }
     layers.extend([band, -band].map(|value| Layer::Level { value, label: String::new() }));
     (!values.is_empty()).then(|| {
-        let drawing = Curves { x: Axis::new("lag", "s"), y: Axis::new(name, ""), layers };
+        let drawing = Curves { x: Axis::new("lag", record.time_unit.name()), y: Axis::new(name, ""), layers };
         Drawing::Curves(drawing)
     })
 }
 
 /// Where the power of the residual lies.
 fn spectrum(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
-    let of = &fit.residuals.spectrum;
+    let (of, hertz) = (&fit.residuals.spectrum, record.time_unit.frequency());
+    // Over a hertz, or times a minute.
+    let over = hertz.strip_prefix("1/").map_or_else(|| format!("/{hertz}"), |time| format!(" {time}"));
     let line = |style, values: &[f64]| Layer::Line {
         style,
         points: of.frequency.iter().copied().zip(values.iter().copied()).collect(),
     };
     let mut layers = vec![line(Style::Quiet, &of.greatest), line(Style::Main, &of.density)];
-    layers.extend(
-        fit.residuals.period.map(|period| Layer::Mark {
-            value: period.frequency,
-            label: format!("{} Hz", number(period.frequency, 4)),
-        }),
-    );
+    layers.extend(fit.residuals.period.map(|period| Layer::Mark {
+        value: period.frequency,
+        label: format!("{} {hertz}", number(period.frequency, 4)),
+    }));
     let unit = match fit.unit.as_str() {
-        "" | "1" => "1/Hz".to_owned(),
-        single if single.chars().all(char::is_alphabetic) => format!("{single}²/Hz"),
-        several => format!("({several})²/Hz"),
+        "" | "1" => format!("1{over}"),
+        single if single.chars().all(char::is_alphabetic) => format!("{single}²{over}"),
+        several => format!("({several})²{over}"),
     };
-    let drawing =
-        Curves { x: Axis::new("frequency", "Hz").from(0.0), y: Axis::new("power density", unit).logarithmic(), layers };
+    let drawing = Curves {
+        x: Axis::new("frequency", hertz).from(0.0),
+        y: Axis::new("power density", unit).logarithmic(),
+        layers,
+    };
     let caption = "Spectrum: mean power density, and (thin) the greatest in each column; flat for white residuals";
     let title = format!("Spectrum of the residual of {} of {}", fit.name, record.name);
     let plot = Plot::of(format!("spectrum-{id}-{}", fit.name), caption, title, Drawing::Curves(drawing));
@@ -224,8 +228,10 @@ fn spectrum(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
 /// Size of the residual over the range of a signal.
 fn spread(id: &str, record: &Record, fit: &OutputFit, over: &Spread) -> Plot {
     let Spread { signal, role, unit, at, deviation, .. } = over;
-    let shift = if *role == SignalRole::Time { record.begin } else { 0.0 };
-    let points: Vec<(f64, f64)> = at.iter().map(|at| at - shift).zip(deviation.iter().copied()).collect();
+    let of_time = *role == SignalRole::Time;
+    let unit = if of_time { record.time_unit.name() } else { unit };
+    let place = |at: &f64| if of_time { record.time_unit.convert(*at) - record.begin } else { *at };
+    let points: Vec<(f64, f64)> = at.iter().map(place).zip(deviation.iter().copied()).collect();
     let all = Layer::Level { value: fit.residuals.standard_deviation, label: String::new() };
     let drawing = Curves {
         x: Axis::new(signal, unit),

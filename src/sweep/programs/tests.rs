@@ -1,11 +1,13 @@
 use super::*;
 use crate::functions::Handle;
+use crate::graph::choices;
 use crate::integrate::Rk4;
 use crate::model::Model;
 use crate::predict::{FreeRun, Horizon, Kalman, Predictor};
 use crate::record::{Channel, Column};
 use crate::scalar::Scalar;
 use crate::signals;
+use crate::sweep::duals::Uncompiled;
 use crate::sweep::{DualSweep, Evaluated, Typed, Window};
 
 signals! {
@@ -90,7 +92,8 @@ fn sweeps<M: Model>(model: &M, predictor: impl Predictor) -> [Arc<dyn Sweep + '_
     let equations = Arc::new(Equations::trace(model).unwrap());
     let duals = |code| -> Arc<dyn Sweep + '_> {
         let (layout, method, predictor) = (Arc::new(Layout::of::<M>()), method.clone(), predictor.clone());
-        Arc::new(DualSweep { layout, code, method, predictor, uncompiled: Default::default() })
+        let uncompiled = Uncompiled { reason: String::new(), choices: Some(choices(equations.graph())) };
+        Arc::new(DualSweep { layout, code, method, predictor, uncompiled })
     };
     let evaluated = duals(Arc::new(Evaluated::new(equations.clone())));
     let typed = match predictor.needs_slopes() && !equations.is_affine() {

@@ -3,12 +3,11 @@
 //! Truncation puts an offset of half a quantization step, on average, into an output, of which the unknowns take a part. The fit with that
 //! offset is compared with the fit without it, by the slopes at the estimate.
 
-use super::Extended;
-use crate::estimate::{Unknown, Warning, WarningCode};
 use crate::judge::checks::data::{FEW, PART_OF_STEP, TIMES, distinct};
+use crate::judge::checks::*;
+use crate::judge::evidence::extended::Extended;
 use crate::judge::evidence::sensors::{KINDS, Kind};
-use crate::numeral::{number, percent};
-use crate::optimize::{Linearization, Severity};
+use crate::optimize::Linearization;
 
 /// With more values than these (6 bits) the offset of half a step is below a hundredth of the range.
 const MOST: usize = 64;
@@ -19,49 +18,47 @@ const FAR: f64 = 2.0;
 /// Weight of the row that fixes the offset, relative to the norm of the offset's column: what the data say of it adds 1e-12.
 const HELD: f64 = 1e6;
 
-impl Extended<'_> {
-    /// Outputs that may have been truncated, where that moves a parameter.
-    pub(crate) fn cut_off(&self, unknowns: &[Unknown]) -> Vec<Warning> {
-        let residuals = &self.evidence.residuals.outputs;
-        let coarse = |j: usize| {
-            let (count, step) = steps(&distinct(&self.objective.problem.records, j, MOST)?)?;
-            let often = residuals[j].samples >= (TIMES * count) as u64;
-            (often && residuals[j].rmse > PART_OF_STEP * step && !self.evidence.rounded[j]).then_some((j, count, step))
-        };
-        let found = (0..self.objective.outputs()).filter_map(coarse);
-        found.filter_map(|(j, count, step)| self.if_cut_off(unknowns, (j, count, step))).collect()
-    }
+/// Outputs that may have been truncated, where that moves a parameter.
+pub(super) fn cut_off(extended: &Extended<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
+    let residuals = &extended.evidence.residuals.outputs;
+    let coarse = |j: usize| {
+        let (count, step) = steps(&distinct(&extended.evidence.point.objective.problem.records, j, MOST)?)?;
+        let often = residuals[j].samples >= (TIMES * count) as u64;
+        (often && residuals[j].rmse > PART_OF_STEP * step && !extended.evidence.rounded[j]).then_some((j, count, step))
+    };
+    let found = (0..extended.evidence.point.objective.outputs()).filter_map(coarse);
+    found.filter_map(|(j, count, step)| if_cut_off(extended, unknowns, (j, count, step))).collect()
+}
 
-    fn if_cut_off(&self, unknowns: &[Unknown], (j, count, size): (usize, usize, f64)) -> Option<Warning> {
-        let regressor = j * KINDS + Kind::ALL.iter().position(|kind| *kind == Kind::Offset)?;
-        let place = self.place(regressor);
-        let held = self.held(Some(regressor));
-        let weight = HELD * self.linear.column_norms()[place];
-        let mut triangles: Vec<_> = self.linear.columns().map(|(triangle, _)| triangle.clone()).collect();
-        let (_, columns) = self.linear.columns().next()?;
-        let row: Vec<f64> = columns.iter().map(|column| if *column == place { weight } else { 0.0 }).collect();
-        triangles[0].absorb_row(&row, -0.5 * weight * size);
-        let shared = self.place(self.objective.outputs() * KINDS);
-        let step = Linearization::new(0.0, shared, triangles).step(&vec![0.0; held.len()], &held)?;
-        let without = self.linear.step(&vec![0.0; held.len()], &self.held(None))?;
-        let gain = |step: &[f64]| 2.0 * self.linear.predicted_reduction(step);
-        let variance = (self.linear.sum_of_squares() - gain(&without)) / self.evidence.point.degrees;
-        if gain(&without) - gain(&step) > CERTAIN * variance {
-            return None;
-        }
-        let (name, part, errors) = self.furthest(&step, unknowns).filter(|(.., errors)| *errors > FAR)?;
-        let output = &self.objective.problem.layout().outputs[j];
-        let text = format!(
-            "the output `{}` has {count} values, {} {} apart: if the sensor truncates instead of rounding, which the record does not \
-             exclude, `{name}` is {} ({} standard errors) away from this estimate; add half a step to truncated values, or measure it finer",
-            output.name,
-            number(size, 3),
-            output.unit,
-            percent(part, 2),
-            number(errors, 2)
-        );
-        Some(Warning { code: WarningCode::CoarseOutput, severity: Severity::UsableWithCare, text })
+fn if_cut_off(extended: &Extended<'_>, unknowns: &[Unknown], (j, count, size): (usize, usize, f64)) -> Option<Warning> {
+    let regressor = j * KINDS + Kind::ALL.iter().position(|kind| *kind == Kind::Offset)?;
+    let place = extended.place(regressor);
+    let held = extended.held(Some(regressor));
+    let weight = HELD * extended.linear.column_norms()[place];
+    let mut triangles: Vec<_> = extended.linear.columns().map(|(triangle, _)| triangle.clone()).collect();
+    let (_, columns) = extended.linear.columns().next()?;
+    let row: Vec<f64> = columns.iter().map(|column| if *column == place { weight } else { 0.0 }).collect();
+    triangles[0].absorb_row(&row, -0.5 * weight * size);
+    let shared = extended.place(extended.evidence.point.objective.outputs() * KINDS);
+    let step = Linearization::new(0.0, shared, triangles).step(&vec![0.0; held.len()], &held)?;
+    let without = extended.without()?;
+    let gain = |step: &[f64]| 2.0 * extended.linear.predicted_reduction(step);
+    let variance = (extended.linear.sum_of_squares() - gain(&without)) / extended.evidence.point.degrees;
+    if gain(&without) - gain(&step) > CERTAIN * variance {
+        return None;
     }
+    let (name, part, errors) = extended.furthest(&step, unknowns).filter(|(.., errors)| *errors > FAR)?;
+    let output = &extended.evidence.point.objective.problem.layout().outputs[j];
+    let text = format!(
+        "the output `{}` has {count} values, {}{} apart: if the sensor truncates instead of rounding, which the record does not \
+         exclude, `{name}` is {} ({} standard errors) away from this estimate; add half a step to truncated values, or measure it finer",
+        output.name,
+        number(size, 3),
+        unit_after(&output.unit),
+        percent(part, 2),
+        number(errors, 2)
+    );
+    Some(with_care(WarningCode::CoarseOutput, text))
 }
 
 /// The number of values and the quantization step, where there are more than [`FEW`], all multiples of one step apart.

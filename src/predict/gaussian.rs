@@ -1,0 +1,170 @@
+//! The filter of a state that is taken as Gaussian, by the moments of the model's functions: what [`Kalman`](super::Kalman) and
+//! [`SecondOrder`](super::SecondOrder) share.
+
+use super::{Moments, Plant};
+use crate::error::Error;
+use crate::integrate::Stuck;
+use crate::layout::{Kind, Layout};
+use crate::moments::entry;
+use crate::scalar::Scalar;
+
+/// How a filter finds the moments of the model's functions, from a state and the covariance after it.
+pub(super) trait Order {
+    /// Of the derivative at a fraction of the interval, or of the next state.
+    fn state<S: Scalar>(plant: &dyn Plant<S>, position: f64, carry: &[S]) -> Moments<S>;
+
+    /// Of the outputs.
+    fn outputs<S: Scalar>(plant: &dyn Plant<S>, carry: &[S]) -> Moments<S>;
+}
+
+/// What the filter knows of an output before it is taken in.
+struct Expected<S> {
+    mean: S,
+    /// The output's row of slopes.
+    c: Vec<S>,
+    /// Covariance of the state times that row.
+    gain: Vec<S>,
+    /// Variance of the measurement noise, and what the output's curvature adds.
+    noise: S,
+    /// Variance of the output.
+    variance: S,
+}
+
+fn expected<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &[S], output: usize) -> Expected<S> {
+    let (n, outputs) = (plant.layout().states.len(), plant.layout().outputs.len());
+    let Moments { mean, slopes, spread } = O::outputs(plant, carry);
+    let c = slopes[output * n..][..n].to_vec();
+    let covariance = &carry[n..];
+    let times = |i: usize| (0..n).map(|j| covariance[entry(n, i, j)] * c[j]).sum::<S>();
+    let gain: Vec<S> = (0..n).map(times).collect();
+    let mut noise = vec![S::from(0.0); outputs];
+    plant.noise(&mut noise);
+    let noise = noise[output] * noise[output];
+    let noise = spread.get(entry(outputs, output, output)).map_or(noise, |spread| noise + *spread);
+    let variance = gain.iter().zip(&c).map(|(g, c)| *g * *c).sum::<S>() + noise;
+    Expected { mean: mean[output], c, gain, noise, variance }
+}
+
+/// The state and its covariance.
+pub(super) fn carry(layout: &Layout) -> usize {
+    let n = layout.states.len();
+    n + n * (n + 1) / 2
+}
+
+pub(super) fn check(layout: &Layout) -> Result<(), Error> {
+    if layout.kind == Kind::Static {
+        return Err(Error::Option("a static model has no state to filter; leave the predictor out".to_owned()));
+    }
+    Ok(())
+}
+
+pub(super) fn start<S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S]) {
+    carry[plant.layout().states.len()..].fill(S::from(0.0));
+}
+
+pub(super) fn predict<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &[S], output: usize) -> (S, S) {
+    let Expected { mean, variance, .. } = expected::<O, S>(plant, carry, output);
+    (mean, variance)
+}
+
+pub(super) fn correct<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S], output: usize, error: S) {
+    let n = plant.layout().states.len();
+    let Expected { c, gain, noise, variance, .. } = expected::<O, S>(plant, carry, output);
+    let part: Vec<S> = gain.iter().map(|gain| *gain / variance).collect();
+    let (x, covariance) = carry.split_at_mut(n);
+    x.iter_mut().zip(&part).for_each(|(x, part)| *x += *part * error);
+    // (I - k c) P (I - k c)' + k r k'
+    let rest = |i: usize, j: usize| {
+        let taken = -(part[i] * c[j]);
+        if i == j { taken + 1.0 } else { taken }
+    };
+    let rest: Vec<Vec<S>> = (0..n).map(|i| (0..n).map(|j| rest(i, j)).collect()).collect();
+    let product = |i: usize, j: usize| (0..n).map(|l| rest[i][l] * covariance[entry(n, l, j)]).sum::<S>();
+    let product: Vec<Vec<S>> = (0..n).map(|i| (0..n).map(|j| product(i, j)).collect()).collect();
+    for i in 0..n {
+        for j in i..n {
+            let left = (0..n).map(|l| product[i][l] * rest[j][l]).sum::<S>();
+            covariance[entry(n, i, j)] = left + part[i] * noise * part[j];
+        }
+    }
+}
+
+pub(super) fn advance<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S]) -> Result<(), Stuck> {
+    let n = plant.layout().states.len();
+    let mut noise = vec![S::from(0.0); n];
+    plant.diffusion(&mut noise);
+    let with_noise = |i: usize, j: usize, moved: S| if i == j { moved + noise[i] * noise[i] } else { moved };
+    if plant.layout().kind == Kind::Discrete {
+        let Moments { mean, slopes: a, spread } = O::state(plant, 0.0, carry);
+        let before = carry[n..].to_vec();
+        carry[..n].copy_from_slice(&mean);
+        for i in 0..n {
+            for j in i..n {
+                let pairs = (0..n).flat_map(|k| (0..n).map(move |l| (k, l)));
+                let moved: S = pairs.map(|(k, l)| a[i * n + k] * before[entry(n, k, l)] * a[j * n + l]).sum();
+                let moved = spread.get(entry(n, i, j)).map_or(moved, |spread| moved + *spread);
+                carry[n + entry(n, i, j)] = with_noise(i, j, moved);
+            }
+        }
+        return Ok(());
+    }
+    // dx/dt = E f, dP/dt = A P + P A' + Q with A = E df/dx: the covariance of x and f(x) is P A' where x is Gaussian (C. Stein).
+    plant.integrate(carry, &|position, z, to| {
+        let Moments { mean, slopes: a, .. } = O::state(plant, position, z);
+        to[..n].copy_from_slice(&mean);
+        let flow = |i: usize, j: usize| (0..n).map(|k| a[i * n + k] * z[n + entry(n, k, j)]).sum::<S>();
+        for i in 0..n {
+            for j in i..n {
+                to[n + entry(n, i, j)] = with_noise(i, j, flow(i, j) + flow(j, i));
+            }
+        }
+    })
+}
+
+/// The [`Predictor`](super::Predictor) of an [`Order`].
+macro_rules! filter {
+    ($order:ident, $description:literal) => {
+        impl $crate::predict::Predictor for $order {
+            fn carry(&self, layout: &$crate::layout::Layout) -> usize {
+                $crate::predict::gaussian::carry(layout)
+            }
+
+            fn predicts_variance(&self) -> bool {
+                true
+            }
+
+            fn needs_slopes(&self) -> bool {
+                true
+            }
+
+            fn check(&self, layout: &$crate::layout::Layout) -> Result<(), $crate::error::Error> {
+                $crate::predict::gaussian::check(layout)
+            }
+
+            fn start<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S]) {
+                $crate::predict::gaussian::start(plant, carry);
+            }
+
+            fn predict<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &[S], output: usize) -> (S, S) {
+                $crate::predict::gaussian::predict::<Self, S>(plant, carry, output)
+            }
+
+            fn correct<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S], output: usize, error: S) {
+                $crate::predict::gaussian::correct::<Self, S>(plant, carry, output, error);
+            }
+
+            fn advance<S: Scalar>(
+                &self,
+                plant: &dyn Plant<S>,
+                carry: &mut [S],
+            ) -> Result<(), $crate::integrate::Stuck> {
+                $crate::predict::gaussian::advance::<Self, S>(plant, carry)
+            }
+
+            fn describe(&self) -> String {
+                $description.to_owned()
+            }
+        }
+    };
+}
+pub(super) use filter;
