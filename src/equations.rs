@@ -34,6 +34,15 @@ pub struct Equations {
     delay: Vec<Id>,
 }
 
+/// Dead times of inputs.
+#[derive(Clone, Debug)]
+pub(crate) struct DeadTimes {
+    /// Each once, by its node.
+    pub roots: Vec<Id>,
+    /// Of each input the number of its dead time, if it is late.
+    pub of: Vec<Option<usize>>,
+}
+
 /// The serialized form of equations.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -129,7 +138,7 @@ impl Equations {
                 Leaf::State(i) => (i as usize) < layout.states.len() && !constant,
                 Leaf::Input(i) => (i as usize) < layout.inputs.len() && !constant,
                 Leaf::Parameter(i) => (i as usize) < layout.parameters.len(),
-                Leaf::Step | Leaf::NextInput(_) | Leaf::Measured(_) => false,
+                Leaf::Step | Leaf::NextInput(_) | Leaf::Measured(_) | Leaf::Late { .. } => false,
             };
             if !there {
                 return Err(InvalidEquations::NoSuchQuantity { leaf });
@@ -229,8 +238,20 @@ impl Equations {
 
     /// Which inputs have a dead time.
     pub(crate) fn late(&self) -> Vec<bool> {
-        let zero = |id: Option<&Id>| id.is_none_or(|id| self.graph.known(*id) == Some(0.0));
-        (0..self.layout.inputs.len()).map(|i| !zero(self.delay.get(i))).collect()
+        self.dead_times().of.iter().map(Option::is_some).collect()
+    }
+
+    /// The dead times that differ, and which one each input has.
+    pub(crate) fn dead_times(&self) -> DeadTimes {
+        let (mut roots, mut of) = (vec![], vec![None; self.layout.inputs.len()]);
+        for (of, id) in of.iter_mut().zip(&self.delay).filter(|(_, id)| self.graph.known(**id) != Some(0.0)) {
+            let known = roots.iter().position(|root| root == id);
+            *of = known.or(Some(roots.len()));
+            if known.is_none() {
+                roots.push(*id);
+            }
+        }
+        DeadTimes { roots, of }
     }
 
     /// Whether derivatives and outputs are affine in the states: then so is each step, and slopes do not depend on states.
@@ -274,7 +295,7 @@ pub(crate) fn name(layout: &Layout, leaf: Leaf) -> String {
         Leaf::Input(i) => name(&layout.inputs, i),
         Leaf::Parameter(i) => name(&layout.parameters, i),
         Leaf::Measured(i) => name(&layout.outputs, i),
-        Leaf::Step | Leaf::NextInput(_) => format!("{leaf:?}"),
+        Leaf::Step | Leaf::NextInput(_) | Leaf::Late { .. } => format!("{leaf:?}"),
     }
 }
 

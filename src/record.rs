@@ -15,7 +15,7 @@ mod time;
 
 pub use column::{Channel, Column};
 pub use cycles::Gap;
-pub(crate) use delays::Part;
+pub(crate) use delays::{Part, ROUNDING};
 #[cfg(feature = "csv")]
 pub use file::{DataFile, DateOrder, Reading, TimeSource};
 pub(crate) use holds::Holds;

@@ -18,7 +18,7 @@ pub(crate) struct Part<S> {
 }
 
 /// A part of the sample time by which a dead time may differ from a whole number of samples and is still that.
-const ROUNDING: f64 = 1e-9;
+pub(crate) const ROUNDING: f64 = 1e-9;
 
 impl Record {
     /// The interval from sample `k` on, cut where an input that is late by its dead time (s; none of one that is not late) jumps or bends. Of a
@@ -62,9 +62,11 @@ impl Record {
     pub(crate) fn late_inputs<S: Scalar>(&self, k: usize, delays: &[Option<S>]) -> Vec<S> {
         let t = self.time(k);
         let late = |(i, delay): (usize, &Option<S>)| {
-            let late = delay.map_or(0.0, |delay| delay.value());
-            let last = self.sample_at(t + self.soon(k) - late);
-            self.late(i, *delay, (self.time(last) <= t - late || last > 0).then_some(last), S::from(t))
+            let Some(delay) = *delay else { return S::from(self.inputs[i].values[k]) };
+            // A held input has jumped, an interpolated one still has the slope of a longer dead time.
+            let at = t - delay.value() + if self.input_hold(i) == Hold::Zero { self.soon(k) } else { -self.soon(k) };
+            let last = self.sample_at(at);
+            self.late(i, Some(delay), (self.time(last) < at).then_some(last), S::from(t))
         };
         delays.iter().enumerate().map(late).collect()
     }

@@ -4,11 +4,12 @@ mod columns;
 mod derived;
 mod horizon;
 mod interleaved;
+mod late;
 mod run;
 mod workspace;
 
 use super::{Coupling, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
-use crate::engine::{Program, Sampling, TooLarge, Trajectories};
+use crate::engine::{Program, Sampling, Trajectories};
 use crate::equations::Equations;
 use crate::error::{Error, Failure};
 use crate::graph::Untraceable;
@@ -20,6 +21,7 @@ use crate::record::{Holds, Record, Time};
 use crate::recurrence::Recurrence;
 pub(crate) use derived::Derived;
 pub(crate) use interleaved::Interleaved;
+use late::Late;
 use run::Run;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use workspace::Compiled;
@@ -46,7 +48,10 @@ struct Programs {
 }
 
 /// A program, or the reason why there is none.
-type MaybeCompiled = Result<Arc<Compiled>, TooLarge>;
+type MaybeCompiled = Result<Arc<Compiled>, String>;
+
+/// Why a record has no program.
+const UNEVEN: &str = "inputs have dead times and samples are not evenly spaced";
 
 /// Number of samples that take as long in dual numbers as a program takes to be compiled.
 const WORTH_COMPILING: usize = 4_000;
@@ -91,9 +96,6 @@ impl Programs {
         method: Arc<dyn Method>,
         predictor: Arc<dyn Prediction>,
     ) -> Result<Self, Untraceable> {
-        if equations.late().contains(&true) {
-            return Err(Untraceable::new("inputs have dead times"));
-        }
         let coupling = match predictor.restarts() {
             Some(_) => Coupling::Restarted,
             None if equations.layout().kind == Kind::Static => Coupling::Restarted,
@@ -137,11 +139,18 @@ impl Programs {
             return program.clone().ok();
         }
         let recurrence = self.recurrence(&key.holds).ok()?;
+        let is_late = self.equations.late().contains(&true);
         let program = match purpose {
-            Purpose::Rows => Program::compile(&recurrence, seeds, sampling, Trajectories::Many),
-            Purpose::Carry => Program::compile(&recurrence.without_outputs(), &[], sampling, Trajectories::One),
+            // How often a dead time cuts an interval differs from one to the next.
+            _ if is_late && sampling == Sampling::Irregular => Err(UNEVEN.to_owned()),
+            Purpose::Rows => {
+                Program::compile(&recurrence, seeds, sampling, Trajectories::Many).map_err(|e| e.to_string())
+            }
+            Purpose::Carry => Program::compile(&recurrence.without_outputs(), &[], sampling, Trajectories::One)
+                .map_err(|e| e.to_string()),
         };
-        let program = program.map(|program| Arc::new(Compiled::new(program)));
+        let late = is_late.then(|| Late::new(self.equations.clone()));
+        let program = program.map(|program| Arc::new(Compiled::new(program, late)));
         compiled.push((key, program.clone()));
         program.ok()
     }
