@@ -125,6 +125,18 @@ pub enum Error {
         /// Its second place, from one.
         second: usize,
     },
+    /// A column whose cells are not what is wanted.
+    #[error("{}: column `{column}` holds {kind}, where {wanted} are wanted; convert it where the file is written", path.display())]
+    ColumnKind {
+        /// The file.
+        path: PathBuf,
+        /// Name of the column.
+        column: String,
+        /// What it holds.
+        kind: String,
+        /// What is wanted.
+        wanted: &'static str,
+    },
     /// A row with more or fewer cells than there are columns.
     #[error("{}, line {line}: {found} cell(s), but {expected} column(s) have a name", path.display())]
     RowLength {

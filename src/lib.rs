@@ -218,7 +218,7 @@ pub use scalar::Scalar;
 pub use signals::{Entry, Nothing, Of, Signals};
 
 #[cfg(feature = "csv")]
-pub use record::{DataFile, DateOrder, Reading, TimeSource};
+pub use record::{DataFile, DateOrder, FileFormat, Reading, TimeSource};
 #[cfg(feature = "std")]
 pub use {
     error::{Error, Failure},

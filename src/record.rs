@@ -17,7 +17,7 @@ pub use column::{Channel, Column};
 pub use cycles::Gap;
 pub(crate) use delays::{Part, ROUNDING};
 #[cfg(feature = "csv")]
-pub use file::{DataFile, DateOrder, Reading, TimeSource};
+pub use file::{DataFile, DateOrder, FileFormat, Reading, TimeSource};
 pub(crate) use holds::Holds;
 pub(crate) use inspect::Looked;
 pub use inspect::{ChannelInspection, Inspection, Suspicion};

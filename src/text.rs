@@ -37,6 +37,7 @@ mod parse;
 mod read;
 mod remark;
 mod rust;
+mod section;
 mod shipped;
 mod string;
 mod toml_value;
@@ -203,8 +204,8 @@ impl Model {
         }
     }
 
-    /// The standard deviation of the noise of each output, where the text gives a number for each.
-    pub fn noise(&self) -> Option<Vec<f64>> {
+    /// The standard deviation of the noise of each output for which the text gives a number.
+    pub fn noise(&self) -> Vec<Option<f64>> {
         let value = |output: &document::Output| match output.noise.as_ref()?.nodes.as_slice() {
             [single] => match single.operation {
                 Operation::Number(value) => Some(value),
@@ -246,9 +247,7 @@ impl Model {
     pub fn fit(&self, records: &[Record]) -> Result<Fit<'_, Equations>, crate::error::Error> {
         let records = records.iter().map(|record| self.prepare(record.clone())).collect::<Result<Vec<Record>, _>>()?;
         let mut fit = Fit::new(&*self.equations, &records).parameters(self.parameters.clone());
-        if let Some(noise) = self.noise() {
-            fit = fit.noise(noise);
-        }
+        fit = fit.noise_of_some(self.noise());
         if let Some(integrator) = self.integrator() {
             fit = fit.integrator_by_name(integrator)?;
         }

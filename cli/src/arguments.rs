@@ -6,8 +6,9 @@ use std::path::PathBuf;
 
 /// Physical parameters, with their intervals, from a model and measured records.
 ///
-/// A model is a file (`greybox new` writes one) or the name of one that ships (`greybox models`). A record is a CSV file with a
-/// column for each input and output and one for time. Options may stand in a file `greybox.toml` in the present folder, by
+/// A model is a file (`greybox new` writes one) or the name of one that ships (`greybox models`). A record is a file with a
+/// column for each input and output and one for time: CSV, or, where this build has the features for them, Parquet, Arrow, MATLAB,
+/// HDF5 and NumPy archives. Options may stand in a file `greybox.toml` in the present folder, by
 /// their long names; then `greybox fit` repeats the fit.
 ///
 /// Exit codes: 0 usable, 2 usable with care, 3 not usable, 1 error.
@@ -91,6 +92,13 @@ pub struct ModelOptions {
     pub initial: Vec<String>,
 }
 
+/// What stands first in a date.
+#[derive(Clone, Copy, ValueEnum)]
+pub enum Order {
+    Day,
+    Month,
+}
+
 /// How files become records.
 #[derive(Args, Clone, Default)]
 pub struct RecordOptions {
@@ -106,6 +114,12 @@ pub struct RecordOptions {
     /// The unit of time in the file: s, ms, us, ns, min, h.
     #[arg(long, value_name = "UNIT")]
     pub time_unit: Option<String>,
+    /// What stands first in dates such as 03/04/2025.
+    #[arg(long, value_enum, value_name = "FIRST")]
+    pub date_order: Option<Order>,
+    /// The zone of dates that have none, such as Europe/Berlin: clocks that are set forward and back are followed.
+    #[arg(long, value_name = "ZONE")]
+    pub zone: Option<String>,
     /// Time from a constant sample time (s) instead of a column.
     #[arg(long, value_name = "SECONDS")]
     pub sample_time: Option<f64>,
@@ -123,7 +137,7 @@ pub struct RecordOptions {
 /// What is minimized, and how.
 #[derive(Args, Clone, Default)]
 pub struct FitOptions {
-    /// The standard deviation of the noise of each output; without it, it is estimated.
+    /// The standard deviation of the noise of an output; without it, it is estimated.
     #[arg(long, value_name = "OUTPUT=STD", value_parser = assignment)]
     pub noise: Vec<(String, String)>,
     /// Estimate the covariance of the noise of all outputs.
@@ -291,13 +305,17 @@ pub struct Fleet {
     pub model: Option<String>,
     /// Records; patterns such as 'data/*.csv' are expanded.
     pub records: Vec<PathBuf>,
+    /// A column that tells the records of one file apart: their rows have a text or whole number of their own there.
+    #[arg(long, value_name = "COLUMN")]
+    pub by: Option<String>,
     #[command(flatten, next_help_heading = "Model")]
     pub of_model: ModelOptions,
     #[command(flatten, next_help_heading = "Records")]
     pub of_records: RecordOptions,
     #[command(flatten, next_help_heading = "Fit")]
     pub of_fit: FitOptions,
-    /// The table: a CSV file, one row for each record. Records that it has already are not fitted again.
+    /// The table, .csv or .parquet: one row for each record. Records that it has already are not fitted again, nor those that
+    /// a run had done that was killed.
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }

@@ -73,7 +73,8 @@ pub fn report(
         "" => "Parameter estimation".to_owned(),
         name => name.to_owned(),
     };
-    let report = Report::new(problem, estimate)?.titled(title).made_from(origin);
+    let mut report = Report::new(problem, estimate)?.titled(title).made_from(origin);
+    report.sections.insert(0, Section::from(&loaded.model));
     if derived.is_empty() {
         return Ok(report);
     }

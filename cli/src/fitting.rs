@@ -160,11 +160,13 @@ pub fn fit<'a>(
         fit = fit.predictor_by_name(name)?;
     }
     let noise = numbers("--noise", &options.noise)?;
-    fit = match model.noise() {
-        _ if options.noise_covariance => fit.noise_covariance(),
-        _ if !noise.is_empty() => fit.noise_by_name(pairs(&noise))?,
-        Some(noise) => fit.noise(noise),
-        None => fit,
+    fit = match options.noise_covariance {
+        true => fit.noise_covariance(),
+        false if !noise.is_empty() => fit.noise_by_name(pairs(&noise))?,
+        false => {
+            let outputs = equations.layout().outputs.iter().map(|output| output.name.as_str());
+            fit.noise_by_name(outputs.zip(model.noise()).filter_map(|(output, noise)| Some((output, noise?))))?
+        }
     };
     let input_noise = numbers("--input-noise", &options.input_noise)?;
     if !input_noise.is_empty() {

@@ -1,17 +1,22 @@
 //! `fleet`: many records, each fitted by itself, as rows of one table.
 
+mod journal;
+#[cfg(feature = "arrow")]
+mod parquet;
+mod row;
+mod table;
+
 use crate::arguments::Fleet;
 use crate::fitting::{declared, expanded, fit, model};
 use crate::terminal::Terminal;
 use crate::{Failure, Verdict, output, records};
-use greybox::layout::Layout;
-use greybox::optimize::Severity;
-use greybox::{Knowledge, Summary};
-use std::collections::HashSet;
+use greybox::record::Record;
+use greybox::text::Model;
+use row::{Name, Row};
+use std::cell::RefCell;
+use std::collections::{HashMap, HashSet, VecDeque};
 use std::path::{Path, PathBuf};
-
-/// Rows after which the table is written again.
-const ROWS: usize = 500;
+use table::Table;
 
 pub fn run(one: &Fleet, terminal: &Terminal) -> Result<Verdict, Failure> {
     let model = model(one.model.as_deref(), &one.of_model.constant, terminal)?;
@@ -21,152 +26,114 @@ pub fn run(one: &Fleet, terminal: &Terminal) -> Result<Verdict, Failure> {
     if paths.is_empty() {
         return Err("no record is named; write files or a pattern after the model: 'data/*.csv'".into());
     }
-    let mut table = Table::open(one.out.as_deref(), layout)?;
     let fleet = fit(&model, &[], &parameters, &one.of_fit)?.cancel(terminal.stop()).fleet()?;
-    let left: Vec<&PathBuf> = paths.iter().filter(|path| !table.has(path)).collect();
-    if left.len() < paths.len() {
-        terminal.remark(format_args!(
-            "{} of {} records are in the table already",
-            paths.len() - left.len(),
-            paths.len()
-        ));
+    let mut table = Table::open(one.out.as_deref(), row::header(layout, one.by.as_deref())?)?;
+    let before = table.rows().len();
+    if before > 0 {
+        terminal.remark(format_args!("{before} records are in the table already"));
     }
-    let bar = terminal.steps(left.len(), "records");
-    let quiet = terminal.silent();
-    for group in left.chunks(ROWS) {
+    let bar = terminal.steps(paths.len(), "files");
+    let reader = Reader { one, model: &model, quiet: &terminal.silent(), waiting: RefCell::default() };
+    // Whatever is read is in the table or on its way there, and is not read again.
+    let mut known: HashSet<Name> = table.rows().iter().map(|row| row.name.clone()).collect();
+    let mut files: HashMap<String, u32> = HashMap::new();
+    let there = paths.iter().take_while(|_| !terminal.stopped()).flat_map(|path| {
+        bar.inc(1);
+        let read = reader.read(path).into_iter().filter(|(name, _)| {
+            if let Some(group) = &name.group {
+                *files.entry(group.clone()).or_default() += 1;
+            }
+            known.insert(name.clone())
+        });
+        read.collect::<Vec<_>>()
+    });
+    let there = there.filter_map(|(name, record)| reader.wait(name, record));
+    for answer in fleet.run(there) {
+        // What Ctrl-C ended is no answer; the same command gives it.
         if terminal.stopped() {
             break;
         }
-        let read = group.iter().map(|path| records::one(path, &model, &one.of_records, &one.of_model.initial, &quiet));
-        let read: Vec<Result<_, Failure>> = read.collect();
-        let (there, mut found) = (read.iter().flatten().cloned().collect::<Vec<_>>(), vec![]);
-        for answer in fleet.run(there) {
-            bar.inc(1);
-            found.push(answer);
+        reader.add_errors(&mut table, terminal)?;
+        if let Some((name, _)) = reader.next() {
+            let row = Row::of(name, answer.as_ref().map_err(ToString::to_string));
+            table.add(row, terminal)?;
+            bar.set_message(format!("{} records, files", table.rows().len()));
         }
-        let mut found = found.into_iter();
-        for (path, record) in group.iter().zip(&read) {
-            let row = match record {
-                Err(error) => Err(error.to_string()),
-                Ok(_) => match found.next() {
-                    Some(answer) => answer.map_err(|error| error.to_string()),
-                    None => break,
-                },
-            };
-            if let Err(error) = &row {
-                terminal.remark(format_args!("{}: {error}", path.display()));
-            }
-            table.add(path, row.as_ref(), layout);
-        }
-        table.save()?;
+    }
+    if !terminal.stopped() {
+        reader.add_errors(&mut table, terminal)?;
     }
     bar.finish_and_clear();
+    let several = files.values().filter(|count| **count > 1).count();
+    if several > 0 {
+        terminal.remark(format_args!(
+            "{several} names stand in more than one file; the rows of each file are a record by themselves"
+        ));
+    }
+    table.finish()?;
+    terminal.remark(table.counts(before));
     if terminal.stopped() {
         terminal.remark("ended by Ctrl-C: the table has what was done; the same command goes on from there");
     }
     if one.out.is_none() {
-        output::print(&table.text()?)?;
+        output::print(&table.csv()?)?;
     }
-    Ok(table.worst)
+    Ok(table.worst())
 }
 
-/// One row for each record.
-struct Table {
-    path: Option<PathBuf>,
-    rows: Vec<Vec<String>>,
-    /// The records of the rows.
-    there: HashSet<String>,
-    worst: Verdict,
+/// Reads files, and keeps the names of the records that are being fitted in their order.
+struct Reader<'a> {
+    one: &'a Fleet,
+    model: &'a Model,
+    quiet: &'a Terminal,
+    /// Why a record has no answer, if it will have none.
+    waiting: RefCell<VecDeque<(Name, Option<String>)>>,
 }
 
-impl Table {
-    /// An empty table, or that of an earlier run.
-    fn open(path: Option<&Path>, layout: &Layout) -> Result<Self, Failure> {
-        let (header, there) = (header(layout), HashSet::new());
-        let mut table = Table { path: path.map(Path::to_owned), rows: vec![], there, worst: Verdict::Usable };
-        if let Some(path) = path.filter(|path| path.is_file()) {
-            let failed = |error: csv::Error| format!("{}: {error}", path.display());
-            let mut file = csv::ReaderBuilder::new().has_headers(false).from_path(path).map_err(failed)?;
-            for row in file.records() {
-                table.rows.push(row.map_err(failed)?.iter().map(str::to_owned).collect());
-            }
-            if table.rows.first() != Some(&header) {
-                return Err(format!(
-                    "{}: the file is there and is no table of this model; name another",
-                    path.display()
-                )
-                .into());
-            }
-            for row in &table.rows[1..] {
-                table.there.insert(row[0].clone());
-                table.worst = table.worst.max(match row[1].as_str() {
-                    "with care" => Verdict::WithCare,
-                    "not usable" | "error" => Verdict::NotUsable,
-                    _ => Verdict::Usable,
-                });
-            }
-            return Ok(table);
-        }
-        table.rows.push(header);
-        Ok(table)
-    }
-
-    fn has(&self, path: &Path) -> bool {
-        self.there.contains(&*path.to_string_lossy())
-    }
-
-    fn add(&mut self, path: &Path, row: Result<&Summary, &String>, layout: &Layout) {
-        let (verdict, word, cells, remarks) = match row {
-            Err(error) => {
-                (Verdict::NotUsable, "error", vec![String::new(); 4 * layout.parameters.len()], error.clone())
-            }
-            Ok(found) => {
-                let word = match found.severity() {
-                    Severity::Usable => "usable",
-                    Severity::UsableWithCare => "with care",
-                    Severity::NotUsable => "not usable",
-                };
-                let codes: Vec<String> = found.warnings.iter().map(|one| format!("{:?}", one.code)).collect();
-                (found.severity().into(), word, cells(found), codes.join(" "))
-            }
+impl Reader<'_> {
+    /// The records of a file, or one error for all of it.
+    fn read(&self, path: &Path) -> Vec<(Name, Result<Record, String>)> {
+        let Fleet { of_model, of_records, by, .. } = self.one;
+        let name = |group| Name { record: path.to_string_lossy().into_owned(), group };
+        let Some(by) = by else {
+            let record = records::one(path, self.model, of_records, &of_model.initial, self.quiet);
+            return vec![(name(None), record.map_err(|error| error.to_string()))];
         };
-        let name = path.to_string_lossy().into_owned();
-        self.there.insert(name.clone());
-        self.rows.push([name, word.to_owned()].into_iter().chain(cells).chain([remarks]).collect());
-        self.worst = self.worst.max(verdict);
-    }
-
-    fn text(&self) -> Result<Vec<u8>, Failure> {
-        let mut writer = csv::Writer::from_writer(vec![]);
-        for row in &self.rows {
-            writer.write_record(row)?;
-        }
-        Ok(writer.into_inner().map_err(|error| error.to_string())?)
-    }
-
-    /// Writes the table to its file. It is whole at any time: what a kill leaves is that of the group before.
-    fn save(&self) -> Result<(), Failure> {
-        match &self.path {
-            Some(path) => output::write(Some(path), &self.text()?),
-            None => Ok(()),
+        match records::groups(path, self.model, of_records, &of_model.initial, by) {
+            Ok(groups) => groups.into_iter().map(|(group, record)| (name(Some(group)), record)).collect(),
+            Err(error) => vec![(name(None), Err(error.to_string()))],
         }
     }
-}
 
-fn header(layout: &Layout) -> Vec<String> {
-    let columns = layout.parameters.iter().map(|one| one.name.as_str());
-    let columns = columns.flat_map(|name| ["", "_std", "_lower", "_upper"].map(|end| format!("{name}{end}")));
-    ["record", "verdict"].map(str::to_owned).into_iter().chain(columns).chain(["remarks".to_owned()]).collect()
-}
-
-/// Value, standard error and interval of each parameter; empty where there is none.
-fn cells(found: &Summary) -> Vec<String> {
-    let of = |one: &greybox::estimate::ParameterEstimate| {
-        let (error, lower, upper) = match one.knowledge {
-            Knowledge::Known { standard_error, lower, upper } => (Some(standard_error), Some(lower), Some(upper)),
-            _ => (None, None, None),
+    /// Puts a name into the queue, and hands its record on.
+    fn wait(&self, name: Name, record: Result<Record, String>) -> Option<Record> {
+        let (record, error) = match record {
+            Ok(record) => (Some(record), None),
+            Err(error) => (None, Some(error)),
         };
-        [Some(one.value), error, lower, upper].map(|value| value.map_or(String::new(), |value| value.to_string()))
-    };
-    found.parameters.iter().flat_map(of).collect()
+        self.waiting.borrow_mut().push_back((name, error));
+        record
+    }
+
+    fn next(&self) -> Option<(Name, Option<String>)> {
+        self.waiting.borrow_mut().pop_front()
+    }
+
+    /// Adds the rows of records that will have no answer, up to the next that will have one.
+    fn add_errors(&self, table: &mut Table, terminal: &Terminal) -> Result<(), Failure> {
+        let is_error = || self.waiting.borrow().front().is_some_and(|(_, error)| error.is_some());
+        while is_error() {
+            if let Some((name, Some(error))) = self.next() {
+                table.add(Row::failed(name, error), terminal)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A file beside another, with this at the end of its name.
+fn beside(path: &Path, end: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(end);
+    name.into()
 }

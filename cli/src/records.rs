@@ -1,13 +1,13 @@
 //! Files of records.
 
 use crate::Failure;
-use crate::arguments::RecordOptions;
+use crate::arguments::{Order, RecordOptions};
 use crate::fitting::{expanded, initial, number, range};
 use crate::terminal::Terminal;
 use greybox::layout::Layout;
 use greybox::record::Record;
 use greybox::text::{self, Model};
-use greybox::{DataFile, Hold};
+use greybox::{DataFile, DateOrder, Hold};
 use std::path::{Path, PathBuf};
 
 /// Reads the records of a model, with the holds and the initial state that the model and the command line say.
@@ -75,8 +75,37 @@ fn prepared(record: Record, model: &Model, options: &RecordOptions, of_initial: 
     })
 }
 
+/// The name of a record of a file, and the record or why there is none.
+pub type Group = (String, Result<Record, String>);
+
+/// Reads the records of a file, which a column tells apart.
+pub fn groups(
+    path: &Path,
+    model: &Model,
+    options: &RecordOptions,
+    of_initial: &[String],
+    by: &str,
+) -> Result<Vec<Group>, Failure> {
+    let layout = model.equations().layout();
+    let record = |record: Result<Record, greybox::Error>| {
+        prepared(record.map_err(|error| error.to_string())?, model, options, of_initial)
+            .map_err(|error| error.to_string())
+    };
+    let groups = file(path, layout, options)?.read_groups(layout, by)?;
+    Ok(groups.into_iter().map(|(name, found)| (name, record(found))).collect())
+}
+
 /// Reads the columns of a layout.
 fn read(path: &Path, layout: &Layout, options: &RecordOptions, terminal: &Terminal) -> Result<Record, Failure> {
+    let record = file(path, layout, options)?.read_record(layout)?;
+    if let Some(reading) = record.reading() {
+        terminal.remark(format_args!("{}: {reading}", path.display()));
+    }
+    Ok(record)
+}
+
+/// A file with what the command line says of it.
+fn file(path: &Path, layout: &Layout, options: &RecordOptions) -> Result<DataFile, Failure> {
     let mut file = DataFile::new(path);
     for (signal, column) in &options.column {
         file = file.column(signal, column);
@@ -93,11 +122,16 @@ fn read(path: &Path, layout: &Layout, options: &RecordOptions, terminal: &Termin
     if let Some(step) = options.sample_time {
         file = file.sample_time(step);
     }
-    let record = file.read_record(layout)?;
-    if let Some(reading) = record.reading() {
-        terminal.remark(format_args!("{}: {reading}", path.display()));
+    if let Some(order) = options.date_order {
+        file = file.dates(match order {
+            Order::Day => DateOrder::DayFirst,
+            Order::Month => DateOrder::MonthFirst,
+        });
     }
-    Ok(record)
+    if let Some(zone) = &options.zone {
+        file = file.zone(zone);
+    }
+    Ok(file)
 }
 
 /// What the numbers of a file are multiplied by.

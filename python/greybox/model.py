@@ -66,11 +66,11 @@ class Model:
 
     def derivative(self, t: Symbol, x: Vector, u: Vector, p: Vector) -> Returned:
         """Give the derivative of each state."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} has no method derivative(self, t, x, u, p)")
 
     def next(self, t: Symbol, x: Vector, u: Vector, p: Vector) -> Returned:
         """Give the next value of each state."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} has no method next(self, t, x, u, p)")
 
     def output(self, t: Symbol, x: Vector, u: Vector, p: Vector) -> Returned:
         """Give each output: the states of these names, unless a model says otherwise."""
@@ -82,11 +82,11 @@ class Model:
 
     def diffusion(self, p: Vector) -> Returned:
         """Give the intensity of the process noise of each state."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} has no method diffusion(self, p)")
 
     def noise(self, p: Vector) -> Returned:
         """Give the standard deviation of the noise of each output."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} has no method noise(self, p)")
 
     def delay(self, p: Vector) -> Returned:
         """Give the dead time of each input (s)."""

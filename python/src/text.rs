@@ -54,7 +54,7 @@ impl TextModel {
 
     #[getter]
     fn noise(&self) -> Option<Vec<f64>> {
-        self.0.noise()
+        self.0.noise().into_iter().collect()
     }
 
     #[getter]

@@ -36,6 +36,7 @@ impl Summary {
         let noise = match self.method.noise {
             NoiseModel::Covariance if self.noise_covariance.is_some() => outputs * (outputs + 1) / 2,
             NoiseModel::PerOutput | NoiseModel::Covariance => outputs,
+            NoiseModel::SomeGiven(given) => outputs.saturating_sub(given),
             NoiseModel::Given | NoiseModel::Predicted => 0,
         };
         (self.unknowns.len() + noise) as f64

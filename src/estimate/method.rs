@@ -10,6 +10,8 @@ use serde::{Deserialize, Serialize};
 pub enum NoiseModel {
     /// They were given.
     Given,
+    /// So many were given; of the other outputs they were estimated.
+    SomeGiven(usize),
     /// Estimated per output.
     #[default]
     PerOutput,
@@ -23,6 +25,7 @@ impl fmt::Display for NoiseModel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             NoiseModel::Given => "given",
+            NoiseModel::SomeGiven(count) => return write!(f, "given for {count} output(s), estimated for the others"),
             NoiseModel::PerOutput => "estimated per output",
             NoiseModel::Covariance => "estimated as a full covariance",
             NoiseModel::Predicted => "predicted",

@@ -1,4 +1,4 @@
-//! Experiments from and to CSV files.
+//! Experiments from files, and to CSV files.
 
 use super::{Experiment, ExperimentOf};
 use crate::error::Error;

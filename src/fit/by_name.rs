@@ -46,14 +46,26 @@ impl<M: Made> Fit<'_, M> {
         &self.parameters
     }
 
-    /// As [`noise`](Fit::noise), by the names of the outputs, in any order.
+    /// As [`noise`](Fit::noise), by the names of the outputs, in any order. Of outputs that are left out it is estimated.
     ///
     /// # Errors
-    /// A name that the model does not have, one that stands twice, an output that is left out.
+    /// A name that the model does not have, one that stands twice.
     pub fn noise_by_name<'n>(self, sigma: impl IntoIterator<Item = (&'n str, f64)>) -> Result<Self, Error> {
-        let sigma: Vec<(&str, f64)> = sigma.into_iter().collect();
-        let sigma = in_order("output", &self.model.layout().outputs, &sigma)?;
-        Ok(self.set(|settings| settings.noise = Noise::Given(sigma)))
+        let given: Vec<(&str, f64)> = sigma.into_iter().collect();
+        let sigma = entries("output", &self.model.layout().outputs, &given)?;
+        Ok(self.noise_of_some(sigma))
+    }
+
+    /// As [`noise`](Fit::noise), of the outputs for which there is one, in the order of the layout; of the others it is estimated.
+    pub(crate) fn noise_of_some(self, sigma: Vec<Option<f64>>) -> Self {
+        let all: Option<Vec<f64>> = sigma.iter().copied().collect();
+        self.set(|settings| {
+            settings.noise = match all {
+                Some(all) => Noise::Given(all),
+                None if sigma.iter().all(Option::is_none) => Noise::PerOutput,
+                None => Noise::SomeGiven(sigma),
+            }
+        })
     }
 
     /// As [`input_noise`](Fit::input_noise), by the names of the inputs; those that are left out have none.
@@ -181,8 +193,8 @@ fn position(role: &str, quantities: &[Quantity], name: &str) -> Result<usize, Er
     find(role, &names, name)
 }
 
-/// One entry for each quantity, in their order.
-fn in_order<T: Copy>(role: &str, quantities: &[Quantity], given: &[(&str, T)]) -> Result<Vec<T>, Error> {
+/// The entries of the quantities for which there is one, in the order of the quantities.
+fn entries<T: Copy>(role: &str, quantities: &[Quantity], given: &[(&str, T)]) -> Result<Vec<Option<T>>, Error> {
     let mut entries: Vec<Option<T>> = vec![None; quantities.len()];
     for (name, entry) in given {
         let j = position(role, quantities, name)?;
@@ -190,6 +202,12 @@ fn in_order<T: Copy>(role: &str, quantities: &[Quantity], given: &[(&str, T)]) -
             return Err(Error::Option(format!("{role} `{name}` is given twice; leave one out")));
         }
     }
+    Ok(entries)
+}
+
+/// One entry for each quantity, in their order.
+fn in_order<T: Copy>(role: &str, quantities: &[Quantity], given: &[(&str, T)]) -> Result<Vec<T>, Error> {
+    let entries = entries(role, quantities, given)?;
     let missing = |(quantity, entry): (&Quantity, Option<T>)| {
         entry.ok_or_else(|| {
             Error::Option(format!("{role} `{}` is not given; every {role} needs an entry", quantity.name))

@@ -211,7 +211,9 @@ fn for_white_errors(
 fn spans_differ(evidence: &Evidence<'_>) -> bool {
     let problem = evidence.point.objective.problem;
     let uneven = problem.records.iter().any(|record| matches!(record.times(), Time::Stamps(_)));
-    matches!(problem.settings.noise, Noise::PerOutput) && uneven && evidence.point.objective.sweep.restarts().is_some()
+    matches!(problem.settings.noise, Noise::PerOutput | Noise::SomeGiven(_))
+        && uneven
+        && evidence.point.objective.sweep.restarts().is_some()
 }
 
 /// The factor by which weights between outputs that were estimated themselves, as a full noise covariance, widen the

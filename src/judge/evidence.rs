@@ -51,9 +51,9 @@ impl<'e> Evidence<'e> {
     pub fn new(point: Point<'e>, residuals: Residuals) -> Self {
         let objective = point.objective;
         let sigma = objective.whitening.sigma();
-        let given = matches!(objective.problem.settings.noise, Noise::Given(_));
         let rounded = |(j, sigma): (usize, &f64)| {
             let rmse = residuals.outputs[j].rmse;
+            let given = objective.problem.settings.noise.given(j).is_some();
             point.is_exact() || given && rmse < ROUNDING * sigma || residuals.is_rounding_of(j)
         };
         let rounded: Vec<bool> = sigma.iter().enumerate().map(rounded).collect();

@@ -22,8 +22,9 @@ pub(super) fn method(objective: &Objective<'_>, optimizer: String, covariance: C
         loss: or(settings.loss.as_ref().map(|loss| loss.describe()), "squared"),
         weighting: or(settings.weights.as_ref().map(|weights| weights.describe()), "none"),
         prefilter: or(settings.prefilter.as_ref().map(|filter| filter.describe()), "none"),
-        noise: match settings.noise {
+        noise: match &settings.noise {
             Noise::Given(_) => NoiseModel::Given,
+            Noise::SomeGiven(sigma) => NoiseModel::SomeGiven(sigma.iter().flatten().count()),
             Noise::PerOutput => NoiseModel::PerOutput,
             Noise::Covariance => NoiseModel::Covariance,
             Noise::Predicted => NoiseModel::Predicted,
@@ -73,7 +74,15 @@ pub(crate) fn noise(evidence: &Evidence<'_>) -> Result<Whitening, Error> {
     }
     // The noise level of errors that are round-off is returned as computed, zero or not.
     let scale = (evidence.point.linear.sum_of_squares() / evidence.point.degrees.max(1.0)).sqrt();
-    Ok(objective.whitening.widened(if noise::only_scales(objective) { scale } else { evidence.point.widening }))
+    let widening = if noise::only_scales(objective) { scale } else { evidence.point.widening };
+    Ok(match objective.whitening.widened(widening) {
+        // What was given is no estimate.
+        Whitening::Diagonal(sigma) => {
+            let given = |(j, sigma)| objective.problem.settings.noise.given(j).unwrap_or(sigma);
+            Whitening::Diagonal(sigma.into_iter().enumerate().map(given).collect())
+        }
+        full => full,
+    })
 }
 
 pub(crate) fn outputs(evidence: &Evidence<'_>, noise: &Whitening) -> Vec<OutputEstimate> {

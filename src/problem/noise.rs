@@ -132,7 +132,9 @@ pub(crate) fn only_scales(objective: &Objective<'_>) -> bool {
 
 /// Whether the noise is estimated between rounds of the search.
 pub(crate) fn is_estimated(objective: &Objective<'_>) -> bool {
-    matches!(objective.problem.settings.noise, Noise::PerOutput | Noise::Covariance) && !only_scales(objective)
+    let estimated =
+        matches!(objective.problem.settings.noise, Noise::PerOutput | Noise::Covariance | Noise::SomeGiven(_));
+    estimated && !only_scales(objective)
 }
 
 /// The noise as given, or estimated from the errors at a point.
@@ -198,6 +200,8 @@ pub(crate) fn estimate_together(points: &[At<'_>]) -> Vec<Result<Whitening, Infe
 /// The iteration for the noise: steps with clipped errors for robust losses; no step for others, whose noise follows from the first moments.
 struct Level {
     moments: SquareMatrix,
+    /// The noise of outputs for which it was given, in their units.
+    given: Vec<Option<f64>>,
     /// The smallest noise of each output that is not round-off, in its unit.
     floor: Vec<f64>,
     /// Mean square of clipped normal errors.
@@ -211,12 +215,13 @@ impl Level {
         let size = |size: f64| if size > 0.0 { size } else { 1.0 };
         let floor = magnitudes(objective).into_iter().map(|magnitude| ROUNDING * size(magnitude)).collect();
         let left = if objective.is_robust() { ROBUST_STEPS } else { 0 };
-        Level { moments, floor, kappa: clipped_variance(&Huber::default()), left }
+        let given = (0..objective.outputs()).map(|j| objective.problem.settings.noise.given(j)).collect();
+        Level { moments, given, floor, kappa: clipped_variance(&Huber::default()), left }
     }
 
     fn sigma(&self) -> Vec<f64> {
-        let levels = self.moments.diagonal().into_iter().zip(&self.floor);
-        levels.map(|(variance, floor)| variance.sqrt().max(*floor)).collect()
+        let levels = self.moments.diagonal().into_iter().zip(&self.floor).zip(&self.given);
+        levels.map(|((variance, floor), given)| given.unwrap_or_else(|| variance.sqrt().max(*floor))).collect()
     }
 
     /// The noise levels in whose units errors are to be clipped for the next step; `None` where there is none.

@@ -98,14 +98,18 @@ impl Settings {
 
     /// Checks the settings against layout and records.
     pub(super) fn check(&self, layout: &Layout, records: &[Record]) -> Result<(), Error> {
-        if let Noise::Given(sigma) = &self.noise {
-            if sigma.len() != layout.outputs.len() {
-                let (found, expected) = (sigma.len(), layout.outputs.len());
-                return Err(Error::Option(format!("{found} noise level(s) are given for {expected} output(s)")));
-            }
-            if let Some(j) = sigma.iter().position(|s| !(*s > 0.0 && s.is_finite())) {
-                let what = format!("the noise of output `{}`", layout.outputs[j].name);
-                return Err(Error::NotPositive { what, value: sigma[j] });
+        let given = match &self.noise {
+            Noise::Given(sigma) => Some(sigma.len()),
+            Noise::SomeGiven(sigma) => Some(sigma.len()),
+            _ => None,
+        };
+        let expected = layout.outputs.len();
+        if let Some(found) = given.filter(|found| *found != expected) {
+            return Err(Error::Option(format!("{found} noise level(s) are given for {expected} output(s)")));
+        }
+        for (j, output) in layout.outputs.iter().enumerate() {
+            if let Some(value) = self.noise.given(j).filter(|sigma| !(*sigma > 0.0 && sigma.is_finite())) {
+                return Err(Error::NotPositive { what: format!("the noise of output `{}`", output.name), value });
             }
         }
         let count = self.searches.count();

@@ -8,12 +8,25 @@ use crate::sweep::Window;
 pub(crate) enum Noise {
     /// Its standard deviation per output.
     Given(Vec<f64>),
+    /// Its standard deviation for some outputs; for the others it is estimated.
+    SomeGiven(Vec<Option<f64>>),
     /// Estimated per output.
     PerOutput,
     /// Estimated as a full covariance.
     Covariance,
     /// The predictor predicts its variance.
     Predicted,
+}
+
+impl Noise {
+    /// The standard deviation that was given for output `j`.
+    pub fn given(&self, j: usize) -> Option<f64> {
+        match self {
+            Noise::Given(sigma) => Some(sigma[j]),
+            Noise::SomeGiven(sigma) => sigma[j],
+            _ => None,
+        }
+    }
 }
 
 /// How errors are standardized: divided by their standard deviations, or multiplied by the inverse Cholesky factor of

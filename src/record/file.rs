@@ -1,6 +1,10 @@
 //! [`DataFile`]: from a file to a record, and from a record to a CSV file.
 
+#[cfg_attr(not(all(feature = "arrow", feature = "mat", feature = "npz")), allow(dead_code))]
+mod columns;
 mod dates;
+mod format;
+mod groups;
 mod guess;
 mod numbers;
 mod read;
@@ -10,13 +14,14 @@ mod table;
 mod timing;
 mod write;
 
+pub use format::FileFormat;
 pub use reading::{DateOrder, Reading, TimeSource};
 
 use super::Record;
 use crate::error::Error;
 use std::path::{Path, PathBuf};
 
-/// A CSV file, and how it becomes a record.
+/// A file, and how it becomes a record.
 ///
 /// A file whose columns have the names of the model's signals, and one of time, needs no word:
 /// `Experiment::from_file(&model, "record.csv")`. Separator, decimal comma, the line with the names, a row of units and the column of
@@ -79,6 +84,18 @@ use std::path::{Path, PathBuf};
 /// names. The names stand on the first line that has all those wanted, or in the last comment if numbers follow it at once (as numpy
 /// writes them); a row of units may follow.
 ///
+/// **Other formats** are known by their first bytes, where the library is built with the feature:
+///
+/// | format | feature | columns |
+/// |---|---|---|
+/// | Parquet; Arrow IPC files (Feather 2) and streams | `arrow` | columns, of any number type; no value is a missing measurement |
+/// | MATLAB 5 to 7 | `mat` | vectors, and fields of structures as `structure.field` |
+/// | MATLAB 7.3 and other HDF5 | `mat` | vectors, and datasets in groups as `group.dataset` |
+/// | archives of NumPy arrays (`.npz`) | `npz` | vectors |
+///
+/// Dates in them, and texts that are dates, become seconds from the first. Objects of MATLAB (`datetime`, `table`) are refused: save
+/// `seconds(t - t(1))`, and `table2struct(T, "ToScalar", true)`.
+///
 /// **Time** is the column `t`, or the only one called `time`, `timestamp`, `datetime`, `Zeit` or the like. It does not decrease. Numbers are
 /// seconds, unless a unit stands behind or below the name, or they can only be milli-, micro- or nanoseconds since 1970. Dates
 /// (`2025-03-20T14:05:00.5Z`, `2025-03-20 14:05`, `20.03.2025 14:05:00`, `03/20/2025 2:05:00 PM`, `20-Mar-2025 14:05:00`) and times of day
@@ -93,7 +110,7 @@ use std::path::{Path, PathBuf};
 /// **The record** is named after the file, its input is held from sample to sample, and its initial state is estimated,
 /// unless the [`Experiment`](crate::Experiment) is told otherwise.
 ///
-/// The file is read row by row and kept only as the record: ten million rows of five signals take 400 MB. Only where time
+/// A text is read row by row and kept only as the record: ten million rows of five signals take 400 MB. Only where time
 /// turns out uneven, a regular file is read again up to there for its stamps.
 #[derive(Clone, Debug)]
 pub struct DataFile {

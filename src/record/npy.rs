@@ -5,7 +5,7 @@ mod header;
 use super::{Channel, Column, Record, Time};
 use crate::error::Error;
 use crate::layout::{Layout, Quantity};
-use header::Header;
+pub(super) use header::Header;
 use memmap2::Mmap;
 use std::fs::File;
 use std::path::Path;

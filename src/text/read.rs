@@ -5,8 +5,8 @@ mod declarations;
 mod quantities;
 mod tables;
 
-use super::document::{Declared, Document, Solver, State};
-use super::expression::Expression;
+use super::document::{Declared, Document, Output, Solver, State};
+use super::expression::{Expression, Node, Operation};
 use super::remark::{Remark, Source};
 use super::string::Place;
 use super::toml_value::{Entry, Values, entries};
@@ -82,7 +82,7 @@ impl Reader {
         let outputs = self.outputs(group("outputs"), &states);
         let solver = self.solver(&solver);
         self.check_begins(&states);
-        let document = Document {
+        let mut document = Document {
             name,
             description,
             kind,
@@ -95,6 +95,7 @@ impl Reader {
             outputs,
             solver,
         };
+        outputs_have_units(&mut document);
         self.check_names(&document);
         Some(document)
     }
@@ -221,6 +222,19 @@ impl Reader {
             field(fields, key).and_then(|found| Some((self.values.text(found)?.to_owned(), found.span.clone())))
         };
         Solver { integrator: text("integrator"), predictor: text("predictor") }
+    }
+}
+
+/// An output without a unit of its own that is a mere quantity has the unit of that.
+fn outputs_have_units(document: &mut Document) {
+    let units: BTreeMap<String, (String, Option<Unit>)> =
+        document.named().map(|(_, one)| (one.name.clone(), (one.unit.clone(), one.dimension.clone()))).collect();
+    for Output { quantity, value, .. } in &mut document.outputs {
+        if let (true, [Node { operation: Operation::Name(name), .. }]) = (quantity.unit.is_empty(), &value.nodes[..])
+            && let Some((unit, dimension)) = units.get(name).cloned()
+        {
+            (quantity.unit, quantity.dimension) = (unit, dimension);
+        }
     }
 }
 

@@ -31,6 +31,7 @@ const SHIPPED: &[Shipped] = shipped!(
     "machine",
     "shaft",
     "exact_surface",
+    "exact_salient",
     "positioning",
     "positioning_loop"
 );

@@ -1,6 +1,7 @@
 //! Records: valid by construction, from files, cut and filtered.
 
 mod bad_records;
+mod columns;
 mod csv;
 mod dates;
 mod edits;

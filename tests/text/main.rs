@@ -3,6 +3,7 @@
 mod exported;
 mod fuzz;
 mod meaning;
+mod noise;
 mod twins;
 mod units;
 mod wrong;

@@ -109,12 +109,12 @@ fn kinds_and_what_is_declared() {
     assert_eq!(discrete.equations().layout().kind, Kind::Discrete);
     assert_eq!(discrete.parameters(), [free(0.5).log().prior(0.4, 0.1), fixed(2.0), free(0.1).per_experiment()]);
     assert_eq!(discrete.initial(), Initial::Given(vec![fixed(0.3), free(1.0).within(0.0, 2.0)]));
-    assert_eq!((discrete.holds(), discrete.noise()), (vec![Some(Hold::First)], None));
+    assert_eq!((discrete.holds(), discrete.noise()), (vec![Some(Hold::First)], vec![None]));
     assert_eq!(discrete.equations().levels()[0].len(), 2);
     let fixed_output =
         model("greybox = 1\n[inputs]\nu = \"V\"\n[outputs]\ny = { value = \"2*u\", unit = \"V\", noise = 0.1 }");
     assert_eq!(fixed_output.equations().layout().kind, Kind::Static);
-    assert_eq!((fixed_output.noise(), fixed_output.initial()), (Some(vec![0.1]), Initial::Estimated));
+    assert_eq!((fixed_output.noise(), fixed_output.initial()), (vec![Some(0.1)], Initial::Estimated));
 }
 
 /// A constant that is set has its new value in the equations and in the file; comments stay.

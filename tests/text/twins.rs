@@ -43,6 +43,7 @@ fn twin(name: &str) -> Equations {
         "machine" => Equations::trace(&Machine::new(4, 100.0).unwrap()),
         "shaft" => Equations::trace(&Shaft::new(100.0).unwrap()),
         "exact_surface" => Equations::trace(&ExactSurface(step())),
+        "exact_salient" => Equations::trace(&ExactSalient(step())),
         "positioning" => Equations::trace(&Positioning::EMPS),
         "positioning_loop" => Equations::trace(&PositioningLoop::EMPS),
         other => panic!("{other} has no twin"),

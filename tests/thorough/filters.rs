@@ -28,12 +28,12 @@ fn covered(runs: u64, truth: &Spring, step: f64, predictor: impl predict::Predic
     covered
 }
 
-/// With weak noise the extended filter shows no bias. 95 % of 1,000 records scatter by 0.7 %:
-/// 93 to 97 % is three standard deviations.
+/// With weak noise the extended filter shows no bias: it covers 94.3 to 95.6 % (1,000 records). Three standard deviations of 400 records
+/// are 3 %.
 #[test]
 fn extended_filter() {
-    let covered = covered(1000, &TRUTH, 0.1, Kalman);
-    assert!(covered.iter().all(|covered| (930..=970).contains(covered)), "{covered:?}");
+    let covered = covered(400, &TRUTH, 0.1, Kalman);
+    assert!(covered.iter().all(|covered| (367..=393).contains(covered)), "{covered:?}");
 }
 
 /// With strong noise that of second order covers 93.5 to 97.8 % (1,000 records), the extended one 63 % of `a`. Three

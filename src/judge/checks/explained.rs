@@ -3,7 +3,6 @@
 use super::*;
 use crate::estimate::CovarianceMethod;
 use crate::numeral::fit;
-use crate::problem::Noise;
 use crate::whiteness::chi_squared_tail;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -63,8 +62,8 @@ fn by_chance_of(evidence: &Evidence<'_>, j: usize, relative: f64) -> f64 {
 
 /// Whether the errors are no larger than the noise that was given.
 fn is_noise(evidence: &Evidence<'_>, j: usize) -> bool {
-    let Noise::Given(sigma) = &evidence.point.objective.problem.settings.noise else { return false };
-    evidence.residuals.outputs[j].rmse <= sigma[j] * (1.0 + 3.0 / (2.0 * evidence.independent(j)).sqrt())
+    let Some(sigma) = evidence.point.objective.problem.settings.noise.given(j) else { return false };
+    evidence.residuals.outputs[j].rmse <= sigma * (1.0 + 3.0 / (2.0 * evidence.independent(j)).sqrt())
 }
 
 /// Outputs that the model explains no better than their mean does.
@@ -104,14 +103,14 @@ fn unexplained(evidence: &Evidence<'_>) -> Vec<Warning> {
 
 /// Noise that was given, and errors of another size.
 fn given_noise(evidence: &Evidence<'_>, method: CovarianceMethod) -> Vec<Warning> {
-    let Noise::Given(sigma) = &evidence.point.objective.problem.settings.noise else { return vec![] };
     if evidence.point.objective.problem.settings.prefilter.is_some() || evidence.point.objective.is_weighted() {
         return vec![];
     }
     let outputs = evidence.point.objective.problem.layout().outputs.iter().enumerate();
     let one = |(j, output): (usize, &crate::layout::Quantity)| {
         let found = &evidence.residuals.outputs[j];
-        let ratio = found.rmse / sigma[j];
+        let sigma = evidence.point.objective.problem.settings.noise.given(j)?;
+        let ratio = found.rmse / sigma;
         if !contradicts(ratio, evidence.independent(j), evidence.point.values.len())
             || ratio > 1.0 && evidence.point.objective.is_robust()
         {
@@ -119,7 +118,7 @@ fn given_noise(evidence: &Evidence<'_>, method: CovarianceMethod) -> Vec<Warning
         }
         let (_, moves) = evidence.residuals.levels[j];
         let narrow = method == CovarianceMethod::Classical && ratio > NARROW;
-        let severity = noise_severity(ratio, sigma[j] > moves, narrow);
+        let severity = noise_severity(ratio, sigma > moves, narrow);
         let intervals = match method {
             CovarianceMethod::Classical if ratio > 1.0 => "intervals are too narrow",
             CovarianceMethod::Classical => "intervals are too wide",
@@ -129,7 +128,7 @@ fn given_noise(evidence: &Evidence<'_>, method: CovarianceMethod) -> Vec<Warning
             "the noise of `{}` was given as {}{unit}, but the errors are {}{unit} (rms): {intervals}; leave the noise out to \
              have it estimated",
             output.name,
-            number(sigma[j], 3),
+            number(sigma, 3),
             number(found.rmse, 3),
             unit = unit_after(&output.unit)
         );

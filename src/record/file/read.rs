@@ -1,23 +1,52 @@
-//! Reading: cells become a record, one row after the other.
+//! Reading: a file's columns become a record, those of a text row by row.
 
+use super::columns;
 use super::guess::{names, split_unit};
 use super::numbers::Numbers;
 use super::table::Table;
 use super::timing::Timing;
-use super::{Column, DataFile, Reading, reading};
+use super::{Column, DataFile, FileFormat, Reading, TimeSource, reading};
 use crate::error::Error;
 use crate::interval::Hold;
 use crate::layout::{Kind, Layout, Quantity};
-use crate::numeral::Moment;
-use crate::record::{Channel, Holds, Initial, Record};
+use crate::numeral::{Moment, TimeUnit};
+use crate::record::{Channel, Holds, Initial, Record, Time};
 use std::sync::Arc;
 
 /// Where the number of one signal comes from.
 #[derive(Clone, Copy, Debug)]
-struct Source {
-    column: usize,
+pub(super) struct Source {
+    pub(super) column: usize,
     factor: f64,
     offset: f64,
+}
+
+impl Source {
+    /// The value of a number in the file.
+    #[inline]
+    pub(super) fn value(self, number: f64) -> f64 {
+        number * self.factor + self.offset
+    }
+}
+
+/// Where the signals and the time of a record are among the columns of a file.
+pub(super) struct Plan<'a> {
+    layout: &'a Layout,
+    pub(super) signals: Vec<&'a Quantity>,
+    pub(super) sources: Vec<Source>,
+    /// The column of time; none where its steps are even.
+    pub(super) time: Option<usize>,
+    /// The even step (s).
+    pub(super) step: f64,
+    /// Signals for which the file has another unit, one of both unknown.
+    pub(super) units: Vec<(String, String, String)>,
+}
+
+/// What was read of one record so far.
+pub(super) struct Rows {
+    columns: Vec<Vec<f64>>,
+    timing: Timing,
+    samples: usize,
 }
 
 impl DataFile {
@@ -27,63 +56,64 @@ impl DataFile {
     /// As [`read`](Self::read).
     pub fn read_record(&self, layout: &Layout) -> Result<Record, Error> {
         self.check(layout)?;
-        let signals: Vec<&Quantity> = layout.inputs.iter().chain(&layout.outputs).collect();
-        let said: Vec<Column> = signals.iter().map(|signal| self.said(&signal.name)).collect();
-        let t = self.said("t");
-        let wanted: Vec<&str> = said.iter().map(Column::name).chain(t.name.as_deref()).collect();
-        let mut table = Table::open(self, &wanted)?;
-        let mut numbers = Numbers::new(self.decimal_comma.then_some(true), table.form().separator);
-
-        // A static model needs no time: without one its rows are numbered.
-        let timed = t.name.is_some() || self.columns.iter().any(|column| column.signal == "t") || table.has("t");
-        let step = self.sample_time.or((layout.kind == Kind::Static && !timed).then_some(1.0));
-        let column = if step.is_none() { Some(self.time_column(&table)?) } else { None };
-        let mut units = Vec::new();
-        let sources = signals.iter().zip(&said);
-        let sources = sources
-            .map(|(signal, said)| self.source(&table, signal, said, &mut units))
-            .collect::<Result<Vec<_>, _>>()?;
-
-        let mut columns: Vec<Vec<f64>> = vec![Vec::new(); signals.len()];
-        let mut timing = Timing::Even(step.unwrap_or(1.0));
-        let mut sample = 0;
-        while table.next()? {
-            if let (0, Some(column)) = (sample, column) {
-                timing = self.timing(&table, &mut numbers, column)?;
-            }
-            let time = timing.tick(self, &table, &mut numbers, sample)?;
-            for (i, (column, source)) in columns.iter_mut().zip(&sources).enumerate() {
-                let number = numbers.read(table.cell(source.column));
-                let value = number.map(|number| number * source.factor + source.offset);
-                // An output may be missing, an input may not.
-                let good = |value: &f64| if i < layout.inputs.len() { value.is_finite() } else { !value.is_infinite() };
-                let Some(value) = value.filter(good) else {
-                    let time = Moment { time, unit: timing.unit() };
-                    return Err(self.bad_cell(&table, source.column, value, &signals[i].name, sample, time));
-                };
-                column.push(value);
-            }
-            sample += 1;
+        if let Some(mut file) = columns::open(self)? {
+            let plan = self.plan(layout, file.names(), |_| None)?;
+            let cells = columns::read(self, file.as_mut(), &plan, None)?;
+            return self.of_columns(&plan, file.as_ref(), &cells, None);
         }
-        let time_unit = timing.unit();
-        let (time, source) = timing.finish(self, &table, sample)?;
-        let form = table.form();
-        let reading = Reading {
-            separator: Some(form.separator.into()),
-            decimal_comma: numbers.comma(),
-            preamble: form.preamble as u64,
-            units_row: form.units.is_some(),
-            time: source,
-            units,
-        };
-        let named = |(values, signal): (Vec<f64>, &&Quantity)| {
-            let mut values = values;
+        let mut table = self.table(layout, &[])?;
+        let mut numbers = Numbers::new(self.decimal_comma.then_some(true), table.form().separator);
+        let plan = self.plan(layout, table.names(), |column| table.form().unit(column))?;
+        let mut rows = Rows::new(&plan);
+        while table.next()? {
+            rows.push(self, &plan, &table, &mut numbers, false)?;
+        }
+        rows.finish(self, &plan, &table, &numbers)
+    }
+
+    /// The rows of a text that has the columns of a layout, and others.
+    pub(super) fn table(&self, layout: &Layout, others: &[&str]) -> Result<Table, Error> {
+        let signals = layout.inputs.iter().chain(&layout.outputs);
+        let said: Vec<Column> = signals.map(|signal| self.said(&signal.name)).collect();
+        let t = self.said("t").name;
+        let wanted: Vec<&str> =
+            said.iter().map(Column::name).chain(t.as_deref()).chain(others.iter().copied()).collect();
+        Table::open(self, &wanted)
+    }
+
+    /// Finds the columns of a layout by their names, and checks their units; `below` is the unit below a name.
+    pub(super) fn plan<'a, 'b>(
+        &self,
+        layout: &'a Layout,
+        names: &[String],
+        below: impl Fn(usize) -> Option<&'b str>,
+    ) -> Result<Plan<'a>, Error> {
+        // A static model needs no time: without one its rows are numbered.
+        let timed = self.columns.iter().any(|column| column.signal == "t") || names.iter().any(|name| name == "t");
+        let step = self.sample_time.or((layout.kind == Kind::Static && !timed).then_some(1.0));
+        let time = if step.is_none() { Some(self.time_column(names)?) } else { None };
+        let signals: Vec<&Quantity> = layout.inputs.iter().chain(&layout.outputs).collect();
+        let mut units = Vec::new();
+        let sources = signals.iter().map(|signal| self.source(names, &below, signal, &mut units));
+        let sources = sources.collect::<Result<Vec<_>, _>>()?;
+        Ok(Plan { layout, signals, sources, time, step: step.unwrap_or(1.0), units })
+    }
+
+    /// The record of values that were read.
+    pub(super) fn record(
+        &self,
+        plan: &Plan,
+        columns: Vec<Vec<f64>>,
+        (time, time_unit): (Time, TimeUnit),
+        reading: Reading,
+    ) -> Result<Record, Error> {
+        let named = |(mut values, signal): (Vec<f64>, &&Quantity)| {
             values.shrink_to_fit();
             Channel::new(&signal.name, &signal.unit, values)
         };
-        let mut inputs: Vec<Channel> = columns.into_iter().zip(&signals).map(named).collect();
-        let outputs = inputs.split_off(layout.inputs.len());
-        let (states, inputs, outputs) = (layout.states.clone().into(), inputs.into(), outputs.into());
+        let mut inputs: Vec<Channel> = columns.into_iter().zip(&plan.signals).map(named).collect();
+        let outputs = inputs.split_off(plan.layout.inputs.len());
+        let (states, inputs, outputs) = (plan.layout.states.clone().into(), inputs.into(), outputs.into());
         let (name, holds, initial) = (self.name(), Holds::All(Hold::default()), Initial::default());
         let (reading, looked) = (Some(Arc::new(reading)), Arc::default());
         Record { name, states, time, time_unit, inputs, outputs, holds, initial, reading, looked }.checked()
@@ -95,7 +125,7 @@ impl DataFile {
     }
 
     /// Refuses what makes no sense whatever the file holds.
-    fn check(&self, layout: &Layout) -> Result<(), Error> {
+    pub(super) fn check(&self, layout: &Layout) -> Result<(), Error> {
         let signals = layout.inputs.iter().chain(&layout.outputs).map(|signal| signal.name.as_str());
         let known = || signals.clone().chain(["t"]);
         for Column { signal, factor, offset, .. } in &self.columns {
@@ -140,17 +170,18 @@ impl DataFile {
     }
 
     /// The column of a signal, in the signal's unit if the file says one.
-    fn source(
+    fn source<'b>(
         &self,
-        table: &Table,
+        names: &[String],
+        below: impl Fn(usize) -> Option<&'b str>,
         signal: &Quantity,
-        said: &Column,
         units: &mut Vec<(String, String, String)>,
     ) -> Result<Source, Error> {
-        let column = self.place(table.names(), &signal.name)?;
-        let name = &table.names()[column];
-        let below = table.form().unit(column);
-        if let (None, Some(file)) = (said.factor, split_unit(name).1.filter(|_| name != said.name()).or(below)) {
+        let said = self.said(&signal.name);
+        let column = self.place(names, &signal.name)?;
+        let name = &names[column];
+        let written = split_unit(name).1.filter(|_| name != said.name());
+        if let (None, Some(file)) = (said.factor, written.or_else(|| below(column))) {
             let (file, model) = (file.to_owned(), signal.unit.clone());
             if let Some(factor) = reading::factor(&file, &model) {
                 let (path, column, signal) = (self.path.clone(), name.clone(), signal.name.clone());
@@ -186,5 +217,64 @@ impl DataFile {
 
     pub(super) fn at_line(&self, table: &Table, problem: Error) -> Error {
         Error::AtLine { path: self.path.clone(), line: table.line(), problem: Box::new(problem) }
+    }
+}
+
+impl Rows {
+    /// None yet.
+    pub(super) fn new(plan: &Plan) -> Rows {
+        Rows { columns: vec![Vec::new(); plan.signals.len()], timing: Timing::Even(plan.step), samples: 0 }
+    }
+
+    /// Takes the current row. Its time is `kept` where the rows of a record do not follow each other in the file.
+    pub(super) fn push(
+        &mut self,
+        file: &DataFile,
+        plan: &Plan,
+        table: &Table,
+        numbers: &mut Numbers,
+        kept: bool,
+    ) -> Result<(), Error> {
+        let sample = self.samples;
+        if let (0, Some(column)) = (sample, plan.time) {
+            self.timing = file.timing(table, numbers, column, kept)?;
+        }
+        let time = self.timing.tick(file, table, numbers, sample)?;
+        for (i, (column, source)) in self.columns.iter_mut().zip(&plan.sources).enumerate() {
+            let value = numbers.read(table.cell(source.column)).map(|number| source.value(number));
+            // An output may be missing, an input may not.
+            let input = i < plan.layout.inputs.len();
+            let good = |value: &f64| if input { value.is_finite() } else { !value.is_infinite() };
+            let Some(value) = value.filter(good) else {
+                let time = Moment { time, unit: self.timing.unit() };
+                return Err(file.bad_cell(table, source.column, value, &plan.signals[i].name, sample, time));
+            };
+            column.push(value);
+        }
+        self.samples += 1;
+        Ok(())
+    }
+
+    /// The record of the rows.
+    pub(super) fn finish(
+        self,
+        file: &DataFile,
+        plan: &Plan,
+        table: &Table,
+        numbers: &Numbers,
+    ) -> Result<Record, Error> {
+        let time_unit = self.timing.unit();
+        let (time, source): (Time, TimeSource) = self.timing.finish(file, table, self.samples)?;
+        let form = table.form();
+        let reading = Reading {
+            format: FileFormat::Text,
+            separator: Some(form.separator.into()),
+            decimal_comma: numbers.comma(),
+            preamble: form.preamble as u64,
+            units_row: form.units.is_some(),
+            time: source,
+            units: plan.units.clone(),
+        };
+        file.record(plan, self.columns, (time, time_unit), reading)
     }
 }

@@ -1,5 +1,6 @@
 //! [`Reading`]: how a file was read.
 
+use super::FileFormat;
 use crate::numeral::TimeUnit;
 use core::fmt;
 
@@ -7,6 +8,8 @@ use core::fmt;
 /// `cells between ";", decimal comma, 2 lines above the names, a row of units; time "Zeit": dates, day first, from 20.03.2025 00:00`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
+    /// The kind of file.
+    pub format: FileFormat,
     /// What stands between the cells; none in a file that is no text.
     pub separator: Option<char>,
     /// Whether numbers are written as 1,5.
@@ -67,7 +70,7 @@ impl fmt::Display for Reading {
             Some('\t') => write!(f, "cells between tabs, ")?,
             Some(' ') => write!(f, "cells between spaces, ")?,
             Some(separator) => write!(f, "cells between \"{separator}\", ")?,
-            None => {}
+            None => write!(f, "{}, ", self.format)?,
         }
         if self.decimal_comma {
             write!(f, "decimal comma, ")?;

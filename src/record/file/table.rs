@@ -69,11 +69,6 @@ impl Table {
         &self.form
     }
 
-    /// Whether a column has this name.
-    pub(super) fn has(&self, name: &str) -> bool {
-        self.form.names.iter().any(|column| column == name)
-    }
-
     /// The names of the columns.
     pub(super) fn names(&self) -> &[String] {
         &self.form.names

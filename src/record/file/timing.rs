@@ -35,23 +35,22 @@ pub(super) enum Timing {
 #[derive(Clone)]
 pub(super) struct Ticks {
     column: usize,
-    unit: f64,
+    pub(super) unit: f64,
     /// The unit in which they are shown.
-    shown: TimeUnit,
+    pub(super) shown: TimeUnit,
     offset: f64,
-    origin: f64,
+    pub(super) origin: f64,
 }
 
 impl Ticks {
-    fn time(&self, number: f64) -> f64 {
+    pub(super) fn time(&self, number: f64) -> f64 {
         (number - self.origin) * self.unit + self.offset
     }
 }
 
 impl DataFile {
     /// The column of time: the one that was said, `t`, or the only one of such a name.
-    pub(super) fn time_column(&self, table: &Table) -> Result<usize, Error> {
-        let names = table.names();
+    pub(super) fn time_column(&self, names: &[String]) -> Result<usize, Error> {
         let plain = |name: &str| split_unit(name).0.to_lowercase().replace([' ', '_', '-'], "");
         let called = |list: &[&str]| -> Vec<usize> {
             (0..names.len()).filter(|at| list.contains(&plain(&names[*at]).as_str())).collect()
@@ -71,32 +70,58 @@ impl DataFile {
         if names.first().is_some_and(String::is_empty) { Ok(0) } else { found }
     }
 
-    /// Looks at the first row of the file.
-    pub(super) fn timing(&self, table: &Table, numbers: &mut Numbers, column: usize) -> Result<Timing, Error> {
-        let (name, cell) = (&table.names()[column], table.cell(column));
-        if let Some(number) = numbers.read(cell) {
-            if name.is_empty() && self.said("t").name.is_none() {
-                // Numbers of rows.
-                return self.place(table.names(), "t").map(|_| Timing::Even(1.0));
-            }
-            let said = self.said("t");
-            let written = split_unit(name).1.or_else(|| suffix(name));
-            let below = table.form().unit(column);
-            let named = written.or(below).and_then(time_unit);
-            let unit = said.factor.or_else(|| named.as_ref().map(TimeUnit::seconds));
-            let long_ago = SINCE_1970.iter().find(|(least, _)| unit.is_none() && number.abs() >= *least);
-            let (unit, origin) = long_ago.map_or((unit.unwrap_or(1.0), 0.0), |(_, unit)| (*unit, number));
-            let shown = shown(named, unit);
-            let unit = if said.reversed { -unit } else { unit };
-            // A pipe cannot be read again, so that its stamps are kept until the end.
-            let stamps = if self.path.is_file() { None } else { Some(Vec::new()) };
-            let ticks = Ticks { column, unit, shown, offset: said.offset, origin };
-            return Ok(Timing::Numbers { ticks, clock: Clock::default(), stamps });
+    /// How the numbers of a column of time become seconds, as its first number, its name and the unit below it say; none where they are
+    /// numbers of rows.
+    ///
+    /// # Errors
+    /// Numbers of rows in place of a column of time that is wanted.
+    pub(super) fn ticks(
+        &self,
+        names: &[String],
+        below: Option<&str>,
+        column: usize,
+        first: f64,
+    ) -> Result<Option<Ticks>, Error> {
+        let (name, said) = (&names[column], self.said("t"));
+        if name.is_empty() && said.name.is_none() {
+            return self.place(names, "t").map(|_| None);
         }
+        let written = split_unit(name).1.or_else(|| suffix(name));
+        let named = written.or(below).and_then(time_unit);
+        let unit = said.factor.or_else(|| named.as_ref().map(TimeUnit::seconds));
+        let long_ago = SINCE_1970.iter().find(|(least, _)| unit.is_none() && first.abs() >= *least);
+        let (unit, origin) = long_ago.map_or((unit.unwrap_or(1.0), 0.0), |(_, unit)| (*unit, first));
+        let shown = shown(named, unit);
+        let unit = if said.reversed { -unit } else { unit };
+        Ok(Some(Ticks { column, unit, shown, offset: said.offset, origin }))
+    }
+
+    /// Dates in a column, in the order and the zone that were said.
+    pub(super) fn dates_of(&self) -> Result<Dates, Error> {
         let zone = self.zone.as_ref().map(|zone| {
             TimeZone::get(zone).map_err(|error| Error::Option(format!("DataFile::zone(\"{zone}\"): {error}")))
         });
-        let dates = Box::new(Dates::new(self.dates, zone.transpose()?));
+        Ok(Dates::new(self.dates, zone.transpose()?))
+    }
+
+    /// Looks at the first row of a record. Its stamps are `kept` where they cannot be read again.
+    pub(super) fn timing(
+        &self,
+        table: &Table,
+        numbers: &mut Numbers,
+        column: usize,
+        kept: bool,
+    ) -> Result<Timing, Error> {
+        let cell = table.cell(column);
+        if let Some(number) = numbers.read(cell) {
+            let Some(ticks) = self.ticks(table.names(), table.form().unit(column), column, number)? else {
+                return Ok(Timing::Even(1.0));
+            };
+            // A pipe cannot be read again.
+            let stamps = if kept || !self.path.is_file() { Some(Vec::new()) } else { None };
+            return Ok(Timing::Numbers { ticks, clock: Clock::default(), stamps });
+        }
+        let dates = Box::new(self.dates_of()?);
         let mut date = None;
         let text = String::from_utf8_lossy(cell).into_owned();
         if !matches!(Stamp::read(&text), Some(Stamp::Instant(_) | Stamp::Local(_))) {

@@ -101,7 +101,7 @@ impl Reader {
         let found: Vec<Output> = match entry.value {
             DeValue::Array(_) => {
                 let listed = self.values.list(entry).unwrap_or_default();
-                listed.iter().filter_map(|one| self.listed_output(one, states)).collect()
+                listed.iter().filter_map(|one| self.listed_output(one)).collect()
             }
             _ => {
                 let fields = self.values.table(entry).unwrap_or_default();
@@ -114,15 +114,12 @@ impl Reader {
         found
     }
 
-    /// An output that is a state, by its name.
-    pub(super) fn listed_output(&mut self, entry: &Entry<'_>, states: &[State]) -> Option<Output> {
-        let name = self.values.text(entry)?;
+    /// An output that is a state or an input, by its name.
+    pub(super) fn listed_output(&mut self, entry: &Entry<'_>) -> Option<Output> {
+        let name = self.values.text(entry)?.to_owned();
         let value = self.values.expression(entry)?;
-        let state = states.iter().find(|state| state.quantity.name == name);
-        let (unit, dimension) = state
-            .map_or_else(Default::default, |state| (state.quantity.unit.clone(), state.quantity.dimension.clone()));
-        let quantity =
-            Declared { name: name.to_owned(), at: entry.span.clone(), unit, dimension, description: String::new() };
+        let (at, unit, description) = (entry.span.clone(), String::new(), String::new());
+        let quantity = Declared { name, at, unit, dimension: None, description };
         Some(Output { quantity, value, noise: None })
     }
 

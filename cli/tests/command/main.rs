@@ -1,88 +1,11 @@
 //! The command as a shell sees it: what it prints, what it leaves behind, and its exit codes.
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-use std::sync::atomic::{AtomicUsize, Ordering};
+mod bench;
+mod fleet;
 
-/// The shipped record of a motor with four pole pairs.
-fn record() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/data/pmsm.csv")
-}
-
-const MODEL: &str = r#"
-greybox = 1
-name = "PMSM"
-[constants]
-np = 4
-[inputs]
-ud = "V"
-uq = "V"
-w = "rad/s"
-[parameters]
-rs = { unit = "ohm", start = 1.0, within = [0.01, 10] }
-ls = { unit = "H", start = 2e-3, positive = true }
-ke = { unit = "V s/rad", start = 0.7 }
-[let]
-we = "np*w"
-[states]
-id = { unit = "A", derivative = "(ud - rs*id)/ls + we*iq" }
-iq = { unit = "A", derivative = "(uq - rs*iq - ke*w*sqrt(2/3))/ls - we*id" }
-[outputs]
-id = "id"
-iq = "iq"
-"#;
-
-/// A folder with the model, in which the command runs.
-struct Bench(PathBuf);
-
-impl Drop for Bench {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
-
-impl Bench {
-    fn new() -> Self {
-        static COUNT: AtomicUsize = AtomicUsize::new(0);
-        let number = COUNT.fetch_add(1, Ordering::Relaxed);
-        let bench = Bench(std::env::temp_dir().join(format!("greybox_command_{}_{number}", std::process::id())));
-        std::fs::create_dir_all(&bench.0).unwrap();
-        std::fs::write(bench.path("pmsm.toml"), MODEL).unwrap();
-        std::fs::copy(record(), bench.path("record.csv")).unwrap();
-        bench
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.join(name)
-    }
-
-    fn run(&self, words: &[&str]) -> Output {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_greybox"));
-        command.args(words).current_dir(&self.0).env_remove("NO_COLOR").output().unwrap()
-    }
-
-    /// What a command prints that ends with this code.
-    fn ends(&self, code: i32, words: &[&str]) -> (String, String) {
-        let Output { status, stdout, stderr } = self.run(words);
-        let [out, error] = [stdout, stderr].map(|bytes| String::from_utf8(bytes).unwrap());
-        assert_eq!(status.code(), Some(code), "{words:?}\n{out}\n{error}");
-        (out, error)
-    }
-
-    fn names(&self) -> Vec<String> {
-        let entries = std::fs::read_dir(&self.0).unwrap();
-        let mut names: Vec<String> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-        names.sort();
-        names
-    }
-}
-
-/// A parameter's value in a table of an estimate.
-fn value(out: &str, name: &str) -> f64 {
-    let line = out.lines().find(|line| line.split_whitespace().next() == Some(name));
-    let line = line.unwrap_or_else(|| panic!("no row `{name}` in\n{out}"));
-    line.split_whitespace().nth(1).unwrap().parse().unwrap()
-}
+use bench::{Bench, MODEL, value};
+use std::path::Path;
+use std::process::Output;
 
 #[test]
 fn fit_prints_the_estimate_and_writes_what_is_asked_for() {
@@ -96,12 +19,30 @@ fn fit_prints_the_estimate_and_writes_what_is_asked_for() {
     assert!(!out.contains('\u{1b}') && !error.contains('\u{1b}'), "color and progress are for terminals");
     assert!(error.contains("record.csv: "), "what was guessed of the file: {error}");
     let text = |name: &str| std::fs::read_to_string(bench.path(name)).unwrap();
-    assert!(text("r.html").contains("PMSM") && text("fit.svg").starts_with("<svg"));
+    let page = text("r.html");
+    assert!(page.contains("PMSM") && text("fit.svg").starts_with("<svg"));
+    // The first section has the equations as the model file has them.
+    let first = page.split("<section").nth(1).unwrap();
+    assert!(first.contains("Equations") && first.contains("(ud - rs*id)/ls + we*iq"), "{first}");
     let estimate = greybox::Summary::from_json(&text("e.json")).unwrap();
     assert_eq!(estimate.parameters[2].name, "ke");
     assert_eq!(bench.names(), ["e.json", "fit.svg", "pmsm.toml", "r.html", "record.csv"], "nothing half-written");
     let (_, error) = bench.ends(0, &["fit", "-q", "pmsm.toml", "record.csv"]);
     assert_eq!(error, "");
+}
+
+/// But for what depends on the processor and its load: the search's last step, its iterations and its time.
+#[test]
+fn the_readme_shows_what_is_printed() {
+    let readme = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md")).unwrap();
+    let shown = readme.split("```").find(|block| block.starts_with("text\nVerdict")).unwrap();
+    let (out, _) = Bench::new().ends(0, &["fit", "pmsm", "record.csv", "--constant", "np=4"]);
+    let fixed = |text: &str| -> Vec<String> {
+        let lines = text.lines().skip_while(|line| !line.starts_with("parameter"));
+        lines.filter(|line| !line.contains(" iterations, ")).map(str::to_string).collect()
+    };
+    assert_eq!(fixed(shown), fixed(&out));
+    assert!(fixed(shown).len() > 10 && out.starts_with("Verdict: usable. Search: converged"), "{out}");
 }
 
 #[test]
@@ -186,27 +127,6 @@ fn a_simulation_is_a_record_that_gives_its_parameters_back() {
 }
 
 #[test]
-fn a_fleet_is_a_table_that_goes_on_where_it_was() {
-    let bench = Bench::new();
-    for name in ["a.csv", "b.csv", "c.csv"] {
-        std::fs::copy(record(), bench.path(name)).unwrap();
-    }
-    std::fs::write(bench.path("b.csv"), "t,ud,uq,w,id,iq\n0,1,2\n").unwrap();
-    let (_, error) = bench.ends(3, &["fleet", "pmsm.toml", "[abc].csv", "--out", "motors.csv"]);
-    assert!(error.contains("b.csv"), "{error}");
-    let table = std::fs::read_to_string(bench.path("motors.csv")).unwrap();
-    let rows: Vec<&str> = table.lines().collect();
-    assert_eq!(rows.len(), 4, "{table}");
-    assert!(rows[0].starts_with("record,verdict,rs,rs_std,rs_lower,rs_upper,ls,"), "{table}");
-    assert!(rows[1].starts_with("a.csv,usable,0.63") && rows[2].starts_with("b.csv,error,"), "{table}");
-    // A row that is there is kept as it stands.
-    std::fs::write(bench.path("motors.csv"), table.replace("a.csv,usable", "a.csv,kept")).unwrap();
-    bench.ends(3, &["fleet", "pmsm.toml", "[abc].csv", "--out", "motors.csv"]);
-    let again = std::fs::read_to_string(bench.path("motors.csv")).unwrap();
-    assert!(again.contains("a.csv,kept") && again.lines().count() == 4, "{again}");
-}
-
-#[test]
 fn models_new_check_and_export_work_together() {
     let bench = Bench::new();
     bench.ends(0, &["new", "tank.toml"]);
@@ -256,4 +176,29 @@ fn shells_and_manuals_know_the_command() {
     let (out, _) = bench.ends(0, &["help"]);
     assert!(out.contains("Exit codes: 0 usable, 2 usable with care, 3 not usable, 1 error"), "{out}");
     bench.ends(1, &["fitt"]);
+}
+
+/// Dates that have no zone, and could have the month first.
+#[test]
+fn dates_are_read_with_an_order_and_a_zone() {
+    let bench = Bench::new();
+    let text = std::fs::read_to_string(bench.path("record.csv")).unwrap();
+    let row = |(k, line): (usize, &str)| {
+        format!("05/10/2025 02:{:02}:{:02},{}\n", k / 60, k % 60, line.split_once(',').unwrap().1)
+    };
+    let rows: String = text.lines().skip(1).take(1000).enumerate().map(row).collect();
+    std::fs::write(bench.path("dates.csv"), format!("t,ud,uq,w,id,iq\n{rows}")).unwrap();
+    let check = |words: &[&str]| {
+        let words: Vec<&str> = ["check", "pmsm.toml", "dates.csv"].iter().chain(words).copied().collect();
+        let Output { stderr, .. } = bench.run(&words);
+        String::from_utf8(stderr).unwrap()
+    };
+    let error = check(&["--date-order", "day", "--zone", "Europe/Berlin"]);
+    assert!(error.contains("dates, day first, in Europe/Berlin, from 05/10/2025 02:00:00"), "{error}");
+    let error = check(&["--date-order", "month"]);
+    assert!(error.contains("dates, month first, from"), "{error}");
+    let error = check(&["--zone", "Europe/Berlim"]);
+    assert!(error.contains("Europe/Berlim"), "{error}");
+    let error = check(&["--date-order", "year"]);
+    assert!(error.contains("day, month"), "{error}");
 }

@@ -1,0 +1,69 @@
+//! The journal of a table that is being made: a line for each row, written as soon as the row is known, so that after a kill at any point the
+//! same command goes on from there.
+
+use super::row::{Name, Row};
+use crate::Failure;
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+/// An open journal, which no other process writes meanwhile.
+pub struct Journal {
+    path: PathBuf,
+    file: File,
+}
+
+/// A row as JSON has it.
+type Line = (String, Option<String>, String, Vec<Option<f64>>, String);
+
+impl Journal {
+    /// Opens the journal, and reads the rows that an earlier run left there.
+    ///
+    /// # Errors
+    /// A file that cannot be written; one of another table; one that another process writes.
+    pub fn open(path: &Path, header: &[String]) -> Result<(Self, Vec<Row>), Failure> {
+        let failed = |error: std::io::Error| format!("{}: {error}", path.display());
+        let mut file =
+            OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
+        if let Err(TryLockError::WouldBlock) = file.try_lock() {
+            return Err(format!("{}: another run is writing this table", path.display()).into());
+        }
+        let mut bytes = vec![];
+        file.read_to_end(&mut bytes).map_err(failed)?;
+        // A kill may have cut off the last line.
+        let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+        file.set_len(whole as u64).map_err(failed)?;
+        file.seek(SeekFrom::End(0)).map_err(failed)?;
+        let mut journal = Journal { path: path.to_owned(), file };
+        let other = || format!("{}: it is of another table; remove it, or name another table", path.display());
+        let mut lines = bytes[..whole].split_inclusive(|byte| *byte == b'\n');
+        match lines.next() {
+            None => journal.write(&header)?,
+            Some(line) if serde_json::from_slice::<Vec<String>>(line).is_ok_and(|found| found == header) => {}
+            Some(_) => return Err(other().into()),
+        }
+        let row = |line| {
+            let (record, group, verdict, numbers, remarks) = serde_json::from_slice::<Line>(line).ok()?;
+            Some(Row { name: Name { record, group }, verdict, numbers, remarks })
+        };
+        let rows: Option<Vec<Row>> = lines.map(row).collect();
+        Ok((journal, rows.ok_or_else(other)?))
+    }
+
+    /// Adds a row.
+    pub fn add(&mut self, row: &Row) -> Result<(), Failure> {
+        self.write(&(&row.name.record, &row.name.group, &row.verdict, &row.numbers, &row.remarks))
+    }
+
+    fn write(&mut self, line: &impl greybox::serde::Serialize) -> Result<(), Failure> {
+        let mut text = serde_json::to_vec(line)?;
+        text.push(b'\n');
+        Ok(self.file.write_all(&text).map_err(|error| format!("{}: {error}", self.path.display()))?)
+    }
+
+    /// Removes the journal: its rows are in the table.
+    pub fn remove(self) -> Result<(), Failure> {
+        drop(self.file);
+        Ok(std::fs::remove_file(&self.path).map_err(|error| format!("{}: {error}", self.path.display()))?)
+    }
+}

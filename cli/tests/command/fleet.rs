@@ -1,0 +1,159 @@
+//! `fleet`: tables of many records, which go on where they were.
+
+use crate::bench::{Bench, record};
+use std::fmt::Write;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+#[test]
+fn a_fleet_is_a_table_that_goes_on_where_it_was() {
+    let bench = Bench::new();
+    for name in ["a.csv", "b.csv", "c.csv"] {
+        std::fs::copy(record(), bench.path(name)).unwrap();
+    }
+    std::fs::write(bench.path("b.csv"), "t,ud,uq,w,id,iq\n0,1,2\n").unwrap();
+    let (_, error) = bench.ends(3, &["fleet", "pmsm.toml", "[abc].csv", "--out", "motors.csv"]);
+    assert!(error.contains("b.csv"), "{error}");
+    let table = std::fs::read_to_string(bench.path("motors.csv")).unwrap();
+    let rows: Vec<&str> = table.lines().collect();
+    assert_eq!(rows.len(), 4, "{table}");
+    assert!(rows[0].starts_with("record,verdict,rs,rs_std,rs_lower,rs_upper,ls,"), "{table}");
+    assert!(rows[1].starts_with("a.csv,usable,0.63") && rows[2].starts_with("b.csv,error,"), "{table}");
+    // A row that is there is kept as it stands.
+    std::fs::write(bench.path("motors.csv"), table.replace("a.csv,usable", "a.csv,kept")).unwrap();
+    bench.ends(3, &["fleet", "pmsm.toml", "[abc].csv", "--out", "motors.csv"]);
+    let again = std::fs::read_to_string(bench.path("motors.csv")).unwrap();
+    assert!(again.contains("a.csv,kept") && again.lines().count() == 4, "{again}");
+}
+
+/// Parts of the shipped record as so many motors in one file, their rows mixed.
+fn motors(bench: &Bench, name: &str, count: usize) {
+    let text = std::fs::read_to_string(record()).unwrap();
+    let rows: Vec<&str> = text.lines().skip(1).collect();
+    let mut mixed = "motor,t,ud,uq,w,id,iq\n".to_owned();
+    for k in 0..200 {
+        for motor in 0..count {
+            writeln!(mixed, "m{motor},{}", rows[(motor * 37) % (rows.len() - 200) + k]).unwrap();
+        }
+    }
+    std::fs::write(bench.path(name), mixed).unwrap();
+}
+
+#[test]
+fn a_column_tells_the_records_of_a_file_apart() {
+    let bench = Bench::new();
+    motors(&bench, "motors.csv", 3);
+    let text = std::fs::read_to_string(bench.path("motors.csv")).unwrap();
+    // A value that is none spoils one motor.
+    std::fs::write(bench.path("motors.csv"), text.replacen("m1,", "m1,x", 1)).unwrap();
+    let words = ["fleet", "pmsm.toml", "motors.csv", "--by", "motor", "--out", "t.csv"];
+    let (_, error) = bench.ends(3, &words);
+    assert!(error.contains("motors.csv, m1: ") && error.contains("line 3"), "{error}");
+    assert!(error.lines().last().unwrap().starts_with("3 records: ") && error.contains("1 error"), "{error}");
+    let table = std::fs::read_to_string(bench.path("t.csv")).unwrap();
+    let rows: Vec<&str> = table.lines().collect();
+    assert!(rows.len() == 4 && rows[0].starts_with("record,motor,verdict,rs,rs_std"), "{table}");
+    assert!(rows[1].starts_with("motors.csv,m0,") && rows[2].starts_with("motors.csv,m1,error,,"), "{table}");
+    assert_eq!(bench.names(), ["motors.csv", "pmsm.toml", "record.csv", "t.csv"], "no journal is left");
+    // Each by itself is the same as in a file of its own, to the bit.
+    let alone: Vec<&str> = text.lines().filter(|line| line.starts_with("m2,") || line.starts_with("motor,")).collect();
+    std::fs::write(bench.path("m2.csv"), alone.join("\n")).unwrap();
+    let (out, _) = bench
+        .ends(bench.run(&["fleet", "pmsm.toml", "m2.csv"]).status.code().unwrap(), &["fleet", "pmsm.toml", "m2.csv"]);
+    assert_eq!(out.lines().nth(1).unwrap().split_once(',').unwrap().1, rows[3].split_once(",m2,").unwrap().1);
+    let (_, error) = bench.ends(1, &["fleet", "pmsm.toml", "motors.csv", "--by", "rs"]);
+    assert!(error.contains("two columns `rs`"), "{error}");
+}
+
+/// Killed at any point, and started again until it ends: each motor once, and the numbers of a run that was not killed.
+#[test]
+fn a_killed_fleet_goes_on_with_nothing_twice() {
+    let bench = Bench::new();
+    motors(&bench, "motors.csv", 200);
+    let words = |out: &'static str| ["fleet", "pmsm.toml", "motors.csv", "motors.csv", "--by", "motor", "--out", out];
+    bench.run(&words("whole.csv"));
+    let whole = std::fs::read_to_string(bench.path("whole.csv")).unwrap();
+    assert_eq!(whole.lines().count(), 201);
+    let journal = bench.path("t.csv.journal");
+    let (mut kills, mut rows, mut tables) = (0, 0, 0);
+    // A run may end before it is killed; then once more from the start.
+    while kills == 0 || !bench.path("t.csv").exists() {
+        if bench.path("t.csv").exists() {
+            std::fs::remove_file(bench.path("t.csv")).unwrap();
+            tables += 1;
+            assert!(tables < 50, "no run was killed before its end");
+        }
+        let quiet = |words: &[&str]| bench.command(words).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let mut run = quiet(&words("t.csv"));
+        let begin = Instant::now();
+        // Until there is another row, or it has ended.
+        loop {
+            let there = std::fs::read_to_string(&journal).unwrap_or_default().lines().count();
+            if there > rows + 1 || run.try_wait().unwrap().is_some() {
+                break;
+            }
+            assert!(begin.elapsed() < Duration::from_secs(300), "{there} lines");
+            std::thread::yield_now();
+        }
+        run.kill().unwrap();
+        run.wait().unwrap();
+        if let Ok(text) = std::fs::read_to_string(&journal) {
+            rows = text.lines().count();
+            kills += 1;
+            // As if it had been killed while it wrote the next row.
+            std::fs::write(&journal, text + "[\"motors.csv\",\"m").unwrap();
+        }
+        assert!(kills < 100);
+    }
+    assert_eq!(std::fs::read_to_string(bench.path("t.csv")).unwrap(), whole);
+    assert!(!journal.exists());
+    // Killed between writing the table and removing the journal, which has all rows again.
+    std::fs::write(&journal, "[\"record\"]\n").unwrap();
+    let (_, error) = bench.ends(1, &words("t.csv"));
+    assert!(error.contains("t.csv.journal: it is of another table; remove it"), "{error}");
+}
+
+#[cfg(feature = "arrow")]
+#[test]
+fn a_table_may_be_parquet() {
+    use greybox::Kind;
+    use greybox::layout::{Layout, Quantity};
+    let bench = Bench::new();
+    motors(&bench, "motors.csv", 4);
+    let words = |out: &'static str| ["fleet", "pmsm.toml", "motors.csv", "--by", "motor", "--out", out];
+    bench.run(&words("t.csv"));
+    bench.run(&words("t.parquet"));
+    let bytes = std::fs::read(bench.path("t.parquet")).unwrap();
+    assert!(bytes.starts_with(b"PAR1") && bytes.ends_with(b"PAR1"));
+    // What a finished run has written is read again, and more is added.
+    motors(&bench, "motors.csv", 5);
+    let error = String::from_utf8(bench.run(&words("t.parquet")).stderr).unwrap();
+    assert!(error.contains("4 records are in the table already") && error.contains("1 records: "), "{error}");
+    // The library reads the numbers that the other table has.
+    let output = |name: &str| Quantity { name: name.to_owned(), unit: String::new() };
+    let outputs = ["rs", "ke_upper"].map(output).to_vec();
+    let layout = Layout { kind: Kind::Static, states: vec![], inputs: vec![], outputs, parameters: vec![] };
+    let record = greybox::DataFile::new(bench.path("t.parquet")).sample_time(1.0).read_record(&layout).unwrap();
+    let table = std::fs::read_to_string(bench.path("t.csv")).unwrap();
+    let header: Vec<&str> = table.lines().next().unwrap().split(',').collect();
+    for (channel, name) in record.outputs().iter().zip(["rs", "ke_upper"]) {
+        let at = header.iter().position(|column| *column == name).unwrap();
+        let expected: Vec<f64> =
+            table.lines().skip(1).map(|row| row.split(',').nth(at).unwrap().parse().unwrap_or(f64::NAN)).collect();
+        assert_eq!(format!("{:?}", &channel.values[..4]), format!("{expected:?}"));
+    }
+    std::fs::write(bench.path("t.parquet"), &bytes[..bytes.len() / 2]).unwrap();
+    let (_, error) = bench.ends(1, &words("t.parquet"));
+    assert!(error.contains("t.parquet: "), "{error}");
+}
+
+#[cfg(not(feature = "arrow"))]
+#[test]
+fn without_its_feature_parquet_is_refused() {
+    let bench = Bench::new();
+    let (_, error) = bench.ends(1, &["fleet", "pmsm.toml", "record.csv", "--out", "t.parquet"]);
+    assert!(error.contains("--features arrow"), "{error}");
+    std::fs::write(bench.path("r.parquet"), "PAR1").unwrap();
+    let (_, error) = bench.ends(1, &["fit", "pmsm.toml", "r.parquet"]);
+    assert!(error.contains("the file is Parquet") && error.contains("--features arrow"), "{error}");
+}

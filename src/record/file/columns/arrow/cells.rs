@@ -1,0 +1,140 @@
+//! Arrow arrays as cells.
+
+use super::Cells;
+use arrow_array::cast::AsArray;
+use arrow_array::types::{
+    ArrowPrimitiveType, Date32Type, Date64Type, Decimal32Type, Decimal64Type, Decimal128Type, DurationMicrosecondType,
+    DurationMillisecondType, DurationNanosecondType, DurationSecondType, Float16Type, Float32Type, Float64Type,
+    Int8Type, Int16Type, Int32Type, Int64Type, Time32MillisecondType, Time32SecondType, Time64MicrosecondType,
+    Time64NanosecondType, TimestampMicrosecondType, TimestampMillisecondType, TimestampNanosecondType,
+    TimestampSecondType, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
+};
+use arrow_array::{Array, ArrayRef};
+use arrow_schema::{DataType, TimeUnit};
+
+/// Adds the values of an array to the cells of its column. Cells that are texts take whole numbers, too.
+///
+/// # Errors
+/// What the array holds, where that cannot be cells.
+pub(super) fn append(cells: &mut Option<Cells>, array: &ArrayRef) -> Result<(), String> {
+    if let DataType::Dictionary(..) = array.data_type() {
+        let dictionary = array.as_any_dictionary();
+        let values = arrow_select::take::take(dictionary.values(), dictionary.keys(), None);
+        return append(cells, &values.map_err(|error| error.to_string())?);
+    }
+    let other = || format!("cells of type {}", array.data_type());
+    if let Some(Cells::Texts(texts)) = cells {
+        texts.extend(self::texts(array).ok_or_else(other)?);
+        return Ok(());
+    }
+    let more = numbers(array)
+        .map(Cells::Numbers)
+        .or_else(|| seconds(array).map(Cells::Seconds))
+        .or_else(|| instants(array))
+        .or_else(|| Some(Cells::Texts(self::texts(array)?)))
+        .ok_or_else(other)?;
+    match (&mut *cells, more) {
+        (None, more) => *cells = Some(more),
+        (Some(Cells::Numbers(all)), Cells::Numbers(more)) | (Some(Cells::Seconds(all)), Cells::Seconds(more)) => {
+            all.extend(more);
+        }
+        (Some(Cells::Instants { nanoseconds: all, .. }), Cells::Instants { nanoseconds, .. }) => {
+            all.extend(nanoseconds);
+        }
+        _ => return Err(other()),
+    }
+    Ok(())
+}
+
+/// Each value as a number; NaN where there is none.
+fn each<T: ArrowPrimitiveType>(array: &ArrayRef, number: impl Fn(T::Native) -> f64) -> Vec<f64> {
+    array.as_primitive::<T>().iter().map(|value| value.map_or(f64::NAN, &number)).collect()
+}
+
+fn numbers(array: &ArrayRef) -> Option<Vec<f64>> {
+    // A decimal is a whole number of units.
+    let unit = |scale: &i8| 10f64.powi((*scale).into());
+    Some(match array.data_type() {
+        DataType::Null => vec![f64::NAN; array.len()],
+        DataType::Boolean => {
+            array.as_boolean().iter().map(|value| value.map_or(f64::NAN, |value| f64::from(u8::from(value)))).collect()
+        }
+        DataType::Int8 => each::<Int8Type>(array, f64::from),
+        DataType::Int16 => each::<Int16Type>(array, f64::from),
+        DataType::Int32 => each::<Int32Type>(array, f64::from),
+        DataType::Int64 => each::<Int64Type>(array, |value| value as f64),
+        DataType::UInt8 => each::<UInt8Type>(array, f64::from),
+        DataType::UInt16 => each::<UInt16Type>(array, f64::from),
+        DataType::UInt32 => each::<UInt32Type>(array, f64::from),
+        DataType::UInt64 => each::<UInt64Type>(array, |value| value as f64),
+        DataType::Float16 => each::<Float16Type>(array, f64::from),
+        DataType::Float32 => each::<Float32Type>(array, f64::from),
+        DataType::Float64 => each::<Float64Type>(array, |value| value),
+        DataType::Decimal32(_, scale) => each::<Decimal32Type>(array, |value| f64::from(value) / unit(scale)),
+        DataType::Decimal64(_, scale) => each::<Decimal64Type>(array, |value| value as f64 / unit(scale)),
+        DataType::Decimal128(_, scale) => each::<Decimal128Type>(array, |value| value as f64 / unit(scale)),
+        _ => return None,
+    })
+}
+
+/// Lengths of time, and times of a day.
+fn seconds(array: &ArrayRef) -> Option<Vec<f64>> {
+    use TimeUnit::{Microsecond, Millisecond, Nanosecond, Second};
+    Some(match array.data_type() {
+        DataType::Duration(Second) => each::<DurationSecondType>(array, |value| value as f64),
+        DataType::Duration(Millisecond) => each::<DurationMillisecondType>(array, |value| value as f64 / 1e3),
+        DataType::Duration(Microsecond) => each::<DurationMicrosecondType>(array, |value| value as f64 / 1e6),
+        DataType::Duration(Nanosecond) => each::<DurationNanosecondType>(array, |value| value as f64 / 1e9),
+        DataType::Time32(Second) => each::<Time32SecondType>(array, f64::from),
+        DataType::Time32(Millisecond) => each::<Time32MillisecondType>(array, |value| f64::from(value) / 1e3),
+        DataType::Time64(Microsecond) => each::<Time64MicrosecondType>(array, |value| value as f64 / 1e6),
+        DataType::Time64(Nanosecond) => each::<Time64NanosecondType>(array, |value| value as f64 / 1e9),
+        _ => return None,
+    })
+}
+
+/// Dates; those whose nanoseconds since 1970 have no place in 64 bits are none.
+fn instants(array: &ArrayRef) -> Option<Cells> {
+    fn of<T: ArrowPrimitiveType>(array: &ArrayRef, nanoseconds: i64) -> Vec<Option<i64>>
+    where
+        T::Native: Into<i64>,
+    {
+        array.as_primitive::<T>().iter().map(|value| value?.into().checked_mul(nanoseconds)).collect()
+    }
+    let nanoseconds = match array.data_type() {
+        DataType::Timestamp(TimeUnit::Second, _) => of::<TimestampSecondType>(array, 1_000_000_000),
+        DataType::Timestamp(TimeUnit::Millisecond, _) => of::<TimestampMillisecondType>(array, 1_000_000),
+        DataType::Timestamp(TimeUnit::Microsecond, _) => of::<TimestampMicrosecondType>(array, 1_000),
+        DataType::Timestamp(TimeUnit::Nanosecond, _) => of::<TimestampNanosecondType>(array, 1),
+        DataType::Date32 => of::<Date32Type>(array, 86_400_000_000_000),
+        DataType::Date64 => of::<Date64Type>(array, 1_000_000),
+        _ => return None,
+    };
+    let universal = matches!(array.data_type(), DataType::Timestamp(_, Some(_)));
+    Some(Cells::Instants { nanoseconds, universal })
+}
+
+/// Texts, and whole numbers as texts; a text that is not there is empty.
+fn texts(array: &ArrayRef) -> Option<Vec<String>> {
+    fn of<T: ArrowPrimitiveType>(array: &ArrayRef) -> Vec<String>
+    where
+        T::Native: ToString,
+    {
+        array.as_primitive::<T>().iter().map(|value| value.map_or(String::new(), |value| value.to_string())).collect()
+    }
+    let owned = |text: Option<&str>| text.unwrap_or_default().to_owned();
+    Some(match array.data_type() {
+        DataType::Utf8 => array.as_string::<i32>().iter().map(owned).collect(),
+        DataType::LargeUtf8 => array.as_string::<i64>().iter().map(owned).collect(),
+        DataType::Utf8View => array.as_string_view().iter().map(owned).collect(),
+        DataType::Int8 => of::<Int8Type>(array),
+        DataType::Int16 => of::<Int16Type>(array),
+        DataType::Int32 => of::<Int32Type>(array),
+        DataType::Int64 => of::<Int64Type>(array),
+        DataType::UInt8 => of::<UInt8Type>(array),
+        DataType::UInt16 => of::<UInt16Type>(array),
+        DataType::UInt32 => of::<UInt32Type>(array),
+        DataType::UInt64 => of::<UInt64Type>(array),
+        _ => return None,
+    })
+}

@@ -1,0 +1,87 @@
+//! The time of a record from a column of numbers, lengths of time, dates or texts.
+
+use super::super::read::Plan;
+use super::super::stamp::Stamp;
+use super::super::{DataFile, Fault, TimeSource};
+use super::{Cells, Columns};
+use crate::error::Error;
+use crate::numeral::TimeUnit;
+use crate::record::Time;
+use jiff::Timestamp;
+use jiff::tz::TimeZone;
+
+impl DataFile {
+    /// The times of the rows, or of some of them (s), the unit in which they are shown, and where they are from.
+    pub(super) fn column_times(
+        &self,
+        plan: &Plan,
+        file: &dyn Columns,
+        cells: &[Cells],
+        rows: Option<&[usize]>,
+    ) -> Result<((Time, TimeUnit), TimeSource), Error> {
+        let seconds = TimeUnit::default;
+        let even = |step| Ok(((Time::Uniform { start: 0.0, step }, seconds()), TimeSource::Even { step }));
+        let (Some(at), Some(cells)) = (plan.time, cells.get(plan.sources.len())) else { return even(plan.step) };
+        let row = |sample: usize| rows.map_or(sample, |rows| rows[sample]);
+        let samples = rows.map_or(cells.len(), <[usize]>::len);
+        let column = file.names()[at].clone();
+        match cells {
+            Cells::Numbers(numbers) => {
+                let first = if samples == 0 { 0.0 } else { numbers[row(0)] };
+                let Some(ticks) = self.ticks(file.names(), None, at, first)? else { return even(1.0) };
+                let stamps = (0..samples).map(|sample| ticks.time(numbers[row(sample)])).collect();
+                let source = TimeSource::Numbers { column, unit: ticks.unit, origin: ticks.origin };
+                Ok(((Time::from_stamps(stamps), ticks.shown), source))
+            }
+            Cells::Seconds(lengths) => {
+                let stamps = (0..samples).map(|sample| lengths[row(sample)]).collect();
+                Ok(((Time::from_stamps(stamps), seconds()), TimeSource::Numbers { column, unit: 1.0, origin: 0.0 }))
+            }
+            Cells::Instants { nanoseconds, universal } => {
+                let of = |sample| nanoseconds[row(sample)].and_then(|nanoseconds| instant(nanoseconds, *universal));
+                self.stamps(column, samples, |sample| Some(of(sample)?.0), |sample| of(sample).map(|(_, text)| text()))
+            }
+            Cells::Texts(texts) => {
+                let text = |sample| texts[row(sample)].clone();
+                self.stamps(column, samples, |sample| Stamp::read(&texts[row(sample)]), |sample| Some(text(sample)))
+            }
+        }
+    }
+
+    /// The times of the dates of samples, which have these stamps and texts.
+    fn stamps(
+        &self,
+        column: String,
+        samples: usize,
+        stamp: impl Fn(usize) -> Option<Stamp>,
+        text: impl Fn(usize) -> Option<String>,
+    ) -> Result<((Time, TimeUnit), TimeSource), Error> {
+        let mut dates = self.dates_of()?;
+        for sample in 0..samples {
+            let Some(stamp) = stamp(sample) else {
+                let text = text(sample).map_or("nothing".to_owned(), |text| format!("`{text}`"));
+                return Err(self.wrong_kind(&column, format!("{text} in sample {sample}"), "dates"));
+            };
+            if !dates.push(stamp, "", sample as u64 + 1) {
+                break;
+            }
+        }
+        let (seconds, order) = dates.finish().map_err(|Fault { line, problem, .. }| {
+            // Samples are counted from zero. A fault of no single one has no line.
+            let at = line.checked_sub(1).map(|sample| (sample, text(sample as usize).unwrap_or_default()));
+            let problem = at.map_or(problem.clone(), |(sample, text)| format!("sample {sample}, `{text}`, {problem}"));
+            Error::Dates { path: self.path.clone(), line: 0, column: column.clone(), text: String::new(), problem }
+        })?;
+        let first = if samples == 0 { String::new() } else { text(0).unwrap_or_default() };
+        let time = (Time::from_stamps(seconds), TimeUnit::default());
+        Ok((time, TimeSource::Dates { column, first, order, zone: self.zone.clone() }))
+    }
+}
+
+/// A date and its text; none beyond the years that dates have.
+fn instant(nanoseconds: i64, universal: bool) -> Option<(Stamp, impl Fn() -> String)> {
+    let instant = Timestamp::from_nanosecond(nanoseconds.into()).ok()?;
+    let local = TimeZone::UTC.to_datetime(instant);
+    let stamp = if universal { Stamp::Instant(instant) } else { Stamp::Local([Some(local); 2]) };
+    Some((stamp, move || if universal { instant.to_string() } else { local.to_string() }))
+}

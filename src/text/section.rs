@@ -1,0 +1,38 @@
+//! The equations of a model as a section of a report.
+
+use super::Model;
+use super::expression::Expression;
+use crate::layout::Kind;
+use crate::section::{Cell, Section, Table};
+
+impl Model {
+    /// An expression as the file has it, on one line.
+    fn written(&self, expression: &Expression) -> String {
+        let text = &self.source.text[expression.whole()];
+        text.trim_matches(['"', '\'']).split_whitespace().collect::<Vec<_>>().join(" ")
+    }
+}
+
+impl From<&Model> for Section {
+    /// Constants, definitions, and the equations of states and outputs, as they were fitted.
+    fn from(model: &Model) -> Section {
+        let document = &model.document;
+        let mut rows = vec![];
+        for state in &document.states {
+            let name = &state.quantity.name;
+            let left = if document.kind == Kind::Discrete { format!("next {name}") } else { format!("d {name}/dt") };
+            rows.push((left, model.written(&state.rate)));
+        }
+        for one in &document.definitions {
+            rows.push((one.quantity.name.clone(), model.written(&one.value)));
+        }
+        for one in &document.outputs {
+            rows.push((format!("output {}", one.quantity.name), model.written(&one.value)));
+        }
+        let number = |(name, value, unit): (&str, f64, &str)| (name.to_owned(), format!("{value} {unit}"));
+        rows.extend(model.constants().into_iter().map(number));
+        let row = |(left, right): (String, String)| [Cell::from(left.as_str()), Cell::from(right.trim_end())];
+        let table = Table::new("", ["quantity", "equation"]).rows(rows.into_iter().map(row));
+        Section::new("equations", "Equations").table(table)
+    }
+}
