@@ -1,9 +1,11 @@
 //! [`Equations`]: a model as data.
 
+mod dead_times;
 mod degree;
 mod moments;
 mod slopes;
 
+pub(crate) use dead_times::DeadTimes;
 pub(crate) use moments::MomentsOf;
 pub(crate) use slopes::{Jacobian, Slopes};
 
@@ -32,15 +34,6 @@ pub struct Equations {
     diffusion: Vec<Id>,
     noise: Vec<Id>,
     delay: Vec<Id>,
-}
-
-/// Dead times of inputs.
-#[derive(Clone, Debug)]
-pub(crate) struct DeadTimes {
-    /// Each once, by its node.
-    pub roots: Vec<Id>,
-    /// Of each input the number of its dead time, if it is late.
-    pub of: Vec<Option<usize>>,
 }
 
 /// The serialized form of equations.
@@ -234,24 +227,6 @@ impl Equations {
     /// The dead time of each input; empty where not said.
     pub fn delay(&self) -> &[Id] {
         &self.delay
-    }
-
-    /// Which inputs have a dead time.
-    pub(crate) fn late(&self) -> Vec<bool> {
-        self.dead_times().of.iter().map(Option::is_some).collect()
-    }
-
-    /// The dead times that differ, and which one each input has.
-    pub(crate) fn dead_times(&self) -> DeadTimes {
-        let (mut roots, mut of) = (vec![], vec![None; self.layout.inputs.len()]);
-        for (of, id) in of.iter_mut().zip(&self.delay).filter(|(_, id)| self.graph.known(**id) != Some(0.0)) {
-            let known = roots.iter().position(|root| root == id);
-            *of = known.or(Some(roots.len()));
-            if known.is_none() {
-                roots.push(*id);
-            }
-        }
-        DeadTimes { roots, of }
     }
 
     /// Whether derivatives and outputs are affine in the states: then so is each step, and slopes do not depend on states.

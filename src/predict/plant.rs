@@ -167,7 +167,7 @@ impl<S: Stepped> SlicePlant<'_, S> {
             let (length, states) = (here.length, z.len());
             let rate = |position: f64, z: &[S], to: &mut [S]| {
                 rate(position, z, to);
-                to.iter_mut().for_each(|to| *to = *to * length);
+                to.iter_mut().for_each(|to| *to *= length);
             };
             let slopes = |position: f64, z: &[f64]| {
                 let (mut value, mut rows) = slopes(position, z);

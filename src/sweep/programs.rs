@@ -143,12 +143,10 @@ impl Programs {
         let program = match purpose {
             // How often a dead time cuts an interval differs from one to the next.
             _ if is_late && sampling == Sampling::Irregular => Err(UNEVEN.to_owned()),
-            Purpose::Rows => {
-                Program::compile(&recurrence, seeds, sampling, Trajectories::Many).map_err(|e| e.to_string())
-            }
-            Purpose::Carry => Program::compile(&recurrence.without_outputs(), &[], sampling, Trajectories::One)
-                .map_err(|e| e.to_string()),
+            Purpose::Rows => Ok(Program::compile(&recurrence, seeds, sampling, Trajectories::Many)),
+            Purpose::Carry => Ok(Program::compile(&recurrence.without_outputs(), &[], sampling, Trajectories::One)),
         };
+        let program = program.and_then(|program| program.map_err(|too_large| too_large.to_string()));
         let late = is_late.then(|| Late::new(self.equations.clone()));
         let program = program.map(|program| Arc::new(Compiled::new(program, late)));
         compiled.push((key, program.clone()));

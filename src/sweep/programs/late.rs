@@ -25,7 +25,7 @@ impl Whole {
     fn of(time: f64, step: f64, samples: usize) -> Option<Self> {
         let whole = (time / step + ROUNDING).floor();
         match whole {
-            _ if !(time >= 0.0 && time < f64::INFINITY) => None,
+            _ if !(0.0..f64::INFINITY).contains(&time) => None,
             _ if whole > samples as f64 => Some(Whole { samples: samples as isize, seconds: time }),
             _ => Some(Whole { samples: whole as isize, seconds: whole * step }),
         }

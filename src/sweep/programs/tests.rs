@@ -89,8 +89,8 @@ fn rows(sweep: &dyn Sweep, pieces: &[Piece<'_>], seeds: &[Seed]) -> (Vec<Vec<f64
 }
 
 /// The model's own code in duals (its equations, where slopes are asked for that it does not have), its equations in duals, and programs.
-fn sweeps<M: Model>(model: &M, predictor: impl Predictor, substeps: u32) -> [Arc<dyn Sweep + '_>; 3] {
-    let (method, predictor): (_, Arc<dyn Prediction>) = (automatic(substeps), Arc::new(predictor));
+fn sweeps<M: Model>(model: &M, predictor: impl Predictor) -> [Arc<dyn Sweep + '_>; 3] {
+    let (method, predictor): (_, Arc<dyn Prediction>) = (automatic(1), Arc::new(predictor));
     let equations = Arc::new(Equations::trace(model).unwrap());
     let duals = |code| -> Arc<dyn Sweep + '_> {
         let (layout, method, predictor) = (Arc::new(Layout::of::<M>()), method.clone(), predictor.clone());
@@ -109,7 +109,7 @@ fn sweeps<M: Model>(model: &M, predictor: impl Predictor, substeps: u32) -> [Arc
 /// Pieces of several records with different parameters, with slopes and without; the longest has windows after the first of every engine,
 /// in which other samples are missing.
 fn compare(model: &Pendulum, predictor: impl Predictor, uniform: bool, hold: Hold) {
-    let [plain, evaluated, programs] = sweeps(model, predictor, 1);
+    let [plain, evaluated, programs] = sweeps(model, predictor);
     let lengths = [300, 64, 2, 33, 197];
     let parameters = |i: usize| [2.0 + 0.1 * i as f64, 0.3, 1.5, 0.2, 0.1];
     let records: Vec<Record> = lengths.iter().map(|&n| record(n.max(40), n as f64, uniform).hold(hold)).collect();
@@ -189,7 +189,7 @@ impl Model for Cart {
 /// without any memory, whatever ran before.
 #[test]
 fn kept_columns_are_those_of_the_records_at_hand() {
-    let [.., programs] = sweeps(&Cart, FreeRun, 1);
+    let [.., programs] = sweeps(&Cart, FreeRun);
     let first = record(300, 1.0, true);
     let with_other_output = {
         let outputs = record(300, 4.0, true).outputs().to_vec();
