@@ -64,11 +64,9 @@ fn driven(samples: usize, holds: [Hold; 3]) -> Record {
 /// Pieces with dead times of their own, in lanes side by side, from the begin and from within the record. Where an input does not move, which is
 /// before the record, duals cross an interval by one step and programs by two or three. Their slopes with respect to a cut differ by some 1e-8
 /// for steps of 0.02 (RK4: by the fourth power), in up to 150 intervals.
-fn compare(model: &impl Model, predictor: impl Predictor, holds: [Hold; 3]) {
+fn compare(model: &impl Model, predictor: impl Predictor, holds: [Hold; 3], late: [[f64; 2]; 5]) {
     let [plain, evaluated, programs] = sweeps(model, predictor);
     let record = driven(150, holds);
-    // Both zero, at one place between samples, whole, in either order, longer than the record.
-    let late = [[0.0, 0.0], [0.37, 0.37], [2.0, 1.6], [1.2, 5.7], [500.0, 3.5]];
     let all_p = late.map(|[early, late]| [2.0, 1.5, 0.1, early * STEP, late * STEP]);
     for (begin, seeds) in [(0, &SEEDS[..]), (0, &[]), (70, &SEEDS[..])] {
         let prepared: Vec<Prepared> = all_p.iter().map(|p| plain.prepare(&record, p).unwrap()).collect();
@@ -100,15 +98,27 @@ fn compare(model: &impl Model, predictor: impl Predictor, holds: [Hold; 3]) {
     }
 }
 
+/// Both dead times zero, at one place between samples, whole, in either order, longer than the record.
+const LATE: [[f64; 2]; 5] = [[0.0, 0.0], [0.37, 0.37], [2.0, 1.6], [1.2, 5.7], [500.0, 3.5]];
+
 #[test]
-fn late_inputs_in_programs_and_in_duals() {
+fn late_inputs_that_are_held() {
+    compare(&Continuous, FreeRun, [Hold::Zero; 3], LATE);
+    compare(&Discrete, FreeRun, [Hold::Zero; 3], LATE);
+}
+
+/// Of two cuts at one place the order is that of dead times in programs, that of inputs in duals; the steps between differ, and where inputs
+/// are interpolated, so do slopes by the error of a step. Here cuts are apart.
+#[test]
+fn late_inputs_that_are_interpolated() {
     let (zero, first) = (Hold::Zero, Hold::First);
-    for holds in [[zero; 3], [first; 3], [zero, first, first]] {
-        compare(&Continuous, FreeRun, holds);
-        compare(&Discrete, FreeRun, holds);
+    let late = [[0.0, 0.45], [0.37, 0.81], [2.0, 1.6], [1.2, 5.7], [500.0, 3.5]];
+    for holds in [[first; 3], [zero, first, first]] {
+        compare(&Continuous, FreeRun, holds, late);
+        compare(&Discrete, FreeRun, holds, late);
     }
-    compare(&Continuous, Kalman, [first, zero, zero]);
-    compare(&Continuous, Horizon::new(5), [zero, first, zero]);
+    compare(&Continuous, Kalman, [first, zero, zero], late);
+    compare(&Continuous, Horizon::new(5), [zero, first, zero], late);
 }
 
 /// A dead time that cannot be gives no number; samples that are not evenly spaced are run in dual numbers, and that is said.
