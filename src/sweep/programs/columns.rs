@@ -1,7 +1,7 @@
 //! [`Columns`]: what a program reads, gathered from the records of its lanes.
 
 use super::derived::{derived, step};
-use super::workspace::Compiled;
+use super::late::Late;
 use crate::engine::{Column, Program};
 use crate::record::Record;
 use crate::sweep::Piece;
@@ -35,12 +35,11 @@ enum ColumnSource<'r> {
 
 impl<'r> Columns<'r> {
     /// Of pieces in so many lanes; those without a piece repeat the first.
-    pub fn new(compiled: &Compiled, pieces: &[Piece<'r>], lanes: usize) -> Self {
-        let program = &compiled.program;
+    pub fn new(program: &Program, late: Option<&Late>, pieces: &[Piece<'r>], lanes: usize) -> Self {
         let piece = |lane: usize| pieces.get(lane).unwrap_or(&pieces[0]);
         let of = |piece: &Piece<'r>| (piece.record, piece.prepared.derived.of(program, piece.record));
         let (records, derived): (Vec<&'r Record>, Vec<_>) = (0..lanes).map(piece).map(of).unzip();
-        let whole = |lane: usize| compiled.late.as_ref().map_or(vec![], |late| late.whole(piece(lane)));
+        let whole = |lane: usize| late.map_or(vec![], |late| late.whole(piece(lane)));
         let whole: Vec<_> = (0..lanes).map(whole).collect();
         let source = |lane: usize, record: &'r Record, column: &Column| match *column {
             Column::Time => ColumnSource::Time,
@@ -49,7 +48,7 @@ impl<'r> Columns<'r> {
             Column::Measured(j) => ColumnSource::Values(&record.outputs()[j].values),
             Column::Derived(n) => ColumnSource::Derived(n),
             Column::Late(i, after) => {
-                let behind = compiled.late.as_ref().and_then(|late| late.behind(&whole[lane], i, after));
+                let behind = late.and_then(|late| late.behind(&whole[lane], i, after));
                 ColumnSource::Late(&record.inputs()[i].values, behind)
             }
         };
