@@ -1,8 +1,11 @@
 //! [`Equations`]: a model as data.
 
+mod dead_times;
+mod degree;
 mod moments;
 mod slopes;
 
+pub(crate) use dead_times::DeadTimes;
 pub(crate) use moments::MomentsOf;
 pub(crate) use slopes::{Jacobian, Slopes};
 
@@ -13,6 +16,7 @@ use crate::model::Model;
 use crate::scalar::Scalar;
 use crate::signals::Signals;
 use core::fmt::{self, Display};
+use degree::{Degree, degrees};
 use serde::{Deserialize, Serialize};
 
 /// A model's quantities and its arithmetic, known at run time.
@@ -29,6 +33,7 @@ pub struct Equations {
     /// Empty where not said.
     diffusion: Vec<Id>,
     noise: Vec<Id>,
+    delay: Vec<Id>,
 }
 
 /// The serialized form of equations.
@@ -43,6 +48,8 @@ struct Parts {
     diffusion: Vec<Id>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     noise: Vec<Id>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    delay: Vec<Id>,
 }
 
 /// A graph that does not make up equations of its layout.
@@ -83,21 +90,22 @@ impl Equations {
     /// # Errors
     /// If they do not fit the layout.
     pub fn new(layout: Layout, graph: &Graph, state: &[Id], output: &[Id]) -> Result<Self, InvalidEquations> {
-        Equations::with_noise(layout, graph, [state, output, &[], &[]])
+        Equations::complete(layout, graph, [state, output, &[], &[], &[]])
     }
 
-    /// These equations with process noise and measurement noise, as [`Model::diffusion`] and [`Model::noise`] say them: roots of
-    /// the states, the outputs, the diffusion of each state and the noise of each output. Either may be left empty.
+    /// These equations with process noise, measurement noise and dead times, as [`Model::diffusion`], [`Model::noise`] and
+    /// [`Model::delay`] say them: roots of the states, the outputs, the diffusion of each state, the noise of each output and the dead time
+    /// of each input. The last three may be left empty.
     ///
     /// # Errors
-    /// If they do not fit the layout, or noise depends on more than parameters.
-    pub fn with_noise(layout: Layout, graph: &Graph, roots: [&[Id]; 4]) -> Result<Self, InvalidEquations> {
+    /// If they do not fit the layout, or one of the last three depends on more than parameters.
+    pub fn complete(layout: Layout, graph: &Graph, roots: [&[Id]; 5]) -> Result<Self, InvalidEquations> {
         let count = |role, expected: usize, found: usize| match expected == found {
             true => Ok(()),
             false => Err(InvalidEquations::Count { role, expected, found }),
         };
         layout.check()?;
-        let [state, output, diffusion, noise] = roots;
+        let [state, output, diffusion, noise, delay] = roots;
         count("states", if layout.kind == Kind::Static { 0 } else { layout.states.len() }, state.len())?;
         count("outputs", layout.outputs.len(), output.len())?;
         if !diffusion.is_empty() {
@@ -105,6 +113,9 @@ impl Equations {
         }
         if !noise.is_empty() {
             count("noises of outputs", layout.outputs.len(), noise.len())?;
+        }
+        if !delay.is_empty() {
+            count("dead times of inputs", layout.inputs.len(), delay.len())?;
         }
         let all = roots.concat();
         if let Some(root) = all.iter().find(|root| root.index() >= graph.len()) {
@@ -120,16 +131,17 @@ impl Equations {
                 Leaf::State(i) => (i as usize) < layout.states.len() && !constant,
                 Leaf::Input(i) => (i as usize) < layout.inputs.len() && !constant,
                 Leaf::Parameter(i) => (i as usize) < layout.parameters.len(),
-                Leaf::Step | Leaf::NextInput(_) | Leaf::Measured(_) => false,
+                Leaf::Step | Leaf::NextInput(_) | Leaf::Measured(_) | Leaf::Late { .. } => false,
             };
             if !there {
                 return Err(InvalidEquations::NoSuchQuantity { leaf });
             }
         }
         let (state, output) = drift.split_at(state.len());
-        let (diffusion, noise) = levels.split_at(diffusion.len());
-        let [state, output, diffusion, noise] = [state, output, diffusion, noise].map(<[Id]>::to_vec);
-        Ok(Equations { layout, graph, state, output, diffusion, noise })
+        let (diffusion, rest) = levels.split_at(diffusion.len());
+        let (noise, delay) = rest.split_at(noise.len());
+        let [state, output, diffusion, noise, delay] = [state, output, diffusion, noise, delay].map(<[Id]>::to_vec);
+        Ok(Equations { layout, graph, state, output, diffusion, noise, delay })
     }
 
     /// Reads a Rust model.
@@ -166,22 +178,25 @@ impl Equations {
             let p = leaves().3;
             let diffusion = M::State::into_array(model.diffusion(&p));
             let noise = M::Output::into_array(model.noise(&p));
-            diffusion.as_ref().iter().chain(noise.as_ref()).copied().collect()
+            let delay = M::Input::into_array(model.delay(&p));
+            diffusion.as_ref().iter().chain(noise.as_ref()).chain(delay.as_ref()).copied().collect()
         })?;
         Equations::traced(layout, &graph, [&state, &output, &levels])
     }
 
-    /// The equations of roots that were read: states, outputs, and the noise of both.
+    /// The equations of roots that were read: states, outputs, and the noise of both with the dead times.
     fn traced(layout: Layout, graph: &Graph, [state, output, levels]: [&[Id]; 3]) -> Result<Self, Untraceable> {
-        let (diffusion, noise) = levels.split_at(layout.states.len());
+        let (diffusion, rest) = levels.split_at(layout.states.len());
+        let (noise, delay) = rest.split_at(layout.outputs.len());
         // Noise that is not in the file is zero.
         let said = |levels: &[Id], unsaid: fn(f64) -> bool| {
             let unsaid = |id: &Id| graph.known(*id).is_some_and(unsaid);
             if levels.iter().all(unsaid) { vec![] } else { levels.to_vec() }
         };
-        let (diffusion, noise) = (said(diffusion, |level| level == 0.0), said(noise, f64::is_nan));
-        let roots: [&[Id]; 4] = [state, output, &diffusion, &noise];
-        Equations::with_noise(layout, graph, roots).map_err(|wrong| Untraceable { reason: wrong.to_string() })
+        let zero = |level| level == 0.0;
+        let [diffusion, noise, delay] = [said(diffusion, zero), said(noise, f64::is_nan), said(delay, zero)];
+        Equations::complete(layout, graph, [state, output, &diffusion, &noise, &delay])
+            .map_err(|wrong| Untraceable { reason: wrong.to_string() })
     }
 
     /// The quantities.
@@ -207,6 +222,11 @@ impl Equations {
     /// The process noise of each state and the measurement noise of each output; empty where not said.
     pub fn levels(&self) -> [&[Id]; 2] {
         [&self.diffusion, &self.noise]
+    }
+
+    /// The dead time of each input; empty where not said.
+    pub fn delay(&self) -> &[Id] {
+        &self.delay
     }
 
     /// Whether derivatives and outputs are affine in the states: then so is each step, and slopes do not depend on states.
@@ -250,43 +270,8 @@ pub(crate) fn name(layout: &Layout, leaf: Leaf) -> String {
         Leaf::Input(i) => name(&layout.inputs, i),
         Leaf::Parameter(i) => name(&layout.parameters, i),
         Leaf::Measured(i) => name(&layout.outputs, i),
-        Leaf::Step | Leaf::NextInput(_) => format!("{leaf:?}"),
+        Leaf::Step | Leaf::NextInput(_) | Leaf::Late { .. } => format!("{leaf:?}"),
     }
-}
-
-/// How a node depends on the states.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Degree {
-    Zero,
-    One,
-    Higher,
-}
-
-/// The degree of each node in the states.
-fn degrees(graph: &Graph) -> Vec<Degree> {
-    let mut degrees: Vec<Degree> = Vec::with_capacity(graph.len());
-    for node in graph.nodes() {
-        let of = |id: Id| degrees[id.index()];
-        let product = |a: Degree, b: Degree| match (a, b) {
-            (Degree::Zero, other) | (other, Degree::Zero) => other,
-            _ => Degree::Higher,
-        };
-        let constant = |needed: Degree, result: Degree| if needed == Degree::Zero { result } else { Degree::Higher };
-        let degree = match *node {
-            Node::Constant(_) => Degree::Zero,
-            Node::Leaf(Leaf::State(_)) => Degree::One,
-            Node::Leaf(_) => Degree::Zero,
-            Node::Neg(a) => of(a),
-            Node::Add(a, b) | Node::Sub(a, b) => of(a).max(of(b)),
-            Node::Mul(a, b) => product(of(a), of(b)),
-            Node::Div(a, b) => constant(of(b), of(a)),
-            Node::MulAdd([a, b, c]) => product(of(a), of(b)).max(of(c)),
-            Node::Select(_, [a, b, c, d]) => constant(of(a).max(of(b)), of(c).max(of(d))),
-            _ => constant(node.operands().map(of).max().unwrap_or(Degree::Zero), Degree::Zero),
-        };
-        degrees.push(degree);
-    }
-    degrees
 }
 
 impl<S: Scalar> Functions<S> for Equations {
@@ -310,11 +295,16 @@ impl<S: Scalar> Functions<S> for Equations {
         to.fill(S::from(f64::NAN));
         self.values(&self.noise, None, p, to);
     }
+
+    fn delay(&self, p: &[S], to: &mut [S]) {
+        to.fill(S::from(0.0));
+        self.values(&self.delay, None, p, to);
+    }
 }
 
 impl From<Equations> for Parts {
-    fn from(Equations { layout, graph, state, output, diffusion, noise }: Equations) -> Self {
-        Parts { layout, graph, state, output, diffusion, noise }
+    fn from(Equations { layout, graph, state, output, diffusion, noise, delay }: Equations) -> Self {
+        Parts { layout, graph, state, output, diffusion, noise, delay }
     }
 }
 
@@ -322,13 +312,13 @@ impl TryFrom<Parts> for Equations {
     type Error = InvalidEquations;
 
     fn try_from(parts: Parts) -> Result<Self, InvalidEquations> {
-        let Parts { layout, graph, state, output, diffusion, noise } = parts;
-        Equations::with_noise(layout, &graph, [&state, &output, &diffusion, &noise])
+        let Parts { layout, graph, state, output, diffusion, noise, delay } = parts;
+        Equations::complete(layout, &graph, [&state, &output, &diffusion, &noise, &delay])
     }
 }
 
 impl Display for Equations {
-    /// One line per state and output, by the names of the layout, after what they share.
+    /// One line per state, output and dead time, by the names of the layout, after what they share.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let left = |name: &str| match self.layout.kind {
             Kind::Continuous => format!("d({name})/dt"),
@@ -337,7 +327,9 @@ impl Display for Equations {
         let state = self.layout.states.iter().zip(&self.state).map(|(quantity, root)| (left(&quantity.name), *root));
         let outputs = self.layout.outputs.iter().zip(&self.output);
         let output = outputs.map(|(quantity, root)| (format!("output {}", quantity.name), *root));
-        let roots: Vec<(String, Id)> = state.chain(output).collect();
+        let late = self.layout.inputs.iter().zip(&self.delay).zip(self.late()).filter(|(_, late)| *late);
+        let delay = late.map(|((quantity, root), _)| (format!("dead time of {}", quantity.name), *root));
+        let roots: Vec<(String, Id)> = state.chain(output).chain(delay).collect();
         self.graph.write(f, &|leaf| name(&self.layout, leaf), &roots)
     }
 }

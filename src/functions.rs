@@ -22,6 +22,9 @@ pub trait Functions<S>: Send + Sync {
     /// Measurement noise of each output, as [`Model::noise`].
     fn noise(&self, p: &[S], to: &mut [S]);
 
+    /// Dead time of each input, as [`Model::delay`].
+    fn delay(&self, p: &[S], to: &mut [S]);
+
     /// The slopes of [`state`](Functions::state) with respect to the states, row by row: unless written, by secants, which are exact of
     /// functions that are affine.
     fn state_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S])
@@ -63,6 +66,16 @@ pub trait Functions<S>: Send + Sync {
         self.output_slopes(t, &carry[..n], u, p, &mut slopes);
         Moments { mean, slopes, spread: vec![] }
     }
+}
+
+/// The dead times of the inputs, none of those that are not late; empty where none is.
+pub(crate) fn delays<S: Scalar>(functions: &dyn Functions<S>, late: &[bool], p: &[S]) -> Vec<Option<S>> {
+    if !late.contains(&true) {
+        return vec![];
+    }
+    let mut found = vec![S::from(0.0); late.len()];
+    functions.delay(p, &mut found);
+    late.iter().zip(found).map(|(late, delay)| late.then_some(delay)).collect()
 }
 
 /// The length of a vector by which the column of an affine function is found: so large that its value at zero, which is subtracted, takes
@@ -146,6 +159,11 @@ impl<M: Model, S: Scalar> Functions<S> for Handle<'_, M> {
     fn noise(&self, p: &[S], to: &mut [S]) {
         let p = M::Parameters::from_fn(|i| p[i]);
         to.copy_from_slice(M::Output::into_array(Model::noise(&**self, &p)).as_ref());
+    }
+
+    fn delay(&self, p: &[S], to: &mut [S]) {
+        let p = M::Parameters::from_fn(|i| p[i]);
+        to.copy_from_slice(M::Input::into_array(Model::delay(&**self, &p)).as_ref());
     }
 }
 

@@ -92,6 +92,14 @@ pub trait Model: Send + Sync {
         Self::Output::splat(S::from(f64::NAN))
     }
 
+    /// Dead time of each input (s): at time `t` the model has the input of as much earlier; before the first sample, that of the first
+    /// sample. Zero unless written. Continuous models see a held input jump between samples; a discrete one has the input that holds at the
+    /// sample. Online observers have no dead time: give them the late input.
+    #[inline]
+    fn delay<S: Scalar>(&self, _p: &Of<Self::Parameters, S>) -> Of<Self::Input, S> {
+        Self::Input::splat(S::from(0.0))
+    }
+
     /// The outputs at time `t` (s).
     fn output<S: Scalar>(
         &self,

@@ -2,6 +2,7 @@
 
 mod column;
 mod cycles;
+mod delays;
 mod edit;
 #[cfg(feature = "csv")]
 mod file;
@@ -14,6 +15,7 @@ mod time;
 
 pub use column::{Channel, Column};
 pub use cycles::Gap;
+pub(crate) use delays::{Part, ROUNDING};
 #[cfg(feature = "csv")]
 pub use file::{DataFile, DateOrder, FileFormat, Reading, TimeSource};
 pub(crate) use holds::Holds;

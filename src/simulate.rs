@@ -4,10 +4,11 @@ use crate::error::{Error, Failure};
 use crate::experiment::{Experiment, ExperimentOf};
 use crate::integrate::{Automatic, Integrator, Method, ModelSystem, Stuck};
 use crate::interval::{Hold, Interval};
+use crate::layout::Kind;
 use crate::model::Model;
 use crate::numeral::TimeUnit;
 use crate::random::Random;
-use crate::record::Time;
+use crate::record::{Channel, Part, Record, Time};
 use crate::signals::{Of, Signals};
 
 /// Simulates a model from an initial state, its inputs held from sample to sample, by the step that its kind asks for;
@@ -87,24 +88,52 @@ impl<'a, M: Model, I: Integrator> Simulator<'a, M, I> {
         inputs: &[Of<M::Input, f64>],
     ) -> Result<Simulation<M>, Error> {
         self.check(&time, inputs)?;
+        let late = self.late(parameters, &time, inputs)?;
         let mut x = *initial;
         let mut step = 0.0;
         let (mut states, mut outputs) = (Vec::with_capacity(inputs.len()), Vec::with_capacity(inputs.len()));
         for (k, u) in inputs.iter().enumerate() {
             finite::<M::State>("state", &x, k, &time)?;
-            let y = self.model.output(time.at(k), &x, u, parameters);
+            let here = late.as_ref().map_or(*u, |late| late.at::<M::Input>(k));
+            let y = self.model.output(time.at(k), &x, &here, parameters);
             finite::<M::Output>("output", &y, k, &time)?;
             states.push(x);
             outputs.push(y);
             let Some(&next) = inputs.get(k + 1) else { break };
             let u1 = if self.hold == Hold::First { next } else { *u };
             let interval = Interval { t0: time.at(k), t1: time.at(k + 1), u0: *u, u1, hold: self.hold };
-            let system = ModelSystem { model: self.model, interval: &interval, p: parameters };
-            x = system
-                .step(&self.integrator, x, &mut step)
-                .map_err(|Stuck| failure("the progress of the integrator".to_owned(), 0.0, k, &time))?;
+            let parts = match &late {
+                Some(late) => &late.parts::<M::Input>(M::KIND, k)[..],
+                None => &[interval],
+            };
+            for interval in parts {
+                x = ModelSystem { model: self.model, interval, p: parameters }
+                    .step(&self.integrator, x, &mut step)
+                    .map_err(|Stuck| failure("the progress of the integrator".to_owned(), 0.0, k, &time))?;
+            }
         }
         Ok(Simulation { time, hold: self.hold, inputs: inputs.to_vec(), states, outputs })
+    }
+
+    /// The inputs as the model has them, if any has a dead time.
+    fn late(
+        &self,
+        parameters: &Of<M::Parameters, f64>,
+        time: &Time,
+        inputs: &[Of<M::Input, f64>],
+    ) -> Result<Option<Late>, Error> {
+        let delays = M::Input::into_array(self.model.delay(parameters));
+        let delays = delays.as_ref();
+        if delays.iter().all(|delay| *delay == 0.0) {
+            return Ok(None);
+        }
+        if let Some(i) = delays.iter().position(|delay| !(0.0..f64::INFINITY).contains(delay)) {
+            return Err(failure(format!("the dead time of input `{}`", M::Input::NAMES[i]), delays[i], 0, time));
+        }
+        let values = |i: usize| inputs.iter().map(|u| M::Input::into_array(*u).as_ref()[i]).collect::<Vec<f64>>();
+        let channels = (0..delays.len()).map(|i| Channel::new(M::Input::NAMES[i], M::Input::UNITS[i], values(i)));
+        let record = Record::new(vec![], time.clone(), channels.collect(), vec![])?.hold(self.hold);
+        Ok(Some(Late { record, delays: delays.iter().copied().map(Some).collect() }))
     }
 
     fn check(&self, time: &Time, inputs: &[Of<M::Input, f64>]) -> Result<(), Error> {
@@ -120,6 +149,35 @@ impl<'a, M: Model, I: Integrator> Simulator<'a, M, I> {
             return Err(Error::NotFinite { experiment, signal, value, sample, time: time.at(sample).into() });
         }
         Method::check(&self.integrator, M::KIND)
+    }
+}
+
+/// Inputs with their dead times.
+struct Late {
+    record: Record,
+    delays: Vec<Option<f64>>,
+}
+
+impl Late {
+    /// The inputs at a sample.
+    fn at<U: Signals>(&self, k: usize) -> Of<U, f64> {
+        let u = self.record.late_inputs(k, &self.delays);
+        U::from_fn(|i| u[i])
+    }
+
+    /// An interval between two samples, by what the inputs do in it; a discrete model makes one step.
+    fn parts<U: Signals>(&self, kind: Kind, k: usize) -> Vec<Interval<U>> {
+        let of = |u: &[f64]| U::from_fn(|i| u[i]);
+        if kind != Kind::Continuous {
+            let (t0, t1, u) = (self.record.time(k), self.record.time(k + 1), self.at::<U>(k));
+            return vec![Interval { t0, t1, u0: u, u1: u, hold: Hold::Zero }];
+        }
+        let parts = self.record.parts(k, &self.delays).into_iter();
+        let part = |part: Part<f64>| {
+            let (t0, t1) = (part.t0, part.t0 + part.length);
+            Interval { t0, t1, u0: of(&part.u0), u1: of(&part.u1), hold: Hold::First }
+        };
+        parts.map(part).collect()
     }
 }
 

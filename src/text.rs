@@ -270,7 +270,8 @@ impl FromStr for Model {
 fn unused(document: &Document, source: &Arc<Source>) -> Vec<Remark> {
     let rates = document.states.iter().flat_map(|state| [Some(&state.rate), state.diffusion.as_ref()]);
     let outputs = document.outputs.iter().flat_map(|output| [Some(&output.value), output.noise.as_ref()]);
-    let all = rates.chain(outputs).flatten().chain(names::items(document));
+    let delays = document.inputs.iter().map(|input| input.delay.as_ref());
+    let all = rates.chain(outputs).chain(delays).flatten().chain(names::items(document));
     let mut used = std::collections::HashSet::new();
     for node in all.flat_map(|expression| &expression.nodes) {
         if let Operation::Name(name) | Operation::Call { name, .. } = &node.operation {

@@ -32,6 +32,7 @@ class Model:
     ``output(t, x, u, p)``     each output; may be left out where all outputs are states
     ``diffusion(p)``           the intensity of the process noise of each state, for a Kalman predictor
     ``noise(p)``               the standard deviation of the noise of each output, for a Kalman predictor
+    ``delay(p)``               the dead time of each input (s)
     ========================== =======================================================================
 
     ``t`` is the time (s), ``x``, ``u`` and ``p`` are vectors with entries by name. A model without ``derivative`` and ``next`` is
@@ -86,6 +87,10 @@ class Model:
     def noise(self, p: Vector) -> Returned:
         """Give the standard deviation of the noise of each output."""
         raise NotImplementedError(f"{type(self).__name__} has no method noise(self, p)")
+
+    def delay(self, p: Vector) -> Returned:
+        """Give the dead time of each input (s)."""
+        raise NotImplementedError
 
     def equations(self) -> Equations:
         """Read the model.
@@ -164,6 +169,7 @@ def model(
     output: Callable[..., Returned] | None = None,
     diffusion: Callable[..., Returned] | None = None,
     noise: Callable[..., Returned] | None = None,
+    delay: Callable[..., Returned] | None = None,
     states: SignalsLike = (),
     inputs: SignalsLike = (),
     outputs: SignalsLike = (),
@@ -175,7 +181,7 @@ def model(
     ----------
     derivative, next, output : callable, optional
         As the methods of :class:`Model`, without ``self``.
-    diffusion, noise : callable, optional
+    diffusion, noise, delay : callable, optional
         The same, of ``p`` alone.
     states, inputs, outputs, parameters : Signals, mapping from names to units, or names
         The quantities.
@@ -191,7 +197,8 @@ def model(
     d(body)/dt = k * (room - body)
     output body = body
     """
-    functions = {"derivative": derivative, "next": next, "output": output, "diffusion": diffusion, "noise": noise}
+    levels = {"diffusion": diffusion, "noise": noise, "delay": delay}
+    functions = {"derivative": derivative, "next": next, "output": output, **levels}
     given = {name: function for name, function in functions.items() if function is not None}
     return _Functions(given, {"states": states, "inputs": inputs, "outputs": outputs, "parameters": parameters})
 
@@ -260,7 +267,7 @@ def _roots(
 
     x, u, p = vector("states", graph.state), vector("inputs", graph.input), vector("parameters", graph.parameter)
     output = _written(of, "output") or (lambda *args: Model.output(of, *args))
-    diffusion, noise = _written(of, "diffusion"), _written(of, "noise")
+    diffusion, noise, delay = _written(of, "diffusion"), _written(of, "noise"), _written(of, "delay")
 
     def nodes(role: str, function: Callable[..., Returned] | None, name: str, *args: Any) -> list[_core.Node]:
         if function is None:
@@ -278,6 +285,7 @@ def _roots(
         nodes("outputs", output, "output", t, x, u, p),
         nodes("states", diffusion, "diffusion", p),
         nodes("outputs", noise, "noise", p),
+        nodes("inputs", delay, "delay", p),
     ]
 
 

@@ -29,20 +29,20 @@ fn names(of: &[Quantity]) -> Names {
 #[pymethods]
 impl Equations {
     /// Equations of quantities (states, inputs, outputs, parameters) and roots of a graph (derivatives or next states, outputs,
-    /// diffusions, noises).
+    /// diffusions, noises, dead times).
     #[new]
     #[expect(clippy::needless_pass_by_value, reason = "arguments of Python come as values")]
     fn new(
         kind: &str,
         quantities_by_role: [Names; 4],
         graph: &Graph,
-        roots: [Vec<PyRef<'_, Node>>; 4],
+        roots: [Vec<PyRef<'_, Node>>; 5],
     ) -> PyResult<Self> {
         let [states, inputs, outputs, parameters] = quantities_by_role.map(quantities);
         let layout = Layout { kind: named(kind)?, states, inputs, outputs, parameters };
         let roots: Vec<Vec<Id>> = roots.iter().map(|nodes| nodes.iter().map(|node| node.0).collect()).collect();
-        let roots = [0, 1, 2, 3].map(|i| &*roots[i]);
-        let equations = greybox::equations::Equations::with_noise(layout, &graph.0, roots);
+        let roots = [0, 1, 2, 3, 4].map(|i| &*roots[i]);
+        let equations = greybox::equations::Equations::complete(layout, &graph.0, roots);
         Ok(Equations(Arc::new(equations.map_err(raised)?)))
     }
 

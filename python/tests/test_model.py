@@ -31,6 +31,20 @@ def test_models_pickle() -> None:
     assert model.equations() == Pmsm(4).equations()
 
 
+def test_dead_times() -> None:
+    late = gb.model(
+        lambda t, x, u, p: [p.k * u.early + u.late],
+        delay=lambda p: {"early": 0.0, "late": p.theta},
+        states=["z"],
+        inputs=["early", "late"],
+        outputs=["z"],
+        parameters={"k": "1", "theta": "s"},
+    )
+    equations = late.equations()
+    assert str(equations).endswith("output z = z\ndead time of late = theta")
+    assert pickle.loads(pickle.dumps(equations)) == equations
+
+
 @pytest.mark.parametrize(
     "returned",
     [

@@ -105,6 +105,8 @@ pub enum Column {
     Input(usize),
     /// An output as measured; not a number where there is none.
     Measured(usize),
+    /// A late input, so many samples after the one that it had reached just before.
+    Late(usize, usize),
     /// Costly functions of the record alone, computed once per record.
     Derived(usize),
 }
@@ -118,6 +120,7 @@ impl Column {
             Leaf::Input(i) => (Column::Input(i as usize), false),
             Leaf::NextInput(i) => (Column::Input(i as usize), true),
             Leaf::Measured(i) => (Column::Measured(i as usize), false),
+            Leaf::Late { input, after } => (Column::Late(input as usize, after as usize), false),
             Leaf::State(_) | Leaf::Parameter(_) => return None,
         })
     }

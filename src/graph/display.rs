@@ -133,6 +133,7 @@ fn numbered(leaf: Leaf) -> String {
         Leaf::NextInput(i) => format!("u{i}'"),
         Leaf::Measured(i) => format!("y{i}"),
         Leaf::Parameter(i) => format!("p{i}"),
+        Leaf::Late { input, after } => format!("u{input}[{after}]"),
     }
 }
 

@@ -54,6 +54,13 @@ pub enum Leaf {
     Measured(u32),
     /// A parameter.
     Parameter(u32),
+    /// An input that is late, where samples are evenly spaced.
+    Late {
+        /// Which input.
+        input: u32,
+        /// Samples after the one that it had reached just before this sample: 0 for that one.
+        after: u32,
+    },
 }
 
 /// One operation; operands are nodes that come before it.

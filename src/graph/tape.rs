@@ -21,6 +21,8 @@ impl Depends {
             Leaf::Step if uniform => Self::PASS,
             Leaf::Step | Leaf::Time | Leaf::Input(_) | Leaf::NextInput(_) | Leaf::Measured(_) => Self::RECORD,
             Leaf::State(_) => Self::CARRY,
+            // By how many samples changes with a parameter.
+            Leaf::Late { .. } => Self::PASS | Self::RECORD,
         })
     }
 

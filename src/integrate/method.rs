@@ -3,7 +3,7 @@
 use super::{Automatic, Integrator, Rk4, Square, Stiff, Stuck, System};
 use crate::dual::Dual;
 use crate::error::Error;
-use crate::graph::{Leaf, Symbol};
+use crate::graph::Symbol;
 use crate::layout::Kind;
 use crate::scalar::Scalar;
 use crate::signals::Entry;
@@ -75,9 +75,11 @@ impl<S: Scalar> System for Field<'_, S> {
     }
 }
 
-/// An interval of a system in symbols: its begin is [`Leaf::Time`], its length [`Leaf::Step`].
+/// An interval of a system in symbols.
 pub(crate) struct SymbolicField<'a> {
     pub kind: Kind,
+    /// In s.
+    pub length: Symbol,
     pub states: usize,
     pub rate: Rate<'a, Symbol>,
 }
@@ -119,7 +121,7 @@ impl System for SymbolicField<'_> {
         if part == 0.0 {
             return x.clone();
         }
-        let h = Symbol::leaf(Leaf::Step) * part;
+        let h = self.length * part;
         x.iter().zip(k).map(|(x, k)| x.along(*k, h)).collect()
     }
 }

@@ -73,6 +73,10 @@ impl Horizon {
                 record.name()
             )));
         }
+        let constants: Vec<Duals> = p.iter().map(|p| Duals::constant(*p)).collect();
+        let mut delays = vec![Duals::constant(0.0); record.inputs().len()];
+        functions.delay(&constants, &mut delays);
+        let delays: Vec<Option<f64>> = delays.iter().map(|delay| Some(delay.value)).collect();
         let not_measured = |reason| Error::StateNotMeasured {
             experiment: record.name().to_owned(),
             reason,
@@ -83,7 +87,7 @@ impl Horizon {
         let mut states = vec![f64::NAN; n * samples];
         let mut known = 0;
         for k in 0..samples {
-            let (t, u, y) = (record.time(k), record.input(k), record.output(k));
+            let (t, u, y) = (record.time(k), record.late_inputs(k, &delays), record.output(k));
             let place = Place { layout, functions, t, u: &u, p };
             match place.state(&y) {
                 Ok(x) => {

@@ -6,8 +6,9 @@ use crate::functions::Functions;
 use crate::integrate::{Duals, Field, Method, Rate, Slopes, Stuck};
 use crate::interval::Hold;
 use crate::layout::{Kind, Layout};
-use crate::record::Record;
+use crate::record::{Part, Record};
 use crate::scalar::Scalar;
+use core::cell::Cell;
 
 /// The model at one sample and in the interval to the next, with given parameters and inputs.
 pub trait Plant<S> {
@@ -59,38 +60,59 @@ pub trait Plant<S> {
 }
 
 /// From one sample of a record to the next.
-pub(crate) struct Between {
+pub(crate) struct Between<S> {
     /// Begin and length (s).
     interval: (f64, f64),
-    u0: Vec<f64>,
+    u0: Vec<S>,
     /// The input at the end; `None` where it is held.
-    u1: Option<Vec<f64>>,
+    u1: Option<Vec<S>>,
+    /// Where an input is late: between its jumps.
+    parts: Vec<Part<S>>,
+    /// The part that is being crossed.
+    part: Cell<Option<usize>>,
 }
 
-impl Between {
-    /// From sample `k` on; after the last one the input is held and no time passes.
-    pub fn new(record: &Record, k: usize) -> Self {
-        let (t0, u0) = (record.time(k), record.input(k));
+impl<S: Scalar> Between<S> {
+    /// From sample `k` on, with the dead times of inputs, if any has one; after the last sample the input is held and no time passes.
+    pub fn new(record: &Record, k: usize, delays: &[Option<S>]) -> Self {
+        let t0 = record.time(k);
         let last = k + 1 >= record.len();
         let length = if last { 0.0 } else { record.time(k + 1) - t0 };
+        let (interval, part) = ((t0, length), Cell::new(None));
+        if !delays.is_empty() {
+            let (u0, parts) = (record.late_inputs(k, delays), record.parts(k, delays));
+            return Between { interval, u0, u1: None, parts, part };
+        }
+        let u0 = record.input(k);
         let at_end = |(i, u0): (usize, &f64)| match record.input_hold(i) {
-            Hold::Zero => *u0,
-            Hold::First => record.inputs()[i].values[k + 1],
+            Hold::Zero => S::from(*u0),
+            Hold::First => S::from(record.inputs()[i].values[k + 1]),
         };
         let moves = !record.holds.all_zero() && !last;
         let u1 = moves.then(|| u0.iter().enumerate().map(at_end).collect());
-        Between { interval: (t0, length), u0, u1 }
+        Between { interval, u0: u0.into_iter().map(S::from).collect(), u1, parts: vec![], part }
     }
 
-    /// Time at a fraction of the interval (s).
-    pub fn time(&self, position: f64) -> f64 {
-        self.interval.0 + position * self.interval.1
+    fn crossed(&self) -> Option<&Part<S>> {
+        self.part.get().and_then(|i| self.parts.get(i))
     }
 
-    /// The input at a fraction of the interval.
-    pub fn input<S: Scalar>(&self, position: f64) -> Vec<S> {
-        let Some(u1) = &self.u1 else { return self.u0.iter().map(|u| S::from(*u)).collect() };
-        self.u0.iter().zip(u1).map(|(u0, u1)| S::from(u0 + (u1 - u0) * position)).collect()
+    /// Time at a fraction of the interval, or of the part that is being crossed (s).
+    pub fn time(&self, position: f64) -> S {
+        match self.crossed() {
+            Some(part) => part.length * position + part.t0,
+            None => S::from(self.interval.0 + position * self.interval.1),
+        }
+    }
+
+    /// The input there.
+    pub fn input(&self, position: f64) -> Vec<S> {
+        let (u0, u1) = match self.crossed() {
+            Some(part) => (&part.u0, Some(&part.u1)),
+            None => (&self.u0, self.u1.as_ref()),
+        };
+        let Some(u1) = u1 else { return u0.clone() };
+        u0.iter().zip(u1).map(|(u0, u1)| (*u1 - *u0) * position + *u0).collect()
     }
 }
 
@@ -101,10 +123,10 @@ pub(crate) struct SlicePlant<'a, S> {
     /// These functions in numbers with slopes, for Jacobians.
     pub duals: &'a dyn Functions<Duals>,
     pub method: &'a dyn Method,
-    pub between: Between,
+    pub between: Between<S>,
     pub p: &'a [S],
     /// The step that an adaptive integrator passes from interval to interval.
-    pub step: &'a core::cell::Cell<f64>,
+    pub step: &'a Cell<f64>,
 }
 
 /// Numbers that a [`Method`] can integrate.
@@ -131,11 +153,32 @@ impl Stepped for Duals {
 
 impl<S: Stepped> SlicePlant<'_, S> {
     fn cross(&self, kind: Kind, z: &mut [S], rate: Rate<'_, S>, slopes: Slopes<'_>) -> Result<(), Stuck> {
-        let field = Field { kind, interval: self.between.interval, states: z.len(), rate, slopes };
-        let mut step = self.step.get();
-        let end = S::advance(self.method, &field, z.to_vec(), &mut step)?;
-        self.step.set(step);
-        z.copy_from_slice(&end);
+        let Between { interval, parts, part, .. } = &self.between;
+        if parts.is_empty() || kind == Kind::Discrete {
+            let field = Field { kind, interval: *interval, states: z.len(), rate, slopes };
+            let mut step = self.step.get();
+            z.copy_from_slice(&S::advance(self.method, &field, z.to_vec(), &mut step)?);
+            self.step.set(step);
+            return Ok(());
+        }
+        for (i, here) in parts.iter().enumerate() {
+            part.set(Some(i));
+            // By the fraction of the part, whose length has slopes.
+            let (length, states) = (here.length, z.len());
+            let rate = |position: f64, z: &[S], to: &mut [S]| {
+                rate(position, z, to);
+                to.iter_mut().for_each(|to| *to *= length);
+            };
+            let slopes = |position: f64, z: &[f64]| {
+                let (mut value, mut rows) = slopes(position, z);
+                value.iter_mut().chain(rows.iter_mut().flatten()).for_each(|entry| *entry *= length.value());
+                (value, rows)
+            };
+            let field = Field { kind, interval: (0.0, 1.0), states, rate: &rate, slopes: &slopes };
+            let end = S::advance(self.method, &field, z.to_vec(), &mut 0.0);
+            part.set(None);
+            z.copy_from_slice(&end?);
+        }
         Ok(())
     }
 }
@@ -150,40 +193,41 @@ impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
     }
 
     fn output(&self, x: &[S], y: &mut [S]) {
-        self.functions.output(S::from(self.between.time(0.0)), x, &self.between.input(0.0), self.p, y);
+        self.functions.output(self.between.time(0.0), x, &self.between.input(0.0), self.p, y);
     }
 
     fn next(&self, x: &mut [S]) -> Result<(), Stuck> {
         let (state, _) = x.split_at_mut(self.layout.states.len());
         let p: Vec<Duals> = self.p.iter().map(|p| Dual::constant(p.value())).collect();
         let slopes = |position: f64, x: &[f64]| {
-            let (t, u) = (Dual::constant(self.between.time(position)), self.between.input(position));
+            let t = Dual::constant(self.between.time(position).value());
+            let u: Vec<Duals> = self.between.input(position).iter().map(|u| Dual::constant(u.value())).collect();
             jacobian(x, &|x, to| self.duals.state(t, x, &u, &p, to))
         };
         self.cross(self.layout.kind, state, &|position, x, to| self.derivative(position, x, to), &slopes)
     }
 
     fn derivative(&self, position: f64, x: &[S], to: &mut [S]) {
-        let (t, u) = (S::from(self.between.time(position)), self.between.input(position));
+        let (t, u) = (self.between.time(position), self.between.input(position));
         self.functions.state(t, x, &u, self.p, to);
     }
 
     fn state_slopes(&self, position: f64, x: &[S], to: &mut [S]) {
-        let (t, u) = (S::from(self.between.time(position)), self.between.input(position));
+        let (t, u) = (self.between.time(position), self.between.input(position));
         self.functions.state_slopes(t, x, &u, self.p, to);
     }
 
     fn output_slopes(&self, x: &[S], to: &mut [S]) {
-        self.functions.output_slopes(S::from(self.between.time(0.0)), x, &self.between.input(0.0), self.p, to);
+        self.functions.output_slopes(self.between.time(0.0), x, &self.between.input(0.0), self.p, to);
     }
 
     fn state_moments(&self, position: f64, carry: &[S]) -> Moments<S> {
-        let (t, u) = (S::from(self.between.time(position)), self.between.input(position));
+        let (t, u) = (self.between.time(position), self.between.input(position));
         self.functions.state_moments(t, carry, &u, self.p, self.layout)
     }
 
     fn output_moments(&self, carry: &[S]) -> Moments<S> {
-        let (t, u) = (S::from(self.between.time(0.0)), self.between.input(0.0));
+        let (t, u) = (self.between.time(0.0), self.between.input(0.0));
         self.functions.output_moments(t, carry, &u, self.p, self.layout)
     }
 

@@ -29,7 +29,7 @@ pub(crate) fn recurrence(
     let mut graph = Graph::default();
     let roots = graph.trace(|| {
         let plant = SymbolicPlant {
-            interval: SymbolicInterval { equations, method, holds },
+            interval: SymbolicInterval::new(equations, method, holds),
             slopes: slopes.as_ref(),
             moments: &moments,
             p: (0..layout.parameters.len()).map(|j| Symbol::leaf(Leaf::Parameter(number(j)))).collect(),
@@ -79,7 +79,7 @@ impl SymbolicPlant<'_> {
 
     /// Of the state and of the outputs.
     fn equations_moments(&self) -> &(MomentsOf, MomentsOf) {
-        self.moments.get_or_init(|| self.interval.equations.moments())
+        self.moments.get_or_init(|| self.interval.equations().moments())
     }
 
     fn moments(&self, of: &MomentsOf, position: f64, carry: &[Symbol]) -> Moments<Symbol> {
@@ -89,7 +89,7 @@ impl SymbolicPlant<'_> {
 
 impl Plant<Symbol> for SymbolicPlant<'_> {
     fn layout(&self) -> &Layout {
-        self.interval.equations.layout()
+        self.interval.equations().layout()
     }
 
     fn parameters(&self) -> &[Symbol] {
@@ -132,10 +132,10 @@ impl Plant<Symbol> for SymbolicPlant<'_> {
     }
 
     fn diffusion(&self, to: &mut [Symbol]) {
-        self.interval.equations.diffusion(&self.p, to);
+        self.interval.equations().diffusion(&self.p, to);
     }
 
     fn noise(&self, to: &mut [Symbol]) {
-        self.interval.equations.noise(&self.p, to);
+        self.interval.equations().noise(&self.p, to);
     }
 }

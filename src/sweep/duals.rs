@@ -5,6 +5,7 @@ use super::failure::FailureSearch;
 use super::filtered::Filter;
 use super::{ModelCode, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit, unmoved};
 use crate::error::{Error, Failure};
+use crate::functions::delays;
 use crate::graph::Choices;
 use crate::integrate::Method;
 use crate::layout::{Kind, Layout};
@@ -37,7 +38,16 @@ impl DualSweep<'_> {
             values: self.code.values(),
             duals: self.code.duals(),
             method: &*self.method,
+            late: self.code.late(),
             predictor: &*self.predictor,
+        }
+    }
+
+    /// The inputs that the model has at a sample.
+    fn input(&self, record: &Record, sample: usize, p: &[f64]) -> Vec<f64> {
+        match delays(self.code.values(), &self.code.late(), p) {
+            none if none.is_empty() => record.input(sample),
+            delays => record.late_inputs(sample, &delays),
         }
     }
 
@@ -96,17 +106,17 @@ impl Sweep for DualSweep<'_> {
 
     fn run(&self, pieces: &[Piece<'_>], seeds: &[Seed], visit: Visit<'_>) -> Vec<Result<Reached, RunError>> {
         let one = |piece: &Piece<'_>| {
-            let restart = self.predictor.restarts().map(|horizon| horizon.steps);
-            match restart.is_some() || self.predictor.is_simulation() {
-                true => self.code.run(&self.filter(), piece, seeds, restart, visit),
-                false => self.filter().run(piece, seeds, None, visit),
+            let (restart, filter) = (self.predictor.restarts().map(|horizon| horizon.steps), self.filter());
+            match (restart.is_some() || self.predictor.is_simulation()) && !filter.late.contains(&true) {
+                true => self.code.run(&filter, piece, seeds, restart, visit),
+                false => filter.run(piece, seeds, restart, visit),
             }
         };
         pieces.iter().map(one).collect()
     }
 
     fn measured_state(&self, record: &Record, sample: usize, p: &[f64]) -> Result<Vec<f64>, String> {
-        let u = record.input(sample);
+        let u = self.input(record, sample, p);
         let place = self.place(record.time(sample), &u, p);
         let x = place.state(&record.output(sample))?;
         match place.depends_on_parameter(&x) {
@@ -121,11 +131,11 @@ impl Sweep for DualSweep<'_> {
         let half = |range: (f64, f64)| 0.5 * (range.1 - range.0);
         let moves: Vec<f64> =
             record.inspect_some().outputs.iter().map(|output| output.range.map_or(0.0, half)).collect();
-        self.place(record.time(0), &record.input(0), p).guess(&y, &moves)
+        self.place(record.time(0), &self.input(record, 0, p), p).guess(&y, &moves)
     }
 
     fn state_slopes(&self, record: &Record, sample: usize, state: &[f64], p: &[f64]) -> Option<Vec<f64>> {
-        let (t, u) = (record.time(sample), record.input(sample));
+        let (t, u) = (record.time(sample), self.input(record, sample, p));
         (self.layout.kind == Kind::Continuous).then(|| self.place(t, &u, p).state_slopes(state))
     }
 
@@ -139,7 +149,8 @@ impl Sweep for DualSweep<'_> {
         stops: &dyn Fn() -> bool,
     ) -> Option<Result<Failure, Failure>> {
         let (layout, values, duals) = (&*self.layout, self.code.values(), self.code.duals());
-        let search = FailureSearch { layout, values, duals, method: &*self.method, record };
+        let late = self.code.late();
+        let search = FailureSearch { layout, values, duals, method: &*self.method, late, record };
         Some(search.locate(state, parameters, sample, sigma, stops))
     }
 

@@ -1,7 +1,7 @@
 //! [`FailureSearch`]: the cause of a simulation that fails, found in plain numbers.
 
 use crate::error::Failure;
-use crate::functions::Functions;
+use crate::functions::{Functions, delays};
 use crate::integrate::{Duals, Method, Stuck};
 use crate::layout::Layout;
 use crate::predict::{Between, Plant, SlicePlant};
@@ -15,6 +15,8 @@ pub(crate) struct FailureSearch<'w> {
     pub values: &'w dyn Functions<f64>,
     pub duals: &'w dyn Functions<Duals>,
     pub method: &'w dyn Method,
+    /// Which inputs have a dead time.
+    pub late: Vec<bool>,
     pub record: &'w Record,
 }
 
@@ -47,15 +49,22 @@ impl FailureSearch<'_> {
         };
         let runaway = |x: &[f64]| x.iter().copied().enumerate().find(|(_, x)| x.abs() >= RUNAWAY);
         let name = |i: usize| &self.layout.states[i].name;
+        let delays = delays(self.values, &self.late, p);
+        let wrong = |delay: &Option<f64>| delay.is_some_and(|delay| !(0.0..f64::INFINITY).contains(&delay));
+        if let Some(i) = delays.iter().position(wrong) {
+            let signal = format!("the dead time of input `{}`", self.layout.inputs[i].name);
+            return broken(0, signal, delays[i].unwrap_or(f64::NAN), NEGATIVE);
+        }
         let mut x = state.to_vec();
         let step = Cell::new(0.0);
         let watched = Watched::new(self.values);
         let mut y = vec![0.0; self.layout.outputs.len()];
         let mut largest = (sample, 0, 0.0f64);
         for k in 0..self.record.len() {
-            let between = Between::new(self.record, k);
-            let FailureSearch { layout, duals, method, .. } = *self;
-            let plant = SlicePlant { layout, functions: &watched, duals, method, between, p, step: &step };
+            let between = Between::new(self.record, k, &delays);
+            let FailureSearch { layout, duals, method, .. } = self;
+            let plant =
+                SlicePlant { layout, functions: &watched, duals: *duals, method: *method, between, p, step: &step };
             watched.forget();
             plant.output(&x, &mut y);
             for (j, (&y, channel)) in y.iter().zip(self.record.outputs()).enumerate() {
@@ -101,6 +110,7 @@ const RUNAWAY: f64 = 1e30;
 
 const STUCK: &str = "; no step is short enough, or 100,000 of them do not reach the next sample: the model is too stiff for \
                      the method, jumps, or leaves its domain (take Esdirk, or smooth the model)";
+const NEGATIVE: &str = "; it is zero or longer: bound its parameter (.within(0.0, ..), or .log())";
 const UNDEFINED: &str = "; the equations are undefined there (a division by zero, a root or logarithm out of its domain, \
                          or the `derivative` or `next` that Model::KIND asks for was not written): bound the parameters, \
                          or start elsewhere (parameters and initial states)";
@@ -148,5 +158,9 @@ impl Functions<f64> for Watched<'_> {
 
     fn noise(&self, p: &[f64], to: &mut [f64]) {
         self.values.noise(p, to);
+    }
+
+    fn delay(&self, p: &[f64], to: &mut [f64]) {
+        self.values.delay(p, to);
     }
 }

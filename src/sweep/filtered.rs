@@ -3,7 +3,7 @@
 
 use super::{Piece, Reached, RunError, Seed, Visit, Window};
 use crate::dual::Dual;
-use crate::functions::Functions;
+use crate::functions::{Functions, delays};
 use crate::integrate::{Duals, Method, Stuck};
 use crate::layout::Layout;
 use crate::predict::{Between, Prediction, SlicePlant, Stepped, Steps};
@@ -25,6 +25,8 @@ pub(crate) struct Filter<'f> {
     pub values: &'f dyn Functions<f64>,
     pub duals: &'f dyn Functions<Duals>,
     pub method: &'f dyn Method,
+    /// Which inputs have a dead time.
+    pub late: Vec<bool>,
     pub predictor: &'f dyn Prediction,
 }
 
@@ -42,6 +44,8 @@ struct Pass<S> {
     /// The carry at the begin of the piece.
     start: Vec<S>,
     p: Vec<S>,
+    /// Dead times of the inputs, where there are any.
+    delays: Vec<Option<S>>,
     step: Cell<f64>,
     first: usize,
     used: usize,
@@ -99,7 +103,7 @@ impl Filter<'_> {
             }
             let p: Vec<Duals> = parameters.iter().enumerate().map(|(j, p)| Dual::variable(*p, lane(n + j))).collect();
             let step = Cell::new(0.0);
-            let plant = self.plant(self.duals, Between::new(record, 0), &p, &step);
+            let plant = self.plant(self.duals, Between::new(record, 0, &delays(self.duals, &self.late, &p)), &p, &step);
             self.predictor.duals().start(&plant, &mut carry);
             for (entry, x) in carry.iter().enumerate() {
                 reached.carry[entry] = x.value;
@@ -129,7 +133,7 @@ impl Filter<'_> {
     fn plant<'p, S: Stepped>(
         &'p self,
         functions: &'p dyn Functions<S>,
-        between: Between,
+        between: Between<S>,
         p: &'p [S],
         step: &'p Cell<f64>,
     ) -> SlicePlant<'p, S> {
@@ -145,7 +149,7 @@ impl Filter<'_> {
         let piece = task.piece;
         let capacity = if self.method.is_fixed() { WINDOW } else { ADAPTIVE_WINDOW };
         let count = seeds.len().div_ceil(SLOPES).max(1);
-        let mut passes: Vec<Pass<S>> = (0..count).map(|pass| Pass::new(piece, seeds, pass * SLOPES)).collect();
+        let mut passes: Vec<Pass<S>> = (0..count).map(|pass| self.pass(task, seeds, pass * SLOPES)).collect();
         let outputs = self.layout.outputs.len();
         let variances = self.predictor.predicts_variance();
         let mut window = Window::new(1, outputs, seeds.len(), capacity, variances);
@@ -182,6 +186,11 @@ impl Filter<'_> {
         Ok(Reached { carry, slopes })
     }
 
+    fn pass<S: Number>(&self, task: &Task<'_, S>, seeds: &[Seed], first: usize) -> Pass<S> {
+        let pass = Pass::new(task.piece, seeds, first);
+        Pass { delays: delays(task.functions, &self.late, &pass.p), ..pass }
+    }
+
     /// Predicts the outputs of a sample, corrects the carry with the measured ones, and advances to the next sample.
     fn sample<S: Number>(
         &self,
@@ -196,7 +205,7 @@ impl Filter<'_> {
             None => true,
             Some(restart) => self.restart(task, pass, sample, restart).map_err(|Stuck| RunError::Failed { sample })?,
         };
-        let plant = self.plant(functions, Between::new(piece.record, sample), &pass.p, &pass.step);
+        let plant = self.plant(functions, Between::new(piece.record, sample, &pass.delays), &pass.p, &pass.step);
         let columns = window.columns();
         for (j, channel) in piece.record.outputs().iter().enumerate() {
             let y = if is_known { channel.values[sample] } else { f64::NAN };
@@ -247,7 +256,7 @@ impl Filter<'_> {
         }
         pass.step.set(0.0);
         for from in first..sample {
-            let plant = self.plant(task.functions, Between::new(piece.record, from), &pass.p, &pass.step);
+            let plant = self.plant(task.functions, Between::new(piece.record, from, &pass.delays), &pass.p, &pass.step);
             task.steps.advance(&plant, &mut pass.carry)?;
         }
         Ok(true)
@@ -265,6 +274,6 @@ impl<S: Number> Pass<S> {
             piece.carry.iter().enumerate().map(|(entry, x)| S::with(*x, &|i| slope(entry, i))).collect();
         let parameters = piece.parameters.iter().enumerate();
         let p = parameters.map(|(j, p)| S::with(*p, &|i| f64::from(u8::from(moves(j, i))))).collect();
-        Pass { start: carry.clone(), carry, p, step: Cell::new(0.0), first, used }
+        Pass { start: carry.clone(), carry, p, delays: vec![], step: Cell::new(0.0), first, used }
     }
 }

@@ -30,8 +30,8 @@ pub(crate) fn compiled<'a>(
     let choices = Some(choices(equations.graph()));
     let in_duals = |reason: String| {
         let uncompiled = Uncompiled { reason, choices: choices.clone() };
-        match predictor.needs_slopes() && !equations.is_affine() {
-            // The model's own code in duals has no slopes whose slopes are known.
+        // The model's own code in duals has no slopes whose slopes are known, and does not say which inputs are never late.
+        match predictor.needs_slopes() && !equations.is_affine() || equations.late().contains(&true) {
             true => evaluated(&equations, method, predictor, uncompiled),
             false => plain(uncompiled),
         }

@@ -2,6 +2,7 @@
 
 use super::filtered::Filter;
 use super::{Loops, Piece, Reached, RunError, Seed, Visit};
+use crate::dual::Dual;
 use crate::equations::{Equations, MomentsOf, Slopes};
 use crate::functions::{Functions, Handle};
 use crate::integrate::Duals;
@@ -9,7 +10,11 @@ use crate::layout::{Kind, Layout};
 use crate::model::Model;
 use crate::moments::Moments;
 use crate::scalar::Scalar;
+use crate::signals::Signals;
 use std::sync::{Arc, OnceLock};
+
+/// Slopes of a [`Duals`].
+const COLUMNS: usize = 8;
 
 /// A model's equations on vectors, and its loop over the samples.
 pub(crate) trait ModelCode: Send + Sync {
@@ -31,6 +36,9 @@ pub(crate) trait ModelCode: Send + Sync {
 
     /// Whether derivatives (next states) and outputs are affine in the state, as far as slopes with respect to it are asked for.
     fn is_affine(&self) -> bool;
+
+    /// Which inputs have a dead time.
+    fn late(&self) -> Vec<bool>;
 
     /// Text that identifies the equations.
     fn identity(&self) -> String;
@@ -69,6 +77,20 @@ impl<M: Model> ModelCode for Typed<'_, M> {
     /// Others are evaluated from their graph, or refused.
     fn is_affine(&self) -> bool {
         true
+    }
+
+    /// Those whose dead time is not zero, or moves with a parameter, where all parameters are one.
+    fn late(&self) -> Vec<bool> {
+        let (inputs, parameters) = (M::Input::LEN, M::Parameters::LEN);
+        let mut late = vec![false; inputs];
+        for first in (0..parameters.max(1)).step_by(COLUMNS) {
+            let p: Vec<Duals> = (0..parameters).map(|j| Dual::variable(1.0, j.wrapping_sub(first))).collect();
+            let mut delay = vec![Duals::constant(0.0); inputs];
+            self.model.delay(&p, &mut delay);
+            let zero = |delay: &Duals| delay.value == 0.0 && delay.slopes == [0.0; COLUMNS];
+            late.iter_mut().zip(&delay).for_each(|(late, delay)| *late |= !zero(delay));
+        }
+        late
     }
 
     fn identity(&self) -> String {
@@ -116,6 +138,10 @@ impl<S: Scalar> Functions<S> for Evaluated {
         self.equations.noise(p, to);
     }
 
+    fn delay(&self, p: &[S], to: &mut [S]) {
+        Functions::delay(&*self.equations, p, to);
+    }
+
     fn state_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
         self.slopes().state.at(t, x, u, p, to);
     }
@@ -159,6 +185,10 @@ impl ModelCode for Evaluated {
 
     fn is_affine(&self) -> bool {
         self.equations.is_affine()
+    }
+
+    fn late(&self) -> Vec<bool> {
+        self.equations.late()
     }
 
     /// The equations as they are written to a file.

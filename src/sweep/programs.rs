@@ -4,11 +4,12 @@ mod columns;
 mod derived;
 mod horizon;
 mod interleaved;
+mod late;
 mod run;
 mod workspace;
 
 use super::{Coupling, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
-use crate::engine::{Program, Sampling, TooLarge, Trajectories};
+use crate::engine::{Program, Sampling, Trajectories};
 use crate::equations::Equations;
 use crate::error::{Error, Failure};
 use crate::graph::Untraceable;
@@ -20,6 +21,7 @@ use crate::record::{Holds, Record, Time};
 use crate::recurrence::Recurrence;
 pub(crate) use derived::Derived;
 pub(crate) use interleaved::Interleaved;
+use late::Late;
 use run::Run;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use workspace::Compiled;
@@ -37,7 +39,6 @@ struct Programs {
     method: Arc<dyn Method>,
     predictor: Arc<dyn Prediction>,
     coupling: Coupling,
-    /// Parameters that decide a choice.
     /// By the holds of the inputs.
     recurrences: Mutex<Vec<(Holds, Arc<Recurrence>)>>,
     /// Those that were asked for, with the reason where there can be none.
@@ -47,7 +48,10 @@ struct Programs {
 }
 
 /// A program, or the reason why there is none.
-type MaybeCompiled = Result<Arc<Compiled>, TooLarge>;
+type MaybeCompiled = Result<Arc<Compiled>, String>;
+
+/// Why a record has no program.
+const UNEVEN: &str = "inputs have dead times and samples are not evenly spaced";
 
 /// Number of samples that take as long in dual numbers as a program takes to be compiled.
 const WORTH_COMPILING: usize = 4_000;
@@ -135,11 +139,16 @@ impl Programs {
             return program.clone().ok();
         }
         let recurrence = self.recurrence(&key.holds).ok()?;
+        let is_late = self.equations.late().contains(&true);
         let program = match purpose {
-            Purpose::Rows => Program::compile(&recurrence, seeds, sampling, Trajectories::Many),
-            Purpose::Carry => Program::compile(&recurrence.without_outputs(), &[], sampling, Trajectories::One),
+            // How often a dead time cuts an interval differs from one to the next.
+            _ if is_late && sampling == Sampling::Irregular => Err(UNEVEN.to_owned()),
+            Purpose::Rows => Ok(Program::compile(&recurrence, seeds, sampling, Trajectories::Many)),
+            Purpose::Carry => Ok(Program::compile(&recurrence.without_outputs(), &[], sampling, Trajectories::One)),
         };
-        let program = program.map(|program| Arc::new(Compiled::new(program)));
+        let program = program.and_then(|program| program.map_err(|too_large| too_large.to_string()));
+        let late = is_late.then(|| Late::new(self.equations.clone()));
+        let program = program.map(|program| Arc::new(Compiled::new(program, late)));
         compiled.push((key, program.clone()));
         program.ok()
     }

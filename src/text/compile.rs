@@ -22,11 +22,12 @@ pub(super) fn compile(document: &Document, source: &Arc<Source>) -> Result<Equat
     let output = all(document.outputs.iter().map(|one| &one.value).collect(), &mut compiler);
     let diffusion = compiler.levels(document.states.iter().map(|one| one.diffusion.as_ref()), 0.0, "the diffusion");
     let noise = compiler.levels(document.outputs.iter().map(|one| one.noise.as_ref()), f64::NAN, "the noise");
+    let delay = compiler.levels(document.inputs.iter().map(|one| one.delay.as_ref()), 0.0, "the dead time");
     if !compiler.errors.is_empty() {
         return Err(compiler.errors);
     }
-    let roots: [&[Id]; 4] = [&state, &output, &diffusion, &noise];
-    let made = Equations::with_noise(layout(document), &compiler.graph, roots);
+    let roots: [&[Id]; 5] = [&state, &output, &diffusion, &noise, &delay];
+    let made = Equations::complete(layout(document), &compiler.graph, roots);
     made.map_err(|wrong| vec![Remark::error(source, 0..0, wrong.to_string())])
 }
 

@@ -72,6 +72,11 @@ pub(super) fn check(document: &Document, source: &Arc<Source>) -> Vec<Remark> {
             }
         }
     }
+    for input in &document.inputs {
+        let Some(delay) = &input.delay else { continue };
+        let found = checker.unit(delay);
+        checker.compare(delay, found, &Unit::second(), &format!("the dead time of `{}`", input.quantity.name), "s");
+    }
     for output in &document.outputs {
         let found = checker.unit(&output.value);
         let noise = output.noise.as_ref().map(|noise| (noise, checker.unit(noise)));

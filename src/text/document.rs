@@ -32,6 +32,7 @@ pub(super) struct Constant {
 pub(super) struct Input {
     pub quantity: Declared,
     pub hold: Option<Hold>,
+    pub delay: Option<Expression>,
 }
 
 #[derive(Clone, Debug)]

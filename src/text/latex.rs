@@ -42,6 +42,11 @@ impl Model {
         for one in &document.definitions {
             lines.push(format!("{} &= {}", symbol(&one.quantity.name), formula(&one.value)));
         }
+        for one in &document.inputs {
+            let Some(delay) = &one.delay else { continue };
+            let u = symbol(&one.quantity.name);
+            lines.push(format!("{u}(t) &= {u}_{{\\mathrm{{record}}}}(t - ({}))", formula(delay)));
+        }
         for one in &document.outputs {
             // What is measured is told from the state of the same name.
             lines.push(format!("\\hat{{y}}_{{{}}} &= {}", plain(&one.quantity.name), formula(&one.value)));

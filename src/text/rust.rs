@@ -226,6 +226,11 @@ impl Module<'_> {
         if noise.iter().any(|one| one.1.is_some()) {
             self.function(&mut text, ("noise", "Output", of_parameters), &noise, "S::from(f64::NAN)");
         }
+        let delay: Vec<_> =
+            document.inputs.iter().map(|one| (one.quantity.name.as_str(), one.delay.as_ref())).collect();
+        if delay.iter().any(|one| one.1.is_some()) {
+            self.function(&mut text, ("delay", "Input", of_parameters), &delay, "S::from(0.0)");
+        }
         text + "}\n"
     }
 

@@ -17,17 +17,23 @@ pub(super) fn file(equations: &Equations, name: &str, parameters: &[Parameter]) 
     check(layout, parameters)?;
     let (shared, table) = (free_word(layout, "_"), free_word(layout, "table"));
     let [diffusion, noise] = equations.levels();
-    let counts = [equations.state(), equations.output(), diffusion, noise].map(<[Id]>::len);
+    let counts = [equations.state(), equations.output(), diffusion, noise, equations.delay()].map(<[Id]>::len);
     let lines = lines(equations, [&shared, &table]);
     let (definitions, roots) = lines.split_at(lines.len() - counts.iter().sum::<usize>());
     let mut rest = roots.iter().map(|(_, text)| text.as_str());
-    let [rates, outputs, diffusion, noise] = counts.map(|count| rest.by_ref().take(count).collect::<Vec<&str>>());
+    let [rates, outputs, diffusion, noise, delay] =
+        counts.map(|count| rest.by_ref().take(count).collect::<Vec<&str>>());
 
     let mut file = Writer { text: String::from("greybox = 1\n") };
     if !name.is_empty() {
         file.line(&format!("name = {}", quoted(name)));
     }
-    file.group("inputs", layout.inputs.iter().map(|one| (one.name.as_str(), unit(one))));
+    let input = |(i, one): (usize, &'_ Quantity)| {
+        let delay = delay.get(i).filter(|delay| **delay != "0");
+        let text = delay.map(|delay| format!("{{ unit = {}, delay = {} }}", unit(one), quoted(delay)));
+        (one.name.clone(), text.unwrap_or_else(|| unit(one)))
+    };
+    file.group("inputs", layout.inputs.iter().enumerate().map(input));
     let parameter = |(one, declared): (&'_ Quantity, &Parameter)| (one.name.clone(), declaration(one, declared));
     file.group("parameters", layout.parameters.iter().zip(parameters).map(parameter));
     for (i, one) in equations.graph().tables().iter().enumerate() {
@@ -49,7 +55,7 @@ pub(super) fn file(equations: &Equations, name: &str, parameters: &[Parameter]) 
     Ok(file.text)
 }
 
-/// Definitions, then rates of states, outputs, diffusion and noise.
+/// Definitions, then rates of states, outputs, diffusion, noise and dead times.
 fn lines(equations: &Equations, words: [&str; 2]) -> Vec<(String, String)> {
     let layout = equations.layout();
     let name = |leaf: Leaf| match leaf {
@@ -59,7 +65,7 @@ fn lines(equations: &Equations, words: [&str; 2]) -> Vec<(String, String)> {
         _ => "t".to_owned(),
     };
     let [diffusion, noise] = equations.levels();
-    let all = [equations.state(), equations.output(), diffusion, noise].concat();
+    let all = [equations.state(), equations.output(), diffusion, noise, equations.delay()].concat();
     let roots: Vec<(String, Id)> = all.into_iter().map(|id| (String::new(), id)).collect();
     equations.graph().lines(&name, words, &roots)
 }

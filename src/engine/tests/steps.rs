@@ -44,7 +44,8 @@ pub fn simulation(equations: &Equations, integrator: &impl Integrator, hold: Hol
     let mut graph = Graph::default();
     let mean = graph.import(equations.graph(), equations.output(), Graph::leaf);
     let states = equations.layout().states.len() as u32;
-    let between = SymbolicInterval { equations, method: integrator, holds: &Holds::All(hold) };
+    let holds = Holds::All(hold);
+    let between = SymbolicInterval::new(equations, integrator, &holds);
     let next = graph.trace(|| {
         let mut x: Vec<Symbol> = (0..states).map(|i| Symbol::leaf(Leaf::State(i))).collect();
         between.next(&mut x);

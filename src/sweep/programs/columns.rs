@@ -1,6 +1,7 @@
 //! [`Columns`]: what a program reads, gathered from the records of its lanes.
 
 use super::derived::{derived, step};
+use super::late::Late;
 use crate::engine::{Column, Program};
 use crate::record::Record;
 use crate::sweep::Piece;
@@ -28,22 +29,31 @@ enum ColumnSource<'r> {
     Step,
     /// Number of the derived column.
     Derived(usize),
+    /// Values, and how many samples before; not a number where that is none.
+    Late(&'r [f64], Option<isize>),
 }
 
 impl<'r> Columns<'r> {
     /// Of pieces in so many lanes; those without a piece repeat the first.
-    pub fn new(program: &Program, pieces: &[Piece<'r>], lanes: usize) -> Self {
+    pub fn new(program: &Program, late: Option<&Late>, pieces: &[Piece<'r>], lanes: usize) -> Self {
         let piece = |lane: usize| pieces.get(lane).unwrap_or(&pieces[0]);
         let of = |piece: &Piece<'r>| (piece.record, piece.prepared.derived.of(program, piece.record));
         let (records, derived): (Vec<&'r Record>, Vec<_>) = (0..lanes).map(piece).map(of).unzip();
-        let source = |record: &'r Record, column: &Column| match *column {
+        let whole = |lane: usize| late.map_or(vec![], |late| late.whole(piece(lane)));
+        let whole: Vec<_> = (0..lanes).map(whole).collect();
+        let source = |lane: usize, record: &'r Record, column: &Column| match *column {
             Column::Time => ColumnSource::Time,
             Column::Step => ColumnSource::Step,
             Column::Input(i) => ColumnSource::Values(&record.inputs()[i].values),
             Column::Measured(j) => ColumnSource::Values(&record.outputs()[j].values),
             Column::Derived(n) => ColumnSource::Derived(n),
+            Column::Late(i, after) => {
+                let behind = late.and_then(|late| late.behind(&whole[lane], i, after));
+                ColumnSource::Late(&record.inputs()[i].values, behind)
+            }
         };
-        let inputs = program.columns().iter().map(|column| records.iter().map(|r| source(r, column)).collect());
+        let sources = |column| records.iter().enumerate().map(|(lane, r)| source(lane, r, column)).collect();
+        let inputs = program.columns().iter().map(sources);
         let outputs = (0..program.outputs()).map(|j| records.iter().map(|r| &r.outputs()[j].values[..]).collect());
         let (inputs, outputs) = (inputs.collect(), outputs.collect());
         let next = usize::from(program.reads_next());
@@ -86,7 +96,27 @@ impl<'r> Columns<'r> {
                     self.each(begin, rows, stride, to, |record, sample| record.time(sample.min(record.len() - 1)))
                 }
                 Some(ColumnSource::Step) => self.each(begin, rows, stride, to, step),
+                Some(ColumnSource::Late(..)) => self.late(sources, begin, rows, stride, to),
                 None => {}
+            }
+        }
+    }
+
+    /// Reads a late input, before the record that of its first sample.
+    fn late(&self, sources: &[ColumnSource<'r>], begin: &[usize], rows: usize, stride: usize, to: &mut [f64]) {
+        let source = |lane: usize| match sources[lane] {
+            ColumnSource::Late(values, behind) => (values, behind),
+            _ => (&[][..], None),
+        };
+        let from = |(lane, begin): (usize, &usize)| begin.checked_add_signed(-source(lane).1?);
+        if let Some(from) = begin.iter().enumerate().map(from).collect::<Option<Vec<usize>>>() {
+            return self.transpose(|lane| source(lane).0, Some(&from), rows, stride, to);
+        }
+        for (lane, begin) in begin.iter().enumerate() {
+            let (values, behind) = source(lane);
+            for k in 0..rows {
+                let sample = behind.map(|behind| (begin + k).saturating_add_signed(-behind).min(values.len() - 1));
+                to[k * stride + lane] = sample.map_or(f64::NAN, |sample| values[sample]);
             }
         }
     }

@@ -67,7 +67,7 @@ pub(super) fn derived(program: &Program, record: &Record, begin: usize, samples:
         Column::Step => step(record, begin + k),
         Column::Input(i) => record.inputs()[i].values[sample(k)],
         Column::Measured(j) => record.outputs()[j].values[sample(k)],
-        Column::Derived(_) => f64::NAN,
+        Column::Derived(_) | Column::Late(..) => f64::NAN,
     };
     let rows = samples + usize::from(next);
     let columns: Vec<Vec<f64>> = columns.iter().map(|column| (0..rows).map(|k| number(column, k)).collect()).collect();

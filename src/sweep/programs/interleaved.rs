@@ -41,7 +41,7 @@ impl fmt::Debug for Interleaved {
 }
 
 impl Interleaved {
-    /// The columns of pieces, one piece in each lane. `None` where they are not kept: for programs that read time or step, for
+    /// The columns of pieces, one piece in each lane. `None` where they are not kept: for programs that read time, step or late inputs, for
     /// long records, at first for records that were run together with others before, and for programs without slopes, which
     /// run once or twice a fit, unless a program with slopes has kept the same columns.
     pub(super) fn of<'p>(
@@ -52,9 +52,9 @@ impl Interleaved {
     ) -> Option<Arc<Kept>> {
         let program = &compiled.program;
         let read = program.columns();
-        let of_time = read.iter().any(|column| matches!(column, Column::Time | Column::Step));
+        let moves = |column: &Column| matches!(column, Column::Time | Column::Step | Column::Late(..));
         let numbers = pieces[0].record.len() * (read.len() + program.outputs());
-        if of_time || numbers > KEPT {
+        if read.iter().any(moves) || numbers > KEPT {
             return None;
         }
         let samples = pieces.iter().map(|piece| piece.samples.len()).max().unwrap_or(0);

@@ -26,7 +26,10 @@ impl<'r> Run<'r> {
         // Lanes without a piece repeat the first.
         let piece = |lane: usize| pieces.get(lane).unwrap_or(&pieces[0]);
         for lane in 0..lanes {
-            group.set_parameters(lane, piece(lane).parameters);
+            match &compiled.late {
+                Some(late) => group.set_parameters(lane, &late.parameters(piece(lane))),
+                None => group.set_parameters(lane, piece(lane).parameters),
+            }
             if let Time::Uniform { step, .. } = piece(lane).record.times() {
                 group.set_step(lane, *step);
             }
@@ -96,8 +99,9 @@ impl<'r> Run<'r> {
         for (lane, to) in begins.iter_mut().enumerate() {
             *to = self.pieces.get(lane).unwrap_or(&self.pieces[0]).samples.start + begin;
         }
-        let columns =
-            self.columns.get_or_insert_with(|| Columns::new(&self.compiled.program, &self.pieces, begins.len()));
+        let columns = self.columns.get_or_insert_with(|| {
+            Columns::new(&self.compiled.program, self.compiled.late.as_ref(), &self.pieces, begins.len())
+        });
         columns.read(&self.compiled.program, begins, samples, inputs);
     }
 
@@ -105,10 +109,9 @@ impl<'r> Run<'r> {
     pub fn all(mut self, visit: Visit<'_>) -> Vec<Result<Reached, RunError>> {
         let lanes = (0..self.space.group.lanes()).map(|lane| self.pieces.get(lane).unwrap_or(&self.pieces[0]));
         let lanes: Vec<&Piece<'_>> = lanes.collect();
-        self.kept = lanes[0]
-            .prepared
-            .interleaved
-            .of(self.compiled, &lanes, || Columns::new(&self.compiled.program, &self.pieces, lanes.len()));
+        self.kept = lanes[0].prepared.interleaved.of(self.compiled, &lanes, || {
+            Columns::new(&self.compiled.program, self.compiled.late.as_ref(), &self.pieces, lanes.len())
+        });
         let mut reached = vec![Reached::default(); self.pieces.len()];
         for begin in (0..self.longest()).step_by(WINDOW) {
             self.next(begin, &mut reached);

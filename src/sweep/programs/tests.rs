@@ -1,7 +1,9 @@
+mod late;
+
 use super::*;
 use crate::functions::Handle;
 use crate::graph::choices;
-use crate::integrate::Rk4;
+use crate::integrate::{Rk4, automatic};
 use crate::model::Model;
 use crate::predict::{FreeRun, Horizon, Kalman, Predictor};
 use crate::record::{Channel, Column};
@@ -88,7 +90,7 @@ fn rows(sweep: &dyn Sweep, pieces: &[Piece<'_>], seeds: &[Seed]) -> (Vec<Vec<f64
 
 /// The model's own code in duals (its equations, where slopes are asked for that it does not have), its equations in duals, and programs.
 fn sweeps<M: Model>(model: &M, predictor: impl Predictor) -> [Arc<dyn Sweep + '_>; 3] {
-    let (method, predictor): (Arc<dyn Method>, Arc<dyn Prediction>) = (Arc::new(Rk4::default()), Arc::new(predictor));
+    let (method, predictor): (_, Arc<dyn Prediction>) = (automatic(1), Arc::new(predictor));
     let equations = Arc::new(Equations::trace(model).unwrap());
     let duals = |code| -> Arc<dyn Sweep + '_> {
         let (layout, method, predictor) = (Arc::new(Layout::of::<M>()), method.clone(), predictor.clone());

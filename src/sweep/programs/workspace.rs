@@ -1,6 +1,7 @@
 //! [`Compiled`]: a program with memory for its runs, which the next run uses again.
 
 use super::interleaved::Idle;
+use super::late::Late;
 use crate::aligned::Aligned;
 use crate::engine::{Group, Program};
 use crate::sweep::Window;
@@ -13,6 +14,8 @@ pub(super) const WINDOW: usize = 64;
 /// A program, and the memory of the runs that have ended: a fit runs it some ten times, a fleet thousands of times.
 pub(super) struct Compiled {
     pub program: Program,
+    /// Where inputs have dead times.
+    pub late: Option<Late>,
     idle: Mutex<Vec<Workspace>>,
     pub columns: Arc<Idle>,
 }
@@ -32,8 +35,8 @@ pub(super) struct Workspace {
 }
 
 impl Compiled {
-    pub fn new(program: Program) -> Self {
-        Compiled { program, idle: Mutex::new(vec![]), columns: Arc::default() }
+    pub fn new(program: Program, late: Option<Late>) -> Self {
+        Compiled { program, late, idle: Mutex::new(vec![]), columns: Arc::default() }
     }
 
     /// Memory for a run of so many pieces. Lanes, steps and samples are to be set.

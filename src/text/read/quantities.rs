@@ -21,12 +21,12 @@ impl Reader {
         Some(Constant { quantity, value, set: None })
     }
 
-    /// `name = "V"` or `name = { unit = "V", hold = "zero" }`.
+    /// `name = "V"` or `name = { unit = "V", hold = "zero", delay = "theta" }`.
     pub(super) fn input(&mut self, entry: &Entry<'_>) -> Option<Input> {
         if entry.value.is_str() {
-            return Some(Input { quantity: self.declared(entry, Some(entry), None)?, hold: None });
+            return Some(Input { quantity: self.declared(entry, Some(entry), None)?, hold: None, delay: None });
         }
-        let (quantity, fields) = self.in_table(entry, "an input", &["hold"])?;
+        let (quantity, fields) = self.in_table(entry, "an input", &["hold", "delay"])?;
         let hold = match field(&fields, "hold") {
             None => None,
             Some(found) => match self.values.text(found)? {
@@ -42,7 +42,11 @@ impl Reader {
                 }
             },
         };
-        Some(Input { quantity, hold })
+        let delay = match field(&fields, "delay") {
+            Some(found) => Some(self.values.expression(found)?),
+            None => None,
+        };
+        Some(Input { quantity, hold, delay })
     }
 
     /// `name = "np*w"` or `name = { value = "np*w", unit = "rad/s" }`.
