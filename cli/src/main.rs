@@ -83,7 +83,10 @@ fn main() -> ExitCode {
     match run(&arguments, &terminal) {
         Ok(verdict) => verdict.code(arguments.strict).into(),
         Err(error) => {
-            eprintln!("error: {error}");
+            let text = error.to_string();
+            // A mistake in a model file is shown with its place, after the same word.
+            let word = if text.starts_with("error: ") { "" } else { "error: " };
+            eprintln!("{word}{text}");
             1.into()
         }
     }

@@ -96,6 +96,14 @@ fn mistakes_are_sentences_with_the_remedy() {
 }
 
 #[test]
+fn a_mistake_in_a_model_file_is_shown_with_its_place() {
+    let bench = Bench::new();
+    std::fs::write(bench.path("wrong.toml"), MODEL.replace("(ud - rs*id)", "(ud - r*id)")).unwrap();
+    let (_, error) = bench.ends(1, &["fit", "-q", "wrong.toml", "record.csv"]);
+    assert!(error.starts_with("error: nothing is called `r`\n --> wrong.toml:15:"), "{error}");
+}
+
+#[test]
 fn a_project_file_repeats_a_fit() {
     let bench = Bench::new();
     let project = "model = 'pmsm.toml'\nrecords = ['record.csv']\nfix = { ls = 4e-3 }\nbounds = { rs = [0.01, 5] }\nloss = 'huber'\n";
