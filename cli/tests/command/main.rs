@@ -100,7 +100,7 @@ fn a_mistake_in_a_model_file_is_shown_with_its_place() {
     let bench = Bench::new();
     std::fs::write(bench.path("wrong.toml"), MODEL.replace("(ud - rs*id)", "(ud - r*id)")).unwrap();
     let (_, error) = bench.ends(1, &["fit", "-q", "wrong.toml", "record.csv"]);
-    assert!(error.starts_with("error: nothing is called `r`\n --> wrong.toml:15:"), "{error}");
+    assert!(error.starts_with("error: nothing is called `r`\n  --> wrong.toml:17:40\n"), "{error}");
 }
 
 #[test]
