@@ -6,7 +6,7 @@ use crate::estimate::{About, Summary, Warning, WarningCode};
 use crate::numeral::counted;
 use crate::problem::{Control, Noise, Problem, SearchPlan, Settings};
 use crate::severity::Severity;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Starts of a fit whose first search left an output unexplained, the declared one among them: of 138 records of predators
 /// and prey 16 starts led 118 to the right minimum, 24 led 133, 32 led 136.
@@ -46,13 +46,21 @@ pub(super) enum Further {
         best: Box<Summary>,
         /// Whether limits of the fit stopped searches before their end.
         stopped: bool,
-        seconds: f64,
+        time: Duration,
     },
     /// Records are longer than so many samples, which would take too long.
     TooLong(usize),
 }
 
 impl Further {
+    /// How long the searches took.
+    pub fn time(&self) -> Duration {
+        match self {
+            Further::Found { time, .. } => *time,
+            Further::TooLong(_) => Duration::ZERO,
+        }
+    }
+
     /// The best minimum, if it is usable, in place of the estimate before it.
     pub fn usable(&self, before: &Summary) -> Option<Summary> {
         match self {
@@ -63,10 +71,9 @@ impl Further {
 
     /// The better one of the best minimum and another estimate, with a note.
     fn or(&self, found: &Summary) -> Summary {
-        let (mut best, seconds, text) = match self {
-            Further::Found { best, stopped, seconds } => (
+        let (mut best, text) = match self {
+            Further::Found { best, stopped, .. } => (
                 if is_better(best, found) { after(found, (**best).clone()) } else { found.clone() },
-                *seconds,
                 format!(
                     "the search from the declared start ended where an output is left unexplained, so that the fit searched from \
                      {STARTS} starts by itself, and went on from the best of them{}",
@@ -75,7 +82,6 @@ impl Further {
             ),
             Further::TooLong(most) => (
                 found.clone(),
-                0.0,
                 format!(
                     "the search from the declared start ended where an output is left unexplained; with more than {} the fit does not \
                      search from further starts by itself, so ask for Fit::starts({STARTS})",
@@ -84,7 +90,7 @@ impl Further {
             ),
         };
         best.warnings.push(Warning::new(WarningCode::Unexplained, Severity::Usable, text).about(About::Search));
-        Summary { seconds: found.seconds + seconds, ..best }
+        Summary { seconds: found.seconds + self.time().as_secs_f64(), ..best }
     }
 }
 
@@ -145,7 +151,7 @@ impl Problem<'_> {
         if is_only_coarse(&again) {
             again = self.refined(Ok(again), 0, begin, control).ok()?;
         }
-        Some(Further::Found { best: Box::new(again), stopped: control.stops(), seconds: begin.elapsed().as_secs_f64() })
+        Some(Further::Found { best: Box::new(again), stopped: control.stops(), time: begin.elapsed() })
     }
 
     /// Whether several pieces of records like the first one run together in vector registers.
@@ -156,7 +162,7 @@ impl Problem<'_> {
 
 /// Whether an estimate is not usable and leaves an output unexplained. That may not be the reason by itself: where the loss is robust
 /// or measurements are weighted, it is a warning only.
-fn leaves_unexplained(found: &Summary) -> bool {
+pub(super) fn leaves_unexplained(found: &Summary) -> bool {
     let of_an_output = |warning: &Warning| matches!(warning.about, About::Output(_));
     let unexplained = |warning: &Warning| warning.code == WarningCode::Unexplained && of_an_output(warning);
     found.severity() == Severity::NotUsable && found.warnings.iter().any(unexplained)

@@ -1,5 +1,6 @@
 //! Running a problem: search, estimate at a given point, objective, prediction.
 
+use super::elsewhere::{Further, leaves_unexplained};
 use super::refine::{Attempt, Start};
 use super::search::{at_end, search, settled};
 use super::start_error::start_error;
@@ -10,7 +11,7 @@ use crate::estimate::Summary;
 use crate::judge::conclude;
 use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt};
 use crate::problem::{Control, Objective, Problem, Whitening, noise};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 static NEVER: Control = Control::NEVER;
 
@@ -35,10 +36,15 @@ impl Problem<'_> {
         let usable = further.as_ref().zip(found.as_ref().ok()).and_then(|(further, found)| further.usable(found));
         let found = match usable {
             Some(usable) => usable,
-            None => self.refined(found, 0, begin, &control)?,
+            None => {
+                let time = further.as_ref().map_or(Duration::ZERO, Further::time);
+                let found = self.refined(found, 0, begin + time, &control)?;
+                // Else the time of further searches is added where their best minimum is compared with the estimate.
+                let more = if leaves_unexplained(&found) { Duration::ZERO } else { time };
+                Summary { seconds: found.seconds + more.as_secs_f64(), ..found }
+            }
         };
-        let found = self.searched_elsewhere(&found, further.as_ref(), &control).unwrap_or(found);
-        Ok(Summary { seconds: begin.elapsed().as_secs_f64(), ..found })
+        Ok(self.searched_elsewhere(&found, further.as_ref(), &control).unwrap_or(found))
     }
 
     /// The estimate by a method, numbered as in [`by_method`](Self::by_method), or by a finer one, as long as a finer step would
