@@ -94,8 +94,8 @@ impl Equations {
     }
 
     /// These equations with process noise, measurement noise and dead times, as [`Model::diffusion`], [`Model::noise`] and
-    /// [`Model::delay`] say them: roots of the states, the outputs, the diffusion of each state, the noise of each output and the dead time
-    /// of each input. The last three may be left empty.
+    /// [`Model::delay`] say them. Roots in this order: derivatives (next states), outputs, the diffusion of each state, the noise of each output,
+    /// the dead time of each input (s). The last three may be left empty.
     ///
     /// # Errors
     /// If they do not fit the layout, or one of the last three depends on more than parameters.
@@ -224,7 +224,7 @@ impl Equations {
         [&self.diffusion, &self.noise]
     }
 
-    /// The dead time of each input; empty where not said.
+    /// The dead time of each input (s), in the order of the layout: roots that depend on parameters alone. Empty where not said.
     pub fn delay(&self) -> &[Id] {
         &self.delay
     }

@@ -93,8 +93,9 @@ pub trait Model: Send + Sync {
     }
 
     /// Dead time of each input (s): at time `t` the model has the input of as much earlier; before the first sample, that of the first
-    /// sample. Zero unless written. Continuous models see a held input jump between samples; a discrete one has the input that holds at the
-    /// sample. Online observers have no dead time: give them the late input.
+    /// sample. Zero unless written. Continuous models see a held input jump between samples; a discrete or static one has the input that holds at
+    /// the sample. One that is negative or not finite fails the simulation, which names it. Online observers refuse a dead time
+    /// ([`ObserverError::Late`](crate::online::ObserverError::Late)).
     #[inline]
     fn delay<S: Scalar>(&self, _p: &Of<Self::Parameters, S>) -> Of<Self::Input, S> {
         Self::Input::splat(S::from(0.0))

@@ -20,6 +20,7 @@ pub use mras::{AdaptationLaw, Gradient, Moment, Mras, MrasStart, Order, Rate, St
 pub use rls::{Forgetting, Rls};
 use ud_factors::UdFactors;
 
+use crate::model::Model;
 use crate::parameter::{Parameter, Transform};
 use crate::scalar::Scalar;
 use crate::signals::{Of, Signals};
@@ -145,6 +146,16 @@ pub enum ObserverError {
         lower: f64,
         /// Its upper bound.
         upper: f64,
+    },
+    /// A model with a dead time, which observers do not have.
+    #[error(
+        "input `{input}` is late by {delay} s, and an observer has no dead time: take a model without it, and give the input of as much earlier"
+    )]
+    Late {
+        /// The input.
+        input: &'static str,
+        /// Its dead time at the start (s).
+        delay: f64,
     },
     /// A free quantity without a prior, where an observer needs to know how far off the start may be.
     #[error("`{parameter}` is free but has no prior; say how far off its start may be: free(start).prior(start, std)")]
@@ -300,6 +311,15 @@ fn check_starts<P: Signals>(known: &Of<P, Parameter>) -> Result<(), ObserverErro
         }
     }
     Ok(())
+}
+
+/// Whether no input is late at the start.
+fn check_not_late<M: Model>(model: &M, known: &Of<M::Parameters, Parameter>) -> Result<(), ObserverError> {
+    let delays = M::Input::into_array(model.delay(&M::Parameters::map(*known, |known| known.start)));
+    match delays.as_ref().iter().position(|delay| *delay != 0.0) {
+        Some(i) => Err(ObserverError::Late { input: M::Input::NAMES[i], delay: delays.as_ref()[i] }),
+        None => Ok(()),
+    }
 }
 
 /// Whether all parameters are estimated as they are, for observers that know no logarithms.

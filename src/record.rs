@@ -15,7 +15,7 @@ mod time;
 
 pub use column::{Channel, Column};
 pub use cycles::Gap;
-pub(crate) use delays::{Part, ROUNDING};
+pub(crate) use delays::{NO_DEAD_TIME, Part, ROUNDING, is_dead_time};
 #[cfg(feature = "csv")]
 pub use file::{DataFile, DateOrder, FileFormat, Reading, TimeSource};
 pub(crate) use holds::Holds;

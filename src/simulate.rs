@@ -8,7 +8,7 @@ use crate::layout::Kind;
 use crate::model::Model;
 use crate::numeral::TimeUnit;
 use crate::random::Random;
-use crate::record::{Channel, Part, Record, Time};
+use crate::record::{Channel, NO_DEAD_TIME, Part, Record, Time, is_dead_time};
 use crate::signals::{Of, Signals};
 
 /// Simulates a model from an initial state, its inputs held from sample to sample, by the step that its kind asks for;
@@ -127,13 +127,14 @@ impl<'a, M: Model, I: Integrator> Simulator<'a, M, I> {
         if delays.iter().all(|delay| *delay == 0.0) {
             return Ok(None);
         }
-        if let Some(i) = delays.iter().position(|delay| !(0.0..f64::INFINITY).contains(delay)) {
-            return Err(failure(format!("the dead time of input `{}`", M::Input::NAMES[i]), delays[i], 0, time));
+        if let Some(i) = delays.iter().position(|delay| !is_dead_time(*delay)) {
+            let signal = format!("the dead time of input `{}`", M::Input::NAMES[i]);
+            return Err(failed(signal, delays[i], 0, time, NO_DEAD_TIME));
         }
         let values = |i: usize| inputs.iter().map(|u| M::Input::into_array(*u).as_ref()[i]).collect::<Vec<f64>>();
         let channels = (0..delays.len()).map(|i| Channel::new(M::Input::NAMES[i], M::Input::UNITS[i], values(i)));
         let record = Record::new(vec![], time.clone(), channels.collect(), vec![])?.hold(self.hold);
-        Ok(Some(Late { record, delays: delays.iter().copied().map(Some).collect() }))
+        Ok(Some(Late { record, delays: delays.iter().map(|delay| (*delay != 0.0).then_some(*delay)).collect() }))
     }
 
     fn check(&self, time: &Time, inputs: &[Of<M::Input, f64>]) -> Result<(), Error> {
@@ -183,6 +184,10 @@ impl Late {
 
 fn failure(signal: String, value: f64, sample: usize, time: &Time) -> Error {
     let hint = "; check the parameters and the initial state, or take a shorter step or a stiff method";
+    failed(signal, value, sample, time, hint)
+}
+
+fn failed(signal: String, value: f64, sample: usize, time: &Time, hint: &'static str) -> Error {
     Error::Simulation(Failure {
         experiment: "simulation".to_owned(),
         sample,

@@ -90,7 +90,7 @@ class Model:
 
     def delay(self, p: Vector) -> Returned:
         """Give the dead time of each input (s)."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} has no method delay(self, p)")
 
     def equations(self) -> Equations:
         """Read the model.

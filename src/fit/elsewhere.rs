@@ -1,7 +1,7 @@
 //! Searches that a fit runs by itself after its estimate was judged, since another minimum may be the right one: on the other side of
 //! half the frequency of sampling, and from further starts where an output is left unexplained.
 
-use super::refine::{Start, after, is_only_coarse, is_useless};
+use super::refine::{Start, is_only_coarse, is_useless};
 use crate::estimate::{About, Summary, Warning, WarningCode};
 use crate::numeral::counted;
 use crate::problem::{Control, Noise, Problem, SearchPlan, Settings};
@@ -53,14 +53,6 @@ pub(super) enum Further {
 }
 
 impl Further {
-    /// How long the searches took.
-    pub fn time(&self) -> Duration {
-        match self {
-            Further::Found { time, .. } => *time,
-            Further::TooLong(_) => Duration::ZERO,
-        }
-    }
-
     /// The best minimum, if it is usable, in place of the estimate before it.
     pub fn usable(&self, before: &Summary) -> Option<Summary> {
         match self {
@@ -69,11 +61,11 @@ impl Further {
         }
     }
 
-    /// The better one of the best minimum and another estimate, with a note.
+    /// The better one of the best minimum and an estimate that has the work of these searches, with a note.
     fn or(&self, found: &Summary) -> Summary {
         let (mut best, text) = match self {
             Further::Found { best, stopped, .. } => (
-                if is_better(best, found) { after(found, (**best).clone()) } else { found.clone() },
+                if is_better(best, found) { work_of(found, (**best).clone()) } else { found.clone() },
                 format!(
                     "the search from the declared start ended where an output is left unexplained, so that the fit searched from \
                      {STARTS} starts by itself, and went on from the best of them{}",
@@ -90,7 +82,25 @@ impl Further {
             ),
         };
         best.warnings.push(Warning::new(WarningCode::Unexplained, Severity::Usable, text).about(About::Search));
-        Summary { seconds: found.seconds + self.time().as_secs_f64(), ..best }
+        best
+    }
+}
+
+/// An estimate as if it had taken the work of another.
+fn work_of(of: &Summary, found: Summary) -> Summary {
+    Summary { iterations: of.iterations, evaluations: of.evaluations, seconds: of.seconds, ..found }
+}
+
+/// An estimate with the work of further searches after it.
+pub(super) fn with_work_of(found: Summary, further: Option<&Further>) -> Summary {
+    match further {
+        Some(Further::Found { best, time, .. }) => Summary {
+            iterations: found.iterations + best.iterations,
+            evaluations: found.evaluations + best.evaluations,
+            seconds: found.seconds + time.as_secs_f64(),
+            ..found
+        },
+        _ => found,
     }
 }
 
@@ -111,7 +121,10 @@ impl Problem<'_> {
         if leaves_unexplained(found) {
             return match further {
                 Some(further) => Some(further.or(found)),
-                None => Some(self.search_further(found, control)?.or(found)),
+                None => {
+                    let further = self.search_further(found, control)?;
+                    Some(further.or(&with_work_of(found.clone(), Some(&further))))
+                }
             };
         }
         if control.stops() {
@@ -162,7 +175,7 @@ impl Problem<'_> {
 
 /// Whether an estimate is not usable and leaves an output unexplained. That may not be the reason by itself: where the loss is robust
 /// or measurements are weighted, it is a warning only.
-pub(super) fn leaves_unexplained(found: &Summary) -> bool {
+fn leaves_unexplained(found: &Summary) -> bool {
     let of_an_output = |warning: &Warning| matches!(warning.about, About::Output(_));
     let unexplained = |warning: &Warning| warning.code == WarningCode::Unexplained && of_an_output(warning);
     found.severity() == Severity::NotUsable && found.warnings.iter().any(unexplained)

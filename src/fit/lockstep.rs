@@ -1,6 +1,6 @@
 //! Fits of single records in lockstep: one evaluation of all of them is one pass over lanes.
 
-use super::elsewhere::Further;
+use super::elsewhere::{Further, with_work_of};
 use super::refine::{Attempt, Start};
 use super::search::{Rounds, at_end, ended, settled};
 use crate::covariance::SearchEnd;
@@ -138,6 +138,9 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
     let all: Vec<From<'_>> = problems.iter().map(|problem| (problem, Start::declared(problem))).collect();
     let found = by_one_method(&all, &control);
     let further = each(found.len(), |i| problems[i].search_further(found[i].as_ref().ok()?, &control));
+    let found = found.into_iter().zip(&further);
+    let found: Vec<_> =
+        found.map(|(found, further)| found.map(|found| with_work_of(found, further.as_ref()))).collect();
     let usable = |(further, found): (&Option<Further>, &Result<Summary, Error>)| {
         further.as_ref().zip(found.as_ref().ok()).and_then(|(further, found)| further.usable(found))
     };

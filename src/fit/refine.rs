@@ -18,7 +18,8 @@ pub(super) const CERTAINLY_WORSE: f64 = 15.0;
 /// apart.
 const MOVED: f64 = 1.0;
 
-/// Minima whose deviances differ by less for each measurement, half a percent of their errors, are alike.
+/// Minima whose deviances differ by less for each measurement, half a percent of the errors, are alike. The errors of an output that is left
+/// unexplained are about as large as the output; if the step were the reason, one four times as fine would change them by far more.
 const ALIKE: f64 = 0.01;
 
 /// A part of a search that lowers the deviance by less makes no progress.
@@ -82,9 +83,9 @@ impl Attempt {
         }
     }
 
-    /// Where the search by a finer method begins: at the end of this one if the step is all that is wrong with it, else at the
-    /// start of the problem; `None` if that method's step would decide the cost there, too, where no trial step is left of so
-    /// many for all methods, and for an adaptive method, the slowest, where no step seems to be the reason.
+    /// Where the search by a finer method begins: at the end of this one if only the step is wrong with it, else at the declared start. `None` if no
+    /// trial step is left of so many for all methods, if the method is adaptive, the slowest, and no step seems to be the reason, or if the finer
+    /// step, too, would decide the cost at the start.
     pub fn start(&self, finer: &Problem<'_>, most: u64, control: &Control) -> Option<Start> {
         let trials = most.saturating_sub(self.found.as_ref().map_or(0, |found| found.iterations));
         if trials == 0 || finer.sweep.is_adaptive() && self.is_unexplained_by_any_step() {

@@ -1,6 +1,6 @@
 //! Running a problem: search, estimate at a given point, objective, prediction.
 
-use super::elsewhere::{Further, leaves_unexplained};
+use super::elsewhere::with_work_of;
 use super::refine::{Attempt, Start};
 use super::search::{at_end, search, settled};
 use super::start_error::start_error;
@@ -11,7 +11,7 @@ use crate::estimate::Summary;
 use crate::judge::conclude;
 use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt};
 use crate::problem::{Control, Objective, Problem, Whitening, noise};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 static NEVER: Control = Control::NEVER;
 
@@ -33,16 +33,10 @@ impl Problem<'_> {
         let found = self.run_within(begin, &control, Start::declared(self));
         // Before finer methods, each of which takes several times as long.
         let further = found.as_ref().ok().and_then(|found| self.search_further(found, &control));
-        let usable = further.as_ref().zip(found.as_ref().ok()).and_then(|(further, found)| further.usable(found));
-        let found = match usable {
+        let found = found.map(|found| with_work_of(found, further.as_ref()));
+        let found = match further.as_ref().zip(found.as_ref().ok()).and_then(|(further, found)| further.usable(found)) {
             Some(usable) => usable,
-            None => {
-                let time = further.as_ref().map_or(Duration::ZERO, Further::time);
-                let found = self.refined(found, 0, begin + time, &control)?;
-                // Else the time of further searches is added where their best minimum is compared with the estimate.
-                let more = if leaves_unexplained(&found) { Duration::ZERO } else { time };
-                Summary { seconds: found.seconds + more.as_secs_f64(), ..found }
-            }
+            None => self.refined(found, 0, begin, &control)?,
         };
         Ok(self.searched_elsewhere(&found, further.as_ref(), &control).unwrap_or(found))
     }

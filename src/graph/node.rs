@@ -54,11 +54,12 @@ pub enum Leaf {
     Measured(u32),
     /// A parameter.
     Parameter(u32),
-    /// An input that is late, where samples are evenly spaced.
+    /// A value of an input that is late, where samples are evenly spaced; in graphs of one step only: [`Equations`](crate::equations::Equations)
+    /// refuse it.
     Late {
         /// Which input.
         input: u32,
-        /// Samples after the one that it had reached just before this sample: 0 for that one.
+        /// Which value: 0 is the one that held just before this sample, 1 that of the sample after it, 2 the next.
         after: u32,
     },
 }

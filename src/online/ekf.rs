@@ -3,7 +3,7 @@
 //! the parameters' covariance in a block of its own, which survives when the state must start anew.
 
 use super::{Beat, Clock, Divergence, Guard, ObserverError, UdFactors, Update, UpdateOutcome, Watch};
-use super::{check_all_positive, check_starts, in_bounds, not_finite, prior_std};
+use super::{check_all_positive, check_not_late, check_starts, in_bounds, not_finite, prior_std};
 use crate::dual::Dual;
 use crate::integrate::{Automatic, Integrator, ModelSystem};
 use crate::interval::{Hold, Interval};
@@ -96,10 +96,11 @@ impl<M: Model, const N: usize, I: Integrator> Ekf<M, N, I> {
     ///
     /// # Errors
     /// A sample time or noise that is not positive, a start outside its bounds, a free quantity without prior, more
-    /// states and free parameters than `N`.
+    /// states and free parameters than `N`, a model with a dead time.
     pub fn with_integrator(model: M, integrator: I, ts: f64, start: EkfStart<M>) -> Result<Self, ObserverError> {
         check_starts::<M::State>(&start.state)?;
         check_starts::<M::Parameters>(&start.parameters)?;
+        check_not_late(&model, &start.parameters)?;
         check_all_positive::<M::Output>("the noise", &start.noise)?;
         let (state, known) = (M::State::into_array(start.state), M::Parameters::into_array(start.parameters));
         let needed = M::State::LEN + known.as_ref().iter().filter(|known| known.free).count();

@@ -11,7 +11,7 @@ mod stability;
 pub use law::{AdaptationLaw, Gradient, Moment, Rate};
 
 use super::{Beat, Clock, Divergence, Guard, ObserverError, Update, UpdateOutcome, Watch};
-use super::{check_identity, check_starts, in_bounds, not_finite};
+use super::{check_identity, check_not_late, check_starts, in_bounds, not_finite};
 use crate::integrate::{Automatic, ModelSystem};
 use crate::interval::{Hold, Interval};
 use crate::layout::Kind;
@@ -107,9 +107,10 @@ impl<M: Model, L: AdaptationLaw<M>> Mras<M, L> {
     ///
     /// # Errors
     /// A sample time that is not positive, a start outside its bounds, a logarithm, a pull below zero, forward Euler of
-    /// a model that is not continuous.
+    /// a model that is not continuous, a model with a dead time.
     pub fn new(model: M, law: L, ts: f64, start: MrasStart<M>) -> Result<Self, ObserverError> {
         check_starts::<M::Parameters>(&start.parameters)?;
+        check_not_late(&model, &start.parameters)?;
         check_identity::<M::Parameters>(&start.parameters)?;
         if start.stepping == Stepping::Euler && M::KIND != Kind::Continuous {
             return Err(ObserverError::EulerOfDiscrete);

@@ -76,7 +76,7 @@ impl Horizon {
         let constants: Vec<Duals> = p.iter().map(|p| Duals::constant(*p)).collect();
         let mut delays = vec![Duals::constant(0.0); record.inputs().len()];
         functions.delay(&constants, &mut delays);
-        let delays: Vec<Option<f64>> = delays.iter().map(|delay| Some(delay.value)).collect();
+        let delays: Vec<Option<f64>> = delays.iter().map(|delay| (delay.value != 0.0).then_some(delay.value)).collect();
         let not_measured = |reason| Error::StateNotMeasured {
             experiment: record.name().to_owned(),
             reason,

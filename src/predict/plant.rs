@@ -175,9 +175,14 @@ impl<S: Stepped> SlicePlant<'_, S> {
                 (value, rows)
             };
             let field = Field { kind, interval: (0.0, 1.0), states, rate: &rate, slopes: &slopes };
-            let end = S::advance(self.method, &field, z.to_vec(), &mut 0.0);
+            let long = length.value() > 0.0;
+            let mut step = if long { self.step.get() / length.value() } else { 0.0 };
+            let end = S::advance(self.method, &field, z.to_vec(), &mut step);
             part.set(None);
             z.copy_from_slice(&end?);
+            if long {
+                self.step.set(step * length.value());
+            }
         }
         Ok(())
     }

@@ -4,8 +4,8 @@ use super::Record;
 use crate::interval::Hold;
 use crate::scalar::Scalar;
 
-/// A part of an interval between two samples. Where a dead time has slopes, so have begin, length and inputs: what a held input does to the
-/// state changes with its dead time by the jump, at the time of the jump.
+/// A part of the interval between two samples in which no input jumps or bends. Where a dead time has slopes, begin and length have them, too:
+/// so the slopes of the state contain what a jump does that comes later.
 pub(crate) struct Part<S> {
     /// Begin (s).
     pub t0: S,
@@ -17,23 +17,33 @@ pub(crate) struct Part<S> {
     pub u1: Vec<S>,
 }
 
-/// A part of the sample time by which a dead time may differ from a whole number of samples and is still that.
+/// A part of the sample time by which a dead time may differ from a whole number of samples and is still that. Times are rounded to 2e-16 of
+/// themselves, which is 2e-10 of the sample time after a million samples.
 pub(crate) const ROUNDING: f64 = 1e-9;
 
+/// Whether a dead time (s) is one: zero or longer, and finite.
+pub(crate) fn is_dead_time(delay: f64) -> bool {
+    (0.0..f64::INFINITY).contains(&delay)
+}
+
+/// What to do about a dead time that is none.
+pub(crate) const NO_DEAD_TIME: &str = "; a dead time is zero or longer, and finite: bound its parameter from below by zero \
+                                       (.within(0.0, ..), or .log()), or correct its expression";
+
 impl Record {
-    /// The interval from sample `k` on, cut where an input that is late by its dead time (s; none of one that is not late) jumps or bends. Of a
-    /// jump at the begin there is a part of no length before it, which has slopes. After the last sample no time passes.
+    /// The interval from sample `k` on, cut at each time at which a late input jumps (held) or bends (interpolated). `delays`: the dead time of
+    /// each input (s), none of one that is not late. A jump just at the begin leaves a part of length zero before it, for its slopes. After the
+    /// last sample there is a part of length zero.
     pub(crate) fn parts<S: Scalar>(&self, k: usize, delays: &[Option<S>]) -> Vec<Part<S>> {
         let begin = self.time(k);
         let end = if k + 1 < self.len() { self.time(k + 1) } else { begin };
         let (first, last) = (begin - self.soon(k), end - self.soon(k + 1));
-        // Of each input the sample that it has reached before the interval; at a cut, its next one.
+        // Of each input the last sample that it has reached before the interval; it goes on to the next at a cut.
         let (mut reached, mut cuts) = (vec![Some(k); delays.len()], vec![]);
         for (i, delay) in delays.iter().enumerate() {
             let Some(delay) = *delay else { continue };
             let at = |j: usize| self.time(j) + delay.value();
-            let before = self.sample_at(first - delay.value());
-            reached[i] = (at(before) < first).then_some(before);
+            reached[i] = self.reached_before(first, delay.value());
             let next = reached[i].map_or(0, |before| before + 1);
             let here = (next..self.len()).take_while(|j| at(*j) < last).filter(|j| self.bends(i, *j));
             cuts.extend(here.map(|j| (delay + self.time(j), i, j)));
@@ -53,9 +63,22 @@ impl Record {
         parts
     }
 
-    /// How much before sample `k` is still at it (s).
+    /// How much before sample `k` is still at it (s); at least what a time so large rounds off.
     fn soon(&self, k: usize) -> f64 {
-        if k > 0 && k < self.len() { ROUNDING * (self.time(k) - self.time(k - 1)) } else { 0.0 }
+        if k == 0 || k >= self.len() {
+            return 0.0;
+        }
+        let rounding = 4.0 * f64::EPSILON * self.time(k).abs();
+        rounding.max(ROUNDING * (self.time(k) - self.time(k - 1)))
+    }
+
+    /// The last sample that an input with this dead time (s) has reached before a time (s); none before the first.
+    fn reached_before(&self, t: f64, delay: f64) -> Option<usize> {
+        let mut last = self.sample_at(t - delay);
+        while self.time(last) + delay >= t {
+            last = last.checked_sub(1)?;
+        }
+        Some(last)
     }
 
     /// The inputs at sample `k`, late by their dead times.
@@ -64,9 +87,15 @@ impl Record {
         let late = |(i, delay): (usize, &Option<S>)| {
             let Some(delay) = *delay else { return S::from(self.inputs[i].values[k]) };
             // A held input has jumped, an interpolated one still has the slope of a longer dead time.
-            let at = t - delay.value() + if self.input_hold(i) == Hold::Zero { self.soon(k) } else { -self.soon(k) };
-            let last = self.sample_at(at);
-            self.late(i, Some(delay), (self.time(last) < at).then_some(last), S::from(t))
+            let reached = match self.input_hold(i) {
+                Hold::Zero => {
+                    let at = t - delay.value() + self.soon(k);
+                    let last = self.sample_at(at);
+                    (self.time(last) <= at).then_some(last)
+                }
+                Hold::First => self.reached_before(t - self.soon(k), delay.value()),
+            };
+            self.late(i, Some(delay), reached, S::from(t))
         };
         delays.iter().enumerate().map(late).collect()
     }
@@ -74,7 +103,7 @@ impl Record {
     /// Input `i` at time `t`, where it has reached this sample; none before the first. Not a number for a dead time that is negative or none.
     fn late<S: Scalar>(&self, i: usize, delay: Option<S>, reached: Option<usize>, t: S) -> S {
         let (values, delay) = (&self.inputs[i].values, delay.unwrap_or(S::from(0.0)));
-        if !(0.0..f64::INFINITY).contains(&delay.value()) {
+        if !is_dead_time(delay.value()) {
             return S::from(f64::NAN);
         }
         match (self.input_hold(i), reached) {
@@ -165,5 +194,37 @@ mod tests {
         // Before the record it stands still.
         assert_eq!(parts(&record, 0, 0.5), [[0.0, 0.0, 0.5, 0.0, 0.0], [0.5, 1.0, 0.5, 0.0, 2.0]]);
         assert_eq!(record.late_inputs(0, &[Some(0.5)]), [0.0]);
+    }
+
+    /// Rows of one instant, and times so large that a thousand-millionth of the step is less than they round off.
+    #[test]
+    fn times_that_are_equal_and_large() {
+        let state = Quantity { name: "x".to_owned(), unit: "1".to_owned() };
+        let of = |time: Time, values: Vec<f64>| {
+            Record::new(vec![state.clone()], time, vec![Channel::new("u", "1", values)], vec![])
+                .unwrap()
+                .hold(Hold::Zero)
+        };
+        let twice = of(Time::Stamps(vec![0.0, 1.0, 1.0, 2.0, 3.0]), vec![5.0, 7.0, 7.0, 8.0, 9.0]);
+        let at = |record: &Record, delay: f64| -> Vec<f64> {
+            (0..record.len()).map(|k| record.late_inputs(k, &[Some(delay)])[0]).collect()
+        };
+        assert_eq!(at(&twice, 0.0), [5.0, 7.0, 7.0, 8.0, 9.0]);
+        assert_eq!(at(&twice, 1.0), [5.0, 5.0, 5.0, 7.0, 8.0]);
+        let large = of(Time::Uniform { start: 1.7e9, step: 1.0 }, vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(at(&large, 3.0), [1.0, 1.0, 1.0, 1.0, 2.0, 3.0]);
+        for (record, delay) in [(&twice, 0.0), (&twice, 1.0), (&large, 3.0)] {
+            for k in 0..record.len() {
+                let parts = record.parts::<f64>(k, &[Some(delay)]);
+                assert!(parts.iter().all(|part| part.length >= 0.0), "{k} {delay}");
+                let end = parts.last().unwrap();
+                // The interval is covered, and ends with the input that its last part has.
+                let step = if k + 1 < record.len() { record.time(k + 1) - record.time(k) } else { 0.0 };
+                assert_eq!(parts.iter().map(|part| part.length).sum::<f64>(), step, "{k} {delay}");
+                if step > 0.0 {
+                    assert_eq!(end.u0[0], at(record, delay)[k], "{k} {delay}");
+                }
+            }
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! [`LateInputs`]: inputs with dead times, in symbols.
 //!
-//! Where samples are evenly spaced, a dead time is a whole number of samples and a rest: each interval has one cut, always at the rest, where
-//! a late input goes on to its next sample. Several dead times cut it into as many parts and one more, in the order of their rests.
+//! Where samples are evenly spaced, a dead time is a whole number of samples and a rest shorter than one. In each interval a late input then goes
+//! on to its next sample once, at the rest after the sample. With several dead times an interval has one part more than dead times that differ,
+//! in the order of their rests.
 
 use crate::equations::{DeadTimes, Equations};
 use crate::graph::{Leaf, Symbol};
@@ -77,7 +78,8 @@ impl LateInputs {
         ends.into_iter().enumerate().map(part).collect()
     }
 
-    /// A late input in a part, `after()` the sample (s), or at the sample itself; `None` of one that is not late.
+    /// An input that is late, in a part of the interval, or at the sample itself without one; `None` of an input that is not late. `after` gives the
+    /// time after the sample (s).
     pub fn input(&self, i: u32, hold: Hold, part: Option<usize>, after: impl FnOnce() -> Symbol) -> Option<Symbol> {
         let of = (*self.of.get(i as usize)?)?;
         let (cut, rank) = (self.cuts[of], self.ranks[of]);

@@ -32,20 +32,20 @@ pub(crate) struct DualSweep<'a> {
 }
 
 impl DualSweep<'_> {
-    fn filter(&self) -> Filter<'_> {
+    fn filter(&self, p: &[f64]) -> Filter<'_> {
         Filter {
             layout: &self.layout,
             values: self.code.values(),
             duals: self.code.duals(),
             method: &*self.method,
-            late: self.code.late(),
+            late: self.code.late(p),
             predictor: &*self.predictor,
         }
     }
 
     /// The inputs that the model has at a sample.
     fn input(&self, record: &Record, sample: usize, p: &[f64]) -> Vec<f64> {
-        match delays(self.code.values(), &self.code.late(), p) {
+        match delays(self.code.values(), &self.code.late(p), p) {
             none if none.is_empty() => record.input(sample),
             delays => record.late_inputs(sample, &delays),
         }
@@ -100,13 +100,14 @@ impl Sweep for DualSweep<'_> {
     fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Reached {
         match self.predictor.is_simulation() {
             true => unmoved(state, parameters),
-            false => self.filter().start(record, state, parameters),
+            false => self.filter(parameters).start(record, state, parameters),
         }
     }
 
     fn run(&self, pieces: &[Piece<'_>], seeds: &[Seed], visit: Visit<'_>) -> Vec<Result<Reached, RunError>> {
         let one = |piece: &Piece<'_>| {
-            let (restart, filter) = (self.predictor.restarts().map(|horizon| horizon.steps), self.filter());
+            let restart = self.predictor.restarts().map(|horizon| horizon.steps);
+            let filter = self.filter(piece.parameters);
             match (restart.is_some() || self.predictor.is_simulation()) && !filter.late.contains(&true) {
                 true => self.code.run(&filter, piece, seeds, restart, visit),
                 false => filter.run(piece, seeds, restart, visit),
@@ -149,7 +150,7 @@ impl Sweep for DualSweep<'_> {
         stops: &dyn Fn() -> bool,
     ) -> Option<Result<Failure, Failure>> {
         let (layout, values, duals) = (&*self.layout, self.code.values(), self.code.duals());
-        let late = self.code.late();
+        let late = self.code.late(parameters);
         let search = FailureSearch { layout, values, duals, method: &*self.method, late, record };
         Some(search.locate(state, parameters, sample, sigma, stops))
     }

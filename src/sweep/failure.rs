@@ -5,7 +5,7 @@ use crate::functions::{Functions, delays};
 use crate::integrate::{Duals, Method, Stuck};
 use crate::layout::Layout;
 use crate::predict::{Between, Plant, SlicePlant};
-use crate::record::Record;
+use crate::record::{NO_DEAD_TIME, Record, is_dead_time};
 use core::cell::Cell;
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -50,10 +50,10 @@ impl FailureSearch<'_> {
         let runaway = |x: &[f64]| x.iter().copied().enumerate().find(|(_, x)| x.abs() >= RUNAWAY);
         let name = |i: usize| &self.layout.states[i].name;
         let delays = delays(self.values, &self.late, p);
-        let wrong = |delay: &Option<f64>| delay.is_some_and(|delay| !(0.0..f64::INFINITY).contains(&delay));
+        let wrong = |delay: &Option<f64>| delay.is_some_and(|delay| !is_dead_time(delay));
         if let Some(i) = delays.iter().position(wrong) {
             let signal = format!("the dead time of input `{}`", self.layout.inputs[i].name);
-            return broken(0, signal, delays[i].unwrap_or(f64::NAN), NEGATIVE);
+            return broken(0, signal, delays[i].unwrap_or(f64::NAN), NO_DEAD_TIME);
         }
         let mut x = state.to_vec();
         let step = Cell::new(0.0);
@@ -110,7 +110,6 @@ const RUNAWAY: f64 = 1e30;
 
 const STUCK: &str = "; no step is short enough, or 100,000 of them do not reach the next sample: the model is too stiff for \
                      the method, jumps, or leaves its domain (take Esdirk, or smooth the model)";
-const NEGATIVE: &str = "; it is zero or longer: bound its parameter (.within(0.0, ..), or .log())";
 const UNDEFINED: &str = "; the equations are undefined there (a division by zero, a root or logarithm out of its domain, \
                          or the `derivative` or `next` that Model::KIND asks for was not written): bound the parameters, \
                          or start elsewhere (parameters and initial states)";

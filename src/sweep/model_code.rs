@@ -37,8 +37,8 @@ pub(crate) trait ModelCode: Send + Sync {
     /// Whether derivatives (next states) and outputs are affine in the state, as far as slopes with respect to it are asked for.
     fn is_affine(&self) -> bool;
 
-    /// Which inputs have a dead time.
-    fn late(&self) -> Vec<bool>;
+    /// Which inputs have a dead time at these parameters.
+    fn late(&self, p: &[f64]) -> Vec<bool>;
 
     /// Text that identifies the equations.
     fn identity(&self) -> String;
@@ -79,13 +79,12 @@ impl<M: Model> ModelCode for Typed<'_, M> {
         true
     }
 
-    /// Those whose dead time is not zero, or moves with a parameter, where all parameters are one.
-    fn late(&self) -> Vec<bool> {
-        let (inputs, parameters) = (M::Input::LEN, M::Parameters::LEN);
-        let mut late = vec![false; inputs];
-        for first in (0..parameters.max(1)).step_by(COLUMNS) {
-            let p: Vec<Duals> = (0..parameters).map(|j| Dual::variable(1.0, j.wrapping_sub(first))).collect();
-            let mut delay = vec![Duals::constant(0.0); inputs];
+    /// Those whose dead time is not zero, or moves with a parameter.
+    fn late(&self, p: &[f64]) -> Vec<bool> {
+        let mut late = vec![false; M::Input::LEN];
+        for first in (0..p.len().max(1)).step_by(COLUMNS) {
+            let p: Vec<Duals> = p.iter().enumerate().map(|(j, p)| Dual::variable(*p, j.wrapping_sub(first))).collect();
+            let mut delay = vec![Duals::constant(0.0); late.len()];
             self.model.delay(&p, &mut delay);
             let zero = |delay: &Duals| delay.value == 0.0 && delay.slopes == [0.0; COLUMNS];
             late.iter_mut().zip(&delay).for_each(|(late, delay)| *late |= !zero(delay));
@@ -101,6 +100,7 @@ impl<M: Model> ModelCode for Typed<'_, M> {
 /// Equations, evaluated node by node.
 pub(crate) struct Evaluated {
     equations: Arc<Equations>,
+    late: Vec<bool>,
     /// Made when a predictor asks for them.
     slopes: OnceLock<Slopes>,
     moments: OnceLock<(MomentsOf, MomentsOf)>,
@@ -108,7 +108,8 @@ pub(crate) struct Evaluated {
 
 impl Evaluated {
     pub fn new(equations: Arc<Equations>) -> Self {
-        Evaluated { equations, slopes: OnceLock::new(), moments: OnceLock::new() }
+        let late = equations.late();
+        Evaluated { equations, late, slopes: OnceLock::new(), moments: OnceLock::new() }
     }
 
     fn slopes(&self) -> &Slopes {
@@ -187,8 +188,8 @@ impl ModelCode for Evaluated {
         self.equations.is_affine()
     }
 
-    fn late(&self) -> Vec<bool> {
-        self.equations.late()
+    fn late(&self, _p: &[f64]) -> Vec<bool> {
+        self.late.clone()
     }
 
     /// The equations as they are written to a file.

@@ -245,8 +245,8 @@ impl Model for Exploding {
     }
 }
 
-/// From the start on, within the search, or turning 500 times in each of the 200 samples. A search by 256 steps per sample has 20 trials of 200
-/// samples: 4 million evaluations, as many as all methods before it take together at most.
+/// From the start on, within the search, or turning 500 times in each of the 200 samples. 20 trial steps of 200 samples by each of 4, 16, 64 and
+/// 256 steps of four evaluations are 5.4 million; the implicit method comes on top of that.
 #[test]
 fn what_explodes_or_is_fast_is_given_up_soon() {
     for (gain, turn) in [(1e3, 1.0), (1e-3, 1.0), (0.3, 3e3), (-1e-4, 3e3)] {
@@ -260,6 +260,6 @@ fn what_explodes_or_is_fast_is_given_up_soon() {
         let count = model.0.load(Ordering::Relaxed);
         println!("{gain} {turn}: {count}");
         assert!(found.is_err() || found.is_ok_and(|fit| fit.severity() == Severity::NotUsable), "{gain} {turn}");
-        assert!(count < 8_000_000, "{gain} {turn}: {count}");
+        assert!(count < 6_500_000, "{gain} {turn}: {count}");
     }
 }

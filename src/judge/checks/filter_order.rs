@@ -24,16 +24,16 @@ const FAR: f64 = 2.0;
 /// Whether an unknown of a fit by the extended filter would move by that of second order.
 fn filter_order(evidence: &Evidence<'_>, intervals: &Intervals) -> Examined {
     let objective = evidence.point.objective;
-    if objective.sweep.linearizes_choices() {
+    let chooses = objective.sweep.linearizes_choices().then(|| {
         let text = "the model chooses by its state (an `if`, a limit, an absolute value, a place in a table), and the filter takes the choice \
                     at the mean of the state for all of its standard deviation: estimates and intervals may be far off; write the choice in a \
                     smooth form (a `tanh`), so that this can be tested, or compare with a simulation";
-        return Some(with_care(WarningCode::FilterOrder, text.to_owned())).into();
-    }
+        with_care(WarningCode::FilterOrder, text.to_owned())
+    });
     let many = objective.problem.layout().states.len() > MOST;
     let closer = (!many).then(|| objective.sweep.second_order()).flatten();
     let part = (many && objective.sweep.predicts_variance()).then_some("models of more than 8 states");
-    let Some(closer) = closer else { return Examined::from(vec![]).without(part) };
+    let Some(closer) = closer else { return Examined::from(chooses).without(part) };
     let advice = "fit with SecondOrder, or measure more often";
     let warning = match shift(evidence, &objective.of(objective.problem, &*closer), &intervals.unknowns) {
         Some(Shift { errors, .. }) if errors < CARE => None,
@@ -51,5 +51,5 @@ fn filter_order(evidence: &Evidence<'_>, intervals: &Intervals) -> Examined {
             Some(with_care(WarningCode::FilterOrder, text))
         }
     };
-    warning.into()
+    chooses.into_iter().chain(warning).collect::<Vec<_>>().into()
 }

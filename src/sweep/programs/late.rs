@@ -2,7 +2,7 @@
 
 use crate::equations::{DeadTimes, Equations};
 use crate::functions::Functions;
-use crate::record::{ROUNDING, Time};
+use crate::record::{ROUNDING, Time, is_dead_time};
 use crate::sweep::Piece;
 use std::sync::Arc;
 
@@ -25,7 +25,7 @@ impl Whole {
     fn of(time: f64, step: f64, samples: usize) -> Option<Self> {
         let whole = (time / step + ROUNDING).floor();
         match whole {
-            _ if !(0.0..f64::INFINITY).contains(&time) => None,
+            _ if !is_dead_time(time) => None,
             _ if whole > samples as f64 => Some(Whole { samples: samples as isize, seconds: time }),
             _ => Some(Whole { samples: whole as isize, seconds: whole * step }),
         }
@@ -54,7 +54,8 @@ impl Late {
         piece.parameters.iter().copied().chain(whole).collect()
     }
 
-    /// How many samples before the sample an input is read, so many samples after the one that it had reached.
+    /// How many samples before the present one (negative: after it) the value stands that [`Leaf::Late`](crate::graph::Leaf::Late) reads; `None`
+    /// for an input that is not late, and a dead time that cannot be.
     pub fn behind(&self, whole: &[Option<Whole>], input: usize, after: usize) -> Option<isize> {
         let number = (*self.times.of.get(input)?)?;
         whole.get(number).copied().flatten().map(|whole| whole.samples + 1 - after as isize)
