@@ -4,7 +4,7 @@
 //! | observer | for |
 //! |---|---|
 //! | [`Mras`] | measured states, a few parameters with an adaptation law each: the cheapest; no interval |
-//! | [`Ekf`] | any [`Model`](crate::Model): states and parameters together, with their covariance |
+//! | [`Ekf`] | any [`Model`]: states and parameters together, with their covariance |
 //! | [`Rls`] | outputs linear in the parameters |
 //!
 //! Every update returns its innovation and an [`UpdateOutcome`]. An observer that diverges stops: it keeps the last estimates

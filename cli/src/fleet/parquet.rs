@@ -40,7 +40,7 @@ pub fn write(header: &[String], texts: usize, rows: &[Row]) -> Result<Vec<u8>, F
     Ok(writer.into_inner()?)
 }
 
-/// The rows of a file that [`write`] wrote.
+/// The rows of a file that [`write()`] wrote.
 pub fn read(path: &Path, header: &[String], texts: usize) -> Result<Vec<Row>, Failure> {
     let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(path)?)?.build()?;
     let mut rows = vec![];
