@@ -174,7 +174,7 @@ fn guarded<T>(file: &DataFile, format: FileFormat, read: impl FnOnce() -> Result
 /// Reads the signals of a plan, then its time, then the column to group by.
 ///
 /// # Errors
-/// As [`Columns::read`]; a signal whose cells are no numbers.
+/// As [`Columns::read`]; columns that differ in length.
 pub(super) fn read(
     of: &DataFile,
     file: &mut (dyn Columns + '_),
@@ -182,7 +182,14 @@ pub(super) fn read(
     keys: Option<usize>,
 ) -> Result<Vec<Cells>, Error> {
     let columns: Vec<usize> = plan.sources.iter().map(|source| source.column).chain(plan.time).collect();
-    guarded(of, file.format(), || file.read(&columns, keys))
+    let cells = guarded(of, file.format(), || file.read(&columns, keys))?;
+    let expected = cells.first().map_or(0, Cells::len);
+    if let Some(place) = cells.iter().position(|cells| cells.len() != expected) {
+        let all: Vec<usize> = columns.into_iter().chain(keys).collect();
+        let [reference, what] = [0, place].map(|place| format!("`{}`", file.names()[all[place]]));
+        return Err(Error::Lengths { experiment: of.name(), what, found: cells[place].len(), reference, expected });
+    }
+    Ok(cells)
 }
 
 impl DataFile {
