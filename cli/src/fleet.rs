@@ -100,7 +100,11 @@ impl Reader<'_> {
             return vec![(name(None), record.map_err(|error| error.to_string()))];
         };
         match records::groups(path, self.model, of_records, &of_model.initial, by) {
-            Ok(groups) => groups.into_iter().map(|(group, record)| (name(Some(group)), record)).collect(),
+            Ok(groups) => {
+                // As the table has rows without a name.
+                let group = |group: String| Some(group).filter(|group| !group.is_empty());
+                groups.into_iter().map(|(name_of, record)| (name(group(name_of)), record)).collect()
+            }
             Err(error) => vec![(name(None), Err(error.to_string()))],
         }
     }
