@@ -34,11 +34,15 @@ pub fn run(one: &Fleet, terminal: &Terminal) -> Result<Verdict, Failure> {
     }
     let bar = terminal.steps(paths.len(), "files");
     let reader = Reader { one, model: &model, quiet: &terminal.silent(), waiting: RefCell::default() };
-    // Whatever is read is in the table or on its way there, and is not read again.
+    // Names already in the table or queued for a fit; a record of the same name is not fitted again.
     let mut known: HashSet<Name> = table.rows().iter().map(|row| row.name.clone()).collect();
     let mut files: HashMap<String, u32> = HashMap::new();
     let there = paths.iter().take_while(|_| !terminal.stopped()).flat_map(|path| {
         bar.inc(1);
+        // Which records a file has that are told apart by a column is known only when it is read.
+        if one.by.is_none() && known.contains(&name(path, None)) {
+            return vec![];
+        }
         let read = reader.read(path).into_iter().filter(|(name, _)| {
             if let Some(group) = &name.group {
                 *files.entry(group.clone()).or_default() += 1;
@@ -86,7 +90,7 @@ struct Reader<'a> {
     one: &'a Fleet,
     model: &'a Model,
     quiet: &'a Terminal,
-    /// Why a record has no answer, if it will have none.
+    /// Records in the order read. `Some(error)`: could not be read, so the fit gives no answer for it; `None`: an answer will come.
     waiting: RefCell<VecDeque<(Name, Option<String>)>>,
 }
 
@@ -94,18 +98,17 @@ impl Reader<'_> {
     /// The records of a file, or one error for all of it.
     fn read(&self, path: &Path) -> Vec<(Name, Result<Record, String>)> {
         let Fleet { of_model, of_records, by, .. } = self.one;
-        let name = |group| Name { record: path.to_string_lossy().into_owned(), group };
         let Some(by) = by else {
             let record = records::one(path, self.model, of_records, &of_model.initial, self.quiet);
-            return vec![(name(None), record.map_err(|error| error.to_string()))];
+            return vec![(name(path, None), record.map_err(|error| error.to_string()))];
         };
         match records::groups(path, self.model, of_records, &of_model.initial, by) {
             Ok(groups) => {
                 // As the table has rows without a name.
                 let group = |group: String| Some(group).filter(|group| !group.is_empty());
-                groups.into_iter().map(|(name_of, record)| (name(group(name_of)), record)).collect()
+                groups.into_iter().map(|(name_of, record)| (name(path, group(name_of)), record)).collect()
             }
-            Err(error) => vec![(name(None), Err(error.to_string()))],
+            Err(error) => vec![(name(path, None), Err(error.to_string()))],
         }
     }
 
@@ -133,6 +136,11 @@ impl Reader<'_> {
         }
         Ok(())
     }
+}
+
+/// The name of a record of a file.
+fn name(path: &Path, group: Option<String>) -> Name {
+    Name { record: path.to_string_lossy().into_owned(), group }
 }
 
 /// A file beside another, with this at the end of its name.

@@ -128,6 +128,29 @@ fn rows_without_a_name_are_in_the_table_once() {
     }
 }
 
+/// A pipe that nobody writes to holds up whoever opens it.
+#[cfg(unix)]
+#[test]
+fn files_that_are_in_the_table_are_not_opened() {
+    let bench = Bench::new();
+    let words = ["fleet", "pmsm.toml", "record.csv", "--out", "t.csv"];
+    bench.ends(0, &words);
+    std::fs::remove_file(bench.path("record.csv")).unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(bench.path("record.csv")).status().unwrap().success());
+    let mut run = bench.command(&words).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let begin = Instant::now();
+    let ended = loop {
+        match run.try_wait().unwrap() {
+            None if begin.elapsed() < Duration::from_secs(30) => std::thread::sleep(Duration::from_millis(10)),
+            ended => break ended,
+        }
+    };
+    if ended.is_none() {
+        run.kill().unwrap();
+    }
+    assert!(ended.is_some_and(|status| status.success()), "{ended:?}");
+}
+
 #[cfg(feature = "arrow")]
 #[test]
 fn a_table_may_be_parquet() {
