@@ -64,7 +64,7 @@ impl Cells {
         }
     }
 
-    /// Numbers as texts, to group by.
+    /// Whole numbers as texts, to group by; NaN is an empty one.
     #[cfg(any(feature = "mat", feature = "npz"))]
     fn into_keys(self) -> Result<Cells, String> {
         match self {
@@ -72,7 +72,14 @@ impl Cells {
             Cells::Numbers(numbers) if numbers.iter().any(|number| number.abs() >= MAX_KEY) => {
                 Err("numbers beyond 2^53, which are rounded".to_owned())
             }
-            Cells::Numbers(numbers) => Ok(Cells::Texts(numbers.iter().map(f64::to_string).collect())),
+            Cells::Numbers(numbers) if numbers.iter().any(|number| number.is_finite() && number.fract() != 0.0) => {
+                Err("numbers that are not whole".to_owned())
+            }
+            Cells::Numbers(numbers) => {
+                // Minus zero is zero.
+                let key = |number: f64| if number.is_nan() { String::new() } else { (number + 0.0).to_string() };
+                Ok(Cells::Texts(numbers.into_iter().map(key).collect()))
+            }
             Cells::Texts(_) => Ok(self),
             _ => Err(self.kind().to_owned()),
         }

@@ -1,0 +1,55 @@
+//! Files that are no text, made here: keys that are no names, counts of nanoseconds, times of day, attributes of HDF5.
+#![cfg(all(feature = "arrow", feature = "mat", feature = "npz"))]
+
+use crate::pmsm::Pmsm;
+use crate::refused::says;
+use greybox::DataFile;
+use greybox::layout::Layout;
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use zip::ZipWriter;
+use zip::write::SimpleFileOptions;
+
+const SIGNALS: [&str; 4] = ["ud", "w", "id", "iq"];
+
+fn path(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("made");
+    std::fs::create_dir_all(&folder).unwrap();
+    folder.join(name)
+}
+
+fn floats(values: &[f64]) -> Vec<[u8; 8]> {
+    values.iter().map(|value| value.to_le_bytes()).collect()
+}
+
+/// A NumPy archive of the signals and of one more column, of 8 bytes a cell.
+fn archive(name: &str, column: &str, kind: &str, cells: &[[u8; 8]]) -> DataFile {
+    let path = path(name);
+    let mut archive = ZipWriter::new(File::create(&path).unwrap());
+    let numbers = floats(&(0..cells.len()).map(|k| k as f64).collect::<Vec<_>>());
+    for (column, kind, cells) in
+        SIGNALS.iter().map(|signal| (*signal, "<f8", &numbers[..])).chain([(column, kind, cells)])
+    {
+        archive.start_file(format!("{column}.npy"), SimpleFileOptions::default()).unwrap();
+        let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({},), }}", cells.len());
+        let header = format!("{header:117}\n");
+        archive.write_all(b"\x93NUMPY\x01\x00").unwrap();
+        archive.write_all(&(header.len() as u16).to_le_bytes()).unwrap();
+        archive.write_all(header.as_bytes()).unwrap();
+        archive.write_all(cells.as_flattened()).unwrap();
+    }
+    archive.finish().unwrap();
+    DataFile::new(path)
+}
+
+#[test]
+fn keys_are_whole_numbers_or_nothing() {
+    let layout = Layout::of::<Pmsm>();
+    let file = archive("keys.npz", "key", "<f8", &floats(&[7.0, 0.0, f64::NAN, -0.0, 7.0])).sample_time(1.0);
+    let groups = file.read_groups(&layout, "key").unwrap();
+    assert_eq!(groups.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["7", "0", ""]);
+    says(groups[2].1.as_ref().map(|_| ()), &["column `key` holds an empty cell"]);
+    let file = archive("fractions.npz", "key", "<f8", &floats(&[1.0, 0.1, 1.0])).sample_time(1.0);
+    says(file.read_groups(&layout, "key"), &["`key` holds numbers that are not whole", "whole numbers"]);
+}
