@@ -66,6 +66,7 @@ impl DataFile {
                 break;
             }
         }
+        let zone = self.zone.clone().filter(|_| dates.in_zone());
         let (seconds, order) = dates.finish().map_err(|Fault { line, problem, .. }| {
             // Samples are counted from zero. A fault of no single one has no line.
             let at = line.checked_sub(1).map(|sample| (sample, text(sample as usize).unwrap_or_default()));
@@ -74,7 +75,7 @@ impl DataFile {
         })?;
         let first = if samples == 0 { String::new() } else { text(0).unwrap_or_default() };
         let time = (Time::from_stamps(seconds), TimeUnit::default());
-        Ok((time, TimeSource::Dates { column, first, order, zone: self.zone.clone() }))
+        Ok((time, TimeSource::Dates { column, first, order, zone }))
     }
 }
 
