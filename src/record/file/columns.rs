@@ -47,7 +47,7 @@ pub(super) enum Cells {
 
 impl Cells {
     /// What the cells are.
-    fn kind(&self) -> &'static str {
+    pub(super) fn kind(&self) -> &'static str {
         match self {
             Cells::Numbers(_) => "numbers",
             Cells::Seconds(_) => "lengths of time",
