@@ -12,7 +12,7 @@ use crate::terminal::Terminal;
 use crate::{Failure, Verdict, output, records};
 use greybox::record::Record;
 use greybox::text::Model;
-use row::{Name, Row};
+use row::{Header, Name, Row};
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet, VecDeque};
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ pub fn run(one: &Fleet, terminal: &Terminal) -> Result<Verdict, Failure> {
         return Err("no record is named; write files or a pattern after the model: 'data/*.csv'".into());
     }
     let fleet = fit(&model, &[], &parameters, &one.of_fit)?.cancel(terminal.stop()).fleet()?;
-    let mut table = Table::open(one.out.as_deref(), row::header(layout, one.by.as_deref())?)?;
+    let mut table = Table::open(one.out.as_deref(), Header::new(layout, one.by.as_deref())?)?;
     let before = table.rows().len();
     if before > 0 {
         terminal.remark(format_args!("{before} records are in the table already"));
