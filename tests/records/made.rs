@@ -3,8 +3,10 @@
 
 use crate::pmsm::Pmsm;
 use crate::refused::says;
-use greybox::DataFile;
 use greybox::layout::Layout;
+use greybox::record::Record;
+use greybox::{DataFile, Error};
+use hdf5_pure::{AttrValue, FileBuilder};
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -17,6 +19,10 @@ fn path(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("made");
     std::fs::create_dir_all(&folder).unwrap();
     folder.join(name)
+}
+
+fn read(file: &DataFile) -> Result<Record, Error> {
+    file.read_record(&Layout::of::<Pmsm>())
 }
 
 fn floats(values: &[f64]) -> Vec<[u8; 8]> {
@@ -52,4 +58,28 @@ fn keys_are_whole_numbers_or_nothing() {
     says(groups[2].1.as_ref().map(|_| ()), &["column `key` holds an empty cell"]);
     let file = archive("fractions.npz", "key", "<f8", &floats(&[1.0, 0.1, 1.0])).sample_time(1.0);
     says(file.read_groups(&layout, "key"), &["`key` holds numbers that are not whole", "whole numbers"]);
+}
+
+/// A netCDF file has numbers of another unit where it has these attributes.
+#[test]
+fn packed_datasets_are_refused() {
+    let file = |name: &str, attribute: &str, value: f64| {
+        let mut builder = FileBuilder::new();
+        for signal in ["t", "ud", "w", "id", "iq"] {
+            let dataset = builder.create_dataset(signal);
+            dataset.with_f64_data(&[0.0, 1.0, 2.0]);
+            if signal == "w" {
+                dataset.set_attr(attribute, AttrValue::F64(value));
+            }
+        }
+        let path = path(name);
+        builder.write(&path).unwrap();
+        read(&DataFile::new(path))
+    };
+    says(file("scaled.h5", "scale_factor", 0.1), &["column `w` holds", "`scale_factor`"]);
+    says(file("shifted.h5", "add_offset", 273.15), &["column `w` holds", "`add_offset`"]);
+    says(file("filled.h5", "_FillValue", -999.0), &["column `w` holds", "`_FillValue`"]);
+    // What is missing is NaN here, too.
+    file("nan.h5", "_FillValue", f64::NAN).unwrap();
+    file("other.h5", "valid_max", 4.0).unwrap();
 }
