@@ -3,13 +3,15 @@
 
 use crate::pmsm::Pmsm;
 use crate::refused::says;
+use arrow_array::{ArrayRef, DurationMillisecondArray, Float64Array, RecordBatch, Time32MillisecondArray};
 use greybox::layout::Layout;
 use greybox::record::Record;
-use greybox::{DataFile, Error};
+use greybox::{DataFile, Error, Time};
 use hdf5_pure::{AttrValue, FileBuilder};
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
@@ -58,6 +60,36 @@ fn keys_are_whole_numbers_or_nothing() {
     says(groups[2].1.as_ref().map(|_| ()), &["column `key` holds an empty cell"]);
     let file = archive("fractions.npz", "key", "<f8", &floats(&[1.0, 0.1, 1.0])).sample_time(1.0);
     says(file.read_groups(&layout, "key"), &["`key` holds numbers that are not whole", "whole numbers"]);
+}
+
+/// An Arrow file of the signals and a column of time.
+fn arrow(name: &str, times: ArrayRef) -> DataFile {
+    let path = path(name);
+    let numbers: ArrayRef = Arc::new((0..times.len()).map(|k| Some(k as f64)).collect::<Float64Array>());
+    let columns = SIGNALS.iter().map(|signal| (*signal, numbers.clone())).chain([("time", times)]);
+    let batch = RecordBatch::try_from_iter(columns).unwrap();
+    let mut writer = arrow_ipc::writer::FileWriter::try_new(File::create(&path).unwrap(), &batch.schema()).unwrap();
+    writer.write(&batch).unwrap();
+    writer.finish().unwrap();
+    DataFile::new(path)
+}
+
+/// As those of a text: from the first, on past midnight.
+#[test]
+fn times_of_day_begin_at_zero_and_go_on_at_midnight() {
+    let clocks = |name: &str, times: [i32; 4]| arrow(name, Arc::new(Time32MillisecondArray::from(times.to_vec())));
+    let file = clocks("midnight.arrow", [86_399_000, 86_399_500, 0, 500]);
+    assert_eq!(read(&file).unwrap().times(), &Time::Uniform { start: 0.0, step: 0.5 });
+    let back = clocks("clock_back.arrow", [43_200_000, 43_201_000, 43_200_500, 43_202_000]);
+    says(read(&back), &["column `time`", "sample 2, `12:00:00.5`", "0.5 s before the row above", "sort the record"]);
+}
+
+#[test]
+fn lengths_of_time_take_an_offset_but_no_factor() {
+    let file = arrow("lengths.arrow", Arc::new(DurationMillisecondArray::from(vec![0, 500, 1000])));
+    let moved = read(&file.clone().offset("t", 2.0)).unwrap();
+    assert_eq!(moved.times(), &Time::Uniform { start: 2.0, step: 0.5 });
+    says(read(&file.factor("t", 1e-3)), &["the factor of `t`", "column `time` holds lengths of time", "give none"]);
 }
 
 /// A netCDF file has numbers of another unit where it has these attributes.

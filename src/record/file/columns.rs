@@ -35,8 +35,10 @@ pub(super) trait Columns {
 pub(super) enum Cells {
     /// Numbers; NaN where there is none.
     Numbers(Vec<f64>),
-    /// Lengths of time, or times of a day (s).
+    /// Lengths of time (s).
     Seconds(Vec<f64>),
+    /// Times of day: nanoseconds since midnight.
+    Clocks(Vec<Option<i64>>),
     /// Dates: nanoseconds since 1970, and whether they are in universal time or local ones.
     Instants {
         nanoseconds: Vec<Option<i64>>,
@@ -51,6 +53,7 @@ impl Cells {
         match self {
             Cells::Numbers(_) => "numbers",
             Cells::Seconds(_) => "lengths of time",
+            Cells::Clocks(_) => "times of day",
             Cells::Instants { .. } => "dates",
             Cells::Texts(_) => "text",
         }
@@ -59,7 +62,7 @@ impl Cells {
     fn len(&self) -> usize {
         match self {
             Cells::Numbers(numbers) | Cells::Seconds(numbers) => numbers.len(),
-            Cells::Instants { nanoseconds, .. } => nanoseconds.len(),
+            Cells::Clocks(nanoseconds) | Cells::Instants { nanoseconds, .. } => nanoseconds.len(),
             Cells::Texts(texts) => texts.len(),
         }
     }
