@@ -137,7 +137,7 @@ pub struct RecordOptions {
 /// What is minimized, and how.
 #[derive(Args, Clone, Default)]
 pub struct FitOptions {
-    /// The standard deviation of the noise of an output; without it, it is estimated.
+    /// The standard deviation of the noise of an output; without it, that of the model file, or it is estimated.
     #[arg(long, value_name = "OUTPUT=STD", value_parser = assignment)]
     pub noise: Vec<(String, String)>,
     /// Estimate the covariance of the noise of all outputs.

@@ -159,14 +159,9 @@ pub fn fit<'a>(
     if let Some(name) = options.predictor.as_deref().or(model.predictor()) {
         fit = fit.predictor_by_name(name)?;
     }
-    let noise = numbers("--noise", &options.noise)?;
     fit = match options.noise_covariance {
         true => fit.noise_covariance(),
-        false if !noise.is_empty() => fit.noise_by_name(pairs(&noise))?,
-        false => {
-            let outputs = equations.layout().outputs.iter().map(|output| output.name.as_str());
-            fit.noise_by_name(outputs.zip(model.noise()).filter_map(|(output, noise)| Some((output, noise?))))?
-        }
+        false => fit.noise_by_name(pairs(&noise(model, &options.noise)?))?,
     };
     let input_noise = numbers("--input-noise", &options.input_noise)?;
     if !input_noise.is_empty() {
@@ -195,6 +190,17 @@ pub fn fit<'a>(
         fit = fit.checkpoint(path, 10);
     }
     Ok(fit)
+}
+
+/// The noise of the outputs as the model file has it, and as it was said, which goes before.
+fn noise(model: &Model, said: &[(String, String)]) -> Result<Vec<(String, f64)>, Failure> {
+    let said = numbers("--noise", said)?;
+    let outputs = model.equations().layout().outputs.iter().map(|output| output.name.clone());
+    let declared = outputs.zip(model.noise()).filter_map(|(output, noise)| Some((output, noise?)));
+    let mut all: Vec<(String, f64)> =
+        declared.filter(|(output, _)| said.iter().all(|(name, _)| name != output)).collect();
+    all.extend(said);
+    Ok(all)
 }
 
 /// The same that shows its progress and ends by Ctrl-C.

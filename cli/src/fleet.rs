@@ -12,7 +12,7 @@ use crate::terminal::Terminal;
 use crate::{Failure, Verdict, output, records};
 use greybox::record::Record;
 use greybox::text::Model;
-use row::{Name, Row};
+use row::{Header, Name, Row};
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet, VecDeque};
 use std::path::{Path, PathBuf};
@@ -27,18 +27,22 @@ pub fn run(one: &Fleet, terminal: &Terminal) -> Result<Verdict, Failure> {
         return Err("no record is named; write files or a pattern after the model: 'data/*.csv'".into());
     }
     let fleet = fit(&model, &[], &parameters, &one.of_fit)?.cancel(terminal.stop()).fleet()?;
-    let mut table = Table::open(one.out.as_deref(), row::header(layout, one.by.as_deref())?)?;
+    let mut table = Table::open(one.out.as_deref(), Header::new(layout, one.by.as_deref())?)?;
     let before = table.rows().len();
     if before > 0 {
         terminal.remark(format_args!("{before} records are in the table already"));
     }
     let bar = terminal.steps(paths.len(), "files");
     let reader = Reader { one, model: &model, quiet: &terminal.silent(), waiting: RefCell::default() };
-    // Whatever is read is in the table or on its way there, and is not read again.
+    // Names already in the table or queued for a fit; a record of the same name is not fitted again.
     let mut known: HashSet<Name> = table.rows().iter().map(|row| row.name.clone()).collect();
     let mut files: HashMap<String, u32> = HashMap::new();
     let there = paths.iter().take_while(|_| !terminal.stopped()).flat_map(|path| {
         bar.inc(1);
+        // Which records a file has that are told apart by a column is known only when it is read.
+        if one.by.is_none() && known.contains(&name(path, None)) {
+            return vec![];
+        }
         let read = reader.read(path).into_iter().filter(|(name, _)| {
             if let Some(group) = &name.group {
                 *files.entry(group.clone()).or_default() += 1;
@@ -86,7 +90,7 @@ struct Reader<'a> {
     one: &'a Fleet,
     model: &'a Model,
     quiet: &'a Terminal,
-    /// Why a record has no answer, if it will have none.
+    /// Records in the order read. `Some(error)`: could not be read, so the fit gives no answer for it; `None`: an answer will come.
     waiting: RefCell<VecDeque<(Name, Option<String>)>>,
 }
 
@@ -94,14 +98,17 @@ impl Reader<'_> {
     /// The records of a file, or one error for all of it.
     fn read(&self, path: &Path) -> Vec<(Name, Result<Record, String>)> {
         let Fleet { of_model, of_records, by, .. } = self.one;
-        let name = |group| Name { record: path.to_string_lossy().into_owned(), group };
         let Some(by) = by else {
             let record = records::one(path, self.model, of_records, &of_model.initial, self.quiet);
-            return vec![(name(None), record.map_err(|error| error.to_string()))];
+            return vec![(name(path, None), record.map_err(|error| error.to_string()))];
         };
         match records::groups(path, self.model, of_records, &of_model.initial, by) {
-            Ok(groups) => groups.into_iter().map(|(group, record)| (name(Some(group)), record)).collect(),
-            Err(error) => vec![(name(None), Err(error.to_string()))],
+            Ok(groups) => {
+                // As the table has rows without a name.
+                let group = |group: String| Some(group).filter(|group| !group.is_empty());
+                groups.into_iter().map(|(name_of, record)| (name(path, group(name_of)), record)).collect()
+            }
+            Err(error) => vec![(name(path, None), Err(error.to_string()))],
         }
     }
 
@@ -129,6 +136,11 @@ impl Reader<'_> {
         }
         Ok(())
     }
+}
+
+/// The name of a record of a file.
+fn name(path: &Path, group: Option<String>) -> Name {
+    Name { record: path.to_string_lossy().into_owned(), group }
 }
 
 /// A file beside another, with this at the end of its name.

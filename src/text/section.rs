@@ -14,7 +14,7 @@ impl Model {
 }
 
 impl From<&Model> for Section {
-    /// Constants, definitions, and the equations of states and outputs, as they were fitted.
+    /// Constants, definitions, the equations of states and outputs, dead times, and the intensities of noise, as they were fitted.
     fn from(model: &Model) -> Section {
         let document = &model.document;
         let mut rows = vec![];
@@ -28,6 +28,14 @@ impl From<&Model> for Section {
         }
         for one in &document.outputs {
             rows.push((format!("output {}", one.quantity.name), model.written(&one.value)));
+        }
+        let delays = document.inputs.iter().map(|one| ("delay", &one.quantity, &one.delay));
+        let diffusion = document.states.iter().map(|one| ("diffusion", &one.quantity, &one.diffusion));
+        let noise = document.outputs.iter().map(|one| ("noise", &one.quantity, &one.noise));
+        for (what, quantity, expression) in delays.chain(diffusion).chain(noise) {
+            if let Some(expression) = expression {
+                rows.push((format!("{what} of {}", quantity.name), model.written(expression)));
+            }
         }
         let number = |(name, value, unit): (&str, f64, &str)| (name.to_owned(), format!("{value} {unit}"));
         rows.extend(model.constants().into_iter().map(number));

@@ -231,6 +231,12 @@ fn records_of_one_file_are_told_apart_by_a_column() {
     says(DataFile::new(file("motors.csv")).read_groups(&layout, "engine"), &["no column `engine`", "motor"]);
 }
 
+#[test]
+fn columns_that_differ_in_length_are_no_groups() {
+    let groups = DataFile::new(file("lengths.npz")).read_groups(&Layout::of::<Pmsm>(), "w");
+    says(groups, &["`w` has 4 rows, but `ud` has 3"]);
+}
+
 /// A row that is wrong spoils its own record; rows without a name are one that is refused; uneven times and units of time are each record's own.
 #[test]
 fn a_record_that_cannot_be_read_spoils_no_other() {

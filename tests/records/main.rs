@@ -7,6 +7,7 @@ mod dates;
 mod edits;
 mod guesses;
 mod inspect;
+mod made;
 mod npy;
 mod pmsm;
 #[path = "../common/refused.rs"]

@@ -50,6 +50,20 @@ fn a_motor() {
     assert_eq!(model.to_toml(), PMSM);
 }
 
+/// Of a report: what was fitted is all there.
+#[test]
+fn a_section_has_dead_times_and_noise() {
+    let text = PMSM.replace("ke = {", "late = { unit = \"s\", start = 1e-3 }\nke = {");
+    let text = text.replace("hold = \"zero\" }", "hold = \"zero\", delay = \"2*late\" }");
+    let text = text.replacen("initial = \"first\" }", "initial = \"first\", diffusion = 0.25 }", 1);
+    let table = greybox::report::Section::from(&model(&text)).tables[0].to_string();
+    let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split_whitespace().collect()).collect();
+    for row in ["delay of ud 2*late", "diffusion of id 0.25", "noise of iq 0.05"] {
+        assert!(rows.iter().any(|cells| cells.join(" ") == row), "{row} in\n{table}");
+    }
+    assert!(!table.contains("noise of id"), "{table}");
+}
+
 /// The value of an expression of `x` (0.7), `y` (-1.3), `p` (2) and the time (3).
 fn value(expression: &str) -> f64 {
     let text = format!(

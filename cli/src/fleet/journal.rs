@@ -13,8 +13,8 @@ pub struct Journal {
     file: File,
 }
 
-/// A row as JSON has it.
-type Line = (String, Option<String>, String, Vec<Option<f64>>, String);
+/// A row as JSON has it. Numbers are texts: JSON has none that is infinite.
+type Line = (String, Option<String>, String, Vec<Option<String>>, String);
 
 impl Journal {
     /// Opens the journal, and reads the rows that an earlier run left there.
@@ -44,6 +44,8 @@ impl Journal {
         }
         let row = |line| {
             let (record, group, verdict, numbers, remarks) = serde_json::from_slice::<Line>(line).ok()?;
+            let number = |text: Option<String>| text.map(|text| text.parse()).transpose().ok();
+            let numbers = numbers.into_iter().map(number).collect::<Option<_>>()?;
             Some(Row { name: Name { record, group }, verdict, numbers, remarks })
         };
         let rows: Option<Vec<Row>> = lines.map(row).collect();
@@ -52,7 +54,8 @@ impl Journal {
 
     /// Adds a row.
     pub fn add(&mut self, row: &Row) -> Result<(), Failure> {
-        self.write(&(&row.name.record, &row.name.group, &row.verdict, &row.numbers, &row.remarks))
+        let numbers: Vec<_> = row.numbers.iter().map(|number| number.map(|number| number.to_string())).collect();
+        self.write(&(&row.name.record, &row.name.group, &row.verdict, numbers, &row.remarks))
     }
 
     fn write(&mut self, line: &impl greybox::serde::Serialize) -> Result<(), Failure> {
@@ -65,5 +68,24 @@ impl Journal {
     pub fn remove(self) -> Result<(), Failure> {
         drop(self.file);
         Ok(std::fs::remove_file(&self.path).map_err(|error| format!("{}: {error}", self.path.display()))?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Intervals that are open to one side, too: what JSON has as a number is finite.
+    #[test]
+    fn rows_come_back_as_they_were() {
+        let path = std::env::temp_dir().join(format!("greybox_journal_{}", std::process::id()));
+        let header = ["record".to_owned()];
+        let numbers = vec![Some(0.1), None, Some(f64::NEG_INFINITY), Some(f64::INFINITY)];
+        let name = Name { record: "a.csv".to_owned(), group: None };
+        let row = Row { name, verdict: "usable".to_owned(), numbers, remarks: String::new() };
+        Journal::open(&path, &header).unwrap().0.add(&row).unwrap();
+        let (journal, rows) = Journal::open(&path, &header).unwrap();
+        assert_eq!(rows, [row]);
+        journal.remove().unwrap();
     }
 }

@@ -1,6 +1,6 @@
 //! The table as Parquet: texts, then numbers that may be missing, then the remarks.
 
-use super::row::Row;
+use super::row::{Header, Row};
 use crate::Failure;
 use arrow_array::cast::AsArray;
 use arrow_array::types::Float64Type;
@@ -13,11 +13,11 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The rows under these names, of which the first so many are texts.
-pub fn write(header: &[String], texts: usize, rows: &[Row]) -> Result<Vec<u8>, Failure> {
-    let by = texts == 3;
+/// The rows under these columns.
+pub fn write(header: &Header, rows: &[Row]) -> Result<Vec<u8>, Failure> {
+    let (by, texts, last) = (header.by, header.texts(), header.names.len() - 1);
     let column = |at: usize| -> ArrayRef {
-        if at + 1 == header.len() {
+        if at == last {
             return Arc::new(StringArray::from_iter_values(rows.iter().map(|row| row.texts(by).1)));
         }
         match at.checked_sub(texts) {
@@ -29,8 +29,8 @@ pub fn write(header: &[String], texts: usize, rows: &[Row]) -> Result<Vec<u8>, F
         }
     };
     // Numbers may be missing in any row, whether or not they are in these.
-    let columns = header.iter().enumerate().map(|(at, name)| {
-        let number = at >= texts && at + 1 < header.len();
+    let columns = header.names.iter().enumerate().map(|(at, name)| {
+        let number = at >= texts && at < last;
         (name, column(at), number)
     });
     let batch = RecordBatch::try_from_iter_with_nullable(columns)?;
@@ -41,23 +41,24 @@ pub fn write(header: &[String], texts: usize, rows: &[Row]) -> Result<Vec<u8>, F
 }
 
 /// The rows of a file that [`write()`] wrote.
-pub fn read(path: &Path, header: &[String], texts: usize) -> Result<Vec<Row>, Failure> {
+pub fn read(path: &Path, header: &Header) -> Result<Vec<Row>, Failure> {
+    let (texts, last) = (header.texts(), header.names.len() - 1);
     let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(path)?)?.build()?;
     let mut rows = vec![];
     for batch in reader {
         let batch = batch?;
         let other = "the file is there and is no table of this model; name another";
-        if batch.schema().fields().iter().map(|field| field.name()).ne(header) {
+        if batch.schema().fields().iter().map(|field| field.name()).ne(&header.names) {
             return Err(other.into());
         }
         let text = |at: usize| batch.column(at).as_string_opt::<i32>().ok_or(other);
-        let (before, remarks) = ((0..texts).map(text).collect::<Result<Vec<_>, _>>()?, text(header.len() - 1)?);
+        let (before, remarks) = ((0..texts).map(text).collect::<Result<Vec<_>, _>>()?, text(last)?);
         let number = |at: usize| batch.column(at).as_primitive_opt::<Float64Type>().ok_or(other);
-        let numbers = (texts..header.len() - 1).map(number).collect::<Result<Vec<_>, _>>()?;
+        let numbers = (texts..last).map(number).collect::<Result<Vec<_>, _>>()?;
         for at in 0..batch.num_rows() {
             let texts_of = before.iter().map(|column| column.value(at).to_owned()).collect();
             let numbers_of = numbers.iter().map(|column| (!column.is_null(at)).then(|| column.value(at))).collect();
-            let row = Row::from_parts(texts_of, texts == 3, numbers_of, remarks.value(at).to_owned());
+            let row = Row::from_parts(texts_of, header.by, numbers_of, remarks.value(at).to_owned());
             rows.push(row.ok_or(other)?);
         }
     }

@@ -73,18 +73,40 @@ impl Row {
     }
 }
 
-/// The names of the columns.
-///
-/// # Errors
-/// A name that stands twice.
-pub fn header(layout: &Layout, by: Option<&str>) -> Result<Vec<String>, Failure> {
-    let columns = layout.parameters.iter().map(|one| one.name.as_str());
-    let columns = columns.flat_map(|name| ["", "_std", "_lower", "_upper"].map(|end| format!("{name}{end}")));
-    let first = ["record"].into_iter().chain(by).chain(["verdict"]).map(str::to_owned);
-    let header: Vec<String> = first.chain(columns).chain(["remarks".to_owned()]).collect();
-    match header.iter().enumerate().find(|(at, name)| header[..*at].contains(name)) {
-        Some((_, name)) => Err(format!("the table would have two columns `{name}`; rename that of the records").into()),
-        None => Ok(header),
+/// The columns of the table.
+#[derive(Debug)]
+pub struct Header {
+    pub names: Vec<String>,
+    /// Whether one of them tells the records of a file apart.
+    pub by: bool,
+}
+
+impl Header {
+    /// The columns for the parameters of a model.
+    ///
+    /// # Errors
+    /// A name that stands twice.
+    pub fn new(layout: &Layout, by: Option<&str>) -> Result<Self, Failure> {
+        let columns = layout.parameters.iter().map(|one| one.name.as_str());
+        let columns = columns.flat_map(|name| ["", "_std", "_lower", "_upper"].map(|end| format!("{name}{end}")));
+        let first = ["record"].into_iter().chain(by).chain(["verdict"]).map(str::to_owned);
+        let names: Vec<String> = first.chain(columns).chain(["remarks".to_owned()]).collect();
+        match names.iter().enumerate().find(|(at, name)| names[..*at].contains(name)) {
+            Some((_, name)) => {
+                Err(format!("the table would have two columns `{name}`; rename that of the records").into())
+            }
+            None => Ok(Header { names, by: by.is_some() }),
+        }
+    }
+
+    /// How many columns have texts before the numbers.
+    pub fn texts(&self) -> usize {
+        if self.by { 3 } else { 2 }
+    }
+
+    /// How many columns have numbers.
+    pub fn numbers(&self) -> usize {
+        self.names.len() - self.texts() - 1
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::beside;
 use super::journal::Journal;
-use super::row::Row;
+use super::row::{Header, Row};
 use crate::terminal::Terminal;
 use crate::{Failure, Verdict, output};
 use std::collections::HashSet;
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 /// All rows that are known, and where they go.
 pub struct Table {
-    header: Vec<String>,
+    header: Header,
     rows: Vec<Row>,
     path: Option<PathBuf>,
     journal: Option<Journal>,
@@ -21,7 +21,7 @@ impl Table {
     ///
     /// # Errors
     /// A file that is something else, or cannot be written.
-    pub fn open(path: Option<&Path>, header: Vec<String>) -> Result<Self, Failure> {
+    pub fn open(path: Option<&Path>, header: Header) -> Result<Self, Failure> {
         let mut table = Table { header, rows: vec![], path: path.map(Path::to_owned), journal: None };
         let Some(path) = path else { return Ok(table) };
         if output::ending(path) == "parquet" && cfg!(not(feature = "arrow")) {
@@ -35,7 +35,7 @@ impl Table {
         if path.is_file() {
             table.rows = table.read(path).map_err(|error| format!("{}: {error}", path.display()))?;
         }
-        let (journal, rows) = Journal::open(&beside(path, ".journal"), &table.header)?;
+        let (journal, rows) = Journal::open(&beside(path, ".journal"), &table.header.names)?;
         // A run that was killed between writing the table and removing its journal has the rows twice.
         let there: HashSet<_> = table.rows.iter().map(|row| row.name.clone()).collect();
         table.rows.extend(rows.into_iter().filter(|row| !there.contains(&row.name)));
@@ -80,20 +80,10 @@ impl Table {
         self.rows.iter().map(Row::verdict).max().unwrap_or(Verdict::Usable)
     }
 
-    /// Whether a column tells the records of a file apart.
-    fn by(&self) -> bool {
-        self.header[1] != "verdict"
-    }
-
-    /// How many columns have texts before the numbers.
-    fn texts(&self) -> usize {
-        if self.by() { 3 } else { 2 }
-    }
-
     fn content(&self, path: &Path) -> Result<Vec<u8>, Failure> {
         match output::ending(path).as_str() {
             #[cfg(feature = "arrow")]
-            "parquet" => super::parquet::write(&self.header, self.texts(), &self.rows),
+            "parquet" => super::parquet::write(&self.header, &self.rows),
             _ => self.csv(),
         }
     }
@@ -101,19 +91,18 @@ impl Table {
     fn read(&self, path: &Path) -> Result<Vec<Row>, Failure> {
         match output::ending(path).as_str() {
             #[cfg(feature = "arrow")]
-            "parquet" => super::parquet::read(path, &self.header, self.texts()),
+            "parquet" => super::parquet::read(path, &self.header),
             _ => self.read_csv(path),
         }
     }
 
     pub fn csv(&self) -> Result<Vec<u8>, Failure> {
         let mut writer = csv::Writer::from_writer(vec![]);
-        writer.write_record(&self.header)?;
-        let numbers = self.header.len() - self.texts() - 1;
+        writer.write_record(&self.header.names)?;
         for row in &self.rows {
-            let (before, remarks) = row.texts(self.by());
+            let (before, remarks) = row.texts(self.header.by);
             let number = |at: usize| row.numbers.get(at).copied().flatten().map_or(String::new(), |x| x.to_string());
-            let cells = before.into_iter().map(str::to_owned).chain((0..numbers).map(number));
+            let cells = before.into_iter().map(str::to_owned).chain((0..self.header.numbers()).map(number));
             writer.write_record(cells.chain([remarks.to_owned()]))?;
         }
         Ok(writer.into_inner().map_err(|error| error.to_string())?)
@@ -121,15 +110,15 @@ impl Table {
 
     fn read_csv(&self, path: &Path) -> Result<Vec<Row>, Failure> {
         let mut file = csv::Reader::from_path(path)?;
-        if file.headers()?.iter().ne(&self.header) {
+        if file.headers()?.iter().ne(&self.header.names) {
             return Err("the file is there and is no table of this model; name another".into());
         }
         let row = |record: csv::StringRecord| {
             let mut cells: Vec<String> = record.iter().map(str::to_owned).collect();
             let remarks = cells.pop()?;
-            let numbers = cells.split_off(self.texts());
+            let numbers = cells.split_off(self.header.texts());
             let number = |cell: &String| if cell.is_empty() { Some(None) } else { cell.parse().ok().map(Some) };
-            Row::from_parts(cells, self.by(), numbers.iter().map(number).collect::<Option<_>>()?, remarks)
+            Row::from_parts(cells, self.header.by, numbers.iter().map(number).collect::<Option<_>>()?, remarks)
         };
         let damaged = |at: usize| format!("row {} is damaged; name another table", at + 1);
         file.records().enumerate().map(|(at, record)| Ok(row(record?).ok_or_else(|| damaged(at))?)).collect()

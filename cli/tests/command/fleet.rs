@@ -113,6 +113,44 @@ fn a_killed_fleet_goes_on_with_nothing_twice() {
     assert!(error.contains("t.csv.journal: it is of another table; remove it"), "{error}");
 }
 
+/// Rows without a name are one error, once, however often the command runs.
+#[test]
+fn rows_without_a_name_are_in_the_table_once() {
+    let bench = Bench::new();
+    std::fs::write(bench.path("motors.csv"), "motor,t,ud,uq,w,id,iq\n,0,1,2,3,4,5\n,1,1,2,3,4,5\n").unwrap();
+    let outs: &[&str] = if cfg!(feature = "arrow") { &["t.csv", "t.parquet"] } else { &["t.csv"] };
+    for out in outs {
+        let words = ["fleet", "pmsm.toml", "motors.csv", "--by", "motor", "--out", out];
+        let (_, error) = bench.ends(3, &words);
+        assert!(error.contains("1 records: ") && error.contains("1 error"), "{error}");
+        let (_, error) = bench.ends(3, &words);
+        assert!(error.contains("1 records are in the table already") && error.contains("0 records: "), "{error}");
+    }
+}
+
+/// A pipe that nobody writes to holds up whoever opens it.
+#[cfg(unix)]
+#[test]
+fn files_that_are_in_the_table_are_not_opened() {
+    let bench = Bench::new();
+    let words = ["fleet", "pmsm.toml", "record.csv", "--out", "t.csv"];
+    bench.ends(0, &words);
+    std::fs::remove_file(bench.path("record.csv")).unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(bench.path("record.csv")).status().unwrap().success());
+    let mut run = bench.command(&words).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let begin = Instant::now();
+    let ended = loop {
+        match run.try_wait().unwrap() {
+            None if begin.elapsed() < Duration::from_secs(30) => std::thread::sleep(Duration::from_millis(10)),
+            ended => break ended,
+        }
+    };
+    if ended.is_none() {
+        run.kill().unwrap();
+    }
+    assert!(ended.is_some_and(|status| status.success()), "{ended:?}");
+}
+
 #[cfg(feature = "arrow")]
 #[test]
 fn a_table_may_be_parquet() {

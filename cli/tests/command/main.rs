@@ -61,6 +61,25 @@ fn declarations_are_changed_by_name() {
     assert!(out.starts_with("Verdict: not usable"), "{out}");
 }
 
+/// What is said of one output leaves that of the others as the model file has it.
+#[test]
+fn noise_is_changed_by_name() {
+    let bench = Bench::new();
+    let text = MODEL.replace(
+        "id = \"id\"\niq = \"iq\"",
+        "id = { value = \"id\", noise = 0.05 }\niq = { value = \"iq\", noise = 2.0 }",
+    );
+    std::fs::write(bench.path("noisy.toml"), text).unwrap();
+    let fit = |noise: &[&str]| {
+        let words = [&["fit", "noisy.toml", "record.csv"], noise].concat();
+        let out = String::from_utf8(bench.run(&words).stdout).unwrap();
+        ["rs", "ls", "ke"].map(|name| value(&out, name))
+    };
+    let [one, both] = [fit(&["--noise", "id=1"]), fit(&["--noise", "id=1", "--noise", "iq=2"])];
+    assert_eq!(one, both);
+    assert_ne!(one, fit(&["--noise", "id=1", "--noise", "iq=0.05"]));
+}
+
 #[test]
 fn exit_codes_tell_how_far_an_estimate_is_usable() {
     let bench = Bench::new();

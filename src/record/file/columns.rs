@@ -35,8 +35,10 @@ pub(super) trait Columns {
 pub(super) enum Cells {
     /// Numbers; NaN where there is none.
     Numbers(Vec<f64>),
-    /// Lengths of time, or times of a day (s).
+    /// Lengths of time (s).
     Seconds(Vec<f64>),
+    /// Times of day: nanoseconds since midnight.
+    Clocks(Vec<Option<i64>>),
     /// Dates: nanoseconds since 1970, and whether they are in universal time or local ones.
     Instants {
         nanoseconds: Vec<Option<i64>>,
@@ -47,10 +49,11 @@ pub(super) enum Cells {
 
 impl Cells {
     /// What the cells are.
-    fn kind(&self) -> &'static str {
+    pub(super) fn kind(&self) -> &'static str {
         match self {
             Cells::Numbers(_) => "numbers",
             Cells::Seconds(_) => "lengths of time",
+            Cells::Clocks(_) => "times of day",
             Cells::Instants { .. } => "dates",
             Cells::Texts(_) => "text",
         }
@@ -59,12 +62,12 @@ impl Cells {
     fn len(&self) -> usize {
         match self {
             Cells::Numbers(numbers) | Cells::Seconds(numbers) => numbers.len(),
-            Cells::Instants { nanoseconds, .. } => nanoseconds.len(),
+            Cells::Clocks(nanoseconds) | Cells::Instants { nanoseconds, .. } => nanoseconds.len(),
             Cells::Texts(texts) => texts.len(),
         }
     }
 
-    /// Numbers as texts, to group by.
+    /// Whole numbers as texts, to group by; NaN is an empty one.
     #[cfg(any(feature = "mat", feature = "npz"))]
     fn into_keys(self) -> Result<Cells, String> {
         match self {
@@ -72,7 +75,14 @@ impl Cells {
             Cells::Numbers(numbers) if numbers.iter().any(|number| number.abs() >= MAX_KEY) => {
                 Err("numbers beyond 2^53, which are rounded".to_owned())
             }
-            Cells::Numbers(numbers) => Ok(Cells::Texts(numbers.iter().map(f64::to_string).collect())),
+            Cells::Numbers(numbers) if numbers.iter().any(|number| number.is_finite() && number.fract() != 0.0) => {
+                Err("numbers that are not whole".to_owned())
+            }
+            Cells::Numbers(numbers) => {
+                // Minus zero is zero.
+                let key = |number: f64| if number.is_nan() { String::new() } else { (number + 0.0).to_string() };
+                Ok(Cells::Texts(numbers.into_iter().map(key).collect()))
+            }
             Cells::Texts(_) => Ok(self),
             _ => Err(self.kind().to_owned()),
         }
@@ -174,7 +184,7 @@ fn guarded<T>(file: &DataFile, format: FileFormat, read: impl FnOnce() -> Result
 /// Reads the signals of a plan, then its time, then the column to group by.
 ///
 /// # Errors
-/// As [`Columns::read`]; a signal whose cells are no numbers.
+/// As [`Columns::read`]; columns that differ in length.
 pub(super) fn read(
     of: &DataFile,
     file: &mut (dyn Columns + '_),
@@ -182,7 +192,14 @@ pub(super) fn read(
     keys: Option<usize>,
 ) -> Result<Vec<Cells>, Error> {
     let columns: Vec<usize> = plan.sources.iter().map(|source| source.column).chain(plan.time).collect();
-    guarded(of, file.format(), || file.read(&columns, keys))
+    let cells = guarded(of, file.format(), || file.read(&columns, keys))?;
+    let expected = cells.first().map_or(0, Cells::len);
+    if let Some(place) = cells.iter().position(|cells| cells.len() != expected) {
+        let all: Vec<usize> = columns.into_iter().chain(keys).collect();
+        let [reference, what] = [0, place].map(|place| format!("`{}`", file.names()[all[place]]));
+        return Err(Error::Lengths { experiment: of.name(), what, found: cells[place].len(), reference, expected });
+    }
+    Ok(cells)
 }
 
 impl DataFile {

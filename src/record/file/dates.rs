@@ -62,6 +62,11 @@ impl Dates {
         self.ways.iter().any(|way| way.fault.is_none())
     }
 
+    /// Whether the dates so far were read in the zone: those that have one of their own, and times of day, are not.
+    pub(super) fn in_zone(&self) -> bool {
+        self.zone.is_some() && self.ways.iter().any(|way| way.kind == Some(Kind::Local))
+    }
+
     /// The times of all rows (s), and the order if it matters.
     ///
     /// # Errors

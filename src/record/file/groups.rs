@@ -1,7 +1,6 @@
 //! Files with many records, which a column tells apart.
 
 use super::columns::{self, Cells};
-use super::numbers::Numbers;
 use super::read::Rows;
 use super::{Column, DataFile};
 use crate::error::Error;
@@ -44,7 +43,12 @@ impl DataFile {
         let plan = self.plan(layout, file.names(), |_| None)?;
         let at = self.named(file.names(), by)?;
         let cells = columns::read(self, file.as_mut(), &plan, Some(at))?;
-        let Some(Cells::Texts(keys)) = cells.last() else { return Ok(vec![]) };
+        let keys = match cells.last() {
+            Some(Cells::Texts(keys)) => keys,
+            other => {
+                return Err(self.wrong_kind(by, other.map_or("nothing", Cells::kind), "text or whole numbers"));
+            }
+        };
         let mut places = Places::default();
         let mut groups: Groups<Vec<usize>> = vec![];
         for (row, key) in keys.iter().enumerate() {
@@ -58,9 +62,7 @@ impl DataFile {
     }
 
     fn text_groups(&self, layout: &Layout, by: &str) -> Result<Groups<Record>, Error> {
-        let mut table = self.table(layout, &[by])?;
-        let mut numbers = Numbers::new(self.decimal_comma.then_some(true), table.form().separator);
-        let plan = self.plan(layout, table.names(), |column| table.form().unit(column))?;
+        let (mut table, mut numbers, plan) = self.text(layout, &[by])?;
         let at = self.named(table.names(), by)?;
         let mut places = Places::default();
         let mut groups: Groups<Rows> = vec![];

@@ -61,9 +61,7 @@ impl DataFile {
             let cells = columns::read(self, file.as_mut(), &plan, None)?;
             return self.of_columns(&plan, file.as_ref(), &cells, None);
         }
-        let mut table = self.table(layout, &[])?;
-        let mut numbers = Numbers::new(self.decimal_comma.then_some(true), table.form().separator);
-        let plan = self.plan(layout, table.names(), |column| table.form().unit(column))?;
+        let (mut table, mut numbers, plan) = self.text(layout, &[])?;
         let mut rows = Rows::new(&plan);
         while table.next()? {
             rows.push(self, &plan, &table, &mut numbers, false)?;
@@ -71,14 +69,17 @@ impl DataFile {
         rows.finish(self, &plan, &table, &numbers)
     }
 
-    /// The rows of a text that has the columns of a layout, and others.
-    pub(super) fn table(&self, layout: &Layout, others: &[&str]) -> Result<Table, Error> {
+    /// The rows of a text that has the columns of a layout, and others; its numbers; where the columns of the layout are.
+    pub(super) fn text<'a>(&self, layout: &'a Layout, others: &[&str]) -> Result<(Table, Numbers, Plan<'a>), Error> {
         let signals = layout.inputs.iter().chain(&layout.outputs);
         let said: Vec<Column> = signals.map(|signal| self.said(&signal.name)).collect();
         let t = self.said("t").name;
         let wanted: Vec<&str> =
             said.iter().map(Column::name).chain(t.as_deref()).chain(others.iter().copied()).collect();
-        Table::open(self, &wanted)
+        let table = Table::open(self, &wanted)?;
+        let numbers = Numbers::new(self.decimal_comma.then_some(true), table.form().separator);
+        let plan = self.plan(layout, table.names(), |column| table.form().unit(column))?;
+        Ok((table, numbers, plan))
     }
 
     /// Finds the columns of a layout by their names, and checks their units; `below` is the unit below a name.

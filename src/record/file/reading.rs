@@ -50,7 +50,7 @@ pub enum TimeSource {
         first: String,
         /// Whether the day or the month stands first, where that matters.
         order: Option<DateOrder>,
-        /// The zone they are in, if one was said.
+        /// The zone that was said, if it was used: none for dates that have one of their own, and for times of day.
         zone: Option<String>,
     },
 }

@@ -232,6 +232,7 @@ impl Timing {
                 Ok((time, TimeSource::Numbers { column: name(column), unit, origin }))
             }
             Timing::Dates { column, dates, first, .. } => {
+                let zone = file.zone.clone().filter(|_| dates.in_zone());
                 let (seconds, order) = dates.finish().map_err(|fault| Error::Dates {
                     path: file.path.clone(),
                     line: fault.line,
@@ -239,7 +240,7 @@ impl Timing {
                     text: fault.text,
                     problem: fault.problem,
                 })?;
-                let source = TimeSource::Dates { column: name(column), first, order, zone: file.zone.clone() };
+                let source = TimeSource::Dates { column: name(column), first, order, zone };
                 Ok((Time::from_stamps(seconds), source))
             }
         }

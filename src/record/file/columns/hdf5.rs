@@ -38,6 +38,9 @@ impl<'a> Hdf5<'a> {
         if let Some(class) = class(&dataset).map_err(failed)? {
             return Err(other(class));
         }
+        if let Some(attribute) = packed(&dataset).map_err(failed)? {
+            return Err(other(format!("packed numbers (attribute `{attribute}`)")));
+        }
         let kind = dataset.dtype().map_err(failed)?;
         if !is_number(&kind) {
             return Err(other(format!("cells of type {kind}")));
@@ -96,6 +99,20 @@ fn class(dataset: &Dataset) -> Result<Option<String>, hdf5_pure::Error> {
         }
         _ => None,
     })
+}
+
+/// The attribute that says how the numbers of a dataset become values, as netCDF has it, or which number stands for none; NaN does so here, too.
+fn packed(dataset: &Dataset) -> Result<Option<&'static str>, hdf5_pure::Error> {
+    let attributes = dataset.attrs()?;
+    let fills = match attributes.get("_FillValue") {
+        Some(AttrValue::F64(number)) => !number.is_nan(),
+        Some(AttrValue::F32(number)) => !number.is_nan(),
+        Some(AttrValue::F64Array(numbers)) => numbers.iter().any(|number| !number.is_nan()),
+        Some(AttrValue::F32Array(numbers)) => numbers.iter().any(|number| !number.is_nan()),
+        other => other.is_some(),
+    };
+    let scaled = ["scale_factor", "add_offset"].into_iter().find(|name| attributes.contains_key(*name));
+    Ok(scaled.or(fills.then_some("_FillValue")))
 }
 
 fn is_number(kind: &DType) -> bool {

@@ -1,4 +1,4 @@
-//! The time of a record from a column of numbers, lengths of time, dates or texts.
+//! The time of a record from a column of numbers, lengths of time, times of day, dates or texts.
 
 use super::super::read::Plan;
 use super::super::stamp::Stamp;
@@ -7,8 +7,8 @@ use super::{Cells, Columns};
 use crate::error::Error;
 use crate::numeral::TimeUnit;
 use crate::record::Time;
-use jiff::Timestamp;
 use jiff::tz::TimeZone;
+use jiff::{SignedDuration, Timestamp};
 
 impl DataFile {
     /// The times of the rows, or of some of them (s), the unit in which they are shown, and where they are from.
@@ -34,8 +34,20 @@ impl DataFile {
                 Ok(((Time::from_stamps(stamps), ticks.shown), source))
             }
             Cells::Seconds(lengths) => {
-                let stamps = (0..samples).map(|sample| lengths[row(sample)]).collect();
+                let said = self.said("t");
+                if said.factor.is_some_and(|factor| factor != 1.0) {
+                    let held = format!("`{column}` holds lengths of time, whose unit is known");
+                    return Err(Error::Option(format!("the factor of `t`: column {held}; give none")));
+                }
+                let sign = if said.reversed { -1.0 } else { 1.0 };
+                let stamps = (0..samples).map(|sample| sign * lengths[row(sample)] + said.offset).collect();
                 Ok(((Time::from_stamps(stamps), seconds()), TimeSource::Numbers { column, unit: 1.0, origin: 0.0 }))
+            }
+            Cells::Clocks(clocks) => {
+                let stamp = |sample| Some(Stamp::Clock(clocks[row(sample)]? as f64 / 1e9));
+                let passed = |sample| clocks[row(sample)].map(SignedDuration::from_nanos);
+                let text = |sample| Some(jiff::civil::Time::midnight().wrapping_add(passed(sample)?).to_string());
+                self.stamps(column, samples, stamp, text)
             }
             Cells::Instants { nanoseconds, universal } => {
                 let of = |sample| nanoseconds[row(sample)].and_then(|nanoseconds| instant(nanoseconds, *universal));
@@ -66,6 +78,7 @@ impl DataFile {
                 break;
             }
         }
+        let zone = self.zone.clone().filter(|_| dates.in_zone());
         let (seconds, order) = dates.finish().map_err(|Fault { line, problem, .. }| {
             // Samples are counted from zero. A fault of no single one has no line.
             let at = line.checked_sub(1).map(|sample| (sample, text(sample as usize).unwrap_or_default()));
@@ -74,7 +87,7 @@ impl DataFile {
         })?;
         let first = if samples == 0 { String::new() } else { text(0).unwrap_or_default() };
         let time = (Time::from_stamps(seconds), TimeUnit::default());
-        Ok((time, TimeSource::Dates { column, first, order, zone: self.zone.clone() }))
+        Ok((time, TimeSource::Dates { column, first, order, zone }))
     }
 }
 

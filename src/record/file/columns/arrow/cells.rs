@@ -30,6 +30,7 @@ pub(super) fn append(cells: &mut Option<Cells>, array: &ArrayRef) -> Result<(), 
     let more = numbers(array)
         .map(Cells::Numbers)
         .or_else(|| seconds(array).map(Cells::Seconds))
+        .or_else(|| clocks(array).map(Cells::Clocks))
         .or_else(|| instants(array))
         .or_else(|| Some(Cells::Texts(self::texts(array)?)))
         .ok_or_else(other)?;
@@ -38,9 +39,8 @@ pub(super) fn append(cells: &mut Option<Cells>, array: &ArrayRef) -> Result<(), 
         (Some(Cells::Numbers(all)), Cells::Numbers(more)) | (Some(Cells::Seconds(all)), Cells::Seconds(more)) => {
             all.extend(more);
         }
-        (Some(Cells::Instants { nanoseconds: all, .. }), Cells::Instants { nanoseconds, .. }) => {
-            all.extend(nanoseconds);
-        }
+        (Some(Cells::Instants { nanoseconds: all, .. }), Cells::Instants { nanoseconds: more, .. })
+        | (Some(Cells::Clocks(all)), Cells::Clocks(more)) => all.extend(more),
         _ => return Err(other()),
     }
     Ok(())
@@ -77,7 +77,7 @@ fn numbers(array: &ArrayRef) -> Option<Vec<f64>> {
     })
 }
 
-/// Lengths of time, and times of a day.
+/// Lengths of time.
 fn seconds(array: &ArrayRef) -> Option<Vec<f64>> {
     use TimeUnit::{Microsecond, Millisecond, Nanosecond, Second};
     Some(match array.data_type() {
@@ -85,29 +85,39 @@ fn seconds(array: &ArrayRef) -> Option<Vec<f64>> {
         DataType::Duration(Millisecond) => each::<DurationMillisecondType>(array, |value| value as f64 / 1e3),
         DataType::Duration(Microsecond) => each::<DurationMicrosecondType>(array, |value| value as f64 / 1e6),
         DataType::Duration(Nanosecond) => each::<DurationNanosecondType>(array, |value| value as f64 / 1e9),
-        DataType::Time32(Second) => each::<Time32SecondType>(array, f64::from),
-        DataType::Time32(Millisecond) => each::<Time32MillisecondType>(array, |value| f64::from(value) / 1e3),
-        DataType::Time64(Microsecond) => each::<Time64MicrosecondType>(array, |value| value as f64 / 1e6),
-        DataType::Time64(Nanosecond) => each::<Time64NanosecondType>(array, |value| value as f64 / 1e9),
         _ => return None,
     })
 }
 
-/// Dates; those whose nanoseconds since 1970 have no place in 64 bits are none.
+/// Counts of a unit of so many nanoseconds as nanoseconds; those that have no place in 64 bits are none.
+fn nanoseconds<T: ArrowPrimitiveType>(array: &ArrayRef, unit: i64) -> Vec<Option<i64>>
+where
+    T::Native: Into<i64>,
+{
+    array.as_primitive::<T>().iter().map(|value| value?.into().checked_mul(unit)).collect()
+}
+
+/// Times of day.
+fn clocks(array: &ArrayRef) -> Option<Vec<Option<i64>>> {
+    use TimeUnit::{Microsecond, Millisecond, Nanosecond, Second};
+    Some(match array.data_type() {
+        DataType::Time32(Second) => nanoseconds::<Time32SecondType>(array, 1_000_000_000),
+        DataType::Time32(Millisecond) => nanoseconds::<Time32MillisecondType>(array, 1_000_000),
+        DataType::Time64(Microsecond) => nanoseconds::<Time64MicrosecondType>(array, 1_000),
+        DataType::Time64(Nanosecond) => nanoseconds::<Time64NanosecondType>(array, 1),
+        _ => return None,
+    })
+}
+
+/// Dates.
 fn instants(array: &ArrayRef) -> Option<Cells> {
-    fn of<T: ArrowPrimitiveType>(array: &ArrayRef, nanoseconds: i64) -> Vec<Option<i64>>
-    where
-        T::Native: Into<i64>,
-    {
-        array.as_primitive::<T>().iter().map(|value| value?.into().checked_mul(nanoseconds)).collect()
-    }
     let nanoseconds = match array.data_type() {
-        DataType::Timestamp(TimeUnit::Second, _) => of::<TimestampSecondType>(array, 1_000_000_000),
-        DataType::Timestamp(TimeUnit::Millisecond, _) => of::<TimestampMillisecondType>(array, 1_000_000),
-        DataType::Timestamp(TimeUnit::Microsecond, _) => of::<TimestampMicrosecondType>(array, 1_000),
-        DataType::Timestamp(TimeUnit::Nanosecond, _) => of::<TimestampNanosecondType>(array, 1),
-        DataType::Date32 => of::<Date32Type>(array, 86_400_000_000_000),
-        DataType::Date64 => of::<Date64Type>(array, 1_000_000),
+        DataType::Timestamp(TimeUnit::Second, _) => nanoseconds::<TimestampSecondType>(array, 1_000_000_000),
+        DataType::Timestamp(TimeUnit::Millisecond, _) => nanoseconds::<TimestampMillisecondType>(array, 1_000_000),
+        DataType::Timestamp(TimeUnit::Microsecond, _) => nanoseconds::<TimestampMicrosecondType>(array, 1_000),
+        DataType::Timestamp(TimeUnit::Nanosecond, _) => nanoseconds::<TimestampNanosecondType>(array, 1),
+        DataType::Date32 => nanoseconds::<Date32Type>(array, 86_400_000_000_000),
+        DataType::Date64 => nanoseconds::<Date64Type>(array, 1_000_000),
         _ => return None,
     };
     let universal = matches!(array.data_type(), DataType::Timestamp(_, Some(_)));
