@@ -69,7 +69,8 @@ fn what_was_read_is_said() {
     let zoned = file("said_zone", "t", &["2025-03-20 14:00", "2025-03-21 14:00"]).zone("Europe/Berlin");
     assert_eq!(shown(zoned), "cells between \";\", time \"t\": dates, in Europe/Berlin, from 2025-03-20 14:00");
     // Dates that have a zone, and times of day, are not in the one that was said.
-    for (name, first, second) in [("own_zone", "2025-03-20T14:00Z", "2025-03-20T15:00Z"), ("no_day", "14:00", "15:00")]
+    for (name, first, second) in
+        [("own_zone", "2025-03-20T14:00Z", "2025-03-20T15:00Z"), ("no_day", "14:00:00", "15:00:00")]
     {
         let said = shown(file(name, "t", &[first, second]).zone("Europe/Berlin"));
         assert_eq!(said, format!("cells between \";\", time \"t\": dates, from {first}"));
