@@ -14,6 +14,7 @@ mod run;
 mod search;
 mod simulate;
 mod simulated;
+mod stages;
 mod start_error;
 mod starts;
 mod weights;
@@ -199,8 +200,9 @@ impl<'a, M: Made> Fit<'a, M> {
     /// found.
     ///
     /// Unless set, a fit searches from the declared start. If it is not usable and the model leaves one of the
-    /// outputs unexplained ([`WarningCode::Unexplained`](crate::WarningCode::Unexplained)), it goes on to search from 32 starts by itself, after
-    /// 150 evaluations of each from the best four only, and says so; with `starts(1)` it does not, nor with more than 20,000 samples
+    /// outputs unexplained ([`WarningCode::Unexplained`](crate::WarningCode::Unexplained)), it goes on in [stages](Fit::staged) by itself, and
+    /// where these explain nothing either, it searches from 32 starts, after
+    /// 150 evaluations of each from the best four only, and says so; with `starts(1)` it does neither, nor the latter with more than 20,000 samples
     /// (2,000 where the model does not run in vector registers).
     ///
     /// The first start is the declared one. The others are a Latin hypercube (McKay, Beckman and Conover, Technometrics 21
@@ -231,6 +233,18 @@ impl<'a, M: Made> Fit<'a, M> {
     /// ```
     pub fn starts(self, count: usize) -> Self {
         self.set(|settings| settings.searches = SearchPlan::All(count))
+    }
+
+    /// Leads each start to the data in stages before the search. Each stage minimizes the errors of predictions by a filter that corrects the
+    /// state at each sample ([`GivenNoise`](crate::predict::GivenNoise)), and that forgets measurements four times more slowly than that of the
+    /// stage before; the last is one from which a simulation follows the measurements. Predictions with a short memory depend almost linearly
+    /// on the parameters, where a simulation would leave the measurements, diverge, or end in one of many minima.
+    ///
+    /// Without it, a fit does so by itself where the declared start cannot be simulated, or where the search from there leaves an output
+    /// unexplained; after `starts(1)` it does not. A start from which a stage fails stays as it is. Stages need a model that can be read as a graph,
+    /// of at most six states, and no pre-filter.
+    pub fn staged(self) -> Self {
+        self.set(|settings| settings.staged = true)
     }
 
     /// Stops the search at its best point so far when the flag is set (by another thread, a signal handler).

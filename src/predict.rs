@@ -2,6 +2,7 @@
 
 mod free_run;
 mod gaussian;
+mod given_noise;
 mod horizon;
 mod kalman;
 mod measured;
@@ -11,6 +12,7 @@ mod symbolic;
 
 pub use crate::moments::Moments;
 pub use free_run::FreeRun;
+pub use given_noise::GivenNoise;
 pub use horizon::Horizon;
 pub use kalman::Kalman;
 pub use measured::Guess;

@@ -26,6 +26,7 @@ pub use crate::predict::Guess;
 
 use crate::error::{Error, Failure};
 use crate::layout::Layout;
+use crate::predict::GivenNoise;
 use crate::record::Record;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -225,6 +226,12 @@ pub trait Sweep: Send + Sync {
 
     /// Of predictions that restart from measured states: the simulation by the same equations and method.
     fn simulating<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
+        None
+    }
+
+    /// The extended filter of the same equations and method with these levels of noise; `None` where the slopes of the equations are not known.
+    fn filtering<'s>(&'s self, noise: &GivenNoise) -> Option<Arc<dyn Sweep + 's>> {
+        let _ = noise;
         None
     }
 

@@ -167,6 +167,9 @@ pub struct FitOptions {
     /// Search from so many starts.
     #[arg(long, value_name = "COUNT")]
     pub starts: Option<usize>,
+    /// Lead each start to the data in stages before the search.
+    #[arg(long)]
+    pub staged: bool,
     /// End after so many seconds with the best so far.
     #[arg(long, value_name = "SECONDS")]
     pub time_limit: Option<f64>,

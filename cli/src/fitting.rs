@@ -183,6 +183,9 @@ pub fn fit<'a>(
     if let Some(count) = options.starts {
         fit = fit.starts(count);
     }
+    if options.staged {
+        fit = fit.staged();
+    }
     if let Some(limit) = time_limit(options)? {
         fit = fit.time_limit(limit);
     }

@@ -40,6 +40,7 @@ def fit(
     predictor: str | None = None,
     optimizer: str | None = None,
     starts: int | None = None,
+    staged: bool | None = None,
     time_limit: float | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     progress: bool = False,
@@ -85,6 +86,9 @@ def fit(
         ``"levenberg-marquardt"`` or ``"gauss-newton"``.
     starts : int, optional
         Search from so many starts within the bounds.
+    staged : bool, optional
+        Lead each start to the data in stages before the search, by filters that correct the state at each sample, from stage to stage less: for
+        starts from which a simulation diverges, and for chaotic or unstable plants. A fit does so by itself where a search explains nothing.
     time_limit : float, optional
         Stop at the best point so far after this time (s).
     checkpoint : path, optional
@@ -134,6 +138,7 @@ def fit(
             "predictor": predictor,
             "optimizer": optimizer,
             "starts": starts,
+            "staged": staged,
             "time_limit": time_limit,
             "checkpoint": checkpoint,
         },

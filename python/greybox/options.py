@@ -46,6 +46,7 @@ class Options(TypedDict, total=False):
     predictor: str | None
     optimizer: str | None
     starts: int | None
+    staged: bool | None
     time_limit: float | None
     checkpoint: str | os.PathLike[str] | None
 
@@ -67,6 +68,7 @@ def settings(equations: Equations, given: Options) -> dict[str, Any]:
         "input_noise": _levels("input_noise", given.get("input_noise"), inputs),
         "weighting": None if weighting is None else of_sample(equations, weighting),
         "starts": starts,
+        "staged": bool(given.get("staged")),
         "time_limit": given.get("time_limit"),
         "checkpoint": None if checkpoint is None else (os.fspath(checkpoint), 1),
         **{name: _name(name, given.get(name)) for name in names},  # type: ignore[arg-type]

@@ -125,6 +125,7 @@ pub struct Options {
     predictor: Option<String>,
     optimizer: Option<String>,
     starts: Option<usize>,
+    staged: bool,
     time_limit: Option<f64>,
     checkpoint: Option<(PathBuf, u64)>,
 }
@@ -153,6 +154,9 @@ impl Options {
         }
         if let Some(count) = self.starts {
             fit = fit.starts(count);
+        }
+        if self.staged {
+            fit = fit.staged();
         }
         if let Some(seconds) = self.time_limit {
             let limit = Duration::try_from_secs_f64(seconds);

@@ -117,6 +117,8 @@ pub enum WarningCode {
     Outliers,
     /// An initial state that neither the user nor the outputs give a start for.
     GuessedStart,
+    /// The declared start cannot be simulated; the search began where stages led it ([`Fit::staged`](crate::Fit::staged)).
+    Staged,
     /// Time jumps within a record.
     TimeGaps,
     /// An unknown is held at a bound.

@@ -2,6 +2,7 @@
 //! half the frequency of sampling, and from further starts where an output is left unexplained.
 
 use super::refine::{Start, is_only_coarse, is_useless};
+use crate::error::Error;
 use crate::estimate::{About, Summary, Warning, WarningCode};
 use crate::numeral::counted;
 use crate::problem::{Control, Noise, Problem, SearchPlan, Settings};
@@ -20,6 +21,9 @@ const FROM_THE_OTHER_SIDE: u64 = 3;
 /// that run in vector registers, and of others.
 const LONGEST_IN_LANES: usize = 20_000;
 const LONGEST: usize = 2_000;
+
+/// What the stages are, in words.
+const STAGES: &str = "predictions by a filter that corrects the state at each sample, from stage to stage less";
 
 /// Deviances that differ by less belong to one minimum: a move by a tenth of a standard error changes the deviance by 0.1^2.
 const SAME: f64 = 0.01;
@@ -40,10 +44,31 @@ impl Trials {
     }
 }
 
+/// How further searches began.
+#[derive(Clone, Copy)]
+pub(super) enum Way {
+    /// At where so many stages led the declared start.
+    Stages(u32),
+    /// At further starts.
+    Starts,
+}
+
+impl Way {
+    fn said(self) -> String {
+        match self {
+            Way::Stages(count) => {
+                format!("went from there in {} ({STAGES}), and searched on", counted(count.into(), "stage"))
+            }
+            Way::Starts => format!("searched from {STARTS} starts by itself, and went on from the best of them"),
+        }
+    }
+}
+
 /// What searches from further starts found.
 pub(super) enum Further {
     Found {
         best: Box<Summary>,
+        way: Way,
         /// Whether limits of the fit stopped searches before their end.
         stopped: bool,
         time: Duration,
@@ -64,11 +89,11 @@ impl Further {
     /// The better one of the best minimum and an estimate that has the work of these searches, with a note.
     fn or(&self, found: &Summary) -> Summary {
         let (mut best, text) = match self {
-            Further::Found { best, stopped, .. } => (
+            Further::Found { best, way, stopped, .. } => (
                 if is_better(best, found) { work_of(found, (**best).clone()) } else { found.clone() },
                 format!(
-                    "the search from the declared start ended where an output is left unexplained, so that the fit searched from \
-                     {STARTS} starts by itself, and went on from the best of them{}",
+                    "the search from the declared start ended where an output is left unexplained, so that the fit {}{}",
+                    way.said(),
                     if *stopped { "; limits of the fit stopped searches before their end" } else { "" }
                 ),
             ),
@@ -152,11 +177,17 @@ impl Problem<'_> {
             return None;
         }
         let trials = Trials::of(FROM_A_START, found.iterations, self.settings.optimizer.most())?.most;
+        let begin = Instant::now();
+        if let Some((best, stages)) =
+            self.from_stages(trials, begin, control).filter(|(best, _)| !leaves_unexplained(best))
+        {
+            let (best, way) = (Box::new(best), Way::Stages(stages));
+            return Some(Further::Found { best, way, stopped: control.stops(), time: begin.elapsed() });
+        }
         let most = if self.runs_in_lanes() { LONGEST_IN_LANES } else { LONGEST };
         if self.samples() > most {
             return Some(Further::TooLong(most));
         }
-        let begin = Instant::now();
         let settings = Settings { checkpoint: None, searches: SearchPlan::Best(STARTS), ..self.settings.clone() };
         let problem = Problem { settings, finer: None, ..self.clone() };
         let start = Start { trials, ..Start::declared(&problem) };
@@ -164,7 +195,42 @@ impl Problem<'_> {
         if is_only_coarse(&again) {
             again = self.refined(Ok(again), 0, begin, control).ok()?;
         }
-        Some(Further::Found { best: Box::new(again), stopped: control.stops(), time: begin.elapsed() })
+        Some(Further::Found {
+            best: Box::new(again),
+            way: Way::Starts,
+            stopped: control.stops(),
+            time: begin.elapsed(),
+        })
+    }
+
+    /// The estimate from where stages led the declared start, and how many; `None` where they led nowhere.
+    fn from_stages(&self, trials: u64, begin: Instant, control: &Control) -> Option<(Summary, u32)> {
+        let stages = self.stages().filter(|_| !self.settings.staged)?;
+        let (start, stages) = stages.declared(control)?;
+        let mut found = self.run_within(begin, control, Start { trials, ..start }).ok()?;
+        if is_only_coarse(&found) {
+            found = self.refined(Ok(found), 0, begin, control).ok()?;
+        }
+        Some((found, stages))
+    }
+
+    /// The estimate from where stages led a start that cannot be simulated, with a note; the error where they led nowhere.
+    pub(super) fn or_in_stages(
+        &self,
+        found: Result<Summary, Error>,
+        begin: Instant,
+        control: &Control,
+    ) -> Result<Summary, Error> {
+        let Err(Error::Start(failure)) = found else { return found };
+        let trials = self.settings.optimizer.most();
+        let led = match self.settings.searches {
+            SearchPlan::Single => self.from_stages(trials, begin, control),
+            SearchPlan::All(_) | SearchPlan::Best(_) => None,
+        };
+        let Some((mut found, stages)) = led else { return Err(Error::Start(failure)) };
+        let text = format!("the declared start cannot be simulated, so that the fit {}", Way::Stages(stages).said());
+        found.warnings.push(Warning::new(WarningCode::Staged, Severity::Usable, text).about(About::Search));
+        Ok(found)
     }
 
     /// Whether several pieces of records like the first one run together in vector registers.

@@ -135,8 +135,10 @@ impl<'p> Search<'p> {
 /// fit of each alone.
 pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Error>> {
     let Some(control) = problems.first().map(|first| control(first, problems.len())) else { return vec![] };
-    let all: Vec<From<'_>> = problems.iter().map(|problem| (problem, Start::declared(problem))).collect();
-    let found = by_one_method(&all, &control);
+    let all: Vec<From<'_>> = problems.iter().map(|problem| (problem, problem.first_start(&control))).collect();
+    let begin = Instant::now();
+    let found = by_one_method(&all, &control).into_iter().zip(problems);
+    let found: Vec<_> = found.map(|(found, problem)| problem.or_in_stages(found, begin, &control)).collect();
     let further = each(found.len(), |i| problems[i].search_further(found[i].as_ref().ok()?, &control));
     let found = found.into_iter().zip(&further);
     let found: Vec<_> =

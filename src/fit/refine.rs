@@ -33,12 +33,14 @@ pub(super) struct Start {
     pub trials: u64,
     /// Where earlier searches from several starts ended; those of this method begin there.
     pub ends: Option<Starts>,
+    /// Iterations and evaluations of the stages that led to it.
+    pub before: (u64, u64),
 }
 
 impl Start {
     /// The declared start of a problem.
     pub fn declared(problem: &Problem<'_>) -> Self {
-        Start { coordinates: problem.unknowns.start(), trials: u64::MAX, ends: None }
+        Start { coordinates: problem.unknowns.start(), trials: u64::MAX, ends: None, before: (0, 0) }
     }
 }
 
@@ -95,7 +97,7 @@ impl Attempt {
             Ok(found) if is_only_coarse(found) || lacks_starts_only(found) => {
                 let within = |(x, (lower, upper)): (f64, (f64, f64))| x.max(lower).min(upper);
                 let coordinates = found.coordinates().into_iter().zip(finer.unknowns.bounds()).map(within).collect();
-                Some(Start { coordinates, trials, ends: found.starts.clone() })
+                Some(Start { coordinates, trials, ends: found.starts.clone(), before: (0, 0) })
             }
             _ => declared_start(finer, trials, control),
         }
@@ -186,7 +188,7 @@ fn declared_start(finer: &Problem<'_>, trials: u64, control: &Control) -> Option
     let start = finer.unknowns.start();
     let steps = finer.in_units(control);
     let fine = finer.sweep.is_adaptive() || !steps.step_decides(&start).unwrap_or(true);
-    fine.then_some(Start { coordinates: start, trials, ends: None })
+    fine.then_some(Start { coordinates: start, trials, ends: None, before: (0, 0) })
 }
 
 /// The warning where the data do not distinguish the estimate from that of a coarser step.
@@ -244,7 +246,7 @@ impl Problem<'_> {
                 break;
             }
             before = found.deviance;
-            let start = Start { coordinates: found.coordinates(), trials, ends: None };
+            let start = Start { coordinates: found.coordinates(), trials, ends: None, before: (0, 0) };
             found = after(&found, self.run_within(begin, control, start)?);
             if let Outcome::OwnLimit { iterations, .. } = &mut found.outcome {
                 *iterations = found.iterations;

@@ -30,7 +30,8 @@ impl Problem<'_> {
     /// cannot be simulated, is followed by finer ones.
     pub(super) fn run_since(&self, begin: Instant) -> Result<Summary, Error> {
         let control = self.control(begin);
-        let found = self.run_within(begin, &control, Start::declared(self));
+        let found = self.run_within(begin, &control, self.first_start(&control));
+        let found = self.or_in_stages(found, begin, &control);
         // Before finer methods, each of which takes several times as long.
         let further = found.as_ref().ok().and_then(|found| self.search_further(found, &control));
         let found = found.map(|found| with_work_of(found, further.as_ref()));
@@ -39,6 +40,14 @@ impl Problem<'_> {
             None => self.refined(found, 0, begin, &control)?,
         };
         Ok(self.searched_elsewhere(&found, further.as_ref(), &control).unwrap_or(found))
+    }
+
+    /// Where the search begins: at the declared start, or where stages led it if they were asked for.
+    pub(super) fn first_start(&self, control: &Control) -> Start {
+        let single = self.settings.searches.count() == 1;
+        let stages = if self.settings.staged && single { self.stages() } else { None };
+        let led = stages.and_then(|stages| stages.declared(control));
+        led.map_or_else(|| Start::declared(self), |(start, _)| start)
     }
 
     /// The estimate by a method, numbered as in [`by_method`](Self::by_method), or by a finer one, as long as a finer step would
@@ -75,6 +84,9 @@ impl Problem<'_> {
             1 => SearchEnd { starts: start.ends, ..search(&plain, &optimizer, start.coordinates)? },
             count => search_from_many(&plain, &optimizer, count, start.ends.as_ref())?,
         };
+        let (iterations, evaluations) = start.before;
+        let end =
+            SearchEnd { iterations: end.iterations + iterations, evaluations: end.evaluations + evaluations, ..end };
         let end = settled(&plain, end);
         conclude(&at_end(&plain, &end), &end, begin.elapsed().as_secs_f64())
     }

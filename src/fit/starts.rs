@@ -81,7 +81,12 @@ pub(super) fn search_from_many(
     if let Some(earlier) = earlier {
         return again::search_again(plain, optimizer, earlier);
     }
-    let starts = draw::starts(plain, count);
+    let mut starts = draw::starts(plain, count);
+    if let Some(stages) = plain.problem.settings.staged.then(|| plain.problem.stages()).flatten() {
+        let lead = |i: usize| stages.lead(starts[i].clone(), plain.control).map(|led| led.coordinates);
+        let led = each(count, lead);
+        starts = starts.into_iter().zip(led).map(|(start, led)| led.unwrap_or(start)).collect();
+    }
     let file = checkpoint(plain, optimizer)?;
     let resumed = file.as_ref().map(CheckpointFile::load::<Places>).transpose()?.flatten();
     let (cycle, places) = match resumed {

@@ -45,6 +45,8 @@ pub(crate) struct Settings {
     pub(crate) checkpoint: Option<(PathBuf, u64)>,
     pub(crate) optimizer: Arc<dyn Optimizer>,
     pub(crate) searches: SearchPlan,
+    /// Whether each start is led to the data in stages first.
+    pub(crate) staged: bool,
 }
 
 /// From where a fit searches.
@@ -83,6 +85,7 @@ impl Default for Settings {
             checkpoint: None,
             optimizer: Arc::new(<LevenbergMarquardt>::default()),
             searches: SearchPlan::Single,
+            staged: false,
         }
     }
 }

@@ -8,6 +8,7 @@ mod late;
 mod run;
 mod workspace;
 
+use super::made::of_equations;
 use super::{Coupling, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
 use crate::engine::{Program, Sampling, Trajectories};
 use crate::equations::Equations;
@@ -16,7 +17,7 @@ use crate::graph::Untraceable;
 use crate::integrate::Method;
 use crate::interval::Hold;
 use crate::layout::{Kind, Layout};
-use crate::predict::{FreeRun, Guess, Prediction, recurrence};
+use crate::predict::{FreeRun, GivenNoise, Guess, Prediction, recurrence};
 use crate::record::{Holds, Record, Time};
 use crate::recurrence::Recurrence;
 pub(crate) use derived::Derived;
@@ -259,6 +260,12 @@ impl Sweep for ProgramSweep<'_> {
             Ok(sweep) => Arc::new(sweep),
             Err(_) => plain,
         })
+    }
+
+    fn filtering<'s>(&'s self, noise: &GivenNoise) -> Option<Arc<dyn Sweep + 's>> {
+        let predictor: Arc<dyn Prediction> = Arc::new(noise.clone());
+        let sweep: Arc<dyn Sweep> = of_equations(&self.programs.equations, &self.programs.method, &predictor).ok()?;
+        Some(sweep)
     }
 
     fn second_order<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {

@@ -4,6 +4,7 @@ mod affine;
 #[path = "../common/mod.rs"]
 mod common;
 mod extended;
+mod given_noise;
 #[path = "../common/hardening.rs"]
 mod hardening;
 mod second_order;

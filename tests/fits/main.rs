@@ -47,6 +47,7 @@ mod sensors;
 mod shared;
 #[path = "../common/spiral.rs"]
 mod spiral;
+mod stages;
 mod starts;
 mod step_errors;
 mod stiff;
