@@ -22,7 +22,7 @@ pub(crate) use programs::{Derived, Interleaved, ProgramSweep};
 pub use window::Window;
 
 pub use crate::graph::Seed;
-pub use crate::predict::Guess;
+pub use crate::predict::{Guess, Unstable};
 
 use crate::error::{Error, Failure};
 use crate::layout::Layout;
@@ -154,9 +154,12 @@ pub trait Sweep: Send + Sync {
 
     /// The carry at the first sample from the initial state, and its slopes with respect to states, then parameters,
     /// row by row.
-    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Reached {
+    ///
+    /// # Errors
+    /// A plant that is unstable where the predictor cannot start from one that is.
+    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Result<Reached, Unstable> {
         let _ = record;
-        unmoved(state, parameters)
+        Ok(unmoved(state, parameters))
     }
 
     /// Runs pieces in parallel lanes and calls `visit` with each window.

@@ -9,7 +9,7 @@ use crate::functions::delays;
 use crate::graph::Choices;
 use crate::integrate::Method;
 use crate::layout::{Kind, Layout};
-use crate::predict::{FreeRun, Guess, Place, Prediction};
+use crate::predict::{FreeRun, Guess, Place, Prediction, Unstable};
 use crate::record::{Channel, Record};
 use std::sync::Arc;
 
@@ -97,9 +97,9 @@ impl Sweep for DualSweep<'_> {
         Ok(Prepared { restarts, ..Prepared::default() })
     }
 
-    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Reached {
+    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Result<Reached, Unstable> {
         match self.predictor.is_simulation() {
-            true => unmoved(state, parameters),
+            true => Ok(unmoved(state, parameters)),
             false => self.filter(parameters).start(record, state, parameters),
         }
     }

@@ -16,7 +16,7 @@ use crate::graph::Untraceable;
 use crate::integrate::Method;
 use crate::interval::Hold;
 use crate::layout::{Kind, Layout};
-use crate::predict::{FreeRun, Guess, Prediction, recurrence};
+use crate::predict::{FreeRun, Guess, Prediction, Unstable, recurrence};
 use crate::record::{Holds, Record, Time};
 use crate::recurrence::Recurrence;
 pub(crate) use derived::Derived;
@@ -194,7 +194,7 @@ impl Sweep for ProgramSweep<'_> {
         self.plain.prepare(record, parameters)
     }
 
-    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Reached {
+    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Result<Reached, Unstable> {
         self.plain.start(record, state, parameters)
     }
 

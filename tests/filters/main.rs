@@ -6,4 +6,6 @@ mod common;
 mod extended;
 #[path = "../common/hardening.rs"]
 mod hardening;
+mod initial;
 mod second_order;
+mod walls;
