@@ -281,6 +281,15 @@ pub enum Error {
         /// Unit of the time in which it grows.
         per: &'static str,
     },
+    /// States that were asked for by a predictor other than a Kalman filter.
+    #[error(
+        "states are filtered and smoothed by a Kalman filter, and this is {predictor}; take the predictor Kalman, with Model::diffusion and \
+         Model::noise"
+    )]
+    NotFiltered {
+        /// The predictor.
+        predictor: String,
+    },
     /// An initial state, or a restart, that the outputs do not give.
     #[error("experiment `{experiment}`: the state cannot be computed from the outputs ({reason}); {remedy}")]
     StateNotMeasured {

@@ -19,6 +19,7 @@ mod segments;
 mod settings;
 mod simulate;
 mod standardize;
+mod states;
 mod together;
 mod unknowns;
 mod weighing;

@@ -11,6 +11,7 @@ mod loops;
 mod made;
 mod model_code;
 mod programs;
+mod states;
 mod window;
 
 pub(crate) use duals::DualSweep;
@@ -19,6 +20,7 @@ pub(crate) use loops::{Loops, Narrow};
 pub(crate) use made::{compiled, of_equations};
 pub(crate) use model_code::{Evaluated, ModelCode, Typed};
 pub(crate) use programs::{Derived, Interleaved, ProgramSweep};
+pub use states::States;
 pub use window::Window;
 
 pub use crate::graph::Seed;
@@ -228,6 +230,19 @@ pub trait Sweep: Send + Sync {
 
     /// Of predictions that restart from measured states: the simulation by the same equations and method.
     fn simulating<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
+        None
+    }
+
+    /// The states of a record by a Kalman filter, from the carry at the first sample: after each sample's measurements, or `smoothed` by all of
+    /// them; `None` of other predictors. The error is the sample that could not be reached or predicted.
+    fn states(
+        &self,
+        record: &Record,
+        carry: &[f64],
+        parameters: &[f64],
+        smoothed: bool,
+    ) -> Option<Result<States, usize>> {
+        let _ = (record, carry, parameters, smoothed);
         None
     }
 

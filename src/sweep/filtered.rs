@@ -16,7 +16,7 @@ const WINDOW: usize = 128;
 /// Samples per window where a single one may take many steps: after each window a fit looks at its time limit.
 const ADAPTIVE_WINDOW: usize = 8;
 /// Slopes of a pass.
-const SLOPES: usize = 8;
+pub(super) const SLOPES: usize = 8;
 /// Slopes below this are set to zero: their squares are denormal.
 const NEGLIGIBLE: f64 = 1e-150;
 
@@ -137,7 +137,7 @@ impl Filter<'_> {
         }
     }
 
-    fn plant<'p, S: Stepped>(
+    pub(super) fn plant<'p, S: Stepped>(
         &'p self,
         functions: &'p dyn Functions<S>,
         between: Between<S>,

@@ -8,7 +8,7 @@ mod late;
 mod run;
 mod workspace;
 
-use super::{Coupling, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
+use super::{Coupling, Piece, Prepared, Reached, RunError, Seed, States, Sweep, Visit};
 use crate::engine::{Program, Sampling, Trajectories};
 use crate::equations::Equations;
 use crate::error::{Error, Failure};
@@ -217,6 +217,16 @@ impl Sweep for ProgramSweep<'_> {
             Some(program) => Run::new(&program, vec![piece.clone()]).follow(at),
             None => self.plain.follow(piece, at),
         }
+    }
+
+    fn states(
+        &self,
+        record: &Record,
+        carry: &[f64],
+        parameters: &[f64],
+        smoothed: bool,
+    ) -> Option<Result<States, usize>> {
+        self.plain.states(record, carry, parameters, smoothed)
     }
 
     fn measured_state(&self, record: &Record, sample: usize, p: &[f64]) -> Result<Vec<f64>, String> {

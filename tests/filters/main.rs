@@ -8,4 +8,5 @@ mod extended;
 mod hardening;
 mod initial;
 mod second_order;
+mod smoothed;
 mod walls;
