@@ -201,6 +201,8 @@ pub mod sweep;
 #[cfg(feature = "text")]
 pub mod text;
 #[cfg(feature = "std")]
+mod transition;
+#[cfg(feature = "std")]
 pub mod weighting;
 #[cfg(feature = "std")]
 mod whiteness;

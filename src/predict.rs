@@ -9,7 +9,6 @@ mod measured;
 mod plant;
 mod second_order;
 mod symbolic;
-mod transition;
 
 pub use crate::moments::Moments;
 pub use free_run::FreeRun;

@@ -1,11 +1,11 @@
 //! [`InitialCovariance`]: how uncertain the state of a filter is at the first sample.
 
 use super::gaussian::Filter;
-use super::transition::{Restless, Transition};
 use super::{Kalman, Plant, SecondOrder, Unstable};
 use crate::layout::Kind;
 use crate::moments::entry;
 use crate::scalar::Scalar;
+use crate::transition::{Restless, Transition};
 use serde::{Deserialize, Serialize};
 
 /// The covariance of the state at the first sample, about the initial state that the fit estimates or is given, for

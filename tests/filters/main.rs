@@ -8,5 +8,6 @@ mod extended;
 mod hardening;
 mod initial;
 mod second_order;
+mod simulated;
 mod smoothed;
 mod walls;

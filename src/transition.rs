@@ -13,14 +13,14 @@ const REST: f64 = 1e-20;
 
 /// Over an interval `h` of `dx = A x dt + dw`: what is added to the state, `e^{Ah} - I`, which unlike `e^{Ah}` keeps the digits of slow
 /// modes, and the covariance that the noise leaves, the integral of `e^{As} Q e^{A's}` over it. Row by row.
-pub(super) struct Transition<S> {
+pub(crate) struct Transition<S> {
     n: usize,
     added: Vec<S>,
     covariance: Vec<S>,
 }
 
 /// A plant that does not come to rest.
-pub(super) struct Restless {
+pub(crate) struct Restless {
     /// The state in which this shows the most.
     pub state: usize,
     /// The logarithm by which it grows, per unit of the interval.
