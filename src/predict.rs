@@ -8,18 +8,20 @@ mod kalman;
 mod measured;
 mod plant;
 mod second_order;
+mod starting;
 mod symbolic;
 
 pub use crate::moments::Moments;
 pub use free_run::FreeRun;
 pub use horizon::Horizon;
-pub use initial::{InitialCovariance, Starting};
+pub use initial::InitialCovariance;
 pub use kalman::Kalman;
 pub use measured::Guess;
 pub(crate) use measured::Place;
 pub use plant::Plant;
 pub(crate) use plant::{Between, SlicePlant, Stepped};
 pub use second_order::SecondOrder;
+pub use starting::Starting;
 pub(crate) use symbolic::recurrence;
 
 use crate::error::Error;

@@ -105,6 +105,16 @@ fn likelihoods_of_a_discrete_plant() {
     from_each::<true>(&Time::Uniform { start: 0.0, step: STEP }, 1200, at_rest_in_steps);
 }
 
+/// Several measurements at the first instant have one interval, which is that from the last of them.
+#[test]
+fn the_first_interval_is_longer_than_zero() {
+    let time = Time::Stamps((0..40usize).map(|k| 0.1 * k.saturating_sub(2) as f64).collect());
+    let record = record::<false>(time, 40);
+    let fit = Fit::new(&Heated::<false>, &record).parameters(start()).integrator(Rk4 { substeps: 40 });
+    let fit = fit.predictor(Kalman::starting(InitialCovariance::FirstInterval));
+    agrees(fit, &record, |plant| plant.over(0.1).noise, 1e-9);
+}
+
 /// Numbers instead of unknowns: none, and given. Sums of some hundred terms in another order.
 #[test]
 fn given_and_none() {
