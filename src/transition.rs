@@ -150,20 +150,20 @@ mod tests {
         let exact = [(xz + 0.5 / l) * unit * unit, xz * unit, xz * unit, zz];
         let found = Transition::at_rest(2, &a, &q).ok().unwrap();
         for (found, exact) in found.iter().zip(exact) {
-            // Of 25 doublings of numbers that keep all digits.
-            assert!((found / exact - 1.0).abs() < 1e-13, "{found} {exact}");
+            // Some 25 doublings, whose roundings add up. What is left of slow modes beside `e^{Ah}` itself has 12 digits less the 4 decades.
+            assert!((found / exact - 1.0).abs() < 1e-12, "{found} {exact}");
         }
         for h in [1e-3, 1.0, 900.0, 1e6, 1e9] {
             let found = Transition::over(2, &a, &q, h).covariance();
             let slow = zz * -f64::exp_m1(-2.0 * m * h);
-            assert!((found[3] / slow - 1.0).abs() < 1e-13, "{h}: {} {slow}", found[3]);
+            assert!((found[3] / slow - 1.0).abs() < 1e-12, "{h}: {} {slow}", found[3]);
             // The response of x to w is c (e^{-ms} - e^{-ls}) with c = l / (l - m).
             let c = l / (l - m);
             let part = |rate: f64| -f64::exp_m1(-rate * h) / rate;
             let cross = c * unit * (part(2.0 * m) - part(l + m));
             // For a short interval the two parts cancel.
-            let digits = 1e-13 * c * unit * part(2.0 * m) / cross;
-            assert!((found[1] / cross - 1.0).abs() < digits.max(1e-13), "{h}: {} {cross}", found[1]);
+            let digits = 1e-12 * c * unit * part(2.0 * m) / cross;
+            assert!((found[1] / cross - 1.0).abs() < digits.max(1e-12), "{h}: {} {cross}", found[1]);
         }
     }
 

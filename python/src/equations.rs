@@ -32,7 +32,6 @@ impl Equations {
     /// Equations of quantities (states, inputs, outputs, parameters) and roots of a graph (derivatives or next states, outputs,
     /// diffusions, noises, initial noises, dead times).
     #[new]
-    #[expect(clippy::needless_pass_by_value, reason = "arguments of Python come as values")]
     fn new(
         kind: &str,
         quantities_by_role: [Names; 4],
