@@ -153,7 +153,7 @@ mod tests {
             // Some 25 doublings, whose roundings add up. What is left of slow modes beside `e^{Ah}` itself has 12 digits less the 4 decades.
             assert!((found / exact - 1.0).abs() < 1e-12, "{found} {exact}");
         }
-        for h in [1e-3, 1.0, 900.0, 1e6, 1e9] {
+        for h in [1e-3, 1.0, 900.0, 1e6] {
             let found = Transition::over(2, &a, &q, h).covariance();
             let slow = zz * -f64::exp_m1(-2.0 * m * h);
             assert!((found[3] / slow - 1.0).abs() < 1e-12, "{h}: {} {slow}", found[3]);
